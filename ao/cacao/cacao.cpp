@@ -1,0 +1,306 @@
+#include "ao/cacao/cacao.h"
+
+#include "projection/error.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <fmt/format.h>
+
+namespace scanshade {
+namespace {
+
+using shared::CacaoConstants;
+using shared::ivec2;
+using shared::vec2;
+
+constexpr float pi = 3.14159265358979323846F;
+
+int halved(int n) { return (n + 1) / 2; }
+int groups(int threads, int tile) { return (threads + tile - 1) / tile; }
+std::size_t texels(ivec2 size) { return static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y); }
+
+/// Pattern rotation and scale of slice `a`, phase `phase` (PatternRotScaleMatrices); the matrix is (x, y; y, -x).
+vec2 rotation(int a, int phase) {
+    constexpr std::array<int, 5> order{0, 1, 4, 3, 2};
+    const float b = static_cast<float>(order[static_cast<std::size_t>(phase)]);
+    const float slice = static_cast<float>(a);
+    const float angle = (slice + b / 5.0F) * (pi * 0.5F);
+    const float scale = 1.0F + (slice - 1.5F + (b - 2.0F) / 5.0F) * 0.07F;
+    return {scale * std::cos(angle), -scale * std::sin(angle)};
+}
+
+/// Device depth d -> z = mu / (alpha - d), with z positive for both orders of near and far.
+vec2 depth_unpack(const CacaoOptions& options) {
+    const float n = options.near_m, f = options.far_m;
+    const bool reverse = options.depth_input == "reverse_z";
+    const float p22 = reverse ? n / (n - f) : f / (f - n);   // z' = p22 + p23 / z, left-handed
+    const float p23 = reverse ? -f * n / (n - f) : -n * f / (f - n);
+    const float mu = -p23;
+    return {mu, mu * p22 < 0 ? -p22 : p22};
+}
+
+void set_sizes(CacaoConstants& k, const CacaoOptions& options, cv::Size image) {
+    k.image = {image.width, image.height};
+    k.slice = {halved(image.width), halved(image.height)};
+    if (options.downsampled) k.slice = {halved(k.slice.x), halved(k.slice.y)};
+    k.importance = {halved(k.slice.x), halved(k.slice.y)};
+    k.grid = {halved(image.width) + 4, halved(image.height) + 4};
+    k.slice_inv = {1.0F / static_cast<float>(k.slice.x), 1.0F / static_cast<float>(k.slice.y)};
+    k.image_inv = {1.0F / static_cast<float>(image.width), 1.0F / static_cast<float>(image.height)};
+    int offset = 0;
+    for (int m = 0; m < 4; ++m) {
+        k.mip_size[m] = {std::max(1, k.slice.x >> m), std::max(1, k.slice.y >> m)};
+        k.mip_offset[m] = offset;
+        offset += 4 * k.mip_size[m].x * k.mip_size[m].y;
+    }
+}
+
+void set_camera(CacaoConstants& k, const Pinhole& camera) {
+    const float width = static_cast<float>(camera.size.width), height = static_cast<float>(camera.size.height);
+    const auto c = camera.on_gpu();
+    k.view_mul = {width / c.fx, -height / c.fy};
+    k.view_add = {-(c.cx + 0.5F) / c.fx, (c.cy + 0.5F) / c.fy};
+    k.ray_step = {1.0F / c.fx, -1.0F / c.fy};
+    k.ray_base = {static_cast<float>(-camera.cx / camera.fx), static_cast<float>(camera.cy / camera.fy)};
+}
+
+} // namespace
+
+std::vector<Parameter> CacaoOptions::parameters() {
+    return {
+        {"profile", "reference reproduces AMD's shaders, scan corrects them for sensor depth", &profile, "", {}, {}, {"scan", "reference"}},
+        {"quality", "lowest: 3 tap pairs on half the pixels; low: 3; medium: 5; high: 12 with depth mips; highest: 6 to 31, adaptive",
+         &quality, "", {}, {}, {"lowest", "low", "medium", "high", "highest"}},
+        {"downsampled", "compute on every second pixel of every second row, then upsample", &downsampled},
+        {"radius", "surfaces farther than this do not occlude", &radius, "m", 1e-4, 1e5},
+        {"shadow-multiplier", "strength of the effect, linear", &shadow_multiplier, "", 0, 5},
+        {"shadow-power", "strength of the effect, exponent of visibility", &shadow_power, "", 0.5, 5},
+        {"shadow-clamp", "darkest obscurance before the exponent", &shadow_clamp, "", 0, 1},
+        {"horizon-angle", "samples lower above the surface than this do not occlude", &horizon_angle, "sine", 0, 0.2},
+        {"fade-from", "depth at which AO starts to fade out", &fade_from, "m", 0, 1e6},
+        {"fade-to", "depth at which AO has faded out", &fade_to, "m", 0, 1e6},
+        {"adaptive-limit", "highest: mean importance above which extra taps are rationed", &adaptive_limit, "", 0, 1},
+        {"blur-passes", "edge-aware blur steps", &blur_passes, "", 0, 8},
+        {"sharpness", "how little the blur crosses edges", &sharpness, "", 0, 1},
+        {"detail-strength", "strength of the shadows cast by adjacent pixels", &detail_strength, "", 0, 5},
+        {"sigma-squared", "upsampler: spatial sigma squared", &sigma_squared, "half-size pixels^2", 1e-3, 1e3},
+        {"depth-sigma-squared", "upsampler: depth sigma squared", &depth_sigma_squared, "m^2", 1e-9, 1e6},
+        {"depth-input", "what the depth image holds", &depth_input, "", {}, {}, {"metric", "normal_z", "reverse_z"}},
+        {"near", "near plane of device depth", &near_m, "m", 1e-6, 1e6},
+        {"far", "far plane of device depth", &far_m, "m", 1e-6, 1e9},
+        {"normals-mul", "supplied normals are multiplied by this", &normals_mul, "", -1e3, 1e3},
+        {"normals-add", "then this is added", &normals_add, "", -1e3, 1e3},
+    };
+}
+
+CacaoQuality CacaoOptions::level() const {
+    constexpr std::array names{"lowest", "low", "medium", "high", "highest"};
+    const auto* const found = std::find(names.begin(), names.end(), quality);
+    if (found == names.end()) throw Misuse("quality '" + quality + "': lowest, low, medium, high or highest expected");
+    return static_cast<CacaoQuality>(found - names.begin());
+}
+
+CacaoConstants constants_from(const CacaoOptions& options, const Pinhole& camera) {
+    CacaoConstants k{};
+    const CacaoQuality level = options.level();
+    set_sizes(k, options, camera.size);
+    set_camera(k, camera);
+    k.depth_unpack = depth_unpack(options);
+    const float at_zero = k.depth_unpack.y == 0 ? 0.0F : k.depth_unpack.x / k.depth_unpack.y;
+    k.outside_depth = options.outside_depth.value_or(options.depth_input == "metric" ? 0.0F : at_zero);
+
+    const float wide = level <= CacaoQuality::low ? 1.5F : 1.0F;
+    const float tan_half_height = static_cast<float>(camera.size.height) / (2.0F * static_cast<float>(camera.fy));
+    k.radius = std::clamp(options.radius, 0.0F, 100000.0F) * (level == CacaoQuality::lowest ? 0.8F : 1.0F);
+    k.neg_rec_radius = -1.0F / k.radius;
+    k.near_limit_rec = 1.0F / ((options.radius * 1.2F * wide) / tan_half_height);
+    k.mip_weight = options.scan() ? -1.0F / (k.radius * k.radius) : k.neg_rec_radius * k.radius; // AMD's slip: always -1
+    k.shadow_strength = std::clamp(4.3F * options.shadow_multiplier, 0.0F, 10.0F);
+    k.shadow_power = std::clamp(options.shadow_power, 0.0F, 10.0F);
+    k.shadow_clamp = std::clamp(options.shadow_clamp, 0.0F, 1.0F);
+    k.horizon = std::clamp(options.horizon_angle, 0.0F, 1.0F);
+    k.fade_mul = -1.0F / (options.fade_to - options.fade_from);
+    k.fade_add = options.fade_from / (options.fade_to - options.fade_from) + 1.0F;
+    k.depth_offset = 0.9992F;
+    k.load_counter_div = static_cast<float>(9.0 / (static_cast<double>(texels(k.importance)) * 255.0));
+    k.adaptive_limit = options.adaptive_limit;
+    k.inv_sharpness = std::clamp(1.0F - options.sharpness, 0.0F, 1.0F);
+    k.sigma_spatial = options.sigma_squared;
+    k.sigma_depth = options.depth_sigma_squared;
+    k.detail_strength = options.detail_strength;
+    k.normals_mul = options.normals_mul;
+    k.normals_add = options.normals_add;
+    for (int a = 0; a < 4; ++a)
+        for (int phase = 0; phase < 5; ++phase) k.rotation[5 * a + phase] = rotation(a, phase);
+    return k;
+}
+
+CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, bool normals_supplied) {
+    using Host = gpu::BufferRow::Host;
+    using shared::spec_scan;
+    const CacaoQuality level = options.level();
+    const bool scan = options.scan(), highest = level == CacaoQuality::highest;
+    const bool two_slices = level == CacaoQuality::lowest, mips = level >= CacaoQuality::high;
+    const int layers = two_slices ? 2 : 4;
+    const int kernel = level == CacaoQuality::lowest ? 0 : static_cast<int>(level) - 1;
+    const int n = options.blur_passes, halo = scan ? 0 : n;
+    int resolve = two_slices ? shared::resolve_half : shared::resolve_plain;
+    if (level >= (options.downsampled ? CacaoQuality::high : CacaoQuality::medium)) resolve = shared::resolve_smart;
+    const bool power = !scan && (options.downsampled ? !two_slices : resolve == shared::resolve_smart);
+
+    const std::size_t slices = 4 * texels(k.slice);
+    const std::size_t all_mips = static_cast<std::size_t>(k.mip_offset[3]) + 4 * texels(k.mip_size[3]);
+    const std::size_t haloed = 4 * texels({k.slice.x + 2 * halo, k.slice.y + 2 * halo});
+    CacaoTables tables;
+    tables.buffers = {
+        {"depth in", texels(k.image) * 4, Host::upload},
+        {"normals in", normals_supplied ? texels(k.image) * 12 : 4, normals_supplied ? Host::upload : Host::none},
+        {"depths", (mips ? all_mips : slices) * 4},
+        {"normals", slices * 4},
+        {"ping", slices * 4},
+        {"pong", slices * 4},
+        {"importance", highest ? texels(k.importance) * 4 : 4},
+        {"importance pong", highest ? texels(k.importance) * 4 : 4},
+        {"load counter", 4},
+        {"blur a", !scan && n > 1 ? haloed * 4 : 4},
+        {"blur b", !scan && n > 2 ? haloed * 4 : 4},
+        {"staged", options.downsampled ? texels(k.grid) * 8 : 8},
+        {"visibility", texels(k.image) * 4, Host::download},
+    };
+
+    const auto add = [&](std::string name, std::string_view shader, std::vector<int> reads, std::vector<int> writes, ivec2 threads,
+                         int depth, std::vector<std::pair<int, int>> extra = {}) {
+        std::vector<std::pair<int, int>> constants{{spec_scan, scan},
+                                                   {shared::spec_spacing, options.downsampled ? 2 : 1},
+                                                   {shared::spec_kernel, kernel},
+                                                   {shared::spec_two_slices, two_slices},
+                                                   {shared::spec_device_depth, options.depth_input != "metric"}};
+        constants.insert(constants.end(), extra.begin(), extra.end());
+        tables.passes.push_back({std::move(name), shader, std::move(reads), std::move(writes),
+                                 {static_cast<std::uint32_t>(groups(threads.x, 8)), static_cast<std::uint32_t>(groups(threads.y, 8)),
+                                  static_cast<std::uint32_t>(depth)},
+                                 std::move(constants)});
+    };
+
+    const int given = normals_supplied ? cacao_normals_in : cacao_depth_in;
+    add("prepare", "cacao/prepare", {cacao_depth_in, given}, {cacao_depths, cacao_normals}, k.slice, 1,
+        {{shared::spec_normals, normals_supplied}});
+    if (mips) {
+        add("mips", "cacao/mips", {cacao_depth_in}, {cacao_depths}, {groups(k.slice.x, 8), k.slice.y}, 4);
+    }
+    // Slots a configuration does not read are filled with a buffer it reads anyway.
+    std::vector<int> inputs{cacao_depths, cacao_normals, cacao_depths, cacao_depths, cacao_depths};
+    if (highest) {
+        tables.passes.push_back({"clear counter", "", {}, {cacao_counter}, {1, 1, 1}, {}});
+        add("base", "cacao/generate", inputs, {cacao_pong}, k.slice, 4, {{shared::spec_base, 1}, {shared::spec_mips, 1}});
+        add("importance", "cacao/importance", {cacao_pong}, {cacao_importance}, k.importance, 1);
+        add("importance blur a", "cacao/importance_blur", {cacao_importance}, {cacao_importance_pong, cacao_counter}, k.importance, 1);
+        add("importance blur b", "cacao/importance_blur", {cacao_importance_pong}, {cacao_importance, cacao_counter}, k.importance, 1,
+            {{shared::spec_last, 1}});
+        inputs = {cacao_depths, cacao_normals, cacao_pong, cacao_importance, cacao_counter};
+    }
+    add("generate", "cacao/generate", inputs, {cacao_ping}, k.slice, layers, {{shared::spec_mips, mips}});
+
+    int from = cacao_ping;
+    for (int i = 0; i < n; ++i) {
+        const bool first = i == 0, last = i == n - 1;
+        int to = from == cacao_ping ? cacao_pong : cacao_ping;
+        if (!scan) to = last ? cacao_pong : (i % 2 == 0 ? cacao_blur_a : cacao_blur_b);
+        add(fmt::format("blur {}", i + 1), "cacao/blur", {from}, {to}, {k.slice.x + 2 * halo, k.slice.y + 2 * halo}, layers,
+            {{shared::spec_first, first}, {shared::spec_last, last}, {shared::spec_halo, halo}});
+        from = to;
+    }
+    tables.blurred = from;
+
+    const std::vector<std::pair<int, int>> how{{shared::spec_resolve, resolve}, {shared::spec_power, power}};
+    if (!options.downsampled) {
+        add("apply", "cacao/apply", {from, cacao_depth_in}, {cacao_out}, k.image, 1, how);
+    } else {
+        add("stage", "cacao/stage", {from, cacao_depths}, {cacao_staged}, k.grid, 1, how);
+        add("upsample", "cacao/upsample", {cacao_staged, cacao_depth_in}, {cacao_out}, {halved(k.image.x), halved(k.image.y)}, 1, how);
+    }
+    return tables;
+}
+
+Cacao::Cacao(gpu::Device& device, CacaoOptions options) : device_(device), options_(std::move(options)) {
+    for (const Parameter& row : options_.parameters()) check(row);
+    if (options_.fade_to <= options_.fade_from) throw Misuse("fade-to must lie beyond fade-from");
+    if (options_.near_m == options_.far_m) throw Misuse("near and far must differ");
+}
+
+void Cacao::prepare(const View& view) {
+    const Pinhole& camera = view.depth.camera;
+    const bool supplied = view.normals != nullptr;
+    if (program_ && supplied == normals_supplied_ && camera.size == camera_.size) {
+        if (std::memcmp(&camera, &camera_, sizeof camera) == 0) return;
+    } else {
+        program_.reset();
+    }
+    constants_ = constants_from(options_, camera);
+    camera_ = camera;
+    normals_supplied_ = supplied;
+    if (program_) return;
+    tables_ = cacao_tables(options_, constants_, supplied);
+    program_ = std::make_unique<gpu::Program>(device_, tables_.buffers, tables_.passes, sizeof constants_);
+}
+
+AoMap Cacao::compute(const View& view) {
+    const cv::Mat1f& z = view.depth.z_m;
+    if (z.empty() || z.size() != view.depth.camera.size)
+        throw Error(fmt::format("depth image of {}x{} with a camera of {}x{}", z.cols, z.rows, view.depth.camera.size.width,
+                                view.depth.camera.size.height));
+    if (view.normals && view.normals->normals.size() != z.size()) throw Error("normals and depth differ in size");
+    prepare(view);
+    const auto upload = [&](int buffer, const cv::Mat& image) {
+        std::byte* to = program_->host(buffer).data();
+        const std::size_t row = static_cast<std::size_t>(image.cols) * image.elemSize();
+        for (int y = 0; y < image.rows; ++y) std::memcpy(to + static_cast<std::size_t>(y) * row, image.ptr(y), row);
+    };
+    const auto start = std::chrono::steady_clock::now();
+    upload(cacao_depth_in, z);
+    if (view.normals) upload(cacao_normals_in, view.normals->normals);
+    const auto uploaded = std::chrono::steady_clock::now();
+    program_->run(std::as_bytes(std::span(&constants_, 1)));
+    const auto ran = std::chrono::steady_clock::now();
+    AoMap ao{cv::Mat1f(z.size())};
+    const auto result = program_->host(cacao_out);
+    std::memcpy(ao.visibility.data, result.data(), result.size());
+    const auto done = std::chrono::steady_clock::now();
+    const auto ms = [](auto from, auto to) { return std::chrono::duration<double, std::milli>(to - from).count(); };
+    timings_.assign({{"host upload", ms(start, uploaded)}});
+    timings_.insert(timings_.end(), program_->timings().begin(), program_->timings().end());
+    timings_.emplace_back("host download", ms(ran, done));
+    return ao;
+}
+
+std::vector<Intermediate> Cacao::intermediates() {
+    std::vector<Intermediate> all;
+    if (!program_) return all;
+    const CacaoQuality level = options_.level();
+    const auto words = [&](int buffer, std::size_t first, std::size_t count) {
+        const auto bytes = program_->read_back(buffer);
+        return std::vector<std::byte>(bytes.begin() + static_cast<std::ptrdiff_t>(first * 4),
+                                      bytes.begin() + static_cast<std::ptrdiff_t>((first + count) * 4));
+    };
+    const auto add = [&](std::string name, std::string type, std::vector<int> shape, int buffer, int first = 0) {
+        std::size_t count = 1;
+        for (int n : shape) count *= static_cast<std::size_t>(n);
+        all.push_back({std::move(name), std::move(type), std::move(shape), words(buffer, static_cast<std::size_t>(first), count)});
+    };
+    const CacaoConstants& k = constants_;
+    for (int m = 0; m < (level >= CacaoQuality::high ? 4 : 1); ++m)
+        add(fmt::format("depth_mip{}", m), "f4", {4, k.mip_size[m].y, k.mip_size[m].x}, cacao_depths, k.mip_offset[m]);
+    const std::vector<int> slices{4, k.slice.y, k.slice.x};
+    add("normals", "u4", slices, cacao_normals);
+    if (level == CacaoQuality::highest) {
+        add("importance", "u4", {k.importance.y, k.importance.x}, cacao_importance);
+        add("load_counter", "u4", {1}, cacao_counter);
+    }
+    add("ao", "u4", slices, cacao_ping);
+    if (options_.blur_passes > 0) add("ao_blurred", "u4", slices, tables_.blurred);
+    return all;
+}
+
+} // namespace scanshade

@@ -1,0 +1,47 @@
+// A Vulkan compute device: instance, device, queue, buffers, validation messages.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace scanshade::gpu {
+
+/// What `scanshade devices` prints of one Vulkan device.
+struct DeviceInfo {
+    int index = 0;          ///< in the order the Vulkan loader lists them
+    std::string name;       ///< "llvmpipe (LLVM 15.0.6, 256 bits)"
+    std::string kind;       ///< "discrete GPU", "integrated GPU", "virtual GPU", "CPU", "other"
+    std::string driver;     ///< driver name and version text
+    std::string api;        ///< "1.3.230"
+    std::string unusable;   ///< what it lacks; empty = usable
+};
+
+/// Every device the loader knows, usable or not. Empty without a driver; throws Error only when there is no Vulkan loader.
+[[nodiscard]] std::vector<DeviceInfo> list_devices();
+
+/// One opened device. Owns the Vulkan objects; programs made from it must not outlive it.
+class Device {
+  public:
+    /// `choice`: empty = discrete GPU, else integrated, else any usable (lavapipe); an index; or part of a name, case-insensitive.
+    /// Throws Error listing the devices there are when nothing fits.
+    explicit Device(const std::string& choice = {});
+    ~Device();
+    Device(const Device&) = delete;
+    Device& operator=(const Device&) = delete;
+
+    [[nodiscard]] const DeviceInfo& info() const;
+    /// Messages of the validation layer so far (it is on when SCANSHADE_VALIDATE=1 and installed): errors and warnings.
+    [[nodiscard]] std::vector<std::string> validation_messages() const;
+    /// Whether the validation layer (with synchronization validation) is really active.
+    [[nodiscard]] bool validating() const;
+
+    struct State;
+    [[nodiscard]] State& state() const { return *state_; }
+
+  private:
+    std::unique_ptr<State> state_;
+};
+
+} // namespace scanshade::gpu

@@ -1,0 +1,298 @@
+#include "ao/gpu/program.h"
+
+#include "ao/gpu/shader_table.h"
+#include "ao/gpu/vulkan.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <cstring>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+namespace scanshade::gpu {
+namespace {
+
+constexpr std::uint32_t first_write_binding = 16, constants_binding = 32;
+
+using Stage = vk::PipelineStageFlagBits2;
+using Access = vk::AccessFlagBits2;
+using Memory = vk::MemoryPropertyFlagBits;
+
+/// Memory that a shader and the host can both reach at full speed: then nothing is copied.
+constexpr auto shared_memory = Memory::eDeviceLocal | Memory::eHostVisible | Memory::eHostCoherent | Memory::eHostCached;
+
+struct BoundBuffer {
+    vk::raii::DeviceMemory memory = nullptr;
+    vk::raii::Buffer buffer = nullptr;
+    std::byte* mapped = nullptr;
+    std::size_t bytes = 0;
+
+    BoundBuffer() = default;
+    BoundBuffer(const Device::State& gpu, std::size_t size, vk::BufferUsageFlags usage, std::initializer_list<vk::MemoryPropertyFlags> wishes)
+        : bytes(size) {
+        buffer = gpu.device.createBuffer({{}, size, usage});
+        const auto needs = buffer.getMemoryRequirements();
+        int type = -1;
+        vk::MemoryPropertyFlags flags;
+        for (const auto& wish : wishes)
+            if (type < 0 && (type = gpu.memory_type(needs.memoryTypeBits, wish)) >= 0) flags = wish;
+        if (type < 0) throw Error("the device has no fitting memory");
+        memory = gpu.device.allocateMemory({needs.size, static_cast<std::uint32_t>(type)});
+        buffer.bindMemory(*memory, 0);
+        if (flags & Memory::eHostVisible) mapped = static_cast<std::byte*>(memory.mapMemory(0, size));
+    }
+};
+
+/// Which buffers were touched since the last barrier, to place barriers only where one is needed.
+struct Hazards {
+    std::vector<char> read, written;
+
+    explicit Hazards(std::size_t buffers) : read(buffers), written(buffers) {}
+    [[nodiscard]] bool conflict(const std::vector<int>& reads, const std::vector<int>& writes) const {
+        return std::any_of(reads.begin(), reads.end(), [&](int i) { return written[i]; }) ||
+               std::any_of(writes.begin(), writes.end(), [&](int i) { return written[i] || read[i]; });
+    }
+    void clear() {
+        std::fill(read.begin(), read.end(), char(0));
+        std::fill(written.begin(), written.end(), char(0));
+    }
+    void note(const std::vector<int>& reads, const std::vector<int>& writes) {
+        for (int i : reads) read[i] = 1;
+        for (int i : writes) written[i] = 1;
+    }
+};
+
+void barrier(const vk::raii::CommandBuffer& commands, vk::PipelineStageFlags2 to_stage, vk::AccessFlags2 to_access) {
+    const vk::MemoryBarrier2 memory(Stage::eComputeShader | Stage::eTransfer, Access::eMemoryRead | Access::eMemoryWrite,
+                                    to_stage, to_access);
+    commands.pipelineBarrier2(vk::DependencyInfo({}, memory));
+}
+
+void compute_barrier(const vk::raii::CommandBuffer& commands) {
+    barrier(commands, Stage::eComputeShader | Stage::eTransfer, Access::eMemoryRead | Access::eMemoryWrite);
+}
+
+} // namespace
+
+std::vector<std::string> problems(std::span<const BufferRow> buffers, std::span<const PassRow> passes) {
+    std::vector<std::string> found;
+    std::vector<char> written(buffers.size());
+    for (std::size_t i = 0; i < buffers.size(); ++i) {
+        written[i] = buffers[i].host == BufferRow::Host::upload;
+        if (buffers[i].bytes == 0) found.push_back(fmt::format("buffer {} is empty", buffers[i].name));
+    }
+    for (const PassRow& pass : passes) {
+        if (std::find(pass.groups.begin(), pass.groups.end(), 0u) != pass.groups.end())
+            found.push_back(fmt::format("pass {} dispatches no work group", pass.name));
+        for (const auto* side : {&pass.reads, &pass.writes})
+            for (int i : *side)
+                if (i < 0 || i >= static_cast<int>(buffers.size()))
+                    found.push_back(fmt::format("pass {} names buffer {} of {}", pass.name, i, buffers.size()));
+        if (!found.empty()) return found;
+        for (int i : pass.reads)
+            if (!written[i]) found.push_back(fmt::format("pass {} reads {} before anything wrote it", pass.name, buffers[i].name));
+        for (int i : pass.writes) written[i] = 1;
+    }
+    for (std::size_t i = 0; i < buffers.size(); ++i)
+        if (buffers[i].host == BufferRow::Host::download && !written[i])
+            found.push_back(fmt::format("output {} is never written", buffers[i].name));
+    return found;
+}
+
+struct Program::State {
+    Device::State& gpu;
+    std::vector<BufferRow> rows;
+    std::vector<PassRow> passes;
+    std::vector<BoundBuffer> buffers;
+    std::vector<BoundBuffer> staging; // per row; empty where the host reaches the buffer itself
+    BoundBuffer constants;
+    struct Pipeline {
+        vk::raii::DescriptorSetLayout set = nullptr;
+        vk::raii::PipelineLayout layout = nullptr;
+        vk::raii::Pipeline pipeline = nullptr;
+    };
+    std::vector<Pipeline> pipelines;
+    vk::raii::QueryPool queries = nullptr;
+    vk::raii::Fence fence = nullptr;
+    vk::raii::CommandBuffer commands = nullptr;
+
+    State(Device::State& gpu_, std::vector<BufferRow> rows_, std::vector<PassRow> passes_)
+        : gpu(gpu_), rows(std::move(rows_)), passes(std::move(passes_)) {}
+
+    void make_buffers(std::size_t constants_bytes) {
+        using Usage = vk::BufferUsageFlagBits;
+        staging.resize(rows.size());
+        for (std::size_t i = 0; i < rows.size(); ++i) {
+            const BufferRow& row = rows[i];
+            const auto usage = Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst;
+            buffers.push_back(during(fmt::format("buffer {} of {} bytes", row.name, row.bytes), [&] {
+                return BoundBuffer(gpu, row.bytes, usage, {shared_memory, Memory::eDeviceLocal});
+            }));
+            if (row.host == BufferRow::Host::none || buffers.back().mapped) continue;
+            const vk::MemoryPropertyFlags visible = Memory::eHostVisible | Memory::eHostCoherent;
+            const bool upload = row.host == BufferRow::Host::upload;
+            staging[i] = upload ? BoundBuffer(gpu, row.bytes, Usage::eTransferSrc, {visible})
+                                : BoundBuffer(gpu, row.bytes, Usage::eTransferDst, {visible | Memory::eHostCached, visible});
+        }
+        constants = BoundBuffer(gpu, std::max<std::size_t>(constants_bytes, 4), Usage::eUniformBuffer,
+                                {Memory::eHostVisible | Memory::eHostCoherent});
+    }
+
+    Pipeline make_pipeline(const PassRow& pass) {
+        Pipeline made;
+        if (pass.shader.empty()) return made;
+        std::vector<vk::DescriptorSetLayoutBinding> bindings;
+        const auto add = [&](std::uint32_t binding, vk::DescriptorType type) {
+            bindings.emplace_back(binding, type, 1, vk::ShaderStageFlagBits::eCompute);
+        };
+        for (std::size_t i = 0; i < pass.reads.size(); ++i) add(static_cast<std::uint32_t>(i), vk::DescriptorType::eStorageBuffer);
+        for (std::size_t i = 0; i < pass.writes.size(); ++i)
+            add(first_write_binding + static_cast<std::uint32_t>(i), vk::DescriptorType::eStorageBuffer);
+        add(constants_binding, vk::DescriptorType::eUniformBuffer);
+        made.set = gpu.device.createDescriptorSetLayout({vk::DescriptorSetLayoutCreateFlagBits::ePushDescriptorKHR, bindings});
+        made.layout = gpu.device.createPipelineLayout(vk::PipelineLayoutCreateInfo({}, *made.set));
+
+        std::vector<vk::SpecializationMapEntry> entries;
+        std::vector<std::int32_t> values;
+        for (const auto& [id, value] : pass.constants) {
+            entries.emplace_back(static_cast<std::uint32_t>(id), static_cast<std::uint32_t>(values.size() * 4), 4);
+            values.push_back(value);
+        }
+        const vk::SpecializationInfo specialization(static_cast<std::uint32_t>(entries.size()), entries.data(), values.size() * 4,
+                                                    values.data());
+        const auto words = shader_words(pass.shader);
+        const vk::raii::ShaderModule module_ =
+            gpu.device.createShaderModule({{}, words.size_bytes(), words.data()});
+        const vk::PipelineShaderStageCreateInfo stage({}, vk::ShaderStageFlagBits::eCompute, *module_, "main", &specialization);
+        made.pipeline = gpu.device.createComputePipeline(nullptr, {{}, stage, *made.layout});
+        return made;
+    }
+
+    void push_descriptors(const PassRow& pass, const Pipeline& pipeline) {
+        std::vector<vk::DescriptorBufferInfo> infos;
+        infos.reserve(pass.reads.size() + pass.writes.size() + 1);
+        std::vector<vk::WriteDescriptorSet> writes;
+        const auto add = [&](std::uint32_t binding, const BoundBuffer& buffer, vk::DescriptorType type) {
+            infos.emplace_back(*buffer.buffer, 0, VK_WHOLE_SIZE);
+            writes.emplace_back(nullptr, binding, 0, 1, type, nullptr, &infos.back());
+        };
+        std::uint32_t binding = 0;
+        for (int i : pass.reads) add(binding++, buffers[i], vk::DescriptorType::eStorageBuffer);
+        binding = first_write_binding;
+        for (int i : pass.writes) add(binding++, buffers[i], vk::DescriptorType::eStorageBuffer);
+        add(constants_binding, constants, vk::DescriptorType::eUniformBuffer);
+        commands.pushDescriptorSetKHR(vk::PipelineBindPoint::eCompute, *pipeline.layout, 0, writes);
+    }
+
+    void stamp(std::uint32_t query) {
+        if (gpu.has_timestamps) commands.writeTimestamp2(Stage::eAllCommands, *queries, query);
+    }
+
+    void record_transfers(BufferRow::Host side) {
+        bool any = false;
+        for (std::size_t i = 0; i < rows.size(); ++i) {
+            if (rows[i].host != side || staging[i].bytes == 0) continue;
+            const bool upload = side == BufferRow::Host::upload;
+            if (!upload && !any) compute_barrier(commands);
+            commands.copyBuffer(upload ? *staging[i].buffer : *buffers[i].buffer, upload ? *buffers[i].buffer : *staging[i].buffer,
+                                vk::BufferCopy(0, 0, rows[i].bytes));
+            any = true;
+        }
+        if (any && side == BufferRow::Host::upload) compute_barrier(commands);
+    }
+
+    /// The command buffer is the same every frame, so it is recorded once.
+    void record() {
+        const auto stamps = static_cast<std::uint32_t>(passes.size() + 3);
+        queries = gpu.device.createQueryPool({{}, vk::QueryType::eTimestamp, stamps});
+        fence = gpu.device.createFence({});
+        commands = std::move(gpu.device.allocateCommandBuffers({*gpu.pool, vk::CommandBufferLevel::ePrimary, 1}).front());
+        commands.begin(vk::CommandBufferBeginInfo{});
+        if (gpu.has_timestamps) commands.resetQueryPool(*queries, 0, stamps);
+        std::uint32_t query = 0;
+        stamp(query++);
+        record_transfers(BufferRow::Host::upload);
+        stamp(query++);
+        Hazards hazards(rows.size());
+        for (std::size_t i = 0; i < passes.size(); ++i) {
+            const PassRow& pass = passes[i];
+            if (hazards.conflict(pass.reads, pass.writes)) {
+                compute_barrier(commands);
+                hazards.clear();
+            }
+            hazards.note(pass.reads, pass.writes);
+            if (pass.shader.empty()) {
+                for (int w : pass.writes) commands.fillBuffer(*buffers[w].buffer, 0, VK_WHOLE_SIZE, 0);
+            } else {
+                commands.bindPipeline(vk::PipelineBindPoint::eCompute, *pipelines[i].pipeline);
+                push_descriptors(pass, pipelines[i]);
+                commands.dispatch(pass.groups[0], pass.groups[1], pass.groups[2]);
+            }
+            stamp(query++);
+        }
+        record_transfers(BufferRow::Host::download);
+        barrier(commands, Stage::eHost, Access::eHostRead);
+        stamp(query++);
+        commands.end();
+    }
+
+    void submit(const vk::raii::CommandBuffer& recorded) {
+        const vk::CommandBufferSubmitInfo info(*recorded);
+        gpu.queue.submit2(vk::SubmitInfo2({}, {}, info), *fence);
+        constexpr std::uint64_t patience_ns = 120'000'000'000;
+        if (gpu.device.waitForFences(*fence, VK_TRUE, patience_ns) != vk::Result::eSuccess)
+            throw Error(fmt::format("{} did not finish within 120 s", gpu.info.name));
+        gpu.device.resetFences(*fence);
+    }
+};
+
+Program::Program(Device& device, std::vector<BufferRow> buffers, std::vector<PassRow> passes, std::size_t constants_bytes) {
+    const auto wrong = problems(buffers, passes);
+    if (!wrong.empty()) throw Error(fmt::format("pass table: {}", fmt::join(wrong, "; ")));
+    state_ = std::make_unique<State>(device.state(), std::move(buffers), std::move(passes));
+    state_->make_buffers(constants_bytes);
+    for (const PassRow& pass : state_->passes)
+        state_->pipelines.push_back(during("pass " + pass.name, [&] { return state_->make_pipeline(pass); }));
+    state_->record();
+}
+
+Program::~Program() = default;
+
+std::span<std::byte> Program::host(int buffer) {
+    const BoundBuffer& own = state_->buffers.at(buffer);
+    const BoundBuffer& reached = own.mapped ? own : state_->staging.at(buffer);
+    if (!reached.mapped) throw Error(fmt::format("buffer {} is not the host's", state_->rows.at(buffer).name));
+    return {reached.mapped, own.bytes};
+}
+
+void Program::run(std::span<const std::byte> constants) {
+    State& s = *state_;
+    std::memcpy(s.constants.mapped, constants.data(), std::min(constants.size(), s.constants.bytes));
+    during(s.gpu.info.name, [&] { s.submit(s.commands); });
+    timings_.clear();
+    if (!s.gpu.has_timestamps) return;
+    const auto count = s.passes.size() + 3;
+    const auto [result, ticks] =
+        s.queries.getResults<std::uint64_t>(0, static_cast<std::uint32_t>(count), count * 8, 8, vk::QueryResultFlagBits::e64);
+    if (result != vk::Result::eSuccess) return;
+    const auto ms = [&](std::size_t i) { return static_cast<double>(ticks[i + 1] - ticks[i]) * s.gpu.nanoseconds_per_tick * 1e-6; };
+    timings_.emplace_back("upload", ms(0));
+    for (std::size_t i = 0; i < s.passes.size(); ++i) timings_.emplace_back(s.passes[i].name, ms(i + 1));
+    timings_.emplace_back("download", ms(count - 2));
+}
+
+std::vector<std::byte> Program::read_back(int buffer) {
+    State& s = *state_;
+    const BoundBuffer& own = s.buffers.at(buffer);
+    BoundBuffer copy(s.gpu, own.bytes, vk::BufferUsageFlagBits::eTransferDst, {Memory::eHostVisible | Memory::eHostCoherent});
+    const auto commands = std::move(s.gpu.device.allocateCommandBuffers({*s.gpu.pool, vk::CommandBufferLevel::ePrimary, 1}).front());
+    commands.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
+    compute_barrier(commands);
+    commands.copyBuffer(*own.buffer, *copy.buffer, vk::BufferCopy(0, 0, own.bytes));
+    barrier(commands, Stage::eHost, Access::eHostRead);
+    commands.end();
+    s.submit(commands);
+    return {copy.mapped, copy.mapped + own.bytes};
+}
+
+} // namespace scanshade::gpu

@@ -1,0 +1,74 @@
+// Rows of passes -> pipelines -> one command buffer; milliseconds per pass. Passes are plain data: they can be printed,
+// timed by name and checked without a GPU.
+#pragma once
+
+#include "ao/gpu/device.h"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace scanshade::gpu {
+
+/// A buffer of the program. Host buffers can be reached by Program::host() before (upload) or after (download) a run.
+struct BufferRow {
+    enum class Host { none, upload, download };
+    std::string_view name;
+    std::size_t bytes = 0;
+    Host host = Host::none;
+};
+
+/// One dispatch. `reads` bind from 0, `writes` (read-write included) from 16, the constants at 32.
+struct PassRow {
+    std::string name;              ///< for people: timings carry it
+    std::string_view shader;       ///< "cacao/blur"; empty = fill the written buffers with zero
+    std::vector<int> reads, writes; ///< indices of BufferRow
+    std::array<std::uint32_t, 3> groups{1, 1, 1};
+    std::vector<std::pair<int, int>> constants; ///< specialization: id, value
+};
+
+/// What is wrong with the table, as sentences: unknown indices, reads before any write, empty dispatches, an output never
+/// written. Empty = sound. Needs no GPU.
+[[nodiscard]] std::vector<std::string> problems(std::span<const BufferRow> buffers, std::span<const PassRow> passes);
+
+/// A table of passes made runnable on one device. One memory barrier goes before each pass that touches what an earlier
+/// pass wrote (or overwrites what it read) and only there.
+class Program {
+  public:
+    /// `constants_bytes` is the size of the uniform block every pass sees. Throws Error listing problems() or naming the
+    /// shader whose pipeline could not be made.
+    Program(Device& device, std::vector<BufferRow> buffers, std::vector<PassRow> passes, std::size_t constants_bytes);
+    ~Program();
+    Program(const Program&) = delete;
+    Program& operator=(const Program&) = delete;
+
+    /// The host's side of an upload or download buffer.
+    [[nodiscard]] std::span<std::byte> host(int buffer);
+    template <class T>
+    [[nodiscard]] std::span<T> host_as(int buffer) {
+        const auto bytes = host(buffer);
+        return {reinterpret_cast<T*>(bytes.data()), bytes.size() / sizeof(T)};
+    }
+
+    /// Uploads, runs all passes, downloads; returns when the results are on the host. Throws Error on device loss.
+    void run(std::span<const std::byte> constants);
+
+    /// Device milliseconds of the last run: "upload", each pass by name, "download".
+    [[nodiscard]] const std::vector<std::pair<std::string, double>>& timings() const { return timings_; }
+
+    /// Copies any buffer to the host, outside the hot path: for studying intermediates.
+    [[nodiscard]] std::vector<std::byte> read_back(int buffer);
+
+  private:
+    struct State;
+    std::unique_ptr<State> state_;
+    std::vector<std::pair<std::string, double>> timings_;
+};
+
+} // namespace scanshade::gpu

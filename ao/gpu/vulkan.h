@@ -1,0 +1,36 @@
+// The Vulkan objects behind Device, for the files of this folder alone: everything else speaks Device and Program.
+#pragma once
+
+#include "ao/gpu/device.h"
+
+#include <mutex>
+#include <vulkan/vulkan_raii.hpp>
+
+namespace scanshade::gpu {
+
+struct Messages {
+    std::mutex mutex;
+    std::vector<std::string> texts;
+};
+
+struct Device::State {
+    vk::raii::Context context;
+    std::unique_ptr<Messages> messages = std::make_unique<Messages>(); // outlives the messenger that writes into it
+    bool validating = false;
+    vk::raii::Instance instance = nullptr;
+    vk::raii::DebugUtilsMessengerEXT messenger = nullptr;
+    vk::raii::PhysicalDevice physical = nullptr;
+    vk::raii::Device device = nullptr;
+    vk::raii::Queue queue = nullptr;
+    std::uint32_t queue_family = 0;
+    vk::raii::CommandPool pool = nullptr;
+    vk::PhysicalDeviceMemoryProperties memory;
+    double nanoseconds_per_tick = 1;
+    bool has_timestamps = false;
+    DeviceInfo info;
+
+    /// Index of the first memory type among `allowed` bits that has all `wanted` flags; -1 if none.
+    [[nodiscard]] int memory_type(std::uint32_t allowed, vk::MemoryPropertyFlags wanted) const;
+};
+
+} // namespace scanshade::gpu

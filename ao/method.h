@@ -1,0 +1,60 @@
+// Depth in, visibility out: the one interface every AO method has, and the row type of the table of methods.
+#pragma once
+
+#include "projection/maps.h"
+#include "projection/parameters.h"
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace scanshade {
+
+namespace gpu {
+class Device;
+}
+
+/// What a method looks at. Normals are optional: without them the method derives its own from depth.
+struct View {
+    const DepthImage& depth;
+    const NormalImage* normals = nullptr;
+};
+
+/// Milliseconds per named pass or transfer, in execution order.
+using Timings = std::vector<std::pair<std::string, double>>;
+
+/// One AO method, made for one device. Not thread-safe: one frame at a time.
+class Method {
+  public:
+    virtual ~Method() = default;
+    /// Visibility of each pixel: same size as view.depth.z_m; NaN exactly where there is no surface.
+    virtual AoMap compute(const View& view) = 0;
+    /// Where the time of the last compute() went.
+    [[nodiscard]] virtual const Timings& timings() const = 0;
+};
+
+/// A method's settings before it is made: rows to fill, then make().
+class MethodSetup {
+  public:
+    virtual ~MethodSetup() = default;
+    /// Every setting, bound to this object. Names are plain ("radius"); the command line prefixes the method's name.
+    virtual std::vector<Parameter> parameters() = 0;
+    /// Takes the settings as they are now; throws Error naming the setting that is out of range.
+    virtual std::unique_ptr<Method> make(gpu::Device& device) const = 0;
+};
+
+struct MethodRow {
+    std::string_view name;    ///< as on the command line
+    std::string_view summary; ///< one line
+    std::string_view source;  ///< paper or documentation it follows
+    std::unique_ptr<MethodSetup> (*setup)();
+};
+
+/// The table of methods, in the order shown to people.
+[[nodiscard]] const std::vector<MethodRow>& methods();
+/// The row of that name; throws Misuse listing the names there are.
+[[nodiscard]] const MethodRow& method_named(std::string_view name);
+
+} // namespace scanshade

@@ -1,0 +1,41 @@
+// PLY and PCD clouds: points out, every other field, face and comment kept as the file's own bytes and written back.
+#pragma once
+
+#include "projection/frame.h"
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace scanshade {
+
+/// Reads PCD (ascii, binary, binary_compressed) or PLY (ascii, both endians; float or double; list properties walked),
+/// told by content. Infinite or absurd (> 1e30) coordinates become NaN. Throws Error naming the file and the line or byte
+/// offset for every damage the header or body shows; nothing is allocated from an unchecked number.
+/// `warnings` receives what was odd but readable.
+[[nodiscard]] Cloud read_cloud(const std::filesystem::path& file, std::vector<std::string>& warnings);
+
+/// A float field to add to each point. NaN = unknown.
+struct AddedField {
+    std::string name;
+    std::span<const float> values; ///< one per point
+};
+
+/// Writes the cloud in the format, encoding and byte order it was read from, plus `added` fields (replacing a field of that
+/// name). All other fields, point count, grid, viewpoint, faces, comments keep their bits. `colours`, when not empty,
+/// replaces the colour field's r, g, b (alpha kept). Atomic.
+void write_cloud(const std::filesystem::path& file, const Cloud& cloud, const std::vector<AddedField>& added,
+                 std::span<const cv::Vec3b> colours = {});
+
+/// A new cloud as binary PLY (x y z float or double when far from the origin, red green blue, `added`). Atomic.
+void write_new_ply(const std::filesystem::path& file, const std::vector<Eigen::Vector3d>& points,
+                   const std::vector<cv::Vec3b>& colours, const std::vector<AddedField>& added,
+                   const std::vector<std::string>& comments = {});
+
+/// Properties of the file as people ask for them: format, encoding, fields, grid.
+[[nodiscard]] std::string describe(const CloudRecords& records);
+/// ".pcd" or ".ply", as read.
+[[nodiscard]] std::string extension(const CloudRecords& records);
+
+} // namespace scanshade

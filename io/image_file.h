@@ -1,0 +1,58 @@
+// Colour, depth and AO images on disk; the only place that knows their formats and stored units.
+#pragma once
+
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <string>
+
+namespace scanshade {
+
+/// How stored depth numbers become metres. Never guessed silently: `origin` says who decided.
+struct DepthEncoding {
+    enum class Kind {
+        linear,        ///< metres = value / units_per_metre; 0 and 65535 (integers), NaN, inf and <= 0 (floats) = hole
+        sun_rotated,   ///< SUN RGB-D: 16-bit value rotated right by 3 bits is millimetres
+        nyu_disparity, ///< NYUv2 raw: bytes swapped, Kinect disparity d; metres = 351.3 / (1092.5 - d); 2047 = hole
+    };
+    Kind kind = Kind::linear;
+    double units_per_metre = 1000;
+    std::string name;   ///< "mm", "tum", "sun", "nyu", "m" or the number
+    std::string origin; ///< "TUM layout", "--depth-scale", "assumed: 16-bit integers are millimetres" ...
+};
+
+/// "mm" (1000), "tum" (5000), "sun", "nyu", "m" (1, float files), or a positive number of units per metre.
+/// Throws Misuse listing these.
+[[nodiscard]] DepthEncoding depth_encoding(const std::string& text, const std::string& origin);
+
+/// The numbers as stored, one channel: CV_16U (PNG, PGM, TIFF) or CV_32F metres (TIFF, EXR, PFM).
+/// The format is told by the file's signature, not its name. Throws Error naming the file and what was expected for:
+/// missing or empty file, truncation (with byte counts or offset), checksum errors, 8-bit depth, colour images, JPEG,
+/// more than 2^28 pixels (before allocating), PGM size or maxval that do not fit the bytes.
+[[nodiscard]] cv::Mat read_stored_depth(const std::filesystem::path& file);
+
+/// Stored numbers -> metres, 0 = hole. Throws Error when the encoding needs integers and the file holds floats, or the reverse.
+[[nodiscard]] cv::Mat1f depth_in_metres(const cv::Mat& stored, const DepthEncoding& encoding);
+
+/// 8-bit BGR; 16-bit and grey are converted. Throws Error naming the file when it is missing, damaged or truncated.
+[[nodiscard]] cv::Mat3b read_colour(const std::filesystem::path& file);
+
+enum class AoFormat { png16, png8, tiff, exr };
+/// Throws Misuse listing the names.
+[[nodiscard]] AoFormat ao_format(const std::string& name);
+/// ".png", ".tiff" or ".exr".
+[[nodiscard]] std::string extension(AoFormat format);
+
+/// Writes visibility. Integers: 0 = no surface, 1 .. max = visibility 0 .. 1 (so 1 + round(v (max - 1))); floats keep NaN.
+/// Atomic; fast compression.
+void write_ao(const std::filesystem::path& file, const cv::Mat1f& visibility, AoFormat format);
+/// The reverse of write_ao (format told by signature and bit depth): NaN = no surface.
+[[nodiscard]] cv::Mat1f read_ao(const std::filesystem::path& file);
+
+/// 8-bit BGR picture as PNG with fast compression, or JPEG by extension. Atomic.
+void write_picture(const std::filesystem::path& file, const cv::Mat3b& picture);
+/// 16-bit integer depth as PNG (value = round(metres * units_per_metre), 0 = hole). Atomic.
+void write_depth_png(const std::filesystem::path& file, const cv::Mat1f& depth_m, double units_per_metre);
+/// 32-bit float image as TIFF. Atomic.
+void write_float_tiff(const std::filesystem::path& file, const cv::Mat1f& image);
+
+} // namespace scanshade

@@ -1,0 +1,19 @@
+// Writing without half files: everything goes to a temporary name beside the target, then is renamed.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string_view>
+
+namespace scanshade {
+
+/// Calls `write` with a temporary path in target's folder (same extension, name starting with '.'), then syncs and renames
+/// it to `target`. On failure the temporary file is removed and Error names `target`. Missing parent folders are made.
+void write_atomically(const std::filesystem::path& target, const std::function<void(const std::filesystem::path&)>& write);
+/// The same for bytes already in memory.
+void write_atomically(const std::filesystem::path& target, std::string_view bytes);
+
+/// Removes temporary files that a killed run left in `folder` (only names write_atomically makes). Returns how many.
+int remove_leftovers(const std::filesystem::path& folder);
+
+} // namespace scanshade

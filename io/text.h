@@ -1,0 +1,58 @@
+// Files as bytes, lines and numbers, each number checked: what every text reader of io stands on.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace scanshade {
+
+/// The whole file, or its first `limit` bytes. Throws Error naming the file when it is missing, a folder, or unreadable.
+[[nodiscard]] std::string read_bytes(const std::filesystem::path& file, std::size_t limit = SIZE_MAX);
+
+/// One line of a text file without its line end; numbers start at 1.
+struct TextLine {
+    int number = 0;
+    std::string_view text;
+};
+
+/// All lines, blank ones too. A UTF-8 byte order mark and carriage returns are left out.
+/// The views point into `bytes`, which must outlive them.
+[[nodiscard]] std::vector<TextLine> text_lines(std::string_view bytes);
+
+/// The words of a line: split at blanks and tabs.
+[[nodiscard]] std::vector<std::string_view> words(std::string_view line);
+/// Without blanks at either end.
+[[nodiscard]] std::string_view trimmed(std::string_view text);
+/// A word or line cut and cleaned so that it can stand in a message, in quotes.
+[[nodiscard]] std::string in_quotes(std::string_view text);
+
+/// The number that is the whole word; "nan" and "inf" are numbers too. Nothing when it is anything else.
+[[nodiscard]] std::optional<double> number(std::string_view word);
+/// A non-negative integer, digits only, below 2^64.
+[[nodiscard]] std::optional<std::uint64_t> whole_number(std::string_view word);
+
+/// "path line 12": how every message names a place in a text file.
+[[nodiscard]] std::string at_line(const std::filesystem::path& file, int line);
+
+/// "1 point", "7 points"
+[[nodiscard]] std::string counted(std::size_t count, std::string_view noun);
+
+/// Appends to `warnings` the first few of many alike, and how many more there were.
+class RepeatedWarning {
+  public:
+    explicit RepeatedWarning(std::vector<std::string>& warnings) : warnings_(warnings) {}
+    ~RepeatedWarning();
+    RepeatedWarning(const RepeatedWarning&) = delete;
+    RepeatedWarning& operator=(const RepeatedWarning&) = delete;
+    void add(std::string sentence);
+
+  private:
+    std::vector<std::string>& warnings_;
+    std::size_t seen_ = 0;
+};
+
+} // namespace scanshade

@@ -1,0 +1,42 @@
+// Frame -> DepthImage: undistort a recorded image once, or splat a cloud's points with a depth test.
+#pragma once
+
+#include "projection/frame.h"
+#include "projection/maps.h"
+#include "projection/refine.h"
+
+namespace scanshade {
+
+/// Depths outside [near_m, far_m], NaN and infinities become holes. far_m 1000: nothing a depth sensor records is
+/// farther.
+struct ProjectOptions {
+    double near_m = 1e-3;
+    double far_m = 1000.0;
+};
+
+/// The camera a frame is looked at with; its `origin` says how it was come by:
+/// - the frame's own, where it has one (a missing image size is taken from the depth image, the grid, or twice the
+///   principal point);
+/// - else, for an organised cloud, the one its points tell: "recovered from the points, rms 0.0003 px, 239087 points";
+/// - else one at the origin, looking along +z, that frames the cloud at about one point per pixel.
+/// Putting the result into frame.camera saves project() the search.
+/// Throws Error for a depth image without a camera or of another size than its camera's, for a frame without data, and
+/// for a cloud around or beside its origin, which has no single camera.
+[[nodiscard]] Camera camera_of(const Frame& frame);
+
+/// The depth image the methods work on, seen by camera_of(frame).
+/// - Depth frames without distortion keep their pixels (the very same cv::Mat where nothing had to become a hole); with
+///   distortion each pixel takes the nearest recorded depth (never an average: that would invent points between
+///   surfaces).
+/// - Organised clouds whose points lie on their own pixels keep the grid; others are splatted with a depth test
+/// (nearest
+///   wins, then the lowest index), `source` remembering which point each pixel shows. Unorganised clouds have gaps
+///   between their points closed, so that what lies behind does not shine through.
+/// An all-hole image is a result; Error as camera_of() throws it.
+[[nodiscard]] DepthImage project(const Frame& frame, const ProjectOptions& options = {});
+
+/// Two depths that differ by less, in one pixel or neighbouring ones, are taken for one surface: 1 % and two pixels'
+/// width.
+[[nodiscard]] inline double same_surface_m(const Pinhole& camera, double z_m) { return z_m * (0.01 + 2.0 / camera.fx); }
+
+} // namespace scanshade

@@ -1,0 +1,16 @@
+// sRGB's transfer curve (IEC 61966-2-1): stored colour <-> linear light, both 0 .. 1.
+#pragma once
+
+#include <cmath>
+
+namespace scanshade {
+
+[[nodiscard]] inline double linear_from_srgb(double stored) {
+    return stored <= 0.04045 ? stored / 12.92 : std::pow((stored + 0.055) / 1.055, 2.4);
+}
+
+[[nodiscard]] inline double srgb_from_linear(double linear) {
+    return linear <= 0.0031308 ? linear * 12.92 : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
+}
+
+} // namespace scanshade

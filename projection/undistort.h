@@ -1,0 +1,39 @@
+// Lens distortion taken off and put back: one point at a time, and as maps for whole images.
+#pragma once
+
+#include "projection/camera.h"
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+
+namespace scanshade {
+
+/// Normalised coordinates bent by the lens (see distort()).
+[[nodiscard]] Eigen::Vector2d distorted(const Distortion& distortion, const Eigen::Vector2d& straight);
+
+/// The reverse, by Newton's method to 1e-10 (under 1e-6 px at any focal length in use). None where it does not converge
+/// or where the polynomial has turned round, so that two directions share one pixel.
+[[nodiscard]] std::optional<Eigen::Vector2d> undistorted(const Distortion& distortion, const Eigen::Vector2d& bent);
+
+/// Which pixel of the recorded image shows what pixel of the undistorted one, both ways, nearest pixel. Both images
+/// have the same intrinsics and size. Immutable: frames and threads share it.
+class Undistortion {
+  public:
+    explicit Undistortion(const Camera& camera);
+
+    /// Made once per camera and kept while it is among the few used last; safe from several threads.
+    [[nodiscard]] static std::shared_ptr<const Undistortion> of(const Camera& camera);
+
+    /// For each undistorted pixel the index (row-major) of the recorded pixel to look at; -1 where the lens saw
+    /// nothing.
+    [[nodiscard]] const cv::Mat1i& recorded_pixel() const { return recorded_pixel_; }
+    /// For each recorded pixel the index of the undistorted pixel that shows it, or is nearest to it; -1 outside the
+    /// image.
+    [[nodiscard]] const cv::Mat1i& undistorted_pixel() const { return undistorted_pixel_; }
+
+  private:
+    cv::Mat1i recorded_pixel_, undistorted_pixel_;
+};
+
+} // namespace scanshade

@@ -1,0 +1,38 @@
+// CACAO apply, native resolution: visibility of each image pixel from the four slices.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "lib/cacao.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(constant_id = spec_resolve) const int resolve = resolve_smart;
+layout(constant_id = spec_power) const int power = 0;
+layout(binding = 0, scalar) readonly buffer Ao { uint ao[]; };
+layout(binding = 1, scalar) readonly buffer DepthIn { float depth_in[]; };
+layout(binding = 16, scalar) writeonly buffer Out { float visibility[]; };
+
+#include "lib/cacao_resolve.glsl"
+
+float reference(ivec2 p) {
+    if (resolve == resolve_smart) {
+        ivec2 parity = p & 1;
+        uint c = grid_texel(p);
+        return smart_reference(ao_value(c), unpack_edges(ao_edges(c)), vec2(p), parity);
+    }
+    vec2 at = vec2(p) * k.image_inv * vec2(k.slice);
+    if (resolve == resolve_half) return 0.5 * (slice_filtered(0, at) + slice_filtered(3, at));
+    return 0.25 * (slice_filtered(0, at) + slice_filtered(1, at) + slice_filtered(2, at) + slice_filtered(3, at));
+}
+
+void main() {
+    ivec2 p = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(p, k.image))) return;
+    int here = p.y * k.image.x + p.x;
+    if (scan != 0) {
+        vec2 v = resolve == resolve_smart ? smart_scan(p) : plain_scan(p);
+        visibility[here] = v.y > 0.0 && depth_in[here] > 0.0 ? v.x : uintBitsToFloat(0x7fc00000u);
+        return;
+    }
+    float v = reference(p);
+    visibility[here] = power != 0 ? pow(v, 2.2) : v;
+}

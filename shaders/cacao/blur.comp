@@ -1,0 +1,64 @@
+// CACAO blur: one Jacobi step over the four neighbours of a slice texel, weighted by its edges.
+// The reference keeps a mirrored halo that evolves with the image, and binary16 between steps; scan leaves holes out.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "lib/cacao.glsl"
+
+layout(local_size_x = cacao_tile_x, local_size_y = cacao_tile_y) in;
+layout(constant_id = spec_first) const int first = 0;
+layout(constant_id = spec_last) const int last = 0;
+layout(constant_id = spec_halo) const int halo = 0;
+layout(binding = 0, scalar) readonly buffer From { uint from[]; };
+layout(binding = 16, scalar) writeonly buffer To { uint to[]; };
+
+int mirrored(int i, int size) {
+    int m = i % (2 * size);
+    if (m < 0) m += 2 * size;
+    return m < size ? m : 2 * size - 1 - m;
+}
+
+int index_between_steps(int slice, ivec2 t) {
+    ivec2 size = k.slice + 2 * halo;
+    ivec2 p = clamp(t + halo, ivec2(0), size - 1);
+    return (slice * size.y + p.y) * size.x + p.x;
+}
+
+uint read(int slice, ivec2 t) {
+    if (scan != 0) return from[slice_index(slice, clamp(t, ivec2(0), k.slice - 1))];
+    if (first != 0) return from[slice_index(slice, ivec2(mirrored(t.x, k.slice.x), mirrored(t.y, k.slice.y)))];
+    return from[index_between_steps(slice, t)];
+}
+
+float value(uint texel) {
+    if (scan != 0) return ao_value(texel);
+    return first != 0 ? half_even(ao_value(texel)) : unpackHalf2x16(texel).x;
+}
+
+void main() {
+    ivec2 t = ivec2(gl_GlobalInvocationID.xy) - halo;
+    if (any(greaterThanEqual(t, k.slice + halo))) return;
+    int slice = slice_of_layer(int(gl_GlobalInvocationID.z));
+    uint c = read(slice, t);
+    if (is_hole(c)) {
+        to[slice_index(slice, t)] = c;
+        return;
+    }
+    uint n[4] = {read(slice, t - ivec2(1, 0)), read(slice, t + ivec2(1, 0)), read(slice, t - ivec2(0, 1)), read(slice, t + ivec2(0, 1))};
+    vec4 e = unpack_edges(ao_edges(c));
+    if (scan != 0) {
+        e *= vec4(t.x > 0, t.x + 1 < k.slice.x, t.y > 0, t.y + 1 < k.slice.y);
+        e *= vec4(!is_hole(n[0]), !is_hole(n[1]), !is_hole(n[2]), !is_hole(n[3]));
+    }
+    float sum = 0.5 * value(c) + e.x * value(n[0]) + e.y * value(n[1]) + e.z * value(n[2]) + e.w * value(n[3]);
+    float v = sum / (0.5 + e.x + e.y + e.z + e.w);
+    if (scan != 0) {
+        to[slice_index(slice, t)] = ao_texel(v, ao_edges(c));
+        return;
+    }
+    v = half_even(v);
+    if (last == 0)
+        to[index_between_steps(slice, t)] = (packHalf2x16(vec2(v, 0.0)) & 0xffffu) | (c & 0xffff0000u);
+    else if (all(greaterThanEqual(t, ivec2(0))) && all(lessThan(t, k.slice)))
+        to[slice_index(slice, t)] = ao_texel(v, ao_edges(c));
+}

@@ -1,0 +1,198 @@
+// CACAO generation: obscurance of each slice texel from pairs of taps on opposite sides, on the slice's own depth.
+// One kernel for every quality; HIGHEST runs it twice, first as the base pass that decides how many taps follow.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "lib/cacao.glsl"
+#include "lib/cacao_normal.glsl"
+#include "lib/cacao_pattern.glsl"
+#include "lib/cacao_filter.glsl"
+
+layout(local_size_x = cacao_tile_x, local_size_y = cacao_tile_y) in;
+layout(constant_id = spec_base) const int base = 0;
+layout(constant_id = spec_mips) const int mips = 0;
+
+layout(binding = 0, scalar) readonly buffer Depths { float depths[]; };
+layout(binding = 1, scalar) readonly buffer Normals { uint normals[]; };
+layout(binding = 2, scalar) readonly buffer BaseResult { uint base_result[]; };
+layout(binding = 3, scalar) readonly buffer Importance { uint importance[]; };
+layout(binding = 4, scalar) readonly buffer LoadCounter { uint load_counter; };
+layout(binding = 16, scalar) writeonly buffer Ao { uint ao[]; };
+
+const bool detailed = kernel >= 1 && base == 0; // depth edges, edge fade-out, detail shadows
+const bool halo_weighted = kernel >= 1;
+const float weight_range = 20.0;                // the base pass stores its weight sum divided by this
+
+struct Surface {
+    ivec2 texel;
+    int slice;
+    vec2 uv;        // reference: of the texel in its slice
+    vec2 ray;       // scan: view ray of the pixel itself
+    vec2 ray_step;  // scan: its change per slice texel
+    vec3 point;     // moved a little towards the camera
+    vec3 normal;
+    mat2 rotation;  // pattern rotation, scaled to texels
+    float falloff;  // F = -1 / R'^2
+    float mip_base; // log2 of the disc radius, biased
+};
+
+struct Sum {
+    float obscurance, weight;
+};
+
+float obscurance(vec3 normal, vec3 d, float falloff) {
+    float d2 = dot(d, d);
+    float facing = scan != 0 ? dot(normal, d) * inversesqrt(max(d2, 1e-30)) : dot(normal, d) / sqrt(d2);
+    return max(0.0, facing - k.horizon) * max(0.0, d2 * falloff + 1.0);
+}
+
+// What the tap at this texel offset sees: x, y, z in view space, and w = 1 if anything is known there.
+vec4 sample_at(Surface s, vec2 offset, int mip) {
+    if (scan != 0) {
+        ivec2 t = s.texel + ivec2(offset);
+        bool inside = uint(t.x) < uint(k.slice.x) && uint(t.y) < uint(k.slice.y);
+        vec2 at = offset;
+        int index;
+        if (mips != 0) {
+            // The tap looks from the centre of the mip texel it reads, so that slopes stay planes.
+            ivec2 size = k.mip_size[mip];
+            ivec2 m = clamp(t >> mip, ivec2(0), size - 1);
+            float scale = float(1 << mip);
+            at = (vec2(m) + 0.5) * scale - 0.5 - vec2(s.texel);
+            index = k.mip_offset[mip] + (s.slice * size.y + m.y) * size.x + m.x;
+        } else {
+            t = clamp(t, ivec2(0), k.slice - 1);
+            index = (s.slice * k.slice.y + t.y) * k.slice.x + t.x;
+        }
+        float z = depths[index];
+        return vec4((s.ray + at * s.ray_step) * z, z, inside && z > 0.0 ? 1.0 : 0.0);
+    }
+    vec2 uv = s.uv + offset * k.slice_inv;
+    ivec2 size = k.mip_size[mip];
+    ivec2 m = clamp(ivec2(floor(uv * vec2(size))), ivec2(0), size - 1);
+    float z = depths[k.mip_offset[mip] + (s.slice * size.y + m.y) * size.x + m.x];
+    return vec4((k.view_mul * uv + k.view_add) * z, z, 1.0);
+}
+
+void tap(Surface s, vec4 row, bool weighted, inout Sum sum) {
+    vec2 offset = roundEven(s.rotation * row.xy);
+    int mip = mips != 0 ? int(clamp(roundEven(row.w + s.mip_base), 0.0, 3.0)) : 0;
+    for (int side = 0; side < 2; ++side) {
+        vec4 seen = sample_at(s, side == 0 ? offset : -offset, mip);
+        vec3 d = seen.xyz - s.point;
+        float weight = weighted ? row.z : 1.0;
+        if (halo_weighted) weight *= 0.6 * clamp(2.0 + k.neg_rec_radius * max(0.0, -d.z), 0.0, 1.0) + 0.4;
+        if (scan != 0) weight *= seen.w;
+        sum.obscurance += obscurance(s.normal, d, s.falloff) * weight;
+        sum.weight += weight;
+    }
+}
+
+vec4 neighbour_depths(int slice, ivec2 t) {
+    ivec2 low = max(t - 1, ivec2(0)), high = min(t + 1, k.slice - 1);
+    vec4 z = vec4(depths[slice_index(slice, ivec2(low.x, t.y))], depths[slice_index(slice, ivec2(high.x, t.y))],
+                  depths[slice_index(slice, ivec2(t.x, low.y))], depths[slice_index(slice, ivec2(t.x, high.y))]);
+    if (scan != 0) z *= vec4(t.x > 0, t.x + 1 < k.slice.x, t.y > 0, t.y + 1 < k.slice.y);
+    return z;
+}
+
+vec3 normal_at(int slice, ivec2 t) { return unpack_normal(normals[slice_index(slice, t)]); }
+
+// Edges where normals turn away. Outside the slice there is no normal: the reference halves that edge.
+vec4 normal_edges(vec3 n, int slice, ivec2 t) {
+    vec4 c = vec4(0.0);
+    if (t.x > 0) c.x = dot(n, normal_at(slice, t - ivec2(1, 0)));
+    if (t.x + 1 < k.slice.x) c.y = dot(n, normal_at(slice, t + ivec2(1, 0)));
+    if (t.y > 0) c.z = dot(n, normal_at(slice, t - ivec2(0, 1)));
+    if (t.y + 1 < k.slice.y) c.w = dot(n, normal_at(slice, t + ivec2(0, 1)));
+    return clamp(c + 0.5, 0.0, 1.0);
+}
+
+// Obscurance by the four adjacent texels, with a falloff four times as tight.
+float detail(Surface s, vec2 step_m, vec4 z, vec4 edges) {
+    vec3 r = vec3(s.point.xy / s.point.z, 1.0);
+    vec4 o = vec4(obscurance(s.normal, vec3(-step_m.x, 0.0, 0.0) + r * (z.x - s.point.z), 4.0 * s.falloff),
+                  obscurance(s.normal, vec3(+step_m.x, 0.0, 0.0) + r * (z.y - s.point.z), 4.0 * s.falloff),
+                  obscurance(s.normal, vec3(0.0, -step_m.y, 0.0) + r * (z.z - s.point.z), 4.0 * s.falloff),
+                  obscurance(s.normal, vec3(0.0, +step_m.y, 0.0) + r * (z.w - s.point.z), 4.0 * s.falloff));
+    return k.detail_strength * dot(o, edges);
+}
+
+float importance_at(vec2 uv) {
+    ivec2 c = filter_coordinate(uv, k.importance);
+    Footprint f = footprint(c, k.importance);
+    return filtered(f, importance[f.low.y * k.importance.x + f.low.x], importance[f.low.y * k.importance.x + f.high.x],
+                    importance[f.high.y * k.importance.x + f.low.x], importance[f.high.y * k.importance.x + f.high.x]);
+}
+
+void main() {
+    ivec2 t = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(t, k.slice))) return;
+    Surface s;
+    s.texel = t;
+    s.slice = slice_of_layer(int(gl_GlobalInvocationID.z));
+    int here = slice_index(s.slice, t);
+    float zc = depths[here];
+    if (scan != 0 && !(zc > 0.0)) {
+        ao[here] = hole_texel;
+        return;
+    }
+    ivec2 parity = ivec2(s.slice & 1, s.slice >> 1);
+    s.uv = (vec2(t) + 0.5) * k.slice_inv;
+    s.ray_step = k.ray_step * float(2 * spacing);
+    s.ray = k.ray_base + vec2(spacing * (2 * t + parity)) * k.ray_step;
+    vec2 step_m = scan != 0 ? zc * s.ray_step : zc * k.view_mul * k.slice_inv;
+    s.point = scan != 0 ? vec3(s.ray, 1.0) * zc : vec3((k.view_mul * s.uv + k.view_add) * zc, zc);
+    s.normal = normal_at(s.slice, t);
+
+    float radius = scan != 0 ? k.radius : k.radius * (clamp(length(s.point) * k.near_limit_rec, 0.0, 1.0) * 0.8 + 0.2);
+    float disc = (0.85 * radius) / step_m.x;
+    s.falloff = -1.0 / (radius * radius);
+    s.mip_base = log2(disc) - 4.3;
+    vec2 turn = k.rotation[s.slice * 5 + (t.x + 2 * t.y) % 5] * disc;
+    s.rotation = mat2(turn.x, turn.y, turn.y, -turn.x);
+    if (scan != 0) { // pixels need not be square
+        float aspect = step_m.x / -step_m.y;
+        s.rotation[0].y *= aspect;
+        s.rotation[1].y *= aspect;
+    }
+    s.point *= k.depth_offset;
+
+    Sum sum = Sum(0.0, 0.0);
+    vec4 edges = vec4(1.0);
+    if (detailed) {
+        vec4 z = neighbour_depths(s.slice, t);
+        edges = scan != 0 ? edges_from_depth(zc, z) : edges_from_depth(zc, z);
+        sum.obscurance = detail(s, step_m, z, edges);
+        if (kernel >= 2) edges *= normal_edges(s.normal, s.slice, t);
+    }
+
+    if (kernel == 3 && base == 0) {
+        float wanted = importance_at(s.uv + vec2(parity) * k.slice_inv);
+        sum.obscurance *= 5.0 / 32.0 + wanted * (27.0 / 32.0);
+        uint b = base_result[here];
+        sum.weight = weight_range * float(b >> 16) * (1.0 / weight_levels());
+        if (scan == 0) sum.weight = weight_range * (float(b >> 16) * inv_255);
+        sum.obscurance += ao_value(b) * sum.weight;
+        float average = float(load_counter) * k.load_counter_div;
+        wanted *= clamp(k.adaptive_limit / average, 0.0, 1.0);
+        int end = min(31, int(27.0 * wanted + 1.5) + 5);
+        for (int i = 5; i < end; ++i) tap(s, pattern[i], false, sum);
+    } else {
+        const int taps = kernel == 0 ? 3 : kernel == 2 ? 12 : 5;
+        for (int i = 0; i < taps; ++i) tap(s, pattern[i], true, sum);
+    }
+
+    float o = scan != 0 ? sum.obscurance / max(sum.weight, 1e-6) : sum.obscurance / sum.weight;
+    if (base != 0) {
+        ao[here] = quantised(o, value_levels()) | quantised(sum.weight / weight_range, weight_levels()) << 16;
+        return;
+    }
+    float fade = clamp(s.point.z * k.fade_mul + k.fade_add, 0.0, 1.0);
+    if (detailed) {
+        vec2 cut = clamp(0.35 * (1.0 - edges.xz - edges.yw), 0.0, 1.0);
+        fade *= clamp(1.0 - cut.x - cut.y, 0.0, 1.0);
+    }
+    float visibility = clamp(1.0 - fade * min(k.shadow_strength * o, k.shadow_clamp), 0.0, 1.0);
+    ao[here] = ao_texel(pow(visibility, k.shadow_power), pack_edges(edges));
+}

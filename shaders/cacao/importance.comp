@@ -1,0 +1,25 @@
+// CACAO HIGHEST: how much a 4x4 block of the AO grid needs more taps, from the contrast of the base pass.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "lib/cacao.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(binding = 0, scalar) readonly buffer BaseResult { uint base_result[]; };
+layout(binding = 16, scalar) writeonly buffer Importance { uint importance[]; };
+
+void main() {
+    ivec2 t = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(t, k.importance))) return;
+    float lowest = 1.0, highest = 0.0;
+    for (int slice = 0; slice < 4; ++slice)
+        for (int i = 0; i < 4; ++i) {
+            uint b = base_result[slice_index(slice, min(2 * t + ivec2(i & 1, i >> 1), k.slice - 1))];
+            if (is_hole(b)) continue;
+            float v = pow(clamp(1.0 - k.shadow_strength * ao_value(b), 0.0, 1.0), k.shadow_power);
+            lowest = min(lowest, v);
+            highest = max(highest, v);
+        }
+    float contrast = clamp(2.0 * (highest - lowest), 0.0, 1.0);
+    importance[t.y * k.importance.x + t.x] = quantised(pow(contrast, 0.8), 255.0);
+}

@@ -1,0 +1,33 @@
+// CACAO HIGHEST: smooths the importance map; the second pass also sums every ninth texel into the load counter.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "lib/cacao.glsl"
+#include "lib/cacao_filter.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(constant_id = spec_last) const int second = 0;
+layout(binding = 0, scalar) readonly buffer From { uint from[]; };
+layout(binding = 16, scalar) writeonly buffer To { uint to[]; };
+layout(binding = 17, scalar) buffer LoadCounter { uint load_counter; };
+
+uint read(int x, int y) {
+    ivec2 t = clamp(ivec2(x, y), ivec2(0), k.importance - 1);
+    return from[t.y * k.importance.x + t.x];
+}
+
+// Mean of the 2x2 texels whose upper left is (x, y), in the filter's own 8-bit steps.
+float box(int x, int y) {
+    return filtered(Footprint(ivec2(0), ivec2(0), ivec2(128)), read(x, y), read(x + 1, y), read(x, y + 1), read(x + 1, y + 1));
+}
+
+void main() {
+    ivec2 t = ivec2(gl_GlobalInvocationID.xy);
+    float sum = second == 0 ? box(t.x - 2, t.y - 1) + box(t.x, t.y - 2) + box(t.x + 1, t.y) + box(t.x - 1, t.y + 1)
+                            : box(t.x - 1, t.y - 2) + box(t.x + 1, t.y - 1) + box(t.x, t.y + 1) + box(t.x - 2, t.y);
+    float mean = sum * 0.25;
+    // Threads beyond the map count too, as AMD's do: the whole dispatch, not only the map, is summed.
+    if (second != 0 && t.x % 3 == 0 && t.y % 3 == 0) atomicAdd(load_counter, uint(255.0 * clamp(mean, 0.0, 1.0) + 0.5));
+    if (any(greaterThanEqual(t, k.importance))) return;
+    to[t.y * k.importance.x + t.x] = quantised(mean, 255.0);
+}

@@ -1,0 +1,73 @@
+// CACAO upsampling, first half: one AO value and one depth per pixel of the half-size grid, with a halo of two.
+// AMD's shader does this in shared memory; its behaviour outside the image is kept in the reference.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "lib/cacao.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(constant_id = spec_resolve) const int resolve = resolve_smart;
+layout(binding = 0, scalar) readonly buffer Ao { uint ao[]; };
+layout(binding = 1, scalar) readonly buffer Depths { float depths[]; };
+layout(binding = 16, scalar) writeonly buffer Staged { vec2 staged[]; };
+
+#include "lib/cacao_resolve.glsl"
+
+const int wrapped = 1 << 24; // stands for an unsigned coordinate that wrapped below zero
+
+bool in_slice(ivec2 t) { return all(greaterThanEqual(t, ivec2(0))) && all(lessThan(t, k.slice)); }
+float depth_or_zero(int slice, ivec2 t) { return in_slice(t) ? depths[slice_index(slice, t)] : 0.0; }
+float texel_clamped(int slice, ivec2 t) { return ao_value(ao[slice_index(slice, clamp(t, ivec2(0), k.slice - 1))]); }
+
+// The tie of the slice 3 sample on even columns and rows, as lavapipe's arithmetic breaks it.
+int tie(int x, float r, int size) {
+    precise float a = (float(x) + 0.5) * r;
+    precise float b = 0.5 * r;
+    precise float c = a - b;
+    precise float t = c * float(size);
+    return int(floor(t));
+}
+ivec2 corner_tie(ivec2 t) { return ivec2(tie(t.x, k.slice_inv.x, k.slice.x), tie(t.y, k.slice_inv.y, k.slice.y)); }
+
+vec2 plain_reference(ivec2 h, ivec2 parity, ivec2 t) {
+    float sum = 0.0;
+    if (resolve == resolve_half) {
+        ivec2 s0 = t + parity;
+        ivec2 s3 = parity == ivec2(0) ? corner_tie(t) : t;
+        return vec2(0.5 * (texel_clamped(0, s0) + texel_clamped(3, s3)), depth_or_zero(3 * parity.y, t));
+    }
+    for (int n = 0; n < 4; ++n) { // forward 2x2 box
+        ivec2 p = h + ivec2(n & 1, n >> 1);
+        ivec2 q = p >> 1;
+        if (n == 3 && parity == ivec2(0)) q = corner_tie(t);
+        sum += texel_clamped((p.x & 1) + 2 * (p.y & 1), q);
+    }
+    return vec2(0.25 * sum, depth_or_zero(parity.x + 2 * parity.y, t));
+}
+
+vec2 smart_staged(ivec2 h, ivec2 parity, ivec2 seen) {
+    ivec2 t = ivec2(h.x == -1 ? 0 : h.x >> 1, h.y >> 1); // column -1 reads column 1: its remainder is floored, its half wraps
+    bool known = in_slice(t) && h.y >= 0;
+    uint c = known ? ao[slice_index(parity.x + 2 * parity.y, t)] : 0u;
+    float v = smart_reference(ao_value(c), unpack_edges(ao_edges(c)), vec2(seen), parity);
+    return vec2(v, depth_or_zero(parity.x + 2 * parity.y, ivec2((h.x + 1) >> 1, h.y >> 1))); // one column too far, as in AMD's
+}
+
+void main() {
+    ivec2 g = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(g, k.grid))) return;
+    ivec2 h = g - 2;
+    ivec2 parity = h & 1;
+    int here = g.y * k.grid.x + g.x;
+    if (scan != 0) {
+        vec2 v = !in_grid(h) ? vec2(0.0) : resolve == resolve_smart ? smart_scan(h) : plain_scan(h);
+        bool written = two_slices == 0 || parity.x == parity.y;
+        float z = v.y > 0.0 && written ? depth_or_zero(parity.x + 2 * parity.y, h >> 1) : 0.0;
+        staged[here] = vec2(v.x, z);
+        return;
+    }
+    ivec2 seen = ivec2(h.x < 0 ? wrapped + h.x : h.x, h.y < 0 ? wrapped + h.y : h.y);
+    vec2 v = resolve == resolve_smart ? smart_staged(h, parity, seen) : plain_reference(seen, parity, seen >> 1);
+    if (any(lessThan(h, ivec2(0))) && resolve != resolve_smart) v.y = 0.0;
+    staged[here] = vec2(half_even(v.x), v.y);
+}

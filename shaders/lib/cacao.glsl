@@ -1,0 +1,66 @@
+// What every CACAO pass needs: the constant block, the profile, AO texels, binary16 and 8-bit rounding, edges.
+#include "shared/cacao.h"
+
+layout(binding = 32, scalar) uniform Constants { CacaoConstants k; };
+
+layout(constant_id = spec_scan) const int scan = 0;
+layout(constant_id = spec_spacing) const int spacing = 1;
+layout(constant_id = spec_kernel) const int kernel = 2;
+layout(constant_id = spec_two_slices) const int two_slices = 0;
+
+const float inv_255 = 1.0 / 255.0;
+const uint hole_texel = 0x80000000u;
+
+// --- AO texel: visibility (or raw obscurance) in bits 0..15, packed edges or sample weight from bit 16, hole flag in bit 31.
+// The reference keeps AMD's 8-bit UNORM steps; scan has 16 bits for the value.
+float value_levels() { return scan != 0 ? 65535.0 : 255.0; }
+float weight_levels() { return scan != 0 ? 32767.0 : 255.0; }
+
+uint quantised(float value, float levels) { return uint(roundEven(clamp(value, 0.0, 1.0) * levels)); }
+uint ao_texel(float value, uint edges) { return quantised(value, value_levels()) | (edges << 16); }
+float ao_value(uint texel) { return float(texel & 0xffffu) * (scan != 0 ? 1.0 / 65535.0 : inv_255); }
+uint ao_edges(uint texel) { return (texel >> 16) & 0xffu; }
+bool is_hole(uint texel) { return scan != 0 && texel >= hole_texel; }
+
+// --- binary16 as an exact float, independent of how a driver rounds its own conversions.
+float half_even(float v) {
+    if (abs(v) < 6.103515625e-5) return roundEven(v * 16777216.0) * (1.0 / 16777216.0);
+    uint b = floatBitsToUint(v);
+    return uintBitsToFloat((b + 0xfffu + ((b >> 13) & 1u)) & 0xffffe000u);
+}
+float half_toward_zero(float v) {
+    if (abs(v) < 6.103515625e-5) return trunc(v * 16777216.0) * (1.0 / 16777216.0);
+    return uintBitsToFloat(floatBitsToUint(v) & 0xffffe000u);
+}
+
+// --- edges: 1 = same surface, 0 = cut; order left, right, top, bottom.
+// Reference: differences corrected by the slope seen on the other side. Scan: a hole is cut and lends no slope.
+vec4 edges_from_depth(float zc, vec4 z) {
+    vec4 d = z - zc;
+    vec4 other = d.yxwz;
+    vec4 e = min(abs(d), abs(d + other));
+    if (scan != 0) {
+        bvec4 known = greaterThan(z, vec4(0.0));
+        e = mix(abs(d), e, vec4(known.yxwz));
+        return mix(vec4(0.0), clamp(1.3 - e / (0.04 * zc), 0.0, 1.0), vec4(known));
+    }
+    return clamp(1.3 - e / (0.04 * zc), 0.0, 1.0);
+}
+uint pack_edges(vec4 edges) {
+    uvec4 r = uvec4(roundEven(clamp(edges, 0.0, 1.0) * 3.05));
+    return r.x << 6 | r.y << 4 | r.z << 2 | r.w;
+}
+vec4 unpack_edges(uint p) {
+    return clamp(vec4(uvec4(p >> 6, p >> 4, p >> 2, p) & 3u) / 3.0 + k.inv_sharpness, 0.0, 1.0);
+}
+
+// --- addresses
+int slice_index(int slice, ivec2 texel) { return (slice * k.slice.y + texel.y) * k.slice.x + texel.x; }
+int slice_of_layer(int layer) { return two_slices != 0 && layer == 1 ? 3 : layer; }
+
+// --- depth linearisation; the literal order keeps AMD's rounding (inverse of 0 is 0)
+float linear_depth(float d) {
+    float v = k.depth_unpack.y - d;
+    float s = sign(v) * sign(v);
+    return k.depth_unpack.x * (s / ((v + s) - 1.0));
+}

@@ -1,0 +1,32 @@
+// Normals of CACAO: from the four quadrants around a point, weighted by edges; and how they are stored.
+
+// Unit vector to a neighbour; scan meets neighbours without depth (zero length), whose edge weight is zero anyway.
+vec3 towards(vec3 from, vec3 to) {
+    vec3 d = to - from;
+    return scan != 0 ? d * inversesqrt(max(dot(d, d), 1e-30)) : normalize(d);
+}
+
+vec3 normal_from_neighbours(vec4 e, vec3 c, vec3 left, vec3 right, vec3 top, vec3 bottom) {
+    vec3 l = towards(c, left), r = towards(c, right), t = towards(c, top), b = towards(c, bottom);
+    vec3 n = vec3(0.0, 0.0, -0.0005);
+    n += e.x * e.z * cross(l, t);
+    n += e.z * e.y * cross(t, r);
+    n += e.y * e.w * cross(r, b);
+    n += e.w * e.x * cross(b, l);
+    return normalize(n);
+}
+
+// Reference: SNORM8 per axis. Scan: 10 bits per axis in the same 32.
+uint pack_normal(vec3 n) {
+    float levels = scan != 0 ? 511.0 : 127.0;
+    int bits = scan != 0 ? 10 : 8;
+    ivec3 q = ivec3(roundEven(clamp(n, -1.0, 1.0) * levels));
+    uint mask = (1u << bits) - 1u;
+    return (uint(q.x) & mask) | ((uint(q.y) & mask) << bits) | ((uint(q.z) & mask) << (2 * bits));
+}
+vec3 unpack_normal(uint p) {
+    int bits = scan != 0 ? 10 : 8;
+    int q = int(p);
+    vec3 n = vec3(q << (32 - bits) >> (32 - bits), q << (32 - 2 * bits) >> (32 - bits), q << (32 - 3 * bits) >> (32 - bits));
+    return max(n * (scan != 0 ? 1.0 / 511.0 : 1.0 / 127.0), vec3(-1.0));
+}

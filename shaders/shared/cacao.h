@@ -1,0 +1,68 @@
+// What host and shaders share of CACAO: the constant block, tile sizes, and the names of specialization constants.
+// Symbols in comments are those of AMD's public documentation of FidelityFX CACAO 1.3 where it names them.
+#ifndef SCANSHADE_SHARED_CACAO_H
+#define SCANSHADE_SHARED_CACAO_H
+#include "types.h"
+SHARED_BEGIN
+
+// Per-frame constants. Lengths in view units (metres for `scan`); the view frame inside this room is x right, y UP, z forward.
+struct CacaoConstants {
+    vec2 view_mul, view_add;        // NDCToViewMul / Add: image UV -> view position at z = 1
+    vec2 slice_inv;                 // 1 / slice size
+    vec2 image_inv;                 // 1 / image size
+    vec2 depth_unpack;              // mu, alpha: z = mu / (alpha - d) for device depth
+    ivec2 image;                    // W, H
+    ivec2 slice;                    // w, h of one de-interleaved layer
+    ivec2 importance;               // size of the importance map
+    ivec2 grid;                     // size of the staged AO grid of the upsampler, halo of 2 included
+    vec2 ray_step;                  // scan: view ray change per image pixel (1/fx, -1/fy)
+    vec2 ray_base;                  // scan: view ray of pixel (0, 0)
+    float outside_depth;            // reference: what an out-of-range depth load reads after linearisation
+    float radius;                   // R, EffectRadius
+    float neg_rec_radius;           // -1 / R
+    float near_limit_rec;           // kappa, EffectSamplingRadiusNearLimitRec
+    float shadow_strength;          // already times 4.3
+    float shadow_power;
+    float shadow_clamp;
+    float fade_mul, fade_add;
+    float horizon;                  // tau, sine of the angle below which a sample does not occlude
+    float depth_offset;             // beta, DepthPrecisionOffsetMod
+    float load_counter_div;         // LoadCounterAvgDiv
+    float adaptive_limit;           // AdaptiveSampleCountLimit
+    float inv_sharpness;            // iota
+    float sigma_spatial;            // BilateralSigmaSquared
+    float sigma_depth;              // BilateralSimilarityDistanceSigma (a squared sigma)
+    float detail_strength;
+    float mip_weight;               // phi: weight of a mip sample is 1 + phi (z - nearest)^2
+    float normals_mul, normals_add; // NormalsUnpackMul / Add
+    ivec2 mip_size[4];
+    int mip_offset[4];              // first texel of slice 0 in each mip
+    vec2 rotation[20];              // (m00, m01) of PatternRotScaleMatrices[slice][phase]; m10 = m01, m11 = -m00
+};
+
+// Texels of a work group; one slice texel per thread.
+const int cacao_tile_x = 8;
+const int cacao_tile_y = 8;
+
+// Specialization constants, the same numbers in every CACAO shader.
+const int spec_scan = 0;        // 1: profile `scan`, 0: profile `reference`
+const int spec_spacing = 1;     // image pixels per AO grid pixel: 1 native, 2 downsampled
+const int spec_kernel = 2;      // q: 0 LOWEST and LOW, 1 MEDIUM, 2 HIGH, 3 HIGHEST
+const int spec_base = 3;        // 1: base pass of HIGHEST
+const int spec_two_slices = 4;  // 1: LOWEST, only slices 0 and 3
+const int spec_normals = 5;     // 1: normals supplied, 0: derived from depth
+const int spec_device_depth = 6; // 1: input is device depth (normal-Z or reverse-Z), 0: metric linear z
+const int spec_mips = 7;        // 1: depth mips are built and read
+const int spec_first = 8;       // blur: 1 for the first step
+const int spec_last = 9;        // blur: 1 for the last step
+const int spec_halo = 10;       // blur: texels of mirrored halo kept round each slice (reference)
+const int spec_resolve = 11;    // apply and stage: 0 smart, 1 plain, 2 half
+const int spec_power = 12;      // 1: output raised to 2.2 (reference, where AMD's shaders do)
+
+// Resolve kinds, values of spec_resolve.
+const int resolve_smart = 0;
+const int resolve_plain = 1;
+const int resolve_half = 2;
+
+SHARED_END
+#endif
