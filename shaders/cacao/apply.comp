@@ -20,8 +20,13 @@ float reference(ivec2 p) {
         return smart_reference(ao_value(c), unpack_edges(ao_edges(c)), vec2(p), parity);
     }
     vec2 at = vec2(p) * k.image_inv * vec2(k.slice);
-    if (resolve == resolve_half) return 0.5 * (slice_filtered(0, at) + slice_filtered(3, at));
-    return 0.25 * (slice_filtered(0, at) + slice_filtered(1, at) + slice_filtered(2, at) + slice_filtered(3, at));
+    precise float sum = slice_filtered(0, at); // sums of 8-bit steps tie; their order is part of the result
+    if (resolve == resolve_half) {
+        sum = sum + slice_filtered(3, at);
+        return 0.5 * sum;
+    }
+    for (int slice = 1; slice < 4; ++slice) sum = sum + slice_filtered(slice, at);
+    return 0.25 * sum;
 }
 
 void main() {
@@ -34,5 +39,5 @@ void main() {
         return;
     }
     float v = reference(p);
-    visibility[here] = power != 0 ? pow(v, 2.2) : v;
+    visibility[here] = stored(power != 0 ? pow(v, 2.2) : v);
 }

@@ -67,7 +67,7 @@ vec4 sample_at(Surface s, vec2 offset, int mip) {
         float z = depths[index];
         return vec4((s.ray + at * s.ray_step) * z, z, inside && z > 0.0 ? 1.0 : 0.0);
     }
-    vec2 uv = s.uv + offset * k.slice_inv;
+    precise vec2 uv = s.uv + offset * k.slice_inv;
     ivec2 size = k.mip_size[mip];
     ivec2 m = clamp(ivec2(floor(uv * vec2(size))), ivec2(0), size - 1);
     float z = depths[k.mip_offset[mip] + (s.slice * size.y + m.y) * size.x + m.x];

@@ -23,9 +23,10 @@ float box(int x, int y) {
 
 void main() {
     ivec2 t = ivec2(gl_GlobalInvocationID.xy);
-    float sum = second == 0 ? box(t.x - 2, t.y - 1) + box(t.x, t.y - 2) + box(t.x + 1, t.y) + box(t.x - 1, t.y + 1)
+    // Exact quarters of 8-bit steps tie often; the order of these sums decides them, so no compiler may change it.
+    precise float sum = second == 0 ? box(t.x - 2, t.y - 1) + box(t.x, t.y - 2) + box(t.x + 1, t.y) + box(t.x - 1, t.y + 1)
                             : box(t.x - 1, t.y - 2) + box(t.x + 1, t.y - 1) + box(t.x, t.y + 1) + box(t.x - 2, t.y);
-    float mean = sum * 0.25;
+    precise float mean = sum * 0.25;
     // Threads beyond the map count too, as AMD's do: the whole dispatch, not only the map, is summed.
     if (second != 0 && t.x % 3 == 0 && t.y % 3 == 0) atomicAdd(load_counter, uint(255.0 * clamp(mean, 0.0, 1.0) + 0.5));
     if (any(greaterThanEqual(t, k.importance))) return;

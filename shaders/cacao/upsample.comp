@@ -74,6 +74,6 @@ void main() {
                 continue;
             }
             float v = scan == 0 && resolve == resolve_half ? filtered_in_half(h + 2, shift, zf) : filtered_value(h + 2, shift, zf);
-            visibility[here] = power != 0 ? pow(v, 2.2) : v;
+            visibility[here] = scan != 0 ? v : stored(power != 0 ? pow(v, 2.2) : v);
         }
 }

@@ -20,6 +20,8 @@ uint quantised(float value, float levels) { return uint(roundEven(clamp(value, 0
 uint ao_texel(float value, uint edges) { return quantised(value, value_levels()) | (edges << 16); }
 float ao_value(uint texel) { return float(texel & 0xffffu) * (scan != 0 ? 1.0 / 65535.0 : inv_255); }
 uint ao_edges(uint texel) { return (texel >> 16) & 0xffu; }
+// The reference's output is 8-bit; rounded here, in the arithmetic its ties were broken in.
+float stored(float v) { return roundEven(255.0 * clamp(v, 0.0, 1.0)) * inv_255; }
 bool is_hole(uint texel) { return scan != 0 && texel >= hole_texel; }
 
 // --- binary16 as an exact float, independent of how a driver rounds its own conversions.

@@ -1,5 +1,5 @@
 // cacao_reference: runs the `reference` profile over a folder of AMD's own CACAO outputs and says how equal we are.
-//   cacao_reference [FOLDER] [--intermediates]      FOLDER holds manifest.json, inputs/, outputs/
+//   cacao_reference [FOLDER] [--intermediates] [--only TEXT]      FOLDER holds manifest.json, inputs/, outputs/
 // Without FOLDER: SCANSHADE_FIXTURES, else ../shared/fixtures/cacao beside the source tree. Exit 0 all cases within the
 // contract, 1 a case misses, 2 unreadable, 77 no folder.
 #include "ao/cacao/cacao.h"
@@ -148,7 +148,7 @@ std::string default_folder() {
     return SCANSHADE_SOURCE "/../shared/fixtures/cacao";
 }
 
-int check(const fs::path& folder, bool with_intermediates) {
+int check(const fs::path& folder, bool with_intermediates, const std::string& only) {
     const json manifest = json::parse(std::ifstream(folder / "manifest.json"));
     gpu::Device device(std::getenv("SCANSHADE_DEVICE") ? std::getenv("SCANSHADE_DEVICE") : "");
     fmt::print("{} on {}\n{:<52} {:>10} {:>9} {:>6}\n", folder.string(), device.info().name, "case", "within 1", "mean", "worst");
@@ -156,6 +156,7 @@ int check(const fs::path& folder, bool with_intermediates) {
     int missed = 0, cases = 0;
     for (const json& one : manifest.at("cases")) {
         const std::string id = one.at("id");
+        if (id.find(only) == std::string::npos) continue;
         during(id, [&] {
             const Input input = input_of(folder, manifest.at("inputs").at(one.at("input").get<std::string>()));
             const cv::Mat theirs = cv::imread((folder / one.at("output").get<std::string>()).string(), cv::IMREAD_UNCHANGED);
@@ -182,10 +183,11 @@ int check(const fs::path& folder, bool with_intermediates) {
 } // namespace
 
 int main(int argc, char** argv) {
-    std::string folder;
+    std::string folder, only;
     bool with_intermediates = false;
     for (int i = 1; i < argc; ++i) {
         if (std::string(argv[i]) == "--intermediates") with_intermediates = true;
+        else if (std::string(argv[i]) == "--only" && i + 1 < argc) only = argv[++i];
         else folder = argv[i];
     }
     if (folder.empty()) folder = default_folder();
@@ -194,7 +196,7 @@ int main(int argc, char** argv) {
         return argc > 1 && !folder.empty() && folder != default_folder() ? 2 : 77;
     }
     try {
-        return check(folder, with_intermediates);
+        return check(folder, with_intermediates, only);
     } catch (const std::exception& failure) {
         fmt::print(stderr, "{}\n", failure.what());
         return 2;
