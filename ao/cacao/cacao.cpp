@@ -154,19 +154,20 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
     const std::size_t all_mips = static_cast<std::size_t>(k.mip_offset[3]) + 4 * texels(k.mip_size[3]);
     const std::size_t haloed = 4 * texels({k.slice.x + 2 * halo, k.slice.y + 2 * halo});
     CacaoTables tables;
+    const auto floats = gpu::BufferRow::Texels::r32f, pairs = gpu::BufferRow::Texels::rg32f, words = gpu::BufferRow::Texels::r32ui;
     tables.buffers = {
-        {"depth in", texels(k.image) * 4, Host::upload},
-        {"normals in", normals_supplied ? texels(k.image) * 12 : 4, normals_supplied ? Host::upload : Host::none},
-        {"depths", (mips ? all_mips : slices) * 4},
-        {"normals", slices * 4},
-        {"ping", slices * 4},
-        {"pong", slices * 4},
-        {"importance", highest ? texels(k.importance) * 4 : 4},
-        {"importance pong", highest ? texels(k.importance) * 4 : 4},
-        {"load counter", 4},
-        {"blur a", !scan && n > 1 ? haloed * 4 : 4},
-        {"blur b", !scan && n > 2 ? haloed * 4 : 4},
-        {"staged", options.downsampled ? texels(k.grid) * 8 : 8},
+        {"depth in", texels(k.image) * 4, Host::upload, floats},
+        {"normals in", normals_supplied ? texels(k.image) * 12 : 4, normals_supplied ? Host::upload : Host::none, floats},
+        {"depths", (mips ? all_mips : slices) * 4, Host::none, floats},
+        {"normals", slices * 4, Host::none, words},
+        {"ping", slices * 4, Host::none, words},
+        {"pong", slices * 4, Host::none, words},
+        {"importance", highest ? texels(k.importance) * 4 : 4, Host::none, words},
+        {"importance pong", highest ? texels(k.importance) * 4 : 4, Host::none, words},
+        {"load counter", 4, Host::none, words},
+        {"blur a", !scan && n > 1 ? haloed * 4 : 4, Host::none, words},
+        {"blur b", !scan && n > 2 ? haloed * 4 : 4, Host::none, words},
+        {"staged", options.downsampled ? texels(k.grid) * 8 : 8, Host::none, pairs},
         {"visibility", texels(k.image) * 4, Host::download},
     };
 
@@ -191,7 +192,7 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
         add("mips", "cacao/mips", {cacao_depth_in}, {cacao_depths}, {groups(k.slice.x, 8), k.slice.y}, 4);
     }
     // Slots a configuration does not read are filled with a buffer it reads anyway.
-    std::vector<int> inputs{cacao_depths, cacao_normals, cacao_depths, cacao_depths, cacao_depths};
+    std::vector<int> inputs{cacao_depths, cacao_normals, cacao_normals, cacao_normals, cacao_normals};
     if (highest) {
         tables.passes.push_back({"clear counter", "", {}, {cacao_counter}, {1, 1, 1}, {}});
         add("base", "cacao/generate", inputs, {cacao_pong}, k.slice, 4, {{shared::spec_base, 1}, {shared::spec_mips, 1}});

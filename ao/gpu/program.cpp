@@ -24,6 +24,7 @@ constexpr auto shared_memory = Memory::eDeviceLocal | Memory::eHostVisible | Mem
 struct BoundBuffer {
     vk::raii::DeviceMemory memory = nullptr;
     vk::raii::Buffer buffer = nullptr;
+    vk::raii::BufferView view = nullptr; // texel buffers only
     std::byte* mapped = nullptr;
     std::size_t bytes = 0;
 
@@ -42,6 +43,14 @@ struct BoundBuffer {
         if (flags & Memory::eHostVisible) mapped = static_cast<std::byte*>(memory.mapMemory(0, size));
     }
 };
+
+vk::Format format_of(BufferRow::Texels texels) {
+    switch (texels) {
+    case BufferRow::Texels::r32f: return vk::Format::eR32Sfloat;
+    case BufferRow::Texels::rg32f: return vk::Format::eR32G32Sfloat;
+    default: return vk::Format::eR32Uint;
+    }
+}
 
 /// Which buffers were touched since the last barrier, to place barriers only where one is needed.
 struct Hazards {
@@ -124,10 +133,15 @@ struct Program::State {
         staging.resize(rows.size());
         for (std::size_t i = 0; i < rows.size(); ++i) {
             const BufferRow& row = rows[i];
-            const auto usage = Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst;
+            auto usage = Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst;
+            if (row.texels != BufferRow::Texels::none) usage |= Usage::eUniformTexelBuffer;
             buffers.push_back(during(fmt::format("buffer {} of {} bytes", row.name, row.bytes), [&] {
                 return BoundBuffer(gpu, row.bytes, usage, {shared_memory, Memory::eDeviceLocal});
             }));
+            if (row.texels != BufferRow::Texels::none) {
+                buffers.back().view =
+                    gpu.device.createBufferView({{}, *buffers.back().buffer, format_of(row.texels), 0, VK_WHOLE_SIZE});
+            }
             if (row.host == BufferRow::Host::none || buffers.back().mapped) continue;
             const vk::MemoryPropertyFlags visible = Memory::eHostVisible | Memory::eHostCoherent;
             const bool upload = row.host == BufferRow::Host::upload;
@@ -138,6 +152,11 @@ struct Program::State {
                                 {Memory::eHostVisible | Memory::eHostCoherent});
     }
 
+    [[nodiscard]] vk::DescriptorType read_type(int buffer) const {
+        return rows[buffer].texels == BufferRow::Texels::none ? vk::DescriptorType::eStorageBuffer
+                                                              : vk::DescriptorType::eUniformTexelBuffer;
+    }
+
     Pipeline make_pipeline(const PassRow& pass) {
         Pipeline made;
         if (pass.shader.empty()) return made;
@@ -145,7 +164,7 @@ struct Program::State {
         const auto add = [&](std::uint32_t binding, vk::DescriptorType type) {
             bindings.emplace_back(binding, type, 1, vk::ShaderStageFlagBits::eCompute);
         };
-        for (std::size_t i = 0; i < pass.reads.size(); ++i) add(static_cast<std::uint32_t>(i), vk::DescriptorType::eStorageBuffer);
+        for (std::size_t i = 0; i < pass.reads.size(); ++i) add(static_cast<std::uint32_t>(i), read_type(pass.reads[i]));
         for (std::size_t i = 0; i < pass.writes.size(); ++i)
             add(first_write_binding + static_cast<std::uint32_t>(i), vk::DescriptorType::eStorageBuffer);
         add(constants_binding, vk::DescriptorType::eUniformBuffer);
@@ -174,10 +193,10 @@ struct Program::State {
         std::vector<vk::WriteDescriptorSet> writes;
         const auto add = [&](std::uint32_t binding, const BoundBuffer& buffer, vk::DescriptorType type) {
             infos.emplace_back(*buffer.buffer, 0, VK_WHOLE_SIZE);
-            writes.emplace_back(nullptr, binding, 0, 1, type, nullptr, &infos.back());
+            writes.emplace_back(nullptr, binding, 0, 1, type, nullptr, &infos.back(), &*buffer.view);
         };
         std::uint32_t binding = 0;
-        for (int i : pass.reads) add(binding++, buffers[i], vk::DescriptorType::eStorageBuffer);
+        for (int i : pass.reads) add(binding++, buffers[i], read_type(i));
         binding = first_write_binding;
         for (int i : pass.writes) add(binding++, buffers[i], vk::DescriptorType::eStorageBuffer);
         add(constants_binding, constants, vk::DescriptorType::eUniformBuffer);

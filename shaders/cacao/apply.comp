@@ -7,8 +7,8 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(constant_id = spec_resolve) const int resolve = resolve_smart;
 layout(constant_id = spec_power) const int power = 0;
-layout(binding = 0, scalar) readonly buffer Ao { uint ao[]; };
-layout(binding = 1, scalar) readonly buffer DepthIn { float depth_in[]; };
+layout(binding = 0) uniform usamplerBuffer ao;
+layout(binding = 1) uniform samplerBuffer depth_in;
 layout(binding = 16, scalar) writeonly buffer Out { float visibility[]; };
 
 #include "lib/cacao_resolve.glsl"
@@ -35,7 +35,7 @@ void main() {
     int here = p.y * k.image.x + p.x;
     if (scan != 0) {
         vec2 v = resolve == resolve_smart ? smart_scan(p) : plain_scan(p);
-        visibility[here] = v.y > 0.0 && depth_in[here] > 0.0 ? v.x : uintBitsToFloat(0x7fc00000u);
+        visibility[here] = v.y > 0.0 && texelFetch(depth_in, here).x > 0.0 ? v.x : uintBitsToFloat(0x7fc00000u);
         return;
     }
     float v = reference(p);

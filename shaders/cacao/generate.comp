@@ -12,11 +12,11 @@ layout(local_size_x = cacao_tile_x, local_size_y = cacao_tile_y) in;
 layout(constant_id = spec_base) const int base = 0;
 layout(constant_id = spec_mips) const int mips = 0;
 
-layout(binding = 0, scalar) readonly buffer Depths { float depths[]; };
-layout(binding = 1, scalar) readonly buffer Normals { uint normals[]; };
-layout(binding = 2, scalar) readonly buffer BaseResult { uint base_result[]; };
-layout(binding = 3, scalar) readonly buffer Importance { uint importance[]; };
-layout(binding = 4, scalar) readonly buffer LoadCounter { uint load_counter; };
+layout(binding = 0) uniform samplerBuffer depths;
+layout(binding = 1) uniform usamplerBuffer normals;
+layout(binding = 2) uniform usamplerBuffer base_result;
+layout(binding = 3) uniform usamplerBuffer importance;
+layout(binding = 4) uniform usamplerBuffer load_counter;
 layout(binding = 16, scalar) writeonly buffer Ao { uint ao[]; };
 
 const bool detailed = kernel >= 1 && base == 0; // depth edges, edge fade-out, detail shadows
@@ -64,13 +64,13 @@ vec4 sample_at(Surface s, vec2 offset, int mip) {
             t = clamp(t, ivec2(0), k.slice - 1);
             index = (s.slice * k.slice.y + t.y) * k.slice.x + t.x;
         }
-        float z = depths[index];
+        float z = texelFetch(depths, index).x;
         return vec4((s.ray + at * s.ray_step) * z, z, inside && z > 0.0 ? 1.0 : 0.0);
     }
     precise vec2 uv = s.uv + offset * k.slice_inv;
     ivec2 size = k.mip_size[mip];
     ivec2 m = clamp(ivec2(floor(uv * vec2(size))), ivec2(0), size - 1);
-    float z = depths[k.mip_offset[mip] + (s.slice * size.y + m.y) * size.x + m.x];
+    float z = texelFetch(depths, k.mip_offset[mip] + (s.slice * size.y + m.y) * size.x + m.x).x;
     return vec4((k.view_mul * uv + k.view_add) * z, z, 1.0);
 }
 
@@ -88,15 +88,18 @@ void tap(Surface s, vec4 row, bool weighted, inout Sum sum) {
     }
 }
 
+#define TAP(i, dx, dy, w, bias) tap(s, vec4(dx, dy, w, bias), true, sum);
+#define EXTRA_TAP(i, dx, dy, w, bias) if (i < end) tap(s, vec4(dx, dy, w, bias), false, sum);
+
 vec4 neighbour_depths(int slice, ivec2 t) {
     ivec2 low = max(t - 1, ivec2(0)), high = min(t + 1, k.slice - 1);
-    vec4 z = vec4(depths[slice_index(slice, ivec2(low.x, t.y))], depths[slice_index(slice, ivec2(high.x, t.y))],
-                  depths[slice_index(slice, ivec2(t.x, low.y))], depths[slice_index(slice, ivec2(t.x, high.y))]);
+    vec4 z = vec4(texelFetch(depths, slice_index(slice, ivec2(low.x, t.y))).x, texelFetch(depths, slice_index(slice, ivec2(high.x, t.y))).x,
+                  texelFetch(depths, slice_index(slice, ivec2(t.x, low.y))).x, texelFetch(depths, slice_index(slice, ivec2(t.x, high.y))).x);
     if (scan != 0) z *= vec4(t.x > 0, t.x + 1 < k.slice.x, t.y > 0, t.y + 1 < k.slice.y);
     return z;
 }
 
-vec3 normal_at(int slice, ivec2 t) { return unpack_normal(normals[slice_index(slice, t)]); }
+vec3 normal_at(int slice, ivec2 t) { return unpack_normal(texelFetch(normals, slice_index(slice, t)).x); }
 
 // Edges where normals turn away. Outside the slice there is no normal: the reference halves that edge.
 vec4 normal_edges(vec3 n, int slice, ivec2 t) {
@@ -121,8 +124,8 @@ float detail(Surface s, vec2 step_m, vec4 z, vec4 edges) {
 float importance_at(vec2 uv) {
     ivec2 c = filter_coordinate(uv, k.importance);
     Footprint f = footprint(c, k.importance);
-    return filtered(f, importance[f.low.y * k.importance.x + f.low.x], importance[f.low.y * k.importance.x + f.high.x],
-                    importance[f.high.y * k.importance.x + f.low.x], importance[f.high.y * k.importance.x + f.high.x]);
+    return filtered(f, texelFetch(importance, f.low.y * k.importance.x + f.low.x).x, texelFetch(importance, f.low.y * k.importance.x + f.high.x).x,
+                    texelFetch(importance, f.high.y * k.importance.x + f.low.x).x, texelFetch(importance, f.high.y * k.importance.x + f.high.x).x);
 }
 
 void main() {
@@ -132,7 +135,7 @@ void main() {
     s.texel = t;
     s.slice = slice_of_layer(int(gl_GlobalInvocationID.z));
     int here = slice_index(s.slice, t);
-    float zc = depths[here];
+    float zc = texelFetch(depths, here).x;
     if (scan != 0 && !(zc > 0.0)) {
         ao[here] = hole_texel;
         return;
@@ -170,17 +173,19 @@ void main() {
     if (kernel == 3 && base == 0) {
         float wanted = importance_at(s.uv + vec2(parity) * k.slice_inv);
         sum.obscurance *= 5.0 / 32.0 + wanted * (27.0 / 32.0);
-        uint b = base_result[here];
+        uint b = texelFetch(base_result, here).x;
         sum.weight = weight_range * float(b >> 16) * (1.0 / weight_levels());
         if (scan == 0) sum.weight = weight_range * (float(b >> 16) * inv_255);
         sum.obscurance += ao_value(b) * sum.weight;
-        float average = float(load_counter) * k.load_counter_div;
+        float average = float(texelFetch(load_counter, 0).x) * k.load_counter_div;
         wanted *= clamp(k.adaptive_limit / average, 0.0, 1.0);
         int end = min(31, int(27.0 * wanted + 1.5) + 5);
-        for (int i = 5; i < end; ++i) tap(s, pattern[i], false, sum);
+        CACAO_PATTERN_5_12(EXTRA_TAP)
+        CACAO_PATTERN_12_31(EXTRA_TAP)
     } else {
-        const int taps = kernel == 0 ? 3 : kernel == 2 ? 12 : 5;
-        for (int i = 0; i < taps; ++i) tap(s, pattern[i], true, sum);
+        CACAO_PATTERN_0_3(TAP)
+        if (kernel >= 1) { CACAO_PATTERN_3_5(TAP) }
+        if (kernel == 2) { CACAO_PATTERN_5_12(TAP) }
     }
 
     float o = scan != 0 ? sum.obscurance / max(sum.weight, 1e-6) : sum.obscurance / sum.weight;

@@ -7,13 +7,13 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(constant_id = spec_last) const int second = 0;
-layout(binding = 0, scalar) readonly buffer From { uint from[]; };
+layout(binding = 0) uniform usamplerBuffer from;
 layout(binding = 16, scalar) writeonly buffer To { uint to[]; };
 layout(binding = 17, scalar) buffer LoadCounter { uint load_counter; };
 
 uint read(int x, int y) {
     ivec2 t = clamp(ivec2(x, y), ivec2(0), k.importance - 1);
-    return from[t.y * k.importance.x + t.x];
+    return texelFetch(from, t.y * k.importance.x + t.x).x;
 }
 
 // Mean of the 2x2 texels whose upper left is (x, y), in the filter's own 8-bit steps.

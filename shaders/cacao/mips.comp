@@ -8,7 +8,7 @@
 layout(local_size_x = 8, local_size_y = 1) in;
 layout(constant_id = spec_device_depth) const int device_depth = 0;
 
-layout(binding = 0, scalar) readonly buffer DepthIn { float depth_in[]; };
+layout(binding = 0) uniform samplerBuffer depth_in;
 layout(binding = 16, scalar) writeonly buffer Depths { float depths[]; };
 
 // Mean of what lies on the nearest surface. Scan leaves holes out and yields a hole when all four are.
@@ -43,7 +43,7 @@ void main() {
                 ivec2 t = 8 * block + 2 * ivec2(i, j) + ivec2(n >> 1, n & 1);
                 ivec2 p = spacing * (2 * t + origin);
                 ivec2 q = min(p, k.image - 1);
-                float d = depth_in[q.y * k.image.x + q.x];
+                float d = texelFetch(depth_in, q.y * k.image.x + q.x).x;
                 if (device_depth != 0) d = linear_depth(d);
                 z0[n] = scan != 0 && q != p ? 0.0 : d;
             }

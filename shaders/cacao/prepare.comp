@@ -10,13 +10,13 @@ layout(local_size_x = cacao_tile_x, local_size_y = cacao_tile_y) in;
 layout(constant_id = spec_normals) const int supplied = 0;
 layout(constant_id = spec_device_depth) const int device_depth = 0;
 
-layout(binding = 0, scalar) readonly buffer DepthIn { float depth_in[]; };
-layout(binding = 1, scalar) readonly buffer NormalsIn { vec3 normals_in[]; };
+layout(binding = 0) uniform samplerBuffer depth_in;
+layout(binding = 1) uniform samplerBuffer normals_in;
 layout(binding = 16, scalar) writeonly buffer Depths { float depths[]; };
 layout(binding = 17, scalar) writeonly buffer Normals { uint normals[]; };
 
 float depth_at(ivec2 p) {
-    float d = depth_in[p.y * k.image.x + p.x];
+    float d = texelFetch(depth_in, p.y * k.image.x + p.x).x;
     return device_depth != 0 ? linear_depth(d) : d;
 }
 bool inside(ivec2 p) { return all(greaterThanEqual(p, ivec2(0))) && all(lessThan(p, k.image)); }
@@ -30,7 +30,9 @@ float neighbour(ivec2 p) {
 }
 
 vec3 supplied_normal(ivec2 p) {
-    vec3 n = (inside(p) ? normals_in[p.y * k.image.x + p.x] : vec3(0.0)) * k.normals_mul + k.normals_add;
+    int at = 3 * (p.y * k.image.x + p.x);
+    vec3 given = vec3(texelFetch(normals_in, at).x, texelFetch(normals_in, at + 1).x, texelFetch(normals_in, at + 2).x);
+    vec3 n = (inside(p) ? given : vec3(0.0)) * k.normals_mul + k.normals_add;
     return n * vec3(1.0, -1.0, 1.0); // camera space has y down, this room y up
 }
 

@@ -8,15 +8,15 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(constant_id = spec_resolve) const int resolve = resolve_smart;
 layout(constant_id = spec_power) const int power = 0;
 layout(constant_id = spec_device_depth) const int device_depth = 0;
-layout(binding = 0, scalar) readonly buffer Staged { vec2 staged[]; };
-layout(binding = 1, scalar) readonly buffer DepthIn { float depth_in[]; };
+layout(binding = 0) uniform samplerBuffer staged;
+layout(binding = 1) uniform samplerBuffer depth_in;
 layout(binding = 16, scalar) writeonly buffer Out { float visibility[]; };
 
 const float self_weight = 1e-3;
 
 float full_depth(ivec2 p) {
     if (any(greaterThanEqual(p, k.image))) return k.outside_depth;
-    float d = depth_in[p.y * k.image.x + p.x];
+    float d = texelFetch(depth_in, p.y * k.image.x + p.x).x;
     return device_depth != 0 ? linear_depth(d) : d;
 }
 
@@ -25,11 +25,11 @@ float filtered_in_half(ivec2 g, vec2 shift, float zf) {
     const float c = -half_even(1.44269504);
     float rs = half_even(1.0 / half_even(k.sigma_spatial)), rd = half_even(1.0 / half_even(k.sigma_depth));
     float total = half_even(self_weight);
-    float sum = half_even(total * staged[g.y * k.grid.x + g.x].x);
+    float sum = half_even(total * texelFetch(staged, g.y * k.grid.x + g.x).x);
     zf = half_even(zf);
     for (int p = -2; p <= 2; ++p)
         for (int r = -2; r <= 2; ++r) {
-            vec2 s = staged[(g.y + r) * k.grid.x + g.x + p];
+            vec2 s = texelFetch(staged, (g.y + r) * k.grid.x + g.x + p).xy;
             vec2 d = vec2(p, r) - shift;
             float dz = half_even(zf - s.y);
             float a = half_even(half_even(half_even(d.x * d.x + d.y * d.y) * c) * rs);
@@ -43,12 +43,12 @@ float filtered_in_half(ivec2 g, vec2 shift, float zf) {
 
 float filtered_value(ivec2 g, vec2 shift, float zf) {
     float sigma_depth = k.sigma_depth;
-    vec2 own = staged[g.y * k.grid.x + g.x];
+    vec2 own = texelFetch(staged, g.y * k.grid.x + g.x).xy;
     float total = scan != 0 && !(own.y > 0.0) ? 0.0 : self_weight;
     float sum = total * own.x;
     for (int p = -2; p <= 2; ++p)
         for (int r = -2; r <= 2; ++r) {
-            vec2 s = staged[(g.y + r) * k.grid.x + g.x + p];
+            vec2 s = texelFetch(staged, (g.y + r) * k.grid.x + g.x + p).xy;
             vec2 d = vec2(p, r) - shift;
             float dz = zf - s.y;
             float w = exp(-dot(d, d) / k.sigma_spatial) * exp(-dz * dz / sigma_depth);

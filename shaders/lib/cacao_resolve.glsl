@@ -4,8 +4,8 @@
 // Reference: bilinear read of one slice at slice-texel coordinates (centres at one half).
 float slice_filtered(int slice, vec2 at) {
     Footprint f = footprint(filter_coordinate(at * k.slice_inv, k.slice), k.slice);
-    return filtered(f, ao[slice_index(slice, f.low)] & 0xffffu, ao[slice_index(slice, ivec2(f.high.x, f.low.y))] & 0xffffu,
-                    ao[slice_index(slice, ivec2(f.low.x, f.high.y))] & 0xffffu, ao[slice_index(slice, f.high)] & 0xffffu);
+    return filtered(f, texelFetch(ao, slice_index(slice, f.low)).x & 0xffffu, texelFetch(ao, slice_index(slice, ivec2(f.high.x, f.low.y))).x & 0xffffu,
+                    texelFetch(ao, slice_index(slice, ivec2(f.low.x, f.high.y))).x & 0xffffu, texelFetch(ao, slice_index(slice, f.high)).x & 0xffffu);
 }
 
 // Reference: own texel plus one filtered value from each other slice, pulled away from edges. `at` is the grid pixel as
@@ -21,7 +21,7 @@ float smart_reference(float own, vec4 e, vec2 at, ivec2 parity) {
     return (own + wh * h + wv * v + wd * d) / (1.0 + wh + wv + wd);
 }
 
-uint grid_texel(ivec2 p) { return ao[slice_index((p.x & 1) + 2 * (p.y & 1), p >> 1)]; }
+uint grid_texel(ivec2 p) { return texelFetch(ao, slice_index((p.x & 1) + 2 * (p.y & 1), p >> 1)).x; }
 bool in_grid(ivec2 p) { return all(greaterThanEqual(p, ivec2(0))) && all(lessThan(p, 2 * k.slice)); }
 
 // Scan: the same weights centred on the pixel: neighbours left/right, above/below and diagonal, holes left out.
