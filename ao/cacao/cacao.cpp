@@ -49,12 +49,11 @@ void set_sizes(CacaoConstants& k, const CacaoOptions& options, cv::Size image) {
     k.grid = {halved(image.width) + 4, halved(image.height) + 4};
     k.slice_inv = {1.0F / static_cast<float>(k.slice.x), 1.0F / static_cast<float>(k.slice.y)};
     k.image_inv = {1.0F / static_cast<float>(image.width), 1.0F / static_cast<float>(image.height)};
-    int offset = 0;
-    for (int m = 0; m < 4; ++m) {
-        k.mip_size[m] = {std::max(1, k.slice.x >> m), std::max(1, k.slice.y >> m)};
-        k.mip_offset[m] = offset;
-        offset += 4 * k.mip_size[m].x * k.mip_size[m].y;
-    }
+    // Mip starts by shifts alone: with a stride of 24s and rows of 8s, 4/3 of mip 0 is divisible by 64.
+    k.depth_stride = 24 * groups(k.slice.x, 24);
+    const int padded = k.depth_stride * 8 * groups(k.slice.y, 8);
+    k.depth_mips = padded / 3 * 4;
+    k.depth_pitch = k.depth_mips - (k.depth_mips >> 8);
 }
 
 void set_camera(CacaoConstants& k, const Pinhole& camera) {
@@ -132,6 +131,11 @@ CacaoConstants constants_from(const CacaoOptions& options, const Pinhole& camera
     k.detail_strength = options.detail_strength;
     k.normals_mul = options.normals_mul;
     k.normals_add = options.normals_add;
+    for (int odd = 0; odd < 2; ++odd)
+        for (int tap = -2; tap <= 2; ++tap) {
+            const float d = static_cast<float>(tap) - 0.5F * static_cast<float>(odd);
+            k.spatial[5 * odd + tap + 2] = std::exp(-d * d / options.sigma_squared);
+        }
     for (int a = 0; a < 4; ++a)
         for (int phase = 0; phase < 5; ++phase) k.rotation[5 * a + phase] = rotation(a, phase);
     return k;
@@ -151,14 +155,13 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
     const bool power = !scan && (options.downsampled ? !two_slices : resolve == shared::resolve_smart);
 
     const std::size_t slices = 4 * texels(k.slice);
-    const std::size_t all_mips = static_cast<std::size_t>(k.mip_offset[3]) + 4 * texels(k.mip_size[3]);
     const std::size_t haloed = 4 * texels({k.slice.x + 2 * halo, k.slice.y + 2 * halo});
     CacaoTables tables;
     const auto floats = gpu::BufferRow::Texels::r32f, pairs = gpu::BufferRow::Texels::rg32f, words = gpu::BufferRow::Texels::r32ui;
     tables.buffers = {
         {"depth in", texels(k.image) * 4, Host::upload, floats},
         {"normals in", normals_supplied ? texels(k.image) * 12 : 4, normals_supplied ? Host::upload : Host::none, floats},
-        {"depths", (mips ? all_mips : slices) * 4, Host::none, floats},
+        {"depths", static_cast<std::size_t>(k.depth_pitch) * 16, Host::none, floats},
         {"normals", slices * 4, Host::none, words},
         {"ping", slices * 4, Host::none, words},
         {"pong", slices * 4, Host::none, words},
@@ -276,6 +279,20 @@ AoMap Cacao::compute(const View& view) {
     return ao;
 }
 
+/// The four slices of one mip, without the padding of their buffer.
+Intermediate Cacao::depth_slices(int mip) {
+    const CacaoConstants& k = constants_;
+    const int width = std::max(1, k.slice.x >> mip), height = std::max(1, k.slice.y >> mip);
+    Intermediate slices{fmt::format("depth_mip{}", mip), "f4", {4, height, width}, {}};
+    const auto bytes = program_->read_back(cacao_depths);
+    for (int a = 0; a < 4; ++a)
+        for (int y = 0; y < height; ++y) {
+            const int first = a * k.depth_pitch + k.depth_mips - (k.depth_mips >> (2 * mip)) + y * (k.depth_stride >> mip);
+            slices.data.insert(slices.data.end(), bytes.begin() + 4L * first, bytes.begin() + 4L * (first + width));
+        }
+    return slices;
+}
+
 std::vector<Intermediate> Cacao::intermediates() {
     std::vector<Intermediate> all;
     if (!program_) return all;
@@ -291,8 +308,7 @@ std::vector<Intermediate> Cacao::intermediates() {
         all.push_back({std::move(name), std::move(type), std::move(shape), words(buffer, static_cast<std::size_t>(first), count)});
     };
     const CacaoConstants& k = constants_;
-    for (int m = 0; m < (level >= CacaoQuality::high ? 4 : 1); ++m)
-        add(fmt::format("depth_mip{}", m), "f4", {4, k.mip_size[m].y, k.mip_size[m].x}, cacao_depths, k.mip_offset[m]);
+    for (int m = 0; m < (level >= CacaoQuality::high ? 4 : 1); ++m) all.push_back(depth_slices(m));
     const std::vector<int> slices{4, k.slice.y, k.slice.x};
     add("normals", "u4", slices, cacao_normals);
     if (level == CacaoQuality::highest) {

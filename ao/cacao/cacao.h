@@ -87,6 +87,7 @@ class Cacao final : public Method {
 
   private:
     void prepare(const View& view);
+    Intermediate depth_slices(int mip);
 
     gpu::Device& device_;
     CacaoOptions options_;

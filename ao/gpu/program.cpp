@@ -134,7 +134,7 @@ struct Program::State {
         for (std::size_t i = 0; i < rows.size(); ++i) {
             const BufferRow& row = rows[i];
             auto usage = Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst;
-            if (row.texels != BufferRow::Texels::none) usage |= Usage::eUniformTexelBuffer;
+            if (row.texels != BufferRow::Texels::none) usage |= Usage::eUniformTexelBuffer | Usage::eStorageTexelBuffer;
             buffers.push_back(during(fmt::format("buffer {} of {} bytes", row.name, row.bytes), [&] {
                 return BoundBuffer(gpu, row.bytes, usage, {shared_memory, Memory::eDeviceLocal});
             }));
@@ -152,6 +152,10 @@ struct Program::State {
                                 {Memory::eHostVisible | Memory::eHostCoherent});
     }
 
+    [[nodiscard]] vk::DescriptorType write_type(int buffer) const {
+        return rows[buffer].texels == BufferRow::Texels::none ? vk::DescriptorType::eStorageBuffer
+                                                              : vk::DescriptorType::eStorageTexelBuffer;
+    }
     [[nodiscard]] vk::DescriptorType read_type(int buffer) const {
         return rows[buffer].texels == BufferRow::Texels::none ? vk::DescriptorType::eStorageBuffer
                                                               : vk::DescriptorType::eUniformTexelBuffer;
@@ -166,7 +170,7 @@ struct Program::State {
         };
         for (std::size_t i = 0; i < pass.reads.size(); ++i) add(static_cast<std::uint32_t>(i), read_type(pass.reads[i]));
         for (std::size_t i = 0; i < pass.writes.size(); ++i)
-            add(first_write_binding + static_cast<std::uint32_t>(i), vk::DescriptorType::eStorageBuffer);
+            add(first_write_binding + static_cast<std::uint32_t>(i), write_type(pass.writes[i]));
         add(constants_binding, vk::DescriptorType::eUniformBuffer);
         made.set = gpu.device.createDescriptorSetLayout({vk::DescriptorSetLayoutCreateFlagBits::ePushDescriptorKHR, bindings});
         made.layout = gpu.device.createPipelineLayout(vk::PipelineLayoutCreateInfo({}, *made.set));
@@ -198,7 +202,7 @@ struct Program::State {
         std::uint32_t binding = 0;
         for (int i : pass.reads) add(binding++, buffers[i], read_type(i));
         binding = first_write_binding;
-        for (int i : pass.writes) add(binding++, buffers[i], vk::DescriptorType::eStorageBuffer);
+        for (int i : pass.writes) add(binding++, buffers[i], write_type(i));
         add(constants_binding, constants, vk::DescriptorType::eUniformBuffer);
         commands.pushDescriptorSetKHR(vk::PipelineBindPoint::eCompute, *pipeline.layout, 0, writes);
     }

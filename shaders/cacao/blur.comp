@@ -10,7 +10,7 @@ layout(constant_id = spec_first) const int first = 0;
 layout(constant_id = spec_last) const int last = 0;
 layout(constant_id = spec_halo) const int halo = 0;
 layout(binding = 0) uniform usamplerBuffer from;
-layout(binding = 16, scalar) writeonly buffer To { uint to[]; };
+layout(binding = 16, r32ui) uniform writeonly uimageBuffer to;
 
 int mirrored(int i, int size) {
     int m = i % (2 * size);
@@ -41,7 +41,7 @@ void main() {
     int slice = slice_of_layer(int(gl_GlobalInvocationID.z));
     uint c = read(slice, t);
     if (is_hole(c)) {
-        to[slice_index(slice, t)] = c;
+        imageStore(to, slice_index(slice, t), uvec4(c));
         return;
     }
     uint n[4] = {read(slice, t - ivec2(1, 0)), read(slice, t + ivec2(1, 0)), read(slice, t - ivec2(0, 1)), read(slice, t + ivec2(0, 1))};
@@ -53,12 +53,12 @@ void main() {
     float sum = 0.5 * value(c) + e.x * value(n[0]) + e.y * value(n[1]) + e.z * value(n[2]) + e.w * value(n[3]);
     float v = sum / (0.5 + e.x + e.y + e.z + e.w);
     if (scan != 0) {
-        to[slice_index(slice, t)] = ao_texel(v, ao_edges(c));
+        imageStore(to, slice_index(slice, t), uvec4(ao_texel(v, ao_edges(c))));
         return;
     }
     v = half_even(v);
     if (last == 0)
-        to[index_between_steps(slice, t)] = (packHalf2x16(vec2(v, 0.0)) & 0xffffu) | (c & 0xffff0000u);
+        imageStore(to, index_between_steps(slice, t), uvec4((packHalf2x16(vec2(v, 0.0)) & 0xffffu) | (c & 0xffff0000u)));
     else if (all(greaterThanEqual(t, ivec2(0))) && all(lessThan(t, k.slice)))
-        to[slice_index(slice, t)] = ao_texel(v, ao_edges(c));
+        imageStore(to, slice_index(slice, t), uvec4(ao_texel(v, ao_edges(c))));
 }

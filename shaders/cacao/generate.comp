@@ -17,7 +17,7 @@ layout(binding = 1) uniform usamplerBuffer normals;
 layout(binding = 2) uniform usamplerBuffer base_result;
 layout(binding = 3) uniform usamplerBuffer importance;
 layout(binding = 4) uniform usamplerBuffer load_counter;
-layout(binding = 16, scalar) writeonly buffer Ao { uint ao[]; };
+layout(binding = 16, r32ui) uniform writeonly uimageBuffer ao;
 
 const bool detailed = kernel >= 1 && base == 0; // depth edges, edge fade-out, detail shadows
 const bool halo_weighted = kernel >= 1;
@@ -27,8 +27,9 @@ struct Surface {
     ivec2 texel;
     int slice;
     vec2 uv;        // reference: of the texel in its slice
-    vec2 ray;       // scan: view ray of the pixel itself
+    vec2 ray;       // scan: view ray of the slice's texel (0, 0)
     vec2 ray_step;  // scan: its change per slice texel
+    int depth_base; // scan: first texel of the slice's depths, mips counted from their far end
     vec3 point;     // moved a little towards the camera
     vec3 normal;
     mat2 rotation;  // pattern rotation, scaled to texels
@@ -51,41 +52,41 @@ vec4 sample_at(Surface s, vec2 offset, int mip) {
     if (scan != 0) {
         ivec2 t = s.texel + ivec2(offset);
         bool inside = uint(t.x) < uint(k.slice.x) && uint(t.y) < uint(k.slice.y);
-        vec2 at = offset;
         int index;
+        vec2 at;
         if (mips != 0) {
             // The tap looks from the centre of the mip texel it reads, so that slopes stay planes.
-            ivec2 size = k.mip_size[mip];
-            ivec2 m = clamp(t >> mip, ivec2(0), size - 1);
-            float scale = float(1 << mip);
-            at = (vec2(m) + 0.5) * scale - 0.5 - vec2(s.texel);
-            index = k.mip_offset[mip] + (s.slice * size.y + m.y) * size.x + m.x;
+            ivec2 m = t >> mip;
+            index = s.depth_base - (k.depth_mips >> (2 * mip)) + m.y * (k.depth_stride >> mip) + m.x;
+            at = vec2(m << mip) + float((1 << mip) - 1) * 0.5;
         } else {
-            t = clamp(t, ivec2(0), k.slice - 1);
-            index = (s.slice * k.slice.y + t.y) * k.slice.x + t.x;
+            index = s.depth_base + t.y * k.depth_stride + t.x;
+            at = vec2(t);
         }
-        float z = texelFetch(depths, index).x;
+        float z = texelFetch(depths, inside ? index : 0).x;
         return vec4((s.ray + at * s.ray_step) * z, z, inside && z > 0.0 ? 1.0 : 0.0);
     }
     precise vec2 uv = s.uv + offset * k.slice_inv;
-    ivec2 size = k.mip_size[mip];
+    ivec2 size = mip_size(mip);
     ivec2 m = clamp(ivec2(floor(uv * vec2(size))), ivec2(0), size - 1);
-    float z = texelFetch(depths, k.mip_offset[mip] + (s.slice * size.y + m.y) * size.x + m.x).x;
+    float z = texelFetch(depths, depth_index(s.slice, mip, m)).x;
     return vec4((k.view_mul * uv + k.view_add) * z, z, 1.0);
+}
+
+// Samples far in front of the surface count less: that is what keeps halos off whatever stands before a wall.
+void add(Surface s, vec4 seen, float weight, inout Sum sum) {
+    vec3 d = seen.xyz - s.point;
+    if (halo_weighted) weight *= 0.6 * clamp(2.0 + k.neg_rec_radius * max(0.0, -d.z), 0.0, 1.0) + 0.4;
+    if (scan != 0) weight *= seen.w;
+    sum.obscurance += obscurance(s.normal, d, s.falloff) * weight;
+    sum.weight += weight;
 }
 
 void tap(Surface s, vec4 row, bool weighted, inout Sum sum) {
     vec2 offset = roundEven(s.rotation * row.xy);
     int mip = mips != 0 ? int(clamp(roundEven(row.w + s.mip_base), 0.0, 3.0)) : 0;
-    for (int side = 0; side < 2; ++side) {
-        vec4 seen = sample_at(s, side == 0 ? offset : -offset, mip);
-        vec3 d = seen.xyz - s.point;
-        float weight = weighted ? row.z : 1.0;
-        if (halo_weighted) weight *= 0.6 * clamp(2.0 + k.neg_rec_radius * max(0.0, -d.z), 0.0, 1.0) + 0.4;
-        if (scan != 0) weight *= seen.w;
-        sum.obscurance += obscurance(s.normal, d, s.falloff) * weight;
-        sum.weight += weight;
-    }
+    add(s, sample_at(s, offset, mip), weighted ? row.z : 1.0, sum);
+    add(s, sample_at(s, -offset, mip), weighted ? row.z : 1.0, sum);
 }
 
 #define TAP(i, dx, dy, w, bias) tap(s, vec4(dx, dy, w, bias), true, sum);
@@ -93,8 +94,8 @@ void tap(Surface s, vec4 row, bool weighted, inout Sum sum) {
 
 vec4 neighbour_depths(int slice, ivec2 t) {
     ivec2 low = max(t - 1, ivec2(0)), high = min(t + 1, k.slice - 1);
-    vec4 z = vec4(texelFetch(depths, slice_index(slice, ivec2(low.x, t.y))).x, texelFetch(depths, slice_index(slice, ivec2(high.x, t.y))).x,
-                  texelFetch(depths, slice_index(slice, ivec2(t.x, low.y))).x, texelFetch(depths, slice_index(slice, ivec2(t.x, high.y))).x);
+    vec4 z = vec4(texelFetch(depths, depth_index(slice, 0, ivec2(low.x, t.y))).x, texelFetch(depths, depth_index(slice, 0, ivec2(high.x, t.y))).x,
+                  texelFetch(depths, depth_index(slice, 0, ivec2(t.x, low.y))).x, texelFetch(depths, depth_index(slice, 0, ivec2(t.x, high.y))).x);
     if (scan != 0) z *= vec4(t.x > 0, t.x + 1 < k.slice.x, t.y > 0, t.y + 1 < k.slice.y);
     return z;
 }
@@ -135,24 +136,25 @@ void main() {
     s.texel = t;
     s.slice = slice_of_layer(int(gl_GlobalInvocationID.z));
     int here = slice_index(s.slice, t);
-    float zc = texelFetch(depths, here).x;
+    float zc = texelFetch(depths, depth_index(s.slice, 0, t)).x;
     if (scan != 0 && !(zc > 0.0)) {
-        ao[here] = hole_texel;
+        imageStore(ao, here, uvec4(hole_texel));
         return;
     }
     ivec2 parity = ivec2(s.slice & 1, s.slice >> 1);
     s.uv = (vec2(t) + 0.5) * k.slice_inv;
     s.ray_step = k.ray_step * float(2 * spacing);
-    s.ray = k.ray_base + vec2(spacing * (2 * t + parity)) * k.ray_step;
+    s.ray = k.ray_base + vec2(spacing * parity) * k.ray_step;
+    s.depth_base = s.slice * k.depth_pitch + (mips != 0 ? k.depth_mips : 0);
     vec2 step_m = scan != 0 ? zc * s.ray_step : zc * k.view_mul * k.slice_inv;
-    s.point = scan != 0 ? vec3(s.ray, 1.0) * zc : vec3((k.view_mul * s.uv + k.view_add) * zc, zc);
+    s.point = scan != 0 ? vec3(s.ray + vec2(t) * s.ray_step, 1.0) * zc : vec3((k.view_mul * s.uv + k.view_add) * zc, zc);
     s.normal = normal_at(s.slice, t);
 
     float radius = scan != 0 ? k.radius : k.radius * (clamp(length(s.point) * k.near_limit_rec, 0.0, 1.0) * 0.8 + 0.2);
     float disc = (0.85 * radius) / step_m.x;
     s.falloff = -1.0 / (radius * radius);
     s.mip_base = log2(disc) - 4.3;
-    vec2 turn = k.rotation[s.slice * 5 + (t.x + 2 * t.y) % 5] * disc;
+    vec2 turn = k.rotation[s.slice * 5 + int(uint(t.x + 2 * t.y) % 5u)] * disc;
     s.rotation = mat2(turn.x, turn.y, turn.y, -turn.x);
     if (scan != 0) { // pixels need not be square
         float aspect = step_m.x / -step_m.y;
@@ -165,7 +167,7 @@ void main() {
     vec4 edges = vec4(1.0);
     if (detailed) {
         vec4 z = neighbour_depths(s.slice, t);
-        edges = scan != 0 ? edges_from_depth(zc, z) : edges_from_depth(zc, z);
+        edges = edges_from_depth(zc, z);
         sum.obscurance = detail(s, step_m, z, edges);
         if (kernel >= 2) edges *= normal_edges(s.normal, s.slice, t);
     }
@@ -190,7 +192,7 @@ void main() {
 
     float o = scan != 0 ? sum.obscurance / max(sum.weight, 1e-6) : sum.obscurance / sum.weight;
     if (base != 0) {
-        ao[here] = quantised(o, value_levels()) | quantised(sum.weight / weight_range, weight_levels()) << 16;
+        imageStore(ao, here, uvec4(quantised(o, value_levels()) | quantised(sum.weight / weight_range, weight_levels()) << 16));
         return;
     }
     float fade = clamp(s.point.z * k.fade_mul + k.fade_add, 0.0, 1.0);
@@ -199,5 +201,5 @@ void main() {
         fade *= clamp(1.0 - cut.x - cut.y, 0.0, 1.0);
     }
     float visibility = clamp(1.0 - fade * min(k.shadow_strength * o, k.shadow_clamp), 0.0, 1.0);
-    ao[here] = ao_texel(pow(visibility, k.shadow_power), pack_edges(edges));
+    imageStore(ao, here, uvec4(ao_texel(pow(visibility, k.shadow_power), pack_edges(edges))));
 }

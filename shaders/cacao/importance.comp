@@ -6,7 +6,7 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0) uniform usamplerBuffer base_result;
-layout(binding = 16, scalar) writeonly buffer Importance { uint importance[]; };
+layout(binding = 16, r32ui) uniform writeonly uimageBuffer importance;
 
 void main() {
     ivec2 t = ivec2(gl_GlobalInvocationID.xy);
@@ -21,5 +21,5 @@ void main() {
             highest = max(highest, v);
         }
     float contrast = clamp(2.0 * (highest - lowest), 0.0, 1.0);
-    importance[t.y * k.importance.x + t.x] = quantised(pow(contrast, 0.8), 255.0);
+    imageStore(importance, t.y * k.importance.x + t.x, uvec4(quantised(pow(contrast, 0.8), 255.0)));
 }

@@ -8,8 +8,8 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(constant_id = spec_last) const int second = 0;
 layout(binding = 0) uniform usamplerBuffer from;
-layout(binding = 16, scalar) writeonly buffer To { uint to[]; };
-layout(binding = 17, scalar) buffer LoadCounter { uint load_counter; };
+layout(binding = 16, r32ui) uniform writeonly uimageBuffer to;
+layout(binding = 17, r32ui) uniform uimageBuffer load_counter;
 
 uint read(int x, int y) {
     ivec2 t = clamp(ivec2(x, y), ivec2(0), k.importance - 1);
@@ -28,7 +28,7 @@ void main() {
                             : box(t.x - 1, t.y - 2) + box(t.x + 1, t.y - 1) + box(t.x, t.y + 1) + box(t.x - 2, t.y);
     precise float mean = sum * 0.25;
     // Threads beyond the map count too, as AMD's do: the whole dispatch, not only the map, is summed.
-    if (second != 0 && t.x % 3 == 0 && t.y % 3 == 0) atomicAdd(load_counter, uint(255.0 * clamp(mean, 0.0, 1.0) + 0.5));
+    if (second != 0 && t.x % 3 == 0 && t.y % 3 == 0) imageAtomicAdd(load_counter, 0, uint(255.0 * clamp(mean, 0.0, 1.0) + 0.5));
     if (any(greaterThanEqual(t, k.importance))) return;
-    to[t.y * k.importance.x + t.x] = quantised(mean, 255.0);
+    imageStore(to, t.y * k.importance.x + t.x, uvec4(quantised(mean, 255.0)));
 }

@@ -9,7 +9,7 @@ layout(local_size_x = 8, local_size_y = 1) in;
 layout(constant_id = spec_device_depth) const int device_depth = 0;
 
 layout(binding = 0) uniform samplerBuffer depth_in;
-layout(binding = 16, scalar) writeonly buffer Depths { float depths[]; };
+layout(binding = 16, r32f) uniform writeonly imageBuffer depths;
 
 // Mean of what lies on the nearest surface. Scan leaves holes out and yields a hole when all four are.
 float nearest_surface(float a, float b, float c, float d) {
@@ -25,36 +25,39 @@ float nearest_surface(float a, float b, float c, float d) {
 }
 
 void store(int slice, int mip, ivec2 t, float z) {
-    if (any(greaterThanEqual(t, k.mip_size[mip]))) return;
-    depths[k.mip_offset[mip] + (slice * k.mip_size[mip].y + t.y) * k.mip_size[mip].x + t.x] =
-        scan != 0 ? z : half_toward_zero(z);
+    // Scan keeps the partial texels at the right and lower rim; the reference's mips end before them.
+    if (scan == 0 && any(greaterThanEqual(t, mip_size(mip)))) return;
+    imageStore(depths, depth_index(slice, mip, t), vec4(scan != 0 ? z : half_toward_zero(z)));
+}
+
+float depth_at(int slice, ivec2 t) {
+    ivec2 p = spacing * (2 * t + ivec2(slice & 1, slice >> 1));
+    ivec2 q = min(p, k.image - 1);
+    float d = texelFetch(depth_in, q.y * k.image.x + q.x).x;
+    if (device_depth != 0) d = linear_depth(d);
+    return scan != 0 && q != p ? 0.0 : d;
+}
+
+// The texel of mip 1 at t, from four of mip 0 taken column by column, as AMD orders them.
+float mip1(int slice, ivec2 t) {
+    float z = nearest_surface(depth_at(slice, 2 * t), depth_at(slice, 2 * t + ivec2(0, 1)), depth_at(slice, 2 * t + ivec2(1, 0)),
+                              depth_at(slice, 2 * t + ivec2(1, 1)));
+    store(slice, 1, t, z);
+    return z;
+}
+
+float mip2(int slice, ivec2 t) {
+    float z = nearest_surface(mip1(slice, 2 * t), mip1(slice, 2 * t + ivec2(0, 1)), mip1(slice, 2 * t + ivec2(1, 0)),
+                              mip1(slice, 2 * t + ivec2(1, 1)));
+    store(slice, 2, t, z);
+    return z;
 }
 
 void main() {
     int slice = int(gl_GlobalInvocationID.z);
-    ivec2 block = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(block * 8, k.slice))) return;
-    ivec2 origin = ivec2(slice & 1, slice >> 1);
-    float z1[4][4];
-    for (int j = 0; j < 4; ++j)
-        for (int i = 0; i < 4; ++i) {
-            float z0[4];
-            for (int n = 0; n < 4; ++n) { // column by column, as AMD orders the four
-                ivec2 t = 8 * block + 2 * ivec2(i, j) + ivec2(n >> 1, n & 1);
-                ivec2 p = spacing * (2 * t + origin);
-                ivec2 q = min(p, k.image - 1);
-                float d = texelFetch(depth_in, q.y * k.image.x + q.x).x;
-                if (device_depth != 0) d = linear_depth(d);
-                z0[n] = scan != 0 && q != p ? 0.0 : d;
-            }
-            z1[j][i] = nearest_surface(z0[0], z0[1], z0[2], z0[3]);
-            store(slice, 1, 4 * block + ivec2(i, j), z1[j][i]);
-        }
-    float z2[2][2];
-    for (int j = 0; j < 2; ++j)
-        for (int i = 0; i < 2; ++i) {
-            z2[j][i] = nearest_surface(z1[2 * j][2 * i], z1[2 * j + 1][2 * i], z1[2 * j][2 * i + 1], z1[2 * j + 1][2 * i + 1]);
-            store(slice, 2, 2 * block + ivec2(i, j), z2[j][i]);
-        }
-    store(slice, 3, block, nearest_surface(z2[0][0], z2[1][0], z2[0][1], z2[1][1]));
+    ivec2 t = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(t * 8, k.slice))) return;
+    float z = nearest_surface(mip2(slice, 2 * t), mip2(slice, 2 * t + ivec2(0, 1)), mip2(slice, 2 * t + ivec2(1, 0)),
+                              mip2(slice, 2 * t + ivec2(1, 1)));
+    store(slice, 3, t, z);
 }

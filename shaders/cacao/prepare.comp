@@ -1,5 +1,5 @@
-// CACAO, first pass: one slice texel per thread. De-interleaves depth into four slices and writes four normals,
-// derived from the full-precision depth or taken from the supplied image.
+// CACAO, first pass: one slice texel per thread, that is 2x2 pixels. De-interleaves depth into four slices and writes
+// four normals, derived from the full-precision depth or taken from the supplied image.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -12,28 +12,59 @@ layout(constant_id = spec_device_depth) const int device_depth = 0;
 
 layout(binding = 0) uniform samplerBuffer depth_in;
 layout(binding = 1) uniform samplerBuffer normals_in;
-layout(binding = 16, scalar) writeonly buffer Depths { float depths[]; };
-layout(binding = 17, scalar) writeonly buffer Normals { uint normals[]; };
+layout(binding = 16, r32f) uniform writeonly imageBuffer depths;
+layout(binding = 17, r32ui) uniform writeonly uimageBuffer normals;
 
 float depth_at(ivec2 p) {
     float d = texelFetch(depth_in, p.y * k.image.x + p.x).x;
     return device_depth != 0 ? linear_depth(d) : d;
 }
-bool inside(ivec2 p) { return all(greaterThanEqual(p, ivec2(0))) && all(lessThan(p, k.image)); }
-float depth_replicated(ivec2 p) { return depth_at(clamp(p, ivec2(0), k.image - 1)); }
-float depth_or_outside(ivec2 p) { return inside(p) ? depth_at(p) : k.outside_depth; }
+bool inside(ivec2 p) { return all(lessThan(uvec2(p), uvec2(k.image))); }
 
-// Depth next to a pixel, for its normal. Scan knows nothing outside the image: a hole.
+// Depth next to a pixel. Scan knows nothing outside the image: a hole. AMD's native shader replicates, its downsampled
+// one loads zero.
 float neighbour(ivec2 p) {
-    if (scan != 0) return inside(p) ? depth_at(p) : 0.0;
-    return spacing == 1 ? depth_replicated(p) : depth_or_outside(p);
+    float z = depth_at(clamp(p, ivec2(0), k.image - 1));
+    if (scan != 0) return inside(p) ? z : 0.0;
+    return spacing == 1 || inside(p) ? z : k.outside_depth;
 }
 
 vec3 supplied_normal(ivec2 p) {
-    int at = 3 * (p.y * k.image.x + p.x);
+    ivec2 q = clamp(p, ivec2(0), k.image - 1);
+    int at = 3 * (q.y * k.image.x + q.x);
     vec3 given = vec3(texelFetch(normals_in, at).x, texelFetch(normals_in, at + 1).x, texelFetch(normals_in, at + 2).x);
     vec3 n = (inside(p) ? given : vec3(0.0)) * k.normals_mul + k.normals_add;
     return n * vec3(1.0, -1.0, 1.0); // camera space has y down, this room y up
+}
+
+// What the slice holds. AMD's LOWEST loads zero outside the image, the others replicate.
+float stored_depth(ivec2 p, float z) {
+    if (scan != 0) return z;
+    if (!inside(p)) z = two_slices != 0 ? k.outside_depth : depth_at(clamp(p, ivec2(0), k.image - 1));
+    return half_toward_zero(z);
+}
+
+vec2 ray_of(ivec2 p0, ivec2 step) {
+    if (scan != 0) return k.ray_base + vec2(p0 + spacing * step) * k.ray_step;
+    return k.view_mul * ((vec2(p0) + 0.5) * k.image_inv + vec2(step) * float(spacing) * k.image_inv) + k.view_add;
+}
+
+// One of the four pixels: its depth c and the depths left, right, above and below; rays at -1, 0, +1 of each axis.
+void put(int slice, ivec2 t, ivec2 p0, float c, vec4 around, vec3 ray_x, vec3 ray_y) {
+    ivec2 parity = ivec2(slice & 1, slice >> 1);
+    ivec2 p = p0 + spacing * parity;
+    if (two_slices == 0 || slice == 0 || slice == 3)
+        imageStore(depths, depth_index(slice, 0, t), vec4(stored_depth(p, c)));
+    vec3 n;
+    if (supplied != 0) {
+        n = supplied_normal(p);
+    } else {
+        vec4 edges = edges_from_depth(c, around);
+        vec3 here = vec3(ray_x.y, ray_y.y, 1.0) * c;
+        n = normal_from_neighbours(edges, here, vec3(ray_x.x, ray_y.y, 1.0) * around.x, vec3(ray_x.z, ray_y.y, 1.0) * around.y,
+                                   vec3(ray_x.y, ray_y.x, 1.0) * around.z, vec3(ray_x.y, ray_y.z, 1.0) * around.w);
+    }
+    imageStore(normals, slice_index(slice, t), uvec4(pack_normal(n)));
 }
 
 void main() {
@@ -41,43 +72,18 @@ void main() {
     if (any(greaterThanEqual(t, k.slice))) return;
     ivec2 p0 = 2 * spacing * t;
 
-    float z[4];
-    for (int a = 0; a < 4; ++a) {
-        ivec2 p = p0 + spacing * ivec2(a & 1, a >> 1);
-        if (scan != 0)
-            z[a] = inside(p) ? depth_at(p) : 0.0;
-        else
-            z[a] = two_slices != 0 ? depth_or_outside(p) : depth_replicated(p);
-        if (two_slices == 0 || a == 0 || a == 3)
-            depths[slice_index(a, t)] = scan != 0 ? z[a] : half_toward_zero(z[a]);
-    }
-
-    if (supplied != 0) {
-        for (int a = 0; a < 4; ++a)
-            normals[slice_index(a, t)] = pack_normal(supplied_normal(p0 + spacing * ivec2(a & 1, a >> 1)));
-        return;
-    }
-
     // Rows and columns -1 .. 2 around the four pixels; the corners are not needed.
-    float s[4][4];
-    for (int j = 0; j < 4; ++j)
-        for (int i = 0; i < 4; ++i)
-            s[j][i] = (i == 0 || i == 3) && (j == 0 || j == 3) ? 0.0 : neighbour(p0 + spacing * ivec2(i - 1, j - 1));
-    vec3 v[4][4];
-    vec2 uv0 = (vec2(p0) + 0.5) * k.image_inv;
-    for (int j = 0; j < 4; ++j)
-        for (int i = 0; i < 4; ++i) {
-            vec2 ray;
-            if (scan != 0)
-                ray = k.ray_base + vec2(p0 + spacing * ivec2(i - 1, j - 1)) * k.ray_step;
-            else
-                ray = k.view_mul * (uv0 + vec2(i - 1, j - 1) * float(spacing) * k.image_inv) + k.view_add;
-            v[j][i] = vec3(ray, 1.0) * s[j][i];
-        }
-    for (int a = 0; a < 4; ++a) {
-        int i = 1 + (a & 1), j = 1 + (a >> 1);
-        vec4 edges = edges_from_depth(s[j][i], vec4(s[j][i - 1], s[j][i + 1], s[j - 1][i], s[j + 1][i]));
-        vec3 n = normal_from_neighbours(edges, v[j][i], v[j][i - 1], v[j][i + 1], v[j - 1][i], v[j + 1][i]);
-        normals[slice_index(a, t)] = pack_normal(n);
-    }
+    float a1 = neighbour(p0 + spacing * ivec2(0, -1)), a2 = neighbour(p0 + spacing * ivec2(1, -1));
+    float b0 = neighbour(p0 + spacing * ivec2(-1, 0)), b1 = neighbour(p0), b2 = neighbour(p0 + spacing * ivec2(1, 0)),
+          b3 = neighbour(p0 + spacing * ivec2(2, 0));
+    float c0 = neighbour(p0 + spacing * ivec2(-1, 1)), c1 = neighbour(p0 + spacing * ivec2(0, 1)),
+          c2 = neighbour(p0 + spacing * ivec2(1, 1)), c3 = neighbour(p0 + spacing * ivec2(2, 1));
+    float d1 = neighbour(p0 + spacing * ivec2(0, 2)), d2 = neighbour(p0 + spacing * ivec2(1, 2));
+
+    vec2 r0 = ray_of(p0, ivec2(-1)), r1 = ray_of(p0, ivec2(0)), r2 = ray_of(p0, ivec2(1)), r3 = ray_of(p0, ivec2(2));
+    vec3 x0 = vec3(r0.x, r1.x, r2.x), x1 = vec3(r1.x, r2.x, r3.x), y0 = vec3(r0.y, r1.y, r2.y), y1 = vec3(r1.y, r2.y, r3.y);
+    put(0, t, p0, b1, vec4(b0, b2, a1, c1), x0, y0);
+    put(1, t, p0, b2, vec4(b1, b3, a2, c2), x1, y0);
+    put(2, t, p0, c1, vec4(c0, c2, b1, d1), x0, y1);
+    put(3, t, p0, c2, vec4(c1, c3, b2, d2), x1, y1);
 }

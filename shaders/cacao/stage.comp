@@ -9,14 +9,14 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(constant_id = spec_resolve) const int resolve = resolve_smart;
 layout(binding = 0) uniform usamplerBuffer ao;
 layout(binding = 1) uniform samplerBuffer depths;
-layout(binding = 16, scalar) writeonly buffer Staged { vec2 staged[]; };
+layout(binding = 16, rg32f) uniform writeonly imageBuffer staged;
 
 #include "lib/cacao_resolve.glsl"
 
 const int wrapped = 1 << 24; // stands for an unsigned coordinate that wrapped below zero
 
 bool in_slice(ivec2 t) { return all(greaterThanEqual(t, ivec2(0))) && all(lessThan(t, k.slice)); }
-float depth_or_zero(int slice, ivec2 t) { return in_slice(t) ? texelFetch(depths, slice_index(slice, t)).x : 0.0; }
+float depth_or_zero(int slice, ivec2 t) { return in_slice(t) ? texelFetch(depths, depth_index(slice, 0, t)).x : 0.0; }
 float texel_clamped(int slice, ivec2 t) { return ao_value(texelFetch(ao, slice_index(slice, clamp(t, ivec2(0), k.slice - 1))).x); }
 
 // The tie of the slice 3 sample on even columns and rows, as lavapipe's arithmetic breaks it.
@@ -63,11 +63,11 @@ void main() {
         vec2 v = !in_grid(h) ? vec2(0.0) : resolve == resolve_smart ? smart_scan(h) : plain_scan(h);
         bool written = two_slices == 0 || parity.x == parity.y;
         float z = v.y > 0.0 && written ? depth_or_zero(parity.x + 2 * parity.y, h >> 1) : 0.0;
-        staged[here] = vec2(v.x, z);
+        imageStore(staged, here, vec4(vec2(v.x, z), 0.0, 0.0));
         return;
     }
     ivec2 seen = ivec2(h.x < 0 ? wrapped + h.x : h.x, h.y < 0 ? wrapped + h.y : h.y);
     vec2 v = resolve == resolve_smart ? smart_staged(h, parity, seen) : plain_reference(seen, parity, seen >> 1);
     if (any(lessThan(h, ivec2(0))) && resolve != resolve_smart) v.y = 0.0;
-    staged[here] = vec2(half_even(v.x), v.y);
+    imageStore(staged, here, vec4(vec2(half_even(v.x), v.y), 0.0, 0.0));
 }

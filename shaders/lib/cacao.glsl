@@ -43,8 +43,8 @@ vec4 edges_from_depth(float zc, vec4 z) {
     vec4 e = min(abs(d), abs(d + other));
     if (scan != 0) {
         bvec4 known = greaterThan(z, vec4(0.0));
-        e = mix(abs(d), e, vec4(known.yxwz));
-        return mix(vec4(0.0), clamp(1.3 - e / (0.04 * zc), 0.0, 1.0), vec4(known));
+        e = mix(abs(d), e, known.yxwz);
+        return mix(vec4(0.0), clamp(1.3 - e * (25.0 / zc), 0.0, 1.0), known);
     }
     return clamp(1.3 - e / (0.04 * zc), 0.0, 1.0);
 }
@@ -58,6 +58,10 @@ vec4 unpack_edges(uint p) {
 
 // --- addresses
 int slice_index(int slice, ivec2 texel) { return (slice * k.slice.y + texel.y) * k.slice.x + texel.x; }
+int depth_index(int slice, int mip, ivec2 texel) {
+    return slice * k.depth_pitch + k.depth_mips - (k.depth_mips >> (2 * mip)) + texel.y * (k.depth_stride >> mip) + texel.x;
+}
+ivec2 mip_size(int mip) { return max(k.slice >> mip, ivec2(1)); }
 int slice_of_layer(int layer) { return two_slices != 0 && layer == 1 ? 3 : layer; }
 
 // --- depth linearisation; the literal order keeps AMD's rounding (inverse of 0 is 0)

@@ -35,8 +35,10 @@ struct CacaoConstants {
     float detail_strength;
     float mip_weight;               // phi: weight of a mip sample is 1 + phi (z - nearest)^2
     float normals_mul, normals_add; // NormalsUnpackMul / Add
-    ivec2 mip_size[4];
-    int mip_offset[4];              // first texel of slice 0 in each mip
+    int depth_stride;               // texels from one row of a depth slice to the next; mip m has stride >> m
+    int depth_pitch;                // texels from one slice, with its mips, to the next
+    int depth_mips;                 // T: mip m of a slice starts at T - (T >> 2m); T = 4/3 of mip 0 with its padding
+    float spatial[10];              // upsampler: 1D spatial weight of tap -2 .. 2 for even, then odd pixels
     vec2 rotation[20];              // (m00, m01) of PatternRotScaleMatrices[slice][phase]; m10 = m01, m11 = -m00
 };
 
