@@ -220,9 +220,9 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
 
     const std::vector<std::pair<int, int>> how{{shared::spec_resolve, resolve}, {shared::spec_power, power}};
     if (!options.downsampled) {
-        add("apply", "cacao/apply", {from, cacao_depth_in}, {cacao_out}, k.image, 1, how);
+        add("apply", "cacao/apply", {from, cacao_depth_in}, {cacao_out}, k.slice, 1, how);
     } else {
-        add("stage", "cacao/stage", {from, cacao_depths}, {cacao_staged}, k.grid, 1, how);
+        add("stage", "cacao/stage", {from, cacao_depths}, {cacao_staged}, {halved(k.grid.x), halved(k.grid.y)}, 1, how);
         add("upsample", "cacao/upsample", {cacao_staged, cacao_depth_in}, {cacao_out}, {halved(k.image.x), halved(k.image.y)}, 1, how);
     }
     return tables;

@@ -29,15 +29,26 @@ float reference(ivec2 p) {
     return 0.25 * sum;
 }
 
-void main() {
-    ivec2 p = ivec2(gl_GlobalInvocationID.xy);
+void put(ivec2 p, float v) {
     if (any(greaterThanEqual(p, k.image))) return;
     int here = p.y * k.image.x + p.x;
     if (scan != 0) {
-        vec2 v = resolve == resolve_smart ? smart_scan(p) : plain_scan(p);
-        visibility[here] = v.y > 0.0 && texelFetch(depth_in, here).x > 0.0 ? v.x : uintBitsToFloat(0x7fc00000u);
-        return;
+        bool surface = v >= 0.0 && (two_slices == 0 || texelFetch(depth_in, here).x > 0.0);
+        visibility[here] = surface ? v : uintBitsToFloat(0x7fc00000u);
+    } else {
+        visibility[here] = stored(power != 0 ? pow(v, 2.2) : v);
     }
-    float v = reference(p);
-    visibility[here] = stored(power != 0 ? pow(v, 2.2) : v);
+}
+
+// 2x2 pixels a thread.
+void main() {
+    ivec2 t = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(t, k.slice))) return;
+    ivec2 p = 2 * t;
+    const ivec2 x = ivec2(1, 0), y = ivec2(0, 1);
+    vec4 v = scan != 0 ? resolved_block(t) : vec4(reference(p), reference(p + x), reference(p + y), reference(p + x + y));
+    put(p, v.x);
+    put(p + x, v.y);
+    put(p + y, v.z);
+    put(p + x + y, v.w);
 }

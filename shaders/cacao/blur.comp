@@ -31,7 +31,6 @@ uint read(int slice, ivec2 t) {
 }
 
 float value(uint texel) {
-    if (scan != 0) return ao_value(texel);
     return first != 0 ? half_even(ao_value(texel)) : unpackHalf2x16(texel).x;
 }
 
@@ -40,23 +39,17 @@ void main() {
     if (any(greaterThanEqual(t, k.slice + halo))) return;
     int slice = slice_of_layer(int(gl_GlobalInvocationID.z));
     uint c = read(slice, t);
-    if (is_hole(c)) {
-        imageStore(to, slice_index(slice, t), uvec4(c));
-        return;
-    }
-    uint n[4] = {read(slice, t - ivec2(1, 0)), read(slice, t + ivec2(1, 0)), read(slice, t - ivec2(0, 1)), read(slice, t + ivec2(0, 1))};
+    uint l = read(slice, t - ivec2(1, 0)), r = read(slice, t + ivec2(1, 0));
+    uint up = read(slice, t - ivec2(0, 1)), down = read(slice, t + ivec2(0, 1));
     vec4 e = unpack_edges(ao_edges(c));
-    if (scan != 0) {
-        e *= vec4(t.x > 0, t.x + 1 < k.slice.x, t.y > 0, t.y + 1 < k.slice.y);
-        e *= vec4(!is_hole(n[0]), !is_hole(n[1]), !is_hole(n[2]), !is_hole(n[3]));
-    }
-    float sum = 0.5 * value(c) + e.x * value(n[0]) + e.y * value(n[1]) + e.z * value(n[2]) + e.w * value(n[3]);
-    float v = sum / (0.5 + e.x + e.y + e.z + e.w);
-    if (scan != 0) {
-        imageStore(to, slice_index(slice, t), uvec4(ao_texel(v, ao_edges(c))));
+    if (scan != 0) { // edges to holes and to the outside are cut; a hole stays one
+        float sum = 0.5 * float(c & 0xffffu) + dot(e, vec4(uvec4(l, r, up, down) & 0xffffu));
+        uint v = uint(sum / (0.5 + e.x + e.y + e.z + e.w) + 0.5);
+        imageStore(to, slice_index(slice, t), uvec4(v | (c & 0xffff0000u)));
         return;
     }
-    v = half_even(v);
+    float sum = 0.5 * value(c) + e.x * value(l) + e.y * value(r) + e.z * value(up) + e.w * value(down);
+    float v = half_even(sum / (0.5 + e.x + e.y + e.z + e.w));
     if (last == 0)
         imageStore(to, index_between_steps(slice, t), uvec4((packHalf2x16(vec2(v, 0.0)) & 0xffffu) | (c & 0xffff0000u)));
     else if (all(greaterThanEqual(t, ivec2(0))) && all(lessThan(t, k.slice)))

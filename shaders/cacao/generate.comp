@@ -165,10 +165,10 @@ void main() {
 
     Sum sum = Sum(0.0, 0.0);
     vec4 edges = vec4(1.0);
-    if (detailed) {
+    if (detailed || (scan != 0 && base == 0)) { // scan never blurs across a depth edge, whatever the quality
         vec4 z = neighbour_depths(s.slice, t);
         edges = edges_from_depth(zc, z);
-        sum.obscurance = detail(s, step_m, z, edges);
+        if (detailed) sum.obscurance = detail(s, step_m, z, edges);
         if (kernel >= 2) edges *= normal_edges(s.normal, s.slice, t);
     }
 

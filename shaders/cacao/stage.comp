@@ -53,21 +53,36 @@ vec2 smart_staged(ivec2 h, ivec2 parity, ivec2 seen) {
     return vec2(v, depth_or_zero(parity.x + 2 * parity.y, ivec2((h.x + 1) >> 1, h.y >> 1))); // one column too far, as in AMD's
 }
 
-void main() {
-    ivec2 g = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(g, k.grid))) return;
-    ivec2 h = g - 2;
+vec2 reference(ivec2 h) {
     ivec2 parity = h & 1;
-    int here = g.y * k.grid.x + g.x;
-    if (scan != 0) {
-        vec2 v = !in_grid(h) ? vec2(0.0) : resolve == resolve_smart ? smart_scan(h) : plain_scan(h);
-        bool written = two_slices == 0 || parity.x == parity.y;
-        float z = v.y > 0.0 && written ? depth_or_zero(parity.x + 2 * parity.y, h >> 1) : 0.0;
-        imageStore(staged, here, vec4(vec2(v.x, z), 0.0, 0.0));
-        return;
-    }
     ivec2 seen = ivec2(h.x < 0 ? wrapped + h.x : h.x, h.y < 0 ? wrapped + h.y : h.y);
     vec2 v = resolve == resolve_smart ? smart_staged(h, parity, seen) : plain_reference(seen, parity, seen >> 1);
     if (any(lessThan(h, ivec2(0))) && resolve != resolve_smart) v.y = 0.0;
-    imageStore(staged, here, vec4(vec2(half_even(v.x), v.y), 0.0, 0.0));
+    return vec2(half_even(v.x), v.y);
+}
+
+void put(ivec2 h, float v, float z) {
+    ivec2 g = h + 2;
+    if (all(lessThan(g, k.grid))) imageStore(staged, g.y * k.grid.x + g.x, vec4(v, z, 0.0, 0.0));
+}
+
+// 2x2 grid pixels a thread, from the halo on.
+void main() {
+    ivec2 t = ivec2(gl_GlobalInvocationID.xy) - 1;
+    if (any(greaterThanEqual(2 * t, k.grid - 2))) return;
+    for (int slice = 0; slice < 4; ++slice) {
+        ivec2 h = 2 * t + ivec2(slice & 1, slice >> 1);
+        if (scan == 0) {
+            vec2 v = reference(h);
+            put(h, v.x, v.y);
+        }
+    }
+    if (scan == 0) return;
+    vec4 v = resolved_block(t);
+    vec4 z = vec4(depth_or_zero(0, t), two_slices != 0 ? 0.0 : depth_or_zero(1, t), two_slices != 0 ? 0.0 : depth_or_zero(2, t),
+                  depth_or_zero(3, t)); // depth 0 keeps holes, and what LOWEST has not computed, out of the upsampler
+    put(2 * t, v.x, z.x);
+    put(2 * t + ivec2(1, 0), v.y, z.y);
+    put(2 * t + ivec2(0, 1), v.z, z.z);
+    put(2 * t + ivec2(1, 1), v.w, z.w);
 }

@@ -41,39 +41,85 @@ float filtered_in_half(ivec2 g, vec2 shift, float zf) {
     return half_even(sum / total);
 }
 
-float filtered_value(ivec2 g, vec2 shift, float zf) {
-    float sigma_depth = k.sigma_depth;
-    vec2 own = texelFetch(staged, g.y * k.grid.x + g.x).xy;
-    float total = scan != 0 && !(own.y > 0.0) ? 0.0 : self_weight;
-    float sum = total * own.x;
+float gaussian(ivec2 g, vec2 shift, float zf) {
+    float total = self_weight;
+    float sum = total * texelFetch(staged, g.y * k.grid.x + g.x).x;
     for (int p = -2; p <= 2; ++p)
         for (int r = -2; r <= 2; ++r) {
             vec2 s = texelFetch(staged, (g.y + r) * k.grid.x + g.x + p).xy;
             vec2 d = vec2(p, r) - shift;
             float dz = zf - s.y;
-            float w = exp(-dot(d, d) / k.sigma_spatial) * exp(-dz * dz / sigma_depth);
-            if (scan != 0) w = s.y > 0.0 ? w : 0.0;
+            float w = exp(-dot(d, d) / k.sigma_spatial) * exp(-dz * dz / k.sigma_depth);
             sum += w * s.x;
             total += w;
         }
     return sum / total;
 }
 
+// Scan: four pixels share each tap. (1 - x / 4)^4 stands for exp(-x): no exponential, and nothing beyond two sigma.
+struct Four {
+    vec4 z, sum, total;
+    float narrow; // 1 / (4 sigma^2)
+};
+
+void tap(inout Four four, int at, vec2 gx, vec2 gy) {
+    vec2 s = texelFetch(staged, at).xy;
+    vec4 dz = four.z - s.y;
+    vec4 w = max(1.0 - dz * dz * four.narrow, 0.0);
+    w = s.y > 0.0 ? w * w : vec4(0.0);
+    w *= w * vec4(gx * gy.x, gx * gy.y);
+    four.sum += w * s.x;
+    four.total += w;
+}
+
+#define GX(i) vec2(k.spatial[i], k.spatial[5 + i])
+void row(inout Four four, int at, vec2 gy) {
+    tap(four, at - 2, GX(0), gy);
+    tap(four, at - 1, GX(1), gy);
+    tap(four, at, GX(2), gy);
+    tap(four, at + 1, GX(3), gy);
+    tap(four, at + 2, GX(4), gy);
+}
+
+vec4 upsampled(ivec2 g, vec4 z) {
+    int at = g.y * k.grid.x + g.x, step = k.grid.x;
+    vec2 own = texelFetch(staged, at).xy;
+    float known = own.y > 0.0 ? self_weight : 0.0;
+    Four four = Four(z, vec4(known * own.x), vec4(known), 0.25 / k.sigma_depth);
+    row(four, at - 2 * step, GX(0));
+    row(four, at - step, GX(1));
+    row(four, at, GX(2));
+    row(four, at + step, GX(3));
+    row(four, at + 2 * step, GX(4));
+    return mix(vec4(1.0), four.sum / max(four.total, 1e-12), greaterThan(four.total, vec4(0.0)));
+}
+
+void put(ivec2 p, float zf, float v) {
+    if (any(greaterThanEqual(p, k.image))) return;
+    if (scan != 0)
+        visibility[p.y * k.image.x + p.x] = zf > 0.0 ? v : uintBitsToFloat(0x7fc00000u);
+    else
+        visibility[p.y * k.image.x + p.x] = stored(power != 0 ? pow(v, 2.2) : v);
+}
+
+float reference(ivec2 g, vec2 shift, float zf) {
+    return resolve == resolve_half ? filtered_in_half(g, shift, zf) : gaussian(g, shift, zf);
+}
+
 void main() {
     ivec2 h = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(2 * h, k.image))) return;
-    for (int j = 0; j < 2; ++j)
-        for (int i = 0; i < 2; ++i) {
-            ivec2 p = 2 * h + ivec2(i, j);
-            if (any(greaterThanEqual(p, k.image))) continue;
-            float zf = full_depth(p);
-            int here = p.y * k.image.x + p.x;
-            vec2 shift = vec2(i, j) * 0.5;
-            if (scan != 0 && !(zf > 0.0)) {
-                visibility[here] = uintBitsToFloat(0x7fc00000u);
-                continue;
-            }
-            float v = scan == 0 && resolve == resolve_half ? filtered_in_half(h + 2, shift, zf) : filtered_value(h + 2, shift, zf);
-            visibility[here] = scan != 0 ? v : stored(power != 0 ? pow(v, 2.2) : v);
-        }
+    ivec2 p = 2 * h, g = h + 2;
+    if (any(greaterThanEqual(p, k.image))) return;
+    const ivec2 x = ivec2(1, 0), y = ivec2(0, 1);
+    vec4 z = vec4(full_depth(p), full_depth(p + x), full_depth(p + y), full_depth(p + x + y));
+    vec4 v;
+    if (scan != 0)
+        v = upsampled(g, z);
+    else
+        v = vec4(reference(g, vec2(0.0), z.x), reference(g, vec2(0.5, 0.0), z.y), reference(g, vec2(0.0, 0.5), z.z),
+                 reference(g, vec2(0.5), z.w));
+    put(p, z.x, v.x);
+    put(p + x, z.y, v.y);
+    put(p + y, z.z, v.z);
+    put(p + x + y, z.w, v.w);
 }

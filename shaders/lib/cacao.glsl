@@ -52,7 +52,12 @@ uint pack_edges(vec4 edges) {
     uvec4 r = uvec4(roundEven(clamp(edges, 0.0, 1.0) * 3.05));
     return r.x << 6 | r.y << 4 | r.z << 2 | r.w;
 }
+// Reference: a cut edge still lets iota through. Scan: cut is cut, so that nothing of a hole or another surface leaks.
 vec4 unpack_edges(uint p) {
+    if (scan != 0) {
+        vec4 f = vec4(uvec4(p >> 6, p >> 4, p >> 2, p) & 3u);
+        return min(min(f * (1.0 / 3.0) + k.inv_sharpness, f), 1.0);
+    }
     return clamp(vec4(uvec4(p >> 6, p >> 4, p >> 2, p) & 3u) / 3.0 + k.inv_sharpness, 0.0, 1.0);
 }
 

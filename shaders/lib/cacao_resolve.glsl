@@ -22,46 +22,61 @@ float smart_reference(float own, vec4 e, vec2 at, ivec2 parity) {
 }
 
 uint grid_texel(ivec2 p) { return texelFetch(ao, slice_index((p.x & 1) + 2 * (p.y & 1), p >> 1)).x; }
-bool in_grid(ivec2 p) { return all(greaterThanEqual(p, ivec2(0))) && all(lessThan(p, 2 * k.slice)); }
 
-// Scan: the same weights centred on the pixel: neighbours left/right, above/below and diagonal, holes left out.
-// Returns value and 1, or 0 and 0 at a hole.
-vec2 smart_scan(ivec2 p) {
-    uint c = grid_texel(p);
-    if (is_hole(c)) return vec2(0.0);
-    vec4 e = unpack_edges(ao_edges(c));
-    float sum = ao_value(c), total = 1.0;
-    vec2 pull = vec2(e.y - e.x, e.w - e.z);
-    vec2 near = 0.5 - 0.5 * pull, far = 0.5 + 0.5 * pull; // shares of left/top and right/bottom
-    float wh = (e.x + e.y) * 0.5, wv = (e.z + e.w) * 0.5, wd = (wh + wv) * 0.5;
-    for (int j = -1; j <= 1; ++j)
-        for (int i = -1; i <= 1; ++i) {
-            if (i == 0 && j == 0) continue;
-            ivec2 q = p + ivec2(i, j);
-            float w = (i == 0 ? 1.0 : i < 0 ? near.x : far.x) * (j == 0 ? 1.0 : j < 0 ? near.y : far.y);
-            w *= j == 0 ? wh : i == 0 ? wv : wd;
-            uint n = in_grid(q) ? grid_texel(q) : hole_texel;
-            if (is_hole(n)) w = 0.0;
-            sum += w * ao_value(n);
-            total += w;
-        }
-    return vec2(sum / total, 1.0);
+// --- scan: the 2x2 grid pixels of one slice texel at once, from the 4x4 grid pixels around them.
+
+struct Known {
+    float value; // visibility in the texel's own units, 0 at holes
+    float weight; // 1, or 0 at holes and outside
+};
+
+Known known(int slice, ivec2 t) {
+    bool inside = all(lessThan(uvec2(t), uvec2(k.slice)));
+    uint texel = texelFetch(ao, inside ? slice_index(slice, t) : 0).x;
+    bool usable = inside && texel < hole_texel;
+    return Known(usable ? float(texel & 0xffffu) : 0.0, usable ? 1.0 : 0.0);
 }
 
-// Scan, LOW and LOWEST: mean of the 2x2 (LOW: tent of 3x3) grid pixels that exist and lie on no other surface cannot be
-// told without edges; so the mean of the known pixels of the block.
-vec2 plain_scan(ivec2 p) {
-    bool half_grid = two_slices != 0;
-    bool written = !half_grid || (p.x & 1) == (p.y & 1);
-    float sum = 0.0, total = 0.0;
-    for (int j = -1; j <= 1; ++j)
-        for (int i = -1; i <= 1; ++i) {
-            ivec2 q = p + ivec2(i, j);
-            if (!in_grid(q) || (half_grid && (q.x & 1) != (q.y & 1))) continue;
-            uint n = grid_texel(q);
-            float w = is_hole(n) ? 0.0 : float((2 - abs(i)) * (2 - abs(j)));
-            sum += w * ao_value(n);
-            total += w;
-        }
-    return total > 0.0 ? vec2(sum / total, 1.0) : vec2(0.0);
+// Own value plus left/right, above/below and diagonal ones, each pair shared out by the edges; AMD's weights, centred on
+// the pixel. Returns visibility, or -1 at a hole.
+float smart(uint c, Known l, Known r, Known t, Known b, Known lt, Known rt, Known lb, Known rb) {
+    if (is_hole(c)) return -1.0;
+    vec4 e = unpack_edges(ao_edges(c));
+    float wh = (e.x + e.y) * 0.5, wv = (e.z + e.w) * 0.5, wd = (wh + wv) * 0.5;
+    vec2 pull = vec2(e.y - e.x, e.w - e.z) * 0.5;
+    float wl = 0.5 - pull.x, wr = 0.5 + pull.x, wt = 0.5 - pull.y, wb = 0.5 + pull.y;
+    float sum = float(c & 0xffffu) + wh * (wl * l.value + wr * r.value) + wv * (wt * t.value + wb * b.value) +
+                wd * (wt * (wl * lt.value + wr * rt.value) + wb * (wl * lb.value + wr * rb.value));
+    float total = 1.0 + wh * (wl * l.weight + wr * r.weight) + wv * (wt * t.weight + wb * b.weight) +
+                  wd * (wt * (wl * lt.weight + wr * rt.weight) + wb * (wl * lb.weight + wr * rb.weight));
+    return sum / (total * 65535.0);
+}
+
+// LOWEST has no value of its own at odd pixels of a row: the four neighbours', by their edges towards it.
+float from_neighbours(uint l, uint r, uint t, uint b) {
+    vec4 w = vec4(unpack_edges(ao_edges(l)).y, unpack_edges(ao_edges(r)).x, unpack_edges(ao_edges(t)).w, unpack_edges(ao_edges(b)).z) + 1e-3;
+    w *= vec4(lessThan(uvec4(l, r, t, b), uvec4(hole_texel)));
+    float total = w.x + w.y + w.z + w.w;
+    float sum = dot(w, vec4(uvec4(l, r, t, b) & 0xffffu));
+    return total > 0.0 ? sum / (total * 65535.0) : 1.0; // alone among holes: nothing is known to occlude it
+}
+
+uint texel_or_hole(int slice, ivec2 t) {
+    return all(lessThan(uvec2(t), uvec2(k.slice))) ? texelFetch(ao, slice_index(slice, t)).x : hole_texel;
+}
+
+// Visibility of grid pixels (2t, 2t + (1, 0), 2t + (0, 1), 2t + (1, 1)); -1 at holes.
+vec4 resolved_block(ivec2 t) {
+    const ivec2 x = ivec2(1, 0), y = ivec2(0, 1);
+    uint c0 = texel_or_hole(0, t), c3 = texel_or_hole(3, t);
+    if (two_slices != 0) // odd pixels have no hole flag of their own: the caller knows their depth
+        return vec4(is_hole(c0) ? -1.0 : ao_value(c0), from_neighbours(c0, texel_or_hole(0, t + x), texel_or_hole(3, t - y), c3),
+                    from_neighbours(texel_or_hole(3, t - x), c3, c0, texel_or_hole(0, t + y)), is_hole(c3) ? -1.0 : ao_value(c3));
+    uint c1 = texel_or_hole(1, t), c2 = texel_or_hole(2, t);
+    Known k00 = known(3, t - x - y), k10 = known(2, t - y), k20 = known(3, t - y), k30 = known(2, t + x - y);
+    Known k01 = known(1, t - x), k11 = known(0, t), k21 = known(1, t), k31 = known(0, t + x);
+    Known k02 = known(3, t - x), k12 = known(2, t), k22 = known(3, t), k32 = known(2, t + x);
+    Known k03 = known(1, t - x + y), k13 = known(0, t + y), k23 = known(1, t + y), k33 = known(0, t + x + y);
+    return vec4(smart(c0, k01, k21, k10, k12, k00, k20, k02, k22), smart(c1, k11, k31, k20, k22, k10, k30, k12, k32),
+                smart(c2, k02, k22, k11, k13, k01, k21, k03, k23), smart(c3, k12, k32, k21, k23, k11, k31, k13, k33));
 }
