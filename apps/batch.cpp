@@ -1,0 +1,354 @@
+// The walk for many frames: load, project, compute, attach, write, with a bounded number of frames in memory.
+#include "apps/batch.h"
+
+#include "apps/picture.h"
+#include "io/cloud_file.h"
+#include "projection/attach.h"
+#include "projection/error.h"
+#include "projection/project.h"
+#include "projection/undistort.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <fmt/format.h>
+#include <limits>
+#include <memory>
+#include <tbb/info.h>
+#include <tbb/parallel_pipeline.h>
+
+namespace scanshade {
+namespace {
+
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+/// One frame on its way through the pipeline.
+struct Work {
+    const CaptureEntry& entry;
+    FrameRow& row;
+    Frame frame = {};
+    DepthImage depth = {};
+    AoMap ao = {};
+    Attached attached = {};
+};
+
+/// Takes one step with a frame and its time; the only place where a frame's failure is caught.
+template <class Step>
+void take(Work& work, double StageTimes::*stage, Step&& step) {
+    if (work.row.status == FrameStatus::failed)
+        return;
+    const auto start = std::chrono::steady_clock::now();
+    try {
+        step();
+    } catch (const std::exception& failure) {
+        work.row.status = FrameStatus::failed;
+        work.row.why = failure.what();
+    }
+    work.row.ms.*stage = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+Frame load(const Capture& capture, std::size_t index, const std::optional<Registration>& registration) {
+    if (const std::string& problem = capture.entries[index].problem; !problem.empty())
+        throw Error(problem);
+    Frame frame = capture.load(index);
+    if (registration)
+        frame.registration = *registration;
+    return frame;
+}
+
+double share(std::ptrdiff_t part, std::size_t whole) {
+    return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+/// Pixels or points that hold a depth / all of them.
+double valid_share(const Frame& frame) {
+    if (!frame.cloud)
+        return share(cv::countNonZero(frame.depth_m > 0), frame.depth_m.total());
+    const auto& points = frame.cloud->points;
+    return share(std::count_if(points.begin(), points.end(), [](const auto& p) { return p.allFinite(); }),
+                 points.size());
+}
+
+void describe_frame(Work& work) {
+    const Frame& frame = work.frame;
+    FrameRow& row = work.row;
+    row.size = frame.cloud ? frame.cloud->grid : frame.depth_m.size();
+    row.valid_share = valid_share(frame);
+    row.warnings = frame.warnings;
+    if (frame.registration == Registration::yes && !frame.cloud && !frame.colour.empty() &&
+        frame.colour.size() != frame.depth_m.size())
+        row.warnings.push_back(fmt::format("colour is {}x{}, depth {}x{}: shaded shows clay.", frame.colour.cols,
+                                           frame.colour.rows, frame.depth_m.cols, frame.depth_m.rows));
+}
+
+/// What the pictures of a frame show, all on one pixel grid.
+struct Scene {
+    cv::Mat1f z_m, visibility;
+    cv::Mat3b colour; ///< empty unless it fits the depth
+    Pinhole camera;
+};
+
+cv::Mat3b colour_in_view(const Cloud& cloud, const DepthImage& depth) {
+    if (cloud.colours.empty())
+        return {};
+    cv::Mat3b colour(depth.z_m.size(), cv::Vec3b(64, 40, 28));
+    std::transform(depth.source.begin(), depth.source.end(), colour.begin(), colour.begin(),
+                   [&](int point, const cv::Vec3b& none) { return point < 0 ? none : cloud.colours[point]; });
+    return colour;
+}
+
+/// Values of an organised cloud's points as an image; shares their memory.
+template <class Pixel>
+cv::Mat_<Pixel> on_grid(const std::vector<Pixel>& values, cv::Size grid) {
+    return cv::Mat_<Pixel>(grid.height, grid.width, const_cast<Pixel*>(values.data()));
+}
+
+cv::Mat1f depth_on_grid(const Cloud& cloud) {
+    cv::Mat1f z_m(cloud.grid);
+    std::transform(cloud.points.begin(), cloud.points.end(), z_m.begin(),
+                   [](const Eigen::Vector3d& p) { return p.allFinite() ? static_cast<float>(p.z()) : 0.0f; });
+    return z_m;
+}
+
+/// A depth frame is shown on its recorded pixels, an organised cloud on its grid, other clouds as projected.
+/// A point's colour is its own; a depth pixel's colour is claimed only where the images are registered.
+Scene scene_of(const Work& work) {
+    const Frame& frame = work.frame;
+    const cv::Mat1f& visibility = work.attached.visibility;
+    if (!frame.cloud) {
+        const bool fits = frame.registration == Registration::yes && frame.colour.size() == frame.depth_m.size();
+        return {frame.depth_m, visibility, fits ? frame.colour : cv::Mat3b(), frame.camera.pinhole};
+    }
+    const Cloud& cloud = *frame.cloud;
+    if (!cloud.organised())
+        return {work.depth.z_m, visibility, colour_in_view(cloud, work.depth), work.depth.camera};
+    const cv::Mat3b colour = cloud.colours.empty() ? cv::Mat3b() : on_grid(cloud.colours, cloud.grid);
+    return {depth_on_grid(cloud), visibility, colour, frame.camera.pinhole};
+}
+
+/// Clay has no pixel colours to keep where there is no surface, so both kinds go through the same multiplication.
+cv::Mat3b shaded_picture(const Scene& scene, double strength) {
+    return shade(scene.colour.empty() ? clay(scene.z_m, scene.camera) : scene.colour, scene.visibility, strength);
+}
+
+cv::Mat3b panel_picture(const Frame& frame, const Scene& scene, const cv::Mat3b& shaded) {
+    const bool fits = !scene.colour.empty();
+    const std::string colour = fits                   ? "colour"
+                               : frame.colour.empty() ? "no colour"
+                                                      : "colour (not known to fit the depth)";
+    return panel({{colour, fits ? scene.colour : frame.colour},
+                  {"depth", depth_picture(scene.z_m)},
+                  {"ambient occlusion", visibility_picture(scene.visibility)},
+                  {fits ? "colour x AO" : "clay x AO", shaded}});
+}
+
+std::vector<cv::Vec3b> shaded_colours(const std::vector<cv::Vec3b>& colours, const std::vector<float>& visibility,
+                                      double strength) {
+    const cv::Size row(static_cast<int>(colours.size()), 1);
+    if (row.empty())
+        return {};
+    const cv::Mat3b shaded = shade(on_grid(colours, row), on_grid(visibility, row), strength);
+    return {shaded.begin(), shaded.end()};
+}
+
+/// The colour of each undistorted pixel; the lens bends where to look. Black where it saw nothing.
+cv::Mat3b undistorted_colour(const cv::Mat3b& colour, const Camera& camera) {
+    if (colour.empty() || !camera.distortion.any())
+        return colour;
+    const auto maps = Undistortion::of(camera);
+    cv::Mat3b straight(colour.size());
+    std::transform(maps->recorded_pixel().begin(), maps->recorded_pixel().end(), straight.begin(), [&](int pixel) {
+        return pixel < 0 ? cv::Vec3b() : colour(pixel / colour.cols, pixel % colour.cols);
+    });
+    return straight;
+}
+
+/// The depth frame's surface as points in camera space, coloured where the colour fits.
+void write_depth_cloud(const std::filesystem::path& file, const Work& work, const Scene& scene,
+                       const Outputs& outputs) {
+    const auto& [camera, z_m, source] = work.depth;
+    const cv::Mat3b colour = undistorted_colour(scene.colour, work.frame.camera);
+    std::vector<Eigen::Vector3d> points;
+    std::vector<cv::Vec3b> colours;
+    std::vector<float> visibility;
+    for (int v = 0; v < z_m.rows; ++v) {
+        for (int u = 0; u < z_m.cols; ++u) {
+            const double z = z_m(v, u);
+            if (z <= 0)
+                continue;
+            points.emplace_back((u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z);
+            visibility.push_back(work.ao.visibility(v, u));
+            if (!colour.empty())
+                colours.push_back(colour(v, u));
+        }
+    }
+    if (outputs.colour_cloud)
+        colours = shaded_colours(colours, visibility, outputs.shade_strength);
+    write_new_ply(file, points, colours, {{"ambient_occlusion", visibility}},
+                  {"camera space: x right, y down, z forward, metres"});
+}
+
+void write_recorded_cloud(const std::filesystem::path& file, const Work& work, const Outputs& outputs) {
+    const Cloud& cloud = *work.frame.cloud;
+    std::vector<cv::Vec3b> colours;
+    if (outputs.colour_cloud)
+        colours = shaded_colours(cloud.colours, work.attached.per_point, outputs.shade_strength);
+    write_cloud(file, cloud, {{"ambient_occlusion", work.attached.per_point}}, colours);
+}
+
+std::filesystem::path ao_file(const std::string& name, const Outputs& outputs) {
+    return std::filesystem::path("ao") / (name + extension(outputs.format));
+}
+std::filesystem::path picture_file(const char* kind, const std::string& name) {
+    return std::filesystem::path(kind) / (name + ".png");
+}
+std::filesystem::path cloud_file(const std::string& name, const std::string& extension) {
+    return std::filesystem::path("clouds") / (name + extension);
+}
+
+void write_all(Work& work, const Scene& scene, const cv::Mat3b& shaded, const Outputs& outputs) {
+    const std::string& name = work.entry.name;
+    const auto wrote = [&](const std::filesystem::path& file, const auto& write) {
+        write(outputs.folder / file);
+        work.row.files.push_back(file);
+    };
+    if (outputs.ao)
+        wrote(ao_file(name, outputs), [&](const auto& file) { write_ao(file, scene.visibility, outputs.format); });
+    if (outputs.shaded)
+        wrote(picture_file("shaded", name), [&](const auto& file) { write_picture(file, shaded); });
+    if (outputs.panel)
+        wrote(picture_file("panel", name),
+              [&](const auto& file) { write_picture(file, panel_picture(work.frame, scene, shaded)); });
+    if (work.frame.cloud && outputs.cloud)
+        wrote(cloud_file(name, extension(*work.frame.cloud->records)),
+              [&](const auto& file) { write_recorded_cloud(file, work, outputs); });
+    if (!work.frame.cloud && outputs.depth_cloud)
+        wrote(cloud_file(name, ".ply"), [&](const auto& file) { write_depth_cloud(file, work, scene, outputs); });
+}
+
+/// A failed frame leaves neither part of its own files nor those of an earlier run: what lies there is what the row
+/// says.
+void remove_files(Work& work, const Outputs& outputs) {
+    work.row.files.clear();
+    for (const auto& file : files_of(work.entry, outputs)) {
+        std::error_code gone_already;
+        std::filesystem::remove(file, gone_already);
+    }
+}
+
+void attach_and_write(Work& work, const Outputs& outputs) {
+    Scene scene;
+    cv::Mat3b shaded;
+    take(work, &StageTimes::attach, [&] {
+        work.attached = attach(work.frame, work.depth, work.ao);
+        work.row.coverage = work.attached.coverage;
+        work.row.mean_visibility = work.attached.mean_visibility;
+        scene = scene_of(work);
+        if (outputs.shaded || outputs.panel)
+            shaded = shaded_picture(scene, outputs.shade_strength);
+    });
+    take(work, &StageTimes::write, [&] { write_all(work, scene, shaded, outputs); });
+    if (work.row.status == FrameStatus::failed)
+        remove_files(work, outputs);
+    else
+        work.row.status = FrameStatus::ok;
+}
+
+std::vector<FrameRow> planned_rows(const Capture& capture, const std::vector<std::size_t>& frames) {
+    std::vector<FrameRow> rows;
+    for (const std::size_t index : frames) {
+        FrameRow& row = rows.emplace_back();
+        row.index = index;
+        row.name = capture.entries.at(index).name;
+        row.why = "interrupted";
+        row.valid_share = row.coverage = row.mean_visibility = unknown;
+        row.ms = {unknown, unknown, unknown, unknown, unknown};
+    }
+    return rows;
+}
+
+} // namespace
+
+std::string_view name_of(FrameStatus status) {
+    switch (status) {
+    case FrameStatus::ok:
+        return "ok";
+    case FrameStatus::failed:
+        return "failed";
+    case FrameStatus::skipped:
+        return "skipped";
+    }
+    return "";
+}
+
+std::vector<std::filesystem::path> files_of(const CaptureEntry& entry, const Outputs& outputs) {
+    std::vector<std::filesystem::path> files;
+    const auto add = [&](const std::filesystem::path& file) { files.push_back(outputs.folder / file); };
+    if (outputs.ao)
+        add(ao_file(entry.name, outputs));
+    if (outputs.shaded)
+        add(picture_file("shaded", entry.name));
+    if (outputs.panel)
+        add(picture_file("panel", entry.name));
+    if (entry.cloud.empty() ? outputs.depth_cloud : outputs.cloud)
+        add(cloud_file(entry.name, ".ply"));
+    if (!entry.cloud.empty() && outputs.cloud)
+        add(cloud_file(entry.name, ".pcd"));
+    return files;
+}
+
+std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const BatchOptions& options,
+                                const std::function<void(const FrameRow&)>& on_frame) {
+    std::vector<FrameRow> rows = planned_rows(capture, options.frames);
+    std::size_t begun = 0;
+    using Token = std::shared_ptr<Work>;
+
+    const auto begin = [&](tbb::flow_control& flow) -> Token {
+        if (begun == rows.size() || (options.stop && *options.stop)) {
+            flow.stop();
+            return {};
+        }
+        FrameRow& row = rows[begun++];
+        row.why.clear();
+        return std::make_shared<Work>(Work{capture.entries[row.index], row});
+    };
+    const auto load_and_project = [&](Token work) {
+        take(*work, &StageTimes::load, [&] {
+            work->frame = load(capture, work->row.index, options.registration);
+            describe_frame(*work);
+        });
+        take(*work, &StageTimes::project, [&] {
+            work->frame.camera = work->row.camera = camera_of(work->frame);
+            work->depth = project(work->frame);
+        });
+        return work;
+    };
+    const auto compute = [&](Token work) {
+        take(*work, &StageTimes::compute, [&] {
+            work->ao = method.compute({work->depth});
+            work->row.passes = method.timings();
+        });
+        return work;
+    };
+    const auto finish = [&](const Token& work) {
+        attach_and_write(*work, options.outputs);
+        return &work->row; // the images end here
+    };
+    const auto report = [&](const FrameRow* row) {
+        if (on_frame)
+            on_frame(*row);
+    };
+
+    using tbb::filter_mode;
+    const int in_memory =
+        options.frames_in_memory > 0 ? options.frames_in_memory : tbb::info::default_concurrency() + 2;
+    tbb::parallel_pipeline(static_cast<std::size_t>(in_memory),
+                           tbb::make_filter<void, Token>(filter_mode::serial_in_order, begin) &
+                               tbb::make_filter<Token, Token>(filter_mode::parallel, load_and_project) &
+                               tbb::make_filter<Token, Token>(filter_mode::serial_in_order, compute) &
+                               tbb::make_filter<Token, FrameRow*>(filter_mode::parallel, finish) &
+                               tbb::make_filter<FrameRow*, void>(filter_mode::serial_in_order, report));
+    return rows;
+}
+
+} // namespace scanshade

@@ -1,0 +1,73 @@
+// The walk for many frames: load, project, compute, attach, write, with a bounded number of frames in memory.
+#pragma once
+
+#include "ao/method.h"
+#include "io/capture.h"
+#include "io/image_file.h"
+
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace scanshade {
+
+/// What is written of each frame, under `folder`: ao/NAME.png, shaded/NAME.png, panel/NAME.png, clouds/NAME.pcd or
+/// .ply.
+struct Outputs {
+    std::filesystem::path folder;
+    bool ao = true;     ///< the visibility map
+    bool shaded = true; ///< colour times visibility; clay times visibility where colour is not known to fit the depth
+    bool panel = false; ///< colour | depth | AO | shaded
+    bool cloud = true;  ///< a cloud input with the field ambient_occlusion, everything else as it was
+    bool depth_cloud = false; ///< a new PLY of a depth frame's points, in camera space
+    AoFormat format = AoFormat::png16;
+    double shade_strength = 1; ///< 0 leaves the colour, 1 multiplies by visibility
+    bool colour_cloud = false; ///< replaces the cloud's colour by colour times visibility
+};
+
+/// The files that `outputs` makes of a frame; of a cloud both possible names, since only its content tells the format.
+[[nodiscard]] std::vector<std::filesystem::path> files_of(const CaptureEntry& entry, const Outputs& outputs);
+
+struct BatchOptions {
+    std::vector<std::size_t> frames; ///< indices into capture.entries; the report keeps this order
+    Outputs outputs;
+    std::optional<Registration> registration; ///< what the user said; otherwise what the capture says
+    int frames_in_memory = 0;                 ///< 0 = cores + 2
+    const std::atomic<bool>* stop = nullptr;  ///< set = begin no further frame
+};
+
+enum class FrameStatus { ok, failed, skipped };
+[[nodiscard]] std::string_view name_of(FrameStatus status);
+
+/// Milliseconds that one frame spent in each stage of the walk.
+struct StageTimes {
+    double load = 0, project = 0, compute = 0, attach = 0, write = 0;
+};
+
+/// What became of one frame: a row of frames.csv. NaN and empty where the frame did not come that far.
+struct FrameRow {
+    std::size_t index = 0; ///< in capture.entries
+    std::string name;
+    FrameStatus status = FrameStatus::skipped;
+    std::string why; ///< of a failed or skipped frame
+    cv::Size size;
+    double valid_share = 0; ///< pixels or points with a depth / all of them
+    double coverage = 0;    ///< pixels or points with a visibility / those with a depth
+    double mean_visibility = 0;
+    Camera camera; ///< as used
+    StageTimes ms;
+    Timings passes; ///< the method's own account of `ms.compute`
+    std::vector<std::string> warnings;
+    std::vector<std::filesystem::path> files; ///< written, relative to Outputs::folder
+};
+
+/// Runs the walk over the frames. A frame that fails says why in its row, leaves no file, and stops no other.
+/// `on_frame` is called once per row, in the order of `options.frames`, never concurrently.
+/// Rows come back in that order too; what is written does not depend on timing.
+[[nodiscard]] std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const BatchOptions& options,
+                                              const std::function<void(const FrameRow&)>& on_frame = {});
+
+} // namespace scanshade

@@ -1,0 +1,53 @@
+// What a command of the program is: words and flags bound to variables, and what to do once they are set.
+#pragma once
+
+#include "projection/parameters.h"
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace scanshade {
+
+/// What the program's exit code tells a script.
+enum ExitCode : int { all_well = 0, misuse = 1, some_failed = 2, nothing_done = 3 };
+
+/// Flags of one stage of the walk, as the help groups them. Row "radius" is the flag --radius; row "out" is also -o.
+struct Stage {
+    std::string title; ///< "input", "output", "method cacao"
+    std::vector<Parameter> rows;
+};
+
+/// What stands on the command line without a flag: PATH...
+struct Words {
+    std::string name; ///< "PATH", as the help shows it
+    std::string help;
+    std::vector<std::string>* values = nullptr; ///< null = the command takes no words
+    int at_least = 0, at_most = 0;
+};
+
+/// One command, its settings held by itself. The parser fills words() and stages(), then calls run().
+class Command {
+  public:
+    virtual ~Command() = default;
+    virtual Words words() { return {}; }
+    virtual std::vector<Stage> stages() { return {}; }
+    /// Does the work; returns an ExitCode. Throws Misuse for settings that cannot be, Error when nothing can be done.
+    virtual int run() = 0;
+};
+
+/// A row of the table of commands in main.cpp.
+struct CommandRow {
+    std::string_view name;    ///< "run"
+    std::string_view summary; ///< one line
+    std::unique_ptr<Command> (*make)();
+};
+
+std::unique_ptr<Command> inspect_command();
+std::unique_ptr<Command> run_command();
+std::unique_ptr<Command> generate_command();
+std::unique_ptr<Command> methods_command();
+std::unique_ptr<Command> devices_command();
+
+} // namespace scanshade

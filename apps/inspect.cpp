@@ -1,0 +1,330 @@
+// `scanshade inspect`: what is in a capture, and what looks wrong, before anything is computed.
+#include "apps/command.h"
+#include "apps/json.h"
+#include "io/capture.h"
+#include "io/cloud_file.h"
+#include "projection/error.h"
+#include "projection/project.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <map>
+#include <ranges>
+
+namespace scanshade {
+namespace {
+
+constexpr std::size_t most_samples = 10;
+
+// ---------------------------------------------------------------------------------------------------- measuring
+
+/// The smallest step between two different depths from `from_m` to `to_m`.
+struct DepthStep {
+    double from_m, to_m, step_m;
+};
+
+/// What the sampled frames hold together.
+struct Samples {
+    std::vector<float> depths_m; ///< all that were seen
+    std::size_t recorded = 0;    ///< pixels or points, seen or not
+    std::size_t frames = 0;
+    std::map<std::pair<int, int>, int> colour_sizes, depth_sizes; ///< width x height -> how many frames
+    std::map<std::string, int> clouds;                            ///< description -> how many
+    std::optional<Camera> camera;                                 ///< of the first frame that has one
+    std::vector<std::string> warnings;
+};
+
+/// One frame's findings: those of a bad one are why it is bad.
+struct Problem {
+    std::string frame, why;
+};
+
+struct Findings {
+    Capture capture;
+    Samples samples;
+    std::vector<Problem> problems;
+    std::size_t poses = 0;
+    double path_length_m = 0;
+    std::vector<DepthStep> steps;
+    double nearest_m = 0, median_m = 0, farthest_m = 0; ///< of the sampled depths
+};
+
+void add_depths(const Frame& frame, Samples& samples) {
+    const auto add = [&](double z) {
+        ++samples.recorded;
+        if (std::isfinite(z) && z != 0)
+            samples.depths_m.push_back(static_cast<float>(z));
+    };
+    if (frame.cloud)
+        for (const Eigen::Vector3d& point : frame.cloud->points)
+            add(point.z());
+    else
+        for (const float z : frame.depth_m)
+            add(z);
+}
+
+void add_frame(const Frame& frame, Samples& samples) {
+    ++samples.frames;
+    add_depths(frame, samples);
+    if (!frame.colour.empty())
+        ++samples.colour_sizes[{frame.colour.cols, frame.colour.rows}];
+    if (frame.cloud)
+        ++samples.clouds[describe(*frame.cloud->records)];
+    else
+        ++samples.depth_sizes[{frame.depth_m.cols, frame.depth_m.rows}];
+    for (const std::string& warning : frame.warnings)
+        samples.warnings.push_back(frame.name + ": " + warning);
+    const bool without_camera = !frame.cloud && frame.camera.pinhole.fx == 0; // the capture's own warning says so
+    if (samples.camera || without_camera)
+        return;
+    try {
+        samples.camera = camera_of(frame);
+    } catch (const Error& none) {
+        samples.warnings.push_back(frame.name + ": " + none.what());
+    }
+}
+
+/// Up to most_samples indices, evenly spread, first and last included.
+std::vector<std::size_t> spread(std::size_t count) {
+    std::vector<std::size_t> chosen;
+    const std::size_t samples = std::min(count, most_samples);
+    for (std::size_t i = 0; i < samples; ++i)
+        chosen.push_back(samples == 1 ? 0 : i * (count - 1) / (samples - 1));
+    return chosen;
+}
+
+/// Steps in bands of half a metre to 6 m. A band with fewer than 1000 depths or 3 different ones tells nothing, and
+/// below a hundredth of a millimetre it is the numbers that are stepped, not the sensor.
+std::vector<DepthStep> depth_steps(const std::vector<float>& sorted) {
+    constexpr float width_m = 0.5f, noise_m = 1e-5f;
+    std::vector<DepthStep> steps;
+    for (float from = 0; from < 6; from += width_m) {
+        const auto begin = std::lower_bound(sorted.begin(), sorted.end(), from);
+        const auto end = std::lower_bound(begin, sorted.end(), from + width_m);
+        if (end - begin < 1000)
+            continue;
+        int different = 1;
+        float smallest = width_m;
+        for (auto z = begin + 1; z != end; ++z)
+            if (*z > *(z - 1)) {
+                smallest = std::min(smallest, *z - *(z - 1));
+                ++different;
+            }
+        if (different >= 3 && smallest > noise_m)
+            steps.push_back({from, from + width_m, smallest});
+    }
+    return steps;
+}
+
+void measure_poses(Findings& findings) {
+    std::optional<Eigen::Vector3d> before;
+    for (const CaptureEntry& entry : findings.capture.entries) {
+        if (!entry.world_from_camera)
+            continue;
+        const Eigen::Vector3d here = entry.world_from_camera->translation();
+        findings.path_length_m += before ? (here - *before).norm() : 0;
+        before = here;
+        ++findings.poses;
+    }
+}
+
+void measure_samples(Findings& findings) {
+    std::vector<std::size_t> loadable;
+    for (std::size_t i = 0; i < findings.capture.entries.size(); ++i) {
+        const CaptureEntry& entry = findings.capture.entries[i];
+        if (entry.problem.empty())
+            loadable.push_back(i);
+        else
+            findings.problems.push_back({entry.name, entry.problem});
+        for (const std::string& warning : entry.warnings)
+            findings.samples.warnings.push_back(entry.name + ": " + warning);
+    }
+    for (const std::size_t place : spread(loadable.size())) {
+        try {
+            add_frame(findings.capture.load(loadable[place]), findings.samples);
+        } catch (const std::exception& failure) {
+            findings.problems.push_back({findings.capture.entries[loadable[place]].name, failure.what()});
+        }
+    }
+}
+
+Findings look_at(Capture capture) {
+    Findings findings{.capture = std::move(capture), .samples = {}, .problems = {}, .steps = {}};
+    measure_poses(findings);
+    measure_samples(findings);
+    std::vector<float>& depths = findings.samples.depths_m;
+    if (depths.empty())
+        return findings;
+    std::ranges::sort(depths);
+    findings.nearest_m = depths.front();
+    findings.median_m = depths[depths.size() / 2];
+    findings.farthest_m = depths.back();
+    findings.steps = depth_steps(depths);
+    return findings;
+}
+
+double hole_share(const Samples& samples) {
+    return samples.recorded == 0
+               ? 0
+               : 1 - static_cast<double>(samples.depths_m.size()) / static_cast<double>(samples.recorded);
+}
+
+// ---------------------------------------------------------------------------------------------------- telling
+
+void line(const std::string& name, const std::string& text) { fmt::print("  {:<14} {}\n", name, text); }
+
+std::string sizes_text(const std::map<std::pair<int, int>, int>& sizes) {
+    std::string text;
+    for (const auto& [size, count] : sizes)
+        text += fmt::format("{}{}x{}{}", text.empty() ? "" : ", ", size.first, size.second,
+                            sizes.size() > 1 ? fmt::format(" ({} frames)", count) : "");
+    return text;
+}
+
+void print_depth(const Findings& found) {
+    const DepthEncoding& depth = found.capture.depth;
+    if (found.samples.clouds.empty())
+        line("depth unit", fmt::format("{} ({})", depth.name, depth.origin));
+    line("depth range",
+         fmt::format("{:.3f} .. {:.3f} m, median {:.3f} m", found.nearest_m, found.farthest_m, found.median_m));
+    line("holes", fmt::format("{:.1f} %", 100 * hole_share(found.samples)));
+    std::string steps;
+    for (const DepthStep& step : found.steps | std::views::take(6))
+        steps += fmt::format("{}{:.2g} mm at {:.1f} m", steps.empty() ? "" : ", ", 1000 * step.step_m, step.from_m);
+    line("depth step", steps.empty() ? "none seen" : steps);
+}
+
+/// Many frames often have the same trouble: the first few tell what it is.
+void print_some(const std::string& name, const std::vector<std::string>& texts) {
+    constexpr std::size_t most = 8;
+    for (const std::string& text : texts | std::views::take(most))
+        line(name, text);
+    if (texts.size() > most)
+        line(name, fmt::format("... and {} more; --json lists them all", texts.size() - most));
+}
+
+void print(const Findings& found) {
+    const Capture& capture = found.capture;
+    const Samples& samples = found.samples;
+    fmt::print("{}\n", capture.path.string());
+    line("kind", capture.kind);
+    line("frames",
+         fmt::format("{}{}; {} looked into", capture.entries.size(),
+                     found.problems.empty() ? "" : fmt::format(", {} of them unusable", found.problems.size()),
+                     samples.frames));
+    if (!samples.depth_sizes.empty())
+        line("depth size", sizes_text(samples.depth_sizes));
+    if (!samples.colour_sizes.empty())
+        line("colour size", sizes_text(samples.colour_sizes));
+    for (const auto& [description, count] : samples.clouds)
+        line("cloud", description);
+    if (samples.frames > 0)
+        print_depth(found);
+    if (const auto& camera = samples.camera ? samples.camera : capture.camera)
+        line("camera", fmt::format("{} ({})", describe(*camera), camera->origin));
+    else
+        line("camera", "none: --camera gives one");
+    line("poses", found.poses == 0 ? "none" : fmt::format("{}, path {:.2f} m", found.poses, found.path_length_m));
+    const std::string registered(samples.clouds.empty() ? name_of(capture.registration) : "by its nature");
+    line("registered",
+         registered + (capture.registration_reason.empty() ? "" : " (" + capture.registration_reason + ")"));
+    std::vector<std::string> unusable;
+    for (const Problem& problem : found.problems)
+        unusable.push_back(problem.frame + ": " + problem.why);
+    print_some("warning", capture.warnings);
+    print_some("warning", samples.warnings);
+    print_some("unusable", unusable);
+}
+
+json sizes_json(const std::map<std::pair<int, int>, int>& sizes) {
+    json text = json::array();
+    for (const auto& [size, count] : sizes)
+        text.push_back({{"width", size.first}, {"height", size.second}, {"frames", count}});
+    return text;
+}
+
+json depth_json(const Findings& found) {
+    const DepthEncoding& depth = found.capture.depth;
+    json text{{"encoding", depth.name},     {"origin", depth.origin},    {"near_m", found.nearest_m},
+              {"median_m", found.median_m}, {"far_m", found.farthest_m}, {"holes", hole_share(found.samples)},
+              {"steps", json::array()}};
+    for (const DepthStep& step : found.steps)
+        text["steps"].push_back({{"from_m", step.from_m}, {"to_m", step.to_m}, {"step_m", step.step_m}});
+    return text;
+}
+
+json to_json(const Findings& found) {
+    const Capture& capture = found.capture;
+    const auto& camera = found.samples.camera ? found.samples.camera : capture.camera;
+    std::vector<std::string> warnings = capture.warnings;
+    std::ranges::copy(found.samples.warnings, std::back_inserter(warnings));
+    json text{
+        {"path", capture.path.string()},
+        {"kind", capture.kind},
+        {"frames", capture.entries.size()},
+        {"frames_looked_into", found.samples.frames},
+        {"depth_sizes", sizes_json(found.samples.depth_sizes)},
+        {"colour_sizes", sizes_json(found.samples.colour_sizes)},
+        {"clouds", json::array()},
+        {"depth", depth_json(found)},
+        {"camera", camera ? to_json(*camera) : json()},
+        {"poses", {{"count", found.poses}, {"path_m", found.path_length_m}}},
+        {"registration", {{"registered", name_of(capture.registration)}, {"reason", capture.registration_reason}}},
+        {"warnings", warnings},
+        {"unusable", json::array()}};
+    for (const auto& [description, count] : found.samples.clouds)
+        text["clouds"].push_back(description);
+    for (const Problem& problem : found.problems)
+        text["unusable"].push_back({{"frame", problem.frame}, {"why", problem.why}});
+    return text;
+}
+
+// ---------------------------------------------------------------------------------------------------- the command
+
+class Inspect final : public Command {
+  public:
+    Words words() override { return {"PATH", "captures: folders, depth images or clouds", &paths_, 1, 1 << 20}; }
+
+    std::vector<Stage> stages() override {
+        return {{"input",
+                 {{"camera", "a camera file, or fx,fy,cx,cy; replaces the capture's own", &options_.camera},
+                  {"depth-scale", "mm, tum, sun, nyu, m, or units per metre; replaces the capture's own",
+                   &options_.depth_scale},
+                  {"association-limit", "colour, depth and poses farther apart in time are not paired",
+                   &options_.association_limit_s, "s", 0, 1e6}}},
+                {"output", {{"json", "the same as JSON", &as_json_}}}};
+    }
+
+    int run() override {
+        json all = json::array();
+        std::size_t usable = 0, problems = 0;
+        for (const std::string& path : paths_) {
+            try {
+                const Findings found = look_at(open_capture(path, options_));
+                usable += found.samples.frames;
+                problems += found.problems.size();
+                as_json_ ? all.push_back(to_json(found)) : print(found);
+            } catch (const Misuse&) {
+                throw;
+            } catch (const std::exception& failure) {
+                fmt::print(stderr, "scanshade: {}\n", failure.what());
+                ++problems;
+            }
+        }
+        if (as_json_)
+            fmt::print("{}\n", text_of(paths_.size() == 1 && !all.empty() ? all[0] : all));
+        return usable == 0 ? nothing_done : problems > 0 ? some_failed : all_well;
+    }
+
+  private:
+    std::vector<std::string> paths_;
+    CaptureOptions options_;
+    bool as_json_ = false;
+};
+
+} // namespace
+
+std::unique_ptr<Command> inspect_command() { return std::make_unique<Inspect>(); }
+
+} // namespace scanshade

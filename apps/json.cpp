@@ -1,0 +1,29 @@
+// Values that both the manifest and `inspect --json` tell.
+#include "apps/json.h"
+
+namespace scanshade {
+
+json to_json(const Camera& camera) {
+    const auto& [fx, fy, cx, cy, size] = camera.pinhole;
+    json text{{"fx", fx}, {"fy", fy}, {"cx", cx}, {"cy", cy}, {"width", size.width}, {"height", size.height}};
+    if (const Distortion& d = camera.distortion; d.any())
+        text["distortion"] = {d.k1, d.k2, d.p1, d.p2, d.k3};
+    text["origin"] = camera.origin;
+    return text;
+}
+
+std::string_view name_of(Registration registration) {
+    switch (registration) {
+    case Registration::yes:
+        return "yes";
+    case Registration::no:
+        return "no";
+    case Registration::unknown:
+        return "unknown";
+    }
+    return "";
+}
+
+std::string text_of(const json& value) { return value.dump(2, ' ', false, json::error_handler_t::replace); }
+
+} // namespace scanshade

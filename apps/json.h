@@ -1,0 +1,23 @@
+// Values that both the manifest and `inspect --json` tell.
+#pragma once
+
+#include "projection/camera.h"
+#include "projection/frame.h"
+
+#include <nlohmann/json.hpp>
+#include <string_view>
+
+namespace scanshade {
+
+using json = nlohmann::ordered_json;
+
+/// fx, fy, cx, cy, width, height, distortion [k1, k2, p1, p2, k3] where there is any, origin.
+[[nodiscard]] json to_json(const Camera& camera);
+
+/// "yes", "no" or "unknown".
+[[nodiscard]] std::string_view name_of(Registration registration);
+
+/// The text as people read it; bytes that are not UTF-8 (file names may hold any) become U+FFFD.
+[[nodiscard]] std::string text_of(const json& value);
+
+} // namespace scanshade

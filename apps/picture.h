@@ -1,0 +1,32 @@
+// Depth and visibility made visible: colours for depth, clay for shape, and the side-by-side panel.
+#pragma once
+
+#include "projection/camera.h"
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+namespace scanshade {
+
+/// Depth (metres, 0 = hole) in turbo colours, near warm and far cold over the frame's own 1..99 % range; holes are
+/// black.
+[[nodiscard]] cv::Mat3b depth_picture(const cv::Mat1f& z_m);
+
+/// Visibility as grey, 1 = white; where there is no surface a dim blue that no visibility has.
+[[nodiscard]] cv::Mat3b visibility_picture(const cv::Mat1f& visibility);
+
+/// The surface as grey clay lit from the camera: what `depth` alone knows of the shape. Holes get the same dim blue.
+/// `camera` is the pinhole of `z_m`, same size; lens distortion may be ignored, it only bends the light a little.
+[[nodiscard]] cv::Mat3b clay(const cv::Mat1f& z_m, const Pinhole& camera);
+
+/// One picture of a panel, and what is written above it.
+struct Tile {
+    std::string title;
+    cv::Mat3b picture; ///< empty = an empty tile
+};
+
+/// Tiles side by side, each scaled to the first non-empty one's height, with titles.
+[[nodiscard]] cv::Mat3b panel(const std::vector<Tile>& tiles);
+
+} // namespace scanshade

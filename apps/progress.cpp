@@ -1,0 +1,56 @@
+// How far a run has come: a bar with rate and remaining time on a terminal, one line per frame elsewhere. On stderr.
+#include "apps/progress.h"
+
+#include <cmath>
+#include <fmt/format.h>
+#include <unistd.h>
+
+namespace scanshade {
+namespace {
+
+const char* const clear_line = "\r\033[K";
+
+std::string line_of(const FrameRow& row) {
+    if (row.status != FrameStatus::ok)
+        return fmt::format("{}: {}: {}", row.name, name_of(row.status), row.why);
+    const StageTimes& ms = row.ms;
+    const std::string visibility =
+        std::isnan(row.mean_visibility) ? "no visibility" : fmt::format("visibility {:.3f}", row.mean_visibility);
+    std::string line =
+        fmt::format("{}: ok, valid {:.1f} %, coverage {:.1f} %, {}, {:.0f} ms", row.name, 100 * row.valid_share,
+                    100 * row.coverage, visibility, ms.load + ms.project + ms.compute + ms.attach + ms.write);
+    for (const std::string& warning : row.warnings)
+        line += "; warning: " + warning;
+    return line;
+}
+
+} // namespace
+
+Progress::Progress(std::size_t total) : total_(total), on_terminal_(isatty(STDERR_FILENO) == 1) {}
+
+void Progress::add(const FrameRow& row) {
+    ++done_;
+    const bool remarkable = row.status != FrameStatus::ok || !row.warnings.empty();
+    if (!on_terminal_ || remarkable)
+        fmt::print(stderr, "{}  {}\n", on_terminal_ ? clear_line : "", line_of(row));
+    if (on_terminal_)
+        draw();
+}
+
+void Progress::draw() {
+    constexpr std::size_t width = 30;
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    const double rate = static_cast<double>(done_) / seconds;
+    const int left = static_cast<int>(static_cast<double>(total_ - done_) / rate + 0.5);
+    const std::size_t filled = width * done_ / total_;
+    fmt::print(stderr, "{}  [{:#<{}}{:.<{}}] {}/{}  {:.1f} frames/s  {}:{:02} left", clear_line, "", filled, "",
+               width - filled, done_, total_, rate, left / 60, left % 60);
+    std::fflush(stderr);
+}
+
+void Progress::end() {
+    if (on_terminal_ && done_ > 0)
+        fmt::print(stderr, "\n");
+}
+
+} // namespace scanshade

@@ -1,0 +1,25 @@
+// How far a run has come: a bar with rate and remaining time on a terminal, one line per frame elsewhere. On stderr.
+#pragma once
+
+#include "apps/batch.h"
+
+#include <chrono>
+
+namespace scanshade {
+
+class Progress {
+  public:
+    explicit Progress(std::size_t total);
+    void add(const FrameRow& row);
+    /// Leaves the terminal on a fresh line.
+    void end();
+
+  private:
+    void draw();
+
+    std::size_t total_, done_ = 0;
+    bool on_terminal_;
+    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+} // namespace scanshade

@@ -1,0 +1,204 @@
+// What a run leaves beside its pictures: frames.csv, a row per frame, and manifest.json, enough to run it again.
+#include "apps/report.h"
+
+#include "apps/json.h"
+#include "io/output_file.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <ctime>
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <fstream>
+#include <type_traits>
+
+namespace scanshade {
+namespace {
+
+std::string quoted(const std::string& field) {
+    if (field.find_first_of(",\"\r\n") == std::string::npos)
+        return field;
+    std::string text = "\"";
+    for (const char c : field)
+        text += c == '"' ? std::string("\"\"") : std::string(1, c);
+    return text + '"';
+}
+
+std::string number(double value, int digits) { return std::isnan(value) ? "" : fmt::format("{:.{}f}", value, digits); }
+
+std::string csv_line(const FrameRow& row) {
+    const auto ms = [](double value) { return number(value, 2); };
+    const bool loaded = !row.size.empty();
+    return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.index, quoted(row.name),
+                       name_of(row.status), quoted(row.why), loaded ? std::to_string(row.size.width) : "",
+                       loaded ? std::to_string(row.size.height) : "", number(row.valid_share, 4),
+                       number(row.coverage, 4), number(row.mean_visibility, 4), ms(row.ms.load), ms(row.ms.project),
+                       ms(row.ms.compute), ms(row.ms.attach), ms(row.ms.write),
+                       quoted(fmt::format("{}", fmt::join(row.warnings, "; "))));
+}
+
+/// JSON knows no NaN: what is not known is null.
+json known(double value, int digits = 4) {
+    const double scale = std::pow(10.0, digits);
+    return std::isfinite(value) ? json(std::round(value * scale) / scale) : json();
+}
+
+json value_json(const Parameter& row) {
+    return std::visit(
+        [&](const auto* value) -> json {
+            if constexpr (std::is_same_v<decltype(value), const float*>)
+                return json::parse(value_text(row)); // the number as typed: 0.1, not 0.10000000149011612
+            else
+                return *value;
+        },
+        row.value);
+}
+
+json settings_json(const std::vector<Stage>& stages) {
+    json settings = json::object();
+    for (const Stage& stage : stages)
+        for (const Parameter& row : stage.rows)
+            settings[stage.title][row.name] = value_json(row);
+    return settings;
+}
+
+json capture_json(const RunReport& report) {
+    const Capture& capture = report.capture;
+    std::vector<std::string> warnings = capture.warnings;
+    json text{{"path", capture.path.string()}, {"kind", capture.kind}, {"frames", capture.entries.size()}};
+    text["camera"] = capture.camera ? to_json(*capture.camera) : json();
+    text["depth"] = {{"encoding", capture.depth.name},
+                     {"units_per_metre", capture.depth.units_per_metre},
+                     {"origin", capture.depth.origin}};
+    text["registration"] = {{"registered", name_of(report.registration)}, {"reason", report.registration_reason}};
+    text["warnings"] = warnings;
+    return text;
+}
+
+json stage_json(const StageTimes& ms) {
+    return {{"load", known(ms.load, 3)},
+            {"project", known(ms.project, 3)},
+            {"compute", known(ms.compute, 3)},
+            {"attach", known(ms.attach, 3)},
+            {"write", known(ms.write, 3)}};
+}
+
+json passes_json(const Timings& passes) {
+    json text = json::array(); // a list: a pass may run twice under one name
+    for (const auto& [pass, ms] : passes)
+        text.push_back({{"pass", pass}, {"ms", known(ms)}});
+    return text;
+}
+
+json frame_json(const FrameRow& row, bool with_camera) {
+    json text{{"index", row.index}, {"name", row.name}, {"status", name_of(row.status)}};
+    if (!row.why.empty())
+        text["why"] = row.why;
+    if (!row.size.empty())
+        text["size"] = {row.size.width, row.size.height};
+    if (with_camera && !row.size.empty())
+        text["camera"] = to_json(row.camera);
+    text["valid_share"] = known(row.valid_share);
+    text["coverage"] = known(row.coverage);
+    text["mean_visibility"] = known(row.mean_visibility);
+    text["ms"] = stage_json(row.ms);
+    text["passes"] = passes_json(row.passes);
+    text["warnings"] = row.warnings;
+    text["files"] = json::array();
+    for (const auto& file : row.files)
+        text["files"].push_back(file.generic_string());
+    return text;
+}
+
+/// The largest the process has been, in MiB, as the kernel counts it; NaN where /proc does not tell.
+double peak_memory_mib() {
+    std::ifstream status("/proc/self/status");
+    for (std::string word; status >> word;)
+        if (double kib = 0; word == "VmHWM:" && status >> kib)
+            return kib / 1024;
+    return std::nan("");
+}
+
+/// A word as a shell would take it back.
+std::string as_typed(const std::string& word) {
+    const bool plain = std::ranges::all_of(word, [](unsigned char c) {
+        return std::isalnum(c) || c >= 0x80 ||
+               std::string_view("_-+=.,:/@%").find(static_cast<char>(c)) != std::string_view::npos;
+    });
+    if (plain && !word.empty())
+        return word;
+    std::string text = "'";
+    for (const char c : word)
+        text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    return text + "'";
+}
+
+/// What was typed, as the kernel keeps it.
+std::string command_line() {
+    std::ifstream words("/proc/self/cmdline");
+    std::string line;
+    for (std::string word; std::getline(words, word, '\0'); line += as_typed(word))
+        line += line.empty() ? "" : " ";
+    return line;
+}
+
+json totals_json(const RunReport& report) {
+    StageTimes sum;
+    for (const FrameRow& row : report.frames)
+        for (double StageTimes::*stage :
+             {&StageTimes::load, &StageTimes::project, &StageTimes::compute, &StageTimes::attach, &StageTimes::write})
+            sum.*stage += std::isnan(row.ms.*stage) ? 0 : row.ms.*stage;
+    const std::size_t ok = count(report.frames, FrameStatus::ok);
+    return {{"frames", report.frames.size()},
+            {"ok", ok},
+            {"failed", count(report.frames, FrameStatus::failed)},
+            {"skipped", count(report.frames, FrameStatus::skipped)},
+            {"took_ms", known(report.took_ms, 3)},
+            {"frames_per_second", known(static_cast<double>(ok) * 1000 / report.took_ms, 2)},
+            {"stage_ms", stage_json(sum)},
+            {"peak_memory_mib", known(peak_memory_mib(), 1)}};
+}
+
+std::string utc(std::chrono::system_clock::time_point time) {
+    return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::chrono::system_clock::to_time_t(time)));
+}
+
+} // namespace
+
+std::size_t count(const std::vector<FrameRow>& rows, FrameStatus status) {
+    return static_cast<std::size_t>(
+        std::count_if(rows.begin(), rows.end(), [&](const FrameRow& row) { return row.status == status; }));
+}
+
+void write_frames_csv(const std::filesystem::path& file, const std::vector<FrameRow>& frames) {
+    std::string text = "index,name,status,why,width,height,valid_share,coverage,mean_visibility,"
+                       "load_ms,project_ms,compute_ms,attach_ms,write_ms,warnings\n";
+    for (const FrameRow& row : frames)
+        text += csv_line(row);
+    write_atomically(file, text);
+}
+
+void write_manifest(const std::filesystem::path& file, const RunReport& report) {
+    json text{{"program", "scanshade"},
+              {"version", SCANSHADE_VERSION},
+              {"command_line", command_line()},
+              {"started", utc(report.started)},
+              {"device",
+               {{"name", report.device.name},
+                {"kind", report.device.kind},
+                {"driver", report.device.driver},
+                {"api", report.device.api}}},
+              {"method", report.method},
+              {"settings", settings_json(report.settings)},
+              {"capture", capture_json(report)},
+              {"shading", report.shading},
+              {"totals", totals_json(report)},
+              {"frames", json::array()}};
+    for (const FrameRow& row : report.frames)
+        text["frames"].push_back(frame_json(row, !report.capture.camera));
+    write_atomically(file, text_of(text) + "\n");
+}
+
+} // namespace scanshade

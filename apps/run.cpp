@@ -1,0 +1,421 @@
+// `scanshade run`: ambient occlusion for every frame of one or more captures.
+#include "ao/gpu/device.h"
+#include "ao/method.h"
+#include "apps/batch.h"
+#include "apps/command.h"
+#include "apps/progress.h"
+#include "apps/report.h"
+#include "io/output_file.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <opencv2/core/utility.hpp>
+#include <set>
+#include <sstream>
+
+namespace scanshade {
+namespace {
+
+namespace fs = std::filesystem;
+
+// ---------------------------------------------------------------------------------------------------- interruption
+
+std::atomic<bool> interrupted = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may touch nothing else");
+
+/// The first Ctrl-C ends the run after the frames in flight; the second one kills it, as always.
+void end_gracefully_on_signals() {
+    struct sigaction action = {};
+    action.sa_handler = [](int) { interrupted = true; };
+    action.sa_flags = static_cast<int>(SA_RESETHAND) | SA_RESTART;
+    sigaction(SIGINT, &action, nullptr);
+    sigaction(SIGTERM, &action, nullptr);
+}
+
+// ---------------------------------------------------------------------------------------------------- frames a:b:step
+
+/// The indices that Python's slice a:b:step takes of 0 .. count - 1; a lone number takes that one frame.
+std::vector<std::size_t> slice(const std::string& text, std::size_t count) {
+    const auto refuse = [&] {
+        throw Misuse("frames: '" + text + "' given, expected a:b:step, such as 10:50:2, :100 or 7");
+    };
+    std::vector<std::string> parts;
+    std::istringstream stream(text + ":");
+    for (std::string part; std::getline(stream, part, ':');)
+        parts.push_back(part);
+    if (parts.size() > 3)
+        refuse();
+    const auto total = static_cast<int>(count);
+    const auto number = [&](std::size_t part, int otherwise) {
+        int value = otherwise;
+        if (part < parts.size() && !parts[part].empty())
+            set({"frames", "", &value}, parts[part]);
+        return value;
+    };
+    const auto from_end = [&](int index) { return index < 0 ? index + total : index; };
+    const int first = from_end(number(0, 0)), step = number(2, 1);
+    const int end = parts.size() == 1 && !text.empty() ? first + 1 : from_end(number(1, total));
+    if (step < 1)
+        refuse();
+    std::vector<std::size_t> chosen;
+    for (int index = std::max(first, 0); index < std::min(end, total); index += step)
+        chosen.push_back(static_cast<std::size_t>(index));
+    if (chosen.empty())
+        throw Misuse(fmt::format("frames: '{}' takes none of the {} frames", text, count));
+    return chosen;
+}
+
+// ---------------------------------------------------------------------------------------------------- what is asked
+
+struct RunSettings {
+    std::vector<std::string> paths;
+    std::string frames, camera, depth_scale, registered = "auto";
+    double association_limit_s = 0.02;
+    std::string method = "cacao", radius, quality, device;
+    std::string out, write = "auto", format = "png16";
+    double shade_strength = 1;
+    bool colour_cloud = false, overwrite = false;
+};
+
+std::set<std::string> words_of(const std::string& list) {
+    std::set<std::string> words;
+    std::istringstream stream(list);
+    for (std::string word; std::getline(stream, word, ',');) {
+        if (word != "ao" && word != "shaded" && word != "cloud" && word != "panel")
+            throw Misuse("write: '" + word + "' given, expected any of ao,shaded,cloud,panel");
+        words.insert(word);
+    }
+    return words;
+}
+
+Outputs outputs_from(const RunSettings& settings) {
+    Outputs outputs;
+    outputs.format = ao_format(settings.format);
+    outputs.shade_strength = settings.shade_strength;
+    outputs.colour_cloud = settings.colour_cloud;
+    if (settings.write != "auto") {
+        const std::set<std::string> words = words_of(settings.write);
+        outputs.ao = words.contains("ao");
+        outputs.shaded = words.contains("shaded");
+        outputs.panel = words.contains("panel");
+        outputs.cloud = outputs.depth_cloud = words.contains("cloud");
+    }
+    return outputs;
+}
+
+std::optional<Registration> registration_from(const std::string& text) {
+    if (text == "auto")
+        return std::nullopt;
+    return text == "yes" ? Registration::yes : Registration::no;
+}
+
+// ---------------------------------------------------------------------------------------------------- jobs
+
+/// One capture, the frames to take of it, and where its results go.
+struct Job {
+    Capture capture;
+    BatchOptions batch;
+};
+
+/// "office" of captures/office/ and captures/office.pcd; "office-2" when another capture has that name.
+std::string folder_name(const fs::path& path, std::set<std::string>& taken) {
+    const fs::path whole = fs::weakly_canonical(path);
+    const fs::path last = whole.has_filename() ? whole.filename() : whole.parent_path().filename();
+    const std::string stem = fs::is_directory(path) ? last.string() : last.stem().string();
+    std::string name = stem.empty() ? "capture" : stem;
+    for (int n = 2; !taken.insert(name).second; ++n)
+        name = fmt::format("{}-{}", stem, n);
+    return name;
+}
+
+/// Nothing is begun when something would be lost: an earlier result is replaced only with --overwrite.
+void refuse_to_overwrite(const Job& job) {
+    const Outputs& outputs = job.batch.outputs;
+    std::vector<fs::path> files = {outputs.folder / "manifest.json", outputs.folder / "frames.csv"};
+    for (const std::size_t index : job.batch.frames)
+        std::ranges::copy(files_of(job.capture.entries[index], outputs), std::back_inserter(files));
+    const auto there = std::ranges::find_if(files, [](const fs::path& file) { return fs::exists(file); });
+    if (there != files.end())
+        throw Misuse(there->string() + " exists already: --overwrite replaces earlier results, or choose another -o");
+}
+
+/// Clears what a killed run left, and the report of an earlier one: a manifest says that what lies beside it is
+/// complete.
+void prepare_folder(const fs::path& folder) {
+    for (const char* part : {"", "ao", "shaded", "panel", "clouds"})
+        remove_leftovers(folder / part);
+    for (const char* report : {"manifest.json", "frames.csv"})
+        fs::remove(folder / report);
+}
+
+// ---------------------------------------------------------------------------------------------------- what is said
+
+/// What the shaded pictures of this capture show, and how to have it otherwise.
+std::string shading_sentence(const Capture& capture, Registration registration) {
+    const bool clouds = std::ranges::all_of(capture.entries, [](const auto& entry) { return !entry.cloud.empty(); });
+    const bool colour = std::ranges::any_of(capture.entries, [](const auto& entry) { return !entry.colour.empty(); });
+    if (clouds)
+        return "shaded pictures show the points' own colours, or grey clay where they have none.";
+    if (!colour)
+        return "shaded pictures show grey clay made from depth: the capture has no colour images.";
+    if (registration == Registration::yes)
+        return "shaded pictures show the colour images.";
+    const std::string why = registration == Registration::no ? "do not lie on" : "are not known to lie on";
+    return fmt::format(
+        "shaded pictures show grey clay made from depth, because the colour images {} the depth pixels{}; "
+        "--registered yes shades the colour images anyway.",
+        why, capture.registration_reason.empty() ? "" : " (" + capture.registration_reason + ")");
+}
+
+void say(const std::string& line) { fmt::print(stderr, "{}\n", line); }
+
+void introduce(const RunReport& report) {
+    const Capture& capture = report.capture;
+    say(fmt::format("{}: {}, {} of {} frames", capture.path.string(), capture.kind, report.frames.size(),
+                    capture.entries.size()));
+    if (!capture.depth.origin.empty())
+        say(fmt::format("  depth: {} ({})", capture.depth.name, capture.depth.origin));
+    if (capture.camera)
+        say(fmt::format("  camera: {} ({})", describe(*capture.camera), capture.camera->origin));
+    for (const std::string& warning : capture.warnings)
+        say("  warning: " + warning);
+    say("  " + report.shading);
+}
+
+/// The first ten by name, the rest by number.
+std::string names_of_failed(const std::vector<FrameRow>& rows) {
+    std::vector<std::string> names;
+    for (const FrameRow& row : rows)
+        if (row.status == FrameStatus::failed)
+            names.push_back(row.name);
+    constexpr std::size_t most = 10;
+    const std::string more = names.size() > most ? fmt::format(" and {} more", names.size() - most) : "";
+    names.resize(std::min(names.size(), most));
+    return fmt::format("{}{}", fmt::join(names, ", "), more);
+}
+
+void conclude(const RunReport& report, const fs::path& folder) {
+    const std::size_t ok = count(report.frames, FrameStatus::ok);
+    say(fmt::format("  {} of {} frames in {:.1f} s ({:.1f} frames/s) -> {}", ok, report.frames.size(),
+                    report.took_ms / 1000, static_cast<double>(ok) * 1000 / report.took_ms, folder.string()));
+    if (count(report.frames, FrameStatus::failed) > 0)
+        say(fmt::format("  failed: {} ({} says why)", names_of_failed(report.frames),
+                        (folder / "frames.csv").string()));
+    if (const std::size_t skipped = count(report.frames, FrameStatus::skipped); skipped > 0)
+        say(fmt::format("  interrupted: {} frames were not begun", skipped));
+}
+
+// ---------------------------------------------------------------------------------------------------- the command
+
+class Run final : public Command {
+  public:
+    Run() {
+        for (const MethodRow& row : methods())
+            setups_.emplace_back(row.name, row.setup());
+    }
+
+    Words words() override { return {"PATH", "captures: folders, depth images or clouds", &asked_.paths, 1, 1 << 20}; }
+
+    std::vector<Stage> stages() override {
+        std::vector<Stage> all = common_stages();
+        for (const auto& [name, setup] : setups_)
+            all.push_back(method_stage(name, *setup));
+        return all;
+    }
+
+    int run() override {
+        check_settings();
+        MethodSetup& setup = chosen_setup();
+        int unopened = 0;
+        std::vector<Job> jobs = plan(unopened);
+        for (const Job& job : jobs)
+            if (!asked_.overwrite)
+                refuse_to_overwrite(job);
+        if (jobs.empty())
+            return nothing_done;
+
+        gpu::Device device(asked_.device);
+        const std::unique_ptr<Method> method = setup.make(device);
+        say(fmt::format("{} on {} ({})", asked_.method, device.info().name, device.info().driver));
+        cv::setNumThreads(1); // frames are the parallelism; threads inside a frame would only compete with them
+        end_gracefully_on_signals();
+        std::vector<FrameRow> rows;
+        for (const Job& job : jobs)
+            if (!interrupted)
+                std::ranges::move(process(job, *method, device.info()), std::back_inserter(rows));
+        return exit_code(rows, unopened);
+    }
+
+  private:
+    std::vector<Stage> common_stages() {
+        RunSettings& s = asked_;
+        const auto [radius, quality] = method_defaults();
+        return {
+            {"input",
+             {{"frames", "which frames, by index: first:end:step, end not included; negative counts from the end",
+               &s.frames},
+              {"camera", "a camera file, or fx,fy,cx,cy; replaces the capture's own", &s.camera},
+              {"depth-scale", "mm, tum, sun, nyu, m, or units per metre; replaces the capture's own", &s.depth_scale},
+              {.name = "registered",
+               .help = "whether colour pixels lie on depth pixels",
+               .value = &s.registered,
+               .choices = {"auto", "yes", "no"}},
+              {"association-limit", "colour, depth and poses farther apart in time are not paired",
+               &s.association_limit_s, "s", 0, 1e6}}},
+            {"method",
+             {{.name = "method",
+               .help = "which method computes the visibility",
+               .value = &s.method,
+               .choices = method_names()},
+              {"radius", "how far away a surface may still occlude, in metres" + radius, &s.radius},
+              {"quality", "the method's quality level" + quality, &s.quality},
+              {"device", "index or part of the name of a Vulkan device; empty = the fastest kind", &s.device}}},
+            {"output",
+             {{"out", "folder of the results; several captures get a folder each in it", &s.out},
+              {"write", "any of ao,shaded,cloud,panel; auto = ao,shaded, and cloud for clouds", &s.write},
+              {.name = "format",
+               .help = "of the ao maps",
+               .value = &s.format,
+               .choices = {"png16", "png8", "tiff", "exr"}},
+              {"shade-strength", "0 leaves the colour, 1 multiplies it by visibility", &s.shade_strength, "", 0, 1},
+              {"colour-cloud", "replace the clouds' colour by colour times visibility", &s.colour_cloud},
+              {"overwrite", "replace the results of an earlier run", &s.overwrite}}}};
+    }
+
+    Stage method_stage(std::string_view name, MethodSetup& setup) {
+        Stage stage{fmt::format("method {}", name), setup.parameters()};
+        for (Parameter& row : stage.rows)
+            row.name = fmt::format("{}.{}", name, row.name);
+        return stage;
+    }
+
+    static std::vector<std::string> method_names() {
+        std::vector<std::string> names;
+        for (const MethodRow& row : methods())
+            names.emplace_back(row.name);
+        return names;
+    }
+
+    static const Parameter* find(const std::vector<Parameter>& rows, std::string_view name) {
+        const auto row = std::ranges::find(rows, name, &Parameter::name);
+        return row == rows.end() ? nullptr : &*row;
+    }
+
+    /// What --radius and --quality are when not given, as their help says it.
+    std::pair<std::string, std::string> method_defaults() {
+        std::string radius, quality;
+        for (const auto& [name, setup] : setups_) {
+            const std::vector<Parameter> rows = setup->parameters();
+            if (const Parameter* row = find(rows, "radius"))
+                radius += fmt::format("; {}: {} by default", name, value_text(*row));
+            if (const Parameter* row = find(rows, "quality"))
+                quality += fmt::format("; {}: {}, {} by default", name, range_text(*row), value_text(*row));
+        }
+        return {radius, quality};
+    }
+
+    void check_settings() {
+        if (asked_.out.empty())
+            throw Misuse("run needs -o FOLDER for its results");
+        outputs_ = outputs_from(asked_);
+        if (!asked_.depth_scale.empty())
+            (void)depth_encoding(asked_.depth_scale, "--depth-scale");
+    }
+
+    /// The chosen method's settings, --radius and --quality put in their rows.
+    MethodSetup& chosen_setup() {
+        MethodSetup& setup = *std::ranges::find(setups_, asked_.method, [](const auto& s) { return s.first; })->second;
+        const std::vector<Parameter> rows = setup.parameters();
+        for (const auto& [name, text] : {std::pair("radius", asked_.radius), std::pair("quality", asked_.quality)}) {
+            if (text.empty())
+                continue;
+            const Parameter* row = find(rows, name);
+            if (!row)
+                throw Misuse(fmt::format("{}: the method {} has no such setting", name, asked_.method));
+            set(*row, text);
+        }
+        return setup;
+    }
+
+    /// Opens what is to be processed. A capture that cannot be opened is told and counted; it stops no other.
+    std::vector<Job> plan(int& unopened) {
+        std::vector<Job> jobs;
+        std::set<std::string> taken;
+        for (const std::string& path : asked_.paths) {
+            const fs::path folder =
+                asked_.paths.size() == 1 ? fs::path(asked_.out) : asked_.out / fs::path(folder_name(path, taken));
+            try {
+                Job job{open_capture(path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s}), {}};
+                job.batch.frames = slice(asked_.frames, job.capture.entries.size());
+                job.batch.outputs = outputs_;
+                job.batch.outputs.folder = folder;
+                job.batch.registration = registration_from(asked_.registered);
+                job.batch.stop = &interrupted;
+                jobs.push_back(std::move(job));
+            } catch (const Misuse&) {
+                throw;
+            } catch (const std::exception& failure) {
+                say(fmt::format("failed: {}", failure.what()));
+                ++unopened;
+            }
+        }
+        return jobs;
+    }
+
+    RunReport report_on(const Job& job, const gpu::DeviceInfo& device) {
+        const auto& said = job.batch.registration;
+        const Registration registration = said.value_or(job.capture.registration);
+        RunReport report{.started = std::chrono::system_clock::now(),
+                         .device = device,
+                         .method = asked_.method,
+                         .settings = common_stages(),
+                         .capture = job.capture,
+                         .registration = registration,
+                         .registration_reason = said ? "--registered" : job.capture.registration_reason,
+                         .shading = shading_sentence(job.capture, registration),
+                         .frames = {}};
+        for (const auto& [name, setup] : setups_)
+            if (name == asked_.method)
+                report.settings.push_back(method_stage(name, *setup));
+        return report;
+    }
+
+    std::vector<FrameRow> process(const Job& job, Method& method, const gpu::DeviceInfo& device) {
+        const fs::path& folder = job.batch.outputs.folder;
+        RunReport report = report_on(job, device);
+        report.frames.resize(job.batch.frames.size());
+        introduce(report);
+        prepare_folder(folder);
+        Progress progress(job.batch.frames.size());
+        const auto start = std::chrono::steady_clock::now();
+        report.frames = run_batch(job.capture, method, job.batch, [&](const FrameRow& row) { progress.add(row); });
+        report.took_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+        progress.end();
+        write_frames_csv(folder / "frames.csv", report.frames);
+        write_manifest(folder / "manifest.json", report);
+        conclude(report, folder);
+        return report.frames;
+    }
+
+    static int exit_code(const std::vector<FrameRow>& rows, int unopened) {
+        const std::size_t ok = count(rows, FrameStatus::ok);
+        if (ok == rows.size() && unopened == 0 && !interrupted)
+            return all_well;
+        return ok == 0 && !interrupted ? nothing_done : some_failed;
+    }
+
+    RunSettings asked_;
+    Outputs outputs_;
+    std::vector<std::pair<std::string, std::unique_ptr<MethodSetup>>> setups_;
+};
+
+} // namespace
+
+std::unique_ptr<Command> run_command() { return std::make_unique<Run>(); }
+
+} // namespace scanshade

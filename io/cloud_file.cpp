@@ -1,0 +1,223 @@
+// Clouds in and out: the format told by content, points and colours taken from the records, fields added to them.
+#include "io/cloud_file.h"
+
+#include "io/cloud_records.h"
+#include "io/output_file.h"
+#include "io/text.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <fmt/format.h>
+#include <limits>
+
+namespace scanshade {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+using Format = CloudRecords::Format;
+using Encoding = CloudRecords::Encoding;
+
+constexpr double largest_coordinate = 1e30; // 3e38 and the like mark invalid points
+
+CloudRecords read_records(const fs::path& file, std::vector<std::string>& warnings) {
+    const std::string bytes = read_bytes(file);
+    if (bytes.empty()) throw Error(file.string() + ": empty file (0 bytes), expected a cloud");
+    if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r")) return read_ply(bytes, file, warnings);
+    for (const std::string_view start : {"# .PCD", "VERSION", "FIELDS", "COLUMNS", "#"})
+        if (bytes.starts_with(start)) return read_pcd(bytes, file, warnings);
+    throw Error(file.string() + ": neither PCD nor PLY (expected \"# .PCD\" or \"ply\" at its start)");
+}
+
+/// A coordinate of every point, its place looked up once where records are alike.
+void read_coordinate(const CloudRecords& records, std::size_t field, int axis, std::vector<Eigen::Vector3d>& points) {
+    const bool alike = records.stride != 0;
+    const std::size_t offset = records.fields[field].offset;
+    const Scalar type = records.fields[field].type;
+    const bool big_endian = records.encoding == Encoding::big_endian;
+    for (std::size_t i = 0; i < points.size(); ++i)
+        points[i][axis] = alike ? decoded(records.points.data() + i * records.stride + offset, type, big_endian)
+                                : value_at(records, records.record(i), field);
+}
+
+std::vector<Eigen::Vector3d> points_of(const CloudRecords& records, const fs::path& file, std::vector<std::string>& warnings) {
+    std::vector<Eigen::Vector3d> points(records.point_count);
+    read_coordinate(records, *records.field_named("x"), 0, points);
+    read_coordinate(records, *records.field_named("y"), 1, points);
+    read_coordinate(records, *records.field_named("z"), 2, points);
+    std::size_t absurd = 0, valid = 0;
+    for (Eigen::Vector3d& point : points) {
+        const bool usable = (point.array().abs() <= largest_coordinate).all();
+        valid += usable;
+        absurd += !usable && !point.array().isNaN().any();
+        if (!usable) point.setConstant(std::numeric_limits<double>::quiet_NaN());
+    }
+    if (absurd > 0)
+        warnings.push_back(fmt::format("{}: {} with infinite or absurd coordinates (beyond 1e30), treated as invalid.",
+                                       file.string(), counted(absurd, "point")));
+    if (points.empty()) warnings.push_back(file.string() + ": no points.");
+    else if (valid == 0) warnings.push_back(fmt::format("{}: no valid points among {}.", file.string(), points.size()));
+    return points;
+}
+
+cv::Vec3b bgr_of(std::uint32_t bits) {
+    return {static_cast<uchar>(bits), static_cast<uchar>(bits >> 8), static_cast<uchar>(bits >> 16)};
+}
+
+std::vector<cv::Vec3b> colours_of(const CloudRecords& records) {
+    const ColourFields fields = colour_fields(records);
+    std::vector<cv::Vec3b> colours;
+    if (!fields.packed && !fields.bgr) return colours;
+    colours.reserve(records.point_count);
+    for (std::size_t i = 0; i < records.point_count; ++i) {
+        const std::string_view record = records.record(i);
+        if (fields.packed) {
+            colours.push_back(bgr_of(packed_bits(records, record, *fields.packed)));
+            continue;
+        }
+        cv::Vec3b colour;
+        for (std::size_t channel = 0; channel < 3; ++channel)
+            colour[static_cast<int>(channel)] = cv::saturate_cast<uchar>(value_at(records, record, (*fields.bgr)[channel]));
+        colours.push_back(colour);
+    }
+    return colours;
+}
+
+void check_added(const Cloud& cloud, const AddedField& field) {
+    const bool word = !field.name.empty() && field.name.find_first_of(" \t\r\n") == std::string::npos;
+    if (!word) throw Error(fmt::format("added field {}: expected a name without blanks", in_quotes(field.name)));
+    if (field.values.size() != cloud.points.size())
+        throw Error(fmt::format("added field {}: {}, expected one for each of {}", field.name,
+                                counted(field.values.size(), "value"), counted(cloud.points.size(), "point")));
+}
+
+/// Splits what is to be added into fields the file already has and new ones.
+void sort_out(const CloudRecords& records, const std::vector<AddedField>& added, std::vector<FieldReplacement>& replacements,
+              std::vector<FieldAddition>& additions) {
+    for (const AddedField& field : added) {
+        const auto existing = records.field_named(field.name);
+        if (!existing) {
+            additions.push_back({field.name, field.values});
+            continue;
+        }
+        const CloudField& old = records.fields[*existing];
+        if (old.count != 1 || old.list_length)
+            throw Error(fmt::format("field {} is already there with several values per point; it is not replaced", field.name));
+        replacements.push_back({*existing, [&records, type = old.type, values = field.values](std::size_t point, std::string_view) {
+                                    return encoded(records, type, static_cast<double>(values[point]));
+                                }});
+    }
+}
+
+void replace_colours(const CloudRecords& records, std::span<const cv::Vec3b> colours, std::vector<FieldReplacement>& replacements) {
+    const ColourFields fields = colour_fields(records);
+    if (fields.packed) {
+        replacements.push_back({*fields.packed, [&records, colours, field = *fields.packed](std::size_t point, std::string_view record) {
+                                    const cv::Vec3b& c = colours[point];
+                                    const std::uint32_t alpha = packed_bits(records, record, field) & 0xff000000U;
+                                    const auto bits = alpha | std::uint32_t(c[2]) << 16 | std::uint32_t(c[1]) << 8 | c[0];
+                                    return encoded_bits(records, records.fields[field].type, bits);
+                                }});
+    } else if (fields.bgr) {
+        for (int channel = 0; channel < 3; ++channel)
+            replacements.push_back({(*fields.bgr)[static_cast<std::size_t>(channel)],
+                                    [&records, colours, channel](std::size_t point, std::string_view) {
+                                        return encoded(records, Scalar::uint8, colours[point][channel]);
+                                    }});
+    } else {
+        throw Error("the cloud has no colour field to replace (rgb, rgba, or red green blue as uchar)");
+    }
+}
+
+template <class Number>
+void append(std::string& bytes, Number value) {
+    const auto raw = std::bit_cast<std::array<char, sizeof(Number)>>(value);
+    bytes.append(raw.data(), raw.size());
+}
+
+} // namespace
+
+Cloud read_cloud(const fs::path& file, std::vector<std::string>& warnings) {
+    auto records = std::make_shared<CloudRecords>(read_records(file, warnings));
+    Cloud cloud;
+    cloud.grid = records->grid;
+    cloud.points = points_of(*records, file, warnings);
+    cloud.colours = colours_of(*records);
+    cloud.records = std::move(records);
+    return cloud;
+}
+
+void write_cloud(const fs::path& file, const Cloud& cloud, const std::vector<AddedField>& added, std::span<const cv::Vec3b> colours) {
+    if (!cloud.records) throw Error(file.string() + ": this cloud was not read from a file");
+    const CloudRecords& records = *cloud.records;
+    std::string bytes = during(file.string(), [&] {
+        for (const AddedField& field : added) check_added(cloud, field);
+        if (!colours.empty() && colours.size() != cloud.points.size())
+            throw Error(fmt::format("{} for {}", counted(colours.size(), "colour"), counted(cloud.points.size(), "point")));
+        std::vector<FieldReplacement> replacements;
+        std::vector<FieldAddition> additions;
+        sort_out(records, added, replacements, additions);
+        if (!colours.empty()) replace_colours(records, colours, replacements);
+        std::sort(replacements.begin(), replacements.end(),
+                  [](const FieldReplacement& a, const FieldReplacement& b) { return a.field < b.field; });
+        const std::string points = edited_points(records, replacements, additions);
+        return records.format == Format::pcd ? pcd_bytes(records, points, additions) : ply_bytes(records, points, additions);
+    });
+    write_atomically(file, bytes);
+}
+
+void write_new_ply(const fs::path& file, const std::vector<Eigen::Vector3d>& points, const std::vector<cv::Vec3b>& colours,
+                   const std::vector<AddedField>& added, const std::vector<std::string>& comments) {
+    // Beyond 4096 m neighbouring floats are half a millimetre apart.
+    static constexpr double far_away_m = 4096;
+    const bool doubles = std::any_of(points.begin(), points.end(), [](const Eigen::Vector3d& p) {
+        return (p.array().abs() > far_away_m).any();
+    });
+    if (!colours.empty() && colours.size() != points.size())
+        throw Error(fmt::format("{}: {} for {}", file.string(), counted(colours.size(), "colour"), counted(points.size(), "point")));
+    for (const AddedField& field : added)
+        if (field.values.size() != points.size())
+            throw Error(fmt::format("{}: field {} has {} for {}", file.string(), field.name, counted(field.values.size(), "value"),
+                                    counted(points.size(), "point")));
+
+    std::string bytes = "ply\nformat binary_little_endian 1.0\n";
+    for (std::string comment : comments) {
+        std::replace_if(comment.begin(), comment.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+        bytes += "comment " + comment + "\n";
+    }
+    bytes += fmt::format("element vertex {}\n", points.size());
+    for (const auto* axis : {"x", "y", "z"}) bytes += fmt::format("property {} {}\n", doubles ? "double" : "float", axis);
+    if (!colours.empty())
+        for (const auto* channel : {"red", "green", "blue"}) bytes += fmt::format("property uchar {}\n", channel);
+    for (const AddedField& field : added) bytes += fmt::format("property float {}\n", field.name);
+    bytes += "end_header\n";
+
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        for (const double coordinate : points[i]) doubles ? append(bytes, coordinate) : append(bytes, static_cast<float>(coordinate));
+        if (!colours.empty())
+            for (const int channel : {2, 1, 0}) append(bytes, colours[i][channel]);
+        for (const AddedField& field : added) append(bytes, field.values[i]);
+    }
+    write_atomically(file, bytes);
+}
+
+std::string describe(const CloudRecords& records) {
+    std::string names;
+    for (const CloudField& field : records.fields) names += " " + field.name;
+    const std::string encoding = records.encoding == Encoding::ascii        ? "ascii"
+                                 : records.encoding == Encoding::compressed ? "binary_compressed"
+                                 : records.encoding == Encoding::big_endian ? "binary_big_endian"
+                                 : records.format == Format::ply            ? "binary_little_endian"
+                                                                            : "binary";
+    const std::string grid = records.grid.height > 1 ? fmt::format(", {}x{} organised", records.grid.width, records.grid.height) : "";
+    return fmt::format("{} {}, {}{}, fields{}", records.format == Format::pcd ? "PCD" : "PLY", encoding,
+                       counted(records.point_count, "point"), grid, names);
+}
+
+std::string extension(const CloudRecords& records) { return records.format == Format::pcd ? ".pcd" : ".ply"; }
+
+} // namespace scanshade

@@ -1,0 +1,93 @@
+// Writing without half files: temporary name, sync, rename.
+#include "io/output_file.h"
+
+#include "io/text.h"
+#include "projection/error.h"
+
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <memory>
+#include <regex>
+#include <system_error>
+#include <unistd.h>
+
+namespace scanshade {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+fs::path temporary_name(const fs::path& target) {
+    static std::atomic<unsigned> count = 0;
+    const auto name = fmt::format(".{}.tmp-{}-{}{}", target.stem().string(), ::getpid(), count++,
+                                  target.extension().string());
+    return target.parent_path() / name;
+}
+
+/// Makes sure that what was written is on the disk before the rename says that it is there.
+void sync(const fs::path& path, int flags) {
+    const int handle = ::open(path.c_str(), flags | O_CLOEXEC);
+    if (handle < 0) throw std::system_error(errno, std::generic_category(), "cannot be opened again");
+    const int failed = ::fsync(handle) == 0 ? 0 : errno;
+    ::close(handle);
+    // EINVAL: a file system without fsync, where nothing better can be done.
+    if (failed != 0 && failed != EINVAL) throw std::system_error(failed, std::generic_category(), "cannot be synced");
+}
+
+void write_bytes(const fs::path& file, std::string_view bytes) {
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "wb"), &std::fclose);
+    if (!stream) throw std::system_error(errno, std::generic_category(), "cannot be created");
+    const bool complete = std::fwrite(bytes.data(), 1, bytes.size(), stream.get()) == bytes.size();
+    if (!complete || std::fflush(stream.get()) != 0)
+        throw std::system_error(errno, std::generic_category(), "cannot be written");
+}
+
+/// Whether the process that made a temporary file may still be writing it. Our own number counts as dead: in a fresh
+/// container a killed run's number is often ours again, and leftovers are removed before anything is written.
+bool still_writing(const std::string& pid_text) {
+    const auto pid = whole_number(pid_text);
+    if (!pid || *pid == 0 || *pid > 0x7fffffff || static_cast<pid_t>(*pid) == ::getpid()) return false;
+    return ::kill(static_cast<pid_t>(*pid), 0) == 0 || errno == EPERM;
+}
+
+} // namespace
+
+void write_atomically(const fs::path& target, const std::function<void(const fs::path&)>& write) {
+    const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+    const fs::path temporary = temporary_name(target);
+    try {
+        fs::create_directories(folder);
+        write(temporary);
+        sync(temporary, O_RDONLY);
+        fs::rename(temporary, target);
+        sync(folder, O_RDONLY | O_DIRECTORY);
+    } catch (const std::exception& failure) {
+        std::error_code ignored;
+        fs::remove(temporary, ignored);
+        throw Error(target.string() + ": not written: " + failure.what());
+    }
+}
+
+void write_atomically(const fs::path& target, std::string_view bytes) {
+    write_atomically(target, [&](const fs::path& temporary) { write_bytes(temporary, bytes); });
+}
+
+int remove_leftovers(const fs::path& folder) {
+    static const std::regex made_by_us(R"(\..*\.tmp-(\d+)-\d+(\.[^.]*)?)");
+    int removed = 0;
+    std::error_code trouble;
+    for (fs::directory_iterator entry(folder, trouble), end; !trouble && entry != end; entry.increment(trouble)) {
+        const std::string name = entry->path().filename().string();
+        std::smatch match;
+        if (!std::regex_match(name, match, made_by_us) || still_writing(match[1])) continue;
+        std::error_code ignored;
+        if (entry->is_regular_file(ignored) && fs::remove(entry->path(), ignored)) ++removed;
+    }
+    return removed;
+}
+
+} // namespace scanshade

@@ -1,0 +1,59 @@
+#include "projection/camera.h"
+
+#include "projection/error.h"
+
+#include <cmath>
+#include <fmt/format.h>
+
+namespace scanshade {
+namespace {
+
+[[noreturn]] void refuse(const Camera& camera, const std::string& what) {
+    throw Error(fmt::format("camera ({}): {}", camera.origin.empty() ? "origin unknown" : camera.origin, what));
+}
+
+void check_focal_length(const Camera& camera, const char* name, double value) {
+    if (!std::isfinite(value) || value <= 0)
+        refuse(camera, fmt::format("{} is {}, a positive number of pixels expected", name, value));
+}
+
+/// Cropped images may have their principal point outside. But an image that lies wholly more than 70 degrees off the
+/// axis comes from mixed-up numbers.
+void check_principal_point(const Camera& camera, const char* name, double value, double focal_length, int length) {
+    const double reach = 2.8 * focal_length;
+    if (!std::isfinite(value) || value < -reach || value > length + reach)
+        refuse(camera, fmt::format("{} is {}, expected near the image's {} pixels", name, value, length));
+}
+
+} // namespace
+
+void check(const Camera& camera) {
+    const auto& [fx, fy, cx, cy, size] = camera.pinhole;
+    check_focal_length(camera, "fx", fx);
+    check_focal_length(camera, "fy", fy);
+    if (size.width <= 0 || size.height <= 0)
+        refuse(camera, fmt::format("image size is {}x{}, at least 1x1 expected", size.width, size.height));
+    check_principal_point(camera, "cx", cx, fx, size.width);
+    check_principal_point(camera, "cy", cy, fy, size.height);
+    const auto& [k1, k2, p1, p2, k3] = camera.distortion;
+    for (const auto& [name, value] : {std::pair{"k1", k1}, {"k2", k2}, {"p1", p1}, {"p2", p2}, {"k3", k3}})
+        if (!std::isfinite(value))
+            refuse(camera, fmt::format("{} is {}, a finite number expected", name, value));
+}
+
+Pinhole scaled(const Pinhole& camera, cv::Size size) {
+    const double sx = static_cast<double>(size.width) / camera.size.width;
+    const double sy = static_cast<double>(size.height) / camera.size.height;
+    return {camera.fx * sx, camera.fy * sy, (camera.cx + 0.5) * sx - 0.5, (camera.cy + 0.5) * sy - 0.5, size};
+}
+
+std::string describe(const Camera& camera) {
+    const auto& [fx, fy, cx, cy, size] = camera.pinhole;
+    std::string text =
+        fmt::format("fx {:.2f} fy {:.2f} cx {:.2f} cy {:.2f} ({}x{})", fx, fy, cx, cy, size.width, size.height);
+    if (const Distortion& d = camera.distortion; d.any())
+        text += fmt::format(" k1 {:g} k2 {:g} p1 {:g} p2 {:g} k3 {:g}", d.k1, d.k2, d.p1, d.p2, d.k3);
+    return text;
+}
+
+} // namespace scanshade

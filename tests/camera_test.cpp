@@ -1,0 +1,237 @@
+// The conventions of projection/camera.h, and cameras recovered from what was recorded.
+#include "projection/camera.h"
+
+#include "projection/error.h"
+#include "projection/refine.h"
+#include "projection/undistort.h"
+#include "tests/support/says.h"
+#include "tests/support/scenes.h"
+
+#include <gtest/gtest.h>
+#include <random>
+#include <thread>
+
+namespace scanshade {
+namespace {
+
+using tests::ball_on_floor, tests::says, tests::test_camera, tests::tilted_plane, tests::with_holes;
+
+// The very text that the GPU runs, checked by the C++ compiler: a pixel lifted to a depth falls back onto itself.
+constexpr shared::Pinhole gpu_camera{512, 480, 319.5F, 239.5F};
+constexpr shared::vec3 lifted = shared::unproject(gpu_camera, {63.5F, 359.5F}, 2);
+static_assert(lifted.x == -1 && lifted.y == 0.5F && lifted.z == 2);
+static_assert(shared::project(gpu_camera, lifted).x == 63.5F && shared::project(gpu_camera, lifted).y == 359.5F);
+
+// Kinect colour, a wide lens, a strong barrel and a decentred one, as calibrations report them.
+const Distortion lenses[] = {{0.2624, -0.9531, -0.0054, 0.0026, 1.1633},
+                             {-0.265, -0.047, 0.0018, -0.0003, 0.252},
+                             {-0.28, 0.07, 0, 0, 0},
+                             {0.01, 0, 0.02, -0.015, 0}};
+
+Camera camera_with(const Distortion& lens) { return {{525, 520, 310.5, 245.25, {640, 480}}, lens, "test"}; }
+
+TEST(Camera, PixelLiftedToAnyDepthFallsBackOntoItself) {
+    const shared::Pinhole camera = camera_with({}).pinhole.on_gpu();
+    for (float v = 0; v < 480; v += 7)
+        for (float u = 0; u < 640; u += 7)
+            for (const float z : {0.3F, 2.0F, 100.0F}) {
+                const shared::vec2 pixel = shared::project(camera, shared::unproject(camera, {u, v}, z));
+                EXPECT_NEAR(pixel.x, u, 2e-4); // single precision at 640 pixels
+                EXPECT_NEAR(pixel.y, v, 2e-4);
+            }
+}
+
+TEST(Camera, WithoutDistortionTheLensIsTheSharedPinhole) {
+    const Eigen::Vector2d straight(0.31, -0.27);
+    EXPECT_EQ(distorted({}, straight), straight); // exactly: undistorted captures must not change by a bit
+    const Pinhole pinhole = camera_with({}).pinhole;
+    const shared::vec2 pixel = shared::project(pinhole.on_gpu(), {0.31F * 2, -0.27F * 2, 2});
+    EXPECT_NEAR(pixel.x, pinhole.fx * straight.x() + pinhole.cx, 1e-4);
+    EXPECT_NEAR(pixel.y, pinhole.fy * straight.y() + pinhole.cy, 1e-4);
+}
+
+TEST(Camera, DistortionFollowsOpenCvsFormula) {
+    // By hand at (0.5, 0.25): r2 = 0.3125, radial = 1 + 0.1 r2 + 0.01 r2^2 + 0.001 r2^3.
+    const double radial = 1 + 0.03125 + 0.0009765625 + 0.000030517578125;
+    const Eigen::Vector2d bent = distorted({0.1, 0.01, 0.002, 0.003, 0.001}, {0.5, 0.25});
+    EXPECT_NEAR(bent.x(), 0.5 * radial + 2 * 0.002 * 0.125 + 0.003 * (0.3125 + 0.5), 1e-15);
+    EXPECT_NEAR(bent.y(), 0.25 * radial + 0.002 * (0.3125 + 0.125) + 2 * 0.003 * 0.125, 1e-15);
+}
+
+TEST(Camera, UndistortingReversesDistortingAllOverTheImage) {
+    for (const Distortion& lens : lenses) {
+        const Camera camera = camera_with(lens);
+        const auto& [fx, fy, cx, cy, size] = camera.pinhole;
+        for (int v = 0; v < size.height; v += 8)
+            for (int u = 0; u < size.width; u += 8) {
+                const Eigen::Vector2d bent((u - cx) / fx, (v - cy) / fy);
+                const auto straight = undistorted(lens, bent);
+                if (!straight)
+                    continue; // beyond the lens's fold, see below
+                const Eigen::Vector2d miss = distorted(lens, *straight) - bent;
+                EXPECT_LT(std::hypot(miss.x() * fx, miss.y() * fy), 1e-6) << "at pixel " << u << ", " << v;
+            }
+        EXPECT_TRUE(undistorted(lens, {0.3, 0.2})) << "the middle of the image must be reachable";
+    }
+}
+
+TEST(Camera, NothingIsSeenBeyondWhereTheLensModelFoldsBack) {
+    // r (1 - 0.5 r^2) grows up to r = 0.8165, where it is 0.544: no direction lands farther out.
+    const Distortion folding{-0.5, 0, 0, 0, 0};
+    EXPECT_TRUE(undistorted(folding, {0.54, 0}));
+    EXPECT_FALSE(undistorted(folding, {0.55, 0}));
+    // The target pixel at r = 1.2 would bend to 0.336, into the image: a ghost unless it is left out.
+    const Camera wide{{100, 100, 160, 120, {320, 240}}, folding, "test"};
+    const Undistortion maps(wide);
+    EXPECT_EQ(maps.recorded_pixel()(120, 160 + 120), -1);
+    EXPECT_NE(maps.recorded_pixel()(120, 160 + 70), -1);
+}
+
+TEST(Camera, RecordedPixelsFindTheUndistortedPixelThatShowsThem) {
+    for (const Distortion& lens : lenses) {
+        const Undistortion maps(camera_with(lens));
+        int shown = 0, same = 0;
+        for (int v = 0; v < 480; ++v)
+            for (int u = 0; u < 640; ++u)
+                if (const int target = maps.undistorted_pixel()(v, u); target >= 0) {
+                    const int back = maps.recorded_pixel()(target / 640, target % 640);
+                    if (back < 0)
+                        continue; // at the rim rounding may leave the image
+                    ++shown;
+                    same += back == v * 640 + u;
+                    EXPECT_LE(std::abs(back % 640 - u), 2);
+                    EXPECT_LE(std::abs(back / 640 - v), 2);
+                }
+        EXPECT_GT(same, 0.75 * shown); // where the lens shrinks the image, some recorded pixels are shown by none
+        EXPECT_GT(shown, 0.75 * 640 * 480);
+    }
+}
+
+TEST(Camera, ThreadsShareOneCamerasMaps) {
+    std::vector<std::shared_ptr<const Undistortion>> maps(8);
+    std::vector<std::thread> threads;
+    for (auto& slot : maps)
+        threads.emplace_back([&slot] { slot = Undistortion::of(camera_with(lenses[0])); });
+    for (auto& thread : threads)
+        thread.join();
+    for (const auto& slot : maps)
+        EXPECT_EQ(slot, maps[0]);
+    EXPECT_NE(Undistortion::of(camera_with(lenses[1])), maps[0]);
+}
+
+TEST(Camera, ResizingKeepsTheFieldOfView) {
+    const Pinhole full = camera_with({}).pinhole, half = scaled(full, {320, 240});
+    // The image covers [-0.5, width - 0.5]: its borders keep their directions.
+    EXPECT_DOUBLE_EQ((-0.5 - full.cx) / full.fx, (-0.5 - half.cx) / half.fx);
+    EXPECT_DOUBLE_EQ((639.5 - full.cx) / full.fx, (319.5 - half.cx) / half.fx);
+    EXPECT_DOUBLE_EQ((479.5 - full.cy) / full.fy, (239.5 - half.cy) / half.fy);
+    const Pinhole again = scaled(half, {640, 480});
+    EXPECT_DOUBLE_EQ(again.fx, full.fx);
+    EXPECT_DOUBLE_EQ(again.cy, full.cy);
+}
+
+std::string refusal(const Camera& camera) {
+    return tests::refusal([&] { check(camera); });
+}
+
+TEST(Camera, ImpossibleCamerasAreRefusedByNameValueAndOrigin) {
+    const auto broken = [](auto&& change) {
+        Camera camera = camera_with({});
+        camera.origin = "room/camera.json";
+        change(camera);
+        return refusal(camera);
+    };
+    EXPECT_EQ(broken([](Camera&) {}), "");
+    const std::string negative = broken([](Camera& c) { c.pinhole.fx = -525; });
+    EXPECT_TRUE(says(negative, "fx is -525"));
+    EXPECT_TRUE(says(negative, "room/camera.json"));
+    EXPECT_TRUE(says(broken([](Camera& c) { c.pinhole.fy = 0; }), "fy is 0"));
+    EXPECT_TRUE(says(broken([](Camera& c) { c.pinhole.cx = NAN; }), "cx is nan"));
+    EXPECT_TRUE(says(broken([](Camera& c) { c.pinhole.cy = 5000; }), "cy is 5000"));
+    EXPECT_TRUE(says(broken([](Camera& c) { c.pinhole.size = {640, 0}; }), "640x0"));
+    EXPECT_TRUE(says(broken([](Camera& c) { c.distortion.k3 = INFINITY; }), "k3 is inf"));
+    EXPECT_EQ(broken([](Camera& c) { c.pinhole.cx = -40; }), "") << "a cropped image's principal point may lie outside";
+}
+
+TEST(Camera, DescriptionStatesTheNumbersPeopleCompare) {
+    EXPECT_EQ(describe(camera_with({})), "fx 525.00 fy 520.00 cx 310.50 cy 245.25 (640x480)");
+    EXPECT_TRUE(says(describe(camera_with({-0.28, 0, 0, 0, 0})), "k1 -0.28"));
+}
+
+// ---------------------------------------------------------------------------------------------------- recovered
+// cameras
+
+/// What a depth sensor's driver makes of a depth image: one point per pixel, NaN in holes.
+Cloud cloud_of(const DepthImage& depth, bool single_precision = true) {
+    Cloud cloud{depth.z_m.size(), {}, {}, {}};
+    for (int v = 0; v < depth.z_m.rows; ++v)
+        for (int u = 0; u < depth.z_m.cols; ++u) {
+            const double z = depth.z_m(v, u) > 0 ? depth.z_m(v, u) : NAN;
+            const Eigen::Vector3d point((u - depth.camera.cx) / depth.camera.fx * z,
+                                        (v - depth.camera.cy) / depth.camera.fy * z, z);
+            cloud.points.push_back(single_precision ? point.cast<float>().cast<double>().eval() : point);
+        }
+    return cloud;
+}
+
+TEST(FitPinhole, RecoversTheCameraFromItsOwnPoints) {
+    const DepthImage depth = with_holes(ball_on_floor(test_camera()), 0.3);
+    const PinholeFit fit = fit_pinhole(cloud_of(depth));
+    EXPECT_NEAR(fit.camera.fx, depth.camera.fx, 1e-3);
+    EXPECT_NEAR(fit.camera.fy, depth.camera.fy, 1e-3);
+    EXPECT_NEAR(fit.camera.cx, depth.camera.cx, 1e-3);
+    EXPECT_NEAR(fit.camera.cy, depth.camera.cy, 1e-3);
+    EXPECT_EQ(fit.camera.size, depth.camera.size);
+    EXPECT_LT(fit.rms_px, 1e-4);
+    EXPECT_EQ(fit.points, cv::countNonZero(depth.z_m)) << "holes are not points";
+}
+
+TEST(FitPinhole, StraysDoNotBendTheCamera) {
+    const DepthImage depth = ball_on_floor(test_camera());
+    Cloud cloud = cloud_of(depth);
+    std::mt19937 random(1);
+    for (int i = 0; i < 100; ++i) // half a percent of the points, moved by some ten pixels
+        cloud.points[random() % cloud.points.size()].x() += 0.3;
+    const PinholeFit fit = fit_pinhole(cloud);
+    EXPECT_NEAR(fit.camera.fx, depth.camera.fx, 0.01);
+    EXPECT_NEAR(fit.camera.cx, depth.camera.cx, 0.01);
+    EXPECT_LT(fit.points, static_cast<int>(cloud.points.size()) - 50);
+}
+
+std::string fit_refusal(const Cloud& cloud) {
+    return tests::refusal([&] { (void)fit_pinhole(cloud); });
+}
+
+TEST(FitPinhole, SaysWhyPointsCannotTell) {
+    const Cloud whole = cloud_of(tilted_plane(test_camera(), 20));
+    const Eigen::Vector3d hole = Eigen::Vector3d::Constant(NAN);
+    const int width = whole.grid.width;
+
+    Cloud none = whole;
+    std::fill(none.points.begin(), none.points.end(), hole);
+    EXPECT_TRUE(says(fit_refusal(none), "0 valid points"));
+
+    Cloud row = none, column = none;
+    for (int i = 0; i < 50; ++i) {
+        row.points[40 * width + i] = whole.points[40 * width + i];
+        column.points[i * width + 7] = whole.points[i * width + 7];
+    }
+    EXPECT_TRUE(says(fit_refusal(row), "one row or one column"));
+    EXPECT_TRUE(says(fit_refusal(column), "one row or one column"));
+
+    Cloud shuffled = whole; // a grid that is none: points in random order
+    std::shuffle(shuffled.points.begin(), shuffled.points.end(), std::mt19937(1));
+    EXPECT_TRUE(says(fit_refusal(shuffled), "no camera can be recovered"));
+
+    Cloud flipped = whole; // y up, as ICL-NUIM has it
+    for (auto& point : flipped.points)
+        point.y() = -point.y();
+    EXPECT_TRUE(says(fit_refusal(flipped), "positive values expected"));
+
+    Cloud list = whole;
+    list.grid = {static_cast<int>(whole.points.size()), 1};
+    EXPECT_TRUE(says(fit_refusal(list), "not in a grid"));
+}
+
+} // namespace
+} // namespace scanshade

@@ -1,0 +1,109 @@
+// The device and the pass runner: what a table of passes promises, and that the alarm rings when it is broken.
+#include "ao/gpu/program.h"
+#include "projection/error.h"
+
+#include <cstdlib>
+#include <gtest/gtest.h>
+#include <numeric>
+
+namespace scanshade {
+namespace {
+
+using gpu::BufferRow;
+using gpu::PassRow;
+using Host = BufferRow::Host;
+using Texels = BufferRow::Texels;
+
+constexpr int count = 1000;
+
+BufferRow words(std::string_view name, Host host = Host::none) { return {name, count * 4, host, Texels::r32ui}; }
+PassRow add_one(int from, int to, int step = 1) { return {"add", "test/add_one", {from}, {to}, {(count + 63) / 64, 1, 1}, {{0, step}}}; }
+
+TEST(gpu, devices_are_listed_with_what_they_lack) {
+    const auto devices = gpu::list_devices();
+    ASSERT_FALSE(devices.empty()) << "lavapipe at least";
+    for (const auto& device : devices) {
+        EXPECT_FALSE(device.name.empty());
+        EXPECT_FALSE(device.api.empty());
+    }
+}
+
+TEST(gpu, a_device_that_is_not_there_is_refused_with_the_list_of_those_that_are) {
+    try {
+        gpu::Device device("no such card");
+        FAIL() << "opened " << device.info().name;
+    } catch (const Error& error) {
+        EXPECT_NE(std::string(error.what()).find("no such card"), std::string::npos) << error.what();
+        EXPECT_NE(std::string(error.what()).find(gpu::list_devices().front().name), std::string::npos) << error.what();
+    }
+}
+
+TEST(gpu, a_chain_of_passes_sees_each_others_results) {
+    // Each pass reads the element at the far end of what the one before wrote, so a missing barrier gives wrong sums.
+    gpu::Device device;
+    gpu::Program program(device, {words("in", Host::upload), words("a"), words("b"), words("out", Host::download)},
+                         {add_one(0, 1), add_one(1, 2, 10), add_one(2, 1, 100), add_one(1, 3, 1000)}, 4);
+    const auto in = program.host_as<std::uint32_t>(0);
+    for (int repeat = 0; repeat < 20; ++repeat) {
+        std::iota(in.begin(), in.end(), static_cast<std::uint32_t>(repeat));
+        const std::int32_t n = count;
+        program.run(std::as_bytes(std::span(&n, 1)));
+        const auto out = program.host_as<std::uint32_t>(3);
+        for (std::size_t i = 0; i < count; ++i) ASSERT_EQ(out[i], in[i] + 1111) << i; // four mirrorings: back in place
+    }
+    EXPECT_EQ(program.timings().size(), 6U) << "upload, four passes, download";
+    for (const std::string& message : device.validation_messages()) ADD_FAILURE() << message;
+}
+
+TEST(gpu, two_programs_may_share_a_device) {
+    gpu::Device device;
+    const std::vector<BufferRow> buffers{words("in", Host::upload), words("out", Host::download)};
+    gpu::Program one(device, buffers, {add_one(0, 1, 1)}, 4), two(device, buffers, {add_one(0, 1, 2)}, 4);
+    const std::int32_t n = count;
+    std::fill_n(one.host_as<std::uint32_t>(0).begin(), count, 5U);
+    std::fill_n(two.host_as<std::uint32_t>(0).begin(), count, 7U);
+    one.run(std::as_bytes(std::span(&n, 1)));
+    two.run(std::as_bytes(std::span(&n, 1)));
+    EXPECT_EQ(one.host_as<std::uint32_t>(1)[count - 1], 6U);
+    EXPECT_EQ(two.host_as<std::uint32_t>(1)[0], 9U);
+}
+
+TEST(gpu, a_pass_without_a_shader_clears) {
+    gpu::Device device;
+    gpu::Program program(device, {words("out", Host::download)}, {{"clear", "", {}, {0}, {1, 1, 1}, {}}}, 4);
+    std::fill_n(program.host_as<std::uint32_t>(0).begin(), count, 9U);
+    program.run({});
+    EXPECT_EQ(program.host_as<std::uint32_t>(0)[count / 2], 0U);
+}
+
+TEST(gpu, a_broken_table_is_refused_before_anything_runs) {
+    const std::vector<BufferRow> buffers{words("in", Host::upload), words("between"), words("out", Host::download)};
+    EXPECT_TRUE(gpu::problems(buffers, std::vector{add_one(0, 1), add_one(1, 2)}).empty());
+    EXPECT_FALSE(gpu::problems(buffers, std::vector{add_one(1, 2)}).empty()) << "reads what nobody wrote";
+    EXPECT_FALSE(gpu::problems(buffers, std::vector{add_one(0, 1)}).empty()) << "the output is never written";
+    EXPECT_FALSE(gpu::problems(buffers, std::vector{add_one(0, 3)}).empty()) << "no such buffer";
+    PassRow idle = add_one(0, 2);
+    idle.groups = {0, 1, 1};
+    EXPECT_FALSE(gpu::problems(buffers, std::vector{idle}).empty()) << "dispatches nothing";
+    gpu::Device device;
+    EXPECT_THROW(gpu::Program(device, buffers, {add_one(1, 2)}, 4), Error);
+    PassRow unknown = add_one(0, 2);
+    unknown.shader = "no/such";
+    EXPECT_THROW(gpu::Program(device, buffers, {unknown}, 4), Error);
+}
+
+TEST(gpu, validation_rings_when_a_program_is_wrong) {
+    // A pipeline whose shader uses binding 0 while the table gives it none: the layer must say so, or it is not watching.
+    setenv("SCANSHADE_VALIDATE", "1", 1);
+    gpu::Device device;
+    if (!device.validating()) GTEST_SKIP() << "the validation layer is not installed";
+    PassRow blind{"blind", "test/add_one", {}, {0}, {1, 1, 1}, {}};
+    try {
+        gpu::Program program(device, {words("out", Host::download)}, {blind}, 4);
+    } catch (const Error&) {
+    }
+    EXPECT_FALSE(device.validation_messages().empty());
+}
+
+} // namespace
+} // namespace scanshade

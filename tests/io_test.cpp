@@ -1,0 +1,562 @@
+// Files and values: images, cameras, atomic output and captures of every layout come back as they were written.
+#include "io/camera_file.h"
+#include "io/capture.h"
+#include "io/image_file.h"
+#include "io/output_file.h"
+#include "tests/support/files.h"
+
+#include <cmath>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
+
+namespace scanshade {
+namespace {
+
+namespace fs = std::filesystem;
+using tests::file_bytes;
+using tests::joined;
+using tests::refusal;
+using tests::says;
+using tests::TemporaryFolder;
+using tests::warned;
+using tests::write_file;
+
+constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+
+cv::Mat1f visibility_ramp() {
+    cv::Mat1f map(7, 13);
+    for (int i = 0; i < 91; ++i) map(i / 13, i % 13) = i % 10 == 3 ? nan : static_cast<float>(i) / 90.0F;
+    return map;
+}
+
+/// A tilted wall 1 to 2 m away, with a hole in the corner.
+cv::Mat1f wall(cv::Size size = {64, 48}) {
+    cv::Mat1f depth(size);
+    for (int y = 0; y < size.height; ++y)
+        for (int x = 0; x < size.width; ++x) depth(y, x) = 1.0F + static_cast<float>(x) / static_cast<float>(size.width);
+    depth(0, 0) = 0;
+    return depth;
+}
+
+cv::Mat3b picture(cv::Size size = {64, 48}) {
+    cv::Mat3b image(size);
+    for (int y = 0; y < size.height; ++y)
+        for (int x = 0; x < size.width; ++x) image(y, x) = {static_cast<uchar>(x), static_cast<uchar>(y), 200};
+    return image;
+}
+
+double worst_difference(const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF); }
+
+// --- AO maps ---
+
+class AoFormats : public ::testing::TestWithParam<std::pair<const char*, double>> {};
+
+TEST_P(AoFormats, come_back_within_half_a_step_and_keep_holes) {
+    const TemporaryFolder folder;
+    const auto [name, tolerance] = GetParam();
+    const AoFormat format = ao_format(name);
+    const fs::path file = folder / ("map" + extension(format));
+    const cv::Mat1f written = visibility_ramp();
+    write_ao(file, written, format);
+    const cv::Mat1f read = read_ao(file);
+    ASSERT_EQ(read.size(), written.size());
+    for (int i = 0; i < 91; ++i) {
+        const float a = written(i / 13, i % 13), b = read(i / 13, i % 13);
+        EXPECT_EQ(std::isnan(a), std::isnan(b)) << i;
+        if (!std::isnan(a)) {
+            EXPECT_NEAR(a, b, tolerance) << i;
+        }
+    }
+}
+// Half a step of 65534 and 254 steps; floats are exact.
+INSTANTIATE_TEST_SUITE_P(all, AoFormats,
+                         ::testing::Values(std::pair{"png16", 0.5001 / 65534}, std::pair{"png8", 0.5001 / 254},
+                                           std::pair{"tiff", 0.0}, std::pair{"exr", 0.0}));
+
+TEST(ao_maps, closed_is_1_and_no_surface_is_0_in_integer_files) {
+    const TemporaryFolder folder;
+    write_ao(folder / "map.png", (cv::Mat1f(1, 4) << nan, 0.0F, 1.0F, 7.0F), AoFormat::png8);
+    const cv::Mat stored = cv::imread((folder / "map.png").string(), cv::IMREAD_UNCHANGED);
+    EXPECT_EQ(stored.at<uchar>(0), 0);
+    EXPECT_EQ(stored.at<uchar>(1), 1);
+    EXPECT_EQ(stored.at<uchar>(2), 255);
+    EXPECT_EQ(stored.at<uchar>(3), 255); // held within 0 .. 1
+}
+
+TEST(ao_maps, same_map_gives_same_bytes) {
+    const TemporaryFolder folder;
+    for (const char* name : {"png16", "tiff", "exr"}) {
+        const AoFormat format = ao_format(name);
+        write_ao(folder / "a", visibility_ramp(), format);
+        write_ao(folder / "b", visibility_ramp(), format);
+        EXPECT_EQ(file_bytes(folder / "a"), file_bytes(folder / "b")) << name;
+    }
+}
+
+TEST(ao_maps, an_unknown_format_is_misuse) { EXPECT_THROW((void)ao_format("bmp"), Misuse); }
+
+// --- depth images ---
+
+TEST(depth_images, png_keeps_every_millimetre) {
+    const TemporaryFolder folder;
+    write_depth_png(folder / "depth.png", wall(), 1000);
+    const cv::Mat1f read = depth_in_metres(read_stored_depth(folder / "depth.png"), depth_encoding("mm", "test"));
+    EXPECT_LE(worst_difference(read, wall()), 0.00051);
+    EXPECT_EQ(read(0, 0), 0);
+}
+
+TEST(depth_images, what_a_png_cannot_hold_becomes_a_hole) {
+    const TemporaryFolder folder;
+    write_depth_png(folder / "depth.png", (cv::Mat1f(1, 4) << nan, -1.0F, 65.535F, 100.0F), 1000);
+    EXPECT_EQ(cv::countNonZero(read_stored_depth(folder / "depth.png")), 0);
+}
+
+TEST(depth_images, pgm_is_big_endian) {
+    const TemporaryFolder folder;
+    const auto file = write_file(folder / "d.pgm", "P5\n# by hand\n2 1\n65535\n" + std::string("\x01\x02\x03\x04", 4));
+    const cv::Mat stored = read_stored_depth(file);
+    EXPECT_EQ(stored.at<ushort>(0), 0x0102);
+    EXPECT_EQ(stored.at<ushort>(1), 0x0304);
+}
+
+TEST(depth_images, pfm_starts_at_the_bottom_and_knows_both_byte_orders) {
+    const TemporaryFolder folder;
+    const std::array<float, 2> values{1.5F, 2.5F}; // bottom row, top row
+    std::string little(reinterpret_cast<const char*>(values.data()), 8), big = little;
+    std::reverse(big.begin(), big.begin() + 4);
+    std::reverse(big.begin() + 4, big.end());
+    for (const auto& [scale, bytes] : {std::pair{"-1.0", little}, {"1.0", big}}) {
+        const cv::Mat stored = read_stored_depth(write_file(folder / "d.pfm", fmt::format("Pf\n1 2\n{}\n", scale) + bytes));
+        EXPECT_EQ(stored.at<float>(0), 2.5F) << scale;
+        EXPECT_EQ(stored.at<float>(1), 1.5F) << scale;
+    }
+}
+
+TEST(depth_images, float_tiff_and_exr_are_metres_and_tiff_may_hold_integers) {
+    const TemporaryFolder folder;
+    write_float_tiff(folder / "d.tiff", wall());
+    EXPECT_EQ(worst_difference(read_stored_depth(folder / "d.tiff"), wall()), 0);
+    write_ao(folder / "d.exr", wall(), AoFormat::exr);
+    EXPECT_EQ(worst_difference(read_stored_depth(folder / "d.exr"), wall()), 0);
+    const cv::Mat1w integers(3, 5, ushort(1234));
+    cv::imwrite((folder / "i.tiff").string(), integers);
+    EXPECT_EQ(worst_difference(read_stored_depth(folder / "i.tiff"), integers), 0);
+}
+
+TEST(depth_images, a_format_is_told_by_signature_not_by_name) {
+    const TemporaryFolder folder;
+    write_depth_png(folder / "depth.png", wall(), 1000);
+    fs::rename(folder / "depth.png", folder / "depth.tiff");
+    EXPECT_EQ(read_stored_depth(folder / "depth.tiff").type(), CV_16UC1);
+}
+
+TEST(depth_encodings, sentinels_and_non_numbers_are_holes) {
+    const cv::Mat1w integers = (cv::Mat1w(1, 3) << 0, 65535, 500);
+    const cv::Mat1f metres = depth_in_metres(integers, depth_encoding("mm", ""));
+    EXPECT_EQ(metres(0), 0);
+    EXPECT_EQ(metres(1), 0);
+    EXPECT_FLOAT_EQ(metres(2), 0.5F);
+    const float inf = std::numeric_limits<float>::infinity();
+    const cv::Mat1f floats = depth_in_metres((cv::Mat1f(1, 4) << nan, inf, -1.0F, 2.0F), depth_encoding("m", ""));
+    EXPECT_EQ(cv::countNonZero(floats), 1);
+    EXPECT_EQ(floats(3), 2.0F);
+}
+
+TEST(depth_encodings, sun_rotates_and_nyu_swaps) {
+    // SUN: 1057 mm rotated left by 3. NYU: disparity 986 byte-swapped is 351.3 / (1092.5 - 986) m (Open3D's constants).
+    const cv::Mat1w sun = (cv::Mat1w(1, 1) << ushort(1057 << 3));
+    EXPECT_FLOAT_EQ(depth_in_metres(sun, depth_encoding("sun", ""))(0), 1.057F);
+    const auto swapped = [](int d) { return static_cast<ushort>((d << 8 | d >> 8) & 0xffff); };
+    const cv::Mat1w nyu = (cv::Mat1w(1, 2) << swapped(986), swapped(2047));
+    const cv::Mat1f metres = depth_in_metres(nyu, depth_encoding("nyu", ""));
+    EXPECT_NEAR(metres(0), 351.3 / 106.5, 1e-5);
+    EXPECT_EQ(metres(1), 0);
+}
+
+TEST(depth_encodings, integers_and_floats_are_not_mixed_up) {
+    EXPECT_THROW((void)depth_in_metres(cv::Mat1w(1, 1, ushort(1)), depth_encoding("m", "")), Error);
+    EXPECT_THROW((void)depth_in_metres(cv::Mat1f(1, 1, 1.0F), depth_encoding("tum", "")), Error);
+    EXPECT_THROW((void)depth_in_metres(cv::Mat1f(1, 1, 1.0F), depth_encoding("nyu", "")), Error);
+}
+
+TEST(depth_encodings, a_number_is_units_per_metre_and_anything_else_is_misuse) {
+    EXPECT_EQ(depth_encoding("10000", "test").units_per_metre, 10000);
+    for (const char* text : {"", "0", "-5", "nan", "inf", "cm", "1000x"}) EXPECT_THROW((void)depth_encoding(text, "test"), Misuse) << text;
+}
+
+// --- colour ---
+
+TEST(colour_images, grey_and_16_bit_become_8_bit_bgr) {
+    const TemporaryFolder folder;
+    cv::imwrite((folder / "grey.png").string(), cv::Mat1b(4, 4, uchar(77)));
+    EXPECT_EQ(read_colour(folder / "grey.png")(0, 0), cv::Vec3b(77, 77, 77));
+    cv::imwrite((folder / "deep.png").string(), cv::Mat(4, 4, CV_16UC3, cv::Scalar(0x1000, 0x2000, 0x3000)));
+    EXPECT_EQ(read_colour(folder / "deep.png")(0, 0), cv::Vec3b(0x10, 0x20, 0x30));
+}
+
+TEST(colour_images, png_pictures_are_exact_and_jpeg_is_close) {
+    const TemporaryFolder folder;
+    write_picture(folder / "p.png", picture());
+    EXPECT_EQ(worst_difference(read_colour(folder / "p.png"), picture()), 0);
+    write_picture(folder / "p.JPG", picture());
+    EXPECT_LE(worst_difference(read_colour(folder / "p.JPG"), picture()), 12);
+    EXPECT_THROW(write_picture(folder / "p.gif", picture()), Error);
+}
+
+// --- atomic output ---
+
+TEST(atomic_output, a_failed_write_leaves_neither_target_nor_temporary) {
+    const TemporaryFolder folder;
+    const fs::path target = folder / "new/map.png";
+    const std::string message = refusal([&] {
+        write_atomically(target, [](const fs::path& temporary) {
+            write_file(temporary, "half");
+            throw Error("disk on fire");
+        });
+    });
+    EXPECT_TRUE(says(message, target.string()));
+    EXPECT_TRUE(says(message, "disk on fire"));
+    EXPECT_TRUE(fs::is_empty(target.parent_path()));
+}
+
+TEST(atomic_output, an_existing_file_stays_whole_until_the_new_one_is) {
+    const TemporaryFolder folder;
+    const fs::path target = write_file(folder / "map.png", "old");
+    write_atomically(target, [&](const fs::path& temporary) {
+        EXPECT_EQ(temporary.parent_path(), target.parent_path());
+        EXPECT_EQ(temporary.extension(), ".png");
+        EXPECT_TRUE(temporary.filename().string().starts_with("."));
+        write_file(temporary, "new");
+        EXPECT_EQ(file_bytes(target), "old");
+    });
+    EXPECT_EQ(file_bytes(target), "new");
+}
+
+TEST(atomic_output, leftovers_of_dead_runs_are_removed_and_nothing_else) {
+    const TemporaryFolder folder;
+    const std::string living = std::to_string(::getppid());
+    write_file(folder / ".map.tmp-999999999-3.png", "half");
+    write_file(folder / fmt::format(".map.tmp-{}-3.png", living), "another run is writing this");
+    write_file(folder / "map.tmp-999999999-3.png", "the user's");
+    write_file(folder / ".hidden", "the user's");
+    EXPECT_EQ(remove_leftovers(folder.path()), 1);
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 3);
+    EXPECT_EQ(remove_leftovers(folder / "nowhere"), 0);
+}
+
+// --- cameras ---
+
+TEST(camera_files, our_json_comes_back_bit_for_bit) {
+    const TemporaryFolder folder;
+    CameraFile written;
+    written.camera = {{525.1234567890123, 524.9, 319.5, 239.25, {640, 480}}, {0.1, -0.2, 1e-4, 2e-5, 0.03}, ""};
+    written.depth_units_per_metre = 5000;
+    written.registration = Registration::yes;
+    write_camera_file(folder / "camera.json", written);
+    const CameraFile read = read_camera_file(folder / "camera.json");
+    EXPECT_EQ(read.camera.pinhole.fx, written.camera.pinhole.fx);
+    EXPECT_EQ(read.camera.pinhole.cy, written.camera.pinhole.cy);
+    EXPECT_EQ(read.camera.pinhole.size, cv::Size(640, 480));
+    EXPECT_EQ(read.camera.distortion.p2, 2e-5);
+    EXPECT_EQ(read.depth_units_per_metre, 5000);
+    EXPECT_EQ(read.registration, Registration::yes);
+    EXPECT_TRUE(says(read.camera.origin, "camera.json"));
+}
+
+TEST(camera_files, a_text_matrix_is_read_by_rows_and_names_no_size) {
+    const TemporaryFolder folder;
+    const auto read = read_camera_file(write_file(folder / "k.txt", "\xEF\xBB\xBF" "585 0 320\r\n0 586 240\r\n0 0 1\r\n"));
+    EXPECT_EQ(read.camera.pinhole.fy, 586);
+    EXPECT_EQ(read.camera.pinhole.cx, 320);
+    EXPECT_TRUE(read.camera.pinhole.size.empty());
+}
+
+TEST(camera_files, bundle_fusion_info_gives_size_and_depth_unit) {
+    const TemporaryFolder folder;
+    const auto read = read_camera_file(write_file(folder / "info.txt",
+                                                  "m_versionNumber = 4\nm_depthWidth = 640\nm_depthHeight = 480\nm_depthShift = 1000\n"
+                                                  "m_calibrationDepthIntrinsic = 582 0 320 0 0 583 240 0 0 0 1 0 0 0 0 1\n"));
+    EXPECT_EQ(read.camera.pinhole.fx, 582);
+    EXPECT_EQ(read.camera.pinhole.fy, 583);
+    EXPECT_EQ(read.camera.pinhole.cy, 240);
+    EXPECT_EQ(read.camera.pinhole.size, cv::Size(640, 480));
+    EXPECT_EQ(read.depth_units_per_metre, 1000);
+}
+
+TEST(camera_files, the_command_line_takes_numbers_or_a_file) {
+    const CameraFile numbers = camera_from_argument("500, 501, 320, 240");
+    EXPECT_EQ(numbers.camera.pinhole.fy, 501);
+    EXPECT_TRUE(says(numbers.camera.origin, "--camera"));
+    for (const char* text : {"500,501,320", "500,501,320,x", "-500,501,320,240", "0,501,320,240", "nowhere.json", "500,nan,1,1"})
+        EXPECT_THROW((void)camera_from_argument(text), Misuse) << text;
+}
+
+TEST(camera_files, json_of_the_wrong_shape_names_the_key) {
+    const TemporaryFolder folder;
+    const auto message = [&](const std::string& text) {
+        return refusal([&] { (void)read_camera_file(write_file(folder / "c.json", text)); });
+    };
+    EXPECT_TRUE(says(message(R"({"fx": 1, "fy": 1, "cx": 1, "width": 4, "height": 4})"), "\"cy\""));
+    EXPECT_TRUE(says(message(R"({"fx": 1, "fy": 1, "cx": 1, "cy": "x", "width": 4, "height": 4})"), "\"cy\""));
+    EXPECT_TRUE(says(message(R"({"fx": 1, "fy": 1, "cx": 1, "cy": 1, "width": 0, "height": 4})"), "\"width\""));
+    EXPECT_TRUE(says(message(R"({"fx": 1, "fy": 1, "cx": 1, "cy": 1, "width": 4, "height": 4, "distortion": [1]})"), "\"distortion\""));
+    EXPECT_TRUE(says(message(R"({"fx": 1e999, "fy": 1, "cx": 1, "cy": 1, "width": 4, "height": 4})"), "c.json"));
+    EXPECT_TRUE(says(message("[1, 2]"), "object"));
+    EXPECT_TRUE(says(message(""), "empty"));
+    EXPECT_TRUE(says(message("{\"fx\": 1,\n \"cx\": Infinity}"), "line 2"));
+    EXPECT_TRUE(says(message("{\"fx\": 1,\n \"cx\": Infinity}"), "\"cx\""));
+}
+
+// --- captures ---
+
+void write_pair(const fs::path& colour, const fs::path& depth, double units) {
+    write_picture(colour, picture());
+    write_depth_png(depth, wall(), units);
+}
+
+/// A capture in TUM's layout: colour a little before depth, poses at other times again.
+void write_tum(const fs::path& folder, int frames) {
+    std::string rgb = "# colour\n", depth = "# depth\n", poses = "# poses\n";
+    for (int i = 0; i < frames; ++i) {
+        const std::string colour_name = fmt::format("rgb/{:.6f}.png", 10 + i * 0.1), depth_name = fmt::format("depth/{:.6f}.png", 10.01 + i * 0.1);
+        write_pair(folder / colour_name, folder / depth_name, 5000);
+        rgb += fmt::format("{:.6f} {}\n", 10 + i * 0.1, colour_name);
+        depth += fmt::format("{:.6f} {}\n", 10.01 + i * 0.1, depth_name);
+        poses += fmt::format("{:.4f} {} 2 3 0 0 0.7071 0.7071\n", 10.005 + i * 0.1, i);
+    }
+    write_file(folder / "rgb.txt", rgb);
+    write_file(folder / "depth.txt", depth);
+    write_file(folder / "groundtruth.txt", poses);
+}
+
+void write_camera(const fs::path& file) {
+    CameraFile camera;
+    camera.camera.pinhole = {60, 60, 31.5, 23.5, {64, 48}};
+    camera.registration = Registration::yes;
+    write_camera_file(file, camera);
+}
+
+TEST(captures, tum_pairs_by_time_and_reads_poses) {
+    const TemporaryFolder folder;
+    write_tum(folder.path(), 3);
+    write_camera(folder / "camera.json");
+    const Capture capture = open_capture(folder.path());
+    EXPECT_EQ(capture.kind, "TUM RGB-D");
+    EXPECT_EQ(capture.depth.units_per_metre, 5000);
+    EXPECT_EQ(capture.registration, Registration::yes);
+    EXPECT_TRUE(capture.warnings.empty()) << joined(capture.warnings);
+    ASSERT_EQ(capture.entries.size(), 3);
+    EXPECT_EQ(capture.entries[1].name, "10.110000"); // the depth image's own stamp
+    const Frame frame = capture.load(2);
+    EXPECT_LE(worst_difference(frame.depth_m, wall()), 0.00011);
+    EXPECT_EQ(worst_difference(frame.colour, picture()), 0);
+    EXPECT_EQ(frame.camera.pinhole.size, cv::Size(64, 48));
+    ASSERT_TRUE(frame.world_from_camera);
+    EXPECT_EQ(frame.world_from_camera->translation(), Eigen::Vector3d(2, 2, 3));
+    // A quarter turn about z takes x to y.
+    EXPECT_NEAR((*frame.world_from_camera * Eigen::Vector3d::UnitX()).y(), 3, 1e-9);
+    EXPECT_TRUE(frame.warnings.empty()) << joined(frame.warnings);
+}
+
+TEST(captures, tum_limit_is_obeyed) {
+    const TemporaryFolder folder;
+    write_tum(folder.path(), 2);
+    CaptureOptions strict;
+    strict.association_limit_s = 0.005; // colour is 10 ms away, poses 5 ms
+    EXPECT_TRUE(says(refusal([&] { (void)open_capture(folder.path(), strict); }), "0.010 s after rgb.txt"));
+}
+
+TEST(captures, tum_uses_each_colour_once) {
+    const TemporaryFolder folder;
+    write_pair(folder / "rgb/1.png", folder / "depth/1.png", 5000);
+    write_file(folder / "rgb.txt", "1.000 rgb/1.png\n");
+    write_file(folder / "depth.txt", "0.995 depth/1.png\n1.002 depth/1.png\n1.010 depth/1.png\n");
+    const Capture capture = open_capture(folder.path());
+    ASSERT_EQ(capture.entries.size(), 3);
+    EXPECT_TRUE(capture.entries[0].colour.empty());
+    EXPECT_FALSE(capture.entries[1].colour.empty()); // the nearest one
+    EXPECT_TRUE(capture.entries[2].colour.empty());
+}
+
+TEST(captures, tum_takes_the_published_camera_only_for_the_benchmarks_own_recordings) {
+    const TemporaryFolder folder;
+    const auto open = [&](const std::string& name) {
+        const fs::path capture = folder / name;
+        write_depth_png(capture / "depth/1.png", wall({640, 480}), 5000);
+        write_file(capture / "depth.txt", "1.0 depth/1.png\n");
+        return open_capture(capture);
+    };
+    const Capture named = open("rgbd_dataset_freiburg2_xyz");
+    EXPECT_EQ(named.camera->pinhole.fx, 520.9);
+    EXPECT_EQ(named.registration, Registration::yes);
+    EXPECT_TRUE(warned(named.warnings, "not applied to depth"));
+    const Capture other = open("mine");
+    EXPECT_EQ(other.camera->pinhole.fx, 525);
+    EXPECT_TRUE(says(other.camera->origin, "assumed"));
+    EXPECT_EQ(other.registration, Registration::unknown);
+}
+
+TEST(captures, the_users_words_override_the_captures) {
+    const TemporaryFolder folder;
+    write_tum(folder.path(), 1);
+    write_file(folder / "camera.json", "not even JSON"); // nobody needs it
+    CaptureOptions options;
+    options.camera = "70,70,31.5,23.5";
+    options.depth_scale = "2500";
+    const Capture capture = open_capture(folder.path(), options);
+    EXPECT_EQ(capture.camera->pinhole.fx, 70);
+    EXPECT_EQ(capture.camera->pinhole.size, cv::Size(64, 48)); // from the images
+    EXPECT_EQ(capture.depth.origin, "--depth-scale");
+    EXPECT_NEAR(capture.load(0).depth_m(0, 1), 2 * wall()(0, 1), 0.001);
+}
+
+TEST(captures, seven_scenes_reads_matrices_and_never_claims_registration) {
+    const TemporaryFolder folder;
+    for (const char* name : {"frame-000009", "frame-000010"}) {
+        write_pair(folder / (std::string(name) + ".color.jpg"), folder / (std::string(name) + ".depth.png"), 1000);
+        write_file(folder / (std::string(name) + ".pose.txt"), "0 -1 0 5\n1 0 0 6\n0 0 1 7\n0 0 0 1\n");
+    }
+    write_file(folder / "camera-intrinsics.txt", "60 0 31.5\n0 60 23.5\n0 0 1\n");
+    write_file(folder / "Thumbs.db", "foreign");
+    write_file(folder / "._frame-000009.depth.png", "foreign");
+    const Capture capture = open_capture(folder.path());
+    EXPECT_EQ(capture.kind, "7-Scenes");
+    EXPECT_EQ(capture.registration, Registration::no);
+    ASSERT_EQ(capture.entries.size(), 2);
+    const Frame frame = capture.load(1);
+    EXPECT_EQ(frame.name, "frame-000010");
+    EXPECT_EQ(frame.camera.pinhole.size, cv::Size(64, 48));
+    EXPECT_TRUE((*frame.world_from_camera * Eigen::Vector3d(1, 0, 0)).isApprox(Eigen::Vector3d(5, 7, 7)));
+}
+
+TEST(captures, a_lost_pose_is_left_out_and_the_frame_stays) {
+    const TemporaryFolder folder;
+    write_pair(folder / "frame-000001.color.jpg", folder / "frame-000001.depth.png", 1000);
+    write_file(folder / "frame-000001.pose.txt", "-inf -inf -inf -inf\n-inf -inf -inf -inf\n-inf -inf -inf -inf\n0 0 0 1\n");
+    const Frame frame = open_capture(folder.path()).load(0);
+    EXPECT_FALSE(frame.world_from_camera);
+    EXPECT_TRUE(warned(frame.warnings, "tracking was lost"));
+}
+
+constexpr const char* open3d_camera = R"({"width": 64, "height": 48, "intrinsic_matrix": [60, 0, 0, 0, 61, 0, 31.5, 23.5, 1]})";
+
+TEST(captures, redwood_reads_match_log_and_column_major_camera) {
+    const TemporaryFolder folder;
+    write_pair(folder / "color/b.jpg", folder / "depth/00000.png", 1000);
+    write_pair(folder / "color/a.jpg", folder / "depth/00001.png", 1000);
+    write_file(folder / "rgbd.match", "depth/00000.png color/b.jpg\ncolor/a.jpg depth/00001.png\n");
+    write_file(folder / "trajectory.log", "0 0 1\n1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 1\n1 1 2\n1 0 0 4\n0 1 0 5\n0 0 1 6\n0 0 0 1\n");
+    write_file(folder / "camera_primesense.json", open3d_camera);
+    write_file(folder / "camera_trajectory.json", "{}"); // poses, whatever its name begins with
+    const Capture capture = open_capture(folder.path());
+    EXPECT_EQ(capture.kind, "Redwood / Open3D");
+    EXPECT_EQ(capture.camera->pinhole.fy, 61);
+    EXPECT_TRUE(says(capture.depth.origin, "assumed"));
+    ASSERT_EQ(capture.entries.size(), 2);
+    EXPECT_EQ(capture.entries[0].colour.filename(), "b.jpg");
+    EXPECT_EQ(capture.entries[1].colour.filename(), "a.jpg");
+    EXPECT_EQ(capture.load(1).world_from_camera->translation(), Eigen::Vector3d(4, 5, 6));
+}
+
+TEST(captures, colour_and_depth_folders_pair_by_name_in_natural_order) {
+    const TemporaryFolder folder;
+    for (const char* name : {"2", "10"}) write_pair(folder / ("color/" + std::string(name) + ".png"), folder / ("depth/" + std::string(name) + ".png"), 1000);
+    write_file(folder / "pose.txt", "0 0 0 0 0 0 1\n7 8 9 0 0 0 1"); // row N is image N's
+    const Capture capture = open_capture(folder.path());
+    EXPECT_EQ(capture.kind, "colour and depth folders");
+    EXPECT_FALSE(capture.camera);
+    EXPECT_TRUE(warned(capture.warnings, "--camera"));
+    ASSERT_EQ(capture.entries.size(), 2);
+    EXPECT_EQ(capture.entries[0].name, "2");
+    EXPECT_EQ(capture.load(0).world_from_camera->translation(), Eigen::Vector3d(7, 8, 9));
+    EXPECT_TRUE(warned(capture.load(1).warnings, "pose.txt has no row"));
+    EXPECT_TRUE(says(refusal([&] { check(capture.load(0).camera); }), "--camera"));
+}
+
+TEST(captures, depth_folders_need_no_colour) {
+    const TemporaryFolder folder;
+    write_depth_png(folder / "depth/1.png", wall(), 1000);
+    EXPECT_TRUE(open_capture(folder.path()).load(0).colour.empty());
+    const Capture flat = open_capture(folder / "depth");
+    EXPECT_EQ(flat.kind, "depth images");
+    EXPECT_LE(worst_difference(flat.load(0).depth_m, wall()), 0.00051);
+}
+
+TEST(captures, single_files_are_captures_of_one_frame) {
+    const TemporaryFolder folder;
+    write_float_tiff(folder / "d.tiff", wall());
+    const Capture depth = open_capture(folder / "d.tiff");
+    EXPECT_EQ(depth.kind, "depth image");
+    EXPECT_EQ(depth.depth.origin, "assumed: floats are metres");
+    EXPECT_EQ(worst_difference(depth.load(0).depth_m, wall()), 0);
+    const auto cloud_file = write_file(folder / "c.dat", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                                                         "property float z\nend_header\n1 2 3\n");
+    const Capture cloud = open_capture(cloud_file); // told by content
+    EXPECT_EQ(cloud.kind, "cloud");
+    EXPECT_EQ(cloud.load(0).cloud->points[0], Eigen::Vector3d(1, 2, 3));
+    EXPECT_TRUE(says(refusal([&] { (void)open_capture(write_file(folder / "notes.txt", "hello")); }), "neither"));
+}
+
+TEST(captures, frame_names_are_unique_and_fit_for_files) {
+    const TemporaryFolder folder;
+    const std::string cloud = "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+    write_file(folder / "a.ply", cloud);
+    write_file(folder / "a.PLY", cloud);
+    const Capture capture = open_capture(folder.path());
+    ASSERT_EQ(capture.entries.size(), 2);
+    EXPECT_NE(capture.entries[0].name, capture.entries[1].name);
+}
+
+TEST(captures, a_pcd_viewpoint_is_the_pose_and_leaves_the_points_alone) {
+    const TemporaryFolder folder;
+    // w x y z = 0 1 0 0: a half turn about x; points stay in the camera's frame.
+    const auto file = write_file(folder / "c.pcd", "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\n"
+                                                   "VIEWPOINT 1 2 3 0 1 0 0\nPOINTS 1\nDATA ascii\n0 0 2\n");
+    const Frame frame = open_capture(file).load(0);
+    EXPECT_EQ(frame.cloud->points[0], Eigen::Vector3d(0, 0, 2));
+    EXPECT_TRUE((*frame.world_from_camera * frame.cloud->points[0]).isApprox(Eigen::Vector3d(1, 2, 1)));
+}
+
+TEST(captures, a_wrong_depth_scale_is_doubted_with_the_alternatives) {
+    const TemporaryFolder folder;
+    const cv::Mat1f far_wall(2.0 * wall() + 1.0);
+    write_depth_png(folder / "d.png", far_wall, 5000); // TUM's unit, read as millimetres: 15 to 25 m
+    const Frame frame = open_capture(folder / "d.png").load(0);
+    EXPECT_TRUE(warned(frame.warnings, "implausible"));
+    EXPECT_TRUE(warned(frame.warnings, "tum a median of"));
+    CaptureOptions right;
+    right.depth_scale = "tum";
+    EXPECT_FALSE(warned(open_capture(folder / "d.png", right).load(0).warnings, "implausible"));
+}
+
+TEST(captures, noise_in_place_of_surfaces_is_doubted) {
+    const TemporaryFolder folder;
+    cv::Mat1w noise(48, 64);
+    cv::RNG random(7);
+    for (auto& value : noise) value = static_cast<ushort>(random.uniform(500, 9000));
+    cv::imwrite((folder / "d.png").string(), noise);
+    EXPECT_TRUE(warned(open_capture(folder / "d.png").load(0).warnings, "noise"));
+}
+
+TEST(captures, colour_of_another_size_is_left_out_and_depth_stays) {
+    const TemporaryFolder folder;
+    write_picture(folder / "color/1.png", picture({32, 24}));
+    write_depth_png(folder / "depth/1.png", wall(), 1000);
+    const Frame frame = open_capture(folder.path()).load(0);
+    EXPECT_TRUE(frame.colour.empty());
+    EXPECT_FALSE(frame.depth_m.empty());
+    EXPECT_TRUE(warned(frame.warnings, "32x24"));
+}
+
+TEST(captures, nothing_to_do_says_what_was_looked_for) {
+    const TemporaryFolder folder;
+    const std::string message = refusal([&] { (void)open_capture(folder.path()); });
+    EXPECT_TRUE(says(message, "no frames found in " + folder.path().string()));
+    EXPECT_TRUE(says(message, "depth.txt"));
+    EXPECT_TRUE(says(refusal([&] { (void)open_capture(folder / "nowhere"); }), "no such file"));
+}
+
+} // namespace
+} // namespace scanshade

@@ -1,0 +1,119 @@
+// Rows of settings: text in, text out, and every refusal names the row and what was expected.
+#include "projection/parameters.h"
+
+#include "projection/error.h"
+#include "tests/support/says.h"
+
+#include <gtest/gtest.h>
+
+namespace scanshade {
+namespace {
+
+struct Settings {
+    bool adaptive = false;
+    int passes = 2;
+    float radius = 0.5F;
+    double sigma = 0.1;
+    std::string quality = "high", note;
+
+    std::vector<Parameter> parameters() {
+        return {{"adaptive", "", &adaptive, "", 0, 1, {}},
+                {"passes", "", &passes, "", 0, 8, {}},
+                {"radius", "", &radius, "m", 0, 100000, {}},
+                {"sigma", "", &sigma, "rad", 0, std::numeric_limits<double>::infinity(), {}},
+                {"quality", "", &quality, "", 0, 0, {"low", "high"}},
+                {"note", "", &note, "", 0, 0, {}}};
+    }
+};
+enum Row { adaptive, passes, radius, sigma, quality, note };
+
+using tests::says;
+
+std::string refusal(const Parameter& row, const std::string& text) {
+    return tests::refusal([&] { set(row, text); });
+}
+
+TEST(Parameters, TextSetsTheVariableTheRowIsBoundTo) {
+    Settings settings;
+    const auto rows = settings.parameters();
+    set(rows[adaptive], "true");
+    set(rows[passes], "8");
+    set(rows[radius], "0.25");
+    set(rows[sigma], "1e-3");
+    set(rows[quality], "low");
+    set(rows[note], "any text, -1");
+    EXPECT_TRUE(settings.adaptive);
+    EXPECT_EQ(settings.passes, 8);
+    EXPECT_EQ(settings.radius, 0.25F);
+    EXPECT_EQ(settings.sigma, 1e-3);
+    EXPECT_EQ(settings.quality, "low");
+    EXPECT_EQ(settings.note, "any text, -1");
+    for (const char* no : {"false", "0", "off", "no"}) {
+        settings.adaptive = true;
+        set(rows[adaptive], no);
+        EXPECT_FALSE(settings.adaptive) << no;
+    }
+}
+
+TEST(Parameters, PrintedValuesReadBackTheSameAndAreShort) {
+    Settings settings;
+    const auto rows = settings.parameters();
+    settings.radius = 0.1F;
+    settings.sigma = 0.1 + 0.2;
+    EXPECT_EQ(value_text(rows[radius]), "0.1") << "not the 0.10000000149 a float is as a double";
+    EXPECT_EQ(value_text(rows[sigma]), "0.30000000000000004");
+    EXPECT_EQ(value_text(rows[adaptive]), "false");
+    EXPECT_EQ(value_text(rows[quality]), "high");
+    for (const Parameter& row : rows) {
+        const std::string text = value_text(row);
+        set(row, text);
+        EXPECT_EQ(value_text(row), text);
+    }
+    EXPECT_EQ(settings.sigma, 0.1 + 0.2);
+}
+
+TEST(Parameters, RangesReadAsPeopleWriteThem) {
+    Settings settings;
+    const auto rows = settings.parameters();
+    EXPECT_EQ(range_text(rows[adaptive]), "true | false");
+    EXPECT_EQ(range_text(rows[passes]), "0 .. 8");
+    EXPECT_EQ(range_text(rows[radius]), "m, 0 .. 100000");
+    EXPECT_EQ(range_text(rows[sigma]), "rad, 0 or more");
+    EXPECT_EQ(range_text(rows[quality]), "low | high");
+    EXPECT_EQ(range_text(rows[note]), "");
+}
+
+TEST(Parameters, WhatCannotBeIsRefusedByNameAndLeavesTheSettingAlone) {
+    Settings settings;
+    const auto rows = settings.parameters();
+    const std::string why = refusal(rows[radius], "-1");
+    EXPECT_TRUE(says(why, "radius"));
+    EXPECT_TRUE(says(why, "'-1'"));
+    EXPECT_TRUE(says(why, "m, 0 .. 100000"));
+    for (const char* text : {"", "abc", "1m", " 1", "nan", "inf", "1e9", "1e999", "0,5"})
+        EXPECT_NE(refusal(rows[radius], text), "") << text;
+    for (const char* text : {"", "2.5", "9", "-1", "99999999999", "0x2"})
+        EXPECT_NE(refusal(rows[passes], text), "") << text;
+    for (const char* text : {"", "High", "medium"})
+        EXPECT_TRUE(says(refusal(rows[quality], text), "low | high")) << text;
+    EXPECT_TRUE(says(refusal(rows[adaptive], "maybe"), "true | false"));
+    EXPECT_EQ(settings.radius, 0.5F);
+    EXPECT_EQ(settings.passes, 2);
+    EXPECT_EQ(settings.quality, "high");
+}
+
+TEST(Parameters, ValuesSetInCodeAreCheckedToo) {
+    Settings settings;
+    const auto rows = settings.parameters();
+    for (const Parameter& row : rows)
+        EXPECT_NO_THROW(check(row)) << row.name;
+    settings.radius = std::numeric_limits<float>::quiet_NaN();
+    EXPECT_THROW(check(rows[radius]), Misuse);
+    settings.passes = 9;
+    EXPECT_THROW(check(rows[passes]), Misuse);
+    settings.quality = "best";
+    EXPECT_THROW(check(rows[quality]), Misuse);
+}
+
+} // namespace
+} // namespace scanshade

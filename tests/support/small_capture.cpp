@@ -1,0 +1,63 @@
+#include "tests/support/small_capture.h"
+
+#include "io/camera_file.h"
+#include "io/image_file.h"
+
+#include <cstdlib>
+#include <fmt/format.h>
+#include <fstream>
+#include <stdexcept>
+#include <sys/wait.h>
+
+namespace scanshade::tests {
+
+namespace fs = std::filesystem;
+
+TemporaryFolder::TemporaryFolder() {
+    std::string name = (fs::temp_directory_path() / "scanshade-test-XXXXXX").string();
+    if (!mkdtemp(name.data()))
+        throw std::runtime_error("no temporary folder could be made: " + name);
+    path_ = name;
+}
+
+TemporaryFolder::~TemporaryFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+}
+
+Camera small_camera() { return {{52.0, 52.0, 31.5, 23.5, {64, 48}}, {}, "test"}; }
+
+cv::Mat1f corner_depth(int index) {
+    const Pinhole camera = small_camera().pinhole;
+    const double edge = (index % 8 - 4) * 0.05; // x / z of the edge
+    cv::Mat1f z_m(camera.size);
+    for (int v = 0; v < z_m.rows; ++v)
+        for (int u = 0; u < z_m.cols; ++u) // walls z = 2 - |x - edge z|: 45 degrees to the view on either side
+            z_m(v, u) = static_cast<float>(2 / (1 + std::abs((u - camera.cx) / camera.fx - edge)));
+    z_m(cv::Rect(2, 2, 6, 5)) = 0;
+    return z_m;
+}
+
+void write_capture(const fs::path& folder, int frames, Registration registration) {
+    for (int i = 0; i < frames; ++i) {
+        write_depth_png(folder / fmt::format("depth/{:03}.png", i), corner_depth(i), 1000);
+        write_picture(folder / fmt::format("color/{:03}.png", i), cv::Mat3b(48, 64, cv::Vec3b(40, 120, 200)));
+    }
+    write_camera_file(folder / "camera.json", {small_camera(), 1000, registration, {}});
+}
+
+std::string read_bytes(const fs::path& file) {
+    std::ifstream stream(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+Ran run_program(const std::string& arguments) {
+    const TemporaryFolder folder;
+    const std::string command = fmt::format("'{}' {} >'{}' 2>'{}'", SCANSHADE_PROGRAM, arguments,
+                                            (folder / "out").string(), (folder / "err").string());
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_bytes(folder / "out"),
+            read_bytes(folder / "err")};
+}
+
+} // namespace scanshade::tests

@@ -1,0 +1,48 @@
+// Captures small enough to be made anew for each test, in a folder that vanishes with it.
+#pragma once
+
+#include "projection/frame.h"
+
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <string>
+
+namespace scanshade::tests {
+
+/// A fresh folder under the system's temporary one; removed with everything in it.
+class TemporaryFolder {
+  public:
+    TemporaryFolder();
+    ~TemporaryFolder();
+    TemporaryFolder(const TemporaryFolder&) = delete;
+    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+    [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+    [[nodiscard]] std::filesystem::path operator/(const std::filesystem::path& part) const { return path_ / part; }
+
+  private:
+    std::filesystem::path path_;
+};
+
+/// The camera of write_capture(): 64x48 pixels, about 63 degrees wide.
+[[nodiscard]] Camera small_camera();
+
+/// Two walls that meet in a vertical edge 2 m away, with a block of holes at the upper left; metres. Each `index` has
+/// the edge at another column.
+[[nodiscard]] cv::Mat1f corner_depth(int index);
+
+/// `frames` corners as color/NNN.png (a plain colour), depth/NNN.png (millimetres) and camera.json.
+void write_capture(const std::filesystem::path& folder, int frames, Registration registration = Registration::yes);
+
+/// What a command printed, and how it ended.
+struct Ran {
+    int exit_code = -1;
+    std::string out, err;
+};
+
+/// Runs the program with `arguments`, as a shell takes them.
+[[nodiscard]] Ran run_program(const std::string& arguments);
+
+[[nodiscard]] std::string read_bytes(const std::filesystem::path& file);
+
+} // namespace scanshade::tests
