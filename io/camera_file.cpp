@@ -26,13 +26,16 @@ constexpr int widest_image = 1 << 16;
 void check_numbers(const fs::path& file, const Pinhole& camera, const std::array<std::string, 4>& names) {
     const std::array<double, 4> values{camera.fx, camera.fy, camera.cx, camera.cy};
     for (std::size_t i = 0; i < values.size(); ++i)
-        if (!std::isfinite(values[i])) refuse(file, fmt::format("{} is {}, expected a finite number", names[i], values[i]));
+        if (!std::isfinite(values[i]))
+            refuse(file, fmt::format("{} is {}, expected a finite number", names[i], values[i]));
     for (std::size_t i = 0; i < 2; ++i) {
-        if (values[i] == 0) refuse(file, fmt::format("{} is 0, expected a focal length in pixels", names[i]));
+        if (values[i] == 0)
+            refuse(file, fmt::format("{} is 0, expected a focal length in pixels", names[i]));
         if (values[i] < 0)
-            refuse(file, fmt::format("{} is {}, expected a positive focal length (fy < 0 is ICL-NUIM's flipped image axis: "
-                                     "flip the images or negate it yourself; nothing is mirrored silently)",
-                                     names[i], values[i]));
+            refuse(file,
+                   fmt::format("{} is {}, expected a positive focal length (fy < 0 is ICL-NUIM's flipped image axis: "
+                               "flip the images or negate it yourself; nothing is mirrored silently)",
+                               names[i], values[i]));
     }
 }
 
@@ -41,9 +44,11 @@ void check_numbers(const fs::path& file, const Pinhole& camera, const std::array
 /// The key whose value holds byte `offset`: the last quoted word before it that a colon follows.
 std::string key_before(std::string_view text, std::size_t offset) {
     const auto colon = text.substr(0, offset).rfind(':');
-    if (colon == std::string_view::npos) return {};
+    if (colon == std::string_view::npos)
+        return {};
     const auto close = text.substr(0, colon).rfind('"');
-    if (close == std::string_view::npos || close == 0) return {};
+    if (close == std::string_view::npos || close == 0)
+        return {};
     const auto open = text.substr(0, close).rfind('"');
     return open == std::string_view::npos ? std::string() : std::string(text.substr(open + 1, close - open - 1));
 }
@@ -64,9 +69,11 @@ bool mentions_not_a_number(std::string_view rest) {
     const std::size_t word = text.find_last_of(" \t\r\n,[:", offset == 0 ? 0 : offset - 1);
     const std::size_t word_start = word == std::string_view::npos ? 0 : word + 1;
     if (mentions_not_a_number(text.substr(std::min(word_start, text.size()))))
-        refuse(file, fmt::format("{}: \"{}\" holds NaN or infinity, expected a number", place, key_before(text, offset)));
+        refuse(file,
+               fmt::format("{}: \"{}\" holds NaN or infinity, expected a number", place, key_before(text, offset)));
     std::string reason = failure.what();
-    if (const auto colon = reason.find(": "); colon != std::string::npos) reason = reason.substr(colon + 2);
+    if (const auto colon = reason.find(": "); colon != std::string::npos)
+        reason = reason.substr(colon + 2);
     refuse(file, fmt::format("{}: not JSON: {}", place, reason));
 }
 
@@ -82,14 +89,17 @@ Json parse(const fs::path& file, const std::string& text) {
 
 const Json& member(const fs::path& file, const Json& object, const std::string& key) {
     const auto found = object.find(key);
-    if (found == object.end()) refuse(file, fmt::format("\"{}\" is missing", key));
+    if (found == object.end())
+        refuse(file, fmt::format("\"{}\" is missing", key));
     return *found;
 }
 
 double number_of(const fs::path& file, const Json& value, const std::string& key) {
-    if (!value.is_number()) refuse(file, fmt::format("\"{}\" is {}, expected a number", key, in_quotes(value.dump())));
+    if (!value.is_number())
+        refuse(file, fmt::format("\"{}\" is {}, expected a number", key, in_quotes(value.dump())));
     const double found = value.get<double>();
-    if (!std::isfinite(found)) refuse(file, fmt::format("\"{}\" is not finite, expected a number", key));
+    if (!std::isfinite(found))
+        refuse(file, fmt::format("\"{}\" is not finite, expected a number", key));
     return found;
 }
 
@@ -102,24 +112,29 @@ int size_of(const fs::path& file, const Json& object, const std::string& key) {
 
 std::vector<double> numbers_of(const fs::path& file, const Json& object, const std::string& key, std::size_t count) {
     const Json& list = member(file, object, key);
-    if (!list.is_array()) refuse(file, fmt::format("\"{}\" is not a list of {} numbers", key, count));
+    if (!list.is_array())
+        refuse(file, fmt::format("\"{}\" is not a list of {} numbers", key, count));
     if (list.size() != count)
         refuse(file, fmt::format("\"{}\" has {}, expected {}", key, counted(list.size(), "number"), count));
     std::vector<double> values;
-    for (const Json& value : list) values.push_back(number_of(file, value, key));
+    for (const Json& value : list)
+        values.push_back(number_of(file, value, key));
     return values;
 }
 
 /// Open3D's matrix stores columns one after another: fx 0 0, 0 fy 0, cx cy 1.
 Pinhole from_columns(const fs::path& file, const std::vector<double>& m) {
     if (m[6] == 0 && m[7] == 0 && (m[2] != 0 || m[5] != 0))
-        refuse(file, "\"intrinsic_matrix\" is stored row by row; Open3D's layout stores columns: fx 0 0 0 fy 0 cx cy 1");
+        refuse(file,
+               "\"intrinsic_matrix\" is stored row by row; Open3D's layout stores columns: fx 0 0 0 fy 0 cx cy 1");
     if (m[2] != 0 || m[5] != 0 || m[8] != 1 || m[1] != 0)
         refuse(file, "\"intrinsic_matrix\" is not a camera matrix stored by columns: expected fx 0 0 0 fy 0 cx cy 1");
-    if (m[3] != 0) refuse(file, fmt::format("\"intrinsic_matrix\" has skew {}, a pinhole camera here has none", m[3]));
+    if (m[3] != 0)
+        refuse(file, fmt::format("\"intrinsic_matrix\" has skew {}, a pinhole camera here has none", m[3]));
     const Pinhole camera{m[0], m[4], m[6], m[7], {}};
-    check_numbers(file, camera,
-                  {"\"intrinsic_matrix\" fx", "\"intrinsic_matrix\" fy", "\"intrinsic_matrix\" cx", "\"intrinsic_matrix\" cy"});
+    check_numbers(
+        file, camera,
+        {"\"intrinsic_matrix\" fx", "\"intrinsic_matrix\" fy", "\"intrinsic_matrix\" cx", "\"intrinsic_matrix\" cy"});
     return camera;
 }
 
@@ -132,7 +147,8 @@ Pinhole from_keys(const fs::path& file, const Json& object) {
 
 CameraFile from_json(const fs::path& file, const std::string& text) {
     const Json object = parse(file, text);
-    if (!object.is_object()) refuse(file, "expected a JSON object that describes a camera");
+    if (!object.is_object())
+        refuse(file, "expected a JSON object that describes a camera");
     if (!object.contains("intrinsic_matrix") && !object.contains("fx"))
         refuse(file, "\"intrinsic_matrix\" (Open3D's layout) and \"fx\" (ours) are both missing");
     CameraFile result;
@@ -146,11 +162,13 @@ CameraFile from_json(const fs::path& file, const std::string& text) {
     }
     if (object.contains("depth_units_per_metre")) {
         const double units = number_of(file, object["depth_units_per_metre"], "depth_units_per_metre");
-        if (units <= 0) refuse(file, fmt::format("\"depth_units_per_metre\" is {}, expected a positive number", units));
+        if (units <= 0)
+            refuse(file, fmt::format("\"depth_units_per_metre\" is {}, expected a positive number", units));
         result.depth_units_per_metre = units;
     }
     if (object.contains("registered")) {
-        if (!object["registered"].is_boolean()) refuse(file, "\"registered\" is not true or false");
+        if (!object["registered"].is_boolean())
+            refuse(file, "\"registered\" is not true or false");
         result.registration = object["registered"].get<bool>() ? Registration::yes : Registration::no;
     }
     return result;
@@ -162,7 +180,8 @@ CameraFile from_json(const fs::path& file, const std::string& text) {
 std::vector<std::string_view> info_value(const std::vector<TextLine>& lines, std::string_view key, int& line_number) {
     for (const TextLine& line : lines) {
         const auto all = words(line.text);
-        if (all.size() < 3 || all[0] != key || all[1] != "=") continue;
+        if (all.size() < 3 || all[0] != key || all[1] != "=")
+            continue;
         line_number = line.number;
         return {all.begin() + 2, all.end()};
     }
@@ -173,7 +192,8 @@ double info_number(const fs::path& file, const std::vector<TextLine>& lines, std
                    std::size_t index) {
     int line = 1;
     const auto values = info_value(lines, key, line);
-    if (values.empty()) refuse(file, fmt::format("\"{}\" is missing", key));
+    if (values.empty())
+        refuse(file, fmt::format("\"{}\" is missing", key));
     const auto value = values.size() == count ? number(values[index]) : std::nullopt;
     if (!value || !std::isfinite(*value))
         throw Error(fmt::format("{}: \"{}\": expected {}", at_line(file, line), key, counted(count, "finite number")));
@@ -193,7 +213,8 @@ CameraFile from_info(const fs::path& file, const std::vector<TextLine>& lines) {
         refuse(file, fmt::format("m_depthWidth {} and m_depthHeight {} are not an image size", width, height));
     pinhole.size = {static_cast<int>(width), static_cast<int>(height)};
     const double units = info_number(file, lines, "m_depthShift", 1, 0);
-    if (units <= 0) refuse(file, fmt::format("m_depthShift is {}, expected units per metre", units));
+    if (units <= 0)
+        refuse(file, fmt::format("m_depthShift is {}, expected units per metre", units));
     result.depth_units_per_metre = units;
     return result;
 }
@@ -203,23 +224,28 @@ CameraFile from_matrix(const fs::path& file, const std::vector<TextLine>& lines)
     int rows = 0;
     for (const TextLine& line : lines) {
         const auto row = words(line.text);
-        if (row.empty() || row[0].starts_with('#')) continue;
-        if (rows == 3) throw Error(at_line(file, line.number) + ": a fourth row, expected a 3x3 matrix");
+        if (row.empty() || row[0].starts_with('#'))
+            continue;
+        if (rows == 3)
+            throw Error(at_line(file, line.number) + ": a fourth row, expected a 3x3 matrix");
         if (row.size() != 3)
             throw Error(fmt::format("{}: {}, expected 3 (a row of a 3x3 camera matrix)", at_line(file, line.number),
                                     counted(row.size(), "value")));
         for (std::size_t i = 0; i < 3; ++i) {
             const auto value = number(row[i]);
             if (!value || !std::isfinite(*value))
-                throw Error(fmt::format("{}: {} is not a finite number", at_line(file, line.number), in_quotes(row[i])));
+                throw Error(
+                    fmt::format("{}: {} is not a finite number", at_line(file, line.number), in_quotes(row[i])));
             m[static_cast<std::size_t>(rows) * 3 + i] = *value;
         }
         ++rows;
     }
-    if (rows != 3) refuse(file, fmt::format("{}, expected a 3x3 camera matrix", counted(static_cast<std::size_t>(rows), "row")));
+    if (rows != 3)
+        refuse(file, fmt::format("{}, expected a 3x3 camera matrix", counted(static_cast<std::size_t>(rows), "row")));
     if (m[3] != 0 || m[6] != 0 || m[7] != 0 || m[8] != 1)
         refuse(file, "not a camera matrix stored by rows: expected fx 0 cx, 0 fy cy, 0 0 1");
-    if (m[1] != 0) refuse(file, fmt::format("skew {} in line 1, a pinhole camera here has none", m[1]));
+    if (m[1] != 0)
+        refuse(file, fmt::format("skew {} in line 1, a pinhole camera here has none", m[1]));
     CameraFile result;
     result.camera.pinhole = {m[0], m[4], m[2], m[5], {}};
     check_numbers(file, result.camera.pinhole, {"fx", "fy", "cx", "cy"});
@@ -230,14 +256,16 @@ CameraFile from_matrix(const fs::path& file, const std::vector<TextLine>& lines)
 
 CameraFile read_camera_file(const fs::path& file) {
     const std::string bytes = read_bytes(file, largest_file + 1);
-    if (bytes.size() > largest_file) refuse(file, "more than 1 MiB, too large for a camera file");
-    if (trimmed(bytes).empty()) refuse(file, "empty file, expected a camera");
+    if (bytes.size() > largest_file)
+        refuse(file, "more than 1 MiB, too large for a camera file");
+    if (trimmed(bytes).empty())
+        refuse(file, "empty file, expected a camera");
     const auto lines = text_lines(bytes);
     const auto first = bytes.find_first_of("{[");
     const bool json = first != std::string::npos && bytes.find_first_not_of("\xEF\xBB\xBF \t\r\n") == first;
-    CameraFile result = json                                                  ? from_json(file, bytes)
+    CameraFile result = json                                               ? from_json(file, bytes)
                         : bytes.find("m_calibration") != std::string::npos ? from_info(file, lines)
-                                                                              : from_matrix(file, lines);
+                                                                           : from_matrix(file, lines);
     result.camera.origin = file.string();
     return result;
 }
@@ -247,7 +275,8 @@ CameraFile camera_from_argument(const std::string& text) {
     for (std::string_view rest = text;;) {
         const auto comma = rest.find(',');
         parts.push_back(trimmed(rest.substr(0, comma)));
-        if (comma == std::string_view::npos) break;
+        if (comma == std::string_view::npos)
+            break;
         rest.remove_prefix(comma + 1);
     }
     std::error_code ignored;
@@ -263,8 +292,9 @@ CameraFile camera_from_argument(const std::string& text) {
         const auto value = number(parts[i]);
         const bool usable = value && std::isfinite(*value) && (i >= 2 || *value > 0);
         if (!usable)
-            throw Misuse(fmt::format("--camera {}: {} is {}, expected fx,fy,cx,cy in pixels (focal lengths positive) or a file",
-                                     text, std::array{"fx", "fy", "cx", "cy"}[i], in_quotes(parts[i])));
+            throw Misuse(
+                fmt::format("--camera {}: {} is {}, expected fx,fy,cx,cy in pixels (focal lengths positive) or a file",
+                            text, std::array{"fx", "fy", "cx", "cy"}[i], in_quotes(parts[i])));
         values[i] = *value;
     }
     CameraFile result;
@@ -276,13 +306,19 @@ CameraFile camera_from_argument(const std::string& text) {
 void write_camera_file(const fs::path& file, const CameraFile& camera) {
     const Pinhole& pinhole = camera.camera.pinhole;
     check(camera.camera);
-    nlohmann::ordered_json object{{"fx", pinhole.fx},           {"fy", pinhole.fy},
-                                  {"cx", pinhole.cx},           {"cy", pinhole.cy},
-                                  {"width", pinhole.size.width}, {"height", pinhole.size.height}};
+    nlohmann::ordered_json object{{"fx", pinhole.fx},
+                                  {"fy", pinhole.fy},
+                                  {"cx", pinhole.cx},
+                                  {"cy", pinhole.cy},
+                                  {"width", pinhole.size.width},
+                                  {"height", pinhole.size.height}};
     const Distortion& d = camera.camera.distortion;
-    if (d.any()) object["distortion"] = {d.k1, d.k2, d.p1, d.p2, d.k3};
-    if (camera.depth_units_per_metre) object["depth_units_per_metre"] = *camera.depth_units_per_metre;
-    if (camera.registration != Registration::unknown) object["registered"] = camera.registration == Registration::yes;
+    if (d.any())
+        object["distortion"] = {d.k1, d.k2, d.p1, d.p2, d.k3};
+    if (camera.depth_units_per_metre)
+        object["depth_units_per_metre"] = *camera.depth_units_per_metre;
+    if (camera.registration != Registration::unknown)
+        object["registered"] = camera.registration == Registration::yes;
     write_atomically(file, object.dump(2) + "\n");
 }
 

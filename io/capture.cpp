@@ -1,4 +1,5 @@
-// open_capture: which layout, camera and depth encoding; load: one frame's files decoded and checked against each other.
+// open_capture: which layout, camera and depth encoding; load: one frame's files decoded and checked against each
+// other.
 #include "io/capture.h"
 
 #include "io/cloud_file.h"
@@ -21,20 +22,27 @@ namespace {
 // --- opening ---
 
 Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
-    if (auto listing = list_tum(folder, options)) return *std::move(listing);
-    if (auto listing = list_seven_scenes(folder)) return *std::move(listing);
-    if (auto listing = list_image_folders(folder)) return *std::move(listing);
-    if (auto listing = list_depth_images(folder)) return *std::move(listing);
-    if (auto listing = list_clouds(folder)) return *std::move(listing);
-    throw Error(fmt::format("no frames found in {}: looked for depth.txt (TUM), frame-NNNNNN.depth.png (7-Scenes), a folder depth/ "
-                            "(Redwood, RealSense), 16-bit or float depth images, and .pcd or .ply clouds",
-                            folder.string()));
+    if (auto listing = list_tum(folder, options))
+        return *std::move(listing);
+    if (auto listing = list_seven_scenes(folder))
+        return *std::move(listing);
+    if (auto listing = list_image_folders(folder))
+        return *std::move(listing);
+    if (auto listing = list_depth_images(folder))
+        return *std::move(listing);
+    if (auto listing = list_clouds(folder))
+        return *std::move(listing);
+    throw Error(fmt::format(
+        "no frames found in {}: looked for depth.txt (TUM), frame-NNNNNN.depth.png (7-Scenes), a folder depth/ "
+        "(Redwood, RealSense), 16-bit or float depth images, and .pcd or .ply clouds",
+        folder.string()));
 }
 
 bool is_cloud(const fs::path& file) {
     const std::string start = read_bytes(file, 16);
     for (const std::string_view beginning : {"ply\n", "ply\r", "# .PCD", "VERSION", "FIELDS"})
-        if (start.starts_with(beginning)) return true;
+        if (start.starts_with(beginning))
+            return true;
     return image_format(start) == ImageFormat::unknown && has_cloud_extension(file);
 }
 
@@ -51,7 +59,8 @@ Listing list_file(const fs::path& file) {
     } else {
         const bool image = image_format(read_bytes(file, 16)) != ImageFormat::unknown;
         if (!image && !has_depth_extension(file))
-            throw Error(file.string() + ": neither a folder, a depth image (PNG, PGM, TIFF, EXR, PFM) nor a cloud (PCD, PLY)");
+            throw Error(file.string() +
+                        ": neither a folder, a depth image (PNG, PGM, TIFF, EXR, PFM) nor a cloud (PCD, PLY)");
         entry.depth = file;
         listing.capture.kind = "depth image";
         listing.capture.depth = assumed_encoding(file);
@@ -65,8 +74,10 @@ Listing list_file(const fs::path& file) {
 cv::Size depth_size(const std::vector<CaptureEntry>& entries) {
     int tries = 8;
     for (const CaptureEntry& entry : entries) {
-        if (!entry.problem.empty() || entry.depth.empty()) continue;
-        if (tries-- == 0) break;
+        if (!entry.problem.empty() || entry.depth.empty())
+            continue;
+        if (tries-- == 0)
+            break;
         try {
             return peek(entry.depth).size;
         } catch (const Error&) {
@@ -90,14 +101,18 @@ void settle_camera(Listing& listing, const CaptureOptions& options) {
     }
     capture.warnings.insert(capture.warnings.end(), found->warnings.begin(), found->warnings.end());
     capture.camera = found->camera;
-    if (capture.camera->pinhole.size.empty()) capture.camera->pinhole.size = size;
-    if (!capture.camera->pinhole.size.empty()) check(*capture.camera);
+    if (capture.camera->pinhole.size.empty())
+        capture.camera->pinhole.size = size;
+    if (!capture.camera->pinhole.size.empty())
+        check(*capture.camera);
     if (found->depth_units_per_metre)
         capture.depth = depth_encoding(fmt::format("{}", *found->depth_units_per_metre), found->camera.origin);
-    if (found->registration == Registration::unknown) return;
+    if (found->registration == Registration::unknown)
+        return;
     capture.registration = found->registration;
-    capture.registration_reason = (found->registration == Registration::yes ? "registered, according to " : "unregistered, according to ") +
-                                  found->camera.origin;
+    capture.registration_reason =
+        (found->registration == Registration::yes ? "registered, according to " : "unregistered, according to ") +
+        found->camera.origin;
 }
 
 // --- loading ---
@@ -108,8 +123,8 @@ std::string text(cv::Size size) { return fmt::format("{}x{}", size.width, size.h
 void check_depth_size(const Frame& frame, const fs::path& depth) {
     const cv::Size expected = frame.camera.pinhole.size, found = frame.depth_m.size();
     if (!expected.empty() && found != expected)
-        throw Error(fmt::format("{}: depth is {}, but its camera is for {} ({})", depth.string(), text(found), text(expected),
-                                frame.camera.origin));
+        throw Error(fmt::format("{}: depth is {}, but its camera is for {} ({})", depth.string(), text(found),
+                                text(expected), frame.camera.origin));
 }
 
 void load_colour(const fs::path& file, Frame& frame) {
@@ -120,8 +135,10 @@ void load_colour(const fs::path& file, Frame& frame) {
         return;
     }
     const cv::Size colour = frame.colour.size(), depth = frame.depth_m.size();
-    if (colour == depth) return;
-    frame.warnings.push_back(fmt::format("{}: colour is {}, depth is {}; processed without colour.", file.string(), text(colour), text(depth)));
+    if (colour == depth)
+        return;
+    frame.warnings.push_back(fmt::format("{}: colour is {}, depth is {}; processed without colour.", file.string(),
+                                         text(colour), text(depth)));
     frame.colour = cv::Mat3b();
 }
 
@@ -130,36 +147,43 @@ void load_depth(const Capture& capture, const CaptureEntry& entry, Frame& frame)
     frame.depth_m = during(entry.depth.string(), [&] { return depth_in_metres(stored, capture.depth); });
     if (capture.camera) {
         frame.camera = *capture.camera;
-        if (frame.camera.pinhole.size.empty()) frame.camera.pinhole.size = frame.depth_m.size();
+        if (frame.camera.pinhole.size.empty())
+            frame.camera.pinhole.size = frame.depth_m.size();
         check_depth_size(frame, entry.depth);
     } else { // anything that needs the camera refuses this one, and says its origin
         frame.camera.origin = "none is known; give --camera FILE or --camera fx,fy,cx,cy";
     }
     const auto doubts = doubts_about(frame.depth_m, stored, capture.depth);
     frame.warnings.insert(frame.warnings.end(), doubts.begin(), doubts.end());
-    if (!entry.colour.empty()) load_colour(entry.colour, frame);
+    if (!entry.colour.empty())
+        load_colour(entry.colour, frame);
 }
 
 void load_cloud(const Capture& capture, const CaptureEntry& entry, Frame& frame) {
     frame.cloud = read_cloud(entry.cloud, frame.warnings);
-    if (frame.cloud->records->viewpoint) frame.world_from_camera = frame.cloud->records->viewpoint;
-    if (!capture.camera) return;
+    if (frame.cloud->records->viewpoint)
+        frame.world_from_camera = frame.cloud->records->viewpoint;
+    if (!capture.camera)
+        return;
     frame.camera = *capture.camera;
     Pinhole& pinhole = frame.camera.pinhole;
     const cv::Size grid = frame.cloud->grid;
     if (frame.cloud->organised()) {
-        if (pinhole.size.empty()) pinhole.size = grid;
+        if (pinhole.size.empty())
+            pinhole.size = grid;
         if (pinhole.size != grid)
-            throw Error(fmt::format("{}: the cloud's grid is {}, but its camera is for {} ({})", entry.cloud.string(), text(grid),
-                                    text(pinhole.size), frame.camera.origin));
+            throw Error(fmt::format("{}: the cloud's grid is {}, but its camera is for {} ({})", entry.cloud.string(),
+                                    text(grid), text(pinhole.size), frame.camera.origin));
     } else if (pinhole.size.empty()) {
         // Four numbers say nothing about the image; a principal point is usually its middle.
         constexpr double widest = 1 << 14;
         if (!(pinhole.cx >= 0 && pinhole.cy >= 0 && pinhole.cx < widest / 2 && pinhole.cy < widest / 2))
-            throw Error(fmt::format("{}: an image size is needed with this camera ({}); give a camera file", entry.cloud.string(),
-                                    frame.camera.origin));
-        pinhole.size = {static_cast<int>(std::lround(2 * pinhole.cx + 1)), static_cast<int>(std::lround(2 * pinhole.cy + 1))};
-        frame.warnings.push_back(fmt::format("the camera names no image size; {} is taken from its principal point.", text(pinhole.size)));
+            throw Error(fmt::format("{}: an image size is needed with this camera ({}); give a camera file",
+                                    entry.cloud.string(), frame.camera.origin));
+        pinhole.size = {static_cast<int>(std::lround(2 * pinhole.cx + 1)),
+                        static_cast<int>(std::lround(2 * pinhole.cy + 1))};
+        frame.warnings.push_back(
+            fmt::format("the camera names no image size; {} is taken from its principal point.", text(pinhole.size)));
     }
     check(frame.camera);
 }
@@ -168,20 +192,24 @@ void load_cloud(const Capture& capture, const CaptureEntry& entry, Frame& frame)
 
 Capture open_capture(const fs::path& path, const CaptureOptions& options) {
     std::error_code ignored;
-    if (!fs::exists(path, ignored)) throw Error(path.string() + ": no such file or folder");
+    if (!fs::exists(path, ignored))
+        throw Error(path.string() + ": no such file or folder");
     Listing listing = fs::is_directory(path, ignored) ? list_folder(path, options) : list_file(path);
     Capture& capture = listing.capture;
     capture.path = path;
     settle_names(capture.entries);
     settle_camera(listing, options);
-    if (!options.depth_scale.empty()) capture.depth = depth_encoding(options.depth_scale, "--depth-scale");
+    if (!options.depth_scale.empty())
+        capture.depth = depth_encoding(options.depth_scale, "--depth-scale");
     return std::move(capture);
 }
 
 Frame Capture::load(std::size_t index) const {
-    if (index >= entries.size()) throw Error(fmt::format("{}: frame {} of {}", path.string(), index, entries.size()));
+    if (index >= entries.size())
+        throw Error(fmt::format("{}: frame {} of {}", path.string(), index, entries.size()));
     const CaptureEntry& entry = entries[index];
-    if (!entry.problem.empty()) throw Error(entry.problem);
+    if (!entry.problem.empty())
+        throw Error(entry.problem);
     Frame frame;
     frame.name = entry.name;
     frame.warnings = entry.warnings;

@@ -14,34 +14,35 @@ namespace scanshade {
 
 /// What the user said about a capture that its files may not say.
 struct CaptureOptions {
-    std::string camera;            ///< file or "fx,fy,cx,cy"; empty = from the capture
-    std::string depth_scale;       ///< as depth_encoding() takes it; empty = from the layout
+    std::string camera;                ///< file or "fx,fy,cx,cy"; empty = from the capture
+    std::string depth_scale;           ///< as depth_encoding() takes it; empty = from the layout
     double association_limit_s = 0.02; ///< colour, depth and poses farther apart in time are not paired (TUM)
 };
 
 /// One frame's listing: where its parts lie. Nothing is decoded yet.
 struct CaptureEntry {
-    std::string name; ///< unique in the capture
+    std::string name;                           ///< unique in the capture
     std::filesystem::path colour, depth, cloud; ///< empty where there is none
     std::optional<Eigen::Isometry3d> world_from_camera;
     std::optional<double> stamp_s;
-    std::string problem;               ///< why this frame cannot be loaded (names file and line); empty = it may be tried
+    std::string problem; ///< why this frame cannot be loaded (names file and line); empty = it may be tried
     std::vector<std::string> warnings; ///< what was odd in the listing of this frame
 };
 
 /// A recording, listed. Opening is cheap; frames are decoded by load().
 struct Capture {
     std::filesystem::path path;
-    std::string kind;              ///< "TUM RGB-D", "7-Scenes", "Redwood / Open3D", "colour and depth folders", "depth image", "cloud"
-    std::optional<Camera> camera;  ///< none: clouds recover theirs; depth images need --camera
+    std::string
+        kind; ///< "TUM RGB-D", "7-Scenes", "Redwood / Open3D", "colour and depth folders", "depth image", "cloud"
+    std::optional<Camera> camera; ///< none: clouds recover theirs; depth images need --camera
     DepthEncoding depth;
     Registration registration = Registration::unknown;
     std::string registration_reason;
     std::vector<CaptureEntry> entries; ///< in recording order
     std::vector<std::string> warnings; ///< about the capture as a whole
 
-    /// Decodes frame `index`; safe to call from several threads. Throws Error naming file and place; a damaged colour image
-    /// is a warning, not a failure.
+    /// Decodes frame `index`; safe to call from several threads. Throws Error naming file and place; a damaged colour
+    /// image is a warning, not a failure.
     [[nodiscard]] Frame load(std::size_t index) const;
 };
 

@@ -26,10 +26,13 @@ constexpr double largest_coordinate = 1e30; // 3e38 and the like mark invalid po
 
 CloudRecords read_records(const fs::path& file, std::vector<std::string>& warnings) {
     const std::string bytes = read_bytes(file);
-    if (bytes.empty()) throw Error(file.string() + ": empty file (0 bytes), expected a cloud");
-    if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r")) return read_ply(bytes, file, warnings);
+    if (bytes.empty())
+        throw Error(file.string() + ": empty file (0 bytes), expected a cloud");
+    if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r"))
+        return read_ply(bytes, file, warnings);
     for (const std::string_view start : {"# .PCD", "VERSION", "FIELDS", "COLUMNS", "#"})
-        if (bytes.starts_with(start)) return read_pcd(bytes, file, warnings);
+        if (bytes.starts_with(start))
+            return read_pcd(bytes, file, warnings);
     throw Error(file.string() + ": neither PCD nor PLY (expected \"# .PCD\" or \"ply\" at its start)");
 }
 
@@ -44,7 +47,8 @@ void read_coordinate(const CloudRecords& records, std::size_t field, int axis, s
                                 : value_at(records, records.record(i), field);
 }
 
-std::vector<Eigen::Vector3d> points_of(const CloudRecords& records, const fs::path& file, std::vector<std::string>& warnings) {
+std::vector<Eigen::Vector3d> points_of(const CloudRecords& records, const fs::path& file,
+                                       std::vector<std::string>& warnings) {
     std::vector<Eigen::Vector3d> points(records.point_count);
     read_coordinate(records, *records.field_named("x"), 0, points);
     read_coordinate(records, *records.field_named("y"), 1, points);
@@ -54,13 +58,16 @@ std::vector<Eigen::Vector3d> points_of(const CloudRecords& records, const fs::pa
         const bool usable = (point.array().abs() <= largest_coordinate).all();
         valid += usable;
         absurd += !usable && !point.array().isNaN().any();
-        if (!usable) point.setConstant(std::numeric_limits<double>::quiet_NaN());
+        if (!usable)
+            point.setConstant(std::numeric_limits<double>::quiet_NaN());
     }
     if (absurd > 0)
         warnings.push_back(fmt::format("{}: {} with infinite or absurd coordinates (beyond 1e30), treated as invalid.",
                                        file.string(), counted(absurd, "point")));
-    if (points.empty()) warnings.push_back(file.string() + ": no points.");
-    else if (valid == 0) warnings.push_back(fmt::format("{}: no valid points among {}.", file.string(), points.size()));
+    if (points.empty())
+        warnings.push_back(file.string() + ": no points.");
+    else if (valid == 0)
+        warnings.push_back(fmt::format("{}: no valid points among {}.", file.string(), points.size()));
     return points;
 }
 
@@ -71,7 +78,8 @@ cv::Vec3b bgr_of(std::uint32_t bits) {
 std::vector<cv::Vec3b> colours_of(const CloudRecords& records) {
     const ColourFields fields = colour_fields(records);
     std::vector<cv::Vec3b> colours;
-    if (!fields.packed && !fields.bgr) return colours;
+    if (!fields.packed && !fields.bgr)
+        return colours;
     colours.reserve(records.point_count);
     for (std::size_t i = 0; i < records.point_count; ++i) {
         const std::string_view record = records.record(i);
@@ -81,7 +89,8 @@ std::vector<cv::Vec3b> colours_of(const CloudRecords& records) {
         }
         cv::Vec3b colour;
         for (std::size_t channel = 0; channel < 3; ++channel)
-            colour[static_cast<int>(channel)] = cv::saturate_cast<uchar>(value_at(records, record, (*fields.bgr)[channel]));
+            colour[static_cast<int>(channel)] =
+                cv::saturate_cast<uchar>(value_at(records, record, (*fields.bgr)[channel]));
         colours.push_back(colour);
     }
     return colours;
@@ -89,15 +98,16 @@ std::vector<cv::Vec3b> colours_of(const CloudRecords& records) {
 
 void check_added(const Cloud& cloud, const AddedField& field) {
     const bool word = !field.name.empty() && field.name.find_first_of(" \t\r\n") == std::string::npos;
-    if (!word) throw Error(fmt::format("added field {}: expected a name without blanks", in_quotes(field.name)));
+    if (!word)
+        throw Error(fmt::format("added field {}: expected a name without blanks", in_quotes(field.name)));
     if (field.values.size() != cloud.points.size())
         throw Error(fmt::format("added field {}: {}, expected one for each of {}", field.name,
                                 counted(field.values.size(), "value"), counted(cloud.points.size(), "point")));
 }
 
 /// Splits what is to be added into fields the file already has and new ones.
-void sort_out(const CloudRecords& records, const std::vector<AddedField>& added, std::vector<FieldReplacement>& replacements,
-              std::vector<FieldAddition>& additions) {
+void sort_out(const CloudRecords& records, const std::vector<AddedField>& added,
+              std::vector<FieldReplacement>& replacements, std::vector<FieldAddition>& additions) {
     for (const AddedField& field : added) {
         const auto existing = records.field_named(field.name);
         if (!existing) {
@@ -106,22 +116,26 @@ void sort_out(const CloudRecords& records, const std::vector<AddedField>& added,
         }
         const CloudField& old = records.fields[*existing];
         if (old.count != 1 || old.list_length)
-            throw Error(fmt::format("field {} is already there with several values per point; it is not replaced", field.name));
-        replacements.push_back({*existing, [&records, type = old.type, values = field.values](std::size_t point, std::string_view) {
-                                    return encoded(records, type, static_cast<double>(values[point]));
-                                }});
+            throw Error(
+                fmt::format("field {} is already there with several values per point; it is not replaced", field.name));
+        replacements.push_back(
+            {*existing, [&records, type = old.type, values = field.values](std::size_t point, std::string_view) {
+                 return encoded(records, type, static_cast<double>(values[point]));
+             }});
     }
 }
 
-void replace_colours(const CloudRecords& records, std::span<const cv::Vec3b> colours, std::vector<FieldReplacement>& replacements) {
+void replace_colours(const CloudRecords& records, std::span<const cv::Vec3b> colours,
+                     std::vector<FieldReplacement>& replacements) {
     const ColourFields fields = colour_fields(records);
     if (fields.packed) {
-        replacements.push_back({*fields.packed, [&records, colours, field = *fields.packed](std::size_t point, std::string_view record) {
-                                    const cv::Vec3b& c = colours[point];
-                                    const std::uint32_t alpha = packed_bits(records, record, field) & 0xff000000U;
-                                    const auto bits = alpha | std::uint32_t(c[2]) << 16 | std::uint32_t(c[1]) << 8 | c[0];
-                                    return encoded_bits(records, records.fields[field].type, bits);
-                                }});
+        replacements.push_back(
+            {*fields.packed, [&records, colours, field = *fields.packed](std::size_t point, std::string_view record) {
+                 const cv::Vec3b& c = colours[point];
+                 const std::uint32_t alpha = packed_bits(records, record, field) & 0xff000000U;
+                 const auto bits = alpha | std::uint32_t(c[2]) << 16 | std::uint32_t(c[1]) << 8 | c[0];
+                 return encoded_bits(records, records.fields[field].type, bits);
+             }});
     } else if (fields.bgr) {
         for (int channel = 0; channel < 3; ++channel)
             replacements.push_back({(*fields.bgr)[static_cast<std::size_t>(channel)],
@@ -151,69 +165,85 @@ Cloud read_cloud(const fs::path& file, std::vector<std::string>& warnings) {
     return cloud;
 }
 
-void write_cloud(const fs::path& file, const Cloud& cloud, const std::vector<AddedField>& added, std::span<const cv::Vec3b> colours) {
-    if (!cloud.records) throw Error(file.string() + ": this cloud was not read from a file");
+void write_cloud(const fs::path& file, const Cloud& cloud, const std::vector<AddedField>& added,
+                 std::span<const cv::Vec3b> colours) {
+    if (!cloud.records)
+        throw Error(file.string() + ": this cloud was not read from a file");
     const CloudRecords& records = *cloud.records;
     std::string bytes = during(file.string(), [&] {
-        for (const AddedField& field : added) check_added(cloud, field);
+        for (const AddedField& field : added)
+            check_added(cloud, field);
         if (!colours.empty() && colours.size() != cloud.points.size())
-            throw Error(fmt::format("{} for {}", counted(colours.size(), "colour"), counted(cloud.points.size(), "point")));
+            throw Error(
+                fmt::format("{} for {}", counted(colours.size(), "colour"), counted(cloud.points.size(), "point")));
         std::vector<FieldReplacement> replacements;
         std::vector<FieldAddition> additions;
         sort_out(records, added, replacements, additions);
-        if (!colours.empty()) replace_colours(records, colours, replacements);
+        if (!colours.empty())
+            replace_colours(records, colours, replacements);
         std::sort(replacements.begin(), replacements.end(),
                   [](const FieldReplacement& a, const FieldReplacement& b) { return a.field < b.field; });
         const std::string points = edited_points(records, replacements, additions);
-        return records.format == Format::pcd ? pcd_bytes(records, points, additions) : ply_bytes(records, points, additions);
+        return records.format == Format::pcd ? pcd_bytes(records, points, additions)
+                                             : ply_bytes(records, points, additions);
     });
     write_atomically(file, bytes);
 }
 
-void write_new_ply(const fs::path& file, const std::vector<Eigen::Vector3d>& points, const std::vector<cv::Vec3b>& colours,
-                   const std::vector<AddedField>& added, const std::vector<std::string>& comments) {
+void write_new_ply(const fs::path& file, const std::vector<Eigen::Vector3d>& points,
+                   const std::vector<cv::Vec3b>& colours, const std::vector<AddedField>& added,
+                   const std::vector<std::string>& comments) {
     // Beyond 4096 m neighbouring floats are half a millimetre apart.
     static constexpr double far_away_m = 4096;
-    const bool doubles = std::any_of(points.begin(), points.end(), [](const Eigen::Vector3d& p) {
-        return (p.array().abs() > far_away_m).any();
-    });
+    const bool doubles = std::any_of(points.begin(), points.end(),
+                                     [](const Eigen::Vector3d& p) { return (p.array().abs() > far_away_m).any(); });
     if (!colours.empty() && colours.size() != points.size())
-        throw Error(fmt::format("{}: {} for {}", file.string(), counted(colours.size(), "colour"), counted(points.size(), "point")));
+        throw Error(fmt::format("{}: {} for {}", file.string(), counted(colours.size(), "colour"),
+                                counted(points.size(), "point")));
     for (const AddedField& field : added)
         if (field.values.size() != points.size())
-            throw Error(fmt::format("{}: field {} has {} for {}", file.string(), field.name, counted(field.values.size(), "value"),
-                                    counted(points.size(), "point")));
+            throw Error(fmt::format("{}: field {} has {} for {}", file.string(), field.name,
+                                    counted(field.values.size(), "value"), counted(points.size(), "point")));
 
     std::string bytes = "ply\nformat binary_little_endian 1.0\n";
     for (std::string comment : comments) {
-        std::replace_if(comment.begin(), comment.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+        std::replace_if(
+            comment.begin(), comment.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
         bytes += "comment " + comment + "\n";
     }
     bytes += fmt::format("element vertex {}\n", points.size());
-    for (const auto* axis : {"x", "y", "z"}) bytes += fmt::format("property {} {}\n", doubles ? "double" : "float", axis);
+    for (const auto* axis : {"x", "y", "z"})
+        bytes += fmt::format("property {} {}\n", doubles ? "double" : "float", axis);
     if (!colours.empty())
-        for (const auto* channel : {"red", "green", "blue"}) bytes += fmt::format("property uchar {}\n", channel);
-    for (const AddedField& field : added) bytes += fmt::format("property float {}\n", field.name);
+        for (const auto* channel : {"red", "green", "blue"})
+            bytes += fmt::format("property uchar {}\n", channel);
+    for (const AddedField& field : added)
+        bytes += fmt::format("property float {}\n", field.name);
     bytes += "end_header\n";
 
     for (std::size_t i = 0; i < points.size(); ++i) {
-        for (const double coordinate : points[i]) doubles ? append(bytes, coordinate) : append(bytes, static_cast<float>(coordinate));
+        for (const double coordinate : points[i])
+            doubles ? append(bytes, coordinate) : append(bytes, static_cast<float>(coordinate));
         if (!colours.empty())
-            for (const int channel : {2, 1, 0}) append(bytes, colours[i][channel]);
-        for (const AddedField& field : added) append(bytes, field.values[i]);
+            for (const int channel : {2, 1, 0})
+                append(bytes, colours[i][channel]);
+        for (const AddedField& field : added)
+            append(bytes, field.values[i]);
     }
     write_atomically(file, bytes);
 }
 
 std::string describe(const CloudRecords& records) {
     std::string names;
-    for (const CloudField& field : records.fields) names += " " + field.name;
+    for (const CloudField& field : records.fields)
+        names += " " + field.name;
     const std::string encoding = records.encoding == Encoding::ascii        ? "ascii"
                                  : records.encoding == Encoding::compressed ? "binary_compressed"
                                  : records.encoding == Encoding::big_endian ? "binary_big_endian"
                                  : records.format == Format::ply            ? "binary_little_endian"
                                                                             : "binary";
-    const std::string grid = records.grid.height > 1 ? fmt::format(", {}x{} organised", records.grid.width, records.grid.height) : "";
+    const std::string grid =
+        records.grid.height > 1 ? fmt::format(", {}x{} organised", records.grid.width, records.grid.height) : "";
     return fmt::format("{} {}, {}{}, fields{}", records.format == Format::pcd ? "PCD" : "PLY", encoding,
                        counted(records.point_count, "point"), grid, names);
 }

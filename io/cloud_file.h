@@ -11,9 +11,9 @@
 namespace scanshade {
 
 /// Reads PCD (ascii, binary, binary_compressed) or PLY (ascii, both endians; float or double; list properties walked),
-/// told by content. Infinite or absurd (> 1e30) coordinates become NaN. Throws Error naming the file and the line or byte
-/// offset for every damage the header or body shows; nothing is allocated from an unchecked number.
-/// `warnings` receives what was odd but readable.
+/// told by content. Infinite or absurd (> 1e30) coordinates become NaN. Throws Error naming the file and the line or
+/// byte offset for every damage the header or body shows; nothing is allocated from an unchecked number. `warnings`
+/// receives what was odd but readable.
 [[nodiscard]] Cloud read_cloud(const std::filesystem::path& file, std::vector<std::string>& warnings);
 
 /// A float field to add to each point. NaN = unknown.
@@ -22,9 +22,9 @@ struct AddedField {
     std::span<const float> values; ///< one per point
 };
 
-/// Writes the cloud in the format, encoding and byte order it was read from, plus `added` fields (replacing a field of that
-/// name). All other fields, point count, grid, viewpoint, faces, comments keep their bits. `colours`, when not empty,
-/// replaces the colour field's r, g, b (alpha kept). Atomic.
+/// Writes the cloud in the format, encoding and byte order it was read from, plus `added` fields (replacing a field of
+/// that name). All other fields, point count, grid, viewpoint, faces, comments keep their bits. `colours`, when not
+/// empty, replaces the colour field's r, g, b (alpha kept). Atomic.
 void write_cloud(const std::filesystem::path& file, const Cloud& cloud, const std::vector<AddedField>& added,
                  std::span<const cv::Vec3b> colours = {});
 

@@ -18,29 +18,35 @@ static_assert(std::endian::native == std::endian::little, "byte orders here are 
 std::size_t size_of(Scalar type) {
     switch (type) {
     case Scalar::int8:
-    case Scalar::uint8: return 1;
+    case Scalar::uint8:
+        return 1;
     case Scalar::int16:
-    case Scalar::uint16: return 2;
+    case Scalar::uint16:
+        return 2;
     case Scalar::int32:
     case Scalar::uint32:
-    case Scalar::float32: return 4;
+    case Scalar::float32:
+        return 4;
     case Scalar::int64:
     case Scalar::uint64:
-    case Scalar::float64: break;
+    case Scalar::float64:
+        break;
     }
     return 8;
 }
 
 std::string_view CloudRecords::record(std::size_t index) const {
     const std::string_view all = points;
-    if (stride != 0) return all.substr(index * stride, stride);
+    if (stride != 0)
+        return all.substr(index * stride, stride);
     const std::size_t start = index == 0 ? 0 : ends[index - 1];
     return all.substr(start, ends[index] - start);
 }
 
 std::optional<std::size_t> CloudRecords::field_named(std::string_view name) const {
     for (std::size_t i = 0; i < fields.size(); ++i)
-        if (fields[i].name == name) return i;
+        if (fields[i].name == name)
+            return i;
     return std::nullopt;
 }
 
@@ -51,14 +57,16 @@ template <class Number>
 Number raw(const char* from, bool big_endian) {
     std::array<char, sizeof(Number)> bytes{};
     std::memcpy(bytes.data(), from, bytes.size());
-    if (big_endian) std::reverse(bytes.begin(), bytes.end());
+    if (big_endian)
+        std::reverse(bytes.begin(), bytes.end());
     return std::bit_cast<Number>(bytes);
 }
 
 template <class Number>
 std::string raw_bytes(Number value, bool big_endian) {
     auto bytes = std::bit_cast<std::array<char, sizeof(Number)>>(value);
-    if (big_endian) std::reverse(bytes.begin(), bytes.end());
+    if (big_endian)
+        std::reverse(bytes.begin(), bytes.end());
     return {bytes.data(), bytes.size()};
 }
 
@@ -66,16 +74,26 @@ std::string raw_bytes(Number value, bool big_endian) {
 template <class Action>
 decltype(auto) with_type(Scalar type, Action&& action) {
     switch (type) {
-    case Scalar::int8: return action(std::int8_t());
-    case Scalar::uint8: return action(std::uint8_t());
-    case Scalar::int16: return action(std::int16_t());
-    case Scalar::uint16: return action(std::uint16_t());
-    case Scalar::int32: return action(std::int32_t());
-    case Scalar::uint32: return action(std::uint32_t());
-    case Scalar::int64: return action(std::int64_t());
-    case Scalar::uint64: return action(std::uint64_t());
-    case Scalar::float32: return action(float());
-    case Scalar::float64: break;
+    case Scalar::int8:
+        return action(std::int8_t());
+    case Scalar::uint8:
+        return action(std::uint8_t());
+    case Scalar::int16:
+        return action(std::int16_t());
+    case Scalar::uint16:
+        return action(std::uint16_t());
+    case Scalar::int32:
+        return action(std::int32_t());
+    case Scalar::uint32:
+        return action(std::uint32_t());
+    case Scalar::int64:
+        return action(std::int64_t());
+    case Scalar::uint64:
+        return action(std::uint64_t());
+    case Scalar::float32:
+        return action(float());
+    case Scalar::float64:
+        break;
     }
     return action(double());
 }
@@ -83,12 +101,14 @@ decltype(auto) with_type(Scalar type, Action&& action) {
 /// Rounded and held within the type's range; integers know no NaN and get 0.
 template <class Number>
 Number nearest(double value) {
-    if constexpr (std::is_floating_point_v<Number>) return static_cast<Number>(value);
-    if (std::isnan(value)) return 0;
+    if constexpr (std::is_floating_point_v<Number>)
+        return static_cast<Number>(value);
+    if (std::isnan(value))
+        return 0;
     constexpr auto low = static_cast<double>(std::numeric_limits<Number>::lowest());
     constexpr auto high = static_cast<double>(std::numeric_limits<Number>::max());
     const double rounded = std::round(value);
-    return rounded <= low ? std::numeric_limits<Number>::lowest()
+    return rounded <= low    ? std::numeric_limits<Number>::lowest()
            : rounded >= high ? std::numeric_limits<Number>::max()
                              : static_cast<Number>(rounded);
 }
@@ -120,8 +140,10 @@ FieldPlace locate_bytes(const CloudRecords& records, std::string_view record, st
         const CloudField& f = records.fields[i];
         std::size_t length = f.bytes();
         if (f.list_length)
-            length = size_of(*f.list_length) + size_of(f.type) * list_size(record.substr(offset), false, *f.list_length, big_endian);
-        if (i == field) return {offset, length};
+            length = size_of(*f.list_length) +
+                     size_of(f.type) * list_size(record.substr(offset), false, *f.list_length, big_endian);
+        if (i == field)
+            return {offset, length};
         offset += length;
     }
 }
@@ -129,7 +151,8 @@ FieldPlace locate_bytes(const CloudRecords& records, std::string_view record, st
 } // namespace
 
 FieldPlace locate(const CloudRecords& records, std::string_view record, std::size_t field) {
-    if (records.stride != 0) return {records.fields[field].offset, records.fields[field].bytes()};
+    if (records.stride != 0)
+        return {records.fields[field].offset, records.fields[field].bytes()};
     return records.text() ? locate_words(records, record, field) : locate_bytes(records, record, field);
 }
 
@@ -151,7 +174,8 @@ std::string encoded(const CloudRecords& records, Scalar type, double value) {
     return with_type(type, [&](auto zero) {
         const auto exact = nearest<decltype(zero)>(value);
         // fmt's "{}" is the shortest text that reads back as the same bits; the + makes characters of bytes numbers.
-        if (records.text()) return fmt::format("{}", +exact);
+        if (records.text())
+            return fmt::format("{}", +exact);
         return raw_bytes(exact, records.encoding == CloudRecords::Encoding::big_endian);
     });
 }
@@ -160,18 +184,23 @@ ColourFields colour_fields(const CloudRecords& records) {
     ColourFields found;
     for (const auto* name : {"rgba", "rgb"}) {
         const auto field = records.field_named(name);
-        if (!field) continue;
+        if (!field)
+            continue;
         const CloudField& f = records.fields[*field];
-        if (f.count == 1 && !f.list_length && size_of(f.type) == 4) found.packed = field;
+        if (f.count == 1 && !f.list_length && size_of(f.type) == 4)
+            found.packed = field;
     }
     for (const std::string prefix : {"diffuse_", ""}) {
         const auto blue = records.field_named(prefix + "blue"), green = records.field_named(prefix + "green"),
                    red = records.field_named(prefix + "red");
-        if (!blue || !green || !red) continue;
+        if (!blue || !green || !red)
+            continue;
         const auto one_byte = [&](std::size_t i) {
-            return records.fields[i].type == Scalar::uint8 && records.fields[i].count == 1 && !records.fields[i].list_length;
+            return records.fields[i].type == Scalar::uint8 && records.fields[i].count == 1 &&
+                   !records.fields[i].list_length;
         };
-        if (one_byte(*blue) && one_byte(*green) && one_byte(*red)) found.bgr = {*blue, *green, *red};
+        if (one_byte(*blue) && one_byte(*green) && one_byte(*red))
+            found.bgr = {*blue, *green, *red};
     }
     return found;
 }
@@ -182,15 +211,20 @@ std::uint32_t packed_bits(const CloudRecords& records, std::string_view record, 
     if (!records.text())
         return raw<std::uint32_t>(record.data() + place.offset, records.encoding == CloudRecords::Encoding::big_endian);
     const double value = value_at(records, record, field);
-    if (std::isnan(value)) return 0; // a NaN's text has lost its bits
-    if (floats) return std::bit_cast<std::uint32_t>(static_cast<float>(value));
+    if (std::isnan(value))
+        return 0; // a NaN's text has lost its bits
+    if (floats)
+        return std::bit_cast<std::uint32_t>(static_cast<float>(value));
     return value < 0 ? static_cast<std::uint32_t>(nearest<std::int32_t>(value)) : nearest<std::uint32_t>(value);
 }
 
 std::string encoded_bits(const CloudRecords& records, Scalar type, std::uint32_t bits) {
-    if (!records.text()) return raw_bytes(bits, records.encoding == CloudRecords::Encoding::big_endian);
-    if (type == Scalar::int32) return fmt::format("{}", static_cast<std::int32_t>(bits));
-    if (type != Scalar::float32) return fmt::format("{}", bits);
+    if (!records.text())
+        return raw_bytes(bits, records.encoding == CloudRecords::Encoding::big_endian);
+    if (type == Scalar::int32)
+        return fmt::format("{}", static_cast<std::int32_t>(bits));
+    if (type != Scalar::float32)
+        return fmt::format("{}", bits);
     constexpr std::uint32_t colour_only = 0x00ffffff;
     const bool text_loses_it = !std::isfinite(std::bit_cast<float>(bits));
     return fmt::format("{}", std::bit_cast<float>(text_loses_it ? bits & colour_only : bits));
@@ -200,7 +234,8 @@ std::string edited_points(const CloudRecords& records, const std::vector<FieldRe
                           const std::vector<FieldAddition>& additions) {
     const bool big_endian = records.encoding == CloudRecords::Encoding::big_endian;
     std::string result;
-    result.reserve(records.points.size() + records.point_count * additions.size() * (records.text() ? 12 : sizeof(float)));
+    result.reserve(records.points.size() +
+                   records.point_count * additions.size() * (records.text() ? 12 : sizeof(float)));
     for (std::size_t point = 0; point < records.point_count; ++point) {
         const std::string_view record = records.record(point);
         std::size_t copied = 0;
@@ -213,8 +248,10 @@ std::string edited_points(const CloudRecords& records, const std::vector<FieldRe
         result += record.substr(copied);
         for (const FieldAddition& addition : additions) {
             const float value = addition.values[point];
-            if (records.text()) fmt::format_to(std::back_inserter(result), " {}", value);
-            else result += raw_bytes(value, big_endian);
+            if (records.text())
+                fmt::format_to(std::back_inserter(result), " {}", value);
+            else
+                result += raw_bytes(value, big_endian);
         }
     }
     return result;
@@ -226,7 +263,8 @@ bool TextRecords::next() {
         words_ = scanshade::words(body_.substr(at_, end - at_));
         at_ = std::min(end + 1, body_.size());
         ++line_;
-        if (words_.empty()) continue;
+        if (words_.empty())
+            continue;
         end_ = static_cast<std::size_t>(words_.back().data() + words_.back().size() - body_.data());
         return true;
     }

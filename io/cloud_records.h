@@ -1,9 +1,9 @@
 // A cloud file as its own records: header text, fields, and the bytes or words of every point, kept to be written back.
 #pragma once
 
-#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
+#include <Eigen/Geometry>
 #include <filesystem>
 #include <functional>
 #include <opencv2/core.hpp>
@@ -42,11 +42,12 @@ struct CloudRecords {
     std::vector<CloudField> fields;
     std::size_t point_count = 0;
     cv::Size grid;
-    std::string before;            ///< PLY elements that come before the vertices
-    std::string points;            ///< the records, without the last one's line end
-    std::size_t stride = 0;        ///< bytes per record; 0 where records differ in length (text, lists)
-    std::vector<std::size_t> ends; ///< where each record ends in `points` (text: behind its last word), when stride is 0
-    std::string after;             ///< faces, other elements, left-over lines
+    std::string before;     ///< PLY elements that come before the vertices
+    std::string points;     ///< the records, without the last one's line end
+    std::size_t stride = 0; ///< bytes per record; 0 where records differ in length (text, lists)
+    std::vector<std::size_t>
+        ends;          ///< where each record ends in `points` (text: behind its last word), when stride is 0
+    std::string after; ///< faces, other elements, left-over lines
     std::optional<Eigen::Isometry3d> viewpoint; ///< world_from_camera as the PCD says, where it says something
 
     [[nodiscard]] bool text() const { return encoding == Encoding::ascii; }
@@ -70,7 +71,7 @@ struct FieldPlace {
 
 /// Fields that hold colour: one 4-byte field of packed bits, or three bytes.
 struct ColourFields {
-    std::optional<std::size_t> packed;            ///< 0xAARRGGBB, typed float or integer
+    std::optional<std::size_t> packed; ///< 0xAARRGGBB, typed float or integer
     std::optional<std::array<std::size_t, 3>> bgr;
 };
 [[nodiscard]] ColourFields colour_fields(const CloudRecords& records);
@@ -111,8 +112,10 @@ class TextRecords {
 };
 
 // One reader and one writer per format; cloud_file.cpp chooses. `bytes` is the whole file.
-[[nodiscard]] CloudRecords read_pcd(std::string_view bytes, const std::filesystem::path& file, std::vector<std::string>& warnings);
-[[nodiscard]] CloudRecords read_ply(std::string_view bytes, const std::filesystem::path& file, std::vector<std::string>& warnings);
+[[nodiscard]] CloudRecords read_pcd(std::string_view bytes, const std::filesystem::path& file,
+                                    std::vector<std::string>& warnings);
+[[nodiscard]] CloudRecords read_ply(std::string_view bytes, const std::filesystem::path& file,
+                                    std::vector<std::string>& warnings);
 /// The file again with `points` (from edited_points) and the header naming `additions`.
 [[nodiscard]] std::string pcd_bytes(const CloudRecords& records, const std::string& points,
                                     const std::vector<FieldAddition>& additions);

@@ -1,4 +1,5 @@
-// What an image file's container says, checked before anything is decoded: decoders hand out half images without a word.
+// What an image file's container says, checked before anything is decoded: decoders hand out half images without a
+// word.
 #pragma once
 
 #include <cstdint>
@@ -14,11 +15,11 @@ enum class ImageFormat { unknown, png, jpeg, pgm, ppm, other_netpbm, pfm, tiff, 
 struct ImageFacts {
     ImageFormat format = ImageFormat::unknown;
     cv::Size size;
-    int bits = 0;     ///< per sample
+    int bits = 0; ///< per sample
     int channels = 0;
     bool floats = false;
-    bool big_endian = false;    ///< PFM
-    std::size_t pixels_at = 0;  ///< PGM, PPM and PFM: where the samples start
+    bool big_endian = false;   ///< PFM
+    std::size_t pixels_at = 0; ///< PGM, PPM and PFM: where the samples start
 };
 
 /// More pixels than this are refused before anything is allocated.
@@ -29,8 +30,8 @@ constexpr std::uint64_t most_pixels = std::uint64_t(1) << 28;
 /// "PNG", "JPEG", ...
 [[nodiscard]] std::string_view format_name(ImageFormat format);
 
-/// Header only: works on the first few hundred bytes of PNG, JPEG (up to its size), PGM, PPM and PFM; TIFF and EXR need the
-/// whole file. Throws Error naming `file` for a header that is cut short or absurd.
+/// Header only: works on the first few hundred bytes of PNG, JPEG (up to its size), PGM, PPM and PFM; TIFF and EXR need
+/// the whole file. Throws Error naming `file` for a header that is cut short or absurd.
 [[nodiscard]] ImageFacts read_image_header(std::string_view bytes, const std::filesystem::path& file);
 
 /// Header and container: every chunk, checksum, strip and byte count. Throws Error naming `file` and the byte offset.

@@ -21,7 +21,8 @@ namespace {
 
 std::string read_image_bytes(const fs::path& file) {
     std::string bytes = read_bytes(file);
-    if (bytes.empty()) throw Error(file.string() + ": empty file (0 bytes), expected an image");
+    if (bytes.empty())
+        throw Error(file.string() + ": empty file (0 bytes), expected an image");
     return bytes;
 }
 
@@ -33,7 +34,8 @@ cv::Mat decode(const std::string& bytes, const fs::path& file, int flags) {
     } catch (const cv::Exception& failure) {
         throw Error(fmt::format("{}: cannot be decoded: {}", file.string(), failure.err));
     }
-    if (image.empty()) throw Error(fmt::format("{}: cannot be decoded: damaged or not an image", file.string()));
+    if (image.empty())
+        throw Error(fmt::format("{}: cannot be decoded: damaged or not an image", file.string()));
     return image;
 }
 
@@ -43,11 +45,16 @@ void check_is_depth(const ImageFacts& facts, const fs::path& file) {
     };
     const auto format = facts.format;
     const std::string name(format_name(format));
-    if (format == ImageFormat::unknown) refuse("neither PNG, PGM, TIFF, EXR nor PFM");
-    if (format == ImageFormat::jpeg) refuse("JPEG, which is 8-bit and lossy and cannot hold depth");
-    if (format == ImageFormat::other_netpbm) refuse("a Netpbm kind other than binary grey (P5)");
-    if (facts.channels != 1) refuse(fmt::format("{} with {} channels", name, facts.channels));
-    if (facts.bits != 16 && !(facts.floats && facts.bits == 32)) refuse(fmt::format("{}-bit {}", facts.bits, name));
+    if (format == ImageFormat::unknown)
+        refuse("neither PNG, PGM, TIFF, EXR nor PFM");
+    if (format == ImageFormat::jpeg)
+        refuse("JPEG, which is 8-bit and lossy and cannot hold depth");
+    if (format == ImageFormat::other_netpbm)
+        refuse("a Netpbm kind other than binary grey (P5)");
+    if (facts.channels != 1)
+        refuse(fmt::format("{} with {} channels", name, facts.channels));
+    if (facts.bits != 16 && !(facts.floats && facts.bits == 32))
+        refuse(fmt::format("{}-bit {}", facts.bits, name));
 }
 
 cv::Mat1w unpack_pgm(std::string_view bytes, const ImageFacts& facts) {
@@ -68,7 +75,8 @@ cv::Mat1f unpack_pfm(std::string_view bytes, const ImageFacts& facts) {
         std::memcpy(image[y], bytes.data() + facts.pixels_at + file_row * row_bytes, row_bytes);
     }
     if (facts.big_endian)
-        for (auto& value : image) value = std::bit_cast<float>(__builtin_bswap32(std::bit_cast<std::uint32_t>(value)));
+        for (auto& value : image)
+            value = std::bit_cast<float>(__builtin_bswap32(std::bit_cast<std::uint32_t>(value)));
     return image;
 }
 
@@ -76,16 +84,22 @@ cv::Mat1f unpack_pfm(std::string_view bytes, const ImageFacts& facts) {
 
 DepthEncoding depth_encoding(const std::string& text, const std::string& origin) {
     using Kind = DepthEncoding::Kind;
-    if (text == "mm") return {Kind::linear, 1000, text, origin};
-    if (text == "tum") return {Kind::linear, 5000, text, origin};
-    if (text == "m") return {Kind::linear, 1, text, origin};
-    if (text == "sun") return {Kind::sun_rotated, 1000, text, origin};
-    if (text == "nyu") return {Kind::nyu_disparity, 1, text, origin};
+    if (text == "mm")
+        return {Kind::linear, 1000, text, origin};
+    if (text == "tum")
+        return {Kind::linear, 5000, text, origin};
+    if (text == "m")
+        return {Kind::linear, 1, text, origin};
+    if (text == "sun")
+        return {Kind::sun_rotated, 1000, text, origin};
+    if (text == "nyu")
+        return {Kind::nyu_disparity, 1, text, origin};
     const auto units = number(text);
     if (!units || !std::isfinite(*units) || *units <= 0)
-        throw Misuse(fmt::format("{}: {}: expected mm (1000 units per metre), tum (5000), sun, nyu, m (float files in metres), "
-                                 "or a positive number of units per metre",
-                                 origin, in_quotes(text)));
+        throw Misuse(
+            fmt::format("{}: {}: expected mm (1000 units per metre), tum (5000), sun, nyu, m (float files in metres), "
+                        "or a positive number of units per metre",
+                        origin, in_quotes(text)));
     return {Kind::linear, *units, text, origin};
 }
 
@@ -94,8 +108,10 @@ cv::Mat read_stored_depth(const fs::path& file) {
     // The header speaks first: what cannot be depth is refused for that, whatever else is wrong with it.
     check_is_depth(read_image_header(bytes, file), file);
     const ImageFacts facts = check_image(bytes, file);
-    if (facts.format == ImageFormat::pgm) return unpack_pgm(bytes, facts);
-    if (facts.format == ImageFormat::pfm) return unpack_pfm(bytes, facts);
+    if (facts.format == ImageFormat::pgm)
+        return unpack_pgm(bytes, facts);
+    if (facts.format == ImageFormat::pfm)
+        return unpack_pfm(bytes, facts);
     const cv::Mat image = decode(bytes, file, cv::IMREAD_UNCHANGED);
     if (image.size() != facts.size || (image.type() != CV_16UC1 && image.type() != CV_32FC1))
         throw Error(fmt::format("{}: decoded to something else than its header says", file.string()));
@@ -105,20 +121,23 @@ cv::Mat read_stored_depth(const fs::path& file) {
 cv::Mat1f depth_in_metres(const cv::Mat& stored, const DepthEncoding& encoding) {
     using Kind = DepthEncoding::Kind;
     const bool integers = stored.type() == CV_16UC1;
-    if (!integers && stored.type() != CV_32FC1) throw Error("depth is neither 16-bit integers nor floats");
+    if (!integers && stored.type() != CV_32FC1)
+        throw Error("depth is neither 16-bit integers nor floats");
     if (integers && encoding.name == "m")
-        throw Error(fmt::format("depth encoding \"m\" ({}) is for float files; this one holds 16-bit integers", encoding.origin));
+        throw Error(fmt::format("depth encoding \"m\" ({}) is for float files; this one holds 16-bit integers",
+                                encoding.origin));
     const bool for_integers = encoding.kind != Kind::linear || encoding.name == "mm" || encoding.name == "tum";
     if (!integers && for_integers)
-        throw Error(fmt::format("depth encoding \"{}\" ({}) is for 16-bit integers; this file holds floats", encoding.name,
-                                encoding.origin));
+        throw Error(fmt::format("depth encoding \"{}\" ({}) is for 16-bit integers; this file holds floats",
+                                encoding.name, encoding.origin));
 
     cv::Mat1f metres(stored.size());
     const auto each = [&](auto&& convert, auto sample) {
         using Sample = decltype(sample);
         for (int y = 0; y < stored.rows; ++y) {
             const auto* from = stored.ptr<Sample>(y);
-            for (int x = 0; x < stored.cols; ++x) metres(y, x) = convert(from[x]);
+            for (int x = 0; x < stored.cols; ++x)
+                metres(y, x) = convert(from[x]);
         }
     };
     const double units = encoding.units_per_metre;

@@ -30,7 +30,8 @@ struct DepthEncoding {
 /// more than 2^28 pixels (before allocating), PGM size or maxval that do not fit the bytes.
 [[nodiscard]] cv::Mat read_stored_depth(const std::filesystem::path& file);
 
-/// Stored numbers -> metres, 0 = hole. Throws Error when the encoding needs integers and the file holds floats, or the reverse.
+/// Stored numbers -> metres, 0 = hole. Throws Error when the encoding needs integers and the file holds floats, or the
+/// reverse.
 [[nodiscard]] cv::Mat1f depth_in_metres(const cv::Mat& stored, const DepthEncoding& encoding);
 
 /// 8-bit BGR; 16-bit and grey are converted. Throws Error naming the file when it is missing, damaged or truncated.
@@ -42,8 +43,8 @@ enum class AoFormat { png16, png8, tiff, exr };
 /// ".png", ".tiff" or ".exr".
 [[nodiscard]] std::string extension(AoFormat format);
 
-/// Writes visibility. Integers: 0 = no surface, 1 .. max = visibility 0 .. 1 (so 1 + round(v (max - 1))); floats keep NaN.
-/// Atomic; fast compression.
+/// Writes visibility. Integers: 0 = no surface, 1 .. max = visibility 0 .. 1 (so 1 + round(v (max - 1))); floats keep
+/// NaN. Atomic; fast compression.
 void write_ao(const std::filesystem::path& file, const cv::Mat1f& visibility, AoFormat format);
 /// The reverse of write_ao (format told by signature and bit depth): NaN = no surface.
 [[nodiscard]] cv::Mat1f read_ao(const std::filesystem::path& file);

@@ -18,15 +18,16 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// No compression level: OpenCV then filters with SUB alone at zlib's fastest level, which takes half the time of asking for
-// level 1 (640x480 16-bit AO: 8 ms against 14) at the same size.
+// No compression level: OpenCV then filters with SUB alone at zlib's fastest level, which takes half the time of asking
+// for level 1 (640x480 16-bit AO: 8 ms against 14) at the same size.
 const std::vector<int> fast_png{cv::IMWRITE_PNG_STRATEGY, cv::IMWRITE_PNG_STRATEGY_RLE};
 const std::vector<int> plain_tiff{cv::IMWRITE_TIFF_COMPRESSION, 1};
 // ZIP, the default, takes ten times as long for a tenth of the size.
 const std::vector<int> fast_exr{cv::IMWRITE_EXR_TYPE, cv::IMWRITE_EXR_TYPE_FLOAT, //
                                 cv::IMWRITE_EXR_COMPRESSION, cv::IMWRITE_EXR_COMPRESSION_RLE};
 
-void write_encoded(const fs::path& file, const cv::Mat& image, const std::string& extension, const std::vector<int>& settings) {
+void write_encoded(const fs::path& file, const cv::Mat& image, const std::string& extension,
+                   const std::vector<int>& settings) {
     std::vector<uchar> bytes;
     bool done = false;
     try {
@@ -34,7 +35,8 @@ void write_encoded(const fs::path& file, const cv::Mat& image, const std::string
     } catch (const cv::Exception& failure) {
         throw Error(fmt::format("{}: cannot be encoded: {}", file.string(), failure.err));
     }
-    if (!done) throw Error(fmt::format("{}: cannot be encoded as {}", file.string(), extension));
+    if (!done)
+        throw Error(fmt::format("{}: cannot be encoded as {}", file.string(), extension));
     write_atomically(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
@@ -68,24 +70,33 @@ cv::Mat1f from_integers(const cv::Mat_<Integer>& image) {
 } // namespace
 
 AoFormat ao_format(const std::string& name) {
-    if (name == "png16") return AoFormat::png16;
-    if (name == "png8") return AoFormat::png8;
-    if (name == "tiff") return AoFormat::tiff;
-    if (name == "exr") return AoFormat::exr;
+    if (name == "png16")
+        return AoFormat::png16;
+    if (name == "png8")
+        return AoFormat::png8;
+    if (name == "tiff")
+        return AoFormat::tiff;
+    if (name == "exr")
+        return AoFormat::exr;
     throw Misuse(fmt::format("--format {}: expected png16, png8, tiff or exr", in_quotes(name)));
 }
 
 std::string extension(AoFormat format) {
-    if (format == AoFormat::tiff) return ".tiff";
+    if (format == AoFormat::tiff)
+        return ".tiff";
     return format == AoFormat::exr ? ".exr" : ".png";
 }
 
 void write_ao(const fs::path& file, const cv::Mat1f& visibility, AoFormat format) {
     switch (format) {
-    case AoFormat::png16: return write_encoded(file, as_integers<ushort>(visibility), ".png", fast_png);
-    case AoFormat::png8: return write_encoded(file, as_integers<uchar>(visibility), ".png", fast_png);
-    case AoFormat::tiff: return write_encoded(file, visibility, ".tiff", plain_tiff);
-    case AoFormat::exr: return write_encoded(file, visibility, ".exr", fast_exr);
+    case AoFormat::png16:
+        return write_encoded(file, as_integers<ushort>(visibility), ".png", fast_png);
+    case AoFormat::png8:
+        return write_encoded(file, as_integers<uchar>(visibility), ".png", fast_png);
+    case AoFormat::tiff:
+        return write_encoded(file, visibility, ".tiff", plain_tiff);
+    case AoFormat::exr:
+        return write_encoded(file, visibility, ".exr", fast_exr);
     }
 }
 
@@ -95,22 +106,29 @@ cv::Mat1f read_ao(const fs::path& file) {
     const bool png = facts.format == ImageFormat::png && facts.channels == 1 && (facts.bits == 8 || facts.bits == 16);
     const bool floats = facts.floats && facts.channels == 1 && facts.format != ImageFormat::pfm;
     if (!png && !floats)
-        throw Error(fmt::format("{}: not an AO map: expected 8- or 16-bit grey PNG, or float TIFF or EXR; found {}-bit {} "
-                                "with {} channels",
-                                file.string(), facts.bits, format_name(facts.format), facts.channels));
+        throw Error(
+            fmt::format("{}: not an AO map: expected 8- or 16-bit grey PNG, or float TIFF or EXR; found {}-bit {} "
+                        "with {} channels",
+                        file.string(), facts.bits, format_name(facts.format), facts.channels));
     const cv::Mat view(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
     const cv::Mat image = cv::imdecode(view, cv::IMREAD_UNCHANGED);
-    if (image.type() == CV_16UC1) return from_integers<ushort>(image);
-    if (image.type() == CV_8UC1) return from_integers<uchar>(image);
-    if (image.type() == CV_32FC1) return image;
+    if (image.type() == CV_16UC1)
+        return from_integers<ushort>(image);
+    if (image.type() == CV_8UC1)
+        return from_integers<uchar>(image);
+    if (image.type() == CV_32FC1)
+        return image;
     throw Error(file.string() + ": AO map cannot be decoded");
 }
 
 void write_picture(const fs::path& file, const cv::Mat3b& picture) {
     std::string kind = file.extension().string();
-    std::transform(kind.begin(), kind.end(), kind.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    if (kind == ".jpg" || kind == ".jpeg") return write_encoded(file, picture, ".jpg", {cv::IMWRITE_JPEG_QUALITY, 95});
-    if (kind != ".png") throw Error(file.string() + ": pictures are written as .png, .jpg or .jpeg");
+    std::transform(kind.begin(), kind.end(), kind.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    if (kind == ".jpg" || kind == ".jpeg")
+        return write_encoded(file, picture, ".jpg", {cv::IMWRITE_JPEG_QUALITY, 95});
+    if (kind != ".png")
+        throw Error(file.string() + ": pictures are written as .png, .jpg or .jpeg");
     write_encoded(file, picture, ".png", fast_png);
 }
 

@@ -1,4 +1,5 @@
-// Layouts of folders other than TUM's: 7-Scenes, colour and depth folders, depth images alone, clouds; and what all share.
+// Layouts of folders other than TUM's: 7-Scenes, colour and depth folders, depth images alone, clouds; and what all
+// share.
 #include "io/layouts.h"
 
 #include "io/text.h"
@@ -10,7 +11,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <map>
-#include <regex>
 #include <set>
 
 namespace scanshade {
@@ -24,21 +24,27 @@ bool natural_less(const std::string& a, const std::string& b) {
     std::size_t i = 0, j = 0;
     while (i < a.size() && j < b.size()) {
         if (!digit(a[i]) || !digit(b[j])) {
-            if (a[i] != b[j]) return a[i] < b[j];
+            if (a[i] != b[j])
+                return a[i] < b[j];
             ++i, ++j;
             continue;
         }
         const auto run = [&](const std::string& text, std::size_t& at) { // digits without leading zeros
-            while (at < text.size() && text[at] == '0') ++at;
+            while (at < text.size() && text[at] == '0')
+                ++at;
             const std::size_t start = at;
-            while (at < text.size() && digit(text[at])) ++at;
+            while (at < text.size() && digit(text[at]))
+                ++at;
             return text.substr(start, at - start);
         };
         const std::string left = run(a, i), right = run(b, j);
-        if (left.size() != right.size()) return left.size() < right.size();
-        if (left != right) return left < right;
+        if (left.size() != right.size())
+            return left.size() < right.size();
+        if (left != right)
+            return left < right;
     }
-    if (a.size() - i != b.size() - j) return a.size() - i < b.size() - j;
+    if (a.size() - i != b.size() - j)
+        return a.size() - i < b.size() - j;
     return a < b; // "01" and "1": any fixed order will do
 }
 
@@ -47,24 +53,37 @@ std::vector<fs::path> files_in(const fs::path& folder) {
     for (const auto& entry : fs::directory_iterator(folder)) {
         const std::string name = entry.path().filename().string();
         std::error_code ignored;
-        if (name.starts_with('.') || name == "Thumbs.db" || name == "desktop.ini" || !entry.is_regular_file(ignored)) continue;
+        if (name.starts_with('.') || name == "Thumbs.db" || name == "desktop.ini" || !entry.is_regular_file(ignored))
+            continue;
         files.push_back(entry.path());
     }
-    std::sort(files.begin(), files.end(),
-              [](const fs::path& a, const fs::path& b) { return natural_less(a.filename().string(), b.filename().string()); });
+    std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
+        return natural_less(a.filename().string(), b.filename().string());
+    });
     return files;
 }
 
 std::string lower_extension(const fs::path& file) {
     std::string text = file.extension().string();
-    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    std::transform(text.begin(), text.end(), text.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     return text;
 }
 
 namespace {
+
+bool speaks_of(const fs::path& file, std::initializer_list<std::string_view> subjects) {
+    std::string name = file.filename().string();
+    std::transform(name.begin(), name.end(), name.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return std::any_of(subjects.begin(), subjects.end(),
+                       [&](std::string_view subject) { return name.find(subject) != std::string::npos; });
+}
+
 bool one_of(const std::string& text, std::initializer_list<std::string_view> choices) {
     return std::find(choices.begin(), choices.end(), text) != choices.end();
 }
+
 } // namespace
 
 bool has_depth_extension(const fs::path& file) {
@@ -80,7 +99,8 @@ std::string trouble_with(const fs::path& folder, const std::string& name) {
     if (relative.is_absolute() || (!relative.empty() && *relative.begin() == ".."))
         return fmt::format("{} leaves the capture's folder; not opened", in_quotes(name));
     std::error_code ignored;
-    if (!fs::is_regular_file(folder / relative, ignored)) return fmt::format("{} does not exist", name);
+    if (!fs::is_regular_file(folder / relative, ignored))
+        return fmt::format("{} does not exist", name);
     return {};
 }
 
@@ -93,23 +113,26 @@ ImageFacts peek(const fs::path& image) {
 }
 
 std::optional<CameraFile> camera_in(const fs::path& folder, std::vector<std::string>& warnings) {
-    // Text files named after cameras are often poses or calibrations of another kind; JSON files rarely are.
-    static const std::regex names_intrinsics("intrinsic", std::regex::icase), names_camera("cam|intrinsic", std::regex::icase);
-    static const std::regex names_poses("traj|pose|extrinsic", std::regex::icase);
     std::vector<fs::path> candidates, others;
     for (const fs::path& file : files_in(folder)) {
         const std::string name = file.filename().string();
         const bool json = lower_extension(file) == ".json", text = lower_extension(file) == ".txt";
-        if (name == "camera.json") candidates.insert(candidates.begin(), file);
-        else if ((json && std::regex_search(name, names_camera) && !std::regex_search(name, names_poses)) ||
-                 (text && std::regex_search(name, names_intrinsics)))
+        // Text files named after cameras are often poses or calibrations of another kind; JSON files rarely are.
+        const bool promising =
+            (json && speaks_of(file, {"cam", "intrinsic"}) && !speaks_of(file, {"traj", "pose", "extrinsic"})) ||
+            (text && speaks_of(file, {"intrinsic"}));
+        if (name == "camera.json")
+            candidates.insert(candidates.begin(), file);
+        else if (promising)
             candidates.push_back(file);
-        else if (json || name == "info.txt") others.push_back(file);
+        else if (json || name == "info.txt")
+            others.push_back(file);
     }
     std::optional<CameraFile> found;
     for (const fs::path& file : candidates) {
         if (found) {
-            warnings.push_back(fmt::format("{} is used as the camera; {} is not.", found->camera.origin, file.filename().string()));
+            warnings.push_back(
+                fmt::format("{} is used as the camera; {} is not.", found->camera.origin, file.filename().string()));
             continue;
         }
         found = read_camera_file(file);
@@ -130,18 +153,22 @@ DepthEncoding assumed_encoding(const fs::path& first_depth) {
         floats = !first_depth.empty() && peek(first_depth).floats;
     } catch (const Error&) { // loading that frame will say what is wrong with it
     }
-    if (floats) return depth_encoding("m", "assumed: floats are metres");
+    if (floats)
+        return depth_encoding("m", "assumed: floats are metres");
     return depth_encoding("mm", "assumed: 16-bit integers are millimetres");
 }
 
 void settle_names(std::vector<CaptureEntry>& entries) {
     std::set<std::string> taken;
     for (CaptureEntry& entry : entries) {
-        std::replace_if(entry.name.begin(), entry.name.end(),
-                        [](char c) { return c == '/' || c == '\\' || static_cast<unsigned char>(c) < ' '; }, '_');
-        if (entry.name.empty()) entry.name = "frame";
+        std::replace_if(
+            entry.name.begin(), entry.name.end(),
+            [](char c) { return c == '/' || c == '\\' || static_cast<unsigned char>(c) < ' '; }, '_');
+        if (entry.name.empty())
+            entry.name = "frame";
         const std::string wanted = entry.name;
-        for (int n = 2; !taken.insert(entry.name).second; ++n) entry.name = fmt::format("{}-{}", wanted, n);
+        for (int n = 2; !taken.insert(entry.name).second; ++n)
+            entry.name = fmt::format("{}-{}", wanted, n);
     }
 }
 
@@ -153,9 +180,21 @@ struct SceneFrame {
     fs::path colour, depth, pose;
 };
 
+/// "frame-000200.depth.png" -> "frame-000200" and "depth"; nothing for other names.
+std::optional<std::pair<std::string, std::string>> scene_part(const std::string& name) {
+    constexpr std::string_view start = "frame-";
+    const auto first = name.find('.'), second = name.find('.', std::min(first, name.size() - 1) + 1);
+    const bool three_parts =
+        name.starts_with(start) && second != std::string::npos && name.find('.', second + 1) == std::string::npos;
+    if (!three_parts || !whole_number(name.substr(start.size(), first - start.size())))
+        return std::nullopt;
+    return std::pair(name.substr(0, first), name.substr(first + 1, second - first - 1));
+}
+
 std::string name_list(const std::vector<std::string>& names) { return fmt::format("{}", fmt::join(names, ", ")); }
 
-CaptureEntry scene_entry(const std::string& name, const SceneFrame& frame, const fs::path& folder, bool colours, bool poses) {
+CaptureEntry scene_entry(const std::string& name, const SceneFrame& frame, const fs::path& folder, bool colours,
+                         bool poses) {
     CaptureEntry entry;
     entry.name = name;
     entry.depth = frame.depth;
@@ -166,52 +205,66 @@ CaptureEntry scene_entry(const std::string& name, const SceneFrame& frame, const
         return entry;
     }
     std::vector<std::string> missing;
-    if (colours && frame.colour.empty()) missing.emplace_back("no colour image");
-    if (poses && frame.pose.empty()) missing.emplace_back("no pose file");
+    if (colours && frame.colour.empty())
+        missing.emplace_back("no colour image");
+    if (poses && frame.pose.empty())
+        missing.emplace_back("no pose file");
     if (!missing.empty())
-        entry.warnings.push_back(fmt::format("{} stands alone: {}.", frame.depth.filename().string(), name_list(missing)));
-    if (frame.pose.empty()) return entry;
+        entry.warnings.push_back(
+            fmt::format("{} stands alone: {}.", frame.depth.filename().string(), name_list(missing)));
+    if (frame.pose.empty())
+        return entry;
     const MatrixPose pose = read_matrix_pose(frame.pose);
     entry.problem = pose.problem;
     entry.world_from_camera = pose.world_from_camera;
-    if (!pose.warning.empty()) entry.warnings.push_back(pose.warning);
+    if (!pose.warning.empty())
+        entry.warnings.push_back(pose.warning);
     return entry;
 }
 
 std::optional<CameraFile> scene_camera(const fs::path& folder, cv::Size size, std::vector<std::string>& warnings) {
-    if (auto camera = camera_in(folder, warnings)) return camera;
-    if (size != cv::Size(640, 480)) return std::nullopt;
+    if (auto camera = camera_in(folder, warnings))
+        return camera;
+    if (size != cv::Size(640, 480))
+        return std::nullopt;
     CameraFile published;
-    published.camera = {{585, 585, 320, 240, size}, {}, "assumed: 7-Scenes' published default, no camera file in the capture"};
-    warnings.push_back(fmt::format("{}: no camera file; 7-Scenes' published default fx 585 fy 585 cx 320 cy 240 is assumed.",
-                                   folder.string()));
+    published.camera = {
+        {585, 585, 320, 240, size}, {}, "assumed: 7-Scenes' published default, no camera file in the capture"};
+    warnings.push_back(fmt::format(
+        "{}: no camera file; 7-Scenes' published default fx 585 fy 585 cx 320 cy 240 is assumed.", folder.string()));
     return published;
 }
 
 } // namespace
 
 std::optional<Listing> list_seven_scenes(const fs::path& folder) {
-    static const std::regex part(R"((frame-\d+)\.(color|depth|pose)\.(\w+))");
     std::map<std::string, SceneFrame, decltype(&natural_less)> frames(&natural_less);
     bool any_depth = false, any_colour = false, any_pose = false;
     for (const fs::path& file : files_in(folder)) {
-        const std::string name = file.filename().string();
-        std::smatch match;
-        if (!std::regex_match(name, match, part)) continue;
-        SceneFrame& frame = frames[match[1]];
-        if (match[2] == "color" && has_colour_extension(file)) frame.colour = file, any_colour = true;
-        if (match[2] == "depth" && has_depth_extension(file)) frame.depth = file, any_depth = true;
-        if (match[2] == "pose" && match[3] == "txt") frame.pose = file, any_pose = true;
+        const auto name_and_part = scene_part(file.filename().string());
+        if (!name_and_part)
+            continue;
+        const auto& [name, part] = *name_and_part;
+        if (part == "color" && has_colour_extension(file))
+            frames[name].colour = file, any_colour = true;
+        if (part == "depth" && has_depth_extension(file))
+            frames[name].depth = file, any_depth = true;
+        if (part == "pose" && lower_extension(file) == ".txt")
+            frames[name].pose = file, any_pose = true;
     }
-    if (!any_depth) return std::nullopt;
+    if (!any_depth)
+        return std::nullopt;
     Listing listing;
     Capture& capture = listing.capture;
     capture.kind = "7-Scenes";
     capture.depth = depth_encoding("mm", "7-Scenes layout");
     capture.registration = Registration::no;
     capture.registration_reason = "7-Scenes colour and depth are unregistered in this layout";
-    for (const auto& [name, frame] : frames) capture.entries.push_back(scene_entry(name, frame, folder, any_colour, any_pose));
-    listing.find_camera = [folder](cv::Size size, std::vector<std::string>& warnings) { return scene_camera(folder, size, warnings); };
+    for (const auto& [name, frame] : frames)
+        capture.entries.push_back(scene_entry(name, frame, folder, any_colour, any_pose));
+    listing.find_camera = [folder](cv::Size size, std::vector<std::string>& warnings) {
+        return scene_camera(folder, size, warnings);
+    };
     return listing;
 }
 
@@ -222,12 +275,14 @@ namespace {
 std::optional<fs::path> folder_named(const fs::path& parent, std::initializer_list<std::string_view> names) {
     std::error_code ignored;
     for (const std::string_view name : names)
-        if (fs::is_directory(parent / name, ignored)) return parent / name;
+        if (fs::is_directory(parent / name, ignored))
+            return parent / name;
     return std::nullopt;
 }
 
 std::vector<fs::path> images_in(const std::optional<fs::path>& folder, bool (*wanted)(const fs::path&)) {
-    if (!folder) return {};
+    if (!folder)
+        return {};
     auto files = files_in(*folder);
     std::erase_if(files, [&](const fs::path& file) { return !wanted(file); });
     return files;
@@ -239,22 +294,27 @@ void entries_from_match(const fs::path& folder, const fs::path& depth_folder, Ca
     const std::string bytes = read_bytes(list);
     for (const TextLine& line : text_lines(bytes)) {
         auto names = words(line.text);
-        if (names.empty() || names[0].starts_with('#')) continue;
+        if (names.empty() || names[0].starts_with('#'))
+            continue;
         if (names.size() != 2) {
-            capture.warnings.push_back(fmt::format("{}: {}, expected 2 file names; line not used.", at_line(list, line.number),
-                                                   counted(names.size(), "word")));
+            capture.warnings.push_back(fmt::format("{}: {}, expected 2 file names; line not used.",
+                                                   at_line(list, line.number), counted(names.size(), "word")));
             continue;
         }
         const std::string depth_start = depth_folder.filename().string() + "/";
-        if (!names[0].starts_with(depth_start) && names[1].starts_with(depth_start)) std::swap(names[0], names[1]);
+        if (!names[0].starts_with(depth_start) && names[1].starts_with(depth_start))
+            std::swap(names[0], names[1]);
         CaptureEntry entry;
         const std::string depth(names[0]), colour(names[1]);
         entry.name = fs::path(depth).stem().string();
         entry.depth = folder / depth;
         if (const auto trouble = trouble_with(folder, depth); !trouble.empty())
             entry.problem = fmt::format("{}: {}", at_line(list, line.number), trouble);
-        if (const auto trouble = trouble_with(folder, colour); trouble.empty()) entry.colour = folder / colour;
-        else entry.warnings.push_back(fmt::format("{}: {}; processed without colour.", at_line(list, line.number), trouble));
+        if (const auto trouble = trouble_with(folder, colour); trouble.empty())
+            entry.colour = folder / colour;
+        else
+            entry.warnings.push_back(
+                fmt::format("{}: {}; processed without colour.", at_line(list, line.number), trouble));
         capture.entries.push_back(std::move(entry));
     }
 }
@@ -262,21 +322,27 @@ void entries_from_match(const fs::path& folder, const fs::path& depth_folder, Ca
 /// Pairs by equal stems; where no stem is shared but there are as many of each, by order.
 void entries_from_names(const std::vector<fs::path>& depths, const std::vector<fs::path>& colours, Capture& capture) {
     std::map<std::string, fs::path> by_stem;
-    for (const fs::path& colour : colours) by_stem.emplace(colour.stem().string(), colour);
+    for (const fs::path& colour : colours)
+        by_stem.emplace(colour.stem().string(), colour);
     std::size_t shared = 0;
-    for (const fs::path& depth : depths) shared += by_stem.count(depth.stem().string());
+    for (const fs::path& depth : depths)
+        shared += by_stem.count(depth.stem().string());
     const bool by_order = shared == 0 && !colours.empty() && colours.size() == depths.size();
     if (by_order)
-        capture.warnings.push_back(fmt::format("colour and depth share no file names; paired by order ({} with {}, ...).",
-                                               colours[0].filename().string(), depths[0].filename().string()));
+        capture.warnings.push_back(
+            fmt::format("colour and depth share no file names; paired by order ({} with {}, ...).",
+                        colours[0].filename().string(), depths[0].filename().string()));
     for (std::size_t i = 0; i < depths.size(); ++i) {
         CaptureEntry entry;
         entry.name = depths[i].stem().string();
         entry.depth = depths[i];
         const auto same = by_stem.find(entry.name);
-        if (by_order) entry.colour = colours[i];
-        else if (same != by_stem.end()) entry.colour = same->second;
-        else if (!colours.empty()) entry.warnings.push_back(fmt::format("{} has no colour image.", depths[i].string()));
+        if (by_order)
+            entry.colour = colours[i];
+        else if (same != by_stem.end())
+            entry.colour = same->second;
+        else if (!colours.empty())
+            entry.warnings.push_back(fmt::format("{} has no colour image.", depths[i].string()));
         capture.entries.push_back(std::move(entry));
     }
     if (!by_order && shared < colours.size())
@@ -284,18 +350,21 @@ void entries_from_names(const std::vector<fs::path>& depths, const std::vector<f
                                                counted(colours.size() - shared, "colour image")));
 }
 
-/// trajectory.log by index in recording order; pose.txt by the number in the depth image's name (row N, from 1; from 0 where
-/// an image is numbered 0).
+/// trajectory.log by index in recording order; pose.txt by the number in the depth image's name (row N, from 1; from 0
+/// where an image is numbered 0).
 void add_poses(const fs::path& folder, Capture& capture) {
     std::error_code ignored;
     if (fs::is_regular_file(folder / "trajectory.log", ignored)) {
         const auto poses = read_redwood_log(folder / "trajectory.log", capture.warnings);
         for (std::size_t i = 0; i < capture.entries.size(); ++i)
-            if (const auto pose = poses.find(i); pose != poses.end()) capture.entries[i].world_from_camera = pose->second;
-            else capture.entries[i].warnings.push_back(fmt::format("trajectory.log has no pose for frame {}.", i));
+            if (const auto pose = poses.find(i); pose != poses.end())
+                capture.entries[i].world_from_camera = pose->second;
+            else
+                capture.entries[i].warnings.push_back(fmt::format("trajectory.log has no pose for frame {}.", i));
         return;
     }
-    if (!fs::is_regular_file(folder / "pose.txt", ignored)) return;
+    if (!fs::is_regular_file(folder / "pose.txt", ignored))
+        return;
     const auto poses = read_pose_rows(folder / "pose.txt", capture.warnings);
     const auto number_in = [](const CaptureEntry& entry) { return whole_number(entry.name); };
     const bool from_zero = std::any_of(capture.entries.begin(), capture.entries.end(),
@@ -303,8 +372,10 @@ void add_poses(const fs::path& folder, Capture& capture) {
     for (CaptureEntry& entry : capture.entries) {
         const auto number = number_in(entry);
         const auto pose = number ? poses.find(*number + (from_zero ? 1 : 0)) : poses.end();
-        if (pose != poses.end()) entry.world_from_camera = pose->second;
-        else entry.warnings.push_back(fmt::format("pose.txt has no row for {}.", entry.name));
+        if (pose != poses.end())
+            entry.world_from_camera = pose->second;
+        else
+            entry.warnings.push_back(fmt::format("pose.txt has no row for {}.", entry.name));
     }
 }
 
@@ -312,9 +383,11 @@ void add_poses(const fs::path& folder, Capture& capture) {
 
 std::optional<Listing> list_image_folders(const fs::path& folder) {
     const auto depth_folder = folder_named(folder, {"depth", "depths", "Depth", "depth_images"});
-    if (!depth_folder) return std::nullopt;
+    if (!depth_folder)
+        return std::nullopt;
     const auto depths = images_in(depth_folder, &has_depth_extension);
-    if (depths.empty()) return std::nullopt;
+    if (depths.empty())
+        return std::nullopt;
     const auto colour_folder = folder_named(folder, {"color", "colour", "rgb", "image", "images", "Color", "RGB"});
 
     Listing listing;
@@ -325,10 +398,14 @@ std::optional<Listing> list_image_folders(const fs::path& folder) {
     capture.kind = redwood ? "Redwood / Open3D" : "colour and depth folders";
     capture.depth = assumed_encoding(depths.front());
     capture.registration_reason = "nothing in the capture says whether colour and depth are registered";
-    if (matched) entries_from_match(folder, *depth_folder, capture);
-    else entries_from_names(depths, images_in(colour_folder, &has_colour_extension), capture);
+    if (matched)
+        entries_from_match(folder, *depth_folder, capture);
+    else
+        entries_from_names(depths, images_in(colour_folder, &has_colour_extension), capture);
     add_poses(folder, capture);
-    listing.find_camera = [folder](cv::Size, std::vector<std::string>& warnings) { return camera_in(folder, warnings); };
+    listing.find_camera = [folder](cv::Size, std::vector<std::string>& warnings) {
+        return camera_in(folder, warnings);
+    };
     return listing;
 }
 
@@ -353,7 +430,8 @@ std::optional<Listing> list_depth_images(const fs::path& folder) {
     Capture& capture = listing.capture;
     std::size_t others = 0;
     for (const fs::path& file : files_in(folder)) {
-        if (!has_depth_extension(file)) continue;
+        if (!has_depth_extension(file))
+            continue;
         if (!may_be_depth(file)) {
             ++others;
             continue;
@@ -363,27 +441,32 @@ std::optional<Listing> list_depth_images(const fs::path& folder) {
         entry.depth = file;
         capture.entries.push_back(std::move(entry));
     }
-    if (capture.entries.empty()) return std::nullopt;
+    if (capture.entries.empty())
+        return std::nullopt;
     capture.kind = "depth images";
     capture.depth = assumed_encoding(capture.entries.front().depth);
     capture.registration_reason = "there is no colour";
     if (others > 0)
-        capture.warnings.push_back(fmt::format("{}: {} left out, neither 16-bit nor float of one channel.", folder.string(),
-                                               counted(others, "image")));
-    listing.find_camera = [folder](cv::Size, std::vector<std::string>& warnings) { return camera_in(folder, warnings); };
+        capture.warnings.push_back(fmt::format("{}: {} left out, neither 16-bit nor float of one channel.",
+                                               folder.string(), counted(others, "image")));
+    listing.find_camera = [folder](cv::Size, std::vector<std::string>& warnings) {
+        return camera_in(folder, warnings);
+    };
     return listing;
 }
 
 std::optional<Listing> list_clouds(const fs::path& folder) {
     Listing listing;
     for (const fs::path& file : files_in(folder)) {
-        if (!has_cloud_extension(file)) continue;
+        if (!has_cloud_extension(file))
+            continue;
         CaptureEntry entry;
         entry.name = file.stem().string();
         entry.cloud = file;
         listing.capture.entries.push_back(std::move(entry));
     }
-    if (listing.capture.entries.empty()) return std::nullopt;
+    if (listing.capture.entries.empty())
+        return std::nullopt;
     listing.capture.kind = "clouds";
     listing.capture.depth = depth_encoding("m", "clouds hold metres");
     listing.capture.registration_reason = "colours belong to the points";

@@ -43,9 +43,11 @@ struct Listing {
 /// Size and type of an image from its first bytes; throws Error where they make no sense.
 [[nodiscard]] ImageFacts peek(const std::filesystem::path& image);
 
-/// The camera among a folder's files: camera.json, any JSON or text file whose name speaks of a camera or intrinsics, info.txt.
-/// A file that speaks of a camera and cannot be read is an Error; of several, the first is used and the others are named.
-[[nodiscard]] std::optional<CameraFile> camera_in(const std::filesystem::path& folder, std::vector<std::string>& warnings);
+/// The camera among a folder's files: camera.json, any JSON or text file whose name speaks of a camera or intrinsics,
+/// info.txt. A file that speaks of a camera and cannot be read is an Error; of several, the first is used and the
+/// others are named.
+[[nodiscard]] std::optional<CameraFile> camera_in(const std::filesystem::path& folder,
+                                                  std::vector<std::string>& warnings);
 
 /// "assumed: 16-bit integers are millimetres", or metres where `first_depth` holds floats.
 [[nodiscard]] DepthEncoding assumed_encoding(const std::filesystem::path& first_depth);

@@ -11,7 +11,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <memory>
-#include <regex>
+#include <optional>
 #include <system_error>
 #include <unistd.h>
 
@@ -23,35 +23,51 @@ namespace {
 
 fs::path temporary_name(const fs::path& target) {
     static std::atomic<unsigned> count = 0;
-    const auto name = fmt::format(".{}.tmp-{}-{}{}", target.stem().string(), ::getpid(), count++,
-                                  target.extension().string());
+    const auto name =
+        fmt::format(".{}.tmp-{}-{}{}", target.stem().string(), ::getpid(), count++, target.extension().string());
     return target.parent_path() / name;
 }
 
 /// Makes sure that what was written is on the disk before the rename says that it is there.
 void sync(const fs::path& path, int flags) {
     const int handle = ::open(path.c_str(), flags | O_CLOEXEC);
-    if (handle < 0) throw std::system_error(errno, std::generic_category(), "cannot be opened again");
+    if (handle < 0)
+        throw std::system_error(errno, std::generic_category(), "cannot be opened again");
     const int failed = ::fsync(handle) == 0 ? 0 : errno;
     ::close(handle);
     // EINVAL: a file system without fsync, where nothing better can be done.
-    if (failed != 0 && failed != EINVAL) throw std::system_error(failed, std::generic_category(), "cannot be synced");
+    if (failed != 0 && failed != EINVAL)
+        throw std::system_error(failed, std::generic_category(), "cannot be synced");
 }
 
 void write_bytes(const fs::path& file, std::string_view bytes) {
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "wb"), &std::fclose);
-    if (!stream) throw std::system_error(errno, std::generic_category(), "cannot be created");
+    if (!stream)
+        throw std::system_error(errno, std::generic_category(), "cannot be created");
     const bool complete = std::fwrite(bytes.data(), 1, bytes.size(), stream.get()) == bytes.size();
     if (!complete || std::fflush(stream.get()) != 0)
         throw std::system_error(errno, std::generic_category(), "cannot be written");
 }
 
+/// The process number in a name that temporary_name() made; nothing for any other name.
+std::optional<std::uint64_t> maker_of(std::string_view name) {
+    constexpr std::string_view mark = ".tmp-";
+    const auto at = name.rfind(mark);
+    if (!name.starts_with('.') || at == std::string_view::npos)
+        return std::nullopt;
+    const std::string_view numbers = name.substr(at + mark.size(), name.find('.', at + mark.size()) - at - mark.size());
+    const auto dash = numbers.find('-');
+    if (dash == std::string_view::npos || !whole_number(numbers.substr(dash + 1)))
+        return std::nullopt;
+    return whole_number(numbers.substr(0, dash));
+}
+
 /// Whether the process that made a temporary file may still be writing it. Our own number counts as dead: in a fresh
 /// container a killed run's number is often ours again, and leftovers are removed before anything is written.
-bool still_writing(const std::string& pid_text) {
-    const auto pid = whole_number(pid_text);
-    if (!pid || *pid == 0 || *pid > 0x7fffffff || static_cast<pid_t>(*pid) == ::getpid()) return false;
-    return ::kill(static_cast<pid_t>(*pid), 0) == 0 || errno == EPERM;
+bool still_writing(std::uint64_t pid) {
+    if (pid == 0 || pid > 0x7fffffff || static_cast<pid_t>(pid) == ::getpid())
+        return false;
+    return ::kill(static_cast<pid_t>(pid), 0) == 0 || errno == EPERM;
 }
 
 } // namespace
@@ -77,15 +93,15 @@ void write_atomically(const fs::path& target, std::string_view bytes) {
 }
 
 int remove_leftovers(const fs::path& folder) {
-    static const std::regex made_by_us(R"(\..*\.tmp-(\d+)-\d+(\.[^.]*)?)");
     int removed = 0;
     std::error_code trouble;
     for (fs::directory_iterator entry(folder, trouble), end; !trouble && entry != end; entry.increment(trouble)) {
-        const std::string name = entry->path().filename().string();
-        std::smatch match;
-        if (!std::regex_match(name, match, made_by_us) || still_writing(match[1])) continue;
+        const auto maker = maker_of(entry->path().filename().string());
+        if (!maker || still_writing(*maker))
+            continue;
         std::error_code ignored;
-        if (entry->is_regular_file(ignored) && fs::remove(entry->path(), ignored)) ++removed;
+        if (entry->is_regular_file(ignored) && fs::remove(entry->path(), ignored))
+            ++removed;
     }
     return removed;
 }

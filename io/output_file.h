@@ -7,9 +7,11 @@
 
 namespace scanshade {
 
-/// Calls `write` with a temporary path in target's folder (same extension, name starting with '.'), then syncs and renames
-/// it to `target`. On failure the temporary file is removed and Error names `target`. Missing parent folders are made.
-void write_atomically(const std::filesystem::path& target, const std::function<void(const std::filesystem::path&)>& write);
+/// Calls `write` with a temporary path in target's folder (same extension, name starting with '.'), then syncs and
+/// renames it to `target`. On failure the temporary file is removed and Error names `target`. Missing parent folders
+/// are made.
+void write_atomically(const std::filesystem::path& target,
+                      const std::function<void(const std::filesystem::path&)>& write);
 /// The same for bytes already in memory.
 void write_atomically(const std::filesystem::path& target, std::string_view bytes);
 

@@ -27,19 +27,23 @@ Statistics statistics_of(const cv::Mat1f& depth_m) {
     for (int y = 0; y < depth_m.rows; y += 3) {
         const float* row = depth_m[y];
         for (int x = 0; x < depth_m.cols; x += 3) {
-            if (row[x] <= 0) continue;
+            if (row[x] <= 0)
+                continue;
             sample.push_back(row[x]);
-            if (x + 1 >= depth_m.cols || row[x + 1] <= 0) continue;
+            if (x + 1 >= depth_m.cols || row[x + 1] <= 0)
+                continue;
             ++neighbours;
             jumps += std::abs(row[x] - row[x + 1]) > 0.2F * std::min(row[x], row[x + 1]);
         }
     }
     result.valid = sample.size();
-    if (sample.empty()) return result;
+    if (sample.empty())
+        return result;
     const auto middle = sample.begin() + static_cast<std::ptrdiff_t>(sample.size() / 2);
     std::nth_element(sample.begin(), middle, sample.end());
     result.median_m = *middle;
-    if (neighbours > 100) result.jumps = static_cast<double>(jumps) / static_cast<double>(neighbours);
+    if (neighbours > 100)
+        result.jumps = static_cast<double>(jumps) / static_cast<double>(neighbours);
     return result;
 }
 
@@ -47,12 +51,17 @@ Statistics statistics_of(const cv::Mat1f& depth_m) {
 std::string what_others_give(const cv::Mat& stored, const DepthEncoding& encoding) {
     std::vector<std::string> parts;
     for (const char* name : {"mm", "tum", "sun", "nyu"}) {
-        if (encoding.name == name || stored.type() != CV_16UC1) continue;
+        if (encoding.name == name || stored.type() != CV_16UC1)
+            continue;
         const Statistics other = statistics_of(depth_in_metres(stored, depth_encoding(name, "")));
-        if (other.valid == 0) parts.push_back(fmt::format("{} no depth at all", name));
-        else parts.push_back(fmt::format("{} a median of {:.2f} m{}", name, other.median_m, other.jumps > 0.2 ? " (noise)" : ""));
+        if (other.valid == 0)
+            parts.push_back(fmt::format("{} no depth at all", name));
+        else
+            parts.push_back(
+                fmt::format("{} a median of {:.2f} m{}", name, other.median_m, other.jumps > 0.2 ? " (noise)" : ""));
     }
-    if (parts.empty()) return {};
+    if (parts.empty())
+        return {};
     return fmt::format(" With --depth-scale the other encodings give: {}.", fmt::join(parts, ", "));
 }
 
@@ -64,7 +73,8 @@ std::vector<std::string> doubts_about(const cv::Mat1f& depth_m, const cv::Mat& s
     constexpr float assumed_farthest_median_m = 12;
     const Statistics depth = statistics_of(depth_m);
     if (depth.valid == 0) {
-        if (depth.largest_m > 0) return {}; // a few pixels between those sampled
+        if (depth.largest_m > 0)
+            return {}; // a few pixels between those sampled
         return {"no valid depth in this frame: every pixel is a hole."};
     }
     const bool assumed = encoding.origin.starts_with("assumed");
@@ -72,12 +82,13 @@ std::vector<std::string> doubts_about(const cv::Mat1f& depth_m, const cv::Mat& s
     const std::string stated = fmt::format("encoding {} ({})", encoding.name, encoding.origin);
     std::vector<std::string> doubts;
     if (depth.jumps > 0.2)
-        doubts.push_back(fmt::format("{:.0f} % of neighbouring depths differ by more than a fifth, which is noise rather than surfaces; "
-                                     "{} is probably wrong.{}",
-                                     100 * depth.jumps, stated, what_others_give(stored, encoding)));
+        doubts.push_back(fmt::format(
+            "{:.0f} % of neighbouring depths differ by more than a fifth, which is noise rather than surfaces; "
+            "{} is probably wrong.{}",
+            100 * depth.jumps, stated, what_others_give(stored, encoding)));
     else if (depth.median_m < nearest_median_m || depth.median_m > farthest_likely_m || depth.largest_m > farthest_m)
-        doubts.push_back(fmt::format("a median depth of {:.3g} m and a largest of {:.3g} m are implausible with {}.{}", depth.median_m,
-                                     depth.largest_m, stated, what_others_give(stored, encoding)));
+        doubts.push_back(fmt::format("a median depth of {:.3g} m and a largest of {:.3g} m are implausible with {}.{}",
+                                     depth.median_m, depth.largest_m, stated, what_others_give(stored, encoding)));
     return doubts;
 }
 

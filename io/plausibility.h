@@ -10,8 +10,9 @@
 
 namespace scanshade {
 
-/// Sentences about what looks wrong in `depth_m` (decoded from `stored` with `encoding`): no valid depth, a range that no
-/// depth sensor has, noise in place of surfaces. Each says what other encodings would give.
-[[nodiscard]] std::vector<std::string> doubts_about(const cv::Mat1f& depth_m, const cv::Mat& stored, const DepthEncoding& encoding);
+/// Sentences about what looks wrong in `depth_m` (decoded from `stored` with `encoding`): no valid depth, a range that
+/// no depth sensor has, noise in place of surfaces. Each says what other encodings would give.
+[[nodiscard]] std::vector<std::string> doubts_about(const cv::Mat1f& depth_m, const cv::Mat& stored,
+                                                    const DepthEncoding& encoding);
 
 } // namespace scanshade

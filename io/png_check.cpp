@@ -1,6 +1,6 @@
-// PNG's container (W3C PNG, section 5): header, chunk lengths, checksums and end. libpng through OpenCV passes over some
-// damage in silence and leaves the rest of the image zero, which would read as holes. That the pixels are all there once
-// every chunk is sound, libpng does check.
+// PNG's container (W3C PNG, section 5): header, chunk lengths, checksums and end. libpng through OpenCV passes over
+// some damage in silence and leaves the rest of the image zero, which would read as holes. That the pixels are all
+// there once every chunk is sound, libpng does check.
 #include "io/image_check.h"
 
 #include <fmt/format.h>
@@ -15,12 +15,18 @@ constexpr std::size_t chunk_overhead = 12; // length, type, checksum
 
 int channels_of(int colour_type) {
     switch (colour_type) {
-    case 0: return 1; // grey
-    case 2: return 3; // RGB
-    case 3: return 3; // palette, RGB once decoded
-    case 4: return 2; // grey and alpha
-    case 6: return 4; // RGB and alpha
-    default: return 0;
+    case 0:
+        return 1; // grey
+    case 2:
+        return 3; // RGB
+    case 3:
+        return 3; // palette, RGB once decoded
+    case 4:
+        return 2; // grey and alpha
+    case 6:
+        return 4; // RGB and alpha
+    default:
+        return 0;
     }
 }
 
@@ -30,13 +36,15 @@ ImageFacts png_header(std::string_view bytes, const std::filesystem::path& file)
     constexpr std::size_t header_end = signature_length + chunk_overhead + 13;
     if (bytes.size() < header_end)
         refuse(file, fmt::format("PNG ends early: {} bytes, the header alone takes {}", bytes.size(), header_end));
-    if (big_endian_32(bytes, 8) != 13 || bytes.substr(12, 4) != "IHDR") refuse(file, "PNG does not start with its header IHDR");
+    if (big_endian_32(bytes, 8) != 13 || bytes.substr(12, 4) != "IHDR")
+        refuse(file, "PNG does not start with its header IHDR");
     ImageFacts facts;
     facts.format = ImageFormat::png;
     facts.size = checked_size(big_endian_32(bytes, 16), big_endian_32(bytes, 20), file);
     facts.bits = static_cast<unsigned char>(bytes[24]);
     facts.channels = channels_of(static_cast<unsigned char>(bytes[25]));
-    const bool legal_bits = facts.bits == 1 || facts.bits == 2 || facts.bits == 4 || facts.bits == 8 || facts.bits == 16;
+    const bool legal_bits =
+        facts.bits == 1 || facts.bits == 2 || facts.bits == 4 || facts.bits == 8 || facts.bits == 16;
     if (facts.channels == 0 || !legal_bits)
         refuse(file, fmt::format("PNG header says {} bits and colour type {}, which is not PNG", facts.bits,
                                  static_cast<unsigned char>(bytes[25])));
@@ -56,7 +64,8 @@ void check_png_chunks(std::string_view bytes, const std::filesystem::path& file)
         const auto sum = crc32(0, reinterpret_cast<const Bytef*>(covered.data()), static_cast<uInt>(covered.size()));
         if (sum != big_endian_32(bytes, at + 8 + length))
             refuse(file, fmt::format("PNG is damaged: checksum (CRC) of the chunk at byte {} does not match", at));
-        if (type == "IEND") break;
+        if (type == "IEND")
+            break;
         at += chunk_overhead + length;
     }
 }

@@ -15,27 +15,34 @@ namespace scanshade {
 std::string read_bytes(const std::filesystem::path& file, std::size_t limit) {
     std::error_code trouble;
     const auto status = std::filesystem::status(file, trouble);
-    if (status.type() == std::filesystem::file_type::not_found) throw Error(file.string() + ": no such file");
-    if (!std::filesystem::is_regular_file(status)) throw Error(file.string() + ": not a regular file");
+    if (status.type() == std::filesystem::file_type::not_found)
+        throw Error(file.string() + ": no such file");
+    if (!std::filesystem::is_regular_file(status))
+        throw Error(file.string() + ": not a regular file");
     const auto size = std::filesystem::file_size(file, trouble);
-    if (trouble) throw Error(file.string() + ": cannot be read: " + trouble.message());
+    if (trouble)
+        throw Error(file.string() + ": cannot be read: " + trouble.message());
 
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "rb"), &std::fclose);
-    if (!stream) throw Error(file.string() + ": cannot be opened for reading");
+    if (!stream)
+        throw Error(file.string() + ": cannot be opened for reading");
     std::string bytes(std::min<std::uintmax_t>(size, limit), '\0');
     bytes.resize(std::fread(bytes.data(), 1, bytes.size(), stream.get()));
-    if (std::ferror(stream.get())) throw Error(file.string() + ": cannot be read to its end");
+    if (std::ferror(stream.get()))
+        throw Error(file.string() + ": cannot be read to its end");
     return bytes;
 }
 
 std::vector<TextLine> text_lines(std::string_view bytes) {
     constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
-    if (bytes.starts_with(byte_order_mark)) bytes.remove_prefix(byte_order_mark.size());
+    if (bytes.starts_with(byte_order_mark))
+        bytes.remove_prefix(byte_order_mark.size());
     std::vector<TextLine> lines;
     while (!bytes.empty()) {
         const auto end = std::min(bytes.find('\n'), bytes.size());
         std::string_view text = bytes.substr(0, end);
-        if (text.ends_with('\r')) text.remove_suffix(1);
+        if (text.ends_with('\r'))
+            text.remove_suffix(1);
         lines.push_back({static_cast<int>(lines.size()) + 1, text});
         bytes.remove_prefix(std::min(end + 1, bytes.size()));
     }
@@ -58,7 +65,8 @@ std::vector<std::string_view> words(std::string_view line) {
 
 std::string_view trimmed(std::string_view text) {
     const auto start = text.find_first_not_of(blanks);
-    if (start == std::string_view::npos) return {};
+    if (start == std::string_view::npos)
+        return {};
     return text.substr(start, text.find_last_not_of(blanks) - start + 1);
 }
 
@@ -66,25 +74,31 @@ std::string in_quotes(std::string_view text) {
     constexpr std::size_t longest = 40;
     std::string clean(text.substr(0, longest));
     // Damaged files hold anything; a terminal must not obey it.
-    std::replace_if(clean.begin(), clean.end(), [](char c) { return c < ' ' || c == 0x7f; }, '?');
+    std::replace_if(
+        clean.begin(), clean.end(), [](char c) { return c < ' ' || c == 0x7f; }, '?');
     return '"' + clean + (text.size() > longest ? "...\"" : "\"");
 }
 
 std::optional<double> number(std::string_view word) {
-    if (word.starts_with('+')) word.remove_prefix(1);
+    if (word.starts_with('+'))
+        word.remove_prefix(1);
     double value = 0;
     const auto [end, trouble] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (end != word.data() + word.size() || word.empty()) return std::nullopt;
+    if (end != word.data() + word.size() || word.empty())
+        return std::nullopt;
     // from_chars does not say whether 1e-400 or 1e400 was met; strtod does, as 0 or infinity.
-    if (trouble == std::errc::result_out_of_range) return std::strtod(std::string(word).c_str(), nullptr);
-    if (trouble != std::errc()) return std::nullopt;
+    if (trouble == std::errc::result_out_of_range)
+        return std::strtod(std::string(word).c_str(), nullptr);
+    if (trouble != std::errc())
+        return std::nullopt;
     return value;
 }
 
 std::optional<std::uint64_t> whole_number(std::string_view word) {
     std::uint64_t value = 0;
     const auto [end, trouble] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (trouble != std::errc() || end != word.data() + word.size()) return std::nullopt;
+    if (trouble != std::errc() || end != word.data() + word.size())
+        return std::nullopt;
     return value;
 }
 
@@ -101,11 +115,13 @@ constexpr std::size_t shown = 5;
 }
 
 void RepeatedWarning::add(std::string sentence) {
-    if (++seen_ <= shown) warnings_.push_back(std::move(sentence));
+    if (++seen_ <= shown)
+        warnings_.push_back(std::move(sentence));
 }
 
 RepeatedWarning::~RepeatedWarning() {
-    if (seen_ > shown) warnings_.push_back(fmt::format("... and {} more like the last one.", seen_ - shown));
+    if (seen_ > shown)
+        warnings_.push_back(fmt::format("... and {} more like the last one.", seen_ - shown));
 }
 
 } // namespace scanshade

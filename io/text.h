@@ -10,7 +10,8 @@
 
 namespace scanshade {
 
-/// The whole file, or its first `limit` bytes. Throws Error naming the file when it is missing, a folder, or unreadable.
+/// The whole file, or its first `limit` bytes. Throws Error naming the file when it is missing, a folder, or
+/// unreadable.
 [[nodiscard]] std::string read_bytes(const std::filesystem::path& file, std::size_t limit = SIZE_MAX);
 
 /// One line of a text file without its line end; numbers start at 1.

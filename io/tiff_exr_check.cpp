@@ -22,7 +22,8 @@ struct TiffReader {
 
     [[nodiscard]] std::uint64_t unsigned_at(std::uint64_t offset, unsigned length) const {
         if (offset > bytes.size() || length > bytes.size() - offset)
-            refuse(file, fmt::format("TIFF ends early: {} bytes, something is said to lie at byte {}", bytes.size(), offset));
+            refuse(file,
+                   fmt::format("TIFF ends early: {} bytes, something is said to lie at byte {}", bytes.size(), offset));
         std::uint64_t value = 0;
         for (unsigned i = 0; i < length; ++i) {
             const auto byte = static_cast<unsigned char>(bytes[offset + (big_endian ? i : length - 1 - i)]);
@@ -45,7 +46,8 @@ std::vector<TiffEntry> first_directory(const TiffReader& tiff) {
     for (std::uint64_t i = 0; i < count; ++i) {
         const std::uint64_t at = start + 2 + 12 * i;
         TiffEntry entry{tiff.unsigned_at(at, 2), tiff.unsigned_at(at + 2, 2), tiff.unsigned_at(at + 4, 4), at + 8};
-        if (entry.count * type_length(entry.type) > 4) entry.at = tiff.unsigned_at(at + 8, 4);
+        if (entry.count * type_length(entry.type) > 4)
+            entry.at = tiff.unsigned_at(at + 8, 4);
         entries.push_back(entry);
     }
     return entries;
@@ -53,19 +55,24 @@ std::vector<TiffEntry> first_directory(const TiffReader& tiff) {
 
 std::vector<std::uint64_t> values(const TiffReader& tiff, const std::vector<TiffEntry>& entries, std::uint64_t tag) {
     const auto entry = std::find_if(entries.begin(), entries.end(), [&](const TiffEntry& e) { return e.tag == tag; });
-    if (entry == entries.end()) return {};
+    if (entry == entries.end())
+        return {};
     const unsigned length = type_length(entry->type);
     if (entry->count > tiff.bytes.size() / length)
-        refuse(tiff.file, fmt::format("TIFF tag {} claims {} values in {} bytes", tag, entry->count, tiff.bytes.size()));
+        refuse(tiff.file,
+               fmt::format("TIFF tag {} claims {} values in {} bytes", tag, entry->count, tiff.bytes.size()));
     std::vector<std::uint64_t> found(entry->count);
-    for (std::uint64_t i = 0; i < entry->count; ++i) found[i] = tiff.unsigned_at(entry->at + i * length, length);
+    for (std::uint64_t i = 0; i < entry->count; ++i)
+        found[i] = tiff.unsigned_at(entry->at + i * length, length);
     return found;
 }
 
 /// Strips or tiles must lie in the file: libtiff fills what is missing with zeros.
-void check_pieces(const TiffReader& tiff, const std::vector<std::uint64_t>& offsets, const std::vector<std::uint64_t>& counts) {
+void check_pieces(const TiffReader& tiff, const std::vector<std::uint64_t>& offsets,
+                  const std::vector<std::uint64_t>& counts) {
     if (offsets.empty() || offsets.size() != counts.size())
-        refuse(tiff.file, fmt::format("TIFF lists {} pieces of image data and {} lengths", offsets.size(), counts.size()));
+        refuse(tiff.file,
+               fmt::format("TIFF lists {} pieces of image data and {} lengths", offsets.size(), counts.size()));
     for (std::size_t i = 0; i < offsets.size(); ++i)
         if (offsets[i] > tiff.bytes.size() || counts[i] > tiff.bytes.size() - offsets[i])
             refuse(tiff.file, fmt::format("TIFF ends early: {} bytes, piece {} of the image lies at bytes {} to {}",
@@ -81,17 +88,23 @@ std::uint32_t little_endian_32(std::string_view bytes, std::size_t at) {
 }
 
 /// The value of one header attribute: name, type, length, bytes; a list that an empty name ends.
-std::optional<std::string_view> exr_attribute(std::string_view bytes, const std::filesystem::path& file, std::string_view wanted) {
+std::optional<std::string_view> exr_attribute(std::string_view bytes, const std::filesystem::path& file,
+                                              std::string_view wanted) {
     for (std::size_t at = 8;;) {
         const auto name_end = bytes.find('\0', std::min(at, bytes.size()));
-        if (name_end == std::string_view::npos) refuse(file, "EXR ends inside its header");
-        if (name_end == at) return std::nullopt;
+        if (name_end == std::string_view::npos)
+            refuse(file, "EXR ends inside its header");
+        if (name_end == at)
+            return std::nullopt;
         const auto type_end = bytes.find('\0', name_end + 1);
-        if (type_end == std::string_view::npos || bytes.size() - type_end < 5) refuse(file, "EXR ends inside its header");
+        if (type_end == std::string_view::npos || bytes.size() - type_end < 5)
+            refuse(file, "EXR ends inside its header");
         const std::size_t length = little_endian_32(bytes, type_end + 1);
         const std::size_t value_at = type_end + 5;
-        if (length > bytes.size() - value_at) refuse(file, "EXR ends inside its header");
-        if (bytes.substr(at, name_end - at) == wanted) return bytes.substr(value_at, length);
+        if (length > bytes.size() - value_at)
+            refuse(file, "EXR ends inside its header");
+        if (bytes.substr(at, name_end - at) == wanted)
+            return bytes.substr(value_at, length);
         at = value_at + length;
     }
 }
@@ -100,7 +113,8 @@ int exr_channels(std::string_view list) {
     int count = 0;
     for (std::size_t at = 0; at < list.size() && list[at] != '\0'; ++count) {
         const auto name_end = list.find('\0', at);
-        if (name_end == std::string_view::npos) break;
+        if (name_end == std::string_view::npos)
+            break;
         at = name_end + 1 + 16;
     }
     return count;
@@ -127,11 +141,15 @@ ImageFacts tiff_facts(std::string_view bytes, const std::filesystem::path& file)
 }
 
 ImageFacts exr_facts(std::string_view bytes, const std::filesystem::path& file) {
-    if (bytes.size() < 8) refuse(file, fmt::format("EXR ends early: {} bytes", bytes.size()));
+    if (bytes.size() < 8)
+        refuse(file, fmt::format("EXR ends early: {} bytes", bytes.size()));
     const auto window = exr_attribute(bytes, file, "dataWindow");
     const auto channels = exr_attribute(bytes, file, "channels");
-    if (!window || window->size() != 16 || !channels) refuse(file, "EXR header lacks dataWindow or channels");
-    const auto corner = [&](std::size_t i) { return std::int64_t(static_cast<std::int32_t>(little_endian_32(*window, 4 * i))); };
+    if (!window || window->size() != 16 || !channels)
+        refuse(file, "EXR header lacks dataWindow or channels");
+    const auto corner = [&](std::size_t i) {
+        return std::int64_t(static_cast<std::int32_t>(little_endian_32(*window, 4 * i)));
+    };
     const auto width = corner(2) - corner(0) + 1, height = corner(3) - corner(1) + 1;
     ImageFacts facts;
     facts.format = ImageFormat::exr;

@@ -28,8 +28,8 @@ Eigen::Isometry3d pose_from(const Eigen::Vector3d& translation, const Eigen::Qua
 }
 
 /// tx ty tz qx qy qz qw from seven words; what is wrong goes to `trouble`, what was mended to `warning`.
-std::optional<Eigen::Isometry3d> quaternion_pose(const std::vector<std::string_view>& row, std::size_t first, std::string& trouble,
-                                                 std::string& warning) {
+std::optional<Eigen::Isometry3d> quaternion_pose(const std::vector<std::string_view>& row, std::size_t first,
+                                                 std::string& trouble, std::string& warning) {
     static constexpr std::array names{"tx", "ty", "tz", "qx", "qy", "qz", "qw"};
     std::array<double, 7> v{};
     for (std::size_t i = 0; i < v.size(); ++i) {
@@ -46,7 +46,8 @@ std::optional<Eigen::Isometry3d> quaternion_pose(const std::vector<std::string_v
         trouble = "the quaternion is zero";
         return std::nullopt;
     }
-    if (std::abs(length - 1) > unit_tolerance) warning = fmt::format("the quaternion has length {:.4g}; normalised", length);
+    if (std::abs(length - 1) > unit_tolerance)
+        warning = fmt::format("the quaternion has length {:.4g}; normalised", length);
     return pose_from({v[0], v[1], v[2]}, rotation);
 }
 
@@ -69,14 +70,16 @@ Eigen::Isometry3d rigid(const Eigen::Matrix4d& m) {
 /// Lines that hold something: neither blank nor a comment.
 std::vector<TextLine> content_lines(std::string_view bytes) {
     auto lines = text_lines(bytes);
-    std::erase_if(lines, [](const TextLine& line) { return trimmed(line.text).empty() || trimmed(line.text).starts_with('#'); });
+    std::erase_if(
+        lines, [](const TextLine& line) { return trimmed(line.text).empty() || trimmed(line.text).starts_with('#'); });
     return lines;
 }
 
 /// Four numbers of a matrix row; on failure the reason.
 std::string read_row(const TextLine& line, Eigen::Matrix4d& matrix, int row) {
     const auto all = words(line.text);
-    if (all.size() != 4) return fmt::format("{}, expected 4 (a row of a 4x4 pose)", counted(all.size(), "value"));
+    if (all.size() != 4)
+        return fmt::format("{}, expected 4 (a row of a 4x4 pose)", counted(all.size(), "value"));
     for (int i = 0; i < 4; ++i) {
         const auto value = number(all[static_cast<std::size_t>(i)]);
         if (!value || std::isnan(*value))
@@ -108,9 +111,12 @@ std::vector<StampedPose> read_tum_trajectory(const fs::path& file, std::vector<s
         } else {
             std::string trouble, warning;
             const auto pose = quaternion_pose(row, 1, trouble, warning);
-            if (pose) poses.push_back({*stamp, *pose});
-            else left_out.add(fmt::format("{}: {}; pose not used.", at, trouble));
-            if (!warning.empty()) mended.add(fmt::format("{}: {}.", at, warning));
+            if (pose)
+                poses.push_back({*stamp, *pose});
+            else
+                left_out.add(fmt::format("{}: {}; pose not used.", at, trouble));
+            if (!warning.empty())
+                mended.add(fmt::format("{}: {}.", at, warning));
         }
     }
     const auto earlier = [](const StampedPose& a, const StampedPose& b) { return a.stamp_s < b.stamp_s; };
@@ -132,12 +138,16 @@ std::map<std::size_t, Eigen::Isometry3d> read_pose_rows(const fs::path& file, st
         const auto at = at_line(file, line.number);
         std::string trouble, warning;
         if (row.size() != 7) {
-            left_out.add(fmt::format("{}: {}, expected 7 (tx ty tz qx qy qz qw); pose not used.", at, counted(row.size(), "value")));
+            left_out.add(fmt::format("{}: {}, expected 7 (tx ty tz qx qy qz qw); pose not used.", at,
+                                     counted(row.size(), "value")));
             continue;
         }
-        if (const auto pose = quaternion_pose(row, 0, trouble, warning)) poses.emplace(number_of_row, *pose);
-        else left_out.add(fmt::format("{}: {}; pose not used.", at, trouble));
-        if (!warning.empty()) mended.add(fmt::format("{}: {}.", at, warning));
+        if (const auto pose = quaternion_pose(row, 0, trouble, warning))
+            poses.emplace(number_of_row, *pose);
+        else
+            left_out.add(fmt::format("{}: {}; pose not used.", at, trouble));
+        if (!warning.empty())
+            mended.add(fmt::format("{}: {}.", at, warning));
     }
     return poses;
 }
@@ -152,7 +162,8 @@ std::map<std::size_t, Eigen::Isometry3d> read_redwood_log(const fs::path& file, 
         const auto index = head.size() == 3 ? whole_number(head[0]) : std::nullopt;
         std::string trouble = index ? "" : "expected three whole numbers before a pose";
         int line = lines[i].number;
-        if (trouble.empty() && i + 4 >= lines.size()) trouble = "the file ends inside the pose that starts here";
+        if (trouble.empty() && i + 4 >= lines.size())
+            trouble = "the file ends inside the pose that starts here";
         Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
         for (int row = 0; row < 4 && trouble.empty(); ++row) {
             const TextLine& text = lines[i + 1 + static_cast<std::size_t>(row)];
@@ -160,11 +171,14 @@ std::map<std::size_t, Eigen::Isometry3d> read_redwood_log(const fs::path& file, 
             line = text.number;
         }
         if (!trouble.empty()) { // what follows cannot be told apart into poses any more
-            warnings.push_back(fmt::format("{}: {}; this pose and all after it not used.", at_line(file, line), trouble));
+            warnings.push_back(
+                fmt::format("{}: {}; this pose and all after it not used.", at_line(file, line), trouble));
             return poses;
         }
-        if (!is_rigid(matrix)) left_out.add(fmt::format("{}: {}; pose not used.", at_line(file, lines[i].number), not_rigid(matrix)));
-        else poses.emplace(*index, rigid(matrix));
+        if (!is_rigid(matrix))
+            left_out.add(fmt::format("{}: {}; pose not used.", at_line(file, lines[i].number), not_rigid(matrix)));
+        else
+            poses.emplace(*index, rigid(matrix));
     }
     return poses;
 }
@@ -180,7 +194,8 @@ MatrixPose read_matrix_pose(const fs::path& file) {
     }
     for (std::size_t row = 0; row < lines.size(); ++row) {
         const std::string trouble = read_row(lines[row], matrix, static_cast<int>(row));
-        if (trouble.empty()) continue;
+        if (trouble.empty())
+            continue;
         result.problem = fmt::format("{}: {}", at_line(file, lines[row].number), trouble);
         return result;
     }
@@ -190,7 +205,8 @@ MatrixPose read_matrix_pose(const fs::path& file) {
         result.warning = fmt::format("{}: {}; pose not used.", file.string(), not_rigid(matrix));
     } else {
         result.world_from_camera = rigid(matrix);
-        if (lines.size() == 3) result.warning = file.string() + ": 3 rows, expected 4; the last taken as 0 0 0 1.";
+        if (lines.size() == 3)
+            result.warning = file.string() + ": 3 rows, expected 4; the last taken as 0 0 0 1.";
     }
     return result;
 }

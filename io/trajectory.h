@@ -15,27 +15,31 @@ struct StampedPose {
     Eigen::Isometry3d world_from_camera;
 };
 
-/// TUM's groundtruth.txt: "time tx ty tz qx qy qz qw" per line. Lines that cannot be used (not a number, NaN, zero quaternion)
-/// are left out, each with a warning naming the line; quaternions off unit length are normalised. Sorted by time.
-[[nodiscard]] std::vector<StampedPose> read_tum_trajectory(const std::filesystem::path& file, std::vector<std::string>& warnings);
+/// TUM's groundtruth.txt: "time tx ty tz qx qy qz qw" per line. Lines that cannot be used (not a number, NaN, zero
+/// quaternion) are left out, each with a warning naming the line; quaternions off unit length are normalised. Sorted by
+/// time.
+[[nodiscard]] std::vector<StampedPose> read_tum_trajectory(const std::filesystem::path& file,
+                                                           std::vector<std::string>& warnings);
 
 /// The same rows without time: the pose of row N (counted from 1, comments and blank lines left out).
 [[nodiscard]] std::map<std::size_t, Eigen::Isometry3d> read_pose_rows(const std::filesystem::path& file,
-                                                                     std::vector<std::string>& warnings);
+                                                                      std::vector<std::string>& warnings);
 
 /// Redwood's .log: a line of three integers, of which the first is the frame's index, then a 4x4 matrix.
 /// A damaged block ends the reading with a warning naming the line.
 [[nodiscard]] std::map<std::size_t, Eigen::Isometry3d> read_redwood_log(const std::filesystem::path& file,
-                                                                       std::vector<std::string>& warnings);
+                                                                        std::vector<std::string>& warnings);
 
 /// A file that holds one pose.
 struct MatrixPose {
     std::optional<Eigen::Isometry3d> world_from_camera;
     std::string problem; ///< the file is damaged: names file and line
-    std::string warning; ///< why there is no pose though the file is sound (tracking lost, not rigid), or what was completed
+    std::string
+        warning; ///< why there is no pose though the file is sound (tracking lost, not rigid), or what was completed
 };
 
-/// 7-Scenes' and BundleFusion's pose.txt: 4x4, or 3x4 with the last row left out. Infinities mean that tracking was lost.
+/// 7-Scenes' and BundleFusion's pose.txt: 4x4, or 3x4 with the last row left out. Infinities mean that tracking was
+/// lost.
 [[nodiscard]] MatrixPose read_matrix_pose(const std::filesystem::path& file);
 
 } // namespace scanshade

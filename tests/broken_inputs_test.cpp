@@ -1,5 +1,5 @@
-// Damaged and odd inputs: those made here, and, where they are at hand, those of the shared data folder and its good captures.
-// A refusal must name the file and the place; what can still be used must be used, with a warning.
+// Damaged and odd inputs: those made here, and, where they are at hand, those of the shared data folder and its good
+// captures. A refusal must name the file and the place; what can still be used must be used, with a warning.
 #include "io/camera_file.h"
 #include "io/capture.h"
 #include "io/cloud_file.h"
@@ -30,7 +30,8 @@ using tests::write_file;
 
 std::string big_endian(std::uint32_t value) {
     std::string bytes;
-    for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(value >> shift);
+    for (int shift = 24; shift >= 0; shift -= 8)
+        bytes += static_cast<char>(value >> shift);
     return bytes;
 }
 
@@ -43,16 +44,19 @@ std::string png_chunk(const std::string& type, const std::string& data) {
 std::string compressed(const std::string& raw) {
     uLongf length = compressBound(static_cast<uLong>(raw.size()));
     std::string packed(length, '\0');
-    compress(reinterpret_cast<Bytef*>(packed.data()), &length, reinterpret_cast<const Bytef*>(raw.data()), static_cast<uLong>(raw.size()));
+    compress(reinterpret_cast<Bytef*>(packed.data()), &length, reinterpret_cast<const Bytef*>(raw.data()),
+             static_cast<uLong>(raw.size()));
     packed.resize(length);
     return packed;
 }
 
 /// A PNG of sound chunks: whatever the header says, `rows` rows of 8 grey 16-bit pixels follow.
 std::string png(std::uint32_t width, std::uint32_t height, int bits, int colour_type, int rows) {
-    const std::string header = big_endian(width) + big_endian(height) + static_cast<char>(bits) + static_cast<char>(colour_type) + std::string(3, '\0');
+    const std::string header = big_endian(width) + big_endian(height) + static_cast<char>(bits) +
+                               static_cast<char>(colour_type) + std::string(3, '\0');
     const std::string raw(static_cast<std::size_t>(rows) * 17, '\x01'); // filter 1, then samples
-    return std::string("\x89PNG\r\n\x1a\n") + png_chunk("IHDR", header) + png_chunk("IDAT", compressed(raw)) + png_chunk("IEND", "");
+    return std::string("\x89PNG\r\n\x1a\n") + png_chunk("IHDR", header) + png_chunk("IDAT", compressed(raw)) +
+           png_chunk("IEND", "");
 }
 
 class BrokenImages : public ::testing::Test {
@@ -70,7 +74,8 @@ TEST_F(BrokenImages, a_sound_png_is_read) { EXPECT_EQ(depth_refusal(png(8, 4, 16
 
 TEST_F(BrokenImages, a_png_cut_anywhere_is_refused) {
     const std::string whole = png(8, 4, 16, 0, 4);
-    for (std::size_t length = 0; length < whole.size(); ++length) EXPECT_NE(depth_refusal(whole.substr(0, length)), "") << length;
+    for (std::size_t length = 0; length < whole.size(); ++length)
+        EXPECT_NE(depth_refusal(whole.substr(0, length)), "") << length;
     EXPECT_TRUE(says(depth_refusal(""), "empty file"));
     EXPECT_TRUE(says(depth_refusal(whole.substr(0, whole.size() - 12)), "IEND"));
 }
@@ -102,7 +107,9 @@ TEST_F(BrokenImages, what_cannot_be_depth_is_refused_by_its_header) {
 }
 
 TEST_F(BrokenImages, pgm_and_pfm_sizes_must_fit_the_bytes) {
-    const auto refused = [&](const std::string& header, std::size_t bytes) { return depth_refusal(header + std::string(bytes, 'x'), "d.pgm"); };
+    const auto refused = [&](const std::string& header, std::size_t bytes) {
+        return depth_refusal(header + std::string(bytes, 'x'), "d.pgm");
+    };
     EXPECT_EQ(refused("P5 4 2 65535\n", 16), "");
     EXPECT_TRUE(says(refused("P5 4 2 65535\n", 15), "needs 16 bytes of samples, found 15"));
     EXPECT_TRUE(says(refused("P5 4 2 65535\n", 17), "found 17"));
@@ -146,7 +153,9 @@ TEST_F(BrokenImages, changed_bytes_never_crash_a_reader) {
         ASSERT_TRUE(cv::imencode(kind, image, encoded));
         for (int i = 0; i < 300; ++i) {
             std::string changed(encoded.begin(), encoded.end());
-            for (int k = 0; k < 3; ++k) changed[static_cast<std::size_t>(random.uniform(0, static_cast<int>(changed.size())))] = static_cast<char>(random.next());
+            for (int k = 0; k < 3; ++k)
+                changed[static_cast<std::size_t>(random.uniform(0, static_cast<int>(changed.size())))] =
+                    static_cast<char>(random.next());
             const fs::path file = write_file(folder_ / "any", changed);
             (void)refusal([&] { (void)read_stored_depth(file); });
             (void)refusal([&] { (void)read_colour(file); });
@@ -184,7 +193,8 @@ class BrokenClouds : public ::testing::Test {
 };
 
 std::string pcd(const std::string& data, const std::string& body, const std::string& points = "2") {
-    return "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH " + points + "\nHEIGHT 1\nPOINTS " + points + "\nDATA " + data + "\n" + body;
+    return "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH " + points + "\nHEIGHT 1\nPOINTS " +
+           points + "\nDATA " + data + "\n" + body;
 }
 
 TEST_F(BrokenClouds, pcd_headers_are_checked_line_by_line) {
@@ -226,12 +236,15 @@ TEST_F(BrokenClouds, pcd_bodies_must_hold_what_the_header_says) {
     EXPECT_TRUE(says(cloud_refusal(pcd("binary_compressed", sizes(4, 4294967280U) + "1234")), "4294967280"));
     EXPECT_TRUE(says(cloud_refusal(pcd("binary_compressed", sizes(100, 24) + "1234")), "100 bytes expected"));
     EXPECT_TRUE(says(cloud_refusal(pcd("binary_compressed", sizes(3, 24) + "\xe0\xff\xff")), "LZF"));
-    EXPECT_TRUE(says(cloud_refusal(pcd("binary_compressed", sizes(3, 12 * 300000000U) + "\xe0\xff\xff", "300000000")), "cannot unpack"));
+    EXPECT_TRUE(says(cloud_refusal(pcd("binary_compressed", sizes(3, 12 * 300000000U) + "\xe0\xff\xff", "300000000")),
+                     "cannot unpack"));
 }
 
 TEST_F(BrokenClouds, odd_viewpoints_are_taken_as_identity) {
     for (const char* viewpoint : {"0 0 0 0 0 0 0", "nan 0 0 1 0 0 0", "1 2 3"}) {
-        EXPECT_EQ(cloud_refusal(fmt::format("VERSION 0.7\nVIEWPOINT {}\n", viewpoint) + pcd("ascii", "1 2 3\n4 5 6\n").substr(12)), "");
+        EXPECT_EQ(cloud_refusal(fmt::format("VERSION 0.7\nVIEWPOINT {}\n", viewpoint) +
+                                pcd("ascii", "1 2 3\n4 5 6\n").substr(12)),
+                  "");
         EXPECT_TRUE(warned(warnings_, "line 2: VIEWPOINT")) << viewpoint;
     }
 }
@@ -243,7 +256,9 @@ std::string ply(const std::string& format, const std::string& header, const std:
 const std::string vertices = "element vertex 2\nproperty float x\nproperty float y\nproperty float z\n";
 
 TEST_F(BrokenClouds, ply_headers_are_checked_line_by_line) {
-    const auto refused = [&](const std::string& header) { return cloud_refusal(ply("ascii", header, "1 2 3\n4 5 6\n")); };
+    const auto refused = [&](const std::string& header) {
+        return cloud_refusal(ply("ascii", header, "1 2 3\n4 5 6\n"));
+    };
     EXPECT_EQ(refused(vertices), "");
     EXPECT_TRUE(says(refused("element vertex -2\n"), "line 3"));
     EXPECT_TRUE(says(refused("element vertex 18446744073709551615\n"), "line 3"));
@@ -267,10 +282,13 @@ TEST_F(BrokenClouds, ply_bodies_must_hold_what_the_header_says) {
     EXPECT_TRUE(says(cloud_refusal(ply("binary_little_endian", vertices, std::string(20, 'x'))), "holds 1"));
     EXPECT_TRUE(says(cloud_refusal(ply("ascii", vertices + faces, "1 2 3\n4 5 6\n4 0 1 0\n")), "line 12"));
     EXPECT_TRUE(says(cloud_refusal(ply("ascii", vertices + faces, "1 2 3\n4 5 6\n-1\n")), "line 12"));
-    EXPECT_TRUE(says(cloud_refusal(ply("binary_little_endian", vertices + faces, std::string(24, '\0') + "\xff")), "claims 255 values"));
+    EXPECT_TRUE(says(cloud_refusal(ply("binary_little_endian", vertices + faces, std::string(24, '\0') + "\xff")),
+                     "claims 255 values"));
     EXPECT_EQ(cloud_refusal(ply("ascii", vertices + faces, "1 2 3\n4 5 6\n3 0 1 2\n")), "");
     EXPECT_TRUE(warned(warnings_, "face 1 names vertex 2 of 2"));
-    EXPECT_EQ(cloud_refusal(ply("ascii", "element vertex 0\nproperty float x\nproperty float y\nproperty float z\n", "")), "");
+    EXPECT_EQ(
+        cloud_refusal(ply("ascii", "element vertex 0\nproperty float x\nproperty float y\nproperty float z\n", "")),
+        "");
     EXPECT_TRUE(warned(warnings_, "no points"));
 }
 
@@ -281,14 +299,21 @@ TEST_F(BrokenClouds, changed_bytes_never_crash_a_reader) {
     twenty.replace(twenty.find(" 2"), 2, " 20");
     const std::string faces = "element face 2\nproperty list uchar int vertex_indices\n";
     std::string lines;
-    for (int i = 0; i < 20; ++i) lines += "1.5 2 3\n";
+    for (int i = 0; i < 20; ++i)
+        lines += "1.5 2 3\n";
     const std::string packed = std::string("\x78\0\0\0\xf0\0\0\0", 8) + std::string(120, '\x07');
-    for (const std::string& whole : {pcd("ascii", lines, "20"), pcd("binary", body, "20"), pcd("binary_compressed", packed, "20"),
-                                     ply("ascii", twenty + faces, lines + "3 0 1 2\n3 1 2 3\n"), ply("binary_big_endian", twenty + faces, body + std::string("\1\0\0\0\0\0", 6)),
-                                     ply("binary_little_endian", twenty + "property list uchar uchar tags\n", body + body)}) {
+    for (const std::string& whole :
+         {pcd("ascii", lines, "20"), pcd("binary", body, "20"), pcd("binary_compressed", packed, "20"),
+          ply("ascii", twenty + faces, lines + "3 0 1 2\n3 1 2 3\n"),
+          ply("binary_big_endian", twenty + faces, body + std::string("\1\0\0\0\0\0", 6)),
+          ply("binary_little_endian", twenty + "property list uchar uchar tags\n", body + body)}) {
         for (int i = 0; i < 400; ++i) {
-            std::string changed = whole.substr(0, static_cast<std::size_t>(random.uniform(static_cast<int>(whole.size() / 2), static_cast<int>(whole.size()) + 1)));
-            for (int k = 0; k < 2; ++k) changed[static_cast<std::size_t>(random.uniform(0, static_cast<int>(changed.size())))] = static_cast<char>(random.next());
+            std::string changed =
+                whole.substr(0, static_cast<std::size_t>(random.uniform(static_cast<int>(whole.size() / 2),
+                                                                        static_cast<int>(whole.size()) + 1)));
+            for (int k = 0; k < 2; ++k)
+                changed[static_cast<std::size_t>(random.uniform(0, static_cast<int>(changed.size())))] =
+                    static_cast<char>(random.next());
             const fs::path file = write_file(folder_ / "any", changed);
             (void)refusal([&] {
                 std::vector<std::string> warnings;
@@ -311,7 +336,8 @@ fs::path data_folder() {
 
 enum class Reader { depth, colour, cloud, camera, capture };
 
-/// One row of broken/README.md: the words that the refusal must hold, or those that some warning must (empty = none at all).
+/// One row of broken/README.md: the words that the refusal must hold, or those that some warning must (empty = none at
+/// all).
 struct Case {
     const char* path;
     Reader reader;
@@ -342,7 +368,8 @@ const Case cases[] = {
     {"tum_unsorted", Reader::capture, false, "depth.txt: time stamps are out of order"},
     {"tum_duplicate_stamp", Reader::capture, false, "rgb.txt line 3: repeats the time stamp"},
     {"tum_zero_quaternion", Reader::capture, false, "groundtruth.txt line 3: the quaternion is zero"},
-    {"tum_nonunit_quaternion", Reader::capture, false, "groundtruth.txt line 3: the quaternion has length 2; normalised"},
+    {"tum_nonunit_quaternion", Reader::capture, false,
+     "groundtruth.txt line 3: the quaternion has length 2; normalised"},
     {"tum_nan_pose", Reader::capture, false, "groundtruth.txt line 3: tx is \"nan\""},
     {"tum_empty_list", Reader::capture, false, "rgb.txt: no entries"},
     {"tum_header_without_hash", Reader::capture, false, "groundtruth.txt line 1"},
@@ -352,7 +379,8 @@ const Case cases[] = {
     {"pcd/ok_reference_160x120_compressed.pcd", Reader::cloud, false, ""},
     {"pcd/count_too_high.pcd", Reader::cloud, true, "says 5000 points, the file holds 200"},
     {"pcd/count_too_low.pcd", Reader::cloud, false, "100 lines are left over"},
-    {"pcd/width_height_points_disagree.pcd", Reader::cloud, true, "WIDTH 640 x HEIGHT 480 is 307200, but POINTS says 200"},
+    {"pcd/width_height_points_disagree.pcd", Reader::cloud, true,
+     "WIDTH 640 x HEIGHT 480 is 307200, but POINTS says 200"},
     {"pcd/huge_counts.pcd", Reader::cloud, true, "4000000000"},
     {"pcd/ascii_garbage_line.pcd", Reader::cloud, true, "line 112"},
     {"pcd/ascii_short_line.pcd", Reader::cloud, true, "line 62: 2 values, expected 3"},
@@ -378,7 +406,8 @@ const Case cases[] = {
     {"ply/list_length_lies.ply", Reader::cloud, true, "4294967295"},
     {"ply/face_index_out_of_range.ply", Reader::cloud, false, "face 2 names vertex 99999 of 500"},
     {"ply/zero_vertices.ply", Reader::cloud, false, "no points"},
-    // The data's README says line 9, the second vertex; lines counted from 1, it is the tenth (the first stands in line 9).
+    // The data's README says line 9, the second vertex; lines counted from 1, it is the tenth (the first stands in line
+    // 9).
     {"ply/ascii_missing_column.ply", Reader::cloud, true, "line 10: 2 values, expected 3 (record 2"},
     {"camera/ok_open3d.json", Reader::camera, false, ""},
     {"camera/row_major.json", Reader::camera, true, "row by row"},
@@ -404,11 +433,21 @@ std::vector<std::string> warnings_of(const fs::path& path) {
 std::vector<std::string> use(const fs::path& path, Reader reader) {
     std::vector<std::string> warnings;
     switch (reader) {
-    case Reader::depth: (void)read_stored_depth(path); break;
-    case Reader::colour: (void)read_colour(path); break;
-    case Reader::cloud: (void)read_cloud(path, warnings); break;
-    case Reader::camera: warnings = read_camera_file(path).warnings; break;
-    case Reader::capture: warnings = warnings_of(path); break;
+    case Reader::depth:
+        (void)read_stored_depth(path);
+        break;
+    case Reader::colour:
+        (void)read_colour(path);
+        break;
+    case Reader::cloud:
+        (void)read_cloud(path, warnings);
+        break;
+    case Reader::camera:
+        warnings = read_camera_file(path).warnings;
+        break;
+    case Reader::capture:
+        warnings = warnings_of(path);
+        break;
     }
     return warnings;
 }
@@ -418,7 +457,8 @@ class BrokenData : public ::testing::TestWithParam<Case> {};
 TEST_P(BrokenData, is_refused_or_warned_about_as_the_table_says) {
     const Case& c = GetParam();
     const fs::path path = data_folder() / "broken" / c.path;
-    if (!fs::exists(path)) GTEST_SKIP() << path << " is not at hand";
+    if (!fs::exists(path))
+        GTEST_SKIP() << path << " is not at hand";
     std::vector<std::string> warnings;
     const std::string message = refusal([&] { warnings = use(path, c.reader); });
     if (c.refused) {
@@ -427,13 +467,16 @@ TEST_P(BrokenData, is_refused_or_warned_about_as_the_table_says) {
         return;
     }
     EXPECT_EQ(message, "");
-    if (*c.words == '\0') EXPECT_TRUE(warnings.empty()) << joined(warnings);
-    else EXPECT_TRUE(warned(warnings, c.words));
+    if (*c.words == '\0')
+        EXPECT_TRUE(warnings.empty()) << joined(warnings);
+    else
+        EXPECT_TRUE(warned(warnings, c.words));
 }
 INSTANTIATE_TEST_SUITE_P(readme, BrokenData, ::testing::ValuesIn(cases));
 
-#define NEEDS(path) \
-    if (!fs::exists(path)) GTEST_SKIP() << (path) << " is not at hand"
+#define NEEDS(path)                                                                                                    \
+    if (!fs::exists(path))                                                                                             \
+    GTEST_SKIP() << (path) << " is not at hand"
 
 struct OneBadFrame {
     const char* path;
@@ -452,19 +495,24 @@ TEST_P(OneBadFrameOf, a_sequence_leaves_the_others_alone) {
     EXPECT_GE(capture.entries.size(), 3);
     for (std::size_t i = 0; i < capture.entries.size(); ++i) {
         const std::string message = refusal([&] { EXPECT_FALSE(capture.load(i).depth_m.empty()); });
-        if (capture.entries[i].name == bad) EXPECT_TRUE(says(message, words));
-        else EXPECT_EQ(message, "");
+        if (capture.entries[i].name == bad)
+            EXPECT_TRUE(says(message, words));
+        else
+            EXPECT_EQ(message, "");
     }
 }
-INSTANTIATE_TEST_SUITE_P(
-    readme, OneBadFrameOf,
-    ::testing::Values(OneBadFrame{"seq_nan_pose", "frame-000220", "frame-000220.pose.txt line 2"},
-                      OneBadFrame{"seq_missing_depth", "frame-000220", "frame-000220.depth"},
-                      OneBadFrame{"seq_size_mismatch", "frame-000220", "depth is 320x240, but its camera is for 640x480"},
-                      OneBadFrame{"seq_one_truncated", "frame-000220", "frame-000220.depth.png: PNG ends early at byte 30000"},
-                      OneBadFrame{"seq_odd_names", "frame-000239", "frame-000239.depth"},
-                      OneBadFrame{"tum_missing_depth_file", "6.733333", "depth.txt line 3"},
-                      OneBadFrame{"tum_path_escape", "6.666667", "depth.txt line 2: \"../../outside.png\" leaves the capture's folder"}));
+INSTANTIATE_TEST_SUITE_P(readme, OneBadFrameOf,
+                         ::testing::Values(OneBadFrame{"seq_nan_pose", "frame-000220", "frame-000220.pose.txt line 2"},
+                                           OneBadFrame{"seq_missing_depth", "frame-000220", "frame-000220.depth"},
+                                           OneBadFrame{"seq_size_mismatch", "frame-000220",
+                                                       "depth is 320x240, but its camera is for 640x480"},
+                                           OneBadFrame{"seq_one_truncated", "frame-000220",
+                                                       "frame-000220.depth.png: PNG ends early at byte 30000"},
+                                           OneBadFrame{"seq_odd_names", "frame-000239", "frame-000239.depth"},
+                                           OneBadFrame{"tum_missing_depth_file", "6.733333", "depth.txt line 3"},
+                                           OneBadFrame{
+                                               "tum_path_escape", "6.666667",
+                                               "depth.txt line 2: \"../../outside.png\" leaves the capture's folder"}));
 
 TEST(broken_data, unpaired_files_are_reported_and_foreign_ones_ignored) {
     const fs::path path = data_folder() / "broken/seq_odd_names";
@@ -491,7 +539,8 @@ TEST(broken_data, no_frame_of_a_duplicate_stamp_is_used_twice) {
     NEEDS(path);
     std::vector<fs::path> colours;
     for (const CaptureEntry& entry : open_capture(path).entries)
-        if (!entry.colour.empty()) colours.push_back(entry.colour);
+        if (!entry.colour.empty())
+            colours.push_back(entry.colour);
     std::sort(colours.begin(), colours.end());
     EXPECT_EQ(std::adjacent_find(colours.begin(), colours.end()), colours.end());
     EXPECT_EQ(colours.size(), 3);
@@ -516,7 +565,8 @@ TEST(broken_data, controls_are_read_exactly) {
     EXPECT_EQ(plain.colours, packed.colours);
     for (std::size_t i = 0; i < plain.points.size(); ++i)
         EXPECT_TRUE(plain.points[i] == packed.points[i] || (plain.points[i].hasNaN() && packed.points[i].hasNaN()));
-    const Cloud little = read_cloud(path / "ply/ok_reference_500.ply", warnings), big = read_cloud(path / "ply/ok_big_endian.ply", warnings);
+    const Cloud little = read_cloud(path / "ply/ok_reference_500.ply", warnings),
+                big = read_cloud(path / "ply/ok_big_endian.ply", warnings);
     EXPECT_EQ(little.points, big.points);
     EXPECT_EQ(little.colours, big.colours);
     EXPECT_EQ(read_camera_file(path / "camera/ok_open3d.json").camera.pinhole.cx, 319.5);
@@ -529,7 +579,8 @@ struct Good {
     const char* kind;
     std::size_t frames;
     double fx; ///< 0 = the capture has no camera
-    double least_holes, most_holes, nearest_m, farthest_m; ///< over all frames, a little wider than the README's roundings
+    double least_holes, most_holes, nearest_m,
+        farthest_m; ///< over all frames, a little wider than the README's roundings
     bool poses;
     Registration registration;
 };
@@ -569,8 +620,10 @@ INSTANTIATE_TEST_SUITE_P(
         Good{"rgbd_redwood", "Redwood / Open3D", 5, 525, 0.1235, 0.1305, 0.9549, 2.7021, true, Registration::unknown},
         Good{"rgbd_tum_fr1_desk", "TUM RGB-D", 6, 517.3, 0.1685, 0.1835, 0.735, 2.1151, true, Registration::yes},
         Good{"rgbd_tum_converted", "TUM RGB-D", 20, 525, 0.078, 0.108, 0.9649, 3.1151, true, Registration::unknown},
-        Good{"rgbd_realsense", "colour and depth folders", 5, 617.25, 0.0044, 0.0651, 0.2799, 3.1851, false, Registration::unknown},
-        Good{"rgbd_kinect_pgm", "colour and depth folders", 2, 0, 0.3065, 0.3195, 0.945, 9.8251, true, Registration::unknown}));
+        Good{"rgbd_realsense", "colour and depth folders", 5, 617.25, 0.0044, 0.0651, 0.2799, 3.1851, false,
+             Registration::unknown},
+        Good{"rgbd_kinect_pgm", "colour and depth folders", 2, 0, 0.3065, 0.3195, 0.945, 9.8251, true,
+             Registration::unknown}));
 
 TEST(good_data, single_depth_images_need_their_encoding_and_doubt_the_wrong_one) {
     const fs::path folder = data_folder() / "single_frames";
@@ -579,8 +632,9 @@ TEST(good_data, single_depth_images_need_their_encoding_and_doubt_the_wrong_one)
         const char *file, *scale;
         double nearest_m, farthest_m, holes;
     };
-    for (const Row& row : {Row{"NYU_depth.pgm", "nyu", 1.385, 6.75, 0.072}, Row{"SUN_depth.png", "sun", 1.0569, 9.8701, 0.182},
-                           Row{"TUM_depth.png", "tum", 1.46, 9.335, 0.192}}) {
+    for (const Row& row :
+         {Row{"NYU_depth.pgm", "nyu", 1.385, 6.75, 0.072}, Row{"SUN_depth.png", "sun", 1.0569, 9.8701, 0.182},
+          Row{"TUM_depth.png", "tum", 1.46, 9.335, 0.192}}) {
         CaptureOptions options;
         options.depth_scale = row.scale;
         const Frame right = open_capture(folder / row.file, options).load(0);
@@ -605,7 +659,8 @@ TEST(good_data, organised_clouds_keep_invalid_points_and_their_colours) {
         const Cloud cloud = read_cloud(folder / (std::string(name) + ".pcd"), warnings);
         EXPECT_TRUE(warnings.empty()) << joined(warnings);
         EXPECT_EQ(cloud.grid, cv::Size(640, 480));
-        const auto invalid = std::count_if(cloud.points.begin(), cloud.points.end(), [](const auto& p) { return p.hasNaN(); });
+        const auto invalid =
+            std::count_if(cloud.points.begin(), cloud.points.end(), [](const auto& p) { return p.hasNaN(); });
         EXPECT_NEAR(static_cast<double>(invalid) / 307200, share, 0.0006) << name;
         EXPECT_EQ(cloud.colours.empty(), std::string(name) == "capture0001");
     }
@@ -615,8 +670,9 @@ TEST(good_data, clouds_survive_a_field_more_with_every_bit) {
     const fs::path data = data_folder();
     NEEDS(data / "unorganised");
     const TemporaryFolder folder;
-    for (const char* name : {"unorganised/frag_115.ply", "unorganised/fragment.pcd", "unorganised/bun0.pcd", "unorganised/milk_color.pcd",
-                             "organised/learn0.pcd", "terrain_utm/samp11-utm.pcd", "broken/ply/list_in_vertex.ply"}) {
+    for (const char* name :
+         {"unorganised/frag_115.ply", "unorganised/fragment.pcd", "unorganised/bun0.pcd", "unorganised/milk_color.pcd",
+          "organised/learn0.pcd", "terrain_utm/samp11-utm.pcd", "broken/ply/list_in_vertex.ply"}) {
         std::vector<std::string> warnings;
         const Cloud cloud = read_cloud(data / name, warnings);
         write_cloud(folder / "same", cloud, {});

@@ -56,8 +56,10 @@ std::string swapped_bytes_of(Values... values) {
 std::vector<float> ramp(std::size_t count) {
     std::vector<float> values(count);
     std::iota(values.begin(), values.end(), 0.0F);
-    for (float& value : values) value /= 8;
-    if (count > 0) values[0] = nan;
+    for (float& value : values)
+        value /= 8;
+    if (count > 0)
+        values[0] = nan;
     return values;
 }
 
@@ -91,35 +93,43 @@ void expect_same_bytes(const fs::path& source) {
 
 // --- PCD ---
 
-std::string pcd_header(const std::string& fields, const std::string& sizes, const std::string& types, cv::Size grid, const std::string& data) {
-    return fmt::format("# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS {}\nSIZE {}\nTYPE {}\nCOUNT{}\nWIDTH {}\nHEIGHT {}\n"
-                       "VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {}\nDATA {}\n",
-                       fields, sizes, types, [&] {
-                           std::string ones;
-                           for (std::size_t i = 0; i < sizes.size(); i += 2) ones += " 1";
-                           return ones;
-                       }(),
-                       grid.width, grid.height, grid.area(), data);
+std::string pcd_header(const std::string& fields, const std::string& sizes, const std::string& types, cv::Size grid,
+                       const std::string& data) {
+    return fmt::format(
+        "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS {}\nSIZE {}\nTYPE {}\nCOUNT{}\nWIDTH "
+        "{}\nHEIGHT {}\n"
+        "VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {}\nDATA {}\n",
+        fields, sizes, types,
+        [&] {
+            std::string ones;
+            for (std::size_t i = 0; i < sizes.size(); i += 2)
+                ones += " 1";
+            return ones;
+        }(),
+        grid.width, grid.height, grid.area(), data);
 }
 
 TEST(pcd, ascii_keeps_every_word_and_gets_one_more) {
     const TemporaryFolder folder;
     // Words that a number's round trip would change: trailing zeros, exponents, capitals, odd blanks, carriage returns.
     const std::string body = "1.50 -0 3e0\tnan\r\n  nan NAN nan 4.2108e+06\r\n\r\n0.10000000149 2 3 7";
-    const auto file = write_file(folder / "c.pcd", pcd_header("x y z rgb", "4 4 4 4", "F F F F", {3, 1}, "ascii") + body);
+    const auto file =
+        write_file(folder / "c.pcd", pcd_header("x y z rgb", "4 4 4 4", "F F F F", {3, 1}, "ascii") + body);
     expect_same_bytes(file);
     const std::string added = with_ao(file, folder / "out.pcd");
     EXPECT_TRUE(says(added, "FIELDS x y z rgb ambient_occlusion\nSIZE 4 4 4 4 4\nTYPE F F F F F\nCOUNT 1 1 1 1 1\n"));
-    EXPECT_TRUE(added.ends_with("1.50 -0 3e0\tnan nan\r\n  nan NAN nan 4.2108e+06 0.125\r\n\r\n0.10000000149 2 3 7 0.25"));
+    EXPECT_TRUE(
+        added.ends_with("1.50 -0 3e0\tnan nan\r\n  nan NAN nan 4.2108e+06 0.125\r\n\r\n0.10000000149 2 3 7 0.25"));
 }
 
 TEST(pcd, binary_keeps_doubles_labels_and_nan_patterned_colours) {
     const TemporaryFolder folder;
     // A float colour with alpha 0xff is a NaN whose payload is the colour; a float copy may quieten it.
-    const std::string first = bytes_of(std::uint16_t(7), 512345.678901234, 5403210.123456789, 252.25, std::uint32_t(0xff812345));
+    const std::string first =
+        bytes_of(std::uint16_t(7), 512345.678901234, 5403210.123456789, 252.25, std::uint32_t(0xff812345));
     const std::string second = bytes_of(std::uint16_t(9), 0.1, 0.2, 0.3, std::uint32_t(0x7f800001));
-    const auto file =
-        write_file(folder / "c.pcd", pcd_header("label x y z rgb", "2 8 8 8 4", "U F F F F", {2, 1}, "binary") + first + second);
+    const auto file = write_file(
+        folder / "c.pcd", pcd_header("label x y z rgb", "2 8 8 8 4", "U F F F F", {2, 1}, "binary") + first + second);
     expect_same_bytes(file);
     const Cloud cloud = read(file);
     EXPECT_EQ(cloud.points[0].x(), 512345.678901234); // not a float's
@@ -134,8 +144,9 @@ TEST(pcd, compressed_holds_fields_one_after_another) {
     const std::string columns = bytes_of(1.0F, 2.0F, 3.0F, 4.0F, 5.0F, 6.0F, 0x00abcdefU, 0xff010203U);
     const std::string packed = "\x1f" + columns;
     ASSERT_EQ(columns.size(), 32);
-    const auto file = write_file(folder / "c.pcd", pcd_header("x y z rgba", "4 4 4 4", "F F F U", {1, 2}, "binary_compressed") +
-                                                       bytes_of(std::uint32_t(packed.size()), std::uint32_t(32)) + packed);
+    const auto file =
+        write_file(folder / "c.pcd", pcd_header("x y z rgba", "4 4 4 4", "F F F U", {1, 2}, "binary_compressed") +
+                                         bytes_of(std::uint32_t(packed.size()), std::uint32_t(32)) + packed);
     const Cloud cloud = read(file);
     EXPECT_EQ(cloud.points[0], Eigen::Vector3d(1, 3, 5));
     EXPECT_EQ(cloud.points[1], Eigen::Vector3d(2, 4, 6));
@@ -144,7 +155,8 @@ TEST(pcd, compressed_holds_fields_one_after_another) {
     (void)with_ao(file, folder / "out.pcd");
     const Cloud back = read(folder / "out.pcd");
     EXPECT_EQ(back.records->encoding, CloudRecords::Encoding::compressed);
-    for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(back.records->record(i).substr(0, 16), cloud.records->record(i));
+    for (std::size_t i = 0; i < 2; ++i)
+        EXPECT_EQ(back.records->record(i).substr(0, 16), cloud.records->record(i));
 }
 
 TEST(pcd, large_compressed_bodies_of_every_texture_survive) {
@@ -153,8 +165,10 @@ TEST(pcd, large_compressed_bodies_of_every_texture_survive) {
     std::string rows;
     cv::RNG random(1);
     for (int i = 0; i < n; ++i) // smooth, constant, noise, NaN: LZF's easy and hard cases
-        rows += bytes_of(static_cast<float>(i), 1.0F, static_cast<float>(random.uniform(-1.0, 1.0)), nan, static_cast<std::uint32_t>(random.next()));
-    const auto binary = write_file(folder / "b.pcd", pcd_header("x y z curvature rgba", "4 4 4 4 4", "F F F F U", {n, 1}, "binary") + rows);
+        rows += bytes_of(static_cast<float>(i), 1.0F, static_cast<float>(random.uniform(-1.0, 1.0)), nan,
+                         static_cast<std::uint32_t>(random.next()));
+    const auto binary = write_file(
+        folder / "b.pcd", pcd_header("x y z curvature rgba", "4 4 4 4 4", "F F F F U", {n, 1}, "binary") + rows);
     Cloud cloud = read(binary);
     auto records = std::make_shared<CloudRecords>(*cloud.records);
     records->encoding = CloudRecords::Encoding::compressed;
@@ -168,8 +182,10 @@ TEST(pcd, large_compressed_bodies_of_every_texture_survive) {
 TEST(pcd, padding_fields_and_counts_above_one_keep_their_places) {
     const TemporaryFolder folder;
     const std::string record = bytes_of(1.0F) + "abc" + bytes_of(2.0F, 3.0F, 10.0F, 11.0F);
-    const auto file = write_file(folder / "c.pcd", "VERSION .7\nFIELDS x _ y z normal\nSIZE 4 1 4 4 4\nTYPE F U F F F\nCOUNT 1 3 1 1 2\n"
-                                                   "WIDTH 1\nHEIGHT 1\nPOINTS 1\nDATA binary\n" + record);
+    const auto file = write_file(folder / "c.pcd",
+                                 "VERSION .7\nFIELDS x _ y z normal\nSIZE 4 1 4 4 4\nTYPE F U F F F\nCOUNT 1 3 1 1 2\n"
+                                 "WIDTH 1\nHEIGHT 1\nPOINTS 1\nDATA binary\n" +
+                                     record);
     EXPECT_EQ(read(file).points[0], Eigen::Vector3d(1, 2, 3));
     EXPECT_TRUE(with_ao(file, folder / "out.pcd").ends_with(record + bytes_of(nan)));
 }
@@ -179,8 +195,10 @@ TEST(pcd, a_field_of_that_name_is_replaced_not_doubled) {
     for (const char* data : {"ascii", "binary", "binary_compressed"}) {
         const bool text = std::string(data) == "ascii";
         const std::string columns = bytes_of(1.0F, 2.0F, 3.0F);
-        const std::string body = text ? "1 2 3\n" : data == std::string("binary") ? columns
-                                                  : bytes_of(std::uint32_t(13), std::uint32_t(12)) + "\x0b" + columns;
+        const std::string body = text ? "1 2 3\n"
+                                 : data == std::string("binary")
+                                     ? columns
+                                     : bytes_of(std::uint32_t(13), std::uint32_t(12)) + "\x0b" + columns;
         const auto file = write_file(folder / "c.pcd", pcd_header("x y z", "4 4 4", "F F F", {1, 1}, data) + body);
         const std::array first{0.25F}, second{0.75F};
         write_cloud(folder / "once.pcd", read(file), {{ao, first}});
@@ -194,12 +212,15 @@ TEST(pcd, a_field_of_that_name_is_replaced_not_doubled) {
 
 TEST(pcd, new_colours_keep_alpha_and_are_made_only_on_request) {
     const TemporaryFolder folder;
-    const auto file = write_file(folder / "c.pcd", pcd_header("x y z rgba", "4 4 4 4", "F F F U", {2, 1}, "binary") +
-                                                       bytes_of(1.0F, 1.0F, 1.0F, 0x00112233U, 1.0F, 1.0F, 1.0F, 0xff445566U));
+    const auto file =
+        write_file(folder / "c.pcd", pcd_header("x y z rgba", "4 4 4 4", "F F F U", {2, 1}, "binary") +
+                                         bytes_of(1.0F, 1.0F, 1.0F, 0x00112233U, 1.0F, 1.0F, 1.0F, 0xff445566U));
     const std::array colours{cv::Vec3b(1, 2, 3), cv::Vec3b(4, 5, 6)};
     write_cloud(folder / "out.pcd", read(file), {}, colours);
-    EXPECT_TRUE(file_bytes(folder / "out.pcd").ends_with(bytes_of(1.0F, 1.0F, 1.0F, 0x00030201U, 1.0F, 1.0F, 1.0F, 0xff060504U)));
-    const auto grey = write_file(folder / "g.pcd", pcd_header("x y z", "4 4 4", "F F F", {2, 1}, "ascii") + "1 1 1\n2 2 2\n");
+    EXPECT_TRUE(file_bytes(folder / "out.pcd")
+                    .ends_with(bytes_of(1.0F, 1.0F, 1.0F, 0x00030201U, 1.0F, 1.0F, 1.0F, 0xff060504U)));
+    const auto grey =
+        write_file(folder / "g.pcd", pcd_header("x y z", "4 4 4", "F F F", {2, 1}, "ascii") + "1 1 1\n2 2 2\n");
     EXPECT_TRUE(says(refusal([&] { write_cloud(folder / "no.pcd", read(grey), {}, colours); }), "no colour field"));
     EXPECT_FALSE(fs::exists(folder / "no.pcd"));
 }
@@ -207,17 +228,20 @@ TEST(pcd, new_colours_keep_alpha_and_are_made_only_on_request) {
 TEST(pcd, ascii_colours_are_replaced_as_the_words_of_their_type) {
     const TemporaryFolder folder;
     const std::array colours{cv::Vec3b(1, 2, 3)};
-    const auto as_integer = write_file(folder / "u.pcd", pcd_header("x rgba y z", "4 4 4 4", "F U F F", {1, 1}, "ascii") + "1  4278190080 2 3\n");
+    const auto as_integer = write_file(
+        folder / "u.pcd", pcd_header("x rgba y z", "4 4 4 4", "F U F F", {1, 1}, "ascii") + "1  4278190080 2 3\n");
     write_cloud(folder / "out.pcd", read(as_integer), {}, colours);
     EXPECT_TRUE(file_bytes(folder / "out.pcd").ends_with(fmt::format("1  {} 2 3\n", 0xff030201U)));
-    const auto as_float = write_file(folder / "f.pcd", pcd_header("x rgb y z", "4 4 4 4", "F F F F", {1, 1}, "ascii") + "1 0 2 3\n");
+    const auto as_float =
+        write_file(folder / "f.pcd", pcd_header("x rgb y z", "4 4 4 4", "F F F F", {1, 1}, "ascii") + "1 0 2 3\n");
     write_cloud(folder / "out.pcd", read(as_float), {}, colours);
     EXPECT_EQ(read(folder / "out.pcd").colours[0], colours[0]);
 }
 
 TEST(pcd, left_over_lines_are_warned_about_and_written_back) {
     const TemporaryFolder folder;
-    const auto file = write_file(folder / "c.pcd", pcd_header("x y z", "4 4 4", "F F F", {1, 1}, "ascii") + "1 1 1\n2 2 2\n3 3 3\n");
+    const auto file =
+        write_file(folder / "c.pcd", pcd_header("x y z", "4 4 4", "F F F", {1, 1}, "ascii") + "1 1 1\n2 2 2\n3 3 3\n");
     std::vector<std::string> warnings;
     const Cloud cloud = read_cloud(file, warnings);
     EXPECT_EQ(cloud.points.size(), 1);
@@ -229,9 +253,11 @@ TEST(pcd, left_over_lines_are_warned_about_and_written_back) {
 
 // --- PLY ---
 
-std::string ply_header(const std::string& format, int vertices, const std::string& properties, const std::string& after = "") {
-    return fmt::format("ply\nformat {} 1.0\ncomment made by hand\nobj_info kept too\nelement vertex {}\n{}{}comment last\nend_header\n", format,
-                       vertices, properties, after);
+std::string ply_header(const std::string& format, int vertices, const std::string& properties,
+                       const std::string& after = "") {
+    return fmt::format("ply\nformat {} 1.0\ncomment made by hand\nobj_info kept too\nelement vertex {}\n{}{}comment "
+                       "last\nend_header\n",
+                       format, vertices, properties, after);
 }
 
 const std::string xyz = "property float x\nproperty float y\nproperty float z\n";
@@ -240,7 +266,8 @@ const std::string faces = "element face 1\nproperty list uchar int vertex_indice
 
 TEST(ply, comments_faces_and_both_byte_orders_survive) {
     const TemporaryFolder folder;
-    const std::string little_face = bytes_of(std::uint8_t(3), 0, 1, 0), big_face = swapped_bytes_of(std::uint8_t(3), 0, 1, 0);
+    const std::string little_face = bytes_of(std::uint8_t(3), 0, 1, 0),
+                      big_face = swapped_bytes_of(std::uint8_t(3), 0, 1, 0);
     const std::string little = bytes_of(1.0F, 2.0F, 3.0F), big = swapped_bytes_of(1.0F, 2.0F, 3.0F);
     struct Case {
         std::string format, record, face, first_ao, second_ao;
@@ -248,20 +275,26 @@ TEST(ply, comments_faces_and_both_byte_orders_survive) {
     for (const Case& c : {Case{"binary_little_endian", little, little_face, bytes_of(nan), bytes_of(0.125F)},
                           Case{"binary_big_endian", big, big_face, swapped_bytes_of(nan), swapped_bytes_of(0.125F)},
                           Case{"ascii", "1.0 2 3\n", "3 0 1 0\n", "", ""}}) {
-        const auto file = write_file(folder / "c.ply", ply_header(c.format, 2, xyz, faces) + c.record + c.record + c.face);
+        const auto file =
+            write_file(folder / "c.ply", ply_header(c.format, 2, xyz, faces) + c.record + c.record + c.face);
         expect_same_bytes(file);
         EXPECT_EQ(read(file).points[1], Eigen::Vector3d(1, 2, 3)) << c.format;
         const std::string added = with_ao(file, folder / "out.ply");
-        EXPECT_TRUE(added.starts_with(ply_header(c.format, 2, xyz + "property float ambient_occlusion\n", faces))) << c.format;
-        if (c.format == "ascii") EXPECT_TRUE(added.ends_with("1.0 2 3 nan\n1.0 2 3 0.125\n3 0 1 0\n"));
-        else EXPECT_TRUE(added.ends_with(c.record + c.first_ao + c.record + c.second_ao + c.face)) << c.format;
+        EXPECT_TRUE(added.starts_with(ply_header(c.format, 2, xyz + "property float ambient_occlusion\n", faces)))
+            << c.format;
+        if (c.format == "ascii")
+            EXPECT_TRUE(added.ends_with("1.0 2 3 nan\n1.0 2 3 0.125\n3 0 1 0\n"));
+        else
+            EXPECT_TRUE(added.ends_with(c.record + c.first_ao + c.record + c.second_ao + c.face)) << c.format;
     }
 }
 
 TEST(ply, doubles_stay_doubles) {
     const TemporaryFolder folder;
-    const std::string properties = "property double x\nproperty double y\nproperty double z\nproperty ushort intensity\n";
-    const std::string record = bytes_of(515396.12345678901, 4918348.9876543210, 2324.000244140625, std::uint16_t(40000));
+    const std::string properties =
+        "property double x\nproperty double y\nproperty double z\nproperty ushort intensity\n";
+    const std::string record =
+        bytes_of(515396.12345678901, 4918348.9876543210, 2324.000244140625, std::uint16_t(40000));
     const auto file = write_file(folder / "c.ply", ply_header("binary_little_endian", 1, properties) + record);
     expect_same_bytes(file);
     EXPECT_EQ(read(file).points[0].y(), 4918348.9876543210);
@@ -285,8 +318,9 @@ TEST(ply, lists_inside_vertices_are_walked) {
 
 TEST(ply, elements_before_the_vertices_are_passed_over) {
     const TemporaryFolder folder;
-    const std::string header = "ply\r\nformat binary_little_endian 1.0\r\nelement camera 2\r\nproperty int id\r\nelement vertex 1\r\n"
-                               "property float x\r\nproperty float y\r\nproperty float z\r\nend_header\r\n";
+    const std::string header =
+        "ply\r\nformat binary_little_endian 1.0\r\nelement camera 2\r\nproperty int id\r\nelement vertex 1\r\n"
+        "property float x\r\nproperty float y\r\nproperty float z\r\nend_header\r\n";
     const std::string body = bytes_of(11, 12, 1.0F, 2.0F, 3.0F);
     const auto file = write_file(folder / "c.ply", header + body);
     expect_same_bytes(file);
@@ -312,7 +346,8 @@ TEST(ply, colours_change_only_on_request_and_leave_faces_alone) {
 
 TEST(ply, a_grid_in_obj_info_makes_an_organised_cloud) {
     const TemporaryFolder folder;
-    const std::string header = "ply\nformat ascii 1.0\nobj_info num_cols 3\nobj_info num_rows 2\nelement vertex 6\n" + xyz + "end_header\n";
+    const std::string header =
+        "ply\nformat ascii 1.0\nobj_info num_cols 3\nobj_info num_rows 2\nelement vertex 6\n" + xyz + "end_header\n";
     const auto file = write_file(folder / "c.ply", header + "0 0 1\n1 0 1\n2 0 1\n0 1 1\n1 1 1\nnan nan nan\n");
     EXPECT_EQ(read(file).grid, cv::Size(3, 2));
     EXPECT_TRUE(read(file).points[5].array().isNaN().all());
@@ -342,12 +377,16 @@ TEST(new_fields, must_fit_the_cloud) {
     const std::array two{1.0F, 2.0F};
     const std::array one{1.0F};
     EXPECT_TRUE(says(refusal([&] { write_cloud(folder / "o.ply", read(file), {{ao, two}}); }), "2 values"));
-    EXPECT_TRUE(says(refusal([&] { write_cloud(folder / "o.ply", read(file), {{"two words", one}}); }), "without blanks"));
+    EXPECT_TRUE(says(refusal([&] {
+                         write_cloud(folder / "o.ply", read(file), {{"two words", one}});
+                     }),
+                     "without blanks"));
 }
 
 TEST(clouds, describe_themselves) {
     const TemporaryFolder folder;
-    const auto file = write_file(folder / "c.pcd", pcd_header("x y z", "4 4 4", "F F F", {2, 2}, "ascii") + "1 1 1\n1 1 1\n1 1 1\n1 1 1\n");
+    const auto file = write_file(folder / "c.pcd", pcd_header("x y z", "4 4 4", "F F F", {2, 2}, "ascii") +
+                                                       "1 1 1\n1 1 1\n1 1 1\n1 1 1\n");
     const Cloud cloud = read(file);
     EXPECT_EQ(describe(*cloud.records), "PCD ascii, 4 points, 2x2 organised, fields x y z");
     EXPECT_EQ(extension(*cloud.records), ".pcd");

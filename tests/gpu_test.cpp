@@ -93,15 +93,13 @@ TEST(gpu, a_broken_table_is_refused_before_anything_runs) {
 }
 
 TEST(gpu, validation_rings_when_a_program_is_wrong) {
-    // A pipeline whose shader uses binding 0 while the table gives it none: the layer must say so, or it is not watching.
+    // More work groups than any device allows, recorded but never run: the layer must say so, or it is not watching.
     setenv("SCANSHADE_VALIDATE", "1", 1);
     gpu::Device device;
     if (!device.validating()) GTEST_SKIP() << "the validation layer is not installed";
-    PassRow blind{"blind", "test/add_one", {}, {0}, {1, 1, 1}, {}};
-    try {
-        gpu::Program program(device, {words("out", Host::download)}, {blind}, 4);
-    } catch (const Error&) {
-    }
+    PassRow vast = add_one(0, 1);
+    vast.groups = {1, 1U << 31, 1};
+    const gpu::Program program(device, {words("in", Host::upload), words("out", Host::download)}, {vast}, 4);
     EXPECT_FALSE(device.validation_messages().empty());
 }
 

@@ -27,7 +27,8 @@ constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 
 cv::Mat1f visibility_ramp() {
     cv::Mat1f map(7, 13);
-    for (int i = 0; i < 91; ++i) map(i / 13, i % 13) = i % 10 == 3 ? nan : static_cast<float>(i) / 90.0F;
+    for (int i = 0; i < 91; ++i)
+        map(i / 13, i % 13) = i % 10 == 3 ? nan : static_cast<float>(i) / 90.0F;
     return map;
 }
 
@@ -35,7 +36,8 @@ cv::Mat1f visibility_ramp() {
 cv::Mat1f wall(cv::Size size = {64, 48}) {
     cv::Mat1f depth(size);
     for (int y = 0; y < size.height; ++y)
-        for (int x = 0; x < size.width; ++x) depth(y, x) = 1.0F + static_cast<float>(x) / static_cast<float>(size.width);
+        for (int x = 0; x < size.width; ++x)
+            depth(y, x) = 1.0F + static_cast<float>(x) / static_cast<float>(size.width);
     depth(0, 0) = 0;
     return depth;
 }
@@ -43,7 +45,8 @@ cv::Mat1f wall(cv::Size size = {64, 48}) {
 cv::Mat3b picture(cv::Size size = {64, 48}) {
     cv::Mat3b image(size);
     for (int y = 0; y < size.height; ++y)
-        for (int x = 0; x < size.width; ++x) image(y, x) = {static_cast<uchar>(x), static_cast<uchar>(y), 200};
+        for (int x = 0; x < size.width; ++x)
+            image(y, x) = {static_cast<uchar>(x), static_cast<uchar>(y), 200};
     return image;
 }
 
@@ -128,7 +131,8 @@ TEST(depth_images, pfm_starts_at_the_bottom_and_knows_both_byte_orders) {
     std::reverse(big.begin(), big.begin() + 4);
     std::reverse(big.begin() + 4, big.end());
     for (const auto& [scale, bytes] : {std::pair{"-1.0", little}, {"1.0", big}}) {
-        const cv::Mat stored = read_stored_depth(write_file(folder / "d.pfm", fmt::format("Pf\n1 2\n{}\n", scale) + bytes));
+        const cv::Mat stored =
+            read_stored_depth(write_file(folder / "d.pfm", fmt::format("Pf\n1 2\n{}\n", scale) + bytes));
         EXPECT_EQ(stored.at<float>(0), 2.5F) << scale;
         EXPECT_EQ(stored.at<float>(1), 1.5F) << scale;
     }
@@ -183,7 +187,8 @@ TEST(depth_encodings, integers_and_floats_are_not_mixed_up) {
 
 TEST(depth_encodings, a_number_is_units_per_metre_and_anything_else_is_misuse) {
     EXPECT_EQ(depth_encoding("10000", "test").units_per_metre, 10000);
-    for (const char* text : {"", "0", "-5", "nan", "inf", "cm", "1000x"}) EXPECT_THROW((void)depth_encoding(text, "test"), Misuse) << text;
+    for (const char* text : {"", "0", "-5", "nan", "inf", "cm", "1000x"})
+        EXPECT_THROW((void)depth_encoding(text, "test"), Misuse) << text;
 }
 
 // --- colour ---
@@ -267,7 +272,8 @@ TEST(camera_files, our_json_comes_back_bit_for_bit) {
 
 TEST(camera_files, a_text_matrix_is_read_by_rows_and_names_no_size) {
     const TemporaryFolder folder;
-    const auto read = read_camera_file(write_file(folder / "k.txt", "\xEF\xBB\xBF" "585 0 320\r\n0 586 240\r\n0 0 1\r\n"));
+    const auto read = read_camera_file(write_file(folder / "k.txt", "\xEF\xBB\xBF"
+                                                                    "585 0 320\r\n0 586 240\r\n0 0 1\r\n"));
     EXPECT_EQ(read.camera.pinhole.fy, 586);
     EXPECT_EQ(read.camera.pinhole.cx, 320);
     EXPECT_TRUE(read.camera.pinhole.size.empty());
@@ -275,9 +281,9 @@ TEST(camera_files, a_text_matrix_is_read_by_rows_and_names_no_size) {
 
 TEST(camera_files, bundle_fusion_info_gives_size_and_depth_unit) {
     const TemporaryFolder folder;
-    const auto read = read_camera_file(write_file(folder / "info.txt",
-                                                  "m_versionNumber = 4\nm_depthWidth = 640\nm_depthHeight = 480\nm_depthShift = 1000\n"
-                                                  "m_calibrationDepthIntrinsic = 582 0 320 0 0 583 240 0 0 0 1 0 0 0 0 1\n"));
+    const auto read = read_camera_file(write_file(
+        folder / "info.txt", "m_versionNumber = 4\nm_depthWidth = 640\nm_depthHeight = 480\nm_depthShift = 1000\n"
+                             "m_calibrationDepthIntrinsic = 582 0 320 0 0 583 240 0 0 0 1 0 0 0 0 1\n"));
     EXPECT_EQ(read.camera.pinhole.fx, 582);
     EXPECT_EQ(read.camera.pinhole.fy, 583);
     EXPECT_EQ(read.camera.pinhole.cy, 240);
@@ -289,7 +295,8 @@ TEST(camera_files, the_command_line_takes_numbers_or_a_file) {
     const CameraFile numbers = camera_from_argument("500, 501, 320, 240");
     EXPECT_EQ(numbers.camera.pinhole.fy, 501);
     EXPECT_TRUE(says(numbers.camera.origin, "--camera"));
-    for (const char* text : {"500,501,320", "500,501,320,x", "-500,501,320,240", "0,501,320,240", "nowhere.json", "500,nan,1,1"})
+    for (const char* text :
+         {"500,501,320", "500,501,320,x", "-500,501,320,240", "0,501,320,240", "nowhere.json", "500,nan,1,1"})
         EXPECT_THROW((void)camera_from_argument(text), Misuse) << text;
 }
 
@@ -301,7 +308,8 @@ TEST(camera_files, json_of_the_wrong_shape_names_the_key) {
     EXPECT_TRUE(says(message(R"({"fx": 1, "fy": 1, "cx": 1, "width": 4, "height": 4})"), "\"cy\""));
     EXPECT_TRUE(says(message(R"({"fx": 1, "fy": 1, "cx": 1, "cy": "x", "width": 4, "height": 4})"), "\"cy\""));
     EXPECT_TRUE(says(message(R"({"fx": 1, "fy": 1, "cx": 1, "cy": 1, "width": 0, "height": 4})"), "\"width\""));
-    EXPECT_TRUE(says(message(R"({"fx": 1, "fy": 1, "cx": 1, "cy": 1, "width": 4, "height": 4, "distortion": [1]})"), "\"distortion\""));
+    EXPECT_TRUE(says(message(R"({"fx": 1, "fy": 1, "cx": 1, "cy": 1, "width": 4, "height": 4, "distortion": [1]})"),
+                     "\"distortion\""));
     EXPECT_TRUE(says(message(R"({"fx": 1e999, "fy": 1, "cx": 1, "cy": 1, "width": 4, "height": 4})"), "c.json"));
     EXPECT_TRUE(says(message("[1, 2]"), "object"));
     EXPECT_TRUE(says(message(""), "empty"));
@@ -320,7 +328,8 @@ void write_pair(const fs::path& colour, const fs::path& depth, double units) {
 void write_tum(const fs::path& folder, int frames) {
     std::string rgb = "# colour\n", depth = "# depth\n", poses = "# poses\n";
     for (int i = 0; i < frames; ++i) {
-        const std::string colour_name = fmt::format("rgb/{:.6f}.png", 10 + i * 0.1), depth_name = fmt::format("depth/{:.6f}.png", 10.01 + i * 0.1);
+        const std::string colour_name = fmt::format("rgb/{:.6f}.png", 10 + i * 0.1),
+                          depth_name = fmt::format("depth/{:.6f}.png", 10.01 + i * 0.1);
         write_pair(folder / colour_name, folder / depth_name, 5000);
         rgb += fmt::format("{:.6f} {}\n", 10 + i * 0.1, colour_name);
         depth += fmt::format("{:.6f} {}\n", 10.01 + i * 0.1, depth_name);
@@ -434,20 +443,23 @@ TEST(captures, seven_scenes_reads_matrices_and_never_claims_registration) {
 TEST(captures, a_lost_pose_is_left_out_and_the_frame_stays) {
     const TemporaryFolder folder;
     write_pair(folder / "frame-000001.color.jpg", folder / "frame-000001.depth.png", 1000);
-    write_file(folder / "frame-000001.pose.txt", "-inf -inf -inf -inf\n-inf -inf -inf -inf\n-inf -inf -inf -inf\n0 0 0 1\n");
+    write_file(folder / "frame-000001.pose.txt",
+               "-inf -inf -inf -inf\n-inf -inf -inf -inf\n-inf -inf -inf -inf\n0 0 0 1\n");
     const Frame frame = open_capture(folder.path()).load(0);
     EXPECT_FALSE(frame.world_from_camera);
     EXPECT_TRUE(warned(frame.warnings, "tracking was lost"));
 }
 
-constexpr const char* open3d_camera = R"({"width": 64, "height": 48, "intrinsic_matrix": [60, 0, 0, 0, 61, 0, 31.5, 23.5, 1]})";
+constexpr const char* open3d_camera =
+    R"({"width": 64, "height": 48, "intrinsic_matrix": [60, 0, 0, 0, 61, 0, 31.5, 23.5, 1]})";
 
 TEST(captures, redwood_reads_match_log_and_column_major_camera) {
     const TemporaryFolder folder;
     write_pair(folder / "color/b.jpg", folder / "depth/00000.png", 1000);
     write_pair(folder / "color/a.jpg", folder / "depth/00001.png", 1000);
     write_file(folder / "rgbd.match", "depth/00000.png color/b.jpg\ncolor/a.jpg depth/00001.png\n");
-    write_file(folder / "trajectory.log", "0 0 1\n1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 1\n1 1 2\n1 0 0 4\n0 1 0 5\n0 0 1 6\n0 0 0 1\n");
+    write_file(folder / "trajectory.log",
+               "0 0 1\n1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 1\n1 1 2\n1 0 0 4\n0 1 0 5\n0 0 1 6\n0 0 0 1\n");
     write_file(folder / "camera_primesense.json", open3d_camera);
     write_file(folder / "camera_trajectory.json", "{}"); // poses, whatever its name begins with
     const Capture capture = open_capture(folder.path());
@@ -462,7 +474,9 @@ TEST(captures, redwood_reads_match_log_and_column_major_camera) {
 
 TEST(captures, colour_and_depth_folders_pair_by_name_in_natural_order) {
     const TemporaryFolder folder;
-    for (const char* name : {"2", "10"}) write_pair(folder / ("color/" + std::string(name) + ".png"), folder / ("depth/" + std::string(name) + ".png"), 1000);
+    for (const char* name : {"2", "10"})
+        write_pair(folder / ("color/" + std::string(name) + ".png"), folder / ("depth/" + std::string(name) + ".png"),
+                   1000);
     write_file(folder / "pose.txt", "0 0 0 0 0 0 1\n7 8 9 0 0 0 1"); // row N is image N's
     const Capture capture = open_capture(folder.path());
     EXPECT_EQ(capture.kind, "colour and depth folders");
@@ -491,8 +505,9 @@ TEST(captures, single_files_are_captures_of_one_frame) {
     EXPECT_EQ(depth.kind, "depth image");
     EXPECT_EQ(depth.depth.origin, "assumed: floats are metres");
     EXPECT_EQ(worst_difference(depth.load(0).depth_m, wall()), 0);
-    const auto cloud_file = write_file(folder / "c.dat", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
-                                                         "property float z\nend_header\n1 2 3\n");
+    const auto cloud_file =
+        write_file(folder / "c.dat", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                                     "property float z\nend_header\n1 2 3\n");
     const Capture cloud = open_capture(cloud_file); // told by content
     EXPECT_EQ(cloud.kind, "cloud");
     EXPECT_EQ(cloud.load(0).cloud->points[0], Eigen::Vector3d(1, 2, 3));
@@ -501,7 +516,8 @@ TEST(captures, single_files_are_captures_of_one_frame) {
 
 TEST(captures, frame_names_are_unique_and_fit_for_files) {
     const TemporaryFolder folder;
-    const std::string cloud = "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+    const std::string cloud =
+        "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
     write_file(folder / "a.ply", cloud);
     write_file(folder / "a.PLY", cloud);
     const Capture capture = open_capture(folder.path());
@@ -512,8 +528,9 @@ TEST(captures, frame_names_are_unique_and_fit_for_files) {
 TEST(captures, a_pcd_viewpoint_is_the_pose_and_leaves_the_points_alone) {
     const TemporaryFolder folder;
     // w x y z = 0 1 0 0: a half turn about x; points stay in the camera's frame.
-    const auto file = write_file(folder / "c.pcd", "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\n"
-                                                   "VIEWPOINT 1 2 3 0 1 0 0\nPOINTS 1\nDATA ascii\n0 0 2\n");
+    const auto file = write_file(folder / "c.pcd",
+                                 "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\n"
+                                 "VIEWPOINT 1 2 3 0 1 0 0\nPOINTS 1\nDATA ascii\n0 0 2\n");
     const Frame frame = open_capture(file).load(0);
     EXPECT_EQ(frame.cloud->points[0], Eigen::Vector3d(0, 0, 2));
     EXPECT_TRUE((*frame.world_from_camera * frame.cloud->points[0]).isApprox(Eigen::Vector3d(1, 2, 1)));
@@ -535,7 +552,8 @@ TEST(captures, noise_in_place_of_surfaces_is_doubted) {
     const TemporaryFolder folder;
     cv::Mat1w noise(48, 64);
     cv::RNG random(7);
-    for (auto& value : noise) value = static_cast<ushort>(random.uniform(500, 9000));
+    for (auto& value : noise)
+        value = static_cast<ushort>(random.uniform(500, 9000));
     cv::imwrite((folder / "d.png").string(), noise);
     EXPECT_TRUE(warned(open_capture(folder / "d.png").load(0).warnings, "noise"));
 }

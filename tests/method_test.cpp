@@ -18,6 +18,8 @@ struct Case {
     bool downsampled;
 };
 
+void PrintTo(const Case& c, std::ostream* out) { *out << c.method << " " << c.quality << (c.downsampled ? " downsampled" : ""); }
+
 Parameter* row_named(std::vector<Parameter>& rows, const std::string& name) {
     for (Parameter& row : rows)
         if (row.name == name) return &row;

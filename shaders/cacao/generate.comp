@@ -167,7 +167,7 @@ void main() {
     vec4 edges = vec4(1.0);
     if (detailed || (scan != 0 && base == 0)) { // scan never blurs across a depth edge, whatever the quality
         vec4 z = neighbour_depths(s.slice, t);
-        edges = edges_from_depth(zc, z);
+        edges = scan != 0 ? edges_from_inverse(1.0 / zc, inverse_or_hole(z)) : edges_from_depth(zc, z);
         if (detailed) sum.obscurance = detail(s, step_m, z, edges);
         if (kernel >= 2) edges *= normal_edges(s.normal, s.slice, t);
     }

@@ -49,22 +49,25 @@ vec2 ray_of(ivec2 p0, ivec2 step) {
     return k.view_mul * ((vec2(p0) + 0.5) * k.image_inv + vec2(step) * float(spacing) * k.image_inv) + k.view_add;
 }
 
-// One of the four pixels: its depth c and the depths left, right, above and below; rays at -1, 0, +1 of each axis.
-void put(int slice, ivec2 t, ivec2 p0, float c, vec4 around, vec3 ray_x, vec3 ray_y) {
-    ivec2 parity = ivec2(slice & 1, slice >> 1);
-    ivec2 p = p0 + spacing * parity;
+// Normal of one pixel from its depth c and the depths left, right, above and below; w are their inverses.
+vec3 derived(float c, vec4 around, float wc, vec4 w, vec3 ray_x, vec3 ray_y) {
+    vec4 edges = scan != 0 ? edges_from_inverse(wc, w) : edges_from_depth(c, around);
+    return normal_from_neighbours(edges, vec3(ray_x.y, ray_y.y, 1.0) * c, vec3(ray_x.x, ray_y.y, 1.0) * around.x,
+                                  vec3(ray_x.z, ray_y.y, 1.0) * around.y, vec3(ray_x.y, ray_y.x, 1.0) * around.z,
+                                  vec3(ray_x.y, ray_y.z, 1.0) * around.w);
+}
+
+// Scan: where holes leave a pixel no whole quadrant, the other three pixels lend theirs if they lie as deep.
+vec3 completed(vec3 n, float c, vec3 z, vec3 a, vec3 b, vec3 d) {
+    vec3 near = vec3(lessThan(abs(z - c), vec3(0.05 * c)));
+    return scan == 0 || dot(n, n) > 1e-8 ? n : near.x * a + near.y * b + near.z * d;
+}
+
+void put(int slice, ivec2 t, ivec2 p0, float c, vec3 n) {
+    ivec2 p = p0 + spacing * ivec2(slice & 1, slice >> 1);
     if (two_slices == 0 || slice == 0 || slice == 3)
         imageStore(depths, depth_index(slice, 0, t), vec4(stored_depth(p, c)));
-    vec3 n;
-    if (supplied != 0) {
-        n = supplied_normal(p);
-    } else {
-        vec4 edges = edges_from_depth(c, around);
-        vec3 here = vec3(ray_x.y, ray_y.y, 1.0) * c;
-        n = normal_from_neighbours(edges, here, vec3(ray_x.x, ray_y.y, 1.0) * around.x, vec3(ray_x.z, ray_y.y, 1.0) * around.y,
-                                   vec3(ray_x.y, ray_y.x, 1.0) * around.z, vec3(ray_x.y, ray_y.z, 1.0) * around.w);
-    }
-    imageStore(normals, slice_index(slice, t), uvec4(pack_normal(n)));
+    imageStore(normals, slice_index(slice, t), uvec4(pack_normal(supplied != 0 ? supplied_normal(p) : unit(n))));
 }
 
 void main() {
@@ -82,8 +85,14 @@ void main() {
 
     vec2 r0 = ray_of(p0, ivec2(-1)), r1 = ray_of(p0, ivec2(0)), r2 = ray_of(p0, ivec2(1)), r3 = ray_of(p0, ivec2(2));
     vec3 x0 = vec3(r0.x, r1.x, r2.x), x1 = vec3(r1.x, r2.x, r3.x), y0 = vec3(r0.y, r1.y, r2.y), y1 = vec3(r1.y, r2.y, r3.y);
-    put(0, t, p0, b1, vec4(b0, b2, a1, c1), x0, y0);
-    put(1, t, p0, b2, vec4(b1, b3, a2, c2), x1, y0);
-    put(2, t, p0, c1, vec4(c0, c2, b1, d1), x0, y1);
-    put(3, t, p0, c2, vec4(c1, c3, b2, d2), x1, y1);
+    vec4 wad = inverse_or_hole(vec4(a1, a2, d1, d2));
+    vec4 wb = inverse_or_hole(vec4(b0, b1, b2, b3)), wc = inverse_or_hole(vec4(c0, c1, c2, c3));
+    vec3 n0 = derived(b1, vec4(b0, b2, a1, c1), wb.y, vec4(wb.x, wb.z, wad.x, wc.y), x0, y0);
+    vec3 n1 = derived(b2, vec4(b1, b3, a2, c2), wb.z, vec4(wb.y, wb.w, wad.y, wc.z), x1, y0);
+    vec3 n2 = derived(c1, vec4(c0, c2, b1, d1), wc.y, vec4(wc.x, wc.z, wb.y, wad.z), x0, y1);
+    vec3 n3 = derived(c2, vec4(c1, c3, b2, d2), wc.z, vec4(wc.y, wc.w, wb.z, wad.w), x1, y1);
+    put(0, t, p0, b1, completed(n0, b1, vec3(b2, c1, c2), n1, n2, n3));
+    put(1, t, p0, b2, completed(n1, b2, vec3(b1, c1, c2), n0, n2, n3));
+    put(2, t, p0, c1, completed(n2, c1, vec3(b1, b2, c2), n0, n1, n3));
+    put(3, t, p0, c2, completed(n3, c2, vec3(b1, b2, c1), n0, n1, n2));
 }

@@ -36,18 +36,21 @@ float half_toward_zero(float v) {
 }
 
 // --- edges: 1 = same surface, 0 = cut; order left, right, top, bottom.
-// Reference: differences corrected by the slope seen on the other side. Scan: a hole is cut and lends no slope.
+// Differences are corrected by the slope seen on the other side.
 vec4 edges_from_depth(float zc, vec4 z) {
     vec4 d = z - zc;
-    vec4 other = d.yxwz;
-    vec4 e = min(abs(d), abs(d + other));
-    if (scan != 0) {
-        bvec4 known = greaterThan(z, vec4(0.0));
-        e = mix(abs(d), e, known.yxwz);
-        return mix(vec4(0.0), clamp(1.3 - e * (25.0 / zc), 0.0, 1.0), known);
-    }
+    vec4 e = min(abs(d), abs(d + d.yxwz));
     return clamp(1.3 - e / (0.04 * zc), 0.0, 1.0);
 }
+// Scan: the same thresholds on 1/z, which is linear across any plane, so that even a grazing plane is one surface.
+// A hole (1/z = 0) is cut and lends no slope.
+vec4 edges_from_inverse(float wc, vec4 w) {
+    vec4 d = w - wc;
+    bvec4 known = greaterThan(w, vec4(0.0));
+    vec4 e = mix(abs(d), min(abs(d), abs(d + d.yxwz)), known.yxwz);
+    return mix(vec4(0.0), clamp(1.3 - e * (25.0 / wc), 0.0, 1.0), known);
+}
+vec4 inverse_or_hole(vec4 z) { return mix(vec4(0.0), 1.0 / z, greaterThan(z, vec4(0.0))); }
 uint pack_edges(vec4 edges) {
     uvec4 r = uvec4(roundEven(clamp(edges, 0.0, 1.0) * 3.05));
     return r.x << 6 | r.y << 4 | r.z << 2 | r.w;

@@ -1,17 +1,20 @@
 // Normals of CACAO: from the four quadrants around a point, weighted by edges; and how they are stored.
 
-// Unit vector to a neighbour; scan meets neighbours without depth (zero length), whose edge weight is zero anyway.
+// Unit vector to a neighbour; scan meets neighbours without depth, whose edge weight is zero anyway.
 vec3 towards(vec3 from, vec3 to) {
     vec3 d = to - from;
     return scan != 0 ? d * inversesqrt(max(dot(d, d), 1e-30)) : normalize(d);
 }
 
+// Not normalised. Scan: zero where no quadrant is whole; the reference then faces the camera.
 vec3 normal_from_neighbours(vec4 e, vec3 c, vec3 left, vec3 right, vec3 top, vec3 bottom) {
     vec3 l = towards(c, left), r = towards(c, right), t = towards(c, top), b = towards(c, bottom);
     // The four quadrants' cross products, each weighted by its two edges, factor into one.
-    vec3 n = cross(e.x * l - e.y * r, e.z * t - e.w * b) + vec3(0.0, 0.0, -0.0005);
-    return n * inversesqrt(dot(n, n));
+    return cross(e.x * l - e.y * r, e.z * t - e.w * b) + vec3(0.0, 0.0, scan != 0 ? 0.0 : -0.0005);
 }
+
+// Zero stays zero: a surface of unknown slope is nowhere below a horizon, so it stays open.
+vec3 unit(vec3 n) { return n * inversesqrt(max(dot(n, n), 1e-20)); }
 
 // Reference: SNORM8 per axis. Scan: 10 bits per axis in the same 32.
 uint pack_normal(vec3 n) {

@@ -69,9 +69,14 @@ uint texel_or_hole(int slice, ivec2 t) {
 vec4 resolved_block(ivec2 t) {
     const ivec2 x = ivec2(1, 0), y = ivec2(0, 1);
     uint c0 = texel_or_hole(0, t), c3 = texel_or_hole(3, t);
-    if (two_slices != 0) // odd pixels have no hole flag of their own: the caller knows their depth
-        return vec4(is_hole(c0) ? -1.0 : ao_value(c0), from_neighbours(c0, texel_or_hole(0, t + x), texel_or_hole(3, t - y), c3),
-                    from_neighbours(texel_or_hole(3, t - x), c3, c0, texel_or_hole(0, t + y)), is_hole(c3) ? -1.0 : ao_value(c3));
+    if (two_slices != 0) { // odd pixels have no hole flag of their own: the caller knows their depth
+        const Known none = Known(0.0, 0.0);
+        Known k0 = known(0, t), k3 = known(3, t);
+        return vec4(smart(c0, none, none, none, none, known(3, t - x - y), known(3, t - y), known(3, t - x), k3),
+                    from_neighbours(c0, texel_or_hole(0, t + x), texel_or_hole(3, t - y), c3),
+                    from_neighbours(texel_or_hole(3, t - x), c3, c0, texel_or_hole(0, t + y)),
+                    smart(c3, none, none, none, none, k0, known(0, t + x), known(0, t + y), known(0, t + x + y)));
+    }
     uint c1 = texel_or_hole(1, t), c2 = texel_or_hole(2, t);
     Known k00 = known(3, t - x - y), k10 = known(2, t - y), k20 = known(3, t - y), k30 = known(2, t + x - y);
     Known k01 = known(1, t - x), k11 = known(0, t), k21 = known(1, t), k31 = known(0, t + x);

@@ -28,13 +28,15 @@ inline std::string file_bytes(const std::filesystem::path& file) {
 
 inline std::string joined(const std::vector<std::string>& texts) {
     std::string all;
-    for (const std::string& text : texts) all += "\n  " + text;
+    for (const std::string& text : texts)
+        all += "\n  " + text;
     return all;
 }
 
 /// Whether any of the warnings holds `part`; shows them all where none does.
 inline testing::AssertionResult warned(const std::vector<std::string>& warnings, const std::string& part) {
-    if (std::any_of(warnings.begin(), warnings.end(), [&](const std::string& w) { return w.find(part) != std::string::npos; }))
+    if (std::any_of(warnings.begin(), warnings.end(),
+                    [&](const std::string& w) { return w.find(part) != std::string::npos; }))
         return testing::AssertionSuccess();
     return testing::AssertionFailure() << "none says \"" << part << "\":" << joined(warnings);
 }
