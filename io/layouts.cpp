@@ -1,5 +1,4 @@
-// Layouts of folders other than TUM's: 7-Scenes, colour and depth folders, depth images alone, clouds; and what all
-// share.
+// Layouts of folders other than TUM's: 7-Scenes, colour and depth folders, depth images alone, clouds.
 #include "io/layouts.h"
 
 #include "io/text.h"
@@ -7,170 +6,13 @@
 #include "projection/error.h"
 
 #include <algorithm>
-#include <cctype>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <map>
-#include <set>
 
 namespace scanshade {
 
 namespace fs = std::filesystem;
-
-// --- what layouts share ---
-
-bool natural_less(const std::string& a, const std::string& b) {
-    const auto digit = [](char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; };
-    std::size_t i = 0, j = 0;
-    while (i < a.size() && j < b.size()) {
-        if (!digit(a[i]) || !digit(b[j])) {
-            if (a[i] != b[j])
-                return a[i] < b[j];
-            ++i, ++j;
-            continue;
-        }
-        const auto run = [&](const std::string& text, std::size_t& at) { // digits without leading zeros
-            while (at < text.size() && text[at] == '0')
-                ++at;
-            const std::size_t start = at;
-            while (at < text.size() && digit(text[at]))
-                ++at;
-            return text.substr(start, at - start);
-        };
-        const std::string left = run(a, i), right = run(b, j);
-        if (left.size() != right.size())
-            return left.size() < right.size();
-        if (left != right)
-            return left < right;
-    }
-    if (a.size() - i != b.size() - j)
-        return a.size() - i < b.size() - j;
-    return a < b; // "01" and "1": any fixed order will do
-}
-
-std::vector<fs::path> files_in(const fs::path& folder) {
-    std::vector<fs::path> files;
-    for (const auto& entry : fs::directory_iterator(folder)) {
-        const std::string name = entry.path().filename().string();
-        std::error_code ignored;
-        if (name.starts_with('.') || name == "Thumbs.db" || name == "desktop.ini" || !entry.is_regular_file(ignored))
-            continue;
-        files.push_back(entry.path());
-    }
-    std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
-        return natural_less(a.filename().string(), b.filename().string());
-    });
-    return files;
-}
-
-std::string lower_extension(const fs::path& file) {
-    std::string text = file.extension().string();
-    std::transform(text.begin(), text.end(), text.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    return text;
-}
-
-namespace {
-
-bool speaks_of(const fs::path& file, std::initializer_list<std::string_view> subjects) {
-    std::string name = file.filename().string();
-    std::transform(name.begin(), name.end(), name.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    return std::any_of(subjects.begin(), subjects.end(),
-                       [&](std::string_view subject) { return name.find(subject) != std::string::npos; });
-}
-
-bool one_of(const std::string& text, std::initializer_list<std::string_view> choices) {
-    return std::find(choices.begin(), choices.end(), text) != choices.end();
-}
-
-} // namespace
-
-bool has_depth_extension(const fs::path& file) {
-    return one_of(lower_extension(file), {".png", ".pgm", ".tif", ".tiff", ".exr", ".pfm"});
-}
-bool has_colour_extension(const fs::path& file) {
-    return one_of(lower_extension(file), {".png", ".jpg", ".jpeg", ".ppm", ".pgm", ".bmp", ".tif", ".tiff", ".webp"});
-}
-bool has_cloud_extension(const fs::path& file) { return one_of(lower_extension(file), {".pcd", ".ply"}); }
-
-std::string trouble_with(const fs::path& folder, const std::string& name) {
-    const fs::path relative = fs::path(name).lexically_normal();
-    if (relative.is_absolute() || (!relative.empty() && *relative.begin() == ".."))
-        return fmt::format("{} leaves the capture's folder; not opened", in_quotes(name));
-    std::error_code ignored;
-    if (!fs::is_regular_file(folder / relative, ignored))
-        return fmt::format("{} does not exist", name);
-    return {};
-}
-
-ImageFacts peek(const fs::path& image) {
-    constexpr std::size_t header = 1 << 16;
-    const std::string start = read_bytes(image, header);
-    const ImageFormat format = image_format(start);
-    const bool whole = format == ImageFormat::tiff || format == ImageFormat::exr; // their sizes may lie at the end
-    return read_image_header(whole ? read_bytes(image) : start, image);
-}
-
-std::optional<CameraFile> camera_in(const fs::path& folder, std::vector<std::string>& warnings) {
-    std::vector<fs::path> candidates, others;
-    for (const fs::path& file : files_in(folder)) {
-        const std::string name = file.filename().string();
-        const bool json = lower_extension(file) == ".json", text = lower_extension(file) == ".txt";
-        // Text files named after cameras are often poses or calibrations of another kind; JSON files rarely are.
-        const bool promising =
-            (json && speaks_of(file, {"cam", "intrinsic"}) && !speaks_of(file, {"traj", "pose", "extrinsic"})) ||
-            (text && speaks_of(file, {"intrinsic"}));
-        if (name == "camera.json")
-            candidates.insert(candidates.begin(), file);
-        else if (promising)
-            candidates.push_back(file);
-        else if (json || name == "info.txt")
-            others.push_back(file);
-    }
-    std::optional<CameraFile> found;
-    for (const fs::path& file : candidates) {
-        if (found) {
-            warnings.push_back(
-                fmt::format("{} is used as the camera; {} is not.", found->camera.origin, file.filename().string()));
-            continue;
-        }
-        found = read_camera_file(file);
-    }
-    for (auto other = others.begin(); !found && other != others.end(); ++other) {
-        try {
-            found = read_camera_file(*other);
-        } catch (const Error&) {
-            continue; // a name that promises nothing may hold anything
-        }
-    }
-    return found;
-}
-
-DepthEncoding assumed_encoding(const fs::path& first_depth) {
-    bool floats = false;
-    try {
-        floats = !first_depth.empty() && peek(first_depth).floats;
-    } catch (const Error&) { // loading that frame will say what is wrong with it
-    }
-    if (floats)
-        return depth_encoding("m", "assumed: floats are metres");
-    return depth_encoding("mm", "assumed: 16-bit integers are millimetres");
-}
-
-void settle_names(std::vector<CaptureEntry>& entries) {
-    std::set<std::string> taken;
-    for (CaptureEntry& entry : entries) {
-        std::replace_if(
-            entry.name.begin(), entry.name.end(),
-            [](char c) { return c == '/' || c == '\\' || static_cast<unsigned char>(c) < ' '; }, '_');
-        if (entry.name.empty())
-            entry.name = "frame";
-        const std::string wanted = entry.name;
-        for (int n = 2; !taken.insert(entry.name).second; ++n)
-            entry.name = fmt::format("{}-{}", wanted, n);
-    }
-}
 
 // --- 7-Scenes and BundleFusion: frame-NNNNNN.color.jpg, .depth.png, .pose.txt ---
 

@@ -1,4 +1,5 @@
 // bench: milliseconds of every CACAO quality and of each pass, beside a calibration gather timed in the same run.
+//   bench --write-maps FOLDER | --compare-maps FOLDER     the same maps on two devices, and how far they differ
 //   bench [--sizes 640x480,1920x1080] [--repeat 20] [--device NAME] [--passes] [--profile scan|reference]
 // Times are device time (timestamps) where the device has them, medians over the repeats. The scene is a generated room.
 #include "ao/cacao/cacao.h"
@@ -10,7 +11,9 @@
 #include <chrono>
 #include <cmath>
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <fmt/format.h>
+#include <fstream>
 #include <map>
 
 using namespace scanshade;
@@ -85,6 +88,54 @@ cv::Size parse_size(const std::string& text) {
     return size;
 }
 
+/// The configurations whose maps two devices must agree on: every quality and resolution, holes included.
+template <class Use>
+void each_map(gpu::Device& device, Use use) {
+    DepthImage depth = room({641, 479});
+    depth.z_m(cv::Rect(200, 150, 60, 7)) = 0;
+    depth.z_m(cv::Rect(400, 0, 5, 300)) = 0;
+    for (const bool downsampled : {false, true})
+        for (const char* quality : {"lowest", "low", "medium", "high", "highest"}) {
+            CacaoOptions options;
+            options.quality = quality;
+            options.downsampled = downsampled;
+            Cacao method(device, options);
+            use(fmt::format("{}_{}", quality, downsampled ? "downsampled" : "native"), method.compute({depth}).visibility);
+        }
+}
+
+void write_maps(gpu::Device& device, const std::filesystem::path& folder) {
+    std::filesystem::create_directories(folder);
+    each_map(device, [&](const std::string& name, const cv::Mat1f& map) {
+        std::ofstream(folder / (name + ".f32"), std::ios::binary)
+            .write(reinterpret_cast<const char*>(map.data), static_cast<std::streamsize>(map.total() * 4));
+    });
+}
+
+int compare_maps(gpu::Device& device, const std::filesystem::path& folder) {
+    int missed = 0;
+    fmt::print("{:<32} {:>10} {:>8} {:>8}   differences in 1/255 to {}\n", "map", "mean", "p99", "worst", folder.string());
+    each_map(device, [&](const std::string& name, const cv::Mat1f& map) {
+        cv::Mat1f theirs(map.size());
+        if (!std::ifstream(folder / (name + ".f32"), std::ios::binary)
+                 .read(reinterpret_cast<char*>(theirs.data), static_cast<std::streamsize>(theirs.total() * 4)))
+            throw Error((folder / name).string() + ".f32 is missing or short");
+        std::vector<double> differences;
+        double sum = 0;
+        for (std::size_t i = 0; i < map.total(); ++i) {
+            const float a = map.ptr<float>()[i], b = theirs.ptr<float>()[i];
+            differences.push_back(std::isnan(a) != std::isnan(b) ? 255.0 : std::isnan(a) ? 0.0 : 255.0 * std::abs(a - b));
+            sum += differences.back();
+        }
+        std::sort(differences.begin(), differences.end());
+        const double mean = sum / static_cast<double>(differences.size()), p99 = differences[differences.size() * 99 / 100];
+        const bool met = mean <= 0.5 && p99 <= 2;
+        fmt::print("{:<32} {:>10.4f} {:>8.3f} {:>8.2f}{}\n", name, mean, p99, differences.back(), met ? "" : "  MISSED");
+        missed += !met;
+    });
+    return missed ? 1 : 0;
+}
+
 } // namespace
 
 int main(int argc, char** argv) {
@@ -92,6 +143,7 @@ int main(int argc, char** argv) {
     std::string choice, profile = "scan";
     int repeat = 20;
     bool passes = false;
+    std::string written, compared;
     CLI::App app{"milliseconds of CACAO"};
     app.add_option("--sizes", sizes)->delimiter(',');
     app.add_option("--qualities", qualities)->delimiter(',');
@@ -99,10 +151,14 @@ int main(int argc, char** argv) {
     app.add_option("--device", choice);
     app.add_option("--profile", profile);
     app.add_flag("--passes", passes);
+    app.add_option("--write-maps", written);
+    app.add_option("--compare-maps", compared);
     CLI11_PARSE(app, argc, argv);
     try {
         gpu::Device device(choice);
         fmt::print("{} ({}), profile {}\n", device.info().name, device.info().driver, profile);
+        if (!written.empty()) return write_maps(device, written), 0;
+        if (!compared.empty()) return compare_maps(device, compared);
         for (const std::string& text : sizes) {
             const cv::Size size = parse_size(text);
             const DepthImage depth = room(size);
