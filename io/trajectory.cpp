@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <fmt/format.h>
 
 namespace scanshade {
@@ -159,8 +160,9 @@ std::map<std::size_t, Eigen::Isometry3d> read_redwood_log(const fs::path& file, 
     RepeatedWarning left_out(warnings);
     for (std::size_t i = 0; i < lines.size(); i += 5) {
         const auto head = words(lines[i].text);
-        const auto index = head.size() == 3 ? whole_number(head[0]) : std::nullopt;
-        std::string trouble = index ? "" : "expected three whole numbers before a pose";
+        constexpr std::uint64_t none = UINT64_MAX;
+        const std::uint64_t index = head.size() == 3 ? whole_number(head[0]).value_or(none) : none;
+        std::string trouble = index != none ? "" : "expected three whole numbers before a pose";
         int line = lines[i].number;
         if (trouble.empty() && i + 4 >= lines.size())
             trouble = "the file ends inside the pose that starts here";
@@ -178,7 +180,7 @@ std::map<std::size_t, Eigen::Isometry3d> read_redwood_log(const fs::path& file, 
         if (!is_rigid(matrix))
             left_out.add(fmt::format("{}: {}; pose not used.", at_line(file, lines[i].number), not_rigid(matrix)));
         else
-            poses.emplace(*index, rigid(matrix));
+            poses.emplace(index, rigid(matrix));
     }
     return poses;
 }

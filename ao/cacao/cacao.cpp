@@ -192,7 +192,8 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
     add("prepare", "cacao/prepare", {cacao_depth_in, given}, {cacao_depths, cacao_normals}, k.slice, 1,
         {{shared::spec_normals, normals_supplied}});
     if (mips) {
-        add("mips", "cacao/mips", {cacao_depth_in}, {cacao_depths}, {groups(k.slice.x, 8), k.slice.y}, 4);
+        add("mips", "cacao/mips", {cacao_depth_in}, {cacao_depths}, {0, 0}, 1);
+        tables.passes.back().groups = {static_cast<std::uint32_t>(groups(4 * groups(k.slice.x, 8) * groups(k.slice.y, 8), 64)), 1, 1};
     }
     // Slots a configuration does not read are filled with a buffer it reads anyway.
     std::vector<int> inputs{cacao_depths, cacao_normals, cacao_normals, cacao_normals, cacao_normals};

@@ -7,6 +7,7 @@
 #include "lib/cacao_normal.glsl"
 #include "lib/cacao_pattern.glsl"
 #include "lib/cacao_filter.glsl"
+#include "lib/cheap.glsl"
 
 layout(local_size_x = cacao_tile_x, local_size_y = cacao_tile_y) in;
 layout(constant_id = spec_base) const int base = 0;
@@ -29,7 +30,7 @@ struct Surface {
     vec2 uv;        // reference: of the texel in its slice
     vec2 ray;       // scan: view ray of the slice's texel (0, 0)
     vec2 ray_step;  // scan: its change per slice texel
-    int depth_base; // scan: first texel of the slice's depths, mips counted from their far end
+    int depth_base; // scan: first texel of the slice's depths
     vec3 point;     // moved a little towards the camera
     vec3 normal;
     mat2 rotation;  // pattern rotation, scaled to texels
@@ -43,50 +44,73 @@ struct Sum {
 
 float obscurance(vec3 normal, vec3 d, float falloff) {
     float d2 = dot(d, d);
-    float facing = scan != 0 ? dot(normal, d) * inversesqrt(max(d2, 1e-30)) : dot(normal, d) / sqrt(d2);
+    float facing = scan != 0 ? dot(normal, d) * inversesqrt(d2) : dot(normal, d) / sqrt(d2);
     return max(0.0, facing - k.horizon) * max(0.0, d2 * falloff + 1.0);
 }
 
-// What the tap at this texel offset sees: x, y, z in view space, and w = 1 if anything is known there.
-vec4 sample_at(Surface s, vec2 offset, int mip) {
-    if (scan != 0) {
-        ivec2 t = s.texel + ivec2(offset);
-        bool inside = uint(t.x) < uint(k.slice.x) && uint(t.y) < uint(k.slice.y);
-        int index;
-        vec2 at;
-        if (mips != 0) {
-            // The tap looks from the centre of the mip texel it reads, so that slopes stay planes.
-            ivec2 m = t >> mip;
-            index = s.depth_base - (k.depth_mips >> (2 * mip)) + m.y * (k.depth_stride >> mip) + m.x;
-            at = vec2(m << mip) + float((1 << mip) - 1) * 0.5;
-        } else {
-            index = s.depth_base + t.y * k.depth_stride + t.x;
-            at = vec2(t);
-        }
-        float z = texelFetch(depths, inside ? index : 0).x;
-        return vec4((s.ray + at * s.ray_step) * z, z, inside && z > 0.0 ? 1.0 : 0.0);
-    }
+// --- reference: positions by texture coordinate, as AMD's sampler sees them.
+vec3 sample_reference(Surface s, vec2 offset, int mip) {
     precise vec2 uv = s.uv + offset * k.slice_inv;
     ivec2 size = mip_size(mip);
     ivec2 m = clamp(ivec2(floor(uv * vec2(size))), ivec2(0), size - 1);
     float z = texelFetch(depths, depth_index(s.slice, mip, m)).x;
-    return vec4((k.view_mul * uv + k.view_add) * z, z, 1.0);
+    return vec3((k.view_mul * uv + k.view_add) * z, z);
 }
 
 // Samples far in front of the surface count less: that is what keeps halos off whatever stands before a wall.
-void add(Surface s, vec4 seen, float weight, inout Sum sum) {
-    vec3 d = seen.xyz - s.point;
-    if (halo_weighted) weight *= 0.6 * clamp(2.0 + k.neg_rec_radius * max(0.0, -d.z), 0.0, 1.0) + 0.4;
-    if (scan != 0) weight *= seen.w;
+float halo_weight(float dz) {
+    return halo_weighted ? 0.6 * clamp(2.0 + k.neg_rec_radius * max(0.0, -dz), 0.0, 1.0) + 0.4 : 1.0;
+}
+
+void add_reference(Surface s, vec3 seen, float weight, inout Sum sum) {
+    vec3 d = seen - s.point;
+    weight *= halo_weight(d.z);
     sum.obscurance += obscurance(s.normal, d, s.falloff) * weight;
     sum.weight += weight;
 }
 
+// --- scan. One step of a mip: where its texels lie and which depth cells hold them.
+struct Level {
+    int shift, first, stride;
+    vec2 ray; // view ray of the centre of the mip's texel (0, 0)
+};
+
+Level level(Surface s, int mip) {
+    float middle = 0.5 * power_of_two(mip) - 0.5;
+    return Level(mip, s.depth_base + k.depth_mips - (k.depth_mips >> (2 * mip)), k.depth_stride >> mip, s.ray + middle * s.ray_step);
+}
+
+// The tap looks from the centre of the texel it reads, so that slopes stay planes. Holes and what lies outside the image
+// are unknown: they count neither as open nor as closed.
+void add_scan(Surface s, Level l, ivec2 t, float weight, inout Sum sum) {
+    ivec2 m = t >> l.shift;
+    bool inside = all(lessThan(uvec2(t), uvec2(k.slice)));
+    float z = texelFetch(depths, inside ? l.first + m.y * l.stride + m.x : 0).x;
+    vec3 d = vec3((l.ray + float_of(m << l.shift) * s.ray_step) * z, z) - s.point;
+    float d2 = dot(d, d);
+    float facing = positive(dot(s.normal, d) * inversesqrt(d2) - k.horizon);
+    float near = positive(d2 * s.falloff + 1.0);
+    if (halo_weighted) weight *= 0.6 * at_most_one(positive(2.0 + k.neg_rec_radius * positive(-d.z))) + 0.4;
+    weight = inside && z > 0.0 ? weight : 0.0;
+    sum.obscurance += facing * near * weight;
+    sum.weight += weight;
+}
+
 void tap(Surface s, vec4 row, bool weighted, inout Sum sum) {
-    vec2 offset = roundEven(s.rotation * row.xy);
-    int mip = mips != 0 ? int(clamp(roundEven(row.w + s.mip_base), 0.0, 3.0)) : 0;
-    add(s, sample_at(s, offset, mip), weighted ? row.z : 1.0, sum);
-    add(s, sample_at(s, -offset, mip), weighted ? row.z : 1.0, sum);
+    float weight = weighted ? row.z : 1.0;
+    vec2 offset = s.rotation * row.xy;
+    float mip = clamp(row.w + s.mip_base, 0.0, 3.0);
+    if (scan != 0) {
+        ivec2 o = nearest(offset);
+        Level l = level(s, mips != 0 ? nearest(mip) : 0);
+        add_scan(s, l, s.texel + o, weight, sum);
+        add_scan(s, l, s.texel - o, weight, sum);
+    } else {
+        offset = roundEven(offset);
+        int m = mips != 0 ? int(roundEven(mip)) : 0;
+        add_reference(s, sample_reference(s, offset, m), weight, sum);
+        add_reference(s, sample_reference(s, -offset, m), weight, sum);
+    }
 }
 
 #define TAP(i, dx, dy, w, bias) tap(s, vec4(dx, dy, w, bias), true, sum);
@@ -145,7 +169,7 @@ void main() {
     s.uv = (vec2(t) + 0.5) * k.slice_inv;
     s.ray_step = k.ray_step * float(2 * spacing);
     s.ray = k.ray_base + vec2(spacing * parity) * k.ray_step;
-    s.depth_base = s.slice * k.depth_pitch + (mips != 0 ? k.depth_mips : 0);
+    s.depth_base = s.slice * k.depth_pitch;
     vec2 step_m = scan != 0 ? zc * s.ray_step : zc * k.view_mul * k.slice_inv;
     s.point = scan != 0 ? vec3(s.ray + vec2(t) * s.ray_step, 1.0) * zc : vec3((k.view_mul * s.uv + k.view_add) * zc, zc);
     s.normal = normal_at(s.slice, t);

@@ -5,7 +5,7 @@
 #extension GL_EXT_scalar_block_layout : require
 #include "lib/cacao.glsl"
 
-layout(local_size_x = 8, local_size_y = 1) in;
+layout(local_size_x = 64) in;
 layout(constant_id = spec_device_depth) const int device_depth = 0;
 
 layout(binding = 0) uniform samplerBuffer depth_in;
@@ -54,9 +54,12 @@ float mip2(int slice, ivec2 t) {
 }
 
 void main() {
-    int slice = int(gl_GlobalInvocationID.z);
-    ivec2 t = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(t * 8, k.slice))) return;
+    int i = int(gl_GlobalInvocationID.x);
+    ivec2 blocks = (k.slice + 7) / 8;
+    int slice = i / (blocks.x * blocks.y);
+    if (slice > 3) return;
+    i -= slice * blocks.x * blocks.y;
+    ivec2 t = ivec2(i % blocks.x, i / blocks.x);
     float z = nearest_surface(mip2(slice, 2 * t), mip2(slice, 2 * t + ivec2(0, 1)), mip2(slice, 2 * t + ivec2(1, 0)),
                               mip2(slice, 2 * t + ivec2(1, 1)));
     store(slice, 3, t, z);
