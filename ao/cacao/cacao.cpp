@@ -122,6 +122,7 @@ CacaoConstants constants_from(const CacaoOptions& options, const Pinhole& camera
     k.horizon = std::clamp(options.horizon_angle, 0.0F, 1.0F);
     k.fade_mul = -1.0F / (options.fade_to - options.fade_from);
     k.fade_add = options.fade_from / (options.fade_to - options.fade_from) + 1.0F;
+    k.all_ones = ~0U;
     k.depth_offset = 0.9992F;
     k.load_counter_div = static_cast<float>(9.0 / (static_cast<double>(texels(k.importance)) * 255.0));
     k.adaptive_limit = options.adaptive_limit;

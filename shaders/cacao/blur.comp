@@ -45,13 +45,13 @@ void main() {
     if (scan != 0) { // edges to holes and to the outside are cut; a hole stays one
         float sum = 0.5 * float(c & 0xffffu) + dot(e, vec4(uvec4(l, r, up, down) & 0xffffu));
         uint v = uint(sum / (0.5 + e.x + e.y + e.z + e.w) + 0.5);
-        imageStore(to, slice_index(slice, t), uvec4(v | (c & 0xffff0000u)));
+        imageStore(to, slice_index(slice, t), uvec4(whole(v | (c & 0xffff0000u))));
         return;
     }
     float sum = 0.5 * value(c) + e.x * value(l) + e.y * value(r) + e.z * value(up) + e.w * value(down);
     float v = half_even(sum / (0.5 + e.x + e.y + e.z + e.w));
     if (last == 0)
-        imageStore(to, index_between_steps(slice, t), uvec4((packHalf2x16(vec2(v, 0.0)) & 0xffffu) | (c & 0xffff0000u)));
+        imageStore(to, index_between_steps(slice, t), uvec4(whole((packHalf2x16(vec2(v, 0.0)) & 0xffffu) | (c & 0xffff0000u))));
     else if (all(greaterThanEqual(t, ivec2(0))) && all(lessThan(t, k.slice)))
-        imageStore(to, slice_index(slice, t), uvec4(ao_texel(v, ao_edges(c))));
+        imageStore(to, slice_index(slice, t), uvec4(whole(ao_texel(v, ao_edges(c)))));
 }

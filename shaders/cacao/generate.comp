@@ -162,7 +162,7 @@ void main() {
     int here = slice_index(s.slice, t);
     float zc = texelFetch(depths, depth_index(s.slice, 0, t)).x;
     if (scan != 0 && !(zc > 0.0)) {
-        imageStore(ao, here, uvec4(hole_texel));
+        imageStore(ao, here, uvec4(whole(hole_texel)));
         return;
     }
     ivec2 parity = ivec2(s.slice & 1, s.slice >> 1);
@@ -216,7 +216,7 @@ void main() {
 
     float o = scan != 0 ? sum.obscurance / max(sum.weight, 1e-6) : sum.obscurance / sum.weight;
     if (base != 0) {
-        imageStore(ao, here, uvec4(quantised(o, value_levels()) | quantised(sum.weight / weight_range, weight_levels()) << 16));
+        imageStore(ao, here, uvec4(whole(quantised(o, value_levels()) | quantised(sum.weight / weight_range, weight_levels()) << 16)));
         return;
     }
     float fade = clamp(s.point.z * k.fade_mul + k.fade_add, 0.0, 1.0);
@@ -225,5 +225,5 @@ void main() {
         fade *= clamp(1.0 - cut.x - cut.y, 0.0, 1.0);
     }
     float visibility = clamp(1.0 - fade * min(k.shadow_strength * o, k.shadow_clamp), 0.0, 1.0);
-    imageStore(ao, here, uvec4(ao_texel(pow(visibility, k.shadow_power), pack_edges(edges))));
+    imageStore(ao, here, uvec4(whole(ao_texel(pow(visibility, k.shadow_power), pack_edges(edges)))));
 }

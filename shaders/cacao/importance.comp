@@ -21,5 +21,5 @@ void main() {
             highest = max(highest, v);
         }
     float contrast = clamp(2.0 * (highest - lowest), 0.0, 1.0);
-    imageStore(importance, t.y * k.importance.x + t.x, uvec4(quantised(pow(contrast, 0.8), 255.0)));
+    imageStore(importance, t.y * k.importance.x + t.x, uvec4(whole(quantised(pow(contrast, 0.8), 255.0))));
 }

@@ -30,5 +30,5 @@ void main() {
     // Threads beyond the map count too, as AMD's do: the whole dispatch, not only the map, is summed.
     if (second != 0 && t.x % 3 == 0 && t.y % 3 == 0) imageAtomicAdd(load_counter, 0, uint(255.0 * clamp(mean, 0.0, 1.0) + 0.5));
     if (any(greaterThanEqual(t, k.importance))) return;
-    imageStore(to, t.y * k.importance.x + t.x, uvec4(quantised(mean, 255.0)));
+    imageStore(to, t.y * k.importance.x + t.x, uvec4(whole(quantised(mean, 255.0))));
 }

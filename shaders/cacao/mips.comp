@@ -27,7 +27,7 @@ float nearest_surface(float a, float b, float c, float d) {
 void store(int slice, int mip, ivec2 t, float z) {
     // Scan keeps the partial texels at the right and lower rim; the reference's mips end before them.
     if (scan == 0 && any(greaterThanEqual(t, mip_size(mip)))) return;
-    imageStore(depths, depth_index(slice, mip, t), vec4(scan != 0 ? z : half_toward_zero(z)));
+    imageStore(depths, depth_index(slice, mip, t), vec4(whole(scan != 0 ? z : half_toward_zero(z))));
 }
 
 float depth_at(int slice, ivec2 t) {

@@ -66,8 +66,8 @@ vec3 completed(vec3 n, float c, vec3 z, vec3 a, vec3 b, vec3 d) {
 void put(int slice, ivec2 t, ivec2 p0, float c, vec3 n) {
     ivec2 p = p0 + spacing * ivec2(slice & 1, slice >> 1);
     if (two_slices == 0 || slice == 0 || slice == 3)
-        imageStore(depths, depth_index(slice, 0, t), vec4(stored_depth(p, c)));
-    imageStore(normals, slice_index(slice, t), uvec4(pack_normal(supplied != 0 ? supplied_normal(p) : unit(n))));
+        imageStore(depths, depth_index(slice, 0, t), vec4(whole(stored_depth(p, c))));
+    imageStore(normals, slice_index(slice, t), uvec4(whole(pack_normal(supplied != 0 ? supplied_normal(p) : unit(n)))));
 }
 
 void main() {

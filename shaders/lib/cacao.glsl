@@ -64,6 +64,11 @@ vec4 unpack_edges(uint p) {
     return clamp(vec4(uvec4(p >> 6, p >> 4, p >> 2, p) & 3u) / 3.0 + k.inv_sharpness, 0.0, 1.0);
 }
 
+// A value about to be stored, finished as a vector. lavapipe stores lane by lane, and LLVM would move the packing into
+// that loop, eight times over; a minimum with an unknown number cannot be moved.
+uint whole(uint v) { return min(v, k.all_ones); }
+float whole(float v) { return min(v, uintBitsToFloat(k.all_ones >> 1 & 0x7f800000u)); }
+
 // --- addresses
 int slice_index(int slice, ivec2 texel) { return (slice * k.slice.y + texel.y) * k.slice.x + texel.x; }
 int depth_index(int slice, int mip, ivec2 texel) {
