@@ -193,6 +193,7 @@ void write_manifest(const std::filesystem::path& file, const RunReport& report) 
               {"method", report.method},
               {"settings", settings_json(report.settings)},
               {"capture", capture_json(report)},
+              {"depth_noise", report.depth_noise},
               {"shading", report.shading},
               {"totals", totals_json(report)},
               {"frames", json::array()}};

@@ -1,4 +1,5 @@
 // `scanshade run`: ambient occlusion for every frame of one or more captures.
+#include "ao/fit_plane/fit_plane.h"
 #include "ao/gpu/device.h"
 #include "ao/method.h"
 #include "apps/batch.h"
@@ -7,6 +8,7 @@
 #include "apps/report.h"
 #include "io/output_file.h"
 #include "projection/error.h"
+#include "projection/project.h"
 
 #include <algorithm>
 #include <atomic>
@@ -74,7 +76,7 @@ std::vector<std::size_t> slice(const std::string& text, std::size_t count) {
 
 struct RunSettings {
     std::vector<std::string> paths;
-    std::string frames, camera, depth_scale, registered = "auto";
+    std::string frames, camera, depth_scale, registered = "auto", depth_noise = "auto";
     double association_limit_s = 0.02;
     std::string method = "cacao", radius, quality, device;
     std::string out, write = "auto", format = "png16";
@@ -182,6 +184,7 @@ void introduce(const RunReport& report) {
         say(fmt::format("  depth: {} ({})", capture.depth.name, capture.depth.origin));
     if (capture.camera)
         say(fmt::format("  camera: {} ({})", describe(*capture.camera), capture.camera->origin));
+    say("  depth noise: " + report.depth_noise);
     for (const std::string& warning : capture.warnings)
         say("  warning: " + warning);
     say("  " + report.shading);
@@ -247,7 +250,7 @@ class Run final : public Command {
         std::vector<FrameRow> rows;
         for (const Job& job : jobs)
             if (!interrupted)
-                std::ranges::move(process(job, *method, device.info()), std::back_inserter(rows));
+                std::ranges::move(process(job, *method, device), std::back_inserter(rows));
         return exit_code(rows, unopened);
     }
 
@@ -265,6 +268,10 @@ class Run final : public Command {
                .help = "whether colour pixels lie on depth pixels",
                .value = &s.registered,
                .choices = {"auto", "yes", "no"}},
+              {"depth-noise",
+               "sigma of one depth value, FLOOR,PER_Z2 for FLOOR + PER_Z2 z^2 metres, or auto (measured), none, kinect, tof; where "
+               "there is any, depth and normals come from plane fits",
+               &s.depth_noise},
               {"association-limit", "colour, depth and poses farther apart in time are not paired",
                &s.association_limit_s, "s", 0, 1e6}}},
             {"method",
@@ -323,6 +330,8 @@ class Run final : public Command {
         if (asked_.out.empty())
             throw Misuse("run needs -o FOLDER for its results");
         outputs_ = outputs_from(asked_);
+        if (asked_.depth_noise != "auto")
+            (void)noise_from_text(asked_.depth_noise);
         if (!asked_.depth_scale.empty())
             (void)depth_encoding(asked_.depth_scale, "--depth-scale");
     }
@@ -377,6 +386,7 @@ class Run final : public Command {
                          .capture = job.capture,
                          .registration = registration,
                          .registration_reason = said ? "--registered" : job.capture.registration_reason,
+                         .depth_noise = {},
                          .shading = shading_sentence(job.capture, registration),
                          .frames = {}};
         for (const auto& [name, setup] : setups_)
@@ -385,9 +395,15 @@ class Run final : public Command {
         return report;
     }
 
-    std::vector<FrameRow> process(const Job& job, Method& method, const gpu::DeviceInfo& device) {
+    std::vector<FrameRow> process(const Job& job, Method& plain, gpu::Device& device) {
         const fs::path& folder = job.batch.outputs.folder;
-        RunReport report = report_on(job, device);
+        const DepthNoise noise = asked_.depth_noise == "auto" ? noise_of(job) : noise_from_text(asked_.depth_noise);
+        std::optional<OnFittedDepth> fitted;
+        if (noise.any())
+            fitted.emplace(device, noise, plain);
+        Method& method = fitted ? *fitted : plain;
+        RunReport report = report_on(job, device.info());
+        report.depth_noise = noise_sentence(noise);
         report.frames.resize(job.batch.frames.size());
         introduce(report);
         prepare_folder(folder);
@@ -400,6 +416,29 @@ class Run final : public Command {
         write_manifest(folder / "manifest.json", report);
         conclude(report, folder);
         return report.frames;
+    }
+
+    /// What recorded depth is worth, from a few frames spread over the capture. A cloud without a grid has no sensor's image.
+    static DepthNoise noise_of(const Job& job) {
+        constexpr std::size_t most = 5;
+        std::vector<DepthImage> images;
+        const auto& frames = job.batch.frames;
+        const std::size_t tried = std::min(most, frames.size());
+        for (std::size_t i = 0; i < tried; ++i) {
+            try {
+                const Frame frame = job.capture.load(frames[i * frames.size() / tried]);
+                if (!frame.cloud || frame.cloud->organised())
+                    images.push_back(project(frame));
+            } catch (const std::exception&) { // the batch says what is wrong with it
+            }
+        }
+        return measure_noise(images);
+    }
+
+    std::string noise_sentence(const DepthNoise& noise) const {
+        const std::string origin = asked_.depth_noise == "auto" ? "measured" : "--depth-noise";
+        return noise.any() ? fmt::format("{} ({}); depth and normals come from plane fits", describe(noise), origin)
+                           : fmt::format("none to mind ({}); depth is used as recorded", origin);
     }
 
     static int exit_code(const std::vector<FrameRow>& rows, int unopened) {

@@ -1,0 +1,113 @@
+#include "projection/noise.h"
+
+#include "projection/error.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <fmt/format.h>
+#include <vector>
+
+namespace scanshade {
+namespace {
+
+constexpr int lag_px = 4;      // longer than the sensor's own smoothing, shorter than most surfaces
+constexpr int step_px = 3;     // every third pixel of every third row is plenty
+constexpr int bands = 24;      // equal steps of log z over 0.2 .. 50 m
+constexpr double nearest_m = 0.2, farthest_m = 50;
+constexpr std::size_t enough = 400; // samples for a band to speak
+
+struct Band {
+    std::vector<float> spread_m; // |second difference| of depth, scaled to one value's deviation
+    double z_sum = 0;
+};
+
+int band_of(double z) {
+    return static_cast<int>(bands * std::log(z / nearest_m) / std::log(farthest_m / nearest_m));
+}
+
+/// Second difference of 1/z along (dx, dy), as metres of depth at z; negative where something is unknown.
+float second_difference(const cv::Mat1f& z, int x, int y, int dx, int dy) {
+    const float c = z(y, x), a = z(y - dy, x - dx), b = z(y + dy, x + dx);
+    if (!(a > 0 && b > 0)) return -1;
+    return std::abs(1 / a + 1 / b - 2 / c) * c * c;
+}
+
+void collect(const cv::Mat1f& z, std::array<Band, bands>& all) {
+    for (int y = lag_px; y < z.rows - lag_px; y += step_px)
+        for (int x = lag_px; x < z.cols - lag_px; x += step_px) {
+            const float c = z(y, x);
+            if (!(c > nearest_m && c < farthest_m)) continue;
+            Band& band = all[static_cast<std::size_t>(std::min(band_of(c), bands - 1))];
+            for (const auto& [dx, dy] : {std::pair{lag_px, 0}, std::pair{0, lag_px}}) {
+                const float d = second_difference(z, x, y, dx, dy);
+                if (d < 0) continue;
+                band.spread_m.push_back(d);
+                band.z_sum += c;
+            }
+        }
+}
+
+struct Measured {
+    double z, sigma, weight;
+};
+
+/// floor + per_z2 z^2 through the bands by least squares of relative error, both terms at least zero.
+DepthNoise law_through(const std::vector<Measured>& points) {
+    double s00 = 0, s01 = 0, s11 = 0, t0 = 0, t1 = 0;
+    for (const Measured& p : points) {
+        const double w = p.weight / (p.sigma * p.sigma), q = p.z * p.z;
+        s00 += w, s01 += w * q, s11 += w * q * q, t0 += w * p.sigma, t1 += w * q * p.sigma;
+    }
+    const double determinant = s00 * s11 - s01 * s01;
+    DepthNoise noise;
+    if (determinant > 1e-9 * s00 * s11) {
+        noise.floor_m = (t0 * s11 - t1 * s01) / determinant;
+        noise.per_z2 = (t1 * s00 - t0 * s01) / determinant;
+    } else {
+        noise.floor_m = t0 / s00; // one distance: it cannot be told how noise grows
+    }
+    if (noise.per_z2 < 0) noise = {t0 / s00, 0};
+    if (noise.floor_m < 0) noise = {0, t1 / s11};
+    return noise;
+}
+
+} // namespace
+
+DepthNoise measure_noise(std::span<const DepthImage> images) {
+    std::array<Band, bands> all;
+    for (const DepthImage& image : images) collect(image.z_m, all);
+    std::vector<Measured> points;
+    for (Band& band : all) {
+        if (band.spread_m.size() < enough) continue;
+        // The 60 % quantile of |N(0, s)| is 0.8416 s; a second difference of three independent values has s = sqrt(6) sigma.
+        // Not the median: in coarse quantisation more than half of the differences can be exactly zero.
+        const auto at = band.spread_m.begin() + static_cast<std::ptrdiff_t>(0.6 * static_cast<double>(band.spread_m.size()));
+        std::nth_element(band.spread_m.begin(), at, band.spread_m.end());
+        const double sigma = *at / (0.8416 * std::sqrt(6.0)), count = static_cast<double>(band.spread_m.size());
+        points.push_back({band.z_sum / count, std::max(sigma, 1e-6), count});
+    }
+    if (points.empty()) return {};
+    const DepthNoise noise = law_through(points);
+    const bool clean = std::all_of(points.begin(), points.end(), [&](const Measured& p) { return noise.at(p.z) < 1e-4 * p.z; });
+    return clean ? DepthNoise{} : noise;
+}
+
+DepthNoise noise_from_text(const std::string& text) {
+    if (text == "none") return {};
+    if (text == "kinect") return {0.0015, 0.0018};
+    if (text == "tof") return {0.0015, 0};
+    DepthNoise noise;
+    int used = 0;
+    if (std::sscanf(text.c_str(), "%lf,%lf%n", &noise.floor_m, &noise.per_z2, &used) != 2 || used != static_cast<int>(text.size()) ||
+        !(noise.floor_m >= 0 && noise.floor_m < 1 && noise.per_z2 >= 0 && noise.per_z2 < 1))
+        throw Misuse("depth noise '" + text + "': auto, none, kinect, tof or FLOOR,PER_Z2 (metres, 0 .. 1) expected");
+    return noise;
+}
+
+std::string describe(const DepthNoise& noise) {
+    return noise.any() ? fmt::format("sigma {:.5f} + {:.5f} z^2 m", noise.floor_m, noise.per_z2) : "none";
+}
+
+} // namespace scanshade

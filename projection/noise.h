@@ -1,0 +1,32 @@
+// How uncertain recorded depth is: sigma(z), measured from the data themselves.
+#pragma once
+
+#include "projection/maps.h"
+
+#include <span>
+#include <string>
+
+namespace scanshade {
+
+/// Standard deviation of one depth value in metres, quantisation included: sigma(z) = floor_m + per_z2 z^2.
+/// The square law is that of disparity sensors; time of flight is nearly all floor (Khoshelham and Elberink 2012).
+struct DepthNoise {
+    double floor_m = 0;
+    double per_z2 = 0; ///< 1/m
+
+    [[nodiscard]] double at(double z_m) const { return floor_m + per_z2 * z_m * z_m; }
+    [[nodiscard]] bool any() const { return floor_m > 0 || per_z2 > 0; }
+};
+
+/// Measures sigma(z) on depth images of one sensor: the spread of second differences of 1/z (zero on any plane) in bands of
+/// z, and the law fitted through the bands. Edges and curvature are the spread's far tail and do not count.
+/// Returns no noise where the spread stays below a tenth of a millimetre per metre: then nothing needs smoothing.
+[[nodiscard]] DepthNoise measure_noise(std::span<const DepthImage> images);
+
+/// "auto" is not for here. "none", "kinect" (0.0015, 0.0018), "tof" (0.0015, 0) or "floor,per_z2". Throws Misuse.
+[[nodiscard]] DepthNoise noise_from_text(const std::string& text);
+
+/// "sigma 0.0014 + 0.0018 z^2 m", or "none".
+[[nodiscard]] std::string describe(const DepthNoise& noise);
+
+} // namespace scanshade
