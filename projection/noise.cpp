@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fmt/format.h>
+#include <numeric>
 #include <vector>
 
 namespace scanshade {
@@ -81,11 +82,13 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
     std::vector<Measured> points;
     for (Band& band : all) {
         if (band.spread_m.size() < enough) continue;
-        // The 60 % quantile of |N(0, s)| is 0.8416 s; a second difference of three independent values has s = sqrt(6) sigma.
-        // Not the median: in coarse quantisation more than half of the differences can be exactly zero.
-        const auto at = band.spread_m.begin() + static_cast<std::ptrdiff_t>(0.6 * static_cast<double>(band.spread_m.size()));
+        // The lower 80 % of |N(0, s)| have the mean 0.5586 s; a second difference of three independent values has s = sqrt(6)
+        // sigma. Not a quantile: in coarse steps more than half of the differences are exactly zero.
+        const double count = static_cast<double>(band.spread_m.size());
+        const auto at = band.spread_m.begin() + static_cast<std::ptrdiff_t>(0.8 * count);
         std::nth_element(band.spread_m.begin(), at, band.spread_m.end());
-        const double sigma = *at / (0.8416 * std::sqrt(6.0)), count = static_cast<double>(band.spread_m.size());
+        const double mean = std::accumulate(band.spread_m.begin(), at, 0.0) / (0.8 * count);
+        const double sigma = mean / (0.5586 * std::sqrt(6.0));
         points.push_back({band.z_sum / count, std::max(sigma, 1e-6), count});
     }
     if (points.empty()) return {};

@@ -28,7 +28,7 @@ struct Sums {
 struct Here {
     ivec2 p;
     float w;      // 1/z
-    float narrow; // 1 / (3 sigma) in units of 1/z
+    float narrow; // 1 / (4.5 sigma) in units of 1/z: disparity steps and matching windows reach beyond 3
     float widen;  // first round: tolerance grows with distance, 1/z per pixel
 };
 
@@ -97,9 +97,9 @@ void main() {
     float zc = hole ? 1.0 : z;
     h.w = 1.0 / zc;
     float sigma = k.noise_floor + k.noise_per_z2 * zc * zc;
-    h.narrow = zc * zc / (3.0 * sigma);
+    h.narrow = zc * zc / (4.5 * sigma);
     // The window at which a slope's error from noise equals that from a curvature of 5 % of the depth.
-    float radius = clamp(sqrt(17.3 * sigma * k.fx / zc), 1.5, k.largest_radius);
+    float radius = clamp(sqrt(28.0 * sigma * k.fx / zc), 1.5, k.largest_radius);
 
     const Plane flat_one = Plane(0.0, 0.0, 0.0);
     Plane plane;
@@ -131,7 +131,7 @@ void main() {
     float w_principal = w_here - plane.a * (float(h.p.x) - k.cx) - plane.b * (float(h.p.y) - k.cy);
     vec3 n = -vec3(k.fx * plane.a, k.fy * plane.b, w_principal);
     n *= inversesqrt(max(dot(n, n), 1e-30));
-    bool near = abs(plane.c) * h.narrow < 1.0; // within 3 sigma of what was recorded
+    bool near = abs(plane.c) * h.narrow < 1.0; // within the tolerance of what was recorded
     float fitted = good && near && w_here > 0.0 ? 1.0 / w_here : z;
     n = good && !hole ? n : vec3(0.0);
     imageStore(depth_out, here, vec4(hole ? 0.0 : fitted));

@@ -193,7 +193,7 @@ int main(int argc, char** argv) {
     if (folder.empty()) folder = default_folder();
     if (!fs::exists(fs::path(folder) / "manifest.json")) {
         fmt::print("skipped: no manifest.json in {}\n", folder);
-        return argc > 1 && !folder.empty() && folder != default_folder() ? 2 : 77;
+        return 77;
     }
     try {
         return check(folder, with_intermediates, only);

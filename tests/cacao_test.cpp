@@ -1,0 +1,600 @@
+// CACAO's own tests: what profile `scan` corrects, each shown against `reference`, which must fail it; the shaders
+// against the formulas of AMD's documentation; every table of passes; kinds of depth; and a few golden maps.
+#include "ao/cacao/cacao.h"
+#include "io/image_file.h"
+#include "tests/reference/cacao_cpu.h"
+#include "tests/support/scenes.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <functional>
+#include <gtest/gtest.h>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <set>
+
+namespace scanshade {
+namespace {
+
+using namespace tests;
+using reference::Around;
+using shared::CacaoConstants;
+
+constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+const cv::Size usual(160, 120);
+
+/// One for all: opening costs more than a frame. It validates where the layer is installed.
+gpu::Device& device() {
+    static const int asked = setenv("SCANSHADE_VALIDATE", "1", 1);
+    static gpu::Device opened;
+    return (void)asked, opened;
+}
+
+// --- running CACAO and looking inside
+
+/// AO values of one slice of the grid, and the packed edges beside them. NaN at holes.
+struct Slice {
+    cv::Mat1f ao;
+    cv::Mat1b edges;
+};
+
+struct Seen {
+    cv::Mat1f visibility;
+    CacaoConstants k;
+    std::array<Slice, 4> raw, blurred;                ///< before and after the blur
+    std::array<std::array<cv::Mat1f, 4>, 4> depth;    ///< by slice, by mip (above 0 with HIGH and HIGHEST only)
+    std::array<cv::Mat3f, 4> normals;                 ///< y up, as stored
+};
+
+/// What a run is given besides depth.
+struct Given {
+    cv::Mat3f normals{};
+    std::function<Slice(int slice, const Slice& made)> ao{}; ///< replaces what generation made
+};
+
+/// The words of AO texels: the reference keeps AMD's 8 bits, scan 16.
+std::uint32_t word_of(float ao, int edges, bool scan) {
+    return static_cast<std::uint32_t>(std::nearbyint(ao * (scan ? 65535.0F : 255.0F))) | static_cast<std::uint32_t>(edges) << 16;
+}
+
+Slice slice_of(const std::uint32_t* words, cv::Size size, bool scan) {
+    Slice s{cv::Mat1f(size), cv::Mat1b(size)};
+    for (int y = 0; y < size.height; ++y)
+        for (int x = 0; x < size.width; ++x) {
+            const std::uint32_t word = *words++;
+            const bool hole = scan && word >> 31;
+            s.ao(y, x) = hole ? nan : static_cast<float>(word & 0xffffU) / (scan ? 65535.0F : 255.0F);
+            s.edges(y, x) = static_cast<uchar>(word >> 16);
+        }
+    return s;
+}
+
+cv::Vec3f normal_of(std::uint32_t word, bool scan) {
+    const int bits = scan ? 10 : 8;
+    cv::Vec3f n;
+    for (int axis = 0; axis < 3; ++axis) {
+        const int value = static_cast<int>(word << (32 - (axis + 1) * bits)) >> (32 - bits);
+        n[axis] = std::max(-1.0F, static_cast<float>(value) / (scan ? 511.0F : 127.0F));
+    }
+    return n;
+}
+
+/// Programs by their tables: runs that differ in constants only share pipelines, and pipelines are what takes time here.
+class Shared {
+  public:
+    gpu::Program program;
+    static Shared& made_for(const CacaoTables& tables) {
+        static std::map<std::string, std::unique_ptr<Shared>> all;
+        std::string key;
+        for (const gpu::BufferRow& row : tables.buffers) key += fmt::format("{} {} ", row.bytes, static_cast<int>(row.host));
+        for (const gpu::PassRow& row : tables.passes)
+            key += fmt::format("{} {} {} {} {} ", row.shader, row.groups, row.reads, row.writes, row.constants);
+        auto& one = all[key];
+        if (!one) one = std::unique_ptr<Shared>(new Shared(tables));
+        return *one;
+    }
+
+  private:
+    explicit Shared(const CacaoTables& t) : program(device(), t.buffers, t.passes, sizeof(CacaoConstants)) {}
+};
+
+void upload(gpu::Program& program, int buffer, const cv::Mat& image) {
+    ASSERT_EQ(program.host(buffer).size(), image.total() * image.elemSize());
+    const cv::Mat whole = image.clone(); // one block
+    std::memcpy(program.host(buffer).data(), whole.data, program.host(buffer).size());
+}
+
+Seen run_tables(const CacaoOptions& o, const CacaoConstants& k, const CacaoTables& tables, const DepthImage& depth,
+                const cv::Mat3f& normals, const std::vector<std::uint32_t>& ao) {
+    gpu::Program& program = Shared::made_for(tables).program;
+    upload(program, cacao_depth_in, depth.z_m);
+    if (!normals.empty()) upload(program, cacao_normals_in, normals);
+    if (!ao.empty()) std::memcpy(program.host(cacao_ping).data(), ao.data(), ao.size() * 4);
+    program.run(std::as_bytes(std::span(&k, 1)));
+
+    Seen seen{cv::Mat1f(depth.z_m.size()), k, {}, {}, {}, {}};
+    std::memcpy(seen.visibility.data, program.host(cacao_out).data(), seen.visibility.total() * 4);
+    const cv::Size size(k.slice.x, k.slice.y);
+    const auto read = [&](int buffer) { return program.read_back(buffer); };
+    const auto ping = read(cacao_ping), after = read(tables.blurred), normal = read(cacao_normals), z = read(cacao_depths);
+    for (std::size_t a = 0; a < 4; ++a) {
+        const std::size_t first = a * static_cast<std::size_t>(size.area());
+        const auto words = [&](const std::vector<std::byte>& bytes) { return reinterpret_cast<const std::uint32_t*>(bytes.data()) + first; };
+        seen.raw[a] = slice_of(words(ping), size, o.scan());
+        seen.blurred[a] = slice_of(words(after), size, o.scan());
+        seen.normals[a] = cv::Mat3f(size);
+        for (int i = 0; i < size.area(); ++i) seen.normals[a](i / size.width, i % size.width) = normal_of(words(normal)[i], o.scan());
+        for (int m = 0; m < 4; ++m) {
+            cv::Mat1f& to = seen.depth[a][static_cast<std::size_t>(m)] = cv::Mat1f(std::max(1, size.height >> m), std::max(1, size.width >> m));
+            const auto* slice = reinterpret_cast<const float*>(z.data()) + static_cast<int>(a) * k.depth_pitch + k.depth_mips - (k.depth_mips >> 2 * m);
+            for (int y = 0; y < to.rows; ++y) std::copy_n(slice + y * (k.depth_stride >> m), to.cols, to[y]);
+        }
+    }
+    return seen;
+}
+
+Seen run(const CacaoOptions& o, const DepthImage& depth, const Given& given = {}) {
+    const CacaoConstants k = constants_from(o, depth.camera);
+    CacaoTables tables = cacao_tables(o, k, !given.normals.empty());
+    if (!given.ao) return run_tables(o, k, tables, depth, given.normals, {});
+    // Everything but generation, which is replaced by an upload.
+    const Seen made = run_tables(o, k, tables, depth, given.normals, {});
+    std::vector<std::uint32_t> words;
+    for (int a = 0; a < 4; ++a) {
+        const Slice slice = given.ao(a, made.raw[static_cast<std::size_t>(a)]);
+        for (int i = 0; i < slice.ao.size().area(); ++i) {
+            const int y = i / slice.ao.cols, x = i % slice.ao.cols;
+            words.push_back(word_of(slice.ao(y, x), slice.edges(y, x), o.scan()));
+        }
+    }
+    std::erase_if(tables.passes, [](const gpu::PassRow& row) {
+        return std::set<std::string_view>{"", "cacao/mips", "cacao/generate", "cacao/importance", "cacao/importance_blur"}.count(row.shader) > 0;
+    });
+    tables.buffers[cacao_ping].host = gpu::BufferRow::Host::upload;
+    return run_tables(o, k, tables, depth, given.normals, words);
+}
+
+CacaoOptions options(const std::string& profile, const std::string& quality = "high", bool downsampled = false) {
+    CacaoOptions o;
+    o.profile = profile;
+    o.quality = quality;
+    o.downsampled = downsampled;
+    return o;
+}
+
+/// The same through both profiles.
+struct Both {
+    Seen scan, reference;
+};
+Both both(CacaoOptions o, const DepthImage& depth, const Given& given = {}) {
+    o.profile = "scan";
+    Seen scan = run(o, depth, given);
+    o.profile = "reference";
+    return {std::move(scan), run(o, depth, given)};
+}
+
+/// The figures a test is about, one line in the log.
+void measured(const std::string& what, double scan, double reference) {
+    fmt::print("             {}: scan {:.4f}, reference {:.4f}\n", what, scan, reference);
+}
+
+// --- scenes and figures
+
+Pinhole camera_of(double f, cv::Size size = usual) { return {f, f, (size.width - 1) / 2.0, (size.height - 1) / 2.0, size}; }
+
+/// Normals of tilted_plane(), camera space.
+cv::Mat3f plane_normals(cv::Size size, double tilt_degrees) {
+    const double tilt = tilt_degrees * std::numbers::pi / 180;
+    return cv::Mat3f(size, cv::Vec3f(static_cast<float>(std::sin(tilt)), 0, static_cast<float>(-std::cos(tilt))));
+}
+
+DepthImage flat(const Pinhole& camera, float z) { return {camera, cv::Mat1f(camera.size, z), {}}; }
+/// A wall at z, and left of the middle column another at `left`.
+DepthImage step(const Pinhole& camera, float left, float z) {
+    DepthImage depth = flat(camera, z);
+    depth.z_m.colRange(0, camera.size.width / 2) = left;
+    return depth;
+}
+
+/// Of the values that are numbers, where `mask` allows.
+struct Figures {
+    double low = 0, high = 0, average = 0;
+};
+Figures figures(const cv::Mat1f& v, const cv::Mat& mask = {}) {
+    cv::Mat known = v == v;
+    if (!mask.empty()) known &= mask;
+    Figures f;
+    cv::minMaxLoc(v, &f.low, &f.high, nullptr, nullptr, known);
+    f.average = cv::mean(v, known)[0];
+    return f;
+}
+double lowest(const cv::Mat1f& v, const cv::Mat& mask = {}) { return figures(v, mask).low; }
+double highest(const cv::Mat1f& v, const cv::Mat& mask = {}) { return figures(v, mask).high; }
+double average(const cv::Mat1f& v, const cv::Mat& mask = {}) { return figures(v, mask).average; }
+cv::Mat1f difference(const cv::Mat1f& a, const cv::Mat1f& b) {
+    cv::Mat1f d;
+    cv::absdiff(a, b, d);
+    return d;
+}
+
+class cacao_scan : public testing::Test {
+  protected:
+    void TearDown() override { silent(); }
+    /// No message of the validation layer since the last look.
+    static void silent() {
+        static std::size_t read = 0;
+        const auto messages = device().validation_messages();
+        for (; read < messages.size(); ++read) ADD_FAILURE() << messages[read];
+    }
+};
+using cacao_reference = cacao_scan;
+using cacao_tables_ = cacao_scan;
+using cacao_golden = cacao_scan;
+
+// --- A. departures of scan
+
+TEST_F(cacao_scan, visibility_comes_out_as_computed) {
+    // All slices say 0.5, so the map must say 0.5. AMD raises it to 2.2 on the way out, but not in every quality.
+    const Given half{{}, [](int, const Slice& made) { return Slice{cv::Mat1f(made.ao.size(), 0.5F), made.edges}; }};
+    const double dark = std::pow(128.0 / 255, 2.2);
+    for (const auto& [quality, expected] : {std::pair<std::string, double>{"low", 128.0 / 255}, {"high", dark}}) {
+        CacaoOptions o = options("", quality);
+        o.blur_passes = 0;
+        const Both maps = both(o, flat(camera_of(125), 3), half);
+        measured(quality, average(maps.scan.visibility), average(maps.reference.visibility));
+        EXPECT_NEAR(lowest(maps.scan.visibility), 0.5, 1e-4);
+        EXPECT_NEAR(highest(maps.scan.visibility), 0.5, 1e-4);
+        EXPECT_NEAR(average(maps.reference.visibility), expected, 0.005);
+    }
+}
+
+TEST_F(cacao_scan, holes_do_not_occlude_and_have_no_visibility) {
+    // A plane is open, whatever of it is missing. A hole is depth 0, the place of the camera: nearer than the radius,
+    // the reference takes it for something right in front of the plane.
+    DepthImage depth = with_holes(flat(camera_of(125), 0.3F), 0.1);
+    CacaoOptions o = options("");
+    o.radius = 2;
+    const Both maps = both(o, depth);
+    const cv::Mat surface = depth.z_m > 0;
+    measured("darkest pixel of a plane with holes", lowest(maps.scan.visibility, surface), lowest(maps.reference.visibility, surface));
+    EXPECT_GE(lowest(maps.scan.visibility), 0.999);
+    EXPECT_LT(lowest(maps.reference.visibility, surface), 0.2);
+    EXPECT_EQ(cv::countNonZero((maps.scan.visibility == maps.scan.visibility) != surface), 0) << "NaN at holes, only there";
+    EXPECT_GT(cv::countNonZero((maps.reference.visibility == maps.reference.visibility) & ~surface), 0);
+}
+
+TEST_F(cacao_scan, a_missing_slice_takes_nothing_from_the_others) {
+    // Holes at every second pixel of every second row are one whole slice of four; the other three still see a plane.
+    DepthImage depth = flat(camera_of(125), 0.3F);
+    for (int y = 1; y < usual.height; y += 2)
+        for (int x = 1; x < usual.width; x += 2) depth.z_m(y, x) = 0;
+    CacaoOptions o = options("");
+    o.radius = 2;
+    const Both maps = both(o, depth);
+    const cv::Mat surface = depth.z_m > 0;
+    measured("mean of a plane without its fourth slice", average(maps.scan.visibility, surface), average(maps.reference.visibility, surface));
+    EXPECT_GE(lowest(maps.scan.visibility), 0.999);
+    EXPECT_LT(average(maps.reference.visibility, surface), 0.95);
+}
+
+TEST_F(cacao_scan, holes_are_not_open_space) {
+    // Pixels taken from a corner at random leave it as dark as it was. Beyond the radius the reference counts a hole as a
+    // ray that met nothing, and the corner brightens.
+    const Pinhole camera = camera_of(125);
+    const DepthImage corner = wall_corner(camera), punched = with_holes(corner, 0.4);
+    cv::Mat3f normals(usual);
+    const float s = std::numbers::sqrt2_v<float> / 2;
+    for (int x = 0; x < usual.width; ++x) normals.col(x) = cv::Vec3f(x < camera.cx ? s : -s, 0, -s);
+    const Both whole = both(options(""), corner, {normals, {}}), rest = both(options(""), punched, {normals, {}});
+    cv::Mat near = cv::Mat::zeros(usual, CV_8U);
+    near.colRange(60, 100) = 255;
+    near &= punched.z_m > 0;
+    const double scan = average(rest.scan.visibility, near) - average(whole.scan.visibility, near);
+    const double amd = average(rest.reference.visibility, near) - average(whole.reference.visibility, near);
+    measured("brightening of a corner by 40 % holes", scan, amd);
+    EXPECT_NEAR(scan, 0, 0.02);
+    EXPECT_GT(amd, 0.06);
+}
+
+TEST_F(cacao_scan, a_hole_does_not_poison_the_mips) {
+    // The mean of what is known of a wall at 3 m is 3 m. The reference takes the nearest of each four, and a hole is
+    // nearest: one missing pixel empties 16x16 of them in mip 3.
+    DepthImage depth = flat(camera_of(125), 3);
+    depth.z_m(40, 40) = 0;
+    const Both maps = both(options(""), depth);
+    for (std::size_t m = 1; m < 4; ++m) {
+        EXPECT_EQ(lowest(maps.scan.depth[0][m]), 3) << "mip " << m;
+        EXPECT_EQ(lowest(maps.reference.depth[0][m]), 0) << "mip " << m;
+    }
+    measured("mip 3 over one hole", maps.scan.depth[0][3](2, 2), maps.reference.depth[0][3](2, 2));
+}
+
+TEST_F(cacao_scan, mips_know_the_radius) {
+    // A scene and its radius eight times as large is the same picture: every length scales by a power of two, so not even
+    // rounding changes. AMD's mip weight forgot the radius and cuts at one unit, whatever the unit.
+    DepthImage depth = ball_on_floor(camera_of(125));
+    CacaoOptions o = options("");
+    o.radius = 1;
+    o.fade_from = 1000;
+    o.fade_to = 2000;
+    const Both one = both(o, depth);
+    for (const float scale : {0.125F, 8.0F}) {
+        DepthImage scaled = depth;
+        scaled.z_m = depth.z_m * scale;
+        o.radius = scale;
+        const Both other = both(o, scaled);
+        const cv::Mat1f scan = difference(one.scan.visibility, other.scan.visibility),
+                        amd = difference(one.reference.visibility, other.reference.visibility);
+        measured(fmt::format("scaled by {}, largest difference", scale), highest(scan), highest(amd));
+        EXPECT_LE(highest(scan), 1e-4);
+        EXPECT_GT(highest(amd), 0.02);
+    }
+}
+
+TEST_F(cacao_scan, what_lies_outside_the_image_is_unknown) {
+    // A plane that recedes out of the image is open up to its rim. The reference goes on from the rim with its last
+    // depth, straight sideways, which stands above the plane.
+    const DepthImage depth = tilted_plane(camera_of(200), 60);
+    const Both maps = both(options(""), depth, {plane_normals(usual, 60), {}});
+    const cv::Rect inside(60, 0, 40, 120);
+    measured("darkest at the rim", lowest(maps.scan.visibility), lowest(maps.reference.visibility));
+    EXPECT_GE(lowest(maps.scan.visibility), 0.999);
+    EXPECT_GE(lowest(maps.reference.visibility(inside)), 0.98) << "away from the rim";
+    EXPECT_LT(lowest(maps.reference.visibility), 0.8);
+}
+
+TEST_F(cacao_scan, taps_look_from_the_texel_they_read) {
+    // A tap of mip m reads the mean of 2^m texels across. Seen from that texel's centre it lies on the plane; seen from
+    // where the tap fell, as in the reference, a slope becomes a staircase. Without a horizon angle to hide behind.
+    const DepthImage depth = tilted_plane(camera_of(200), 60);
+    const Given given{plane_normals(usual, 60), {}};
+    CacaoOptions o = options("");
+    o.radius = 0.8F;
+    o.horizon_angle = 0;
+    const Both maps = both(o, depth, given);
+    const cv::Rect inside(76, 0, 8, 120); // no tap of these leaves the image sideways
+    o.quality = "medium";
+    o.profile = "reference";
+    measured("steep plane by mips", lowest(maps.scan.visibility(inside)), lowest(maps.reference.visibility(inside)));
+    EXPECT_GE(lowest(maps.scan.visibility), 0.999);
+    EXPECT_LT(lowest(maps.reference.visibility(inside)), 0.9);
+    EXPECT_GE(lowest(run(o, depth, given).visibility(inside)), 0.98) << "the same without mips";
+}
+
+TEST_F(cacao_scan, a_grazing_plane_is_one_surface) {
+    // 1/z is linear across any plane, so a plane has no edges, however it is tilted; z is not.
+    const double tilt = 80;
+    const DepthImage depth = tilted_plane(camera_of(125), tilt);
+    const Both maps = both(options(""), depth);
+    const cv::Vec3f truth = plane_normals({1, 1}, tilt)(0, 0);
+    const auto found = [&](const Seen& seen) {
+        int whole = 0, texels = 0;
+        double worst = 0;
+        for (std::size_t a = 0; a < 4; ++a)
+            for (int y = 1; y + 1 < seen.k.slice.y; ++y)
+                for (int x = 1; x + 1 < seen.k.slice.x; ++x) {
+                    const cv::Mat1f& z = seen.depth[a][0];
+                    if (z(y, x - 1) == 0 || z(y, x) == 0 || z(y, x + 1) == 0) continue;
+                    ++texels;
+                    whole += seen.raw[a].edges(y, x) == 0xff;
+                    const double cosine = cv::normalize(seen.normals[a](y, x)).dot(truth);
+                    worst = std::max(worst, std::acos(std::min(1.0, cosine)) * 180 / std::numbers::pi);
+                }
+        return std::pair(static_cast<double>(whole) / texels, worst);
+    };
+    const auto [scan_whole, scan_worst] = found(maps.scan);
+    const auto [amd_whole, amd_worst] = found(maps.reference);
+    measured("share of texels without an edge", scan_whole, amd_whole);
+    measured("worst normal, degrees", scan_worst, amd_worst);
+    EXPECT_EQ(scan_whole, 1);
+    EXPECT_LT(amd_whole, 0.9);
+    EXPECT_LT(scan_worst, 1);
+    EXPECT_GT(amd_worst, 10);
+}
+
+TEST_F(cacao_scan, nothing_leaks_across_a_cut_edge) {
+    // Left all open, right all closed, a metre apart in depth: no pass of the blur may mix them. AMD lets 1 - sharpness
+    // through every cut edge.
+    const DepthImage depth = step(camera_of(125), 1, 3);
+    const Given sides{{}, [](int, const Slice& made) {
+                          Slice s{cv::Mat1f(made.ao.size(), 0.0F), made.edges};
+                          s.ao.colRange(0, s.ao.cols / 2) = 1;
+                          return s;
+                      }};
+    CacaoOptions o = options("");
+    o.blur_passes = 8;
+    o.sharpness = 0.98F;
+    const Both maps = both(o, depth, sides);
+    const auto leak = [](const Seen& seen) {
+        double bright = 1, dark = 0;
+        for (const Slice& s : seen.blurred) {
+            bright = std::min(bright, lowest(s.ao.colRange(0, s.ao.cols / 2)));
+            dark = std::max(dark, highest(s.ao.colRange(s.ao.cols / 2, s.ao.cols)));
+        }
+        return std::pair(bright, dark);
+    };
+    measured("bright side after eight passes", leak(maps.scan).first, leak(maps.reference).first);
+    measured("dark side after eight passes", leak(maps.scan).second, leak(maps.reference).second);
+    EXPECT_EQ(leak(maps.scan), std::pair(1.0, 0.0));
+    EXPECT_LT(leak(maps.reference).first, 0.99);
+    EXPECT_GT(leak(maps.reference).second, 0.01);
+}
+
+/// Columns of the AO grid, put in place of what was generated; all edges open, or those found in depth.
+Given columns(const std::function<float(int)>& value, bool found_edges = false) {
+    return {{}, [=](int slice, const Slice& made) {
+                Slice s{cv::Mat1f(made.ao.size()), found_edges ? made.edges : cv::Mat1b(made.ao.size(), 255)};
+                for (int x = 0; x < s.ao.cols; ++x) s.ao.col(x) = value(2 * x + slice % 2);
+                return s;
+            }};
+}
+
+CacaoOptions upsampling(const std::string& quality) {
+    CacaoOptions o = options("", quality, true);
+    o.blur_passes = 0;
+    return o;
+}
+
+TEST_F(cacao_scan, the_left_rim_knows_nothing_of_the_right) {
+    // AMD's unsigned coordinates wrap: its halo left of the image shows AO of the right rim.
+    const Both maps = both(upsampling("high"), flat(camera_of(125), 3), columns([](int g) { return g < 70 ? 1.0F : 0.0F; }));
+    const cv::Rect left(0, 0, 4, 120);
+    measured("left rim, open, with the right rim closed", lowest(maps.scan.visibility(left)), lowest(maps.reference.visibility(left)));
+    EXPECT_GE(lowest(maps.scan.visibility(left)), 0.9999);
+    EXPECT_LT(lowest(maps.reference.visibility(left)), 0.9);
+}
+
+TEST_F(cacao_scan, upsampled_ao_stays_where_it_was_computed) {
+    // One closed column of the grid must darken the pixels left and right of it alike. AMD's nearest samples fall on
+    // texel borders, where the hardware chooses a side: the map moves by half a grid pixel, here and there by a whole one.
+    for (const int column : {34, 35}) {
+        const Both maps = both(upsampling("low"), flat(camera_of(125), 3), columns([&](int g) { return g == column ? 0.0F : 1.0F; }));
+        const auto lopsided = [&](const Seen& seen) {
+            double most = 0;
+            for (int d = 1; d <= 4; ++d)
+                most = std::max(most, std::abs(average(seen.visibility.col(2 * column - d)) - average(seen.visibility.col(2 * column + d))));
+            return most;
+        };
+        measured(fmt::format("left against right of grid column {}", column), lopsided(maps.scan), lopsided(maps.reference));
+        EXPECT_LT(lopsided(maps.scan), 0.002);
+        EXPECT_GT(lopsided(maps.reference), 0.02);
+    }
+}
+
+TEST_F(cacao_scan, the_upsampler_compares_with_the_depth_of_the_same_column) {
+    // A near open surface left, a far closed one right: their depths keep them apart. AMD reads the depth of odd columns
+    // one slice texel to the right, so the near rim is taken for the far wall.
+    const Both maps = both(upsampling("high"), step(camera_of(125), 1, 3), columns([](int g) { return g < 40 ? 1.0F : 0.0F; }, true));
+    const cv::Rect left(6, 0, 74, 120), right(80, 0, 74, 120);
+    measured("darkest left of the step", lowest(maps.scan.visibility(left)), lowest(maps.reference.visibility(left)));
+    measured("brightest right of the step", highest(maps.scan.visibility(right)), highest(maps.reference.visibility(right)));
+    EXPECT_GE(lowest(maps.scan.visibility(left)), 0.9999);
+    EXPECT_LE(highest(maps.scan.visibility(right)), 0.0001);
+    EXPECT_GT(highest(maps.reference.visibility(right)), 0.05);
+}
+
+TEST_F(cacao_scan, the_last_odd_column_counts) {
+    // Its depth is one column too far right as well: outside, so AMD's last column weighs nothing.
+    const auto closed = [](int column) { return columns([=](int g) { return g == column ? 0.0F : 1.0F; }); };
+    const DepthImage depth = flat(camera_of(125), 3);
+    const Both last = both(upsampling("high"), depth, closed(79)), inner = both(upsampling("high"), depth, closed(39));
+    const auto darkening = [](const Seen& seen, int x) { return 1 - average(seen.visibility.col(x)); };
+    const double scan = darkening(last.scan, 158) / darkening(inner.scan, 78),
+                 amd = darkening(last.reference, 158) / darkening(inner.reference, 78);
+    measured("effect of the last column against an inner one", scan, amd);
+    EXPECT_GT(scan, 0.9);
+    EXPECT_LT(amd, 0.6);
+}
+
+TEST_F(cacao_scan, pixels_are_where_they_are_at_odd_sizes) {
+    // 33 pixels are 9 slice texels of four, 36 pixels: AMD's kernel squeezes its rays by 33/36, and a plane no longer
+    // fits its own normals. At 36 pixels it does.
+    const double tilt = 50;
+    CacaoOptions o = options("", "low", true);
+    o.radius = 0.8F;
+    o.horizon_angle = 0;
+    const auto inner = [&](const Seen& seen) { return lowest(seen.visibility(cv::Rect(12, 12, 9, 9))); };
+    const auto of = [&](int width) {
+        const cv::Size size(width, width);
+        return both(o, tilted_plane(camera_of(40, size), tilt), {plane_normals(size, tilt), {}});
+    };
+    const Both odd = of(33), even = of(36);
+    measured("plane of 33 pixels", inner(odd.scan), inner(odd.reference));
+    measured("plane of 36 pixels", inner(even.scan), inner(even.reference));
+    EXPECT_GE(lowest(odd.scan.visibility), 0.999);
+    EXPECT_GE(inner(even.reference), 0.98);
+    EXPECT_LT(inner(odd.reference), 0.95);
+}
+
+TEST_F(cacao_scan, depth_is_precise_from_near_to_far) {
+    // Seen through a telephoto lens, a pixel is 2 cm wide at 66 m, where binary16 counts in steps of 6 cm: AMD's slope is
+    // a staircase. 32 bits have no steps that size anywhere.
+    CacaoOptions o = options("");
+    o.fade_from = 1e4F;
+    o.fade_to = 1e5F;
+    for (const double tilt : {10.0, 45.0, 80.0})
+        for (const double z : {0.3, 3.0, 66.0, 100.0}) {
+            const DepthImage depth = tilted_plane(camera_of(3200), tilt, z);
+            const Both maps = both(o, depth, {plane_normals(usual, tilt), {}});
+            EXPECT_GE(lowest(maps.scan.visibility), 0.999) << tilt << " degrees, " << z << " m";
+            measured(fmt::format("{} degrees, {} m", tilt, z), lowest(maps.scan.visibility), lowest(maps.reference.visibility));
+        }
+}
+
+TEST_F(cacao_scan, the_radius_is_metric_at_close_range) {
+    // A wall that ends 0.2 m in front of another shades it; how far, is a matter of metres. The reference shrinks its
+    // radius where it would cover much of the screen.
+    CacaoOptions o = options("");
+    const auto profile = [](const Seen& seen, double metres_per_pixel) {
+        std::vector<double> at;
+        for (const double x : {0.05, 0.1, 0.15, 0.2, 0.25}) at.push_back(average(seen.visibility.col(80 + static_cast<int>(x / metres_per_pixel)).rowRange(50, 70)));
+        return at;
+    };
+    const Both close = both(o, step(camera_of(125), 0.3F, 0.5F)), far = both(o, step(camera_of(500), 4.8F, 5));
+    const auto scan = profile(close.scan, 0.004), scan_far = profile(far.scan, 0.01);
+    const auto amd = profile(close.reference, 0.004), amd_far = profile(far.reference, 0.01);
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+        measured(fmt::format("close {}", i), scan[i], amd[i]);
+        measured(fmt::format("far {}", i), scan_far[i], amd_far[i]);
+    }
+}
+
+TEST_F(cacao_scan, pixels_need_not_be_square) {
+    // The same view, sampled twice as finely down as across, shows the same shadows. AMD's disc is as high as wide in
+    // pixels.
+    const cv::Size tall(160, 240);
+    const Both square = both(options(""), ball_on_floor(camera_of(125)));
+    const Both high = both(options(""), ball_on_floor({125, 250, 79.5, 119.5, tall}));
+    const auto apart = [](const Seen& a, const Seen& b) {
+        cv::Mat1f halved;
+        cv::resize(b.visibility, halved, a.visibility.size(), 0, 0, cv::INTER_AREA);
+        return average(difference(a.visibility, halved));
+    };
+    measured("mean difference", apart(square.scan, high.scan), apart(square.reference, high.reference));
+}
+
+TEST_F(cacao_scan, lowest_reads_nothing_beyond_an_odd_image) {
+    // Of an odd image the last column has no partner in the other slice. AMD loads 0 for it, a wall at the camera.
+    CacaoOptions o = options("", "lowest");
+    o.radius = 2;
+    const Both odd = both(o, flat(camera_of(40, {41, 31}), 0.3F));
+    o.profile = "reference";
+    const Seen even = run(o, flat(camera_of(40, {42, 32}), 0.3F));
+    measured("darkest pixel of a plane of 41x31", lowest(odd.scan.visibility), lowest(odd.reference.visibility));
+    EXPECT_GE(lowest(odd.scan.visibility), 0.999);
+    EXPECT_LT(lowest(odd.reference.visibility), 0.9);
+    EXPECT_GE(lowest(even.visibility), 0.98);
+}
+
+TEST_F(cacao_scan, normals_beside_holes_are_true_or_absent) {
+    // Half of a slope is missing. Where a quadrant is left its normal is the plane's, where none is the neighbours' may
+    // do, and else none is better than AMD's guess, which faces the camera.
+    const double tilt = 60;
+    const DepthImage depth = with_holes(tilted_plane(camera_of(200), tilt), 0.6);
+    const Both maps = both(options(""), depth);
+    const cv::Vec3f truth = plane_normals({1, 1}, tilt)(0, 0);
+    const auto found = [&](const Seen& seen) {
+        int wrong = 0, none = 0, texels = 0;
+        for (std::size_t a = 0; a < 4; ++a)
+            for (int y = 1; y + 1 < seen.k.slice.y; ++y)
+                for (int x = 1; x + 1 < seen.k.slice.x; ++x) {
+                    if (seen.depth[a][0](y, x) == 0) continue;
+                    ++texels;
+                    const cv::Vec3f n = seen.normals[a](y, x);
+                    none += cv::norm(n) < 0.5;
+                    wrong += cv::norm(n) >= 0.5 && cv::normalize(n).dot(truth) < std::cos(2 * std::numbers::pi / 180);
+                }
+        return std::pair(static_cast<double>(wrong) / texels, static_cast<double>(none) / texels);
+    };
+    measured("share of wrong normals", found(maps.scan).first, found(maps.reference).first);
+    measured("share of absent normals", found(maps.scan).second, found(maps.reference).second);
+    EXPECT_EQ(found(maps.scan).first, 0);
+    EXPECT_GT(found(maps.reference).first, 0.02);
+}
+
+} // namespace
+} // namespace scanshade

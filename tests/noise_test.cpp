@@ -1,0 +1,143 @@
+// Noise measured from depth, and the plane fit that it steers: what is gained on noisy depth, and what must not be lost.
+#include "ao/fit_plane/fit_plane.h"
+#include "ao/gpu/device.h"
+#include "projection/error.h"
+#include "tests/support/says.h"
+#include "tests/support/scenes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <gtest/gtest.h>
+#include <random>
+
+namespace scanshade {
+namespace {
+
+using namespace tests;
+
+constexpr double degrees = 180 / 3.14159265358979323846;
+
+/// Independent Gaussian noise of the given law, then the disparity steps of a structured-light sensor.
+DepthImage noisy(const DepthImage& clean, const DepthNoise& noise, double step_per_z2 = 0, unsigned seed = 1) {
+    DepthImage image{clean.camera, clean.z_m.clone(), {}};
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    for (float& z : image.z_m) {
+        if (z <= 0) continue;
+        double value = z + noise.at(z) * normal(random);
+        if (step_per_z2 > 0) value = 1 / (std::round(1 / (value * step_per_z2)) * step_per_z2);
+        z = static_cast<float>(value);
+    }
+    return image;
+}
+
+gpu::Device& device() {
+    static gpu::Device opened;
+    return opened;
+}
+
+/// Angle between fitted normals and the plane's own, 8 pixels off the border, sorted.
+std::vector<double> normal_errors(const cv::Mat3f& normals, const cv::Vec3d& truth) {
+    std::vector<double> errors;
+    for (int y = 8; y < normals.rows - 8; ++y)
+        for (int x = 8; x < normals.cols - 8; ++x) {
+            const cv::Vec3d n = normals(y, x);
+            if (cv::norm(n) > 0) errors.push_back(degrees * std::acos(std::clamp(n.dot(truth), -1.0, 1.0)));
+        }
+    std::sort(errors.begin(), errors.end());
+    return errors;
+}
+
+TEST(noise, clean_depth_has_none) {
+    // Second differences of 1/z vanish on planes; what a scene's edges and curves add is the far tail.
+    const std::vector<DepthImage> images{tilted_plane(test_camera({320, 240}), 40), ball_on_floor(test_camera({320, 240}))};
+    EXPECT_FALSE(measure_noise(images).any()) << describe(measure_noise(images));
+}
+
+TEST(noise, a_known_law_is_measured) {
+    const Pinhole camera = test_camera({320, 240});
+    const DepthNoise kinect{0.001, 0.0018};
+    std::vector<DepthImage> images;
+    for (const double z : {1.0, 2.0, 3.0, 4.0}) images.push_back(noisy(tilted_plane(camera, 35, z), kinect));
+    const DepthNoise measured = measure_noise(images);
+    for (const double z : {1.0, 2.0, 3.0, 4.0}) EXPECT_NEAR(measured.at(z), kinect.at(z), 0.2 * kinect.at(z)) << z << " m";
+}
+
+TEST(noise, disparity_steps_count_as_noise) {
+    // Steps of q without noise have a deviation of q / sqrt(12) on a slope.
+    const Pinhole camera = test_camera({320, 240});
+    const std::vector<DepthImage> images{noisy(tilted_plane(camera, 30, 2), {}, 2.85e-3)};
+    const double q = 2.85e-3 * 4;
+    EXPECT_NEAR(measure_noise(images).at(2), q / std::sqrt(12.0), 0.5 * q / std::sqrt(12.0));
+}
+
+TEST(noise, text_is_checked) {
+    EXPECT_FALSE(noise_from_text("none").any());
+    EXPECT_DOUBLE_EQ(noise_from_text("0.001,0.002").at(2), 0.009);
+    for (const char* wrong : {"", "much", "1", "0.1,", "0.1,0.2x", "-1,0", "nan,0", "0,5"})
+        EXPECT_TRUE(says(refusal([&] { (void)noise_from_text(wrong); }), "FLOOR,PER_Z2")) << wrong;
+}
+
+TEST(fit_plane, noise_no_longer_tilts_normals) {
+    // Differences of neighbouring depths tilt by atan(sigma f / z), here 60 degrees; the fit must bring that to 5.
+    const Pinhole camera = test_camera({320, 240});
+    for (const double z : {1.0, 2.0, 3.0}) {
+        const DepthNoise kinect{0.0012, 0.0018};
+        FitPlane fit(device(), kinect);
+        const FittedDepth fitted = fit.compute(noisy(tilted_plane(camera, 30, z), kinect));
+        const double tilt = 30 / degrees;
+        const auto errors = normal_errors(fitted.normals.normals, {std::sin(tilt), 0, -std::cos(tilt)});
+        ASSERT_GT(errors.size(), 60000U);
+        EXPECT_LT(errors[errors.size() / 2], 5) << z << " m";
+        EXPECT_LT(errors[errors.size() * 95 / 100], 15) << z << " m";
+    }
+}
+
+TEST(fit_plane, clean_planes_stay_where_they_are) {
+    const Pinhole camera = test_camera({320, 240});
+    const DepthImage plane = tilted_plane(camera, 60);
+    FitPlane fit(device(), {0.001, 0.001});
+    const FittedDepth fitted = fit.compute(plane);
+    const double tilt = 60 / degrees;
+    const auto errors = normal_errors(fitted.normals.normals, {std::sin(tilt), 0, -std::cos(tilt)});
+    EXPECT_LT(errors.back(), 1);
+    for (int y = 0; y < plane.z_m.rows; ++y)
+        for (int x = 0; x < plane.z_m.cols; ++x) ASSERT_NEAR(fitted.depth.z_m(y, x), plane.z_m(y, x), 1e-3 * plane.z_m(y, x)) << x << ", " << y;
+}
+
+TEST(fit_plane, edges_stay_within_a_pixel) {
+    // A step of 30 cm at 2 m is far beyond 4.5 sigma: no pixel may end up between the two surfaces.
+    const Pinhole camera = test_camera({320, 240});
+    DepthImage step{camera, cv::Mat1f(camera.size, 2.0F), {}};
+    step.z_m.colRange(160, 320) = 2.3F;
+    const DepthNoise kinect{0.0012, 0.0018};
+    FitPlane fit(device(), kinect);
+    const cv::Mat1f z = fit.compute(noisy(step, kinect)).depth.z_m;
+    for (int y = 0; y < z.rows; ++y)
+        for (int x = 0; x < z.cols; ++x) ASSERT_NEAR(z(y, x), x < 160 ? 2.0 : 2.3, 0.06) << x << ", " << y;
+}
+
+TEST(fit_plane, depth_gains_from_the_fit) {
+    const Pinhole camera = test_camera({320, 240});
+    const DepthImage plane = tilted_plane(camera, 20);
+    const DepthNoise kinect{0.0012, 0.0018};
+    const DepthImage recorded = noisy(plane, kinect);
+    FitPlane fit(device(), kinect);
+    const double before = cv::norm(recorded.z_m, plane.z_m), after = cv::norm(fit.compute(recorded).depth.z_m, plane.z_m);
+    EXPECT_LT(after, 0.5 * before);
+}
+
+TEST(fit_plane, holes_stay_holes_and_invent_nothing) {
+    const DepthImage punched = with_holes(ball_on_floor(test_camera()), 0.2);
+    FitPlane fit(device(), {0.001, 0.002});
+    const FittedDepth fitted = fit.compute(punched);
+    for (int y = 0; y < punched.z_m.rows; ++y)
+        for (int x = 0; x < punched.z_m.cols; ++x) {
+            ASSERT_EQ(fitted.depth.z_m(y, x) == 0, punched.z_m(y, x) == 0);
+            ASSERT_TRUE(std::isfinite(fitted.depth.z_m(y, x)));
+        }
+    for (const std::string& message : device().validation_messages()) ADD_FAILURE() << message;
+}
+
+} // namespace
+} // namespace scanshade
