@@ -81,6 +81,13 @@ void describe_frame(Work& work) {
                                            frame.colour.rows, frame.depth_m.cols, frame.depth_m.rows));
 }
 
+/// A camera that sees none of the points is a mistake to be told, not an empty result. (No depth at all is a result.)
+void refuse_blind_view(const Work& work) {
+    if (work.row.valid_share > 0 && cv::countNonZero(work.depth.z_m) == 0)
+        throw Error(fmt::format("nothing recorded lies in view of the camera ({}; {})", describe(work.frame.camera),
+                                work.frame.camera.origin));
+}
+
 /// What the pictures of a frame show, all on one pixel grid.
 struct Scene {
     cv::Mat1f z_m, visibility;
@@ -320,6 +327,7 @@ std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const Ba
         take(*work, &StageTimes::project, [&] {
             work->frame.camera = work->row.camera = camera_of(work->frame);
             work->depth = project(work->frame);
+            refuse_blind_view(*work);
         });
         return work;
     };

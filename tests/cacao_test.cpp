@@ -88,6 +88,7 @@ class Shared {
   public:
     gpu::Program program;
     static Shared& made_for(const CacaoTables& tables) {
+        (void)device(); // made before, gone after the programs
         static std::map<std::string, std::unique_ptr<Shared>> all;
         std::string key;
         for (const gpu::BufferRow& row : tables.buffers) key += fmt::format("{} {} ", row.bytes, static_cast<int>(row.host));
@@ -323,8 +324,7 @@ TEST_F(cacao_scan, mips_know_the_radius) {
     o.fade_to = 2000;
     const Both one = both(o, depth);
     for (const float scale : {0.125F, 8.0F}) {
-        DepthImage scaled = depth;
-        scaled.z_m = depth.z_m * scale;
+        const DepthImage scaled{depth.camera, cv::Mat1f(depth.z_m * scale), {}};
         o.radius = scale;
         const Both other = both(o, scaled);
         const cv::Mat1f scan = difference(one.scan.visibility, other.scan.visibility),
