@@ -1,20 +1,24 @@
 // bench: milliseconds of every CACAO quality and of each pass, beside a calibration gather timed in the same run.
 //   bench --write-maps FOLDER | --compare-maps FOLDER     the same maps on two devices, and how far they differ
 //   bench [--sizes 640x480,1920x1080] [--repeat 20] [--device NAME] [--passes] [--profile scan|reference]
-// Times are device time (timestamps) where the device has them, medians over the repeats. The scene is a generated room.
+// Times are the device's own (timestamps), transfers left out, over `repeat` runs. Each is taken in turns with a plain 32-tap
+// gather over the same image; "x gather" is the median of their ratios, what remains comparable on a busy machine.
+// The scene is a generated room. --passes stamps every pass, which costs a GPU some microseconds each.
 #include "ao/cacao/cacao.h"
 #include "ao/gpu/device.h"
 #include "ao/gpu/program.h"
 #include "projection/error.h"
 
 #include <algorithm>
-#include <chrono>
+#include <array>
+#include <cstring>
 #include <cmath>
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
 #include <map>
+#include <span>
 
 using namespace scanshade;
 
@@ -42,44 +46,52 @@ DepthImage room(cv::Size size) {
 
 double median(std::vector<double> values) {
     std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-    return std::getenv("BENCH_MIN") ? *std::min_element(values.begin(), values.end()) : values[values.size() / 2];
+    return values[values.size() / 2];
 }
 
-struct Timed {
-    double wall = 0, device = 0;
-    std::vector<std::pair<std::string, double>> passes;
+/// Device milliseconds of a program's passes, transfers left out, resubmitted without touching the host's images.
+class Timed {
+  public:
+    Timed(gpu::Device& device, const CacaoTables& tables, std::span<const std::byte> constants, gpu::Program::Stamps stamps)
+        : program_(device, tables.buffers, tables.passes, constants.size(), stamps), constants_(constants.begin(), constants.end()) {}
+
+    double run() {
+        program_.run(constants_);
+        double sum = 0;
+        for (const auto& [name, ms] : program_.timings()) {
+            if (name == "upload" || name == "download") continue;
+            passes_[name].push_back(ms);
+            sum += ms;
+        }
+        return sum;
+    }
+    template <class T>
+    std::span<T> host(int buffer) {
+        return program_.host_as<T>(buffer);
+    }
+    void print_passes() {
+        for (const auto& [name, ms] : program_.timings())
+            if (passes_.count(name)) fmt::print("    {:<20} {:>8.4f}\n", name, median(passes_[name]));
+    }
+
+  private:
+    gpu::Program program_;
+    std::vector<std::byte> constants_;
+    std::map<std::string, std::vector<double>> passes_;
 };
 
-template <class Run, class Timings>
-Timed timed(int repeat, Run run, Timings timings) {
-    for (int i = 0; i < 3; ++i) run();
-    std::vector<double> wall, device;
-    std::map<std::string, std::vector<double>> passes;
-    std::vector<std::string> order;
-    for (int i = 0; i < repeat; ++i) {
-        const auto start = std::chrono::steady_clock::now();
-        run();
-        wall.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
-        double sum = 0;
-        for (const auto& [name, ms] : timings()) {
-            if (i == 0) order.push_back(name);
-            passes[name].push_back(ms);
-            if (name.find("load") == std::string::npos && name.rfind("host", 0) != 0) sum += ms;
-        }
-        device.push_back(sum);
-    }
-    Timed result{median(wall), median(device), {}};
-    for (const std::string& name : order) result.passes.emplace_back(name, median(passes[name]));
-    return result;
-}
+struct Calibration {
+    std::array<std::int32_t, 2> size;
+    CacaoTables tables;
+};
 
-Timed calibration(gpu::Device& device, cv::Size size, int repeat) {
+/// 32 taps over the same image: what relates the times of machines, and of one machine's better and worse minutes.
+Calibration calibration(cv::Size size) {
     const auto pixels = static_cast<std::size_t>(size.area());
     const auto groups = [](int n) { return static_cast<std::uint32_t>((n + 7) / 8); };
-    gpu::Program program(device, {{"from", pixels * 4, gpu::BufferRow::Host::upload, gpu::BufferRow::Texels::r32f}, {"to", pixels * 4}},
-                         {{"calibrate", "calibrate", {0}, {1}, {groups(size.width), groups(size.height), 1}, {}}}, 8);
-    const std::int32_t constants[2] = {size.width, size.height};
-    return timed(repeat, [&] { program.run(std::as_bytes(std::span(constants))); }, [&] { return program.timings(); });
+    return {{size.width, size.height},
+            {{{"from", pixels * 4, gpu::BufferRow::Host::upload, gpu::BufferRow::Texels::r32f}, {"to", pixels * 4}},
+             {{"calibrate", "calibrate", {0}, {1}, {groups(size.width), groups(size.height), 1}, {}}}}};
 }
 
 cv::Size parse_size(const std::string& text) {
@@ -162,10 +174,10 @@ int main(int argc, char** argv) {
         for (const std::string& text : sizes) {
             const cv::Size size = parse_size(text);
             const DepthImage depth = room(size);
-            const Timed gather = calibration(device, size, repeat);
-            const double mtaps = 32.0 * size.area() / (gather.device * 1e3);
-            fmt::print("\n{}: calibration gather {:.3f} ms ({:.0f} Mtaps/s)\n{:<10} {:>11} {:>9} {:>9} {:>9}\n", text, gather.device, mtaps,
-                       "quality", "resolution", "device ms", "wall ms", "x gather");
+            const Calibration plain = calibration(size);
+            Timed gather(device, plain.tables, std::as_bytes(std::span(plain.size)), gpu::Program::Stamps::total);
+            fmt::print("\n{}\n{:<10} {:>11} {:>10} {:>10} {:>10} {:>10}\n", text, "quality", "resolution", "median ms", "least ms",
+                       "x gather", "gather ms");
             for (const bool downsampled : {false, true})
                 for (const std::string& quality : qualities) {
                     CacaoOptions options;
@@ -173,12 +185,22 @@ int main(int argc, char** argv) {
                     options.quality = quality;
                     options.downsampled = downsampled;
                     options.radius = 1.2F;
-                    Cacao method(device, options);
-                    const Timed t = timed(repeat, [&] { return method.compute({depth}); }, [&] { return method.timings(); });
-                    fmt::print("{:<10} {:>11} {:>9.3f} {:>9.3f} {:>9.2f}\n", quality, downsampled ? "downsampled" : "native", t.device,
-                               t.wall, t.device / gather.device);
-                    if (passes)
-                        for (const auto& [name, ms] : t.passes) fmt::print("    {:<20} {:>8.4f}\n", name, ms);
+                    const shared::CacaoConstants constants = constants_from(options, depth.camera);
+                    const CacaoTables tables = cacao_tables(options, constants, false);
+                    Timed method(device, tables, std::as_bytes(std::span(&constants, 1)),
+                                 passes ? gpu::Program::Stamps::passes : gpu::Program::Stamps::total);
+                    std::memcpy(method.host<float>(cacao_depth_in).data(), depth.z_m.data, depth.z_m.total() * 4);
+                    std::vector<double> ms, taps, ratios;
+                    for (int i = -3; i < repeat; ++i) { // three to warm up; method and gather in turns, so that both see the same minutes
+                        const double a = method.run(), b = gather.run();
+                        if (i < 0) continue;
+                        ms.push_back(a);
+                        taps.push_back(b);
+                        ratios.push_back(a / b);
+                    }
+                    fmt::print("{:<10} {:>11} {:>10.4f} {:>10.4f} {:>10.2f} {:>10.4f}\n", quality, downsampled ? "downsampled" : "native",
+                               median(ms), *std::min_element(ms.begin(), ms.end()), median(ratios), median(taps));
+                    if (passes) method.print_passes();
                 }
         }
     } catch (const std::exception& failure) {
