@@ -45,7 +45,8 @@ inline Around edges(float zc, const Around& z) {
 inline Around edges_of_inverse(float zc, const Around& z) {
     const auto inverse = [](float depth) { return depth > 0 ? 1 / depth : 0; };
     const auto edge = [&](float toward, float away) {
-        if (!(toward > 0)) return 0.0F;
+        if (!(toward > 0))
+            return 0.0F;
         const float d = inverse(toward) - 1 / zc, opposite = inverse(away) - 1 / zc;
         return saturated(1.3F - (away > 0 ? std::min(std::abs(d), std::abs(d + opposite)) : std::abs(d)) * 25 * zc);
     };
@@ -186,8 +187,10 @@ class High {
             for (const float side : {1.0F, -1.0F}) {
                 const float u = t.u + side * o[0] * k.slice_inv.x, v = t.v + side * o[1] * k.slice_inv.y;
                 const cv::Mat1f& read = depth[static_cast<std::size_t>(m)];
-                const int mx = std::clamp(static_cast<int>(std::floor(u * static_cast<float>(read.cols))), 0, read.cols - 1);
-                const int my = std::clamp(static_cast<int>(std::floor(v * static_cast<float>(read.rows))), 0, read.rows - 1);
+                const int mx =
+                    std::clamp(static_cast<int>(std::floor(u * static_cast<float>(read.cols))), 0, read.cols - 1);
+                const int my =
+                    std::clamp(static_cast<int>(std::floor(v * static_cast<float>(read.rows))), 0, read.rows - 1);
                 const Point d = place(u, v, read(my, mx)) - p;
                 const float in_front = saturated(2 + k.neg_rec_radius * std::max(0.0F, -d[2]));
                 const float weight = tap.weight * (0.6F * in_front + 0.4F);
