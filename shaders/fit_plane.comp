@@ -11,7 +11,7 @@
 #include "lib/cheap.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(binding = 0) uniform samplerBuffer depth_in;
+layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 16, r32f) uniform writeonly imageBuffer depth_out;
 layout(binding = 17, r32f) uniform writeonly imageBuffer normals_out;
 layout(binding = 32, scalar) uniform Constants { FitPlaneConstants k; };
@@ -33,7 +33,7 @@ struct Here {
 };
 
 void add(inout Sums s, Here h, bool ok, int at, float x, float y, Plane plane, float tolerance) {
-    float z = texelFetch(depth_in, ok ? at : 0).x;
+    float z = imageLoad(depth_in, ok ? at : 0).x;
     float w = 1.0 / z - h.w;
     float e = (w - (plane.c + x * plane.a + y * plane.b)) * tolerance;
     float g = positive(1.0 - e * e);
@@ -67,14 +67,14 @@ bool solve(Sums s, out Plane plane) {
 }
 
 #define COLUMN(i) { int o = nearest(float(i) * spread); int u = h.p.x + o; \
-    add(sums, h, row_ok && uint(u) < uint(k.size.x), line + u, float_of(ivec2(o)).x, y, plane, tolerance); }
+    add(sums, h, row_ok && uint(u) < uint(k.size.x), line + u, float(o), y, plane, tolerance); }
 
 void row5(inout Sums sums, Here h, int j, float spread, Plane plane, float tolerance) {
     int o = nearest(float(j) * spread);
     int v = h.p.y + o;
     bool row_ok = uint(v) < uint(k.size.y);
     int line = v * k.size.x;
-    float y = float_of(ivec2(o)).y;
+    float y = float(o);
     COLUMN(-2) COLUMN(-1) COLUMN(0) COLUMN(1) COLUMN(2)
 }
 
@@ -83,7 +83,7 @@ void row7(inout Sums sums, Here h, int j, float spread, Plane plane, float toler
     int v = h.p.y + o;
     bool row_ok = uint(v) < uint(k.size.y);
     int line = v * k.size.x;
-    float y = float_of(ivec2(o)).y;
+    float y = float(o);
     COLUMN(-3) COLUMN(-2) COLUMN(-1) COLUMN(0) COLUMN(1) COLUMN(2) COLUMN(3)
 }
 
@@ -92,7 +92,7 @@ void main() {
     h.p = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(h.p, k.size))) return;
     int here = h.p.y * k.size.x + h.p.x;
-    float z = texelFetch(depth_in, here).x;
+    float z = imageLoad(depth_in, here).x;
     bool hole = !(z > 0.0);
     float zc = hole ? 1.0 : z;
     h.w = 1.0 / zc;

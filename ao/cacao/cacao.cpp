@@ -1,6 +1,7 @@
 #include "ao/cacao/cacao.h"
 
 #include "projection/error.h"
+#include "shaders/lib/cacao_pattern.glsl"
 
 #include <algorithm>
 #include <chrono>
@@ -31,6 +32,11 @@ vec2 rotation(int a, int phase) {
     return {scale * std::cos(angle), -scale * std::sin(angle)};
 }
 
+/// The sampling pattern as the adaptive taps of HIGHEST read it.
+#define ROW(i, x, y, weight, mip_bias) x##F, y##F, weight##F, mip_bias##F,
+const std::vector<float> pattern{CACAO_PATTERN_0_3(ROW) CACAO_PATTERN_3_5(ROW) CACAO_PATTERN_5_12(ROW) CACAO_PATTERN_12_31(ROW)};
+#undef ROW
+
 /// Device depth d -> z = mu / (alpha - d), with z positive for both orders of near and far.
 vec2 depth_unpack(const CacaoOptions& options) {
     const float n = options.near_m, f = options.far_m;
@@ -49,11 +55,14 @@ void set_sizes(CacaoConstants& k, const CacaoOptions& options, cv::Size image) {
     k.grid = {halved(image.width) + 4, halved(image.height) + 4};
     k.slice_inv = {1.0F / static_cast<float>(k.slice.x), 1.0F / static_cast<float>(k.slice.y)};
     k.image_inv = {1.0F / static_cast<float>(image.width), 1.0F / static_cast<float>(image.height)};
-    // Mip starts by shifts alone: with a stride of 24s and rows of 8s, 4/3 of mip 0 is divisible by 64.
-    k.depth_stride = 24 * groups(k.slice.x, 24);
-    const int padded = k.depth_stride * 8 * groups(k.slice.y, 8);
+    // Mip starts by shifts alone: with a stride of 24s and rows of 8s, 4/3 of mip 0 is divisible by 64. Each mip ends with at
+    // least one column and row that nothing writes; they serve as the rim of its left and upper side, too, and the first
+    // slice has a row before it.
+    k.depth_stride = 24 * groups(8 * groups(k.slice.x, 8) + 8, 24);
+    const int padded = k.depth_stride * 8 * (groups(k.slice.y, 8) + 1), lead = k.depth_stride + 8;
     k.depth_mips = padded / 3 * 4;
-    k.depth_pitch = k.depth_mips - (k.depth_mips >> 8);
+    k.depth_end = lead + k.depth_mips;
+    k.depth_pitch = k.depth_end - (k.depth_mips >> 8);
 }
 
 void set_camera(CacaoConstants& k, const Pinhole& camera) {
@@ -172,6 +181,7 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
         {"blur a", !scan && n > 1 ? haloed * 4 : 4, Host::none, words},
         {"blur b", !scan && n > 2 ? haloed * 4 : 4, Host::none, words},
         {"staged", options.downsampled ? texels(k.grid) * 8 : 8, Host::none, pairs},
+        {"pattern", pattern.size() * 4, Host::none, gpu::BufferRow::Texels::rgba32f, pattern},
         {"visibility", texels(k.image) * 4, Host::download},
     };
 
@@ -197,7 +207,7 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
         tables.passes.back().groups = {static_cast<std::uint32_t>(groups(4 * groups(k.slice.x, 8) * groups(k.slice.y, 8), 64)), 1, 1};
     }
     // Slots a configuration does not read are filled with a buffer it reads anyway.
-    std::vector<int> inputs{cacao_depths, cacao_normals, cacao_normals, cacao_normals, cacao_normals};
+    std::vector<int> inputs{cacao_depths, cacao_normals, cacao_normals, cacao_normals, cacao_normals, cacao_pattern};
     if (highest) {
         tables.passes.push_back({"clear counter", "", {}, {cacao_counter}, {1, 1, 1}, {}});
         add("base", "cacao/generate", inputs, {cacao_pong}, k.slice, 4, {{shared::spec_base, 1}, {shared::spec_mips, 1}});
@@ -205,7 +215,7 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
         add("importance blur a", "cacao/importance_blur", {cacao_importance}, {cacao_importance_pong, cacao_counter}, k.importance, 1);
         add("importance blur b", "cacao/importance_blur", {cacao_importance_pong}, {cacao_importance, cacao_counter}, k.importance, 1,
             {{shared::spec_last, 1}});
-        inputs = {cacao_depths, cacao_normals, cacao_pong, cacao_importance, cacao_counter};
+        inputs = {cacao_depths, cacao_normals, cacao_pong, cacao_importance, cacao_counter, cacao_pattern};
     }
     add("generate", "cacao/generate", inputs, {cacao_ping}, k.slice, layers, {{shared::spec_mips, mips}});
 
@@ -289,7 +299,7 @@ Intermediate Cacao::depth_slices(int mip) {
     const auto bytes = program_->read_back(cacao_depths);
     for (int a = 0; a < 4; ++a)
         for (int y = 0; y < height; ++y) {
-            const int first = a * k.depth_pitch + k.depth_mips - (k.depth_mips >> (2 * mip)) + y * (k.depth_stride >> mip);
+            const int first = a * k.depth_pitch + k.depth_end - (k.depth_mips >> (2 * mip)) + y * (k.depth_stride >> mip);
             slices.data.insert(slices.data.end(), bytes.begin() + 4L * first, bytes.begin() + 4L * (first + width));
         }
     return slices;

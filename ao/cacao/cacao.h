@@ -55,7 +55,7 @@ struct CacaoOptions {
 /// The buffers of CACAO by name; the rows of CacaoTables::buffers are in this order.
 enum CacaoBuffer : int {
     cacao_depth_in, cacao_normals_in, cacao_depths, cacao_normals, cacao_ping, cacao_pong, cacao_importance,
-    cacao_importance_pong, cacao_counter, cacao_blur_a, cacao_blur_b, cacao_staged, cacao_out, cacao_buffer_count
+    cacao_importance_pong, cacao_counter, cacao_blur_a, cacao_blur_b, cacao_staged, cacao_pattern, cacao_out, cacao_buffer_count
 };
 
 /// Everything one configuration runs, as plain data.

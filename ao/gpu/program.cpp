@@ -48,6 +48,8 @@ vk::Format format_of(BufferRow::Texels texels) {
     switch (texels) {
     case BufferRow::Texels::r32f: return vk::Format::eR32Sfloat;
     case BufferRow::Texels::rg32f: return vk::Format::eR32G32Sfloat;
+    case BufferRow::Texels::rgba32f: return vk::Format::eR32G32B32A32Sfloat;
+    case BufferRow::Texels::rgba32ui: return vk::Format::eR32G32B32A32Uint;
     default: return vk::Format::eR32Uint;
     }
 }
@@ -87,7 +89,7 @@ std::vector<std::string> problems(std::span<const BufferRow> buffers, std::span<
     std::vector<std::string> found;
     std::vector<char> written(buffers.size());
     for (std::size_t i = 0; i < buffers.size(); ++i) {
-        written[i] = buffers[i].host == BufferRow::Host::upload;
+        written[i] = buffers[i].host == BufferRow::Host::upload || !buffers[i].initial.empty();
         if (buffers[i].bytes == 0) found.push_back(fmt::format("buffer {} is empty", buffers[i].name));
     }
     for (const PassRow& pass : passes) {
@@ -121,6 +123,8 @@ struct Program::State {
         vk::raii::Pipeline pipeline = nullptr;
     };
     std::vector<Pipeline> pipelines;
+    Stamps stamps = Stamps::passes;
+    std::vector<std::string> intervals; // what lies between one time stamp and the next
     vk::raii::QueryPool queries = nullptr;
     vk::raii::Fence fence = nullptr;
     vk::raii::CommandBuffer commands = nullptr;
@@ -134,7 +138,7 @@ struct Program::State {
         for (std::size_t i = 0; i < rows.size(); ++i) {
             const BufferRow& row = rows[i];
             auto usage = Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst;
-            if (row.texels != BufferRow::Texels::none) usage |= Usage::eUniformTexelBuffer | Usage::eStorageTexelBuffer;
+            if (row.texels != BufferRow::Texels::none) usage |= Usage::eStorageTexelBuffer;
             buffers.push_back(during(fmt::format("buffer {} of {} bytes", row.name, row.bytes), [&] {
                 return BoundBuffer(gpu, row.bytes, usage, {shared_memory, Memory::eDeviceLocal});
             }));
@@ -152,13 +156,9 @@ struct Program::State {
                                 {Memory::eHostVisible | Memory::eHostCoherent});
     }
 
-    [[nodiscard]] vk::DescriptorType write_type(int buffer) const {
+    [[nodiscard]] vk::DescriptorType type_of(int buffer) const {
         return rows[buffer].texels == BufferRow::Texels::none ? vk::DescriptorType::eStorageBuffer
                                                               : vk::DescriptorType::eStorageTexelBuffer;
-    }
-    [[nodiscard]] vk::DescriptorType read_type(int buffer) const {
-        return rows[buffer].texels == BufferRow::Texels::none ? vk::DescriptorType::eStorageBuffer
-                                                              : vk::DescriptorType::eUniformTexelBuffer;
     }
 
     Pipeline make_pipeline(const PassRow& pass) {
@@ -168,9 +168,9 @@ struct Program::State {
         const auto add = [&](std::uint32_t binding, vk::DescriptorType type) {
             bindings.emplace_back(binding, type, 1, vk::ShaderStageFlagBits::eCompute);
         };
-        for (std::size_t i = 0; i < pass.reads.size(); ++i) add(static_cast<std::uint32_t>(i), read_type(pass.reads[i]));
+        for (std::size_t i = 0; i < pass.reads.size(); ++i) add(static_cast<std::uint32_t>(i), type_of(pass.reads[i]));
         for (std::size_t i = 0; i < pass.writes.size(); ++i)
-            add(first_write_binding + static_cast<std::uint32_t>(i), write_type(pass.writes[i]));
+            add(first_write_binding + static_cast<std::uint32_t>(i), type_of(pass.writes[i]));
         add(constants_binding, vk::DescriptorType::eUniformBuffer);
         made.set = gpu.device.createDescriptorSetLayout({vk::DescriptorSetLayoutCreateFlagBits::ePushDescriptorKHR, bindings});
         made.layout = gpu.device.createPipelineLayout(vk::PipelineLayoutCreateInfo({}, *made.set));
@@ -200,9 +200,9 @@ struct Program::State {
             writes.emplace_back(nullptr, binding, 0, 1, type, nullptr, &infos.back(), &*buffer.view);
         };
         std::uint32_t binding = 0;
-        for (int i : pass.reads) add(binding++, buffers[i], read_type(i));
+        for (int i : pass.reads) add(binding++, buffers[i], type_of(i));
         binding = first_write_binding;
-        for (int i : pass.writes) add(binding++, buffers[i], write_type(i));
+        for (int i : pass.writes) add(binding++, buffers[i], type_of(i));
         add(constants_binding, constants, vk::DescriptorType::eUniformBuffer);
         commands.pushDescriptorSetKHR(vk::PipelineBindPoint::eCompute, *pipeline.layout, 0, writes);
     }
@@ -226,12 +226,16 @@ struct Program::State {
 
     /// The command buffer is the same every frame, so it is recorded once.
     void record() {
-        const auto stamps = static_cast<std::uint32_t>(passes.size() + 3);
-        queries = gpu.device.createQueryPool({{}, vk::QueryType::eTimestamp, stamps});
+        intervals = {"upload"};
+        if (stamps == Stamps::total) intervals.emplace_back("passes");
+        else for (const PassRow& pass : passes) intervals.push_back(pass.name);
+        intervals.emplace_back("download");
+        const auto count = static_cast<std::uint32_t>(intervals.size() + 1);
+        queries = gpu.device.createQueryPool({{}, vk::QueryType::eTimestamp, count});
         fence = gpu.device.createFence({});
         commands = std::move(gpu.device.allocateCommandBuffers({*gpu.pool, vk::CommandBufferLevel::ePrimary, 1}).front());
         commands.begin(vk::CommandBufferBeginInfo{});
-        if (gpu.has_timestamps) commands.resetQueryPool(*queries, 0, stamps);
+        if (gpu.has_timestamps) commands.resetQueryPool(*queries, 0, count);
         std::uint32_t query = 0;
         stamp(query++);
         record_transfers(BufferRow::Host::upload);
@@ -251,12 +255,27 @@ struct Program::State {
                 push_descriptors(pass, pipelines[i]);
                 commands.dispatch(pass.groups[0], pass.groups[1], pass.groups[2]);
             }
-            stamp(query++);
+            if (stamps == Stamps::passes) stamp(query++);
         }
+        if (stamps == Stamps::total) stamp(query++);
         record_transfers(BufferRow::Host::download);
         barrier(commands, Stage::eHost, Access::eHostRead);
         stamp(query++);
         commands.end();
+    }
+
+    void fill_buffers() {
+        const auto once = std::move(gpu.device.allocateCommandBuffers({*gpu.pool, vk::CommandBufferLevel::ePrimary, 1}).front());
+        once.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
+        for (std::size_t i = 0; i < rows.size(); ++i) {
+            if (rows[i].initial.empty())
+                once.fillBuffer(*buffers[i].buffer, 0, VK_WHOLE_SIZE, 0);
+            else
+                once.updateBuffer<float>(*buffers[i].buffer, 0, rows[i].initial);
+        }
+        compute_barrier(once);
+        once.end();
+        submit(once);
     }
 
     void submit(const vk::raii::CommandBuffer& recorded) {
@@ -269,14 +288,17 @@ struct Program::State {
     }
 };
 
-Program::Program(Device& device, std::vector<BufferRow> buffers, std::vector<PassRow> passes, std::size_t constants_bytes) {
+Program::Program(Device& device, std::vector<BufferRow> buffers, std::vector<PassRow> passes, std::size_t constants_bytes,
+                 Stamps stamps) {
     const auto wrong = problems(buffers, passes);
     if (!wrong.empty()) throw Error(fmt::format("pass table: {}", fmt::join(wrong, "; ")));
     state_ = std::make_unique<State>(device.state(), std::move(buffers), std::move(passes));
+    state_->stamps = stamps;
     state_->make_buffers(constants_bytes);
     for (const PassRow& pass : state_->passes)
         state_->pipelines.push_back(during("pass " + pass.name, [&] { return state_->make_pipeline(pass); }));
     state_->record();
+    state_->fill_buffers();
 }
 
 Program::~Program() = default;
@@ -294,14 +316,12 @@ void Program::run(std::span<const std::byte> constants) {
     during(s.gpu.info.name, [&] { s.submit(s.commands); });
     timings_.clear();
     if (!s.gpu.has_timestamps) return;
-    const auto count = s.passes.size() + 3;
+    const auto count = s.intervals.size() + 1;
     const auto [result, ticks] =
         s.queries.getResults<std::uint64_t>(0, static_cast<std::uint32_t>(count), count * 8, 8, vk::QueryResultFlagBits::e64);
     if (result != vk::Result::eSuccess) return;
     const auto ms = [&](std::size_t i) { return static_cast<double>(ticks[i + 1] - ticks[i]) * s.gpu.nanoseconds_per_tick * 1e-6; };
-    timings_.emplace_back("upload", ms(0));
-    for (std::size_t i = 0; i < s.passes.size(); ++i) timings_.emplace_back(s.passes[i].name, ms(i + 1));
-    timings_.emplace_back("download", ms(count - 2));
+    for (std::size_t i = 0; i < s.intervals.size(); ++i) timings_.emplace_back(s.intervals[i], ms(i));
 }
 
 std::vector<std::byte> Program::read_back(int buffer) {

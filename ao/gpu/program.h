@@ -16,16 +16,17 @@
 
 namespace scanshade::gpu {
 
-/// A buffer of the program. Host buffers can be reached by Program::host() before (upload) or after (download) a run.
+/// A buffer of the program, zero to begin with. Host buffers can be reached by Program::host() before (upload) or after (download) a run.
 struct BufferRow {
     enum class Host { none, upload, download };
     std::string_view name;
     std::size_t bytes = 0;
     Host host = Host::none;
-    /// Read as a texel buffer (samplerBuffer, usamplerBuffer) instead of a storage buffer: the device's texture path, which
-    /// on lavapipe gathers without a branch per lane, five times as fast.
-    enum class Texels { none, r32f, rg32f, r32ui };
+    /// Bound as a storage texel buffer (imageBuffer, uimageBuffer) instead of a storage buffer: on lavapipe a load is then
+    /// one gather in place, without a branch per lane (storage buffer) or a call (sampled texel buffer).
+    enum class Texels { none, r32f, rg32f, rgba32f, r32ui, rgba32ui };
     Texels texels = Texels::none;
+    std::vector<float> initial = {}; ///< what it holds from the start instead of zeros; 64 KiB at most
 };
 
 /// One dispatch. `reads` bind from 0, `writes` (read-write included) from 16, the constants at 32.
@@ -47,7 +48,10 @@ class Program {
   public:
     /// `constants_bytes` is the size of the uniform block every pass sees. Throws Error listing problems() or naming the
     /// shader whose pipeline could not be made.
-    Program(Device& device, std::vector<BufferRow> buffers, std::vector<PassRow> passes, std::size_t constants_bytes);
+    /// Stamps::total times all passes together, as "passes": stamping each costs a GPU some microseconds.
+    enum class Stamps { passes, total };
+    Program(Device& device, std::vector<BufferRow> buffers, std::vector<PassRow> passes, std::size_t constants_bytes,
+            Stamps stamps = Stamps::passes);
     ~Program();
     Program(const Program&) = delete;
     Program& operator=(const Program&) = delete;

@@ -7,8 +7,8 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(constant_id = spec_resolve) const int resolve = resolve_smart;
 layout(constant_id = spec_power) const int power = 0;
-layout(binding = 0) uniform usamplerBuffer ao;
-layout(binding = 1) uniform samplerBuffer depth_in;
+layout(binding = 0, r32ui) readonly uniform uimageBuffer ao;
+layout(binding = 1, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 16, scalar) writeonly buffer Out { float visibility[]; };
 
 #include "lib/cacao_resolve.glsl"
@@ -33,7 +33,7 @@ void put(ivec2 p, float v) {
     if (any(greaterThanEqual(p, k.image))) return;
     int here = p.y * k.image.x + p.x;
     if (scan != 0) {
-        bool surface = v >= 0.0 && (two_slices == 0 || texelFetch(depth_in, here).x > 0.0);
+        bool surface = v >= 0.0 && (two_slices == 0 || imageLoad(depth_in, here).x > 0.0);
         visibility[here] = surface ? v : uintBitsToFloat(0x7fc00000u);
     } else {
         visibility[here] = stored(power != 0 ? pow(v, 2.2) : v);
@@ -42,6 +42,7 @@ void put(ivec2 p, float v) {
 
 // 2x2 pixels a thread.
 void main() {
+    k = constants;
     ivec2 t = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(t, k.slice))) return;
     ivec2 p = 2 * t;

@@ -9,7 +9,7 @@ layout(local_size_x = cacao_tile_x, local_size_y = cacao_tile_y) in;
 layout(constant_id = spec_first) const int first = 0;
 layout(constant_id = spec_last) const int last = 0;
 layout(constant_id = spec_halo) const int halo = 0;
-layout(binding = 0) uniform usamplerBuffer from;
+layout(binding = 0, r32ui) readonly uniform uimageBuffer from;
 layout(binding = 16, r32ui) uniform writeonly uimageBuffer to;
 
 int mirrored(int i, int size) {
@@ -25,9 +25,9 @@ int index_between_steps(int slice, ivec2 t) {
 }
 
 uint read(int slice, ivec2 t) {
-    if (scan != 0) return texelFetch(from, slice_index(slice, clamp(t, ivec2(0), k.slice - 1))).x;
-    if (first != 0) return texelFetch(from, slice_index(slice, ivec2(mirrored(t.x, k.slice.x), mirrored(t.y, k.slice.y)))).x;
-    return texelFetch(from, index_between_steps(slice, t)).x;
+    if (scan != 0) return imageLoad(from, slice_index(slice, clamp(t, ivec2(0), k.slice - 1))).x;
+    if (first != 0) return imageLoad(from, slice_index(slice, ivec2(mirrored(t.x, k.slice.x), mirrored(t.y, k.slice.y)))).x;
+    return imageLoad(from, index_between_steps(slice, t)).x;
 }
 
 float value(uint texel) {
@@ -35,6 +35,7 @@ float value(uint texel) {
 }
 
 void main() {
+    k = constants;
     ivec2 t = ivec2(gl_GlobalInvocationID.xy) - halo;
     if (any(greaterThanEqual(t, k.slice + halo))) return;
     int slice = slice_of_layer(int(gl_GlobalInvocationID.z));

@@ -13,11 +13,12 @@ layout(local_size_x = cacao_tile_x, local_size_y = cacao_tile_y) in;
 layout(constant_id = spec_base) const int base = 0;
 layout(constant_id = spec_mips) const int mips = 0;
 
-layout(binding = 0) uniform samplerBuffer depths;
-layout(binding = 1) uniform usamplerBuffer normals;
-layout(binding = 2) uniform usamplerBuffer base_result;
-layout(binding = 3) uniform usamplerBuffer importance;
-layout(binding = 4) uniform usamplerBuffer load_counter;
+layout(binding = 0, r32f) readonly uniform imageBuffer depths;
+layout(binding = 1, r32ui) readonly uniform uimageBuffer normals;
+layout(binding = 2, r32ui) readonly uniform uimageBuffer base_result;
+layout(binding = 3, r32ui) readonly uniform uimageBuffer importance;
+layout(binding = 4, r32ui) readonly uniform uimageBuffer load_counter;
+layout(binding = 5, rgba32f) readonly uniform imageBuffer pattern;
 layout(binding = 16, r32ui) uniform writeonly uimageBuffer ao;
 
 const bool detailed = kernel >= 1 && base == 0; // depth edges, edge fade-out, detail shadows
@@ -25,13 +26,16 @@ const bool halo_weighted = kernel >= 1;
 const float weight_range = 20.0;                // the base pass stores its weight sum divided by this
 
 struct Surface {
-    ivec2 texel;
     int slice;
-    vec2 uv;        // reference: of the texel in its slice
-    vec2 ray;       // scan: view ray of the slice's texel (0, 0)
-    vec2 ray_step;  // scan: its change per slice texel
-    int depth_base; // scan: first texel of the slice's depths
-    vec3 point;     // moved a little towards the camera
+    vec2 uv;           // reference: of the texel in its slice
+    vec2 ray;          // scan: view ray of the slice's texel (0, 0)
+    vec2 ray_step;     // scan: its change per slice texel
+    vec2 at;           // scan: the texel as a coordinate (see Level)
+    ivec2 beyond;      // scan: bits of the first coordinate beyond the slice
+    int depth_base;    // scan: end of the slice's depths
+    vec3 quick_normal; // scan: as quick_inversesqrt() wants it
+    float halo_step;   // scan: 0.6 / R
+    vec3 point;        // moved a little towards the camera
     vec3 normal;
     mat2 rotation;  // pattern rotation, scaled to texels
     float falloff;  // F = -1 / R'^2
@@ -44,7 +48,7 @@ struct Sum {
 
 float obscurance(vec3 normal, vec3 d, float falloff) {
     float d2 = dot(d, d);
-    float facing = scan != 0 ? dot(normal, d) * inversesqrt(d2) : dot(normal, d) / sqrt(d2);
+    float facing = scan != 0 ? dot(normal, d) * (quick_scale * quick_inversesqrt(d2)) : dot(normal, d) / sqrt(d2);
     return max(0.0, facing - k.horizon) * max(0.0, d2 * falloff + 1.0);
 }
 
@@ -53,7 +57,7 @@ vec3 sample_reference(Surface s, vec2 offset, int mip) {
     precise vec2 uv = s.uv + offset * k.slice_inv;
     ivec2 size = mip_size(mip);
     ivec2 m = clamp(ivec2(floor(uv * vec2(size))), ivec2(0), size - 1);
-    float z = texelFetch(depths, depth_index(s.slice, mip, m)).x;
+    float z = imageLoad(depths, depth_index(s.slice, mip, m)).x;
     return vec3((k.view_mul * uv + k.view_add) * z, z);
 }
 
@@ -69,29 +73,34 @@ void add_reference(Surface s, vec3 seen, float weight, inout Sum sum) {
     sum.weight += weight;
 }
 
-// --- scan. One step of a mip: where its texels lie and which depth cells hold them.
+// --- scan. Coordinates are floats at a scale where an addition rounds and the low bits count texels: a tap's texel, the
+// mip texel around it and its centre are then a few integer steps. |coordinate| < 2^16, far outside everything is clamped.
+const int fraction = mips != 0 ? 6 : 0;                             // bits below one texel, for centres of mip texels
+const float snap = mips != 0 ? 196608.0 : 12582912.0;               // 1.5 * 2^(23 - fraction)
+const int snap_bits = mips != 0 ? 0x48400000 : 0x4b400000;
+
 struct Level {
-    int shift, first, stride;
-    vec2 ray; // view ray of the centre of the mip's texel (0, 0)
+    int shift, first, stride; // which depth cells hold the mip's texels
+    int whole_texels, middle; // from a coordinate's bits to those of its mip texel's centre
 };
 
 Level level(Surface s, int mip) {
-    float middle = 0.5 * power_of_two(mip) - 0.5;
-    return Level(mip, s.depth_base + k.depth_mips - (k.depth_mips >> (2 * mip)), k.depth_stride >> mip, s.ray + middle * s.ray_step);
+    int one = (1 << fraction) << mip;
+    return Level(mip + fraction, s.depth_base - (k.depth_mips >> (2 * mip)), k.depth_stride >> mip, -one, (one >> 1) - ((1 << fraction) >> 1));
 }
 
-// The tap looks from the centre of the texel it reads, so that slopes stay planes. Holes and what lies outside the image
-// are unknown: they count neither as open nor as closed.
-void add_scan(Surface s, Level l, ivec2 t, float weight, inout Sum sum) {
-    ivec2 m = t >> l.shift;
-    bool inside = all(lessThan(uvec2(t), uvec2(k.slice)));
-    float z = texelFetch(depths, inside ? l.first + m.y * l.stride + m.x : 0).x;
-    vec3 d = vec3((l.ray + float_of(m << l.shift) * s.ray_step) * z, z) - s.point;
+// The tap looks from the centre of the texel it reads, so that slopes stay planes. Holes and the rim of holes round the
+// image are unknown: they count neither as open nor as closed.
+void add_scan(Surface s, Level l, vec2 at, inout Sum sum) {
+    ivec2 bits = min(max(floatBitsToInt(at), snap_bits - (1 << fraction)), s.beyond);
+    ivec2 m = (bits - snap_bits) >> l.shift;
+    float z = imageLoad(depths, l.first + m.y * l.stride + m.x).x;
+    precise vec2 centre = intBitsToFloat((bits & l.whole_texels) + l.middle) - snap;
+    vec3 d = vec3((s.ray + centre * s.ray_step) * z, z) - s.point;
     float d2 = dot(d, d);
-    float facing = positive(dot(s.normal, d) * inversesqrt(d2) - k.horizon);
+    float facing = positive(dot(s.quick_normal, d) * quick_inversesqrt(d2) - k.horizon);
     float near = positive(d2 * s.falloff + 1.0);
-    if (halo_weighted) weight *= 0.6 * at_most_one(positive(2.0 + k.neg_rec_radius * positive(-d.z))) + 0.4;
-    weight = inside && z > 0.0 ? weight : 0.0;
+    float weight = z > 0.0 ? (halo_weighted ? at_most_one(at_least(d.z * s.halo_step + 1.6, 0.4)) : 1.0) : 0.0;
     sum.obscurance += facing * near * weight;
     sum.weight += weight;
 }
@@ -99,13 +108,16 @@ void add_scan(Surface s, Level l, ivec2 t, float weight, inout Sum sum) {
 void tap(Surface s, vec4 row, bool weighted, inout Sum sum) {
     float weight = weighted ? row.z : 1.0;
     vec2 offset = s.rotation * row.xy;
-    float mip = clamp(row.w + s.mip_base, 0.0, 3.0);
     if (scan != 0) {
-        ivec2 o = nearest(offset);
-        Level l = level(s, mips != 0 ? nearest(mip) : 0);
-        add_scan(s, l, s.texel + o, weight, sum);
-        add_scan(s, l, s.texel - o, weight, sum);
+        Level l = level(s, mips != 0 ? min(max(nearest(row.w + s.mip_base), 0), 3) : 0);
+        precise vec2 ahead = s.at + offset, behind = s.at - offset;
+        Sum pair = Sum(0.0, 0.0);
+        add_scan(s, l, ahead, pair);
+        add_scan(s, l, behind, pair);
+        sum.obscurance += weight * pair.obscurance;
+        sum.weight += weight * pair.weight;
     } else {
+        float mip = clamp(row.w + s.mip_base, 0.0, 3.0);
         offset = roundEven(offset);
         int m = mips != 0 ? int(roundEven(mip)) : 0;
         add_reference(s, sample_reference(s, offset, m), weight, sum);
@@ -114,25 +126,23 @@ void tap(Surface s, vec4 row, bool weighted, inout Sum sum) {
 }
 
 #define TAP(i, dx, dy, w, bias) tap(s, vec4(dx, dy, w, bias), true, sum);
-#define EXTRA_TAP(i, dx, dy, w, bias) if (i < end) tap(s, vec4(dx, dy, w, bias), false, sum);
 
 vec4 neighbour_depths(int slice, ivec2 t) {
     ivec2 low = max(t - 1, ivec2(0)), high = min(t + 1, k.slice - 1);
-    vec4 z = vec4(texelFetch(depths, depth_index(slice, 0, ivec2(low.x, t.y))).x, texelFetch(depths, depth_index(slice, 0, ivec2(high.x, t.y))).x,
-                  texelFetch(depths, depth_index(slice, 0, ivec2(t.x, low.y))).x, texelFetch(depths, depth_index(slice, 0, ivec2(t.x, high.y))).x);
+    vec4 z = vec4(imageLoad(depths, depth_index(slice, 0, ivec2(low.x, t.y))).x, imageLoad(depths, depth_index(slice, 0, ivec2(high.x, t.y))).x,
+                  imageLoad(depths, depth_index(slice, 0, ivec2(t.x, low.y))).x, imageLoad(depths, depth_index(slice, 0, ivec2(t.x, high.y))).x);
     if (scan != 0) z *= vec4(t.x > 0, t.x + 1 < k.slice.x, t.y > 0, t.y + 1 < k.slice.y);
     return z;
 }
 
-vec3 normal_at(int slice, ivec2 t) { return unpack_normal(texelFetch(normals, slice_index(slice, t)).x); }
+vec3 normal_at(int slice, ivec2 t) { return unpack_normal(imageLoad(normals, slice_index(slice, t)).x); }
 
 // Edges where normals turn away. Outside the slice there is no normal: the reference halves that edge.
 vec4 normal_edges(vec3 n, int slice, ivec2 t) {
-    vec4 c = vec4(0.0);
-    if (t.x > 0) c.x = dot(n, normal_at(slice, t - ivec2(1, 0)));
-    if (t.x + 1 < k.slice.x) c.y = dot(n, normal_at(slice, t + ivec2(1, 0)));
-    if (t.y > 0) c.z = dot(n, normal_at(slice, t - ivec2(0, 1)));
-    if (t.y + 1 < k.slice.y) c.w = dot(n, normal_at(slice, t + ivec2(0, 1)));
+    ivec2 low = max(t - 1, ivec2(0)), high = min(t + 1, k.slice - 1);
+    vec4 c = vec4(dot(n, normal_at(slice, ivec2(low.x, t.y))), dot(n, normal_at(slice, ivec2(high.x, t.y))),
+                  dot(n, normal_at(slice, ivec2(t.x, low.y))), dot(n, normal_at(slice, ivec2(t.x, high.y))));
+    c = mix(vec4(0.0), c, bvec4(t.x > 0, t.x + 1 < k.slice.x, t.y > 0, t.y + 1 < k.slice.y));
     return clamp(c + 0.5, 0.0, 1.0);
 }
 
@@ -149,18 +159,18 @@ float detail(Surface s, vec2 step_m, vec4 z, vec4 edges) {
 float importance_at(vec2 uv) {
     ivec2 c = filter_coordinate(uv, k.importance);
     Footprint f = footprint(c, k.importance);
-    return filtered(f, texelFetch(importance, f.low.y * k.importance.x + f.low.x).x, texelFetch(importance, f.low.y * k.importance.x + f.high.x).x,
-                    texelFetch(importance, f.high.y * k.importance.x + f.low.x).x, texelFetch(importance, f.high.y * k.importance.x + f.high.x).x);
+    return filtered(f, imageLoad(importance, f.low.y * k.importance.x + f.low.x).x, imageLoad(importance, f.low.y * k.importance.x + f.high.x).x,
+                    imageLoad(importance, f.high.y * k.importance.x + f.low.x).x, imageLoad(importance, f.high.y * k.importance.x + f.high.x).x);
 }
 
 void main() {
+    k = constants;
     ivec2 t = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(t, k.slice))) return;
     Surface s;
-    s.texel = t;
     s.slice = slice_of_layer(int(gl_GlobalInvocationID.z));
     int here = slice_index(s.slice, t);
-    float zc = texelFetch(depths, depth_index(s.slice, 0, t)).x;
+    float zc = imageLoad(depths, depth_index(s.slice, 0, t)).x;
     if (scan != 0 && !(zc > 0.0)) {
         imageStore(ao, here, uvec4(whole(hole_texel)));
         return;
@@ -169,16 +179,20 @@ void main() {
     s.uv = (vec2(t) + 0.5) * k.slice_inv;
     s.ray_step = k.ray_step * float(2 * spacing);
     s.ray = k.ray_base + vec2(spacing * parity) * k.ray_step;
-    s.depth_base = s.slice * k.depth_pitch;
+    s.at = vec2(t) + (mips != 0 ? snap + 0.5 : snap);
+    s.beyond = (((k.slice + 7) & ~7) << fraction) + snap_bits;
+    s.depth_base = s.slice * k.depth_pitch + k.depth_end;
+    s.halo_step = -0.6 * k.neg_rec_radius;
     vec2 step_m = scan != 0 ? zc * s.ray_step : zc * k.view_mul * k.slice_inv;
     s.point = scan != 0 ? vec3(s.ray + vec2(t) * s.ray_step, 1.0) * zc : vec3((k.view_mul * s.uv + k.view_add) * zc, zc);
     s.normal = normal_at(s.slice, t);
+    s.quick_normal = s.normal * quick_scale;
 
     float radius = scan != 0 ? k.radius : k.radius * (clamp(length(s.point) * k.near_limit_rec, 0.0, 1.0) * 0.8 + 0.2);
     float disc = (0.85 * radius) / step_m.x;
     s.falloff = -1.0 / (radius * radius);
     s.mip_base = log2(disc) - 4.3;
-    vec2 turn = k.rotation[s.slice * 5 + int(uint(t.x + 2 * t.y) % 5u)] * disc;
+    vec2 turn = constants.rotation[s.slice * 5 + int(uint(t.x + 2 * t.y) % 5u)] * disc;
     s.rotation = mat2(turn.x, turn.y, turn.y, -turn.x);
     if (scan != 0) { // pixels need not be square
         float aspect = step_m.x / -step_m.y;
@@ -199,15 +213,14 @@ void main() {
     if (kernel == 3 && base == 0) {
         float wanted = importance_at(s.uv + vec2(parity) * k.slice_inv);
         sum.obscurance *= 5.0 / 32.0 + wanted * (27.0 / 32.0);
-        uint b = texelFetch(base_result, here).x;
+        uint b = imageLoad(base_result, here).x;
         sum.weight = weight_range * float(b >> 16) * (1.0 / weight_levels());
         if (scan == 0) sum.weight = weight_range * (float(b >> 16) * inv_255);
         sum.obscurance += ao_value(b) * sum.weight;
-        float average = float(texelFetch(load_counter, 0).x) * k.load_counter_div;
+        float average = float(imageLoad(load_counter, 0).x) * k.load_counter_div;
         wanted *= clamp(k.adaptive_limit / average, 0.0, 1.0);
         int end = min(31, int(27.0 * wanted + 1.5) + 5);
-        CACAO_PATTERN_5_12(EXTRA_TAP)
-        CACAO_PATTERN_12_31(EXTRA_TAP)
+        for (int i = 5; i < end; ++i) tap(s, imageLoad(pattern, i), false, sum);
     } else {
         CACAO_PATTERN_0_3(TAP)
         if (kernel >= 1) { CACAO_PATTERN_3_5(TAP) }

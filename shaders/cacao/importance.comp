@@ -5,16 +5,17 @@
 #include "lib/cacao.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(binding = 0) uniform usamplerBuffer base_result;
+layout(binding = 0, r32ui) readonly uniform uimageBuffer base_result;
 layout(binding = 16, r32ui) uniform writeonly uimageBuffer importance;
 
 void main() {
+    k = constants;
     ivec2 t = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(t, k.importance))) return;
     float lowest = 1.0, highest = 0.0;
     for (int slice = 0; slice < 4; ++slice)
         for (int i = 0; i < 4; ++i) {
-            uint b = texelFetch(base_result, slice_index(slice, min(2 * t + ivec2(i & 1, i >> 1), k.slice - 1))).x;
+            uint b = imageLoad(base_result, slice_index(slice, min(2 * t + ivec2(i & 1, i >> 1), k.slice - 1))).x;
             if (is_hole(b)) continue;
             float v = pow(clamp(1.0 - k.shadow_strength * ao_value(b), 0.0, 1.0), k.shadow_power);
             lowest = min(lowest, v);

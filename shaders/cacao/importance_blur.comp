@@ -7,13 +7,13 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(constant_id = spec_last) const int second = 0;
-layout(binding = 0) uniform usamplerBuffer from;
+layout(binding = 0, r32ui) readonly uniform uimageBuffer from;
 layout(binding = 16, r32ui) uniform writeonly uimageBuffer to;
 layout(binding = 17, r32ui) uniform uimageBuffer load_counter;
 
 uint read(int x, int y) {
     ivec2 t = clamp(ivec2(x, y), ivec2(0), k.importance - 1);
-    return texelFetch(from, t.y * k.importance.x + t.x).x;
+    return imageLoad(from, t.y * k.importance.x + t.x).x;
 }
 
 // Mean of the 2x2 texels whose upper left is (x, y), in the filter's own 8-bit steps.
@@ -22,6 +22,7 @@ float box(int x, int y) {
 }
 
 void main() {
+    k = constants;
     ivec2 t = ivec2(gl_GlobalInvocationID.xy);
     // Exact quarters of 8-bit steps tie often; the order of these sums decides them, so no compiler may change it.
     precise float sum = second == 0 ? box(t.x - 2, t.y - 1) + box(t.x, t.y - 2) + box(t.x + 1, t.y) + box(t.x - 1, t.y + 1)

@@ -8,15 +8,18 @@
 layout(local_size_x = 64) in;
 layout(constant_id = spec_device_depth) const int device_depth = 0;
 
-layout(binding = 0) uniform samplerBuffer depth_in;
+layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 16, r32f) uniform writeonly imageBuffer depths;
 
 // Mean of what lies on the nearest surface. Scan leaves holes out and yields a hole when all four are.
 float nearest_surface(float a, float b, float c, float d) {
     vec4 z = vec4(a, b, c, d);
     vec4 known = scan != 0 ? vec4(greaterThan(z, vec4(0.0))) : vec4(1.0);
-    vec4 candidate = scan != 0 ? mix(vec4(3e38), z, known) : z;
-    float nearest = min(min(candidate.x, candidate.y), min(candidate.z, candidate.w));
+    float nearest = min(min(a, b), min(c, d));
+    if (scan != 0) { // as unsigned integers less one, holes are the farthest; a far stand-in for them came out as 0 on NVIDIA
+        uvec4 order = floatBitsToUint(z) - 1u;
+        nearest = uintBitsToFloat(min(min(order.x, order.y), min(order.z, order.w)) + 1u);
+    }
     vec4 away = z - nearest;
     vec4 w = known * clamp(1.0 + k.mip_weight * (away * away), 0.0, 1.0);
     float total = w.x + w.y + w.z + w.w;
@@ -33,7 +36,7 @@ void store(int slice, int mip, ivec2 t, float z) {
 float depth_at(int slice, ivec2 t) {
     ivec2 p = spacing * (2 * t + ivec2(slice & 1, slice >> 1));
     ivec2 q = min(p, k.image - 1);
-    float d = texelFetch(depth_in, q.y * k.image.x + q.x).x;
+    float d = imageLoad(depth_in, q.y * k.image.x + q.x).x;
     if (device_depth != 0) d = linear_depth(d);
     return scan != 0 && q != p ? 0.0 : d;
 }
@@ -54,6 +57,7 @@ float mip2(int slice, ivec2 t) {
 }
 
 void main() {
+    k = constants;
     int i = int(gl_GlobalInvocationID.x);
     ivec2 blocks = (k.slice + 7) / 8;
     int slice = i / (blocks.x * blocks.y);

@@ -10,13 +10,13 @@ layout(local_size_x = cacao_tile_x, local_size_y = cacao_tile_y) in;
 layout(constant_id = spec_normals) const int supplied = 0;
 layout(constant_id = spec_device_depth) const int device_depth = 0;
 
-layout(binding = 0) uniform samplerBuffer depth_in;
-layout(binding = 1) uniform samplerBuffer normals_in;
+layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
+layout(binding = 1, r32f) readonly uniform imageBuffer normals_in;
 layout(binding = 16, r32f) uniform writeonly imageBuffer depths;
 layout(binding = 17, r32ui) uniform writeonly uimageBuffer normals;
 
 float depth_at(ivec2 p) {
-    float d = texelFetch(depth_in, p.y * k.image.x + p.x).x;
+    float d = imageLoad(depth_in, p.y * k.image.x + p.x).x;
     return device_depth != 0 ? linear_depth(d) : d;
 }
 bool inside(ivec2 p) { return all(lessThan(uvec2(p), uvec2(k.image))); }
@@ -32,7 +32,7 @@ float neighbour(ivec2 p) {
 vec3 supplied_normal(ivec2 p) {
     ivec2 q = clamp(p, ivec2(0), k.image - 1);
     int at = 3 * (q.y * k.image.x + q.x);
-    vec3 given = vec3(texelFetch(normals_in, at).x, texelFetch(normals_in, at + 1).x, texelFetch(normals_in, at + 2).x);
+    vec3 given = vec3(imageLoad(normals_in, at).x, imageLoad(normals_in, at + 1).x, imageLoad(normals_in, at + 2).x);
     vec3 n = (inside(p) ? given : vec3(0.0)) * k.normals_mul + k.normals_add;
     return n * vec3(1.0, -1.0, 1.0); // camera space has y down, this room y up
 }
@@ -71,6 +71,7 @@ void put(int slice, ivec2 t, ivec2 p0, float c, vec3 n) {
 }
 
 void main() {
+    k = constants;
     ivec2 t = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(t, k.slice))) return;
     ivec2 p0 = 2 * spacing * t;

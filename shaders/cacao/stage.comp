@@ -7,8 +7,8 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(constant_id = spec_resolve) const int resolve = resolve_smart;
-layout(binding = 0) uniform usamplerBuffer ao;
-layout(binding = 1) uniform samplerBuffer depths;
+layout(binding = 0, r32ui) readonly uniform uimageBuffer ao;
+layout(binding = 1, r32f) readonly uniform imageBuffer depths;
 layout(binding = 16, rg32f) uniform writeonly imageBuffer staged;
 
 #include "lib/cacao_resolve.glsl"
@@ -16,8 +16,8 @@ layout(binding = 16, rg32f) uniform writeonly imageBuffer staged;
 const int wrapped = 1 << 24; // stands for an unsigned coordinate that wrapped below zero
 
 bool in_slice(ivec2 t) { return all(greaterThanEqual(t, ivec2(0))) && all(lessThan(t, k.slice)); }
-float depth_or_zero(int slice, ivec2 t) { return in_slice(t) ? texelFetch(depths, depth_index(slice, 0, t)).x : 0.0; }
-float texel_clamped(int slice, ivec2 t) { return ao_value(texelFetch(ao, slice_index(slice, clamp(t, ivec2(0), k.slice - 1))).x); }
+float depth_or_zero(int slice, ivec2 t) { return in_slice(t) ? imageLoad(depths, depth_index(slice, 0, t)).x : 0.0; }
+float texel_clamped(int slice, ivec2 t) { return ao_value(imageLoad(ao, slice_index(slice, clamp(t, ivec2(0), k.slice - 1))).x); }
 
 // The tie of the slice 3 sample on even columns and rows, as lavapipe's arithmetic breaks it.
 int tie(int x, float r, int size) {
@@ -48,7 +48,7 @@ vec2 plain_reference(ivec2 h, ivec2 parity, ivec2 t) {
 vec2 smart_staged(ivec2 h, ivec2 parity, ivec2 seen) {
     ivec2 t = ivec2(h.x == -1 ? 0 : h.x >> 1, h.y >> 1); // column -1 reads column 1: its remainder is floored, its half wraps
     bool known = in_slice(t) && h.y >= 0;
-    uint c = known ? texelFetch(ao, slice_index(parity.x + 2 * parity.y, t)).x : 0u;
+    uint c = known ? imageLoad(ao, slice_index(parity.x + 2 * parity.y, t)).x : 0u;
     float v = smart_reference(ao_value(c), unpack_edges(ao_edges(c)), vec2(seen), parity);
     return vec2(v, depth_or_zero(parity.x + 2 * parity.y, ivec2((h.x + 1) >> 1, h.y >> 1))); // one column too far, as in AMD's
 }
@@ -68,6 +68,7 @@ void put(ivec2 h, float v, float z) {
 
 // 2x2 grid pixels a thread, from the halo on.
 void main() {
+    k = constants;
     ivec2 t = ivec2(gl_GlobalInvocationID.xy) - 1;
     if (any(greaterThanEqual(2 * t, k.grid - 2))) return;
     for (int slice = 0; slice < 4; ++slice) {

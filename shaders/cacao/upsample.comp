@@ -8,15 +8,15 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(constant_id = spec_resolve) const int resolve = resolve_smart;
 layout(constant_id = spec_power) const int power = 0;
 layout(constant_id = spec_device_depth) const int device_depth = 0;
-layout(binding = 0) uniform samplerBuffer staged;
-layout(binding = 1) uniform samplerBuffer depth_in;
+layout(binding = 0, rg32f) readonly uniform imageBuffer staged;
+layout(binding = 1, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 16, scalar) writeonly buffer Out { float visibility[]; };
 
 const float self_weight = 1e-3;
 
 float full_depth(ivec2 p) {
     if (any(greaterThanEqual(p, k.image))) return k.outside_depth;
-    float d = texelFetch(depth_in, p.y * k.image.x + p.x).x;
+    float d = imageLoad(depth_in, p.y * k.image.x + p.x).x;
     return device_depth != 0 ? linear_depth(d) : d;
 }
 
@@ -25,11 +25,11 @@ float filtered_in_half(ivec2 g, vec2 shift, float zf) {
     const float c = -half_even(1.44269504);
     float rs = half_even(1.0 / half_even(k.sigma_spatial)), rd = half_even(1.0 / half_even(k.sigma_depth));
     float total = half_even(self_weight);
-    float sum = half_even(total * texelFetch(staged, g.y * k.grid.x + g.x).x);
+    float sum = half_even(total * imageLoad(staged, g.y * k.grid.x + g.x).x);
     zf = half_even(zf);
     for (int p = -2; p <= 2; ++p)
         for (int r = -2; r <= 2; ++r) {
-            vec2 s = texelFetch(staged, (g.y + r) * k.grid.x + g.x + p).xy;
+            vec2 s = imageLoad(staged, (g.y + r) * k.grid.x + g.x + p).xy;
             vec2 d = vec2(p, r) - shift;
             float dz = half_even(zf - s.y);
             float a = half_even(half_even(half_even(d.x * d.x + d.y * d.y) * c) * rs);
@@ -43,10 +43,10 @@ float filtered_in_half(ivec2 g, vec2 shift, float zf) {
 
 float gaussian(ivec2 g, vec2 shift, float zf) {
     float total = self_weight;
-    float sum = total * texelFetch(staged, g.y * k.grid.x + g.x).x;
+    float sum = total * imageLoad(staged, g.y * k.grid.x + g.x).x;
     for (int p = -2; p <= 2; ++p)
         for (int r = -2; r <= 2; ++r) {
-            vec2 s = texelFetch(staged, (g.y + r) * k.grid.x + g.x + p).xy;
+            vec2 s = imageLoad(staged, (g.y + r) * k.grid.x + g.x + p).xy;
             vec2 d = vec2(p, r) - shift;
             float dz = zf - s.y;
             float w = exp(-dot(d, d) / k.sigma_spatial) * exp(-dz * dz / k.sigma_depth);
@@ -63,7 +63,7 @@ struct Four {
 };
 
 void tap(inout Four four, int at, vec2 gx, vec2 gy) {
-    vec2 s = texelFetch(staged, at).xy;
+    vec2 s = imageLoad(staged, at).xy;
     vec4 dz = four.z - s.y;
     vec4 w = max(1.0 - dz * dz * four.narrow, 0.0);
     w = s.y > 0.0 ? w * w : vec4(0.0);
@@ -83,7 +83,7 @@ void row(inout Four four, int at, vec2 gy) {
 
 vec4 upsampled(ivec2 g, vec4 z) {
     int at = g.y * k.grid.x + g.x, step = k.grid.x;
-    vec2 own = texelFetch(staged, at).xy;
+    vec2 own = imageLoad(staged, at).xy;
     float known = own.y > 0.0 ? self_weight : 0.0;
     Four four = Four(z, vec4(known * own.x), vec4(known), 0.25 / k.sigma_depth);
     row(four, at - 2 * step, GX(0));
@@ -107,6 +107,7 @@ float reference(ivec2 g, vec2 shift, float zf) {
 }
 
 void main() {
+    k = constants;
     ivec2 h = ivec2(gl_GlobalInvocationID.xy);
     ivec2 p = 2 * h, g = h + 2;
     if (any(greaterThanEqual(p, k.image))) return;

@@ -1,7 +1,11 @@
 // What every CACAO pass needs: the constant block, the profile, AO texels, binary16 and 8-bit rounding, edges.
 #include "shared/cacao.h"
 
-layout(binding = 32, scalar) uniform Constants { CacaoConstants k; };
+layout(binding = 32, scalar) uniform Constants { CacaoConstants constants; };
+
+// Every main() starts with `k = constants`, before any branch: where lanes may be off, lavapipe loads each constant lane by
+// lane (some 35 instructions); what main() loads first is loaded once. What is not used costs nothing.
+CacaoConstants k;
 
 layout(constant_id = spec_scan) const int scan = 0;
 layout(constant_id = spec_spacing) const int spacing = 1;
@@ -72,13 +76,14 @@ float whole(float v) { return min(v, uintBitsToFloat(k.all_ones >> 1 & 0x7f80000
 // --- addresses
 int slice_index(int slice, ivec2 texel) { return (slice * k.slice.y + texel.y) * k.slice.x + texel.x; }
 int depth_index(int slice, int mip, ivec2 texel) {
-    return slice * k.depth_pitch + k.depth_mips - (k.depth_mips >> (2 * mip)) + texel.y * (k.depth_stride >> mip) + texel.x;
+    return slice * k.depth_pitch + k.depth_end - (k.depth_mips >> (2 * mip)) + texel.y * (k.depth_stride >> mip) + texel.x;
 }
 ivec2 mip_size(int mip) { return max(k.slice >> mip, ivec2(1)); }
 int slice_of_layer(int layer) { return two_slices != 0 && layer == 1 ? 3 : layer; }
 
 // --- depth linearisation; the literal order keeps AMD's rounding (inverse of 0 is 0)
 float linear_depth(float d) {
+    if (scan != 0 && d == 0.0) return 0.0; // a hole, whatever the depth counts
     float v = k.depth_unpack.y - d;
     float s = sign(v) * sign(v);
     return k.depth_unpack.x * (s / ((v + s) - 1.0));

@@ -4,8 +4,8 @@
 // Reference: bilinear read of one slice at slice-texel coordinates (centres at one half).
 float slice_filtered(int slice, vec2 at) {
     Footprint f = footprint(filter_coordinate(at * k.slice_inv, k.slice), k.slice);
-    return filtered(f, texelFetch(ao, slice_index(slice, f.low)).x & 0xffffu, texelFetch(ao, slice_index(slice, ivec2(f.high.x, f.low.y))).x & 0xffffu,
-                    texelFetch(ao, slice_index(slice, ivec2(f.low.x, f.high.y))).x & 0xffffu, texelFetch(ao, slice_index(slice, f.high)).x & 0xffffu);
+    return filtered(f, imageLoad(ao, slice_index(slice, f.low)).x & 0xffffu, imageLoad(ao, slice_index(slice, ivec2(f.high.x, f.low.y))).x & 0xffffu,
+                    imageLoad(ao, slice_index(slice, ivec2(f.low.x, f.high.y))).x & 0xffffu, imageLoad(ao, slice_index(slice, f.high)).x & 0xffffu);
 }
 
 // Reference: own texel plus one filtered value from each other slice, pulled away from edges. `at` is the grid pixel as
@@ -21,7 +21,7 @@ float smart_reference(float own, vec4 e, vec2 at, ivec2 parity) {
     return (own + wh * h + wv * v + wd * d) / (1.0 + wh + wv + wd);
 }
 
-uint grid_texel(ivec2 p) { return texelFetch(ao, slice_index((p.x & 1) + 2 * (p.y & 1), p >> 1)).x; }
+uint grid_texel(ivec2 p) { return imageLoad(ao, slice_index((p.x & 1) + 2 * (p.y & 1), p >> 1)).x; }
 
 // --- scan: the 2x2 grid pixels of one slice texel at once, from the 4x4 grid pixels around them.
 
@@ -32,7 +32,7 @@ struct Known {
 
 Known known(int slice, ivec2 t) {
     bool inside = all(lessThan(uvec2(t), uvec2(k.slice)));
-    uint texel = texelFetch(ao, inside ? slice_index(slice, t) : 0).x;
+    uint texel = imageLoad(ao, inside ? slice_index(slice, t) : 0).x;
     bool usable = inside && texel < hole_texel;
     return Known(usable ? float(texel & 0xffffu) : 0.0, usable ? 1.0 : 0.0);
 }
@@ -62,7 +62,7 @@ float from_neighbours(uint l, uint r, uint t, uint b) {
 }
 
 uint texel_or_hole(int slice, ivec2 t) {
-    return all(lessThan(uvec2(t), uvec2(k.slice))) ? texelFetch(ao, slice_index(slice, t)).x : hole_texel;
+    return all(lessThan(uvec2(t), uvec2(k.slice))) ? imageLoad(ao, slice_index(slice, t)).x : hole_texel;
 }
 
 // Visibility of grid pixels (2t, 2t + (1, 0), 2t + (0, 1), 2t + (1, 1)); -1 at holes.

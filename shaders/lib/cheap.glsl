@@ -8,14 +8,14 @@ int nearest(float x) {
     precise float shifted = x + magic;
     return floatBitsToInt(shifted) - magic_bits;
 }
-ivec2 nearest(vec2 x) {
-    precise vec2 shifted = x + magic;
-    return floatBitsToInt(shifted) - magic_bits;
-}
-vec2 float_of(ivec2 i) {
-    precise vec2 shifted = intBitsToFloat(i + magic_bits);
-    return shifted - magic;
-}
-float power_of_two(int e) { return intBitsToFloat((e + 127) << 23); }
 float positive(float x) { return intBitsToFloat(max(floatBitsToInt(x), 0)); }               // max(x, 0)
 float at_most_one(float x) { return intBitsToFloat(min(floatBitsToInt(x), 0x3f800000)); }   // min(x, 1), x >= 0
+float at_least(float x, float low) { return intBitsToFloat(max(floatBitsToInt(x), floatBitsToInt(low))); } // low > 0
+
+// 1 / (quick_scale sqrt(x)) to 0.07 %: half the exponent, then one Newton step with Kadlec's constants. A square root and a
+// division take 20 cycles on CPUs; the scale is for the caller to fold into something constant.
+const float quick_scale = 0.703952253;
+float quick_inversesqrt(float x) {
+    float y = intBitsToFloat(0x5f1ffff9 - (floatBitsToInt(x) >> 1));
+    return y * (2.38924456 - x * y * y);
+}

@@ -37,7 +37,8 @@ struct CacaoConstants {
     float normals_mul, normals_add; // NormalsUnpackMul / Add
     int depth_stride;               // texels from one row of a depth slice to the next; mip m has stride >> m
     int depth_pitch;                // texels from one slice, with its mips, to the next
-    int depth_mips;                 // T: mip m of a slice starts at T - (T >> 2m); T = 4/3 of mip 0 with its padding
+    int depth_mips;                 // T: 4/3 of mip 0 with its padding
+    int depth_end;                  // mip m of a slice starts at depth_end - (T >> 2m); a rim of holes, always 0, lies round each
     uint all_ones;                  // 0xffffffff, unknown to the compiler (see lib/cacao.glsl, whole())
     float spatial[10];              // upsampler: 1D spatial weight of tap -2 .. 2 for even, then odd pixels
     vec2 rotation[20];              // (m00, m01) of PatternRotScaleMatrices[slice][phase]; m10 = m01, m11 = -m00
