@@ -143,7 +143,7 @@ Seen run_tables(const CacaoOptions& o, const CacaoConstants& k, const CacaoTable
             cv::Mat1f& to = seen.depth[a][static_cast<std::size_t>(m)] =
                 cv::Mat1f(std::max(1, size.height >> m), std::max(1, size.width >> m));
             const auto* slice = reinterpret_cast<const float*>(z.data()) + static_cast<int>(a) * k.depth_pitch +
-                                k.depth_mips - (k.depth_mips >> 2 * m);
+                                k.depth_end - (k.depth_mips >> 2 * m);
             for (int y = 0; y < to.rows; ++y)
                 std::copy_n(slice + y * (k.depth_stride >> m), to.cols, to[y]);
         }
@@ -321,6 +321,24 @@ TEST_F(cacao_scan, holes_are_not_open_space) {
         EXPECT_NEAR(scan, 1, 0.08);
         EXPECT_LT(amd, 0.8);
     }
+}
+
+TEST_F(cacao_scan, a_hole_of_device_depth_is_a_hole) {
+    // 0 in the depth image is no surface (projection/maps.h), whatever the numbers mean otherwise: with reverse-Z it is
+    // what a cleared buffer holds, infinitely far.
+    for (const char* kind : {"normal_z", "reverse_z"})
+        for (const char* quality : {"lowest", "high"})
+            for (const bool downsampled : {false, true}) {
+                CacaoOptions o = options("scan", quality, downsampled);
+                o.depth_input = kind;
+                o.radius = 2;
+                const float d = kind == std::string("normal_z") ? 0.66673334F : 0.33326666F; // 0.3 m between 0.1 and 1000 m
+                DepthImage depth = flat(camera_of(125), d);
+                depth.z_m(cv::Rect(60, 40, 20, 20)) = 0;
+                const cv::Mat1f v = run(o, depth).visibility;
+                EXPECT_TRUE(std::isnan(v(50, 70))) << kind << " " << quality << " " << downsampled << ": " << v(50, 70);
+                EXPECT_GE(lowest(v), 0.999) << kind << " " << quality << " " << downsampled;
+            }
 }
 
 TEST_F(cacao_scan, a_hole_does_not_poison_the_mips) {
