@@ -80,7 +80,7 @@ std::vector<Parameter> CacaoOptions::parameters() {
     return {
         {"profile", "reference reproduces AMD's shaders, scan corrects them for sensor depth", &profile, "", {}, {}, {"scan", "reference"}},
         {"quality", "lowest: 3 tap pairs on half the pixels; low: 3; medium: 5; high: 12 with depth mips; highest: 6 to 31 where the picture "
-         "asks for them, no closer to ray-traced truth than high on generated rooms, at 1.5 times its cost",
+         "asks for them, no closer to ray-traced truth than high on the generated office, at 1.7 times its cost",
          &quality, "", {}, {}, {"lowest", "low", "medium", "high", "highest"}},
         {"downsampled", "compute on every second pixel of every second row, then upsample", &downsampled},
         {"radius", "surfaces farther than this do not occlude", &radius, "m", 1e-4, 1e5},

@@ -49,7 +49,6 @@ vk::Format format_of(BufferRow::Texels texels) {
     case BufferRow::Texels::r32f: return vk::Format::eR32Sfloat;
     case BufferRow::Texels::rg32f: return vk::Format::eR32G32Sfloat;
     case BufferRow::Texels::rgba32f: return vk::Format::eR32G32B32A32Sfloat;
-    case BufferRow::Texels::rgba32ui: return vk::Format::eR32G32B32A32Uint;
     default: return vk::Format::eR32Uint;
     }
 }
