@@ -2,6 +2,7 @@
 #pragma once
 
 #include "projection/maps.h"
+#include "projection/noise.h"
 #include "projection/parameters.h"
 
 #include <memory>
@@ -20,6 +21,7 @@ class Device;
 struct View {
     const DepthImage& depth;
     const NormalImage* normals = nullptr;
+    DepthNoise noise = {}; ///< sigma(z) of `depth` as recorded; none = clean. Methods may widen their tolerances by it
 };
 
 /// Milliseconds per named pass or transfer, in execution order.
