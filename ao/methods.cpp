@@ -1,5 +1,6 @@
 // The table of methods.
 #include "ao/cacao/cacao.h"
+#include "ao/gtao/gtao.h"
 #include "ao/method.h"
 #include "projection/error.h"
 
@@ -24,6 +25,8 @@ const std::vector<MethodRow>& methods() {
     static const std::vector<MethodRow> table{
         {"cacao", "tap pairs on de-interleaved depth, edge-aware blur; five qualities, native or half resolution",
          "FidelityFX CACAO 1.3 (AMD's public documentation)", SetupOf<CacaoOptions, Cacao>::start},
+        {"gtao", "open arc between two horizons, slice by slice", "Jimenez et al. 2016; XeGTAO (Strugar, McCalla 2021)",
+         SetupOf<GtaoOptions, Gtao>::start},
     };
     return table;
 }

@@ -1,0 +1,34 @@
+// GTAO: the open arc between two horizons, slice by slice, after Jimenez et al. (2016) and XeGTAO (Strugar, McCalla
+// 2021).
+//
+// Profile `metric`, the default, estimates visibility within the radius itself; `xegtao` takes XeGTAO's constants,
+// which were tuned together for a look. Every surface is as thick as it needs to be: bitmask is the same with a
+// thickness.
+#pragma once
+
+#include "ao/screen/slices.h"
+
+namespace scanshade {
+
+struct GtaoOptions {
+    ScreenOptions screen;
+    SliceOptions slices;
+    std::string profile = "metric";
+    std::string falloff = "hard";
+
+    [[nodiscard]] std::vector<Parameter> parameters();
+};
+
+class Gtao final : public ScreenMethod {
+  public:
+    /// Throws Misuse naming a setting out of its range.
+    Gtao(gpu::Device& device, const GtaoOptions& options);
+
+  private:
+    void add_passes(ScreenTables& tables) const override;
+    [[nodiscard]] std::vector<std::byte> constants(const shared::ScreenConstants& screen) const override;
+
+    GtaoOptions options_;
+};
+
+} // namespace scanshade

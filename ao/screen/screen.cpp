@@ -1,0 +1,151 @@
+#include "ao/screen/screen.h"
+
+#include "ao/screen/noise.h"
+#include "projection/error.h"
+
+#include <chrono>
+#include <cstring>
+#include <fmt/format.h>
+
+namespace scanshade {
+namespace {
+
+constexpr float nearest_m = 1e-4F, farthest_m = 1e6F; // beyond them single precision, not the scene, would decide
+
+void refuse_odd_sizes(const View& view) {
+    const cv::Size depth = view.depth.z_m.size(), camera = view.depth.camera.size;
+    if (depth.empty() || depth != camera)
+        throw Error(fmt::format("depth image of {}x{} with a camera of {}x{}", depth.width, depth.height, camera.width,
+                                camera.height));
+    if (view.normals && view.normals->normals.size() != depth)
+        throw Error(fmt::format("normals of {}x{} for a depth image of {}x{}", view.normals->normals.cols,
+                                view.normals->normals.rows, depth.width, depth.height));
+}
+
+/// What is no depth becomes a hole here, once, so that the shaders only ask z > 0.
+void upload_depth(const cv::Mat1f& z_m, std::span<float> to) {
+    for (int y = 0; y < z_m.rows; ++y) {
+        const float* const from = z_m[y];
+        float* const row = to.data() + static_cast<std::ptrdiff_t>(y) * z_m.cols;
+        for (int x = 0; x < z_m.cols; ++x)
+            row[x] = from[x] >= nearest_m && from[x] <= farthest_m ? from[x] : 0.0F;
+    }
+}
+
+void upload_normals(const cv::Mat3f& normals, std::span<std::byte> to) {
+    const std::size_t row = static_cast<std::size_t>(normals.cols) * normals.elemSize();
+    for (int y = 0; y < normals.rows; ++y)
+        std::memcpy(to.data() + static_cast<std::size_t>(y) * row, normals.ptr(y), row);
+}
+
+cv::Mat1f downloaded(std::span<const float> from, cv::Size size) {
+    cv::Mat1f image(size);
+    std::memcpy(image.data, from.data(), from.size_bytes());
+    return image;
+}
+
+std::vector<gpu::BufferRow> shared_buffers(std::size_t pixels, bool supplied, int seed) {
+    using Host = gpu::BufferRow::Host;
+    constexpr auto floats = gpu::BufferRow::Texels::r32f, pairs = gpu::BufferRow::Texels::rg32f;
+    const std::vector<float> noise = noise_table(seed);
+    return {
+        {"depth", pixels * 4, Host::upload, floats},
+        {"given normals", supplied ? pixels * 12 : 4, supplied ? Host::upload : Host::none, floats},
+        {"normals", pixels * 12, Host::none, floats},
+        {"noise", noise.size() * 4, Host::none, pairs, noise},
+        {"raw", pixels * 4, Host::none, floats},
+        {"coverage", pixels * 4, Host::download, floats},
+        {"visibility", pixels * 4, Host::download, floats},
+    };
+}
+
+} // namespace
+
+std::vector<Parameter> ScreenOptions::parameters() {
+    return {
+        {"radius", "surfaces farther than this do not occlude", &radius, "m", 1e-6, 1e6},
+        {"strength", "share of the occlusion that is shown, before the power", &strength, "", 0, 2},
+        {"power", "exponent of the visibility shown", &power, "", 0.25, 8},
+        {"denoise", "mean over the 5x5 pixels around that lie on the same plane", &denoise},
+        {"renormalise",
+         "samples that met nothing known count as those that did, where at least half did; else they count as open",
+         &renormalise},
+        {"tangent-sine",
+         "samples lower above the surface than this do not occlude: pixels lie beside the line that is marched",
+         &tangent_sine, "sine", 0, 0.5},
+        {"tangent-sigmas", "nor do samples that rise less than so many deviations of the depth's noise",
+         &tangent_sigmas, "sigma", 0, 20},
+        {"seed", "another number, another noise pattern", &seed, "", 0, 1e6},
+    };
+}
+
+int ScreenTables::add_buffer(gpu::BufferRow row) {
+    buffers.push_back(std::move(row));
+    return static_cast<int>(buffers.size()) - 1;
+}
+
+void ScreenTables::add_pass(std::string name, std::string_view shader, std::vector<int> reads, std::vector<int> writes,
+                            std::vector<std::pair<int, int>> constants, int pixels_a_side) {
+    const int tile = shared::screen_tile * pixels_a_side;
+    const auto groups = [&](int n) { return static_cast<std::uint32_t>((n + tile - 1) / tile); };
+    passes.push_back({std::move(name),
+                      shader,
+                      std::move(reads),
+                      std::move(writes),
+                      {groups(size.width), groups(size.height), 1},
+                      std::move(constants)});
+}
+
+shared::ScreenConstants constants_from(const ScreenOptions& options, const View& view) {
+    const Pinhole& camera = view.depth.camera;
+    return {camera.on_gpu(),
+            {camera.size.width, camera.size.height},
+            options.radius,
+            static_cast<float>(view.noise.floor_m),
+            static_cast<float>(view.noise.per_z2),
+            options.tangent_sine,
+            options.tangent_sigmas,
+            options.strength,
+            options.power};
+}
+
+ScreenTables ScreenMethod::tables(cv::Size size, bool supplied) const {
+    ScreenTables all{size, shared_buffers(static_cast<std::size_t>(size.area()), supplied, options_.seed), {}};
+    // Without normals of the view, depth fills their slot; nothing reads it.
+    all.add_pass("normals", "normals", {screen_depth, supplied ? screen_given : screen_depth}, {screen_normals},
+                 {{shared::spec_supplied, supplied}});
+    add_passes(all);
+    all.add_pass("denoise", "denoise", {screen_depth, screen_normals, screen_raw}, {screen_visibility},
+                 {{shared::spec_denoise, options_.denoise}}, 2);
+    return all;
+}
+
+AoMap ScreenMethod::compute(const View& view) {
+    refuse_odd_sizes(view);
+    const cv::Size size = view.depth.z_m.size();
+    const bool supplied = view.normals != nullptr;
+    const auto block = constants(constants_from(options_, view));
+    if (!program_ || size != size_ || supplied != supplied_) {
+        const ScreenTables all = tables(size, supplied);
+        program_ = std::make_unique<gpu::Program>(device_, all.buffers, all.passes, block.size());
+        size_ = size;
+        supplied_ = supplied;
+    }
+    const auto start = std::chrono::steady_clock::now();
+    upload_depth(view.depth.z_m, program_->host_as<float>(screen_depth));
+    if (supplied)
+        upload_normals(view.normals->normals, program_->host(screen_given));
+    const auto uploaded = std::chrono::steady_clock::now();
+    program_->run(block);
+    const auto ran = std::chrono::steady_clock::now();
+    AoMap ao{downloaded(program_->host_as<float>(screen_visibility), size),
+             downloaded(program_->host_as<float>(screen_coverage), size)};
+    const auto done = std::chrono::steady_clock::now();
+    const auto ms = [](auto from, auto to) { return std::chrono::duration<double, std::milli>(to - from).count(); };
+    timings_.assign({{"host upload", ms(start, uploaded)}});
+    timings_.insert(timings_.end(), program_->timings().begin(), program_->timings().end());
+    timings_.emplace_back("host download", ms(ran, done));
+    return ao;
+}
+
+} // namespace scanshade

@@ -1,0 +1,66 @@
+#include "ao/screen/slices.h"
+
+#include "projection/error.h"
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace scanshade {
+namespace {
+
+struct Count {
+    const char* quality;
+    int slices, steps;
+};
+constexpr std::array counts{Count{"lowest", 1, 4}, Count{"low", 2, 4}, Count{"medium", 2, 8}, Count{"high", 4, 8},
+                            Count{"highest", 16, 16}};
+
+Count count_of(const SliceOptions& options) {
+    for (const Count& count : counts)
+        if (options.quality == count.quality)
+            return {count.quality, options.slices > 0 ? options.slices : count.slices,
+                    options.steps > 0 ? options.steps : count.steps};
+    throw Misuse("quality '" + options.quality + "': lowest, low, medium, high or highest expected");
+}
+
+} // namespace
+
+std::vector<Parameter> SliceOptions::parameters() {
+    return {
+        {"quality",
+         "slices x steps to either side: lowest 1x4, low 2x4, medium 2x8, high 4x8, highest 16x16",
+         &quality,
+         "",
+         {},
+         {},
+         {"lowest", "low", "medium", "high", "highest"}},
+        {"slices", "slices through the eye's ray; 0 = as the quality says", &slices, "", 0, 64},
+        {"steps", "steps to either side of a slice; 0 = as the quality says", &steps, "", 0, 256},
+        {"distribution", "exponent of the steps' distances; above 1, they are denser close by", &distribution, "", 0.5,
+         4},
+    };
+}
+
+shared::GtaoConstants slice_constants(const SliceOptions& options, const shared::ScreenConstants& screen) {
+    const Count count = count_of(options);
+    const double turn = std::numbers::pi / count.slices;
+    shared::GtaoConstants block{};
+    block.screen = screen;
+    block.slices = count.slices;
+    block.steps = count.steps;
+    block.turn_cosine = static_cast<float>(std::cos(turn));
+    block.turn_sine = static_cast<float>(std::sin(turn));
+    block.distribution = options.distribution;
+    return block;
+}
+
+void add_slice_pass(ScreenTables& tables, const ScreenOptions& screen, const SliceOptions& options,
+                    std::vector<std::pair<int, int>> constants) {
+    constants.insert(constants.end(), {{shared::spec_renormalise, screen.renormalise},
+                                       {shared::spec_square, options.distribution == 2}});
+    tables.add_pass("generate", "gtao/generate", {screen_depth, screen_normals, screen_noise},
+                    {screen_raw, screen_coverage}, std::move(constants));
+}
+
+} // namespace scanshade

@@ -1,0 +1,77 @@
+// The surface point a pixel asks for, how far its neighbourhood reaches, and what is done with the answer: expects the
+// texel buffers `normals`, and `raw` and `coverage` to write.
+#include "lib/cheap.glsl"
+
+layout(constant_id = spec_renormalise) const int renormalise = 0;
+
+struct Surface {
+    vec3 point, normal;
+    vec3 eye;        // unit, towards the camera
+    float rise;      // lower above the tangent plane than this, in metres, nothing counts (with k.tangent_sine)
+    float radius_px; // of the sphere around it, in the image
+};
+
+// In holes a point that is as good as any: what comes of it is not kept.
+Surface surface_at(ivec2 p, float z, int index) {
+    Surface s;
+    vec3 ray = ray_of(vec2(p));
+    z = z > 0.0 ? z : 1.0;
+    s.point = ray * z;
+    s.normal = normal_at(index);
+    s.eye = -ray * inversesqrt(dot(ray, ray));
+    // Rounding of depth in single precision is a noise, too.
+    s.rise = (k.tangent_sigmas * sigma_of(z) + 1e-6 * z) * abs(dot(s.normal, ray));
+    s.radius_px = k.radius * sqrt(k.camera.fx * k.camera.fy) / z;
+    return s;
+}
+
+// Whether a sample lies on the surface or below it: pixels lie beside the marched line, and depth is noisy. `apart` is
+// the sample minus the point, `away` its length.
+bool rises(Surface s, vec3 apart, float away) { return dot(s.normal, apart) > k.tangent_sine * away + s.rise; }
+
+// 1 / sqrt(x) to 1e-6, in a third of the time of a root and a division.
+float inverse_root(float x) {
+    float y = quick_inversesqrt(x) * quick_scale;
+    return y * (1.5 - 0.5 * x * y * y);
+}
+
+// acos for |c| <= 1 to 7e-5 (Abramowitz and Stegun 4.4.45).
+float angle_of(float c) {
+    float a = abs(c);
+    float angle = sqrt(positive(1.0 - a)) * (((-0.0187293 * a + 0.0742610) * a - 0.2121144) * a + 1.5707288);
+    return c < 0.0 ? 3.14159265 - angle : angle;
+}
+
+// Where the sphere around a point ends in the image, in one direction d perpendicular to the eye's.
+struct March {
+    vec2 direction; // unit, pixels
+    float reach;    // pixels to the sphere's outline; large where that is beside or behind the camera
+    float within;  // the part of it that lies in the image
+};
+
+// The outline along the plane of eye and d touches the sphere where the view ray leaves it: at the angle asin(R / |P|) from
+// the point's own ray. It covers what stands in front of the point, not only what is as deep.
+March march_along(Surface s, vec2 p, vec3 d) {
+    float sine = min(k.radius * inversesqrt(dot(s.point, s.point)), 0.999), cosine = sqrt(1.0 - sine * sine);
+    vec2 ray = s.point.xy / s.point.z;
+    vec2 line = vec2(k.camera.fx, k.camera.fy) * (d.xy - ray * d.z);
+    float pixels = length(line);
+    float end_z = sine * d.z - cosine * s.eye.z; // of the outline's unit ray
+    March m;
+    m.direction = line / max(pixels, 1e-20);
+    m.reach = end_z > 1e-4 ? pixels * sine / end_z : 1e6;
+    vec2 room = mix(p + 0.49, vec2(k.size) - 0.51 - p, greaterThan(m.direction, vec2(0.0)));
+    vec2 to_border = room / max(abs(m.direction), vec2(1e-6));
+    m.within = min(m.reach, min(to_border.x, to_border.y));
+    return m;
+}
+
+// Writes a pixel's result. Below a radius of one pixel nothing can be seen within it: open and unknown; up to three the
+// occlusion fades in. `known` is the share of the wanted samples that met known depth.
+void finish(Surface s, bool hole, int index, float visibility, float known) {
+    float occlusion = 1.0 - visibility;
+    if (renormalise != 0) occlusion = min(occlusion / max(known, 0.5), 1.0);
+    occlusion *= clamp(0.5 * s.radius_px - 0.5, 0.0, 1.0);
+    imageStore(raw, index, vec4(hole ? 1.0 : clamp(1.0 - occlusion, 0.0, 1.0)));
+    imageStore(coverage, index, vec4(hole || s.radius_px < 1.0 ? 0.0 : known));
+}

@@ -1,0 +1,28 @@
+// What host and shaders share of every screen-space room but CACAO's: the view, the radius, and how the result is shown.
+#ifndef SCANSHADE_SHARED_SCREEN_H
+#define SCANSHADE_SHARED_SCREEN_H
+#include "camera.h"
+SHARED_BEGIN
+
+// A room's own constant block begins with this one, so that the passes all rooms share can read it there.
+struct ScreenConstants {
+    Pinhole camera;
+    ivec2 size;                       // of the image
+    float radius;                     // R, metres
+    float noise_floor, noise_per_z2;  // sigma(z) = floor + per_z2 z^2 of the depth looked at, metres
+    float tangent_sine;               // beta_t: samples lower above the tangent plane than this do not count (sine)
+    float tangent_sigmas;             // kappa: nor do those within so many sigma(z) of it
+    float strength, power;            // of what is shown: (1 - strength (1 - V))^power
+};
+
+// Pixels of the noise table's side, and of a work group's.
+const int noise_side = 64;
+const int screen_tile = 8;
+
+// Specialization constants of the shared passes.
+const int spec_supplied = 0;    // normals: 1 = the view brings some
+const int spec_denoise = 1;     // denoise: 0 = only the look is applied
+const int spec_renormalise = 2; // generate: 1 = unknown samples count as those known, where at least half are
+
+SHARED_END
+#endif
