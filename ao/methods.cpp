@@ -1,6 +1,10 @@
 // The table of methods.
+#include "ao/bitmask/bitmask.h"
 #include "ao/cacao/cacao.h"
 #include "ao/gtao/gtao.h"
+#include "ao/hbao/hbao.h"
+#include "ao/hemisphere/hemisphere.h"
+#include "ao/luna/luna.h"
 #include "ao/method.h"
 #include "projection/error.h"
 
@@ -25,8 +29,15 @@ const std::vector<MethodRow>& methods() {
     static const std::vector<MethodRow> table{
         {"cacao", "tap pairs on de-interleaved depth, edge-aware blur; five qualities, native or half resolution",
          "FidelityFX CACAO 1.3 (AMD's public documentation)", SetupOf<CacaoOptions, Cacao>::start},
+        {"luna", "fourteen vectors around the point, occluded by what stands in front of it",
+         "Luna, Introduction to 3D Game Programming with DirectX 12 (2016), ch. 21", SetupOf<LunaOptions, Luna>::start},
+        {"hemisphere", "points in the half ball above the surface, tested against what is seen", "tutorials on SSAO with a hemisphere kernel",
+         SetupOf<HemisphereOptions, Hemisphere>::start},
+        {"hbao", "horizons above the tangent plane, attenuated by distance", "Bavoil, Sainz, Dimitrov 2008", SetupOf<HbaoOptions, Hbao>::start},
         {"gtao", "open arc between two horizons, slice by slice", "Jimenez et al. 2016; XeGTAO (Strugar, McCalla 2021)",
          SetupOf<GtaoOptions, Gtao>::start},
+        {"bitmask", "gtao's slices with 32 sectors, so that what is seen has a thickness", "Therrien, Levesque, Gilet 2023",
+         SetupOf<BitmaskOptions, Bitmask>::start},
     };
     return table;
 }

@@ -96,6 +96,20 @@ void ScreenTables::add_pass(std::string name, std::string_view shader, std::vect
                       std::move(constants)});
 }
 
+void ScreenTables::add_blurs(int iterations, const std::vector<float>& weights) {
+    if (iterations == 0)
+        return;
+    constexpr auto floats = gpu::BufferRow::Texels::r32f;
+    const int between = add_buffer({"between blurs", pixels() * 4, gpu::BufferRow::Host::none, floats});
+    const int table = add_buffer({"blur weights", weights.size() * 4, gpu::BufferRow::Host::none, floats, weights});
+    const int radius = static_cast<int>(weights.size()) - 1;
+    for (int i = 0; i < iterations; ++i)
+        for (const bool down : {false, true})
+            add_pass(fmt::format("blur {} {}", i + 1, down ? "down" : "across"), "blur",
+                     {screen_depth, screen_normals, down ? between : screen_raw, table}, {down ? screen_raw : between},
+                     {{shared::spec_blur_radius, radius}, {shared::spec_blur_down, down}});
+}
+
 shared::ScreenConstants constants_from(const ScreenOptions& options, const View& view) {
     const Pinhole& camera = view.depth.camera;
     return {camera.on_gpu(),

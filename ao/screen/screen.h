@@ -48,6 +48,9 @@ struct ScreenTables {
     /// Appends a pass of one thread per `pixels_a_side` squared pixels.
     void add_pass(std::string name, std::string_view shader, std::vector<int> reads, std::vector<int> writes,
                   std::vector<std::pair<int, int>> constants = {}, int pixels_a_side = 1);
+    /// Appends so many iterations of a separable blur of screen_raw over the pixels of the same surface; `weights` are
+    /// those of offsets 0, 1, 2 ... to either side.
+    void add_blurs(int iterations, const std::vector<float>& weights);
     [[nodiscard]] std::size_t pixels() const { return static_cast<std::size_t>(size.area()); }
 };
 

@@ -97,12 +97,6 @@ void look(Surface s, Slice slice, ivec2 q, float low, float side, float dither, 
     }
 }
 
-ivec2 pixel_at(vec2 p, March march, float x) {
-    float along = min(nearest_px + x * march.within, march.within);
-    vec2 at = p + march.direction * along;
-    return ivec2(nearest(at.x), nearest(at.y));
-}
-
 void main() {
     g = constants;
     k = g.screen;
@@ -138,8 +132,8 @@ void main() {
             float x = (float(j) + fract(jitter)) * inverse_steps;
             jitter += float(g.steps) * golden;
             x = square != 0 ? x * x : pow(x, g.distribution);
-            look(s, slice, pixel_at(vec2(p), ahead, x), -slice.sine, 1.0, dither, plus);
-            look(s, slice, pixel_at(vec2(p), behind, x), slice.sine, -1.0, dither, minus);
+            look(s, slice, pixel_along(vec2(p), ahead, nearest_px + x * ahead.within), -slice.sine, 1.0, dither, plus);
+            look(s, slice, pixel_along(vec2(p), behind, nearest_px + x * behind.within), slice.sine, -1.0, dither, minus);
         }
         float measure = bitmask != 0
             ? slice.full * (1.0 - float(bitCount(plus.occupied | minus.occupied)) / 32.0)

@@ -49,6 +49,19 @@ struct March {
     float within;  // the part of it that lies in the image
 };
 
+// Beyond the border nothing is known: steps spread over what lies before it.
+March cut_at_border(vec2 p, vec2 direction, float reach) {
+    vec2 room = mix(p + 0.49, vec2(k.size) - 0.51 - p, greaterThan(direction, vec2(0.0)));
+    vec2 to_border = room / max(abs(direction), vec2(1e-6));
+    return March(direction, reach, min(reach, min(to_border.x, to_border.y)));
+}
+
+// The pixel so many pixels along, but never outside the image: near the border that may be the pixel itself.
+ivec2 pixel_along(vec2 p, March march, float pixels) {
+    vec2 at = p + march.direction * min(pixels, march.within);
+    return ivec2(nearest(at.x), nearest(at.y));
+}
+
 // The outline along the plane of eye and d touches the sphere where the view ray leaves it: at the angle asin(R / |P|) from
 // the point's own ray. It covers what stands in front of the point, not only what is as deep.
 March march_along(Surface s, vec2 p, vec3 d) {
@@ -57,13 +70,7 @@ March march_along(Surface s, vec2 p, vec3 d) {
     vec2 line = vec2(k.camera.fx, k.camera.fy) * (d.xy - ray * d.z);
     float pixels = length(line);
     float end_z = sine * d.z - cosine * s.eye.z; // of the outline's unit ray
-    March m;
-    m.direction = line / max(pixels, 1e-20);
-    m.reach = end_z > 1e-4 ? pixels * sine / end_z : 1e6;
-    vec2 room = mix(p + 0.49, vec2(k.size) - 0.51 - p, greaterThan(m.direction, vec2(0.0)));
-    vec2 to_border = room / max(abs(m.direction), vec2(1e-6));
-    m.within = min(m.reach, min(to_border.x, to_border.y));
-    return m;
+    return cut_at_border(p, line / max(pixels, 1e-20), end_z > 1e-4 ? pixels * sine / end_z : 1e6);
 }
 
 // Writes a pixel's result. Below a radius of one pixel nothing can be seen within it: open and unknown; up to three the

@@ -1,0 +1,70 @@
+#include "ao/hbao/hbao.h"
+
+#include "projection/error.h"
+#include "shaders/shared/hbao.h"
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace scanshade {
+namespace {
+
+struct Count {
+    const char* quality;
+    int directions, steps;
+};
+constexpr std::array counts{Count{"lowest", 4, 2}, Count{"low", 4, 4}, Count{"medium", 8, 4}, Count{"high", 8, 8},
+                            Count{"highest", 32, 16}};
+
+Count count_of(const HbaoOptions& options) {
+    for (const Count& count : counts)
+        if (options.quality == count.quality)
+            return {count.quality, options.directions > 0 ? options.directions : count.directions,
+                    options.steps > 0 ? options.steps : count.steps};
+    throw Misuse("quality '" + options.quality + "': lowest, low, medium, high or highest expected");
+}
+
+} // namespace
+
+std::vector<Parameter> HbaoOptions::parameters() {
+    auto rows = screen.parameters();
+    const std::vector<Parameter> own{
+        {"quality",
+         "directions x steps: lowest 4x2, low 4x4, medium 8x4, high 8x8, highest 32x16",
+         &quality,
+         "",
+         {},
+         {},
+         {"lowest", "low", "medium", "high", "highest"}},
+        {"directions", "directions in the image; 0 = as the quality says", &directions, "", 0, 128},
+        {"steps", "steps along each; 0 = as the quality says", &steps, "", 0, 256},
+        {"bias", "horizons lower above the tangent plane than this do not occlude; published 30", &bias_degrees,
+         "degrees", 0, 89},
+        {"attenuated",
+         "samples count less with the square of their distance, as published; else all within the radius count alike",
+         &attenuated},
+        {"contrast", "the occlusion is multiplied by this; published 1.25", &contrast, "", 0, 5},
+    };
+    rows.insert(rows.end(), own.begin(), own.end());
+    return rows;
+}
+
+Hbao::Hbao(gpu::Device& device, const HbaoOptions& options)
+    : ScreenMethod(device, checked(options).screen), options_(options) {}
+
+void Hbao::add_passes(ScreenTables& tables) const {
+    tables.add_pass("generate", "hbao/generate", {screen_depth, screen_normals, screen_noise},
+                    {screen_raw, screen_coverage}, {{shared::spec_renormalise, options_.screen.renormalise}});
+}
+
+std::vector<std::byte> Hbao::constants(const shared::ScreenConstants& screen) const {
+    const Count count = count_of(options_);
+    const double turn = 2 * std::numbers::pi / count.directions, bias = options_.bias_degrees * std::numbers::pi / 180;
+    return bytes_of(shared::HbaoConstants{screen, count.directions, count.steps, static_cast<float>(std::cos(turn)),
+                                          static_cast<float>(std::sin(turn)), static_cast<float>(std::cos(bias)),
+                                          static_cast<float>(std::sin(bias)), options_.attenuated ? 1.0F : 0.0F,
+                                          options_.contrast});
+}
+
+} // namespace scanshade

@@ -1,0 +1,31 @@
+// HBAO: horizons above the tangent plane along directions in the image, after Bavoil, Sainz and Dimitrov (2008).
+#pragma once
+
+#include "ao/screen/screen.h"
+
+namespace scanshade {
+
+struct HbaoOptions {
+    ScreenOptions screen;
+    std::string quality = "medium"; ///< lowest 8 reads, low 16, medium 32, high 64, highest 512
+    int directions = 0, steps = 0;  ///< above 0: instead of the quality's
+    float bias_degrees = 10;
+    bool attenuated = true;
+    float contrast = 1;
+
+    [[nodiscard]] std::vector<Parameter> parameters();
+};
+
+class Hbao final : public ScreenMethod {
+  public:
+    /// Throws Misuse naming a setting out of its range.
+    Hbao(gpu::Device& device, const HbaoOptions& options);
+
+  private:
+    void add_passes(ScreenTables& tables) const override;
+    [[nodiscard]] std::vector<std::byte> constants(const shared::ScreenConstants& screen) const override;
+
+    HbaoOptions options_;
+};
+
+} // namespace scanshade

@@ -1,0 +1,102 @@
+#include "ao/hemisphere/hemisphere.h"
+
+#include "projection/error.h"
+#include "shaders/shared/point_samples.h"
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+namespace scanshade {
+namespace {
+
+constexpr double shortest = 0.01; // of the radius
+constexpr double lowest = 0.05;   // height above the tangent plane: points lower only meet the surface itself
+
+int points_of(const HemisphereOptions& options) {
+    if (options.points > 0)
+        return options.points;
+    for (const auto& [name, points] :
+         {std::pair{"lowest", 8}, {"low", 16}, {"medium", 32}, {"high", 64}, {"highest", 256}})
+        if (options.quality == name)
+            return points;
+    throw Misuse("quality '" + options.quality + "': lowest, low, medium, high or highest expected");
+}
+
+double fraction(double x) { return x - std::floor(x); }
+
+void append(std::vector<float>& kernel, double x, double y, double z, double share) {
+    const double scale = (shortest + (1 - shortest) * share * share) / std::sqrt(x * x + y * y + z * z);
+    for (const double c : {x * scale, y * scale, z * scale, 0.0})
+        kernel.push_back(static_cast<float>(c));
+}
+
+} // namespace
+
+std::vector<float> hemisphere_kernel(int points) {
+    std::vector<float> kernel;
+    for (int i = 0; i < points; ++i) {
+        const double away2 = (i + 0.5) / points, phi = 2 * std::numbers::pi * fraction(i * 0.6180339887);
+        // Which distance goes with which direction: another sequence, so that neither knows of the other.
+        const double share = fraction(0.5 + i * 0.7548776662);
+        append(kernel, std::sqrt(away2) * std::cos(phi), std::sqrt(away2) * std::sin(phi),
+               std::max(std::sqrt(1 - away2), lowest), share);
+    }
+    return kernel;
+}
+
+std::vector<float> published_kernel(int points) {
+    std::mt19937 random(1);
+    const auto next = [&] { return static_cast<double>(random()) / 4294967296.0; };
+    std::vector<float> kernel;
+    for (int i = 0; i < points; ++i) {
+        const double x = 2 * next() - 1, y = 2 * next() - 1, z = next();
+        append(kernel, x, y, z + 1e-9, static_cast<double>(i) / points);
+    }
+    return kernel;
+}
+
+std::vector<Parameter> HemisphereOptions::parameters() {
+    auto rows = screen.parameters();
+    const std::vector<Parameter> own{
+        {"profile",
+         "metric: open planes and a normalised mean; published: the tutorial's test against the surface's own depth",
+         &profile,
+         "",
+         {},
+         {},
+         {"metric", "published"}},
+        {"quality",
+         "points: lowest 8, low 16, medium 32, high 64, highest 256",
+         &quality,
+         "",
+         {},
+         {},
+         {"lowest", "low", "medium", "high", "highest"}},
+        {"points", "points of the kernel; 0 = as the quality says", &points, "", 0, 1024},
+        {"blurs", "iterations of the published 7-tap blur, before denoise", &blurs, "", 0, 16},
+    };
+    rows.insert(rows.end(), own.begin(), own.end());
+    return rows;
+}
+
+Hemisphere::Hemisphere(gpu::Device& device, const HemisphereOptions& options)
+    : ScreenMethod(device, checked(options).screen), options_(options) {}
+
+void Hemisphere::add_passes(ScreenTables& tables) const {
+    const bool published = options_.profile == "published";
+    const int points = points_of(options_);
+    const auto kernel = published ? published_kernel(points) : hemisphere_kernel(points);
+    const int table = tables.add_buffer(
+        {"kernel", kernel.size() * 4, gpu::BufferRow::Host::none, gpu::BufferRow::Texels::rgba32f, kernel});
+    tables.add_pass("generate", "hemisphere/generate", {screen_depth, screen_normals, screen_noise, table},
+                    {screen_raw, screen_coverage},
+                    {{shared::spec_published, published}, {shared::spec_renormalise, options_.screen.renormalise}});
+    tables.add_blurs(options_.blurs, {0.370F, 0.317F, 0.198F, 0.115F});
+}
+
+std::vector<std::byte> Hemisphere::constants(const shared::ScreenConstants& screen) const {
+    return bytes_of(shared::HemisphereConstants{screen, points_of(options_), 0.02F * screen.radius});
+}
+
+} // namespace scanshade

@@ -1,0 +1,114 @@
+#include "ao/luna/luna.h"
+
+#include "projection/error.h"
+#include "shaders/shared/point_samples.h"
+
+#include <array>
+#include <cmath>
+
+namespace scanshade {
+namespace {
+
+/// Corners and face centres of a cube, opposite pairs together: any even number of them points nowhere on the whole.
+constexpr std::array<std::array<int, 3>, 14> directions{{{1, 1, 1},
+                                                         {-1, -1, -1},
+                                                         {-1, 1, 1},
+                                                         {1, -1, -1},
+                                                         {1, 1, -1},
+                                                         {-1, -1, 1},
+                                                         {-1, 1, -1},
+                                                         {1, -1, 1},
+                                                         {-1, 0, 0},
+                                                         {1, 0, 0},
+                                                         {0, -1, 0},
+                                                         {0, 1, 0},
+                                                         {0, 0, -1},
+                                                         {0, 0, 1}}};
+
+struct Count {
+    const char* quality;
+    int sets, count;
+};
+constexpr std::array counts{Count{"lowest", 1, 8}, Count{"low", 1, 14}, Count{"medium", 2, 14}, Count{"high", 4, 14},
+                            Count{"highest", 16, 14}};
+
+Count count_of(const LunaOptions& options) {
+    for (const Count& count : counts)
+        if (options.quality == count.quality)
+            return count;
+    throw Misuse("quality '" + options.quality + "': lowest, low, medium, high or highest expected");
+}
+
+/// The companion code's power and blur belong to its look.
+LunaOptions resolved(LunaOptions options) {
+    options = checked(std::move(options));
+    if (options.profile == "metric")
+        return options;
+    options.screen.power *= 6;
+    options.screen.denoise = false;
+    options.blurs = 4;
+    return options;
+}
+
+} // namespace
+
+std::vector<float> luna_vectors(int sets, int count) {
+    std::vector<float> vectors;
+    for (int i = 0; i < sets * count; ++i) {
+        const auto& [x, y, z] = directions[static_cast<std::size_t>(i % count)];
+        const double place = 0.5 + i * 0.6180339887;
+        const double length = (0.25 + 0.75 * (place - std::floor(place))) / std::sqrt(x * x + y * y + z * z);
+        for (const int c : {x, y, z, 0})
+            vectors.push_back(static_cast<float>(c * length));
+    }
+    return vectors;
+}
+
+std::vector<Parameter> LunaOptions::parameters() {
+    auto rows = screen.parameters();
+    const std::vector<Parameter> own{
+        {"profile",
+         "metric: the radius is respected; published: the companion code's constants (in metres), power 6 and four "
+         "blurs",
+         &profile,
+         "",
+         {},
+         {},
+         {"metric", "published"}},
+        {"quality",
+         "vectors: lowest 8, low the published 14, medium 28, high 56, highest 224",
+         &quality,
+         "",
+         {},
+         {},
+         {"lowest", "low", "medium", "high", "highest"}},
+        {"blurs", "iterations of the published 11-tap blur, before denoise", &blurs, "", 0, 16},
+    };
+    rows.insert(rows.end(), own.begin(), own.end());
+    return rows;
+}
+
+Luna::Luna(gpu::Device& device, const LunaOptions& options)
+    : ScreenMethod(device, resolved(options).screen), options_(resolved(options)) {}
+
+void Luna::add_passes(ScreenTables& tables) const {
+    const Count count = count_of(options_);
+    const auto vectors = luna_vectors(count.sets, count.count);
+    const int table = tables.add_buffer(
+        {"vectors", vectors.size() * 4, gpu::BufferRow::Host::none, gpu::BufferRow::Texels::rgba32f, vectors});
+    tables.add_pass("generate", "luna/generate", {screen_depth, screen_normals, screen_noise, table},
+                    {screen_raw, screen_coverage},
+                    {{shared::spec_published, options_.profile == "published"},
+                     {shared::spec_renormalise, options_.screen.renormalise}});
+    tables.add_blurs(options_.blurs, {0.16397F, 0.15136F, 0.11906F, 0.07981F, 0.04559F, 0.02219F}); // sigma 2.5 pixels
+}
+
+std::vector<std::byte> Luna::constants(const shared::ScreenConstants& screen) const {
+    const Count count = count_of(options_);
+    const float r = screen.radius;
+    const bool published = options_.profile == "published";
+    return bytes_of(published ? shared::LunaConstants{screen, count.sets, count.count, 0.05F, 0.2F, 1.0F}
+                              : shared::LunaConstants{screen, count.sets, count.count, 0.02F * r, 0.4F * r, r});
+}
+
+} // namespace scanshade

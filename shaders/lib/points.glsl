@@ -1,0 +1,20 @@
+// Where a point of space falls in the image, and what is seen there: for methods that test points around the surface.
+
+struct Seen {
+    bool known;
+    vec3 point; // of the pixel's centre
+    float z;
+};
+
+Seen seen_at(vec3 q) {
+    float inverse = 1.0 / max(q.z, 1e-6);
+    vec2 at = vec2(k.camera.fx, k.camera.fy) * q.xy * inverse + vec2(k.camera.cx, k.camera.cy);
+    ivec2 pixel = ivec2(nearest(clamp(at.x, -2.0, 1e6)), nearest(clamp(at.y, -2.0, 1e6)));
+    bool in_view = inside(pixel) && q.z > 1e-4;
+    float z = imageLoad(depth_in, in_view ? index_of(pixel) : 0).x;
+    Seen seen;
+    seen.known = in_view && z > 0.0;
+    seen.z = z;
+    seen.point = ray_of(vec2(pixel)) * z;
+    return seen;
+}
