@@ -25,11 +25,28 @@ Count count_of(const HbaoOptions& options) {
     throw Misuse("quality '" + options.quality + "': lowest, low, medium, high or highest expected");
 }
 
+HbaoOptions resolved(HbaoOptions options) {
+    options = checked(std::move(options));
+    if (options.profile == "metric")
+        return options;
+    options.bias_degrees = 30;
+    options.attenuated = true;
+    options.contrast = 1.25F;
+    return options;
+}
+
 } // namespace
 
 std::vector<Parameter> HbaoOptions::parameters() {
     auto rows = screen.parameters();
     const std::vector<Parameter> own{
+        {"profile",
+         "metric: all within the radius count alike; published: bias 30, attenuated, contrast 1.25",
+         &profile,
+         "",
+         {},
+         {},
+         {"metric", "published"}},
         {"quality",
          "directions x steps: lowest 4x2, low 4x4, medium 8x4, high 8x8, highest 32x16",
          &quality,
@@ -39,19 +56,17 @@ std::vector<Parameter> HbaoOptions::parameters() {
          {"lowest", "low", "medium", "high", "highest"}},
         {"directions", "directions in the image; 0 = as the quality says", &directions, "", 0, 128},
         {"steps", "steps along each; 0 = as the quality says", &steps, "", 0, 256},
-        {"bias", "horizons lower above the tangent plane than this do not occlude; published 30", &bias_degrees,
-         "degrees", 0, 89},
-        {"attenuated",
-         "samples count less with the square of their distance, as published; else all within the radius count alike",
+        {"bias", "horizons lower above the tangent plane than this do not occlude", &bias_degrees, "degrees", 0, 89},
+        {"attenuated", "samples count less with the square of their distance, instead of all alike up to the radius",
          &attenuated},
-        {"contrast", "the occlusion is multiplied by this; published 1.25", &contrast, "", 0, 5},
+        {"contrast", "the occlusion is multiplied by this", &contrast, "", 0, 5},
     };
     rows.insert(rows.end(), own.begin(), own.end());
     return rows;
 }
 
 Hbao::Hbao(gpu::Device& device, const HbaoOptions& options)
-    : ScreenMethod(device, checked(options).screen), options_(options) {}
+    : ScreenMethod(device, resolved(options).screen), options_(resolved(options)) {}
 
 void Hbao::add_passes(ScreenTables& tables) const {
     tables.add_pass("generate", "hbao/generate", {screen_depth, screen_normals, screen_noise},

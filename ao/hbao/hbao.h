@@ -1,4 +1,7 @@
 // HBAO: horizons above the tangent plane along directions in the image, after Bavoil, Sainz and Dimitrov (2008).
+//
+// Profile `metric`, the default, counts all within the radius alike and has no angle bias, because the rule that leaves
+// out samples on the tangent plane makes one needless; `published` has the paper's attenuation, bias and contrast.
 #pragma once
 
 #include "ao/screen/screen.h"
@@ -9,8 +12,9 @@ struct HbaoOptions {
     ScreenOptions screen;
     std::string quality = "medium"; ///< lowest 8 reads, low 16, medium 32, high 64, highest 512
     int directions = 0, steps = 0;  ///< above 0: instead of the quality's
-    float bias_degrees = 10;
-    bool attenuated = true;
+    std::string profile = "metric";
+    float bias_degrees = 0;
+    bool attenuated = false;
     float contrast = 1;
 
     [[nodiscard]] std::vector<Parameter> parameters();

@@ -42,11 +42,16 @@ Count count_of(const LunaOptions& options) {
 /// The companion code's power and blur belong to its look.
 LunaOptions resolved(LunaOptions options) {
     options = checked(std::move(options));
+    if (options.fade_to <= options.fade_from)
+        throw Misuse("fade-to must lie beyond fade-from");
     if (options.profile == "metric")
         return options;
     options.screen.power *= 6;
     options.screen.denoise = false;
     options.blurs = 4;
+    options.epsilon = 0.05F; // in metres, as the next two
+    options.fade_from = 0.2F;
+    options.fade_to = 1;
     return options;
 }
 
@@ -82,6 +87,9 @@ std::vector<Parameter> LunaOptions::parameters() {
          {},
          {},
          {"lowest", "low", "medium", "high", "highest"}},
+        {"epsilon", "what stands less than this in front of the surface does not occlude", &epsilon, "radii", 0, 1},
+        {"fade-from", "what stands farther in front occludes less", &fade_from, "radii", 0, 10},
+        {"fade-to", "and beyond this not at all", &fade_to, "radii", 1e-3, 10},
         {"blurs", "iterations of the published 11-tap blur, before denoise", &blurs, "", 0, 16},
     };
     rows.insert(rows.end(), own.begin(), own.end());
@@ -105,10 +113,9 @@ void Luna::add_passes(ScreenTables& tables) const {
 
 std::vector<std::byte> Luna::constants(const shared::ScreenConstants& screen) const {
     const Count count = count_of(options_);
-    const float r = screen.radius;
-    const bool published = options_.profile == "published";
-    return bytes_of(published ? shared::LunaConstants{screen, count.sets, count.count, 0.05F, 0.2F, 1.0F}
-                              : shared::LunaConstants{screen, count.sets, count.count, 0.02F * r, 0.4F * r, r});
+    const float unit = options_.profile == "published" ? 1 : screen.radius;
+    return bytes_of(shared::LunaConstants{screen, count.sets, count.count, options_.epsilon * unit,
+                                          options_.fade_from * unit, options_.fade_to * unit});
 }
 
 } // namespace scanshade
