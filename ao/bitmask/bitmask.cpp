@@ -28,7 +28,7 @@ Bitmask::Bitmask(gpu::Device& device, const BitmaskOptions& options)
 void Bitmask::add_passes(ScreenTables& tables) const {
     // Unbounded is a linear falloff so slow that every sample keeps some weight; sectors know no weights.
     const int falloff = options_.unbounded ? shared::falloff_linear : shared::falloff_hard;
-    add_slice_pass(tables, options_.screen, options_.slices,
+    add_slice_pass(tables, options_.slices,
                    {{shared::spec_bitmask, 1},
                     {shared::spec_falloff, falloff},
                     {shared::spec_uniform, options_.sectors == "angle"}});

@@ -51,7 +51,7 @@ Gtao::Gtao(gpu::Device& device, const GtaoOptions& options)
     : ScreenMethod(device, resolved(options).screen), options_(resolved(options)) {}
 
 void Gtao::add_passes(ScreenTables& tables) const {
-    add_slice_pass(tables, options_.screen, options_.slices, {{shared::spec_falloff, kind_of(options_.falloff)}});
+    add_slice_pass(tables, options_.slices, {{shared::spec_falloff, kind_of(options_.falloff)}});
 }
 
 std::vector<std::byte> Gtao::constants(const shared::ScreenConstants& screen) const {

@@ -70,7 +70,7 @@ Hbao::Hbao(gpu::Device& device, const HbaoOptions& options)
 
 void Hbao::add_passes(ScreenTables& tables) const {
     tables.add_pass("generate", "hbao/generate", {screen_depth, screen_normals, screen_noise},
-                    {screen_raw, screen_coverage}, {{shared::spec_renormalise, options_.screen.renormalise}});
+                    {screen_raw, screen_coverage});
 }
 
 std::vector<std::byte> Hbao::constants(const shared::ScreenConstants& screen) const {

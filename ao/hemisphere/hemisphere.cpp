@@ -74,6 +74,8 @@ std::vector<Parameter> HemisphereOptions::parameters() {
          {},
          {"lowest", "low", "medium", "high", "highest"}},
         {"points", "points of the kernel; 0 = as the quality says", &points, "", 0, 1024},
+        {"renormalise", "samples that met nothing known count as those that did, where at least half did; else as open",
+         &renormalise},
         {"blurs", "iterations of the published 7-tap blur, before denoise", &blurs, "", 0, 16},
     };
     rows.insert(rows.end(), own.begin(), own.end());
@@ -91,7 +93,7 @@ void Hemisphere::add_passes(ScreenTables& tables) const {
         {"kernel", kernel.size() * 4, gpu::BufferRow::Host::none, gpu::BufferRow::Texels::rgba32f, kernel});
     tables.add_pass("generate", "hemisphere/generate", {screen_depth, screen_normals, screen_noise, table},
                     {screen_raw, screen_coverage},
-                    {{shared::spec_published, published}, {shared::spec_renormalise, options_.screen.renormalise}});
+                    {{shared::spec_published, published}, {shared::spec_renormalise, options_.renormalise}});
     tables.add_blurs(options_.blurs, {0.370F, 0.317F, 0.198F, 0.115F});
 }
 

@@ -13,7 +13,8 @@ struct HemisphereOptions {
     std::string profile = "metric";
     std::string quality = "medium"; ///< lowest 8 points, low 16, medium 32, high 64, highest 256
     int points = 0;                 ///< above 0: instead of the quality's
-    int blurs = 0;                  ///< iterations of the published blur, before denoise
+    bool renormalise = false;
+    int blurs = 0; ///< iterations of the published blur, before denoise
 
     [[nodiscard]] std::vector<Parameter> parameters();
 };

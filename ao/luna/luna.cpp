@@ -90,6 +90,8 @@ std::vector<Parameter> LunaOptions::parameters() {
         {"epsilon", "what stands less than this in front of the surface does not occlude", &epsilon, "radii", 0, 1},
         {"fade-from", "what stands farther in front occludes less", &fade_from, "radii", 0, 10},
         {"fade-to", "and beyond this not at all", &fade_to, "radii", 1e-3, 10},
+        {"renormalise", "samples that met nothing known count as those that did, where at least half did; else as open",
+         &renormalise},
         {"blurs", "iterations of the published 11-tap blur, before denoise", &blurs, "", 0, 16},
     };
     rows.insert(rows.end(), own.begin(), own.end());
@@ -104,10 +106,9 @@ void Luna::add_passes(ScreenTables& tables) const {
     const auto vectors = luna_vectors(count.sets, count.count);
     const int table = tables.add_buffer(
         {"vectors", vectors.size() * 4, gpu::BufferRow::Host::none, gpu::BufferRow::Texels::rgba32f, vectors});
-    tables.add_pass("generate", "luna/generate", {screen_depth, screen_normals, screen_noise, table},
-                    {screen_raw, screen_coverage},
-                    {{shared::spec_published, options_.profile == "published"},
-                     {shared::spec_renormalise, options_.screen.renormalise}});
+    tables.add_pass(
+        "generate", "luna/generate", {screen_depth, screen_normals, screen_noise, table}, {screen_raw, screen_coverage},
+        {{shared::spec_published, options_.profile == "published"}, {shared::spec_renormalise, options_.renormalise}});
     tables.add_blurs(options_.blurs, {0.16397F, 0.15136F, 0.11906F, 0.07981F, 0.04559F, 0.02219F}); // sigma 2.5 pixels
 }
 

@@ -14,7 +14,8 @@ struct LunaOptions {
     std::string quality = "low";         ///< lowest 8 vectors, low the published 14, medium 28, high 56, highest 224
     float epsilon = 0.02F;               ///< radii in front of the surface up to which nothing occludes
     float fade_from = 0.4F, fade_to = 1; ///< radii in front over which occlusion ends
-    int blurs = 0;                       ///< iterations of the published blur, before denoise
+    bool renormalise = false;
+    int blurs = 0; ///< iterations of the published blur, before denoise
 
     [[nodiscard]] std::vector<Parameter> parameters();
 };

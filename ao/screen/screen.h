@@ -17,7 +17,6 @@ struct ScreenOptions {
     float radius = 0.5F;
     float strength = 1, power = 1;
     bool denoise = true;
-    bool renormalise = false;
     float tangent_sine = 0.02F;   ///< beta_t of the rule that keeps a surface from occluding itself
     float tangent_sigmas = 4.24F; ///< kappa of that rule, 3 sqrt 2: a difference of two depths, three deviations
     int seed = 0;

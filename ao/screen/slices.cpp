@@ -55,10 +55,8 @@ shared::GtaoConstants slice_constants(const SliceOptions& options, const shared:
     return block;
 }
 
-void add_slice_pass(ScreenTables& tables, const ScreenOptions& screen, const SliceOptions& options,
-                    std::vector<std::pair<int, int>> constants) {
-    constants.insert(constants.end(), {{shared::spec_renormalise, screen.renormalise},
-                                       {shared::spec_square, options.distribution == 2}});
+void add_slice_pass(ScreenTables& tables, const SliceOptions& options, std::vector<std::pair<int, int>> constants) {
+    constants.emplace_back(shared::spec_square, options.distribution == 2);
     tables.add_pass("generate", "gtao/generate", {screen_depth, screen_normals, screen_noise},
                     {screen_raw, screen_coverage}, std::move(constants));
 }

@@ -22,7 +22,6 @@ struct SliceOptions {
 [[nodiscard]] shared::GtaoConstants slice_constants(const SliceOptions& options, const shared::ScreenConstants& screen);
 
 /// Appends the one pass of gtao and bitmask; `constants` are specializations (shared/gtao.h).
-void add_slice_pass(ScreenTables& tables, const ScreenOptions& screen, const SliceOptions& options,
-                    std::vector<std::pair<int, int>> constants);
+void add_slice_pass(ScreenTables& tables, const SliceOptions& options, std::vector<std::pair<int, int>> constants);
 
 } // namespace scanshade

@@ -2,8 +2,6 @@
 // texel buffers `normals`, and `raw` and `coverage` to write.
 #include "lib/cheap.glsl"
 
-layout(constant_id = spec_renormalise) const int renormalise = 0;
-
 struct Surface {
     vec3 point, normal;
     vec3 eye;        // unit, towards the camera
@@ -77,7 +75,6 @@ March march_along(Surface s, vec2 p, vec3 d) {
 // occlusion fades in. `known` is the share of the wanted samples that met known depth.
 void finish(Surface s, bool hole, int index, float visibility, float known) {
     float occlusion = 1.0 - visibility;
-    if (renormalise != 0) occlusion = min(occlusion / max(known, 0.5), 1.0);
     occlusion *= clamp(0.5 * s.radius_px - 0.5, 0.0, 1.0);
     imageStore(raw, index, vec4(hole ? 1.0 : clamp(1.0 - occlusion, 0.0, 1.0)));
     imageStore(coverage, index, vec4(hole || s.radius_px < 1.0 ? 0.0 : known));

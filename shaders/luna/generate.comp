@@ -12,6 +12,7 @@
 
 layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(constant_id = spec_published) const int published = 0;
+layout(constant_id = spec_renormalise) const int renormalise = 0;
 layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 1, r32f) readonly uniform imageBuffer normals;
 layout(binding = 2, rg32f) readonly uniform imageBuffer noise_table;
@@ -62,5 +63,7 @@ void main() {
         }
     }
     float share = 1.0 / float(l.sets * l.count);
-    finish(s, !(z > 0.0), here, 1.0 - occlusion * share, known * share);
+    known *= share;
+    occlusion *= renormalise != 0 ? share / max(known, 0.5) : share;
+    finish(s, !(z > 0.0), here, 1.0 - occlusion, known);
 }

@@ -20,5 +20,7 @@ struct HemisphereConstants {
 
 const int spec_published = 10;      // 1: as published, faults included
 
+const int spec_renormalise = 11;    // 1: unknown samples count as the known ones, where at least half are known
+
 SHARED_END
 #endif
