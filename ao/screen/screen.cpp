@@ -109,15 +109,19 @@ void ScreenTables::add_blurs(int iterations, const std::vector<float>& weights) 
 
 shared::ScreenConstants constants_from(const ScreenOptions& options, const View& view) {
     const Pinhole& camera = view.depth.camera;
-    return {camera.on_gpu(),
-            {camera.size.width, camera.size.height},
-            options.radius,
-            static_cast<float>(view.noise.floor_m),
-            static_cast<float>(view.noise.per_z2),
-            options.tangent_sine,
-            options.tangent_sigmas,
-            options.strength,
-            options.power};
+    shared::ScreenConstants k{};
+    k.camera = camera.on_gpu();
+    k.size = {camera.size.width, camera.size.height};
+    k.ray_step = {static_cast<float>(1 / camera.fx), static_cast<float>(1 / camera.fy)};
+    k.ray_base = {static_cast<float>(-camera.cx / camera.fx), static_cast<float>(-camera.cy / camera.fy)};
+    k.radius = options.radius;
+    k.noise_floor = static_cast<float>(view.noise.floor_m);
+    k.noise_per_z2 = static_cast<float>(view.noise.per_z2);
+    k.tangent_sine = options.tangent_sine;
+    k.tangent_sigmas = options.tangent_sigmas;
+    k.strength = options.strength;
+    k.power = options.power;
+    return k;
 }
 
 ScreenTables ScreenMethod::tables(cv::Size size, bool supplied) const {

@@ -112,7 +112,8 @@ void main() {
     float inverse_steps = 1.0 / float(g.steps);
 
     float open = 0.0, full = 0.0, known = 0.0;
-    for (int i = 0; i < g.slices; ++i) {
+    int i = 0;
+    do {
         vec3 d = e1 * turned.x + e2 * turned.y, axis = cross(d, s.eye);
         turned = vec2(turned.x * g.turn_cosine - turned.y * g.turn_sine, turned.y * g.turn_cosine + turned.x * g.turn_sine);
         vec3 projected = s.normal - axis * dot(s.normal, axis);
@@ -124,17 +125,19 @@ void main() {
         slice.full = slice.cosine + slice.angle * slice.sine;
         slice.below = 0.5 * slice.cosine + 0.25 * (2.0 * slice.angle - pi) * slice.sine;
 
-        March ahead = march_along(s, vec2(p), d), behind = march_along(s, vec2(p), -d);
+        March ahead, behind;
+        march_both_ways(s, vec2(p), d, ahead, behind);
         float dither = fract(noise.x * 7.0 + float(i) * golden);
         Side plus = Side(-slice.sine, 0u, 0.0), minus = Side(slice.sine, 0u, 0.0);
         float jitter = noise.y + float(i) * golden;
-        for (int j = 0; j < g.steps; ++j) {
+        int j = 0;
+        do { // a loop that asks first runs once more on lavapipe, with every lane off
             float x = (float(j) + fract(jitter)) * inverse_steps;
             jitter += float(g.steps) * golden;
             x = square != 0 ? x * x : pow(x, g.distribution);
             look(s, slice, pixel_along(vec2(p), ahead, nearest_px + x * ahead.within), -slice.sine, 1.0, dither, plus);
             look(s, slice, pixel_along(vec2(p), behind, nearest_px + x * behind.within), slice.sine, -1.0, dither, minus);
-        }
+        } while (++j < g.steps);
         float measure = bitmask != 0
             ? slice.full * (1.0 - float(bitCount(plus.occupied | minus.occupied)) / 32.0)
             : arc_measure(slice, clamped_cosine(plus.horizon), 1.0) + arc_measure(slice, clamped_cosine(minus.horizon), -1.0);
@@ -142,6 +145,6 @@ void main() {
         open += weight * measure;
         full += weight * slice.full;
         known += plus.known * (ahead.within / ahead.reach) + minus.known * (behind.within / behind.reach);
-    }
+    } while (++i < g.slices);
     finish(s, !(z > 0.0), here, open / max(full, 1e-6), known * inverse_steps / float(2 * g.slices));
 }

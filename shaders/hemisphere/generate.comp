@@ -2,8 +2,7 @@
 //
 // The well-known tutorial form (64 points, a random turn per pixel, range check, less weight for points along the view).
 // Departures, off with `published`: points are compared by their own depth, not the surface's, which darkened every slope;
-// occluders within the radius count, less those on the tangent plane; points along the view weigh as much as the rest, because
-// with points compared by their own depth none of them falls on the surface itself.
+// occluders within the radius count, less those on the tangent plane; the mean is over the weights, not the points.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -43,7 +42,7 @@ void main() {
     vec3 tangent = e1 * turn.x + e2 * turn.y, bitangent = cross(s.normal, tangent);
     float slack = k.tangent_sigmas * sigma_of(s.point.z) + 1e-4 * s.point.z;
 
-    float occluded = 0.0, known = 0.0;
+    float occluded = 0.0, weights = 0.0, known = 0.0;
     for (int i = 0; i < h.count; ++i) {
         vec3 c = imageLoad(kernel, i).xyz;
         vec3 a = tangent * c.x + bitangent * c.y + s.normal * c.z, q = s.point + k.radius * a;
@@ -51,16 +50,15 @@ void main() {
         vec3 apart = seen.point - s.point;
         float away2 = dot(apart, apart) + 1e-20;
         bool behind = seen.z < q.z - slack && away2 <= k.radius * k.radius && rises(s, apart, away2 * inverse_root(away2));
-        float weight = 1.0;
-        if (published != 0) {
-            float side = clamp(5.0 * length(a.xy), 0.0, 1.0);
-            weight = side * side * (3.0 - 2.0 * side);
-            behind = seen.z + h.bias < s.point.z && abs(apart.z) <= k.radius;
-        }
+        float side = at_most_one(5.0 * sqrt(dot(a.xy, a.xy)));
+        float weight = side * side * (3.0 - 2.0 * side);
+        if (published != 0) behind = seen.z + h.bias < s.point.z && abs(apart.z) <= k.radius;
         occluded += seen.known && behind ? weight : 0.0;
+        weights += weight;
         known += seen.known ? 1.0 : 0.0;
     }
     known /= float(h.count);
-    occluded /= float(h.count) * (renormalise != 0 ? max(known, 0.5) : 1.0);
+    weights = published != 0 ? float(h.count) : max(weights, 1e-6);
+    occluded /= renormalise != 0 ? weights * max(known, 0.5) : weights;
     finish(s, !(z > 0.0), here, 1.0 - occluded, known);
 }

@@ -9,7 +9,7 @@ int index_of(ivec2 p) { return p.y * k.size.x + p.x; }
 bool inside(ivec2 p) { return all(lessThan(uvec2(p), uvec2(k.size))); }
 
 // The ray through a pixel, z = 1; times depth it is the pixel's point.
-vec3 ray_of(vec2 p) { return vec3((p - vec2(k.camera.cx, k.camera.cy)) / vec2(k.camera.fx, k.camera.fy), 1.0); }
+vec3 ray_of(vec2 p) { return vec3(p * k.ray_step + k.ray_base, 1.0); }
 
 float sigma_of(float z) { return k.noise_floor + k.noise_per_z2 * z * z; }
 

@@ -4,9 +4,11 @@
 
 struct Surface {
     vec3 point, normal;
+    vec2 ray;        // of its pixel, z = 1
     vec3 eye;        // unit, towards the camera
     float rise;      // lower above the tangent plane than this, in metres, nothing counts (with k.tangent_sine)
     float radius_px; // of the sphere around it, in the image
+    float outline_sine, outline_cosine; // of the angle between its ray and the sphere's outline
 };
 
 // In holes a point that is as good as any: what comes of it is not kept.
@@ -16,7 +18,11 @@ Surface surface_at(ivec2 p, float z, int index) {
     z = z > 0.0 ? z : 1.0;
     s.point = ray * z;
     s.normal = normal_at(index);
-    s.eye = -ray * inversesqrt(dot(ray, ray));
+    s.ray = ray.xy;
+    float inverse = inversesqrt(dot(ray, ray));
+    s.eye = -ray * inverse;
+    s.outline_sine = min(k.radius * inverse / z, 0.999);
+    s.outline_cosine = sqrt(1.0 - s.outline_sine * s.outline_sine);
     // Rounding of depth in single precision is a noise, too.
     s.rise = (k.tangent_sigmas * sigma_of(z) + 1e-6 * z) * abs(dot(s.normal, ray));
     s.radius_px = k.radius * sqrt(k.camera.fx * k.camera.fy) / z;
@@ -40,11 +46,11 @@ float angle_of(float c) {
     return c < 0.0 ? 3.14159265 - angle : angle;
 }
 
-// Where the sphere around a point ends in the image, in one direction d perpendicular to the eye's.
+// A direction to march in the image, and how far.
 struct March {
     vec2 direction; // unit, pixels
-    float reach;    // pixels to the sphere's outline; large where that is beside or behind the camera
-    float within;  // the part of it that lies in the image
+    float reach;    // pixels to the outline of the sphere around the point; large where that is beside or behind the camera
+    float within;   // the part of it that lies in the image
 };
 
 // Beyond the border nothing is known: steps spread over what lies before it.
@@ -60,15 +66,17 @@ ivec2 pixel_along(vec2 p, March march, float pixels) {
     return ivec2(nearest(at.x), nearest(at.y));
 }
 
-// The outline along the plane of eye and d touches the sphere where the view ray leaves it: at the angle asin(R / |P|) from
-// the point's own ray. It covers what stands in front of the point, not only what is as deep.
-March march_along(Surface s, vec2 p, vec3 d) {
-    float sine = min(k.radius * inversesqrt(dot(s.point, s.point)), 0.999), cosine = sqrt(1.0 - sine * sine);
-    vec2 ray = s.point.xy / s.point.z;
-    vec2 line = vec2(k.camera.fx, k.camera.fy) * (d.xy - ray * d.z);
-    float pixels = length(line);
-    float end_z = sine * d.z - cosine * s.eye.z; // of the outline's unit ray
-    return cut_at_border(p, line / max(pixels, 1e-20), end_z > 1e-4 ? pixels * sine / end_z : 1e6);
+// Both ways along a direction d perpendicular to the eye's ray. The sphere's outline in the plane of eye and d is where the
+// view ray touches it: at the angle asin(R / |P|) from the point's own ray. It covers what stands in front of the point, not
+// only what is as deep.
+void march_both_ways(Surface s, vec2 p, vec3 d, out March ahead, out March behind) {
+    vec2 line = (d.xy - s.ray * d.z) / k.ray_step;
+    float inverse = inversesqrt(max(dot(line, line), 1e-20));
+    vec2 direction = line * inverse;
+    vec2 end_z = vec2(d.z, -d.z) * s.outline_sine - s.eye.z * s.outline_cosine; // of the outline's unit rays
+    vec2 reach = mix(vec2(1e6), s.outline_sine / (end_z * inverse), greaterThan(end_z, vec2(1e-4)));
+    ahead = cut_at_border(p, direction, reach.x);
+    behind = cut_at_border(p, -direction, reach.y);
 }
 
 // Writes a pixel's result. Below a radius of one pixel nothing can be seen within it: open and unknown; up to three the

@@ -8,6 +8,7 @@ SHARED_BEGIN
 struct ScreenConstants {
     Pinhole camera;
     ivec2 size;                       // of the image
+    vec2 ray_step, ray_base;          // the ray of pixel p is (p ray_step + ray_base, 1): divisions are dear
     float radius;                     // R, metres
     float noise_floor, noise_per_z2;  // sigma(z) = floor + per_z2 z^2 of the depth looked at, metres
     float tangent_sine;               // beta_t: samples lower above the tangent plane than this do not count (sine)
