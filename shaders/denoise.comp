@@ -8,13 +8,10 @@
 
 layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(constant_id = spec_denoise) const int denoise = 1;
-layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
-layout(binding = 1, r32f) readonly uniform imageBuffer normals;
-layout(binding = 2, r32f) readonly uniform imageBuffer raw;
+layout(binding = 0, rgba32f) readonly uniform imageBuffer surfaces;
+layout(binding = 1, r32f) readonly uniform imageBuffer raw;
 layout(binding = 16, r32f) uniform writeonly imageBuffer visibility;
 layout(binding = 32, scalar) uniform Constants { ScreenConstants constants; };
-
-#include "lib/normal.glsl"
 
 struct Mean {
     vec3 normal_over_tolerance; // a plane's distances then come in tolerances
@@ -31,8 +28,8 @@ struct Tap {
 Tap tap_at(ivec2 p) {
     bool known = inside(p);
     int i = known ? index_of(p) : 0;
-    vec3 n = normal_at(i);
-    return Tap(ray_of(vec2(p)) * imageLoad(depth_in, i).x, known ? n : vec3(0.0), imageLoad(raw, i).x);
+    vec4 surface = imageLoad(surfaces, i);
+    return Tap(ray_of(vec2(p)) * surface.w, known ? surface.xyz : vec3(0.0), imageLoad(raw, i).x);
 }
 
 Mean mean_about(Tap centre) {

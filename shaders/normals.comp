@@ -13,6 +13,7 @@ layout(constant_id = spec_supplied) const int supplied = 0;
 layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 1, r32f) readonly uniform imageBuffer normals; // those of the view, if any
 layout(binding = 16, r32f) uniform writeonly imageBuffer normals_out;
+layout(binding = 17, rgba32f) uniform writeonly imageBuffer surfaces; // normal and depth in one: denoise reads many
 layout(binding = 32, scalar) uniform Constants { ScreenConstants constants; };
 
 #include "lib/depth.glsl"
@@ -50,7 +51,8 @@ void look_around(ivec2 p, float z, vec3 point, bool wanted, inout vec3 one, inou
     for (int i = 0; wanted && i < 8 * rings; ++i) {
         int cell = (i & 7) + ((i & 7) >> 2); // of 3x3, without the middle one
         int ring = 1 + (i >> 3);
-        ivec2 q = p + ring * ivec2(cell % 3 - 1, cell / 3 - 1);
+        int row = (11 * cell) >> 5; // of the cell: its third, without a division
+        ivec2 q = p + ring * ivec2(cell - 3 * row - 1, row - 1);
         float zq = depth_at(q);
         vec3 apart = ray_of(vec2(q)) * zq - point;
         bool same = zq > 0.0 && abs(zq - z) < gentle * length(apart.xy);
@@ -105,4 +107,5 @@ void main() {
     imageStore(normals_out, 3 * here, vec4(n.x));
     imageStore(normals_out, 3 * here + 1, vec4(n.y));
     imageStore(normals_out, 3 * here + 2, vec4(n.z));
+    imageStore(surfaces, here, vec4(n, z));
 }

@@ -56,6 +56,7 @@ std::vector<gpu::BufferRow> shared_buffers(std::size_t pixels, bool supplied, in
         {"raw", pixels * 4, Host::none, floats},
         {"coverage", pixels * 4, Host::download, floats},
         {"visibility", pixels * 4, Host::download, floats},
+        {"surfaces", pixels * 16, Host::none, gpu::BufferRow::Texels::rgba32f},
     };
 }
 
@@ -127,10 +128,10 @@ shared::ScreenConstants constants_from(const ScreenOptions& options, const View&
 ScreenTables ScreenMethod::tables(cv::Size size, bool supplied) const {
     ScreenTables all{size, shared_buffers(static_cast<std::size_t>(size.area()), supplied, options_.seed), {}};
     // Without normals of the view, depth fills their slot; nothing reads it.
-    all.add_pass("normals", "normals", {screen_depth, supplied ? screen_given : screen_depth}, {screen_normals},
+    all.add_pass("normals", "normals", {screen_depth, supplied ? screen_given : screen_depth}, {screen_normals, screen_surfaces},
                  {{shared::spec_supplied, supplied}});
     add_passes(all);
-    all.add_pass("denoise", "denoise", {screen_depth, screen_normals, screen_raw}, {screen_visibility},
+    all.add_pass("denoise", "denoise", {screen_surfaces, screen_raw}, {screen_visibility},
                  {{shared::spec_denoise, options_.denoise}}, 2);
     return all;
 }

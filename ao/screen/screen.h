@@ -33,6 +33,7 @@ enum ScreenBuffer : int {
     screen_raw,        ///< r32f: visibility before denoise, finite everywhere
     screen_coverage,   ///< r32f: share of the wanted samples that fell on known depth, 0 in holes
     screen_visibility, ///< r32f: the result, NaN in holes
+    screen_surfaces,   ///< rgba32f: normal and depth once more, for passes that read many
     screen_own
 };
 
