@@ -162,28 +162,40 @@ TEST(Noise, any_8x8_pixels_hold_numbers_spread_over_zero_to_one) {
 
 // ------------------------------------------------------------------------------------------------- normals
 
+/// The shared passes by themselves: depth, given normals and raw visibility in; normals and shown visibility out.
+struct SharedPasses {
+    enum : int { depth, given, raw, normals, surfaces, visibility };
+    std::unique_ptr<gpu::Program> program;
+
+    SharedPasses(cv::Size size, bool supplied) {
+        using Row = gpu::BufferRow;
+        const auto pixels = static_cast<std::size_t>(size.area());
+        const std::vector<Row> buffers{{"depth", pixels * 4, Row::Host::upload, Row::Texels::r32f},
+                                       {"given", pixels * 12, Row::Host::upload, Row::Texels::r32f},
+                                       {"raw", pixels * 4, Row::Host::upload, Row::Texels::r32f},
+                                       {"normals", pixels * 12, Row::Host::download, Row::Texels::r32f},
+                                       {"surfaces", pixels * 16, Row::Host::none, Row::Texels::rgba32f},
+                                       {"visibility", pixels * 4, Row::Host::download, Row::Texels::r32f}};
+        ScreenTables tables{size, {}, {}};
+        tables.add_pass("normals", "normals", {depth, given}, {normals, surfaces}, {{shared::spec_supplied, supplied}});
+        tables.add_pass("denoise", "denoise", {surfaces, raw}, {visibility}, {}, 2);
+        program = std::make_unique<gpu::Program>(device(), buffers, tables.passes, sizeof(shared::ScreenConstants));
+    }
+
+    void put(int buffer, const cv::Mat& image) {
+        std::memcpy(program->host(buffer).data(), image.clone().data, image.total() * image.elemSize());
+    }
+};
+
 cv::Mat3f normals_of(const DepthImage& depth, const cv::Mat3f& supplied = {}) {
-    using Row = gpu::BufferRow;
-    const auto pixels = depth.z_m.total();
-    const bool given = !supplied.empty();
-    std::vector<Row> buffers{{"depth", pixels * 4, Row::Host::upload, Row::Texels::r32f},
-                             {"given", pixels * 12, Row::Host::upload, Row::Texels::r32f},
-                             {"normals", pixels * 12, Row::Host::download, Row::Texels::r32f}};
-    const auto groups = [](int n) { return static_cast<std::uint32_t>((n + 7) / 8); };
-    std::vector<gpu::PassRow> passes{{"normals",
-                                      "normals",
-                                      {0, 1},
-                                      {2},
-                                      {groups(depth.z_m.cols), groups(depth.z_m.rows), 1},
-                                      {{shared::spec_supplied, given}}}};
-    gpu::Program program(device(), buffers, passes, sizeof(shared::ScreenConstants));
-    std::memcpy(program.host(0).data(), depth.z_m.data, pixels * 4);
-    if (given)
-        std::memcpy(program.host(1).data(), supplied.data, pixels * 12);
+    SharedPasses passes(depth.z_m.size(), !supplied.empty());
+    passes.put(SharedPasses::depth, depth.z_m);
+    if (!supplied.empty())
+        passes.put(SharedPasses::given, supplied);
     const shared::ScreenConstants k = constants_from(ScreenOptions{}, {depth});
-    program.run(std::as_bytes(std::span(&k, 1)));
+    passes.program->run(std::as_bytes(std::span(&k, 1)));
     cv::Mat3f normals(depth.z_m.size());
-    std::memcpy(normals.data, program.host(2).data(), pixels * 12);
+    std::memcpy(normals.data, passes.program->host(SharedPasses::normals).data(), normals.total() * 12);
     return normals;
 }
 
@@ -262,27 +274,16 @@ TEST_F(Classics, supplied_normals_are_kept_and_mended) {
 // ------------------------------------------------------------------------------------------------- denoise
 
 cv::Mat1f denoised(const DepthImage& depth, const cv::Mat1f& raw, float strength = 1, float power = 1) {
-    using Row = gpu::BufferRow;
-    const auto pixels = depth.z_m.total();
-    std::vector<Row> buffers{{"depth", pixels * 4, Row::Host::upload, Row::Texels::r32f},
-                             {"normals", pixels * 12, Row::Host::upload, Row::Texels::r32f},
-                             {"raw", pixels * 4, Row::Host::upload, Row::Texels::r32f},
-                             {"visibility", pixels * 4, Row::Host::download, Row::Texels::r32f}};
-    const auto groups = [](int n) { return static_cast<std::uint32_t>((n + 15) / 16); };
-    gpu::Program program(device(), buffers,
-                         {{"denoise", "denoise", {0, 1, 2}, {3}, {groups(raw.cols), groups(raw.rows), 1}, {}}},
-                         sizeof(shared::ScreenConstants));
-    const cv::Mat3f normals = normals_of(depth);
-    std::memcpy(program.host(0).data(), depth.z_m.data, pixels * 4);
-    std::memcpy(program.host(1).data(), normals.data, pixels * 12);
-    std::memcpy(program.host(2).data(), raw.data, pixels * 4);
+    SharedPasses passes(depth.z_m.size(), false);
+    passes.put(SharedPasses::depth, depth.z_m);
+    passes.put(SharedPasses::raw, raw);
     ScreenOptions look;
     look.strength = strength;
     look.power = power;
     const shared::ScreenConstants k = constants_from(look, {depth});
-    program.run(std::as_bytes(std::span(&k, 1)));
+    passes.program->run(std::as_bytes(std::span(&k, 1)));
     cv::Mat1f shown(raw.size());
-    std::memcpy(shown.data, program.host(3).data(), pixels * 4);
+    std::memcpy(shown.data, passes.program->host(SharedPasses::visibility).data(), shown.total() * 4);
     return shown;
 }
 

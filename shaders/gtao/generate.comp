@@ -33,42 +33,49 @@ const float nearest_px = 1.3; // so that no first step rounds to the pixel itsel
 
 GtaoConstants g;
 
-// One half plane through the eye's ray.
+// A plane through the eye's ray. Angles in it are measured from the eye, positive towards side +1; the cosine-weighted
+// measure of the arc from the eye to an angle t is a(t) = (cos n + 2 t sin n - cos(2 t - n)) / 4 (F of Jimenez et al. 2016).
 struct Slice {
-    float cosine, sine, angle; // gamma, the projected normal's angle from the eye, positive towards side +1
-    float below, full;         // measure of the open slice on side -1, and of all of it
+    float cosine, sine, angle; // of n, the projected normal's angle
+    float full;                // measure of the open slice
+    vec3 sectors;              // of 32: the dither and side -1's share of them, then per sin^2 t and per segment(cos t)
 };
 
-// Cosine-weighted measure of the arc from the eye's ray to the angle acos(c) on a side: F of eq. 4 in closed form.
+// Area that a chord at distance c from the centre cuts off the unit circle, acos(c) - c sqrt(1 - c^2), to 6e-6: then
+// a(t) = (cos n sin^2 t + sin n segment(cos t)) / 2 needs no arc function. Sectors can do with 7e-4.
+float segment(float c) {
+    float t = positive(1.0 - abs(c));
+    float root = bitmask != 0 ? t * quick_scale * quick_inversesqrt(t) : sqrt(t);
+    float area = t * root * (((-0.0112172 * t - 0.0182299) * t - 0.2857573) * t + 1.8860061);
+    return c < 0.0 ? pi - area : area;
+}
+
+// Measure of the arc from the eye to the angle with cosine c on a side.
 float arc_measure(Slice slice, float c, float side) {
-    float sine2 = positive(1.0 - c * c);
-    return 0.5 * (slice.cosine * sine2 + side * slice.sine * (angle_of(c) - sqrt(sine2) * c));
+    return 0.5 * (slice.cosine * positive(1.0 - c * c) + side * slice.sine * segment(c));
 }
 
-// Share of the slice's measure that lies before the angle acos(c) on a side, counted from the end of side -1; directions
-// behind the tangent plane are that end or the other.
-float quantile(Slice slice, float c, float side) {
-    float sine = side * sqrt(positive(1.0 - c * c));
-    bool behind = c * slice.cosine + sine * slice.sine < 0.0;
-    float share = equal_angles != 0 ? (side * angle_of(c) - slice.angle) / pi + 0.5
-                                    : (slice.below + side * arc_measure(slice, c, side)) / slice.full;
-    return behind ? 0.5 + 0.5 * side : clamp(share, 0.0, 1.0);
+// Sectors of the slice that lie before the angle with cosine c on a side, counted from the end of side -1; a direction
+// behind the tangent plane is that end or the other.
+int sectors_before(Slice slice, float c, float side) {
+    float n = equal_angles != 0 ? slice.sectors.x + (side * angle_of(c) - slice.angle) * (32.0 / pi) + 16.0
+                                : slice.sectors.x + side * slice.sectors.y * positive(1.0 - c * c) + slice.sectors.z * segment(c);
+    bool behind = c < -side * slice.sine;
+    return min(max(nearest(behind ? 16.0 + 17.0 * side : n), 0), 32);
 }
 
-uint sectors_below(int i) { return i < 32 ? (1u << i) - 1u : ~0u; }
+uint bits_below(int i) { return i < 32 ? (1u << i) - 1u : ~0u; }
 
-// The sectors between two cosines, rounded by the slice's own dither so that the expected length is exact.
-uint sectors(Slice slice, float front, float back, float side, float dither) {
-    int a = int(quantile(slice, front, side) * 32.0 + dither), b = int(quantile(slice, back, side) * 32.0 + dither);
-    return sectors_below(max(a, b)) & ~sectors_below(min(a, b));
+// The sectors between two cosines.
+uint sectors(Slice slice, float front, float back, float side) {
+    int a = sectors_before(slice, front, side), b = sectors_before(slice, back, side);
+    return bits_below(max(a, b)) & ~bits_below(min(a, b));
 }
 
 float falloff_weight(float away2, float away) {
     if (falloff == falloff_hard) return away2 <= k.radius * k.radius ? 1.0 : 0.0;
     return clamp(g.falloff_add + g.falloff_scale * (falloff == falloff_linear ? away : away2), 0.0, 1.0);
 }
-
-float clamped_cosine(float c) { return at_most_one(positive(c + 1.0) * 0.5) * 2.0 - 1.0; }
 
 // What a side of a slice has met.
 struct Side {
@@ -77,23 +84,24 @@ struct Side {
     float known;   // samples on known depth
 };
 
-void look(Surface s, Slice slice, ivec2 q, float low, float side, float dither, inout Side met) {
+void look(Surface s, Slice slice, ivec2 q, float side, inout Side met) {
     float z = imageLoad(depth_in, index_of(q)).x;
     vec3 sample_point = ray_of(vec2(q)) * z, apart = sample_point - s.point;
-    float away2 = dot(apart, apart) + 1e-20;
-    float inverse = inverse_root(away2), away = away2 * inverse;
+    float away2 = dot(apart, apart) + 1e-20; // lengths to 7e-4 will do: what the angles lose by it is less than that
+    float inverse = quick_scale * quick_inversesqrt(away2), away = away2 * inverse;
     float weight = falloff_weight(away2, away);
     bool counts = z > 0.0 && weight > 0.0 && rises(s, apart, away);
     float front = dot(apart, s.eye) * inverse;
     met.known += z > 0.0 ? 1.0 : 0.0;
     if (bitmask == 0) {
+        float low = -side * slice.sine;
         float horizon = falloff == falloff_hard ? front : low + (front - low) * weight;
         met.horizon = counts && horizon > met.horizon ? horizon : met.horizon;
     } else {
         float thickness = g.thickness + g.thickness_per_z * z;
-        vec3 behind = apart + sample_point * (thickness * inverse_root(dot(sample_point, sample_point) + 1e-20));
-        float back = dot(behind, s.eye) * inverse_root(dot(behind, behind) + 1e-20);
-        met.occupied |= counts ? sectors(slice, clamped_cosine(front), clamped_cosine(back), side, dither) : 0u;
+        vec3 behind = apart + sample_point * (thickness * quick_scale * quick_inversesqrt(dot(sample_point, sample_point) + 1e-20));
+        float back = dot(behind, s.eye) * (quick_scale * quick_inversesqrt(dot(behind, behind) + 1e-20));
+        met.occupied |= counts ? sectors(slice, front, back, side) : 0u;
     }
 }
 
@@ -123,11 +131,13 @@ void main() {
         slice.sine = clamp(dot(projected, d) / weight, -1.0, 1.0);
         slice.angle = sign(slice.sine) * angle_of(slice.cosine);
         slice.full = slice.cosine + slice.angle * slice.sine;
-        slice.below = 0.5 * slice.cosine + 0.25 * (2.0 * slice.angle - pi) * slice.sine;
+        float below = 0.5 * slice.cosine + 0.25 * (2.0 * slice.angle - pi) * slice.sine; // measure of side -1
+        float dither = fract(noise.x * 7.0 + float(i) * golden) - 0.5; // so that the expected number of sectors is exact
+        slice.sectors = vec3(32.0 * below, 16.0 * slice.cosine, 16.0 * slice.sine) / slice.full;
+        slice.sectors.x = dither + (equal_angles != 0 ? 0.0 : slice.sectors.x);
 
         March ahead, behind;
         march_both_ways(s, vec2(p), d, ahead, behind);
-        float dither = fract(noise.x * 7.0 + float(i) * golden);
         Side plus = Side(-slice.sine, 0u, 0.0), minus = Side(slice.sine, 0u, 0.0);
         float jitter = noise.y + float(i) * golden;
         int j = 0;
@@ -135,12 +145,12 @@ void main() {
             float x = (float(j) + fract(jitter)) * inverse_steps;
             jitter += float(g.steps) * golden;
             x = square != 0 ? x * x : pow(x, g.distribution);
-            look(s, slice, pixel_along(vec2(p), ahead, nearest_px + x * ahead.within), -slice.sine, 1.0, dither, plus);
-            look(s, slice, pixel_along(vec2(p), behind, nearest_px + x * behind.within), slice.sine, -1.0, dither, minus);
+            look(s, slice, pixel_along(vec2(p), ahead, nearest_px + x * ahead.within), 1.0, plus);
+            look(s, slice, pixel_along(vec2(p), behind, nearest_px + x * behind.within), -1.0, minus);
         } while (++j < g.steps);
         float measure = bitmask != 0
             ? slice.full * (1.0 - float(bitCount(plus.occupied | minus.occupied)) / 32.0)
-            : arc_measure(slice, clamped_cosine(plus.horizon), 1.0) + arc_measure(slice, clamped_cosine(minus.horizon), -1.0);
+            : arc_measure(slice, plus.horizon, 1.0) + arc_measure(slice, minus.horizon, -1.0);
         weight = weight2 < 1e-10 ? 0.0 : weight;
         open += weight * measure;
         full += weight * slice.full;

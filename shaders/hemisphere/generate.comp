@@ -43,20 +43,21 @@ void main() {
     float slack = k.tangent_sigmas * sigma_of(s.point.z) + 1e-4 * s.point.z;
 
     float occluded = 0.0, weights = 0.0, known = 0.0;
-    for (int i = 0; i < h.count; ++i) {
+    int i = 0;
+    do { // loops ask last: one that asks first runs once more on lavapipe, with every lane off
         vec3 c = imageLoad(kernel, i).xyz;
         vec3 a = tangent * c.x + bitangent * c.y + s.normal * c.z, q = s.point + k.radius * a;
         Seen seen = seen_at(q);
         vec3 apart = seen.point - s.point;
         float away2 = dot(apart, apart) + 1e-20;
-        bool behind = seen.z < q.z - slack && away2 <= k.radius * k.radius && rises(s, apart, away2 * inverse_root(away2));
-        float side = at_most_one(5.0 * sqrt(dot(a.xy, a.xy)));
+        bool behind = seen.z < q.z - slack && away2 <= k.radius * k.radius && rises(s, apart, away2 * quick_scale * quick_inversesqrt(away2));
+        float across2 = dot(a.xy, a.xy), side = at_most_one(5.0 * quick_scale * across2 * quick_inversesqrt(across2));
         float weight = side * side * (3.0 - 2.0 * side);
         if (published != 0) behind = seen.z + h.bias < s.point.z && abs(apart.z) <= k.radius;
         occluded += seen.known && behind ? weight : 0.0;
         weights += weight;
         known += seen.known ? 1.0 : 0.0;
-    }
+    } while (++i < h.count);
     known /= float(h.count);
     weights = published != 0 ? float(h.count) : max(weights, 1e-6);
     occluded /= renormalise != 0 ? weights * max(known, 0.5) : weights;

@@ -33,12 +33,6 @@ Surface surface_at(ivec2 p, float z, int index) {
 // the sample minus the point, `away` its length.
 bool rises(Surface s, vec3 apart, float away) { return dot(s.normal, apart) > k.tangent_sine * away + s.rise; }
 
-// 1 / sqrt(x) to 1e-6, in a third of the time of a root and a division.
-float inverse_root(float x) {
-    float y = quick_inversesqrt(x) * quick_scale;
-    return y * (1.5 - 0.5 * x * y * y);
-}
-
 // acos for |c| <= 1 to 7e-5 (Abramowitz and Stegun 4.4.45).
 float angle_of(float c) {
     float a = abs(c);

@@ -44,10 +44,12 @@ void main() {
     float epsilon = l.epsilon + k.tangent_sigmas * sigma_of(s.point.z), fade = 1.0 / (l.fade_to - l.fade_from);
 
     float occlusion = 0.0, known = 0.0;
-    for (int set = 0; set < l.sets; ++set) {
+    int set = 0;
+    do { // loops ask last: one that asks first runs once more on lavapipe, with every lane off
         vec3 mirror = random_vector(noise);
         noise = fract(noise + vec2(0.7548776662, 0.5698402910));
-        for (int i = 0; i < l.count; ++i) {
+        int i = 0;
+        do {
             vec3 v = imageLoad(vectors, set * l.count + i).xyz;
             vec3 a = v - 2.0 * mirror * dot(mirror, v);
             a *= dot(a, s.normal) < 0.0 ? -1.0 : 1.0;
@@ -55,13 +57,13 @@ void main() {
             Seen seen = seen_at(q);
             vec3 apart = (published != 0 ? q * (seen.z / q.z) : seen.point) - s.point;
             float away2 = dot(apart, apart);
-            float facing = away2 > 1e-12 ? positive(dot(s.normal, apart) * inverse_root(away2 + 1e-20)) : 0.0;
+            float facing = away2 > 1e-12 ? positive(dot(s.normal, apart) * (quick_scale * quick_inversesqrt(away2 + 1e-20))) : 0.0;
             float in_front = -apart.z;
             float near = in_front > epsilon ? clamp((l.fade_to - in_front) * fade, 0.0, 1.0) : 0.0;
             occlusion += seen.known ? facing * near : 0.0;
             known += seen.known ? 1.0 : 0.0;
-        }
-    }
+        } while (++i < l.count);
+    } while (++set < l.sets);
     float share = 1.0 / float(l.sets * l.count);
     known *= share;
     occlusion *= renormalise != 0 ? share / max(known, 0.5) : share;
