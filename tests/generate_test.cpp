@@ -56,25 +56,33 @@ TEST(Scene, RaysMeetEverySolidWhereItsFormulaSays) {
 }
 
 TEST(Scene, CameraPosesAreRigidUprightAndSmooth) {
-    const auto& walk = scene::scene_named("office").walk;
-    for (int i = 0; i < 200; ++i) {
-        const Eigen::Isometry3d pose = world_from_camera(walk, i * 0.1), next = world_from_camera(walk, i * 0.1 + 0.01);
-        EXPECT_LT((pose.linear() * pose.linear().transpose() - Eigen::Matrix3d::Identity()).norm(), 1e-12);
-        EXPECT_NEAR(pose.linear().determinant(), 1, 1e-12);
-        EXPECT_LT(pose.linear().col(1).z(), -0.7) << "image y points down";
-        EXPECT_LT((next.translation() - pose.translation()).norm(), 0.01) << "under a metre per second";
+    for (const Scene& scene : scene::scenes()) {
+        const double steady = 0.01 * std::max(1.0, scene.ao_radius_m); // under a metre per second; outdoors two
+        for (int i = 0; i < 10 * scene.walk.period_s; ++i) {
+            const Eigen::Isometry3d pose = world_from_camera(scene.walk, i * 0.1);
+            const Eigen::Isometry3d next = world_from_camera(scene.walk, i * 0.1 + 0.01);
+            EXPECT_LT((pose.linear() * pose.linear().transpose() - Eigen::Matrix3d::Identity()).norm(), 1e-12);
+            EXPECT_NEAR(pose.linear().determinant(), 1, 1e-12);
+            EXPECT_LT(pose.linear().col(1).z(), -0.5) << scene.name << " " << i << ": image y points down";
+            EXPECT_LT((next.translation() - pose.translation()).norm(), steady) << scene.name << " " << i;
+            EXPECT_LT(Eigen::AngleAxisd(pose.linear().transpose() * next.linear()).angle(), 0.03)
+                << scene.name << " " << i << ": no faster than a person turns";
+        }
     }
 }
 
-TEST(Scene, TheOfficeIsClosedAndTheCameraWalksFreely) {
-    const Scene& office = scene::scene_named("office");
-    for (double time = 0; time < office.walk.period_s; time += 2) {
-        const auto exact =
-            render_geometry(scene::World(office), test_camera({80, 60}), world_from_camera(office.walk, time));
-        double nearest = 0, farthest = 0;
-        cv::minMaxLoc(exact.z_m, &nearest, &farthest);
-        EXPECT_GT(nearest, 0.45) << "no hole, and nothing nearer than a Kinect can see";
-        EXPECT_LT(farthest, 6);
+TEST(Scene, RoomsAreClosedAndTheCameraWalksFreely) {
+    for (const Scene& scene : scene::scenes()) {
+        const scene::World world(scene);
+        for (double time = 0; time < scene.walk.period_s; time += 0.5) {
+            const auto exact = render_geometry(world, test_camera({80, 60}), world_from_camera(scene.walk, time));
+            double nearest = 0, farthest = 0;
+            cv::minMaxLoc(exact.z_m, &nearest, &farthest, nullptr, nullptr, exact.z_m > 0);
+            EXPECT_GT(nearest, 0.45) << scene.name << " " << time << ": nothing nearer than a Kinect can see";
+            EXPECT_LT(farthest, scene.far_m) << scene.name << " " << time;
+            const double seen = cv::countNonZero(exact.z_m) / static_cast<double>(exact.z_m.total());
+            EXPECT_GE(seen, scene.name == "outdoor" ? 0.6 : 1.0) << scene.name << " " << time << ": rooms are closed";
+        }
     }
 }
 
