@@ -1,6 +1,7 @@
 // The table of methods.
 #include "ao/cacao/cacao.h"
 #include "ao/method.h"
+#include "ao/raycast/raycast.h"
 #include "projection/error.h"
 
 namespace scanshade {
@@ -24,6 +25,8 @@ const std::vector<MethodRow>& methods() {
     static const std::vector<MethodRow> table{
         {"cacao", "tap pairs on de-interleaved depth, edge-aware blur; five qualities, native or half resolution",
          "FidelityFX CACAO 1.3 (AMD's public documentation)", SetupOf<CacaoOptions, Cacao>::start},
+        {"raycast", "rays against the depth surface, the cloud's discs or the mesh itself; on the CPU, with standard errors",
+         "cosine-weighted ambient occlusion by its definition; Embree 3", SetupOf<RaycastOptions, Raycast>::start},
     };
     return table;
 }

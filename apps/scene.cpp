@@ -433,7 +433,7 @@ Truth true_visibility(const World& world, const Pinhole& camera, const Eigen::Is
         if (!hit.body)
             return;
         const std::uint32_t key = hash(static_cast<std::uint32_t>(u), static_cast<std::uint32_t>(v));
-        const RayEstimate estimate = hemisphere.at(sight.origin + hit.t * sight.direction, hit.normal, key);
+        const RayEstimate estimate = hemisphere.at({sight.origin + hit.t * sight.direction, hit.normal, key});
         for (std::size_t kind = 0; kind < kinds; ++kind)
             truth.visibility[kind](v, u) = estimate.visibility[kind];
         truth.standard_error(v, u) = estimate.standard_error[0];

@@ -8,7 +8,9 @@
 #include <cmath>
 #include <Eigen/Geometry>
 #include <fmt/format.h>
+#include <limits>
 #include <numbers>
+#include <tuple>
 
 namespace scanshade {
 namespace {
@@ -98,6 +100,8 @@ struct Tally {
         int count = 0, filled = 0;
         for (std::size_t b = 0; b < open.size(); ++b)
             sum += open[b], count += cast[b], filled += cast[b] > 0;
+        if (count == 0)
+            return {std::numeric_limits<float>::quiet_NaN(), 0.0F};
         const double mean = sum / count;
         double spread = 0;
         for (std::size_t b = 0; b < open.size(); ++b)
@@ -108,6 +112,21 @@ struct Tally {
         return {static_cast<float>(mean), static_cast<float>(of_block * std::pow(filled, -0.75))};
     }
 };
+
+/// Turns up to eight directions about the normal; lanes without one, and directions below all faces, stay dead.
+void aim(RayBundle& bundle, std::span<const CosineDirections::Direction> eight, const Eigen::Matrix3f& axes,
+         std::span<const Vector3d> faces) {
+    bundle.live.fill(0);
+    for (std::size_t i = 0; i < RayBundle::size; ++i) {
+        const auto& d = eight[std::min(i, eight.size() - 1)];
+        const Vector3f turned = axes * Vector3f(d.x, d.y, d.z);
+        bundle.x[i] = turned.x(), bundle.y[i] = turned.y(), bundle.z[i] = turned.z();
+        const bool inside = !faces.empty() && std::all_of(faces.begin(), faces.end(), [&](const Vector3d& face) {
+            return face.cast<float>().dot(turned) <= 0;
+        });
+        bundle.live[i] = i < eight.size() && !inside ? -1 : 0;
+    }
+}
 
 } // namespace
 
@@ -145,33 +164,32 @@ RayHemisphere::RayHemisphere(const RaySurface& surface, const CosineDirections& 
                              bool all_falloffs)
     : surface_(surface), directions_(directions), radius_m_(radius_m), all_falloffs_(all_falloffs) {}
 
-RayEstimate RayHemisphere::at(const Vector3d& point, const Vector3d& normal, std::uint32_t key, double lift_m) const {
-    const double lift = std::max({lift_m, 1e-4 * radius_m_, surface_.rounding_m()});
-    const Eigen::Matrix3f axes = axes_about(normal, 2 * std::numbers::pi * hash(key) * 0x1p-32);
+RayEstimate RayHemisphere::at(const RayStart& start) const {
+    const double lift = std::max({start.lift_m, 1e-4 * radius_m_, surface_.rounding_m()});
+    const Eigen::Matrix3f axes = axes_about(start.normal, 2 * std::numbers::pi * hash(start.key) * 0x1p-32);
     RayBundle bundle;
-    bundle.origin = surface_.local(point + lift * normal);
-    bundle.far_m = static_cast<float>(radius_m_ - lift);
-    const auto directions = directions_.set_for(hash(key ^ 0x68bc21ebU));
+    bundle.origin = surface_.local(start.point + lift * start.normal);
+    bundle.far_m = static_cast<float>(std::min(radius_m_ - lift, 1e30));
+    bundle.own = {surface_.local(start.point), static_cast<float>(2 * start.disc_radius_m),
+                  static_cast<float>(0.2 * start.disc_radius_m)};
+    const auto directions = directions_.set_for(hash(start.key ^ 0x68bc21ebU));
     std::array<Tally, 3> tallies;
     for (std::size_t first = 0; first < directions.size(); first += RayBundle::size) {
         const auto eight = directions.subspan(first, std::min<std::size_t>(RayBundle::size, directions.size() - first));
-        bundle.live.fill(0);
-        for (std::size_t i = 0; i < RayBundle::size; ++i) {
-            const auto& d = eight[std::min(i, eight.size() - 1)];
-            const Vector3f turned = axes * Vector3f(d.x, d.y, d.z);
-            bundle.x[i] = turned.x(), bundle.y[i] = turned.y(), bundle.z[i] = turned.z();
-            bundle.live[i] = i < eight.size() ? -1 : 0;
-        }
+        aim(bundle, eight, axes, start.faces);
+        const auto cast = bundle.live;
         if (all_falloffs_) {
             const auto met = surface_.distances(bundle);
             for (std::size_t i = 0; i < eight.size(); ++i)
                 for (const Falloff falloff : {Falloff::hard, Falloff::quad, Falloff::lin})
-                    tallies[static_cast<std::size_t>(falloff)].add(eight[i].block,
-                                                                   1 - occlusion(falloff, met[i] / bundle.far_m));
+                    if (cast[i])
+                        tallies[static_cast<std::size_t>(falloff)].add(eight[i].block,
+                                                                       1 - occlusion(falloff, met[i] / bundle.far_m));
         } else {
             surface_.drop_blocked(bundle);
             for (std::size_t i = 0; i < eight.size(); ++i)
-                tallies[0].add(eight[i].block, bundle.live[i] ? 1.0F : 0.0F);
+                if (cast[i])
+                    tallies[0].add(eight[i].block, bundle.live[i] ? 1.0F : 0.0F);
         }
     }
     RayEstimate estimate;

@@ -44,6 +44,16 @@ struct RayEstimate {
     std::array<float, 3> standard_error{0, 0, 0}; ///< 0 also where all rays agree
 };
 
+/// Where rays start from and what they do not count.
+struct RayStart {
+    Eigen::Vector3d point, normal; ///< unit
+    std::uint32_t key = 0;         ///< decides set and turn: equal keys give equal results on any number of threads
+    double lift_m = 0;             ///< above the point; at least as much as rounding asks for
+    double disc_radius_m = 0;      ///< of the point's own disc, where it has one
+    std::span<const Eigen::Vector3d> faces = {}; ///< normals of the faces round a vertex: a direction below them all is
+                                                 ///< inside and is not cast
+};
+
 /// Share of the cosine-weighted hemisphere about `normal` that is open within a radius, methods.md's equation 1.
 class RayHemisphere {
   public:
@@ -51,10 +61,7 @@ class RayHemisphere {
     /// ray in place of any meeting.
     RayHemisphere(const RaySurface& surface, const CosineDirections& directions, double radius_m, bool all_falloffs);
 
-    /// `key` decides set and turn, so equal keys give equal results on any number of threads. The rays start `lift_m`
-    /// above the point, at least as much as rounding asks for.
-    [[nodiscard]] RayEstimate at(const Eigen::Vector3d& point, const Eigen::Vector3d& normal, std::uint32_t key,
-                                 double lift_m = 0) const;
+    [[nodiscard]] RayEstimate at(const RayStart& start) const;
 
   private:
     const RaySurface& surface_;

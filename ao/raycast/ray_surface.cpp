@@ -1,12 +1,13 @@
 // What rays can meet: geometry recentred in double, handed to Embree in single precision.
 #include "ao/raycast/ray_surface.h"
 
+#include "ao/raycast/embree.h"
 #include "projection/error.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <Eigen/Geometry>
-#include <embree3/rtcore.h>
 #include <fmt/format.h>
 #include <limits>
 
@@ -14,18 +15,6 @@ namespace scanshade {
 namespace {
 
 using Eigen::Vector3d, Eigen::Vector3f;
-
-/// Embree's device, one for all surfaces: it holds no geometry, only the choice of instructions.
-RTCDevice device() {
-    static const RTCDevice opened = [] {
-        const RTCDevice made = rtcNewDevice(nullptr);
-        if (!made)
-            throw Error(fmt::format("Embree cannot be used on this processor (error {})",
-                                    static_cast<int>(rtcGetDeviceError(nullptr))));
-        return made;
-    }();
-    return opened;
-}
 
 /// Narrower triangles have no usable plane in single precision.
 bool has_area(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
@@ -48,13 +37,57 @@ struct Extent {
 
 } // namespace
 
+RTCDevice embree_device() {
+    static const RTCDevice opened = [] {
+        const RTCDevice made = rtcNewDevice(nullptr);
+        if (!made)
+            throw Error(fmt::format("Embree cannot be used on this processor (error {})",
+                                    static_cast<int>(rtcGetDeviceError(nullptr))));
+        return made;
+    }();
+    return opened;
+}
+
+namespace {
+
+/// What a cast must know of where it starts; Embree hands it through to the filter.
+struct CastContext {
+    RTCIntersectContext embree;
+    OwnSurface own;
+
+    explicit CastContext(const OwnSurface& own_surface) : own(own_surface) { rtcInitIntersectContext(&embree); }
+};
+static_assert(offsetof(CastContext, embree) == 0, "Embree's pointer to its context is a pointer to ours");
+
+/// Lets rays pass the discs that belong to the surface they start from.
+void pass_own_surface(const RTCFilterFunctionNArguments* arguments) {
+    const auto& own = reinterpret_cast<const CastContext*>(arguments->context)->own;
+    const unsigned n = arguments->N;
+    for (unsigned i = 0; i < n; ++i) {
+        if (arguments->valid[i] == 0)
+            continue;
+        RTCRayN* ray = arguments->ray;
+        const float t = RTCRayN_tfar(ray, n, i);
+        if (t >= own.reach_m)
+            continue;
+        const Vector3f met = Vector3f(RTCRayN_org_x(ray, n, i), RTCRayN_org_y(ray, n, i), RTCRayN_org_z(ray, n, i)) +
+                             t * Vector3f(RTCRayN_dir_x(ray, n, i), RTCRayN_dir_y(ray, n, i), RTCRayN_dir_z(ray, n, i));
+        RTCHitN* hit = arguments->hit;
+        const Vector3f normal(RTCHitN_Ng_x(hit, n, i), RTCHitN_Ng_y(hit, n, i), RTCHitN_Ng_z(hit, n, i));
+        if (std::abs(normal.dot(own.point - met)) <= own.depth_m * normal.norm())
+            arguments->valid[i] = 0;
+    }
+}
+
+} // namespace
+
 struct RaySurface::Tree {
     RTCScene scene = nullptr;
     Vector3d middle = Vector3d::Zero();
     double rounding_m = 0;
     std::vector<int> index; ///< Embree's primitive -> as given
 
-    Tree() : scene(rtcNewScene(device())) { rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST); }
+    Tree() : scene(rtcNewScene(embree_device())) { rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST); }
     ~Tree() { rtcReleaseScene(scene); }
     Tree(const Tree&) = delete;
     Tree& operator=(const Tree&) = delete;
@@ -82,7 +115,7 @@ struct RaySurface::Tree {
         rtcAttachGeometry(scene, geometry);
         rtcReleaseGeometry(geometry);
         rtcCommitScene(scene);
-        if (const RTCError error = rtcGetDeviceError(device()); error != RTC_ERROR_NONE)
+        if (const RTCError error = rtcGetDeviceError(embree_device()); error != RTC_ERROR_NONE)
             throw Error(fmt::format("Embree cannot build its tree of {} items (error {})", index.size(),
                                     static_cast<int>(error)));
     }
@@ -104,7 +137,7 @@ RaySurface::RaySurface(const Mesh& mesh) : tree_(std::make_unique<Tree>()) {
     tree_->centre_on(extent);
     if (tree_->index.empty())
         return;
-    const RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
+    const RTCGeometry geometry = rtcNewGeometry(embree_device(), RTC_GEOMETRY_TYPE_TRIANGLE);
     auto* places =
         tree_->buffer<std::array<float, 3>>(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, mesh.vertices.size());
     for (int i = 0; i < count; ++i) {
@@ -132,7 +165,7 @@ RaySurface::RaySurface(std::span<const Disc> discs) : tree_(std::make_unique<Tre
     tree_->centre_on(extent);
     if (tree_->index.empty())
         return;
-    const RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_ORIENTED_DISC_POINT);
+    const RTCGeometry geometry = rtcNewGeometry(embree_device(), RTC_GEOMETRY_TYPE_ORIENTED_DISC_POINT);
     auto* places =
         tree_->buffer<std::array<float, 4>>(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT4, tree_->index.size());
     auto* normals =
@@ -143,6 +176,8 @@ RaySurface::RaySurface(std::span<const Disc> discs) : tree_(std::make_unique<Tre
         places[i] = {at.x(), at.y(), at.z(), static_cast<float>(disc.radius_m)};
         normals[i] = {normal.x(), normal.y(), normal.z()};
     }
+    rtcSetGeometryOccludedFilterFunction(geometry, pass_own_surface);
+    rtcSetGeometryIntersectFilterFunction(geometry, pass_own_surface);
     tree_->finish(geometry);
 }
 
@@ -186,9 +221,8 @@ std::optional<RaySurface::Meeting> RaySurface::nearest(const Vector3d& origin, c
     sought.ray = ray_along(local(origin), direction.cast<float>(), static_cast<float>(near),
                            std::numeric_limits<float>::infinity());
     sought.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    rtcIntersect1(tree_->scene, &context, &sought);
+    CastContext context({});
+    rtcIntersect1(tree_->scene, &context.embree, &sought);
     if (sought.hit.geomID == RTC_INVALID_GEOMETRY_ID)
         return std::nullopt;
     return Meeting{sought.ray.tfar, tree_->index[sought.hit.primID]};
@@ -199,9 +233,8 @@ bool RaySurface::blocked(const Vector3d& from, const Vector3d& to) const {
     if (empty())
         return false;
     RTCRay ray = ray_along(local(from), (to - from).cast<float>(), clear_of_ends, 1 - clear_of_ends);
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    rtcOccluded1(tree_->scene, &context, &ray);
+    CastContext context({});
+    rtcOccluded1(tree_->scene, &context.embree, &ray);
     return ray.tfar < 0;
 }
 
@@ -210,9 +243,8 @@ void RaySurface::drop_blocked(RayBundle& bundle) const {
         return;
     RTCRay8 rays;
     fill(rays, bundle);
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    rtcOccluded8(bundle.live.data(), tree_->scene, &context, &rays);
+    CastContext context(bundle.own);
+    rtcOccluded8(bundle.live.data(), tree_->scene, &context.embree, &rays);
     for (int i = 0; i < RayBundle::size; ++i)
         if (rays.tfar[i] < 0)
             bundle.live[i] = 0;
@@ -226,9 +258,8 @@ std::array<float, RayBundle::size> RaySurface::distances(const RayBundle& bundle
     RTCRayHit8 sought;
     fill(sought.ray, bundle);
     std::fill(std::begin(sought.hit.geomID), std::end(sought.hit.geomID), RTC_INVALID_GEOMETRY_ID);
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    rtcIntersect8(bundle.live.data(), tree_->scene, &context, &sought);
+    CastContext context(bundle.own);
+    rtcIntersect8(bundle.live.data(), tree_->scene, &context.embree, &sought);
     for (int i = 0; i < RayBundle::size; ++i)
         if (bundle.live[i] && sought.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID)
             found[i] = sought.ray.tfar[i];

@@ -23,11 +23,19 @@ struct Disc {
     double radius_m = 0;
 };
 
+/// Discs overlap, so a ray from one meets its neighbours at once: discs that are met closer than reach_m, in a plane
+/// that passes within depth_m of `point`, do not count. Means nothing to triangles.
+struct OwnSurface {
+    Eigen::Vector3f point = Eigen::Vector3f::Zero(); ///< local: RaySurface::local()
+    float reach_m = 0, depth_m = 0;
+};
+
 /// Eight rays from one origin, as Embree takes them: directions of unit length.
 struct RayBundle {
     static constexpr int size = 8;
     Eigen::Vector3f origin; ///< local: RaySurface::local()
     float far_m = 0;
+    OwnSurface own;
     alignas(32) std::array<float, size> x, y, z;
     alignas(32) std::array<int, size> live; ///< -1 for rays to cast, 0 for the others
 };
