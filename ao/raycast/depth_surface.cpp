@@ -149,14 +149,15 @@ class Tangents {
 
 Vector3d normal_at(const Tangents& tangents, const Pinhole& camera, cv::Point p) {
     const Vector3d to_eye = -tangents.point(p).normalized();
-    const auto right = tangents.along(p, {1, 0}, camera.fx), down = tangents.along(p, {0, 1}, camera.fy);
+    std::optional<Vector3d> first, second; // rows and columns; beside holes diagonals stand in
+    for (const cv::Point axis : {cv::Point(1, 0), cv::Point(0, 1), cv::Point(1, 1), cv::Point(1, -1)})
+        if (auto tangent = tangents.along(p, axis, axis.x ? camera.fx : camera.fy); tangent && !second)
+            (first ? second : first) = tangent;
     Vector3d normal = to_eye;
-    if (right && down)
-        normal = down->cross(*right);
-    else if (right || down) { // as far towards the camera as the one tangent allows: wires
-        const Vector3d along = (right ? *right : *down).normalized();
-        normal = to_eye - along.dot(to_eye) * along;
-    }
+    if (first && second)
+        normal = second->cross(*first);
+    else if (first) // as far towards the camera as the one tangent allows: wires
+        normal = to_eye - first->dot(to_eye) / first->squaredNorm() * *first;
     const double length = normal.norm();
     if (!(length > 0))
         return to_eye;

@@ -14,8 +14,9 @@ namespace scanshade {
 /// can be there).
 [[nodiscard]] Mesh surface_of(const DepthImage& depth, const DepthNoise& noise, double thickness_m);
 
-/// Normals of clean depth: along each axis from the neighbour towards which 1/z bends less (surfel.md's 3.6). A pixel
-/// that lacks neighbours along an axis is turned to the camera about the other; every pixel with depth has a normal.
+/// Normals of clean depth: along each axis from the neighbour towards which 1/z bends less (surfel.md's 3.6), along
+/// diagonals where an axis has none. With one direction only, as on wires, the normal leans to the camera; with none it faces
+/// it: every pixel with depth has a normal.
 [[nodiscard]] NormalImage normals_of(const DepthImage& depth);
 
 /// The point a pixel sees.
