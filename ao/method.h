@@ -5,7 +5,10 @@
 #include "projection/noise.h"
 #include "projection/parameters.h"
 
+#include <array>
+#include <Eigen/Core>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -35,6 +38,20 @@ class Method {
     virtual AoMap compute(const View& view) = 0;
     /// Where the time of the last compute() went.
     [[nodiscard]] virtual const Timings& timings() const = 0;
+};
+
+/// A cloud, or a mesh where there are triangles (indices of points), in metres. Normals, one per point, may be missing.
+struct PointSet {
+    std::span<const Eigen::Vector3d> points, normals = {};
+    std::span<const std::array<int, 3>> triangles = {};
+};
+
+/// What a method is besides, if it needs no view: it looks from the points themselves.
+class PointMethod {
+  public:
+    virtual ~PointMethod() = default;
+    /// Visibility of each point; NaN where a point has no surface round it.
+    virtual std::vector<float> compute(const PointSet& points) = 0;
 };
 
 /// A method's settings before it is made: rows to fill, then make().

@@ -6,6 +6,7 @@
 #include "ao/hemisphere/hemisphere.h"
 #include "ao/luna/luna.h"
 #include "ao/method.h"
+#include "ao/raycast/raycast.h"
 #include "projection/error.h"
 
 namespace scanshade {
@@ -38,6 +39,8 @@ const std::vector<MethodRow>& methods() {
          SetupOf<GtaoOptions, Gtao>::start},
         {"bitmask", "gtao's slices with 32 sectors, so that what is seen has a thickness", "Therrien, Levesque, Gilet 2023",
          SetupOf<BitmaskOptions, Bitmask>::start},
+        {"raycast", "rays against the depth surface, the cloud's discs or the mesh itself; on the CPU, with standard errors",
+         "cosine-weighted ambient occlusion by its definition; Embree 3", SetupOf<RaycastOptions, Raycast>::start},
     };
     return table;
 }

@@ -88,6 +88,26 @@ void refuse_blind_view(const Work& work) {
                                 work.frame.camera.origin));
 }
 
+/// Every point's value from the points themselves, or from the faces where the file has some.
+Attached attach_points(const Frame& frame, PointMethod& method) {
+    const Cloud& cloud = *frame.cloud;
+    const auto normals = recorded_normals(cloud);
+    const auto triangles = triangles_of(cloud);
+    Attached attached;
+    attached.per_point = method.compute({cloud.points, normals, triangles});
+    std::ptrdiff_t known = 0, valid = 0;
+    double sum = 0;
+    for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+        const bool has_value = !std::isnan(attached.per_point[i]);
+        valid += cloud.points[i].allFinite();
+        known += has_value;
+        sum += has_value ? static_cast<double>(attached.per_point[i]) : 0;
+    }
+    attached.coverage = share(known, static_cast<std::size_t>(valid));
+    attached.mean_visibility = known > 0 ? sum / static_cast<double>(known) : unknown;
+    return attached;
+}
+
 /// What the pictures of a frame show, all on one pixel grid.
 struct Scene {
     cv::Mat1f z_m, visibility;
@@ -243,14 +263,20 @@ void remove_files(Work& work, const Outputs& outputs) {
     }
 }
 
-void attach_and_write(Work& work, const Outputs& outputs) {
+void attach_and_write(Work& work, const BatchOptions& options) {
+    Outputs outputs = options.outputs;
+    const bool by_points = options.point_method && work.frame.cloud;
+    if (by_points)
+        outputs.ao = outputs.shaded = outputs.panel = false;
     Scene scene;
     cv::Mat3b shaded;
     take(work, &StageTimes::attach, [&] {
-        work.attached = attach(work.frame, work.depth, work.ao);
+        if (!by_points)
+            work.attached = attach(work.frame, work.depth, work.ao);
         work.row.coverage = work.attached.coverage;
         work.row.mean_visibility = work.attached.mean_visibility;
-        scene = scene_of(work);
+        if (!by_points)
+            scene = scene_of(work);
         if (outputs.shaded || outputs.panel)
             shaded = shaded_picture(scene, outputs.shade_strength);
     });
@@ -324,6 +350,8 @@ std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const Ba
             work->frame = load(capture, work->row.index, options.registration);
             describe_frame(*work);
         });
+        if (options.point_method && work->frame.cloud)
+            return work;
         take(*work, &StageTimes::project, [&] {
             work->frame.camera = work->row.camera = camera_of(work->frame);
             work->depth = project(work->frame);
@@ -333,13 +361,17 @@ std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const Ba
     };
     const auto compute = [&](Token work) {
         take(*work, &StageTimes::compute, [&] {
+            if (options.point_method && work->frame.cloud) {
+                work->attached = attach_points(work->frame, *options.point_method);
+                return;
+            }
             work->ao = method.compute({work->depth});
             work->row.passes = method.timings();
         });
         return work;
     };
     const auto finish = [&](const Token& work) {
-        attach_and_write(*work, options.outputs);
+        attach_and_write(*work, options);
         return &work->row; // the images end here
     };
     const auto report = [&](const FrameRow* row) {

@@ -35,6 +35,8 @@ struct BatchOptions {
     std::vector<std::size_t> frames; ///< indices into capture.entries; the report keeps this order
     Outputs outputs;
     std::optional<Registration> registration; ///< what the user said; otherwise what the capture says
+    PointMethod* point_method = nullptr;      ///< what clouds and meshes are computed with, where that needs no view: then
+                                              ///< the cloud is all that is written of them
     int frames_in_memory = 0;                 ///< 0 = cores + 2
     const std::atomic<bool>* stop = nullptr;  ///< set = begin no further frame
 };

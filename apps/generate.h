@@ -1,4 +1,4 @@
-// Captures with known truth: a synthetic room seen by a simulated depth sensor, written in TUM's layout.
+// Captures with known truth: a synthetic scene seen by a simulated depth sensor, written in TUM's layout.
 #pragma once
 
 #include "projection/parameters.h"
@@ -15,11 +15,13 @@ struct GenerateOptions {
     std::string scene = "office";  ///< a name of scenes() (apps/scene.h)
     std::string sensor = "kinect"; ///< a name of sensors() (apps/sensor.h)
     int frames = 8;
-    std::string size = "640x480"; ///< width x height in pixels; the field of view stays that of a Kinect
-    int seed = 1;                 ///< of the sensor's noise and the truth's rays
-    bool truth = true;            ///< whether truth/depth and truth/ao are written
-    double truth_radius_m = 0.5;  ///< occluders farther than this do not count
-    int truth_rays = 64;          ///< per pixel
+    int first = 0, step = 1;            ///< frames first, first + step, ... of the scene's walk, ten per second
+    std::string size = "640x480";       ///< width x height in pixels; the field of view stays that of a Kinect
+    int seed = 1;                       ///< of the sensor's noise and the truth's rays
+    bool truth = true;                  ///< whether truth/depth, truth/normals and truth/ao are written
+    double truth_radius_m = 0;          ///< occluders farther than this do not count; 0 = the scene's own
+    int truth_rays = 256;               ///< per pixel
+    std::string truth_falloff = "hard"; ///< any of hard,quad,lin
     bool overwrite = false;
 
     /// Every setting but the scene, which the command line takes as a word of its own.
@@ -29,9 +31,11 @@ struct GenerateOptions {
 /// Called after each frame that is on disk, from the calling thread.
 using GenerateProgress = std::function<void(int done, int total)>;
 
-/// Writes to `out`: rgb/<stamp>.png, depth/<stamp>.png (5000 per metre), rgb.txt, depth.txt, groundtruth.txt (camera to
-/// world), camera.json, and truth/truth.json, truth/depth/<stamp>.tiff (exact z in metres), truth/ao/<stamp>.tiff
-/// (cosine-weighted visibility within truth_radius_m). Same options, same bytes, however many threads there are.
+/// Writes to `out`: rgb/<stamp>.png, depth/<stamp>.png (5000 per metre; float .tiff in metres where the scene reaches
+/// farther than that counts), rgb.txt, depth.txt, groundtruth.txt (camera to world), camera.json, and truth/truth.json,
+/// truth/depth/<stamp>.tiff (exact z in metres), truth/normals/<stamp>.tiff (exact, x y z), truth/ao/<stamp>.tiff
+/// (cosine-weighted visibility within truth_radius_m; ao_quad and ao_lin for those falloffs). Same options, same bytes,
+/// however many threads there are, and a frame is the same whatever first and step it is reached by.
 /// Throws Misuse for options out of range, an `out` that holds something and is not to be overwritten, or (even then)
 /// is not a generated capture; Error where a file cannot be written.
 void generate(const GenerateOptions& options, const std::filesystem::path& out, const GenerateProgress& progress = {});

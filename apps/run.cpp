@@ -395,7 +395,8 @@ class Run final : public Command {
         return report;
     }
 
-    std::vector<FrameRow> process(const Job& job, Method& plain, gpu::Device& device) {
+    std::vector<FrameRow> process(Job job, Method& plain, gpu::Device& device) {
+        job.batch.point_method = dynamic_cast<PointMethod*>(&plain);
         const fs::path& folder = job.batch.outputs.folder;
         const DepthNoise noise = asked_.depth_noise == "auto" ? noise_of(job) : noise_from_text(asked_.depth_noise);
         std::optional<OnFittedDepth> fitted;

@@ -1,7 +1,7 @@
-// Synthetic scenes made of a few solids: exact depth, colour and visibility for any camera, by casting rays at
-// formulas.
+// Synthetic scenes made of solids: exact depth and normals, colour, and true visibility for any camera.
 #pragma once
 
+#include "ao/raycast/ray_hemisphere.h"
 #include "projection/camera.h"
 
 #include <Eigen/Geometry>
@@ -15,32 +15,35 @@
 
 namespace scanshade::scene {
 
-// World axes: x right, y away from the entrance, z up; metres. All solids are two-sided: a room is a box seen from
-// inside.
+// World axes: x right, y away from the entrance, z up; metres. All solids are two-sided.
 
 struct Ray {
-    Eigen::Vector3d origin, direction; ///< `t` counts in lengths of direction; visibility rays have length 1
+    Eigen::Vector3d origin, direction; ///< `t` counts in lengths of direction
 };
 
-/// Endless; `normal` has unit length.
+/// A square of 1 km, as good as endless; `normal` has unit length.
 struct Plane {
     Eigen::Vector3d point, normal;
 };
-/// Upright, turned about the vertical through its centre.
 struct Box {
     Eigen::Vector3d centre, half;
-    Eigen::Vector2d heading{1, 0}; ///< unit: where its own x axis points
+    Eigen::Matrix3d axes = Eigen::Matrix3d::Identity(); ///< columns: where its own axes point, unit
 };
 struct Sphere {
     Eigen::Vector3d centre;
     double radius;
 };
-/// Upright, closed at both ends.
+/// Closed at both ends.
 struct Cylinder {
-    Eigen::Vector3d base; ///< centre of the lower end
+    Eigen::Vector3d base; ///< centre of one end
     double radius, height;
+    Eigen::Vector3d axis = Eigen::Vector3d::UnitZ(); ///< unit, from the base to the other end
 };
-using Solid = std::variant<Plane, Box, Sphere, Cylinder>;
+/// Hollow things and ground are made of these.
+struct Triangle {
+    Eigen::Vector3d a, b, c;
+};
+using Solid = std::variant<Plane, Box, Sphere, Cylinder, Triangle>;
 
 enum class Pattern { plain, checks, boards, plaster, books };
 
@@ -62,21 +65,26 @@ struct Hit {
     const Body* body = nullptr;                       ///< null: nothing was hit
 };
 
-/// Where a recording walks: position and gaze over time, both closed curves.
+/// Where a recording stands and what it looks at.
+struct Look {
+    Eigen::Vector3d eye, target;
+};
+/// A closed, smooth round through its looks, evenly timed.
 struct Walk {
-    Eigen::Vector3d centre, reach; ///< of the ellipse (in x, y, z) that the camera swings along
-    Eigen::Vector3d gaze;          ///< the point looked at, on average
+    std::vector<Look> looks;
     double period_s = 16;
 };
 
 struct Scene {
     std::string_view name, summary;
-    std::vector<Body> bodies;
-    std::vector<Eigen::Vector3d> windows; ///< soft lights
-    Walk walk;
+    std::vector<Body> bodies = {};
+    std::vector<Eigen::Vector3d> windows = {}; ///< soft lights
+    Walk walk = {};
+    double ao_radius_m = 0.5; ///< to which the truth looks unless told otherwise
+    double far_m = 10;        ///< nothing is seen beyond
 };
 
-/// The table of scenes.
+/// The table of scenes (apps/scenes.cpp).
 [[nodiscard]] const std::vector<Scene>& scenes();
 /// Throws Misuse listing the names there are.
 [[nodiscard]] const Scene& scene_named(std::string_view name);
@@ -86,8 +94,30 @@ struct Scene {
 /// A camera at `eye` whose optical axis meets `target`, image upright.
 [[nodiscard]] Eigen::Isometry3d looking_at(const Eigen::Vector3d& eye, const Eigen::Vector3d& target);
 
-/// The nearest surface beyond `near` lengths of the ray.
+/// The nearest surface beyond `near` lengths of the ray, by trying every body's formula.
 [[nodiscard]] Hit cast(const std::vector<Body>& bodies, const Ray& ray, double near = 1e-9);
+
+/// A scene made ready for many rays: tessellated, in a tree. Round things become polyhedra inscribed within a
+/// thousandth of their radius (a tenth of a millimetre for small ones), which serve to find what is hit and to block;
+/// where it is hit the formula says.
+class World {
+  public:
+    /// Keeps a reference to the scene.
+    explicit World(const Scene& scene);
+
+    [[nodiscard]] const Scene& scene() const { return scene_; }
+    [[nodiscard]] const RaySurface& surface() const { return surface_; }
+    /// The nearest surface.
+    [[nodiscard]] Hit cast(const Ray& ray) const;
+
+  private:
+    const Scene& scene_;
+    std::vector<const Body*> body_of_triangle_;
+    RaySurface surface_;
+};
+
+/// The tessellated scene as a mesh.
+[[nodiscard]] Mesh mesh_of(const Scene& scene);
 
 /// Exact per-pixel geometry: depth along the optical axis, unit normals in camera space facing the camera; 0 where no
 /// surface is.
@@ -95,22 +125,27 @@ struct Geometry {
     cv::Mat1f z_m;
     cv::Mat3f normals;
 };
-[[nodiscard]] Geometry render_geometry(const Scene& scene, const Pinhole& camera,
+[[nodiscard]] Geometry render_geometry(const World& world, const Pinhole& camera,
                                        const Eigen::Isometry3d& world_from_camera);
 
 /// BGR as a camera would store it: albedo under window light and a lamp at the camera, four samples per pixel. There
 /// are no shadows and no occlusion in it: those are for the program under test to add.
-[[nodiscard]] cv::Mat3b render_colour(const Scene& scene, const Pinhole& camera,
+[[nodiscard]] cv::Mat3b render_colour(const World& world, const Pinhole& camera,
                                       const Eigen::Isometry3d& world_from_camera);
 
-/// Share of the cosine-weighted hemisphere about each pixel's surface that is free within radius_m ("hard" visibility),
-/// by `rays` low-discrepancy rays per pixel; NaN where no surface is. Noise falls as rays^-3/4 (0.02 at 64 beside an
-/// edge).
-[[nodiscard]] cv::Mat1f true_visibility(const Scene& scene, const Pinhole& camera,
-                                        const Eigen::Isometry3d& world_from_camera, double radius_m, int rays,
-                                        int seed);
+struct TruthOptions {
+    double radius_m = 0.5;
+    int rays = 256; ///< per pixel
+    int seed = 1;
+    bool all_falloffs = false;
+};
 
-/// Whether a solid stands between two points.
-[[nodiscard]] bool blocked(const std::vector<Body>& bodies, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+/// Visibility of each pixel's exact surface against the whole scene; NaN where no surface is.
+struct Truth {
+    std::array<cv::Mat1f, 3> visibility; ///< by Falloff; quad and lin empty unless all were asked for
+    cv::Mat1f standard_error;            ///< of the hard visibility
+};
+[[nodiscard]] Truth true_visibility(const World& world, const Pinhole& camera,
+                                    const Eigen::Isometry3d& world_from_camera, const TruthOptions& options);
 
 } // namespace scanshade::scene

@@ -101,7 +101,7 @@ bool in_shadow(const Sight& sight, int u, int v, double z_m) {
     const Eigen::Vector3d projector(0.075, 0, 0);
     const cv::Vec3f& n = sight.exact.normals(v, u);
     const Eigen::Vector3d lifted = point_at(sight, u, v, z_m) + 1e-4 * Eigen::Vector3d(n[0], n[1], n[2]);
-    return scene::blocked(sight.scene.bodies, sight.world_from_camera * lifted, sight.world_from_camera * projector);
+    return sight.world.surface().blocked(sight.world_from_camera * lifted, sight.world_from_camera * projector);
 }
 
 double to_disparity_step(double z_m) {

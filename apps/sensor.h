@@ -10,7 +10,7 @@ namespace scanshade {
 
 /// What a sensor looks at. All of one pixel grid.
 struct Sight {
-    const scene::Scene& scene;
+    const scene::World& world;
     Pinhole camera;
     Eigen::Isometry3d world_from_camera;
     scene::Geometry exact;

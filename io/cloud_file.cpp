@@ -165,6 +165,34 @@ Cloud read_cloud(const fs::path& file, std::vector<std::string>& warnings) {
     return cloud;
 }
 
+std::vector<std::array<int, 3>> triangles_of(const Cloud& cloud) {
+    const bool ply = cloud.records && cloud.records->format == Format::ply;
+    return ply ? ply_triangles(*cloud.records) : std::vector<std::array<int, 3>>();
+}
+
+std::vector<Eigen::Vector3d> recorded_normals(const Cloud& cloud) {
+    if (!cloud.records)
+        return {};
+    std::vector<Eigen::Vector3d> normals(cloud.points.size());
+    for (const auto& names : {std::array{"nx", "ny", "nz"}, {"normal_x", "normal_y", "normal_z"}}) {
+        std::size_t found = 0;
+        for (int axis = 0; axis < 3; ++axis)
+            if (const auto field = cloud.records->field_named(names[static_cast<std::size_t>(axis)])) {
+                read_coordinate(*cloud.records, *field, axis, normals);
+                ++found;
+            }
+        if (found < 3)
+            continue;
+        std::size_t valid = 0, unit = 0;
+        for (std::size_t i = 0; i < normals.size(); ++i) {
+            valid += cloud.points[i].allFinite();
+            unit += cloud.points[i].allFinite() && std::abs(normals[i].norm() - 1) < 0.01;
+        }
+        return 10 * unit >= 9 * valid ? normals : std::vector<Eigen::Vector3d>();
+    }
+    return {};
+}
+
 void write_cloud(const fs::path& file, const Cloud& cloud, const std::vector<AddedField>& added,
                  std::span<const cv::Vec3b> colours) {
     if (!cloud.records)

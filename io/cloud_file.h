@@ -3,6 +3,7 @@
 
 #include "projection/frame.h"
 
+#include <array>
 #include <filesystem>
 #include <span>
 #include <string>
@@ -15,6 +16,13 @@ namespace scanshade {
 /// byte offset for every damage the header or body shows; nothing is allocated from an unchecked number. `warnings`
 /// receives what was odd but readable.
 [[nodiscard]] Cloud read_cloud(const std::filesystem::path& file, std::vector<std::string>& warnings);
+
+/// Indices of points, three per triangle, of a mesh (a PLY with faces; polygons are fanned, -1 names no vertex); empty for
+/// clouds.
+[[nodiscard]] std::vector<std::array<int, 3>> triangles_of(const Cloud& cloud);
+/// The file's own normals (nx ny nz, or normal_x ...), one per point; empty where there are none, or fewer than nine in ten
+/// points with coordinates have one of unit length.
+[[nodiscard]] std::vector<Eigen::Vector3d> recorded_normals(const Cloud& cloud);
 
 /// A float field to add to each point. NaN = unknown.
 struct AddedField {

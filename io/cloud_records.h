@@ -116,6 +116,8 @@ class TextRecords {
                                     std::vector<std::string>& warnings);
 [[nodiscard]] CloudRecords read_ply(std::string_view bytes, const std::filesystem::path& file,
                                     std::vector<std::string>& warnings);
+/// Faces as triangles, polygons fanned from their first corner; -1 for an index that names no vertex. Tristrips are not read.
+[[nodiscard]] std::vector<std::array<int, 3>> ply_triangles(const CloudRecords& records);
 /// The file again with `points` (from edited_points) and the header naming `additions`.
 [[nodiscard]] std::string pcd_bytes(const CloudRecords& records, const std::string& points,
                                     const std::vector<FieldAddition>& additions);

@@ -53,7 +53,7 @@ void write_ao(const std::filesystem::path& file, const cv::Mat1f& visibility, Ao
 void write_picture(const std::filesystem::path& file, const cv::Mat3b& picture);
 /// 16-bit integer depth as PNG (value = round(metres * units_per_metre), 0 = hole). Atomic.
 void write_depth_png(const std::filesystem::path& file, const cv::Mat1f& depth_m, double units_per_metre);
-/// 32-bit float image as TIFF. Atomic.
-void write_float_tiff(const std::filesystem::path& file, const cv::Mat1f& image);
+/// 32-bit float image of one or three channels (OpenCV's order: stored last one first) as TIFF. Atomic.
+void write_float_tiff(const std::filesystem::path& file, const cv::Mat& image);
 
 } // namespace scanshade

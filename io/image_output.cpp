@@ -142,6 +142,6 @@ void write_depth_png(const fs::path& file, const cv::Mat1f& depth_m, double unit
     write_encoded(file, image, ".png", fast_png);
 }
 
-void write_float_tiff(const fs::path& file, const cv::Mat1f& image) { write_encoded(file, image, ".tiff", plain_tiff); }
+void write_float_tiff(const fs::path& file, const cv::Mat& image) { write_encoded(file, image, ".tiff", plain_tiff); }
 
 } // namespace scanshade

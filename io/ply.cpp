@@ -251,28 +251,44 @@ std::optional<std::size_t> index_list(const Element& element) {
     return std::nullopt;
 }
 
-/// Faces are passed through, never used: an index that names no vertex is worth a warning, not a refusal.
-class FaceCheck {
+/// Reads the vertex indices of face records.
+class FaceIndices {
   public:
-    FaceCheck(const Element& faces, const Header& header, std::size_t vertices)
-        : list_(*index_list(faces)), vertices_(static_cast<double>(vertices)) {
+    FaceIndices(const Element& faces, const Header& header) : list_(*index_list(faces)) {
         view_.format = CloudRecords::Format::ply;
         view_.encoding = header.encoding;
         view_.fields = faces.properties;
     }
 
-    void look_at(std::uint64_t index, std::string_view record) {
+    /// Calls visit(number) for each index in the record.
+    template <class Visit>
+    void for_each(std::string_view record, Visit&& visit) const {
         const FieldPlace place = locate(view_, record, list_);
         const std::string_view list = record.substr(place.offset, place.length);
         if (view_.text()) {
             const auto all = words(list);
             for (std::size_t i = 1; i < all.size(); ++i)
-                judge(index, number(all[i]).value_or(-1));
+                visit(number(all[i]).value_or(-1));
             return;
         }
         const CloudField& p = view_.fields[list_];
         for (std::size_t at = size_of(*p.list_length); at < list.size(); at += size_of(p.type))
-            judge(index, decoded(list.data() + at, p.type, view_.encoding == Encoding::big_endian));
+            visit(decoded(list.data() + at, p.type, view_.encoding == Encoding::big_endian));
+    }
+
+  private:
+    CloudRecords view_; ///< only to say where a face's list lies
+    std::size_t list_;
+};
+
+/// An index that names no vertex is worth a warning, not a refusal.
+class FaceCheck {
+  public:
+    FaceCheck(const Element& faces, const Header& header, std::size_t vertices)
+        : indices_(faces, header), vertices_(static_cast<double>(vertices)) {}
+
+    void look_at(std::uint64_t index, std::string_view record) {
+        indices_.for_each(record, [&](double vertex) { judge(index, vertex); });
     }
 
     void report(const fs::path& file, std::vector<std::string>& warnings) const {
@@ -294,8 +310,7 @@ class FaceCheck {
         first_vertex_ = vertex;
     }
 
-    CloudRecords view_; ///< only to say where a face's list lies
-    std::size_t list_;
+    FaceIndices indices_;
     double vertices_;
     std::size_t bad_ = 0;
     std::uint64_t first_face_ = 0;
@@ -314,6 +329,13 @@ void read_vertices(CloudRecords& records, BodyWalk& walk, const Element& vertex)
     records.points = walk.body().substr(start, walk.at() - start);
 }
 
+void skip(BodyWalk& walk, const Element& element, const Header& header) {
+    if (header.encoding == Encoding::ascii || element.lists())
+        walk.walk(element, [](std::uint64_t, std::size_t, std::size_t) {});
+    else
+        walk.skip_fixed(element);
+}
+
 void pass_over(BodyWalk& walk, const Element& element, const Header& header, std::size_t vertices, const fs::path& file,
                std::vector<std::string>& warnings) {
     if (element.name == "face" && index_list(element)) {
@@ -322,10 +344,8 @@ void pass_over(BodyWalk& walk, const Element& element, const Header& header, std
             faces.look_at(index, walk.body().substr(start, end - start));
         });
         faces.report(file, warnings);
-    } else if (header.encoding == Encoding::ascii || element.lists()) {
-        walk.walk(element, [](std::uint64_t, std::size_t, std::size_t) {});
     } else {
-        walk.skip_fixed(element);
+        skip(walk, element, header);
     }
 }
 
@@ -392,6 +412,34 @@ CloudRecords read_ply(std::string_view bytes, const fs::path& file, std::vector<
         warnings.push_back(fmt::format("{}: {} after the last element; written back as they are.", file.string(),
                                        counted(left, "byte")));
     return records;
+}
+
+std::vector<std::array<int, 3>> ply_triangles(const CloudRecords& records) {
+    const fs::path name = "mesh";
+    const Header header = parse_header(records.header, name);
+    BodyWalk before(records.before, header, name), after(records.after, header, name);
+    BodyWalk* walk = &before;
+    std::vector<std::array<int, 3>> triangles;
+    for (const Element& element : header.elements) {
+        if (element.name == "vertex") {
+            walk = &after;
+        } else if (element.name == "face" && index_list(element)) {
+            const FaceIndices indices(element, header);
+            std::vector<int> corners;
+            walk->walk(element, [&](std::uint64_t, std::size_t start, std::size_t end) {
+                corners.clear();
+                indices.for_each(walk->body().substr(start, end - start), [&](double vertex) {
+                    const bool named = vertex >= 0 && vertex < static_cast<double>(records.point_count);
+                    corners.push_back(named ? static_cast<int>(vertex) : -1);
+                });
+                for (std::size_t i = 2; i < corners.size(); ++i)
+                    triangles.push_back({corners[0], corners[i - 1], corners[i]});
+            });
+        } else {
+            skip(*walk, element, header);
+        }
+    }
+    return triangles;
 }
 
 std::string ply_bytes(const CloudRecords& records, const std::string& points,

@@ -14,7 +14,7 @@ constexpr float farthest_m = 100;
 /// Bodies given in camera space.
 DepthImage seen(const Pinhole& camera, std::vector<scene::Body> bodies) {
     const scene::Scene scene{"test", "", std::move(bodies), {}, {}};
-    cv::Mat1f z_m = render_geometry(scene, camera, Eigen::Isometry3d::Identity()).z_m;
+    cv::Mat1f z_m = render_geometry(scene::World(scene), camera, Eigen::Isometry3d::Identity()).z_m;
     z_m.setTo(0, z_m > farthest_m);
     return {camera, z_m, {}};
 }

@@ -1,0 +1,73 @@
+// Visibility of a point by rays: cosine-weighted directions, what each of them meets, and how sure the result is.
+#pragma once
+
+#include "ao/raycast/ray_surface.h"
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace scanshade {
+
+/// How much a surface at distance t occludes: hard 1 up to the radius R; quad 1 - t^2 / R^2; lin (R - t) / (0.615 R),
+/// at most 1 (XeGTAO's range).
+enum class Falloff { hard, quad, lin };
+inline constexpr std::array<std::string_view, 3> falloff_names{"hard", "quad", "lin"};
+/// Throws Misuse listing the names.
+[[nodiscard]] Falloff falloff_named(std::string_view name);
+
+/// Cosine-weighted directions about z: Owen-scrambled Sobol points (Burley 2020), in sets that are scrambled apart.
+/// Made once; each point picks a set by its key and turns it about its normal.
+class CosineDirections {
+  public:
+    CosineDirections(int rays, int seed);
+
+    /// One direction of a set: components, and which of `blocks` equal parts of the sequence it belongs to.
+    struct Direction {
+        float x, y, z;
+        int block;
+    };
+    static constexpr int blocks = 16;
+
+    [[nodiscard]] std::span<const Direction> set_for(std::uint32_t key) const;
+    [[nodiscard]] int rays() const { return rays_; }
+
+  private:
+    int rays_, sets_;
+    std::vector<Direction> directions_; ///< neighbours in a set point alike: eight of them travel together
+};
+
+/// Visibility under each falloff, from the same rays, and one standard error of it.
+struct RayEstimate {
+    std::array<float, 3> visibility{1, 1, 1};     ///< by Falloff; quad and lin only where asked for
+    std::array<float, 3> standard_error{0, 0, 0}; ///< 0 also where all rays agree
+};
+
+/// Where rays start from and what they do not count.
+struct RayStart {
+    Eigen::Vector3d point, normal; ///< unit
+    std::uint32_t key = 0;         ///< decides set and turn: equal keys give equal results on any number of threads
+    double lift_m = 0;             ///< above the point; at least as much as rounding asks for
+    double disc_radius_m = 0;      ///< of the point's own disc, where it has one
+    std::span<const Eigen::Vector3d> faces = {}; ///< normals of the faces round a vertex: a direction below them all is
+                                                 ///< inside and is not cast
+};
+
+/// Share of the cosine-weighted hemisphere about `normal` that is open within a radius, methods.md's equation 1.
+class RayHemisphere {
+  public:
+    /// Keeps references: surface and directions must live as long. `all_falloffs` costs the nearest meeting of every
+    /// ray in place of any meeting.
+    RayHemisphere(const RaySurface& surface, const CosineDirections& directions, double radius_m, bool all_falloffs);
+
+    [[nodiscard]] RayEstimate at(const RayStart& start) const;
+
+  private:
+    const RaySurface& surface_;
+    const CosineDirections& directions_;
+    double radius_m_;
+    bool all_falloffs_;
+};
+
+} // namespace scanshade

@@ -1,0 +1,81 @@
+// What rays can meet: triangles or oriented discs in Embree's tree. Every truth of the program is cast against one of
+// these.
+#pragma once
+
+#include <array>
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace scanshade {
+
+/// Triangles with shared vertices, metres; both sides occlude.
+struct Mesh {
+    std::vector<Eigen::Vector3d> vertices;
+    std::vector<std::array<int, 3>> triangles;
+};
+
+/// A flat disc, metres; `normal` has unit length; both sides occlude.
+struct Disc {
+    Eigen::Vector3d centre, normal;
+    double radius_m = 0;
+};
+
+/// Discs overlap, so a ray from one meets its neighbours at once: discs that are met closer than reach_m, in a plane
+/// that passes within depth_m of `point`, do not count. Means nothing to triangles.
+struct OwnSurface {
+    Eigen::Vector3f point = Eigen::Vector3f::Zero(); ///< local: RaySurface::local()
+    float reach_m = 0, depth_m = 0;
+};
+
+/// Eight rays from one origin, as Embree takes them: directions of unit length.
+struct RayBundle {
+    static constexpr int size = 8;
+    Eigen::Vector3f origin; ///< local: RaySurface::local()
+    float far_m = 0;
+    OwnSurface own;
+    alignas(32) std::array<float, size> x, y, z;
+    alignas(32) std::array<int, size> live; ///< -1 for rays to cast, 0 for the others
+};
+
+/// Immutable once made; safe to use from several threads. Coordinates are kept relative to the middle of the geometry,
+/// so that single precision serves far from the origin (methods.md's 2.3: at 500 km a float step is 31 mm).
+class RaySurface {
+  public:
+    /// Triangles that name a missing vertex, a vertex that is not finite, or are no wider than a micrometre, are left
+    /// out.
+    explicit RaySurface(const Mesh& mesh);
+    /// Discs that are not finite or have no radius are left out.
+    explicit RaySurface(std::span<const Disc> discs);
+    ~RaySurface();
+    RaySurface(RaySurface&&) noexcept;
+    RaySurface& operator=(RaySurface&&) noexcept;
+
+    struct Meeting {
+        double distance; ///< in lengths of the ray's direction
+        int primitive;   ///< index of the triangle or disc, as given
+    };
+    /// The first meeting beyond `near` lengths.
+    [[nodiscard]] std::optional<Meeting> nearest(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                                                 double near = 0) const;
+    /// Whether anything lies on the open segment between two points.
+    [[nodiscard]] bool blocked(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
+
+    [[nodiscard]] Eigen::Vector3f local(const Eigen::Vector3d& point) const;
+    /// Rounding of a coordinate anywhere on the geometry: 64 float steps at its farthest coordinate.
+    [[nodiscard]] double rounding_m() const;
+    [[nodiscard]] bool empty() const;
+
+    /// Sets the dead lanes of `bundle` from rays that meet anything closer than far_m: live becomes 0 there.
+    void drop_blocked(RayBundle& bundle) const;
+    /// Distance of the first meeting of each live ray, infinite where there is none.
+    [[nodiscard]] std::array<float, RayBundle::size> distances(const RayBundle& bundle) const;
+
+  private:
+    struct Tree;
+    std::unique_ptr<Tree> tree_;
+};
+
+} // namespace scanshade
