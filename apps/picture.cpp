@@ -96,6 +96,24 @@ float facing(const cv::Mat1f& inverse, cv::Point at, const Pinhole& camera) {
     return length > 0 ? static_cast<float>(std::abs(normal.dot(ray)) / length) : 0;
 }
 
+constexpr int white_at = 127; // of the 255 diverging colours
+
+/// Blue over white to red, BGR.
+std::vector<cv::Vec3b> diverging_colours() {
+    const cv::Vec3f white(97, 0, 0), blue(46, 8, -54), red(46, 46.4F, 28.9F); // L*, a*, b*
+    cv::Mat3f lab(1, 2 * white_at + 1), bgr;
+    for (int i = -white_at; i <= white_at; ++i) {
+        const float share = static_cast<float>(std::abs(i)) / white_at;
+        lab(0, i + white_at) = white + share * ((i < 0 ? blue : red) - white);
+    }
+    cv::cvtColor(lab, bgr, cv::COLOR_Lab2BGR);
+    std::vector<cv::Vec3b> colours;
+    for (const cv::Vec3f& colour : bgr)
+        colours.emplace_back(cv::saturate_cast<uchar>(255 * colour[0]), cv::saturate_cast<uchar>(255 * colour[1]),
+                             cv::saturate_cast<uchar>(255 * colour[2]));
+    return colours;
+}
+
 cv::Mat3b with_title(const Tile& tile, cv::Size size) {
     constexpr int strip = 28;
     cv::Mat3b titled(size.height + strip, size.width, cv::Vec3b(32, 32, 32));
@@ -123,6 +141,18 @@ cv::Mat3b visibility_picture(const cv::Mat1f& visibility) {
     cv::Mat3b picture(visibility.size());
     std::transform(visibility.begin(), visibility.end(), picture.begin(), [](float v) {
         return std::isnan(v) ? no_surface : cv::Vec3b::all(cv::saturate_cast<uchar>(255 * v));
+    });
+    return picture;
+}
+
+cv::Mat3b difference_picture(const cv::Mat1f& difference, double full_scale) {
+    static const std::vector<cv::Vec3b> colours = diverging_colours();
+    cv::Mat3b picture(difference.size());
+    std::transform(difference.begin(), difference.end(), picture.begin(), [&](float d) {
+        if (std::isnan(d))
+            return no_surface;
+        const double place = std::clamp(d / full_scale, -1.0, 1.0) * white_at;
+        return colours[static_cast<std::size_t>(std::lround(place) + white_at)];
     });
     return picture;
 }
