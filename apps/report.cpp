@@ -1,6 +1,7 @@
 // What a run leaves beside its pictures: frames.csv, a row per frame, and manifest.json, enough to run it again.
 #include "apps/report.h"
 
+#include "apps/figures.h"
 #include "apps/json.h"
 #include "io/output_file.h"
 
@@ -17,26 +18,17 @@
 namespace scanshade {
 namespace {
 
-std::string quoted(const std::string& field) {
-    if (field.find_first_of(",\"\r\n") == std::string::npos)
-        return field;
-    std::string text = "\"";
-    for (const char c : field)
-        text += c == '"' ? std::string("\"\"") : std::string(1, c);
-    return text + '"';
-}
-
 std::string number(double value, int digits) { return std::isnan(value) ? "" : fmt::format("{:.{}f}", value, digits); }
 
 std::string csv_line(const FrameRow& row) {
     const auto ms = [](double value) { return number(value, 2); };
     const bool loaded = !row.size.empty();
-    return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.index, quoted(row.name),
-                       name_of(row.status), quoted(row.why), loaded ? std::to_string(row.size.width) : "",
+    return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.index, csv_field(row.name),
+                       name_of(row.status), csv_field(row.why), loaded ? std::to_string(row.size.width) : "",
                        loaded ? std::to_string(row.size.height) : "", number(row.valid_share, 4),
                        number(row.coverage, 4), number(row.mean_visibility, 4), ms(row.ms.load), ms(row.ms.project),
                        ms(row.ms.compute), ms(row.ms.attach), ms(row.ms.write),
-                       quoted(fmt::format("{}", fmt::join(row.warnings, "; "))));
+                       csv_field(fmt::format("{}", fmt::join(row.warnings, "; "))));
 }
 
 /// JSON knows no NaN: what is not known is null.
