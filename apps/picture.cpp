@@ -157,15 +157,24 @@ cv::Mat3b difference_picture(const cv::Mat1f& difference, double full_scale) {
     return picture;
 }
 
-cv::Mat3b clay(const cv::Mat1f& z_m, const Pinhole& camera) {
+cv::Mat1f facing_camera(const cv::Mat1f& z_m, const Pinhole& camera) {
     cv::Mat1f inverse(z_m.size());
     std::transform(z_m.begin(), z_m.end(), inverse.begin(), [](float z) { return z > 0 ? 1 / z : 0.0f; });
     inverse = smoothed(smoothed(inverse, true), false);
-    cv::Mat3b picture(z_m.size(), no_surface);
+    cv::Mat1f cosine(z_m.size(), 0.0f);
     for (int v = 0; v < z_m.rows; ++v)
         for (int u = 0; u < z_m.cols; ++u)
             if (inverse(v, u) > 0)
-                picture(v, u) = cv::Vec3b::all(cv::saturate_cast<uchar>(70 + 165 * facing(inverse, {u, v}, camera)));
+                cosine(v, u) = facing(inverse, {u, v}, camera);
+    return cosine;
+}
+
+cv::Mat3b clay(const cv::Mat1f& z_m, const Pinhole& camera) {
+    const cv::Mat1f cosine = facing_camera(z_m, camera);
+    cv::Mat3b picture(z_m.size());
+    std::transform(z_m.begin(), z_m.end(), cosine.begin(), picture.begin(), [](float z, float c) {
+        return z > 0 ? cv::Vec3b::all(cv::saturate_cast<uchar>(70 + 165 * c)) : no_surface;
+    });
     return picture;
 }
 

@@ -25,6 +25,9 @@ namespace scanshade {
 /// (after Moreland, "Diverging Color Maps for Scientific Visualization", 2009).
 [[nodiscard]] cv::Mat3b difference_picture(const cv::Mat1f& difference, double full_scale);
 
+/// Cosine between each pixel's surface normal and the way back to the camera, after a smoothing along the surface; 0 in holes.
+[[nodiscard]] cv::Mat1f facing_camera(const cv::Mat1f& z_m, const Pinhole& camera);
+
 /// One picture of a panel, and what is written above it.
 struct Tile {
     std::string title;
