@@ -15,6 +15,7 @@ const std::array commands = {
     CommandRow{"inspect", "what is in a capture: frames, sizes, depth range, holes, camera, poses", inspect_command},
     CommandRow{"run", "ambient occlusion for every frame: maps, shaded pictures, clouds, a report", run_command},
     CommandRow{"compare", "two results, or a result and truth, as numbers and difference pictures", compare_command},
+    CommandRow{"bench", "methods and settings against truth: milliseconds, errors, the front, as one page", bench_command},
     CommandRow{"generate", "a capture of a synthetic scene with exact truth", generate_command},
     CommandRow{"methods", "the ambient-occlusion methods there are", methods_command},
     CommandRow{"devices", "the Vulkan devices there are", devices_command},

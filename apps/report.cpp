@@ -1,12 +1,12 @@
 // What a run leaves beside its pictures: frames.csv, a row per frame, and manifest.json, enough to run it again.
 #include "apps/report.h"
 
+#include "apps/command_line.h"
 #include "apps/figures.h"
 #include "apps/json.h"
 #include "io/output_file.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <ctime>
 #include <fmt/chrono.h>
@@ -111,29 +111,6 @@ double peak_memory_mib() {
         if (double kib = 0; word == "VmHWM:" && status >> kib)
             return kib / 1024;
     return std::nan("");
-}
-
-/// A word as a shell would take it back.
-std::string as_typed(const std::string& word) {
-    const bool plain = std::ranges::all_of(word, [](unsigned char c) {
-        return std::isalnum(c) || c >= 0x80 ||
-               std::string_view("_-+=.,:/@%").find(static_cast<char>(c)) != std::string_view::npos;
-    });
-    if (plain && !word.empty())
-        return word;
-    std::string text = "'";
-    for (const char c : word)
-        text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    return text + "'";
-}
-
-/// What was typed, as the kernel keeps it.
-std::string command_line() {
-    std::ifstream words("/proc/self/cmdline");
-    std::string line;
-    for (std::string word; std::getline(words, word, '\0'); line += as_typed(word))
-        line += line.empty() ? "" : " ";
-    return line;
 }
 
 json totals_json(const RunReport& report) {
