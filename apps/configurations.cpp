@@ -54,9 +54,23 @@ void apply(const Configuration& configuration, MethodSetup& setup) {
     }
 }
 
+Settings values_of(MethodSetup& setup) {
+    Settings values;
+    for (const Parameter& row : setup.parameters())
+        values.emplace_back(row.name, value_text(row));
+    return values;
+}
+
 const Parameter* row_named(const std::vector<Parameter>& rows, std::string_view name) {
     const auto row = std::ranges::find(rows, name, &Parameter::name);
     return row == rows.end() ? nullptr : &*row;
+}
+
+Stage method_stage(std::string_view name, MethodSetup& setup) {
+    Stage stage{fmt::format("method {}", name), setup.parameters()};
+    for (Parameter& row : stage.rows)
+        row.name = fmt::format("{}.{}", name, row.name);
+    return stage;
 }
 
 } // namespace scanshade

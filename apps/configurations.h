@@ -2,6 +2,7 @@
 #pragma once
 
 #include "ao/method.h"
+#include "apps/command.h"
 
 #include <string>
 #include <utility>
@@ -28,7 +29,13 @@ struct Configuration {
 /// its value.
 void apply(const Configuration& configuration, MethodSetup& setup);
 
+/// Every row's present value: applying it later brings the settings back.
+[[nodiscard]] Settings values_of(MethodSetup& setup);
+
 /// The row of that name; null where there is none.
 [[nodiscard]] const Parameter* row_named(const std::vector<Parameter>& rows, std::string_view name);
+
+/// The method's rows as the command line shows them: "radius" of cacao is --cacao.radius.
+[[nodiscard]] Stage method_stage(std::string_view name, MethodSetup& setup);
 
 } // namespace scanshade

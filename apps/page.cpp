@@ -13,7 +13,7 @@ namespace {
 
 // ---------------------------------------------------------------------------------------------------- axes
 
-constexpr double width = 760, height = 430, left = 64, right = 190, top = 34, bottom = 62; // px; the legend stands at the right
+constexpr double width = 900, height = 430, left = 64, right = 290, top = 34, bottom = 62; // px; the legend stands at the right
 
 /// Okabe and Ito's palette for all kinds of colour vision, its yellow darkened for white paper.
 constexpr std::array<std::string_view, 8> colours{"#0072b2", "#d55e00", "#009e73", "#cc79a7",

@@ -163,6 +163,7 @@ void write_manifest(const std::filesystem::path& file, const RunReport& report) 
               {"settings", settings_json(report.settings)},
               {"capture", capture_json(report)},
               {"depth_noise", report.depth_noise},
+              {"budget", report.budget},
               {"shading", report.shading},
               {"totals", totals_json(report)},
               {"frames", json::array()}};

@@ -107,21 +107,31 @@ TrialCapture load_trial(const fs::path& path, const TrialRequest& request) {
     const Capture capture = open_capture(path, request.capture);
     const Truth truth = truth_beside(path);
     TrialCapture trial{last_name(path), path, {}, {}, request.radius_m, {}, {}};
-    const auto frames = spread(static_cast<std::size_t>(request.frames), capture.entries.size());
-    trial.noise = noise_of(capture, frames, request.depth_noise);
+    std::vector<std::size_t> among = request.among;
+    for (std::size_t i = 0; request.among.empty() && i < capture.entries.size(); ++i)
+        among.push_back(i);
+    trial.noise = noise_of(capture, among, request.depth_noise);
     trial.noise_origin = request.depth_noise == "auto" ? "measured" : "--depth-noise";
     if (truth.ao) {
         trial.radius_m = truth.ao->radius_m.value_or(request.radius_m);
         trial.reference = "ray-traced truth of the generated scene";
     }
-    for (const std::size_t index : frames)
-        during(fmt::format("{}: frame {}", path.string(), capture.entries[index].name),
-               [&] { trial.frames.push_back(load_frame(capture, index, truth)); });
+    for (const std::size_t place : spread(static_cast<std::size_t>(request.frames), among.size()))
+        try {
+            during(fmt::format("{}: frame {}", path.string(), capture.entries[among[place]].name),
+                   [&] { trial.frames.push_back(load_frame(capture, among[place], truth)); });
+        } catch (const std::exception&) {
+            if (!request.leave_bad_out)
+                throw;
+        }
+    if (trial.frames.empty())
+        throw Error(fmt::format("{}: none of the frames tried could be loaded", path.string()));
     return trial;
 }
 
 namespace {
 
+/// The capture's radius first, so that a configuration may say otherwise.
 std::unique_ptr<MethodSetup> set_up(const Configuration& configuration, double radius_m) {
     std::unique_ptr<MethodSetup> setup = method_named(configuration.method).setup();
     const std::vector<Parameter> rows = setup->parameters();
@@ -134,10 +144,7 @@ std::unique_ptr<MethodSetup> set_up(const Configuration& configuration, double r
 } // namespace
 
 Trial::Trial(gpu::Device& device, Configuration configuration, const DepthNoise& noise, double radius_m)
-    : Trial(device, configuration, set_up(configuration, radius_m), noise) {}
-
-Trial::Trial(gpu::Device& device, Configuration configuration, std::unique_ptr<MethodSetup> setup, const DepthNoise& noise)
-    : configuration_(std::move(configuration)), setup_(std::move(setup)), plain_(setup_->make(device)) {
+    : configuration_(std::move(configuration)), setup_(set_up(configuration_, radius_m)), plain_(setup_->make(device)) {
     if (noise.any())
         fitted_ = std::make_unique<OnFittedDepth>(device, noise, *plain_);
 }

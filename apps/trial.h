@@ -51,12 +51,15 @@ struct TrialRequest {
     double radius_m = 0.5;          ///< where the capture's truth does not say
     std::string depth_noise = "auto";
     CaptureOptions capture;
+    std::vector<std::size_t> among; ///< indices of the frames that may be taken; empty = all
+    bool leave_bad_out = false;     ///< frames that cannot be loaded are left out instead of being an Error
 };
 
 /// `count` of `total` indices, spread evenly from the first on.
 [[nodiscard]] std::vector<std::size_t> spread(std::size_t count, std::size_t total);
 
-/// Loads the frames with the truth that lies beside a generated capture. Throws Error naming the frame that fails.
+/// Loads the frames with the truth that lies beside a generated capture. Throws Error naming the frame that fails, and where
+/// none is left.
 [[nodiscard]] TrialCapture load_trial(const std::filesystem::path& path, const TrialRequest& request);
 
 /// One configuration on one device, as `run` would use it on depth of that noise.
@@ -64,7 +67,6 @@ class Trial {
   public:
     /// `radius_m` goes into the method's radius, before the configuration's own settings.
     Trial(gpu::Device& device, Configuration configuration, const DepthNoise& noise, double radius_m);
-    Trial(gpu::Device& device, Configuration configuration, std::unique_ptr<MethodSetup> setup, const DepthNoise& noise);
 
     /// Visibility on the recorded pixels.
     [[nodiscard]] cv::Mat1f compute(const TrialFrame& frame);
