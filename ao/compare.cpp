@@ -133,21 +133,22 @@ double PairSums::rms(const Look& look) const {
     return count_ > 0 ? std::sqrt(std::max(sum, 0.0) / static_cast<double>(count_)) : unknown;
 }
 
-Look PairSums::best_look() const {
+Look PairSums::best_look(const Look& least, const Look& most) const {
     Look best;
     if (count_ == 0)
         return best;
     for (Look look : starts) {
+        look = {std::clamp(look.strength, least.strength, most.strength), std::clamp(look.power, least.power, most.power)};
         ceres::Problem problem;
         for (const Bin& bin : bins_)
             if (bin.n > 0)
                 problem.AddResidualBlock(new ceres::AutoDiffCostFunction<BinResidual, 1, 1, 1>(
                                              new BinResidual{std::sqrt(bin.n), bin.ours / bin.n, bin.truth / bin.n}),
                                          nullptr, &look.strength, &look.power);
-        problem.SetParameterLowerBound(&look.strength, 0, 0);
-        problem.SetParameterUpperBound(&look.strength, 0, 5);
-        problem.SetParameterLowerBound(&look.power, 0, 0.1);
-        problem.SetParameterUpperBound(&look.power, 0, 10);
+        problem.SetParameterLowerBound(&look.strength, 0, least.strength);
+        problem.SetParameterUpperBound(&look.strength, 0, most.strength);
+        problem.SetParameterLowerBound(&look.power, 0, least.power);
+        problem.SetParameterUpperBound(&look.power, 0, most.power);
         ceres::Solver::Options options;
         options.linear_solver_type = ceres::DENSE_QR;
         options.logging_type = ceres::SILENT;

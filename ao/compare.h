@@ -26,9 +26,9 @@ class PairSums {
     [[nodiscard]] std::size_t count() const { return count_; }
     /// RMSE of look(ours) to truth, `ours` taken as its bin's mean (an error below 1/512 in each value). NaN without pairs.
     [[nodiscard]] double rms(const Look& look) const;
-    /// The look of least rms: strength 0 .. 5, power 0.1 .. 10, by Ceres' least squares over the bins from several starts,
-    /// the identity among them. The identity where there are no pairs.
-    [[nodiscard]] Look best_look() const;
+    /// The look of least rms between two bounds, by Ceres' least squares over the bins from several starts, the identity
+    /// among them. The identity where there are no pairs.
+    [[nodiscard]] Look best_look(const Look& least = {0, 0.1}, const Look& most = {5, 10}) const;
 
   private:
     struct Bin {

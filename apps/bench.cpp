@@ -7,6 +7,7 @@
 #include "apps/scene.h"
 #include "apps/sensor.h"
 #include "io/output_file.h"
+#include "io/text.h"
 #include "projection/error.h"
 
 #include <algorithm>
@@ -63,7 +64,7 @@ class CaptureBench {
     CaptureBench(gpu::Device& device, const TrialCapture& capture, const std::vector<Configuration>& all)
         : capture_(capture) {
         result_ = {capture.name,     capture.path.string(), capture.reference,
-                   describe(capture.noise), capture.sensor(),      capture.radius_m,
+                   describe(capture.noise), capture.sensor,      capture.radius_m,
                    {},               capture.frames.front().depth.z_m.size(), {}, capture.frames.front().truth, {}};
         for (const TrialFrame& frame : capture.frames) {
             result_.frames.push_back(frame.name);
@@ -171,7 +172,7 @@ class Bench final : public Command {
                   {"device", "index or part of the name of a Vulkan device; empty = the fastest kind", &device_}}},
                 {"output",
                  {{"out", "folder of the report: index.html, bench.csv, bench.json", &out_},
-                  {"front", "file for the measured front, as `run --max-error` reads it", &front_},
+                  {"front", "file for the measured front, as `run --max-error` has it; other sensors' parts of it stay", &front_},
                   {"overwrite", "replace an earlier report", &overwrite_}}}};
     }
 
@@ -189,7 +190,7 @@ class Bench final : public Command {
             if (capture.reference.empty())
                 throw Error(fmt::format("{}: nothing to compare with: it has no truth/ao", path.string()));
             say(fmt::format("{}: {} frames, {} depth ({}, {})", path.string(), capture.frames.size(),
-                            name_of(capture.sensor()), describe(capture.noise), capture.noise_origin));
+                            name_of(capture.sensor), describe(capture.noise), capture.noise_origin));
             report.captures.push_back(CaptureBench(device, capture, all).run(rounds_));
         }
         write(report);
@@ -238,9 +239,19 @@ class Bench final : public Command {
         write_atomically(folder / "bench.csv", bench_csv(report));
         write_atomically(folder / "bench.json", text_of(bench_json(report)) + "\n");
         if (!front_.empty())
-            write_atomically(front_, text_of(to_json(front_of(report))) + "\n");
+            write_front(front_of(report));
         write_atomically(folder / "index.html", bench_page(report)); // last: it says that the rest is there
         say(fmt::format("-> {}", (folder / "index.html").string()));
+    }
+
+    /// Sensor classes that this bench did not see keep what an earlier one wrote.
+    void write_front(Front front) const {
+        if (fs::exists(front_)) {
+            Front earlier = front_from(json::parse(read_bytes(front_), nullptr, false), front_);
+            earlier.replace_with(front);
+            front = earlier;
+        }
+        write_atomically(front_, text_of(to_json(front)) + "\n");
     }
 
     static int exit_code(const BenchReport& report) {

@@ -45,6 +45,19 @@ json measured_json(const Measured& m) {
     return text;
 }
 
+/// "scanshade 0.1.0 bench, 2026-11-21: office, staircase; 640x480, 24 frames"
+std::string made_by(const BenchReport& report, const BenchGroup& group) {
+    std::string names;
+    std::size_t frames = 0;
+    for (const BenchCapture* capture : group.captures) {
+        names += (names.empty() ? "" : ", ") + capture->name;
+        frames += capture->frames.size();
+    }
+    const cv::Size size = group.captures.front()->size;
+    return fmt::format("scanshade {} bench, {}: {}; {}x{}, {} frames", report.version, report.date, names, size.width,
+                       size.height, frames);
+}
+
 } // namespace
 
 std::string_view name_of(ErrorBy by) {
@@ -183,8 +196,9 @@ json bench_json(const BenchReport& report) {
 }
 
 Front front_of(const BenchReport& report) {
-    Front front{report.device, report.command, {}};
+    Front front{report.device, {}, {}};
     for (const BenchGroup& group : grouped(report)) {
+        front.made_by[group.sensor] = made_by(report, group);
         std::vector<Priced>& points = front.points[group.sensor];
         for (std::size_t i = 0; i < group.measured.size(); ++i)
             if (group.front[i])

@@ -113,13 +113,13 @@ std::size_t pick(const std::vector<Priced>& points, const std::vector<double>& m
 
 Choice choose(gpu::Device& device, const Front& front, const TrialCapture& capture, double radius_m, const Budget& budget) {
     Choice choice;
-    std::vector<Priced> points = points_for(front, capture.sensor(), choice.sentences);
+    std::vector<Priced> points = points_for(front, capture.sensor, choice.sentences);
     const Trials trials(device, capture, radius_m);
     const double pixels = static_cast<double>(capture.frames.front().depth.z_m.total());
     const double slower = slowness(trials, points, pixels);
     choice.sentences.push_back(fmt::format("budget {}: front of {} depth measured on {}; this device takes {:.2f} times as long "
                                            "per pixel",
-                                           limit_text(budget), name_of(capture.sensor()), front.device, slower));
+                                           limit_text(budget), name_of(capture.sensor), front.device, slower));
     const bool truth_fits = !capture.reference.empty() && std::abs(capture.radius_m - radius_m) < 1e-6 * radius_m;
     const auto reference = std::ranges::min_element(points, {}, &Priced::rms)->configuration;
     const std::vector<cv::Mat1f> right = truth_fits ? truths(capture) : trials.of(reference).maps;

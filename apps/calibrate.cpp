@@ -8,10 +8,12 @@
 #include "projection/error.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <opencv2/core/optim.hpp>
+#include <optional>
 #include <sstream>
 
 namespace scanshade {
@@ -47,9 +49,18 @@ Free free_setting(const std::vector<Parameter>& rows, const std::string& method,
     return {name, start, start != 0 ? 0.25 * std::abs(start) : 0.05 * std::min(span, 1.0), row->low, row->high};
 }
 
-/// Settings by which a method applies a Look to its finished map (all screen-space methods but cacao, whose own stand before
-/// its blur): they need no run of the method, the best ones follow from its maps.
-constexpr std::string_view look_strength = "strength", look_power = "power";
+/// Settings by which a method applies a Look: the best ones follow from maps made without (1, 1), whatever else is searched.
+struct LookRows {
+    std::string_view strength, power;
+};
+/// cacao applies its own before the blur, where the best look of the blurred map is as good as the best to within the blur.
+constexpr std::array look_rows{LookRows{"strength", "power"}, LookRows{"shadow-multiplier", "shadow-power"}};
+
+/// A method's look rows, where both are to be fitted, and the bounds that they have.
+struct FreeLook {
+    LookRows rows;
+    Look least, most;
+};
 
 /// What the errors are with some settings: of each capture, and over all (root mean square over captures).
 struct Score {
@@ -82,8 +93,12 @@ Score score(gpu::Device& device, const std::vector<TrialCapture>& captures, cons
 class Search final : public cv::MinProblemSolver::Function {
   public:
     Search(gpu::Device& device, const std::vector<TrialCapture>& captures, Configuration fixed, std::vector<Free> free,
-           bool look)
-        : device_(device), captures_(captures), fixed_(std::move(fixed)), free_(std::move(free)), look_(look) {}
+           std::optional<FreeLook> look)
+        : device_(device), captures_(captures), fixed_(std::move(fixed)), free_(std::move(free)), look_(look) {
+        if (look_)
+            for (const std::string_view row : {look_->rows.strength, look_->rows.power})
+                fixed_.settings.emplace_back(row, "1");
+    }
 
     [[nodiscard]] int getDims() const override { return static_cast<int>(free_.size()); }
 
@@ -120,10 +135,10 @@ class Search final : public cv::MinProblemSolver::Function {
         std::ranges::copy(values, std::back_inserter(configuration.settings));
         Score now = score(device_, captures_, configuration);
         if (look_) {
-            const Look look = now.pairs.best_look();
+            const Look look = now.pairs.best_look(look_->least, look_->most);
             now.rms = now.pairs.rms(look);
-            values.emplace_back(look_strength, fmt::format("{:.4g}", look.strength));
-            values.emplace_back(look_power, fmt::format("{:.4g}", look.power));
+            values.emplace_back(look_->rows.strength, fmt::format("{:.4g}", look.strength));
+            values.emplace_back(look_->rows.power, fmt::format("{:.4g}", look.power));
         }
         std::string line;
         for (const auto& [name, value] : values)
@@ -140,7 +155,7 @@ class Search final : public cv::MinProblemSolver::Function {
     const std::vector<TrialCapture>& captures_;
     Configuration fixed_;
     std::vector<Free> free_;
-    bool look_;
+    std::optional<FreeLook> look_;
     mutable int tried_ = 0; // the solver's interface is const, what it tells us is not
     mutable Settings best_;
     mutable double best_rms_ = 0;
@@ -185,19 +200,12 @@ class Calibrate final : public Command {
         gpu::Device device(device_);
         const std::vector<TrialCapture> training = load(training_), others = load(split(held_out_));
         std::vector<Free> free;
-        bool look = false;
         const std::vector<Parameter> rows = setup().parameters();
         for (const std::string& name : split(free_))
             free.push_back(free_setting(rows, method_, name));
-        if (has(free, look_strength) && has(free, look_power)) {
-            look = true;
-            std::erase_if(free, [](const Free& f) { return f.name == look_strength || f.name == look_power; });
-        }
-        Configuration neutral = start;
-        if (look)
-            neutral.settings.insert(neutral.settings.end(), {{std::string(look_strength), "1"}, {std::string(look_power), "1"}});
+        const std::optional<FreeLook> look = taken_out(free);
+        const Settings found = Search(device, training, start, free, look).run(evaluations_);
         Configuration fitted = start;
-        const Settings found = Search(device, training, neutral, free, look).run(evaluations_);
         std::ranges::copy(found, std::back_inserter(fitted.settings));
         tell(device, start, fitted, found, training, others);
         return all_well;
@@ -217,8 +225,18 @@ class Calibrate final : public Command {
                     throw Misuse(fmt::format("held-out: {} is a training capture", path));
     }
 
-    static bool has(const std::vector<Free>& free, std::string_view name) {
-        return std::ranges::find(free, name, &Free::name) != free.end();
+    /// The rows of a look, where both are free, leave the search.
+    static std::optional<FreeLook> taken_out(std::vector<Free>& free) {
+        for (const LookRows& rows : look_rows) {
+            const auto strength = std::ranges::find(free, rows.strength, &Free::name);
+            const auto power = std::ranges::find(free, rows.power, &Free::name);
+            if (strength == free.end() || power == free.end())
+                continue;
+            const FreeLook look{rows, {strength->low, power->low}, {strength->high, power->high}};
+            std::erase_if(free, [&](const Free& f) { return f.name == rows.strength || f.name == rows.power; });
+            return look;
+        }
+        return std::nullopt;
     }
 
     MethodSetup& setup() {
@@ -239,7 +257,7 @@ class Calibrate final : public Command {
             if (captures.back().reference.empty())
                 throw Error(path + ": no truth/ao to fit to");
             say(fmt::format("{}: {} frames, {} depth", path, captures.back().frames.size(),
-                            name_of(captures.back().sensor())));
+                            name_of(captures.back().sensor)));
         }
         return captures;
     }

@@ -59,26 +59,42 @@ std::vector<bool> on_front(const std::vector<Priced>& points) {
 }
 
 json to_json(const Front& front) {
-    json text{{"device", front.device}, {"made_by", front.made_by}};
-    for (const auto& [sensor, points] : front.points)
+    json text{{"device", front.device}};
+    for (const auto& [sensor, points] : front.points) {
+        const auto made_by = front.made_by.find(sensor);
+        json& own = text[std::string(name_of(sensor))];
+        own = {{"made_by", made_by == front.made_by.end() ? "" : made_by->second}, {"points", json::array()}};
         for (const Priced& point : points)
-            text[std::string(name_of(sensor))].push_back(point_json(point));
+            own["points"].push_back(point_json(point));
+    }
     return text;
 }
 
 Front front_from(const json& text, const std::string& origin) {
     return during(origin, [&] {
-        Front front{text.at("device"), text.at("made_by"), {}};
+        Front front{text.at("device"), {}, {}};
         for (const SensorClass sensor : sensor_classes)
-            if (const auto points = text.find(name_of(sensor)); points != text.end())
-                for (const json& point : *points)
+            if (const auto own = text.find(name_of(sensor)); own != text.end()) {
+                front.made_by[sensor] = own->at("made_by");
+                for (const json& point : own->at("points"))
                     front.points[sensor].push_back(point_from(point));
+            }
         if (front.points.empty())
             throw Error("no points of any sensor class (clean, structured light, time of flight)");
         for (auto& [sensor, points] : front.points)
             std::ranges::stable_sort(points, {}, &Priced::ns_per_pixel);
         return front;
     });
+}
+
+void Front::replace_with(const Front& other) {
+    if (device != other.device)
+        throw Error(fmt::format("the front was measured on {}, this one on {}: times of two devices do not go together", device,
+                                other.device));
+    for (const auto& [sensor, own] : other.points) {
+        points[sensor] = own;
+        made_by[sensor] = other.made_by.at(sensor);
+    }
 }
 
 const Front& shipped_front() {

@@ -24,11 +24,16 @@ struct Priced {
 
 /// The front of each sensor class, cheapest first, and what it was measured with.
 struct Front {
-    std::string device, made_by;
+    std::string device;
+    std::map<SensorClass, std::string> made_by;
     std::map<SensorClass, std::vector<Priced>> points;
+
+    /// Takes over what `other` has of its classes. Throws Error where it was measured on another device.
+    void replace_with(const Front& other);
 };
 
-/// The front's JSON: {"device", "made_by", "clean": [{"method", "name", "settings": {...}, "ns_per_pixel", "rms"}], ...}.
+/// The front's JSON: {"device", "clean": {"made_by", "points": [{"method", "name", "settings": {...}, "ns_per_pixel", "rms"}]},
+/// "structured light": ...}.
 [[nodiscard]] json to_json(const Front& front);
 /// Throws Error naming `origin` and what was expected there.
 [[nodiscard]] Front front_from(const json& text, const std::string& origin);

@@ -68,8 +68,12 @@ void learn_from_manifest(MapSet& set) {
 
 void learn_from_truth(MapSet& set) {
     set.capture = set.path;
-    if (const fs::path file = set.path / "truth/truth.json"; fs::exists(file))
-        set.radius_m = at<double>(read_json(file), {"radius_m"});
+    const fs::path file = set.path / "truth/truth.json";
+    if (!fs::exists(file))
+        return;
+    const json note = read_json(file);
+    set.radius_m = at<double>(note, {"radius_m"});
+    set.sensor = at<std::string>(note, {"sensor"}).value_or("");
 }
 
 std::string some_names(const MapSet& set) {
@@ -86,7 +90,7 @@ std::string some_names(const MapSet& set) {
 } // namespace
 
 MapSet find_maps(const fs::path& path) {
-    MapSet set{path, "", {}, {}, {}};
+    MapSet set{path, "", {}, {}, {}, {}};
     if (fs::is_directory(path / "ao")) {
         set.kind = "run";
         set.files = maps_in(path / "ao");
@@ -115,7 +119,7 @@ MapSet truth_of(const MapSet& run) {
     if (!fs::is_directory(run.capture / "truth/ao"))
         throw Error(fmt::format("{}: made from {}, which has no truth/ao (generated captures have)", run.path.string(),
                                 run.capture.string()));
-    MapSet truth{run.capture, "truth", maps_in(run.capture / "truth/ao"), {}, {}};
+    MapSet truth{run.capture, "truth", maps_in(run.capture / "truth/ao"), {}, {}, {}};
     learn_from_truth(truth);
     return truth;
 }

@@ -13,7 +13,7 @@ std::string typed(const std::string& name, const json& value) {
         return value.get<std::string>();
     if (value.is_boolean() || value.is_number())
         return value.dump();
-    throw Error(fmt::format("settings: {}: a number, true, false or text expected, found {}", name, value.dump()));
+    throw Misuse(fmt::format("settings: {}: a number, true, false or text expected, found {}", name, value.dump()));
 }
 
 } // namespace
@@ -21,7 +21,7 @@ std::string typed(const std::string& name, const json& value) {
 std::vector<CLI::ConfigItem> SettingsFile::from_config(std::istream& stream) const {
     const json text = json::parse(stream, nullptr, false);
     if (text.is_discarded() || !text.is_object() || !text.contains("settings") || !text["settings"].is_object())
-        throw Error("settings: JSON with an object \"settings\" expected, as calibrate-look and run's manifest.json have");
+        throw Misuse("settings: JSON with an object \"settings\" expected, as calibrate-look and run's manifest.json have");
     std::vector<CLI::ConfigItem> given;
     for (const auto& [stage, rows] : text["settings"].items())
         if (stage.starts_with("method") && rows.is_object())

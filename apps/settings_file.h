@@ -14,7 +14,7 @@ inline constexpr std::string_view settings_flag = "settings";
 /// manifest has them; other stages (input, output) say where an earlier run's files lay and are left alone.
 class SettingsFile final : public CLI::Config {
   public:
-    /// Throws Error where it is no such JSON.
+    /// Throws Misuse where it is no such JSON.
     [[nodiscard]] std::vector<CLI::ConfigItem> from_config(std::istream& stream) const override;
     /// Never asked for: the program's settings are written by write_manifest() and calibrate-look.
     [[nodiscard]] std::string to_config(const CLI::App*, bool, bool, std::string) const override { return {}; }

@@ -23,6 +23,17 @@ std::string last_name(const fs::path& path) {
     return (whole.has_filename() ? whole : whole.parent_path()).stem().string();
 }
 
+/// The class that a simulated sensor stands for.
+std::optional<SensorClass> class_of_simulated(std::string_view sensor) {
+    if (sensor == "ideal")
+        return SensorClass::clean;
+    if (sensor == "kinect")
+        return SensorClass::structured_light;
+    if (sensor == "tof")
+        return SensorClass::time_of_flight;
+    return std::nullopt;
+}
+
 /// Where a generated capture keeps what is exact.
 struct Truth {
     std::optional<MapSet> ao;
@@ -72,9 +83,9 @@ std::string_view name_of(SensorClass sensor) {
 }
 
 SensorClass class_of(const DepthNoise& noise) {
-    if (!noise.any())
+    if (noise.at(2) < 0.001)
         return SensorClass::clean;
-    return noise.at(2) > 0.005 ? SensorClass::structured_light : SensorClass::time_of_flight;
+    return noise.at(2) > 0.006 ? SensorClass::structured_light : SensorClass::time_of_flight;
 }
 
 DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& frames) {
@@ -106,13 +117,15 @@ std::vector<std::size_t> spread(std::size_t count, std::size_t total) {
 TrialCapture load_trial(const fs::path& path, const TrialRequest& request) {
     const Capture capture = open_capture(path, request.capture);
     const Truth truth = truth_beside(path);
-    TrialCapture trial{last_name(path), path, {}, {}, request.radius_m, {}, {}};
+    TrialCapture trial{last_name(path), path, {}, {}, request.radius_m, {}, {}, {}};
     std::vector<std::size_t> among = request.among;
     for (std::size_t i = 0; request.among.empty() && i < capture.entries.size(); ++i)
         among.push_back(i);
     trial.noise = noise_of(capture, among, request.depth_noise);
     trial.noise_origin = request.depth_noise == "auto" ? "measured" : "--depth-noise";
+    trial.sensor = class_of(trial.noise);
     if (truth.ao) {
+        trial.sensor = class_of_simulated(truth.ao->sensor).value_or(trial.sensor);
         trial.radius_m = truth.ao->radius_m.value_or(request.radius_m);
         trial.reference = "ray-traced truth of the generated scene";
     }

@@ -16,7 +16,7 @@ namespace scanshade {
 /// How depth was measured, as far as its noise tells; errors differ more between these than between methods.
 enum class SensorClass { clean, structured_light, time_of_flight };
 [[nodiscard]] std::string_view name_of(SensorClass sensor);
-/// Clean without noise; structured light where sigma at 2 m is above 5 mm (Kinect: 9 mm, time of flight: 3 mm).
+/// By sigma at 2 m: clean below 1 mm, structured light above 6 mm (a Kinect has 7 to 9), time of flight between (3 to 5).
 [[nodiscard]] SensorClass class_of(const DepthNoise& noise);
 
 /// sigma(z) of a capture, measured on up to five of the frames. No noise for clouds without a grid, which no sensor's image
@@ -40,10 +40,9 @@ struct TrialCapture {
     DepthNoise noise;
     std::string noise_origin;
     double radius_m = 0.5;
-    std::string reference; ///< what `truth` is: "ray-traced, 256 rays", or empty
+    SensorClass sensor = SensorClass::clean; ///< a generated capture's own, else class_of(noise)
+    std::string reference; ///< what `truth` is, or empty
     std::vector<TrialFrame> frames;
-
-    [[nodiscard]] SensorClass sensor() const { return class_of(noise); }
 };
 
 struct TrialRequest {
