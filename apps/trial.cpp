@@ -85,7 +85,7 @@ std::string_view name_of(SensorClass sensor) {
 SensorClass class_of(const DepthNoise& noise) {
     if (noise.at(2) < 0.001)
         return SensorClass::clean;
-    return noise.at(2) > 0.006 ? SensorClass::structured_light : SensorClass::time_of_flight;
+    return noise.at(4) > 7 * noise.at(1) ? SensorClass::structured_light : SensorClass::time_of_flight;
 }
 
 DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& frames) {

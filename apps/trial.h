@@ -16,7 +16,8 @@ namespace scanshade {
 /// How depth was measured, as far as its noise tells; errors differ more between these than between methods.
 enum class SensorClass { clean, structured_light, time_of_flight };
 [[nodiscard]] std::string_view name_of(SensorClass sensor);
-/// By sigma at 2 m: clean below 1 mm, structured light above 6 mm (a Kinect has 7 to 9), time of flight between (3 to 5).
+/// Clean where sigma at 2 m is below 1 mm. The noise of structured light grows with the square of the distance (here: more than
+/// sevenfold from 1 to 4 m; Kinects 8 to 13), that of time of flight has a floor (simulated: 5).
 [[nodiscard]] SensorClass class_of(const DepthNoise& noise);
 
 /// sigma(z) of a capture, measured on up to five of the frames. No noise for clouds without a grid, which no sensor's image

@@ -227,6 +227,9 @@ TEST(SensorClassTest, follows_the_noise) {
     EXPECT_EQ(class_of({}), SensorClass::clean);
     EXPECT_EQ(class_of({0.0015, 0.0018}), SensorClass::structured_light);
     EXPECT_EQ(class_of({0.0012, 0.0005}), SensorClass::time_of_flight);
+    EXPECT_EQ(class_of({0.0015, 0}), SensorClass::time_of_flight);
+    EXPECT_EQ(class_of({0.00093, 0.00088}), SensorClass::structured_light) << "7-Scenes, as measured";
+    EXPECT_EQ(class_of({0, 0.0001}), SensorClass::clean);
 }
 
 // ---------------------------------------------------------------------------------------------------- bench
