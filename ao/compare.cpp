@@ -138,7 +138,8 @@ Look PairSums::best_look(const Look& least, const Look& most) const {
     if (count_ == 0)
         return best;
     for (Look look : starts) {
-        look = {std::clamp(look.strength, least.strength, most.strength), std::clamp(look.power, least.power, most.power)};
+        look = {std::clamp(look.strength, least.strength, most.strength),
+                std::clamp(look.power, least.power, most.power)};
         ceres::Problem problem;
         for (const Bin& bin : bins_)
             if (bin.n > 0)

@@ -26,7 +26,8 @@ namespace fs = std::filesystem;
 void say(const std::string& line) { fmt::print(stderr, "{}\n", line); }
 
 /// The comma-separated words, each one of `known`; all of them for "all".
-std::vector<std::string> chosen(const std::string& flag, const std::string& list, const std::vector<std::string>& known) {
+std::vector<std::string> chosen(const std::string& flag, const std::string& list,
+                                const std::vector<std::string>& known) {
     if (list == "all")
         return known;
     std::vector<std::string> words;
@@ -63,9 +64,17 @@ class CaptureBench {
   public:
     CaptureBench(gpu::Device& device, const TrialCapture& capture, const std::vector<Configuration>& all)
         : capture_(capture) {
-        result_ = {capture.name,     capture.path.string(), capture.reference,
-                   describe(capture.noise), capture.sensor,      capture.radius_m,
-                   {},               capture.frames.front().depth.z_m.size(), {}, capture.frames.front().truth, {}};
+        result_ = {capture.name,
+                   capture.path.string(),
+                   capture.reference,
+                   describe(capture.noise),
+                   capture.sensor,
+                   capture.radius_m,
+                   {},
+                   capture.frames.front().depth.z_m.size(),
+                   {},
+                   capture.frames.front().truth,
+                   {}};
         for (const TrialFrame& frame : capture.frames) {
             result_.frames.push_back(frame.name);
             const Pinhole& camera = frame.frame.camera.pinhole;
@@ -151,7 +160,9 @@ class CaptureBench {
 
 class Bench final : public Command {
   public:
-    Words words() override { return {"CAPTURE", "captures with truth/ao, as generate makes them", &paths_, 0, 1 << 20}; }
+    Words words() override {
+        return {"CAPTURE", "captures with truth/ao, as generate makes them", &paths_, 0, 1 << 20};
+    }
 
     std::vector<Stage> stages() override {
         return {{"captures",
@@ -167,12 +178,13 @@ class Bench final : public Command {
                    &request_.depth_noise}}},
                 {"method",
                  {{"methods", "which methods: all, or names with commas", &methods_},
-                  {"rounds", "how often each configuration is timed on each frame, in turns with all others", &rounds_, "",
-                   1, 1000},
+                  {"rounds", "how often each configuration is timed on each frame, in turns with all others", &rounds_,
+                   "", 1, 1000},
                   {"device", "index or part of the name of a Vulkan device; empty = the fastest kind", &device_}}},
                 {"output",
                  {{"out", "folder of the report: index.html, bench.csv, bench.json", &out_},
-                  {"front", "file for the measured front, as `run --max-error` has it; other sensors' parts of it stay", &front_},
+                  {"front", "file for the measured front, as `run --max-error` has it; other sensors' parts of it stay",
+                   &front_},
                   {"overwrite", "replace an earlier report", &overwrite_}}}};
     }
 
@@ -183,8 +195,13 @@ class Bench final : public Command {
         std::erase_if(all, [&](const auto& c) { return std::ranges::find(methods, c.method) == methods.end(); });
 
         gpu::Device device(device_);
-        BenchReport report{command_line(), device.info().name, device.info().driver, SCANSHADE_VERSION,
-                           fmt::format("{:%Y-%m-%d}", fmt::gmtime(std::time(nullptr))), rounds_, {}};
+        BenchReport report{command_line(),
+                           device.info().name,
+                           device.info().driver,
+                           SCANSHADE_VERSION,
+                           fmt::format("{:%Y-%m-%d}", fmt::gmtime(std::time(nullptr))),
+                           rounds_,
+                           {}};
         for (const fs::path& path : captures()) {
             const TrialCapture capture = load_trial(path, request_);
             if (capture.reference.empty())

@@ -15,13 +15,17 @@ std::string heading_of(const BenchGroup& group) {
                        group.captures.size() == 1 ? "capture" : "captures");
 }
 
-// ---------------------------------------------------------------------------------------------------- speed against error
+// ---------------------------------------------------------------------------------------------------- speed against
+// error
 
 /// One series per method, its configurations from cheap to dear; the front is ringed.
 page::Plot speed_plot(const BenchGroup& group, bool wall) {
     page::Plot plot{fmt::format("Speed against error, {} depth", name_of(group.sensor)),
-                    wall ? "milliseconds per frame, transfers included (median)" : "device milliseconds per frame (median)",
-                    "RMSE to the reference", {}, true};
+                    wall ? "milliseconds per frame, transfers included (median)"
+                         : "device milliseconds per frame (median)",
+                    "RMSE to the reference",
+                    {},
+                    true};
     for (std::size_t i = 0; i < group.measured.size(); ++i) {
         const Measured& m = group.measured[i];
         auto series = std::ranges::find(plot.series, m.configuration.method, &page::Series::name);
@@ -30,7 +34,8 @@ page::Plot speed_plot(const BenchGroup& group, bool wall) {
             series = plot.series.end() - 1;
         }
         const double ms = median(wall ? m.wall_ms : m.device_ms), rms = m.difference().rms;
-        series->points.push_back({ms, rms, fmt::format("{}: {:.3f} ms, RMSE {:.4f}", m.configuration.full_name(), ms, rms),
+        series->points.push_back({ms, rms,
+                                  fmt::format("{}: {:.3f} ms, RMSE {:.4f}", m.configuration.full_name(), ms, rms),
                                   !wall && group.front[i]});
     }
     return plot;
@@ -96,7 +101,8 @@ page::Plot plot_by_class(const BenchGroup& group, const std::vector<std::size_t>
     return plot;
 }
 
-// ---------------------------------------------------------------------------------------------------- tables and pictures
+// ---------------------------------------------------------------------------------------------------- tables and
+// pictures
 
 std::string figures_table(const BenchGroup& group) {
     std::vector<std::vector<std::string>> rows;
@@ -128,7 +134,8 @@ std::string pictures(const BenchGroup& group, const std::vector<std::size_t>& sh
             cv::Mat1f apart;
             cv::subtract(map, capture->truth, apart);
             html += page::figure(difference_picture(apart, scale),
-                                 fmt::format("{}: {}, RMSE {:.4f}", capture->name, capture->measured[i].configuration.full_name(),
+                                 fmt::format("{}: {}, RMSE {:.4f}", capture->name,
+                                             capture->measured[i].configuration.full_name(),
                                              capture->measured[i].images.front().rms));
         }
         html += "<br>\n";
@@ -139,8 +146,9 @@ std::string pictures(const BenchGroup& group, const std::vector<std::size_t>& sh
 std::string captures_table(const BenchReport& report) {
     std::vector<std::vector<std::string>> rows;
     for (const BenchCapture& c : report.captures)
-        rows.push_back({c.name, std::string(name_of(c.sensor)), c.noise, fmt::format("{}x{}", c.size.width, c.size.height),
-                        fmt::format("{}", c.frames.size()), fmt::format("{:g} m", c.radius_m), c.reference, c.path});
+        rows.push_back({c.name, std::string(name_of(c.sensor)), c.noise,
+                        fmt::format("{}x{}", c.size.width, c.size.height), fmt::format("{}", c.frames.size()),
+                        fmt::format("{:g} m", c.radius_m), c.reference, c.path});
     return page::table({"capture", "sensor", "depth noise", "size", "frames", "radius", "reference", "path"}, rows);
 }
 
@@ -157,15 +165,15 @@ std::string settings_table(const BenchReport& report) {
 std::string bench_page(const BenchReport& report) {
     std::vector<page::Section> sections;
     sections.push_back(
-        {"What was measured",
-         page::paragraph(fmt::format("{} ({}), {}, version {}: {}", report.device, report.driver, report.date,
-                                     report.version, report.command)) +
-             page::paragraph(fmt::format(
-                 "Configurations were timed in {} rounds over all frames, in turns, so that each met the same minutes of the "
-                 "machine. Device milliseconds are the device's own time stamps of all passes, plane fits included, transfers "
-                 "left out.",
-                 report.rounds)) +
-             captures_table(report)});
+        {"What was measured", page::paragraph(fmt::format("{} ({}), {}, version {}: {}", report.device, report.driver,
+                                                          report.date, report.version, report.command)) +
+                                  page::paragraph(fmt::format("Configurations were timed in {} rounds over all frames, "
+                                                              "in turns, so that each met the same minutes of the "
+                                                              "machine. Device milliseconds are the device's own time "
+                                                              "stamps of all passes, plane fits included, transfers "
+                                                              "left out.",
+                                                              report.rounds)) +
+                                  captures_table(report)});
     for (const BenchGroup& group : grouped(report)) {
         const std::vector<std::size_t> shown = best_of_each_method(group);
         std::string where = page::svg(plot_by_capture(group, shown));
@@ -173,8 +181,8 @@ std::string bench_page(const BenchReport& report) {
             where += page::svg(plot_by_class(group, shown, static_cast<ErrorBy>(by)));
         sections.push_back({heading_of(group), page::paragraph("Ringed, and marked in the table: the front. No other "
                                                                "configuration is both as fast and as accurate.") +
-                                                   page::svg(speed_plot(group, false)) + page::svg(speed_plot(group, true)) +
-                                                   figures_table(group)});
+                                                   page::svg(speed_plot(group, false)) +
+                                                   page::svg(speed_plot(group, true)) + figures_table(group)});
         sections.push_back({"Where the errors are: " + heading_of(group),
                             page::paragraph("Each method's most accurate configuration.") + where});
         sections.push_back({"Pictures: " + heading_of(group), pictures(group, shown)});

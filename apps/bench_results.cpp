@@ -134,9 +134,9 @@ std::vector<BenchGroup> grouped(const BenchReport& report) {
 std::string bench_table(const BenchReport& report) {
     std::string text;
     for (const BenchGroup& group : grouped(report)) {
-        text += fmt::format("{}, {} captures\n{:<34}{:>12}{:>12}{:>12}{:>9}{:>9}{:>9}{:>9}  front\n", name_of(group.sensor),
-                            group.captures.size(), "configuration", "device ms", "least", "wall ms", "RMSE", "calib.",
-                            "bias", "SSIM");
+        text += fmt::format("{}, {} captures\n{:<34}{:>12}{:>12}{:>12}{:>9}{:>9}{:>9}{:>9}  front\n",
+                            name_of(group.sensor), group.captures.size(), "configuration", "device ms", "least",
+                            "wall ms", "RMSE", "calib.", "bias", "SSIM");
         for (std::size_t i = 0; i < group.measured.size(); ++i) {
             const Measured& m = group.measured[i];
             const Difference d = m.difference();
@@ -151,9 +151,10 @@ std::string bench_table(const BenchReport& report) {
 }
 
 std::string bench_csv(const BenchReport& report) {
-    std::string text = "sensor,capture,method,configuration,device_ms_median,device_ms_least,wall_ms_median,wall_ms_least,"
-                       "front," +
-                       figure_csv_heads() + ",settings,why\n";
+    std::string text =
+        "sensor,capture,method,configuration,device_ms_median,device_ms_least,wall_ms_median,wall_ms_least,"
+        "front," +
+        figure_csv_heads() + ",settings,why\n";
     for (const BenchGroup& group : grouped(report)) {
         const std::string sensor(name_of(group.sensor));
         for (std::size_t i = 0; i < group.measured.size(); ++i)
@@ -166,9 +167,9 @@ std::string bench_csv(const BenchReport& report) {
 }
 
 json bench_json(const BenchReport& report) {
-    json text{{"program", "scanshade"},      {"version", report.version}, {"command_line", report.command},
-              {"date", report.date},         {"device", report.device},   {"driver", report.driver},
-              {"rounds", report.rounds},     {"groups", json::array()},   {"captures", json::array()}};
+    json text{{"program", "scanshade"},  {"version", report.version}, {"command_line", report.command},
+              {"date", report.date},     {"device", report.device},   {"driver", report.driver},
+              {"rounds", report.rounds}, {"groups", json::array()},   {"captures", json::array()}};
     for (const BenchGroup& group : grouped(report)) {
         json rows = json::array();
         for (std::size_t i = 0; i < group.measured.size(); ++i) {

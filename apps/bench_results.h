@@ -24,7 +24,7 @@ struct Measured {
     std::array<ErrorByClass, error_by_count> errors;
     std::vector<double> device_ms, wall_ms; ///< of each frame in each round
     std::vector<double> ns_per_pixel;       ///< the same of the device, per pixel of the image
-    std::string why; ///< what failed; empty = nothing
+    std::string why;                        ///< what failed; empty = nothing
 
     void add(const Measured& other);
     [[nodiscard]] Difference difference() const { return total(images, pairs); }

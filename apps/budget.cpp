@@ -18,7 +18,8 @@ const std::vector<Priced>& points_for(const Front& front, SensorClass sensor, st
     if (own != front.points.end() && !own->second.empty())
         return own->second;
     const auto& [other, points] = *front.points.begin();
-    sentences.push_back(fmt::format("the front has no {} depth: errors are those of {} depth", name_of(sensor), name_of(other)));
+    sentences.push_back(
+        fmt::format("the front has no {} depth: errors are those of {} depth", name_of(sensor), name_of(other)));
     return points;
 }
 
@@ -69,7 +70,8 @@ std::vector<cv::Mat1f> truths(const TrialCapture& capture) {
     return maps;
 }
 
-/// How many times slower than the front's this device is with these images: the cheapest and the middle point are timed.
+/// How many times slower than the front's this device is with these images: the cheapest and the middle point are
+/// timed.
 double slowness(const Trials& trials, const std::vector<Priced>& points, double pixels) {
     std::vector<double> ratios;
     for (const std::size_t i : {std::size_t{0}, points.size() / 2})
@@ -99,27 +101,30 @@ std::size_t pick(const std::vector<Priced>& points, const std::vector<double>& m
         most_accurate = points[i].rms < points[most_accurate].rms ? i : most_accurate;
         if (!within(budget, ms[i], points[i].rms))
             continue;
-        const bool better = best == points.size() ||
-                            (budget.max_ms > 0 ? points[i].rms < points[best].rms : ms[i] < ms[best]);
+        const bool better =
+            best == points.size() || (budget.max_ms > 0 ? points[i].rms < points[best].rms : ms[i] < ms[best]);
         best = better ? i : best;
     }
     if (best < points.size())
         return best;
-    throw Misuse(fmt::format("nothing keeps to {}: the fastest, {}, takes about {:.2g} ms (RMSE {:.3f}); the most accurate, {}, "
-                             "is expected at RMSE {:.3f} ({:.2g} ms)",
-                             limit_text(budget), points[fastest].configuration.full_name(), ms[fastest], points[fastest].rms,
-                             points[most_accurate].configuration.full_name(), points[most_accurate].rms, ms[most_accurate]));
+    throw Misuse(
+        fmt::format("nothing keeps to {}: the fastest, {}, takes about {:.2g} ms (RMSE {:.3f}); the most accurate, {}, "
+                    "is expected at RMSE {:.3f} ({:.2g} ms)",
+                    limit_text(budget), points[fastest].configuration.full_name(), ms[fastest], points[fastest].rms,
+                    points[most_accurate].configuration.full_name(), points[most_accurate].rms, ms[most_accurate]));
 }
 
-Choice choose(gpu::Device& device, const Front& front, const TrialCapture& capture, double radius_m, const Budget& budget) {
+Choice choose(gpu::Device& device, const Front& front, const TrialCapture& capture, double radius_m,
+              const Budget& budget) {
     Choice choice;
     std::vector<Priced> points = points_for(front, capture.sensor, choice.sentences);
     const Trials trials(device, capture, radius_m);
     const double pixels = static_cast<double>(capture.frames.front().depth.z_m.total());
     const double slower = slowness(trials, points, pixels);
-    choice.sentences.push_back(fmt::format("budget {}: front of {} depth measured on {}; this device takes {:.2f} times as long "
-                                           "per pixel",
-                                           limit_text(budget), name_of(capture.sensor), front.device, slower));
+    choice.sentences.push_back(
+        fmt::format("budget {}: front of {} depth measured on {}; this device takes {:.2f} times as long "
+                    "per pixel",
+                    limit_text(budget), name_of(capture.sensor), front.device, slower));
     const bool truth_fits = !capture.reference.empty() && std::abs(capture.radius_m - radius_m) < 1e-6 * radius_m;
     const auto reference = std::ranges::min_element(points, {}, &Priced::rms)->configuration;
     const std::vector<cv::Mat1f> right = truth_fits ? truths(capture) : trials.of(reference).maps;
@@ -138,15 +143,17 @@ Choice choose(gpu::Device& device, const Front& front, const TrialCapture& captu
         choice.measured_rms = rms_between(tried.maps, right);
         const bool slow = budget.max_ms > 0 && choice.measured_ms > budget.max_ms;
         const bool off = truth_fits && budget.max_error > 0 && choice.measured_rms > budget.max_error;
-        choice.sentences.push_back(fmt::format(
-            "{} {}: expected {:.3g} ms, RMSE {:.3f}; {} frames: {:.3g} ms, RMSE {:.3f} to {}", slow || off ? "tried" : "picked",
-            choice.configuration.full_name(), choice.expected_ms, choice.expected_rms, capture.frames.size(),
-            choice.measured_ms, choice.measured_rms, truth_fits ? "truth" : reference.full_name()));
+        choice.sentences.push_back(
+            fmt::format("{} {}: expected {:.3g} ms, RMSE {:.3f}; {} frames: {:.3g} ms, RMSE {:.3f} to {}",
+                        slow || off ? "tried" : "picked", choice.configuration.full_name(), choice.expected_ms,
+                        choice.expected_rms, capture.frames.size(), choice.measured_ms, choice.measured_rms,
+                        truth_fits ? "truth" : reference.full_name()));
         if (!slow && !off)
             return choice;
         points.erase(points.begin() + static_cast<std::ptrdiff_t>(picked));
         if (points.empty())
-            throw Misuse(fmt::format("nothing keeps to {} on this capture: {}", limit_text(budget), choice.sentences.back()));
+            throw Misuse(
+                fmt::format("nothing keeps to {} on this capture: {}", limit_text(budget), choice.sentences.back()));
     }
 }
 

@@ -49,11 +49,13 @@ Free free_setting(const std::vector<Parameter>& rows, const std::string& method,
     return {name, start, start != 0 ? 0.25 * std::abs(start) : 0.05 * std::min(span, 1.0), row->low, row->high};
 }
 
-/// Settings by which a method applies a Look: the best ones follow from maps made without (1, 1), whatever else is searched.
+/// Settings by which a method applies a Look: the best ones follow from maps made without (1, 1), whatever else is
+/// searched.
 struct LookRows {
     std::string_view strength, power;
 };
-/// cacao applies its own before the blur, where the best look of the blurred map is as good as the best to within the blur.
+/// cacao applies its own before the blur, where the best look of the blurred map is as good as the best to within the
+/// blur.
 constexpr std::array look_rows{LookRows{"strength", "power"}, LookRows{"shadow-multiplier", "shadow-power"}};
 
 /// A method's look rows, where both are to be fitted, and the bounds that they have.
@@ -88,8 +90,8 @@ Score score(gpu::Device& device, const std::vector<TrialCapture>& captures, cons
     return all;
 }
 
-/// Nelder and Mead's simplex (1965) over the free settings, in units of their first steps; beyond a limit the nearest allowed
-/// value counts, and the way back costs something, so that the simplex turns round.
+/// Nelder and Mead's simplex (1965) over the free settings, in units of their first steps; beyond a limit the nearest
+/// allowed value counts, and the way back costs something, so that the simplex turns round.
 class Search final : public cv::MinProblemSolver::Function {
   public:
     Search(gpu::Device& device, const std::vector<TrialCapture>& captures, Configuration fixed, std::vector<Free> free,
@@ -170,7 +172,9 @@ class Calibrate final : public Command {
             setups_.emplace_back(row.name, row.setup());
     }
 
-    Words words() override { return {"CAPTURE", "training captures with truth/ao, as generate makes them", &training_, 1, 1 << 20}; }
+    Words words() override {
+        return {"CAPTURE", "training captures with truth/ao, as generate makes them", &training_, 1, 1 << 20};
+    }
 
     std::vector<Stage> stages() override {
         std::vector<std::string> names;
@@ -180,7 +184,8 @@ class Calibrate final : public Command {
             {"captures",
              {{"held-out", "captures to judge the result on, with commas: none of the training ones", &held_out_},
               {"frames", "frames taken of each capture, spread evenly", &request_.frames, "", 1, 100000},
-              {"depth-noise", "as run takes it: auto (measured), none, kinect, tof or FLOOR,PER_Z2", &request_.depth_noise}}},
+              {"depth-noise", "as run takes it: auto (measured), none, kinect, tof or FLOOR,PER_Z2",
+               &request_.depth_noise}}},
             {"method",
              {{.name = "method", .help = "whose settings are fitted", .value = &method_, .choices = names},
               {"free", "names of its settings to fit, with commas; the others stay as given", &free_},
@@ -272,8 +277,10 @@ class Calibrate final : public Command {
             fmt::print("--{}.{} {}\n", method_, name, value);
             settings[fmt::format("{}.{}", method_, name)] = std::stod(value);
         }
-        fmt::print("{:<12}{:<24}{:>12}{:>12}{:>14}{:>14}\n", "", "capture", "RMSE before", "after", "calib. before", "after");
-        report["training"] = judged("training", training, score(device, training, before), score(device, training, after));
+        fmt::print("{:<12}{:<24}{:>12}{:>12}{:>14}{:>14}\n", "", "capture", "RMSE before", "after", "calib. before",
+                   "after");
+        report["training"] =
+            judged("training", training, score(device, training, before), score(device, training, after));
         report["held_out"] = judged("held out", others, score(device, others, before), score(device, others, after));
         if (others.empty())
             say("no --held-out captures: nothing says that this holds elsewhere");
@@ -283,7 +290,8 @@ class Calibrate final : public Command {
     static json judged(const std::string& role, const std::vector<TrialCapture>& captures, const Score& before,
                        const Score& after) {
         json rows = json::array();
-        const auto line = [&](const std::string& name, double rms, double rms_after, double calibrated, double calibrated_after) {
+        const auto line = [&](const std::string& name, double rms, double rms_after, double calibrated,
+                              double calibrated_after) {
             fmt::print("{:<12}{:<24}{:>12.4f}{:>12.4f}{:>14.4f}{:>14.4f}\n", role, name, rms, rms_after, calibrated,
                        calibrated_after);
             rows.push_back({{"capture", name}, {"rms_before", rms}, {"rms_after", rms_after}});

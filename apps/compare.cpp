@@ -29,12 +29,14 @@ void say(const std::string& line) { fmt::print(stderr, "{}\n", line); }
 class Compare final : public Command {
   public:
     Words words() override {
-        return {"PATH", "A and B: runs' outputs, folders of maps, maps, or as B a generated capture, whose truth is taken",
+        return {"PATH",
+                "A and B: runs' outputs, folders of maps, maps, or as B a generated capture, whose truth is taken",
                 &paths_, 1, 2};
     }
 
     std::vector<Stage> stages() override {
-        return {{"input", {{"truth", "A is compared with the truth of the generated capture that it was made from", &truth_}}},
+        return {{"input",
+                 {{"truth", "A is compared with the truth of the generated capture that it was made from", &truth_}}},
                 {"output",
                  {{"out", "folder for difference/NAME.png, compare.csv and compare.json", &out_},
                   {"scale", "difference shown in full blue (A too dark) or red (too bright)", &scale_, "", 1e-3, 1},
@@ -126,7 +128,7 @@ class Compare final : public Command {
             images.push_back(row.why.empty() ? json{{"image", row.name}, {"difference", to_json(row.difference)}}
                                              : json{{"image", row.name}, {"why", row.why}});
         }
-        const json text{{"a", a.path.string()}, {"b", b.path.string()},   {"b_is", b.kind},
+        const json text{{"a", a.path.string()}, {"b", b.path.string()},  {"b_is", b.kind},
                         {"scale", scale_},      {"total", to_json(all)}, {"images", images}};
         write_atomically(fs::path(out_) / "compare.csv", csv);
         write_atomically(fs::path(out_) / "compare.json", text_of(text) + "\n"); // last: it says that the rest is there

@@ -39,7 +39,8 @@ std::vector<Configuration> configurations() {
     std::vector<Configuration> all;
     for (const MethodRow& method : methods()) {
         std::ranges::move(levels(method), std::back_inserter(all));
-        std::ranges::copy_if(more(), std::back_inserter(all), [&](const auto& row) { return row.method == method.name; });
+        std::ranges::copy_if(more(), std::back_inserter(all),
+                             [&](const auto& row) { return row.method == method.name; });
     }
     return all;
 }

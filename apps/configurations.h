@@ -21,12 +21,12 @@ struct Configuration {
     [[nodiscard]] std::string full_name() const { return method + " " + name; }
 };
 
-/// What is measured: every level of each method's `quality` (the method as it comes where it has none), then the rows of a
-/// table of more. In the order of the table of methods.
+/// What is measured: every level of each method's `quality` (the method as it comes where it has none), then the rows
+/// of a table of more. In the order of the table of methods.
 [[nodiscard]] std::vector<Configuration> configurations();
 
-/// Puts the settings into the rows of `setup`. Throws Misuse naming the configuration for a row that is not there or refuses
-/// its value.
+/// Puts the settings into the rows of `setup`. Throws Misuse naming the configuration for a row that is not there or
+/// refuses its value.
 void apply(const Configuration& configuration, MethodSetup& setup);
 
 /// Every row's present value: applying it later brings the settings back.

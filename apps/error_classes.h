@@ -16,8 +16,8 @@ struct PixelClasses {
     cv::Mat1b of;
 };
 
-/// By distance in pixels to the nearest pixel beside a jump of depth. A jump is where 1/z differs by more than 1 % and neither
-/// side's slope foretells the other (1/z is linear on planes), or where the depth ends.
+/// By distance in pixels to the nearest pixel beside a jump of depth. A jump is where 1/z differs by more than 1 % and
+/// neither side's slope foretells the other (1/z is linear on planes), or where the depth ends.
 [[nodiscard]] PixelClasses by_edge_distance(const cv::Mat1f& z_m);
 /// By the angle between the surface's normal and the way to the camera.
 [[nodiscard]] PixelClasses by_grazing_angle(const cv::Mat1f& z_m, const Pinhole& camera);

@@ -89,8 +89,8 @@ Front front_from(const json& text, const std::string& origin) {
 
 void Front::replace_with(const Front& other) {
     if (device != other.device)
-        throw Error(fmt::format("the front was measured on {}, this one on {}: times of two devices do not go together", device,
-                                other.device));
+        throw Error(fmt::format("the front was measured on {}, this one on {}: times of two devices do not go together",
+                                device, other.device));
     for (const auto& [sensor, own] : other.points) {
         points[sensor] = own;
         made_by[sensor] = other.made_by.at(sensor);

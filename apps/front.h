@@ -18,8 +18,8 @@ struct Priced {
     [[nodiscard]] double ms(double pixels) const { return ns_per_pixel * pixels * 1e-6; }
 };
 
-/// Whether each point is on the front: none other is at least as fast and as accurate, and better in one of the two. Of equal
-/// points the first one counts. Points that are not finite are never on it.
+/// Whether each point is on the front: none other is at least as fast and as accurate, and better in one of the two. Of
+/// equal points the first one counts. Points that are not finite are never on it.
 [[nodiscard]] std::vector<bool> on_front(const std::vector<Priced>& points);
 
 /// The front of each sensor class, cheapest first, and what it was measured with.
@@ -32,8 +32,8 @@ struct Front {
     void replace_with(const Front& other);
 };
 
-/// The front's JSON: {"device", "clean": {"made_by", "points": [{"method", "name", "settings": {...}, "ns_per_pixel", "rms"}]},
-/// "structured light": ...}.
+/// The front's JSON: {"device", "clean": {"made_by", "points": [{"method", "name", "settings": {...}, "ns_per_pixel",
+/// "rms"}]}, "structured light": ...}.
 [[nodiscard]] json to_json(const Front& front);
 /// Throws Error naming `origin` and what was expected there.
 [[nodiscard]] Front front_from(const json& text, const std::string& origin);

@@ -16,8 +16,10 @@ const std::array commands = {
     CommandRow{"inspect", "what is in a capture: frames, sizes, depth range, holes, camera, poses", inspect_command},
     CommandRow{"run", "ambient occlusion for every frame: maps, shaded pictures, clouds, a report", run_command},
     CommandRow{"compare", "two results, or a result and truth, as numbers and difference pictures", compare_command},
-    CommandRow{"bench", "methods and settings against truth: milliseconds, errors, the front, as one page", bench_command},
-    CommandRow{"calibrate-look", "fits a method's free settings to truth, judges them on other captures", calibrate_command},
+    CommandRow{"bench", "methods and settings against truth: milliseconds, errors, the front, as one page",
+               bench_command},
+    CommandRow{"calibrate-look", "fits a method's free settings to truth, judges them on other captures",
+               calibrate_command},
     CommandRow{"generate", "a capture of a synthetic scene with exact truth", generate_command},
     CommandRow{"methods", "the ambient-occlusion methods there are", methods_command},
     CommandRow{"devices", "the Vulkan devices there are", devices_command},
@@ -72,8 +74,8 @@ void print_help(const CommandRow& row) {
 
 // ---------------------------------------------------------------------------------------------------- flags
 
-/// A switch is given as --name or --name=false; everything else takes a value. --settings FILE gives others theirs, unless
-/// they stand on the command line themselves.
+/// A switch is given as --name or --name=false; everything else takes a value. --settings FILE gives others theirs,
+/// unless they stand on the command line themselves.
 void add_flag(CLI::App& parser, const Parameter& row) {
     const std::string names = flag_names(row);
     if (row.name == settings_flag)

@@ -106,16 +106,17 @@ MapSet find_maps(const fs::path& path) {
         set.kind = "map";
         set.files.emplace(path.stem().string(), path);
     } else {
-        throw Error(fmt::format("{}: not there; a run's output, a folder of maps, a map or a generated capture expected",
-                                path.string()));
+        throw Error(fmt::format(
+            "{}: not there; a run's output, a folder of maps, a map or a generated capture expected", path.string()));
     }
     return set;
 }
 
 MapSet truth_of(const MapSet& run) {
     if (run.capture.empty())
-        throw Error(fmt::format("{}: no manifest.json says which capture it was made from; name the truth as second PATH",
-                                run.path.string()));
+        throw Error(
+            fmt::format("{}: no manifest.json says which capture it was made from; name the truth as second PATH",
+                        run.path.string()));
     if (!fs::is_directory(run.capture / "truth/ao"))
         throw Error(fmt::format("{}: made from {}, which has no truth/ao (generated captures have)", run.path.string(),
                                 run.capture.string()));

@@ -15,13 +15,14 @@ struct MapSet {
     std::filesystem::path path; ///< as asked for
     std::string kind;           ///< "run", "truth", "folder" or "map"
     std::map<std::string, std::filesystem::path> files;
-    std::filesystem::path capture;  ///< of a run: what it was made from, as its manifest says; of truth: the capture itself
-    std::string sensor;             ///< of a generated capture: the one simulated, where its truth.json says
+    std::filesystem::path
+        capture;        ///< of a run: what it was made from, as its manifest says; of truth: the capture itself
+    std::string sensor; ///< of a generated capture: the one simulated, where its truth.json says
     std::optional<double> radius_m; ///< the method's or the truth's, where it is said
 };
 
-/// A folder with ao/ in it is a run, one with truth/ao/ a generated capture; else its own images are taken; a file is a map
-/// by itself. Throws Error naming the path when it is not there or holds no map.
+/// A folder with ao/ in it is a run, one with truth/ao/ a generated capture; else its own images are taken; a file is a
+/// map by itself. Throws Error naming the path when it is not there or holds no map.
 [[nodiscard]] MapSet find_maps(const std::filesystem::path& path);
 
 /// The truth of the capture that `run` was made from. Throws Error where the run does not say or the capture has none.
@@ -33,8 +34,8 @@ struct MapPair {
     std::filesystem::path a, b;
 };
 
-/// Pairs by name, in the order of names; two single maps are a pair whatever they are called. Throws Error, with names of
-/// either side, where nothing pairs.
+/// Pairs by name, in the order of names; two single maps are a pair whatever they are called. Throws Error, with names
+/// of either side, where nothing pairs.
 [[nodiscard]] std::vector<MapPair> paired(const MapSet& a, const MapSet& b);
 
 } // namespace scanshade

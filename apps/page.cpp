@@ -13,7 +13,8 @@ namespace {
 
 // ---------------------------------------------------------------------------------------------------- axes
 
-constexpr double width = 900, height = 430, left = 64, right = 290, top = 34, bottom = 62; // px; the legend stands at the right
+constexpr double width = 900, height = 430, left = 64, right = 290, top = 34,
+                 bottom = 62; // px; the legend stands at the right
 
 /// Okabe and Ito's palette for all kinds of colour vision, its yellow darkened for white paper.
 constexpr std::array<std::string_view, 8> colours{"#0072b2", "#d55e00", "#009e73", "#cc79a7",
@@ -131,12 +132,14 @@ std::string frame(const Plot& plot, const Axis& x, const Axis& y) {
 
 std::string dot(const Point& p, const Axis& x, const Axis& y, std::string_view colour) {
     const std::string ring =
-        p.marked ? fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"7\" class=\"ring\"/>\n", x.at(p.x), y.at(p.y)) : "";
+        p.marked ? fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"7\" class=\"ring\"/>\n", x.at(p.x), y.at(p.y))
+                 : "";
     return ring + fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\" fill=\"{}\"><title>{}</title></circle>\n",
                               x.at(p.x), y.at(p.y), colour, escaped(p.label));
 }
 
-std::string drawn_series(const Plot& plot, const Series& series, const Axis& x, const Axis& y, std::string_view colour) {
+std::string drawn_series(const Plot& plot, const Series& series, const Axis& x, const Axis& y,
+                         std::string_view colour) {
     std::string path, dots;
     for (const Point& p : series.points) {
         if (!drawn(plot, p))
@@ -153,8 +156,8 @@ std::string legend(const Plot& plot) {
     std::string drawn;
     double place = top + 8;
     for (std::size_t i = 0; i < plot.series.size(); ++i, place += 18) {
-        drawn += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\" fill=\"{}\"/>\n", width - right + 18, place - 4,
-                             colours[i % colours.size()]);
+        drawn += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\" fill=\"{}\"/>\n", width - right + 18,
+                             place - 4, colours[i % colours.size()]);
         drawn += text(width - right + 28, place, "start", plot.series[i].name);
     }
     return drawn;
@@ -213,19 +216,28 @@ std::string escaped(std::string_view text) {
     std::string html;
     for (const char c : text)
         switch (c) {
-        case '<': html += "&lt;"; break;
-        case '>': html += "&gt;"; break;
-        case '&': html += "&amp;"; break;
-        case '"': html += "&quot;"; break;
-        default: html += c;
+        case '<':
+            html += "&lt;";
+            break;
+        case '>':
+            html += "&gt;";
+            break;
+        case '&':
+            html += "&amp;";
+            break;
+        case '"':
+            html += "&quot;";
+            break;
+        default:
+            html += c;
         }
     return html;
 }
 
 std::string svg(const Plot& plot) {
     const Axis x = x_axis(plot), y = y_axis(plot);
-    std::string drawn = fmt::format("<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\">\n{2}", width,
-                                    height, frame(plot, x, y));
+    std::string drawn = fmt::format("<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\">\n{2}",
+                                    width, height, frame(plot, x, y));
     for (std::size_t i = 0; i < plot.series.size(); ++i)
         drawn += drawn_series(plot, plot.series[i], x, y, colours[i % colours.size()]);
     return drawn + legend(plot) + "</svg>\n";
@@ -250,9 +262,10 @@ std::string figure(const cv::Mat3b& picture, std::string_view caption) {
 std::string paragraph(std::string_view text) { return fmt::format("<p>{}</p>\n", escaped(text)); }
 
 std::string document(std::string_view title, const std::vector<Section>& sections) {
-    std::string html = fmt::format("<!doctype html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"><title>{0}</title>\n"
-                                   "<style>{1}</style></head>\n<body>\n<h1>{0}</h1>\n",
-                                   escaped(title), style);
+    std::string html =
+        fmt::format("<!doctype html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"><title>{0}</title>\n"
+                    "<style>{1}</style></head>\n<body>\n<h1>{0}</h1>\n",
+                    escaped(title), style);
     for (const Section& section : sections)
         html += fmt::format("<h2>{}</h2>\n{}", escaped(section.heading), section.html);
     return html + "</body>\n</html>\n";

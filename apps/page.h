@@ -22,8 +22,8 @@ struct Series {
     bool joined = true;
 };
 
-/// Axes and what is drawn in them. Points with a coordinate that is not finite (or, on a logarithmic axis, not positive) are
-/// left out.
+/// Axes and what is drawn in them. Points with a coordinate that is not finite (or, on a logarithmic axis, not
+/// positive) are left out.
 struct Plot {
     std::string title, x_label, y_label;
     std::vector<Series> series;
@@ -32,7 +32,8 @@ struct Plot {
     std::vector<std::string> categories = {}; ///< named places 0, 1, 2 ... in place of a numbered x axis
 };
 
-/// Tick positions of even, round steps (1, 2 or 5 times a power of ten) that lie in [low, high], about `wanted` of them.
+/// Tick positions of even, round steps (1, 2 or 5 times a power of ten) that lie in [low, high], about `wanted` of
+/// them.
 [[nodiscard]] std::vector<double> round_ticks(double low, double high, int wanted);
 
 /// The text with <, >, & and quotes as entities.
@@ -40,7 +41,8 @@ struct Plot {
 
 [[nodiscard]] std::string svg(const Plot& plot);
 /// Cells of the first column are aligned left, others right. `marked` rows (by index) stand out.
-[[nodiscard]] std::string table(const std::vector<std::string>& heads, const std::vector<std::vector<std::string>>& rows,
+[[nodiscard]] std::string table(const std::vector<std::string>& heads,
+                                const std::vector<std::vector<std::string>>& rows,
                                 const std::vector<bool>& marked = {});
 /// The picture inside the page, as PNG.
 [[nodiscard]] std::string figure(const cv::Mat3b& picture, std::string_view caption);

@@ -274,7 +274,8 @@ class Run final : public Command {
                .value = &s.registered,
                .choices = {"auto", "yes", "no"}},
               {"depth-noise",
-               "sigma of one depth value, FLOOR,PER_Z2 for FLOOR + PER_Z2 z^2 metres, or auto (measured), none, kinect, tof; where "
+               "sigma of one depth value, FLOOR,PER_Z2 for FLOOR + PER_Z2 z^2 metres, or auto (measured), none, "
+               "kinect, tof; where "
                "there is any, depth and normals come from plane fits",
                &s.depth_noise},
               {"association-limit", "colour, depth and poses farther apart in time are not paired",
@@ -286,12 +287,24 @@ class Run final : public Command {
                .choices = method_names()},
               {"radius", "how far away a surface may still occlude, in metres" + radius, &s.radius},
               {"quality", "the method's quality level" + quality, &s.quality},
-              {"max-error", "picks method and quality: the cheapest within this RMSE to truth; 0 = no limit",
-               &s.budget.max_error, "", 0, 1, {}},
-              {"max-ms", "picks method and quality: the most accurate within these device milliseconds per frame; 0 = no limit",
-               &s.budget.max_ms, "ms", 0, 1e6, {}},
-              {std::string(settings_flag), "file of settings, from calibrate-look or an earlier run's manifest.json; flags given "
-               "here win", &s.settings},
+              {"max-error",
+               "picks method and quality: the cheapest within this RMSE to truth; 0 = no limit",
+               &s.budget.max_error,
+               "",
+               0,
+               1,
+               {}},
+              {"max-ms",
+               "picks method and quality: the most accurate within these device milliseconds per frame; 0 = no limit",
+               &s.budget.max_ms,
+               "ms",
+               0,
+               1e6,
+               {}},
+              {std::string(settings_flag),
+               "file of settings, from calibrate-look or an earlier run's manifest.json; flags given "
+               "here win",
+               &s.settings},
               {"device", "index or part of the name of a Vulkan device; empty = the fastest kind", &s.device}}},
             {"output",
              {{"out", "folder of the results; several captures get a folder each in it", &s.out},
@@ -417,7 +430,8 @@ class Run final : public Command {
 
     std::vector<FrameRow> process(const Job& job, gpu::Device& device) {
         const fs::path& folder = job.batch.outputs.folder;
-        const std::vector<std::string> budget = asked_.budget.any() ? keep_to_budget(job, device) : std::vector<std::string>{};
+        const std::vector<std::string> budget =
+            asked_.budget.any() ? keep_to_budget(job, device) : std::vector<std::string>{};
         const std::unique_ptr<Method> plain = chosen_setup().make(device);
         say(fmt::format("{} on {} ({})", asked_.method, device.info().name, device.info().driver));
         const DepthNoise noise = noise_of(job.capture, job.batch.frames, asked_.depth_noise);

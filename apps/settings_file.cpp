@@ -21,7 +21,8 @@ std::string typed(const std::string& name, const json& value) {
 std::vector<CLI::ConfigItem> SettingsFile::from_config(std::istream& stream) const {
     const json text = json::parse(stream, nullptr, false);
     if (text.is_discarded() || !text.is_object() || !text.contains("settings") || !text["settings"].is_object())
-        throw Misuse("settings: JSON with an object \"settings\" expected, as calibrate-look and run's manifest.json have");
+        throw Misuse(
+            "settings: JSON with an object \"settings\" expected, as calibrate-look and run's manifest.json have");
     std::vector<CLI::ConfigItem> given;
     for (const auto& [stage, rows] : text["settings"].items())
         if (stage.starts_with("method") && rows.is_object())

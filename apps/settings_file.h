@@ -1,4 +1,5 @@
-// Settings kept in a file: what calibrate-look writes and `run --settings` takes; an earlier run's manifest.json serves, too.
+// Settings kept in a file: what calibrate-look writes and `run --settings` takes; an earlier run's manifest.json
+// serves, too.
 #pragma once
 
 #include "apps/json.h"

@@ -1,5 +1,5 @@
-// A configuration tried on captures whose right answer is known: the ground that bench, calibrate-look and error budgets
-// stand on.
+// A configuration tried on captures whose right answer is known: the ground that bench, calibrate-look and error
+// budgets stand on.
 #pragma once
 
 #include "ao/compare.h"
@@ -16,22 +16,23 @@ namespace scanshade {
 /// How depth was measured, as far as its noise tells; errors differ more between these than between methods.
 enum class SensorClass { clean, structured_light, time_of_flight };
 [[nodiscard]] std::string_view name_of(SensorClass sensor);
-/// Clean where sigma at 2 m is below 1 mm. The noise of structured light grows with the square of the distance (here: more than
-/// sevenfold from 1 to 4 m; Kinects 8 to 13), that of time of flight has a floor (simulated: 5).
+/// Clean where sigma at 2 m is below 1 mm. The noise of structured light grows with the square of the distance (here:
+/// more than sevenfold from 1 to 4 m; Kinects 8 to 13), that of time of flight has a floor (simulated: 5).
 [[nodiscard]] SensorClass class_of(const DepthNoise& noise);
 
-/// sigma(z) of a capture, measured on up to five of the frames. No noise for clouds without a grid, which no sensor's image
-/// backs. Frames that cannot be loaded are left out.
+/// sigma(z) of a capture, measured on up to five of the frames. No noise for clouds without a grid, which no sensor's
+/// image backs. Frames that cannot be loaded are left out.
 [[nodiscard]] DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& frames);
 /// `text` is "auto" (measured) or as noise_from_text() takes it.
-[[nodiscard]] DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& frames, const std::string& text);
+[[nodiscard]] DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& frames,
+                                  const std::string& text);
 
 /// A frame ready for the methods, and what should come out.
 struct TrialFrame {
     std::string name;
     Frame frame;
     DepthImage depth;
-    cv::Mat1f truth;    ///< on the recorded pixels, NaN = no surface; empty where nothing is known
+    cv::Mat1f truth;     ///< on the recorded pixels, NaN = no surface; empty where nothing is known
     cv::Mat1f exact_z_m; ///< true depth of a generated capture, else the recorded one; 0 = hole
 };
 
@@ -42,13 +43,13 @@ struct TrialCapture {
     std::string noise_origin;
     double radius_m = 0.5;
     SensorClass sensor = SensorClass::clean; ///< a generated capture's own, else class_of(noise)
-    std::string reference; ///< what `truth` is, or empty
+    std::string reference;                   ///< what `truth` is, or empty
     std::vector<TrialFrame> frames;
 };
 
 struct TrialRequest {
-    int frames = 4;                 ///< spread evenly over the capture
-    double radius_m = 0.5;          ///< where the capture's truth does not say
+    int frames = 4;        ///< spread evenly over the capture
+    double radius_m = 0.5; ///< where the capture's truth does not say
     std::string depth_noise = "auto";
     CaptureOptions capture;
     std::vector<std::size_t> among; ///< indices of the frames that may be taken; empty = all
@@ -58,8 +59,8 @@ struct TrialRequest {
 /// `count` of `total` indices, spread evenly from the first on.
 [[nodiscard]] std::vector<std::size_t> spread(std::size_t count, std::size_t total);
 
-/// Loads the frames with the truth that lies beside a generated capture. Throws Error naming the frame that fails, and where
-/// none is left.
+/// Loads the frames with the truth that lies beside a generated capture. Throws Error naming the frame that fails, and
+/// where none is left.
 [[nodiscard]] TrialCapture load_trial(const std::filesystem::path& path, const TrialRequest& request);
 
 /// One configuration on one device, as `run` would use it on depth of that noise.

@@ -30,11 +30,13 @@ namespace fs = std::filesystem;
 class MeasureTest : public testing::Test {
   protected:
     static void SetUpTestSuite() {
-        ASSERT_EQ(run_program(fmt::format("generate office -o {} --sensor ideal --frames 2 --size 64x48 --truth-rays 16",
-                                          capture()))
-                      .exit_code,
+        ASSERT_EQ(
+            run_program(
+                fmt::format("generate office -o {} --sensor ideal --frames 2 --size 64x48 --truth-rays 16", capture()))
+                .exit_code,
+            0);
+        ASSERT_EQ(run_program(fmt::format("run {} -o {} --write ao --depth-noise none", capture(), made())).exit_code,
                   0);
-        ASSERT_EQ(run_program(fmt::format("run {} -o {} --write ao --depth-noise none", capture(), made())).exit_code, 0);
     }
     static void TearDownTestSuite() { shared_folder().reset(); }
 
@@ -124,9 +126,10 @@ Priced point(const std::string& name, double ns, double rms) { return {{"m", nam
 
 TEST(FrontTest, holds_what_nothing_beats) {
     const double unknown = std::nan("");
-    const std::vector<Priced> points{point("dear and good", 9, 0.05), point("cheap", 1, 0.2), point("beaten", 5, 0.12),
-                                     point("middle", 4, 0.1),         point("cheap again", 1, 0.2),
-                                     point("as dear, worse", 9, 0.06), point("failed", unknown, 0.01)};
+    const std::vector<Priced> points{point("dear and good", 9, 0.05), point("cheap", 1, 0.2),
+                                     point("beaten", 5, 0.12),        point("middle", 4, 0.1),
+                                     point("cheap again", 1, 0.2),    point("as dear, worse", 9, 0.06),
+                                     point("failed", unknown, 0.01)};
     EXPECT_EQ(on_front(points), (std::vector<bool>{true, true, false, true, false, false, false}));
 }
 
@@ -192,14 +195,16 @@ TEST(BudgetTest, an_error_takes_the_cheapest_and_a_time_the_most_accurate) {
 
 TEST(BudgetTest, what_cannot_be_kept_is_told_with_what_could) {
     const std::vector<double> ms{1, 2, 9};
-    EXPECT_TRUE(says(refusal([&] { (void)pick(priced_points, ms, {.max_error = 0.01}); }), "the most accurate, m dear"));
+    EXPECT_TRUE(
+        says(refusal([&] { (void)pick(priced_points, ms, {.max_error = 0.01}); }), "the most accurate, m dear"));
     EXPECT_TRUE(says(refusal([&] { (void)pick(priced_points, ms, {.max_ms = 0.5}); }), "the fastest, m cheap"));
-    EXPECT_TRUE(says(refusal([&] { (void)pick(priced_points, ms, {.max_error = 0.07, .max_ms = 5}); }), "RMSE 0.07, 5 ms"));
+    EXPECT_TRUE(
+        says(refusal([&] { (void)pick(priced_points, ms, {.max_error = 0.07, .max_ms = 5}); }), "RMSE 0.07, 5 ms"));
 }
 
 TEST_F(MeasureTest, a_budget_picks_says_and_verifies) {
-    const Ran ran = run_program(
-        fmt::format("run {} -o {} --write ao --depth-noise none --max-ms 100000", capture(), out()));
+    const Ran ran =
+        run_program(fmt::format("run {} -o {} --write ao --depth-noise none --max-ms 100000", capture(), out()));
     ASSERT_EQ(ran.exit_code, 0) << ran.err;
     EXPECT_TRUE(says(ran.err, "picked"));
     EXPECT_TRUE(says(ran.err, "to truth"));
@@ -235,8 +240,9 @@ TEST(SensorClassTest, follows_the_noise) {
 // ---------------------------------------------------------------------------------------------------- bench
 
 TEST_F(MeasureTest, bench_leaves_one_page_with_everything_in_it) {
-    const Ran ran = run_program(fmt::format("bench {} -o {} --frames 2 --rounds 2 --depth-noise none --methods cacao --front {}",
-                                            capture(), out(), (folder / "front.json").string()));
+    const Ran ran =
+        run_program(fmt::format("bench {} -o {} --frames 2 --rounds 2 --depth-noise none --methods cacao --front {}",
+                                capture(), out(), (folder / "front.json").string()));
     ASSERT_EQ(ran.exit_code, 0) << ran.err;
     EXPECT_TRUE(says(ran.out, "cacao high"));
     const std::string html = read_bytes(folder / "out/index.html");
@@ -333,7 +339,12 @@ TEST(PageTest, words_cannot_break_out_of_a_page) {
 }
 
 TEST(PageTest, a_plot_shows_each_finite_point_and_no_other) {
-    page::Plot plot{"t", "x", "y", {{"s", {{1, 2, "one"}, {10, std::nan(""), "lost"}, {0, 1, "not on a log axis"}, {100, 3, "two", true}}}}, true};
+    page::Plot plot{
+        "t",
+        "x",
+        "y",
+        {{"s", {{1, 2, "one"}, {10, std::nan(""), "lost"}, {0, 1, "not on a log axis"}, {100, 3, "two", true}}}},
+        true};
     const std::string drawn = page::svg(plot);
     EXPECT_TRUE(says(drawn, "<title>one</title>"));
     EXPECT_TRUE(says(drawn, "<title>two</title>"));
@@ -360,27 +371,31 @@ TEST_F(MeasureTest, a_fit_is_no_worse_on_its_captures_and_run_takes_it) {
     const double multiplier = fitted["settings"]["method cacao"]["cacao.shadow-multiplier"];
     const double power = fitted["settings"]["method cacao"]["cacao.shadow-power"];
 
-    const Ran used = run_program(fmt::format("run {} -o {} --write ao --settings {} --cacao.shadow-power 2", capture(), out(), file));
+    const Ran used = run_program(
+        fmt::format("run {} -o {} --write ao --settings {} --cacao.shadow-power 2", capture(), out(), file));
     ASSERT_EQ(used.exit_code, 0) << used.err;
     const json settings = read(folder / "out/manifest.json")["settings"]["method cacao"];
     EXPECT_NEAR(settings["cacao.shadow-multiplier"].get<double>(), multiplier, 1e-5);
     EXPECT_EQ(settings["cacao.shadow-power"], 2) << "flags win over the file's " << power;
 
-    const Ran again = run_program(fmt::format("run {} -o {}/again --write ao --settings {}/manifest.json", capture(), out(), out()));
+    const Ran again =
+        run_program(fmt::format("run {} -o {}/again --write ao --settings {}/manifest.json", capture(), out(), out()));
     ASSERT_EQ(again.exit_code, 0) << again.err;
-    EXPECT_EQ(read(folder / "out/again/manifest.json")["settings"]["method cacao"], settings) << "a manifest serves, too";
+    EXPECT_EQ(read(folder / "out/again/manifest.json")["settings"]["method cacao"], settings)
+        << "a manifest serves, too";
 }
 
 TEST_F(MeasureTest, a_fit_refuses_what_it_cannot_do) {
     const std::string file = (folder / "look.json").string();
     for (const char* flags : {"--free quality", "--free beauty", "", "--free shadow-power --held-out"})
         EXPECT_EQ(run_program(fmt::format("calibrate-look {} -o {} {}", capture(), file, flags)).exit_code, 1) << flags;
-    const Ran same = run_program(fmt::format("calibrate-look {0} -o {1} --free shadow-power --held-out {0}", capture(), file));
+    const Ran same =
+        run_program(fmt::format("calibrate-look {0} -o {1} --free shadow-power --held-out {0}", capture(), file));
     EXPECT_EQ(same.exit_code, 1);
     EXPECT_TRUE(says(same.err, "training capture"));
     tests::write_capture(folder / "recorded", 1);
-    const Ran none = run_program(
-        fmt::format("calibrate-look {} -o {} --free shadow-power", (folder / "recorded").string(), file));
+    const Ran none =
+        run_program(fmt::format("calibrate-look {} -o {} --free shadow-power", (folder / "recorded").string(), file));
     EXPECT_EQ(none.exit_code, 3);
     EXPECT_TRUE(says(none.err, "truth/ao"));
 }
@@ -389,7 +404,9 @@ TEST_F(MeasureTest, a_file_that_holds_no_settings_is_refused) {
     std::ofstream(folder / "odd.json") << "{\"settings\": {\"method cacao\": {\"cacao.colour\": 3}}}";
     std::ofstream(folder / "no.json") << "settings";
     for (const char* file : {"odd.json", "no.json", "nowhere.json"})
-        EXPECT_EQ(run_program(fmt::format("run {} -o {} --settings {}", capture(), out(), (folder / file).string())).exit_code, 1)
+        EXPECT_EQ(run_program(fmt::format("run {} -o {} --settings {}", capture(), out(), (folder / file).string()))
+                      .exit_code,
+                  1)
             << file;
 }
 

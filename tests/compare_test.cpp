@@ -17,8 +17,8 @@ cv::Mat1f wavy(cv::Size size) {
     cv::Mat1f map(size);
     for (int y = 0; y < size.height; ++y)
         for (int x = 0; x < size.width; ++x)
-            map(y, x) = 0.5F + 0.4F * std::sin(0.3F * static_cast<float>(y)) *
-                                   static_cast<float>(x) / static_cast<float>(size.width);
+            map(y, x) = 0.5F + 0.4F * std::sin(0.3F * static_cast<float>(y)) * static_cast<float>(x) /
+                                   static_cast<float>(size.width);
     return map;
 }
 
