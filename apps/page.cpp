@@ -7,6 +7,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 namespace scanshade::page {
 namespace {
@@ -163,6 +164,8 @@ std::string legend(const Plot& plot) {
     return drawn;
 }
 
+constexpr int figure_width = 340; ///< px, as the style has it: a page of fifty pictures stays below some megabytes
+
 std::string base64(const std::vector<uchar>& bytes) {
     constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     std::string coded;
@@ -252,8 +255,12 @@ std::string table(const std::vector<std::string>& heads, const std::vector<std::
 }
 
 std::string figure(const cv::Mat3b& picture, std::string_view caption) {
+    cv::Mat3b shown = picture;
+    if (picture.cols > figure_width)
+        cv::resize(picture, shown, {figure_width, std::max(1, picture.rows * figure_width / picture.cols)}, 0, 0,
+                   cv::INTER_AREA);
     std::vector<uchar> bytes;
-    if (!cv::imencode(".png", picture, bytes))
+    if (!cv::imencode(".png", shown, bytes))
         throw Error(fmt::format("picture '{}' cannot be encoded", caption));
     return fmt::format("<figure><img alt=\"\" src=\"data:image/png;base64,{}\"><figcaption>{}</figcaption></figure>\n",
                        base64(bytes), escaped(caption));

@@ -44,7 +44,7 @@ struct Plot {
 [[nodiscard]] std::string table(const std::vector<std::string>& heads,
                                 const std::vector<std::vector<std::string>>& rows,
                                 const std::vector<bool>& marked = {});
-/// The picture inside the page, as PNG.
+/// The picture inside the page, as PNG, made smaller where it is wider than the page shows it.
 [[nodiscard]] std::string figure(const cv::Mat3b& picture, std::string_view caption);
 [[nodiscard]] std::string paragraph(std::string_view text);
 
