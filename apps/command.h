@@ -46,6 +46,9 @@ struct CommandRow {
 
 std::unique_ptr<Command> inspect_command();
 std::unique_ptr<Command> run_command();
+std::unique_ptr<Command> compare_command();
+std::unique_ptr<Command> bench_command();
+std::unique_ptr<Command> calibrate_command();
 std::unique_ptr<Command> generate_command();
 std::unique_ptr<Command> methods_command();
 std::unique_ptr<Command> devices_command();

@@ -1,5 +1,6 @@
 // The program: the table of commands, their help, and the exit codes.
 #include "apps/command.h"
+#include "apps/settings_file.h"
 #include "projection/error.h"
 
 #include <algorithm>
@@ -14,6 +15,11 @@ namespace {
 const std::array commands = {
     CommandRow{"inspect", "what is in a capture: frames, sizes, depth range, holes, camera, poses", inspect_command},
     CommandRow{"run", "ambient occlusion for every frame: maps, shaded pictures, clouds, a report", run_command},
+    CommandRow{"compare", "two results, or a result and truth, as numbers and difference pictures", compare_command},
+    CommandRow{"bench", "methods and settings against truth: milliseconds, errors, the front, as one page",
+               bench_command},
+    CommandRow{"calibrate-look", "fits a method's free settings to truth, judges them on other captures",
+               calibrate_command},
     CommandRow{"generate", "a capture of a synthetic scene with exact truth", generate_command},
     CommandRow{"methods", "the ambient-occlusion methods there are", methods_command},
     CommandRow{"devices", "the Vulkan devices there are", devices_command},
@@ -31,8 +37,8 @@ const CommandRow& command_named(const std::string& name) {
 void print_overview() {
     fmt::print("scanshade {}: ambient occlusion for recorded depth images and point clouds\n\n", SCANSHADE_VERSION);
     for (const CommandRow& row : commands)
-        fmt::print("  scanshade {:<10} {}\n", row.name, row.summary);
-    fmt::print("  scanshade {:<10} {}\n  scanshade {:<10} {}\n", "help",
+        fmt::print("  scanshade {:<14} {}\n", row.name, row.summary);
+    fmt::print("  scanshade {:<14} {}\n  scanshade {:<14} {}\n", "help",
                "this, or the flags of one command: help COMMAND", "--version", "the version");
     fmt::print("\nExit code: 0 all well, 1 misuse, 2 some frames failed, 3 nothing could be done.\n");
 }
@@ -68,10 +74,13 @@ void print_help(const CommandRow& row) {
 
 // ---------------------------------------------------------------------------------------------------- flags
 
-/// A switch is given as --name or --name=false; everything else takes a value.
+/// A switch is given as --name or --name=false; everything else takes a value. --settings FILE gives others theirs,
+/// unless they stand on the command line themselves.
 void add_flag(CLI::App& parser, const Parameter& row) {
     const std::string names = flag_names(row);
-    if (is_switch(row))
+    if (row.name == settings_flag)
+        parser.set_config(names)->each([row](const std::string& text) { set(row, text); });
+    else if (is_switch(row))
         parser.add_flag_function(names, [row](std::int64_t given) { set(row, given > 0 ? "true" : "false"); });
     else
         parser.add_option_function<std::string>(names, [row](const std::string& text) { set(row, text); });
@@ -81,6 +90,8 @@ void add_flag(CLI::App& parser, const Parameter& row) {
 void parse(Command& command, std::vector<std::string> arguments) {
     CLI::App parser;
     parser.set_help_flag();
+    parser.config_formatter(std::make_shared<SettingsFile>());
+    parser.allow_config_extras(CLI::config_extras_mode::error);
     const Words words = command.words();
     if (words.values)
         parser.add_option(words.name, *words.values)

@@ -96,6 +96,24 @@ float facing(const cv::Mat1f& inverse, cv::Point at, const Pinhole& camera) {
     return length > 0 ? static_cast<float>(std::abs(normal.dot(ray)) / length) : 0;
 }
 
+constexpr int white_at = 127; // of the 255 diverging colours
+
+/// Blue over white to red, BGR.
+std::vector<cv::Vec3b> diverging_colours() {
+    const cv::Vec3f white(97, 0, 0), blue(46, 8, -54), red(46, 46.4F, 28.9F); // L*, a*, b*
+    cv::Mat3f lab(1, 2 * white_at + 1), bgr;
+    for (int i = -white_at; i <= white_at; ++i) {
+        const float share = static_cast<float>(std::abs(i)) / white_at;
+        lab(0, i + white_at) = white + share * ((i < 0 ? blue : red) - white);
+    }
+    cv::cvtColor(lab, bgr, cv::COLOR_Lab2BGR);
+    std::vector<cv::Vec3b> colours;
+    for (const cv::Vec3f& colour : bgr)
+        colours.emplace_back(cv::saturate_cast<uchar>(255 * colour[0]), cv::saturate_cast<uchar>(255 * colour[1]),
+                             cv::saturate_cast<uchar>(255 * colour[2]));
+    return colours;
+}
+
 cv::Mat3b with_title(const Tile& tile, cv::Size size) {
     constexpr int strip = 28;
     cv::Mat3b titled(size.height + strip, size.width, cv::Vec3b(32, 32, 32));
@@ -127,15 +145,36 @@ cv::Mat3b visibility_picture(const cv::Mat1f& visibility) {
     return picture;
 }
 
-cv::Mat3b clay(const cv::Mat1f& z_m, const Pinhole& camera) {
+cv::Mat3b difference_picture(const cv::Mat1f& difference, double full_scale) {
+    static const std::vector<cv::Vec3b> colours = diverging_colours();
+    cv::Mat3b picture(difference.size());
+    std::transform(difference.begin(), difference.end(), picture.begin(), [&](float d) {
+        if (std::isnan(d))
+            return no_surface;
+        const double place = std::clamp(d / full_scale, -1.0, 1.0) * white_at;
+        return colours[static_cast<std::size_t>(std::lround(place) + white_at)];
+    });
+    return picture;
+}
+
+cv::Mat1f facing_camera(const cv::Mat1f& z_m, const Pinhole& camera) {
     cv::Mat1f inverse(z_m.size());
     std::transform(z_m.begin(), z_m.end(), inverse.begin(), [](float z) { return z > 0 ? 1 / z : 0.0f; });
     inverse = smoothed(smoothed(inverse, true), false);
-    cv::Mat3b picture(z_m.size(), no_surface);
+    cv::Mat1f cosine(z_m.size(), 0.0f);
     for (int v = 0; v < z_m.rows; ++v)
         for (int u = 0; u < z_m.cols; ++u)
             if (inverse(v, u) > 0)
-                picture(v, u) = cv::Vec3b::all(cv::saturate_cast<uchar>(70 + 165 * facing(inverse, {u, v}, camera)));
+                cosine(v, u) = facing(inverse, {u, v}, camera);
+    return cosine;
+}
+
+cv::Mat3b clay(const cv::Mat1f& z_m, const Pinhole& camera) {
+    const cv::Mat1f cosine = facing_camera(z_m, camera);
+    cv::Mat3b picture(z_m.size());
+    std::transform(z_m.begin(), z_m.end(), cosine.begin(), picture.begin(), [](float z, float c) {
+        return z > 0 ? cv::Vec3b::all(cv::saturate_cast<uchar>(70 + 165 * c)) : no_surface;
+    });
     return picture;
 }
 

@@ -1,11 +1,12 @@
 // What a run leaves beside its pictures: frames.csv, a row per frame, and manifest.json, enough to run it again.
 #include "apps/report.h"
 
+#include "apps/command_line.h"
+#include "apps/figures.h"
 #include "apps/json.h"
 #include "io/output_file.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <ctime>
 #include <fmt/chrono.h>
@@ -17,26 +18,17 @@
 namespace scanshade {
 namespace {
 
-std::string quoted(const std::string& field) {
-    if (field.find_first_of(",\"\r\n") == std::string::npos)
-        return field;
-    std::string text = "\"";
-    for (const char c : field)
-        text += c == '"' ? std::string("\"\"") : std::string(1, c);
-    return text + '"';
-}
-
 std::string number(double value, int digits) { return std::isnan(value) ? "" : fmt::format("{:.{}f}", value, digits); }
 
 std::string csv_line(const FrameRow& row) {
     const auto ms = [](double value) { return number(value, 2); };
     const bool loaded = !row.size.empty();
-    return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.index, quoted(row.name),
-                       name_of(row.status), quoted(row.why), loaded ? std::to_string(row.size.width) : "",
+    return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.index, csv_field(row.name),
+                       name_of(row.status), csv_field(row.why), loaded ? std::to_string(row.size.width) : "",
                        loaded ? std::to_string(row.size.height) : "", number(row.valid_share, 4),
                        number(row.coverage, 4), number(row.mean_visibility, 4), ms(row.ms.load), ms(row.ms.project),
                        ms(row.ms.compute), ms(row.ms.attach), ms(row.ms.write),
-                       quoted(fmt::format("{}", fmt::join(row.warnings, "; "))));
+                       csv_field(fmt::format("{}", fmt::join(row.warnings, "; "))));
 }
 
 /// JSON knows no NaN: what is not known is null.
@@ -121,29 +113,6 @@ double peak_memory_mib() {
     return std::nan("");
 }
 
-/// A word as a shell would take it back.
-std::string as_typed(const std::string& word) {
-    const bool plain = std::ranges::all_of(word, [](unsigned char c) {
-        return std::isalnum(c) || c >= 0x80 ||
-               std::string_view("_-+=.,:/@%").find(static_cast<char>(c)) != std::string_view::npos;
-    });
-    if (plain && !word.empty())
-        return word;
-    std::string text = "'";
-    for (const char c : word)
-        text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    return text + "'";
-}
-
-/// What was typed, as the kernel keeps it.
-std::string command_line() {
-    std::ifstream words("/proc/self/cmdline");
-    std::string line;
-    for (std::string word; std::getline(words, word, '\0'); line += as_typed(word))
-        line += line.empty() ? "" : " ";
-    return line;
-}
-
 json totals_json(const RunReport& report) {
     StageTimes sum;
     for (const FrameRow& row : report.frames)
@@ -194,6 +163,7 @@ void write_manifest(const std::filesystem::path& file, const RunReport& report) 
               {"settings", settings_json(report.settings)},
               {"capture", capture_json(report)},
               {"depth_noise", report.depth_noise},
+              {"budget", report.budget},
               {"shading", report.shading},
               {"totals", totals_json(report)},
               {"frames", json::array()}};

@@ -22,6 +22,7 @@ struct RunReport {
     Registration registration = Registration::unknown; ///< as used
     std::string registration_reason;
     std::string depth_noise; ///< of the recorded depth, who says so, and what is done about it
+    std::vector<std::string> budget; ///< what an error or time budget picked, expects and found; empty without one
     std::string shading; ///< what the shaded pictures show, and why
     std::vector<FrameRow> frames;
     double took_ms = 0; ///< from the first frame's begin to the last one's end

@@ -3,9 +3,12 @@
 #include "ao/gpu/device.h"
 #include "ao/method.h"
 #include "apps/batch.h"
+#include "apps/budget.h"
 #include "apps/command.h"
 #include "apps/progress.h"
 #include "apps/report.h"
+#include "apps/settings_file.h"
+#include "apps/trial.h"
 #include "io/output_file.h"
 #include "projection/error.h"
 #include "projection/project.h"
@@ -78,7 +81,8 @@ struct RunSettings {
     std::vector<std::string> paths;
     std::string frames, camera, depth_scale, registered = "auto", depth_noise = "auto";
     double association_limit_s = 0.02;
-    std::string method = "cacao", radius, quality, device;
+    std::string method = "cacao", radius, quality, device, settings;
+    Budget budget;
     std::string out, write = "auto", format = "png16";
     double shade_strength = 1;
     bool colour_cloud = false, overwrite = false;
@@ -187,6 +191,8 @@ void introduce(const RunReport& report) {
     say("  depth noise: " + report.depth_noise);
     for (const std::string& warning : capture.warnings)
         say("  warning: " + warning);
+    for (const std::string& sentence : report.budget)
+        say("  " + sentence);
     say("  " + report.shading);
 }
 
@@ -233,7 +239,8 @@ class Run final : public Command {
 
     int run() override {
         check_settings();
-        MethodSetup& setup = chosen_setup();
+        if (!asked_.budget.any())
+            (void)chosen_setup(); // refuses before anything is opened
         int unopened = 0;
         std::vector<Job> jobs = plan(unopened);
         for (const Job& job : jobs)
@@ -243,14 +250,12 @@ class Run final : public Command {
             return nothing_done;
 
         gpu::Device device(asked_.device);
-        const std::unique_ptr<Method> method = setup.make(device);
-        say(fmt::format("{} on {} ({})", asked_.method, device.info().name, device.info().driver));
         cv::setNumThreads(1); // frames are the parallelism; threads inside a frame would only compete with them
         end_gracefully_on_signals();
         std::vector<FrameRow> rows;
         for (const Job& job : jobs)
             if (!interrupted)
-                std::ranges::move(process(job, *method, device), std::back_inserter(rows));
+                std::ranges::move(process(job, device), std::back_inserter(rows));
         return exit_code(rows, unopened);
     }
 
@@ -269,7 +274,8 @@ class Run final : public Command {
                .value = &s.registered,
                .choices = {"auto", "yes", "no"}},
               {"depth-noise",
-               "sigma of one depth value, FLOOR,PER_Z2 for FLOOR + PER_Z2 z^2 metres, or auto (measured), none, kinect, tof; where "
+               "sigma of one depth value, FLOOR,PER_Z2 for FLOOR + PER_Z2 z^2 metres, or auto (measured), none, "
+               "kinect, tof; where "
                "there is any, depth and normals come from plane fits",
                &s.depth_noise},
               {"association-limit", "colour, depth and poses farther apart in time are not paired",
@@ -281,6 +287,24 @@ class Run final : public Command {
                .choices = method_names()},
               {"radius", "how far away a surface may still occlude, in metres" + radius, &s.radius},
               {"quality", "the method's quality level" + quality, &s.quality},
+              {"max-error",
+               "picks method and quality: the cheapest within this RMSE to truth; 0 = no limit",
+               &s.budget.max_error,
+               "",
+               0,
+               1,
+               {}},
+              {"max-ms",
+               "picks method and quality: the most accurate within these device milliseconds per frame; 0 = no limit",
+               &s.budget.max_ms,
+               "ms",
+               0,
+               1e6,
+               {}},
+              {std::string(settings_flag),
+               "file of settings, from calibrate-look or an earlier run's manifest.json; flags given "
+               "here win",
+               &s.settings},
               {"device", "index or part of the name of a Vulkan device; empty = the fastest kind", &s.device}}},
             {"output",
              {{"out", "folder of the results; several captures get a folder each in it", &s.out},
@@ -294,13 +318,6 @@ class Run final : public Command {
               {"overwrite", "replace the results of an earlier run", &s.overwrite}}}};
     }
 
-    Stage method_stage(std::string_view name, MethodSetup& setup) {
-        Stage stage{fmt::format("method {}", name), setup.parameters()};
-        for (Parameter& row : stage.rows)
-            row.name = fmt::format("{}.{}", name, row.name);
-        return stage;
-    }
-
     static std::vector<std::string> method_names() {
         std::vector<std::string> names;
         for (const MethodRow& row : methods())
@@ -308,19 +325,14 @@ class Run final : public Command {
         return names;
     }
 
-    static const Parameter* find(const std::vector<Parameter>& rows, std::string_view name) {
-        const auto row = std::ranges::find(rows, name, &Parameter::name);
-        return row == rows.end() ? nullptr : &*row;
-    }
-
     /// What --radius and --quality are when not given, as their help says it.
     std::pair<std::string, std::string> method_defaults() {
         std::string radius, quality;
         for (const auto& [name, setup] : setups_) {
             const std::vector<Parameter> rows = setup->parameters();
-            if (const Parameter* row = find(rows, "radius"))
+            if (const Parameter* row = row_named(rows, "radius"))
                 radius += fmt::format("; {}: {} by default", name, value_text(*row));
-            if (const Parameter* row = find(rows, "quality"))
+            if (const Parameter* row = row_named(rows, "quality"))
                 quality += fmt::format("; {}: {}, {} by default", name, range_text(*row), value_text(*row));
         }
         return {radius, quality};
@@ -332,6 +344,8 @@ class Run final : public Command {
         outputs_ = outputs_from(asked_);
         if (asked_.depth_noise != "auto")
             (void)noise_from_text(asked_.depth_noise);
+        if (asked_.budget.any() && !asked_.quality.empty())
+            throw Misuse("a budget (--max-error, --max-ms) picks the quality: leave --quality out");
         if (!asked_.depth_scale.empty())
             (void)depth_encoding(asked_.depth_scale, "--depth-scale");
     }
@@ -343,7 +357,7 @@ class Run final : public Command {
         for (const auto& [name, text] : {std::pair("radius", asked_.radius), std::pair("quality", asked_.quality)}) {
             if (text.empty())
                 continue;
-            const Parameter* row = find(rows, name);
+            const Parameter* row = row_named(rows, name);
             if (!row)
                 throw Misuse(fmt::format("{}: the method {} has no such setting", name, asked_.method));
             set(*row, text);
@@ -387,6 +401,7 @@ class Run final : public Command {
                          .registration = registration,
                          .registration_reason = said ? "--registered" : job.capture.registration_reason,
                          .depth_noise = {},
+                         .budget = {},
                          .shading = shading_sentence(job.capture, registration),
                          .frames = {}};
         for (const auto& [name, setup] : setups_)
@@ -395,16 +410,39 @@ class Run final : public Command {
         return report;
     }
 
-    std::vector<FrameRow> process(Job job, Method& plain, gpu::Device& device) {
-        job.batch.point_method = dynamic_cast<PointMethod*>(&plain);
+    /// Picks method and settings for the capture, from where the command line left them. Says what it did.
+    std::vector<std::string> keep_to_budget(const Job& job, gpu::Device& device) {
+        const TrialRequest request{.depth_noise = asked_.depth_noise,
+                                   .capture = {asked_.camera, asked_.depth_scale, asked_.association_limit_s},
+                                   .among = job.batch.frames,
+                                   .leave_bad_out = true};
+        const TrialCapture trial = load_trial(job.capture.path, request);
+        const double radius_m = asked_.radius.empty() ? request.radius_m : std::stod(asked_.radius);
+        const Choice choice = choose(device, shipped_front(), trial, radius_m, asked_.budget);
+        if (!before_budget_.settings.empty())
+            apply(before_budget_, chosen_setup());
+        asked_.method = choice.configuration.method;
+        MethodSetup& setup = chosen_setup();
+        before_budget_ = {asked_.method, "as given", values_of(setup)};
+        apply(choice.configuration, setup);
+        return choice.sentences;
+    }
+
+    std::vector<FrameRow> process(Job job, gpu::Device& device) {
         const fs::path& folder = job.batch.outputs.folder;
-        const DepthNoise noise = asked_.depth_noise == "auto" ? noise_of(job) : noise_from_text(asked_.depth_noise);
+        const std::vector<std::string> budget =
+            asked_.budget.any() ? keep_to_budget(job, device) : std::vector<std::string>{};
+        const std::unique_ptr<Method> plain = chosen_setup().make(device);
+        job.batch.point_method = dynamic_cast<PointMethod*>(plain.get());
+        say(fmt::format("{} on {} ({})", asked_.method, device.info().name, device.info().driver));
+        const DepthNoise noise = noise_of(job.capture, job.batch.frames, asked_.depth_noise);
         std::optional<OnFittedDepth> fitted;
         if (noise.any())
-            fitted.emplace(device, noise, plain);
-        Method& method = fitted ? *fitted : plain;
+            fitted.emplace(device, noise, *plain);
+        Method& method = fitted ? static_cast<Method&>(*fitted) : *plain;
         RunReport report = report_on(job, device.info());
         report.depth_noise = noise_sentence(noise);
+        report.budget = budget;
         report.frames.resize(job.batch.frames.size());
         introduce(report);
         prepare_folder(folder);
@@ -417,23 +455,6 @@ class Run final : public Command {
         write_manifest(folder / "manifest.json", report);
         conclude(report, folder);
         return report.frames;
-    }
-
-    /// What recorded depth is worth, from a few frames spread over the capture. A cloud without a grid has no sensor's image.
-    static DepthNoise noise_of(const Job& job) {
-        constexpr std::size_t most = 5;
-        std::vector<DepthImage> images;
-        const auto& frames = job.batch.frames;
-        const std::size_t tried = std::min(most, frames.size());
-        for (std::size_t i = 0; i < tried; ++i) {
-            try {
-                const Frame frame = job.capture.load(frames[i * frames.size() / tried]);
-                if (!frame.cloud || frame.cloud->organised())
-                    images.push_back(project(frame));
-            } catch (const std::exception&) { // the batch says what is wrong with it
-            }
-        }
-        return measure_noise(images);
     }
 
     std::string noise_sentence(const DepthNoise& noise) const {
@@ -451,6 +472,7 @@ class Run final : public Command {
 
     RunSettings asked_;
     Outputs outputs_;
+    Configuration before_budget_; ///< of the method that a budget picked for the capture before this one
     std::vector<std::pair<std::string, std::unique_ptr<MethodSetup>>> setups_;
 };
 

@@ -21,6 +21,7 @@ constexpr std::size_t enough = 400; // samples for a band to speak
 
 struct Band {
     std::vector<float> spread_m; // |second difference| of depth, scaled to one value's deviation
+    std::vector<float> depths_m; // at their middles
     double z_sum = 0;
 };
 
@@ -41,6 +42,7 @@ void collect(const cv::Mat1f& z, std::array<Band, bands>& all) {
             const float c = z(y, x);
             if (!(c > nearest_m && c < farthest_m)) continue;
             Band& band = all[static_cast<std::size_t>(std::min(band_of(c), bands - 1))];
+            band.depths_m.push_back(c);
             for (const auto& [dx, dy] : {std::pair{lag_px, 0}, std::pair{0, lag_px}}) {
                 const float d = second_difference(z, x, y, dx, dy);
                 if (d < 0) continue;
@@ -53,6 +55,35 @@ void collect(const cv::Mat1f& z, std::array<Band, bands>& all) {
 struct Measured {
     double z, sigma, weight;
 };
+
+/// Sigma from the mean of the smallest `share` of the differences, were they Gaussian; `mean_of_share` is that mean for sigma 1.
+/// A second difference of three independent values has sqrt(6) times the deviation of one.
+double sigma_of(std::vector<float>& spread_m, double share, double mean_of_share) {
+    const double count = share * static_cast<double>(spread_m.size());
+    const auto at = spread_m.begin() + static_cast<std::ptrdiff_t>(count);
+    std::nth_element(spread_m.begin(), at, spread_m.end());
+    return std::accumulate(spread_m.begin(), at, 0.0) / count / (mean_of_share * std::sqrt(6.0));
+}
+
+/// The usual distance between neighbouring values that occur: the sensor's step where it has one.
+double step_of(std::vector<float>& depths_m) {
+    std::sort(depths_m.begin(), depths_m.end());
+    depths_m.erase(std::unique(depths_m.begin(), depths_m.end()), depths_m.end());
+    if (depths_m.size() < 2) return 0;
+    std::vector<float> gaps(depths_m.size() - 1);
+    for (std::size_t i = 0; i < gaps.size(); ++i) gaps[i] = depths_m[i + 1] - depths_m[i];
+    const auto middle = gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2);
+    std::nth_element(gaps.begin(), middle, gaps.end());
+    return *middle;
+}
+
+/// The lower 80 % of |N(0, 1)| have the mean 0.5586, the lower 40 % 0.2563. Among clutter more than a fifth of the differences
+/// straddle an edge, so the smaller share decides; but not where the values come in steps: there many differences are exactly
+/// zero, and the steps are the noise.
+double sigma_of(Band& band) {
+    const double most = sigma_of(band.spread_m, 0.8, 0.5586), few = sigma_of(band.spread_m, 0.4, 0.2563);
+    return step_of(band.depths_m) >= 0.5 * most ? most : std::min(most, few);
+}
 
 /// floor + per_z2 z^2 through the bands by least squares of relative error, both terms at least zero.
 DepthNoise law_through(const std::vector<Measured>& points) {
@@ -82,13 +113,8 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
     std::vector<Measured> points;
     for (Band& band : all) {
         if (band.spread_m.size() < enough) continue;
-        // The lower 80 % of |N(0, s)| have the mean 0.5586 s; a second difference of three independent values has s = sqrt(6)
-        // sigma. Not a quantile: in coarse steps more than half of the differences are exactly zero.
         const double count = static_cast<double>(band.spread_m.size());
-        const auto at = band.spread_m.begin() + static_cast<std::ptrdiff_t>(0.8 * count);
-        std::nth_element(band.spread_m.begin(), at, band.spread_m.end());
-        const double mean = std::accumulate(band.spread_m.begin(), at, 0.0) / (0.8 * count);
-        const double sigma = mean / (0.5586 * std::sqrt(6.0));
+        const double sigma = sigma_of(band);
         points.push_back({band.z_sum / count, std::max(sigma, 1e-6), count});
     }
     if (points.empty()) return {};

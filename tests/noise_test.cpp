@@ -54,6 +54,22 @@ TEST(noise, clean_depth_has_none) {
     EXPECT_FALSE(measure_noise(images).any()) << describe(measure_noise(images));
 }
 
+TEST(noise, clutter_is_not_noise) {
+    // Blocks of 16 pixels, each its own slanted plane: half of all differences over 4 + 4 pixels straddle an edge.
+    const Pinhole camera = test_camera({320, 240});
+    DepthImage blocks{camera, cv::Mat1f(camera.size), {}};
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> depth(0.8, 4), slope(-1, 1);
+    for (int v = 0; v < 240; v += 16)
+        for (int u = 0; u < 320; u += 16) {
+            const double w = 1 / depth(random), along = slope(random) * w / 500, down = slope(random) * w / 500;
+            for (int y = v; y < v + 16; ++y)
+                for (int x = u; x < u + 16; ++x)
+                    blocks.z_m(y, x) = static_cast<float>(1 / (w + along * (x - u) + down * (y - v)));
+        }
+    EXPECT_FALSE(measure_noise(std::vector{blocks}).any()) << describe(measure_noise(std::vector{blocks}));
+}
+
 TEST(noise, a_known_law_is_measured) {
     const Pinhole camera = test_camera({320, 240});
     const DepthNoise kinect{0.001, 0.0018};

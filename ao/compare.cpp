@@ -1,0 +1,255 @@
+#include "ao/compare.h"
+
+#include "projection/error.h"
+
+#include <algorithm>
+#include <ceres/ceres.h>
+#include <cmath>
+#include <fmt/format.h>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+namespace scanshade {
+namespace {
+
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+void check_sizes(const cv::Mat1f& a, const cv::Mat1f& b) {
+    if (a.size() != b.size())
+        throw Error(fmt::format("maps of one size expected, found {}x{} and {}x{}", a.cols, a.rows, b.cols, b.rows));
+}
+
+/// Calls use(a, b) for the pixels that have a value in both.
+template <class Use>
+void each_pair(const cv::Mat1f& a, const cv::Mat1f& b, Use&& use) {
+    for (int y = 0; y < a.rows; ++y)
+        for (int x = 0; x < a.cols; ++x)
+            if (std::isfinite(a(y, x)) && std::isfinite(b(y, x)))
+                use(a(y, x), b(y, x));
+}
+
+// ---------------------------------------------------------------------------------------------------- the best look
+
+constexpr double darkest = 1e-4; // a power's slope at 0 is infinite below power 1, which no solver likes
+
+/// sqrt(n) (look(v) - mean truth) of one bin: the part of the squared error that a look can change.
+struct BinResidual {
+    double root_n, ours, truth;
+    template <class Number>
+    bool operator()(const Number* strength, const Number* power, Number* residual) const {
+        const Number light = Number(1) - *strength * Number(1 - ours);
+        const Number shown = light < Number(darkest) ? Number(darkest) : light > Number(1) ? Number(1) : light;
+        residual[0] = Number(root_n) * (pow(shown, *power) - Number(truth));
+        return true;
+    }
+};
+
+/// Where fits begin: as it is, weaker, and the two ends of the valley that strength and power share.
+constexpr std::array starts{Look{1, 1}, Look{0.5, 1}, Look{0.25, 4}, Look{1, 0.5}, Look{0.8, 2}};
+
+// ---------------------------------------------------------------------------------------------------- similarity
+
+constexpr int window = 11;
+
+cv::Mat1d blurred(const cv::Mat1d& image) {
+    cv::Mat1d mean;
+    cv::GaussianBlur(image, mean, {window, window}, 1.5, 1.5, cv::BORDER_REFLECT);
+    return mean;
+}
+
+cv::Mat1d blurred_product(const cv::Mat1d& p, const cv::Mat1d& q) {
+    cv::Mat1d product;
+    cv::multiply(p, q, product);
+    return blurred(product);
+}
+
+/// Holes as 0: they take part in no window that counts.
+cv::Mat1d filled(const cv::Mat1f& map) {
+    cv::Mat1d image(map.size());
+    std::transform(map.begin(), map.end(), image.begin(), [](float v) { return std::isfinite(v) ? double(v) : 0.0; });
+    return image;
+}
+
+/// 255 where the whole window lies inside the image and has a value in both maps.
+cv::Mat1b whole_windows(const cv::Mat1f& a, const cv::Mat1f& b) {
+    cv::Mat1b valid(a.size()), whole;
+    std::transform(a.begin(), a.end(), b.begin(), valid.begin(),
+                   [](float p, float q) { return std::isfinite(p) && std::isfinite(q) ? uchar(255) : uchar(0); });
+    cv::erode(valid, whole, cv::Mat1b::ones(window, window), {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
+    return whole;
+}
+
+/// Mean of the member over the images where it is known.
+double mean_of(const std::vector<Difference>& images, double Difference::*member) {
+    double sum = 0, count = 0;
+    for (const Difference& image : images)
+        if (std::isfinite(image.*member))
+            sum += image.*member, ++count;
+    return count > 0 ? sum / count : unknown;
+}
+
+double root_mean_square_of(const std::vector<Difference>& images, double Difference::*member) {
+    double sum = 0, count = 0;
+    for (const Difference& image : images)
+        if (std::isfinite(image.*member))
+            sum += image.*member * (image.*member), ++count;
+    return count > 0 ? std::sqrt(sum / count) : unknown;
+}
+
+} // namespace
+
+double Look::operator()(double visibility) const {
+    return std::pow(std::clamp(1 - strength * (1 - visibility), 0.0, 1.0), power);
+}
+
+void PairSums::add(float ours, float truth) {
+    const double v = std::clamp(static_cast<double>(ours), 0.0, 1.0), t = truth;
+    Bin& bin = bins_[static_cast<std::size_t>(std::min(static_cast<int>(v * bins), bins - 1))];
+    bin.n += 1;
+    bin.ours += v;
+    bin.truth += t;
+    bin.truth_squared += t * t;
+    ++count_;
+}
+
+void PairSums::add(const PairSums& other) {
+    for (std::size_t i = 0; i < bins_.size(); ++i) {
+        Bin& bin = bins_[i];
+        const Bin& more = other.bins_[i];
+        bin = {bin.n + more.n, bin.ours + more.ours, bin.truth + more.truth, bin.truth_squared + more.truth_squared};
+    }
+    count_ += other.count_;
+}
+
+double PairSums::rms(const Look& look) const {
+    double sum = 0;
+    for (const Bin& bin : bins_) {
+        if (bin.n == 0)
+            continue;
+        const double shown = look(bin.ours / bin.n);
+        sum += bin.n * shown * shown - 2 * shown * bin.truth + bin.truth_squared;
+    }
+    return count_ > 0 ? std::sqrt(std::max(sum, 0.0) / static_cast<double>(count_)) : unknown;
+}
+
+Look PairSums::best_look(const Look& least, const Look& most) const {
+    Look best;
+    if (count_ == 0)
+        return best;
+    for (Look look : starts) {
+        look = {std::clamp(look.strength, least.strength, most.strength),
+                std::clamp(look.power, least.power, most.power)};
+        ceres::Problem problem;
+        for (const Bin& bin : bins_)
+            if (bin.n > 0)
+                problem.AddResidualBlock(new ceres::AutoDiffCostFunction<BinResidual, 1, 1, 1>(
+                                             new BinResidual{std::sqrt(bin.n), bin.ours / bin.n, bin.truth / bin.n}),
+                                         nullptr, &look.strength, &look.power);
+        problem.SetParameterLowerBound(&look.strength, 0, least.strength);
+        problem.SetParameterUpperBound(&look.strength, 0, most.strength);
+        problem.SetParameterLowerBound(&look.power, 0, least.power);
+        problem.SetParameterUpperBound(&look.power, 0, most.power);
+        ceres::Solver::Options options;
+        options.linear_solver_type = ceres::DENSE_QR;
+        options.logging_type = ceres::SILENT;
+        ceres::Solver::Summary summary;
+        ceres::Solve(options, &problem, &summary);
+        if (rms(look) < rms(best))
+            best = look;
+    }
+    return best;
+}
+
+PairSums pair_sums(const cv::Mat1f& a, const cv::Mat1f& b) {
+    check_sizes(a, b);
+    PairSums sums;
+    each_pair(a, b, [&](float ours, float truth) { sums.add(ours, truth); });
+    return sums;
+}
+
+Difference compare(const cv::Mat1f& a, const cv::Mat1f& b) {
+    check_sizes(a, b);
+    Difference d;
+    std::vector<double> apart;
+    double sum = 0, square = 0, sum_a = 0, sum_b = 0;
+    each_pair(a, b, [&](double p, double q) {
+        apart.push_back(std::abs(p - q));
+        sum += apart.back();
+        square += (p - q) * (p - q);
+        sum_a += p;
+        sum_b += q;
+    });
+    d.pixels = apart.size();
+    d.only_a = static_cast<std::size_t>(cv::countNonZero(a == a)) - d.pixels; // a NaN differs from itself
+    d.only_b = static_cast<std::size_t>(cv::countNonZero(b == b)) - d.pixels;
+    if (apart.empty()) {
+        d.mae = d.rms = d.bias = d.percentile_95 = d.worst = d.ssim = d.correlation = d.calibrated_rms = unknown;
+        return d;
+    }
+    const auto n = static_cast<double>(apart.size());
+    d.mae = sum / n;
+    d.rms = std::sqrt(square / n);
+    d.bias = (sum_a - sum_b) / n;
+    const auto rank = static_cast<std::ptrdiff_t>(std::ceil(0.95 * n)) - 1;
+    std::nth_element(apart.begin(), apart.begin() + rank, apart.end());
+    d.percentile_95 = apart[static_cast<std::size_t>(rank)];
+    d.worst = *std::max_element(apart.begin() + rank, apart.end());
+
+    double spread_a = 0, spread_b = 0, together = 0;
+    const double mean_a = sum_a / n, mean_b = sum_b / n;
+    each_pair(a, b, [&](double p, double q) {
+        spread_a += (p - mean_a) * (p - mean_a);
+        spread_b += (q - mean_b) * (q - mean_b);
+        together += (p - mean_a) * (q - mean_b);
+    });
+    d.correlation = spread_a > 0 && spread_b > 0 ? together / std::sqrt(spread_a * spread_b) : unknown;
+    d.ssim = structural_similarity(a, b);
+    const PairSums pairs = pair_sums(a, b);
+    d.look = pairs.best_look();
+    d.calibrated_rms = pairs.rms(d.look);
+    return d;
+}
+
+Difference total(const std::vector<Difference>& images, const PairSums& pairs) {
+    Difference all;
+    all.worst = unknown;
+    for (const Difference& image : images) {
+        all.pixels += image.pixels;
+        all.only_a += image.only_a;
+        all.only_b += image.only_b;
+        all.worst = std::fmax(all.worst, image.worst);
+    }
+    all.mae = mean_of(images, &Difference::mae);
+    all.rms = root_mean_square_of(images, &Difference::rms);
+    all.bias = mean_of(images, &Difference::bias);
+    all.percentile_95 = mean_of(images, &Difference::percentile_95);
+    all.ssim = mean_of(images, &Difference::ssim);
+    all.correlation = mean_of(images, &Difference::correlation);
+    all.look = pairs.best_look();
+    all.calibrated_rms = pairs.rms(all.look);
+    return all;
+}
+
+double structural_similarity(const cv::Mat1f& a, const cv::Mat1f& b) {
+    check_sizes(a, b);
+    constexpr double c1 = 0.01 * 0.01, c2 = 0.03 * 0.03;
+    const cv::Mat1d p = filled(a), q = filled(b);
+    const cv::Mat1b counted = whole_windows(a, b);
+    const cv::Mat1d mean_p = blurred(p), mean_q = blurred(q);
+    const cv::Mat1d mean_pp = blurred_product(p, p), mean_qq = blurred_product(q, q), mean_pq = blurred_product(p, q);
+    double sum = 0, windows = 0;
+    for (int y = 0; y < p.rows; ++y)
+        for (int x = 0; x < p.cols; ++x) {
+            if (counted(y, x) == 0)
+                continue;
+            const double m = mean_p(y, x), n = mean_q(y, x);
+            const double variances = mean_pp(y, x) - m * m + mean_qq(y, x) - n * n;
+            const double covariance = mean_pq(y, x) - m * n;
+            sum += (2 * m * n + c1) * (2 * covariance + c2) / ((m * m + n * n + c1) * (variances + c2));
+            ++windows;
+        }
+    return windows > 0 ? sum / windows : unknown;
+}
+
+} // namespace scanshade

@@ -1,0 +1,147 @@
+// `scanshade compare`: how far the maps of one run are from those of another, or from truth, as numbers and pictures.
+#include "ao/compare.h"
+#include "apps/command.h"
+#include "apps/figures.h"
+#include "apps/json.h"
+#include "apps/map_set.h"
+#include "apps/picture.h"
+#include "io/image_file.h"
+#include "io/output_file.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+
+namespace scanshade {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What became of one pair of maps.
+struct Row {
+    std::string name;
+    Difference difference;
+    std::string why; ///< empty unless it failed
+};
+
+void say(const std::string& line) { fmt::print(stderr, "{}\n", line); }
+
+class Compare final : public Command {
+  public:
+    Words words() override {
+        return {"PATH",
+                "A and B: runs' outputs, folders of maps, maps, or as B a generated capture, whose truth is taken",
+                &paths_, 1, 2};
+    }
+
+    std::vector<Stage> stages() override {
+        return {{"input",
+                 {{"truth", "A is compared with the truth of the generated capture that it was made from", &truth_}}},
+                {"output",
+                 {{"out", "folder for difference/NAME.png, compare.csv and compare.json", &out_},
+                  {"scale", "difference shown in full blue (A too dark) or red (too bright)", &scale_, "", 1e-3, 1},
+                  {"overwrite", "replace an earlier comparison", &overwrite_}}}};
+    }
+
+    int run() override {
+        if (paths_.size() == 1 && !truth_)
+            throw Misuse("compare needs two PATHs, or one and --truth");
+        if (!out_.empty() && fs::exists(fs::path(out_) / "compare.json") && !overwrite_)
+            throw Misuse(out_ + "/compare.json exists already: --overwrite replaces it, or choose another -o");
+        const MapSet a = find_maps(paths_[0]);
+        const MapSet b = other_than(a);
+        introduce(a, b);
+        PairSums pairs;
+        std::vector<Row> rows;
+        for (const MapPair& pair : paired(a, b))
+            rows.push_back(compared(pair, pairs));
+        return conclude(a, b, rows, pairs);
+    }
+
+  private:
+    MapSet other_than(const MapSet& a) const {
+        if (paths_.size() == 1)
+            return truth_of(a);
+        MapSet b = find_maps(paths_[1]);
+        if (truth_ && b.kind != "truth")
+            throw Misuse(fmt::format("--truth: {} is no generated capture with truth/ao", paths_[1]));
+        return b;
+    }
+
+    static void introduce(const MapSet& a, const MapSet& b) {
+        say(fmt::format("A {} ({}), {} maps", a.path.string(), a.kind, a.files.size()));
+        say(fmt::format("B {} ({}), {} maps", b.path.string(), b.kind, b.files.size()));
+        if (a.radius_m && b.radius_m && std::abs(*a.radius_m - *b.radius_m) > 1e-6 * *b.radius_m)
+            say(fmt::format("  warning: A was made with a radius of {:g} m, B with {:g} m: they show different things",
+                            *a.radius_m, *b.radius_m));
+    }
+
+    Row compared(const MapPair& pair, PairSums& pairs) const {
+        try {
+            const cv::Mat1f a = read_ao(pair.a), b = read_ao(pair.b);
+            Row row{pair.name, during(pair.a.string() + " and " + pair.b.string(), [&] { return compare(a, b); }), {}};
+            pairs.add(pair_sums(a, b));
+            if (!out_.empty())
+                write_difference(pair.name, a, b);
+            return row;
+        } catch (const std::exception& failure) {
+            say(fmt::format("failed: {}", failure.what()));
+            return {pair.name, {}, failure.what()};
+        }
+    }
+
+    void write_difference(const std::string& name, const cv::Mat1f& a, const cv::Mat1f& b) const {
+        cv::Mat1f apart;
+        cv::subtract(a, b, apart);
+        write_picture(fs::path(out_) / "difference" / (name + ".png"), difference_picture(apart, scale_));
+    }
+
+    int conclude(const MapSet& a, const MapSet& b, const std::vector<Row>& rows, const PairSums& pairs) const {
+        std::vector<Difference> good;
+        for (const Row& row : rows)
+            if (row.why.empty())
+                good.push_back(row.difference);
+        const Difference all = total(good, pairs);
+        print_table(rows, all);
+        const std::size_t alone = a.files.size() + b.files.size() - 2 * rows.size();
+        if (alone > 0)
+            say(fmt::format("{} maps have no partner of their name", alone));
+        if (!out_.empty())
+            write_reports(a, b, rows, all);
+        if (good.size() == rows.size())
+            return all_well;
+        return good.empty() ? nothing_done : some_failed;
+    }
+
+    static void print_table(const std::vector<Row>& rows, const Difference& all) {
+        fmt::print("{:<24}{}\n", "image", figure_heads());
+        for (const Row& row : rows)
+            fmt::print("{:<24}{}\n", row.name, row.why.empty() ? figure_cells(row.difference) : "  failed");
+        fmt::print("{:<24}{}\n", "all (rms over images)", figure_cells(all));
+    }
+
+    void write_reports(const MapSet& a, const MapSet& b, const std::vector<Row>& rows, const Difference& all) const {
+        std::string csv = "image," + figure_csv_heads() + ",why\n";
+        json images = json::array();
+        for (const Row& row : rows) {
+            csv += csv_field(row.name) + "," + figure_csv(row.difference) + "," + csv_field(row.why) + "\n";
+            images.push_back(row.why.empty() ? json{{"image", row.name}, {"difference", to_json(row.difference)}}
+                                             : json{{"image", row.name}, {"why", row.why}});
+        }
+        const json text{{"a", a.path.string()}, {"b", b.path.string()},  {"b_is", b.kind},
+                        {"scale", scale_},      {"total", to_json(all)}, {"images", images}};
+        write_atomically(fs::path(out_) / "compare.csv", csv);
+        write_atomically(fs::path(out_) / "compare.json", text_of(text) + "\n"); // last: it says that the rest is there
+    }
+
+    std::vector<std::string> paths_;
+    std::string out_;
+    double scale_ = 0.5;
+    bool truth_ = false, overwrite_ = false;
+};
+
+} // namespace
+
+std::unique_ptr<Command> compare_command() { return std::make_unique<Compare>(); }
+
+} // namespace scanshade

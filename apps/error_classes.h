@@ -1,0 +1,46 @@
+// Where errors live: pixels by their distance from depth edges, by how grazing they are seen, by range.
+#pragma once
+
+#include "projection/camera.h"
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+namespace scanshade {
+
+/// Each pixel's class, an index into `names`, or `none` where there is no depth.
+struct PixelClasses {
+    static constexpr unsigned char none = 255;
+    std::vector<std::string> names;
+    cv::Mat1b of;
+};
+
+/// By distance in pixels to the nearest pixel beside a jump of depth. A jump is where 1/z differs by more than 1 % and
+/// neither side's slope foretells the other (1/z is linear on planes), or where the depth ends.
+[[nodiscard]] PixelClasses by_edge_distance(const cv::Mat1f& z_m);
+/// By the angle between the surface's normal and the way to the camera.
+[[nodiscard]] PixelClasses by_grazing_angle(const cv::Mat1f& z_m, const Pinhole& camera);
+/// By depth.
+[[nodiscard]] PixelClasses by_range(const cv::Mat1f& z_m);
+
+/// Squared differences of two maps, gathered by class over any number of images.
+class ErrorByClass {
+  public:
+    /// All images have the same classes' names.
+    void add(const cv::Mat1f& a, const cv::Mat1f& b, const PixelClasses& classes);
+    void add(const ErrorByClass& other);
+    [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
+    [[nodiscard]] double pixels(std::size_t i) const { return sums_[i].n; }
+    /// Root mean square of the class; NaN where it has no pixel.
+    [[nodiscard]] double rms(std::size_t i) const;
+
+  private:
+    struct Sum {
+        double n = 0, squares = 0;
+    };
+    std::vector<std::string> names_;
+    std::vector<Sum> sums_;
+};
+
+} // namespace scanshade
