@@ -6,6 +6,7 @@
 #include "ao/hemisphere/hemisphere.h"
 #include "ao/luna/luna.h"
 #include "ao/method.h"
+#include "ao/surfel/surfel.h"
 #include "projection/error.h"
 
 namespace scanshade {
@@ -38,6 +39,8 @@ const std::vector<MethodRow>& methods() {
          SetupOf<GtaoOptions, Gtao>::start},
         {"bitmask", "gtao's slices with 32 sectors, so that what is seen has a thickness", "Therrien, Levesque, Gilet 2023",
          SetupOf<BitmaskOptions, Bitmask>::start},
+        {"surfel", "bitmask over pixels that have a direction and a thickness: the most accurate",
+         "own, after Therrien et al. 2023 and Jimenez et al. 2016", SetupOf<SurfelOptions, Surfel>::start},
     };
     return table;
 }

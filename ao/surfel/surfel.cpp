@@ -1,0 +1,69 @@
+#include "ao/surfel/surfel.h"
+
+#include "projection/error.h"
+#include "shaders/shared/surfel.h"
+
+#include <array>
+#include <string_view>
+
+namespace scanshade {
+namespace {
+
+struct Level {
+    std::string_view name;
+    int slices, steps;
+};
+constexpr std::array levels{Level{"low", 1, 4}, Level{"medium", 1, 8}, Level{"high", 2, 8}, Level{"highest", 2, 16}};
+
+/// Slices and steps of the quality, where none are given.
+SurfelOptions resolved(SurfelOptions options) {
+    options = checked(std::move(options));
+    for (const Level& level : levels)
+        if (level.name == options.quality) {
+            if (options.slices == 0) options.slices = level.slices;
+            if (options.steps == 0) options.steps = level.steps;
+        }
+    return options;
+}
+
+cv::Size words_of(cv::Size size) {
+    const auto words = [](int n) { return (n + shared::surfel_run - 1) / shared::surfel_run; };
+    return {words(size.width), words(size.height)};
+}
+
+} // namespace
+
+std::vector<Parameter> SurfelOptions::parameters() {
+    auto rows = screen.parameters();
+    rows.push_back({"quality", "8, 16, 32 or 64 reads a pixel", &quality, "", {}, {}, {"low", "medium", "high", "highest"}});
+    rows.push_back({"slices", "of the hemisphere; 0 = the quality's", &slices, "", 0, 64});
+    rows.push_back({"steps", "reads on either side of a slice; 0 = the quality's", &steps, "", 0, 256});
+    rows.push_back({"thinnest", "half the thickness of a surface at least", &thinnest, "radii", 0, 10});
+    rows.push_back({"thickest", "half the thickness of a surface at most; what is wider than twice this in the image is as thick",
+                    &thickest, "radii", 1e-3, 10});
+    return rows;
+}
+
+Surfel::Surfel(gpu::Device& device, const SurfelOptions& options)
+    : ScreenMethod(device, resolved(options).screen), options_(resolved(options)) {}
+
+void Surfel::add_passes(ScreenTables& tables) const {
+    using Texels = gpu::BufferRow::Texels;
+    constexpr auto none = gpu::BufferRow::Host::none;
+    const cv::Size words = words_of(tables.size);
+    const auto runs = static_cast<std::size_t>(words.width) * tables.size.height + static_cast<std::size_t>(words.height) * tables.size.width;
+    const int edges = tables.add_buffer({"edges", runs * 8, none, Texels::rg32ui});
+    const int surfels = tables.add_buffer({"surfels", tables.pixels() * 8, none, Texels::rg32ui});
+    tables.passes.push_back({"edges", "surfel/edges", {screen_depth}, {edges}, {static_cast<std::uint32_t>((runs + 63) / 64), 1, 1}, {}});
+    tables.add_pass("surfels", "surfel/surfels", {screen_depth, screen_normals, edges}, {surfels});
+    tables.add_pass("generate", "surfel/generate", {surfels, screen_normals, screen_noise}, {screen_raw, screen_coverage},
+                    {{shared::spec_slices, options_.slices}, {shared::spec_steps, options_.steps}});
+}
+
+std::vector<std::byte> Surfel::constants(const shared::ScreenConstants& screen) const {
+    const cv::Size words = words_of({screen.size.x, screen.size.y});
+    const float r = screen.radius;
+    return bytes_of(shared::SurfelConstants{screen, {words.width, words.height}, options_.thinnest * r, options_.thickest * r, 1, 0.05F * r, 0.3F * r});
+}
+
+} // namespace scanshade

@@ -1,0 +1,23 @@
+// What host and shaders share of the surfel bitmask (shaders/surfel).
+#ifndef SCANSHADE_SHARED_SURFEL_H
+#define SCANSHADE_SHARED_SURFEL_H
+#include "screen.h"
+SHARED_BEGIN
+
+const int surfel_run = 32; // pixels whose edges share a word
+
+struct SurfelConstants {
+    ScreenConstants screen;
+    ivec2 words;               // of edges: along a row, along a column
+    float thinnest, thickest;  // half a surfel's thickness at least and at most, metres
+    float lengthen;            // factor on the half lengths of surfels: few samples leave gaps
+    float jut;                 // metres by which what hides a surface's continuation stands in front of it
+    float longest;             // of what is added to a half length there, metres
+};
+
+// Specialization constants of generate.
+const int spec_slices = 10;
+const int spec_steps = 11; // on either side of a slice
+
+SHARED_END
+#endif
