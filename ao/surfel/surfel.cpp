@@ -53,7 +53,7 @@ void Surfel::add_passes(ScreenTables& tables) const {
     const cv::Size words = words_of(tables.size);
     const auto runs = static_cast<std::size_t>(words.width) * tables.size.height + static_cast<std::size_t>(words.height) * tables.size.width;
     const int edges = tables.add_buffer({"edges", runs * 8, none, Texels::rg32ui});
-    const int surfels = tables.add_buffer({"surfels", tables.pixels() * 8, none, Texels::rg32ui});
+    const int surfels = tables.add_buffer({"surfels", tables.pixels() * 16, none, Texels::rgba32f});
     tables.passes.push_back({"edges", "surfel/edges", {screen_depth}, {edges}, {static_cast<std::uint32_t>((runs + 63) / 64), 1, 1}, {}});
     tables.add_pass("surfels", "surfel/surfels", {screen_depth, screen_normals, edges}, {surfels});
     tables.add_pass("generate", "surfel/generate", {surfels, screen_normals, screen_noise}, {screen_raw, screen_coverage},
