@@ -31,6 +31,8 @@ cv::Size words_of(cv::Size size) {
     return {words(size.width), words(size.height)};
 }
 
+cv::Size plane_of(cv::Size size) { return {(size.width + 3) / 4, (size.height + 3) / 4}; }
+
 } // namespace
 
 std::vector<Parameter> SurfelOptions::parameters() {
@@ -53,17 +55,20 @@ void Surfel::add_passes(ScreenTables& tables) const {
     const cv::Size words = words_of(tables.size);
     const auto runs = static_cast<std::size_t>(words.width) * tables.size.height + static_cast<std::size_t>(words.height) * tables.size.width;
     const int edges = tables.add_buffer({"edges", runs * 8, none, Texels::rg32ui});
-    const int surfels = tables.add_buffer({"surfels", tables.pixels() * 16, none, Texels::rgba32f});
+    const int surfels = tables.add_buffer({"surfels", static_cast<std::size_t>(plane_of(tables.size).area()) * 16 * 16, none, Texels::rgba32f});
     tables.passes.push_back({"edges", "surfel/edges", {screen_depth}, {edges}, {static_cast<std::uint32_t>((runs + 63) / 64), 1, 1}, {}});
     tables.add_pass("surfels", "surfel/surfels", {screen_depth, screen_normals, edges}, {surfels});
-    tables.add_pass("generate", "surfel/generate", {surfels, screen_normals, screen_noise}, {screen_raw, screen_coverage},
-                    {{shared::spec_slices, options_.slices}, {shared::spec_steps, options_.steps}});
+    const cv::Size plane = plane_of(tables.size);
+    const auto groups = [](int n) { return static_cast<std::uint32_t>((n + shared::screen_tile - 1) / shared::screen_tile); };
+    tables.passes.push_back({"generate", "surfel/generate", {surfels, screen_normals, screen_noise}, {screen_raw, screen_coverage},
+                    {16 * groups(plane.width), groups(plane.height), 1}, {{shared::spec_slices, options_.slices}, {shared::spec_steps, options_.steps}}});
 }
 
 std::vector<std::byte> Surfel::constants(const shared::ScreenConstants& screen) const {
     const cv::Size words = words_of({screen.size.x, screen.size.y});
+    const cv::Size plane = plane_of({screen.size.x, screen.size.y});
     const float r = screen.radius;
-    return bytes_of(shared::SurfelConstants{screen, {words.width, words.height}, options_.thinnest * r, options_.thickest * r, 1, 0.05F * r, 0.3F * r});
+    return bytes_of(shared::SurfelConstants{screen, {words.width, words.height}, {plane.width, plane.height}, options_.thinnest * r, options_.thickest * r, 1, 0.05F * r, 0.3F * r});
 }
 
 } // namespace scanshade

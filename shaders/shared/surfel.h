@@ -9,6 +9,7 @@ const int surfel_run = 32; // pixels whose edges share a word
 struct SurfelConstants {
     ScreenConstants screen;
     ivec2 words;               // of edges: along a row, along a column
+    ivec2 plane;               // size of one of the 16 planes that the surfels are stored in
     float thinnest, thickest;  // half a surfel's thickness at least and at most, metres
     float lengthen;            // factor on the half lengths of surfels: few samples leave gaps
     float jut;                 // metres by which what hides a surface's continuation stands in front of it

@@ -6,8 +6,8 @@
 // All angles of a slice are measured from the eye vector V, positive towards T. They are compared as turns,
 // s < 0 ? c - 1 : 1 - c of a vector with |c| + |s| = 1, which need no arc function.
 //
-// Both sides of a slice are marched at once, as the two components of a vector: two independent chains of arithmetic keep
-// a processor twice as busy as one.
+// Four reads go at once, two steps to either side, as the components of a vector: independent chains of arithmetic and of
+// loads keep a processor busy.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -31,18 +31,25 @@ layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 #include "lib/surfel.glsl"
 
 const float pi = 3.14159265358979, golden = 0.618034;
+const vec4 sides = vec4(1.0, -1.0, 1.0, -1.0);
 const float sector_count = 31.0; // so that a bit's place never reaches the width of a word
 
 // Compare and select: min and max mind NaN, which costs.
-vec2 least(vec2 a, vec2 b) { return mix(b, a, lessThan(a, b)); }
-vec2 most(vec2 a, float b) { return mix(vec2(b), a, greaterThan(a, vec2(b))); }
 vec4 least(vec4 a, vec4 b) { return mix(b, a, lessThan(a, b)); }
-vec2 positive(vec2 x) { return vec2(positive(x.x), positive(x.y)); }
+vec4 most(vec4 a, float b) { return mix(vec4(b), a, greaterThan(a, vec4(b))); }
+vec4 positive(vec4 x) { return intBitsToFloat(max(floatBitsToInt(x), ivec4(0))); }
 // To 0.07 %: lengths of directions, not positions.
-vec2 inverse_length(vec2 squared) { return vec2(quick_inversesqrt(squared.x), quick_inversesqrt(squared.y)) * quick_scale; }
+vec4 inverse_length(vec4 squared) {
+    vec4 y = intBitsToFloat(0x5f1ffff9 - (floatBitsToInt(squared) >> 1));
+    return quick_scale * y * (2.38924456 - squared * y * y);
+}
+ivec4 nearest(vec4 x) {
+    precise vec4 shifted = x + magic;
+    return floatBitsToInt(shifted) - magic_bits;
+}
 
 // x^1.5 on [0, 1] within 0.01: where the steps lie.
-vec2 spread(vec2 x) { return x * fma(x, fma(x, vec2(-0.25), vec2(0.95)), vec2(0.3)); }
+vec4 spread(vec4 x) { return x * (x * (0.95 - 0.25 * x) + 0.3); }
 
 // Of the angle t of (c, s) with s >= 0: 1 - c / (|c| + s), monotonic from 0 to 2.
 vec4 turn(vec4 c, vec4 s) { return 1.0 - c / (abs(c) + s + 1e-20); }
@@ -50,14 +57,14 @@ vec4 turn(vec4 c, vec4 s) { return 1.0 - c / (abs(c) + s + 1e-20); }
 // 2 t - sin 2t and 1 - cos 2t of a turn's angle t in [0, pi].
 void measures(vec4 turns, out vec4 along_sine, out vec4 along_cosine) {
     vec4 c = 1.0 - turns;                 // |c| + |s| = 1
-    vec4 y = fma(abs(c), vec4(2.0), vec4(-1.0)); // tangent of pi/4 - t, with t folded into [0, pi/2]
+    vec4 y = 2.0 * abs(c) - 1.0;          // tangent of pi/4 - t, with t folded into [0, pi/2]
     vec4 y2 = y * y;
     // Arc tangent on [-1, 1] to 1e-5 (Abramowitz and Stegun 4.4.49), doubled.
-    vec4 arc = y * fma(y2, fma(y2, fma(y2, fma(y2, vec4(0.0416702), vec4(-0.1702660)), vec4(0.3602820)), vec4(-0.6605990)), vec4(1.9997320));
+    vec4 arc = y * (1.9997320 + y2 * (-0.6605990 + y2 * (0.3602820 + y2 * (-0.1702660 + y2 * 0.0416702))));
     vec4 r = 1.0 / (1.0 + y2);
     vec4 folded = 0.5 * pi - arc - (1.0 - y2) * r;
     along_sine = mix(folded, 2.0 * pi - folded, lessThan(c, vec4(0.0)));
-    along_cosine = fma(-2.0 * y, r, vec4(1.0));
+    along_cosine = 1.0 - 2.0 * y * r;
 }
 
 // Pixels from p to the border of the image.
@@ -67,15 +74,16 @@ float to_border(vec2 p, vec2 direction) {
     return min(at.x, at.y);
 }
 
-uint bits_below(int n) { return (1u << n) - 1u; }
+uvec4 bits_below(ivec4 n) { return (uvec4(1u) << n) - 1u; }
 
 void main() {
     SurfelConstants s = constants;
     k = s.screen;
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 group = ivec2(gl_WorkGroupID.xy), phase = ivec2(group.x & 3, (group.x >> 2) & 3);
+    ivec2 pixel = 4 * (screen_tile * ivec2(group.x >> 4, group.y) + ivec2(gl_LocalInvocationID.xy)) + phase;
     if (any(greaterThanEqual(pixel, k.size))) return;
     int here = index_of(pixel);
-    float own = imageLoad(surfels, here).x;
+    float own = imageLoad(surfels, surfel_index(pixel, s.plane)).x;
     Surface surface = surface_at(pixel, own, here);
     float z = surface.point.z;
     vec2 ray = ray_of(vec2(pixel)).xy;
@@ -89,12 +97,13 @@ void main() {
     float b = 1.0 / (eye.z - 1.0), xy = eye.x * eye.y * b;
     vec3 e1 = vec3(1.0 + eye.x * eye.x * b, xy, eye.x), e2 = vec3(xy, 1.0 + eye.y * eye.y * b, eye.y);
 
-    vec2 noise = noise_at(pixel);
+    vec2 noise = noise_at(phase);
     float radius2 = k.radius * k.radius;
     float reach = k.radius * inversesqrt(max(z * z - radius2, 1e-4 * z * z)); // in units of the image plane
     vec2 per_px = 1.0 / vec2(k.camera.fx, k.camera.fy);
     vec2 flat_eye = eye.xy * per_px, flat_normal = n.xy * per_px;
     float eye_per_z = distance / z, normal_per_z = dot(n, vec3(ray, 1.0));
+    float thickness_step = s.thickest * (1.0 / 255.0);
     float lowest2 = k.tangent_sine * k.tangent_sine;
     float open = 0.0, all = 0.0;
     vec2 known = vec2(0.0);
@@ -110,9 +119,10 @@ void main() {
         // Sectors before an angle t to the side of T: start + scale ((1 - cos 2t) cos n + (2t - sin 2t) sin n); to the
         // other side, with t counted that way, start - scale (... - ... sin n).
         float scale = 0.25 * sector_count / full;
-        vec2 side_scale = vec2(scale, -scale), scaled_cos = side_scale * n_cos, scaled_sin = vec2(scale * n_sin);
+        vec4 scaled_cos = scale * n_cos * sides;
+        float scaled_sin = scale * n_sin;
         float start = scale * (2.0 * n_cos + (2.0 * angle - pi) * n_sin) + fract(noise.x * 7.0 + golden * float(i));
-        vec4 horizon = turn(vec4(-n_sin, n_sin, -n_sin, n_sin), vec4(n_cos));
+        vec4 horizon = turn(-n_sin * sides, vec4(n_cos));
 
         vec2 along = vec2(k.camera.fx, k.camera.fy) * (tangent.xy - ray * tangent.z);
         along *= inversesqrt(dot(along, along));
@@ -120,78 +130,81 @@ void main() {
         float half_pixel = 0.5 * s.lengthen * per_pixel;
         vec2 room = vec2(to_border(vec2(pixel), along), to_border(vec2(pixel), -along));
         float full_reach = reach / per_pixel;
-        vec2 nearest_step = min(room, 1.0), far = max(min(vec2(full_reach), room), nearest_step) - nearest_step;
+        vec2 first = min(room, 1.0), far = max(min(vec2(full_reach), room), first) - first;
         vec2 u = fract(noise.y + golden * vec2(2 * i, 2 * i + 1));
         vec2 flat_tangent = tangent.xy * per_px;
 
         uint closed = 0u;
-        vec2 inside_share = vec2(0.0), before = vec2(0.0);
-        vec2 x = u * (1.0 / float(steps));
-        vec2 now = fma(spread(x), far, nearest_step);
-        for (int j = 0; j < steps; ++j) {
-            x = (float(j + 1) + u) * (1.0 / float(steps));
-            vec2 next = fma(spread(x), far, nearest_step);
-            // Whole pixels away; the second component looks to the other side.
-            vec2 qx = along.x * now, qy = along.y * now;
-            ivec2 ix = ivec2(nearest(qx.x), nearest(-qx.y)), iy = ivec2(nearest(qy.x), nearest(-qy.y));
-            ivec2 at = here + iy * k.size.x + ix;
-            vec4 a = imageLoad(surfels, at.x), b = imageLoad(surfels, at.y);
-            vec2 zq = vec2(a.x, b.x);
-            inside_share += mix(vec2(0.0), vec2(1.0), greaterThan(zq, vec2(0.0)));
+        vec4 found = vec4(0.0);
+        for (int j = 0; j < steps; j += 2) {
+            vec4 x = (float(j) + vec4(u, u + 1.0)) * (1.0 / float(steps));
+            vec4 before = spread(x - 1.0 / float(steps)) * far.xyxy + first.xyxy;
+            vec4 now = spread(x) * far.xyxy + first.xyxy, next = spread(x + 1.0 / float(steps)) * far.xyxy + first.xyxy;
+            if (j == 0) before.xy = vec2(0.0);
+            // Whole pixels away.
+            vec4 signed_now = now * sides;
+            ivec4 ix = nearest(along.x * signed_now), iy = nearest(along.y * signed_now);
+            vec4 a = imageLoad(surfels, surfel_index(pixel + ivec2(ix.x, iy.x), s.plane));
+            vec4 b = imageLoad(surfels, surfel_index(pixel + ivec2(ix.y, iy.y), s.plane));
+            vec4 c = imageLoad(surfels, surfel_index(pixel + ivec2(ix.z, iy.z), s.plane));
+            vec4 d = imageLoad(surfels, surfel_index(pixel + ivec2(ix.w, iy.w), s.plane));
+            vec4 zq = vec4(a.x, b.x, c.x, d.x), nx = vec4(a.y, b.y, c.y, d.y), ny = vec4(a.z, b.z, c.z, d.z), w = vec4(a.w, b.w, c.w, d.w);
+            if (steps % 2 == 1 && j == steps - 1) zq.zw = vec2(0.0);
+            found += mix(vec4(0.0), vec4(1.0), greaterThan(zq, vec4(0.0)));
 
             // From the pixel's point to the sample's, towards V and towards T (outwards on either side): differences first,
             // far away coordinates cancel badly.
-            vec2 mx = vec2(ix), my = vec2(iy), dz = zq - z;
-            vec2 pv = fma(zq, fma(mx, vec2(flat_eye.x), my * flat_eye.y), -eye_per_z * dz);
-            vec2 pt = zq * fma(mx, vec2(flat_tangent.x), my * flat_tangent.y);
-            pt.y = -pt.y;
-            vec2 rise = fma(zq, fma(mx, vec2(flat_normal.x), my * flat_normal.y), fma(dz, vec2(normal_per_z), vec2(-surface.rise)));
-            vec2 d2 = fma(pv, pv, pt * pt);
+            vec4 mx = vec4(ix), my = vec4(iy), dz = zq - z;
+            vec4 pv = zq * (mx * flat_eye.x + my * flat_eye.y) - eye_per_z * dz;
+            vec4 pt = zq * (mx * flat_tangent.x + my * flat_tangent.y) * sides;
+            vec4 rise = zq * (mx * flat_normal.x + my * flat_normal.y) + (dz * normal_per_z - surface.rise);
+            vec4 d2 = pv * pv + pt * pt;
             // The gaze at the sample; across it, outwards: (gt, -gv).
-            vec2 gv = pv - distance;
-            vec2 g = inverse_length(fma(gv, gv, fma(pt, pt, vec2(1e-30))));
+            vec4 gv = pv - distance;
+            vec4 g = inverse_length(gv * gv + (pt * pt + 1e-30));
             gv *= g;
-            vec2 gt = pt * g;
+            vec4 gt = pt * g;
             // Where the surfel lies in the slice: its normal turned by a right angle, outwards.
-            vec2 nx = vec2(a.y, b.y), ny = vec2(a.z, b.z), nz = vec2(a.w, b.w) - surfel_bias;
-            vec2 lv = -fma(nx, vec2(tangent.x), fma(ny, vec2(tangent.y), nz * tangent.z));
-            vec2 lt = fma(nx, vec2(eye.x), fma(ny, vec2(eye.y), nz * eye.z));
-            lv.y = -lv.y;
-            vec2 l = inverse_length(fma(lv, lv, fma(lt, lt, vec2(1e-30))));
-            vec2 slope = (lv * gt - lt * gv) * l;
-            l = mix(-l, l, greaterThan(slope, vec2(0.0)));
+            vec4 nz = w - surfel_bias;
+            vec4 lv = -sides * (nx * tangent.x + ny * tangent.y + nz * tangent.z);
+            vec4 lt = nx * eye.x + ny * eye.y + nz * eye.z;
+            vec4 l = inverse_length(lv * lv + (lt * lt + 1e-30));
+            vec4 slope = (lv * gt - lt * gv) * l;
+            l = mix(-l, l, greaterThan(slope, vec4(0.0)));
             lv *= l;
             lt *= l;
-            vec2 size = zq * half_pixel / most(abs(slope), 0.1);
+            vec4 size = zq * half_pixel / most(abs(slope), 0.1);
             // Clipped to the radius.
-            vec2 middle = fma(pv, lv, pt * lt);
-            vec2 chord = positive(fma(middle, middle, radius2 - d2)) + 1e-30;
+            vec4 middle = pv * lv + pt * lt;
+            vec4 chord = positive(middle * middle + (radius2 - d2)) + 1e-30;
             chord *= inverse_length(chord);
-            vec2 back = least((now - before) * size, middle + chord), ahead = least((next - now) * size, chord - middle);
-            vec2 fv = fma(-lv, back, pv), ft = fma(-lt, back, pt), uv = fma(lv, ahead, pv), ut = fma(lt, ahead, pt);
+            vec4 back = least((now - before) * size, middle + chord), ahead = least((next - now) * size, chord - middle);
+            vec4 fv = pv - lv * back, ft = pt - lt * back, uv = pv + lv * ahead, ut = pt + lt * ahead;
             // Thickness lies behind, as the eye sees it: seen from the pixel, farther outwards.
-            vec2 deep = vec2(thickness_of(a.w), thickness_of(b.w)) * s.thickest;
-            vec2 fdv = fma(gv, deep, fv), fdt = fma(gt, deep, ft), udv = fma(gv, deep, uv), udt = fma(gt, deep, ut);
-            bvec2 turns = greaterThan(fv * ut, ft * uv), deep_turns = greaterThan(fdv * udt, fdt * udv);
-            vec2 low_v = mix(uv, fv, turns), low_t = mix(ut, ft, turns);
-            vec2 high_v = mix(fdv, udv, deep_turns), high_t = mix(fdt, udt, deep_turns);
+            vec4 deep = vec4(floatBitsToInt(w) & 0xff) * thickness_step;
+            vec4 fdv = fv + gv * deep, fdt = ft + gt * deep, udv = uv + gv * deep, udt = ut + gt * deep;
+            bvec4 turns = greaterThan(fv * ut, ft * uv), deep_turns = greaterThan(fdv * udt, fdt * udv);
+            vec4 low = turn(mix(uv, fv, turns), abs(mix(ut, ft, turns)));
+            vec4 high = turn(mix(fdv, udv, deep_turns), abs(mix(fdt, udt, deep_turns)));
 
-            vec4 edge = least(turn(vec4(low_v, high_v), abs(vec4(low_t, high_t))), horizon);
-            vec4 along_sine, along_cosine;
-            measures(edge, along_sine, along_cosine);
-            ivec4 bits = ivec4(fma(along_cosine, vec4(scaled_cos, scaled_cos), fma(along_sine, vec4(scaled_sin, scaled_sin), vec4(start))));
-            bool hit_a = rise.x > 0.0 && rise.x * rise.x > lowest2 * d2.x && d2.x <= radius2 && zq.x > 0.0;
-            bool hit_b = rise.y > 0.0 && rise.y * rise.y > lowest2 * d2.y && d2.y <= radius2 && zq.y > 0.0;
-            uint mask_a = bits_below(bits.z) & ~bits_below(bits.x), mask_b = bits_below(bits.y) & ~bits_below(bits.w);
-            closed |= (hit_a ? mask_a : 0u) | (hit_b ? mask_b : 0u);
-
-            before = now;
-            now = next;
+            vec4 by_sine, by_cosine;
+            measures(least(low, horizon), by_sine, by_cosine);
+            ivec4 from = ivec4(by_cosine * scaled_cos + (by_sine * scaled_sin + start));
+            measures(least(high, horizon), by_sine, by_cosine);
+            ivec4 until = ivec4(by_cosine * scaled_cos + (by_sine * scaled_sin + start));
+            // To the other side, angles are counted the other way.
+            uvec4 below = bits_below(from), over = bits_below(until);
+            uvec4 mask = uvec4(over.x & ~below.x, below.y & ~over.y, over.z & ~below.z, below.w & ~over.w);
+            vec4 height = rise * abs(rise) - lowest2 * d2; // above the surface by the least sine
+            // Above, within the radius, known: what is not makes one of these negative.
+            ivec4 misses = (floatBitsToInt(height) | floatBitsToInt(radius2 - d2) | (floatBitsToInt(zq) - 1)) >> 31;
+            mask &= ~uvec4(misses);
+            closed |= mask.x | mask.y | mask.z | mask.w;
         }
         float measure = weight * full;
         all += measure;
         open += measure * (1.0 - float(bitCount(closed)) * (1.0 / sector_count));
-        known += inside_share * (far + nearest_step) / max(full_reach, 1.0);
+        known += (found.xy + found.zw) * (far + first) / max(full_reach, 1.0);
     }
     finish(surface, !(own > 0.0), here, open / max(all, 1e-6), (known.x + known.y) / float(2 * slices * steps));
 }

@@ -67,5 +67,5 @@ void main() {
     float width = min(float(across) / k.camera.fx, float(along) / k.camera.fy) * z;
     float thickness = clamp(0.5 * width, s.thinnest, s.thickest);
 
-    imageStore(surfels, here, surfel(z, n, thickness / s.thickest));
+    imageStore(surfels, surfel_index(p, s.plane), surfel(z, n, thickness / s.thickest));
 }
