@@ -55,7 +55,7 @@ void Surfel::add_passes(ScreenTables& tables) const {
     const cv::Size words = words_of(tables.size);
     const auto runs = static_cast<std::size_t>(words.width) * tables.size.height + static_cast<std::size_t>(words.height) * tables.size.width;
     const int edges = tables.add_buffer({"edges", runs * 8, none, Texels::rg32ui});
-    const int surfels = tables.add_buffer({"surfels", static_cast<std::size_t>(plane_of(tables.size).area()) * 16 * 16, none, Texels::rgba32f});
+    const int surfels = tables.add_buffer({"surfels", static_cast<std::size_t>(plane_of(tables.size).area()) * 16 * 8, none, Texels::rg32ui});
     tables.passes.push_back({"edges", "surfel/edges", {screen_depth}, {edges}, {static_cast<std::uint32_t>((runs + 63) / 64), 1, 1}, {}});
     tables.add_pass("surfels", "surfel/surfels", {screen_depth, screen_normals, edges}, {surfels});
     const cv::Size plane = plane_of(tables.size);

@@ -1,10 +1,8 @@
-// A surfel in four floats, the form in which occluders are read: depth, normal, and in the lowest bits of the last the
-// thickness as a share of the thickest. The bias keeps those bits from being a denormal number's.
-
-const float surfel_bias = 4.0;
-vec4 surfel(float z, vec3 n, float thickness) {
-    uint t = uint(nearest(at_most_one(thickness) * 255.0));
-    return vec4(z, n.xy, uintBitsToFloat((floatBitsToUint(n.z + surfel_bias) & 0xffffff00u) | t));
+// A surfel in two words, the form in which occluders are read: depth, and in bytes the normal (127 long; half a degree is
+// enough for which way a pixel's piece of surface lies) and the thickness as a share of the thickest.
+uvec2 surfel(float z, vec3 n, float thickness) {
+    ivec3 q = ivec3(nearest(n.x * 127.0), nearest(n.y * 127.0), nearest(n.z * 127.0)) & 0xff;
+    return uvec2(floatBitsToUint(z), q.x << 24 | q.y << 16 | q.z << 8 | nearest(at_most_one(thickness) * 255.0));
 }
 
 // Pixels 4 apart lie side by side, one plane for each place in a 4x4 tile: threads of one plane share their rotation and

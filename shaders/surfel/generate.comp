@@ -18,7 +18,7 @@ layout(constant_id = spec_slices) const int slices = 2;
 layout(constant_id = spec_steps) const int steps = 8;
 
 layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
-layout(binding = 0, rgba32f) readonly uniform imageBuffer surfels;
+layout(binding = 0, rg32ui) readonly uniform uimageBuffer surfels;
 layout(binding = 1, r32f) readonly uniform imageBuffer normals;
 layout(binding = 2, rg32f) readonly uniform imageBuffer noise_table;
 layout(binding = 16, r32f) writeonly uniform imageBuffer raw;
@@ -83,7 +83,7 @@ void main() {
     ivec2 pixel = 4 * (screen_tile * ivec2(group.x >> 4, group.y) + ivec2(gl_LocalInvocationID.xy)) + phase;
     if (any(greaterThanEqual(pixel, k.size))) return;
     int here = index_of(pixel);
-    float own = imageLoad(surfels, surfel_index(pixel, s.plane)).x;
+    float own = uintBitsToFloat(imageLoad(surfels, surfel_index(pixel, s.plane)).x);
     Surface surface = surface_at(pixel, own, here);
     float z = surface.point.z;
     vec2 ray = ray_of(vec2(pixel)).xy;
@@ -144,11 +144,12 @@ void main() {
             // Whole pixels away.
             vec4 signed_now = now * sides;
             ivec4 ix = nearest(along.x * signed_now), iy = nearest(along.y * signed_now);
-            vec4 a = imageLoad(surfels, surfel_index(pixel + ivec2(ix.x, iy.x), s.plane));
-            vec4 b = imageLoad(surfels, surfel_index(pixel + ivec2(ix.y, iy.y), s.plane));
-            vec4 c = imageLoad(surfels, surfel_index(pixel + ivec2(ix.z, iy.z), s.plane));
-            vec4 d = imageLoad(surfels, surfel_index(pixel + ivec2(ix.w, iy.w), s.plane));
-            vec4 zq = vec4(a.x, b.x, c.x, d.x), nx = vec4(a.y, b.y, c.y, d.y), ny = vec4(a.z, b.z, c.z, d.z), w = vec4(a.w, b.w, c.w, d.w);
+            uvec2 a = imageLoad(surfels, surfel_index(pixel + ivec2(ix.x, iy.x), s.plane)).xy;
+            uvec2 b = imageLoad(surfels, surfel_index(pixel + ivec2(ix.y, iy.y), s.plane)).xy;
+            uvec2 c = imageLoad(surfels, surfel_index(pixel + ivec2(ix.z, iy.z), s.plane)).xy;
+            uvec2 d = imageLoad(surfels, surfel_index(pixel + ivec2(ix.w, iy.w), s.plane)).xy;
+            vec4 zq = uintBitsToFloat(uvec4(a.x, b.x, c.x, d.x));
+            ivec4 shape = ivec4(a.y, b.y, c.y, d.y);
             if (steps % 2 == 1 && j == steps - 1) zq.zw = vec2(0.0);
             found += mix(vec4(0.0), vec4(1.0), greaterThan(zq, vec4(0.0)));
 
@@ -165,7 +166,7 @@ void main() {
             gv *= g;
             vec4 gt = pt * g;
             // Where the surfel lies in the slice: its normal turned by a right angle, outwards.
-            vec4 nz = w - surfel_bias;
+            vec4 nx = vec4(shape >> 24), ny = vec4(shape << 8 >> 24), nz = vec4(shape << 16 >> 24);
             vec4 lv = -sides * (nx * tangent.x + ny * tangent.y + nz * tangent.z);
             vec4 lt = nx * eye.x + ny * eye.y + nz * eye.z;
             vec4 l = inverse_length(lv * lv + (lt * lt + 1e-30));
@@ -181,7 +182,7 @@ void main() {
             vec4 back = least((now - before) * size, middle + chord), ahead = least((next - now) * size, chord - middle);
             vec4 fv = pv - lv * back, ft = pt - lt * back, uv = pv + lv * ahead, ut = pt + lt * ahead;
             // Thickness lies behind, as the eye sees it: seen from the pixel, farther outwards.
-            vec4 deep = vec4(floatBitsToInt(w) & 0xff) * thickness_step;
+            vec4 deep = vec4(shape & 0xff) * thickness_step;
             vec4 fdv = fv + gv * deep, fdt = ft + gt * deep, udv = uv + gv * deep, udt = ut + gt * deep;
             bvec4 turns = greaterThan(fv * ut, ft * uv), deep_turns = greaterThan(fdv * udt, fdt * udv);
             vec4 low = turn(mix(uv, fv, turns), abs(mix(ut, ft, turns)));

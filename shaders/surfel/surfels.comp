@@ -11,7 +11,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0, r32f) readonly uniform imageBuffer depth;
 layout(binding = 1, r32f) readonly uniform imageBuffer normals;
 layout(binding = 2, rg32ui) readonly uniform uimageBuffer edges;
-layout(binding = 16, rgba32f) writeonly uniform imageBuffer surfels;
+layout(binding = 16, rg32ui) writeonly uniform uimageBuffer surfels;
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 const int open = 1 << 20; // a run without an end
@@ -67,5 +67,5 @@ void main() {
     float width = min(float(across) / k.camera.fx, float(along) / k.camera.fy) * z;
     float thickness = clamp(0.5 * width, s.thinnest, s.thickest);
 
-    imageStore(surfels, surfel_index(p, s.plane), surfel(z, n, thickness / s.thickest));
+    imageStore(surfels, surfel_index(p, s.plane), uvec4(surfel(z, n, thickness / s.thickest), 0u, 0u));
 }
