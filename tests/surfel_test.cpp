@@ -13,8 +13,8 @@ namespace {
 using namespace tests;
 
 AoMap visibility_of(const DepthImage& depth, const SurfelOptions& options = {}) {
-    static const auto device = gpu::Device::open("");
-    Surfel surfel(*device, options);
+    static gpu::Device device;
+    Surfel surfel(device, options);
     return surfel.compute({depth});
 }
 

@@ -16,18 +16,19 @@
 
 layout(constant_id = spec_slices) const int slices = 2;
 layout(constant_id = spec_steps) const int steps = 8;
+layout(constant_id = spec_spacing) const int spacing = 1;
 
 layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(binding = 0, rg32ui) readonly uniform uimageBuffer surfels;
 layout(binding = 1, r32f) readonly uniform imageBuffer normals;
 layout(binding = 2, rg32f) readonly uniform imageBuffer noise_table;
-layout(binding = 16, r32f) writeonly uniform imageBuffer raw;
-layout(binding = 17, r32f) writeonly uniform imageBuffer coverage;
+layout(binding = 16, rg32f) writeonly uniform imageBuffer sampled; // open and whole measure
+layout(binding = 17, r32f) writeonly uniform imageBuffer known;    // share of the reads that met known depth
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 #include "lib/noise.glsl"
 #include "lib/normal.glsl"
-#include "lib/surface.glsl"
+#include "lib/cheap.glsl"
 #include "lib/surfel.glsl"
 
 const float pi = 3.14159265358979, golden = 0.618034;
@@ -80,16 +81,14 @@ void main() {
     SurfelConstants s = constants;
     k = s.screen;
     ivec2 group = ivec2(gl_WorkGroupID.xy), phase = ivec2(group.x & 3, (group.x >> 2) & 3);
-    ivec2 pixel = 4 * (screen_tile * ivec2(group.x >> 4, group.y) + ivec2(gl_LocalInvocationID.xy)) + phase;
-    if (any(greaterThanEqual(pixel, k.size))) return;
-    int here = index_of(pixel);
+    ivec2 at = 4 * (screen_tile * ivec2(group.x >> 4, group.y) + ivec2(gl_LocalInvocationID.xy)) + phase, pixel = at * spacing;
+    if (any(greaterThanEqual(at, s.samples))) return;
     float own = uintBitsToFloat(imageLoad(surfels, surfel_index(pixel, s.plane)).x);
-    Surface surface = surface_at(pixel, own, here);
-    float z = surface.point.z;
+    float z = own > 0.0 ? own : 1.0; // in holes a point as good as any: what comes of it is not kept
     vec2 ray = ray_of(vec2(pixel)).xy;
-    vec3 eye = surface.eye;
-    float distance = -dot(surface.point, eye);
-    vec3 n = surface.normal;
+    float ray_length = sqrt(dot(ray, ray) + 1.0), distance = z * ray_length;
+    vec3 eye = vec3(ray, 1.0) * (-1.0 / ray_length);
+    vec3 n = normal_at(index_of(pixel));
     // Seen from behind its own plane nothing is defined: bend to the eye.
     n = normalize(n + eye * max(0.01 - dot(n, eye), 0.0));
 
@@ -102,11 +101,13 @@ void main() {
     float reach = k.radius * inversesqrt(max(z * z - radius2, 1e-4 * z * z)); // in units of the image plane
     vec2 per_px = 1.0 / vec2(k.camera.fx, k.camera.fy);
     vec2 flat_eye = eye.xy * per_px, flat_normal = n.xy * per_px;
-    float eye_per_z = distance / z, normal_per_z = dot(n, vec3(ray, 1.0));
+    float eye_per_z = ray_length, normal_per_z = dot(n, vec3(ray, 1.0));
+    // Rounding of depth in single precision is a noise, too.
+    float least_rise = (k.tangent_sigmas * sigma_of(z) + 1e-6 * z) * abs(normal_per_z);
     float thickness_step = s.thickest * (1.0 / 255.0);
     float lowest2 = k.tangent_sine * k.tangent_sine;
     float open = 0.0, all = 0.0;
-    vec2 known = vec2(0.0);
+    vec2 met = vec2(0.0);
 
     for (int i = 0; i < slices; ++i) {
         float phi = pi * (float(i) + noise.x) / float(slices);
@@ -158,7 +159,7 @@ void main() {
             vec4 mx = vec4(ix), my = vec4(iy), dz = zq - z;
             vec4 pv = zq * (mx * flat_eye.x + my * flat_eye.y) - eye_per_z * dz;
             vec4 pt = zq * (mx * flat_tangent.x + my * flat_tangent.y) * sides;
-            vec4 rise = zq * (mx * flat_normal.x + my * flat_normal.y) + (dz * normal_per_z - surface.rise);
+            vec4 rise = zq * (mx * flat_normal.x + my * flat_normal.y) + (dz * normal_per_z - least_rise);
             vec4 d2 = pv * pv + pt * pt;
             // The gaze at the sample; across it, outwards: (gt, -gv).
             vec4 gv = pv - distance;
@@ -205,7 +206,12 @@ void main() {
         float measure = weight * full;
         all += measure;
         open += measure * (1.0 - float(bitCount(closed)) * (1.0 / sector_count));
-        known += (found.xy + found.zw) * (far + first) / max(full_reach, 1.0);
+        met += (found.xy + found.zw) * (far + first) / max(full_reach, 1.0);
     }
-    finish(surface, !(own > 0.0), here, open / max(all, 1e-6), (known.x + known.y) / float(2 * slices * steps));
+    // Where the radius shows as less than a pixel nothing can be seen within it: open and unknown; up to three it fades in.
+    float shows = k.radius * sqrt(k.camera.fx * k.camera.fy) / z;
+    open = mix(all, open, clamp(0.5 * shows - 0.5, 0.0, 1.0));
+    int index = at.y * s.samples.x + at.x;
+    imageStore(sampled, index, own > 0.0 ? vec4(open, all, 0.0, 0.0) : vec4(0.0));
+    imageStore(known, index, vec4(own > 0.0 && shows >= 1.0 ? (met.x + met.y) / float(2 * slices * steps) : 0.0));
 }
