@@ -65,14 +65,23 @@ void Surfel::add_passes(ScreenTables& tables) const {
     using Texels = gpu::BufferRow::Texels;
     constexpr auto none = gpu::BufferRow::Host::none;
     const cv::Size words = words_of(tables.size);
-    const auto runs = static_cast<std::size_t>(words.width) * tables.size.height +
-                      static_cast<std::size_t>(words.height) * tables.size.width;
-    const int edges = tables.add_buffer({"edges", runs * 8, none, Texels::rg32ui});
+    const auto count_of_words = static_cast<std::size_t>(words.width) * tables.size.height +
+                                static_cast<std::size_t>(words.height) * tables.size.width;
+    const int edges = tables.add_buffer({"edges", count_of_words * 8, none, Texels::rg32ui});
+    const int runs = tables.add_buffer({"runs", count_of_words * 8, none, Texels::r32ui});
     const int surfels = tables.add_buffer(
         {"surfels", static_cast<std::size_t>(plane_of(tables.size).area()) * 16 * 8, none, Texels::rg32ui});
-    tables.passes.push_back(
-        {"edges", "surfel/edges", {screen_depth}, {edges}, {static_cast<std::uint32_t>((runs + 63) / 64), 1, 1}, {}});
-    tables.add_pass("surfels", "surfel/surfels", {screen_depth, screen_normals, edges}, {surfels});
+    const auto lines_of = [](std::size_t n) {
+        return std::array<std::uint32_t, 3>{static_cast<std::uint32_t>((n + 63) / 64), 1, 1};
+    };
+    tables.passes.push_back({"edges", "surfel/edges", {screen_depth}, {edges}, lines_of(count_of_words), {}});
+    tables.passes.push_back({"runs",
+                             "surfel/runs",
+                             {edges},
+                             {runs},
+                             lines_of(static_cast<std::size_t>(tables.size.width + tables.size.height)),
+                             {}});
+    tables.add_pass("surfels", "surfel/surfels", {screen_depth, screen_normals, edges, runs}, {surfels});
     const cv::Size samples = samples_of(tables.size, options_.downsampled), plane = plane_of(samples);
     const auto count = static_cast<std::size_t>(samples.area());
     const int sampled = tables.add_buffer({"sampled", count * 8, none, Texels::rg32f});

@@ -4,7 +4,8 @@
 #include "screen.h"
 SHARED_BEGIN
 
-const int surfel_run = 32; // pixels whose edges share a word
+const int surfel_run = 32;                // pixels whose edges share a word
+const uint surfel_nowhere = 0xfffffffeu; // no edge before the border of the image
 
 struct SurfelConstants {
     ScreenConstants screen;
