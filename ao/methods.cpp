@@ -7,6 +7,7 @@
 #include "ao/luna/luna.h"
 #include "ao/method.h"
 #include "ao/raycast/raycast.h"
+#include "ao/surfel/surfel.h"
 #include "projection/error.h"
 
 namespace scanshade {
@@ -39,6 +40,8 @@ const std::vector<MethodRow>& methods() {
          SetupOf<GtaoOptions, Gtao>::start},
         {"bitmask", "gtao's slices with 32 sectors, so that what is seen has a thickness", "Therrien, Levesque, Gilet 2023",
          SetupOf<BitmaskOptions, Bitmask>::start},
+        {"surfel", "bitmask over pixels that have a direction and a thickness: the most accurate",
+         "own, after Therrien et al. 2023 and Jimenez et al. 2016", SetupOf<SurfelOptions, Surfel>::start},
         {"raycast", "rays against the depth surface, the cloud's discs or the mesh itself; on the CPU, with standard errors",
          "cosine-weighted ambient occlusion by its definition; Embree 3", SetupOf<RaycastOptions, Raycast>::start},
     };

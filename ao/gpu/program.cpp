@@ -48,6 +48,7 @@ vk::Format format_of(BufferRow::Texels texels) {
     switch (texels) {
     case BufferRow::Texels::r32f: return vk::Format::eR32Sfloat;
     case BufferRow::Texels::rg32f: return vk::Format::eR32G32Sfloat;
+    case BufferRow::Texels::rg32ui: return vk::Format::eR32G32Uint;
     case BufferRow::Texels::rgba32f: return vk::Format::eR32G32B32A32Sfloat;
     default: return vk::Format::eR32Uint;
     }

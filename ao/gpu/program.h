@@ -24,7 +24,7 @@ struct BufferRow {
     Host host = Host::none;
     /// Bound as a storage texel buffer (imageBuffer, uimageBuffer) instead of a storage buffer: on lavapipe a load is then
     /// one gather in place, without a branch per lane (storage buffer) or a call (sampled texel buffer).
-    enum class Texels { none, r32f, rg32f, rgba32f, r32ui };
+    enum class Texels { none, r32f, rg32f, rgba32f, r32ui, rg32ui };
     Texels texels = Texels::none;
     std::vector<float> initial = {}; ///< what it holds from the start instead of zeros; 64 KiB at most
 };

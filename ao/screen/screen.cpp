@@ -125,14 +125,18 @@ shared::ScreenConstants constants_from(const ScreenOptions& options, const View&
     return k;
 }
 
+void ScreenMethod::add_denoise(ScreenTables& tables) const {
+    tables.add_pass("denoise", "denoise", {screen_surfaces, screen_raw}, {screen_visibility},
+                    {{shared::spec_denoise, options_.denoise}}, 2);
+}
+
 ScreenTables ScreenMethod::tables(cv::Size size, bool supplied) const {
     ScreenTables all{size, shared_buffers(static_cast<std::size_t>(size.area()), supplied, options_.seed), {}};
     // Without normals of the view, depth fills their slot; nothing reads it.
     all.add_pass("normals", "normals", {screen_depth, supplied ? screen_given : screen_depth}, {screen_normals, screen_surfaces},
                  {{shared::spec_supplied, supplied}});
     add_passes(all);
-    all.add_pass("denoise", "denoise", {screen_surfaces, screen_raw}, {screen_visibility},
-                 {{shared::spec_denoise, options_.denoise}}, 2);
+    add_denoise(all);
     return all;
 }
 

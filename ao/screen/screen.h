@@ -66,6 +66,8 @@ class ScreenMethod : public Method {
     /// Appends the room's buffers and passes: screen_depth, screen_normals, screen_noise -> screen_raw,
     /// screen_coverage.
     virtual void add_passes(ScreenTables& tables) const = 0;
+    /// Appends what makes screen_visibility of screen_raw: the shared 5x5 mean, unless a room has its own.
+    virtual void add_denoise(ScreenTables& tables) const;
     /// The room's constant block. It begins with `screen`.
     [[nodiscard]] virtual std::vector<std::byte> constants(const shared::ScreenConstants& screen) const = 0;
 

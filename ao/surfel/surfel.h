@@ -1,0 +1,42 @@
+// Surfel bitmask, the accurate method: every pixel is a surfel, a piece of surface with a direction and a thickness,
+// and the surfels that a slice of the hemisphere meets close the sectors they cover. An open plane is open to the last
+// bit.
+//
+// Visibility bitmask after Therrien, Levesque and Gilet (2023), slices and cosine measure after Jimenez et al. (2016);
+// surfel segments, thickness from silhouette width and the self-normalised estimate are our own.
+#pragma once
+
+#include "ao/screen/screen.h"
+
+#include <string>
+#include <vector>
+
+namespace scanshade {
+
+/// What a person sets. Reads per pixel = 2 x slices x steps.
+struct SurfelOptions {
+    ScreenOptions screen{.tangent_sine = 0.01F, .tangent_sigmas = 0};
+    std::string quality = "high"; ///< low 8 reads, medium 16, high 32, highest 64
+    bool downsampled = false;     ///< a quarter of the pixels are sampled
+    int slices = 0, steps = 0;    ///< above 0: instead of the quality's
+    float thinnest = 0.01F;       ///< half a surfel's thickness at least, share of the radius
+    float thickest = 0.4F;        ///< and at most
+
+    [[nodiscard]] std::vector<Parameter> parameters();
+};
+
+class Surfel final : public ScreenMethod {
+  public:
+    /// Throws Misuse naming a setting out of its range.
+    Surfel(gpu::Device& device, const SurfelOptions& options);
+
+  protected:
+    void add_passes(ScreenTables& tables) const override;
+    void add_denoise(ScreenTables& tables) const override { (void)tables; } // its own, in add_passes
+    [[nodiscard]] std::vector<std::byte> constants(const shared::ScreenConstants& screen) const override;
+
+  private:
+    SurfelOptions options_;
+};
+
+} // namespace scanshade

@@ -1,0 +1,10 @@
+// A surfel in two words, the form in which occluders are read: depth, and in bytes the normal (127 long; half a degree is
+// enough for which way a pixel's piece of surface lies) and the thickness as a share of the thickest.
+uvec2 surfel(float z, vec3 n, float thickness) {
+    ivec3 q = ivec3(nearest(n.x * 127.0), nearest(n.y * 127.0), nearest(n.z * 127.0)) & 0xff;
+    return uvec2(floatBitsToUint(z), q.x << 24 | q.y << 16 | q.z << 8 | nearest(at_most_one(thickness) * 255.0));
+}
+
+// Pixels 4 apart lie side by side, one plane for each place in a 4x4 tile: threads of one plane share their rotation and
+// steps, so what they read lies side by side too.
+int surfel_index(ivec2 p, ivec2 plane) { return (((p.y & 3) * 4 + (p.x & 3)) * plane.y + (p.y >> 2)) * plane.x + (p.x >> 2); }

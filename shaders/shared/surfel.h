@@ -1,0 +1,27 @@
+// What host and shaders share of the surfel bitmask (shaders/surfel).
+#ifndef SCANSHADE_SHARED_SURFEL_H
+#define SCANSHADE_SHARED_SURFEL_H
+#include "screen.h"
+SHARED_BEGIN
+
+const int surfel_run = 32;                // pixels whose edges share a word
+const uint surfel_nowhere = 0xfffffffeu; // no edge before the border of the image
+
+struct SurfelConstants {
+    ScreenConstants screen;
+    ivec2 words;               // of edges: along a row, along a column
+    ivec2 plane;               // size of one of the 16 planes that the surfels are stored in
+    ivec2 samples;             // pixels that slices are marched from: all, or every other one of every other row
+    float thinnest, thickest;  // half a surfel's thickness at least and at most, metres
+    float lengthen;            // factor on the half lengths of surfels: few samples leave gaps
+    float jut;                 // metres by which what hides a surface's continuation stands in front of it
+    float longest;             // of what is added to a half length there, metres
+};
+
+// Specialization constants of generate.
+const int spec_slices = 10;
+const int spec_steps = 11;   // on either side of a slice
+const int spec_spacing = 12; // of the samples, pixels
+
+SHARED_END
+#endif

@@ -1,0 +1,217 @@
+// Visibility of every pixel from the surfels around it: each slice of the hemisphere is 32 sectors of equal cosine weight,
+// and every surfel that a slice meets closes those it covers (visibility bitmask, Therrien et al. 2023; slices and their
+// cosine measure, Jimenez et al. 2016). A surfel is a piece of surface with a direction and a thickness, not a point: between
+// two samples nothing leaks, and light passes behind what is thin.
+//
+// All angles of a slice are measured from the eye vector V, positive towards T. They are compared as turns,
+// s < 0 ? c - 1 : 1 - c of a vector with |c| + |s| = 1, which need no arc function.
+//
+// Four reads go at once, two steps to either side, as the components of a vector: independent chains of arithmetic and of
+// loads keep a processor busy.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "shared/surfel.h"
+#include "lib/screen.glsl"
+
+layout(constant_id = spec_slices) const int slices = 2;
+layout(constant_id = spec_steps) const int steps = 8;
+layout(constant_id = spec_spacing) const int spacing = 1;
+
+layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
+layout(binding = 0, rg32ui) readonly uniform uimageBuffer surfels;
+layout(binding = 1, r32f) readonly uniform imageBuffer normals;
+layout(binding = 2, rg32f) readonly uniform imageBuffer noise_table;
+layout(binding = 16, rg32f) writeonly uniform imageBuffer sampled; // open and whole measure
+layout(binding = 17, r32f) writeonly uniform imageBuffer known;    // share of the reads that met known depth
+layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
+
+#include "lib/noise.glsl"
+#include "lib/normal.glsl"
+#include "lib/cheap.glsl"
+#include "lib/surfel.glsl"
+
+const float pi = 3.14159265358979, golden = 0.618034;
+const vec4 sides = vec4(1.0, -1.0, 1.0, -1.0);
+const float sector_count = 31.0; // so that a bit's place never reaches the width of a word
+
+// Compare and select: min and max mind NaN, which costs.
+vec4 least(vec4 a, vec4 b) { return mix(b, a, lessThan(a, b)); }
+vec4 most(vec4 a, float b) { return mix(vec4(b), a, greaterThan(a, vec4(b))); }
+vec4 positive(vec4 x) { return intBitsToFloat(max(floatBitsToInt(x), ivec4(0))); }
+// To 0.07 %: lengths of directions, not positions.
+vec4 inverse_length(vec4 squared) {
+    vec4 y = intBitsToFloat(0x5f1ffff9 - (floatBitsToInt(squared) >> 1));
+    return quick_scale * y * (2.38924456 - squared * y * y);
+}
+ivec4 nearest(vec4 x) {
+    precise vec4 shifted = x + magic;
+    return floatBitsToInt(shifted) - magic_bits;
+}
+
+// x^1.5 on [0, 1] within 0.01: where the steps lie.
+vec4 spread(vec4 x) { return x * (x * (0.95 - 0.25 * x) + 0.3); }
+
+// Of the angle t of (c, s) with s >= 0: 1 - c / (|c| + s), monotonic from 0 to 2.
+vec4 turn(vec4 c, vec4 s) { return 1.0 - c / (abs(c) + s + 1e-20); }
+
+// 2 t - sin 2t and 1 - cos 2t of a turn's angle t in [0, pi].
+void measures(vec4 turns, out vec4 along_sine, out vec4 along_cosine) {
+    vec4 c = 1.0 - turns;                 // |c| + |s| = 1
+    vec4 y = 2.0 * abs(c) - 1.0;          // tangent of pi/4 - t, with t folded into [0, pi/2]
+    vec4 y2 = y * y;
+    // Arc tangent on [-1, 1] to 1e-5 (Abramowitz and Stegun 4.4.49), doubled.
+    vec4 arc = y * (1.9997320 + y2 * (-0.6605990 + y2 * (0.3602820 + y2 * (-0.1702660 + y2 * 0.0416702))));
+    vec4 r = 1.0 / (1.0 + y2);
+    vec4 folded = 0.5 * pi - arc - (1.0 - y2) * r;
+    along_sine = mix(folded, 2.0 * pi - folded, lessThan(c, vec4(0.0)));
+    along_cosine = 1.0 - 2.0 * y * r;
+}
+
+// Pixels from p to the border of the image.
+float to_border(vec2 p, vec2 direction) {
+    vec2 room = mix(p + 0.49, vec2(k.size) - 0.51 - p, greaterThan(direction, vec2(0.0)));
+    vec2 at = room / max(abs(direction), vec2(1e-6));
+    return min(at.x, at.y);
+}
+
+uvec4 bits_below(ivec4 n) { return (uvec4(1u) << n) - 1u; }
+
+void main() {
+    SurfelConstants s = constants;
+    k = s.screen;
+    ivec2 group = ivec2(gl_WorkGroupID.xy), phase = ivec2(group.x & 3, (group.x >> 2) & 3);
+    ivec2 at = 4 * (screen_tile * ivec2(group.x >> 4, group.y) + ivec2(gl_LocalInvocationID.xy)) + phase, pixel = at * spacing;
+    if (any(greaterThanEqual(at, s.samples))) return;
+    float own = uintBitsToFloat(imageLoad(surfels, surfel_index(pixel, s.plane)).x);
+    float z = own > 0.0 ? own : 1.0; // in holes a point as good as any: what comes of it is not kept
+    vec2 ray = ray_of(vec2(pixel)).xy;
+    float ray_length = sqrt(dot(ray, ray) + 1.0), distance = z * ray_length;
+    vec3 eye = vec3(ray, 1.0) * (-1.0 / ray_length);
+    vec3 n = normal_at(index_of(pixel));
+    // Seen from behind its own plane nothing is defined: bend to the eye.
+    n = normalize(n + eye * max(0.01 - dot(n, eye), 0.0));
+
+    // Two axes across the eye vector, whose z is below 0 (Duff et al. 2017).
+    float b = 1.0 / (eye.z - 1.0), xy = eye.x * eye.y * b;
+    vec3 e1 = vec3(1.0 + eye.x * eye.x * b, xy, eye.x), e2 = vec3(xy, 1.0 + eye.y * eye.y * b, eye.y);
+
+    vec2 noise = noise_at(phase);
+    float radius2 = k.radius * k.radius;
+    float reach = k.radius * inversesqrt(max(z * z - radius2, 1e-4 * z * z)); // in units of the image plane
+    vec2 per_px = 1.0 / vec2(k.camera.fx, k.camera.fy);
+    vec2 flat_eye = eye.xy * per_px, flat_normal = n.xy * per_px;
+    float eye_per_z = ray_length, normal_per_z = dot(n, vec3(ray, 1.0));
+    // Rounding of depth in single precision is a noise, too.
+    float least_rise = (k.tangent_sigmas * sigma_of(z) + 1e-6 * z) * abs(normal_per_z);
+    float thickness_step = s.thickest * (1.0 / 255.0);
+    float lowest2 = k.tangent_sine * k.tangent_sine;
+    float open = 0.0, all = 0.0;
+    vec2 met = vec2(0.0);
+
+    for (int i = 0; i < slices; ++i) {
+        float phi = pi * (float(i) + noise.x) / float(slices);
+        vec3 tangent = e1 * cos(phi) + e2 * sin(phi);
+        vec2 in_slice = vec2(dot(n, eye), dot(n, tangent)); // projected normal, towards V and T
+        float weight = sqrt(dot(in_slice, in_slice));
+        float n_cos = in_slice.x / max(weight, 1e-6), n_sin = in_slice.y / max(weight, 1e-6);
+        float angle = atan(n_sin, n_cos);
+        float full = n_cos + angle * n_sin;
+        // Sectors before an angle t to the side of T: start + scale ((1 - cos 2t) cos n + (2t - sin 2t) sin n); to the
+        // other side, with t counted that way, start - scale (... - ... sin n).
+        float scale = 0.25 * sector_count / full;
+        vec4 scaled_cos = scale * n_cos * sides;
+        float scaled_sin = scale * n_sin;
+        float start = scale * (2.0 * n_cos + (2.0 * angle - pi) * n_sin) + fract(noise.x * 7.0 + golden * float(i));
+        vec4 horizon = turn(-n_sin * sides, vec4(n_cos));
+
+        vec2 along = vec2(k.camera.fx, k.camera.fy) * (tangent.xy - ray * tangent.z);
+        along *= inversesqrt(dot(along, along));
+        float per_pixel = length(along * per_px); // metres at z = 1 m
+        float half_pixel = 0.5 * s.lengthen * per_pixel;
+        vec2 room = vec2(to_border(vec2(pixel), along), to_border(vec2(pixel), -along));
+        float full_reach = reach / per_pixel;
+        vec2 first = min(room, 1.0), far = max(min(vec2(full_reach), room), first) - first;
+        vec2 u = fract(noise.y + golden * vec2(2 * i, 2 * i + 1));
+        vec2 flat_tangent = tangent.xy * per_px;
+
+        uint closed = 0u;
+        vec4 found = vec4(0.0);
+        for (int j = 0; j < steps; j += 2) {
+            vec4 x = (float(j) + vec4(u, u + 1.0)) * (1.0 / float(steps));
+            vec4 before = spread(x - 1.0 / float(steps)) * far.xyxy + first.xyxy;
+            vec4 now = spread(x) * far.xyxy + first.xyxy, next = spread(x + 1.0 / float(steps)) * far.xyxy + first.xyxy;
+            if (j == 0) before.xy = vec2(0.0);
+            // Whole pixels away.
+            vec4 signed_now = now * sides;
+            ivec4 ix = nearest(along.x * signed_now), iy = nearest(along.y * signed_now);
+            uvec2 a = imageLoad(surfels, surfel_index(pixel + ivec2(ix.x, iy.x), s.plane)).xy;
+            uvec2 b = imageLoad(surfels, surfel_index(pixel + ivec2(ix.y, iy.y), s.plane)).xy;
+            uvec2 c = imageLoad(surfels, surfel_index(pixel + ivec2(ix.z, iy.z), s.plane)).xy;
+            uvec2 d = imageLoad(surfels, surfel_index(pixel + ivec2(ix.w, iy.w), s.plane)).xy;
+            vec4 zq = uintBitsToFloat(uvec4(a.x, b.x, c.x, d.x));
+            ivec4 shape = ivec4(a.y, b.y, c.y, d.y);
+            if (steps % 2 == 1 && j == steps - 1) zq.zw = vec2(0.0);
+            found += mix(vec4(0.0), vec4(1.0), greaterThan(zq, vec4(0.0)));
+
+            // From the pixel's point to the sample's, towards V and towards T (outwards on either side): differences first,
+            // far away coordinates cancel badly.
+            vec4 mx = vec4(ix), my = vec4(iy), dz = zq - z;
+            vec4 pv = zq * (mx * flat_eye.x + my * flat_eye.y) - eye_per_z * dz;
+            vec4 pt = zq * (mx * flat_tangent.x + my * flat_tangent.y) * sides;
+            vec4 rise = zq * (mx * flat_normal.x + my * flat_normal.y) + (dz * normal_per_z - least_rise);
+            vec4 d2 = pv * pv + pt * pt;
+            // The gaze at the sample; across it, outwards: (gt, -gv).
+            vec4 gv = pv - distance;
+            vec4 g = inverse_length(gv * gv + (pt * pt + 1e-30));
+            gv *= g;
+            vec4 gt = pt * g;
+            // Where the surfel lies in the slice: its normal turned by a right angle, outwards.
+            vec4 nx = vec4(shape >> 24), ny = vec4(shape << 8 >> 24), nz = vec4(shape << 16 >> 24);
+            vec4 lv = -sides * (nx * tangent.x + ny * tangent.y + nz * tangent.z);
+            vec4 lt = nx * eye.x + ny * eye.y + nz * eye.z;
+            vec4 l = inverse_length(lv * lv + (lt * lt + 1e-30));
+            vec4 slope = (lv * gt - lt * gv) * l;
+            l = mix(-l, l, greaterThan(slope, vec4(0.0)));
+            lv *= l;
+            lt *= l;
+            vec4 size = zq * half_pixel / most(abs(slope), 0.1);
+            // Clipped to the radius.
+            vec4 middle = pv * lv + pt * lt;
+            vec4 chord = positive(middle * middle + (radius2 - d2)) + 1e-30;
+            chord *= inverse_length(chord);
+            vec4 back = least((now - before) * size, middle + chord), ahead = least((next - now) * size, chord - middle);
+            vec4 fv = pv - lv * back, ft = pt - lt * back, uv = pv + lv * ahead, ut = pt + lt * ahead;
+            // Thickness lies behind, as the eye sees it: seen from the pixel, farther outwards.
+            vec4 deep = vec4(shape & 0xff) * thickness_step;
+            vec4 fdv = fv + gv * deep, fdt = ft + gt * deep, udv = uv + gv * deep, udt = ut + gt * deep;
+            bvec4 turns = greaterThan(fv * ut, ft * uv), deep_turns = greaterThan(fdv * udt, fdt * udv);
+            vec4 low = turn(mix(uv, fv, turns), abs(mix(ut, ft, turns)));
+            vec4 high = turn(mix(fdv, udv, deep_turns), abs(mix(fdt, udt, deep_turns)));
+
+            vec4 by_sine, by_cosine;
+            measures(least(low, horizon), by_sine, by_cosine);
+            ivec4 from = ivec4(by_cosine * scaled_cos + (by_sine * scaled_sin + start));
+            measures(least(high, horizon), by_sine, by_cosine);
+            ivec4 until = ivec4(by_cosine * scaled_cos + (by_sine * scaled_sin + start));
+            // To the other side, angles are counted the other way.
+            uvec4 below = bits_below(from), over = bits_below(until);
+            uvec4 mask = uvec4(over.x & ~below.x, below.y & ~over.y, over.z & ~below.z, below.w & ~over.w);
+            vec4 height = rise * abs(rise) - lowest2 * d2; // above the surface by the least sine
+            // Above, within the radius, known: what is not makes one of these negative.
+            ivec4 misses = (floatBitsToInt(height) | floatBitsToInt(radius2 - d2) | (floatBitsToInt(zq) - 1)) >> 31;
+            mask &= ~uvec4(misses);
+            closed |= mask.x | mask.y | mask.z | mask.w;
+        }
+        float measure = weight * full;
+        all += measure;
+        open += measure * (1.0 - float(bitCount(closed)) * (1.0 / sector_count));
+        met += (found.xy + found.zw) * (far + first) / max(full_reach, 1.0);
+    }
+    // Where the radius shows as less than a pixel nothing can be seen within it: open and unknown; up to three it fades in.
+    float shows = k.radius * sqrt(k.camera.fx * k.camera.fy) / z;
+    open = mix(all, open, clamp(0.5 * shows - 0.5, 0.0, 1.0));
+    int index = at.y * s.samples.x + at.x;
+    imageStore(sampled, index, own > 0.0 ? vec4(open, all, 0.0, 0.0) : vec4(0.0));
+    imageStore(known, index, vec4(own > 0.0 && shows >= 1.0 ? (met.x + met.y) / float(2 * slices * steps) : 0.0));
+}

@@ -1,0 +1,114 @@
+// Last pass of the surfel bitmask: the mean over samples of the same plane, then the look. What is averaged is open and
+// whole measure each by itself, since a slice that sees little of the hemisphere must not count like one that sees much.
+//
+// Sixteen rotations repeat every four samples, and the window weighs each of them alike. Where only every other pixel of
+// every other row was sampled, the rest is filled in here. 2x2 pixels a thread, because they share what they read.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "shared/surfel.h"
+#include "lib/screen.glsl"
+#include "lib/cheap.glsl"
+
+layout(constant_id = spec_denoise) const int denoise = 1;
+layout(constant_id = spec_spacing) const int spacing = 1;
+
+layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
+layout(binding = 0, rg32ui) readonly uniform uimageBuffer surfels;
+layout(binding = 1, r32f) readonly uniform imageBuffer normals;
+layout(binding = 2, rg32f) readonly uniform imageBuffer sampled;
+layout(binding = 3, r32f) readonly uniform imageBuffer known;
+layout(binding = 16, r32f) writeonly uniform imageBuffer visibility;
+layout(binding = 17, r32f) writeonly uniform imageBuffer coverage;
+layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
+
+#include "lib/normal.glsl"
+#include "lib/surfel.glsl"
+
+ivec2 plane, samples; // sizes
+
+struct Tap {
+    vec3 point, normal; // both zero where nothing is known
+    vec2 measure;       // open, whole
+};
+
+struct Mean {
+    vec3 normal_over_tolerance; // a plane's distances then come in tolerances
+    float at;                   // of the pixel's own point along it
+    vec3 normal;
+    vec2 sum;
+};
+
+Tap tap_at(ivec2 q) {
+    bool exists = all(lessThan(uvec2(q), uvec2(samples)));
+    q = exists ? q : ivec2(0);
+    ivec2 p = q * spacing;
+    uvec2 word = imageLoad(surfels, surfel_index(p, plane)).xy;
+    float z = exists ? uintBitsToFloat(word.x) : 0.0;
+    ivec3 n = ivec3(int(word.y)) << ivec3(0, 8, 16) >> 24;
+    vec2 measure = imageLoad(sampled, q.y * samples.x + q.x).xy;
+    return Tap(ray_of(vec2(p)) * z, vec3(n) * (z > 0.0 ? 1.0 / 127.0 : 0.0), z > 0.0 ? measure : vec2(0.0));
+}
+
+Mean mean_at(ivec2 p, out float z) {
+    bool exists = inside(p);
+    z = exists ? uintBitsToFloat(imageLoad(surfels, surfel_index(exists ? p : ivec2(0), plane)).x) : 0.0;
+    vec3 point = ray_of(vec2(p)) * z, n = normal_at(exists ? index_of(p) : 0);
+    vec3 scaled = n / (0.05 * k.radius + 3.0 * sigma_of(z));
+    return Mean(scaled, dot(scaled, point), n, vec2(0.0));
+}
+
+void add(inout Mean mean, Tap tap, float share) {
+    float distance = dot(mean.normal_over_tolerance, tap.point) - mean.at;
+    float cosine = positive(dot(mean.normal, tap.normal));
+    cosine *= cosine;
+    float apart = distance * distance;
+    float weight = positive(1.0 - apart) * (cosine * cosine);
+    // A pixel none of whose surface was sampled takes what is least far from it.
+    if (spacing > 1) weight += 1e-4 / (1.0 + apart);
+    mean.sum += share * weight * tap.measure;
+}
+
+float shown(float v) {
+    float v1 = clamp(1.0 - k.strength * (1.0 - v), 0.0, 1.0);
+    return k.power == 1.0 ? v1 : pow(v1, k.power);
+}
+
+void put(ivec2 p, float z, Mean mean, float known_share) {
+    if (!inside(p)) return;
+    bool hole = !(z > 0.0);
+    float v = mean.sum.y > 0.0 ? mean.sum.x / mean.sum.y : 1.0;
+    imageStore(visibility, index_of(p), vec4(hole ? uintBitsToFloat(not_a_number) : shown(clamp(v, 0.0, 1.0))));
+    imageStore(coverage, index_of(p), vec4(hole ? 0.0 : known_share));
+}
+
+// Share of a sample x columns (or rows) from the first pixel's in the mean of the first and the second pixel.
+float of_first(int x) { return denoise == 0 ? float(x == 0) : abs(x) == 2 ? 0.5 : abs(x) < 2 ? 1.0 : 0.0; }
+float of_second(int x) {
+    if (spacing == 1) return of_first(x - 1);
+    return denoise == 0 ? float(x == 0) : x >= -1 && x <= 2 ? 1.0 : 0.0;
+}
+
+#define TAP(x, y) { Tap t = tap_at(q + ivec2(x, y)); \
+    add(a, t, of_first(x) * of_first(y)); add(b, t, of_second(x) * of_first(y)); \
+    add(c, t, of_first(x) * of_second(y)); add(d, t, of_second(x) * of_second(y)); }
+#define ROW(y) TAP(-2, y) TAP(-1, y) TAP(0, y) TAP(1, y) TAP(2, y) if (spacing == 1) TAP(3, y)
+
+void main() {
+    SurfelConstants s = constants;
+    k = s.screen;
+    plane = s.plane;
+    samples = s.samples;
+    ivec2 p = 2 * ivec2(gl_GlobalInvocationID.xy), q = p / spacing;
+    if (any(greaterThanEqual(p, k.size))) return;
+    float za, zb, zc, zd;
+    Mean a = mean_at(p, za), b = mean_at(p + ivec2(1, 0), zb), c = mean_at(p + ivec2(0, 1), zc), d = mean_at(p + ivec2(1, 1), zd);
+    ROW(-2) ROW(-1) ROW(0) ROW(1) ROW(2)
+    if (spacing == 1) { ROW(3) }
+    // Each pixel's own share of known samples, or that of the pixel sampled in its stead.
+    ivec2 other = min(spacing == 1 ? q + 1 : q, samples - 1);
+    put(p, za, a, imageLoad(known, q.y * samples.x + q.x).x);
+    put(p + ivec2(1, 0), zb, b, imageLoad(known, q.y * samples.x + other.x).x);
+    put(p + ivec2(0, 1), zc, c, imageLoad(known, other.y * samples.x + q.x).x);
+    put(p + ivec2(1, 1), zd, d, imageLoad(known, other.y * samples.x + other.x).x);
+}

@@ -1,0 +1,33 @@
+// Where the nearest edge lies before and after each word of edges that has none of its own: one thread walks a line's words.
+// Each number is the pixel at which the run begins (or behind which it ends), and in its lowest bit whether what lies beyond
+// the edge is farther away; `nowhere` at the border of the image.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "shared/surfel.h"
+
+layout(local_size_x = 64) in;
+layout(binding = 0, rg32ui) readonly uniform uimageBuffer edges;
+layout(binding = 16, r32ui) writeonly uniform uimageBuffer runs; // two a word: of before it, of after it
+layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
+
+void main() {
+    SurfelConstants s = constants;
+    ScreenConstants k = s.screen;
+    int line = int(gl_GlobalInvocationID.x);
+    if (line >= k.size.x + k.size.y) return;
+    bool row = line < k.size.y;
+    int words = row ? s.words.x : s.words.y, stride = row ? k.size.y : k.size.x;
+    int base = row ? line : s.words.x * k.size.y + line - k.size.y;
+    // Both directions at once: the one fills `x`, the other `y`, of different words.
+    uint before = surfel_nowhere, after = surfel_nowhere;
+    for (int i = 0; i < words; ++i) {
+        int up = base + i * stride, down = base + (words - 1 - i) * stride;
+        uvec2 a = imageLoad(edges, up).xy, b = imageLoad(edges, down).xy;
+        imageStore(runs, 2 * up, uvec4(before));
+        imageStore(runs, 2 * down + 1, uvec4(after));
+        int last = findMSB(a.x), first = findLSB(b.x);
+        before = a.x == 0u ? before : uint(i * surfel_run + last) << 1 | (a.y >> (last & 31) & 1u);
+        after = b.x == 0u ? after : uint((words - 1 - i) * surfel_run + first) << 1 | (~b.y >> (first & 31) & 1u);
+    }
+}

@@ -1,0 +1,78 @@
+// The accurate method against closed forms: an open plane and right-angled corners, whatever the number of reads.
+#include "ao/gpu/device.h"
+#include "ao/surfel/surfel.h"
+#include "tests/support/scenes.h"
+
+#include <cmath>
+#include <gtest/gtest.h>
+#include <numbers>
+
+namespace scanshade {
+namespace {
+
+using namespace tests;
+
+AoMap visibility_of(const DepthImage& depth, const SurfelOptions& options = {}) {
+    static gpu::Device device;
+    Surfel surfel(device, options);
+    return surfel.compute({depth});
+}
+
+SurfelOptions reads(int slices, int steps) {
+    SurfelOptions options;
+    options.slices = slices;
+    options.steps = steps;
+    return options;
+}
+
+/// Beside a right-angled wall `share` of the radius away (any cosine-weighted hemisphere within the radius).
+double beside_wall(double share) {
+    return share >= 1 ? 1 : 1 - (std::acos(share) - share * std::sqrt(1 - share * share)) / std::numbers::pi;
+}
+
+/// Root mean square error and largest pixel error where all of the sphere of the radius is seen.
+struct Error2 {
+    double rms = 0, worst = 0;
+};
+
+Error2 corner_error(const SurfelOptions& options) {
+    const Pinhole camera = test_camera({640, 480});
+    const DepthImage depth = wall_corner(camera, 2);
+    const AoMap ao = visibility_of(depth, options);
+    double sum = 0;
+    int count = 0;
+    Error2 error;
+    for (int v = 140; v < 340; ++v)
+        for (int u = 0; u < 640; ++u) {
+            const double z = depth.z_m(v, u), x = (u - camera.cx) / camera.fx * z;
+            const double along = std::hypot(x, z - 2); // from the edge, along the own wall: the distance to the other
+            if (along > 0.6) continue;
+            const double off = ao.visibility(v, u) - beside_wall(along / options.screen.radius);
+            sum += off * off;
+            error.worst = std::max(error.worst, std::abs(off));
+            ++count;
+        }
+    error.rms = std::sqrt(sum / count);
+    return error;
+}
+
+TEST(Surfel, a_right_angled_corner_is_as_dark_as_the_closed_form) {
+    EXPECT_LT(corner_error(reads(2, 8)).rms, 0.01);
+    EXPECT_LT(corner_error(reads(1, 4)).rms, 0.028);
+    std::printf("32: %.4f %.4f, 8: %.4f %.4f 16: %.4f\n", corner_error(reads(2, 8)).rms, corner_error(reads(2, 8)).worst, corner_error(reads(1, 4)).rms, corner_error(reads(1, 4)).worst, corner_error(reads(1, 8)).rms);
+}
+
+TEST(Surfel, a_plane_is_open_at_any_tilt_and_distance) {
+    for (const double tilt : {0.0, 45.0, 60.0, 80.0, 85.0})
+        for (const double z : {0.3, 2.0, 20.0}) {
+            const DepthImage depth = tilted_plane(test_camera({320, 240}), tilt, z);
+            const AoMap ao = visibility_of(depth);
+            double lowest = 1;
+            for (int i = 0; i < 320 * 240; ++i)
+                if (depth.z_m(i) > 0) lowest = std::min<double>(lowest, ao.visibility(i));
+            EXPECT_GE(lowest, 0.995) << tilt << " degrees at " << z << " m";
+        }
+}
+
+} // namespace
+} // namespace scanshade
