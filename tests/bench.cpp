@@ -71,7 +71,8 @@ class Timed {
     }
     void print_passes() {
         for (const auto& [name, ms] : program_.timings())
-            if (passes_.count(name)) fmt::print("    {:<20} {:>8.4f}\n", name, median(passes_[name]));
+            if (const auto& all = passes_[name]; !all.empty())
+                fmt::print("    {:<20} {:>8.4f} {:>8.4f}\n", name, median(all), *std::min_element(all.begin(), all.end()));
     }
 
   private:

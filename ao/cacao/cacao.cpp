@@ -22,20 +22,21 @@ int halved(int n) { return (n + 1) / 2; }
 int groups(int threads, int tile) { return (threads + tile - 1) / tile; }
 std::size_t texels(ivec2 size) { return static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y); }
 
-/// Pattern rotation and scale of slice `a`, phase `phase` (PatternRotScaleMatrices); the matrix is (x, y; y, -x).
-vec2 rotation(int a, int phase) {
-    constexpr std::array<int, 5> order{0, 1, 4, 3, 2};
-    const float b = static_cast<float>(order[static_cast<std::size_t>(phase)]);
-    const float slice = static_cast<float>(a);
-    const float angle = (slice + b / 5.0F) * (pi * 0.5F);
-    const float scale = 1.0F + (slice - 1.5F + (b - 2.0F) / 5.0F) * 0.07F;
-    return {scale * std::cos(angle), -scale * std::sin(angle)};
-}
-
 /// The sampling pattern as the adaptive taps of HIGHEST read it.
 #define ROW(i, x, y, weight, mip_bias) x##F, y##F, weight##F, mip_bias##F,
-const std::vector<float> pattern{CACAO_PATTERN_0_3(ROW) CACAO_PATTERN_3_5(ROW) CACAO_PATTERN_5_12(ROW) CACAO_PATTERN_12_31(ROW)};
+const std::vector<float> taps{CACAO_PATTERN_0_3(ROW) CACAO_PATTERN_3_5(ROW) CACAO_PATTERN_5_12(ROW) CACAO_PATTERN_12_31(ROW)};
 #undef ROW
+
+/// What the buffer `pattern` holds: the taps, then the rotations of each slice.
+std::vector<float> pattern() {
+    std::vector<float> rows = taps;
+    for (int a = 0; a < 4; ++a)
+        for (int phase = 0; phase < 5; ++phase) {
+            const vec2 r = cacao_rotation(a, phase);
+            rows.insert(rows.end(), {r.x, r.y, 0.0F, 0.0F});
+        }
+    return rows;
+}
 
 /// Device depth d -> z = mu / (alpha - d), with z positive for both orders of near and far.
 vec2 depth_unpack(const CacaoOptions& options) {
@@ -75,6 +76,15 @@ void set_camera(CacaoConstants& k, const Pinhole& camera) {
 }
 
 } // namespace
+
+shared::vec2 cacao_rotation(int a, int phase) {
+    constexpr std::array<int, 5> order{0, 1, 4, 3, 2};
+    const float b = static_cast<float>(order[static_cast<std::size_t>(phase)]);
+    const float slice = static_cast<float>(a);
+    const float angle = (slice + b / 5.0F) * (pi * 0.5F);
+    const float scale = 1.0F + (slice - 1.5F + (b - 2.0F) / 5.0F) * 0.07F;
+    return {scale * std::cos(angle), -scale * std::sin(angle)};
+}
 
 std::vector<Parameter> CacaoOptions::parameters() {
     return {
@@ -147,8 +157,6 @@ CacaoConstants constants_from(const CacaoOptions& options, const Pinhole& camera
             const float d = static_cast<float>(tap) - 0.5F * static_cast<float>(odd);
             k.spatial[5 * odd + tap + 2] = std::exp(-d * d / options.sigma_squared);
         }
-    for (int a = 0; a < 4; ++a)
-        for (int phase = 0; phase < 5; ++phase) k.rotation[5 * a + phase] = rotation(a, phase);
     return k;
 }
 
@@ -167,6 +175,7 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
 
     const std::size_t slices = 4 * texels(k.slice);
     const std::size_t haloed = 4 * texels({k.slice.x + 2 * halo, k.slice.y + 2 * halo});
+    const std::vector<float> rows = pattern();
     CacaoTables tables;
     const auto floats = gpu::BufferRow::Texels::r32f, pairs = gpu::BufferRow::Texels::rg32f, words = gpu::BufferRow::Texels::r32ui;
     tables.buffers = {
@@ -182,7 +191,7 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
         {"blur a", !scan && n > 1 ? haloed * 4 : 4, Host::none, words},
         {"blur b", !scan && n > 2 ? haloed * 4 : 4, Host::none, words},
         {"staged", options.downsampled ? texels(k.grid) * 8 : 8, Host::none, pairs},
-        {"pattern", pattern.size() * 4, Host::none, gpu::BufferRow::Texels::rgba32f, pattern},
+        {"pattern", rows.size() * 4, Host::none, gpu::BufferRow::Texels::rgba32f, rows},
         {"visibility", texels(k.image) * 4, Host::download},
     };
 

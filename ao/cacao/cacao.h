@@ -52,6 +52,9 @@ struct CacaoOptions {
 /// The constant block of one frame size and camera. Clamps as AMD's host code does.
 [[nodiscard]] shared::CacaoConstants constants_from(const CacaoOptions& options, const Pinhole& camera);
 
+/// Pattern rotation and scale of slice 0 .. 3, phase 0 .. 4 (PatternRotScaleMatrices); the matrix is (x, y; y, -x).
+[[nodiscard]] shared::vec2 cacao_rotation(int slice, int phase);
+
 /// The buffers of CACAO by name; the rows of CacaoTables::buffers are in this order.
 enum CacaoBuffer : int {
     cacao_depth_in, cacao_normals_in, cacao_depths, cacao_normals, cacao_ping, cacao_pong, cacao_importance,

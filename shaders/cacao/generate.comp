@@ -192,7 +192,7 @@ void main() {
     float disc = (0.85 * radius) / step_m.x;
     s.falloff = -1.0 / (radius * radius);
     s.mip_base = log2(disc) - 4.3;
-    vec2 turn = constants.rotation[s.slice * 5 + int(uint(t.x + 2 * t.y) % 5u)] * disc;
+    vec2 turn = imageLoad(pattern, cacao_taps + s.slice * 5 + int(uint(t.x + 2 * t.y) % 5u)).xy * disc;
     s.rotation = mat2(turn.x, turn.y, turn.y, -turn.x);
     if (scan != 0) { // pixels need not be square
         float aspect = step_m.x / -step_m.y;
