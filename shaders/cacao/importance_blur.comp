@@ -5,7 +5,7 @@
 #include "lib/cacao.glsl"
 #include "lib/cacao_filter.glsl"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x_id = spec_tile_x, local_size_y_id = spec_tile_y) in;
 layout(constant_id = spec_last) const int second = 0;
 layout(binding = 0, r32ui) readonly uniform uimageBuffer from;
 layout(binding = 16, r32ui) uniform writeonly uimageBuffer to;

@@ -1,29 +1,7 @@
-// CACAO resolve: one AO value per grid pixel out of the four slices. Include after the buffer `ao` is declared.
-#include "lib/cacao_filter.glsl"
+// CACAO resolve of `scan`: one AO value per grid pixel out of the four slices. The includer has
+// uint texel_or_hole(int slice, ivec2 t), a slice's texel or a hole where there is none.
 
-// Reference: bilinear read of one slice at slice-texel coordinates (centres at one half).
-float slice_filtered(int slice, vec2 at) {
-    Footprint f = footprint(filter_coordinate(at * k.slice_inv, k.slice), k.slice);
-    return filtered(f, imageLoad(ao, slice_index(slice, f.low)).x & 0xffffu, imageLoad(ao, slice_index(slice, ivec2(f.high.x, f.low.y))).x & 0xffffu,
-                    imageLoad(ao, slice_index(slice, ivec2(f.low.x, f.high.y))).x & 0xffffu, imageLoad(ao, slice_index(slice, f.high)).x & 0xffffu);
-}
-
-// Reference: own texel plus one filtered value from each other slice, pulled away from edges. `at` is the grid pixel as
-// AMD's shader sees it (coordinates left of or above the image wrap round to a huge number), parity its slice.
-float smart_reference(float own, vec4 e, vec2 at, ivec2 parity) {
-    vec2 pull = vec2(e.y - e.x, e.w - e.z);
-    vec2 m = vec2(parity);
-    ivec2 other = 1 - parity;
-    float h = slice_filtered(other.x + 2 * parity.y, vec2(at.x + m.x + pull.x - 0.5, at.y + 0.5 - m.y) * 0.5);
-    float v = slice_filtered(parity.x + 2 * other.y, vec2(at.x + 0.5 - m.x, at.y + m.y + pull.y - 0.5) * 0.5);
-    float d = slice_filtered(other.x + 2 * other.y, (at + m + pull - 0.5) * 0.5);
-    float wh = (e.x + e.y) * 0.5, wv = (e.z + e.w) * 0.5, wd = (wh + wv) * 0.5;
-    return (own + wh * h + wv * v + wd * d) / (1.0 + wh + wv + wd);
-}
-
-uint grid_texel(ivec2 p) { return imageLoad(ao, slice_index((p.x & 1) + 2 * (p.y & 1), p >> 1)).x; }
-
-// --- scan: the 2x2 grid pixels of one slice texel at once, from the 4x4 grid pixels around them.
+// The 2x2 grid pixels of one slice texel at once, from the 4x4 grid pixels around them.
 
 struct Known {
     float value; // visibility in the texel's own units, 0 at holes
@@ -31,9 +9,8 @@ struct Known {
 };
 
 Known known(int slice, ivec2 t) {
-    bool inside = all(lessThan(uvec2(t), uvec2(k.slice)));
-    uint texel = imageLoad(ao, inside ? slice_index(slice, t) : 0).x;
-    bool usable = inside && texel < hole_texel;
+    uint texel = texel_or_hole(slice, t);
+    bool usable = texel < hole_texel;
     return Known(usable ? float(texel & 0xffffu) : 0.0, usable ? 1.0 : 0.0);
 }
 
@@ -59,10 +36,6 @@ float from_neighbours(uint l, uint r, uint t, uint b) {
     float total = w.x + w.y + w.z + w.w;
     float sum = dot(w, vec4(uvec4(l, r, t, b) & 0xffffu));
     return total > 0.0 ? sum / (total * 65535.0) : 1.0; // alone among holes: nothing is known to occlude it
-}
-
-uint texel_or_hole(int slice, ivec2 t) {
-    return all(lessThan(uvec2(t), uvec2(k.slice))) ? imageLoad(ao, slice_index(slice, t)).x : hole_texel;
 }
 
 // Visibility of grid pixels (2t, 2t + (1, 0), 2t + (0, 1), 2t + (1, 1)); -1 at holes.

@@ -46,10 +46,6 @@ struct CacaoConstants {
 // Rows of the buffer `pattern`: the taps but the last, which only HIGHEST reads, then 5 rotations for each of 4 slices.
 const int cacao_taps = 31;
 
-// Texels of a work group; one slice texel per thread.
-const int cacao_tile_x = 8;
-const int cacao_tile_y = 8;
-
 // Specialization constants, the same numbers in every CACAO shader.
 const int spec_scan = 0;        // 1: profile `scan`, 0: profile `reference`
 const int spec_spacing = 1;     // image pixels per AO grid pixel: 1 native, 2 downsampled
@@ -63,6 +59,9 @@ const int spec_first = 8;       // blur: 1 for the first step
 const int spec_last = 9;        // blur: 1 for the last step
 const int spec_halo = 10;       // blur: texels of mirrored halo kept round each slice (reference)
 const int spec_resolve = 11;    // apply and stage: 0 smart, 1 plain, 2 half
+const int spec_tile_x = 13;     // threads of a work group
+const int spec_tile_y = 14;
+const int spec_steps = 15;      // finish: blur steps
 const int spec_power = 12;      // 1: output raised to 2.2 (reference, where AMD's shaders do)
 
 // Resolve kinds, values of spec_resolve.
