@@ -208,7 +208,7 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
     };
 
     const auto tile_of = [&](std::string_view shader) -> ivec2 {
-        ivec2 tile = images ? shader == "cacao/finish" ? ivec2{16, 16} : ivec2{8, 8} : ivec2{8, 8};
+        ivec2 tile = images && (shader == "cacao/finish" || shader == "cacao/importance_smooth" || shader == "cacao/upsample_shared") ? ivec2{16, 16} : ivec2{8, 8};
         const char* t = std::getenv(shader == "cacao/finish" ? "TILE_F" : shader == "cacao/generate_image" ? "TILE_G" : shader == "cacao/prepare_image" ? "TILE_P" : "TILE");
         if (t) std::sscanf(t, "%dx%d", &tile.x, &tile.y);
         return tile;
@@ -243,10 +243,14 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
     if (highest) {
         tables.passes.push_back({"clear counter", "", {}, {cacao_counter}, {1, 1, 1}, {}});
         add("base", generate, inputs, {cacao_pong}, k.slice, 4, {{shared::spec_base, 1}, {shared::spec_mips, 1}});
-        add("importance", "cacao/importance", {cacao_pong}, {cacao_importance}, k.importance, 1);
-        add("importance blur a", "cacao/importance_blur", {cacao_importance}, {cacao_importance_pong, cacao_counter}, k.importance, 1);
-        add("importance blur b", "cacao/importance_blur", {cacao_importance_pong}, {cacao_importance, cacao_counter}, k.importance, 1,
-            {{shared::spec_last, 1}});
+        if (images) {
+            add("importance", "cacao/importance_smooth", {cacao_pong}, {cacao_importance, cacao_counter}, k.importance, 1);
+        } else {
+            add("importance", "cacao/importance", {cacao_pong}, {cacao_importance}, k.importance, 1);
+            add("importance blur a", "cacao/importance_blur", {cacao_importance, cacao_pong}, {cacao_importance_pong, cacao_counter}, k.importance, 1);
+            add("importance blur b", "cacao/importance_blur", {cacao_importance_pong, cacao_pong}, {cacao_importance, cacao_counter}, k.importance, 1,
+                {{shared::spec_last, 1}});
+        }
         inputs = {cacao_depths, cacao_normals, cacao_pong, cacao_importance, cacao_counter, cacao_pattern};
     }
     add("generate", generate, inputs, {cacao_ping}, k.slice, layers, {{shared::spec_mips, mips}});
@@ -267,7 +271,7 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
     if (images) {
         add("finish", "cacao/finish", {from, cacao_depth_in}, {cacao_out, cacao_staged}, k.slice, 1, {{shared::spec_steps, fused}});
         if (options.downsampled)
-            add("upsample", "cacao/upsample", {cacao_staged, cacao_depth_in}, {cacao_out}, {halved(k.image.x), halved(k.image.y)}, 1, how);
+            add("upsample", "cacao/upsample_shared", {cacao_staged, cacao_depth_in}, {cacao_out}, {halved(k.image.x), halved(k.image.y)}, 1, how);
     } else if (!options.downsampled) {
         add("apply", "cacao/apply", {from, cacao_depth_in}, {cacao_out}, k.slice, 1, how);
     } else {

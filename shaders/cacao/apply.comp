@@ -11,10 +11,10 @@ layout(binding = 0, r32ui) readonly uniform uimageBuffer ao;
 layout(binding = 1, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 16, scalar) writeonly buffer Out { float visibility[]; };
 
-uint texel_or_hole(int slice, ivec2 t) {
+Texel texel_or_hole(int slice, ivec2 t) {
     bool inside = all(lessThan(uvec2(t), uvec2(k.slice)));
     uint texel = imageLoad(ao, inside ? slice_index(slice, t) : 0).x;
-    return inside ? texel : hole_texel;
+    return Texel(inside && texel < hole_texel ? float(texel & 0xffffu) : -1.0, ao_edges(texel));
 }
 #include "lib/cacao_resolve.glsl"
 #include "lib/cacao_resolve_reference.glsl"

@@ -43,7 +43,8 @@ void main() {
     uint c = read(slice, t);
     uvec4 around = uvec4(read(slice, t - ivec2(1, 0)), read(slice, t + ivec2(1, 0)), read(slice, t - ivec2(0, 1)), read(slice, t + ivec2(0, 1)));
     if (scan != 0) {
-        imageStore(to, slice_index(slice, t), uvec4(whole(blurred(c, around))));
+        float v = blurred(float(c & 0xffffu), vec4(around & 0xffffu), ao_edges(c));
+        imageStore(to, slice_index(slice, t), uvec4(whole(uint(v + 0.5) | (c & 0xffff0000u)))); // a hole stays one
         return;
     }
     vec4 e = unpack_edges(ao_edges(c));

@@ -3,6 +3,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
+#define FOR_GPU
 #include "lib/cacao.glsl"
 #include "lib/cacao_blur.glsl"
 
@@ -14,37 +15,49 @@ layout(binding = 1, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 16, scalar) writeonly buffer Out { float visibility[]; };
 layout(binding = 17, rg32f) uniform writeonly imageBuffer staged;
 
-const int halo = steps + 1, layers = two_slices != 0 ? 2 : 4;
-const int wide = int(gl_WorkGroupSize.x) + 2 * halo, high = int(gl_WorkGroupSize.y) + 2 * halo;
-const int area = wide * high, half_of_all = layers * area;
-shared uint texels[2 * half_of_all]; // before and after a step, in turns
+const int halo = steps + 1;
+const int wide = int(gl_WorkGroupSize.x) + 2 * halo, high = int(gl_WorkGroupSize.y) + 2 * halo, area = wide * high;
+shared vec4 values[2 * area]; // of the four slices, as in Texel; before and after a step, in turns
+shared uint edges[area];      // of the four slices, a byte each
 
-ivec2 origin() { return ivec2(gl_WorkGroupID.xy) * ivec2(gl_WorkGroupSize.xy) - halo; } // slice texel of texels[0]
+ivec2 origin() { return ivec2(gl_WorkGroupID.xy) * ivec2(gl_WorkGroupSize.xy) - halo; } // slice texel of values[0]
 
-uint texel_or_hole(int slice, ivec2 t) {
+Texel texel_or_hole(int slice, ivec2 t) {
     ivec2 l = t - origin();
-    return texels[(steps & 1) * half_of_all + (two_slices != 0 ? slice / 3 : slice) * area + l.y * wide + l.x];
+    int at = l.y * wide + l.x;
+    return Texel(values[(steps & 1) * area + at][slice], edges[at] >> (8 * slice) & 0xffu);
 }
 #include "lib/cacao_resolve.glsl"
 
 void load_texels() {
     ivec2 first = origin();
-    for (int i = int(gl_LocalInvocationIndex); i < half_of_all; i += int(gl_WorkGroupSize.x * gl_WorkGroupSize.y)) {
-        int layer = i / area, rest = i - layer * area;
-        ivec2 t = first + ivec2(rest % wide, rest / wide);
+    for (int i = int(gl_LocalInvocationIndex); i < area; i += int(gl_WorkGroupSize.x * gl_WorkGroupSize.y)) {
+        ivec2 t = first + ivec2(i % wide, i / wide);
         bool inside = all(lessThan(uvec2(t), uvec2(k.slice)));
-        texels[i] = inside ? imageLoad(ao, slice_index(slice_of_layer(layer), t)).x : hole_texel;
+        vec4 v = vec4(-1.0);
+        uint e = 0u;
+        for (int slice = 0; slice < 4; ++slice) {
+            if (!inside || (two_slices != 0 && (slice == 1 || slice == 2))) continue;
+            uint texel = imageLoad(ao, slice_index(slice, t)).x;
+            if (texel < hole_texel) v[slice] = small(texel & 0xffffu);
+            e |= ao_edges(texel) << (8 * slice);
+        }
+        values[i] = v;
+        edges[i] = e;
     }
 }
 
 // Step n leaves n texels at each side as they are: nothing reads them any more.
 void blur_step(int n) {
-    int from = (n - 1 & 1) * half_of_all, to = (n & 1) * half_of_all;
+    int from = (n - 1 & 1) * area, to = (n & 1) * area;
     ivec2 size = ivec2(wide, high) - 2 * n;
-    for (int i = int(gl_LocalInvocationIndex); i < layers * size.x * size.y; i += int(gl_WorkGroupSize.x * gl_WorkGroupSize.y)) {
-        int layer = i / (size.x * size.y), rest = i - layer * size.x * size.y;
-        int at = layer * area + (n + rest / size.x) * wide + n + rest % size.x, c = from + at;
-        texels[to + at] = blurred(texels[c], uvec4(texels[c - 1], texels[c + 1], texels[c - wide], texels[c + wide]));
+    for (int i = int(gl_LocalInvocationIndex); i < size.x * size.y; i += int(gl_WorkGroupSize.x * gl_WorkGroupSize.y)) {
+        int at = (n + i / size.x) * wide + n + i % size.x;
+        vec4 c = values[from + at], l = values[from + at - 1], r = values[from + at + 1], t = values[from + at - wide], b = values[from + at + wide];
+        uint e = edges[at];
+        vec4 v = vec4(blurred(c.x, vec4(l.x, r.x, t.x, b.x), e & 0xffu), blurred(c.y, vec4(l.y, r.y, t.y, b.y), e >> 8 & 0xffu),
+                      blurred(c.z, vec4(l.z, r.z, t.z, b.z), e >> 16 & 0xffu), blurred(c.w, vec4(l.w, r.w, t.w, b.w), e >> 24));
+        values[to + at] = mix(c, v, greaterThanEqual(c, vec4(0.0)));
     }
 }
 

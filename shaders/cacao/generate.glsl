@@ -1,4 +1,4 @@
-// CACAO generation, for both ways to keep depth (DEPTH_IN_IMAGES): obscurance of each slice texel from pairs of taps on opposite
+// CACAO generation, for both ways to keep depth (FOR_GPU): obscurance of each slice texel from pairs of taps on opposite
 // sides, on the slice's own depth. One kernel for every quality; HIGHEST runs it twice, first as the base pass that decides how
 // many taps follow. `reference` keeps depth in buffers only.
 #include "lib/cacao.glsl"
@@ -11,7 +11,7 @@ layout(local_size_x_id = spec_tile_x, local_size_y_id = spec_tile_y) in;
 layout(constant_id = spec_base) const int base = 0;
 layout(constant_id = spec_mips) const int mips = 0;
 
-#ifdef DEPTH_IN_IMAGES
+#ifdef FOR_GPU
 layout(binding = 0) uniform sampler2DArray depths;
 #else
 layout(binding = 0, r32f) readonly uniform imageBuffer depths;
@@ -66,7 +66,7 @@ void add_scan(Surface s, vec2 ray, float z, inout Sum sum) {
     sum.weight += weight;
 }
 
-#ifndef DEPTH_IN_IMAGES
+#ifndef FOR_GPU
 float depth_of(int slice, ivec2 t) { return imageLoad(depths, depth_index(slice, 0, t)).x; }
 
 // --- reference: positions by texture coordinate, as AMD's sampler sees them.
@@ -165,7 +165,7 @@ void tap(Surface s, vec4 row, bool weighted, inout Sum sum) {
         sum.weight += weight * pair.weight;
         return;
     }
-#ifndef DEPTH_IN_IMAGES
+#ifndef FOR_GPU
     float mip = clamp(row.w + s.mip_base, 0.0, 3.0);
     offset = roundEven(offset);
     int m = mips != 0 ? int(roundEven(mip)) : 0;
@@ -173,6 +173,14 @@ void tap(Surface s, vec4 row, bool weighted, inout Sum sum) {
     add_reference(s, sample_reference(s, -offset, m), weight, sum);
 #endif
 }
+
+#ifdef FOR_GPU
+#define ROW(i, x, y, w, bias) vec4(x, y, w, bias),
+const vec4 taps[cacao_taps + 1] = {CACAO_PATTERN_0_3(ROW) CACAO_PATTERN_3_5(ROW) CACAO_PATTERN_5_12(ROW) CACAO_PATTERN_12_31(ROW) vec4(0.0)};
+vec4 adaptive_tap(int i) { return taps[i]; }
+#else
+vec4 adaptive_tap(int i) { return imageLoad(pattern, i); }
+#endif
 
 #define TAP(i, dx, dy, w, bias) tap(s, vec4(dx, dy, w, bias), true, sum);
 
@@ -229,7 +237,7 @@ void main() {
     s.ray_step = k.ray_step * float(2 * spacing);
     s.ray = k.ray_base + vec2(spacing * parity) * k.ray_step;
     s.at = coordinate(t);
-#ifndef DEPTH_IN_IMAGES
+#ifndef FOR_GPU
     s.beyond = (((k.slice + 7) & ~7) << fraction) + snap_bits;
 #endif
     s.depth_base = s.slice * k.depth_pitch + k.depth_end;
@@ -271,7 +279,7 @@ void main() {
         float average = float(imageLoad(load_counter, 0).x) * k.load_counter_div;
         wanted *= clamp(k.adaptive_limit / average, 0.0, 1.0);
         int end = min(31, int(27.0 * wanted + 1.5) + 5);
-        for (int i = 5; i < end; ++i) tap(s, imageLoad(pattern, i), false, sum);
+        for (int i = 5; i < end; ++i) tap(s, adaptive_tap(i), false, sum);
     } else {
         CACAO_PATTERN_0_3(TAP)
         if (kernel >= 1) { CACAO_PATTERN_3_5(TAP) }

@@ -2,5 +2,5 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
-#define DEPTH_IN_IMAGES
+#define FOR_GPU
 #include "cacao/generate.glsl"

@@ -1,4 +1,4 @@
-// CACAO, first pass, for both ways to keep depth (DEPTH_IN_IMAGES): one slice texel per thread, that is 2x2 pixels.
+// CACAO, first pass, for both ways to keep depth (FOR_GPU): one slice texel per thread, that is 2x2 pixels.
 // De-interleaves depth into four slices and writes four normals, derived from the full-precision depth or taken from the
 // supplied image. In images the mips are made here as well.
 #include "lib/cacao.glsl"
@@ -10,7 +10,7 @@ layout(constant_id = spec_device_depth) const int device_depth = 0;
 
 layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 1, r32f) readonly uniform imageBuffer normals_in;
-#ifdef DEPTH_IN_IMAGES
+#ifdef FOR_GPU
 layout(binding = 16, r32f) uniform writeonly image2DArray depths[4];
 #else
 layout(binding = 16, r32f) uniform writeonly imageBuffer depths;
@@ -65,7 +65,7 @@ vec3 completed(vec3 n, float c, vec3 z, vec3 a, vec3 b, vec3 d) {
     return scan == 0 || dot(n, n) > 1e-8 ? n : near.x * a + near.y * b + near.z * d;
 }
 
-#ifdef DEPTH_IN_IMAGES
+#ifdef FOR_GPU
 void store_depth(int slice, ivec2 t, float z) { imageStore(depths[0], ivec3(t, slice), vec4(z)); }
 #else
 void store_depth(int slice, ivec2 t, float z) { imageStore(depths, depth_index(slice, 0, t), vec4(whole(z))); }
@@ -106,7 +106,7 @@ vec4 prepared(ivec2 t) {
     return vec4(b1, b2, c1, c2);
 }
 
-#ifdef DEPTH_IN_IMAGES
+#ifdef FOR_GPU
 #include "lib/cacao_mip.glsl"
 layout(constant_id = spec_mips) const int mips = 0;
 const int tile = 8; // threads of a work group, across and down: one texel of mip 3

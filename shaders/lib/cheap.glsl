@@ -8,7 +8,7 @@ int nearest(float x) {
     precise float shifted = x + magic;
     return floatBitsToInt(shifted) - magic_bits;
 }
-#ifdef DEPTH_IN_IMAGES // a GPU: one instruction each as they stand
+#ifdef FOR_GPU // a GPU: one instruction each as they stand
 float positive(float x) { return max(x, 0.0); }
 float at_most_one(float x) { return min(x, 1.0); }
 float at_least(float x, float low) { return max(x, low); }
