@@ -207,11 +207,14 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
         {"visibility", texels(k.image) * 4, Host::download},
     };
 
+    // Texels a work group makes; where the shader's own threads are as many, it says so itself.
     const auto tile_of = [&](std::string_view shader) -> ivec2 {
-        ivec2 tile = images && (shader == "cacao/finish" || shader == "cacao/importance_smooth" || shader == "cacao/upsample_shared") ? ivec2{16, 16} : ivec2{8, 8};
-        const char* t = std::getenv(shader == "cacao/finish" ? "TILE_F" : shader == "cacao/generate_image" ? "TILE_G" : shader == "cacao/prepare_image" ? "TILE_P" : "TILE");
-        if (t) std::sscanf(t, "%dx%d", &tile.x, &tile.y);
-        return tile;
+        if (shader == "cacao/generate_image") return {20, 8};
+        if (shader == "cacao/finish") return {16, 16};
+        if (shader == "cacao/importance_smooth") return {16, 16};
+        if (shader == "cacao/upsample_shared") return {16, 16};
+        if (const char* t = std::getenv("TILE")) { ivec2 tile; std::sscanf(t, "%dx%d", &tile.x, &tile.y); return tile; }
+        return {8, 8};
     };
     const auto add = [&](std::string name, std::string_view shader, std::vector<int> reads, std::vector<int> writes, ivec2 threads,
                          int depth, std::vector<std::pair<int, int>> extra = {}) {

@@ -34,16 +34,15 @@ void load_texels() {
     for (int i = int(gl_LocalInvocationIndex); i < area; i += int(gl_WorkGroupSize.x * gl_WorkGroupSize.y)) {
         ivec2 t = first + ivec2(i % wide, i / wide);
         bool inside = all(lessThan(uvec2(t), uvec2(k.slice)));
-        vec4 v = vec4(-1.0);
-        uint e = 0u;
-        for (int slice = 0; slice < 4; ++slice) {
-            if (!inside || (two_slices != 0 && (slice == 1 || slice == 2))) continue;
-            uint texel = imageLoad(ao, slice_index(slice, t)).x;
-            if (texel < hole_texel) v[slice] = small(texel & 0xffffu);
-            e |= ao_edges(texel) << (8 * slice);
+        uvec4 texel = uvec4(hole_texel);
+        if (inside) {
+            texel.x = imageLoad(ao, slice_index(0, t)).x;
+            texel.w = imageLoad(ao, slice_index(3, t)).x;
+            if (two_slices == 0) texel.yz = uvec2(imageLoad(ao, slice_index(1, t)).x, imageLoad(ao, slice_index(2, t)).x);
         }
-        values[i] = v;
-        edges[i] = e;
+        uvec4 e = (texel >> 16) & 0xffu;
+        values[i] = mix(small(texel & 0xffffu), vec4(-1.0), greaterThanEqual(texel, uvec4(hole_texel)));
+        edges[i] = e.x | e.y << 8 | e.z << 16 | e.w << 24;
     }
 }
 
@@ -83,10 +82,10 @@ void main() {
     k = constants;
     load_texels();
     barrier();
-    for (int n = 1; n <= steps; ++n) {
-        blur_step(n);
-        barrier();
-    }
+    if (steps > 0) { blur_step(1); barrier(); } // one by one: divisions by what is known when compiling
+    if (steps > 1) { blur_step(2); barrier(); }
+    if (steps > 2) { blur_step(3); barrier(); }
+    if (steps > 3) { blur_step(4); barrier(); }
     ivec2 t = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(t, k.slice))) return;
     vec4 v = resolved_block(t);

@@ -7,7 +7,11 @@
 #include "lib/cacao_filter.glsl"
 #include "lib/cheap.glsl"
 
+#ifdef FOR_GPU
+layout(local_size_x = 32, local_size_y = 5) in;
+#else
 layout(local_size_x_id = spec_tile_x, local_size_y_id = spec_tile_y) in;
+#endif
 layout(constant_id = spec_base) const int base = 0;
 layout(constant_id = spec_mips) const int mips = 0;
 
@@ -36,7 +40,7 @@ struct Surface {
     ivec2 beyond;      // scan, buffers: bits of the first coordinate beyond the slice
     int depth_base;    // scan, buffers: end of the slice's depths
     vec3 quick_normal; // scan: as quick_inversesqrt() wants it
-    float halo_step;   // scan: 0.6 / R
+    float halo_step;   // scan: halo_scale / R
     vec3 point;        // moved a little towards the camera
     vec3 normal;
     mat2 rotation;  // pattern rotation, scaled to texels
@@ -54,14 +58,26 @@ float obscurance(vec3 normal, vec3 d, float falloff) {
     return max(0.0, facing - k.horizon) * max(0.0, d2 * falloff + 1.0);
 }
 
+#ifdef FOR_GPU
+const float halo_scale = 1.0;
+#else
+const float halo_scale = 0.6;
+#endif
+
 // --- scan. The tap looks from the centre of the texel it reads, along `ray`, so that slopes stay planes. Holes and what lies
 // outside the image are unknown: they count neither as open nor as closed.
 void add_scan(Surface s, vec2 ray, float z, inout Sum sum) {
     vec3 d = vec3(ray * z, z) - s.point;
     float d2 = dot(d, d);
     float facing = positive(dot(s.quick_normal, d) * quick_inversesqrt(d2) - k.horizon);
+#ifdef FOR_GPU // clamping to [0, 1] costs nothing
+    float near = clamp(d2 * s.falloff + 1.0, 0.0, 1.0);
+    float halo = halo_weighted ? 0.6 * clamp(d.z * s.halo_step + 2.0, 0.0, 1.0) + 0.4 : 1.0;
+#else
     float near = positive(d2 * s.falloff + 1.0);
-    float weight = z > 0.0 ? (halo_weighted ? at_most_one(at_least(d.z * s.halo_step + 1.6, 0.4)) : 1.0) : 0.0;
+    float halo = halo_weighted ? at_most_one(at_least(d.z * s.halo_step + 1.6, 0.4)) : 1.0;
+#endif
+    float weight = z > 0.0 ? halo : 0.0;
     sum.obscurance += facing * near * weight;
     sum.weight += weight;
 }
@@ -126,30 +142,35 @@ vec2 coordinate(ivec2 t) { return vec2(t) + (mips != 0 ? snap + 0.5 : snap); }
 #else
 float depth_of(int slice, ivec2 t) { return texelFetch(depths, ivec3(t, slice), 0).x; }
 
-// --- scan, depth in images whose size is a multiple of 8, so that a mip's texel covers whole texels. `snapped` is the middle of
-// the texel that a tap falls into, less `half_texel`; the sampler finds it, and finds 0, a hole, outside.
-void look(Surface s, vec2 snapped, float half_texel, float mip, inout Sum sum) {
-    vec2 image_inv = 1.0 / vec2((k.slice + 7) & ~7);
-    vec2 centre = snapped + half_texel;
-    float z = textureLod(depths, vec3((centre + 0.5) * image_inv, float(s.slice)), mip).x;
-    add_scan(s, s.ray + centre * s.ray_step, z, sum);
+// --- scan, depth in images whose size is a multiple of 8, so that a mip's texel covers whole texels. The sampler finds a texel, and
+// 0, a hole, outside.
+void look(Surface s, vec2 uv, vec2 ray, float mip, inout Sum sum) {
+    add_scan(s, ray, textureLod(depths, vec3(uv, float(s.slice)), mip).x, sum);
 }
 
+// Coordinates that are `snap` too large keep 6 bits below one texel, as in a buffer, and clearing bits rounds them down to a texel of
+// any mip. What snap adds to uv and ray is taken off with their offsets: that costs 1e-4 texels of precision.
 void look_both_ways(Surface s, vec2 offset, float mip_bias, inout Sum sum) {
+    const float snap = 196608.0; // 1.5 * 2^17
+    vec2 uv_step = 1.0 / vec2((k.slice + 7) & ~7);
     if (mips == 0) {
-        precise vec2 whole_offset = (offset + magic) - magic;
-        look(s, s.at + whole_offset, 0.0, 0.0, sum);
-        look(s, s.at - whole_offset, 0.0, 0.0, sum);
+        precise vec2 texels = (offset + magic) - magic;
+        vec2 uv = (s.at + 0.5) * uv_step, ray = s.ray + s.at * s.ray_step;
+        look(s, uv + texels * uv_step, ray + texels * s.ray_step, 0.0, sum);
+        look(s, uv - texels * uv_step, ray - texels * s.ray_step, 0.0, sum);
         return;
     }
-    precise float shifted = clamp(mip_bias + s.mip_base, 0.0, 3.0) + magic;
+    precise float shifted = 3.0 * clamp((mip_bias + s.mip_base) * (1.0 / 3.0), 0.0, 1.0) + magic; // that clamp costs nothing
     precise float mip = shifted - magic;
-    float texel = intBitsToFloat((floatBitsToInt(shifted) << 23) + 0x3f800000); // 2^mip
-    float half_texel = 0.5 * texel - 0.5, snap = magic * texel;                 // adding snap rounds to multiples of texel
-    vec2 at = s.at - half_texel;
-    precise vec2 ahead = (at + offset + snap) - snap, behind = (at - offset + snap) - snap;
-    look(s, ahead, half_texel, mip, sum);
-    look(s, behind, half_texel, mip, sum);
+    int level = floatBitsToInt(shifted), whole_texels = -64 << (level & 3);
+    float texel = intBitsToFloat((level << 23) + 0x3f800000); // 2^mip
+    vec2 uv = (0.5 * texel - snap) * uv_step, ray = s.ray + (0.5 * texel - 0.5 - snap) * s.ray_step;
+    vec2 at = s.at + (snap + 0.5);
+    precise vec2 ahead = at + offset, behind = at - offset;
+    ahead = intBitsToFloat(floatBitsToInt(ahead) & whole_texels);
+    behind = intBitsToFloat(floatBitsToInt(behind) & whole_texels);
+    look(s, uv + ahead * uv_step, ray + ahead * s.ray_step, mip, sum);
+    look(s, uv + behind * uv_step, ray + behind * s.ray_step, mip, sum);
 }
 
 vec2 coordinate(ivec2 t) { return vec2(t); }
@@ -220,18 +241,13 @@ float importance_at(vec2 uv) {
                     imageLoad(importance, f.high.y * k.importance.x + f.low.x).x, imageLoad(importance, f.high.y * k.importance.x + f.high.x).x);
 }
 
-void main() {
-    k = constants;
-    ivec2 t = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(t, k.slice))) return;
+// The AO texel of t, or what the base pass stores for it.
+uint generated(int slice, ivec2 t) {
     Surface s;
-    s.slice = slice_of_layer(int(gl_GlobalInvocationID.z));
+    s.slice = slice;
     int here = slice_index(s.slice, t);
     float zc = depth_of(s.slice, t);
-    if (scan != 0 && !(zc > 0.0)) {
-        imageStore(ao, here, uvec4(whole(hole_texel)));
-        return;
-    }
+    if (scan != 0 && !(zc > 0.0)) return hole_texel;
     ivec2 parity = ivec2(s.slice & 1, s.slice >> 1);
     s.uv = (vec2(t) + 0.5) * k.slice_inv;
     s.ray_step = k.ray_step * float(2 * spacing);
@@ -241,7 +257,7 @@ void main() {
     s.beyond = (((k.slice + 7) & ~7) << fraction) + snap_bits;
 #endif
     s.depth_base = s.slice * k.depth_pitch + k.depth_end;
-    s.halo_step = -0.6 * k.neg_rec_radius;
+    s.halo_step = halo_scale * -k.neg_rec_radius;
     vec2 step_m = scan != 0 ? zc * s.ray_step : zc * k.view_mul * k.slice_inv;
     s.point = scan != 0 ? vec3(s.ray + vec2(t) * s.ray_step, 1.0) * zc : vec3((k.view_mul * s.uv + k.view_add) * zc, zc);
     s.normal = normal_at(s.slice, t);
@@ -287,15 +303,42 @@ void main() {
     }
 
     float o = scan != 0 ? sum.obscurance / max(sum.weight, 1e-6) : sum.obscurance / sum.weight;
-    if (base != 0) {
-        imageStore(ao, here, uvec4(whole(quantised(o, value_levels()) | quantised(sum.weight / weight_range, weight_levels()) << 16)));
-        return;
-    }
+    if (base != 0) return quantised(o, value_levels()) | quantised(sum.weight / weight_range, weight_levels()) << 16;
     float fade = clamp(s.point.z * k.fade_mul + k.fade_add, 0.0, 1.0);
     if (detailed) {
         vec2 cut = clamp(0.35 * (1.0 - edges.xz - edges.yw), 0.0, 1.0);
         fade *= clamp(1.0 - cut.x - cut.y, 0.0, 1.0);
     }
     float visibility = clamp(1.0 - fade * min(k.shadow_strength * o, k.shadow_clamp), 0.0, 1.0);
-    imageStore(ao, here, uvec4(whole(ao_texel(pow(visibility, k.shadow_power), pack_edges(edges)))));
+    return ao_texel(pow(visibility, k.shadow_power), pack_edges(edges));
 }
+
+#ifdef FOR_GPU
+// A work group makes 20x8 texels. Each row of its threads, 32 of them, takes those of one rotation, four neighbouring threads from
+// a block of 5x4: their taps lie side by side, so that fewer lines of the cache serve them. Results change places in shared memory
+// to be stored in rows.
+const ivec2 tile = ivec2(20, 8);
+shared uint made[tile.y][tile.x];
+
+void main() {
+    k = constants;
+    ivec2 corner = tile * ivec2(gl_WorkGroupID.xy);
+    int slice = slice_of_layer(int(gl_WorkGroupID.z)), lane = int(gl_LocalInvocationID.x), block = lane >> 2;
+    ivec2 at = ivec2(5 * (block & 3), 4 * (block >> 2) + (lane & 3));
+    // x + 2y = rotation (mod 5)
+    at.x += (int(gl_LocalInvocationID.y) + 3 * (corner.y + at.y)) % 5;
+    if (all(lessThan(corner + at, k.slice))) made[at.y][at.x] = generated(slice, corner + at);
+    barrier();
+    int i = int(gl_LocalInvocationIndex);
+    at = ivec2(i % tile.x, i / tile.x);
+    if (all(lessThan(corner + at, k.slice))) imageStore(ao, slice_index(slice, corner + at), uvec4(made[at.y][at.x]));
+}
+#else
+void main() {
+    k = constants;
+    ivec2 t = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(t, k.slice))) return;
+    int slice = slice_of_layer(int(gl_GlobalInvocationID.z));
+    imageStore(ao, slice_index(slice, t), uvec4(whole(generated(slice, t))));
+}
+#endif

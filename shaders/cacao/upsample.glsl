@@ -79,36 +79,40 @@ int staged_row() { return k.grid.x; }
 int load_staged() { return (int(gl_GlobalInvocationID.y) + 2) * k.grid.x + int(gl_GlobalInvocationID.x) + 2; }
 #endif
 
-// Scan: four pixels share each tap. (1 - x / 4)^4 stands for exp(-x): no exponential, and nothing beyond two sigma.
+// Scan: four pixels share each tap. (1 - x / 4)^4 stands for exp(-x): no exponential, and nothing beyond two sigma. Depths are
+// in units of 2 sigma.
 struct Four {
     vec4 z, sum, total;
-    float narrow; // 1 / (4 sigma^2)
+    float unit; // 1 / (2 sigma)
 };
 
-void tap(inout Four four, int at, vec2 gx, vec2 gy) {
+void tap(inout Four four, int at, vec2 gx) {
     vec2 s = staged_at(at);
-    vec4 dz = four.z - s.y;
-    vec4 w = max(1.0 - dz * dz * four.narrow, 0.0);
-    w = s.y > 0.0 ? w * w : vec4(0.0);
-    w *= w * vec4(gx * gy.x, gx * gy.y);
+    vec4 dz = four.z - (s.y > 0.0 ? s.y * four.unit : 1e9); // holes lie far off
+    vec4 w = clamp(1.0 - dz * dz, 0.0, 1.0);
+    w *= w;
+    w *= w * gx.xyxy;
     four.sum += w * s.x;
     four.total += w;
 }
 
 #define GX(i) vec2(k.spatial[i], k.spatial[5 + i])
 void row(inout Four four, int at, vec2 gy) {
-    tap(four, at - 2, GX(0), gy);
-    tap(four, at - 1, GX(1), gy);
-    tap(four, at, GX(2), gy);
-    tap(four, at + 1, GX(3), gy);
-    tap(four, at + 2, GX(4), gy);
+    Four part = Four(four.z, vec4(0.0), vec4(0.0), four.unit);
+    tap(part, at - 2, GX(0));
+    tap(part, at - 1, GX(1));
+    tap(part, at, GX(2));
+    tap(part, at + 1, GX(3));
+    tap(part, at + 2, GX(4));
+    four.sum += part.sum * gy.xxyy;
+    four.total += part.total * gy.xxyy;
 }
 
 vec4 upsampled(int at, vec4 z) {
     int step = staged_row();
     vec2 own = staged_at(at);
-    float known = own.y > 0.0 ? self_weight : 0.0;
-    Four four = Four(z, vec4(known * own.x), vec4(known), 0.25 / k.sigma_depth);
+    float known = own.y > 0.0 ? self_weight : 0.0, unit = 0.5 * inversesqrt(k.sigma_depth);
+    Four four = Four(z * unit, vec4(known * own.x), vec4(known), unit);
     row(four, at - 2 * step, GX(0));
     row(four, at - step, GX(1));
     row(four, at, GX(2));
