@@ -54,8 +54,13 @@ void blur_step(int n) {
         int at = (n + i / size.x) * wide + n + i % size.x;
         vec4 c = values[from + at], l = values[from + at - 1], r = values[from + at + 1], t = values[from + at - wide], b = values[from + at + wide];
         uint e = edges[at];
-        vec4 v = vec4(blurred(c.x, vec4(l.x, r.x, t.x, b.x), e & 0xffu), blurred(c.y, vec4(l.y, r.y, t.y, b.y), e >> 8 & 0xffu),
-                      blurred(c.z, vec4(l.z, r.z, t.z, b.z), e >> 16 & 0xffu), blurred(c.w, vec4(l.w, r.w, t.w, b.w), e >> 24));
+        vec4 v = c;
+        v.x = blurred(c.x, vec4(l.x, r.x, t.x, b.x), e & 0xffu);
+        v.w = blurred(c.w, vec4(l.w, r.w, t.w, b.w), e >> 24);
+        if (two_slices == 0) {
+            v.y = blurred(c.y, vec4(l.y, r.y, t.y, b.y), e >> 8 & 0xffu);
+            v.z = blurred(c.z, vec4(l.z, r.z, t.z, b.z), e >> 16 & 0xffu);
+        }
         values[to + at] = mix(c, v, greaterThanEqual(c, vec4(0.0)));
     }
 }

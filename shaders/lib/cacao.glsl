@@ -25,9 +25,11 @@ float weight_levels() { return scan != 0 ? 32767.0 : 255.0; }
 #ifdef FOR_GPU
 float small(uint n) { return uintBitsToFloat(0x4b000000u | n) - 8388608.0; }
 uint nearest_small(float x) { return floatBitsToUint(x + 8388608.0) & 0x7fffffu; }
+vec4 up_to_one(vec4 positive) { return clamp(positive, 0.0, 1.0); } // free there
 #else
 float small(uint n) { return float(n); }
 uint nearest_small(float x) { return uint(roundEven(x)); }
+vec4 up_to_one(vec4 positive) { return min(positive, 1.0); }
 #endif
 vec4 small(uvec4 n) { return vec4(small(n.x), small(n.y), small(n.z), small(n.w)); }
 
@@ -78,9 +80,9 @@ uint pack_edges(vec4 edges) {
 }
 // Reference: a cut edge still lets iota through. Scan: cut is cut, so that nothing of a hole or another surface leaks.
 vec4 unpack_edges(uint p) {
-    if (scan != 0) {
-        vec4 f = small(uvec4(p >> 6, p >> 4, p >> 2, p) & 3u);
-        return min(min(f * (1.0 / 3.0) + k.inv_sharpness, f), 1.0);
+    if (scan != 0) { // fields where they lie: 64, 16, 4 and 1 times 0 .. 3
+        vec4 f = small(p & uvec4(0xc0u, 0x30u, 0xcu, 0x3u));
+        return min(up_to_one(f * (1.0 / vec4(192.0, 48.0, 12.0, 3.0)) + k.inv_sharpness), f);
     }
     return clamp(vec4(uvec4(p >> 6, p >> 4, p >> 2, p) & 3u) / 3.0 + k.inv_sharpness, 0.0, 1.0);
 }
