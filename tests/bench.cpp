@@ -71,7 +71,8 @@ class Timed {
     }
     void print_passes() {
         for (const auto& [name, ms] : program_.timings())
-            if (passes_.count(name)) fmt::print("    {:<20} {:>8.4f}\n", name, median(passes_[name]));
+            if (const auto& all = passes_[name]; !all.empty())
+                fmt::print("    {:<20} {:>8.4f} {:>8.4f}\n", name, median(all), *std::min_element(all.begin(), all.end()));
     }
 
   private:
@@ -102,7 +103,7 @@ cv::Size parse_size(const std::string& text) {
 
 /// The configurations whose maps two devices must agree on: every quality and resolution, holes included.
 template <class Use>
-void each_map(gpu::Device& device, Use use) {
+void each_map(gpu::Device& device, const std::string& storage, Use use) {
     DepthImage depth = room({641, 479});
     depth.z_m(cv::Rect(200, 150, 60, 7)) = 0;
     depth.z_m(cv::Rect(400, 0, 5, 300)) = 0;
@@ -111,23 +112,24 @@ void each_map(gpu::Device& device, Use use) {
             CacaoOptions options;
             options.quality = quality;
             options.downsampled = downsampled;
+            options.storage = storage;
             Cacao method(device, options);
             use(fmt::format("{}_{}", quality, downsampled ? "downsampled" : "native"), method.compute({depth}).visibility);
         }
 }
 
-void write_maps(gpu::Device& device, const std::filesystem::path& folder) {
+void write_maps(gpu::Device& device, const std::string& storage, const std::filesystem::path& folder) {
     std::filesystem::create_directories(folder);
-    each_map(device, [&](const std::string& name, const cv::Mat1f& map) {
+    each_map(device, storage, [&](const std::string& name, const cv::Mat1f& map) {
         std::ofstream(folder / (name + ".f32"), std::ios::binary)
             .write(reinterpret_cast<const char*>(map.data), static_cast<std::streamsize>(map.total() * 4));
     });
 }
 
-int compare_maps(gpu::Device& device, const std::filesystem::path& folder) {
+int compare_maps(gpu::Device& device, const std::string& storage, const std::filesystem::path& folder) {
     int missed = 0;
     fmt::print("{:<32} {:>10} {:>8} {:>8}   differences in 1/255 to {}\n", "map", "mean", "p99", "worst", folder.string());
-    each_map(device, [&](const std::string& name, const cv::Mat1f& map) {
+    each_map(device, storage, [&](const std::string& name, const cv::Mat1f& map) {
         cv::Mat1f theirs(map.size());
         if (!std::ifstream(folder / (name + ".f32"), std::ios::binary)
                  .read(reinterpret_cast<char*>(theirs.data), static_cast<std::streamsize>(theirs.total() * 4)))
@@ -152,7 +154,7 @@ int compare_maps(gpu::Device& device, const std::filesystem::path& folder) {
 
 int main(int argc, char** argv) {
     std::vector<std::string> sizes{"640x480"}, qualities{"lowest", "low", "medium", "high", "highest"};
-    std::string choice, profile = "scan";
+    std::string choice, profile = "scan", storage = "auto";
     int repeat = 20;
     bool passes = false;
     std::string written, compared;
@@ -162,6 +164,7 @@ int main(int argc, char** argv) {
     app.add_option("--repeat", repeat);
     app.add_option("--device", choice);
     app.add_option("--profile", profile);
+    app.add_option("--storage", storage);
     app.add_flag("--passes", passes);
     app.add_option("--write-maps", written);
     app.add_option("--compare-maps", compared);
@@ -169,8 +172,8 @@ int main(int argc, char** argv) {
     try {
         gpu::Device device(choice);
         fmt::print("{} ({}), profile {}\n", device.info().name, device.info().driver, profile);
-        if (!written.empty()) return write_maps(device, written), 0;
-        if (!compared.empty()) return compare_maps(device, compared);
+        if (!written.empty()) return write_maps(device, storage, written), 0;
+        if (!compared.empty()) return compare_maps(device, storage, compared);
         for (const std::string& text : sizes) {
             const cv::Size size = parse_size(text);
             const DepthImage depth = room(size);
@@ -186,7 +189,8 @@ int main(int argc, char** argv) {
                     options.downsampled = downsampled;
                     options.radius = 1.2F;
                     const shared::CacaoConstants constants = constants_from(options, depth.camera);
-                    const CacaoTables tables = cacao_tables(options, constants, false);
+                    options.storage = storage;
+                    const CacaoTables tables = cacao_tables(options, constants, false, cacao_storage(options, device));
                     Timed method(device, tables, std::as_bytes(std::span(&constants, 1)),
                                  passes ? gpu::Program::Stamps::passes : gpu::Program::Stamps::total);
                     std::memcpy(method.host<float>(cacao_depth_in).data(), depth.z_m.data, depth.z_m.total() * 4);

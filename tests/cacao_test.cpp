@@ -78,7 +78,8 @@ cv::Vec3f normal_of(std::uint32_t word, bool scan) {
     const int bits = scan ? 10 : 8;
     cv::Vec3f n;
     for (int axis = 0; axis < 3; ++axis) {
-        const int value = static_cast<int>(word << (32 - (axis + 1) * bits)) >> (32 - bits);
+        const int value = scan ? static_cast<int>(word >> (axis * bits) & 1023U) - 512
+                               : static_cast<int>(word << (32 - (axis + 1) * bits)) >> (32 - bits);
         n[axis] = std::max(-1.0F, static_cast<float>(value) / (scan ? 511.0F : 127.0F));
     }
     return n;

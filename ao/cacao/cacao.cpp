@@ -17,25 +17,27 @@ using shared::ivec2;
 using shared::vec2;
 
 constexpr float pi = 3.14159265358979323846F;
+constexpr int most_fused = 4; // blur steps in one pass: each widens the rim that work groups compute twice
 
 int halved(int n) { return (n + 1) / 2; }
 int groups(int threads, int tile) { return (threads + tile - 1) / tile; }
 std::size_t texels(ivec2 size) { return static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y); }
 
-/// Pattern rotation and scale of slice `a`, phase `phase` (PatternRotScaleMatrices); the matrix is (x, y; y, -x).
-vec2 rotation(int a, int phase) {
-    constexpr std::array<int, 5> order{0, 1, 4, 3, 2};
-    const float b = static_cast<float>(order[static_cast<std::size_t>(phase)]);
-    const float slice = static_cast<float>(a);
-    const float angle = (slice + b / 5.0F) * (pi * 0.5F);
-    const float scale = 1.0F + (slice - 1.5F + (b - 2.0F) / 5.0F) * 0.07F;
-    return {scale * std::cos(angle), -scale * std::sin(angle)};
-}
-
 /// The sampling pattern as the adaptive taps of HIGHEST read it.
 #define ROW(i, x, y, weight, mip_bias) x##F, y##F, weight##F, mip_bias##F,
-const std::vector<float> pattern{CACAO_PATTERN_0_3(ROW) CACAO_PATTERN_3_5(ROW) CACAO_PATTERN_5_12(ROW) CACAO_PATTERN_12_31(ROW)};
+const std::vector<float> taps{CACAO_PATTERN_0_3(ROW) CACAO_PATTERN_3_5(ROW) CACAO_PATTERN_5_12(ROW) CACAO_PATTERN_12_31(ROW)};
 #undef ROW
+
+/// What the buffer `pattern` holds: the taps, then the rotations of each slice.
+std::vector<float> pattern() {
+    std::vector<float> rows = taps;
+    for (int a = 0; a < 4; ++a)
+        for (int phase = 0; phase < 5; ++phase) {
+            const vec2 r = cacao_rotation(a, phase);
+            rows.insert(rows.end(), {r.x, r.y, 0.0F, 0.0F});
+        }
+    return rows;
+}
 
 /// Device depth d -> z = mu / (alpha - d), with z positive for both orders of near and far.
 vec2 depth_unpack(const CacaoOptions& options) {
@@ -76,6 +78,15 @@ void set_camera(CacaoConstants& k, const Pinhole& camera) {
 
 } // namespace
 
+shared::vec2 cacao_rotation(int a, int phase) {
+    constexpr std::array<int, 5> order{0, 1, 4, 3, 2};
+    const float b = static_cast<float>(order[static_cast<std::size_t>(phase)]);
+    const float slice = static_cast<float>(a);
+    const float angle = (slice + b / 5.0F) * (pi * 0.5F);
+    const float scale = 1.0F + (slice - 1.5F + (b - 2.0F) / 5.0F) * 0.07F;
+    return {scale * std::cos(angle), -scale * std::sin(angle)};
+}
+
 std::vector<Parameter> CacaoOptions::parameters() {
     return {
         {"profile", "reference reproduces AMD's shaders, scan corrects them for sensor depth", &profile, "", {}, {}, {"scan", "reference"}},
@@ -101,6 +112,8 @@ std::vector<Parameter> CacaoOptions::parameters() {
         {"far", "far plane of device depth", &far_m, "m", 1e-6, 1e9},
         {"normals-mul", "supplied normals are multiplied by this", &normals_mul, "", -1e3, 1e3},
         {"normals-add", "then this is added", &normals_add, "", -1e3, 1e3},
+        {"storage", "where depth lies between the passes; auto: images on GPUs, buffers on CPUs and for the reference", &storage, "", {}, {},
+         {"auto", "buffers", "images"}},
     };
 }
 
@@ -147,12 +160,15 @@ CacaoConstants constants_from(const CacaoOptions& options, const Pinhole& camera
             const float d = static_cast<float>(tap) - 0.5F * static_cast<float>(odd);
             k.spatial[5 * odd + tap + 2] = std::exp(-d * d / options.sigma_squared);
         }
-    for (int a = 0; a < 4; ++a)
-        for (int phase = 0; phase < 5; ++phase) k.rotation[5 * a + phase] = rotation(a, phase);
     return k;
 }
 
-CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, bool normals_supplied) {
+CacaoStorage cacao_storage(const CacaoOptions& options, const gpu::Device& device) {
+    if (options.storage == "buffers" || !options.scan()) return CacaoStorage::buffers;
+    return options.storage == "images" || device.info().kind != "CPU" ? CacaoStorage::images : CacaoStorage::buffers;
+}
+
+CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, bool normals_supplied, CacaoStorage storage) {
     using Host = gpu::BufferRow::Host;
     using shared::spec_scan;
     const CacaoQuality level = options.level();
@@ -167,12 +183,17 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
 
     const std::size_t slices = 4 * texels(k.slice);
     const std::size_t haloed = 4 * texels({k.slice.x + 2 * halo, k.slice.y + 2 * halo});
+    const bool images = storage == CacaoStorage::images;
+    const auto padded = [](int size) { return 8 * static_cast<std::uint32_t>(groups(size, 8)); };
+    const gpu::BufferRow::Image depth_image{padded(k.slice.x), padded(k.slice.y), 4, 4};
+    const std::vector<float> rows = pattern();
     CacaoTables tables;
     const auto floats = gpu::BufferRow::Texels::r32f, pairs = gpu::BufferRow::Texels::rg32f, words = gpu::BufferRow::Texels::r32ui;
     tables.buffers = {
         {"depth in", texels(k.image) * 4, Host::upload, floats},
         {"normals in", normals_supplied ? texels(k.image) * 12 : 4, normals_supplied ? Host::upload : Host::none, floats},
-        {"depths", static_cast<std::size_t>(k.depth_pitch) * 16, Host::none, floats},
+        images ? gpu::BufferRow{"depths", gpu::image_bytes(depth_image), Host::none, {}, {}, depth_image}
+               : gpu::BufferRow{"depths", static_cast<std::size_t>(k.depth_pitch) * 16, Host::none, floats},
         {"normals", slices * 4, Host::none, words},
         {"ping", slices * 4, Host::none, words},
         {"pong", slices * 4, Host::none, words},
@@ -182,46 +203,64 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
         {"blur a", !scan && n > 1 ? haloed * 4 : 4, Host::none, words},
         {"blur b", !scan && n > 2 ? haloed * 4 : 4, Host::none, words},
         {"staged", options.downsampled ? texels(k.grid) * 8 : 8, Host::none, pairs},
-        {"pattern", pattern.size() * 4, Host::none, gpu::BufferRow::Texels::rgba32f, pattern},
+        {"pattern", rows.size() * 4, Host::none, gpu::BufferRow::Texels::rgba32f, rows},
         {"visibility", texels(k.image) * 4, Host::download},
     };
 
+    // Texels a work group makes; where the shader's own threads are as many, it says so itself.
+    const auto tile_of = [&](std::string_view shader) -> ivec2 {
+        if (shader == "cacao/generate_image") return {20, 8};
+        if (shader == "cacao/finish") return {16, 16};
+        if (shader == "cacao/importance_smooth") return {16, 16};
+        if (shader == "cacao/upsample_shared") return {16, 16};
+        if (const char* t = std::getenv("TILE")) { ivec2 tile; std::sscanf(t, "%dx%d", &tile.x, &tile.y); return tile; }
+        return {8, 8};
+    };
     const auto add = [&](std::string name, std::string_view shader, std::vector<int> reads, std::vector<int> writes, ivec2 threads,
                          int depth, std::vector<std::pair<int, int>> extra = {}) {
+        const ivec2 tile = tile_of(shader);
         std::vector<std::pair<int, int>> constants{{spec_scan, scan},
                                                    {shared::spec_spacing, options.downsampled ? 2 : 1},
                                                    {shared::spec_kernel, kernel},
                                                    {shared::spec_two_slices, two_slices},
-                                                   {shared::spec_device_depth, options.depth_input != "metric"}};
+                                                   {shared::spec_device_depth, options.depth_input != "metric"},
+                                                   {shared::spec_tile_x, tile.x},
+                                                   {shared::spec_tile_y, tile.y}};
         constants.insert(constants.end(), extra.begin(), extra.end());
         tables.passes.push_back({std::move(name), shader, std::move(reads), std::move(writes),
-                                 {static_cast<std::uint32_t>(groups(threads.x, 8)), static_cast<std::uint32_t>(groups(threads.y, 8)),
+                                 {static_cast<std::uint32_t>(groups(threads.x, tile.x)), static_cast<std::uint32_t>(groups(threads.y, tile.y)),
                                   static_cast<std::uint32_t>(depth)},
                                  std::move(constants)});
     };
 
     const int given = normals_supplied ? cacao_normals_in : cacao_depth_in;
-    add("prepare", "cacao/prepare", {cacao_depth_in, given}, {cacao_depths, cacao_normals}, k.slice, 1,
-        {{shared::spec_normals, normals_supplied}});
-    if (mips) {
+    add("prepare", images ? "cacao/prepare_image" : "cacao/prepare", {cacao_depth_in, given}, {cacao_depths, cacao_normals}, k.slice, 1,
+        {{shared::spec_normals, normals_supplied}, {shared::spec_mips, mips}});
+    if (mips && !images) {
         add("mips", "cacao/mips", {cacao_depth_in}, {cacao_depths}, {0, 0}, 1);
         tables.passes.back().groups = {static_cast<std::uint32_t>(groups(4 * groups(k.slice.x, 8) * groups(k.slice.y, 8), 64)), 1, 1};
     }
+    const std::string_view generate = images ? "cacao/generate_image" : "cacao/generate";
     // Slots a configuration does not read are filled with a buffer it reads anyway.
     std::vector<int> inputs{cacao_depths, cacao_normals, cacao_normals, cacao_normals, cacao_normals, cacao_pattern};
     if (highest) {
         tables.passes.push_back({"clear counter", "", {}, {cacao_counter}, {1, 1, 1}, {}});
-        add("base", "cacao/generate", inputs, {cacao_pong}, k.slice, 4, {{shared::spec_base, 1}, {shared::spec_mips, 1}});
-        add("importance", "cacao/importance", {cacao_pong}, {cacao_importance}, k.importance, 1);
-        add("importance blur a", "cacao/importance_blur", {cacao_importance}, {cacao_importance_pong, cacao_counter}, k.importance, 1);
-        add("importance blur b", "cacao/importance_blur", {cacao_importance_pong}, {cacao_importance, cacao_counter}, k.importance, 1,
-            {{shared::spec_last, 1}});
+        add("base", generate, inputs, {cacao_pong}, k.slice, 4, {{shared::spec_base, 1}, {shared::spec_mips, 1}});
+        if (images) {
+            add("importance", "cacao/importance_smooth", {cacao_pong}, {cacao_importance, cacao_counter}, k.importance, 1);
+        } else {
+            add("importance", "cacao/importance", {cacao_pong}, {cacao_importance}, k.importance, 1);
+            add("importance blur a", "cacao/importance_blur", {cacao_importance, cacao_pong}, {cacao_importance_pong, cacao_counter}, k.importance, 1);
+            add("importance blur b", "cacao/importance_blur", {cacao_importance_pong, cacao_pong}, {cacao_importance, cacao_counter}, k.importance, 1,
+                {{shared::spec_last, 1}});
+        }
         inputs = {cacao_depths, cacao_normals, cacao_pong, cacao_importance, cacao_counter, cacao_pattern};
     }
-    add("generate", "cacao/generate", inputs, {cacao_ping}, k.slice, layers, {{shared::spec_mips, mips}});
+    add("generate", generate, inputs, {cacao_ping}, k.slice, layers, {{shared::spec_mips, mips}});
 
     int from = cacao_ping;
-    for (int i = 0; i < n; ++i) {
+    const int fused = images ? std::min(n, most_fused) : 0;
+    for (int i = 0; i < n - fused; ++i) {
         const bool first = i == 0, last = i == n - 1;
         int to = from == cacao_ping ? cacao_pong : cacao_ping;
         if (!scan) to = last ? cacao_pong : (i % 2 == 0 ? cacao_blur_a : cacao_blur_b);
@@ -232,7 +271,11 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
     tables.blurred = from;
 
     const std::vector<std::pair<int, int>> how{{shared::spec_resolve, resolve}, {shared::spec_power, power}};
-    if (!options.downsampled) {
+    if (images) {
+        add("finish", "cacao/finish", {from, cacao_depth_in}, {cacao_out, cacao_staged}, k.slice, 1, {{shared::spec_steps, fused}});
+        if (options.downsampled)
+            add("upsample", "cacao/upsample_shared", {cacao_staged, cacao_depth_in}, {cacao_out}, {halved(k.image.x), halved(k.image.y)}, 1, how);
+    } else if (!options.downsampled) {
         add("apply", "cacao/apply", {from, cacao_depth_in}, {cacao_out}, k.slice, 1, how);
     } else {
         add("stage", "cacao/stage", {from, cacao_depths}, {cacao_staged}, {halved(k.grid.x), halved(k.grid.y)}, 1, how);
@@ -259,7 +302,7 @@ void Cacao::prepare(const View& view) {
     camera_ = camera;
     normals_supplied_ = supplied;
     if (program_) return;
-    tables_ = cacao_tables(options_, constants_, supplied);
+    tables_ = cacao_tables(options_, constants_, supplied, cacao_storage(options_, device_));
     program_ = std::make_unique<gpu::Program>(device_, tables_.buffers, tables_.passes, sizeof constants_);
 }
 
@@ -298,9 +341,14 @@ Intermediate Cacao::depth_slices(int mip) {
     const int width = std::max(1, k.slice.x >> mip), height = std::max(1, k.slice.y >> mip);
     Intermediate slices{fmt::format("depth_mip{}", mip), "f4", {4, height, width}, {}};
     const auto bytes = program_->read_back(cacao_depths);
+    const gpu::BufferRow::Image& image = tables_.buffers[cacao_depths].image;
+    int before = 0; // texels of the mips before this one
+    for (int m = 0; m < mip; ++m) before += 4 * static_cast<int>((image.width >> m) * (image.height >> m));
+    const int wide = static_cast<int>(image.width) >> mip, high = static_cast<int>(image.height) >> mip;
     for (int a = 0; a < 4; ++a)
         for (int y = 0; y < height; ++y) {
-            const int first = a * k.depth_pitch + k.depth_end - (k.depth_mips >> (2 * mip)) + y * (k.depth_stride >> mip);
+            const int in_buffer = a * k.depth_pitch + k.depth_end - (k.depth_mips >> (2 * mip)) + y * (k.depth_stride >> mip);
+            const int first = wide > 0 ? before + (a * high + y) * wide : in_buffer;
             slices.data.insert(slices.data.end(), bytes.begin() + 4L * first, bytes.begin() + 4L * (first + width));
         }
     return slices;

@@ -41,6 +41,7 @@ struct CacaoOptions {
     float far_m = 1000.0F;
     float normals_mul = 1.0F;
     float normals_add = 0.0F;
+    std::string storage = "auto";
     std::optional<float> outside_depth; ///< reference only: what loads outside the image read; default: device depth 0, linearised
 
     [[nodiscard]] std::vector<Parameter> parameters();
@@ -51,6 +52,9 @@ struct CacaoOptions {
 
 /// The constant block of one frame size and camera. Clamps as AMD's host code does.
 [[nodiscard]] shared::CacaoConstants constants_from(const CacaoOptions& options, const Pinhole& camera);
+
+/// Pattern rotation and scale of slice 0 .. 3, phase 0 .. 4 (PatternRotScaleMatrices); the matrix is (x, y; y, -x).
+[[nodiscard]] shared::vec2 cacao_rotation(int slice, int phase);
 
 /// The buffers of CACAO by name; the rows of CacaoTables::buffers are in this order.
 enum CacaoBuffer : int {
@@ -64,7 +68,13 @@ struct CacaoTables {
     std::vector<gpu::PassRow> passes;
     int blurred = cacao_ping; ///< which buffer holds AO after the blur
 };
-[[nodiscard]] CacaoTables cacao_tables(const CacaoOptions& options, const shared::CacaoConstants& constants, bool normals_supplied);
+/// How the passes keep what they hand on: in buffers, or depth in images and the last blur steps and the resolve in one pass.
+/// The same kernels and, but for rounding, the same maps; CPUs are faster with the first, GPUs with the second.
+enum class CacaoStorage { buffers, images };
+[[nodiscard]] CacaoStorage cacao_storage(const CacaoOptions& options, const gpu::Device& device);
+
+[[nodiscard]] CacaoTables cacao_tables(const CacaoOptions& options, const shared::CacaoConstants& constants, bool normals_supplied,
+                                       CacaoStorage storage = CacaoStorage::buffers);
 
 /// An intermediate result, for study: `shape` outermost first, little-endian elements of `type` ("f4" or "u1" ...).
 struct Intermediate {

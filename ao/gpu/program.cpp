@@ -44,6 +44,42 @@ struct BoundBuffer {
     }
 };
 
+/// An image of float layers: a view of everything to sample from, and one of each mip to write to.
+struct BoundImage {
+    vk::raii::DeviceMemory memory = nullptr;
+    vk::raii::Image image = nullptr;
+    vk::raii::ImageView sampled = nullptr;
+    std::vector<vk::raii::ImageView> mips;
+
+    BoundImage() = default;
+    BoundImage(const Device::State& gpu, const BufferRow::Image& row) {
+        using Usage = vk::ImageUsageFlagBits;
+        constexpr auto format = vk::Format::eR32Sfloat;
+        image = gpu.device.createImage({{}, vk::ImageType::e2D, format, {row.width, row.height, 1}, row.mips, row.layers,
+                                        vk::SampleCountFlagBits::e1, vk::ImageTiling::eOptimal,
+                                        Usage::eSampled | Usage::eStorage | Usage::eTransferSrc | Usage::eTransferDst});
+        const auto needs = image.getMemoryRequirements();
+        const int type = gpu.memory_type(needs.memoryTypeBits, Memory::eDeviceLocal);
+        if (type < 0) throw Error("the device has no fitting memory");
+        memory = gpu.device.allocateMemory({needs.size, static_cast<std::uint32_t>(type)});
+        image.bindMemory(*memory, 0);
+        const auto view = [&](std::uint32_t first, std::uint32_t count) {
+            return gpu.device.createImageView(
+                {{}, *image, vk::ImageViewType::e2DArray, format, {}, {vk::ImageAspectFlagBits::eColor, first, count, 0, row.layers}});
+        };
+        sampled = view(0, row.mips);
+        for (std::uint32_t m = 0; m < row.mips; ++m) mips.push_back(view(m, 1));
+    }
+};
+
+/// Nearest texel of the nearest mip, 0 outside.
+vk::raii::Sampler make_sampler(const Device::State& gpu) {
+    constexpr auto nearest = vk::Filter::eNearest;
+    constexpr auto border = vk::SamplerAddressMode::eClampToBorder;
+    return gpu.device.createSampler({{}, nearest, nearest, vk::SamplerMipmapMode::eNearest, border, border, border, 0, VK_FALSE, 0,
+                                     VK_FALSE, vk::CompareOp::eNever, 0, VK_LOD_CLAMP_NONE, vk::BorderColor::eFloatTransparentBlack});
+}
+
 vk::Format format_of(BufferRow::Texels texels) {
     switch (texels) {
     case BufferRow::Texels::r32f: return vk::Format::eR32Sfloat;
@@ -85,12 +121,21 @@ void compute_barrier(const vk::raii::CommandBuffer& commands) {
 
 } // namespace
 
+std::size_t image_bytes(const BufferRow::Image& image) {
+    std::size_t texels = 0;
+    for (std::uint32_t m = 0; m < image.mips; ++m)
+        texels += std::size_t(std::max(1U, image.width >> m)) * std::max(1U, image.height >> m);
+    return texels * image.layers * 4;
+}
+
 std::vector<std::string> problems(std::span<const BufferRow> buffers, std::span<const PassRow> passes) {
     std::vector<std::string> found;
     std::vector<char> written(buffers.size());
     for (std::size_t i = 0; i < buffers.size(); ++i) {
         written[i] = buffers[i].host == BufferRow::Host::upload || !buffers[i].initial.empty();
         if (buffers[i].bytes == 0) found.push_back(fmt::format("buffer {} is empty", buffers[i].name));
+        if (buffers[i].image.width > 0 && buffers[i].bytes != image_bytes(buffers[i].image))
+            found.push_back(fmt::format("image {} has {} bytes, not {}", buffers[i].name, image_bytes(buffers[i].image), buffers[i].bytes));
     }
     for (const PassRow& pass : passes) {
         if (std::find(pass.groups.begin(), pass.groups.end(), 0u) != pass.groups.end())
@@ -115,6 +160,8 @@ struct Program::State {
     std::vector<BufferRow> rows;
     std::vector<PassRow> passes;
     std::vector<BoundBuffer> buffers;
+    std::vector<BoundImage> images;   // per row; empty where it is a buffer
+    vk::raii::Sampler sampler = nullptr;
     std::vector<BoundBuffer> staging; // per row; empty where the host reaches the buffer itself
     BoundBuffer constants;
     struct Pipeline {
@@ -135,8 +182,15 @@ struct Program::State {
     void make_buffers(std::size_t constants_bytes) {
         using Usage = vk::BufferUsageFlagBits;
         staging.resize(rows.size());
+        images.resize(rows.size());
+        sampler = make_sampler(gpu);
         for (std::size_t i = 0; i < rows.size(); ++i) {
             const BufferRow& row = rows[i];
+            if (row.image.width > 0) {
+                images[i] = during(fmt::format("image {} of {} bytes", row.name, row.bytes), [&] { return BoundImage(gpu, row.image); });
+                buffers.emplace_back();
+                continue;
+            }
             auto usage = Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst;
             if (row.texels != BufferRow::Texels::none) usage |= Usage::eStorageTexelBuffer;
             buffers.push_back(during(fmt::format("buffer {} of {} bytes", row.name, row.bytes), [&] {
@@ -156,7 +210,10 @@ struct Program::State {
                                 {Memory::eHostVisible | Memory::eHostCoherent});
     }
 
-    [[nodiscard]] vk::DescriptorType type_of(int buffer) const {
+    [[nodiscard]] bool is_image(int row) const { return rows[row].image.width > 0; }
+
+    [[nodiscard]] vk::DescriptorType type_of(int buffer, bool written) const {
+        if (is_image(buffer)) return written ? vk::DescriptorType::eStorageImage : vk::DescriptorType::eCombinedImageSampler;
         return rows[buffer].texels == BufferRow::Texels::none ? vk::DescriptorType::eStorageBuffer
                                                               : vk::DescriptorType::eStorageTexelBuffer;
     }
@@ -165,12 +222,13 @@ struct Program::State {
         Pipeline made;
         if (pass.shader.empty()) return made;
         std::vector<vk::DescriptorSetLayoutBinding> bindings;
-        const auto add = [&](std::uint32_t binding, vk::DescriptorType type) {
-            bindings.emplace_back(binding, type, 1, vk::ShaderStageFlagBits::eCompute);
+        const auto add = [&](std::uint32_t binding, vk::DescriptorType type, std::uint32_t count = 1) {
+            bindings.emplace_back(binding, type, count, vk::ShaderStageFlagBits::eCompute);
         };
-        for (std::size_t i = 0; i < pass.reads.size(); ++i) add(static_cast<std::uint32_t>(i), type_of(pass.reads[i]));
+        for (std::size_t i = 0; i < pass.reads.size(); ++i) add(static_cast<std::uint32_t>(i), type_of(pass.reads[i], false));
         for (std::size_t i = 0; i < pass.writes.size(); ++i)
-            add(first_write_binding + static_cast<std::uint32_t>(i), type_of(pass.writes[i]));
+            add(first_write_binding + static_cast<std::uint32_t>(i), type_of(pass.writes[i], true),
+                is_image(pass.writes[i]) ? rows[pass.writes[i]].image.mips : 1);
         add(constants_binding, vk::DescriptorType::eUniformBuffer);
         made.set = gpu.device.createDescriptorSetLayout({vk::DescriptorSetLayoutCreateFlagBits::ePushDescriptorKHR, bindings});
         made.layout = gpu.device.createPipelineLayout(vk::PipelineLayoutCreateInfo({}, *made.set));
@@ -194,16 +252,26 @@ struct Program::State {
     void push_descriptors(const PassRow& pass, const Pipeline& pipeline) {
         std::vector<vk::DescriptorBufferInfo> infos;
         infos.reserve(pass.reads.size() + pass.writes.size() + 1);
+        std::vector<std::vector<vk::DescriptorImageInfo>> image_infos;
+        image_infos.reserve(pass.reads.size() + pass.writes.size());
         std::vector<vk::WriteDescriptorSet> writes;
-        const auto add = [&](std::uint32_t binding, const BoundBuffer& buffer, vk::DescriptorType type) {
+        const auto add_buffer = [&](std::uint32_t binding, const BoundBuffer& buffer, vk::DescriptorType type) {
             infos.emplace_back(*buffer.buffer, 0, VK_WHOLE_SIZE);
             writes.emplace_back(nullptr, binding, 0, 1, type, nullptr, &infos.back(), &*buffer.view);
         };
+        const auto add = [&](std::uint32_t binding, int row, bool written) {
+            const vk::DescriptorType type = type_of(row, written);
+            if (!is_image(row)) return add_buffer(binding, buffers[row], type);
+            auto& views = image_infos.emplace_back();
+            if (!written) views.emplace_back(*sampler, *images[row].sampled, vk::ImageLayout::eGeneral);
+            else for (const auto& mip : images[row].mips) views.emplace_back(nullptr, *mip, vk::ImageLayout::eGeneral);
+            writes.emplace_back(vk::WriteDescriptorSet(nullptr, binding, 0, type, views));
+        };
         std::uint32_t binding = 0;
-        for (int i : pass.reads) add(binding++, buffers[i], type_of(i));
+        for (int i : pass.reads) add(binding++, i, false);
         binding = first_write_binding;
-        for (int i : pass.writes) add(binding++, buffers[i], type_of(i));
-        add(constants_binding, constants, vk::DescriptorType::eUniformBuffer);
+        for (int i : pass.writes) add(binding++, i, true);
+        add_buffer(constants_binding, constants, vk::DescriptorType::eUniformBuffer);
         commands.pushDescriptorSetKHR(vk::PipelineBindPoint::eCompute, *pipeline.layout, 0, writes);
     }
 
@@ -264,11 +332,36 @@ struct Program::State {
         commands.end();
     }
 
+    /// Images stay in the general layout from here on.
+    static void clear(const vk::raii::CommandBuffer& once, vk::Image image) {
+        const vk::ImageSubresourceRange whole(vk::ImageAspectFlagBits::eColor, 0, VK_REMAINING_MIP_LEVELS, 0, VK_REMAINING_ARRAY_LAYERS);
+        const vk::ImageMemoryBarrier2 general({}, {}, Stage::eTransfer, Access::eTransferWrite, vk::ImageLayout::eUndefined,
+                                              vk::ImageLayout::eGeneral, VK_QUEUE_FAMILY_IGNORED, VK_QUEUE_FAMILY_IGNORED, image, whole);
+        once.pipelineBarrier2(vk::DependencyInfo({}, {}, {}, general));
+        once.clearColorImage(image, vk::ImageLayout::eGeneral, vk::ClearColorValue(0.0F, 0.0F, 0.0F, 0.0F), whole);
+    }
+
+    void copy_out(const vk::raii::CommandBuffer& commands_, int row, vk::Buffer to) {
+        if (!is_image(row)) return commands_.copyBuffer(*buffers[row].buffer, to, vk::BufferCopy(0, 0, rows[row].bytes));
+        const BufferRow::Image& image = rows[row].image;
+        std::vector<vk::BufferImageCopy> copies;
+        std::size_t offset = 0;
+        for (std::uint32_t m = 0; m < image.mips; ++m) {
+            const std::uint32_t width = std::max(1U, image.width >> m), height = std::max(1U, image.height >> m);
+            copies.emplace_back(offset, 0, 0, vk::ImageSubresourceLayers(vk::ImageAspectFlagBits::eColor, m, 0, image.layers),
+                                vk::Offset3D(), vk::Extent3D(width, height, 1));
+            offset += std::size_t(width) * height * image.layers * 4;
+        }
+        commands_.copyImageToBuffer(*images[row].image, vk::ImageLayout::eGeneral, to, copies);
+    }
+
     void fill_buffers() {
         const auto once = std::move(gpu.device.allocateCommandBuffers({*gpu.pool, vk::CommandBufferLevel::ePrimary, 1}).front());
         once.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
         for (std::size_t i = 0; i < rows.size(); ++i) {
-            if (rows[i].initial.empty())
+            if (is_image(static_cast<int>(i)))
+                clear(once, *images[i].image);
+            else if (rows[i].initial.empty())
                 once.fillBuffer(*buffers[i].buffer, 0, VK_WHOLE_SIZE, 0);
             else
                 once.updateBuffer<float>(*buffers[i].buffer, 0, rows[i].initial);
@@ -326,16 +419,16 @@ void Program::run(std::span<const std::byte> constants) {
 
 std::vector<std::byte> Program::read_back(int buffer) {
     State& s = *state_;
-    const BoundBuffer& own = s.buffers.at(buffer);
-    BoundBuffer copy(s.gpu, own.bytes, vk::BufferUsageFlagBits::eTransferDst, {Memory::eHostVisible | Memory::eHostCoherent});
+    const std::size_t bytes = s.rows.at(static_cast<std::size_t>(buffer)).bytes;
+    BoundBuffer copy(s.gpu, bytes, vk::BufferUsageFlagBits::eTransferDst, {Memory::eHostVisible | Memory::eHostCoherent});
     const auto commands = std::move(s.gpu.device.allocateCommandBuffers({*s.gpu.pool, vk::CommandBufferLevel::ePrimary, 1}).front());
     commands.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
     compute_barrier(commands);
-    commands.copyBuffer(*own.buffer, *copy.buffer, vk::BufferCopy(0, 0, own.bytes));
+    s.copy_out(commands, buffer, *copy.buffer);
     barrier(commands, Stage::eHost, Access::eHostRead);
     commands.end();
     s.submit(commands);
-    return {copy.mapped, copy.mapped + own.bytes};
+    return {copy.mapped, copy.mapped + bytes};
 }
 
 } // namespace scanshade::gpu

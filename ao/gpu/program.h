@@ -16,7 +16,7 @@
 
 namespace scanshade::gpu {
 
-/// A buffer of the program, zero to begin with. Host buffers can be reached by Program::host() before (upload) or after (download) a run.
+/// A buffer (or image) of the program, zero to begin with. Host buffers can be reached by Program::host() before (upload) or after (download) a run.
 struct BufferRow {
     enum class Host { none, upload, download };
     std::string_view name;
@@ -27,7 +27,17 @@ struct BufferRow {
     enum class Texels { none, r32f, rg32f, rgba32f, r32ui, rg32ui };
     Texels texels = Texels::none;
     std::vector<float> initial = {}; ///< what it holds from the start instead of zeros; 64 KiB at most
+    /// Instead of a buffer, an array of layers of 32-bit floats with mips; `bytes` is image_bytes(image). Passes that read it see
+    /// a sampler2DArray (nearest texel, 0 outside), passes that write it an image2DArray[mips]. GPUs keep images in tiles and
+    /// find a texel in hardware; lavapipe does all of that step by step.
+    struct Image {
+        std::uint32_t width = 0, height = 0, layers = 0, mips = 0;
+    };
+    Image image = {};
 };
+
+/// Bytes of all mips of all layers, mip by mip, layer by layer, row by row: what Program::read_back() of an image returns.
+[[nodiscard]] std::size_t image_bytes(const BufferRow::Image& image);
 
 /// One dispatch. `reads` bind from 0, `writes` (read-write included) from 16, the constants at 32.
 struct PassRow {
@@ -70,7 +80,7 @@ class Program {
     /// Device milliseconds of the last run: "upload", each pass by name, "download".
     [[nodiscard]] const std::vector<std::pair<std::string, double>>& timings() const { return timings_; }
 
-    /// Copies any buffer to the host, outside the hot path: for studying intermediates.
+    /// Copies any buffer or image to the host, outside the hot path: for studying intermediates.
     [[nodiscard]] std::vector<std::byte> read_back(int buffer);
 
   private:

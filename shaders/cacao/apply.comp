@@ -4,14 +4,20 @@
 #extension GL_EXT_scalar_block_layout : require
 #include "lib/cacao.glsl"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x_id = spec_tile_x, local_size_y_id = spec_tile_y) in;
 layout(constant_id = spec_resolve) const int resolve = resolve_smart;
 layout(constant_id = spec_power) const int power = 0;
 layout(binding = 0, r32ui) readonly uniform uimageBuffer ao;
 layout(binding = 1, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 16, scalar) writeonly buffer Out { float visibility[]; };
 
+Texel texel_or_hole(int slice, ivec2 t) {
+    bool inside = all(lessThan(uvec2(t), uvec2(k.slice)));
+    uint texel = imageLoad(ao, inside ? slice_index(slice, t) : 0).x;
+    return Texel(inside && texel < hole_texel ? float(texel & 0xffffu) : -1.0, ao_edges(texel));
+}
 #include "lib/cacao_resolve.glsl"
+#include "lib/cacao_resolve_reference.glsl"
 
 float reference(ivec2 p) {
     if (resolve == resolve_smart) {

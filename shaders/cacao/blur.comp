@@ -4,8 +4,9 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 #include "lib/cacao.glsl"
+#include "lib/cacao_blur.glsl"
 
-layout(local_size_x = cacao_tile_x, local_size_y = cacao_tile_y) in;
+layout(local_size_x_id = spec_tile_x, local_size_y_id = spec_tile_y) in;
 layout(constant_id = spec_first) const int first = 0;
 layout(constant_id = spec_last) const int last = 0;
 layout(constant_id = spec_halo) const int halo = 0;
@@ -40,16 +41,14 @@ void main() {
     if (any(greaterThanEqual(t, k.slice + halo))) return;
     int slice = slice_of_layer(int(gl_GlobalInvocationID.z));
     uint c = read(slice, t);
-    uint l = read(slice, t - ivec2(1, 0)), r = read(slice, t + ivec2(1, 0));
-    uint up = read(slice, t - ivec2(0, 1)), down = read(slice, t + ivec2(0, 1));
-    vec4 e = unpack_edges(ao_edges(c));
-    if (scan != 0) { // edges to holes and to the outside are cut; a hole stays one
-        float sum = 0.5 * float(c & 0xffffu) + dot(e, vec4(uvec4(l, r, up, down) & 0xffffu));
-        uint v = uint(sum / (0.5 + e.x + e.y + e.z + e.w) + 0.5);
-        imageStore(to, slice_index(slice, t), uvec4(whole(v | (c & 0xffff0000u))));
+    uvec4 around = uvec4(read(slice, t - ivec2(1, 0)), read(slice, t + ivec2(1, 0)), read(slice, t - ivec2(0, 1)), read(slice, t + ivec2(0, 1)));
+    if (scan != 0) {
+        float v = blurred(float(c & 0xffffu), vec4(around & 0xffffu), ao_edges(c));
+        imageStore(to, slice_index(slice, t), uvec4(whole(uint(v + 0.5) | (c & 0xffff0000u)))); // a hole stays one
         return;
     }
-    float sum = 0.5 * value(c) + e.x * value(l) + e.y * value(r) + e.z * value(up) + e.w * value(down);
+    vec4 e = unpack_edges(ao_edges(c));
+    float sum = 0.5 * value(c) + e.x * value(around.x) + e.y * value(around.y) + e.z * value(around.z) + e.w * value(around.w);
     float v = half_even(sum / (0.5 + e.x + e.y + e.z + e.w));
     if (last == 0)
         imageStore(to, index_between_steps(slice, t), uvec4(whole((packHalf2x16(vec2(v, 0.0)) & 0xffffu) | (c & 0xffff0000u))));

@@ -5,13 +5,19 @@
 #extension GL_EXT_scalar_block_layout : require
 #include "lib/cacao.glsl"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x_id = spec_tile_x, local_size_y_id = spec_tile_y) in;
 layout(constant_id = spec_resolve) const int resolve = resolve_smart;
 layout(binding = 0, r32ui) readonly uniform uimageBuffer ao;
 layout(binding = 1, r32f) readonly uniform imageBuffer depths;
 layout(binding = 16, rg32f) uniform writeonly imageBuffer staged;
 
+Texel texel_or_hole(int slice, ivec2 t) {
+    bool inside = all(lessThan(uvec2(t), uvec2(k.slice)));
+    uint texel = imageLoad(ao, inside ? slice_index(slice, t) : 0).x;
+    return Texel(inside && texel < hole_texel ? float(texel & 0xffffu) : -1.0, ao_edges(texel));
+}
 #include "lib/cacao_resolve.glsl"
+#include "lib/cacao_resolve_reference.glsl"
 
 const int wrapped = 1 << 24; // stands for an unsigned coordinate that wrapped below zero
 

@@ -16,17 +16,18 @@ vec3 normal_from_neighbours(vec4 e, vec3 c, vec3 left, vec3 right, vec3 top, vec
 // Zero stays zero: a surface of unknown slope is nowhere below a horizon, so it stays open.
 vec3 unit(vec3 n) { return n * inversesqrt(max(dot(n, n), 1e-20)); }
 
-// Reference: SNORM8 per axis. Scan: 10 bits per axis in the same 32.
+// Reference: SNORM8 per axis. Scan: 10 bits per axis in the same 32, 512 standing for zero.
 uint pack_normal(vec3 n) {
-    float levels = scan != 0 ? 511.0 : 127.0;
-    int bits = scan != 0 ? 10 : 8;
-    ivec3 q = ivec3(roundEven(clamp(n, -1.0, 1.0) * levels));
-    uint mask = (1u << bits) - 1u;
-    return (uint(q.x) & mask) | ((uint(q.y) & mask) << bits) | ((uint(q.z) & mask) << (2 * bits));
+    n = clamp(n, -1.0, 1.0);
+    if (scan != 0) {
+        vec3 q = n * 511.0 + 512.0;
+        return nearest_small(q.x) | nearest_small(q.y) << 10 | nearest_small(q.z) << 20;
+    }
+    uvec3 q = uvec3(ivec3(roundEven(n * 127.0))) & 255u;
+    return q.x | q.y << 8 | q.z << 16;
 }
 vec3 unpack_normal(uint p) {
-    int bits = scan != 0 ? 10 : 8;
+    if (scan != 0) return (vec3(small(p & 1023u), small(p >> 10 & 1023u), small(p >> 20)) - 512.0) * (1.0 / 511.0);
     int q = int(p);
-    vec3 n = vec3(q << (32 - bits) >> (32 - bits), q << (32 - 2 * bits) >> (32 - bits), q << (32 - 3 * bits) >> (32 - bits));
-    return max(n * (scan != 0 ? 1.0 / 511.0 : 1.0 / 127.0), vec3(-1.0));
+    return max(vec3(q << 24 >> 24, q << 16 >> 24, q << 8 >> 24) * (1.0 / 127.0), vec3(-1.0));
 }

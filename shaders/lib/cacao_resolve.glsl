@@ -1,74 +1,42 @@
-// CACAO resolve: one AO value per grid pixel out of the four slices. Include after the buffer `ao` is declared.
-#include "lib/cacao_filter.glsl"
-
-// Reference: bilinear read of one slice at slice-texel coordinates (centres at one half).
-float slice_filtered(int slice, vec2 at) {
-    Footprint f = footprint(filter_coordinate(at * k.slice_inv, k.slice), k.slice);
-    return filtered(f, imageLoad(ao, slice_index(slice, f.low)).x & 0xffffu, imageLoad(ao, slice_index(slice, ivec2(f.high.x, f.low.y))).x & 0xffffu,
-                    imageLoad(ao, slice_index(slice, ivec2(f.low.x, f.high.y))).x & 0xffffu, imageLoad(ao, slice_index(slice, f.high)).x & 0xffffu);
-}
-
-// Reference: own texel plus one filtered value from each other slice, pulled away from edges. `at` is the grid pixel as
-// AMD's shader sees it (coordinates left of or above the image wrap round to a huge number), parity its slice.
-float smart_reference(float own, vec4 e, vec2 at, ivec2 parity) {
-    vec2 pull = vec2(e.y - e.x, e.w - e.z);
-    vec2 m = vec2(parity);
-    ivec2 other = 1 - parity;
-    float h = slice_filtered(other.x + 2 * parity.y, vec2(at.x + m.x + pull.x - 0.5, at.y + 0.5 - m.y) * 0.5);
-    float v = slice_filtered(parity.x + 2 * other.y, vec2(at.x + 0.5 - m.x, at.y + m.y + pull.y - 0.5) * 0.5);
-    float d = slice_filtered(other.x + 2 * other.y, (at + m + pull - 0.5) * 0.5);
-    float wh = (e.x + e.y) * 0.5, wv = (e.z + e.w) * 0.5, wd = (wh + wv) * 0.5;
-    return (own + wh * h + wv * v + wd * d) / (1.0 + wh + wv + wd);
-}
-
-uint grid_texel(ivec2 p) { return imageLoad(ao, slice_index((p.x & 1) + 2 * (p.y & 1), p >> 1)).x; }
-
-// --- scan: the 2x2 grid pixels of one slice texel at once, from the 4x4 grid pixels around them.
+// CACAO resolve of `scan`: one AO value per grid pixel out of the four slices. The includer has
+// Texel texel_or_hole(int slice, ivec2 t), a slice's texel or a hole where there is none.
 
 struct Known {
-    float value; // visibility in the texel's own units, 0 at holes
+    float value;  // visibility in the texel's own units, 0 at holes
     float weight; // 1, or 0 at holes and outside
 };
 
-Known known(int slice, ivec2 t) {
-    bool inside = all(lessThan(uvec2(t), uvec2(k.slice)));
-    uint texel = imageLoad(ao, inside ? slice_index(slice, t) : 0).x;
-    bool usable = inside && texel < hole_texel;
-    return Known(usable ? float(texel & 0xffffu) : 0.0, usable ? 1.0 : 0.0);
-}
+Known known_of(Texel texel) { return Known(max(texel.value, 0.0), texel.value >= 0.0 ? 1.0 : 0.0); }
+Known known(int slice, ivec2 t) { return known_of(texel_or_hole(slice, t)); }
 
 // Own value plus left/right, above/below and diagonal ones, each pair shared out by the edges; AMD's weights, centred on
 // the pixel. Returns visibility, or -1 at a hole.
-float smart(uint c, Known l, Known r, Known t, Known b, Known lt, Known rt, Known lb, Known rb) {
-    if (is_hole(c)) return -1.0;
-    vec4 e = unpack_edges(ao_edges(c));
+float smart(Texel c, Known l, Known r, Known t, Known b, Known lt, Known rt, Known lb, Known rb) {
+    vec4 e = unpack_edges(c.edges);
     float wh = (e.x + e.y) * 0.5, wv = (e.z + e.w) * 0.5, wd = (wh + wv) * 0.5;
     vec2 pull = vec2(e.y - e.x, e.w - e.z) * 0.5;
     float wl = 0.5 - pull.x, wr = 0.5 + pull.x, wt = 0.5 - pull.y, wb = 0.5 + pull.y;
-    float sum = float(c & 0xffffu) + wh * (wl * l.value + wr * r.value) + wv * (wt * t.value + wb * b.value) +
+    float sum = c.value + wh * (wl * l.value + wr * r.value) + wv * (wt * t.value + wb * b.value) +
                 wd * (wt * (wl * lt.value + wr * rt.value) + wb * (wl * lb.value + wr * rb.value));
     float total = 1.0 + wh * (wl * l.weight + wr * r.weight) + wv * (wt * t.weight + wb * b.weight) +
                   wd * (wt * (wl * lt.weight + wr * rt.weight) + wb * (wl * lb.weight + wr * rb.weight));
-    return sum / (total * 65535.0);
+    return c.value >= 0.0 ? sum / (total * 65535.0) : -1.0;
 }
 
 // LOWEST has no value of its own at odd pixels of a row: the four neighbours', by their edges towards it.
-float from_neighbours(uint l, uint r, uint t, uint b) {
-    vec4 w = vec4(unpack_edges(ao_edges(l)).y, unpack_edges(ao_edges(r)).x, unpack_edges(ao_edges(t)).w, unpack_edges(ao_edges(b)).z) + 1e-3;
-    w *= vec4(lessThan(uvec4(l, r, t, b), uvec4(hole_texel)));
+float from_neighbours(Texel l, Texel r, Texel t, Texel b) {
+    Known nl = known_of(l), nr = known_of(r), nt = known_of(t), nb = known_of(b);
+    vec4 w = vec4(unpack_edges(l.edges).y, unpack_edges(r.edges).x, unpack_edges(t.edges).w, unpack_edges(b.edges).z) + 1e-3;
+    w *= vec4(nl.weight, nr.weight, nt.weight, nb.weight);
     float total = w.x + w.y + w.z + w.w;
-    float sum = dot(w, vec4(uvec4(l, r, t, b) & 0xffffu));
+    float sum = dot(w, vec4(nl.value, nr.value, nt.value, nb.value));
     return total > 0.0 ? sum / (total * 65535.0) : 1.0; // alone among holes: nothing is known to occlude it
-}
-
-uint texel_or_hole(int slice, ivec2 t) {
-    return all(lessThan(uvec2(t), uvec2(k.slice))) ? imageLoad(ao, slice_index(slice, t)).x : hole_texel;
 }
 
 // Visibility of grid pixels (2t, 2t + (1, 0), 2t + (0, 1), 2t + (1, 1)); -1 at holes.
 vec4 resolved_block(ivec2 t) {
     const ivec2 x = ivec2(1, 0), y = ivec2(0, 1);
-    uint c0 = texel_or_hole(0, t), c3 = texel_or_hole(3, t);
+    Texel c0 = texel_or_hole(0, t), c3 = texel_or_hole(3, t);
     if (two_slices != 0) { // odd pixels have no hole flag of their own: the caller knows their depth
         const Known none = Known(0.0, 0.0);
         Known k0 = known(0, t), k3 = known(3, t);
@@ -77,7 +45,7 @@ vec4 resolved_block(ivec2 t) {
                     from_neighbours(texel_or_hole(3, t - x), c3, c0, texel_or_hole(0, t + y)),
                     smart(c3, none, none, none, none, k0, known(0, t + x), known(0, t + y), known(0, t + x + y)));
     }
-    uint c1 = texel_or_hole(1, t), c2 = texel_or_hole(2, t);
+    Texel c1 = texel_or_hole(1, t), c2 = texel_or_hole(2, t);
     Known k00 = known(3, t - x - y), k10 = known(2, t - y), k20 = known(3, t - y), k30 = known(2, t + x - y);
     Known k01 = known(1, t - x), k11 = known(0, t), k21 = known(1, t), k31 = known(0, t + x);
     Known k02 = known(3, t - x), k12 = known(2, t), k22 = known(3, t), k32 = known(2, t + x);

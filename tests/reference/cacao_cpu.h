@@ -2,6 +2,7 @@
 // Straightforward and slow; nothing here is shared with the program except the table of tap positions.
 #pragma once
 
+#include "ao/cacao/cacao.h"
 #include "shaders/lib/cacao_pattern.glsl"
 #include "shaders/shared/cacao.h"
 
@@ -147,7 +148,7 @@ class High {
 
     /// Where tap `tap` of texel (x, y) lands, in slice texels, before rounding.
     [[nodiscard]] cv::Vec2f offset(const Tap& tap, const Texel& t, int x, int y) const {
-        const shared::vec2 m = k.rotation[5 * slice + (x + 2 * y) % 5];
+        const shared::vec2 m = cacao_rotation(slice, (x + 2 * y) % 5);
         return {t.disc * m.x * tap.x + t.disc * m.y * tap.y, t.disc * m.y * tap.x - t.disc * m.x * tap.y};
     }
     [[nodiscard]] static int mip(const Tap& tap, const Texel& t) {

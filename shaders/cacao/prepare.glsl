@@ -1,0 +1,154 @@
+// CACAO, first pass, for both ways to keep depth (FOR_GPU): one slice texel per thread, that is 2x2 pixels.
+// De-interleaves depth into four slices and writes four normals, derived from the full-precision depth or taken from the
+// supplied image. In images the mips are made here as well.
+#include "lib/cacao.glsl"
+#include "lib/cacao_normal.glsl"
+
+layout(local_size_x_id = spec_tile_x, local_size_y_id = spec_tile_y) in;
+layout(constant_id = spec_normals) const int supplied = 0;
+layout(constant_id = spec_device_depth) const int device_depth = 0;
+
+layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
+layout(binding = 1, r32f) readonly uniform imageBuffer normals_in;
+#ifdef FOR_GPU
+layout(binding = 16, r32f) uniform writeonly image2DArray depths[4];
+#else
+layout(binding = 16, r32f) uniform writeonly imageBuffer depths;
+#endif
+layout(binding = 17, r32ui) uniform writeonly uimageBuffer normals;
+
+float depth_at(ivec2 p) {
+    float d = imageLoad(depth_in, p.y * k.image.x + p.x).x;
+    return device_depth != 0 ? linear_depth(d) : d;
+}
+bool inside(ivec2 p) { return all(lessThan(uvec2(p), uvec2(k.image))); }
+
+// Depth next to a pixel. Scan knows nothing outside the image: a hole. AMD's native shader replicates, its downsampled
+// one loads zero.
+float neighbour(ivec2 p) {
+    float z = depth_at(clamp(p, ivec2(0), k.image - 1));
+    if (scan != 0) return inside(p) ? z : 0.0;
+    return spacing == 1 || inside(p) ? z : k.outside_depth;
+}
+
+vec3 supplied_normal(ivec2 p) {
+    ivec2 q = clamp(p, ivec2(0), k.image - 1);
+    int at = 3 * (q.y * k.image.x + q.x);
+    vec3 given = vec3(imageLoad(normals_in, at).x, imageLoad(normals_in, at + 1).x, imageLoad(normals_in, at + 2).x);
+    vec3 n = (inside(p) ? given : vec3(0.0)) * k.normals_mul + k.normals_add;
+    return n * vec3(1.0, -1.0, 1.0); // camera space has y down, this room y up
+}
+
+// What the slice holds. AMD's LOWEST loads zero outside the image, the others replicate.
+float stored_depth(ivec2 p, float z) {
+    if (scan != 0) return z;
+    if (!inside(p)) z = two_slices != 0 ? k.outside_depth : depth_at(clamp(p, ivec2(0), k.image - 1));
+    return half_toward_zero(z);
+}
+
+vec2 ray_of(ivec2 p0, ivec2 step) {
+    if (scan != 0) return k.ray_base + vec2(p0 + spacing * step) * k.ray_step;
+    return k.view_mul * ((vec2(p0) + 0.5) * k.image_inv + vec2(step) * float(spacing) * k.image_inv) + k.view_add;
+}
+
+// Normal of one pixel from its depth c and the depths left, right, above and below; w are their inverses.
+vec3 derived(float c, vec4 around, float wc, vec4 w, vec3 ray_x, vec3 ray_y) {
+    vec4 edges = scan != 0 ? edges_from_inverse(wc, w) : edges_from_depth(c, around);
+    return normal_from_neighbours(edges, vec3(ray_x.y, ray_y.y, 1.0) * c, vec3(ray_x.x, ray_y.y, 1.0) * around.x,
+                                  vec3(ray_x.z, ray_y.y, 1.0) * around.y, vec3(ray_x.y, ray_y.x, 1.0) * around.z,
+                                  vec3(ray_x.y, ray_y.z, 1.0) * around.w);
+}
+
+// Scan: where holes leave a pixel no whole quadrant, the other three pixels lend theirs if they lie as deep.
+vec3 completed(vec3 n, float c, vec3 z, vec3 a, vec3 b, vec3 d) {
+    vec3 near = vec3(lessThan(abs(z - c), vec3(0.05 * c)));
+    return scan == 0 || dot(n, n) > 1e-8 ? n : near.x * a + near.y * b + near.z * d;
+}
+
+#ifdef FOR_GPU
+void store_depth(int slice, ivec2 t, float z) { imageStore(depths[0], ivec3(t, slice), vec4(z)); }
+#else
+void store_depth(int slice, ivec2 t, float z) { imageStore(depths, depth_index(slice, 0, t), vec4(whole(z))); }
+#endif
+
+void put(int slice, ivec2 t, ivec2 p0, float c, vec3 n) {
+    ivec2 p = p0 + spacing * ivec2(slice & 1, slice >> 1);
+    bool used = two_slices == 0 || slice == 0 || slice == 3;
+    if (used) store_depth(slice, t, stored_depth(p, c));
+    if (used || scan == 0) // AMD's LOWEST writes all four normals
+        imageStore(normals, slice_index(slice, t), uvec4(whole(pack_normal(supplied != 0 ? supplied_normal(p) : unit(n)))));
+}
+
+// The four pixels of slice texel t; returns their depths.
+vec4 prepared(ivec2 t) {
+    ivec2 p0 = 2 * spacing * t;
+
+    // Rows and columns -1 .. 2 around the four pixels; the corners are not needed.
+    float a1 = neighbour(p0 + spacing * ivec2(0, -1)), a2 = neighbour(p0 + spacing * ivec2(1, -1));
+    float b0 = neighbour(p0 + spacing * ivec2(-1, 0)), b1 = neighbour(p0), b2 = neighbour(p0 + spacing * ivec2(1, 0)),
+          b3 = neighbour(p0 + spacing * ivec2(2, 0));
+    float c0 = neighbour(p0 + spacing * ivec2(-1, 1)), c1 = neighbour(p0 + spacing * ivec2(0, 1)),
+          c2 = neighbour(p0 + spacing * ivec2(1, 1)), c3 = neighbour(p0 + spacing * ivec2(2, 1));
+    float d1 = neighbour(p0 + spacing * ivec2(0, 2)), d2 = neighbour(p0 + spacing * ivec2(1, 2));
+
+    vec2 r0 = ray_of(p0, ivec2(-1)), r1 = ray_of(p0, ivec2(0)), r2 = ray_of(p0, ivec2(1)), r3 = ray_of(p0, ivec2(2));
+    vec3 x0 = vec3(r0.x, r1.x, r2.x), x1 = vec3(r1.x, r2.x, r3.x), y0 = vec3(r0.y, r1.y, r2.y), y1 = vec3(r1.y, r2.y, r3.y);
+    vec4 wad = inverse_or_hole(vec4(a1, a2, d1, d2));
+    vec4 wb = inverse_or_hole(vec4(b0, b1, b2, b3)), wc = inverse_or_hole(vec4(c0, c1, c2, c3));
+    vec3 n0 = derived(b1, vec4(b0, b2, a1, c1), wb.y, vec4(wb.x, wb.z, wad.x, wc.y), x0, y0);
+    vec3 n1 = derived(b2, vec4(b1, b3, a2, c2), wb.z, vec4(wb.y, wb.w, wad.y, wc.z), x1, y0);
+    vec3 n2 = derived(c1, vec4(c0, c2, b1, d1), wc.y, vec4(wc.x, wc.z, wb.y, wad.z), x0, y1);
+    vec3 n3 = derived(c2, vec4(c1, c3, b2, d2), wc.z, vec4(wc.y, wc.w, wb.z, wad.w), x1, y1);
+    put(0, t, p0, b1, completed(n0, b1, vec3(b2, c1, c2), n1, n2, n3));
+    put(1, t, p0, b2, completed(n1, b2, vec3(b1, c1, c2), n0, n2, n3));
+    put(2, t, p0, c1, completed(n2, c1, vec3(b1, b2, c2), n0, n1, n3));
+    put(3, t, p0, c2, completed(n3, c2, vec3(b1, b2, c1), n0, n1, n2));
+    return vec4(b1, b2, c1, c2);
+}
+
+#ifdef FOR_GPU
+#include "lib/cacao_mip.glsl"
+layout(constant_id = spec_mips) const int mips = 0;
+const int tile = 8; // threads of a work group, across and down: one texel of mip 3
+shared float mip0[4][tile][tile], mip1[4][tile / 2][tile / 2], mip2[4][tile / 4][tile / 4];
+
+#define FOUR(from, s, x, y) nearest_surface(from[s][2 * y][2 * x], from[s][2 * y + 1][2 * x], from[s][2 * y][2 * x + 1], from[s][2 * y + 1][2 * x + 1])
+void store_mip(int mip, int slice, ivec2 t, float z) { imageStore(depths[mip], ivec3(t, slice), vec4(z)); }
+
+// All mips of the tile at once, of all slices: thread i makes texel i of each.
+void make_mips(ivec2 l, vec4 z) {
+    for (int slice = 0; slice < 4; ++slice) mip0[slice][l.y][l.x] = z[slice];
+    barrier();
+    int i = int(gl_LocalInvocationIndex);
+    ivec2 group = ivec2(gl_WorkGroupID.xy);
+    {
+        int slice = i >> 4, x = i & 3, y = i >> 2 & 3;
+        float made = FOUR(mip0, slice, x, y);
+        mip1[slice][y][x] = made;
+        store_mip(1, slice, 4 * group + ivec2(x, y), made);
+    }
+    barrier();
+    if (i < 16) {
+        int slice = i >> 2, x = i & 1, y = i >> 1 & 1;
+        float made = FOUR(mip1, slice, x, y);
+        mip2[slice][y][x] = made;
+        store_mip(2, slice, 2 * group + ivec2(x, y), made);
+    }
+    barrier();
+    if (i < 4) store_mip(3, i, group, FOUR(mip2, i, 0, 0));
+}
+
+void main() {
+    k = constants;
+    ivec2 t = ivec2(gl_GlobalInvocationID.xy);
+    vec4 z = vec4(0.0);
+    if (all(lessThan(t, k.slice))) z = prepared(t);
+    if (mips != 0) make_mips(ivec2(gl_LocalInvocationID.xy), z);
+}
+#else
+void main() {
+    k = constants;
+    ivec2 t = ivec2(gl_GlobalInvocationID.xy);
+    if (all(lessThan(t, k.slice))) prepared(t);
+}
+#endif
