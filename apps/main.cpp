@@ -14,6 +14,7 @@ namespace {
 const std::array commands = {
     CommandRow{"inspect", "what is in a capture: frames, sizes, depth range, holes, camera, poses", inspect_command},
     CommandRow{"run", "ambient occlusion for every frame: maps, shaded pictures, clouds, a report", run_command},
+    CommandRow{"refine", "the camera, from pictures of a board, organised clouds or a recording, and how sure", refine_command},
     CommandRow{"generate", "a capture of a synthetic scene with exact truth", generate_command},
     CommandRow{"methods", "the ambient-occlusion methods there are", methods_command},
     CommandRow{"devices", "the Vulkan devices there are", devices_command},

@@ -78,8 +78,6 @@ Boards::Boards(std::vector<BoardView> views) : views_(std::move(views)), weights
             throw Error(fmt::format("{}: {} points of the board, at least 6 expected", view.name, view.pixels.size()));
 }
 
-void Boards::weigh(std::vector<double> weights) { weights_ = std::move(weights); }
-
 Fit Boards::start(const Model& model) const {
     Fit fit{.model = model, .nuisance = std::vector<double>(views_.size() * pose_unknowns), .covariance = {}};
     for (std::size_t i = 0; i < views_.size(); ++i)
@@ -118,11 +116,10 @@ std::vector<ViewScore> Boards::score(const Fit& from, const Views& wanted) const
     return scores;
 }
 
-std::vector<cv::Point2d> Boards::pixels() const {
+std::vector<cv::Point2d> Boards::pixels_of(std::size_t view) const {
     std::vector<cv::Point2d> all;
-    for (const BoardView& view : views_)
-        for (const Eigen::Vector2d& pixel : view.pixels)
-            all.emplace_back(pixel.x(), pixel.y());
+    for (const Eigen::Vector2d& pixel : views_[view].pixels)
+        all.emplace_back(pixel.x(), pixel.y());
     return all;
 }
 

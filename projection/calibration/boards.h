@@ -17,19 +17,15 @@ class Boards final : public Evidence {
     /// Throws Error naming the view that has fewer than 6 points.
     explicit Boards(std::vector<BoardView> views);
 
-    /// How much each view counts, as the factor on its residuals; 1 for all until set.
-    void weigh(std::vector<double> weights);
-
+    void weigh(const std::vector<double>& weights) override { weights_ = weights; }
     [[nodiscard]] std::size_t views() const override { return views_.size(); }
     [[nodiscard]] std::string view_name(std::size_t view) const override { return views_[view].name; }
     [[nodiscard]] Fit start(const Model& model) const override;
     [[nodiscard]] Fit fit(const Fit& from, const Free& free, const Views& used, bool covariance) const override;
     [[nodiscard]] std::vector<ViewScore> score(const Fit& fit, const Views& wanted) const override;
-    [[nodiscard]] std::vector<cv::Point2d> pixels() const override;
+    [[nodiscard]] std::vector<cv::Point2d> pixels_of(std::size_t view) const override;
+    [[nodiscard]] std::vector<Eigen::Vector2d> residuals(const Fit& fit, std::size_t view) const override;
     [[nodiscard]] std::vector<double> depths_m(const Fit& fit) const override;
-
-    /// Residuals (pixel predicted - seen) of one view.
-    [[nodiscard]] std::vector<Eigen::Vector2d> residuals(const Fit& fit, std::size_t view) const;
 
   private:
     std::vector<BoardView> views_;

@@ -147,8 +147,17 @@ class Ladder {
     Climb by_evidence() {
         for (bool higher = true; higher;) { // what failed beside a cruder model may stand beside a better one
             higher = false;
-            for (std::size_t i = 0; i < rungs_.size(); ++i)
-                higher = (!climb_.steps[i].climbed && try_rung(i)) || higher;
+            std::vector<std::size_t> together;
+            for (std::size_t i = 0; i < rungs_.size(); ++i) {
+                if (climb_.steps[i].climbed)
+                    continue;
+                // A strong barrel folds when k1 has to do alone what k1 and k2 do together: then they are freed as one.
+                together.push_back(i);
+                const Outcome outcome = try_rungs(together);
+                higher = higher || outcome == Outcome::climbed;
+                if (outcome != Outcome::folds)
+                    together.clear();
+            }
         }
         for (std::size_t i = rungs_.size(); i-- > 0;)
             take_back_if_unsupported(i);
@@ -178,31 +187,49 @@ class Ladder {
     /// A guess is not information: the first focal length needs to be determined, not to differ from the guess.
     [[nodiscard]] bool must(const Rung& rung) const { return options_.guessed && rung.unknowns.front() == f; }
 
-    bool try_rung(std::size_t index) {
-        const Rung& rung = rungs_[index];
-        Step& step = climb_.steps[index];
+    enum class Outcome { climbed, refused, folds };
+
+    void say(const std::vector<std::size_t>& indices, bool climbed, const std::string& why) {
+        for (const std::size_t index : indices)
+            climb_.steps[index] = {std::string(rungs_[index].name), climbed, why};
+    }
+
+    /// Frees the rungs' numbers as one, if they stand the tests.
+    Outcome try_rungs(const std::vector<std::size_t>& indices) {
+        Rung rung = rungs_[indices.front()];
+        for (std::size_t i = 1; i < indices.size(); ++i)
+            rung.unknowns.insert(rung.unknowns.end(), rungs_[indices[i]].unknowns.begin(), rungs_[indices[i]].unknowns.end());
+        if (const double rms = train_rms(climb_.fit); rms < options_.enough_px && !must(rung)) {
+            say(indices, false, fmt::format("not needed: the error is {:.1g} px without it", rms));
+            return Outcome::refused;
+        }
         Free free = climb_.free;
         for (const Unknown unknown : rung.unknowns)
             free[unknown] = true;
         const Fit fit = evidence_.fit(climb_.fit, free, used_, true);
-        step.why = objection(rung, fit, free);
-        if (!step.why.empty())
-            return false;
+        if (const std::string why = objection(rung, fit, free); !why.empty()) {
+            say(indices, false, why);
+            return Outcome::refused;
+        }
+        if (!monotone(fit.model)) {
+            say(indices, false, "not usable: the lens would fold back on itself within the image");
+            return Outcome::folds;
+        }
         const auto scores = held_out(evidence_, fit, free, used_, options_.folds);
         const Gain gain = gain_of(held_out_, scores);
         if (!gain.clear() && !must(rung)) {
-            step.why = fmt::format("not supported: held-out error falls by {:.2f} % +- {:.2f} %", gain.percent(),
-                                   100 * gain.standard_error);
-            return false;
+            say(indices, false, fmt::format("not supported: held-out error falls by {:.2f} % +- {:.2f} %", gain.percent(),
+                                            100 * gain.standard_error));
+            return Outcome::refused;
         }
-        step = {std::string(rung.name), true,
-                fmt::format("{:.1f} sigma, held-out error falls by {:.2f} % +- {:.2f} %",
-                            sigmas_from(fit, climb_.start.model, rung.unknowns), gain.percent(),
-                            100 * gain.standard_error)};
+        say(indices, true,
+            fmt::format("{:.1f} sigma, held-out error falls by {:.2f} % +- {:.2f} %{}",
+                        sigmas_from(fit, climb_.start.model, rung.unknowns), gain.percent(), 100 * gain.standard_error,
+                        indices.size() > 1 ? " (together)" : ""));
         climb_.fit = fit;
         climb_.free = free;
         held_out_ = scores;
-        return true;
+        return Outcome::climbed;
     }
 
     /// Why the rung cannot be climbed, held-out views aside; empty where nothing speaks against it.
@@ -223,8 +250,6 @@ class Ladder {
             return fmt::format("not determined: condition number {:.1e}", found);
         if (const std::string trouble = inflated(climb_.fit, fit, climb_.free, options_.most_inflation); !trouble.empty())
             return "not supported: " + trouble;
-        if (!monotone(fit.model))
-            return "not usable: the lens would fold back on itself within the image";
         return {};
     }
 

@@ -17,6 +17,7 @@ struct LadderOptions {
     double least_sigmas = 3;      ///< a new number must be this far from where it was (a group: as unlikely as that)
     double most_inflation = 2;    ///< of the focal length's sigma, the principal point's, and the pixel's sigma over the image
     double worst_condition = 1e7; ///< of the free numbers' correlation matrix
+    double enough_px = 1e-3;      ///< an error below this needs no better model
     bool guessed = false;         ///< the first camera is a guess: its focal length holds no information to keep
 };
 
