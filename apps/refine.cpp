@@ -46,6 +46,17 @@ class Refine final : public Command {
                    .help = "of the ChArUco markers",
                    .value = &dictionary_,
                    .choices = dictionary_names()}}},
+                {"recording",
+                 {{.name = "registered",
+                   .help = "whether colour pixels lie on depth pixels; where not, the colour camera and its place are refined",
+                   .value = &recording_.registered,
+                   .choices = {"auto", "yes", "no"}},
+                  {.name = "poses",
+                   .help = "refine recorded poses too, keep them as the truth, or ignore them and follow the camera",
+                   .value = &recording_.poses,
+                   .choices = {"refine", "keep", "ignore"}},
+                  {"frames", "at most so many frames, evenly spread", &recording_.frames, "", 3, 1000},
+                  {"depth-scale", "mm, tum, sun, nyu, m, or units per metre; replaces the capture's own", &depth_scale_}}},
                 {"camera",
                  {{"camera", "where to start: a camera file, or fx,fy,cx,cy; otherwise the capture's own, or a guess",
                    &first_.camera},
@@ -73,6 +84,7 @@ class Refine final : public Command {
                    .help = "the format, whatever the extension",
                    .value = &format_,
                    .choices = format_choices()},
+                  {"trajectory", "the refined poses of a recording, as TUM's rows", &trajectory_},
                   {"report", "a page with tables and plots", &report_},
                   {"overwrite", "replace earlier results", &overwrite_}}}};
     }
@@ -98,7 +110,7 @@ class Refine final : public Command {
     }
 
     void refuse_to_overwrite() const {
-        for (const std::string& file : {out_, report_})
+        for (const std::string& file : {out_, report_, trajectory_})
             if (!file.empty() && fs::exists(file) && !overwrite_)
                 throw Misuse(file + " exists already: --overwrite replaces it, or choose another name");
     }
@@ -121,12 +133,27 @@ class Refine final : public Command {
     }
 
     Refinement from_capture(const fs::path& path) const {
-        const Capture capture = open_capture(path);
+        const Capture capture = open_capture(path, {{}, depth_scale_, 0.02});
         std::vector<std::size_t> frames(capture.entries.size());
         std::iota(frames.begin(), frames.end(), std::size_t{0});
         if (!capture.entries.front().cloud.empty())
             return refine_from_clouds(capture, frames, first_, options_);
-        throw Misuse(path.string() + ": pictures of a board need --board COLUMNSxROWS");
+        RecordingResult result = refine_from_recording(capture, frames, first_, recording_, options_);
+        if (!trajectory_.empty())
+            write_atomically(trajectory_, trajectory_of(result));
+        return std::move(result.refinement);
+    }
+
+    /// TUM's rows: time tx ty tz qx qy qz qw.
+    static std::string trajectory_of(const RecordingResult& result) {
+        std::string rows = "# refined poses, camera to world\n# timestamp tx ty tz qx qy qz qw\n";
+        for (std::size_t i = 0; i < result.poses.size(); ++i) {
+            const Eigen::Vector3d t = result.poses[i].second.translation();
+            const Eigen::Quaterniond q(result.poses[i].second.linear());
+            rows += fmt::format("{:.6f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", result.stamps_s[i], t.x(), t.y(),
+                                t.z(), q.x(), q.y(), q.z(), q.w());
+        }
+        return rows;
     }
 
     void write(const Refinement& result, CameraFormat format, double took_s) const {
@@ -138,17 +165,18 @@ class Refine final : public Command {
             write_camera_file(out_, {.camera = result.after, .depth_units_per_metre = {}, .warnings = {}}, format, quality);
         if (!report_.empty())
             write_atomically(report_, page_of(result, took_s));
-        for (const std::string& file : {out_, report_})
+        for (const std::string& file : {out_, report_, trajectory_})
             if (!file.empty())
                 fmt::print(stderr, "  -> {}\n", file);
     }
 
     std::vector<std::string> paths_;
     std::string board_, target_ = "chessboard", dictionary_ = "4x4_50", lens_ = "brown", model_ = "ladder", outliers_ = "keep";
-    std::string out_, format_, report_;
+    std::string out_, format_, report_, trajectory_, depth_scale_;
     double square_m_ = 0.025, marker_m_ = 0;
     bool overwrite_ = false;
     FirstCamera first_;
+    RecordingOptions recording_;
     RefineOptions options_;
 };
 

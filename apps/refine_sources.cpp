@@ -4,6 +4,7 @@
 #include "io/image_file.h"
 #include "io/layouts.h"
 #include "projection/calibration/organised_evidence.h"
+#include "projection/calibration/sequence.h"
 #include "projection/error.h"
 #include "projection/project.h"
 
@@ -11,6 +12,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <map>
+#include <opencv2/imgproc.hpp>
 
 namespace scanshade {
 namespace fs = std::filesystem;
@@ -153,6 +155,100 @@ Refinement refine_from_clouds(const Capture& capture, const std::vector<std::siz
                                            "them (rectified, or never there).",
                                            result.climb.train_px));
     result.notes.insert(result.notes.begin(), notes.begin(), notes.end());
+    return result;
+}
+
+namespace {
+
+/// Some of the frames that can be loaded with colour and depth, evenly spread; of the others a note.
+std::vector<SequenceFrame> frames_of(const Capture& capture, const std::vector<std::size_t>& wanted,
+                                     const RecordingOptions& recording, std::vector<std::string>& notes,
+                                     std::vector<double>& stamps_s) {
+    std::vector<SequenceFrame> frames;
+    const std::size_t count = std::min<std::size_t>(wanted.size(), static_cast<std::size_t>(recording.frames));
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::size_t index = wanted[count == 1 ? 0 : i * (wanted.size() - 1) / (count - 1)];
+        const CaptureEntry& entry = capture.entries[index];
+        try {
+            const Frame frame = capture.load(index);
+            SequenceFrame part{frame.name, {}, frame.depth_m, {}};
+            const cv::Mat3b colour = frame.colour.empty() && !entry.colour.empty() ? read_colour(entry.colour) : frame.colour;
+            if (colour.empty())
+                throw Error(frame.name + ": no colour image");
+            cv::cvtColor(colour, part.grey, cv::COLOR_BGR2GRAY);
+            if (recording.poses != "ignore")
+                part.world_from_camera = frame.world_from_camera;
+            frames.push_back(std::move(part));
+            stamps_s.push_back(entry.stamp_s.value_or(static_cast<double>(index)));
+        } catch (const std::exception& failure) {
+            notes.push_back(fmt::format("{}; not used.", failure.what()));
+        }
+    }
+    constexpr std::size_t least = 3;
+    if (frames.size() < least)
+        throw Error(fmt::format("{}: {} frames with colour and depth, at least {} expected{}", capture.path.string(),
+                                frames.size(), least, notes.empty() ? "" : "\n  " + notes.front()));
+    return frames;
+}
+
+std::string overlap_sentence(double before_mm, double after_mm) {
+    return fmt::format("overlapping depths of different frames differ by {:.2f} mm (median), {:.2f} mm before.", after_mm,
+                       before_mm);
+}
+
+} // namespace
+
+RecordingResult refine_from_recording(const Capture& capture, const std::vector<std::size_t>& wanted,
+                                      const FirstCamera& first, const RecordingOptions& recording, RefineOptions options) {
+    RecordingResult result;
+    std::vector<std::string> notes = capture.warnings;
+    std::vector<SequenceFrame> frames = frames_of(capture, wanted, recording, notes, result.stamps_s);
+    if (!capture.camera)
+        throw Error(capture.path.string() + ": no camera to start from; give --camera FILE or --camera fx,fy,cx,cy");
+    Camera depth_camera = *capture.camera;
+    if (depth_camera.pinhole.size.empty())
+        depth_camera.pinhole.size = frames.front().depth_m.size();
+    check(depth_camera);
+
+    SequenceOptions how;
+    how.registered = recording.registered == "auto" ? capture.registration != Registration::no : recording.registered == "yes";
+    how.refine_poses = recording.poses != "keep";
+    const cv::Size colour_size = frames.front().grey.size();
+    if (how.registered && colour_size != depth_camera.pinhole.size)
+        throw Error(fmt::format("{}: colour is {}x{}, depth {}x{}: not registered; --registered no refines the colour camera",
+                                capture.path.string(), colour_size.width, colour_size.height, depth_camera.pinhole.size.width,
+                                depth_camera.pinhole.size.height));
+    const auto given = given_camera(first, colour_size);
+    const double usual = 0.82 * colour_size.width; // a Kinect's colour camera
+    const Camera guess{{usual, usual, (colour_size.width - 1) / 2.0, (colour_size.height - 1) / 2.0, colour_size},
+                       {},
+                       "guessed: a usual lens, principal point in the middle"};
+    options.ladder.guessed = !how.registered && !given;
+    const Camera before = given ? *given : how.registered ? depth_camera : guess;
+
+    std::vector<Rung> rungs = camera_rungs(before.distortion.model);
+    if (how.registered && !how.refine_poses)
+        for (const Rung& rung : depth_rungs())
+            rungs.push_back(rung);
+    if (!how.registered)
+        rungs.insert(rungs.begin(), {"place", {turn_x, turn_y, turn_z, shift_x, shift_y, shift_z}});
+
+    options.ladder.folds = std::min(options.ladder.folds, 4);
+    Sequence sequence(std::move(frames), depth_camera, model_of(before), how);
+    const Fit start = sequence.start(model_of(before));
+    result.refinement = refine(sequence, before, rungs, options, sequence.degeneracy(start));
+    Refinement& r = result.refinement;
+    r.source = fmt::format("{} points seen {} times in {} frames, {}, poses {}", sequence.points(), sequence.sightings(),
+                           sequence.views(), how.registered ? "colour registered with depth" : "colour not registered with depth",
+                           recording.poses == "keep" ? "kept" : "refined");
+    const auto poses = sequence.poses(r.climb.fit);
+    for (std::size_t i = 0; i < poses.size(); ++i)
+        result.poses.emplace_back(sequence.view_name(i), poses[i]);
+    const Model depth_before = how.registered ? start.model : model_of(depth_camera);
+    const Model depth_after = how.registered ? r.climb.fit.model : depth_before;
+    r.notes.push_back(overlap_sentence(sequence.overlap_mm(depth_before, sequence.poses(start)),
+                                       sequence.overlap_mm(depth_after, poses)));
+    r.notes.insert(r.notes.begin(), notes.begin(), notes.end());
     return result;
 }
 

@@ -29,4 +29,23 @@ struct FirstCamera {
 [[nodiscard]] calibration::Refinement refine_from_clouds(const Capture& capture, const std::vector<std::size_t>& frames,
                                                          const FirstCamera& first, calibration::RefineOptions options);
 
+/// What the user said of a recording.
+struct RecordingOptions {
+    std::string registered = "auto"; ///< auto (what the capture says; unknown counts as yes), yes, no
+    std::string poses = "refine";    ///< refine, keep (they are the truth), ignore (follow the camera)
+    int frames = 24;                 ///< at most so many, evenly spread
+};
+
+struct RecordingResult {
+    calibration::Refinement refinement;
+    std::vector<std::pair<std::string, Eigen::Isometry3d>> poses; ///< name, world_from_camera of each frame used
+    std::vector<double> stamps_s;                                 ///< of the frames used; their indices where they have none
+};
+
+/// Tracks, depths and poses of a recording's own frames. Registered: the one camera of both images. Unregistered: the
+/// colour camera and its place beside the depth camera.
+[[nodiscard]] RecordingResult refine_from_recording(const Capture& capture, const std::vector<std::size_t>& frames,
+                                                    const FirstCamera& first, const RecordingOptions& recording,
+                                                    calibration::RefineOptions options);
+
 } // namespace scanshade

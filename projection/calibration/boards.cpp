@@ -93,8 +93,12 @@ Fit Boards::fit(const Fit& from, const Free& free, const Views& used, bool covar
             add_view(problem, fit.model, views_[i], weights_[i], &fit.nuisance[i * pose_unknowns]);
     freeze(problem, fit.model, free);
     solve(problem, fit, false);
-    if (covariance)
-        add_covariance(problem, fit, free);
+    if (covariance) {
+        std::vector<double*> poses;
+        for (std::size_t i = 0; i < views_.size(); ++i)
+            poses.push_back(&fit.nuisance[i * pose_unknowns]);
+        add_covariance(problem, fit, free, poses, {});
+    }
     return fit;
 }
 

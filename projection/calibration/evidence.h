@@ -10,16 +10,19 @@
 
 namespace scanshade::calibration {
 
+using Views = std::vector<bool>; ///< which views take part
+
 /// A model fitted to some views.
 struct Fit {
     Model model;
-    std::vector<double> nuisance;    ///< the evidence's own unknowns (poses, landmarks): where the next fit starts
+    std::vector<double> nuisance = {}; ///< the evidence's own unknowns (poses, landmarks): where the next fit starts
     double rss = 0;                  ///< sum of squared residuals of the views used, in units of `unit()`
     int residuals = 0, unknowns = 0; ///< how many of each; unknowns count the evidence's own, too
     /// Of the model's numbers; rows and columns of frozen ones are 0. Scaled by the residual variance.
     /// Empty when it was not asked for, or when the views do not determine the free numbers.
-    Eigen::MatrixXd covariance;
+    Eigen::MatrixXd covariance = {};
     bool converged = false;
+    Views used = {}; ///< the views it was fitted to
 
     [[nodiscard]] double sigma(Unknown unknown) const { return std::sqrt(covariance(unknown, unknown)); }
 };
@@ -31,8 +34,6 @@ struct ViewScore {
     /// Root of the mean squared distance, as OpenCV counts it: per point, not per coordinate.
     [[nodiscard]] double rms() const { return points > 0 ? std::sqrt(squared / points) : 0; }
 };
-
-using Views = std::vector<bool>; ///< which views take part
 
 class Evidence {
   public:

@@ -66,7 +66,7 @@ Fit Organised::fit(const Fit& from, const Free& free, const Views& used, bool co
     freeze(problem, fit.model, free);
     solve(problem, fit, false);
     if (covariance)
-        add_covariance(problem, fit, free);
+        add_covariance(problem, fit, free, {}, {});
     return fit;
 }
 

@@ -13,8 +13,11 @@ void freeze(ceres::Problem& problem, Model& model, const Free& free);
 /// Solves; fills rss (without robust loss), residuals, unknowns, converged. Throws Error where nothing can be solved.
 void solve(ceres::Problem& problem, Fit& fit, bool many_unknowns);
 
-/// Fills fit.covariance, scaled by rss / (residuals - unknowns); leaves it empty where the problem is singular.
-void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free);
+/// Fills fit.covariance, scaled by rss / (residuals - unknowns); leaves it empty where the problem is singular. `points` are
+/// blocks of three that appear together with others but never with each other: they are eliminated one by one (Schur
+/// complement), which keeps what is inverted as small as the model and `poses`.
+void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const std::vector<double*>& poses,
+                    const std::vector<double*>& points);
 
 /// Moves a point by a pose of six numbers: axis times angle, then translation.
 template <class Number>
