@@ -46,6 +46,7 @@ struct CommandRow {
 
 std::unique_ptr<Command> inspect_command();
 std::unique_ptr<Command> run_command();
+std::unique_ptr<Command> refine_command();
 std::unique_ptr<Command> compare_command();
 std::unique_ptr<Command> bench_command();
 std::unique_ptr<Command> calibrate_command();

@@ -11,7 +11,8 @@ namespace scanshade {
 
 using json = nlohmann::ordered_json;
 
-/// fx, fy, cx, cy, width, height, distortion [k1, k2, p1, p2, k3] where there is any, origin.
+/// fx, fy, cx, cy, width, height, distortion [k1, k2, p1, p2, k3] or fisheye [k1, k2, k3, k4] where there
+/// is any, origin.
 [[nodiscard]] json to_json(const Camera& camera);
 
 /// "yes", "no" or "unknown".

@@ -15,6 +15,7 @@ namespace {
 const std::array commands = {
     CommandRow{"inspect", "what is in a capture: frames, sizes, depth range, holes, camera, poses", inspect_command},
     CommandRow{"run", "ambient occlusion for every frame: maps, shaded pictures, clouds, a report", run_command},
+    CommandRow{"refine", "the camera, from pictures of a board, organised clouds or a recording, and how sure", refine_command},
     CommandRow{"compare", "two results, or a result and truth, as numbers and difference pictures", compare_command},
     CommandRow{"bench", "methods and settings against truth: milliseconds, errors, the front, as one page",
                bench_command},

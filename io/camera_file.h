@@ -1,12 +1,15 @@
-// Cameras on disk: JSON (ours and Open3D's), 3x3 text matrices, and fx,fy,cx,cy from the command line.
+// Cameras on disk: ours, Open3D's, OpenCV's, ROS's, Kalibr's, COLMAP's, 3x3 text matrices, and fx,fy,cx,cy from the
+// command line.
 #pragma once
 
 #include "projection/camera.h"
 #include "projection/frame.h"
 
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace scanshade {
 
@@ -20,9 +23,12 @@ struct CameraFile {
 
 /// Reads, told apart by content:
 /// - ours: {"fx","fy","cx","cy","width","height", optional "distortion":[k1,k2,p1,p2,k3], "depth_units_per_metre",
-/// "registered"}
+/// "registered"}; a fisheye has "fisheye":[k1,k2,k3,k4] instead of "distortion"
 /// - Open3D: {"width","height","intrinsic_matrix":[9 numbers, column-major]}
-/// - a 3x3 row-major text matrix (7-Scenes, BundleFusion)
+/// - OpenCV's yml (camera_matrix, distortion_coefficients; `fisheye_model: 1` for a fisheye), ROS's camera_info yaml
+///   (plumb_bob, equidistant), Kalibr's camchain yaml (pinhole with radtan, equidistant or none; its first camera)
+/// - COLMAP's cameras.txt (its first camera; SIMPLE_PINHOLE to FULL_OPENCV and OPENCV_FISHEYE)
+/// - a 3x3 row-major text matrix (7-Scenes, BundleFusion), BundleFusion's info.txt
 /// Throws Error naming the file, and the key, line or column, for: JSON syntax, missing keys, wrong counts, non-finite,
 /// zero or negative focal lengths (with a hint that fy < 0 is ICL-NUIM's flip), a row-major Open3D matrix, short
 /// matrices.
@@ -31,7 +37,21 @@ struct CameraFile {
 /// `text` is a file's path, or "fx,fy,cx,cy". Throws Misuse when it is neither.
 [[nodiscard]] CameraFile camera_from_argument(const std::string& text);
 
-/// Writes ours, atomically.
-void write_camera_file(const std::filesystem::path& file, const CameraFile& camera);
+enum class CameraFormat { scanshade, open3d, opencv, ros, kalibr, colmap };
+[[nodiscard]] std::vector<std::string> camera_format_names();
+/// By name, or where that is empty by the file's extension. Throws Misuse listing what there is.
+[[nodiscard]] CameraFormat camera_format(const std::filesystem::path& file, const std::string& name);
+
+/// What some formats also tell of how the camera was found; empty and NaN where nothing is known.
+struct CameraQuality {
+    double rms_px = std::numeric_limits<double>::quiet_NaN(); ///< OpenCV's avg_reprojection_error
+    std::vector<double> view_rms_px;                          ///< OpenCV's per_view_reprojection_errors
+    std::string details;                                      ///< a JSON object, kept by ours under "refinement"
+};
+
+/// Writes atomically. Throws Error naming the file where the format cannot say what the camera is (a lens for Open3D, k3
+/// for Kalibr): nothing is dropped.
+void write_camera_file(const std::filesystem::path& file, const CameraFile& camera,
+                       CameraFormat format = CameraFormat::scanshade, const CameraQuality& quality = {});
 
 } // namespace scanshade

@@ -35,8 +35,9 @@ void check(const Camera& camera) {
         refuse(camera, fmt::format("image size is {}x{}, at least 1x1 expected", size.width, size.height));
     check_principal_point(camera, "cx", cx, fx, size.width);
     check_principal_point(camera, "cy", cy, fy, size.height);
-    const auto& [k1, k2, p1, p2, k3] = camera.distortion;
-    for (const auto& [name, value] : {std::pair{"k1", k1}, {"k2", k2}, {"p1", p1}, {"p2", p2}, {"k3", k3}})
+    const Distortion& d = camera.distortion;
+    for (const auto& [name, value] :
+         {std::pair{"k1", d.k1}, {"k2", d.k2}, {"p1", d.p1}, {"p2", d.p2}, {"k3", d.k3}, {"k4", d.k4}})
         if (!std::isfinite(value))
             refuse(camera, fmt::format("{} is {}, a finite number expected", name, value));
 }
@@ -51,7 +52,9 @@ std::string describe(const Camera& camera) {
     const auto& [fx, fy, cx, cy, size] = camera.pinhole;
     std::string text =
         fmt::format("fx {:.2f} fy {:.2f} cx {:.2f} cy {:.2f} ({}x{})", fx, fy, cx, cy, size.width, size.height);
-    if (const Distortion& d = camera.distortion; d.any())
+    if (const Distortion& d = camera.distortion; d.model == LensModel::kannala_brandt)
+        text += fmt::format(" fisheye k1 {:g} k2 {:g} k3 {:g} k4 {:g}", d.k1, d.k2, d.k3, d.k4);
+    else if (d.any())
         text += fmt::format(" k1 {:g} k2 {:g} p1 {:g} p2 {:g} k3 {:g}", d.k1, d.k2, d.p1, d.p2, d.k3);
     return text;
 }

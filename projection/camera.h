@@ -13,6 +13,7 @@
 
 #include "shaders/shared/camera.h"
 
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <string>
 
@@ -29,10 +30,19 @@ struct Pinhole {
     }
 };
 
-/// Brown-Conrady distortion in OpenCV's order (k1, k2, p1, p2, k3); all zero = none.
+/// How a lens bends a direction: a polynomial in the tangent (Brown 1966; most lenses) or in the angle itself (Kannala
+/// and Brandt 2006; fisheyes, where the tangent runs away).
+enum class LensModel { brown_conrady, kannala_brandt };
+
+/// Distortion in OpenCV's order. Brown-Conrady has k1, k2, p1, p2, k3, all zero = none; Kannala-Brandt (OpenCV's
+/// `fisheye`, ROS's and Kalibr's `equidistant`) has k1, k2, k3, k4, and bends even when they are zero.
 struct Distortion {
-    double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
-    [[nodiscard]] bool any() const { return k1 != 0 || k2 != 0 || p1 != 0 || p2 != 0 || k3 != 0; }
+    double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0, k4 = 0;
+    LensModel model = LensModel::brown_conrady;
+    [[nodiscard]] bool any() const {
+        return model == LensModel::kannala_brandt || k1 != 0 || k2 != 0 || p1 != 0 || p2 != 0 || k3 != 0;
+    }
+    friend bool operator==(const Distortion&, const Distortion&) = default;
 };
 
 /// A recorded camera: pinhole, lens distortion, and where the numbers came from ("camera.json", "--camera", ...).
@@ -43,15 +53,34 @@ struct Camera {
 };
 
 /// Moves normalised image coordinates (x = X/Z, y = Y/Z) to where the lens bends them
-/// (Brown 1966 as written in OpenCV's calib3d documentation). A template on its number so that solvers can differentiate it.
+/// (Brown 1966 as written in OpenCV's calib3d documentation); `coefficients` are k1, k2, p1, p2, k3.
+/// A template on its number so that solvers can differentiate it.
 template <class Number>
-void distort(const Number coefficients[5], const Number& x, const Number& y, Number& x_bent, Number& y_bent) {
+void distort(const Number* coefficients, const Number& x, const Number& y, Number& x_bent, Number& y_bent) {
     const Number &k1 = coefficients[0], &k2 = coefficients[1], &p1 = coefficients[2], &p2 = coefficients[3];
     const Number& k3 = coefficients[4];
     const Number r2 = x * x + y * y;
     const Number radial = Number(1) + r2 * (k1 + r2 * (k2 + r2 * k3));
     x_bent = x * radial + Number(2) * p1 * x * y + p2 * (r2 + Number(2) * x * x);
     y_bent = y * radial + p1 * (r2 + Number(2) * y * y) + Number(2) * p2 * x * y;
+}
+
+/// The same for a fisheye: the angle theta from the axis becomes the radius theta (1 + k1 theta^2 + .. + k4 theta^8)
+/// (Kannala and Brandt 2006, eq. 6, with OpenCV's scaling); `coefficients` are k1, k2, k3, k4.
+template <class Number>
+void distort_fisheye(const Number* coefficients, const Number& x, const Number& y, Number& x_bent, Number& y_bent) {
+    using std::atan, std::sqrt;
+    const Number r2 = x * x + y * y;
+    if (r2 < Number(1e-16)) { // the square root has no derivative at the axis, the mapping has: 1
+        x_bent = x;
+        y_bent = y;
+        return;
+    }
+    const Number r = sqrt(r2), theta = atan(r), t2 = theta * theta;
+    const Number *k = coefficients;
+    const Number bent = theta * (Number(1) + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3]))));
+    x_bent = x * bent / r;
+    y_bent = y * bent / r;
 }
 
 /// Refuses a camera that cannot be: non-finite or non-positive focal lengths, principal point far outside the image,

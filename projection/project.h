@@ -3,7 +3,7 @@
 
 #include "projection/frame.h"
 #include "projection/maps.h"
-#include "projection/refine.h"
+#include "projection/calibration/organised.h"
 
 namespace scanshade {
 

@@ -7,6 +7,8 @@
 #include <Eigen/LU>
 #include <limits>
 #include <mutex>
+#include <opencv2/core.hpp>
+#include <vector>
 
 namespace scanshade {
 namespace {
@@ -25,19 +27,58 @@ Eigen::Matrix2d jacobian(const Distortion& d, const Eigen::Vector2d& p) {
     return j;
 }
 
-/// Squared radius at which r (1 + k1 r2 + k2 r4 + k3 r6) stops growing: beyond it the lens model folds back on itself.
-double fold_r2(const Distortion& d) {
-    cv::Vec3d roots;
-    const int count = cv::solveCubic(cv::Vec4d(7 * d.k3, 5 * d.k2, 3 * d.k1, 1), roots);
+/// The smallest positive root of 1 + c1 t + c2 t^2 + ..., infinity where there is none.
+double first_root(const std::vector<double>& higher) {
+    cv::Mat1d coefficients(1, static_cast<int>(higher.size()) + 1, 0.0);
+    coefficients(0) = 1;
+    std::copy(higher.begin(), higher.end(), coefficients.begin() + 1);
+    while (coefficients.cols > 1 && coefficients(coefficients.cols - 1) == 0)
+        coefficients = coefficients.colRange(0, coefficients.cols - 1).clone();
     double nearest = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < count; ++i)
-        if (roots[i] > 0)
-            nearest = std::min(nearest, roots[i]);
+    if (coefficients.cols == 1)
+        return nearest;
+    std::vector<cv::Vec2d> roots;
+    cv::solvePoly(coefficients, roots);
+    for (const cv::Vec2d& root : roots)
+        if (root[0] > 0 && std::abs(root[1]) <= 1e-9 * std::max(1.0, root[0]))
+            nearest = std::min(nearest, root[0]);
     return nearest;
+}
+
+/// The angle at which theta (1 + k1 theta^2 + ...) stops growing; just under 90 degrees at most, where a pinhole ends.
+double fold_angle(const Distortion& d) {
+    constexpr double widest = 1.55; // tangent 48
+    return std::min(widest, std::sqrt(first_root({3 * d.k1, 5 * d.k2, 7 * d.k3, 9 * d.k4})));
+}
+
+double bent_angle(const Distortion& d, double theta) {
+    const double t2 = theta * theta;
+    return theta * (1 + t2 * (d.k1 + t2 * (d.k2 + t2 * (d.k3 + t2 * d.k4))));
+}
+
+/// Newton's method on the angle, kept in the bracket where the polynomial grows.
+std::optional<Eigen::Vector2d> undistorted_fisheye(const Distortion& d, const Eigen::Vector2d& bent) {
+    const double wanted = bent.norm();
+    if (wanted < 1e-8)
+        return bent;
+    double low = 0, high = fold_angle(d), theta = std::min(wanted, high);
+    if (wanted >= bent_angle(d, high))
+        return std::nullopt;
+    for (int i = 0; i < 100 && std::abs(bent_angle(d, theta) - wanted) > 1e-14; ++i) {
+        const double miss = bent_angle(d, theta) - wanted, t2 = theta * theta;
+        (miss > 0 ? high : low) = theta;
+        const double slope = 1 + t2 * (3 * d.k1 + t2 * (5 * d.k2 + t2 * (7 * d.k3 + t2 * 9 * d.k4)));
+        theta -= miss / slope;
+        if (!(theta > low && theta < high))
+            theta = (low + high) / 2;
+    }
+    return Eigen::Vector2d(bent * (std::tan(theta) / wanted));
 }
 
 std::optional<Eigen::Vector2d> undistorted_within(const Distortion& distortion, const Eigen::Vector2d& bent,
                                                   double limit_r2) {
+    if (distortion.model == LensModel::kannala_brandt)
+        return undistorted_fisheye(distortion, bent);
     Eigen::Vector2d straight = bent;
     for (int i = 0; i < 50; ++i) {
         const Eigen::Vector2d miss = distorted(distortion, straight) - bent;
@@ -103,20 +144,29 @@ cv::Mat1i map_to_undistorted(const Camera& camera, double limit_r2, const cv::Ma
     return map;
 }
 
-using Key = std::array<double, 11>;
+using Key = std::array<double, 13>;
 
 Key key_of(const Camera& camera) {
     const auto& [fx, fy, cx, cy, size] = camera.pinhole;
-    const auto& [k1, k2, p1, p2, k3] = camera.distortion;
-    return {fx, fy, cx, cy, double(size.width), double(size.height), k1, k2, p1, p2, k3};
+    const Distortion& d = camera.distortion;
+    return {fx,   fy,   cx,   cy,   double(size.width), double(size.height), d.k1,
+            d.k2, d.p1, d.p2, d.k3, d.k4,               double(d.model)};
 }
 
 } // namespace
 
-Eigen::Vector2d distorted(const Distortion& distortion, const Eigen::Vector2d& straight) {
-    const double coefficients[5] = {distortion.k1, distortion.k2, distortion.p1, distortion.p2, distortion.k3};
+double fold_r2(const Distortion& d) {
+    if (d.model == LensModel::kannala_brandt)
+        return std::pow(std::tan(fold_angle(d)), 2);
+    return first_root({3 * d.k1, 5 * d.k2, 7 * d.k3});
+}
+
+Eigen::Vector2d distorted(const Distortion& d, const Eigen::Vector2d& straight) {
     Eigen::Vector2d bent;
-    distort(coefficients, straight.x(), straight.y(), bent.x(), bent.y());
+    if (d.model == LensModel::kannala_brandt)
+        distort_fisheye(std::array{d.k1, d.k2, d.k3, d.k4}.data(), straight.x(), straight.y(), bent.x(), bent.y());
+    else
+        distort(std::array{d.k1, d.k2, d.p1, d.p2, d.k3}.data(), straight.x(), straight.y(), bent.x(), bent.y());
     return bent;
 }
 

@@ -2,7 +2,7 @@
 #include "projection/camera.h"
 
 #include "projection/error.h"
-#include "projection/refine.h"
+#include "projection/calibration/organised.h"
 #include "projection/undistort.h"
 #include "tests/support/says.h"
 #include "tests/support/scenes.h"

@@ -1,4 +1,4 @@
-#include "projection/refine.h"
+#include "projection/calibration/organised.h"
 
 #include "projection/error.h"
 

@@ -1,0 +1,79 @@
+// A recorded RGB-D sequence as evidence: bundle adjustment of tracks, depths, poses and the camera.
+#pragma once
+
+#include "projection/calibration/evidence.h"
+#include "projection/calibration/tracks.h"
+
+#include <Eigen/Geometry>
+#include <optional>
+
+namespace scanshade::calibration {
+
+/// One frame as the adjustment needs it.
+struct SequenceFrame {
+    std::string name;
+    cv::Mat1b grey;      ///< the colour image
+    cv::Mat1f depth_m;   ///< recorded depth, 0 = hole
+    std::optional<Eigen::Isometry3d> world_from_camera; ///< of the depth camera, as recorded
+};
+
+struct SequenceOptions {
+    bool registered = true;    ///< colour pixel (u, v) and depth pixel (u, v) see the same thing
+    bool refine_poses = true;  ///< recorded poses are where to start; otherwise they are the truth
+    double pixel_sigma_px = 0.5;
+    double depth_floor_m = 0.0012, depth_per_z2 = 0.0019; ///< sigma of a depth (Nguyen 2012's order), rescaled by the residuals
+};
+
+/// Registered: one camera takes colour and depth; a track's point must project onto its sightings, and lie at the depth
+/// recorded there. Unregistered: the model is the colour camera and its place, `depth_camera` stays as it is; the point must
+/// lie on the surface that the depth camera saw.
+class Sequence final : public Evidence {
+  public:
+    /// Finds tracks; where a pose is missing, follows the camera from frame to frame (PnP on matches with depth). Prunes
+    /// outliers under the first camera. Throws Error where too little hangs together.
+    Sequence(std::vector<SequenceFrame> frames, const Camera& depth_camera, const Model& first, const SequenceOptions& options);
+
+    [[nodiscard]] std::size_t views() const override { return frames_.size(); }
+    [[nodiscard]] std::string view_name(std::size_t view) const override { return frames_[view].name; }
+    void weigh(const std::vector<double>& weights) override { weights_ = weights; }
+    [[nodiscard]] Fit start(const Model& model) const override;
+    [[nodiscard]] Fit fit(const Fit& from, const Free& free, const Views& used, bool covariance) const override;
+    [[nodiscard]] std::vector<ViewScore> score(const Fit& fit, const Views& wanted) const override;
+    [[nodiscard]] std::vector<cv::Point2d> pixels_of(std::size_t view) const override;
+    [[nodiscard]] std::vector<Eigen::Vector2d> residuals(const Fit& fit, std::size_t view) const override;
+    [[nodiscard]] std::vector<double> depths_m(const Fit& fit) const override;
+
+    /// Poses of the depth camera under a fit, world_from_camera.
+    [[nodiscard]] std::vector<Eigen::Isometry3d> poses(const Fit& fit) const;
+    [[nodiscard]] std::size_t points() const { return tracks_.size(); }
+    [[nodiscard]] std::size_t sightings() const;
+    /// Why these frames cannot determine a camera: pure forward motion, one plane, hardly any motion. Empty = they may.
+    [[nodiscard]] std::string degeneracy(const Fit& fit) const;
+    /// Median distance of frame-to-frame overlapping surfaces along the optical axis, millimetres: each frame's depth lifted,
+    /// moved into the next frames and compared with their depth. NaN where nothing overlaps.
+    [[nodiscard]] double overlap_mm(const Model& depth_model, const std::vector<Eigen::Isometry3d>& poses) const;
+
+  private:
+    friend class SequenceProblem;
+    struct Sighting {
+        int frame = 0;
+        Eigen::Vector2d pixel;
+        double depth_m = 0; ///< recorded there; 0 = unknown, negative = not to be used
+    };
+    struct Point {
+        std::vector<Sighting> sightings;
+    };
+    void follow_camera(const Model& first);
+    void prune(const Model& first);
+    [[nodiscard]] Fit initial(const Model& model) const;
+
+    std::vector<SequenceFrame> frames_;
+    Camera depth_camera_;
+    SequenceOptions options_;
+    std::vector<Point> tracks_;
+    std::vector<double> weights_;
+    std::vector<Eigen::Isometry3d> start_poses_;
+    double depth_weight_ = 1; ///< rescales the assumed depth sigma to what residuals show
+};
+
+} // namespace scanshade::calibration

@@ -1,0 +1,179 @@
+#include "projection/calibration/solve.h"
+
+#include "projection/error.h"
+
+#include <Eigen/Dense>
+
+namespace scanshade::calibration {
+namespace {
+
+struct Block {
+    int first, size;
+};
+constexpr Block blocks[] = {{0, camera_unknowns}, {depth_scale, depth_unknowns}, {turn_x, place_unknowns}};
+
+std::vector<int> free_in(const Block& block, const Free& free) {
+    std::vector<int> indices;
+    for (int i = 0; i < block.size; ++i)
+        if (free[block.first + i])
+            indices.push_back(i);
+    return indices;
+}
+
+bool in_use(const ceres::Problem& problem, const Model& model, const Block& block) {
+    return problem.HasParameterBlock(model.values.data() + block.first);
+}
+
+} // namespace
+
+void freeze(ceres::Problem& problem, Model& model, const Free& free) {
+    for (const Block& block : blocks) {
+        if (!in_use(problem, model, block))
+            continue;
+        double* values = model.values.data() + block.first;
+        const std::vector<int> open = free_in(block, free);
+        if (open.empty()) {
+            problem.SetParameterBlockConstant(values);
+            continue;
+        }
+        problem.SetParameterBlockVariable(values);
+        std::vector<int> frozen;
+        for (int i = 0; i < block.size; ++i)
+            if (!free[block.first + i])
+                frozen.push_back(i);
+        if (!frozen.empty())
+            problem.SetManifold(values, new ceres::SubsetManifold(block.size, frozen));
+    }
+}
+
+void solve(ceres::Problem& problem, Fit& fit, bool many_unknowns) {
+    ceres::Solver::Options options;
+    options.linear_solver_type = many_unknowns ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;
+    options.max_num_iterations = 100;
+    options.function_tolerance = 1e-10;
+    options.gradient_tolerance = 1e-12;
+    options.parameter_tolerance = 1e-10;
+    options.logging_type = ceres::SILENT;
+    options.num_threads = many_unknowns ? 2 : 1;
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, &problem, &summary);
+    if (!summary.IsSolutionUsable())
+        throw Error("the least squares cannot be solved: " + summary.message);
+    double half_rss = 0;
+    ceres::Problem::EvaluateOptions without_loss;
+    without_loss.apply_loss_function = false;
+    problem.Evaluate(without_loss, &half_rss, nullptr, nullptr, nullptr);
+    fit.rss = 2 * half_rss;
+    fit.residuals = summary.num_residuals_reduced;
+    fit.unknowns = summary.num_effective_parameters_reduced;
+    fit.converged = summary.termination_type == ceres::CONVERGENCE;
+}
+
+namespace {
+
+/// The normal equations with the points eliminated. Rows come as a sparse Jacobian whose columns hold the first `kept`
+/// numbers, then three per point.
+class Reduced {
+  public:
+    Reduced(const ceres::CRSMatrix& jacobian, Eigen::Index kept) : kept_(kept), normal_(Eigen::MatrixXd::Zero(kept, kept)) {
+        const auto points = static_cast<std::size_t>((jacobian.num_cols - kept) / 3);
+        own_.assign(points, Eigen::Matrix3d::Zero());
+        mixed_.assign(points, Eigen::MatrixXd());
+        for (int row = 0; row < jacobian.num_rows; ++row)
+            add_row(jacobian, row);
+        for (std::size_t i = 0; i < points; ++i)
+            if (mixed_[i].size() > 0)
+                normal_ -= mixed_[i].transpose() * own_[i].ldlt().solve(mixed_[i]);
+    }
+    [[nodiscard]] const Eigen::MatrixXd& normal() const { return normal_; }
+
+  private:
+    void add_row(const ceres::CRSMatrix& jacobian, int row) {
+        const int begin = jacobian.rows[row], end = jacobian.rows[row + 1];
+        for (int a = begin; a < end; ++a)
+            for (int b = begin; b < end; ++b)
+                add(jacobian.cols[a], jacobian.cols[b], jacobian.values[a] * jacobian.values[b]);
+    }
+    void add(Eigen::Index a, Eigen::Index b, double value) {
+        if (a < kept_ && b < kept_) {
+            normal_(a, b) += value;
+            return;
+        }
+        if (a < kept_)
+            return; // the transpose of what is kept in mixed_
+        const auto point = static_cast<std::size_t>((a - kept_) / 3);
+        const Eigen::Index axis = (a - kept_) % 3;
+        if (b >= kept_) {
+            own_[point](axis, (b - kept_) % 3) += value;
+            return;
+        }
+        if (mixed_[point].size() == 0)
+            mixed_[point] = Eigen::MatrixXd::Zero(3, kept_);
+        mixed_[point](axis, b) += value;
+    }
+
+    Eigen::Index kept_;
+    Eigen::MatrixXd normal_;
+    std::vector<Eigen::Matrix3d> own_;
+    std::vector<Eigen::MatrixXd> mixed_;
+};
+
+/// The inverse of a symmetric matrix scaled to a unit diagonal first; empty where it has none worth the name.
+Eigen::MatrixXd inverse(const Eigen::MatrixXd& normal) {
+    constexpr double smallest = 1e-13; // of the eigenvalues: what is left of double precision after squaring
+    const Eigen::VectorXd scale = normal.diagonal().cwiseSqrt().cwiseInverse();
+    if (!scale.allFinite())
+        return {};
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scale.asDiagonal() * normal * scale.asDiagonal());
+    const Eigen::VectorXd& values = solver.eigenvalues();
+    if (!(values(0) > smallest * values(values.size() - 1)))
+        return {};
+    return scale.asDiagonal() * solver.eigenvectors() * values.cwiseInverse().asDiagonal() *
+           solver.eigenvectors().transpose() * scale.asDiagonal();
+}
+
+} // namespace
+
+void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const std::vector<double*>& poses,
+                    const std::vector<double*>& points) {
+    fit.covariance.resize(0, 0);
+    const int spare = fit.residuals - fit.unknowns;
+    if (spare <= 0)
+        return;
+    ceres::Problem::EvaluateOptions options;
+    options.apply_loss_function = false;
+    std::vector<int> places; // of the kept columns in the model; -1 for the poses'
+    for (const Block& block : blocks) {
+        double* values = fit.model.values.data() + block.first;
+        if (!in_use(problem, fit.model, block) || problem.IsParameterBlockConstant(values))
+            continue;
+        options.parameter_blocks.push_back(values);
+        for (const int index : free_in(block, free))
+            places.push_back(block.first + index);
+    }
+    const auto count = static_cast<Eigen::Index>(places.size());
+    auto kept = count;
+    for (double* pose : poses)
+        if (problem.HasParameterBlock(pose) && !problem.IsParameterBlockConstant(pose)) {
+            options.parameter_blocks.push_back(pose);
+            kept += problem.ParameterBlockTangentSize(pose);
+        }
+    for (double* point : points)
+        if (problem.HasParameterBlock(point))
+            options.parameter_blocks.push_back(point);
+    fit.covariance = Eigen::MatrixXd::Zero(unknown_count, unknown_count);
+    if (count == 0)
+        return;
+    ceres::CRSMatrix jacobian;
+    problem.Evaluate(options, nullptr, nullptr, nullptr, &jacobian);
+    const Eigen::MatrixXd all = inverse(Reduced(jacobian, kept).normal());
+    if (all.size() == 0 || !all.allFinite()) {
+        fit.covariance.resize(0, 0);
+        return;
+    }
+    for (Eigen::Index a = 0; a < count; ++a)
+        for (Eigen::Index b = 0; b < count; ++b)
+            fit.covariance(places[a], places[b]) = all(a, b) * fit.rss / spare;
+}
+
+} // namespace scanshade::calibration

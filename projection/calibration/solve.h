@@ -1,0 +1,35 @@
+// What the sources of evidence share of Ceres: frozen numbers, settings, and the covariance of the model's numbers.
+#pragma once
+
+#include "projection/calibration/evidence.h"
+
+#include <ceres/ceres.h>
+
+namespace scanshade::calibration {
+
+/// The model's numbers are three blocks of a problem: camera, depth, place. Those in the problem are frozen where not free.
+void freeze(ceres::Problem& problem, Model& model, const Free& free);
+
+/// Solves; fills rss (without robust loss), residuals, unknowns, converged. Throws Error where nothing can be solved.
+void solve(ceres::Problem& problem, Fit& fit, bool many_unknowns);
+
+/// Fills fit.covariance, scaled by rss / (residuals - unknowns); leaves it empty where the problem is singular. `points` are
+/// blocks of three that appear together with others but never with each other: they are eliminated one by one (Schur
+/// complement), which keeps what is inverted as small as the model and `poses`.
+void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const std::vector<double*>& poses,
+                    const std::vector<double*>& points);
+
+/// Moves a point by a pose of six numbers: axis times angle, then translation.
+template <class Number>
+void moved(const Number* pose, const Number* point, Number* result);
+
+} // namespace scanshade::calibration
+
+#include <ceres/rotation.h>
+
+template <class Number>
+void scanshade::calibration::moved(const Number* pose, const Number* point, Number* result) {
+    ceres::AngleAxisRotatePoint(pose, point, result);
+    for (int i = 0; i < 3; ++i)
+        result[i] += pose[3 + i];
+}
