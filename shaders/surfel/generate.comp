@@ -68,6 +68,12 @@ void measures(vec4 turns, out vec4 along_sine, out vec4 along_cosine) {
     along_cosine = 1.0 - 2.0 * y * r;
 }
 
+// 1 where depth `other` stands in front of a sample at z and of the sample's plane, which is at z / plane there.
+vec4 hides(vec4 other, vec4 z, vec4 plane, float jut) {
+    vec4 near = other + jut;
+    return vec4(greaterThan(other, vec4(0.0))) * vec4(lessThan(near, z)) * vec4(lessThan(near * plane, z));
+}
+
 // Pixels from p to the border of the image.
 float to_border(vec2 p, vec2 direction) {
     vec2 room = mix(p + 0.49, vec2(k.size) - 0.51 - p, greaterThan(direction, vec2(0.0)));
@@ -137,6 +143,8 @@ void main() {
 
         uint closed = 0u;
         vec4 found = vec4(0.0);
+        vec2 last = vec2(0.0); // depths of the step before, on either side
+        vec2 along_ray = along * per_px;
         for (int j = 0; j < steps; j += 2) {
             vec4 x = (float(j) + vec4(u, u + 1.0)) * (1.0 / float(steps));
             vec4 before = spread(x - 1.0 / float(steps)) * far.xyxy + first.xyxy;
@@ -180,7 +188,15 @@ void main() {
             vec4 middle = pv * lv + pt * lt;
             vec4 chord = positive(middle * middle + (radius2 - d2)) + 1e-30;
             chord *= inverse_length(chord);
-            vec4 back = least((now - before) * size, middle + chord), ahead = least((next - now) * size, chord - middle);
+            // Half way to its neighbours; farther where a neighbour stands in front of it and of its plane: there it goes on.
+            vec4 back = (now - before) * size, ahead = (next - now) * size;
+            vec4 bend = sides * (nx * along_ray.x + ny * along_ray.y) / (nx * (ray.x + mx * per_px.x) + ny * (ray.y + my * per_px.y) + nz);
+            vec4 z_before = vec4(last, zq.xy), z_next = vec4(zq.zw, 0.0, 0.0); // of the last step's nothing is known yet
+            last = zq.zw;
+            back += hides(z_before, zq, 1.0 - (now - before) * bend, s.jut) * least(back, vec4(s.longest));
+            ahead += hides(z_next, zq, 1.0 + (next - now) * bend, s.jut) * least(ahead, vec4(s.longest));
+            back = least(back, middle + chord);
+            ahead = least(ahead, chord - middle);
             vec4 fv = pv - lv * back, ft = pt - lt * back, uv = pv + lv * ahead, ut = pt + lt * ahead;
             // Thickness lies behind, as the eye sees it: seen from the pixel, farther outwards.
             vec4 deep = vec4(shape & 0xff) * thickness_step;
