@@ -4,7 +4,10 @@
 #include "tests/support/scenes.h"
 
 #include <cmath>
+#include <cstring>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <map>
 #include <opencv2/imgproc.hpp>
 
 namespace scanshade {
@@ -18,11 +21,14 @@ struct Case {
     bool downsampled;
 };
 
-void PrintTo(const Case& c, std::ostream* out) { *out << c.method << " " << c.quality << (c.downsampled ? " downsampled" : ""); }
+void PrintTo(const Case& c, std::ostream* out) {
+    *out << c.method << " " << c.quality << (c.downsampled ? " downsampled" : "");
+}
 
 Parameter* row_named(std::vector<Parameter>& rows, const std::string& name) {
     for (Parameter& row : rows)
-        if (row.name == name) return &row;
+        if (row.name == name)
+            return &row;
     return nullptr;
 }
 
@@ -34,7 +40,8 @@ std::vector<Case> cases() {
         const Parameter* quality = row_named(rows, "quality");
         for (const std::string& name : quality ? quality->choices : std::vector<std::string>{""}) {
             all.push_back({std::string(method.name), name, false});
-            if (row_named(rows, "downsampled")) all.push_back({std::string(method.name), name, true});
+            if (row_named(rows, "downsampled"))
+                all.push_back({std::string(method.name), name, true});
         }
     }
     return all;
@@ -47,18 +54,32 @@ gpu::Device& device() {
 
 class Laws : public testing::TestWithParam<Case> {
   protected:
-    std::unique_ptr<Method> make(double radius_m) {
+    std::unique_ptr<Method> make(double radius_m, gpu::Device& opened = device()) {
         const auto setup = method_named(GetParam().method).setup();
         auto rows = setup->parameters();
-        if (!GetParam().quality.empty()) set(*row_named(rows, "quality"), GetParam().quality);
-        if (GetParam().downsampled) set(*row_named(rows, "downsampled"), "true");
+        if (!GetParam().quality.empty())
+            set(*row_named(rows, "quality"), GetParam().quality);
+        if (GetParam().downsampled)
+            set(*row_named(rows, "downsampled"), "true");
         set(*row_named(rows, "radius"), std::to_string(radius_m));
-        return setup->make(device());
+        return setup->make(opened);
     }
-    cv::Mat1f visibility(const DepthImage& depth, double radius_m = 0.5) { return make(radius_m)->compute({depth}).visibility; }
+    /// Made once per size: pipelines are what takes time here.
+    AoMap ao(const DepthImage& depth, double radius_m = 0.5) {
+        static gpu::Device& opened = device(); // made before, gone after the methods
+        static std::map<std::string, std::unique_ptr<Method>> made;
+        const cv::Size size = depth.z_m.size();
+        auto& one = made[fmt::format("{} {} {} {} {}x{}", GetParam().method, GetParam().quality, GetParam().downsampled,
+                                     radius_m, size.width, size.height)];
+        if (!one)
+            one = make(radius_m, opened);
+        return one->compute({depth});
+    }
+    cv::Mat1f visibility(const DepthImage& depth, double radius_m = 0.5) { return ao(depth, radius_m).visibility; }
 
     void TearDown() override {
-        for (const std::string& message : device().validation_messages()) ADD_FAILURE() << message;
+        for (const std::string& message : device().validation_messages())
+            ADD_FAILURE() << message;
     }
 };
 
@@ -99,11 +120,13 @@ TEST_P(Laws, holes_stay_holes_and_surfaces_get_values) {
     const DepthImage depth = with_holes(ball_on_floor(test_camera()), 0.15);
     const cv::Mat1f v = visibility(depth);
     for (int y = 0; y < v.rows; ++y)
-        for (int x = 0; x < v.cols; ++x) ASSERT_EQ(std::isnan(v(y, x)), depth.z_m(y, x) == 0) << x << ", " << y;
+        for (int x = 0; x < v.cols; ++x)
+            ASSERT_EQ(std::isnan(v(y, x)), depth.z_m(y, x) == 0) << x << ", " << y;
 }
 
 TEST_P(Laws, holes_neither_darken_nor_brighten_their_neighbours) {
-    // A plane with holes is a plane: open. And where a corner lies, taking pixels away at random must not shift its mean.
+    // A plane with holes is a plane: open. And where a corner lies, taking pixels away at random must not shift its
+    // mean.
     const Pinhole camera = test_camera({320, 240});
     EXPECT_GE(lowest_inside(visibility(with_holes(tilted_plane(camera, 30), 0.1)), 0), 0.98);
     const DepthImage corner = wall_corner(camera), punched = with_holes(corner, 0.1);
@@ -119,7 +142,8 @@ TEST_P(Laws, a_corner_darkens_towards_its_edge) {
     // Mean of each column; the edge of the corner is the deepest column.
     const int edge = cvRound(camera.cx);
     std::vector<double> columns;
-    for (int x = edge; x < v.cols - 8; ++x) columns.push_back(cv::mean(v(cv::Rect(x, 60, 1, 120)))[0]);
+    for (int x = edge; x < v.cols - 8; ++x)
+        columns.push_back(cv::mean(v(cv::Rect(x, 60, 1, 120)))[0]);
     EXPECT_LT(columns.front(), 0.8);
     EXPECT_GT(columns.back(), columns.front() + 0.1);
     // Monotonic but for the pattern's noise: no column darker than one nearer the edge by more than 0.03.
@@ -143,17 +167,39 @@ TEST_P(Laws, size_is_a_matter_of_units) {
 
 TEST_P(Laws, same_input_same_bytes) {
     const DepthImage depth = with_holes(ball_on_floor(test_camera()), 0.05);
-    const cv::Mat1f one = visibility(depth), two = visibility(depth);
+    const cv::Mat1f one = visibility(depth), two = make(0.5)->compute({depth}).visibility;
     EXPECT_EQ(0, std::memcmp(one.data, two.data, one.total() * 4));
 }
 
 TEST_P(Laws, any_size_works) {
-    for (const cv::Size size : {cv::Size(1, 1), cv::Size(1, 7), cv::Size(9, 1), cv::Size(3, 2), cv::Size(37, 23), cv::Size(161, 119)}) {
+    for (const cv::Size size :
+         {cv::Size(1, 1), cv::Size(1, 7), cv::Size(9, 1), cv::Size(3, 2), cv::Size(37, 23), cv::Size(161, 119)}) {
         const DepthImage depth = tilted_plane(test_camera(size), 10);
         const cv::Mat1f v = visibility(depth);
         for (int y = 0; y < v.rows; ++y)
-            for (int x = 0; x < v.cols; ++x) ASSERT_GE(v(y, x), 0.9) << size << " at " << x << ", " << y;
+            for (int x = 0; x < v.cols; ++x)
+                ASSERT_GE(v(y, x), 0.9) << size << " at " << x << ", " << y;
     }
+}
+
+TEST_P(Laws, coverage_is_a_share_and_nothing_in_holes) {
+    const DepthImage depth = with_holes(ball_on_floor(test_camera()), 0.15);
+    const cv::Mat1f coverage = ao(depth).coverage;
+    if (coverage.empty())
+        GTEST_SKIP() << "this method does not tell its coverage";
+    ASSERT_EQ(coverage.size(), depth.z_m.size());
+    EXPECT_TRUE(cv::checkRange(coverage, true, nullptr, 0.0, 1.0 + 1e-6));
+    EXPECT_EQ(cv::countNonZero((depth.z_m == 0) & (coverage != 0)), 0);
+    EXPECT_GT(cv::mean(coverage, depth.z_m > 0)[0], 0.4) << "most of what is near is known";
+}
+
+TEST_P(Laws, normals_of_the_surface_may_be_brought_along) {
+    // A plane with its own normals is as open as with derived ones, also where some are missing.
+    const DepthImage depth = tilted_plane(test_camera(), 40);
+    const auto s = static_cast<float>(std::sin(40 * CV_PI / 180)), c = static_cast<float>(std::cos(40 * CV_PI / 180));
+    NormalImage normals{cv::Mat3f(depth.z_m.size(), cv::Vec3f(s, 0, -c))};
+    normals.normals(cv::Rect(60, 40, 9, 9)) = cv::Vec3f();
+    EXPECT_GE(lowest_inside(make(0.5)->compute({depth, &normals}).visibility, 8), 0.98);
 }
 
 TEST_P(Laws, an_image_of_holes_is_a_result) {

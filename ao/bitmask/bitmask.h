@@ -13,7 +13,7 @@ namespace scanshade {
 struct BitmaskOptions {
     ScreenOptions screen;
     SliceOptions slices;
-    float thickness = 0.2F;    ///< of what is seen, in radii
+    float thickness = 0.3F;    ///< of what is seen, in radii
     float thickness_per_z = 0; ///< metres more per metre of depth
     std::string sectors = "cosine";
     bool unbounded = false;
