@@ -70,7 +70,13 @@ class Weaver {
         }
     }
 
-    [[nodiscard]] Mesh mesh() && { return std::move(mesh_); }
+    [[nodiscard]] Mesh mesh() && {
+        if (thickness_m_ > 0)
+            hang_curtains();
+        if (thickness_m_ > 0 && thickness_m_ < depth_range()) // else it lies behind everything
+            add_back();
+        return std::move(mesh_);
+    }
 
   private:
     void add(const std::array<cv::Point, 3>& corners, double nearest_m) {
@@ -80,7 +86,29 @@ class Weaver {
         if (inverse_.joined(a, b) && inverse_.joined(b, c) && inverse_.joined(c, a))
             mesh_.triangles.push_back({index(a), index(b), index(c)});
         else if (thickness_m_ > 0)
-            mesh_.triangles.push_back({hung(a, nearest_m), hung(b, nearest_m), hung(c, nearest_m)});
+            curtains_.push_back({hung(a, nearest_m), hung(b, nearest_m), hung(c, nearest_m)});
+    }
+
+    [[nodiscard]] double depth_range() const {
+        double nearest = 0, farthest = 0;
+        cv::minMaxLoc(depth_.z_m, &nearest, &farthest, nullptr, nullptr, depth_.z_m > 0);
+        return farthest - nearest;
+    }
+
+    void hang_curtains() { mesh_.triangles.insert(mesh_.triangles.end(), curtains_.begin(), curtains_.end()); }
+
+    /// The sheet once more behind itself.
+    void add_back() {
+        const int first = static_cast<int>(mesh_.vertices.size());
+        for (int v = 0; v < depth_.z_m.rows; ++v)
+            for (int u = 0; u < depth_.z_m.cols; ++u)
+                mesh_.vertices.push_back(
+                    point_at(depth_.camera, u, v, static_cast<double>(depth_.z_m(v, u)) + thickness_m_));
+        const std::size_t front = mesh_.triangles.size() - curtains_.size();
+        for (std::size_t i = 0; i < front; ++i) {
+            const auto [a, b, c] = mesh_.triangles[i];
+            mesh_.triangles.push_back({first + a, first + b, first + c});
+        }
     }
 
     [[nodiscard]] int index(cv::Point p) const { return p.y * depth_.z_m.cols + p.x; }
@@ -98,6 +126,7 @@ class Weaver {
     InverseDepth inverse_;
     double thickness_m_;
     Mesh mesh_;
+    std::vector<std::array<int, 3>> curtains_;
 };
 
 // ---------------------------------------------------------------------------------------------------- normals

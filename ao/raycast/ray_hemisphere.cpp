@@ -165,7 +165,7 @@ RayHemisphere::RayHemisphere(const RaySurface& surface, const CosineDirections& 
     : surface_(surface), directions_(directions), radius_m_(radius_m), all_falloffs_(all_falloffs) {}
 
 RayEstimate RayHemisphere::at(const RayStart& start) const {
-    const double lift = std::max({start.lift_m, 1e-4 * radius_m_, surface_.rounding_m()});
+    const double lift = std::max(start.lift_m, surface_.rounding_m()); // no share of the radius: it may be endless
     const Eigen::Matrix3f axes = axes_about(start.normal, 2 * std::numbers::pi * hash(start.key) * 0x1p-32);
     RayBundle bundle;
     bundle.origin = surface_.local(start.point + lift * start.normal);
