@@ -3,6 +3,7 @@
 #include "apps/bench_results.h"
 #include "apps/command.h"
 #include "apps/command_line.h"
+#include "apps/fused_reference.h"
 #include "apps/generate.h"
 #include "apps/scene.h"
 #include "apps/sensor.h"
@@ -161,7 +162,9 @@ class CaptureBench {
 class Bench final : public Command {
   public:
     Words words() override {
-        return {"CAPTURE", "captures with truth/ao, as generate makes them", &paths_, 0, 1 << 20};
+        return {"CAPTURE",
+                "captures with truth/ao, as generate makes them, or with poses: then rays against all frames fused",
+                &paths_, 0, 1 << 20};
     }
 
     std::vector<Stage> stages() override {
@@ -170,6 +173,9 @@ class Bench final : public Command {
                   {"scenes", "which scenes: all, or names with commas", &scenes_},
                   {"sensor", "which sensors see them: all, or names with commas", &sensors_},
                   {"size", "their image size, width x height", &generate_.size, "pixels"},
+                  {"first",
+                   "their first frame's place on the scene's walk, in tenths of a second: another one, other views",
+                   &generate_.first, "", 0, 100000},
                   {"truth-rays", "rays per pixel of their truth", &generate_.truth_rays, "", 1, 65536},
                   {"frames", "frames taken of each capture, spread evenly", &request_.frames, "", 1, 100000},
                   {"radius", "how far away a surface may occlude, where the capture's truth does not say",
@@ -203,9 +209,7 @@ class Bench final : public Command {
                            rounds_,
                            {}};
         for (const fs::path& path : captures()) {
-            const TrialCapture capture = load_trial(path, request_);
-            if (capture.reference.empty())
-                throw Error(fmt::format("{}: nothing to compare with: it has no truth/ao", path.string()));
+            const TrialCapture capture = loaded(device, path);
             say(fmt::format("{}: {} frames, {} depth ({}, {})", path.string(), capture.frames.size(),
                             name_of(capture.sensor), describe(capture.noise), capture.noise_origin));
             report.captures.push_back(CaptureBench(device, capture, all).run(rounds_));
@@ -227,6 +231,19 @@ class Bench final : public Command {
             throw Misuse(out_ + "/index.html exists already: --overwrite replaces it, or choose another -o");
     }
 
+    /// The capture with its truth, or with what its posed frames tell together.
+    TrialCapture loaded(gpu::Device& device, const fs::path& path) const {
+        TrialCapture capture = load_trial(path, request_);
+        if (!capture.reference.empty())
+            return capture;
+        FusedReference fused(device, path, capture, request_.capture);
+        say(fmt::format("{}: {}", path.string(), fused.description()));
+        capture.reference = fused.description();
+        for (TrialFrame& frame : capture.frames)
+            frame.truth = fused.visibility(frame);
+        return capture;
+    }
+
     /// The captures named, and those generated: made anew unless one of the same making lies there.
     std::vector<fs::path> captures() {
         std::vector<fs::path> all(paths_.begin(), paths_.end());
@@ -244,6 +261,7 @@ class Bench final : public Command {
         options.scene = scene;
         options.sensor = sensor;
         options.frames = request_.frames;
+        options.step = 25; // tenths of a second: views that differ
         options.overwrite = overwrite_;
         const fs::path folder = fs::path(out_) / "captures" / fmt::format("{}-{}", scene, sensor);
         say(fmt::format("generating {}", folder.string()));

@@ -16,6 +16,10 @@ const std::vector<Configuration>& more() {
         {"cacao", "high downsampled", {{"quality", "high"}, {"downsampled", "true"}}},
         {"cacao", "highest downsampled", {{"quality", "highest"}, {"downsampled", "true"}}},
         {"cacao", "high, as AMD ships it", {{"quality", "high"}, {"profile", "reference"}}},
+        {"surfel", "low downsampled", {{"quality", "low"}, {"downsampled", "true"}}},
+        {"surfel", "high downsampled", {{"quality", "high"}, {"downsampled", "true"}}},
+        {"raycast", "depth surface, 16 rays", {{"rays", "16"}}},
+        {"raycast", "depth surface, thickness 0.1 m", {{"rays", "64"}, {"thickness", "0.1"}}},
     };
     return table;
 }

@@ -119,7 +119,7 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
     }
     if (points.empty()) return {};
     const DepthNoise noise = law_through(points);
-    const bool clean = std::all_of(points.begin(), points.end(), [&](const Measured& p) { return noise.at(p.z) < 1e-4 * p.z; });
+    const bool clean = std::all_of(points.begin(), points.end(), [&](const Measured& p) { return noise.at(p.z) < std::max(1e-4 * p.z, 1.2e-4); });
     return clean ? DepthNoise{} : noise;
 }
 

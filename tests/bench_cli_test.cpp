@@ -276,8 +276,26 @@ TEST_F(MeasureTest, bench_leaves_one_page_with_everything_in_it) {
     EXPECT_NEAR(std::sqrt(squares / pixels), row["difference"]["rms"].get<double>(), 2e-4);
 }
 
+TEST_F(MeasureTest, without_truth_all_posed_frames_together_are_the_reference) {
+    // The same recording without its truth: rays against two fused frames must come close to what rays against the
+    // scene said.
+    const fs::path recorded = folder / "recorded";
+    fs::copy(capture(), recorded, fs::copy_options::recursive);
+    fs::remove_all(recorded / "truth");
+    const std::string words = "bench {} -o {} --frames 2 --rounds 1 --depth-noise none --methods raycast";
+    const Ran ran = run_program(fmt::format(fmt::runtime(words), recorded.string(), out()));
+    ASSERT_EQ(ran.exit_code, 0) << ran.err;
+    const json report = read(folder / "out/bench.json");
+    EXPECT_TRUE(says(report["captures"][0]["reference"].get<std::string>(), "fused of 2 posed frames"));
+    const json& exact = report["groups"][0]["configurations"][0];
+    EXPECT_LT(exact["difference"]["rms"].get<double>(), 0.1) << "rays against one depth image see nearly what two tell";
+    fs::remove(recorded / "groundtruth.txt");
+    const Ran lost = run_program(fmt::format(fmt::runtime(words), recorded.string(), out() + "2"));
+    EXPECT_EQ(lost.exit_code, 3);
+    EXPECT_TRUE(says(lost.err, "0 frames with poses"));
+}
+
 TEST_F(MeasureTest, bench_needs_truth_and_something_to_do) {
-    tests::write_capture(folder / "recorded", 1);
     EXPECT_EQ(run_program(fmt::format("bench -o {}", out())).exit_code, 1);
     EXPECT_EQ(run_program(fmt::format("bench {}", capture())).exit_code, 1);
     const Ran odd = run_program(fmt::format("bench {} -o {} --methods guess", capture(), out()));

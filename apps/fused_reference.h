@@ -1,0 +1,47 @@
+// What to compare with where nobody knows the truth: rays against the cloud that all posed frames of a capture make
+// together.
+#pragma once
+
+#include "ao/fit_plane/fit_plane.h"
+#include "ao/raycast/ray_hemisphere.h"
+#include "apps/trial.h"
+
+#include <optional>
+
+namespace scanshade {
+
+/// Not the truth: it knows what other frames saw behind and beside, but has their noise and the poses' errors in it.
+class FusedReference {
+  public:
+    static constexpr int rays = 256;
+    static constexpr std::size_t most_frames = 60;
+
+    /// Fuses up to `most_frames` posed frames of the capture (depth and normals from plane fits where there is noise)
+    /// into voxels of a fiftieth of the radius, each a disc with the mean point and normal of what fell in; depths
+    /// whose sigma is above a tenth of the radius stay out. Throws Error where fewer than two frames have poses.
+    FusedReference(gpu::Device& device, const std::filesystem::path& path, const TrialCapture& capture,
+                   const CaptureOptions& options);
+
+    /// Visibility of the frame's recorded pixels by `rays` rays each, within the capture's radius; NaN where there is
+    /// no depth or no normal, and everywhere in a frame without a pose.
+    [[nodiscard]] cv::Mat1f visibility(const TrialFrame& frame);
+
+    /// "ray casting against the cloud fused of 40 posed frames (1234567 discs)".
+    [[nodiscard]] const std::string& description() const { return description_; }
+
+  private:
+    struct Surface {
+        DepthImage depth;
+        NormalImage normals;
+    };
+    [[nodiscard]] Surface surface_of(const DepthImage& depth);
+
+    DepthNoise noise_;
+    double radius_m_, voxel_m_;
+    std::optional<FitPlane> fit_;
+    std::optional<RaySurface> discs_;
+    CosineDirections directions_;
+    std::string description_;
+};
+
+} // namespace scanshade
