@@ -892,10 +892,15 @@ TEST_F(cacao_passes, every_configuration_is_sound) {
                             o.blur_passes = blur;
                             const CacaoTables tables =
                                 cacao_tables(o, constants_from(o, camera_of(500, size)), supplied);
-                            const auto wrong = gpu::problems(tables.buffers, tables.passes);
-                            EXPECT_TRUE(wrong.empty()) << profile << " " << quality << ": " << wrong.front();
-                            EXPECT_EQ(tables.passes.back().writes, std::vector<int>{cacao_out});
-                            EXPECT_EQ(tables.buffers.size(), static_cast<std::size_t>(cacao_buffer_count));
+                            const CacaoTables in_images =
+                                cacao_tables(o, constants_from(o, camera_of(500, size)), supplied, CacaoStorage::images);
+                            for (const CacaoTables* each : {&tables, &in_images}) {
+                                if (each == &in_images && !o.scan()) continue;
+                                const auto wrong = gpu::problems(each->buffers, each->passes);
+                                EXPECT_TRUE(wrong.empty()) << profile << " " << quality << ": " << wrong.front();
+                                EXPECT_EQ(each->passes.back().writes.front(), cacao_out);
+                                EXPECT_EQ(each->buffers.size(), static_cast<std::size_t>(cacao_buffer_count));
+                            }
                         }
 }
 
@@ -910,15 +915,41 @@ TEST_F(cacao_passes, odd_and_tiny_images_run_without_a_word_of_validation) {
     for (const cv::Size size : {cv::Size(1, 1), cv::Size(1, 9), cv::Size(3, 2), cv::Size(641, 479)})
         for (const char* profile : {"scan", "reference"}) {
             const auto& [quality, downsampled] = modes[next++];
-            Cacao cacao(device(), options(profile, quality, downsampled));
-            const DepthImage depth = flat(camera_of(500, size), 2);
-            const cv::Mat1f v = cacao.compute({depth}).visibility;
-            EXPECT_EQ(v.size(), size);
-            if (profile == std::string("scan")) {
-                EXPECT_GE(lowest(v), 0.999) << size << " " << quality << ": a plane is open";
+            for (const char* storage : {"buffers", "images"}) {
+                CacaoOptions o = options(profile, quality, downsampled);
+                o.storage = storage;
+                Cacao cacao(device(), o);
+                const DepthImage depth = flat(camera_of(500, size), 2);
+                const cv::Mat1f v = cacao.compute({depth}).visibility;
+                EXPECT_EQ(v.size(), size);
+                if (profile == std::string("scan")) {
+                    EXPECT_GE(lowest(v), 0.999) << size << " " << quality << " in " << storage << ": a plane is open";
+                }
+                silent();
             }
-            silent();
         }
+}
+
+TEST_F(cacao_passes, both_storages_make_the_same_map) {
+    // Buffers are what CPUs are fast with, images and fused passes what GPUs are fast with; one algorithm. Holes, odd sizes and
+    // every number of blur steps, in one pass or more.
+    const DepthImage depth = with_holes(ball_on_floor(camera_of(125, {161, 119})), 0.05);
+    const std::vector<std::pair<std::string, bool>> modes{{"lowest", true}, {"lowest", false}, {"low", true},    {"medium", false},
+                                                          {"high", true},   {"high", false},   {"highest", true}, {"highest", false}};
+    for (std::size_t blur = 0; blur < modes.size(); ++blur) {
+        const auto& [quality, downsampled] = modes[blur];
+        CacaoOptions o = options("scan", quality, downsampled);
+        o.blur_passes = static_cast<int>(blur);
+        o.storage = "buffers";
+        const cv::Mat1f expected = Cacao(device(), o).compute({depth}).visibility;
+        o.storage = "images";
+        const cv::Mat1f ours = Cacao(device(), o).compute({depth}).visibility;
+        EXPECT_EQ(cv::countNonZero((expected == expected) != (ours == ours)), 0) << quality << ": the same holes";
+        const cv::Mat1f apart = difference(ours, expected);
+        EXPECT_LE(average(apart), 0.1 / 255) << quality << " " << downsampled;
+        EXPECT_LE(cv::countNonZero(apart > 2.0 / 255), static_cast<int>(apart.total()) / 500) << quality << " " << downsampled;
+        silent();
+    }
 }
 
 // --- D. kinds of depth

@@ -207,14 +207,13 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
         {"visibility", texels(k.image) * 4, Host::download},
     };
 
-    // Texels a work group makes; where the shader's own threads are as many, it says so itself.
+    // Texels a work group makes, as its shader declares.
     const auto tile_of = [&](std::string_view shader) -> ivec2 {
+        if (!images) return {shared::cacao_row, 1};
+        if (shader == "cacao/prepare_image") return {8, 8};
         if (shader == "cacao/generate_image") return {20, 8};
-        if (shader == "cacao/finish") return {16, 16};
-        if (shader == "cacao/importance_smooth") return {16, 16};
-        if (shader == "cacao/upsample_shared") return {16, 16};
-        if (const char* t = std::getenv("TILE")) { ivec2 tile; std::sscanf(t, "%dx%d", &tile.x, &tile.y); return tile; }
-        return {8, 8};
+        if (shader == "cacao/blur") return {shared::cacao_row, 1};
+        return {shared::cacao_tile, shared::cacao_tile};
     };
     const auto add = [&](std::string name, std::string_view shader, std::vector<int> reads, std::vector<int> writes, ivec2 threads,
                          int depth, std::vector<std::pair<int, int>> extra = {}) {
@@ -223,9 +222,7 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
                                                    {shared::spec_spacing, options.downsampled ? 2 : 1},
                                                    {shared::spec_kernel, kernel},
                                                    {shared::spec_two_slices, two_slices},
-                                                   {shared::spec_device_depth, options.depth_input != "metric"},
-                                                   {shared::spec_tile_x, tile.x},
-                                                   {shared::spec_tile_y, tile.y}};
+                                                   {shared::spec_device_depth, options.depth_input != "metric"}};
         constants.insert(constants.end(), extra.begin(), extra.end());
         tables.passes.push_back({std::move(name), shader, std::move(reads), std::move(writes),
                                  {static_cast<std::uint32_t>(groups(threads.x, tile.x)), static_cast<std::uint32_t>(groups(threads.y, tile.y)),
@@ -251,8 +248,8 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
         } else {
             add("importance", "cacao/importance", {cacao_pong}, {cacao_importance}, k.importance, 1);
             add("importance blur a", "cacao/importance_blur", {cacao_importance, cacao_pong}, {cacao_importance_pong, cacao_counter}, k.importance, 1);
-            add("importance blur b", "cacao/importance_blur", {cacao_importance_pong, cacao_pong}, {cacao_importance, cacao_counter}, k.importance, 1,
-                {{shared::spec_last, 1}});
+            add("importance blur b", "cacao/importance_blur", {cacao_importance_pong, cacao_pong}, {cacao_importance, cacao_counter},
+                {k.importance.x, 8 * groups(k.importance.y, 8)}, 1, {{shared::spec_last, 1}}); // beyond the map, too: see counts()
         }
         inputs = {cacao_depths, cacao_normals, cacao_pong, cacao_importance, cacao_counter, cacao_pattern};
     }

@@ -4,7 +4,7 @@
 #extension GL_EXT_scalar_block_layout : require
 #include "lib/cacao.glsl"
 
-layout(local_size_x_id = spec_tile_x, local_size_y_id = spec_tile_y) in;
+layout(local_size_x = cacao_row) in;
 layout(constant_id = spec_resolve) const int resolve = resolve_smart;
 layout(constant_id = spec_power) const int power = 0;
 layout(binding = 0, r32ui) readonly uniform uimageBuffer ao;

@@ -6,7 +6,7 @@
 #include "lib/cacao.glsl"
 #include "lib/cacao_blur.glsl"
 
-layout(local_size_x_id = spec_tile_x, local_size_y_id = spec_tile_y) in;
+layout(local_size_x = cacao_row) in;
 layout(constant_id = spec_first) const int first = 0;
 layout(constant_id = spec_last) const int last = 0;
 layout(constant_id = spec_halo) const int halo = 0;

@@ -7,7 +7,7 @@
 #include "lib/cacao.glsl"
 #include "lib/cacao_blur.glsl"
 
-layout(local_size_x_id = spec_tile_x, local_size_y_id = spec_tile_y) in;
+layout(local_size_x = cacao_tile, local_size_y = cacao_tile) in;
 layout(constant_id = spec_steps) const int steps = 2;
 layout(constant_id = spec_device_depth) const int device_depth = 0;
 layout(binding = 0, r32ui) readonly uniform uimageBuffer ao;
@@ -16,11 +16,11 @@ layout(binding = 16, scalar) writeonly buffer Out { float visibility[]; };
 layout(binding = 17, rg32f) uniform writeonly imageBuffer staged;
 
 const int halo = steps + 1;
-const int wide = int(gl_WorkGroupSize.x) + 2 * halo, high = int(gl_WorkGroupSize.y) + 2 * halo, area = wide * high;
+const int wide = cacao_tile + 2 * halo, area = wide * wide;
 shared vec4 values[2 * area]; // of the four slices, as in Texel; before and after a step, in turns
 shared uint edges[area];      // of the four slices, a byte each
 
-ivec2 origin() { return ivec2(gl_WorkGroupID.xy) * ivec2(gl_WorkGroupSize.xy) - halo; } // slice texel of values[0]
+ivec2 origin() { return cacao_tile * ivec2(gl_WorkGroupID.xy) - halo; } // slice texel of values[0]
 
 Texel texel_or_hole(int slice, ivec2 t) {
     ivec2 l = t - origin();
@@ -31,7 +31,7 @@ Texel texel_or_hole(int slice, ivec2 t) {
 
 void load_texels() {
     ivec2 first = origin();
-    for (int i = int(gl_LocalInvocationIndex); i < area; i += int(gl_WorkGroupSize.x * gl_WorkGroupSize.y)) {
+    for (int i = int(gl_LocalInvocationIndex); i < area; i += cacao_tile * cacao_tile) {
         ivec2 t = first + ivec2(i % wide, i / wide);
         bool inside = all(lessThan(uvec2(t), uvec2(k.slice)));
         uvec4 texel = uvec4(hole_texel);
@@ -49,8 +49,8 @@ void load_texels() {
 // Step n leaves n texels at each side as they are: nothing reads them any more.
 void blur_step(int n) {
     int from = (n - 1 & 1) * area, to = (n & 1) * area;
-    ivec2 size = ivec2(wide, high) - 2 * n;
-    for (int i = int(gl_LocalInvocationIndex); i < size.x * size.y; i += int(gl_WorkGroupSize.x * gl_WorkGroupSize.y)) {
+    ivec2 size = ivec2(wide - 2 * n);
+    for (int i = int(gl_LocalInvocationIndex); i < size.x * size.y; i += cacao_tile * cacao_tile) {
         int at = (n + i / size.x) * wide + n + i % size.x;
         vec4 c = values[from + at], l = values[from + at - 1], r = values[from + at + 1], t = values[from + at - wide], b = values[from + at + wide];
         uint e = edges[at];

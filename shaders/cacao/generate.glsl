@@ -10,7 +10,7 @@
 #ifdef FOR_GPU
 layout(local_size_x = 32, local_size_y = 5) in;
 #else
-layout(local_size_x_id = spec_tile_x, local_size_y_id = spec_tile_y) in;
+layout(local_size_x = cacao_row) in;
 #endif
 layout(constant_id = spec_base) const int base = 0;
 layout(constant_id = spec_mips) const int mips = 0;

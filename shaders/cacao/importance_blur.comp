@@ -4,7 +4,7 @@
 #extension GL_EXT_scalar_block_layout : require
 #include "lib/cacao.glsl"
 
-layout(local_size_x_id = spec_tile_x, local_size_y_id = spec_tile_y) in;
+layout(local_size_x = cacao_row) in;
 layout(constant_id = spec_last) const int second = 0;
 layout(binding = 0, r32ui) readonly uniform uimageBuffer from;
 layout(binding = 1, r32ui) readonly uniform uimageBuffer base_result;

@@ -5,7 +5,7 @@
 #define FOR_GPU
 #include "lib/cacao.glsl"
 
-const int tile = 16, inner = tile + 4, outer = tile + 8; // each smoothing reads two texels to every side
+const int tile = cacao_tile, inner = tile + 4, outer = tile + 8; // each smoothing reads two texels to every side
 layout(local_size_x = tile, local_size_y = tile) in;
 layout(binding = 0, r32ui) readonly uniform uimageBuffer base_result;
 layout(binding = 16, r32ui) uniform writeonly uimageBuffer importance;

@@ -4,7 +4,11 @@
 #include "lib/cacao.glsl"
 #include "lib/cacao_normal.glsl"
 
-layout(local_size_x_id = spec_tile_x, local_size_y_id = spec_tile_y) in;
+#ifdef FOR_GPU
+layout(local_size_x = 8, local_size_y = 8) in; // one texel of mip 3
+#else
+layout(local_size_x = cacao_row) in;
+#endif
 layout(constant_id = spec_normals) const int supplied = 0;
 layout(constant_id = spec_device_depth) const int device_depth = 0;
 
@@ -109,7 +113,7 @@ vec4 prepared(ivec2 t) {
 #ifdef FOR_GPU
 #include "lib/cacao_mip.glsl"
 layout(constant_id = spec_mips) const int mips = 0;
-const int tile = 8; // threads of a work group, across and down: one texel of mip 3
+const int tile = 8;
 shared float mip0[4][tile][tile], mip1[4][tile / 2][tile / 2], mip2[4][tile / 4][tile / 4];
 
 #define FOUR(from, s, x, y) nearest_surface(from[s][2 * y][2 * x], from[s][2 * y + 1][2 * x], from[s][2 * y][2 * x + 1], from[s][2 * y + 1][2 * x + 1])

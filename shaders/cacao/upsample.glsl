@@ -2,9 +2,9 @@
 #include "lib/cacao.glsl"
 
 #ifdef FOR_GPU
-layout(local_size_x = 16, local_size_y = 16) in;
+layout(local_size_x = cacao_tile, local_size_y = cacao_tile) in;
 #else
-layout(local_size_x_id = spec_tile_x, local_size_y_id = spec_tile_y) in;
+layout(local_size_x = cacao_row) in;
 #endif
 layout(constant_id = spec_resolve) const int resolve = resolve_smart;
 layout(constant_id = spec_power) const int power = 0;
@@ -58,7 +58,7 @@ float gaussian(ivec2 g, vec2 shift, float zf) {
 }
 
 #ifdef FOR_GPU // the 25 taps of neighbours overlap: through shared memory
-const int tile = 16, wide = tile + 4;
+const int tile = cacao_tile, wide = tile + 4;
 shared vec2 near[wide * wide];
 vec2 staged_at(int at) { return near[at]; }
 int staged_row() { return wide; }

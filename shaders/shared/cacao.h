@@ -8,10 +8,6 @@ SHARED_BEGIN
 // Per-frame constants. Lengths in view units (metres for `scan`); the view frame inside this room is x right, y UP, z forward.
 struct CacaoConstants {
     vec2 view_mul, view_add;        // NDCToViewMul / Add: image UV -> view position at z = 1
-    vec2 ray_step;                  // scan: view ray change per image pixel (1/fx, -1/fy)
-    vec2 ray_base;                  // scan: view ray of pixel (0, 0)
-    float near_limit_rec;           // kappa, EffectSamplingRadiusNearLimitRec
-    uint all_ones;                  // 0xffffffff, unknown to the compiler (see lib/cacao.glsl, whole())
     vec2 slice_inv;                 // 1 / slice size
     vec2 image_inv;                 // 1 / image size
     vec2 depth_unpack;              // mu, alpha: z = mu / (alpha - d) for device depth
@@ -19,9 +15,12 @@ struct CacaoConstants {
     ivec2 slice;                    // w, h of one de-interleaved layer
     ivec2 importance;               // size of the importance map
     ivec2 grid;                     // size of the staged AO grid of the upsampler, halo of 2 included
+    vec2 ray_step;                  // scan: view ray change per image pixel (1/fx, -1/fy)
+    vec2 ray_base;                  // scan: view ray of pixel (0, 0)
     float outside_depth;            // reference: what an out-of-range depth load reads after linearisation
     float radius;                   // R, EffectRadius
     float neg_rec_radius;           // -1 / R
+    float near_limit_rec;           // kappa, EffectSamplingRadiusNearLimitRec
     float shadow_strength;          // already times 4.3
     float shadow_power;
     float shadow_clamp;
@@ -40,11 +39,17 @@ struct CacaoConstants {
     int depth_pitch;                // texels from one slice, with its mips, to the next
     int depth_mips;                 // T: 4/3 of mip 0 with its padding
     int depth_end;                  // mip m of a slice starts at depth_end - (T >> 2m); a rim of holes, always 0, lies round each
+    uint all_ones;                  // 0xffffffff, unknown to the compiler (see lib/cacao.glsl, whole())
     float spatial[10];              // upsampler: 1D spatial weight of tap -2 .. 2 for even, then odd pixels
 };
 
 // Rows of the buffer `pattern`: the taps but the last, which only HIGHEST reads, then 5 rotations for each of 4 slices.
 const int cacao_taps = 31;
+
+// Threads of a work group: a row of texels where passes work on buffers, so that CPUs run along their caches' lines; a square where
+// they share memory on GPUs.
+const int cacao_row = 64;
+const int cacao_tile = 16;
 
 // Specialization constants, the same numbers in every CACAO shader.
 const int spec_scan = 0;        // 1: profile `scan`, 0: profile `reference`
@@ -59,10 +64,8 @@ const int spec_first = 8;       // blur: 1 for the first step
 const int spec_last = 9;        // blur: 1 for the last step
 const int spec_halo = 10;       // blur: texels of mirrored halo kept round each slice (reference)
 const int spec_resolve = 11;    // apply and stage: 0 smart, 1 plain, 2 half
-const int spec_tile_x = 13;     // threads of a work group
-const int spec_tile_y = 14;
-const int spec_steps = 15;      // finish: blur steps
 const int spec_power = 12;      // 1: output raised to 2.2 (reference, where AMD's shaders do)
+const int spec_steps = 13;      // finish: blur steps
 
 // Resolve kinds, values of spec_resolve.
 const int resolve_smart = 0;
