@@ -1,3 +1,4 @@
+// The adjustment of a recording: residuals, first guesses, outliers, scores.
 #include "projection/calibration/sequence.h"
 
 #include "projection/calibration/solve.h"
@@ -19,7 +20,8 @@ constexpr double unusable = -1; // a sighting's depth that does not fit
 // ---------------------------------------------------------------------------------------------------- residuals
 
 template <class Number>
-bool seen_at(LensModel lens, const Number* camera, const Number* in_camera, const Eigen::Vector2d& pixel, Number* residual) {
+bool seen_at(LensModel lens, const Number* camera, const Number* in_camera, const Eigen::Vector2d& pixel,
+             Number* residual) {
     if (in_camera[2] < Number(0.01))
         return false; // at or behind the camera: the solver takes a shorter step
     pixel_of(lens, camera, in_camera, residual);
@@ -92,6 +94,29 @@ struct SurfaceResidual {
     }
 };
 
+/// A recorded pose is near the truth: how far the camera has turned and moved from it, in sigmas.
+struct PoseResidual {
+    Eigen::Quaterniond camera_from_world;
+    Eigen::Vector3d centre;
+    double turn_weight, shift_weight;
+    template <class Number>
+    bool operator()(const Number* pose, Number* residual) const {
+        const Number back[4] = {Number(camera_from_world.w()), Number(-camera_from_world.x()),
+                                Number(-camera_from_world.y()), Number(-camera_from_world.z())};
+        Number turn[4], difference[4], moved_by[3];
+        ceres::AngleAxisToQuaternion(pose, turn);
+        ceres::QuaternionProduct(turn, back, difference);
+        ceres::QuaternionToAngleAxis(difference, residual);
+        const Number against[3] = {-pose[0], -pose[1], -pose[2]};
+        ceres::AngleAxisRotatePoint(against, pose + 3, moved_by); // minus the camera's centre
+        for (int i = 0; i < 3; ++i) {
+            residual[i] *= Number(turn_weight);
+            residual[3 + i] = Number(shift_weight) * (moved_by[i] + Number(centre[i]));
+        }
+        return true;
+    }
+};
+
 // ---------------------------------------------------------------------------------------------------- small geometry
 
 void to_six(const Eigen::Isometry3d& transform, double* six) {
@@ -134,7 +159,9 @@ Eigen::Vector2d straight_of(const Camera& camera, const Eigen::Vector2d& pixel) 
 }
 
 /// The direction in which a pixel looks, z = 1.
-Eigen::Vector3d ray_of(const Camera& camera, const Eigen::Vector2d& pixel) { return straight_of(camera, pixel).homogeneous(); }
+Eigen::Vector3d ray_of(const Camera& camera, const Eigen::Vector2d& pixel) {
+    return straight_of(camera, pixel).homogeneous();
+}
 
 struct SurfacePiece {
     Eigen::Vector3d centre, normal;
@@ -166,6 +193,12 @@ std::optional<SurfacePiece> surface_at(const cv::Mat1f& depth_m, const Pinhole& 
     for (const auto& p : points)
         moments += (p - centre) * (p - centre).transpose();
     return SurfacePiece{centre, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(moments).eigenvectors().col(0)};
+}
+
+/// A coarse raster of where points were first seen: neighbours there lie on the same surfaces.
+int neighbourhood_of(const Eigen::Vector2d& pixel, cv::Size size) {
+    constexpr int cells = 7;
+    return static_cast<int>(pixel.y() * cells / size.height) * cells + static_cast<int>(pixel.x() * cells / size.width);
 }
 
 double median_of(std::vector<double> values) {
@@ -201,24 +234,38 @@ class SequenceProblem {
                     new SightingResidual{lens, s.pixel, weight}),
                 loss, fit_.model.values.data(), pose(s.frame), point(track));
         else
-            problem.AddResidualBlock(
-                new ceres::AutoDiffCostFunction<PlacedSightingResidual, 2, camera_unknowns, place_unknowns, pose_unknowns,
-                                                point_unknowns>(new PlacedSightingResidual{lens, s.pixel, weight}),
-                loss, fit_.model.values.data(), place(), pose(s.frame), point(track));
+            problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PlacedSightingResidual, 2, camera_unknowns,
+                                                                     place_unknowns, pose_unknowns, point_unknowns>(
+                                         new PlacedSightingResidual{lens, s.pixel, weight}),
+                                     loss, fit_.model.values.data(), place(), pose(s.frame), point(track));
         sightings.push_back(problem.NumResidualBlocks() - 1);
         add_depth(track, s, weight, loss);
     }
 
+    /// Keeps poses near the recorded ones, or at them; without any, the first says where the world is.
     void hold_poses(const Views& used) {
-        bool first = true; // the world's own place is nobody's to find
+        bool first = true;
         for (std::size_t i = 0; i < used.size(); ++i) {
-            double* values = pose(static_cast<int>(i));
-            if (!problem.HasParameterBlock(values))
+            if (!problem.HasParameterBlock(pose(static_cast<int>(i))))
                 continue;
-            if (first || !sequence_.options_.refine_poses)
-                problem.SetParameterBlockConstant(values);
+            if (!sequence_.options_.refine_poses || (first && !sequence_.frames_[i].world_from_camera))
+                problem.SetParameterBlockConstant(pose(static_cast<int>(i)));
+            else
+                hold_near_recorded(static_cast<int>(i));
             first = false;
         }
+    }
+
+    void hold_near_recorded(int frame) {
+        const auto& recorded = sequence_.frames_[frame].world_from_camera;
+        if (!recorded)
+            return;
+        const SequenceOptions& o = sequence_.options_;
+        problem.AddResidualBlock(
+            new ceres::AutoDiffCostFunction<PoseResidual, 6, pose_unknowns>(
+                new PoseResidual{Eigen::Quaterniond(recorded->linear()).inverse().normalized(), recorded->translation(),
+                                 o.pixel_sigma_px / o.pose_turn_sigma, o.pixel_sigma_px / o.pose_shift_sigma_m}),
+            nullptr, pose(frame));
     }
 
     /// Sigma of a recorded depth, in the residuals' unit.
@@ -276,26 +323,30 @@ Sequence::Sequence(std::vector<SequenceFrame> frames, const Camera& depth_camera
             point.sightings.push_back(
                 {seen.frame, pixel, options_.registered ? depth_at(frames_[seen.frame].depth_m, pixel) : 0});
         }
-        const bool lifted = std::any_of(point.sightings.begin(), point.sightings.end(), [](const auto& s) { return s.depth_m > 0; });
+        const bool lifted =
+            std::any_of(point.sightings.begin(), point.sightings.end(), [](const auto& s) { return s.depth_m > 0; });
         if (lifted || !options_.registered)
             tracks_.push_back(std::move(point));
     }
     constexpr std::size_t least = 40;
     if (tracks_.size() < least)
-        throw Error(fmt::format("{} points are seen in 3 or more of {} images, at least {} expected: too little texture, or "
-                                "frames too far apart",
-                                tracks_.size(), frames_.size(), least));
+        throw Error(
+            fmt::format("{} points are seen in 3 or more of {} images, at least {} expected: too little texture, or "
+                        "frames too far apart",
+                        tracks_.size(), frames_.size(), least));
     follow_camera(first);
     prune(first);
     if (tracks_.size() < least)
-        throw Error(fmt::format("{} points fit together, at least {} expected: the poses, the depth unit or the camera are far "
-                                "off",
-                                tracks_.size(), least));
+        throw Error(
+            fmt::format("{} points fit together, at least {} expected: the poses, the depth unit or the camera are far "
+                        "off",
+                        tracks_.size(), least));
 }
 
 /// Poses that were not recorded: each frame by what it sees of points lifted in frames before (EPnP in RANSAC).
 void Sequence::follow_camera(const Model& first) {
-    const bool all = std::all_of(frames_.begin(), frames_.end(), [](const auto& frame) { return frame.world_from_camera; });
+    const bool all =
+        std::all_of(frames_.begin(), frames_.end(), [](const auto& frame) { return frame.world_from_camera; });
     start_poses_.assign(frames_.size(), Eigen::Isometry3d::Identity());
     if (all) {
         for (std::size_t i = 0; i < frames_.size(); ++i)
@@ -330,9 +381,10 @@ void Sequence::follow_camera(const Model& first) {
             !cv::solvePnPRansac(points, straight, cv::Matx33d::eye(), cv::noArray(), turn, shift, false, 300,
                                 static_cast<float>(4 / first[f]), 0.999, good, cv::SOLVEPNP_EPNP) ||
             good.size() < least)
-            throw Error(fmt::format("{}: its place cannot be found: {} of its points are known from the frames before, {} fit; "
-                                    "at least {} expected",
-                                    frames_[frame].name, points.size(), good.size(), least));
+            throw Error(
+                fmt::format("{}: its place cannot be found: {} of its points are known from the frames before, {} fit; "
+                            "at least {} expected",
+                            frames_[frame].name, points.size(), good.size(), least));
         cv::solvePnPRefineLM(points, straight, cv::Matx33d::eye(), cv::noArray(), turn, shift);
         double six[pose_unknowns] = {turn[0], turn[1], turn[2], shift[0], shift[1], shift[2]};
         start_poses_[frame] = from_six(six).inverse();
@@ -376,8 +428,9 @@ void Sequence::prune(const Model& first) {
     constexpr double robust_px = 1, most_sigmas = 4;
     const auto by_camera = [&](std::size_t i, const Fit& fit) { // in front of each camera, not absurdly far
         for (const Sighting& s : tracks_[i].sightings) {
-            const Eigen::Vector3d p = from_six(&fit.nuisance[s.frame * pose_unknowns]) *
-                                      Eigen::Map<const Eigen::Vector3d>(&fit.nuisance[frames_.size() * pose_unknowns + i * point_unknowns]);
+            const Eigen::Vector3d p =
+                from_six(&fit.nuisance[s.frame * pose_unknowns]) *
+                Eigen::Map<const Eigen::Vector3d>(&fit.nuisance[frames_.size() * pose_unknowns + i * point_unknowns]);
             if (!(p.z() > 0.1 && p.z() < 30))
                 return false;
         }
@@ -433,7 +486,8 @@ void Sequence::prune(const Model& first) {
                     sighting.depth_m = unusable;
                 point.sightings.push_back(sighting);
             }
-            const bool lifted = std::any_of(point.sightings.begin(), point.sightings.end(), [](const auto& s) { return s.depth_m > 0; });
+            const bool lifted = std::any_of(point.sightings.begin(), point.sightings.end(),
+                                            [](const auto& s) { return s.depth_m > 0; });
             if (point.sightings.size() >= 3 && (lifted || !options_.registered))
                 kept.push_back(std::move(point));
         }
@@ -469,11 +523,13 @@ Fit Sequence::fit(const Fit& from, const Free& free, const Views& used, bool cov
     freeze(adjustment.problem, fit.model, free);
     solve(adjustment.problem, fit, true);
     if (covariance) {
-        std::vector<double*> poses, points;
+        std::vector<double*> poses;
+        std::vector<ClusteredPoint> points;
         for (std::size_t i = 0; i < frames_.size(); ++i)
             poses.push_back(adjustment.pose(static_cast<int>(i)));
         for (std::size_t i = 0; i < tracks_.size(); ++i)
-            points.push_back(adjustment.point(i));
+            points.push_back(
+                {adjustment.point(i), neighbourhood_of(tracks_[i].sightings.front().pixel, fit.model.size)});
         add_covariance(adjustment.problem, fit, free, poses, points);
     }
     return fit;
@@ -499,7 +555,9 @@ std::vector<ViewScore> Sequence::score(const Fit& from, const Views& wanted) con
         if (adjustment.sightings.size() < 6)
             continue;
         freeze(adjustment.problem, fit.model, {});
-        if (!options_.refine_poses)
+        if (options_.refine_poses)
+            adjustment.hold_near_recorded(static_cast<int>(frame));
+        else
             adjustment.problem.SetParameterBlockConstant(adjustment.pose(static_cast<int>(frame)));
         Fit alone = fit; // the pose is fitted in place; rss is this view's
         solve(adjustment.problem, alone, false);
@@ -536,7 +594,8 @@ std::vector<double> Sequence::depths_m(const Fit& fit) const {
     std::vector<double> depths;
     for (std::size_t i = 0; i < tracks_.size(); ++i)
         for (const Sighting& s : tracks_[i].sightings) {
-            const Eigen::Map<const Eigen::Vector3d> point(&fit.nuisance[frames_.size() * pose_unknowns + i * point_unknowns]);
+            const Eigen::Map<const Eigen::Vector3d> point(
+                &fit.nuisance[frames_.size() * pose_unknowns + i * point_unknowns]);
             depths.push_back((from_six(&fit.nuisance[s.frame * pose_unknowns]) * point).z());
         }
     return depths;
@@ -575,9 +634,10 @@ std::string Sequence::degeneracy(const Fit& fit) const {
         return fmt::format("the camera hardly moves: {:.0f} mm and {:.1f} degrees before a scene {:.1f} m away",
                            1000 * reach.norm(), turn, depth_m);
     if (turn < least_turn_degrees && reach.head<2>().norm() < 0.2 * reach.z())
-        return fmt::format("the camera moves straight forward ({:.0f} mm along its axis, {:.0f} mm across, {:.1f} degrees): "
-                           "focal length and distance cannot be told apart",
-                           1000 * reach.z(), 1000 * reach.head<2>().norm(), turn);
+        return fmt::format(
+            "the camera moves straight forward ({:.0f} mm along its axis, {:.0f} mm across, {:.1f} degrees): "
+            "focal length and distance cannot be told apart",
+            1000 * reach.z(), 1000 * reach.head<2>().norm(), turn);
     return {};
 }
 
