@@ -97,6 +97,8 @@ class CaptureBench {
                     attempt(i, [&] { time(i, frame); });
                 }
         }
+        for (Measured& measured : result_.measured)
+            measured.sum_up();
         return std::move(result_);
     }
 
@@ -140,7 +142,7 @@ class CaptureBench {
                 result_.visibilities[i] = map;
         }
         say(fmt::format("  {}: {:<34} RMSE {:.4f}", capture_.name, measured.configuration.full_name(),
-                        measured.difference().rms));
+                        total(measured.images, {}).rms));
     }
 
     void time(std::size_t i, const TrialFrame& frame) {
@@ -207,6 +209,7 @@ class Bench final : public Command {
                            SCANSHADE_VERSION,
                            fmt::format("{:%Y-%m-%d}", fmt::gmtime(std::time(nullptr))),
                            rounds_,
+                           {},
                            {}};
         for (const fs::path& path : captures()) {
             const TrialCapture capture = loaded(device, path);
@@ -214,6 +217,7 @@ class Bench final : public Command {
                             name_of(capture.sensor), describe(capture.noise), capture.noise_origin));
             report.captures.push_back(CaptureBench(device, capture, all).run(rounds_));
         }
+        report.groups = grouped(report);
         write(report);
         fmt::print("{}", bench_table(report));
         return exit_code(report);

@@ -174,7 +174,7 @@ std::string bench_page(const BenchReport& report) {
                                                               "left out.",
                                                               report.rounds)) +
                                   captures_table(report)});
-    for (const BenchGroup& group : grouped(report)) {
+    for (const BenchGroup& group : report.groups) {
         const std::vector<std::size_t> shown = best_of_each_method(group);
         std::string where = page::svg(plot_by_capture(group, shown));
         for (std::size_t by = 0; by < error_by_count; ++by)

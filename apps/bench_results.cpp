@@ -124,8 +124,10 @@ std::vector<BenchGroup> grouped(const BenchReport& report) {
     }
     for (BenchGroup& group : groups) {
         std::vector<Priced> points;
-        for (const Measured& m : group.measured)
+        for (Measured& m : group.measured) {
+            m.sum_up();
             points.push_back(priced(m));
+        }
         group.front = on_front(points);
     }
     return groups;
@@ -133,7 +135,7 @@ std::vector<BenchGroup> grouped(const BenchReport& report) {
 
 std::string bench_table(const BenchReport& report) {
     std::string text;
-    for (const BenchGroup& group : grouped(report)) {
+    for (const BenchGroup& group : report.groups) {
         text += fmt::format("{}, {} captures\n{:<34}{:>12}{:>12}{:>12}{:>9}{:>9}{:>9}{:>9}  front\n",
                             name_of(group.sensor), group.captures.size(), "configuration", "device ms", "least",
                             "wall ms", "RMSE", "calib.", "bias", "SSIM");
@@ -155,7 +157,7 @@ std::string bench_csv(const BenchReport& report) {
         "sensor,capture,method,configuration,device_ms_median,device_ms_least,wall_ms_median,wall_ms_least,"
         "front," +
         figure_csv_heads() + ",settings,why\n";
-    for (const BenchGroup& group : grouped(report)) {
+    for (const BenchGroup& group : report.groups) {
         const std::string sensor(name_of(group.sensor));
         for (std::size_t i = 0; i < group.measured.size(); ++i)
             text += csv_row(sensor, "all", group.measured[i], group.front[i]);
@@ -170,7 +172,7 @@ json bench_json(const BenchReport& report) {
     json text{{"program", "scanshade"},  {"version", report.version}, {"command_line", report.command},
               {"date", report.date},     {"device", report.device},   {"driver", report.driver},
               {"rounds", report.rounds}, {"groups", json::array()},   {"captures", json::array()}};
-    for (const BenchGroup& group : grouped(report)) {
+    for (const BenchGroup& group : report.groups) {
         json rows = json::array();
         for (std::size_t i = 0; i < group.measured.size(); ++i) {
             json row = measured_json(group.measured[i]);
@@ -198,7 +200,7 @@ json bench_json(const BenchReport& report) {
 
 Front front_of(const BenchReport& report) {
     Front front{report.device, {}, {}};
-    for (const BenchGroup& group : grouped(report)) {
+    for (const BenchGroup& group : report.groups) {
         front.made_by[group.sensor] = made_by(report, group);
         std::vector<Priced>& points = front.points[group.sensor];
         for (std::size_t i = 0; i < group.measured.size(); ++i)

@@ -26,8 +26,11 @@ struct Measured {
     std::vector<double> ns_per_pixel;       ///< the same of the device, per pixel of the image
     std::string why;                        ///< what failed; empty = nothing
 
+    Difference sum; ///< of the images, once sum_up() was called: the best look takes a solver
+
     void add(const Measured& other);
-    [[nodiscard]] Difference difference() const { return total(images, pairs); }
+    void sum_up() { sum = total(images, pairs); }
+    [[nodiscard]] const Difference& difference() const { return sum; }
 };
 
 /// One capture and what became of every configuration on it.
@@ -54,6 +57,7 @@ struct BenchReport {
     std::string command, device, driver, version, date;
     int rounds = 0;
     std::vector<BenchCapture> captures;
+    std::vector<BenchGroup> groups; ///< grouped(*this), made once the captures are complete; points into them
 };
 
 [[nodiscard]] std::vector<BenchGroup> grouped(const BenchReport& report);

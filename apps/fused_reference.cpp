@@ -23,6 +23,7 @@ using Eigen::Vector3d;
 /// Points and normals that fell into one cube of space.
 struct Voxel {
     Vector3d point = Vector3d::Zero(), normal = Vector3d::Zero();
+    double footprint_m = 0; ///< sum of what the pixels cover
     int count = 0;
 };
 
@@ -54,7 +55,8 @@ std::vector<Disc> discs_of(const Voxels& voxels, double voxel_m) {
     for (const auto& [cell, voxel] : voxels)
         if (voxel.normal.norm() >
             0.5 * voxel.count) // faces of both sides of something thin do not make a disc between them
-            discs.push_back({voxel.point / voxel.count, voxel.normal.normalized(), 0.75 * voxel_m});
+            discs.push_back({voxel.point / voxel.count, voxel.normal.normalized(),
+                             0.75 * std::max(voxel_m, voxel.footprint_m / voxel.count)});
     return discs;
 }
 
@@ -70,7 +72,7 @@ std::vector<std::size_t> posed(const Capture& capture) {
 
 FusedReference::FusedReference(gpu::Device& device, const std::filesystem::path& path, const TrialCapture& trial,
                                const CaptureOptions& options)
-    : noise_(trial.noise), radius_m_(trial.radius_m), voxel_m_(trial.radius_m / 50), directions_(rays, 1) {
+    : noise_(trial.noise), radius_m_(trial.radius_m), voxel_m_(trial.radius_m / 25), directions_(rays, 1) {
     if (noise_.any())
         fit_.emplace(device, noise_);
     const Capture capture = open_capture(path, options);
@@ -101,15 +103,16 @@ FusedReference::FusedReference(gpu::Device& device, const std::filesystem::path&
                                     static_cast<int>(std::floor(at.z()))}];
                         voxel.point += world;
                         voxel.normal += pose.linear() * normal;
+                        voxel.footprint_m += point.z() / surface.depth.camera.fx;
                         ++voxel.count;
                     });
         });
-    const std::vector<Disc> discs = discs_of(voxels, voxel_m_);
-    discs_.emplace(discs);
+    discs_ = discs_of(voxels, voxel_m_);
+    surface_.emplace(discs_);
     description_ =
         fmt::format("ray casting ({} rays) against the cloud fused of {} posed frames ({} discs): no truth, it has the "
                     "sensor's noise and the poses' errors in it",
-                    rays, taken.size(), discs.size());
+                    rays, taken.size(), discs_.size());
 }
 
 FusedReference::Surface FusedReference::surface_of(const DepthImage& depth) {
@@ -119,21 +122,34 @@ FusedReference::Surface FusedReference::surface_of(const DepthImage& depth) {
     return {std::move(fitted.depth), std::move(fitted.normals)};
 }
 
-cv::Mat1f FusedReference::visibility(const TrialFrame& frame) {
+std::optional<RayStart> FusedReference::start(const Vector3d& eye, const Vector3d& seen, double sigma_m) const {
+    const double range = (seen - eye).norm(), tolerance_m = 0.1 * radius_m_ + 2 * sigma_m;
+    const Vector3d direction = (seen - eye) / range;
+    const auto met = surface_->nearest(eye, direction, std::max(range - tolerance_m, 0.0));
+    if (!met || met->distance > range + tolerance_m)
+        return std::nullopt;
+    const Disc& disc = discs_[static_cast<std::size_t>(met->primitive)];
+    const Vector3d normal = disc.normal.dot(direction) > 0 ? Vector3d(-disc.normal) : disc.normal;
+    const double lift_m = disc.radius_m * std::tan(std::numbers::pi / 18) + sigma_m;
+    return RayStart{eye + met->distance * direction, normal, 0, lift_m, disc.radius_m, {}};
+}
+
+cv::Mat1f FusedReference::visibility(const TrialFrame& frame) const {
     AoMap ao{cv::Mat1f(frame.depth.z_m.size(), std::numeric_limits<float>::quiet_NaN()), {}};
     if (frame.frame.world_from_camera) {
-        const Surface surface = surface_of(frame.depth);
         const Isometry3d& pose = *frame.frame.world_from_camera;
-        const RayHemisphere hemisphere(*discs_, directions_, radius_m_, false);
+        const RayHemisphere hemisphere(*surface_, directions_, radius_m_, false);
         tbb::parallel_for(0, ao.visibility.rows, [&](int row) {
-            each_surface_pixel(
-                surface.depth, surface.normals.normals, row, [&](int u, const Vector3d& point, const Vector3d& normal) {
-                    const auto key = hash(static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(u));
-                    const double rim_m = 0.75 * voxel_m_,
-                                 lift_m = rim_m * std::tan(std::numbers::pi / 18) + 2 * noise_.at(point.z());
-                    ao.visibility(row, u) =
-                        hemisphere.at({pose * point, pose.linear() * normal, key, lift_m, rim_m, {}}).visibility[0];
-                });
+            for (int u = 0; u < ao.visibility.cols; ++u) {
+                const double z = frame.depth.z_m(row, u);
+                if (z <= 0)
+                    continue;
+                auto from = start(pose.translation(), pose * point_at(frame.depth.camera, u, row, z), noise_.at(z));
+                if (!from)
+                    continue;
+                from->key = hash(static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(u));
+                ao.visibility(row, u) = hemisphere.at(*from).visibility[0];
+            }
         });
     }
     return attach(frame.frame, frame.depth, ao).visibility;
