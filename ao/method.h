@@ -30,6 +30,14 @@ struct View {
 /// Milliseconds per named pass or transfer, in execution order.
 using Timings = std::vector<std::pair<std::string, double>>;
 
+/// An intermediate result, for study: `shape` outermost first, little-endian elements of `type` ("f4", "u4").
+struct Intermediate {
+    std::string name, type;
+    std::vector<int> shape;
+    std::vector<std::byte> data;
+    std::string meaning = {}; ///< units, and how to read packed words
+};
+
 /// One AO method, made for one device. Not thread-safe: one frame at a time.
 class Method {
   public:
@@ -38,6 +46,8 @@ class Method {
     virtual AoMap compute(const View& view) = 0;
     /// Where the time of the last compute() went.
     [[nodiscard]] virtual const Timings& timings() const = 0;
+    /// What lay between the passes of the last compute(), for study; most methods have nothing to show.
+    [[nodiscard]] virtual std::vector<Intermediate> intermediates() { return {}; }
 };
 
 /// A cloud, or a mesh where there are triangles (indices of points), in metres. Normals, one per point, may be missing.

@@ -3,6 +3,8 @@
 
 #include "apps/picture.h"
 #include "io/cloud_file.h"
+#include "io/npy_file.h"
+#include "io/output_file.h"
 #include "projection/attach.h"
 #include "projection/error.h"
 #include "projection/project.h"
@@ -12,6 +14,7 @@
 #include <chrono>
 #include <cmath>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <limits>
 #include <memory>
 #include <tbb/info.h>
@@ -263,6 +266,16 @@ void remove_files(Work& work, const Outputs& outputs) {
     }
 }
 
+/// Every array as .npy, and index.csv that says what they are.
+void write_intermediates(const std::filesystem::path& folder, const std::vector<Intermediate>& all) {
+    std::string index = "name,type,shape,meaning\n";
+    for (const Intermediate& each : all) {
+        write_npy(folder / (each.name + ".npy"), each.type, each.shape, each.data);
+        index += fmt::format("{},{},{},\"{}\"\n", each.name, each.type, fmt::join(each.shape, "x"), each.meaning);
+    }
+    write_atomically(folder / "index.csv", index);
+}
+
 void attach_and_write(Work& work, const BatchOptions& options) {
     Outputs outputs = options.outputs;
     const bool by_points = options.point_method && work.frame.cloud;
@@ -367,6 +380,8 @@ std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const Ba
             }
             work->ao = method.compute({work->depth});
             work->row.passes = method.timings();
+            if (!options.dump.empty())
+                write_intermediates(options.dump / work->entry.name, method.intermediates());
         });
         return work;
     };

@@ -37,6 +37,7 @@ struct BatchOptions {
     std::optional<Registration> registration; ///< what the user said; otherwise what the capture says
     PointMethod* point_method = nullptr;      ///< what clouds and meshes are computed with, where that needs no view: then
                                               ///< the cloud is all that is written of them
+    std::filesystem::path dump;               ///< folder for the method's intermediates, frame by frame; empty = none
     int frames_in_memory = 0;                 ///< 0 = cores + 2
     const std::atomic<bool>* stop = nullptr;  ///< set = begin no further frame
 };

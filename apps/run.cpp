@@ -83,7 +83,7 @@ struct RunSettings {
     double association_limit_s = 0.02;
     std::string method = "cacao", radius, quality, device, settings;
     Budget budget;
-    std::string out, write = "auto", format = "png16";
+    std::string out, write = "auto", format = "png16", dump;
     double shade_strength = 1;
     bool colour_cloud = false, overwrite = false;
 };
@@ -315,7 +315,8 @@ class Run final : public Command {
                .choices = {"png16", "png8", "tiff", "exr"}},
               {"shade-strength", "0 leaves the colour, 1 multiplies it by visibility", &s.shade_strength, "", 0, 1},
               {"colour-cloud", "replace the clouds' colour by colour times visibility", &s.colour_cloud},
-              {"overwrite", "replace the results of an earlier run", &s.overwrite}}}};
+              {"overwrite", "replace the results of an earlier run", &s.overwrite},
+              {"dump", "folder for what lies between the method's passes, as .npy files with an index.csv per frame", &s.dump}}}};
     }
 
     static std::vector<std::string> method_names() {
@@ -377,6 +378,8 @@ class Run final : public Command {
                 job.batch.frames = slice(asked_.frames, job.capture.entries.size());
                 job.batch.outputs = outputs_;
                 job.batch.outputs.folder = folder;
+                if (!asked_.dump.empty())
+                    job.batch.dump = fs::path(asked_.dump) / folder.lexically_relative(asked_.out);
                 job.batch.registration = registration_from(asked_.registered);
                 job.batch.stop = &interrupted;
                 jobs.push_back(std::move(job));

@@ -1,9 +1,11 @@
 // bench: milliseconds of every CACAO quality and of each pass, beside a calibration gather timed in the same run.
 //   bench --write-maps FOLDER | --compare-maps FOLDER     the same maps on two devices, and how far they differ
-//   bench [--sizes 640x480,1920x1080] [--repeat 20] [--device NAME] [--passes] [--profile scan|reference]
+//   bench [--sizes 640x480,1920x1080] [--repeat 20] [--device NAME] [--passes] [--profile scan|reference] [--storage buffers|images]
+//   bench --model [--sizes ...]     milliseconds as a formula of pixels, taps and blur passes, and how far measurements are from it
 // Times are the device's own (timestamps), transfers left out, over `repeat` runs. Each is taken in turns with a plain 32-tap
 // gather over the same image; "x gather" is the median of their ratios, what remains comparable on a busy machine.
-// The scene is a generated room. --passes stamps every pass, which costs a GPU some microseconds each.
+// The scene is a generated room. --passes stamps every pass, which costs a GPU some microseconds each, and says how many GB/s
+// it moved if it read and wrote each of its buffers once.
 #include "ao/cacao/cacao.h"
 #include "ao/gpu/device.h"
 #include "ao/gpu/program.h"
@@ -18,6 +20,7 @@
 #include <fmt/format.h>
 #include <fstream>
 #include <map>
+#include <set>
 #include <span>
 
 using namespace scanshade;
@@ -49,11 +52,17 @@ double median(std::vector<double> values) {
     return values[values.size() / 2];
 }
 
+double least(const std::vector<double>& values) { return *std::min_element(values.begin(), values.end()); }
+
 /// Device milliseconds of a program's passes, transfers left out, resubmitted without touching the host's images.
 class Timed {
   public:
     Timed(gpu::Device& device, const CacaoTables& tables, std::span<const std::byte> constants, gpu::Program::Stamps stamps)
-        : program_(device, tables.buffers, tables.passes, constants.size(), stamps), constants_(constants.begin(), constants.end()) {}
+        : program_(device, tables.buffers, tables.passes, constants.size(), stamps), constants_(constants.begin(), constants.end()) {
+        for (const gpu::PassRow& pass : tables.passes)
+            for (const auto* side : {&pass.reads, &pass.writes})
+                for (const int i : std::set<int>(side->begin(), side->end())) bytes_[pass.name] += static_cast<double>(tables.buffers[i].bytes);
+    }
 
     double run() {
         program_.run(constants_);
@@ -72,13 +81,14 @@ class Timed {
     void print_passes() {
         for (const auto& [name, ms] : program_.timings())
             if (const auto& all = passes_[name]; !all.empty())
-                fmt::print("    {:<20} {:>8.4f} {:>8.4f}\n", name, median(all), *std::min_element(all.begin(), all.end()));
+                fmt::print("    {:<20} {:>8.4f} {:>8.4f} {:>8.0f} GB/s\n", name, median(all), least(all), 1e-6 * bytes_[name] / least(all));
     }
 
   private:
     gpu::Program program_;
     std::vector<std::byte> constants_;
     std::map<std::string, std::vector<double>> passes_;
+    std::map<std::string, double> bytes_; // of the buffers a pass touches
 };
 
 struct Calibration {
@@ -150,13 +160,43 @@ int compare_maps(gpu::Device& device, const std::string& storage, const std::fil
     return missed ? 1 : 0;
 }
 
+/// Fits ms = fixed + pixels (base + tap taps + blur passes) to native LOW, MEDIUM and HIGH with 0, 2 and 4 blur passes.
+void print_model(gpu::Device& device, const std::vector<std::string>& sizes, int repeat) {
+    const std::vector<std::pair<std::string, int>> taps_of{{"low", 6}, {"medium", 10}, {"high", 24}};
+    cv::Mat1d terms, times;
+    for (const std::string& text : sizes) {
+        const DepthImage depth = room(parse_size(text));
+        for (const auto& [quality, taps] : taps_of)
+            for (const int blur : {0, 2, 4}) {
+                CacaoOptions options;
+                options.quality = quality;
+                options.blur_passes = blur;
+                options.radius = 1.2F;
+                const shared::CacaoConstants constants = constants_from(options, depth.camera);
+                Timed method(device, cacao_tables(options, constants, false, cacao_storage(options, device)),
+                             std::as_bytes(std::span(&constants, 1)), gpu::Program::Stamps::total);
+                std::memcpy(method.host<float>(cacao_depth_in).data(), depth.z_m.data, depth.z_m.total() * 4);
+                std::vector<double> ms;
+                for (int i = 0; i < repeat + 3; ++i) ms.push_back(method.run());
+                const double megapixels = 1e-6 * static_cast<double>(depth.z_m.total()), best = least(ms);
+                // Divided by the time, so that small images count as much as large ones.
+                terms.push_back(cv::Mat1d({1, 4}, {1 / best, megapixels / best, megapixels * taps / best, megapixels * blur / best}));
+                times.push_back(1.0);
+            }
+    }
+    cv::Mat1d model;
+    cv::solve(terms, times, model, cv::DECOMP_SVD);
+    fmt::print("ms = {:.4f} + megapixels ({:.4f} + {:.5f} taps + {:.5f} blur passes), within {:.0f} % of each of {} measurements\n",
+               model(0), model(1), model(2), model(3), 100 * cv::norm(terms * model - times, cv::NORM_INF), terms.rows);
+}
+
 } // namespace
 
 int main(int argc, char** argv) {
     std::vector<std::string> sizes{"640x480"}, qualities{"lowest", "low", "medium", "high", "highest"};
     std::string choice, profile = "scan", storage = "auto";
     int repeat = 20;
-    bool passes = false;
+    bool passes = false, model = false;
     std::string written, compared;
     CLI::App app{"milliseconds of CACAO"};
     app.add_option("--sizes", sizes)->delimiter(',');
@@ -166,6 +206,7 @@ int main(int argc, char** argv) {
     app.add_option("--profile", profile);
     app.add_option("--storage", storage);
     app.add_flag("--passes", passes);
+    app.add_flag("--model", model);
     app.add_option("--write-maps", written);
     app.add_option("--compare-maps", compared);
     CLI11_PARSE(app, argc, argv);
@@ -174,6 +215,7 @@ int main(int argc, char** argv) {
         fmt::print("{} ({}), profile {}\n", device.info().name, device.info().driver, profile);
         if (!written.empty()) return write_maps(device, storage, written), 0;
         if (!compared.empty()) return compare_maps(device, storage, compared);
+        if (model) return print_model(device, sizes, repeat), 0;
         for (const std::string& text : sizes) {
             const cv::Size size = parse_size(text);
             const DepthImage depth = room(size);

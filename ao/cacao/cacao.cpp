@@ -90,8 +90,8 @@ shared::vec2 cacao_rotation(int a, int phase) {
 std::vector<Parameter> CacaoOptions::parameters() {
     return {
         {"profile", "reference reproduces AMD's shaders, scan corrects them for sensor depth", &profile, "", {}, {}, {"scan", "reference"}},
-        {"quality", "lowest: 3 tap pairs on half the pixels; low: 3; medium: 5; high: 12 with depth mips; highest: 6 to 31 where the picture "
-         "asks for them, no closer to ray-traced truth than high on the generated office, at 1.7 times its cost",
+        {"quality", "lowest: 3 tap pairs on half the pixels, 0.4 of high's time; low: 3, 0.6; medium: 5, 0.75; high: 12 with depth mips, 1; "
+         "highest: 6 to 31 where the picture asks for them, 1.6, and no closer to ray-traced truth than high on the generated office",
          &quality, "", {}, {}, {"lowest", "low", "medium", "high", "highest"}},
         {"downsampled", "compute on every second pixel of every second row, then upsample", &downsampled},
         {"radius", "surfaces farther than this do not occlude", &radius, "m", 1e-4, 1e5},
@@ -336,7 +336,7 @@ AoMap Cacao::compute(const View& view) {
 Intermediate Cacao::depth_slices(int mip) {
     const CacaoConstants& k = constants_;
     const int width = std::max(1, k.slice.x >> mip), height = std::max(1, k.slice.y >> mip);
-    Intermediate slices{fmt::format("depth_mip{}", mip), "f4", {4, height, width}, {}};
+    Intermediate slices{fmt::format("depth_mip{}", mip), "f4", {4, height, width}, {}, "metres, 0 = hole; slice 2 (y mod 2) + (x mod 2)"};
     const auto bytes = program_->read_back(cacao_depths);
     const gpu::BufferRow::Image& image = tables_.buffers[cacao_depths].image;
     int before = 0; // texels of the mips before this one
@@ -351,30 +351,55 @@ Intermediate Cacao::depth_slices(int mip) {
     return slices;
 }
 
+/// HIGHEST: how many pairs of taps each texel of the importance map asks for, as cacao/generate counts them.
+Intermediate Cacao::tap_pairs(const Intermediate& importance, const Intermediate& load_counter) const {
+    const auto word = [](const Intermediate& from, std::size_t i) {
+        std::uint32_t value = 0;
+        std::memcpy(&value, from.data.data() + 4 * i, 4);
+        return static_cast<float>(value);
+    };
+    const float average = word(load_counter, 0) * constants_.load_counter_div;
+    const float ration = std::clamp(constants_.adaptive_limit / average, 0.0F, 1.0F);
+    Intermediate pairs{"tap_pairs", "u4", importance.shape, std::vector<std::byte>(importance.data.size()),
+                       "pairs of taps, those of the base pass included"};
+    for (std::size_t i = 0; i < pairs.data.size() / 4; ++i) {
+        const float wanted = word(importance, i) / 255.0F * ration;
+        const std::uint32_t count = std::min(31U, static_cast<std::uint32_t>(27.0F * wanted + 1.5F) + 5U);
+        std::memcpy(pairs.data.data() + 4 * i, &count, 4);
+    }
+    return pairs;
+}
+
 std::vector<Intermediate> Cacao::intermediates() {
     std::vector<Intermediate> all;
     if (!program_) return all;
     const CacaoQuality level = options_.level();
-    const auto words = [&](int buffer, std::size_t first, std::size_t count) {
-        const auto bytes = program_->read_back(buffer);
-        return std::vector<std::byte>(bytes.begin() + static_cast<std::ptrdiff_t>(first * 4),
-                                      bytes.begin() + static_cast<std::ptrdiff_t>((first + count) * 4));
+    const auto words = [&](int buffer, std::size_t count) {
+        auto bytes = program_->read_back(buffer);
+        bytes.resize(count * 4);
+        return bytes;
     };
-    const auto add = [&](std::string name, std::string type, std::vector<int> shape, int buffer, int first = 0) {
+    const auto add = [&](std::string name, std::vector<int> shape, int buffer, std::string meaning) {
         std::size_t count = 1;
         for (int n : shape) count *= static_cast<std::size_t>(n);
-        all.push_back({std::move(name), std::move(type), std::move(shape), words(buffer, static_cast<std::size_t>(first), count)});
+        all.push_back({std::move(name), "u4", std::move(shape), words(buffer, count), std::move(meaning)});
     };
     const CacaoConstants& k = constants_;
     for (int m = 0; m < (level >= CacaoQuality::high ? 4 : 1); ++m) all.push_back(depth_slices(m));
     const std::vector<int> slices{4, k.slice.y, k.slice.x};
-    add("normals", "u4", slices, cacao_normals);
+    const bool scan = options_.scan();
+    const std::string texel = scan ? "visibility / 65535 in bits 0-15, edges to left, right, above, below / 3 in bits 22, 20, 18, 16, hole in bit 31"
+                                   : "visibility / 255 in bits 0-7, edges to left, right, above, below / 3 in bits 22, 20, 18, 16";
+    add("normals", slices, cacao_normals,
+        scan ? "x right, y up, z forward, each (n - 512) / 511 in 10 bits from bit 0" : "each n / 127 in 8 signed bits from bit 0");
     if (level == CacaoQuality::highest) {
-        add("importance", "u4", {k.importance.y, k.importance.x}, cacao_importance);
-        add("load_counter", "u4", {1}, cacao_counter);
+        add("importance", {k.importance.y, k.importance.x}, cacao_importance, "255ths");
+        add("load_counter", {1}, cacao_counter, "sum of every ninth importance");
+        all.push_back(tap_pairs(all[all.size() - 2], all.back()));
     }
-    add("ao", "u4", slices, cacao_ping);
-    if (options_.blur_passes > 0) add("ao_blurred", "u4", slices, tables_.blurred);
+    add("ao", slices, cacao_ping, texel);
+    const bool fused = tables_.buffers[cacao_depths].image.width > 0; // then the last blur steps end in shared memory
+    if (options_.blur_passes > 0 && !fused) add("ao_blurred", slices, tables_.blurred, texel);
     return all;
 }
 

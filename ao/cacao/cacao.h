@@ -76,13 +76,6 @@ enum class CacaoStorage { buffers, images };
 [[nodiscard]] CacaoTables cacao_tables(const CacaoOptions& options, const shared::CacaoConstants& constants, bool normals_supplied,
                                        CacaoStorage storage = CacaoStorage::buffers);
 
-/// An intermediate result, for study: `shape` outermost first, little-endian elements of `type` ("f4" or "u1" ...).
-struct Intermediate {
-    std::string name, type;
-    std::vector<int> shape;
-    std::vector<std::byte> data;
-};
-
 class Cacao final : public Method {
   public:
     /// Throws Misuse naming a setting out of its range.
@@ -93,11 +86,12 @@ class Cacao final : public Method {
 
     /// Buffers between the passes of the last compute(): depth slices by mip, normals, base pass, importance, AO before and
     /// after the blur, load counter. Empty before the first compute().
-    [[nodiscard]] std::vector<Intermediate> intermediates();
+    [[nodiscard]] std::vector<Intermediate> intermediates() override;
 
   private:
     void prepare(const View& view);
     Intermediate depth_slices(int mip);
+    Intermediate tap_pairs(const Intermediate& importance, const Intermediate& load_counter) const;
 
     gpu::Device& device_;
     CacaoOptions options_;

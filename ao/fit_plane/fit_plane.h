@@ -42,6 +42,7 @@ class OnFittedDepth final : public Method {
 
     AoMap compute(const View& view) override;
     [[nodiscard]] const Timings& timings() const override { return timings_; }
+    [[nodiscard]] std::vector<Intermediate> intermediates() override { return method_.intermediates(); }
 
   private:
     FitPlane fit_;

@@ -316,7 +316,7 @@ uint generated(int slice, ivec2 t) {
 #ifdef FOR_GPU
 // A work group makes 20x8 texels. Each row of its threads, 32 of them, takes those of one rotation, four neighbouring threads from
 // a block of 5x4: their taps lie side by side, so that fewer lines of the cache serve them. Results change places in shared memory
-// to be stored in rows. Where the taps are adaptive, neighbours that want as many of them count more: blocks of 4x8.
+// to be stored in rows.
 const ivec2 tile = ivec2(20, 8);
 shared uint made[tile.y][tile.x];
 
@@ -324,11 +324,8 @@ void main() {
     k = constants;
     ivec2 corner = tile * ivec2(gl_WorkGroupID.xy);
     int slice = slice_of_layer(int(gl_WorkGroupID.z)), lane = int(gl_LocalInvocationID.x), row = int(gl_LocalInvocationID.y);
-    ivec2 at = ivec2(4 * row + (lane & 3), lane >> 2);
-    if (kernel < 3 || base != 0) {
-        at = ivec2(5 * (lane >> 2 & 3), 4 * (lane >> 4) + (lane & 3));
-        at.x += (row + 3 * (corner.y + at.y)) % 5; // x + 2y = rotation, modulo 5
-    }
+    ivec2 at = ivec2(5 * (lane >> 2 & 3), 4 * (lane >> 4) + (lane & 3));
+    at.x += (row + 3 * (corner.y + at.y)) % 5; // x + 2y = rotation, modulo 5
     if (all(lessThan(corner + at, k.slice))) made[at.y][at.x] = generated(slice, corner + at);
     barrier();
     int i = int(gl_LocalInvocationIndex);
