@@ -95,6 +95,10 @@ std::vector<Parameter> CacaoOptions::parameters() {
          &quality, "", {}, {}, {"lowest", "low", "medium", "high", "highest"}},
         {"downsampled", "compute on every second pixel of every second row, then upsample", &downsampled},
         {"radius", "surfaces farther than this do not occlude", &radius, "m", 1e-4, 1e5},
+        {"look",
+         "how obscurance becomes visibility: as AMD documents it, or nearer to truth (0.294 times the multiplier, 3.33 times the "
+         "power); auto: calibrated in scan",
+         &look, "", {}, {}, {"auto", "calibrated", "documented"}},
         {"shadow-multiplier", "strength of the effect, linear", &shadow_multiplier, "", 0, 5},
         {"shadow-power", "strength of the effect, exponent of visibility", &shadow_power, "", 0.5, 5},
         {"shadow-clamp", "darkest obscurance before the exponent", &shadow_clamp, "", 0, 1},
@@ -139,8 +143,10 @@ CacaoConstants constants_from(const CacaoOptions& options, const Pinhole& camera
     k.neg_rec_radius = -1.0F / k.radius;
     k.near_limit_rec = 1.0F / ((options.radius * 1.2F * wide) / tan_half_height);
     k.mip_weight = options.scan() ? -1.0F / (k.radius * k.radius) : k.neg_rec_radius * k.radius; // AMD's slip: always -1
-    k.shadow_strength = std::clamp(4.3F * options.shadow_multiplier, 0.0F, 10.0F);
-    k.shadow_power = std::clamp(options.shadow_power, 0.0F, 10.0F);
+    // Fitted to ray-traced truth (calibrate-look): AMD's curve leaves corners far too dark.
+    const bool calibrated = options.look == "calibrated" || (options.look == "auto" && options.scan());
+    k.shadow_strength = std::clamp(4.3F * options.shadow_multiplier * (calibrated ? 0.294F : 1.0F), 0.0F, 10.0F);
+    k.shadow_power = std::clamp(options.shadow_power * (calibrated ? 5.0F / 1.5F : 1.0F), 0.0F, calibrated ? 100.0F : 10.0F);
     k.shadow_clamp = std::clamp(options.shadow_clamp, 0.0F, 1.0F);
     k.horizon = std::clamp(options.horizon_angle, 0.0F, 1.0F);
     k.fade_mul = -1.0F / (options.fade_to - options.fade_from);

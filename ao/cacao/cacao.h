@@ -24,6 +24,7 @@ struct CacaoOptions {
     std::string quality = "high";
     bool downsampled = false;
     float radius = 0.5F;
+    std::string look = "auto"; ///< how obscurance becomes visibility; auto: calibrated in `scan`, documented in `reference`
     float shadow_multiplier = 1.0F;
     float shadow_power = 1.5F;
     float shadow_clamp = 0.98F;
