@@ -52,9 +52,10 @@ class Refine final : public Command {
                    .value = &recording_.registered,
                    .choices = {"auto", "yes", "no"}},
                   {.name = "poses",
-                   .help = "refine recorded poses too, keep them as the truth, or ignore them and follow the camera",
+                   .help = "keep recorded poses as the truth, refine them too, or ignore them and follow the camera; auto keeps "
+                           "them where refined ones would explain hardly more",
                    .value = &recording_.poses,
-                   .choices = {"refine", "keep", "ignore"}},
+                   .choices = {"auto", "keep", "refine", "ignore"}},
                   {"frames", "at most so many frames, evenly spread", &recording_.frames, "", 3, 1000},
                   {"depth-scale", "mm, tum, sun, nyu, m, or units per metre; replaces the capture's own", &depth_scale_}}},
                 {"camera",

@@ -191,6 +191,27 @@ std::vector<SequenceFrame> frames_of(const Capture& capture, const std::vector<s
     return frames;
 }
 
+/// Recorded poses are kept where they explain the frames nearly as well as refined ones would; otherwise refined.
+Sequence adjusted(const std::vector<SequenceFrame>& frames, const Camera& depth_camera, const Model& first, SequenceOptions& how,
+                  const std::string& poses) {
+    constexpr double nearly = 1.3;
+    const bool recorded = std::all_of(frames.begin(), frames.end(), [](const auto& part) { return part.world_from_camera; });
+    how.refine_poses = (poses != "keep" && how.registered) || !recorded; // what is unregistered hangs by its poses
+    Sequence refined(frames, depth_camera, first, how);
+    if (poses != "auto" || !how.refine_poses || !recorded)
+        return refined;
+    how.refine_poses = false;
+    Sequence kept(frames, depth_camera, first, how);
+    const auto error = [&](const Sequence& sequence) {
+        const Fit fit = sequence.start(first);
+        return std::sqrt(fit.rss / fit.residuals);
+    };
+    if (error(kept) <= nearly * error(refined))
+        return kept;
+    how.refine_poses = true;
+    return refined;
+}
+
 std::string overlap_sentence(double before_mm, double after_mm) {
     return fmt::format("overlapping depths of different frames differ by {:.2f} mm (median), {:.2f} mm before.", after_mm,
                        before_mm);
@@ -212,7 +233,6 @@ RecordingResult refine_from_recording(const Capture& capture, const std::vector<
 
     SequenceOptions how;
     how.registered = recording.registered == "auto" ? capture.registration != Registration::no : recording.registered == "yes";
-    how.refine_poses = recording.poses != "keep";
     const cv::Size colour_size = frames.front().grey.size();
     if (how.registered && colour_size != depth_camera.pinhole.size)
         throw Error(fmt::format("{}: colour is {}x{}, depth {}x{}: not registered; --registered no refines the colour camera",
@@ -227,20 +247,22 @@ RecordingResult refine_from_recording(const Capture& capture, const std::vector<
     const Camera before = given ? *given : how.registered ? depth_camera : guess;
 
     std::vector<Rung> rungs = camera_rungs(before.distortion.model);
-    if (how.registered && !how.refine_poses)
-        for (const Rung& rung : depth_rungs())
-            rungs.push_back(rung);
     if (!how.registered)
         rungs.insert(rungs.begin(), {"place", {turn_x, turn_y, turn_z, shift_x, shift_y, shift_z}});
 
     options.ladder.folds = std::min(options.ladder.folds, 4);
-    Sequence sequence(std::move(frames), depth_camera, model_of(before), how);
+    // Depth errors hang together across a scene in ways that no cluster covers: a real error of the camera is far beyond this.
+    options.ladder.least_sigmas = std::max(options.ladder.least_sigmas, 5.0);
+    Sequence sequence = adjusted(frames, depth_camera, model_of(before), how, recording.poses);
+    if (how.registered && !how.refine_poses)
+        for (const Rung& rung : depth_rungs())
+            rungs.push_back(rung);
     const Fit start = sequence.start(model_of(before));
     result.refinement = refine(sequence, before, rungs, options, sequence.degeneracy(start));
     Refinement& r = result.refinement;
     r.source = fmt::format("{} points seen {} times in {} frames, {}, poses {}", sequence.points(), sequence.sightings(),
                            sequence.views(), how.registered ? "colour registered with depth" : "colour not registered with depth",
-                           recording.poses == "keep" ? "kept" : "refined");
+                           how.refine_poses ? "refined" : "kept");
     const auto poses = sequence.poses(r.climb.fit);
     for (std::size_t i = 0; i < poses.size(); ++i)
         result.poses.emplace_back(sequence.view_name(i), poses[i]);

@@ -32,7 +32,7 @@ struct FirstCamera {
 /// What the user said of a recording.
 struct RecordingOptions {
     std::string registered = "auto"; ///< auto (what the capture says; unknown counts as yes), yes, no
-    std::string poses = "refine";    ///< refine, keep (they are the truth), ignore (follow the camera)
+    std::string poses = "auto";      ///< auto, keep (they are the truth), refine (they are near it), ignore (follow the camera)
     int frames = 24;                 ///< at most so many, evenly spread
 };
 

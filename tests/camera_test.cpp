@@ -107,6 +107,24 @@ TEST(Camera, RecordedPixelsFindTheUndistortedPixelThatShowsThem) {
     }
 }
 
+TEST(Camera, AFisheyeBendsAnglesAndIsUndoneUpToItsEdge) {
+    const Distortion fisheye{0.05, -0.01, 0, 0, 0.002, -0.0003, LensModel::kannala_brandt};
+    // By hand at 45 degrees: theta = pi / 4, theta^2 = 0.61685; theta (1 + 0.05 t - 0.01 t^2 + 0.002 t^3 - 0.0003 t^4).
+    const double t = CV_PI * CV_PI / 16;
+    const double bent = CV_PI / 4 * (1 + t * (0.05 + t * (-0.01 + t * (0.002 + t * -0.0003))));
+    EXPECT_NEAR(distorted(fisheye, {1, 0}).x(), bent, 1e-12);
+    EXPECT_EQ(distorted(fisheye, {0, 0}), Eigen::Vector2d(0, 0));
+    for (double degrees = 0; degrees < 88; degrees += 1)
+        for (const double around : {0.0, 0.7, 2.5}) {
+            const double r = std::tan(degrees * CV_PI / 180);
+            const Eigen::Vector2d straight(r * std::cos(around), r * std::sin(around));
+            const auto back = undistorted(fisheye, distorted(fisheye, straight));
+            ASSERT_TRUE(back) << degrees;
+            EXPECT_LT((*back - straight).norm(), 1e-8 * (1 + r * r)) << degrees;
+        }
+    EXPECT_FALSE(undistorted(fisheye, {1.7, 0})); // 1.7 rad is behind a pinhole's image
+}
+
 TEST(Camera, ThreadsShareOneCamerasMaps) {
     std::vector<std::shared_ptr<const Undistortion>> maps(8);
     std::vector<std::thread> threads;

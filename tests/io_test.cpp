@@ -291,6 +291,62 @@ TEST(camera_files, bundle_fusion_info_gives_size_and_depth_unit) {
     EXPECT_EQ(read.depth_units_per_metre, 1000);
 }
 
+TEST(camera_files, every_format_comes_back_as_it_was_written) {
+    const TemporaryFolder folder;
+    const Pinhole pinhole{525.1234567890123, 524.9, 319.5, 239.25, {640, 480}};
+    const Distortion none{}, brown{0.1, -0.2, 1e-4, 2e-5, 0.03}, four{0.1, -0.2, 1e-4, 2e-5, 0};
+    const Distortion fisheye{0.1, -0.2, 0, 0, 0.03, -0.004, LensModel::kannala_brandt};
+    struct Row {
+        CameraFormat format;
+        const char* name;
+        std::vector<Distortion> lenses;
+    };
+    for (const Row& row : {Row{CameraFormat::scanshade, "a.json", {none, brown, fisheye}},
+                           Row{CameraFormat::open3d, "b.json", {none}},
+                           Row{CameraFormat::opencv, "c.yml", {none, brown, fisheye}},
+                           Row{CameraFormat::ros, "d.yaml", {none, brown, fisheye}},
+                           Row{CameraFormat::kalibr, "e.yaml", {none, four, fisheye}},
+                           Row{CameraFormat::colmap, "f.txt", {none, four, brown, fisheye}}})
+        for (const Distortion& lens : row.lenses) {
+            const fs::path file = folder / row.name;
+            write_camera_file(file, {.camera = {pinhole, lens, ""}, .depth_units_per_metre = {}, .warnings = {}}, row.format);
+            const Camera read = read_camera_file(file).camera;
+            EXPECT_NEAR(read.pinhole.fx, pinhole.fx, 1e-9) << row.name;
+            EXPECT_NEAR(read.pinhole.fy, pinhole.fy, 1e-9) << row.name;
+            EXPECT_NEAR(read.pinhole.cx, pinhole.cx, 1e-9) << row.name << ": pixel centres are integers for us";
+            EXPECT_NEAR(read.pinhole.cy, pinhole.cy, 1e-9) << row.name;
+            EXPECT_EQ(read.pinhole.size, pinhole.size) << row.name;
+            EXPECT_EQ(read.distortion, lens) << row.name;
+        }
+}
+
+TEST(camera_files, what_a_format_cannot_say_is_refused_not_dropped) {
+    const TemporaryFolder folder;
+    const CameraFile bent{.camera = {{525, 525, 319.5, 239.5, {640, 480}}, {0.1, 0, 0, 0, 0.2}, ""},
+                          .depth_units_per_metre = {},
+                          .warnings = {}};
+    EXPECT_TRUE(says(refusal([&] { write_camera_file(folder / "a.json", bent, CameraFormat::open3d); }), "no lens distortion"));
+    EXPECT_TRUE(says(refusal([&] { write_camera_file(folder / "a.yaml", bent, CameraFormat::kalibr); }), "k3"));
+    EXPECT_FALSE(fs::exists(folder / "a.json"));
+}
+
+TEST(camera_files, yaml_and_colmap_of_the_wrong_shape_name_the_place) {
+    const TemporaryFolder folder;
+    const auto message = [&](const std::string& text) {
+        return refusal([&] { (void)read_camera_file(write_file(folder / "c.yaml", text)); });
+    };
+    EXPECT_TRUE(says(message("camera_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1]\n"), "has 5 numbers, expected 9"));
+    EXPECT_TRUE(says(message("cam0:\n  camera_model: omni\n"), "\"omni\", expected pinhole"));
+    EXPECT_TRUE(says(message("image_width: 640\n"), "\"camera_matrix\""));
+    const std::string fine = "camera_matrix:\n  rows: 3\n  cols: 3\n  data: [5., 0., 1., 0., 5., 1., 0., 0., 1.]\n";
+    EXPECT_TRUE(says(message(fine + "distortion_coefficients: [1., 2.]\n"), "has 2 numbers"));
+    EXPECT_TRUE(says(message(fine + "distortion_coefficients: [1., 0., 0., 0., 0., 2., 0., 0.]\n"), "rational"));
+    EXPECT_TRUE(says(message("%YAML:1.0\n---\na: [1, 2\nb: 3\n"), "line"));
+    EXPECT_TRUE(says(message("1 PINHOLE 640 480 500 500 320\n"), "line 1: PINHOLE has 3 numbers, expected 4"));
+    EXPECT_TRUE(says(message("1 FOV 640 480 500 500 320 240 1\n"), "line 1: the camera model \"FOV\""));
+    EXPECT_TRUE(says(message("1 PINHOLE 640 480 -500 500 320 240\n"), "fx is -500"));
+}
+
 TEST(camera_files, the_command_line_takes_numbers_or_a_file) {
     const CameraFile numbers = camera_from_argument("500, 501, 320, 240");
     EXPECT_EQ(numbers.camera.pinhole.fy, 501);

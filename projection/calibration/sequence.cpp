@@ -92,6 +92,29 @@ struct SurfaceResidual {
     }
 };
 
+/// A recorded pose is near the truth: how far the camera has turned and moved from it, in sigmas.
+struct PoseResidual {
+    Eigen::Quaterniond camera_from_world;
+    Eigen::Vector3d centre;
+    double turn_weight, shift_weight;
+    template <class Number>
+    bool operator()(const Number* pose, Number* residual) const {
+        const Number back[4] = {Number(camera_from_world.w()), Number(-camera_from_world.x()), Number(-camera_from_world.y()),
+                                Number(-camera_from_world.z())};
+        Number turn[4], difference[4], moved_by[3];
+        ceres::AngleAxisToQuaternion(pose, turn);
+        ceres::QuaternionProduct(turn, back, difference);
+        ceres::QuaternionToAngleAxis(difference, residual);
+        const Number against[3] = {-pose[0], -pose[1], -pose[2]};
+        ceres::AngleAxisRotatePoint(against, pose + 3, moved_by); // minus the camera's centre
+        for (int i = 0; i < 3; ++i) {
+            residual[i] *= Number(turn_weight);
+            residual[3 + i] = Number(shift_weight) * (moved_by[i] + Number(centre[i]));
+        }
+        return true;
+    }
+};
+
 // ---------------------------------------------------------------------------------------------------- small geometry
 
 void to_six(const Eigen::Isometry3d& transform, double* six) {
@@ -168,6 +191,12 @@ std::optional<SurfacePiece> surface_at(const cv::Mat1f& depth_m, const Pinhole& 
     return SurfacePiece{centre, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(moments).eigenvectors().col(0)};
 }
 
+/// A coarse raster of where points were first seen: neighbours there lie on the same surfaces.
+int neighbourhood_of(const Eigen::Vector2d& pixel, cv::Size size) {
+    constexpr int cells = 7;
+    return static_cast<int>(pixel.y() * cells / size.height) * cells + static_cast<int>(pixel.x() * cells / size.width);
+}
+
 double median_of(std::vector<double> values) {
     if (values.empty())
         return std::nan("");
@@ -209,16 +238,29 @@ class SequenceProblem {
         add_depth(track, s, weight, loss);
     }
 
+    /// Keeps poses near the recorded ones, or at them; without any, the first says where the world is.
     void hold_poses(const Views& used) {
-        bool first = true; // the world's own place is nobody's to find
+        bool first = true;
         for (std::size_t i = 0; i < used.size(); ++i) {
-            double* values = pose(static_cast<int>(i));
-            if (!problem.HasParameterBlock(values))
+            if (!problem.HasParameterBlock(pose(static_cast<int>(i))))
                 continue;
-            if (first || !sequence_.options_.refine_poses)
-                problem.SetParameterBlockConstant(values);
+            if (!sequence_.options_.refine_poses || (first && !sequence_.frames_[i].world_from_camera))
+                problem.SetParameterBlockConstant(pose(static_cast<int>(i)));
+            else
+                hold_near_recorded(static_cast<int>(i));
             first = false;
         }
+    }
+
+    void hold_near_recorded(int frame) {
+        const auto& recorded = sequence_.frames_[frame].world_from_camera;
+        if (!recorded)
+            return;
+        const SequenceOptions& o = sequence_.options_;
+        problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PoseResidual, 6, pose_unknowns>(new PoseResidual{
+                                     Eigen::Quaterniond(recorded->linear()).inverse().normalized(), recorded->translation(),
+                                     o.pixel_sigma_px / o.pose_turn_sigma, o.pixel_sigma_px / o.pose_shift_sigma_m}),
+                                 nullptr, pose(frame));
     }
 
     /// Sigma of a recorded depth, in the residuals' unit.
@@ -469,11 +511,12 @@ Fit Sequence::fit(const Fit& from, const Free& free, const Views& used, bool cov
     freeze(adjustment.problem, fit.model, free);
     solve(adjustment.problem, fit, true);
     if (covariance) {
-        std::vector<double*> poses, points;
+        std::vector<double*> poses;
+        std::vector<ClusteredPoint> points;
         for (std::size_t i = 0; i < frames_.size(); ++i)
             poses.push_back(adjustment.pose(static_cast<int>(i)));
         for (std::size_t i = 0; i < tracks_.size(); ++i)
-            points.push_back(adjustment.point(i));
+            points.push_back({adjustment.point(i), neighbourhood_of(tracks_[i].sightings.front().pixel, fit.model.size)});
         add_covariance(adjustment.problem, fit, free, poses, points);
     }
     return fit;
@@ -499,7 +542,9 @@ std::vector<ViewScore> Sequence::score(const Fit& from, const Views& wanted) con
         if (adjustment.sightings.size() < 6)
             continue;
         freeze(adjustment.problem, fit.model, {});
-        if (!options_.refine_poses)
+        if (options_.refine_poses)
+            adjustment.hold_near_recorded(static_cast<int>(frame));
+        else
             adjustment.problem.SetParameterBlockConstant(adjustment.pose(static_cast<int>(frame)));
         Fit alone = fit; // the pose is fitted in place; rss is this view's
         solve(adjustment.problem, alone, false);

@@ -19,7 +19,8 @@ struct SequenceFrame {
 
 struct SequenceOptions {
     bool registered = true;    ///< colour pixel (u, v) and depth pixel (u, v) see the same thing
-    bool refine_poses = true;  ///< recorded poses are where to start; otherwise they are the truth
+    bool refine_poses = true;  ///< recorded poses are good to the sigmas below; otherwise they are the truth
+    double pose_shift_sigma_m = 0.005, pose_turn_sigma = 0.0035; ///< metres and radians
     double pixel_sigma_px = 0.5;
     double depth_floor_m = 0.0012, depth_per_z2 = 0.0019; ///< sigma of a depth (Nguyen 2012's order), rescaled by the residuals
 };

@@ -3,6 +3,7 @@
 #include "projection/error.h"
 
 #include <Eigen/Dense>
+#include <map>
 
 namespace scanshade::calibration {
 namespace {
@@ -49,8 +50,8 @@ void freeze(ceres::Problem& problem, Model& model, const Free& free) {
 void solve(ceres::Problem& problem, Fit& fit, bool many_unknowns) {
     ceres::Solver::Options options;
     options.linear_solver_type = many_unknowns ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;
-    options.max_num_iterations = 100;
-    options.function_tolerance = 1e-10;
+    options.max_num_iterations = many_unknowns ? 40 : 100;
+    options.function_tolerance = many_unknowns ? 1e-7 : 1e-10; // of the sum: far below one sigma of any number
     options.gradient_tolerance = 1e-12;
     options.parameter_tolerance = 1e-10;
     options.logging_type = ceres::SILENT;
@@ -75,47 +76,74 @@ namespace {
 /// numbers, then three per point.
 class Reduced {
   public:
-    Reduced(const ceres::CRSMatrix& jacobian, Eigen::Index kept) : kept_(kept), normal_(Eigen::MatrixXd::Zero(kept, kept)) {
-        const auto points = static_cast<std::size_t>((jacobian.num_cols - kept) / 3);
-        own_.assign(points, Eigen::Matrix3d::Zero());
-        mixed_.assign(points, Eigen::MatrixXd());
+    Reduced(const ceres::CRSMatrix& jacobian, const std::vector<double>& residuals, Eigen::Index kept,
+            const std::vector<int>& clusters)
+        : kept_(kept), normal_(Eigen::MatrixXd::Zero(kept, kept)), spread_(normal_) {
+        points_.resize(static_cast<std::size_t>((jacobian.num_cols - kept) / 3));
         for (int row = 0; row < jacobian.num_rows; ++row)
-            add_row(jacobian, row);
-        for (std::size_t i = 0; i < points; ++i)
-            if (mixed_[i].size() > 0)
-                normal_ -= mixed_[i].transpose() * own_[i].ldlt().solve(mixed_[i]);
+            add_row(jacobian, row, residuals[row]);
+        std::map<int, Eigen::VectorXd> pulls;
+        for (std::size_t i = 0; i < points_.size(); ++i) {
+            const Point& point = points_[i];
+            if (point.mixed.size() == 0)
+                continue;
+            const Eigen::LDLT<Eigen::Matrix3d> own = point.own.ldlt();
+            normal_ -= point.mixed.transpose() * own.solve(point.mixed);
+            const Eigen::VectorXd pull = point.pull - point.mixed.transpose() * own.solve(point.own_pull);
+            const auto [sum, first] = pulls.try_emplace(clusters[i], pull);
+            if (!first)
+                sum->second += pull;
+        }
+        for (const auto& [cluster, pull] : pulls)
+            spread_ += pull * pull.transpose();
+        if (pulls.size() > 1)
+            spread_ *= static_cast<double>(pulls.size()) / static_cast<double>(pulls.size() - 1);
     }
     [[nodiscard]] const Eigen::MatrixXd& normal() const { return normal_; }
+    /// Sum over clusters of the outer product of how each pulls at the kept numbers.
+    [[nodiscard]] const Eigen::MatrixXd& spread() const { return spread_; }
 
   private:
-    void add_row(const ceres::CRSMatrix& jacobian, int row) {
+    struct Point {
+        Eigen::Matrix3d own = Eigen::Matrix3d::Zero();
+        Eigen::MatrixXd mixed;
+        Eigen::VectorXd pull;
+        Eigen::Vector3d own_pull = Eigen::Vector3d::Zero();
+    };
+
+    void add_row(const ceres::CRSMatrix& jacobian, int row, double residual) {
         const int begin = jacobian.rows[row], end = jacobian.rows[row + 1];
-        for (int a = begin; a < end; ++a)
+        Point* point = nullptr;
+        for (int a = begin; a < end && !point; ++a)
+            if (jacobian.cols[a] >= kept_)
+                point = &points_[static_cast<std::size_t>((jacobian.cols[a] - kept_) / 3)];
+        if (point && point->mixed.size() == 0) {
+            point->mixed = Eigen::MatrixXd::Zero(3, kept_);
+            point->pull = Eigen::VectorXd::Zero(kept_);
+        }
+        Eigen::VectorXd alone = point ? Eigen::VectorXd() : Eigen::VectorXd::Zero(kept_);
+        for (int a = begin; a < end; ++a) {
+            const Eigen::Index at = jacobian.cols[a];
+            const double value = jacobian.values[a];
+            (at < kept_ ? (point ? point->pull : alone)(at) : point->own_pull((at - kept_) % 3)) += value * residual;
             for (int b = begin; b < end; ++b)
-                add(jacobian.cols[a], jacobian.cols[b], jacobian.values[a] * jacobian.values[b]);
+                add(point, at, jacobian.cols[b], value * jacobian.values[b]);
+        }
+        if (!point)
+            spread_ += alone * alone.transpose();
     }
-    void add(Eigen::Index a, Eigen::Index b, double value) {
-        if (a < kept_ && b < kept_) {
+    void add(Point* point, Eigen::Index a, Eigen::Index b, double value) {
+        if (a < kept_ && b < kept_)
             normal_(a, b) += value;
-            return;
-        }
-        if (a < kept_)
-            return; // the transpose of what is kept in mixed_
-        const auto point = static_cast<std::size_t>((a - kept_) / 3);
-        const Eigen::Index axis = (a - kept_) % 3;
-        if (b >= kept_) {
-            own_[point](axis, (b - kept_) % 3) += value;
-            return;
-        }
-        if (mixed_[point].size() == 0)
-            mixed_[point] = Eigen::MatrixXd::Zero(3, kept_);
-        mixed_[point](axis, b) += value;
+        else if (a >= kept_ && b >= kept_)
+            point->own((a - kept_) % 3, (b - kept_) % 3) += value;
+        else if (a >= kept_)
+            point->mixed((a - kept_) % 3, b) += value; // the other half is its transpose
     }
 
     Eigen::Index kept_;
-    Eigen::MatrixXd normal_;
-    std::vector<Eigen::Matrix3d> own_;
-    std::vector<Eigen::MatrixXd> mixed_;
+    Eigen::MatrixXd normal_, spread_;
+    std::vector<Point> points_;
 };
 
 /// The inverse of a symmetric matrix scaled to a unit diagonal first; empty where it has none worth the name.
@@ -135,7 +163,7 @@ Eigen::MatrixXd inverse(const Eigen::MatrixXd& normal) {
 } // namespace
 
 void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const std::vector<double*>& poses,
-                    const std::vector<double*>& points) {
+                    const std::vector<ClusteredPoint>& points) {
     fit.covariance.resize(0, 0);
     const int spare = fit.residuals - fit.unknowns;
     if (spare <= 0)
@@ -158,22 +186,28 @@ void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const s
             options.parameter_blocks.push_back(pose);
             kept += problem.ParameterBlockTangentSize(pose);
         }
-    for (double* point : points)
-        if (problem.HasParameterBlock(point))
-            options.parameter_blocks.push_back(point);
+    std::vector<int> clusters;
+    for (const ClusteredPoint& point : points)
+        if (problem.HasParameterBlock(point.values)) {
+            options.parameter_blocks.push_back(point.values);
+            clusters.push_back(point.cluster);
+        }
     fit.covariance = Eigen::MatrixXd::Zero(unknown_count, unknown_count);
     if (count == 0)
         return;
     ceres::CRSMatrix jacobian;
-    problem.Evaluate(options, nullptr, nullptr, nullptr, &jacobian);
-    const Eigen::MatrixXd all = inverse(Reduced(jacobian, kept).normal());
+    std::vector<double> residuals;
+    problem.Evaluate(options, nullptr, &residuals, nullptr, &jacobian);
+    const Reduced reduced(jacobian, residuals, kept, clusters);
+    Eigen::MatrixXd all = inverse(reduced.normal());
     if (all.size() == 0 || !all.allFinite()) {
         fit.covariance.resize(0, 0);
         return;
     }
+    all = points.empty() ? Eigen::MatrixXd(all * (fit.rss / spare)) : Eigen::MatrixXd(all * reduced.spread() * all);
     for (Eigen::Index a = 0; a < count; ++a)
         for (Eigen::Index b = 0; b < count; ++b)
-            fit.covariance(places[a], places[b]) = all(a, b) * fit.rss / spare;
+            fit.covariance(places[a], places[b]) = all(a, b);
 }
 
 } // namespace scanshade::calibration

@@ -13,11 +13,19 @@ void freeze(ceres::Problem& problem, Model& model, const Free& free);
 /// Solves; fills rss (without robust loss), residuals, unknowns, converged. Throws Error where nothing can be solved.
 void solve(ceres::Problem& problem, Fit& fit, bool many_unknowns);
 
-/// Fills fit.covariance, scaled by rss / (residuals - unknowns); leaves it empty where the problem is singular. `points` are
-/// blocks of three that appear together with others but never with each other: they are eliminated one by one (Schur
-/// complement), which keeps what is inverted as small as the model and `poses`.
+/// Three numbers of a scene's point, and the part of the scene whose errors go together.
+struct ClusteredPoint {
+    double* values;
+    int cluster;
+};
+
+/// Fills fit.covariance; leaves it empty where the problem is singular. Without `points` it is the inverse normal matrix
+/// scaled by rss / (residuals - unknowns). `points` are blocks of three that appear together with others but never with each
+/// other: they are eliminated one by one (Schur complement), which keeps what is inverted as small as the model and `poses`.
+/// With them residuals may hang together in any way within a cluster (a piece of wall has the same depth error from
+/// everywhere): the covariance is the cluster-robust one (Liang and Zeger 1986).
 void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const std::vector<double*>& poses,
-                    const std::vector<double*>& points);
+                    const std::vector<ClusteredPoint>& points);
 
 /// Moves a point by a pose of six numbers: axis times angle, then translation.
 template <class Number>
