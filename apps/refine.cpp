@@ -21,8 +21,8 @@ cv::Size parsed_count(const std::string& text) {
     char rest = 0;
     if (std::sscanf(text.c_str(), "%dx%d%c", &width, &height, &rest) != 2 || width < 3 || height < 3 || width > 200 ||
         height > 200)
-        throw Misuse(fmt::format("board: '{}' given, expected columns x rows of the target's points such as 9x6, each 3 .. 200",
-                                 text));
+        throw Misuse(fmt::format(
+            "board: '{}' given, expected columns x rows of the target's points such as 9x6, each 3 .. 200", text));
     return {width, height};
 }
 
@@ -33,61 +33,65 @@ class Refine final : public Command {
     }
 
     std::vector<Stage> stages() override {
-        return {{"target",
-                 {{"board", "inner corners of a chessboard, squares of a ChArUco board, circles of a grid: columns x rows",
-                   &board_},
-                  {.name = "target",
-                   .help = "what is on the pictures",
-                   .value = &target_,
-                   .choices = {"chessboard", "charuco", "circles", "asymmetric-circles"}},
-                  {"square", "from corner to corner, or circle to circle", &square_m_, "m", 1e-6, 100},
-                  {"marker", "side of a ChArUco marker; 0 = three quarters of a square", &marker_m_, "m", 0, 100},
-                  {.name = "dictionary",
-                   .help = "of the ChArUco markers",
-                   .value = &dictionary_,
-                   .choices = dictionary_names()}}},
-                {"recording",
-                 {{.name = "registered",
-                   .help = "whether colour pixels lie on depth pixels; where not, the colour camera and its place are refined",
-                   .value = &recording_.registered,
-                   .choices = {"auto", "yes", "no"}},
-                  {.name = "poses",
-                   .help = "keep recorded poses as the truth, refine them too, or ignore them and follow the camera; auto keeps "
-                           "them where refined ones would explain hardly more",
-                   .value = &recording_.poses,
-                   .choices = {"auto", "keep", "refine", "ignore"}},
-                  {"frames", "at most so many frames, evenly spread", &recording_.frames, "", 3, 1000},
-                  {"depth-scale", "mm, tum, sun, nyu, m, or units per metre; replaces the capture's own", &depth_scale_}}},
-                {"camera",
-                 {{"camera", "where to start: a camera file, or fx,fy,cx,cy; otherwise the capture's own, or a guess",
-                   &first_.camera},
-                  {"fov", "where to start: angle of view across the image; 0 = not known", &first_.fov_degrees, "degrees", 0,
-                   175},
-                  {.name = "lens",
-                   .help = "the kind of lens: brown (most) or fisheye (wide ones)",
-                   .value = &lens_,
-                   .choices = {"brown", "fisheye"}}}},
-                {"model",
-                 {{.name = "model",
-                   .help = "ladder = only what held-out views support, full = everything",
-                   .value = &model_,
-                   .choices = {"ladder", "full"}},
-                  {.name = "outliers",
-                   .help = "views with more than 3 times the median error",
-                   .value = &outliers_,
-                   .choices = {"keep", "downweight", "drop"}},
-                  {"folds", "how often views are held out in turn", &options_.ladder.folds, "", 2, 100},
-                  {"sigmas", "how far a new number must be from where it was", &options_.ladder.least_sigmas, "", 0, 100}}},
-                {"output",
-                 {{"out", "the camera's file; its extension tells the format: .json ours, .yml OpenCV, .yaml ROS, .txt COLMAP",
-                   &out_},
-                  {.name = "format",
-                   .help = "the format, whatever the extension",
-                   .value = &format_,
-                   .choices = format_choices()},
-                  {"trajectory", "the refined poses of a recording, as TUM's rows", &trajectory_},
-                  {"report", "a page with tables and plots", &report_},
-                  {"overwrite", "replace earlier results", &overwrite_}}}};
+        return {
+            {"target",
+             {{"board", "inner corners of a chessboard, squares of a ChArUco board, circles of a grid: columns x rows",
+               &board_},
+              {.name = "target",
+               .help = "what is on the pictures",
+               .value = &target_,
+               .choices = {"chessboard", "charuco", "circles", "asymmetric-circles"}},
+              {"square", "from corner to corner, or circle to circle", &square_m_, "m", 1e-6, 100},
+              {"marker", "side of a ChArUco marker; 0 = three quarters of a square", &marker_m_, "m", 0, 100},
+              {.name = "dictionary",
+               .help = "of the ChArUco markers",
+               .value = &dictionary_,
+               .choices = dictionary_names()}}},
+            {"recording",
+             {{.name = "registered",
+               .help =
+                   "whether colour pixels lie on depth pixels; where not, the colour camera and its place are refined",
+               .value = &recording_.registered,
+               .choices = {"auto", "yes", "no"}},
+              {.name = "poses",
+               .help = "keep recorded poses as the truth, refine them too, or ignore them and follow the camera; auto "
+                       "keeps "
+                       "them where refined ones would explain hardly more",
+               .value = &recording_.poses,
+               .choices = {"auto", "keep", "refine", "ignore"}},
+              {"frames", "at most so many frames, evenly spread", &recording_.frames, "", 3, 1000},
+              {"depth-scale", "mm, tum, sun, nyu, m, or units per metre; replaces the capture's own", &depth_scale_}}},
+            {"camera",
+             {{"camera", "where to start: a camera file, or fx,fy,cx,cy; otherwise the capture's own, or a guess",
+               &first_.camera},
+              {"fov", "where to start: angle of view across the image; 0 = not known", &first_.fov_degrees, "degrees",
+               0, 175},
+              {.name = "lens",
+               .help = "the kind of lens: brown (most) or fisheye (wide ones)",
+               .value = &lens_,
+               .choices = {"brown", "fisheye"}}}},
+            {"model",
+             {{.name = "model",
+               .help = "ladder = only what held-out views support, full = everything",
+               .value = &model_,
+               .choices = {"ladder", "full"}},
+              {.name = "outliers",
+               .help = "views with more than 3 times the median error",
+               .value = &outliers_,
+               .choices = {"keep", "downweight", "drop"}},
+              {"folds", "how often views are held out in turn", &options_.ladder.folds, "", 2, 100},
+              {"sigmas", "how far a new number must be from where it was", &options_.ladder.least_sigmas, "", 0, 100}}},
+            {"output",
+             {{"out",
+               "the camera's file; its extension tells the format: .json ours, .yml OpenCV, .yaml ROS, .txt COLMAP",
+               &out_},
+              {.name = "format",
+               .help = "the format, whatever the extension",
+               .value = &format_,
+               .choices = format_choices()},
+              {"trajectory", "the refined poses of a recording, as TUM's rows", &trajectory_},
+              {"report", "a page with tables and plots", &report_},
+              {"overwrite", "replace earlier results", &overwrite_}}}};
     }
 
     int run() override {
@@ -126,11 +130,12 @@ class Refine final : public Command {
 
     Refinement from_boards(const fs::path& folder) const {
         using Kind = Target::Kind;
-        const Kind kind = target_ == "charuco"   ? Kind::charuco
-                          : target_ == "circles" ? Kind::circles
+        const Kind kind = target_ == "charuco"              ? Kind::charuco
+                          : target_ == "circles"            ? Kind::circles
                           : target_ == "asymmetric-circles" ? Kind::asymmetric_circles
                                                             : Kind::chessboard;
-        return refine_from_boards(folder, {kind, parsed_count(board_), square_m_, marker_m_, dictionary_}, first_, options_);
+        return refine_from_boards(folder, {kind, parsed_count(board_), square_m_, marker_m_, dictionary_}, first_,
+                                  options_);
     }
 
     Refinement from_capture(const fs::path& path) const {
@@ -151,8 +156,8 @@ class Refine final : public Command {
         for (std::size_t i = 0; i < result.poses.size(); ++i) {
             const Eigen::Vector3d t = result.poses[i].second.translation();
             const Eigen::Quaterniond q(result.poses[i].second.linear());
-            rows += fmt::format("{:.6f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", result.stamps_s[i], t.x(), t.y(),
-                                t.z(), q.x(), q.y(), q.z(), q.w());
+            rows += fmt::format("{:.6f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", result.stamps_s[i], t.x(),
+                                t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
         }
         return rows;
     }
@@ -163,7 +168,8 @@ class Refine final : public Command {
             quality.view_rms_px.push_back(view.score.rms());
         quality.details = details_of(result, took_s).dump();
         if (!out_.empty())
-            write_camera_file(out_, {.camera = result.after, .depth_units_per_metre = {}, .warnings = {}}, format, quality);
+            write_camera_file(out_, {.camera = result.after, .depth_units_per_metre = {}, .warnings = {}}, format,
+                              quality);
         if (!report_.empty())
             write_atomically(report_, page_of(result, took_s));
         for (const std::string& file : {out_, report_, trajectory_})
@@ -172,7 +178,8 @@ class Refine final : public Command {
     }
 
     std::vector<std::string> paths_;
-    std::string board_, target_ = "chessboard", dictionary_ = "4x4_50", lens_ = "brown", model_ = "ladder", outliers_ = "keep";
+    std::string board_, target_ = "chessboard", dictionary_ = "4x4_50", lens_ = "brown", model_ = "ladder",
+                        outliers_ = "keep";
     std::string out_, format_, report_, trajectory_, depth_scale_;
     double square_m_ = 0.025, marker_m_ = 0;
     bool overwrite_ = false;

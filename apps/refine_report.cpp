@@ -1,5 +1,9 @@
+// The findings of `refine` as JSON, as a table, and as a page.
 #include "apps/refine_report.h"
 
+#include "apps/page.h"
+
+#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 
@@ -20,9 +24,9 @@ std::vector<NumberRow> numbers_of(const Refinement& r) {
         return r.climb.free[unknown] && fit.covariance.size() > 0 ? fit.sigma(unknown) : std::nan("");
     };
     const bool fy_free = fit.covariance.size() > 0 && (r.climb.free[f] || r.climb.free[aspect]);
-    std::vector<NumberRow> rows = {{"fx", before[f], fit.model[f], sigma(f)},
-                                   {"fy", before[f] * before[aspect], fit.model[f] * fit.model[aspect],
-                                    fy_free ? sigma_fy(fit) : std::nan("")}};
+    std::vector<NumberRow> rows = {
+        {"fx", before[f], fit.model[f], sigma(f)},
+        {"fy", before[f] * before[aspect], fit.model[f] * fit.model[aspect], fy_free ? sigma_fy(fit) : std::nan("")}};
     for (int i = cx; i < unknown_count; ++i) {
         const auto unknown = static_cast<Unknown>(i);
         if (i < k1 || r.climb.free[i] || before[unknown] != (i == depth_scale ? 1 : 0))
@@ -101,7 +105,8 @@ json details_of(const Refinement& r, double took_s) {
     text["coverage"] = {{"share_of_cells", r.coverage.share}, {"counts", grid_json(r.coverage.counts)}};
     text["pixel_sigma_px"] = grid_json(r.pixel_sigma);
     for (const Effect& effect : r.effects)
-        text["effect"].push_back({{"depth_m", effect.depth_m}, {"rms_mm", effect.rms_mm}, {"worst_mm", effect.worst_mm}});
+        text["effect"].push_back(
+            {{"depth_m", effect.depth_m}, {"rms_mm", effect.rms_mm}, {"worst_mm", effect.worst_mm}});
     text["notes"] = r.notes;
     return text;
 }
@@ -120,12 +125,13 @@ std::string summary_of(const Refinement& r, double took_s) {
     text += "\n";
     for (const Step& step : r.climb.steps)
         text += fmt::format("  {:<14} {} {}\n", step.name, step.climbed ? "freed:" : "kept: ", step.why);
-    text += fmt::format("\n  {:.0f} % of the image's cells hold observations; the pixel's sigma is {:.2g} px on average, {:.2g} "
-                        "at most\n",
-                        100 * r.coverage.share, mean_pixel_sigma(r.climb.fit), largest(r.pixel_sigma));
+    text += fmt::format(
+        "\n  {:.0f} % of the image's cells hold observations; the pixel's sigma is {:.2g} px on average, {:.2g} "
+        "at most\n",
+        100 * r.coverage.share, mean_pixel_sigma(r.climb.fit), largest(r.pixel_sigma));
     for (const Effect& effect : r.effects)
-        text += fmt::format("  at {:.2f} m points move by {:.2f} mm rms, {:.2f} mm at most\n", effect.depth_m, effect.rms_mm,
-                            effect.worst_mm);
+        text += fmt::format("  at {:.2f} m points move by {:.2f} mm rms, {:.2f} mm at most\n", effect.depth_m,
+                            effect.rms_mm, effect.worst_mm);
     for (const std::string& note : r.notes)
         text += "  note: " + note + "\n";
     return text;
@@ -135,28 +141,9 @@ std::string summary_of(const Refinement& r, double took_s) {
 
 namespace {
 
-std::string escaped(const std::string& text) {
-    std::string safe;
-    for (const char c : text)
-        safe += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : std::string(1, c);
-    return safe;
+std::string number(double value, int digits = 4) {
+    return std::isfinite(value) ? fmt::format("{:.{}g}", value, digits) : "";
 }
-
-std::string row_of(const std::vector<std::string>& cells, const char* tag = "td") {
-    std::string text = "<tr>";
-    for (const std::string& cell : cells)
-        text += fmt::format("<{0}>{1}</{0}>", tag, escaped(cell));
-    return text + "</tr>\n";
-}
-
-std::string table(const std::vector<std::string>& heads, const std::vector<std::vector<std::string>>& rows) {
-    std::string text = "<table>" + row_of(heads, "th");
-    for (const auto& row : rows)
-        text += row_of(row);
-    return text + "</table>\n";
-}
-
-std::string number(double value, int digits = 4) { return std::isfinite(value) ? fmt::format("{:.{}g}", value, digits) : ""; }
 
 /// White to blue, 0 to 1.
 std::string shade_of(double share) {
@@ -175,8 +162,8 @@ std::string heat_map(const cv::Mat_<Number>& grid, const char* caption, const ch
     for (int row = 0; row < grid.rows; ++row)
         for (int column = 0; column < grid.cols; ++column) {
             const double value = grid(row, column);
-            svg += fmt::format("<rect x='{}' y='{}' width='{}' height='{}' fill='{}'/>", column * cell, row * cell, cell, cell,
-                               std::isfinite(value) ? shade_of(value / most) : "#ddd");
+            svg += fmt::format("<rect x='{}' y='{}' width='{}' height='{}' fill='{}'/>", column * cell, row * cell,
+                               cell, cell, std::isfinite(value) ? shade_of(value / most) : "#ddd");
             if (std::isfinite(value))
                 svg += fmt::format("<text x='{}' y='{}'>{}</text>", column * cell + cell / 2, row * cell + cell / 2 + 5,
                                    fmt::format(fmt::runtime(format), value));
@@ -190,15 +177,17 @@ std::string arrows(const Refinement& r) {
     const double exaggeration = std::max(1.0, std::floor(size.width / 50.0 / std::max(r.climb.train_px, 1e-9)));
     constexpr std::size_t most = 4000;
     const std::size_t step = std::max<std::size_t>(1, r.residuals.size() / most);
-    std::string svg = fmt::format("<figure><svg viewBox='0 0 {} {}' width='640' class='framed'>", size.width, size.height);
+    std::string svg =
+        fmt::format("<figure><svg viewBox='0 0 {} {}' width='640' class='framed'>", size.width, size.height);
     for (std::size_t i = 0; i < r.residuals.size(); i += step) {
         const auto& [at, miss] = r.residuals[i];
         svg += fmt::format("<path d='M{:.1f} {:.1f}l{:.1f} {:.1f}'/>", at.x, at.y, miss.x() * exaggeration,
                            miss.y() * exaggeration);
     }
-    return svg + fmt::format("</svg><figcaption>Residuals (predicted - seen) over the image, {:.0f} times as long as they are"
-                             "</figcaption></figure>\n",
-                             exaggeration);
+    return svg +
+           fmt::format("</svg><figcaption>Residuals (predicted - seen) over the image, {:.0f} times as long as they are"
+                       "</figcaption></figure>\n",
+                       exaggeration);
 }
 
 /// The residuals themselves as a cloud of points: round and centred where nothing is left to model.
@@ -206,8 +195,9 @@ std::string scatter(const Refinement& r) {
     const double reach = std::max(4 * r.climb.train_px, 1e-9), scale = 150 / reach;
     constexpr std::size_t most = 4000;
     const std::size_t step = std::max<std::size_t>(1, r.residuals.size() / most);
-    std::string svg = "<figure><svg viewBox='-160 -160 320 320' width='320' class='framed'><path class='axis' d='M-150 0h300M0 "
-                      "-150v300'/>";
+    std::string svg =
+        "<figure><svg viewBox='-160 -160 320 320' width='320' class='framed'><path class='axis' d='M-150 0h300M0 "
+        "-150v300'/>";
     for (std::size_t i = 0; i < r.residuals.size(); i += step)
         svg += fmt::format("<circle cx='{:.1f}' cy='{:.1f}' r='1.5'/>",
                            std::clamp(r.residuals[i].second.x() * scale, -155.0, 155.0),
@@ -220,34 +210,40 @@ std::string view_bars(const Refinement& r) {
     double most = 1e-12;
     for (const ViewRow& view : r.views)
         most = std::max(most, view.score.rms());
-    std::string svg = fmt::format("<svg viewBox='0 0 640 {}' width='640'>", line * r.views.size() + 4);
+    std::string svg = fmt::format("<svg viewBox='0 0 640 {}' width='640' class='bars'>", line * r.views.size() + 4);
     for (std::size_t i = 0; i < r.views.size(); ++i) {
         const ViewRow& view = r.views[i];
         const double width = 380 * view.score.rms() / most;
-        svg += fmt::format("<text class='name' x='160' y='{0}'>{1}</text><rect x='166' y='{2}' width='{3:.1f}' height='12' "
-                           "class='{4}'/><text class='value' x='{5:.1f}' y='{0}'>{6:.3g} px{7}</text>",
-                           line * i + 14, escaped(view.name), line * i + 4, width, view.outlying ? "bad" : "good", 172 + width,
-                           view.score.rms(), view.used ? "" : ", dropped");
+        svg += fmt::format(
+            "<text class='name' x='160' y='{0}'>{1}</text><rect x='166' y='{2}' width='{3:.1f}' height='12' "
+            "class='{4}'/><text class='value' x='{5:.1f}' y='{0}'>{6:.3g} px{7}</text>",
+            line * i + 14, page::escaped(view.name), line * i + 4, width, view.outlying ? "bad" : "good", 172 + width,
+            view.score.rms(), view.used ? "" : ", dropped");
     }
     return svg + "</svg>\n";
 }
 
+/// For the plots of this page alone.
 constexpr const char* style =
-    "body{font:15px/1.5 sans-serif;max-width:1000px;margin:2em auto;padding:0 1em;color:#222}table{border-collapse:collapse}"
-    "td,th{padding:.15em .8em;border-bottom:1px solid #ddd;text-align:left}figure{display:inline-block;margin:.5em 1em .5em 0}"
-    "figcaption{color:#555;font-size:13px}svg text{font:15px sans-serif;text-anchor:middle}svg .name{text-anchor:end;font-size:"
-    "12px}svg .value{text-anchor:start;font-size:12px}svg path{stroke:#c33;stroke-width:1.2}svg .axis{stroke:#bbb}svg "
-    "circle{fill:#36a;fill-opacity:.4}.framed{border:1px solid #999}.good{fill:#58a}.bad{fill:#c33}";
+    "<style>figure{display:inline-block;margin:.5em 1em .5em 0}figcaption{color:#555;font-size:13px}figure "
+    "text{font:15px "
+    "sans-serif;text-anchor:middle}.bars text{font:12px sans-serif}.bars .name{text-anchor:end}figure path{stroke:#c33;"
+    "stroke-width:1.2}figure .axis{stroke:#bbb}figure circle{fill:#36a;fill-opacity:.4}.framed{border:1px solid "
+    "#999}.good{"
+    "fill:#58a}.bad{fill:#c33}</style>\n";
 
 } // namespace
 
 std::string page_of(const Refinement& r, double took_s) {
     std::vector<std::vector<std::string>> numbers, steps, moves;
+    std::vector<bool> freed;
     for (const NumberRow& row : numbers_of(r))
         numbers.push_back({row.name, number(row.before, 8), number(row.after, 8),
                            std::isnan(row.sigma) ? "kept" : number(row.sigma, 2)});
-    for (const Step& step : r.climb.steps)
+    for (const Step& step : r.climb.steps) {
         steps.push_back({step.name, step.climbed ? "freed" : "kept", step.why});
+        freed.push_back(step.climbed);
+    }
     for (const Effect& effect : r.effects)
         moves.push_back({number(effect.depth_m, 3), number(effect.rms_mm, 3), number(effect.worst_mm, 3)});
     std::vector<std::vector<std::string>> errors = {
@@ -256,21 +252,22 @@ std::string page_of(const Refinement& r, double took_s) {
     if (r.full)
         errors.push_back({"full model, for comparison", number(r.full->train_px), number(r.full->held_out_px)});
 
-    std::string page = fmt::format("<!DOCTYPE html><html lang='en'><meta charset='utf-8'><title>Refined camera</title><style>{}"
-                                   "</style>\n<h1>Camera: {}</h1><p>From {}; {:.1f} s.</p>\n",
-                                   style, status_of(r), escaped(r.source), took_s);
+    std::string found = style + page::paragraph(fmt::format("From {}; {:.1f} s.", r.source, took_s));
     for (const std::string& note : r.notes)
-        page += "<p>" + escaped(note) + "</p>\n";
-    page += "<h2>Numbers</h2>" + table({"", "before", "after", "sigma"}, numbers);
-    page += "<h2>Error, pixels rms</h2>" + table({"", "fitted views", "held-out views"}, errors);
-    page += "<h2>Ladder</h2>" + table({"rung", "", "why"}, steps);
+        found += page::paragraph(note);
+    std::vector<page::Section> sections = {
+        {"Found", found},
+        {"Numbers", page::table({"", "before", "after", "sigma"}, numbers)},
+        {"Error, pixels rms", page::table({"", "fitted views", "held-out views"}, errors)},
+        {"Ladder", page::table({"rung", "", "why"}, steps, freed)},
+        {"Residuals", arrows(r) + scatter(r)},
+        {"Views", view_bars(r)},
+        {"Image", heat_map(r.coverage.counts, "Observations", "{:.0f}") +
+                      heat_map(r.pixel_sigma, "Sigma of a pixel, px", "{:.2g}")}};
     if (!moves.empty())
-        page += "<h2>Effect: how far surface points move</h2>" + table({"depth, m", "rms, mm", "most, mm"}, moves);
-    page += "<h2>Residuals</h2>" + arrows(r) + scatter(r);
-    page += "<h2>Views</h2>" + view_bars(r);
-    page += "<h2>Image</h2>" + heat_map(r.coverage.counts, "Observations", "{:.0f}") +
-            heat_map(r.pixel_sigma, "Sigma of a pixel, px", "{:.2g}");
-    return page + "</html>\n";
+        sections.insert(sections.begin() + 4, {"Effect: how far surface points move",
+                                               page::table({"depth, m", "rms, mm", "most, mm"}, moves)});
+    return page::document("Camera: " + status_of(r), sections);
 }
 
 } // namespace scanshade

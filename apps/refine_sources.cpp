@@ -1,3 +1,4 @@
+// Pictures, clouds and recordings made into evidence, with notes on what was left out.
 #include "apps/refine_sources.h"
 
 #include "io/camera_file.h"
@@ -68,8 +69,9 @@ std::vector<Picture> pictures_in(const fs::path& folder, std::vector<std::string
     }
     if (all.empty())
         throw Error(folder.string() + ": no pictures (PNG, JPEG ...) of a board that can be read");
-    const auto commonest = std::max_element(sizes.begin(), sizes.end(),
-                                            [](const auto& a, const auto& b) { return a.second < b.second; })->first;
+    const auto commonest = std::max_element(sizes.begin(), sizes.end(), [](const auto& a, const auto& b) {
+                               return a.second < b.second;
+                           })->first;
     std::erase_if(all, [&](const Picture& picture) {
         if (std::pair(picture.pixels.cols, picture.pixels.rows) == commonest)
             return false;
@@ -84,8 +86,8 @@ std::vector<Picture> pictures_in(const fs::path& folder, std::vector<std::string
 std::string text_of(const Target& target) {
     const char* kinds[] = {"chessboard of {}x{} corners", "ChArUco board of {}x{} squares", "grid of {}x{} circles",
                            "asymmetric grid of {}x{} circles"};
-    return fmt::format(fmt::runtime(std::string(kinds[static_cast<int>(target.kind)]) + ", {:g} mm"), target.count.width,
-                       target.count.height, 1000 * target.square_m);
+    return fmt::format(fmt::runtime(std::string(kinds[static_cast<int>(target.kind)]) + ", {:g} mm"),
+                       target.count.width, target.count.height, 1000 * target.square_m);
 }
 
 } // namespace
@@ -104,7 +106,8 @@ Refinement refine_from_boards(const fs::path& folder, const Target& target, cons
         else
             notes.push_back(fmt::format("no board found in {}; not used.", (folder / picture.name).string()));
     if (views.empty())
-        throw Error(fmt::format("{}: no {} found in any of {} pictures", folder.string(), text_of(target), pictures.size()));
+        throw Error(
+            fmt::format("{}: no {} found in any of {} pictures", folder.string(), text_of(target), pictures.size()));
     const auto given = given_camera(first, size);
     options.ladder.guessed = !given;
     const Camera before = given ? *given : with_lens(guess_from_boards(views, size), first.lens);
@@ -139,7 +142,8 @@ Refinement refine_from_clouds(const Capture& capture, const std::vector<std::siz
         }
     }
     if (used == 0)
-        throw Error(fmt::format("{}: no organised cloud that tells its camera: {}", capture.path.string(), notes.front()));
+        throw Error(
+            fmt::format("{}: no organised cloud that tells its camera: {}", capture.path.string(), notes.front()));
     const cv::Size size = evidence.size();
     const auto given = given_camera(first, size);
     options.ladder.guessed = !given;
@@ -148,12 +152,14 @@ Refinement refine_from_clouds(const Capture& capture, const std::vector<std::siz
                                 : Camera{{usual, usual, (size.width - 1) / 2.0, (size.height - 1) / 2.0, size},
                                          {},
                                          "guessed: a usual lens, principal point in the middle"};
-    Refinement result = refine(evidence, with_lens(before, first.lens), camera_rungs(before.distortion.model), options, "");
+    Refinement result =
+        refine(evidence, with_lens(before, first.lens), camera_rungs(before.distortion.model), options, "");
     result.source = fmt::format("pixels and points of {} organised cloud{}", used, used == 1 ? "" : "s");
     if (!result.after.distortion.any())
-        result.notes.push_back(fmt::format("the points lie on a pinhole's rays to {:.1g} px: no lens distortion is left in "
-                                           "them (rectified, or never there).",
-                                           result.climb.train_px));
+        result.notes.push_back(
+            fmt::format("the points lie on a pinhole's rays to {:.1g} px: no lens distortion is left in "
+                        "them (rectified, or never there).",
+                        result.climb.train_px));
     result.notes.insert(result.notes.begin(), notes.begin(), notes.end());
     return result;
 }
@@ -172,7 +178,8 @@ std::vector<SequenceFrame> frames_of(const Capture& capture, const std::vector<s
         try {
             const Frame frame = capture.load(index);
             SequenceFrame part{frame.name, {}, frame.depth_m, {}};
-            const cv::Mat3b colour = frame.colour.empty() && !entry.colour.empty() ? read_colour(entry.colour) : frame.colour;
+            const cv::Mat3b colour =
+                frame.colour.empty() && !entry.colour.empty() ? read_colour(entry.colour) : frame.colour;
             if (colour.empty())
                 throw Error(frame.name + ": no colour image");
             cv::cvtColor(colour, part.grey, cv::COLOR_BGR2GRAY);
@@ -192,10 +199,11 @@ std::vector<SequenceFrame> frames_of(const Capture& capture, const std::vector<s
 }
 
 /// Recorded poses are kept where they explain the frames nearly as well as refined ones would; otherwise refined.
-Sequence adjusted(const std::vector<SequenceFrame>& frames, const Camera& depth_camera, const Model& first, SequenceOptions& how,
-                  const std::string& poses) {
+Sequence adjusted(const std::vector<SequenceFrame>& frames, const Camera& depth_camera, const Model& first,
+                  SequenceOptions& how, const std::string& poses) {
     constexpr double nearly = 1.3;
-    const bool recorded = std::all_of(frames.begin(), frames.end(), [](const auto& part) { return part.world_from_camera; });
+    const bool recorded =
+        std::all_of(frames.begin(), frames.end(), [](const auto& part) { return part.world_from_camera; });
     how.refine_poses = (poses != "keep" && how.registered) || !recorded; // what is unregistered hangs by its poses
     Sequence refined(frames, depth_camera, first, how);
     if (poses != "auto" || !how.refine_poses || !recorded)
@@ -213,14 +221,15 @@ Sequence adjusted(const std::vector<SequenceFrame>& frames, const Camera& depth_
 }
 
 std::string overlap_sentence(double before_mm, double after_mm) {
-    return fmt::format("overlapping depths of different frames differ by {:.2f} mm (median), {:.2f} mm before.", after_mm,
-                       before_mm);
+    return fmt::format("overlapping depths of different frames differ by {:.2f} mm (median), {:.2f} mm before.",
+                       after_mm, before_mm);
 }
 
 } // namespace
 
 RecordingResult refine_from_recording(const Capture& capture, const std::vector<std::size_t>& wanted,
-                                      const FirstCamera& first, const RecordingOptions& recording, RefineOptions options) {
+                                      const FirstCamera& first, const RecordingOptions& recording,
+                                      RefineOptions options) {
     RecordingResult result;
     std::vector<std::string> notes = capture.warnings;
     std::vector<SequenceFrame> frames = frames_of(capture, wanted, recording, notes, result.stamps_s);
@@ -232,12 +241,14 @@ RecordingResult refine_from_recording(const Capture& capture, const std::vector<
     check(depth_camera);
 
     SequenceOptions how;
-    how.registered = recording.registered == "auto" ? capture.registration != Registration::no : recording.registered == "yes";
+    how.registered =
+        recording.registered == "auto" ? capture.registration != Registration::no : recording.registered == "yes";
     const cv::Size colour_size = frames.front().grey.size();
     if (how.registered && colour_size != depth_camera.pinhole.size)
-        throw Error(fmt::format("{}: colour is {}x{}, depth {}x{}: not registered; --registered no refines the colour camera",
-                                capture.path.string(), colour_size.width, colour_size.height, depth_camera.pinhole.size.width,
-                                depth_camera.pinhole.size.height));
+        throw Error(
+            fmt::format("{}: colour is {}x{}, depth {}x{}: not registered; --registered no refines the colour camera",
+                        capture.path.string(), colour_size.width, colour_size.height, depth_camera.pinhole.size.width,
+                        depth_camera.pinhole.size.height));
     const auto given = given_camera(first, colour_size);
     const double usual = 0.82 * colour_size.width; // a Kinect's colour camera
     const Camera guess{{usual, usual, (colour_size.width - 1) / 2.0, (colour_size.height - 1) / 2.0, colour_size},
@@ -251,7 +262,8 @@ RecordingResult refine_from_recording(const Capture& capture, const std::vector<
         rungs.insert(rungs.begin(), {"place", {turn_x, turn_y, turn_z, shift_x, shift_y, shift_z}});
 
     options.ladder.folds = std::min(options.ladder.folds, 4);
-    // Depth errors hang together across a scene in ways that no cluster covers: a real error of the camera is far beyond this.
+    // Depth errors hang together across a scene in ways that no cluster covers: a real error of the camera is far
+    // beyond this.
     options.ladder.least_sigmas = std::max(options.ladder.least_sigmas, 5.0);
     Sequence sequence = adjusted(frames, depth_camera, model_of(before), how, recording.poses);
     if (how.registered && !how.refine_poses)
@@ -260,8 +272,9 @@ RecordingResult refine_from_recording(const Capture& capture, const std::vector<
     const Fit start = sequence.start(model_of(before));
     result.refinement = refine(sequence, before, rungs, options, sequence.degeneracy(start));
     Refinement& r = result.refinement;
-    r.source = fmt::format("{} points seen {} times in {} frames, {}, poses {}", sequence.points(), sequence.sightings(),
-                           sequence.views(), how.registered ? "colour registered with depth" : "colour not registered with depth",
+    r.source = fmt::format("{} points seen {} times in {} frames, {}, poses {}", sequence.points(),
+                           sequence.sightings(), sequence.views(),
+                           how.registered ? "colour registered with depth" : "colour not registered with depth",
                            how.refine_poses ? "refined" : "kept");
     const auto poses = sequence.poses(r.climb.fit);
     for (std::size_t i = 0; i < poses.size(); ++i)

@@ -19,8 +19,8 @@ struct FirstCamera {
     LensModel lens = LensModel::brown_conrady;
 };
 
-/// Bundle adjustment over the pictures of a board in a folder. Pictures without a board, damaged ones and those of another
-/// size than most are left out, each with a note. Throws Error where no camera can be found.
+/// Bundle adjustment over the pictures of a board in a folder. Pictures without a board, damaged ones and those of
+/// another size than most are left out, each with a note. Throws Error where no camera can be found.
 [[nodiscard]] calibration::Refinement refine_from_boards(const std::filesystem::path& folder,
                                                          const calibration::Target& target, const FirstCamera& first,
                                                          calibration::RefineOptions options);
@@ -32,14 +32,15 @@ struct FirstCamera {
 /// What the user said of a recording.
 struct RecordingOptions {
     std::string registered = "auto"; ///< auto (what the capture says; unknown counts as yes), yes, no
-    std::string poses = "auto";      ///< auto, keep (they are the truth), refine (they are near it), ignore (follow the camera)
-    int frames = 24;                 ///< at most so many, evenly spread
+    std::string poses =
+        "auto";      ///< auto, keep (they are the truth), refine (they are near it), ignore (follow the camera)
+    int frames = 24; ///< at most so many, evenly spread
 };
 
 struct RecordingResult {
     calibration::Refinement refinement;
     std::vector<std::pair<std::string, Eigen::Isometry3d>> poses; ///< name, world_from_camera of each frame used
-    std::vector<double> stamps_s;                                 ///< of the frames used; their indices where they have none
+    std::vector<double> stamps_s; ///< of the frames used; their indices where they have none
 };
 
 /// Tracks, depths and poses of a recording's own frames. Registered: the one camera of both images. Unregistered: the

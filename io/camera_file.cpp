@@ -24,10 +24,11 @@ void check_numbers(const fs::path& file, const Pinhole& camera, const std::array
         if (values[i] == 0)
             refuse_camera(file, fmt::format("{} is 0, expected a focal length in pixels", names[i]));
         if (values[i] < 0)
-            refuse_camera(file,
-                   fmt::format("{} is {}, expected a positive focal length (fy < 0 is ICL-NUIM's flipped image axis: "
-                               "flip the images or negate it yourself; nothing is mirrored silently)",
-                               names[i], values[i]));
+            refuse_camera(
+                file,
+                fmt::format("{} is {}, expected a positive focal length (fy < 0 is ICL-NUIM's flipped image axis: "
+                            "flip the images or negate it yourself; nothing is mirrored silently)",
+                            names[i], values[i]));
     }
 }
 
@@ -40,12 +41,10 @@ struct FormatRow {
     CameraFormat format;
     const char* extension; ///< the first row of an extension is what it means without --format
 };
-constexpr FormatRow formats[] = {{"scanshade", CameraFormat::scanshade, ".json"},
-                                 {"open3d", CameraFormat::open3d, ".json"},
-                                 {"opencv", CameraFormat::opencv, ".yml"},
-                                 {"ros", CameraFormat::ros, ".yaml"},
-                                 {"kalibr", CameraFormat::kalibr, ".yaml"},
-                                 {"colmap", CameraFormat::colmap, ".txt"}};
+constexpr FormatRow formats[] = {
+    {"scanshade", CameraFormat::scanshade, ".json"}, {"open3d", CameraFormat::open3d, ".json"},
+    {"opencv", CameraFormat::opencv, ".yml"},        {"ros", CameraFormat::ros, ".yaml"},
+    {"kalibr", CameraFormat::kalibr, ".yaml"},       {"colmap", CameraFormat::colmap, ".txt"}};
 
 /// YAML has keys at the line's start, and a file that is not JSON but has one is taken for it.
 bool is_yaml(const std::string& bytes) {
@@ -126,14 +125,16 @@ CameraFormat camera_format(const fs::path& file, const std::string& name) {
     for (const FormatRow& row : formats)
         if (name.empty() ? file.extension() == row.extension : name == row.name)
             return row.format;
-    throw Misuse(name.empty() ? fmt::format("{}: which camera format? Known are .json (ours), .yml (OpenCV), .yaml (ROS), "
-                                            ".txt (COLMAP), or name one of {} with --format",
-                                            file.string(), fmt::join(camera_format_names(), ", "))
-                              : fmt::format("'{}' is no camera format, expected one of {}", name,
-                                            fmt::join(camera_format_names(), ", ")));
+    throw Misuse(name.empty()
+                     ? fmt::format("{}: which camera format? Known are .json (ours), .yml (OpenCV), .yaml (ROS), "
+                                   ".txt (COLMAP), or name one of {} with --format",
+                                   file.string(), fmt::join(camera_format_names(), ", "))
+                     : fmt::format("'{}' is no camera format, expected one of {}", name,
+                                   fmt::join(camera_format_names(), ", ")));
 }
 
-void write_camera_file(const fs::path& file, const CameraFile& camera, CameraFormat format, const CameraQuality& quality) {
+void write_camera_file(const fs::path& file, const CameraFile& camera, CameraFormat format,
+                       const CameraQuality& quality) {
     check(camera.camera);
     const std::string text = during(file.string(), [&] {
         switch (format) {

@@ -49,8 +49,8 @@ struct CameraQuality {
     std::string details;                                      ///< a JSON object, kept by ours under "refinement"
 };
 
-/// Writes atomically. Throws Error naming the file where the format cannot say what the camera is (a lens for Open3D, k3
-/// for Kalibr): nothing is dropped.
+/// Writes atomically. Throws Error naming the file where the format cannot say what the camera is (a lens for Open3D,
+/// k3 for Kalibr): nothing is dropped.
 void write_camera_file(const std::filesystem::path& file, const CameraFile& camera,
                        CameraFormat format = CameraFormat::scanshade, const CameraQuality& quality = {});
 

@@ -42,8 +42,8 @@ bool mentions_not_a_number(std::string_view rest) {
     const std::size_t word = text.find_last_of(" \t\r\n,[:", offset == 0 ? 0 : offset - 1);
     const std::size_t word_start = word == std::string_view::npos ? 0 : word + 1;
     if (mentions_not_a_number(text.substr(std::min(word_start, text.size()))))
-        refuse_camera(file,
-               fmt::format("{}: \"{}\" holds NaN or infinity, expected a number", place, key_before(text, offset)));
+        refuse_camera(
+            file, fmt::format("{}: \"{}\" holds NaN or infinity, expected a number", place, key_before(text, offset)));
     std::string reason = failure.what();
     if (const auto colon = reason.find(": "); colon != std::string::npos)
         reason = reason.substr(colon + 2);
@@ -79,7 +79,8 @@ double number_of(const fs::path& file, const Json& value, const std::string& key
 int size_of(const fs::path& file, const Json& object, const std::string& key) {
     const double value = number_of(file, member(file, object, key), key);
     if (value != std::floor(value) || value < 1 || value > widest_image)
-        refuse_camera(file, fmt::format("\"{}\" is {}, expected a whole number of pixels, 1 .. {}", key, value, widest_image));
+        refuse_camera(
+            file, fmt::format("\"{}\" is {}, expected a whole number of pixels, 1 .. {}", key, value, widest_image));
     return static_cast<int>(value);
 }
 
@@ -98,10 +99,11 @@ std::vector<double> numbers_of(const fs::path& file, const Json& object, const s
 /// Open3D's matrix stores columns one after another: fx 0 0, 0 fy 0, cx cy 1.
 Pinhole from_columns(const fs::path& file, const std::vector<double>& m) {
     if (m[6] == 0 && m[7] == 0 && (m[2] != 0 || m[5] != 0))
-        refuse_camera(file,
-               "\"intrinsic_matrix\" is stored row by row; Open3D's layout stores columns: fx 0 0 0 fy 0 cx cy 1");
+        refuse_camera(
+            file, "\"intrinsic_matrix\" is stored row by row; Open3D's layout stores columns: fx 0 0 0 fy 0 cx cy 1");
     if (m[2] != 0 || m[5] != 0 || m[8] != 1 || m[1] != 0)
-        refuse_camera(file, "\"intrinsic_matrix\" is not a camera matrix stored by columns: expected fx 0 0 0 fy 0 cx cy 1");
+        refuse_camera(file,
+                      "\"intrinsic_matrix\" is not a camera matrix stored by columns: expected fx 0 0 0 fy 0 cx cy 1");
     if (m[3] != 0)
         refuse_camera(file, fmt::format("\"intrinsic_matrix\" has skew {}, a pinhole camera here has none", m[3]));
     const Pinhole camera{m[0], m[4], m[6], m[7], {}};

@@ -79,7 +79,8 @@ CameraFile camera_from_matrix(const fs::path& file, const std::vector<TextLine>&
         ++rows;
     }
     if (rows != 3)
-        refuse_camera(file, fmt::format("{}, expected a 3x3 camera matrix", counted(static_cast<std::size_t>(rows), "row")));
+        refuse_camera(file,
+                      fmt::format("{}, expected a 3x3 camera matrix", counted(static_cast<std::size_t>(rows), "row")));
     if (m[3] != 0 || m[6] != 0 || m[7] != 0 || m[8] != 1)
         refuse_camera(file, "not a camera matrix stored by rows: expected fx 0 cx, 0 fy cy, 0 0 1");
     if (m[1] != 0)
@@ -106,12 +107,26 @@ Camera oblong(const std::vector<double>& p, Distortion lens) { return {{p[0], p[
 const ColmapModel colmap_models[] = {
     {"SIMPLE_PINHOLE", 3, [](const auto& p) { return square(p, {}); }},
     {"PINHOLE", 4, [](const auto& p) { return oblong(p, {}); }},
-    {"SIMPLE_RADIAL", 4, [](const auto& p) { return square(p, {p[3], 0, 0, 0, 0}); }},
-    {"RADIAL", 5, [](const auto& p) { return square(p, {p[3], p[4], 0, 0, 0}); }},
-    {"OPENCV", 8, [](const auto& p) { return oblong(p, {p[4], p[5], p[6], p[7], 0}); }},
-    {"FULL_OPENCV", 12, [](const auto& p) { return oblong(p, {p[4], p[5], p[6], p[7], p[8]}); }},
+    {"SIMPLE_RADIAL", 4,
+     [](const auto& p) {
+         return square(p, {p[3], 0, 0, 0, 0});
+     }},
+    {"RADIAL", 5,
+     [](const auto& p) {
+         return square(p, {p[3], p[4], 0, 0, 0});
+     }},
+    {"OPENCV", 8,
+     [](const auto& p) {
+         return oblong(p, {p[4], p[5], p[6], p[7], 0});
+     }},
+    {"FULL_OPENCV", 12,
+     [](const auto& p) {
+         return oblong(p, {p[4], p[5], p[6], p[7], p[8]});
+     }},
     {"OPENCV_FISHEYE", 8,
-     [](const auto& p) { return oblong(p, {p[4], p[5], 0, 0, p[6], p[7], LensModel::kannala_brandt}); }},
+     [](const auto& p) {
+         return oblong(p, {p[4], p[5], 0, 0, p[6], p[7], LensModel::kannala_brandt});
+     }},
 };
 
 bool is_colmap_line(const std::vector<std::string_view>& all) {
@@ -122,7 +137,8 @@ bool is_colmap_line(const std::vector<std::string_view>& all) {
 } // namespace
 
 bool is_colmap(const std::vector<TextLine>& lines) {
-    return std::any_of(lines.begin(), lines.end(), [](const TextLine& line) { return is_colmap_line(words(line.text)); });
+    return std::any_of(lines.begin(), lines.end(),
+                       [](const TextLine& line) { return is_colmap_line(words(line.text)); });
 }
 
 CameraFile camera_from_colmap(const fs::path& file, const std::vector<TextLine>& lines) {
@@ -174,8 +190,9 @@ CameraFile camera_from_colmap(const fs::path& file, const std::vector<TextLine>&
 std::string camera_as_colmap(const Camera& camera) {
     const auto& [fx, fy, cx, cy, size] = camera.pinhole;
     const Distortion& d = camera.distortion;
-    const std::string start = fmt::format("# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]; pixel centres at 0.5\n1 {{}} {} {} {} {} {} {}",
-                                          size.width, size.height, fx, fy, cx + 0.5, cy + 0.5);
+    const std::string start =
+        fmt::format("# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]; pixel centres at 0.5\n1 {{}} {} {} {} {} {} {}",
+                    size.width, size.height, fx, fy, cx + 0.5, cy + 0.5);
     const auto line = [&](const char* model) { return fmt::format(fmt::runtime(start), model); };
     if (d.model == LensModel::kannala_brandt)
         return fmt::format("{} {} {} {} {}\n", line("OPENCV_FISHEYE"), d.k1, d.k2, d.k3, d.k4);

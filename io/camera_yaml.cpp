@@ -23,7 +23,8 @@ cv::FileStorage opened(const fs::path& file, const std::string& text) {
     } catch (const cv::Exception& failure) {
         int line = 0;
         std::string why = failure.err;
-        if (const auto open = why.find('('); open != std::string::npos && std::sscanf(why.c_str() + open, "(%d)", &line) == 1)
+        if (const auto open = why.find('(');
+            open != std::string::npos && std::sscanf(why.c_str() + open, "(%d)", &line) == 1)
             throw Error(fmt::format("{}: not YAML: {}", at_line(file, line - static_cast<int>(!first.empty())),
                                     why.substr(why.find(": ", open) + 2)));
         refuse_camera(file, "not YAML: " + why);
@@ -65,11 +66,13 @@ cv::Size checked_size(const fs::path& file, double width, double height) {
 
 Pinhole from_matrix(const fs::path& file, const std::vector<double>& m) {
     if (m[3] != 0 || m[6] != 0 || m[7] != 0 || m[8] != 1)
-        refuse_camera(file, "\"camera_matrix\" is not a camera matrix stored by rows: expected fx 0 cx, 0 fy cy, 0 0 1");
+        refuse_camera(file,
+                      "\"camera_matrix\" is not a camera matrix stored by rows: expected fx 0 cx, 0 fy cy, 0 0 1");
     if (m[1] != 0)
         refuse_camera(file, fmt::format("\"camera_matrix\" has skew {}, a pinhole camera here has none", m[1]));
     const Pinhole pinhole{m[0], m[4], m[2], m[5], {}};
-    check_numbers(file, pinhole, {"\"camera_matrix\" fx", "\"camera_matrix\" fy", "\"camera_matrix\" cx", "\"camera_matrix\" cy"});
+    check_numbers(file, pinhole,
+                  {"\"camera_matrix\" fx", "\"camera_matrix\" fy", "\"camera_matrix\" cx", "\"camera_matrix\" cy"});
     return pinhole;
 }
 
@@ -83,10 +86,12 @@ Distortion fisheye(const fs::path& file, const std::string& key, const std::vect
 Distortion polynomial(const fs::path& file, const std::string& key, std::vector<double> k) {
     for (std::size_t i = 5; i < k.size(); ++i)
         if (k[i] != 0)
-            refuse_camera(file, fmt::format("\"{}\" number {} is {}: rational, thin-prism and tilted lenses are not supported",
-                                            key, i + 1, k[i]));
+            refuse_camera(
+                file, fmt::format("\"{}\" number {} is {}: rational, thin-prism and tilted lenses are not supported",
+                                  key, i + 1, k[i]));
     if (k.size() != 4 && k.size() != 5 && k.size() != 8 && k.size() != 12 && k.size() != 14 && !k.empty())
-        refuse_camera(file, fmt::format("\"{}\" has {}, expected 4 or 5 (k1 k2 p1 p2 k3)", key, counted(k.size(), "number")));
+        refuse_camera(file,
+                      fmt::format("\"{}\" has {}, expected 4 or 5 (k1 k2 p1 p2 k3)", key, counted(k.size(), "number")));
     k.resize(5);
     return {k[0], k[1], k[2], k[3], k[4]};
 }
@@ -103,7 +108,8 @@ CameraFile from_matrices(const fs::path& file, const cv::FileNode& root) {
     const std::string model = root["distortion_model"].isString() ? root["distortion_model"].string() : "plumb_bob";
     const bool flagged = root["fisheye_model"].isInt() && static_cast<int>(root["fisheye_model"]) != 0;
     if (model != "plumb_bob" && model != "rational_polynomial" && model != "equidistant" && model != "fisheye")
-        refuse_camera(file, fmt::format("\"distortion_model\" is {}, expected plumb_bob or equidistant", in_quotes(model)));
+        refuse_camera(file,
+                      fmt::format("\"distortion_model\" is {}, expected plumb_bob or equidistant", in_quotes(model)));
     const auto numbers = numbers_of(file, root, key);
     const bool is_fisheye = flagged || model == "equidistant" || model == "fisheye";
     result.camera.distortion = is_fisheye ? fisheye(file, key, numbers) : polynomial(file, key, numbers);
@@ -120,7 +126,8 @@ CameraFile from_camchain(const fs::path& file, const cv::FileNode& root) {
         refuse_camera(file, fmt::format("\"camera_model\" is {}, expected pinhole", in_quotes(model)));
     const auto k = numbers_of(file, camera, "intrinsics", 4);
     result.camera.pinhole = {k[0], k[1], k[2], k[3], {}};
-    check_numbers(file, result.camera.pinhole, {"\"intrinsics\" fx", "\"intrinsics\" fy", "\"intrinsics\" cx", "\"intrinsics\" cy"});
+    check_numbers(file, result.camera.pinhole,
+                  {"\"intrinsics\" fx", "\"intrinsics\" fy", "\"intrinsics\" cx", "\"intrinsics\" cy"});
     const auto size = numbers_of(file, camera, "resolution", 2);
     result.camera.pinhole.size = checked_size(file, size[0], size[1]);
     const std::string lens = camera["distortion_model"].isString() ? camera["distortion_model"].string() : "none";
@@ -129,7 +136,8 @@ CameraFile from_camchain(const fs::path& file, const cv::FileNode& root) {
     else if (lens == "radtan")
         result.camera.distortion = polynomial(file, "distortion_coeffs", numbers_of(file, camera, "distortion_coeffs"));
     else if (lens != "none")
-        refuse_camera(file, fmt::format("\"distortion_model\" is {}, expected radtan, equidistant or none", in_quotes(lens)));
+        refuse_camera(file,
+                      fmt::format("\"distortion_model\" is {}, expected radtan, equidistant or none", in_quotes(lens)));
     return result;
 }
 
@@ -144,8 +152,8 @@ std::vector<double> coefficients(const Distortion& d) {
 std::string list(const std::vector<double>& values) { return fmt::format("[{}]", fmt::join(values, ", ")); }
 
 std::string matrix(const char* name, const char* type, int rows, int columns, const std::vector<double>& values) {
-    return fmt::format("{}:{}\n  rows: {}\n  cols: {}\n{}  data: {}\n", name, *type ? " !!opencv-matrix" : "", rows, columns,
-                       type, list(values));
+    return fmt::format("{}:{}\n  rows: {}\n  cols: {}\n{}  data: {}\n", name, *type ? " !!opencv-matrix" : "", rows,
+                       columns, type, list(values));
 }
 
 std::vector<double> camera_matrix(const Pinhole& p) { return {p.fx, 0, p.cx, 0, p.fy, p.cy, 0, 0, 1}; }
@@ -201,10 +209,10 @@ std::string camera_as_kalibr(const Camera& camera) {
         throw Error(fmt::format("Kalibr's radtan lens has no k3, and this camera's is {}; write another format", d.k3));
     auto k = coefficients(d);
     k.resize(4);
-    return fmt::format("cam0:\n  camera_model: pinhole\n  intrinsics: {}\n  distortion_model: {}\n  distortion_coeffs: {}\n"
-                       "  resolution: [{}, {}]\n",
-                       list({p.fx, p.fy, p.cx, p.cy}), fisheye_lens ? "equidistant" : "radtan", list(k), p.size.width,
-                       p.size.height);
+    return fmt::format(
+        "cam0:\n  camera_model: pinhole\n  intrinsics: {}\n  distortion_model: {}\n  distortion_coeffs: {}\n"
+        "  resolution: [{}, {}]\n",
+        list({p.fx, p.fy, p.cx, p.cy}), fisheye_lens ? "equidistant" : "radtan", list(k), p.size.width, p.size.height);
 }
 
 } // namespace scanshade

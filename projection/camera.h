@@ -77,7 +77,7 @@ void distort_fisheye(const Number* coefficients, const Number& x, const Number& 
         return;
     }
     const Number r = sqrt(r2), theta = atan(r), t2 = theta * theta;
-    const Number *k = coefficients;
+    const Number* k = coefficients;
     const Number bent = theta * (Number(1) + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3]))));
     x_bent = x * bent / r;
     y_bent = y * bent / r;

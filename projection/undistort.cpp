@@ -149,8 +149,8 @@ using Key = std::array<double, 13>;
 Key key_of(const Camera& camera) {
     const auto& [fx, fy, cx, cy, size] = camera.pinhole;
     const Distortion& d = camera.distortion;
-    return {fx,   fy,   cx,   cy,   double(size.width), double(size.height), d.k1,
-            d.k2, d.p1, d.p2, d.k3, d.k4,               double(d.model)};
+    return {fx,   fy,   cx,   cy,   double(size.width), double(size.height), d.k1, d.k2,
+            d.p1, d.p2, d.k3, d.k4, double(d.model)};
 }
 
 } // namespace

@@ -43,17 +43,19 @@ std::vector<BoardView> boards_seen_by(const Camera& camera, int views, double no
     std::vector<BoardView> all;
     while (static_cast<int>(all.size()) < views) {
         const double z_m = 0.35 + 0.15 * even(random);
-        const double pose[6] = {tilt * even(random), tilt * even(random), 0.3 * even(random),
+        const double pose[6] = {tilt * even(random),      tilt * even(random),       0.3 * even(random),
                                 0.3 * z_m * even(random), 0.25 * z_m * even(random), z_m};
         BoardView view{"view " + std::to_string(all.size()), {}, {}};
         bool inside = true;
         for (int i = 0; i < corners.area(); ++i) {
-            const Eigen::Vector3d on_board((i % corners.width - 3.5) * square_m, (i / corners.width - 2.5) * square_m, 0);
+            const Eigen::Vector3d on_board((i % corners.width - 3.5) * square_m, (i / corners.width - 2.5) * square_m,
+                                           0);
             Eigen::Vector3d point;
             Eigen::Vector2d pixel;
             moved(pose, on_board.data(), point.data());
             pixel_of(model.lens, model.values.data(), point.data(), pixel.data());
-            inside = inside && pixel.x() > 0 && pixel.y() > 0 && pixel.x() < image.width - 1 && pixel.y() < image.height - 1;
+            inside =
+                inside && pixel.x() > 0 && pixel.y() > 0 && pixel.x() < image.width - 1 && pixel.y() < image.height - 1;
             view.points_m.push_back(on_board);
             view.pixels.emplace_back(pixel.x() + noise(random), pixel.y() + noise(random));
         }
@@ -74,8 +76,9 @@ Free free_rungs(const std::vector<Rung>& rungs) {
 // ---------------------------------------------------------------------------------------------------- honest sigmas
 
 TEST(Boards, SigmasAreHonest) {
-    // A Gaussian error is within 2 sigma 95.4 % of the time and has a mean square of 1 sigma^2: over 200 trials and each
-    // number the share is 93 .. 98 % (1.6 standard errors either way) and the mean square 0.8 .. 1.2 (2 standard errors).
+    // A Gaussian error is within 2 sigma 95.4 % of the time and has a mean square of 1 sigma^2: over 200 trials and
+    // each number the share is 93 .. 98 % (1.6 standard errors either way) and the mean square 0.8 .. 1.2 (2 standard
+    // errors).
     const Camera truth{{531, 527, 327, 236, image}, {-0.25, 0.08, 0.001, -0.0015, 0}, "truth"};
     const std::vector<Rung> rungs = {{"all", {f, aspect, cx, cy, k1, k2, p1, p2}}};
     const Free free = free_rungs(rungs);
@@ -123,14 +126,17 @@ TEST(Ladder, ClimbsToTheTrueModelAndNoFarther) {
         {"pinhole", {525, 525, 319.5, 239.5, image}, {}, {"f"}},
         {"moved centre", {525, 525, 330, 230, image}, {}, {"f", "cx, cy"}},
         {"barrel", {525, 525, 325, 245, image}, {-0.2, 0, 0, 0, 0}, {"f", "cx, cy", "k1"}},
-        {"all but k3", {530, 522, 325, 245, image}, {-0.25, 0.15, 0.002, -0.002, 0},
+        {"all but k3",
+         {530, 522, 325, 245, image},
+         {-0.25, 0.15, 0.002, -0.002, 0},
          {"f", "fx, fy", "cx, cy", "k1", "k2", "p1, p2"}}};
     constexpr int trials = 10;
     int right = 0, wrong = 0, false_distortion = 0;
     for (const Lens& lens : lenses)
         for (int trial = 0; trial < trials; ++trial) {
             std::mt19937 random(100 * trial + 7);
-            const std::vector<BoardView> views = boards_seen_by({lens.pinhole, lens.distortion, lens.name}, 12, 0.15, random);
+            const std::vector<BoardView> views =
+                boards_seen_by({lens.pinhole, lens.distortion, lens.name}, 12, 0.15, random);
             const Boards boards(views);
             const Fit start = boards.start(model_of(guess_from_boards(views, image)));
             LadderOptions options;
@@ -198,7 +204,8 @@ std::string refusal_of(const std::vector<BoardView>& views, bool guessed) {
     options.ladder.guessed = guessed;
     const Camera before = guessed ? guess_from_boards(views, image) : plain;
     const std::string cannot = degeneracy(views, boards.start(model_of(before)));
-    return tests::refusal([&] { (void)refine(boards, before, camera_rungs(LensModel::brown_conrady), options, cannot); });
+    return tests::refusal(
+        [&] { (void)refine(boards, before, camera_rungs(LensModel::brown_conrady), options, cannot); });
 }
 
 TEST(Boards, DegenerateViewsAreNamedAndChangeNothing) {
@@ -259,7 +266,8 @@ TEST(Boards, AnOutlyingViewIsFlaggedAndItsDroppingHelps) {
     EXPECT_LT(result.climb.train_px, 0.2);
 }
 
-// ---------------------------------------------------------------------------------------------------- targets in pictures
+// ---------------------------------------------------------------------------------------------------- targets in
+// pictures
 
 /// A picture of a flat pattern (1 mm of it = 1 / mm_per_px pixels) as a camera without distortion sees it.
 cv::Mat3b seen(const cv::Mat1b& pattern, double m_per_px, const double* pose, const Pinhole& camera) {
@@ -339,8 +347,8 @@ fs::path data_folder() {
     return set ? fs::path(set) : fs::path(SCANSHADE_SOURCE) / "../shared/data";
 }
 
-#define NEEDS(path)                                                                                                            \
-    if (!fs::exists(path))                                                                                                     \
+#define NEEDS(path)                                                                                                    \
+    if (!fs::exists(path))                                                                                             \
     GTEST_SKIP() << (path) << " is not there; SCANSHADE_DATA names the folder of recorded data"
 
 /// OpenCV's own answer to the same corners with the same model.
@@ -364,8 +372,8 @@ OpenCvAnswer opencv_calibrates(const std::vector<BoardView>& views) {
     OpenCvAnswer answer;
     cv::Mat lens, turns, shifts, pose_sigmas, errors;
     cv::Mat camera;
-    answer.rms = cv::calibrateCamera(points, pixels, image, camera, lens, turns, shifts, answer.sigmas, pose_sigmas, errors, 0,
-                                     {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 100, 1e-12});
+    answer.rms = cv::calibrateCamera(points, pixels, image, camera, lens, turns, shifts, answer.sigmas, pose_sigmas,
+                                     errors, 0, {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 100, 1e-12});
     answer.camera = camera;
     return answer;
 }
@@ -388,7 +396,8 @@ std::vector<BoardView> chessboards(const fs::path& folder, bool plain_window) {
             cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
             std::vector<cv::Point2f> corners;
             EXPECT_TRUE(cv::findChessboardCorners(grey, {9, 6}, corners));
-            cv::cornerSubPix(grey, corners, {11, 11}, {-1, -1}, {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 30, 0.1});
+            cv::cornerSubPix(grey, corners, {11, 11}, {-1, -1},
+                             {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 30, 0.1});
             for (std::size_t c = 0; c < corners.size(); ++c)
                 view->pixels[c] = {corners[c].x, corners[c].y};
         }
@@ -413,8 +422,9 @@ TEST(Chessboards, FullModelIsOpenCvsToTheLastDigitAndSigma) {
         ASSERT_EQ(views.size(), 13);
         const OpenCvAnswer theirs = opencv_calibrates(views);
         const Refinement ours = full_model(views);
-        std::printf("%s window: OpenCV %.4f px, ours %.4f px; fx %.2f and %.2f +- %.2f\n", plain_window ? "fixed" : "own",
-                    theirs.rms, ours.climb.train_px, theirs.camera(0, 0), ours.after.pinhole.fx, ours.climb.fit.sigma(f));
+        std::printf("%s window: OpenCV %.4f px, ours %.4f px; fx %.2f and %.2f +- %.2f\n",
+                    plain_window ? "fixed" : "own", theirs.rms, ours.climb.train_px, theirs.camera(0, 0),
+                    ours.after.pinhole.fx, ours.climb.fit.sigma(f));
         EXPECT_LE(ours.climb.train_px, theirs.rms * (1 + 1e-6)); // the same least squares
         // OpenCV stops a little before the minimum; 2 combined sigmas are a hundred times more than is needed.
         EXPECT_NEAR(ours.after.pinhole.fx, theirs.camera(0, 0), 0.1 * ours.climb.fit.sigma(f));
@@ -447,8 +457,11 @@ TEST(Chessboards, TheLaddersChoiceIsNoWorseThanTheFullModelOnHeldOutViews) {
 TEST(Clouds, OrganisedCloudsTellTheirCameraToAThousandthOfAPixel) {
     const fs::path folder = data_folder() / "organised";
     NEEDS(folder);
-    for (const auto& [name, px, py] : {std::tuple{"learn0", 319.5, 239.5}, {"learn40", 319.5, 239.5}, {"office1", 320.0, 240.0},
-                                       {"capture0001", 319.5, 239.5}, {"frame_20121214T142255.814212", 320.0, 240.0}}) {
+    for (const auto& [name, px, py] : {std::tuple{"learn0", 319.5, 239.5},
+                                       {"learn40", 319.5, 239.5},
+                                       {"office1", 320.0, 240.0},
+                                       {"capture0001", 319.5, 239.5},
+                                       {"frame_20121214T142255.814212", 320.0, 240.0}}) {
         std::vector<std::string> warnings;
         Organised evidence;
         evidence.add(name, read_cloud(folder / (std::string(name) + ".pcd"), warnings));
@@ -471,8 +484,8 @@ TEST(Clouds, DistortionLeftInACloudsGridIsFound) {
     Cloud cloud{small.pinhole.size, {}, {}, {}};
     for (int v = 0; v < 120; ++v)
         for (int u = 0; u < 160; ++u) {
-            const auto straight =
-                undistorted(small.distortion, {(u - small.pinhole.cx) / small.pinhole.fx, (v - small.pinhole.cy) / small.pinhole.fy});
+            const auto straight = undistorted(small.distortion, {(u - small.pinhole.cx) / small.pinhole.fx,
+                                                                 (v - small.pinhole.cy) / small.pinhole.fy});
             const double z = 2 + 0.3 * std::sin(u * 0.1);
             cloud.points.push_back(straight ? Eigen::Vector3d(z * straight->x(), z * straight->y(), z)
                                             : Eigen::Vector3d::Constant(NAN));

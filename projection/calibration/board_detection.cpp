@@ -1,3 +1,4 @@
+// OpenCV's detectors of each target, made to give points and pixels.
 #include "projection/calibration/board_detection.h"
 
 #include "projection/error.h"
@@ -26,7 +27,8 @@ int dictionary_named(const std::string& name) {
     for (const auto& [known, index] : dictionaries())
         if (known == name)
             return index;
-    throw Misuse(fmt::format("'{}' is no marker dictionary, expected one of {}", name, fmt::join(dictionary_names(), ", ")));
+    throw Misuse(
+        fmt::format("'{}' is no marker dictionary, expected one of {}", name, fmt::join(dictionary_names(), ", ")));
 }
 
 void check(const Target& target) {
@@ -77,7 +79,8 @@ std::optional<BoardView> find_chessboard(const cv::Mat1b& grey, const Target& ta
 }
 
 std::optional<BoardView> find_circles(const cv::Mat1b& grey, const Target& target, const std::string& name) {
-    const int layout = target.kind == Target::Kind::circles ? cv::CALIB_CB_SYMMETRIC_GRID : cv::CALIB_CB_ASYMMETRIC_GRID;
+    const int layout =
+        target.kind == Target::Kind::circles ? cv::CALIB_CB_SYMMETRIC_GRID : cv::CALIB_CB_ASYMMETRIC_GRID;
     std::vector<cv::Point2f> centres;
     if (!cv::findCirclesGrid(grey, target.count, centres, layout) &&
         !cv::findCirclesGrid(grey, target.count, centres, layout | cv::CALIB_CB_CLUSTERING))
@@ -90,7 +93,8 @@ std::optional<BoardView> find_charuco(const cv::Mat1b& grey, const Target& targe
     const auto square = static_cast<float>(target.square_m);
     const auto marker = target.marker_m > 0 ? static_cast<float>(target.marker_m) : 0.75F * square;
     const auto dictionary = cv::aruco::getPredefinedDictionary(dictionary_named(target.dictionary));
-    const auto board = cv::aruco::CharucoBoard::create(target.count.width, target.count.height, square, marker, dictionary);
+    const auto board =
+        cv::aruco::CharucoBoard::create(target.count.width, target.count.height, square, marker, dictionary);
     std::vector<std::vector<cv::Point2f>> markers;
     std::vector<int> ids, corner_ids;
     cv::aruco::detectMarkers(grey, dictionary, markers, ids);

@@ -14,8 +14,9 @@ namespace scanshade::calibration {
 struct Target {
     enum class Kind { chessboard, charuco, circles, asymmetric_circles } kind = Kind::chessboard;
     cv::Size count{9, 6};
-    double square_m = 0.025; ///< between neighbouring corners or circles (of one row of an asymmetric grid: half of that)
-    double marker_m = 0;     ///< side of a ChArUco marker; 0 = three quarters of a square
+    double square_m =
+        0.025;           ///< between neighbouring corners or circles (of one row of an asymmetric grid: half of that)
+    double marker_m = 0; ///< side of a ChArUco marker; 0 = three quarters of a square
     std::string dictionary = "4x4_50"; ///< of the ChArUco markers
 };
 

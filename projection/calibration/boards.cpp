@@ -1,3 +1,4 @@
+// Boards as evidence: the adjustment, first guesses, and views that tell nothing.
 #include "projection/calibration/boards.h"
 
 #include "projection/calibration/solve.h"
@@ -33,10 +34,9 @@ struct CornerResidual {
 
 void add_view(ceres::Problem& problem, Model& model, const BoardView& view, double weight, double* pose) {
     for (std::size_t i = 0; i < view.pixels.size(); ++i)
-        problem.AddResidualBlock(
-            new ceres::AutoDiffCostFunction<CornerResidual, 2, camera_unknowns, pose_unknowns>(
-                new CornerResidual{model.lens, view.points_m[i], view.pixels[i], weight}),
-            nullptr, model.values.data(), pose);
+        problem.AddResidualBlock(new ceres::AutoDiffCostFunction<CornerResidual, 2, camera_unknowns, pose_unknowns>(
+                                     new CornerResidual{model.lens, view.points_m[i], view.pixels[i], weight}),
+                                 nullptr, model.values.data(), pose);
 }
 
 /// The board's pose from its homography, with directions freed of the lens so that any lens will do.
@@ -200,14 +200,17 @@ std::string degeneracy(const std::vector<BoardView>& views, const Fit& fit) {
     double widest = 0;
     for (std::size_t i = 0; i < views.size(); ++i)
         for (std::size_t j = 0; j < i; ++j)
-            widest = std::max(widest, std::acos(std::clamp(normal_of(&fit.nuisance[i * pose_unknowns])
-                                                               .dot(normal_of(&fit.nuisance[j * pose_unknowns])),
-                                                           -1.0, 1.0)));
+            widest = std::max(
+                widest,
+                std::acos(std::clamp(
+                    normal_of(&fit.nuisance[i * pose_unknowns]).dot(normal_of(&fit.nuisance[j * pose_unknowns])), -1.0,
+                    1.0)));
     const double degrees = widest * 180 / CV_PI;
     if (degrees < least_tilt_degrees)
-        return fmt::format("the board has the same tilt in all {} views (within {:.1f} degrees): focal length and distance "
-                           "cannot be told apart; tilt it by 20 to 40 degrees either way",
-                           views.size(), degrees);
+        return fmt::format(
+            "the board has the same tilt in all {} views (within {:.1f} degrees): focal length and distance "
+            "cannot be told apart; tilt it by 20 to 40 degrees either way",
+            views.size(), degrees);
     return {};
 }
 

@@ -16,8 +16,8 @@ using Views = std::vector<bool>; ///< which views take part
 struct Fit {
     Model model;
     std::vector<double> nuisance = {}; ///< the evidence's own unknowns (poses, landmarks): where the next fit starts
-    double rss = 0;                  ///< sum of squared residuals of the views used, in units of `unit()`
-    int residuals = 0, unknowns = 0; ///< how many of each; unknowns count the evidence's own, too
+    double rss = 0;                    ///< sum of squared residuals of the views used, in units of `unit()`
+    int residuals = 0, unknowns = 0;   ///< how many of each; unknowns count the evidence's own, too
     /// Of the model's numbers; rows and columns of frozen ones are 0. Scaled by the residual variance.
     /// Empty when it was not asked for, or when the views do not determine the free numbers.
     Eigen::MatrixXd covariance = {};

@@ -1,3 +1,4 @@
+// The ladder: which rung is tried, what speaks against it, what is taken back.
 #include "projection/calibration/ladder.h"
 
 #include "projection/calibration/quality.h"
@@ -93,8 +94,8 @@ std::vector<ViewScore> held_out(const Evidence& evidence, const Fit& from, const
     return all;
 }
 
-/// How much smaller the views' errors have become: mean logarithm of the ratio, and its standard error. Views pair off, and
-/// a view with ten times the error of the others has one vote, not ninety-nine.
+/// How much smaller the views' errors have become: mean logarithm of the ratio, and its standard error. Views pair off,
+/// and a view with ten times the error of the others has one vote, not ninety-nine.
 struct Gain {
     double mean = 0, standard_error = 0;
     [[nodiscard]] bool clear() const { return mean > standard_error; }
@@ -198,7 +199,8 @@ class Ladder {
     Outcome try_rungs(const std::vector<std::size_t>& indices) {
         Rung rung = rungs_[indices.front()];
         for (std::size_t i = 1; i < indices.size(); ++i)
-            rung.unknowns.insert(rung.unknowns.end(), rungs_[indices[i]].unknowns.begin(), rungs_[indices[i]].unknowns.end());
+            rung.unknowns.insert(rung.unknowns.end(), rungs_[indices[i]].unknowns.begin(),
+                                 rungs_[indices[i]].unknowns.end());
         if (const double rms = train_rms(climb_.fit); rms < options_.enough_px && !must(rung)) {
             say(indices, false, fmt::format("not needed: the error is {:.1g} px without it", rms));
             return Outcome::refused;
@@ -218,8 +220,9 @@ class Ladder {
         const auto scores = held_out(evidence_, fit, free, used_, options_.folds);
         const Gain gain = gain_of(held_out_, scores);
         if (!gain.clear() && !must(rung)) {
-            say(indices, false, fmt::format("not supported: held-out error falls by {:.2f} % +- {:.2f} %", gain.percent(),
-                                            100 * gain.standard_error));
+            say(indices, false,
+                fmt::format("not supported: held-out error falls by {:.2f} % +- {:.2f} %", gain.percent(),
+                            100 * gain.standard_error));
             return Outcome::refused;
         }
         say(indices, true,
@@ -248,7 +251,8 @@ class Ladder {
             return "not supported: BIC does not fall";
         if (const double found = condition(fit, free); found > options_.worst_condition)
             return fmt::format("not determined: condition number {:.1e}", found);
-        if (const std::string trouble = inflated(climb_.fit, fit, climb_.free, options_.most_inflation); !trouble.empty())
+        if (const std::string trouble = inflated(climb_.fit, fit, climb_.free, options_.most_inflation);
+            !trouble.empty())
             return "not supported: " + trouble;
         return {};
     }
@@ -281,7 +285,9 @@ class Ladder {
 
 } // namespace
 
-bool Climb::unchanged() const { return std::none_of(free.begin(), free.end(), [](bool open) { return open; }); }
+bool Climb::unchanged() const {
+    return std::none_of(free.begin(), free.end(), [](bool open) { return open; });
+}
 
 Climb climb(const Evidence& evidence, const Fit& start, const std::vector<Rung>& rungs, const Views& used,
             const LadderOptions& options) {

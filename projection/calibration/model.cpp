@@ -1,11 +1,13 @@
+// Cameras to numbers and back; the rungs.
 #include "projection/calibration/model.h"
 
 namespace scanshade::calibration {
 
 std::string_view name_of(Unknown unknown) {
     constexpr std::array<std::string_view, unknown_count> names = {
-        "f",           "fy/fx",        "cx",          "cy",     "k1",     "k2",     "p1",      "p2",      "k3",     "k4",
-        "depth scale", "depth offset", "depth curve", "turn x", "turn y", "turn z", "shift x", "shift y", "shift z"};
+        "f",      "fy/fx",  "cx",      "cy",          "k1",           "k2",          "p1",
+        "p2",     "k3",     "k4",      "depth scale", "depth offset", "depth curve", "turn x",
+        "turn y", "turn z", "shift x", "shift y",     "shift z"};
     return names[unknown];
 }
 

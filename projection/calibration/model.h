@@ -11,9 +11,25 @@ namespace scanshade::calibration {
 
 /// The numbers of a Model. `f` is fx; `aspect` is fy / fx, so that one focal length is one number.
 enum Unknown : int {
-    f, aspect, cx, cy, k1, k2, p1, p2, k3, k4,       // the camera
-    depth_scale, depth_offset, depth_curve,          // true depth = scale z + offset + curve z^2, metres
-    turn_x, turn_y, turn_z, shift_x, shift_y, shift_z, // colour_from_depth: axis times angle, metres
+    f,
+    aspect,
+    cx,
+    cy,
+    k1,
+    k2,
+    p1,
+    p2,
+    k3,
+    k4, // the camera
+    depth_scale,
+    depth_offset,
+    depth_curve, // true depth = scale z + offset + curve z^2, metres
+    turn_x,
+    turn_y,
+    turn_z,
+    shift_x,
+    shift_y,
+    shift_z, // colour_from_depth: axis times angle, metres
     unknown_count
 };
 inline constexpr int camera_unknowns = depth_scale, depth_unknowns = turn_x - depth_scale;

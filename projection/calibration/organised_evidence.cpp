@@ -1,3 +1,4 @@
+// Organised clouds as evidence: a sample of points per tile.
 #include "projection/calibration/organised_evidence.h"
 
 #include "projection/calibration/organised.h"
@@ -33,8 +34,8 @@ void Organised::add(const std::string& name, const Cloud& cloud) {
     if (size_.empty())
         size_ = cloud.grid;
     if (cloud.grid != size_)
-        throw Error(fmt::format("{}: the cloud's grid is {}x{}, the others' {}x{}", name, cloud.grid.width, cloud.grid.height,
-                                size_.width, size_.height));
+        throw Error(fmt::format("{}: the cloud's grid is {}x{}, the others' {}x{}", name, cloud.grid.width,
+                                cloud.grid.height, size_.width, size_.height));
     std::vector<Tile> tiles(tiles_across * tiles_across);
     for (int row = 0; row < size_.height; row += stride)
         for (int column = 0; column < size_.width; column += stride) {

@@ -9,8 +9,9 @@ namespace scanshade::calibration {
 /// Each cloud's grid is cut into 4x4 tiles, which are its views: what is fitted to some tiles is tested on the others.
 class Organised final : public Evidence {
   public:
-    /// Adds a sample of the cloud's points, one of 8x8 pixels. Throws Error for a cloud without grid, of another size than
-    /// the ones before, or whose points do not lie on a pinhole's rays at all (more than 2 px off, see fit_pinhole).
+    /// Adds a sample of the cloud's points, one of 8x8 pixels. Throws Error for a cloud without grid, of another size
+    /// than the ones before, or whose points do not lie on a pinhole's rays at all (more than 2 px off, see
+    /// fit_pinhole).
     void add(const std::string& name, const Cloud& cloud);
 
     [[nodiscard]] cv::Size size() const { return size_; }

@@ -1,3 +1,4 @@
+// Coverage, uncertainty of pixels, effect in millimetres.
 #include "projection/calibration/quality.h"
 
 #include "projection/undistort.h"
@@ -86,8 +87,8 @@ cv::Mat1d pixel_sigmas(const Fit& fit, cv::Size cells) {
     const Eigen::MatrixXd spread = by_camera * fit.covariance.topLeftCorner(camera_unknowns, camera_unknowns);
     for (std::size_t i = 0; i < places.size(); ++i) {
         const auto row = 2 * static_cast<Eigen::Index>(i);
-        sigmas(places[i]) = std::sqrt(
-            std::max(0.0, (spread.middleRows<2>(row) * by_camera.middleRows<2>(row).transpose()).trace()));
+        sigmas(places[i]) =
+            std::sqrt(std::max(0.0, (spread.middleRows<2>(row) * by_camera.middleRows<2>(row).transpose()).trace()));
     }
     return sigmas;
 }
@@ -146,7 +147,8 @@ std::vector<Effect> effects(const Camera& before, const Camera& after, std::vect
         return all;
     std::sort(depths_m.begin(), depths_m.end());
     for (const double share : {0.1, 0.5, 0.9})
-        all.push_back(effect_at(before, after, depths_m[static_cast<std::size_t>(share * static_cast<double>(depths_m.size() - 1))]));
+        all.push_back(effect_at(before, after,
+                                depths_m[static_cast<std::size_t>(share * static_cast<double>(depths_m.size() - 1))]));
     return all;
 }
 

@@ -14,14 +14,16 @@ struct Coverage {
 
 /// One standard deviation of the pixel at which a direction is seen, over a grid of the image (pixels, both axes
 /// together): the covariance of the model carried through the projection, less what a turn of the whole camera makes up
-/// for, since that changes no shape (after mrcal's projection uncertainty). 0 where nothing was free, NaN beyond the lens.
+/// for, since that changes no shape (after mrcal's projection uncertainty). 0 where nothing was free, NaN beyond the
+/// lens.
 [[nodiscard]] cv::Mat1d pixel_sigmas(const Fit& fit, cv::Size cells = {9, 7});
 [[nodiscard]] double mean_pixel_sigma(const Fit& fit);
 
 /// Whether the lens maps ever wider angles to ever larger radii, out to the image's corners.
 [[nodiscard]] bool monotone(const Model& model);
 
-/// By how much the surface point behind a pixel moves from one camera to the other, at a depth, less a turn of the whole.
+/// By how much the surface point behind a pixel moves from one camera to the other, at a depth, less a turn of the
+/// whole.
 struct Effect {
     double depth_m = 0, rms_mm = 0, worst_mm = 0;
 };

@@ -1,3 +1,4 @@
+// One refinement from evidence to findings: climb, outlying views, coverage, effect.
 #include "projection/calibration/refinement.h"
 
 #include "projection/error.h"
@@ -55,8 +56,8 @@ std::string names_of_outlying(const std::vector<ViewRow>& rows) {
 
 } // namespace
 
-Refinement refine(Evidence& evidence, const Camera& before, const std::vector<Rung>& rungs, const RefineOptions& options,
-                  const std::string& cannot) {
+Refinement refine(Evidence& evidence, const Camera& before, const std::vector<Rung>& rungs,
+                  const RefineOptions& options, const std::string& cannot) {
     if (!cannot.empty() && options.ladder.guessed)
         throw Error("no camera can be found: " + cannot);
     Refinement result;
@@ -70,7 +71,8 @@ Refinement refine(Evidence& evidence, const Camera& before, const std::vector<Ru
     } else {
         result.climb = climbed(evidence, start, rungs, used, options);
         result.views = rows_of(evidence, result.climb.fit);
-        const auto outlying = std::count_if(result.views.begin(), result.views.end(), [](const auto& v) { return v.outlying; });
+        const auto outlying =
+            std::count_if(result.views.begin(), result.views.end(), [](const auto& v) { return v.outlying; });
         if (outlying > 0) {
             const char* done = options.outliers == Outliers::keep   ? "kept; --outliers downweight or drop"
                                : options.outliers == Outliers::drop ? "dropped"

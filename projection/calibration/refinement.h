@@ -1,4 +1,5 @@
-// What a refinement found, whatever it was found from: cameras before and after, how sure, and what was wrong with the data.
+// What a refinement found, whatever it was found from: cameras before and after, how sure, and what was wrong with the
+// data.
 #pragma once
 
 #include "projection/calibration/ladder.h"
@@ -26,23 +27,23 @@ struct ViewRow {
 };
 
 struct Refinement {
-    std::string source;       ///< "chessboard of 9x6 corners, 25 mm, in 13 images"
+    std::string source; ///< "chessboard of 9x6 corners, 25 mm, in 13 images"
     Camera before, after;
     Climb climb;
     std::optional<Climb> full; ///< the full model on the same views, for comparison
     std::vector<ViewRow> views;
     std::vector<std::pair<cv::Point2d, Eigen::Vector2d>> residuals; ///< of the views used: where, and predicted - seen
     Coverage coverage;
-    cv::Mat1d pixel_sigma;       ///< pixels, over the image
-    std::vector<Effect> effects; ///< of the change, at the scene's depths
+    cv::Mat1d pixel_sigma;          ///< pixels, over the image
+    std::vector<Effect> effects;    ///< of the change, at the scene's depths
     std::vector<std::string> notes; ///< what was odd, what could not be determined; sentences
 
     [[nodiscard]] bool changed() const { return !climb.unchanged(); }
 };
 
-/// Climbs the ladder (or takes the full model) on the evidence. Views with more than 3 times the median error are outlying:
-/// they are kept, weighed down to the median's error, or dropped, and the climb repeated. `cannot` is why the evidence
-/// determines nothing, if it does not: then nothing is climbed, and a guessed camera is an Error.
+/// Climbs the ladder (or takes the full model) on the evidence. Views with more than 3 times the median error are
+/// outlying: they are kept, weighed down to the median's error, or dropped, and the climb repeated. `cannot` is why the
+/// evidence determines nothing, if it does not: then nothing is climbed, and a guessed camera is an Error.
 [[nodiscard]] Refinement refine(Evidence& evidence, const Camera& before, const std::vector<Rung>& rungs,
                                 const RefineOptions& options, const std::string& cannot);
 

@@ -1,3 +1,4 @@
+// The adjustment of a recording: residuals, first guesses, outliers, scores.
 #include "projection/calibration/sequence.h"
 
 #include "projection/calibration/solve.h"
@@ -19,7 +20,8 @@ constexpr double unusable = -1; // a sighting's depth that does not fit
 // ---------------------------------------------------------------------------------------------------- residuals
 
 template <class Number>
-bool seen_at(LensModel lens, const Number* camera, const Number* in_camera, const Eigen::Vector2d& pixel, Number* residual) {
+bool seen_at(LensModel lens, const Number* camera, const Number* in_camera, const Eigen::Vector2d& pixel,
+             Number* residual) {
     if (in_camera[2] < Number(0.01))
         return false; // at or behind the camera: the solver takes a shorter step
     pixel_of(lens, camera, in_camera, residual);
@@ -99,8 +101,8 @@ struct PoseResidual {
     double turn_weight, shift_weight;
     template <class Number>
     bool operator()(const Number* pose, Number* residual) const {
-        const Number back[4] = {Number(camera_from_world.w()), Number(-camera_from_world.x()), Number(-camera_from_world.y()),
-                                Number(-camera_from_world.z())};
+        const Number back[4] = {Number(camera_from_world.w()), Number(-camera_from_world.x()),
+                                Number(-camera_from_world.y()), Number(-camera_from_world.z())};
         Number turn[4], difference[4], moved_by[3];
         ceres::AngleAxisToQuaternion(pose, turn);
         ceres::QuaternionProduct(turn, back, difference);
@@ -157,7 +159,9 @@ Eigen::Vector2d straight_of(const Camera& camera, const Eigen::Vector2d& pixel) 
 }
 
 /// The direction in which a pixel looks, z = 1.
-Eigen::Vector3d ray_of(const Camera& camera, const Eigen::Vector2d& pixel) { return straight_of(camera, pixel).homogeneous(); }
+Eigen::Vector3d ray_of(const Camera& camera, const Eigen::Vector2d& pixel) {
+    return straight_of(camera, pixel).homogeneous();
+}
 
 struct SurfacePiece {
     Eigen::Vector3d centre, normal;
@@ -230,10 +234,10 @@ class SequenceProblem {
                     new SightingResidual{lens, s.pixel, weight}),
                 loss, fit_.model.values.data(), pose(s.frame), point(track));
         else
-            problem.AddResidualBlock(
-                new ceres::AutoDiffCostFunction<PlacedSightingResidual, 2, camera_unknowns, place_unknowns, pose_unknowns,
-                                                point_unknowns>(new PlacedSightingResidual{lens, s.pixel, weight}),
-                loss, fit_.model.values.data(), place(), pose(s.frame), point(track));
+            problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PlacedSightingResidual, 2, camera_unknowns,
+                                                                     place_unknowns, pose_unknowns, point_unknowns>(
+                                         new PlacedSightingResidual{lens, s.pixel, weight}),
+                                     loss, fit_.model.values.data(), place(), pose(s.frame), point(track));
         sightings.push_back(problem.NumResidualBlocks() - 1);
         add_depth(track, s, weight, loss);
     }
@@ -257,10 +261,11 @@ class SequenceProblem {
         if (!recorded)
             return;
         const SequenceOptions& o = sequence_.options_;
-        problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PoseResidual, 6, pose_unknowns>(new PoseResidual{
-                                     Eigen::Quaterniond(recorded->linear()).inverse().normalized(), recorded->translation(),
-                                     o.pixel_sigma_px / o.pose_turn_sigma, o.pixel_sigma_px / o.pose_shift_sigma_m}),
-                                 nullptr, pose(frame));
+        problem.AddResidualBlock(
+            new ceres::AutoDiffCostFunction<PoseResidual, 6, pose_unknowns>(
+                new PoseResidual{Eigen::Quaterniond(recorded->linear()).inverse().normalized(), recorded->translation(),
+                                 o.pixel_sigma_px / o.pose_turn_sigma, o.pixel_sigma_px / o.pose_shift_sigma_m}),
+            nullptr, pose(frame));
     }
 
     /// Sigma of a recorded depth, in the residuals' unit.
@@ -318,26 +323,30 @@ Sequence::Sequence(std::vector<SequenceFrame> frames, const Camera& depth_camera
             point.sightings.push_back(
                 {seen.frame, pixel, options_.registered ? depth_at(frames_[seen.frame].depth_m, pixel) : 0});
         }
-        const bool lifted = std::any_of(point.sightings.begin(), point.sightings.end(), [](const auto& s) { return s.depth_m > 0; });
+        const bool lifted =
+            std::any_of(point.sightings.begin(), point.sightings.end(), [](const auto& s) { return s.depth_m > 0; });
         if (lifted || !options_.registered)
             tracks_.push_back(std::move(point));
     }
     constexpr std::size_t least = 40;
     if (tracks_.size() < least)
-        throw Error(fmt::format("{} points are seen in 3 or more of {} images, at least {} expected: too little texture, or "
-                                "frames too far apart",
-                                tracks_.size(), frames_.size(), least));
+        throw Error(
+            fmt::format("{} points are seen in 3 or more of {} images, at least {} expected: too little texture, or "
+                        "frames too far apart",
+                        tracks_.size(), frames_.size(), least));
     follow_camera(first);
     prune(first);
     if (tracks_.size() < least)
-        throw Error(fmt::format("{} points fit together, at least {} expected: the poses, the depth unit or the camera are far "
-                                "off",
-                                tracks_.size(), least));
+        throw Error(
+            fmt::format("{} points fit together, at least {} expected: the poses, the depth unit or the camera are far "
+                        "off",
+                        tracks_.size(), least));
 }
 
 /// Poses that were not recorded: each frame by what it sees of points lifted in frames before (EPnP in RANSAC).
 void Sequence::follow_camera(const Model& first) {
-    const bool all = std::all_of(frames_.begin(), frames_.end(), [](const auto& frame) { return frame.world_from_camera; });
+    const bool all =
+        std::all_of(frames_.begin(), frames_.end(), [](const auto& frame) { return frame.world_from_camera; });
     start_poses_.assign(frames_.size(), Eigen::Isometry3d::Identity());
     if (all) {
         for (std::size_t i = 0; i < frames_.size(); ++i)
@@ -372,9 +381,10 @@ void Sequence::follow_camera(const Model& first) {
             !cv::solvePnPRansac(points, straight, cv::Matx33d::eye(), cv::noArray(), turn, shift, false, 300,
                                 static_cast<float>(4 / first[f]), 0.999, good, cv::SOLVEPNP_EPNP) ||
             good.size() < least)
-            throw Error(fmt::format("{}: its place cannot be found: {} of its points are known from the frames before, {} fit; "
-                                    "at least {} expected",
-                                    frames_[frame].name, points.size(), good.size(), least));
+            throw Error(
+                fmt::format("{}: its place cannot be found: {} of its points are known from the frames before, {} fit; "
+                            "at least {} expected",
+                            frames_[frame].name, points.size(), good.size(), least));
         cv::solvePnPRefineLM(points, straight, cv::Matx33d::eye(), cv::noArray(), turn, shift);
         double six[pose_unknowns] = {turn[0], turn[1], turn[2], shift[0], shift[1], shift[2]};
         start_poses_[frame] = from_six(six).inverse();
@@ -418,8 +428,9 @@ void Sequence::prune(const Model& first) {
     constexpr double robust_px = 1, most_sigmas = 4;
     const auto by_camera = [&](std::size_t i, const Fit& fit) { // in front of each camera, not absurdly far
         for (const Sighting& s : tracks_[i].sightings) {
-            const Eigen::Vector3d p = from_six(&fit.nuisance[s.frame * pose_unknowns]) *
-                                      Eigen::Map<const Eigen::Vector3d>(&fit.nuisance[frames_.size() * pose_unknowns + i * point_unknowns]);
+            const Eigen::Vector3d p =
+                from_six(&fit.nuisance[s.frame * pose_unknowns]) *
+                Eigen::Map<const Eigen::Vector3d>(&fit.nuisance[frames_.size() * pose_unknowns + i * point_unknowns]);
             if (!(p.z() > 0.1 && p.z() < 30))
                 return false;
         }
@@ -475,7 +486,8 @@ void Sequence::prune(const Model& first) {
                     sighting.depth_m = unusable;
                 point.sightings.push_back(sighting);
             }
-            const bool lifted = std::any_of(point.sightings.begin(), point.sightings.end(), [](const auto& s) { return s.depth_m > 0; });
+            const bool lifted = std::any_of(point.sightings.begin(), point.sightings.end(),
+                                            [](const auto& s) { return s.depth_m > 0; });
             if (point.sightings.size() >= 3 && (lifted || !options_.registered))
                 kept.push_back(std::move(point));
         }
@@ -516,7 +528,8 @@ Fit Sequence::fit(const Fit& from, const Free& free, const Views& used, bool cov
         for (std::size_t i = 0; i < frames_.size(); ++i)
             poses.push_back(adjustment.pose(static_cast<int>(i)));
         for (std::size_t i = 0; i < tracks_.size(); ++i)
-            points.push_back({adjustment.point(i), neighbourhood_of(tracks_[i].sightings.front().pixel, fit.model.size)});
+            points.push_back(
+                {adjustment.point(i), neighbourhood_of(tracks_[i].sightings.front().pixel, fit.model.size)});
         add_covariance(adjustment.problem, fit, free, poses, points);
     }
     return fit;
@@ -581,7 +594,8 @@ std::vector<double> Sequence::depths_m(const Fit& fit) const {
     std::vector<double> depths;
     for (std::size_t i = 0; i < tracks_.size(); ++i)
         for (const Sighting& s : tracks_[i].sightings) {
-            const Eigen::Map<const Eigen::Vector3d> point(&fit.nuisance[frames_.size() * pose_unknowns + i * point_unknowns]);
+            const Eigen::Map<const Eigen::Vector3d> point(
+                &fit.nuisance[frames_.size() * pose_unknowns + i * point_unknowns]);
             depths.push_back((from_six(&fit.nuisance[s.frame * pose_unknowns]) * point).z());
         }
     return depths;
@@ -620,9 +634,10 @@ std::string Sequence::degeneracy(const Fit& fit) const {
         return fmt::format("the camera hardly moves: {:.0f} mm and {:.1f} degrees before a scene {:.1f} m away",
                            1000 * reach.norm(), turn, depth_m);
     if (turn < least_turn_degrees && reach.head<2>().norm() < 0.2 * reach.z())
-        return fmt::format("the camera moves straight forward ({:.0f} mm along its axis, {:.0f} mm across, {:.1f} degrees): "
-                           "focal length and distance cannot be told apart",
-                           1000 * reach.z(), 1000 * reach.head<2>().norm(), turn);
+        return fmt::format(
+            "the camera moves straight forward ({:.0f} mm along its axis, {:.0f} mm across, {:.1f} degrees): "
+            "focal length and distance cannot be told apart",
+            1000 * reach.z(), 1000 * reach.head<2>().norm(), turn);
     return {};
 }
 

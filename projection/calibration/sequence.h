@@ -12,27 +12,29 @@ namespace scanshade::calibration {
 /// One frame as the adjustment needs it.
 struct SequenceFrame {
     std::string name;
-    cv::Mat1b grey;      ///< the colour image
-    cv::Mat1f depth_m;   ///< recorded depth, 0 = hole
+    cv::Mat1b grey;                                     ///< the colour image
+    cv::Mat1f depth_m;                                  ///< recorded depth, 0 = hole
     std::optional<Eigen::Isometry3d> world_from_camera; ///< of the depth camera, as recorded
 };
 
 struct SequenceOptions {
-    bool registered = true;    ///< colour pixel (u, v) and depth pixel (u, v) see the same thing
-    bool refine_poses = true;  ///< recorded poses are good to the sigmas below; otherwise they are the truth
+    bool registered = true;   ///< colour pixel (u, v) and depth pixel (u, v) see the same thing
+    bool refine_poses = true; ///< recorded poses are good to the sigmas below; otherwise they are the truth
     double pose_shift_sigma_m = 0.005, pose_turn_sigma = 0.0035; ///< metres and radians
     double pixel_sigma_px = 0.5;
-    double depth_floor_m = 0.0012, depth_per_z2 = 0.0019; ///< sigma of a depth (Nguyen 2012's order), rescaled by the residuals
+    double depth_floor_m = 0.0012,
+           depth_per_z2 = 0.0019; ///< sigma of a depth (Nguyen 2012's order), rescaled by the residuals
 };
 
 /// Registered: one camera takes colour and depth; a track's point must project onto its sightings, and lie at the depth
-/// recorded there. Unregistered: the model is the colour camera and its place, `depth_camera` stays as it is; the point must
-/// lie on the surface that the depth camera saw.
+/// recorded there. Unregistered: the model is the colour camera and its place, `depth_camera` stays as it is; the point
+/// must lie on the surface that the depth camera saw.
 class Sequence final : public Evidence {
   public:
-    /// Finds tracks; where a pose is missing, follows the camera from frame to frame (PnP on matches with depth). Prunes
-    /// outliers under the first camera. Throws Error where too little hangs together.
-    Sequence(std::vector<SequenceFrame> frames, const Camera& depth_camera, const Model& first, const SequenceOptions& options);
+    /// Finds tracks; where a pose is missing, follows the camera from frame to frame (PnP on matches with depth).
+    /// Prunes outliers under the first camera. Throws Error where too little hangs together.
+    Sequence(std::vector<SequenceFrame> frames, const Camera& depth_camera, const Model& first,
+             const SequenceOptions& options);
 
     [[nodiscard]] std::size_t views() const override { return frames_.size(); }
     [[nodiscard]] std::string view_name(std::size_t view) const override { return frames_[view].name; }
@@ -50,8 +52,8 @@ class Sequence final : public Evidence {
     [[nodiscard]] std::size_t sightings() const;
     /// Why these frames cannot determine a camera: pure forward motion, one plane, hardly any motion. Empty = they may.
     [[nodiscard]] std::string degeneracy(const Fit& fit) const;
-    /// Median distance of frame-to-frame overlapping surfaces along the optical axis, millimetres: each frame's depth lifted,
-    /// moved into the next frames and compared with their depth. NaN where nothing overlaps.
+    /// Median distance of frame-to-frame overlapping surfaces along the optical axis, millimetres: each frame's depth
+    /// lifted, moved into the next frames and compared with their depth. NaN where nothing overlaps.
     [[nodiscard]] double overlap_mm(const Model& depth_model, const std::vector<Eigen::Isometry3d>& poses) const;
 
   private:

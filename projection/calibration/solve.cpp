@@ -1,3 +1,4 @@
+// Ceres, as all evidence uses it: settings, frozen numbers, covariance.
 #include "projection/calibration/solve.h"
 
 #include "projection/error.h"

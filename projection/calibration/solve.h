@@ -7,7 +7,8 @@
 
 namespace scanshade::calibration {
 
-/// The model's numbers are three blocks of a problem: camera, depth, place. Those in the problem are frozen where not free.
+/// The model's numbers are three blocks of a problem: camera, depth, place. Those in the problem are frozen where not
+/// free.
 void freeze(ceres::Problem& problem, Model& model, const Free& free);
 
 /// Solves; fills rss (without robust loss), residuals, unknowns, converged. Throws Error where nothing can be solved.
@@ -19,11 +20,11 @@ struct ClusteredPoint {
     int cluster;
 };
 
-/// Fills fit.covariance; leaves it empty where the problem is singular. Without `points` it is the inverse normal matrix
-/// scaled by rss / (residuals - unknowns). `points` are blocks of three that appear together with others but never with each
-/// other: they are eliminated one by one (Schur complement), which keeps what is inverted as small as the model and `poses`.
-/// With them residuals may hang together in any way within a cluster (a piece of wall has the same depth error from
-/// everywhere): the covariance is the cluster-robust one (Liang and Zeger 1986).
+/// Fills fit.covariance; leaves it empty where the problem is singular. Without `points` it is the inverse normal
+/// matrix scaled by rss / (residuals - unknowns). `points` are blocks of three that appear together with others but
+/// never with each other: they are eliminated one by one (Schur complement), which keeps what is inverted as small as
+/// the model and `poses`. With them residuals may hang together in any way within a cluster (a piece of wall has the
+/// same depth error from everywhere): the covariance is the cluster-robust one (Liang and Zeger 1986).
 void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const std::vector<double*>& poses,
                     const std::vector<ClusteredPoint>& points);
 

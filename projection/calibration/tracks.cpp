@@ -1,3 +1,4 @@
+// Features, their matches, and chains of matches.
 #include "projection/calibration/tracks.h"
 
 #include <algorithm>
@@ -81,7 +82,8 @@ std::vector<Track> spread(std::vector<Track> tracks, cv::Size size, std::size_t 
     std::map<std::pair<int, int>, std::vector<std::size_t>> by_cell;
     for (std::size_t i = 0; i < tracks.size(); ++i) {
         const cv::Point2d pixel = tracks[i].sightings.front().pixel;
-        by_cell[{static_cast<int>(pixel.x * cells / size.width), static_cast<int>(pixel.y * cells / size.height)}].push_back(i);
+        by_cell[{static_cast<int>(pixel.x * cells / size.width), static_cast<int>(pixel.y * cells / size.height)}]
+            .push_back(i);
     }
     std::vector<Track> chosen;
     for (std::size_t turn = 0; turn < tracks.size() && chosen.size() < most; ++turn)

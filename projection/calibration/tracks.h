@@ -15,8 +15,9 @@ struct Track {
     std::vector<Sighting> sightings;
 };
 
-/// Features (SIFT, Lowe 2004) matched both ways between frames 1, 2, 4 and 8 apart, kept where a fundamental matrix explains
-/// them, and chained. Tracks of at least `shortest` sightings, longest first, at most `most` of them, spread over the images.
+/// Features (SIFT, Lowe 2004) matched both ways between frames 1, 2, 4 and 8 apart, kept where a fundamental matrix
+/// explains them, and chained. Tracks of at least `shortest` sightings, longest first, at most `most` of them, spread
+/// over the images.
 [[nodiscard]] std::vector<Track> find_tracks(const std::vector<cv::Mat1b>& images, int shortest = 3,
                                              std::size_t most = 800);
 
