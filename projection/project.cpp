@@ -8,6 +8,7 @@
 #include <bitset>
 #include <cmath>
 #include <fmt/format.h>
+#include <tuple>
 
 namespace scanshade {
 namespace {
@@ -147,13 +148,43 @@ cv::Mat1f without_invalid(const cv::Mat1f& depth_m, const ProjectOptions& option
     return clean;
 }
 
+/// Depth between four pixels of one surface: linear in 1/z, which any plane is in the image. 0 where they are not all
+/// of one surface.
+float depth_between(const cv::Mat1f& depth_m, const cv::Vec2f& at, float nearest_m, double same_m) {
+    const int u = static_cast<int>(std::floor(at[0])), v = static_cast<int>(std::floor(at[1]));
+    if (u < 0 || v < 0 || u + 1 >= depth_m.cols || v + 1 >= depth_m.rows)
+        return 0;
+    const double right = double{at[0]} - u, down = double{at[1]} - v;
+    double inverse = 0;
+    for (const auto& [du, dv, weight] : {std::tuple(0, 0, (1 - right) * (1 - down)),
+                                         {1, 0, right * (1 - down)},
+                                         {0, 1, (1 - right) * down},
+                                         {1, 1, right * down}}) {
+        const float z = depth_m(v + dv, u + du);
+        if (!(z > 0) || std::abs(z - nearest_m) > same_m)
+            return 0;
+        inverse += weight / z;
+    }
+    return static_cast<float>(1 / inverse);
+}
+
+/// The nearest pixel's depth where it borders on another surface; within a surface, depth between pixels: repeated and
+/// skipped pixels would be terraces to a method that looks at relief.
 cv::Mat1f without_distortion(const cv::Mat1f& depth_m, const Camera& camera, const ProjectOptions& options) {
     const auto maps = Undistortion::of(camera);
-    const cv::Mat1f recorded = depth_m.isContinuous() ? depth_m : depth_m.clone();
-    const float* depths = recorded.ptr<float>();
-    cv::Mat1f z_m(depth_m.size());
-    std::transform(maps->recorded_pixel().begin(), maps->recorded_pixel().end(), z_m.begin(),
-                   [&](int pixel) { return pixel >= 0 && in_range(depths[pixel], options) ? depths[pixel] : 0.0F; });
+    cv::Mat1f z_m(depth_m.size(), 0.0F);
+    for (int v = 0; v < z_m.rows; ++v)
+        for (int u = 0; u < z_m.cols; ++u) {
+            const int pixel = maps->recorded_pixel()(v, u);
+            if (pixel < 0)
+                continue;
+            const float nearest_m = depth_m(pixel / z_m.cols, pixel % z_m.cols);
+            if (!in_range(nearest_m, options))
+                continue;
+            const float between_m =
+                depth_between(depth_m, maps->recorded_at()(v, u), nearest_m, same_surface_m(camera.pinhole, nearest_m));
+            z_m(v, u) = between_m > 0 ? between_m : nearest_m;
+        }
     return z_m;
 }
 

@@ -1,9 +1,9 @@
 // Frame -> DepthImage: undistort a recorded image once, or splat a cloud's points with a depth test.
 #pragma once
 
+#include "projection/calibration/organised.h"
 #include "projection/frame.h"
 #include "projection/maps.h"
-#include "projection/calibration/organised.h"
 
 namespace scanshade {
 
@@ -26,8 +26,8 @@ struct ProjectOptions {
 
 /// The depth image the methods work on, seen by camera_of(frame).
 /// - Depth frames without distortion keep their pixels (the very same cv::Mat where nothing had to become a hole); with
-///   distortion each pixel takes the nearest recorded depth (never an average: that would invent points between
-///   surfaces).
+///   distortion each pixel takes the depth between the recorded pixels around it where they are of one surface, else
+///   the nearest one's (never an average of two surfaces: that would invent points between them).
 /// - Organised clouds whose points lie on their own pixels keep the grid; others are splatted with a depth test
 /// (nearest
 ///   wins, then the lowest index), `source` remembering which point each pixel shows. Unorganised clouds have gaps

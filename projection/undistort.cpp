@@ -107,17 +107,32 @@ std::optional<cv::Point> pixel_at(const Pinhole& camera, const Eigen::Vector2d& 
     return cv::Point(static_cast<int>(u), static_cast<int>(v));
 }
 
-cv::Mat1i map_to_recorded(const Camera& camera, double limit_r2) {
+cv::Mat2f places_in_recorded(const Camera& camera, double limit_r2) {
+    constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
     const Pinhole& pinhole = camera.pinhole;
-    cv::Mat1i map(pinhole.size, -1);
+    cv::Mat2f map(pinhole.size, cv::Vec2f(nowhere, nowhere));
     for (int v = 0; v < map.rows; ++v)
         for (int u = 0; u < map.cols; ++u) {
             const Eigen::Vector2d straight = normalised(pinhole, u, v);
             if (straight.squaredNorm() >= limit_r2)
                 continue;
-            if (const auto pixel = pixel_at(pinhole, distorted(camera.distortion, straight)))
-                map(v, u) = pixel->y * map.cols + pixel->x;
+            const Eigen::Vector2d bent = distorted(camera.distortion, straight);
+            if (pixel_at(pinhole, bent))
+                map(v, u) = {static_cast<float>(pinhole.fx * bent.x() + pinhole.cx),
+                             static_cast<float>(pinhole.fy * bent.y() + pinhole.cy)};
         }
+    return map;
+}
+
+cv::Mat1i nearest_pixels(const cv::Mat2f& places) {
+    cv::Mat1i map(places.size(), -1);
+    std::transform(places.begin(), places.end(), map.begin(), [&](const cv::Vec2f& at) {
+        if (std::isnan(at[0]))
+            return -1;
+        const int u = std::clamp(static_cast<int>(std::lround(at[0])), 0, places.cols - 1);
+        const int v = std::clamp(static_cast<int>(std::lround(at[1])), 0, places.rows - 1);
+        return v * places.cols + u;
+    });
     return map;
 }
 
@@ -176,7 +191,8 @@ std::optional<Eigen::Vector2d> undistorted(const Distortion& distortion, const E
 
 Undistortion::Undistortion(const Camera& camera) {
     const double limit_r2 = fold_r2(camera.distortion);
-    recorded_pixel_ = map_to_recorded(camera, limit_r2);
+    recorded_at_ = places_in_recorded(camera, limit_r2);
+    recorded_pixel_ = nearest_pixels(recorded_at_);
     undistorted_pixel_ = map_to_undistorted(camera, limit_r2, recorded_pixel_);
 }
 

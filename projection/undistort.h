@@ -20,7 +20,7 @@ namespace scanshade {
 /// or where the polynomial has turned round, so that two directions share one pixel.
 [[nodiscard]] std::optional<Eigen::Vector2d> undistorted(const Distortion& distortion, const Eigen::Vector2d& bent);
 
-/// Which pixel of the recorded image shows what pixel of the undistorted one, both ways, nearest pixel. Both images
+/// Which pixel of the recorded image shows what pixel of the undistorted one, both ways. Both images
 /// have the same intrinsics and size. Immutable: frames and threads share it.
 class Undistortion {
   public:
@@ -32,11 +32,15 @@ class Undistortion {
     /// For each undistorted pixel the index (row-major) of the recorded pixel to look at; -1 where the lens saw
     /// nothing.
     [[nodiscard]] const cv::Mat1i& recorded_pixel() const { return recorded_pixel_; }
+    /// The same between pixels: where in the recorded image (column, row) the undistorted pixel's centre falls; NaN
+    /// where the lens saw nothing.
+    [[nodiscard]] const cv::Mat2f& recorded_at() const { return recorded_at_; }
     /// For each recorded pixel the index of the undistorted pixel that shows it, or is nearest to it; -1 outside the
     /// image.
     [[nodiscard]] const cv::Mat1i& undistorted_pixel() const { return undistorted_pixel_; }
 
   private:
+    cv::Mat2f recorded_at_;
     cv::Mat1i recorded_pixel_, undistorted_pixel_;
 };
 

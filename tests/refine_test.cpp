@@ -1,4 +1,6 @@
 // Cameras refined from targets, clouds and sequences: what is recovered, how sure it is, and when nothing is changed.
+#include "apps/generate.h"
+#include "apps/refine_sources.h"
 #include "io/cloud_file.h"
 #include "io/image_file.h"
 #include "projection/calibration/board_detection.h"
@@ -16,6 +18,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <gtest/gtest.h>
+#include <numeric>
 #include <opencv2/aruco/charuco.hpp>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
@@ -164,20 +167,17 @@ TEST(Ladder, ClimbsToTheTrueModelAndNoFarther) {
 
 // ---------------------------------------------------------------------------------------------------- derivatives
 
+struct Pixel {
+    LensModel lens;
+    template <class Number>
+    bool operator()(const Number* camera, const Number* point, Number* pixel) const {
+        pixel_of(lens, camera, point, pixel);
+        return true;
+    }
+};
+
 TEST(Boards, AutomaticDerivativesAgreeWithNumericOnes) {
     // The camera's derivatives through both lens models, by Ceres's Jets against central differences.
-    struct Pixel {
-        LensModel lens;
-        bool operator()(const double* camera, const double* point, double* pixel) const {
-            pixel_of(lens, camera, point, pixel);
-            return true;
-        }
-        template <class Number>
-        bool operator()(const Number* camera, const Number* point, Number* pixel) const {
-            pixel_of(lens, camera, point, pixel);
-            return true;
-        }
-    };
     for (const LensModel lens : {LensModel::brown_conrady, LensModel::kannala_brandt}) {
         const ceres::AutoDiffCostFunction<Pixel, 2, camera_unknowns, 3> automatic(new Pixel{lens});
         const ceres::NumericDiffCostFunction<Pixel, ceres::CENTRAL, 2, camera_unknowns, 3> numeric(new Pixel{lens});
@@ -497,6 +497,54 @@ TEST(Clouds, DistortionLeftInACloudsGridIsFound) {
     EXPECT_NEAR(result.after.pinhole.fx, small.pinhole.fx, 0.01);
     EXPECT_NEAR(result.after.distortion.k1, -0.2, 1e-3);
     EXPECT_NEAR(result.after.distortion.k2, 0.05, 2e-3);
+}
+
+// ---------------------------------------------------------------------------------------------------- recordings
+
+/// A generated office seen by a Kinect: noise that grows with depth, in steps, and colour 4 ms before depth.
+const Capture& office() {
+    static const tests::TemporaryFolder folder;
+    static const Capture capture = [] {
+        GenerateOptions options;
+        options.frames = 12;
+        options.truth = false;
+        generate(options, folder / "office");
+        return open_capture(folder / "office");
+    }();
+    return capture;
+}
+
+std::vector<std::size_t> all_of(const Capture& capture) {
+    std::vector<std::size_t> frames(capture.entries.size());
+    std::iota(frames.begin(), frames.end(), std::size_t{0});
+    return frames;
+}
+
+TEST(Recordings, AWrongFocalLengthIsFoundAndTheRightOneKept) {
+    // 5 % is 26 px; the truth is 525.
+    const RecordingResult wrong =
+        refine_from_recording(office(), all_of(office()), {.camera = "551,551,319.5,239.5"}, {}, {});
+    const Refinement& r = wrong.refinement;
+    std::printf("%s: fx %.1f +- %.1f\n", r.source.c_str(), r.after.pinhole.fx, r.climb.fit.sigma(f));
+    ASSERT_TRUE(r.climb.free[f]);
+    EXPECT_NEAR(r.after.pinhole.fx, 525, 3 * r.climb.fit.sigma(f));
+    EXPECT_NEAR(r.after.pinhole.fx, 525, 8);
+    EXPECT_LT(r.climb.held_out_px, r.climb.held_out_before_px);
+    const RecordingResult right = refine_from_recording(office(), all_of(office()), {}, {}, {});
+    EXPECT_FALSE(right.refinement.changed());
+}
+
+TEST(Recordings, WithoutPosesTheCameraIsFollowed) {
+    const RecordingResult result = refine_from_recording(office(), all_of(office()), {}, {.poses = "ignore"}, {});
+    EXPECT_FALSE(result.refinement.changed());
+    ASSERT_EQ(result.poses.size(), office().entries.size());
+    const Eigen::Isometry3d start = *office().entries[0].world_from_camera; // the followed world is the first camera's
+    for (std::size_t i = 0; i < result.poses.size(); ++i) {
+        const Eigen::Isometry3d truth = start.inverse() * *office().entries[i].world_from_camera;
+        const Eigen::Isometry3d found = result.poses[0].second.inverse() * result.poses[i].second;
+        EXPECT_LT((found.translation() - truth.translation()).norm(), 0.03)
+            << result.poses[i].first; // a Kinect's noise at 2.4 m is 9 mm
+    }
 }
 
 TEST(BrokenData, ChessboardsAreRefusedByNameAndReason) {

@@ -50,7 +50,7 @@ void freeze(ceres::Problem& problem, Model& model, const Free& free) {
 
 void solve(ceres::Problem& problem, Fit& fit, bool many_unknowns) {
     ceres::Solver::Options options;
-    options.linear_solver_type = many_unknowns ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;
+    options.linear_solver_type = ceres::DENSE_SCHUR; // poses and model are few, points are eliminated
     options.max_num_iterations = many_unknowns ? 40 : 100;
     options.function_tolerance = many_unknowns ? 1e-7 : 1e-10; // of the sum: far below one sigma of any number
     options.gradient_tolerance = 1e-12;
