@@ -112,7 +112,7 @@ std::vector<std::byte> Surfel::constants(const shared::ScreenConstants& screen) 
                                             {samples.width, samples.height},
                                             options_.thinnest * r,
                                             options_.thickest * r,
-                                            1,
+                                            options_.slices * options_.steps <= 4 ? 1.3F : 1.0F, // between few samples gaps would open
                                             0.05F * r,
                                             0.3F * r});
 }
