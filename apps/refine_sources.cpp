@@ -211,7 +211,9 @@ Sequence adjusted(const std::vector<SequenceFrame>& frames, const Camera& depth_
     how.refine_poses = false;
     Sequence kept(frames, depth_camera, first, how);
     const auto error = [&](const Sequence& sequence) {
-        const Fit fit = sequence.start(first);
+        Free free{}; // a wrong camera must not speak against the poses
+        free[f] = free[k1] = true;
+        const Fit fit = sequence.fit(sequence.start(first), free, Views(frames.size(), true), false);
         return std::sqrt(fit.rss / fit.residuals);
     };
     if (error(kept) <= nearly * error(refined))

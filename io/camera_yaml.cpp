@@ -22,7 +22,8 @@ cv::FileStorage opened(const fs::path& file, const std::string& text) {
         return {first + text, cv::FileStorage::READ | cv::FileStorage::MEMORY | cv::FileStorage::FORMAT_YAML};
     } catch (const cv::Exception& failure) {
         int line = 0;
-        std::string why = failure.err;
+        // It hands the place and the reason over as the function's name, and the function's name as the reason.
+        std::string why = failure.func.find("): ") != std::string::npos ? failure.func : failure.err;
         if (const auto open = why.find('(');
             open != std::string::npos && std::sscanf(why.c_str() + open, "(%d)", &line) == 1)
             throw Error(fmt::format("{}: not YAML: {}", at_line(file, line - static_cast<int>(!first.empty())),
