@@ -222,6 +222,14 @@ Sequence adjusted(const std::vector<SequenceFrame>& frames, const Camera& depth_
     return refined;
 }
 
+std::string names_of_climbed(const Climb& climb) {
+    std::string names;
+    for (const Step& step : climb.steps)
+        if (step.climbed)
+            names += (names.empty() ? "" : ", ") + step.name;
+    return names;
+}
+
 std::string overlap_sentence(double before_mm, double after_mm) {
     return fmt::format("overlapping depths of different frames differ by {:.2f} mm (median), {:.2f} mm before.",
                        after_mm, before_mm);
@@ -274,6 +282,16 @@ RecordingResult refine_from_recording(const Capture& capture, const std::vector<
     const Fit start = sequence.start(model_of(before));
     result.refinement = refine(sequence, before, rungs, options, sequence.degeneracy(start));
     Refinement& r = result.refinement;
+    const auto overlap = [&](const Fit& fit) {
+        return sequence.overlap_mm(how.registered ? fit.model : model_of(depth_camera), sequence.poses(fit));
+    };
+    const double overlap_before_mm = overlap(start);
+    if (const double after_mm = overlap(r.climb.fit); how.registered && r.changed() && after_mm > overlap_before_mm)
+        r = refine(sequence, before, rungs, options,
+                   fmt::format(
+                       "what explains the tracks better ({}) lets depths of different frames overlap worse: {:.2f} mm, "
+                       "{:.2f} mm before",
+                       names_of_climbed(r.climb), after_mm, overlap_before_mm));
     r.source = fmt::format("{} points seen {} times in {} frames, {}, poses {}", sequence.points(),
                            sequence.sightings(), sequence.views(),
                            how.registered ? "colour registered with depth" : "colour not registered with depth",
@@ -281,10 +299,7 @@ RecordingResult refine_from_recording(const Capture& capture, const std::vector<
     const auto poses = sequence.poses(r.climb.fit);
     for (std::size_t i = 0; i < poses.size(); ++i)
         result.poses.emplace_back(sequence.view_name(i), poses[i]);
-    const Model depth_before = how.registered ? start.model : model_of(depth_camera);
-    const Model depth_after = how.registered ? r.climb.fit.model : depth_before;
-    r.notes.push_back(overlap_sentence(sequence.overlap_mm(depth_before, sequence.poses(start)),
-                                       sequence.overlap_mm(depth_after, poses)));
+    r.notes.push_back(overlap_sentence(overlap_before_mm, overlap(r.climb.fit)));
     r.notes.insert(r.notes.begin(), notes.begin(), notes.end());
     return result;
 }
