@@ -115,7 +115,9 @@ void main() {
     float open = 0.0, all = 0.0;
     vec2 met = vec2(0.0);
 
-    for (int i = 0; i < slices; ++i) {
+    // Loops ask last: lavapipe would run a `for` once more with nobody in it.
+    int i = 0;
+    do {
         float phi = pi * (float(i) + noise.x) / float(slices);
         vec3 tangent = e1 * cos(phi) + e2 * sin(phi);
         vec2 in_slice = vec2(dot(n, eye), dot(n, tangent)); // projected normal, towards V and T
@@ -145,7 +147,8 @@ void main() {
         vec4 found = vec4(0.0);
         vec2 last = vec2(0.0); // depths of the step before, on either side
         vec2 along_ray = along * per_px;
-        for (int j = 0; j < steps; j += 2) {
+        int j = 0;
+        do {
             vec4 x = (float(j) + vec4(u, u + 1.0)) * (1.0 / float(steps));
             vec4 before = spread(x - 1.0 / float(steps)) * far.xyxy + first.xyxy;
             vec4 now = spread(x) * far.xyxy + first.xyxy, next = spread(x + 1.0 / float(steps)) * far.xyxy + first.xyxy;
@@ -218,12 +221,14 @@ void main() {
             ivec4 misses = (floatBitsToInt(height) | floatBitsToInt(radius2 - d2) | (floatBitsToInt(zq) - 1)) >> 31;
             mask &= ~uvec4(misses);
             closed |= mask.x | mask.y | mask.z | mask.w;
-        }
+            j += 2;
+        } while (j < steps);
         float measure = weight * full;
         all += measure;
         open += measure * (1.0 - float(bitCount(closed)) * (1.0 / sector_count));
         met += (found.xy + found.zw) * (far + first) / max(full_reach, 1.0);
-    }
+        ++i;
+    } while (i < slices);
     // Where the radius shows as less than a pixel nothing can be seen within it: open and unknown; up to three it fades in.
     float shows = k.radius * sqrt(k.camera.fx * k.camera.fy) / z;
     open = mix(all, open, clamp(0.5 * shows - 0.5, 0.0, 1.0));
