@@ -25,6 +25,7 @@ struct View {
     const DepthImage& depth;
     const NormalImage* normals = nullptr;
     DepthNoise noise = {}; ///< sigma(z) of `depth` as recorded; none = clean. Methods may widen their tolerances by it
+    bool smoothed = false; ///< the noise is gone from within surfaces; at their edges it is not
 };
 
 /// Milliseconds per named pass or transfer, in execution order.

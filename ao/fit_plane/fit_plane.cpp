@@ -52,7 +52,7 @@ FittedDepth FitPlane::compute(const DepthImage& depth) {
 
 AoMap OnFittedDepth::compute(const View& view) {
     const FittedDepth fitted = fit_.compute(view.depth);
-    AoMap ao = method_.compute({fitted.depth, view.normals ? view.normals : &fitted.normals});
+    AoMap ao = method_.compute({fitted.depth, view.normals ? view.normals : &fitted.normals, noise_, true});
     timings_ = fit_.timings();
     timings_.insert(timings_.end(), method_.timings().begin(), method_.timings().end());
     return ao;

@@ -38,7 +38,7 @@ class FitPlane {
 /// A method that looks at fitted depth and normals in place of the recorded ones.
 class OnFittedDepth final : public Method {
   public:
-    OnFittedDepth(gpu::Device& device, const DepthNoise& noise, Method& method) : fit_(device, noise), method_(method) {}
+    OnFittedDepth(gpu::Device& device, const DepthNoise& noise, Method& method) : fit_(device, noise), noise_(noise), method_(method) {}
 
     AoMap compute(const View& view) override;
     [[nodiscard]] const Timings& timings() const override { return timings_; }
@@ -46,6 +46,7 @@ class OnFittedDepth final : public Method {
 
   private:
     FitPlane fit_;
+    DepthNoise noise_;
     Method& method_;
     Timings timings_;
 };

@@ -119,7 +119,7 @@ shared::ScreenConstants constants_from(const ScreenOptions& options, const View&
     k.noise_floor = static_cast<float>(view.noise.floor_m);
     k.noise_per_z2 = static_cast<float>(view.noise.per_z2);
     k.tangent_sine = options.tangent_sine;
-    k.tangent_sigmas = options.tangent_sigmas;
+    k.tangent_sigmas = view.smoothed ? 0.0F : options.tangent_sigmas;
     k.strength = options.strength;
     k.power = options.power;
     return k;
