@@ -3,6 +3,7 @@
 #include "projection/error.h"
 #include "shaders/shared/surfel.h"
 
+#include <algorithm>
 #include <array>
 #include <string_view>
 
@@ -55,6 +56,10 @@ std::vector<Parameter> SurfelOptions::parameters() {
     rows.push_back({"thickest",
                     "half the thickness of a surface at most; what is wider than twice this in the image is as thick",
                     &thickest, "radii", 1e-3, 10});
+    rows.push_back(
+        {"hidden",
+         "half the thickness of a surface whose ends lie behind others or outside the image; thickest is the limit",
+         &hidden, "radii", 0, 10});
     return rows;
 }
 
@@ -106,15 +111,17 @@ std::vector<std::byte> Surfel::constants(const shared::ScreenConstants& screen) 
     const cv::Size plane = plane_of({screen.size.x, screen.size.y});
     const cv::Size samples = samples_of({screen.size.x, screen.size.y}, options_.downsampled);
     const float r = screen.radius;
-    return bytes_of(shared::SurfelConstants{screen,
-                                            {words.width, words.height},
-                                            {plane.width, plane.height},
-                                            {samples.width, samples.height},
-                                            options_.thinnest * r,
-                                            options_.thickest * r,
-                                            options_.slices * options_.steps <= 4 ? 1.3F : 1.0F, // between few samples gaps would open
-                                            0.05F * r,
-                                            0.3F * r});
+    return bytes_of(shared::SurfelConstants{
+        screen,
+        {words.width, words.height},
+        {plane.width, plane.height},
+        {samples.width, samples.height},
+        options_.thinnest * r,
+        options_.thickest * r,
+        std::min(options_.hidden, options_.thickest) * r,
+        options_.slices * options_.steps <= 4 ? 1.3F : 1.0F, // between few samples gaps would open
+        0.05F * r,
+        0.3F * r});
 }
 
 } // namespace scanshade

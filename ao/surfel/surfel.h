@@ -20,7 +20,8 @@ struct SurfelOptions {
     bool downsampled = false;     ///< a quarter of the pixels are sampled
     int slices = 0, steps = 0;    ///< above 0: instead of the quality's
     float thinnest = 0.01F;       ///< half a surfel's thickness at least, share of the radius
-    float thickest = 0.4F;        ///< and at most
+    float thickest = 0.6F;        ///< and at most
+    float hidden = 0.6F;          ///< that of a surface whose ends are out of sight
 
     [[nodiscard]] std::vector<Parameter> parameters();
 };
