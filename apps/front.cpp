@@ -19,11 +19,6 @@ bool beats(const Priced& a, const Priced& b) {
 bool equal(const Priced& a, const Priced& b) { return a.ns_per_pixel == b.ns_per_pixel && a.rms == b.rms; }
 bool finite(const Priced& point) { return std::isfinite(point.ns_per_pixel) && std::isfinite(point.rms); }
 
-double rounded(double value, int digits) {
-    const double scale = std::pow(10.0, digits);
-    return std::round(value * scale) / scale;
-}
-
 json point_json(const Priced& point) {
     json settings = json::object();
     for (const auto& [name, value] : point.configuration.settings)
@@ -31,8 +26,8 @@ json point_json(const Priced& point) {
     return {{"method", point.configuration.method},
             {"name", point.configuration.name},
             {"settings", settings},
-            {"ns_per_pixel", rounded(point.ns_per_pixel, 3)},
-            {"rms", rounded(point.rms, 5)}};
+            {"ns_per_pixel", point.ns_per_pixel},
+            {"rms", point.rms}};
 }
 
 Priced point_from(const json& text) {
