@@ -8,22 +8,20 @@
 layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(constant_id = spec_blur_radius) const int radius = 5;
 layout(constant_id = spec_blur_down) const int down = 0;
-layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
-layout(binding = 1, r32f) readonly uniform imageBuffer normals;
-layout(binding = 2, r32f) readonly uniform imageBuffer from;
-layout(binding = 3, r32f) readonly uniform imageBuffer weights; // of offsets 0, 1, 2 ...
+layout(binding = 0, rgba32f) readonly uniform imageBuffer surfaces;
+layout(binding = 1, r32f) readonly uniform imageBuffer from;
+layout(binding = 2, r32f) readonly uniform imageBuffer weights; // of offsets 0, 1, 2 ...
 layout(binding = 16, r32f) uniform writeonly imageBuffer to;
 layout(binding = 32, scalar) uniform Constants { ScreenConstants constants; };
-
-#include "lib/normal.glsl"
 
 void main() {
     k = constants;
     ivec2 p = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(p, k.size))) return;
     int here = index_of(p);
-    float z = imageLoad(depth_in, here).x;
-    vec3 normal = normal_at(here), point = ray_of(vec2(p)) * z;
+    vec4 own = imageLoad(surfaces, here);
+    float z = own.w;
+    vec3 normal = own.xyz, point = ray_of(vec2(p)) * z;
     // Off the pixel's plane by more than this is another surface: a limit on depth would cut slopes apart.
     float tolerance = max(max(0.02 * z, 3.0 * sigma_of(z)), 0.1 * k.radius);
     float weight = imageLoad(weights, 0).x, sum = weight * imageLoad(from, here).x;
@@ -31,9 +29,9 @@ void main() {
         ivec2 q = p + (down != 0 ? ivec2(0, i) : ivec2(i, 0));
         bool known = inside(q) && i != 0;
         int at = known ? index_of(q) : here;
-        vec3 other = normal_at(at); // zero in holes
-        float off = dot(normal, ray_of(vec2(q)) * imageLoad(depth_in, at).x - point);
-        bool same = known && dot(normal, other) >= 0.8 && abs(off) <= tolerance;
+        vec4 other = imageLoad(surfaces, at); // its normal is zero in holes
+        float off = dot(normal, ray_of(vec2(q)) * other.w - point);
+        bool same = known && dot(normal, other.xyz) >= 0.8 && abs(off) <= tolerance;
         float w = same ? imageLoad(weights, abs(i)).x : 0.0;
         sum += w * imageLoad(from, at).x;
         weight += w;

@@ -47,11 +47,6 @@ void add(inout Mean mean, Tap tap) {
     mean.weight += weight;
 }
 
-float shown(float v) {
-    float v1 = clamp(1.0 - k.strength * (1.0 - v), 0.0, 1.0);
-    return k.power == 1.0 ? v1 : pow(v1, k.power);
-}
-
 void put(ivec2 p, Tap centre, Mean mean) {
     if (!inside(p)) return;
     bool hole = !(centre.point.z > 0.0);

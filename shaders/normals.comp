@@ -1,5 +1,5 @@
 // Normals from depth, before any screen-space method: along each axis the side that goes on straight in 1/z, which is
-// linear on any plane. Three floats a pixel, unit, facing the camera; (0, 0, 0) in holes and only there.
+// linear on any plane. Written with the depth: unit, facing the camera; (0, 0, 0) in holes and only there.
 //
 // Where the view brings normals they are kept, made unit and turned to the camera; those that are zero or not finite are
 // derived here like the rest.
@@ -11,13 +11,11 @@
 layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(constant_id = spec_supplied) const int supplied = 0;
 layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
-layout(binding = 1, r32f) readonly uniform imageBuffer normals; // those of the view, if any
-layout(binding = 16, r32f) uniform writeonly imageBuffer normals_out;
-layout(binding = 17, rgba32f) uniform writeonly imageBuffer surfaces; // normal and depth in one: denoise reads many
+layout(binding = 1, r32f) readonly uniform imageBuffer given; // normals of the view, if any, three floats a pixel
+layout(binding = 16, rgba32f) uniform writeonly imageBuffer surfaces;
 layout(binding = 32, scalar) uniform Constants { ScreenConstants constants; };
 
 #include "lib/depth.glsl"
-#include "lib/normal.glsl"
 
 const float straight_px = 2.0; // bend in 1/z, in pixels of parallax, up to which a side is the same surface
 const float steep = 30.0;      // slope, metres of depth per metre across, beyond which a neighbour is another surface
@@ -97,15 +95,12 @@ void main() {
     bool hole = !(z > 0.0);
     vec3 n = derived_normal(p, hole ? 1.0 : z, hole);
     if (supplied != 0) {
-        vec3 given = normal_at(here);
-        float length2 = dot(given, given);
+        vec3 own = vec3(imageLoad(given, 3 * here).x, imageLoad(given, 3 * here + 1).x, imageLoad(given, 3 * here + 2).x);
+        float length2 = dot(own, own);
         bool usable = length2 > 1e-6 && length2 < 1e6; // false for NaN
-        given *= dot(given, ray_of(vec2(p))) > 0.0 ? -1.0 : 1.0;
-        n = usable ? given * inversesqrt(length2) : n;
+        own *= dot(own, ray_of(vec2(p))) > 0.0 ? -1.0 : 1.0;
+        n = usable ? own * inversesqrt(length2) : n;
     }
     n = hole ? vec3(0.0) : n;
-    imageStore(normals_out, 3 * here, vec4(n.x));
-    imageStore(normals_out, 3 * here + 1, vec4(n.y));
-    imageStore(normals_out, 3 * here + 2, vec4(n.z));
     imageStore(surfaces, here, vec4(n, z));
 }

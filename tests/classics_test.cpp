@@ -10,6 +10,7 @@
 #include "tests/support/says.h"
 #include "tests/support/scenes.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <fmt/format.h>
@@ -164,7 +165,7 @@ TEST(Noise, any_8x8_pixels_hold_numbers_spread_over_zero_to_one) {
 
 /// The shared passes by themselves: depth, given normals and raw visibility in; normals and shown visibility out.
 struct SharedPasses {
-    enum : int { depth, given, raw, normals, surfaces, visibility };
+    enum : int { depth, given, raw, surfaces, visibility };
     std::unique_ptr<gpu::Program> program;
 
     SharedPasses(cv::Size size, bool supplied) {
@@ -173,11 +174,10 @@ struct SharedPasses {
         const std::vector<Row> buffers{{"depth", pixels * 4, Row::Host::upload, Row::Texels::r32f},
                                        {"given", pixels * 12, Row::Host::upload, Row::Texels::r32f},
                                        {"raw", pixels * 4, Row::Host::upload, Row::Texels::r32f},
-                                       {"normals", pixels * 12, Row::Host::download, Row::Texels::r32f},
-                                       {"surfaces", pixels * 16, Row::Host::none, Row::Texels::rgba32f},
+                                       {"surfaces", pixels * 16, Row::Host::download, Row::Texels::rgba32f},
                                        {"visibility", pixels * 4, Row::Host::download, Row::Texels::r32f}};
         ScreenTables tables{size, {}, {}};
-        tables.add_pass("normals", "normals", {depth, given}, {normals, surfaces}, {{shared::spec_supplied, supplied}});
+        tables.add_pass("normals", "normals", {depth, given}, {surfaces}, {{shared::spec_supplied, supplied}});
         tables.add_pass("denoise", "denoise", {surfaces, raw}, {visibility}, {}, 2);
         program = std::make_unique<gpu::Program>(device(), buffers, tables.passes, sizeof(shared::ScreenConstants));
     }
@@ -195,7 +195,8 @@ cv::Mat3f normals_of(const DepthImage& depth, const cv::Mat3f& supplied = {}) {
     const shared::ScreenConstants k = constants_from(ScreenOptions{}, {depth});
     passes.program->run(std::as_bytes(std::span(&k, 1)));
     cv::Mat3f normals(depth.z_m.size());
-    std::memcpy(normals.data, passes.program->host(SharedPasses::normals).data(), normals.total() * 12);
+    const auto surfaces = passes.program->host_as<cv::Vec4f>(SharedPasses::surfaces);
+    std::ranges::transform(surfaces, normals.begin(), [](const cv::Vec4f& s) { return cv::Vec3f(s[0], s[1], s[2]); });
     return normals;
 }
 

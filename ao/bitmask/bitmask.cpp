@@ -3,23 +3,21 @@
 namespace scanshade {
 
 std::vector<Parameter> BitmaskOptions::parameters() {
-    auto rows = screen.parameters();
-    const auto append = [&](std::vector<Parameter> more) { rows.insert(rows.end(), more.begin(), more.end()); };
-    append(slices.parameters());
-    append({
-        {"thickness", "how thick what is seen is taken to be", &thickness, "radii", 1e-4, 1e6},
-        {"thickness-per-z", "and how much thicker per metre of depth", &thickness_per_z, "m/m", 0, 10},
-        {"sectors",
-         "cosine: of equal cosine-weighted measure; angle: of equal angle, as published",
-         &sectors,
-         "",
-         {},
-         {},
-         {"cosine", "angle"}},
-        {"unbounded", "samples beyond the radius count, too, as published: only the image's march ends there",
-         &unbounded},
-    });
-    return rows;
+    return joined(
+        joined(screen.parameters(), slices.parameters()),
+        {
+            {"thickness", "how thick what is seen is taken to be", &thickness, "radii", 1e-4, 1e6},
+            {"thickness-per-z", "and how much thicker per metre of depth", &thickness_per_z, "m/m", 0, 10},
+            {"sectors",
+             "cosine: of equal cosine-weighted measure; angle: of equal angle, as published",
+             &sectors,
+             "",
+             {},
+             {},
+             {"cosine", "angle"}},
+            {"unbounded", "samples beyond the radius count, too, as published: only the image's march ends there",
+             &unbounded},
+        });
 }
 
 Bitmask::Bitmask(gpu::Device& device, const BitmaskOptions& options)

@@ -25,26 +25,25 @@ int kind_of(const std::string& falloff) {
 } // namespace
 
 std::vector<Parameter> GtaoOptions::parameters() {
-    auto rows = screen.parameters();
-    const auto append = [&](std::vector<Parameter> more) { rows.insert(rows.end(), more.begin(), more.end()); };
-    append(slices.parameters());
-    append({
-        {"profile",
-         "metric: visibility within the radius; xegtao: 1.457 times the radius, linear falloff, power 2.2",
-         &profile,
-         "",
-         {},
-         {},
-         {"metric", "xegtao"}},
-        {"falloff",
-         "how a sample's weight falls with distance: not before the radius, over its last 0.615, or with the square",
-         &falloff,
-         "",
-         {},
-         {},
-         {"hard", "linear", "quadratic"}},
-    });
-    return rows;
+    return joined(
+        joined(screen.parameters(), slices.parameters()),
+        {
+            {"profile",
+             "metric: visibility within the radius; xegtao: 1.457 times the radius, linear falloff, power 2.2",
+             &profile,
+             "",
+             {},
+             {},
+             {"metric", "xegtao"}},
+            {"falloff",
+             "how a sample's weight falls with distance: not before the radius, over its last 0.615, or with the "
+             "square",
+             &falloff,
+             "",
+             {},
+             {},
+             {"hard", "linear", "quadratic"}},
+        });
 }
 
 Gtao::Gtao(gpu::Device& device, const GtaoOptions& options)

@@ -1,6 +1,5 @@
 #include "ao/hbao/hbao.h"
 
-#include "projection/error.h"
 #include "shaders/shared/hbao.h"
 
 #include <array>
@@ -17,12 +16,14 @@ struct Count {
 constexpr std::array counts{Count{"lowest", 4, 2}, Count{"low", 4, 4}, Count{"medium", 8, 4}, Count{"high", 8, 8},
                             Count{"highest", 32, 16}};
 
+/// The quality's, but for what was given.
 Count count_of(const HbaoOptions& options) {
-    for (const Count& count : counts)
-        if (options.quality == count.quality)
-            return {count.quality, options.directions > 0 ? options.directions : count.directions,
-                    options.steps > 0 ? options.steps : count.steps};
-    throw Misuse("quality '" + options.quality + "': lowest, low, medium, high or highest expected");
+    Count count = level_of(counts, options.quality);
+    if (options.directions > 0)
+        count.directions = options.directions;
+    if (options.steps > 0)
+        count.steps = options.steps;
+    return count;
 }
 
 HbaoOptions resolved(HbaoOptions options) {
@@ -38,38 +39,38 @@ HbaoOptions resolved(HbaoOptions options) {
 } // namespace
 
 std::vector<Parameter> HbaoOptions::parameters() {
-    auto rows = screen.parameters();
-    const std::vector<Parameter> own{
-        {"profile",
-         "metric: all within the radius count alike; published: bias 30, attenuated, contrast 1.25",
-         &profile,
-         "",
-         {},
-         {},
-         {"metric", "published"}},
-        {"quality",
-         "directions x steps: lowest 4x2, low 4x4, medium 8x4, high 8x8, highest 32x16",
-         &quality,
-         "",
-         {},
-         {},
-         {"lowest", "low", "medium", "high", "highest"}},
-        {"directions", "directions in the image; 0 = as the quality says", &directions, "", 0, 128},
-        {"steps", "steps along each; 0 = as the quality says", &steps, "", 0, 256},
-        {"bias", "horizons lower above the tangent plane than this do not occlude", &bias_degrees, "degrees", 0, 89},
-        {"attenuated", "samples count less with the square of their distance, instead of all alike up to the radius",
-         &attenuated},
-        {"contrast", "the occlusion is multiplied by this", &contrast, "", 0, 5},
-    };
-    rows.insert(rows.end(), own.begin(), own.end());
-    return rows;
+    return joined(screen.parameters(),
+                  {
+                      {"profile",
+                       "metric: all within the radius count alike; published: bias 30, attenuated, contrast 1.25",
+                       &profile,
+                       "",
+                       {},
+                       {},
+                       {"metric", "published"}},
+                      {"quality",
+                       "directions x steps: lowest 4x2, low 4x4, medium 8x4, high 8x8, highest 32x16",
+                       &quality,
+                       "",
+                       {},
+                       {},
+                       {"lowest", "low", "medium", "high", "highest"}},
+                      {"directions", "directions in the image; 0 = as the quality says", &directions, "", 0, 128},
+                      {"steps", "steps along each; 0 = as the quality says", &steps, "", 0, 256},
+                      {"bias", "horizons lower above the tangent plane than this do not occlude", &bias_degrees,
+                       "degrees", 0, 89},
+                      {"attenuated",
+                       "samples count less with the square of their distance, instead of all alike up to the radius",
+                       &attenuated},
+                      {"contrast", "the occlusion is multiplied by this", &contrast, "", 0, 5},
+                  });
 }
 
 Hbao::Hbao(gpu::Device& device, const HbaoOptions& options)
     : ScreenMethod(device, resolved(options).screen), options_(resolved(options)) {}
 
 void Hbao::add_passes(ScreenTables& tables) const {
-    tables.add_pass("generate", "hbao/generate", {screen_depth, screen_normals, screen_noise},
+    tables.add_pass("generate", "hbao/generate", {screen_depth, screen_surfaces, screen_noise},
                     {screen_raw, screen_coverage});
 }
 

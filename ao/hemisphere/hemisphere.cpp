@@ -1,8 +1,8 @@
 #include "ao/hemisphere/hemisphere.h"
 
-#include "projection/error.h"
 #include "shaders/shared/point_samples.h"
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -13,14 +13,15 @@ namespace {
 constexpr double shortest = 0.01; // of the radius
 constexpr double lowest = 0.05;   // height above the tangent plane: points lower only meet the surface itself
 
+struct Count {
+    const char* quality;
+    int points;
+};
+constexpr std::array counts{Count{"lowest", 8}, Count{"low", 16}, Count{"medium", 32}, Count{"high", 64},
+                            Count{"highest", 256}};
+
 int points_of(const HemisphereOptions& options) {
-    if (options.points > 0)
-        return options.points;
-    for (const auto& [name, points] :
-         {std::pair{"lowest", 8}, {"low", 16}, {"medium", 32}, {"high", 64}, {"highest", 256}})
-        if (options.quality == name)
-            return points;
-    throw Misuse("quality '" + options.quality + "': lowest, low, medium, high or highest expected");
+    return options.points > 0 ? options.points : level_of(counts, options.quality).points;
 }
 
 double fraction(double x) { return x - std::floor(x); }
@@ -57,29 +58,29 @@ std::vector<float> published_kernel(int points) {
 }
 
 std::vector<Parameter> HemisphereOptions::parameters() {
-    auto rows = screen.parameters();
-    const std::vector<Parameter> own{
-        {"profile",
-         "metric: open planes and a normalised mean; published: the tutorial's test against the surface's own depth",
-         &profile,
-         "",
-         {},
-         {},
-         {"metric", "published"}},
-        {"quality",
-         "points: lowest 8, low 16, medium 32, high 64, highest 256",
-         &quality,
-         "",
-         {},
-         {},
-         {"lowest", "low", "medium", "high", "highest"}},
-        {"points", "points of the kernel; 0 = as the quality says", &points, "", 0, 1024},
-        {"renormalise", "samples that met nothing known count as those that did, where at least half did; else as open",
-         &renormalise},
-        {"blurs", "iterations of the published 7-tap blur, before denoise", &blurs, "", 0, 16},
-    };
-    rows.insert(rows.end(), own.begin(), own.end());
-    return rows;
+    return joined(screen.parameters(),
+                  {
+                      {"profile",
+                       "metric: open planes and a normalised mean; published: the tutorial's test against the "
+                       "surface's own depth",
+                       &profile,
+                       "",
+                       {},
+                       {},
+                       {"metric", "published"}},
+                      {"quality",
+                       "points: lowest 8, low 16, medium 32, high 64, highest 256",
+                       &quality,
+                       "",
+                       {},
+                       {},
+                       {"lowest", "low", "medium", "high", "highest"}},
+                      {"points", "points of the kernel; 0 = as the quality says", &points, "", 0, 1024},
+                      {"renormalise",
+                       "samples that met nothing known count as those that did, where at least half did; else as open",
+                       &renormalise},
+                      {"blurs", "iterations of the published 7-tap blur, before denoise", &blurs, "", 0, 16},
+                  });
 }
 
 Hemisphere::Hemisphere(gpu::Device& device, const HemisphereOptions& options)
@@ -91,7 +92,7 @@ void Hemisphere::add_passes(ScreenTables& tables) const {
     const auto kernel = published ? published_kernel(points) : hemisphere_kernel(points);
     const int table = tables.add_buffer(
         {"kernel", kernel.size() * 4, gpu::BufferRow::Host::none, gpu::BufferRow::Texels::rgba32f, kernel});
-    tables.add_pass("generate", "hemisphere/generate", {screen_depth, screen_normals, screen_noise, table},
+    tables.add_pass("generate", "hemisphere/generate", {screen_depth, screen_surfaces, screen_noise, table},
                     {screen_raw, screen_coverage},
                     {{shared::spec_published, published}, {shared::spec_renormalise, options_.renormalise}});
     tables.add_blurs(options_.blurs, {0.370F, 0.317F, 0.198F, 0.115F});

@@ -32,13 +32,6 @@ struct Count {
 constexpr std::array counts{Count{"lowest", 1, 8}, Count{"low", 1, 14}, Count{"medium", 2, 14}, Count{"high", 4, 14},
                             Count{"highest", 16, 14}};
 
-Count count_of(const LunaOptions& options) {
-    for (const Count& count : counts)
-        if (options.quality == count.quality)
-            return count;
-    throw Misuse("quality '" + options.quality + "': lowest, low, medium, high or highest expected");
-}
-
 /// The companion code's power and blur belong to its look.
 LunaOptions resolved(LunaOptions options) {
     options = checked(std::move(options));
@@ -70,50 +63,51 @@ std::vector<float> luna_vectors(int sets, int count) {
 }
 
 std::vector<Parameter> LunaOptions::parameters() {
-    auto rows = screen.parameters();
-    const std::vector<Parameter> own{
-        {"profile",
-         "metric: the radius is respected; published: the companion code's constants (in metres), power 6 and four "
-         "blurs",
-         &profile,
-         "",
-         {},
-         {},
-         {"metric", "published"}},
-        {"quality",
-         "vectors: lowest 8, low the published 14, medium 28, high 56, highest 224",
-         &quality,
-         "",
-         {},
-         {},
-         {"lowest", "low", "medium", "high", "highest"}},
-        {"epsilon", "what stands less than this in front of the surface does not occlude", &epsilon, "radii", 0, 1},
-        {"fade-from", "what stands farther in front occludes less", &fade_from, "radii", 0, 10},
-        {"fade-to", "and beyond this not at all", &fade_to, "radii", 1e-3, 10},
-        {"renormalise", "samples that met nothing known count as those that did, where at least half did; else as open",
-         &renormalise},
-        {"blurs", "iterations of the published 11-tap blur, before denoise", &blurs, "", 0, 16},
-    };
-    rows.insert(rows.end(), own.begin(), own.end());
-    return rows;
+    return joined(
+        screen.parameters(),
+        {
+            {"profile",
+             "metric: the radius is respected; published: the companion code's constants (in metres), power 6 and four "
+             "blurs",
+             &profile,
+             "",
+             {},
+             {},
+             {"metric", "published"}},
+            {"quality",
+             "vectors: lowest 8, low the published 14, medium 28, high 56, highest 224",
+             &quality,
+             "",
+             {},
+             {},
+             {"lowest", "low", "medium", "high", "highest"}},
+            {"epsilon", "what stands less than this in front of the surface does not occlude", &epsilon, "radii", 0, 1},
+            {"fade-from", "what stands farther in front occludes less", &fade_from, "radii", 0, 10},
+            {"fade-to", "and beyond this not at all", &fade_to, "radii", 1e-3, 10},
+            {"renormalise",
+             "samples that met nothing known count as those that did, where at least half did; else as open",
+             &renormalise},
+            {"blurs", "iterations of the published 11-tap blur, before denoise", &blurs, "", 0, 16},
+        });
 }
 
 Luna::Luna(gpu::Device& device, const LunaOptions& options)
     : ScreenMethod(device, resolved(options).screen), options_(resolved(options)) {}
 
 void Luna::add_passes(ScreenTables& tables) const {
-    const Count count = count_of(options_);
+    const Count& count = level_of(counts, options_.quality);
     const auto vectors = luna_vectors(count.sets, count.count);
     const int table = tables.add_buffer(
         {"vectors", vectors.size() * 4, gpu::BufferRow::Host::none, gpu::BufferRow::Texels::rgba32f, vectors});
     tables.add_pass(
-        "generate", "luna/generate", {screen_depth, screen_normals, screen_noise, table}, {screen_raw, screen_coverage},
+        "generate", "luna/generate", {screen_depth, screen_surfaces, screen_noise, table},
+        {screen_raw, screen_coverage},
         {{shared::spec_published, options_.profile == "published"}, {shared::spec_renormalise, options_.renormalise}});
     tables.add_blurs(options_.blurs, {0.16397F, 0.15136F, 0.11906F, 0.07981F, 0.04559F, 0.02219F}); // sigma 2.5 pixels
 }
 
 std::vector<std::byte> Luna::constants(const shared::ScreenConstants& screen) const {
-    const Count count = count_of(options_);
+    const Count& count = level_of(counts, options_.quality);
     const float unit = options_.profile == "published" ? 1 : screen.radius;
     return bytes_of(shared::LunaConstants{screen, count.sets, count.count, options_.epsilon * unit,
                                           options_.fade_from * unit, options_.fade_to * unit});

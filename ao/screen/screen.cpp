@@ -1,7 +1,6 @@
 #include "ao/screen/screen.h"
 
 #include "ao/screen/noise.h"
-#include "projection/error.h"
 
 #include <chrono>
 #include <cstring>
@@ -51,12 +50,11 @@ std::vector<gpu::BufferRow> shared_buffers(std::size_t pixels, bool supplied, in
     return {
         {"depth", pixels * 4, Host::upload, floats},
         {"given normals", supplied ? pixels * 12 : 4, supplied ? Host::upload : Host::none, floats},
-        {"normals", pixels * 12, Host::none, floats},
+        {"surfaces", pixels * 16, Host::none, gpu::BufferRow::Texels::rgba32f},
         {"noise", noise.size() * 4, Host::none, pairs, noise},
         {"raw", pixels * 4, Host::none, floats},
         {"coverage", pixels * 4, Host::download, floats},
         {"visibility", pixels * 4, Host::download, floats},
-        {"surfaces", pixels * 16, Host::none, gpu::BufferRow::Texels::rgba32f},
     };
 }
 
@@ -104,8 +102,13 @@ void ScreenTables::add_blurs(int iterations, const std::vector<float>& weights) 
     for (int i = 0; i < iterations; ++i)
         for (const bool down : {false, true})
             add_pass(fmt::format("blur {} {}", i + 1, down ? "down" : "across"), "blur",
-                     {screen_depth, screen_normals, down ? between : screen_raw, table}, {down ? screen_raw : between},
+                     {screen_surfaces, down ? between : screen_raw, table}, {down ? screen_raw : between},
                      {{shared::spec_blur_radius, radius}, {shared::spec_blur_down, down}});
+}
+
+std::vector<Parameter> joined(std::vector<Parameter> rows, const std::vector<Parameter>& more) {
+    rows.insert(rows.end(), more.begin(), more.end());
+    return rows;
 }
 
 shared::ScreenConstants constants_from(const ScreenOptions& options, const View& view) {
@@ -133,7 +136,7 @@ void ScreenMethod::add_denoise(ScreenTables& tables) const {
 ScreenTables ScreenMethod::tables(cv::Size size, bool supplied) const {
     ScreenTables all{size, shared_buffers(static_cast<std::size_t>(size.area()), supplied, options_.seed), {}};
     // Without normals of the view, depth fills their slot; nothing reads it.
-    all.add_pass("normals", "normals", {screen_depth, supplied ? screen_given : screen_depth}, {screen_normals, screen_surfaces},
+    all.add_pass("normals", "normals", {screen_depth, supplied ? screen_given : screen_depth}, {screen_surfaces},
                  {{shared::spec_supplied, supplied}});
     add_passes(all);
     add_denoise(all);

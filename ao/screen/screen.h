@@ -4,6 +4,7 @@
 
 #include "ao/gpu/program.h"
 #include "ao/method.h"
+#include "projection/error.h"
 #include "shaders/shared/screen.h"
 
 #include <memory>
@@ -28,12 +29,11 @@ struct ScreenOptions {
 enum ScreenBuffer : int {
     screen_depth,      ///< r32f, metres, 0 = hole; nothing else is invalid
     screen_given,      ///< r32f, three a pixel: the view's normals, where it brings any
-    screen_normals,    ///< r32f, three a pixel: unit, facing the camera; (0, 0, 0) exactly in holes
+    screen_surfaces,   ///< rgba32f: normal, unit, facing the camera, (0, 0, 0) exactly in holes; depth
     screen_noise,      ///< rg32f, 64x64: see lib/noise.glsl
     screen_raw,        ///< r32f: visibility before denoise, finite everywhere
     screen_coverage,   ///< r32f: share of the wanted samples that fell on known depth, 0 in holes
     screen_visibility, ///< r32f: the result, NaN in holes
-    screen_surfaces,   ///< rgba32f: normal and depth once more, for passes that read many
     screen_own
 };
 
@@ -63,7 +63,7 @@ class ScreenMethod : public Method {
   protected:
     ScreenMethod(gpu::Device& device, const ScreenOptions& options) : device_(device), options_(options) {}
 
-    /// Appends the room's buffers and passes: screen_depth, screen_normals, screen_noise -> screen_raw,
+    /// Appends the room's buffers and passes: screen_depth, screen_surfaces, screen_noise -> screen_raw,
     /// screen_coverage.
     virtual void add_passes(ScreenTables& tables) const = 0;
     /// Appends what makes screen_visibility of screen_raw: the shared 5x5 mean, unless a room has its own.
@@ -81,6 +81,18 @@ class ScreenMethod : public Method {
     std::unique_ptr<gpu::Program> program_;
     Timings timings_;
 };
+
+/// The row of that quality; the choices of the parameter row are those of the table.
+template <class Levels>
+[[nodiscard]] const auto& level_of(const Levels& levels, const std::string& quality) {
+    for (const auto& level : levels)
+        if (quality == level.quality)
+            return level;
+    throw Misuse("no quality '" + quality + "'");
+}
+
+/// The rows all rooms have, then a room's own.
+[[nodiscard]] std::vector<Parameter> joined(std::vector<Parameter> rows, const std::vector<Parameter>& more);
 
 /// The constants of one view.
 [[nodiscard]] shared::ScreenConstants constants_from(const ScreenOptions& options, const View& view);

@@ -1,7 +1,5 @@
 #include "ao/screen/slices.h"
 
-#include "projection/error.h"
-
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -16,12 +14,14 @@ struct Count {
 constexpr std::array counts{Count{"lowest", 1, 4}, Count{"low", 2, 4}, Count{"medium", 2, 8}, Count{"high", 4, 8},
                             Count{"highest", 16, 16}};
 
+/// The quality's, but for what was given.
 Count count_of(const SliceOptions& options) {
-    for (const Count& count : counts)
-        if (options.quality == count.quality)
-            return {count.quality, options.slices > 0 ? options.slices : count.slices,
-                    options.steps > 0 ? options.steps : count.steps};
-    throw Misuse("quality '" + options.quality + "': lowest, low, medium, high or highest expected");
+    Count count = level_of(counts, options.quality);
+    if (options.slices > 0)
+        count.slices = options.slices;
+    if (options.steps > 0)
+        count.steps = options.steps;
+    return count;
 }
 
 } // namespace
@@ -57,7 +57,7 @@ shared::GtaoConstants slice_constants(const SliceOptions& options, const shared:
 
 void add_slice_pass(ScreenTables& tables, const SliceOptions& options, std::vector<std::pair<int, int>> constants) {
     constants.emplace_back(shared::spec_square, options.distribution == 2);
-    tables.add_pass("generate", "gtao/generate", {screen_depth, screen_normals, screen_noise},
+    tables.add_pass("generate", "gtao/generate", {screen_depth, screen_surfaces, screen_noise},
                     {screen_raw, screen_coverage}, std::move(constants));
 }
 

@@ -13,7 +13,7 @@ layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(constant_id = spec_published) const int published = 0;
 layout(constant_id = spec_renormalise) const int renormalise = 0;
 layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
-layout(binding = 1, r32f) readonly uniform imageBuffer normals;
+layout(binding = 1, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 2, rg32f) readonly uniform imageBuffer noise_table;
 layout(binding = 3, rgba32f) readonly uniform imageBuffer kernel; // tangent, bitangent, normal
 layout(binding = 16, r32f) uniform writeonly imageBuffer raw;

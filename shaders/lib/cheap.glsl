@@ -8,12 +8,18 @@ int nearest(float x) {
     precise float shifted = x + magic;
     return floatBitsToInt(shifted) - magic_bits;
 }
+ivec4 nearest(vec4 x) {
+    precise vec4 shifted = x + magic;
+    return floatBitsToInt(shifted) - magic_bits;
+}
 #ifdef FOR_GPU // a GPU: one instruction each as they stand
 float positive(float x) { return max(x, 0.0); }
 float at_most_one(float x) { return min(x, 1.0); }
 float at_least(float x, float low) { return max(x, low); }
 const float quick_scale = 1.0;
 float quick_inversesqrt(float x) { return inversesqrt(x); }
+vec4 positive(vec4 x) { return max(x, 0.0); }
+vec4 quick_inversesqrt(vec4 x) { return inversesqrt(x); }
 #else
 float positive(float x) { return intBitsToFloat(max(floatBitsToInt(x), 0)); }               // max(x, 0)
 float at_most_one(float x) { return intBitsToFloat(min(floatBitsToInt(x), 0x3f800000)); }   // min(x, 1), x >= 0
@@ -24,6 +30,11 @@ float at_least(float x, float low) { return intBitsToFloat(max(floatBitsToInt(x)
 const float quick_scale = 0.703952253;
 float quick_inversesqrt(float x) {
     float y = intBitsToFloat(0x5f1ffff9 - (floatBitsToInt(x) >> 1));
+    return y * (2.38924456 - x * y * y);
+}
+vec4 positive(vec4 x) { return intBitsToFloat(max(floatBitsToInt(x), ivec4(0))); }
+vec4 quick_inversesqrt(vec4 x) {
+    vec4 y = intBitsToFloat(0x5f1ffff9 - (floatBitsToInt(x) >> 1));
     return y * (2.38924456 - x * y * y);
 }
 #endif

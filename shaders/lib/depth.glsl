@@ -1,4 +1,4 @@
-// Depth and normals of a pixel, with holes: expects the texel buffers `depth_in` and, where normals are read, `normals`.
+// Depth of a pixel, with holes: expects the texel buffer `depth_in`.
 
 // 0 in holes and outside the image: both are unknown.
 float depth_at(ivec2 p) {

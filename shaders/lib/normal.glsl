@@ -1,4 +1,2 @@
-// The normal of a pixel: expects the texel buffer `normals`, three floats a pixel.
-vec3 normal_at(int index) {
-    return vec3(imageLoad(normals, 3 * index).x, imageLoad(normals, 3 * index + 1).x, imageLoad(normals, 3 * index + 2).x);
-}
+// The normal of a pixel, zero in holes: expects the texel buffer `surfaces`, normal and depth of each pixel.
+vec3 normal_at(int index) { return imageLoad(surfaces, index).xyz; }

@@ -1,5 +1,5 @@
 // The surface point a pixel asks for, how far its neighbourhood reaches, and what is done with the answer: expects the
-// texel buffers `normals`, and `raw` and `coverage` to write.
+// texel buffers `surfaces`, and `raw` and `coverage` to write.
 #include "lib/cheap.glsl"
 
 struct Surface {

@@ -4,6 +4,7 @@
 #include "screen.h"
 SHARED_BEGIN
 
+const int surfel_group = 64;              // threads of the passes along lines
 const int surfel_run = 32;                // pixels whose edges share a word
 const uint surfel_nowhere = 0xfffffffeu; // no edge before the border of the image
 
@@ -19,7 +20,7 @@ struct SurfelConstants {
     float longest;             // of what is added to a half length there, metres
 };
 
-// Specialization constants of generate.
+// Specialization constants, besides those of the shared passes.
 const int spec_slices = 10;
 const int spec_steps = 11;   // on either side of a slice
 const int spec_spacing = 12; // of the samples, pixels

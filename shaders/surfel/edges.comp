@@ -7,7 +7,7 @@
 #extension GL_EXT_scalar_block_layout : require
 #include "shared/surfel.h"
 
-layout(local_size_x = 64) in;
+layout(local_size_x = surfel_group) in;
 layout(binding = 0, r32f) readonly uniform imageBuffer depth;
 layout(binding = 16, rg32ui) writeonly uniform uimageBuffer edges;
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };

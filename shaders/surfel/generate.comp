@@ -1,10 +1,10 @@
-// Visibility of every pixel from the surfels around it: each slice of the hemisphere is 32 sectors of equal cosine weight,
+// Visibility of every pixel from the surfels around it: each slice of the hemisphere is 31 sectors of equal cosine weight,
 // and every surfel that a slice meets closes those it covers (visibility bitmask, Therrien et al. 2023; slices and their
 // cosine measure, Jimenez et al. 2016). A surfel is a piece of surface with a direction and a thickness, not a point: between
 // two samples nothing leaks, and light passes behind what is thin.
 //
-// All angles of a slice are measured from the eye vector V, positive towards T. They are compared as turns,
-// s < 0 ? c - 1 : 1 - c of a vector with |c| + |s| = 1, which need no arc function.
+// All angles of a slice are measured from the eye vector V, outwards on either side. They are compared as turns, 1 - c of a
+// vector (c, s) with |c| + s = 1, which need no arc function.
 //
 // Four reads go at once, two steps to either side, as the components of a vector: independent chains of arithmetic and of
 // loads keep a processor busy.
@@ -20,14 +20,13 @@ layout(constant_id = spec_spacing) const int spacing = 1;
 
 layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(binding = 0, rg32ui) readonly uniform uimageBuffer surfels;
-layout(binding = 1, r32f) readonly uniform imageBuffer normals;
+layout(binding = 1, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 2, rg32f) readonly uniform imageBuffer noise_table;
 layout(binding = 16, rg32f) writeonly uniform imageBuffer sampled; // open and whole measure
 layout(binding = 17, r32f) writeonly uniform imageBuffer known;    // share of the reads that met known depth
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 #include "lib/noise.glsl"
-#include "lib/normal.glsl"
 #include "lib/cheap.glsl"
 #include "lib/surfel.glsl"
 
@@ -38,16 +37,8 @@ const float sector_count = 31.0; // so that a bit's place never reaches the widt
 // Compare and select: min and max mind NaN, which costs.
 vec4 least(vec4 a, vec4 b) { return mix(b, a, lessThan(a, b)); }
 vec4 most(vec4 a, float b) { return mix(vec4(b), a, greaterThan(a, vec4(b))); }
-vec4 positive(vec4 x) { return intBitsToFloat(max(floatBitsToInt(x), ivec4(0))); }
 // To 0.07 %: lengths of directions, not positions.
-vec4 inverse_length(vec4 squared) {
-    vec4 y = intBitsToFloat(0x5f1ffff9 - (floatBitsToInt(squared) >> 1));
-    return quick_scale * y * (2.38924456 - squared * y * y);
-}
-ivec4 nearest(vec4 x) {
-    precise vec4 shifted = x + magic;
-    return floatBitsToInt(shifted) - magic_bits;
-}
+vec4 inverse_length(vec4 squared) { return quick_scale * quick_inversesqrt(squared); }
 
 // x^1.5 on [0, 1] within 0.01: where the steps lie.
 vec4 spread(vec4 x) { return x * (x * (0.95 - 0.25 * x) + 0.3); }
@@ -89,14 +80,14 @@ void main() {
     ivec2 group = ivec2(gl_WorkGroupID.xy), phase = ivec2(group.x & 3, (group.x >> 2) & 3);
     ivec2 at = 4 * (screen_tile * ivec2(group.x >> 4, group.y) + ivec2(gl_LocalInvocationID.xy)) + phase, pixel = at * spacing;
     if (any(greaterThanEqual(at, s.samples))) return;
-    float own = uintBitsToFloat(imageLoad(surfels, surfel_index(pixel, s.plane)).x);
+    vec4 surface = imageLoad(surfaces, index_of(pixel));
+    float own = surface.w;
     float z = own > 0.0 ? own : 1.0; // in holes a point as good as any: what comes of it is not kept
     vec2 ray = ray_of(vec2(pixel)).xy;
     float ray_length = sqrt(dot(ray, ray) + 1.0), distance = z * ray_length;
     vec3 eye = vec3(ray, 1.0) * (-1.0 / ray_length);
-    vec3 n = normal_at(index_of(pixel));
     // Seen from behind its own plane nothing is defined: bend to the eye.
-    n = normalize(n + eye * max(0.01 - dot(n, eye), 0.0));
+    vec3 n = normalize(surface.xyz + eye * max(0.01 - dot(surface.xyz, eye), 0.0));
 
     // Two axes across the eye vector, whose z is below 0 (Duff et al. 2017).
     float b = 1.0 / (eye.z - 1.0), xy = eye.x * eye.y * b;
@@ -105,9 +96,8 @@ void main() {
     vec2 noise = noise_at(phase);
     float radius2 = k.radius * k.radius;
     float reach = k.radius * inversesqrt(max(z * z - radius2, 1e-4 * z * z)); // in units of the image plane
-    vec2 per_px = 1.0 / vec2(k.camera.fx, k.camera.fy);
-    vec2 flat_eye = eye.xy * per_px, flat_normal = n.xy * per_px;
-    float eye_per_z = ray_length, normal_per_z = dot(n, vec3(ray, 1.0));
+    vec2 flat_eye = eye.xy * k.ray_step, flat_normal = n.xy * k.ray_step; // per pixel across
+    float normal_per_z = dot(n, vec3(ray, 1.0));
     // Rounding of depth in single precision is a noise, too.
     float least_rise = (k.tangent_sigmas * sigma_of(z) + 1e-6 * z) * abs(normal_per_z);
     float thickness_step = s.thickest * (1.0 / 255.0);
@@ -135,18 +125,18 @@ void main() {
 
         vec2 along = vec2(k.camera.fx, k.camera.fy) * (tangent.xy - ray * tangent.z);
         along *= inversesqrt(dot(along, along));
-        float per_pixel = length(along * per_px); // metres at z = 1 m
+        vec2 along_ray = along * k.ray_step;
+        float per_pixel = length(along_ray); // metres at z = 1 m
         float half_pixel = 0.5 * s.lengthen * per_pixel;
         vec2 room = vec2(to_border(vec2(pixel), along), to_border(vec2(pixel), -along));
         float full_reach = reach / per_pixel;
         vec2 first = min(room, 1.0), far = max(min(vec2(full_reach), room), first) - first;
         vec2 u = fract(noise.y + golden * vec2(2 * i, 2 * i + 1));
-        vec2 flat_tangent = tangent.xy * per_px;
+        vec2 flat_tangent = tangent.xy * k.ray_step;
 
         uint closed = 0u;
         vec4 found = vec4(0.0);
         vec2 last = vec2(0.0); // depths of the step before, on either side
-        vec2 along_ray = along * per_px;
         int j = 0;
         do {
             vec4 x = (float(j) + vec4(u, u + 1.0)) * (1.0 / float(steps));
@@ -168,7 +158,7 @@ void main() {
             // From the pixel's point to the sample's, towards V and towards T (outwards on either side): differences first,
             // far away coordinates cancel badly.
             vec4 mx = vec4(ix), my = vec4(iy), dz = zq - z;
-            vec4 pv = zq * (mx * flat_eye.x + my * flat_eye.y) - eye_per_z * dz;
+            vec4 pv = zq * (mx * flat_eye.x + my * flat_eye.y) - ray_length * dz;
             vec4 pt = zq * (mx * flat_tangent.x + my * flat_tangent.y) * sides;
             vec4 rise = zq * (mx * flat_normal.x + my * flat_normal.y) + (dz * normal_per_z - least_rise);
             vec4 d2 = pv * pv + pt * pt;
@@ -178,7 +168,7 @@ void main() {
             gv *= g;
             vec4 gt = pt * g;
             // Where the surfel lies in the slice: its normal turned by a right angle, outwards.
-            vec4 nx = vec4(shape >> 24), ny = vec4(shape << 8 >> 24), nz = vec4(shape << 16 >> 24);
+            vec4 nx = vec4(shape >> 24), ny = vec4(shape << 8 >> 24), nz = vec4(shape << 16 >> 24); // as bytes_of_normal()
             vec4 lv = -sides * (nx * tangent.x + ny * tangent.y + nz * tangent.z);
             vec4 lt = nx * eye.x + ny * eye.y + nz * eye.z;
             vec4 l = inverse_length(lv * lv + (lt * lt + 1e-30));
@@ -193,7 +183,7 @@ void main() {
             chord *= inverse_length(chord);
             // Half way to its neighbours; farther where a neighbour stands in front of it and of its plane: there it goes on.
             vec4 back = (now - before) * size, ahead = (next - now) * size;
-            vec4 bend = sides * (nx * along_ray.x + ny * along_ray.y) / (nx * (ray.x + mx * per_px.x) + ny * (ray.y + my * per_px.y) + nz);
+            vec4 bend = sides * (nx * along_ray.x + ny * along_ray.y) / (nx * (ray.x + mx * k.ray_step.x) + ny * (ray.y + my * k.ray_step.y) + nz);
             vec4 z_before = vec4(last, zq.xy), z_next = vec4(zq.zw, 0.0, 0.0); // of the last step's nothing is known yet
             last = zq.zw;
             back += hides(z_before, zq, 1.0 - (now - before) * bend, s.jut) * least(back, vec4(s.longest));

@@ -15,14 +15,13 @@ layout(constant_id = spec_spacing) const int spacing = 1;
 
 layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(binding = 0, rg32ui) readonly uniform uimageBuffer surfels;
-layout(binding = 1, r32f) readonly uniform imageBuffer normals;
+layout(binding = 1, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 2, rg32f) readonly uniform imageBuffer sampled;
 layout(binding = 3, r32f) readonly uniform imageBuffer known;
 layout(binding = 16, r32f) writeonly uniform imageBuffer visibility;
 layout(binding = 17, r32f) writeonly uniform imageBuffer coverage;
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
-#include "lib/normal.glsl"
 #include "lib/surfel.glsl"
 
 ivec2 plane, samples; // sizes
@@ -45,15 +44,15 @@ Tap tap_at(ivec2 q) {
     ivec2 p = q * spacing;
     uvec2 word = imageLoad(surfels, surfel_index(p, plane)).xy;
     float z = exists ? uintBitsToFloat(word.x) : 0.0;
-    ivec3 n = ivec3(int(word.y)) << ivec3(0, 8, 16) >> 24;
     vec2 measure = imageLoad(sampled, q.y * samples.x + q.x).xy;
-    return Tap(ray_of(vec2(p)) * z, vec3(n) * (z > 0.0 ? 1.0 / 127.0 : 0.0), z > 0.0 ? measure : vec2(0.0));
+    return Tap(ray_of(vec2(p)) * z, vec3(bytes_of_normal(word.y)) * (z > 0.0 ? 1.0 / 127.0 : 0.0), z > 0.0 ? measure : vec2(0.0));
 }
 
 Mean mean_at(ivec2 p, out float z) {
     bool exists = inside(p);
-    z = exists ? uintBitsToFloat(imageLoad(surfels, surfel_index(exists ? p : ivec2(0), plane)).x) : 0.0;
-    vec3 point = ray_of(vec2(p)) * z, n = normal_at(exists ? index_of(p) : 0);
+    vec4 surface = imageLoad(surfaces, exists ? index_of(p) : 0);
+    z = exists ? surface.w : 0.0;
+    vec3 point = ray_of(vec2(p)) * z, n = surface.xyz;
     vec3 scaled = n / (0.05 * k.radius + 3.0 * sigma_of(z));
     return Mean(scaled, dot(scaled, point), n, vec2(0.0));
 }
@@ -67,11 +66,6 @@ void add(inout Mean mean, Tap tap, float share) {
     // A pixel none of whose surface was sampled takes what is least far from it.
     if (spacing > 1) weight += 1e-4 / (1.0 + apart);
     mean.sum += share * weight * tap.measure;
-}
-
-float shown(float v) {
-    float v1 = clamp(1.0 - k.strength * (1.0 - v), 0.0, 1.0);
-    return k.power == 1.0 ? v1 : pow(v1, k.power);
 }
 
 void put(ivec2 p, float z, Mean mean, float known_share) {

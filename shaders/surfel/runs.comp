@@ -1,12 +1,12 @@
-// Where the nearest edge lies before and after each word of edges that has none of its own: one thread walks a line's words.
-// Each number is the pixel at which the run begins (or behind which it ends), and in its lowest bit whether what lies beyond
-// the edge is farther away; `nowhere` at the border of the image.
+// Where the nearest edge lies before each word of edges, and where after it: one thread walks a line's words. Each number is
+// twice the pixel that the edge lies before, plus 1 where what lies beyond it is farther away or nothing; surfel_nowhere at
+// the border of the image.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 #include "shared/surfel.h"
 
-layout(local_size_x = 64) in;
+layout(local_size_x = surfel_group) in;
 layout(binding = 0, rg32ui) readonly uniform uimageBuffer edges;
 layout(binding = 16, r32ui) writeonly uniform uimageBuffer runs; // two a word: of before it, of after it
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
@@ -19,7 +19,7 @@ void main() {
     bool row = line < k.size.y;
     int words = row ? s.words.x : s.words.y, stride = row ? k.size.y : k.size.x;
     int base = row ? line : s.words.x * k.size.y + line - k.size.y;
-    // Both directions at once: the one fills `x`, the other `y`, of different words.
+    // Both directions at once, each at its own end.
     uint before = surfel_nowhere, after = surfel_nowhere;
     for (int i = 0; i < words; ++i) {
         int up = base + i * stride, down = base + (words - 1 - i) * stride;

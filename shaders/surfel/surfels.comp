@@ -7,11 +7,10 @@
 #include "lib/cheap.glsl"
 #include "lib/surfel.glsl"
 
-layout(local_size_x = 8, local_size_y = 8) in;
-layout(binding = 0, r32f) readonly uniform imageBuffer depth;
-layout(binding = 1, r32f) readonly uniform imageBuffer normals;
-layout(binding = 2, rg32ui) readonly uniform uimageBuffer edges;
-layout(binding = 3, r32ui) readonly uniform uimageBuffer runs;
+layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
+layout(binding = 0, rgba32f) readonly uniform imageBuffer surfaces;
+layout(binding = 1, rg32ui) readonly uniform uimageBuffer edges;
+layout(binding = 2, r32ui) readonly uniform uimageBuffer runs;
 layout(binding = 16, rg32ui) writeonly uniform uimageBuffer surfels;
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
@@ -37,9 +36,8 @@ void main() {
     ScreenConstants k = s.screen;
     ivec2 p = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(p, k.size))) return;
-    int here = p.y * k.size.x + p.x;
-    float z = imageLoad(depth, here).x;
-    vec3 n = vec3(imageLoad(normals, 3 * here).x, imageLoad(normals, 3 * here + 1).x, imageLoad(normals, 3 * here + 2).x);
+    vec4 surface = imageLoad(surfaces, p.y * k.size.x + p.x);
+    float z = surface.w;
 
     int across = run_length(p.x, (p.x >> 5) * k.size.y + p.y);
     int along = run_length(p.y, s.words.x * k.size.y + (p.y >> 5) * k.size.x + p.x);
@@ -47,5 +45,5 @@ void main() {
     bool ends_in_sight = across < open || along < open;
     float thickness = ends_in_sight ? clamp(0.5 * width, s.thinnest, s.thickest) : s.hidden;
 
-    imageStore(surfels, surfel_index(p, s.plane), uvec4(surfel(z, n, thickness / s.thickest), 0u, 0u));
+    imageStore(surfels, surfel_index(p, s.plane), uvec4(surfel(z, surface.xyz, thickness / s.thickest), 0u, 0u));
 }
