@@ -80,6 +80,9 @@ struct MethodRow {
     std::string_view summary; ///< one line
     std::string_view source;  ///< paper or documentation it follows
     std::unique_ptr<MethodSetup> (*setup)();
+    /// How much wider the windows of plane fits are for it than the noise itself asks for: methods that do not widen their
+    /// tolerances by View::noise want it gone.
+    double smoothing = 1;
 };
 
 /// The table of methods, in the order shown to people.

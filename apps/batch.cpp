@@ -367,7 +367,7 @@ std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const Ba
             return work;
         take(*work, &StageTimes::project, [&] {
             work->frame.camera = work->row.camera = camera_of(work->frame);
-            work->depth = project(work->frame);
+            work->depth = project(work->frame, options.range);
             refuse_blind_view(*work);
         });
         return work;

@@ -4,6 +4,7 @@
 #include "ao/method.h"
 #include "io/capture.h"
 #include "io/image_file.h"
+#include "projection/project.h"
 
 #include <atomic>
 #include <filesystem>
@@ -34,6 +35,7 @@ struct Outputs {
 struct BatchOptions {
     std::vector<std::size_t> frames; ///< indices into capture.entries; the report keeps this order
     Outputs outputs;
+    ProjectOptions range;                     ///< depth outside counts as a hole
     std::optional<Registration> registration; ///< what the user said; otherwise what the capture says
     PointMethod* point_method = nullptr;      ///< what clouds and meshes are computed with, where that needs no view: then
                                               ///< the cloud is all that is written of them

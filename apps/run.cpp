@@ -79,7 +79,9 @@ std::vector<std::size_t> slice(const std::string& text, std::size_t count) {
 
 struct RunSettings {
     std::vector<std::string> paths;
-    std::string frames, camera, depth_scale, registered = "auto", depth_noise = "auto";
+    std::string frames, camera, depth_scale, registered = "auto";
+    std::string depth_noise = "auto", depth_range, flying_pixels = "drop";
+    double depth_smoothing = 1;
     double association_limit_s = 0.02;
     std::string method = "cacao", radius, quality, device, settings;
     Budget budget;
@@ -112,6 +114,17 @@ Outputs outputs_from(const RunSettings& settings) {
         outputs.cloud = outputs.depth_cloud = words.contains("cloud");
     }
     return outputs;
+}
+
+ProjectOptions depth_range_from(const std::string& text) {
+    ProjectOptions range;
+    int used = 0;
+    if (text.empty())
+        return range;
+    if (std::sscanf(text.c_str(), "%lf,%lf%n", &range.near_m, &range.far_m, &used) != 2 ||
+        used != static_cast<int>(text.size()) || !(range.near_m >= 0 && range.far_m > range.near_m))
+        throw Misuse("depth-range: '" + text + "' given, expected NEAR,FAR in metres, such as 0.4,5");
+    return range;
 }
 
 std::optional<Registration> registration_from(const std::string& text) {
@@ -273,13 +286,23 @@ class Run final : public Command {
                .help = "whether colour pixels lie on depth pixels",
                .value = &s.registered,
                .choices = {"auto", "yes", "no"}},
-              {"depth-noise",
-               "sigma of one depth value, FLOOR,PER_Z2 for FLOOR + PER_Z2 z^2 metres, or auto (measured), none, "
-               "kinect, tof; where "
-               "there is any, depth and normals come from plane fits",
-               &s.depth_noise},
               {"association-limit", "colour, depth and poses farther apart in time are not paired",
                &s.association_limit_s, "s", 0, 1e6}}},
+            {"depth preparation",
+             {{"depth-range", "NEAR,FAR in metres: depth outside is taken as not recorded; empty = all of it",
+               &s.depth_range},
+              {"depth-noise",
+               "sigma of one depth value, FLOOR,PER_Z2[,GRAIN] for FLOOR + PER_Z2 z^2 metres that err alike over GRAIN "
+               "pixels, or auto (measured), none, kinect, tof; what follows is done only where there is any",
+               &s.depth_noise},
+              {.name = "flying-pixels",
+               .help = "where a sensor saw two surfaces at once: drop leaves them unknown",
+               .value = &s.flying_pixels,
+               .choices = {"drop", "keep"}},
+              {"depth-smoothing",
+               "radius of the plane fits that depth and normals come from, in those that the noise and the method ask "
+               "for; 0 = depth as recorded",
+               &s.depth_smoothing, "", 0, 10}}},
             {"method",
              {{.name = "method",
                .help = "which method computes the visibility",
@@ -345,6 +368,7 @@ class Run final : public Command {
         outputs_ = outputs_from(asked_);
         if (asked_.depth_noise != "auto")
             (void)noise_from_text(asked_.depth_noise);
+        range_ = depth_range_from(asked_.depth_range);
         if (asked_.budget.any() && !asked_.quality.empty())
             throw Misuse("a budget (--max-error, --max-ms) picks the quality: leave --quality out");
         if (!asked_.depth_scale.empty())
@@ -381,6 +405,7 @@ class Run final : public Command {
                 if (!asked_.dump.empty())
                     job.batch.dump = fs::path(asked_.dump) / folder.lexically_relative(asked_.out);
                 job.batch.registration = registration_from(asked_.registered);
+                job.batch.range = range_;
                 job.batch.stop = &interrupted;
                 jobs.push_back(std::move(job));
             } catch (const Misuse&) {
@@ -441,7 +466,9 @@ class Run final : public Command {
         const DepthNoise noise = noise_of(job.capture, job.batch.frames, asked_.depth_noise);
         std::optional<OnFittedDepth> fitted;
         if (noise.any())
-            fitted.emplace(device, noise, *plain);
+            fitted.emplace(device, noise, *plain,
+                           FitPlaneOptions{.drop_flying = asked_.flying_pixels == "drop",
+                                           .smoothing = asked_.depth_smoothing * method_named(asked_.method).smoothing});
         Method& method = fitted ? static_cast<Method&>(*fitted) : *plain;
         RunReport report = report_on(job, device.info());
         report.depth_noise = noise_sentence(noise);
@@ -460,10 +487,14 @@ class Run final : public Command {
         return report.frames;
     }
 
+    /// What is known of the depth's noise, and what is done about it.
     std::string noise_sentence(const DepthNoise& noise) const {
         const std::string origin = asked_.depth_noise == "auto" ? "measured" : "--depth-noise";
-        return noise.any() ? fmt::format("{} ({}); depth and normals come from plane fits", describe(noise), origin)
-                           : fmt::format("none to mind ({}); depth is used as recorded", origin);
+        if (!noise.any())
+            return fmt::format("none to mind ({}); depth is used as recorded", origin);
+        return fmt::format("{} ({}); flying pixels are {}; {}", describe(noise), origin,
+                           asked_.flying_pixels == "drop" ? "dropped" : "kept",
+                           asked_.depth_smoothing > 0 ? "depth and normals come from plane fits" : "depth is used as recorded");
     }
 
     static int exit_code(const std::vector<FrameRow>& rows, int unopened) {
@@ -475,6 +506,7 @@ class Run final : public Command {
 
     RunSettings asked_;
     Outputs outputs_;
+    ProjectOptions range_;
     Configuration before_budget_; ///< of the method that a budget picked for the capture before this one
     std::vector<std::pair<std::string, std::unique_ptr<MethodSetup>>> setups_;
 };

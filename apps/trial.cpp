@@ -159,7 +159,8 @@ std::unique_ptr<MethodSetup> set_up(const Configuration& configuration, double r
 Trial::Trial(gpu::Device& device, Configuration configuration, const DepthNoise& noise, double radius_m)
     : configuration_(std::move(configuration)), setup_(set_up(configuration_, radius_m)), plain_(setup_->make(device)) {
     if (noise.any())
-        fitted_ = std::make_unique<OnFittedDepth>(device, noise, *plain_);
+        fitted_ = std::make_unique<OnFittedDepth>(
+            device, noise, *plain_, FitPlaneOptions{.smoothing = method_named(configuration_.method).smoothing});
 }
 
 cv::Mat1f Trial::compute(const TrialFrame& frame) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fmt/format.h>
+#include <numbers>
 #include <numeric>
 #include <vector>
 
@@ -20,7 +21,8 @@ constexpr double nearest_m = 0.2, farthest_m = 50;
 constexpr std::size_t enough = 400; // samples for a band to speak
 
 struct Band {
-    std::vector<float> spread_m; // |second difference| of depth, scaled to one value's deviation
+    std::vector<float> spread_m;   // |second difference| of depth
+    std::vector<float> adjacent_m; // of neighbouring pixels
     std::vector<float> depths_m; // at their middles
     double z_sum = 0;
 };
@@ -43,17 +45,18 @@ void collect(const cv::Mat1f& z, std::array<Band, bands>& all) {
             if (!(c > nearest_m && c < farthest_m)) continue;
             Band& band = all[static_cast<std::size_t>(std::min(band_of(c), bands - 1))];
             band.depths_m.push_back(c);
-            for (const auto& [dx, dy] : {std::pair{lag_px, 0}, std::pair{0, lag_px}}) {
-                const float d = second_difference(z, x, y, dx, dy);
-                if (d < 0) continue;
+            for (const auto& [dx, dy] : {std::pair{1, 0}, std::pair{0, 1}}) {
+                const float d = second_difference(z, x, y, lag_px * dx, lag_px * dy), adjacent = second_difference(z, x, y, dx, dy);
+                if (d < 0 || adjacent < 0) continue;
                 band.spread_m.push_back(d);
+                band.adjacent_m.push_back(adjacent);
                 band.z_sum += c;
             }
         }
 }
 
 struct Measured {
-    double z, sigma, weight;
+    double z, sigma, adjacent, weight; // deviations by distant and by adjacent pixels
 };
 
 /// Sigma from the mean of the smallest `share` of the differences, were they Gaussian; `mean_of_share` is that mean for sigma 1.
@@ -77,12 +80,35 @@ double step_of(std::vector<float>& depths_m) {
     return *middle;
 }
 
+struct Spread {
+    double distant, adjacent;
+};
+
 /// The lower 80 % of |N(0, 1)| have the mean 0.5586, the lower 40 % 0.2563. Among clutter more than a fifth of the differences
 /// straddle an edge, so the smaller share decides; but not where the values come in steps: there many differences are exactly
 /// zero, and the steps are the noise.
-double sigma_of(Band& band) {
+Spread spread_of(Band& band) {
     const double most = sigma_of(band.spread_m, 0.8, 0.5586), few = sigma_of(band.spread_m, 0.4, 0.2563);
-    return step_of(band.depths_m) >= 0.5 * most ? most : std::min(most, few);
+    if (few >= most || step_of(band.depths_m) >= 0.5 * most) return {most, sigma_of(band.adjacent_m, 0.8, 0.5586)};
+    return {few, sigma_of(band.adjacent_m, 0.4, 0.2563)};
+}
+
+/// Variance of a second difference over `lag` pixels, in variances of one value, where values d pixels apart correlate by
+/// exp(-d^2 / 2 s^2).
+double second_difference_variance(double lag, double s) {
+    const auto correlation = [s](double d) { return std::exp(-d * d / (2 * s * s)); };
+    return 6 - 8 * correlation(lag) + 2 * correlation(2 * lag);
+}
+
+/// The integral of the correlation for which adjacent second differences are `ratio` times as large as distant ones.
+double grain_of(double ratio) {
+    double low = 0.3, high = 3; // of s
+    for (int i = 0; i < 30; ++i) {
+        const double s = (low + high) / 2;
+        const bool too_smooth = second_difference_variance(1, s) < ratio * ratio * second_difference_variance(lag_px, s);
+        (too_smooth ? high : low) = s;
+    }
+    return std::max(1.0, std::sqrt(2 * std::numbers::pi) * low);
 }
 
 /// floor + per_z2 z^2 through the bands by least squares of relative error, both terms at least zero.
@@ -114,29 +140,38 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
     for (Band& band : all) {
         if (band.spread_m.size() < enough) continue;
         const double count = static_cast<double>(band.spread_m.size());
-        const double sigma = sigma_of(band);
-        points.push_back({band.z_sum / count, std::max(sigma, 1e-6), count});
+        const Spread spread = spread_of(band);
+        points.push_back({band.z_sum / count, std::max(spread.distant, 1e-6), spread.adjacent, count});
     }
     if (points.empty()) return {};
-    const DepthNoise noise = law_through(points);
+    DepthNoise noise = law_through(points);
+    double ratios = 0, weights = 0;
+    for (const Measured& p : points) ratios += p.weight * p.adjacent / p.sigma, weights += p.weight;
+    noise.grain_px = grain_of(ratios / weights);
     const bool clean = std::all_of(points.begin(), points.end(), [&](const Measured& p) { return noise.at(p.z) < std::max(1e-4 * p.z, 1.2e-4); });
     return clean ? DepthNoise{} : noise;
 }
 
 DepthNoise noise_from_text(const std::string& text) {
     if (text == "none") return {};
-    if (text == "kinect") return {0.0015, 0.0018};
+    if (text == "kinect") return {0.0015, 0.0018, 3};
     if (text == "tof") return {0.0015, 0};
     DepthNoise noise;
     int used = 0;
-    if (std::sscanf(text.c_str(), "%lf,%lf%n", &noise.floor_m, &noise.per_z2, &used) != 2 || used != static_cast<int>(text.size()) ||
-        !(noise.floor_m >= 0 && noise.floor_m < 1 && noise.per_z2 >= 0 && noise.per_z2 < 1))
-        throw Misuse("depth noise '" + text + "': auto, none, kinect, tof or FLOOR,PER_Z2 (metres, 0 .. 1) expected");
+    const bool law = std::sscanf(text.c_str(), "%lf,%lf%n", &noise.floor_m, &noise.per_z2, &used) == 2;
+    if (law && used < static_cast<int>(text.size())) { // with a grain
+        int more = 0;
+        if (std::sscanf(text.c_str() + used, ",%lf%n", &noise.grain_px, &more) == 1) used += more;
+    }
+    if (!law || used != static_cast<int>(text.size()) || !(noise.floor_m >= 0 && noise.floor_m < 1 && noise.per_z2 >= 0 && noise.per_z2 < 1) ||
+        !(noise.grain_px >= 1 && noise.grain_px <= 16))
+        throw Misuse("depth noise '" + text +
+                     "': auto, none, kinect, tof or FLOOR,PER_Z2[,GRAIN] (metres, 0 .. 1; pixels, 1 .. 16) expected");
     return noise;
 }
 
 std::string describe(const DepthNoise& noise) {
-    return noise.any() ? fmt::format("sigma {:.5f} + {:.5f} z^2 m", noise.floor_m, noise.per_z2) : "none";
+    return noise.any() ? fmt::format("sigma {:.5f} + {:.5f} z^2 m, grain {:.1f} px", noise.floor_m, noise.per_z2, noise.grain_px) : "none";
 }
 
 } // namespace scanshade

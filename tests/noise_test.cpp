@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
 #include <random>
 
 namespace scanshade {
@@ -87,10 +89,28 @@ TEST(noise, disparity_steps_count_as_noise) {
     EXPECT_NEAR(measure_noise(images).at(2), q / std::sqrt(12.0), 0.5 * q / std::sqrt(12.0));
 }
 
+TEST(noise, grain_is_that_of_the_sensors_window) {
+    // White noise under a Gaussian window of deviation d correlates by exp(-x^2 / 4 d^2), whose integral is 2 d sqrt(pi).
+    const Pinhole camera = test_camera({320, 240});
+    const DepthImage clean = tilted_plane(camera, 35, 2);
+    const DepthImage white = noisy(clean, {0.01, 0});
+    EXPECT_NEAR(measure_noise(std::vector{white}).grain_px, 1, 0.3);
+    for (const double deviation : {0.8, 1.2}) {
+        DepthImage grained{camera, {}, {}};
+        cv::GaussianBlur(white.z_m - clean.z_m, grained.z_m, {11, 11}, deviation);
+        const double grain_px = 2 * deviation * std::sqrt(std::numbers::pi);
+        grained.z_m = clean.z_m + grain_px * grained.z_m; // its deviation fell by one grain along either axis
+        const DepthNoise measured = measure_noise(std::vector{grained});
+        EXPECT_NEAR(measured.grain_px, grain_px, 0.15 * grain_px);
+        EXPECT_NEAR(measured.at(2), 0.01, 0.0015);
+    }
+}
+
 TEST(noise, text_is_checked) {
     EXPECT_FALSE(noise_from_text("none").any());
     EXPECT_DOUBLE_EQ(noise_from_text("0.001,0.002").at(2), 0.009);
-    for (const char* wrong : {"", "much", "1", "0.1,", "0.1,0.2x", "-1,0", "nan,0", "0,5"})
+    EXPECT_DOUBLE_EQ(noise_from_text("0.001,0.002,2.5").grain_px, 2.5);
+    for (const char* wrong : {"", "much", "1", "0.1,", "0.1,0.2x", "-1,0", "nan,0", "0,5", "0,0,0.5", "0,0,"})
         EXPECT_TRUE(says(refusal([&] { (void)noise_from_text(wrong); }), "FLOOR,PER_Z2")) << wrong;
 }
 
@@ -145,13 +165,68 @@ TEST(fit_plane, depth_gains_from_the_fit) {
 
 TEST(fit_plane, holes_stay_holes_and_invent_nothing) {
     const DepthImage punched = with_holes(ball_on_floor(test_camera()), 0.2);
-    FitPlane fit(device(), {0.001, 0.002});
+    FitPlane fit(device(), {0.001, 0.002}, {.drop_flying = false});
     const FittedDepth fitted = fit.compute(punched);
     for (int y = 0; y < punched.z_m.rows; ++y)
         for (int x = 0; x < punched.z_m.cols; ++x) {
             ASSERT_EQ(fitted.depth.z_m(y, x) == 0, punched.z_m(y, x) == 0);
             ASSERT_TRUE(std::isfinite(fitted.depth.z_m(y, x)));
         }
+}
+
+/// A near pane before a far one, the last column of either replaced by depths between them: what a time-of-flight pixel
+/// reads that both fall into.
+DepthImage two_panes(bool with_flying) {
+    const Pinhole camera = test_camera({320, 240});
+    DepthImage image{camera, cv::Mat1f(camera.size, 1.0F), {}};
+    image.z_m.colRange(160, 320) = 1.4F;
+    std::mt19937 random(3);
+    std::uniform_real_distribution<float> between(1.05F, 1.35F);
+    for (int y = 0; with_flying && y < image.z_m.rows; ++y)
+        for (int x : {159, 160})
+            if (random() % 5 < 3) image.z_m(y, x) = between(random);
+    return image;
+}
+
+TEST(fit_plane, flying_pixels_are_dropped_and_nothing_else) {
+    const DepthNoise tof{0.001, 0.0006};
+    const DepthImage clean = two_panes(false), flown = two_panes(true);
+    FitPlane fit(device(), tof);
+    int flying = 0, left = 0, lost = 0;
+    const cv::Mat1f kept = fit.compute(noisy(flown, tof)).depth.z_m;
+    for (int y = 0; y < kept.rows; ++y)
+        for (int x = 0; x < kept.cols; ++x) {
+            const bool flies = flown.z_m(y, x) != clean.z_m(y, x);
+            flying += flies;
+            left += flies && kept(y, x) > 0;
+            lost += !flies && !(kept(y, x) > 0);
+        }
+    EXPECT_GT(flying, 200);
+    EXPECT_LT(left, flying / 20);
+    EXPECT_LT(lost, flying / 4); // single pixels of a surface among flying ones
+    EXPECT_EQ(cv::countNonZero(fit.compute(noisy(clean, tof)).depth.z_m), clean.z_m.total());
+}
+
+TEST(fit_plane, a_wire_is_no_flying_pixel) {
+    const Pinhole camera = test_camera({320, 240});
+    DepthImage wires{camera, cv::Mat1f(camera.size, 2.0F), {}};
+    wires.z_m.col(20).rowRange(0, 200) = 1.5F;
+    wires.z_m.row(230) = 1.4F;
+    for (int i = 0; i < 180; ++i) wires.z_m(10 + i, 60 + i) = 1.6F;
+    FitPlane fit(device(), {0.001, 0.0005});
+    const cv::Mat1f kept = fit.compute(wires).depth.z_m;
+    EXPECT_EQ(cv::countNonZero(kept), kept.total());
+}
+
+TEST(fit_plane, without_smoothing_depth_is_as_recorded) {
+    const DepthImage flown = two_panes(true);
+    FitPlane fit(device(), {0.001, 0.0006}, {.smoothing = 0});
+    const FittedDepth fitted = fit.compute(flown);
+    EXPECT_TRUE(fitted.normals.normals.empty());
+    for (int y = 0; y < flown.z_m.rows; ++y)
+        for (int x = 0; x < flown.z_m.cols; ++x)
+            ASSERT_TRUE(fitted.depth.z_m(y, x) == 0 || fitted.depth.z_m(y, x) == flown.z_m(y, x));
+    EXPECT_LT(cv::countNonZero(fitted.depth.z_m), flown.z_m.total());
     for (const std::string& message : device().validation_messages()) ADD_FAILURE() << message;
 }
 

@@ -3,48 +3,74 @@
 #include "projection/error.h"
 #include "shaders/shared/fit_plane.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 
 namespace scanshade {
 namespace {
 
-enum Buffers : int { depth_in, depth_out, normals_out };
+// The order of buffers; the last two only where planes are fitted.
+enum Buffers : int { recorded, kept, averages, depth_out, normals_out };
 
-std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size) {
+/// Of the window's radius, squared, in units of grain sigma fx / z (pixels): what left the least error in AO on simulated
+/// sensors. Below it noise tilts normals, above it a plane no longer is what surfaces are.
+constexpr double window_scale = 2.2;
+
+std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bool planes) {
     using Host = gpu::BufferRow::Host;
     constexpr auto floats = gpu::BufferRow::Texels::r32f;
     const auto pixels = static_cast<std::size_t>(size.area());
-    const auto groups = [](int n) { return static_cast<std::uint32_t>((n + 7) / 8); };
-    return std::make_unique<gpu::Program>(
-        device,
-        std::vector<gpu::BufferRow>{{"depth in", pixels * 4, Host::upload, floats},
-                                    {"depth out", pixels * 4, Host::download, floats},
-                                    {"normals out", pixels * 12, Host::download, floats}},
-        std::vector<gpu::PassRow>{{"fit plane", "fit_plane", {depth_in}, {depth_out, normals_out},
-                                   {groups(size.width), groups(size.height), 1}, {}}},
-        sizeof(shared::FitPlaneConstants));
+    const auto tiles = [](int n) { return static_cast<std::uint32_t>((n + 7) / 8); };
+    const std::array<std::uint32_t, 3> groups{tiles(size.width), tiles(size.height), 1};
+    std::vector<gpu::BufferRow> buffers{{"recorded", pixels * 4, Host::upload, floats},
+                                        {"kept", pixels * 4, planes ? Host::none : Host::download, floats}};
+    std::vector<gpu::PassRow> passes{{"flying pixels", "fit_plane/flying", {recorded}, {kept}, groups, {}}};
+    if (planes) {
+        buffers.insert(buffers.end(), {{"averages", pixels * 4, Host::none, floats},
+                                       {"depth out", pixels * 4, Host::download, floats},
+                                       {"normals out", pixels * 12, Host::download, floats}});
+        passes.push_back({"average", "fit_plane/average", {kept}, {averages}, groups, {}});
+        passes.push_back({"fit plane", "fit_plane/fit", {averages}, {depth_out, normals_out}, groups, {}});
+    }
+    return std::make_unique<gpu::Program>(device, buffers, passes, sizeof(shared::FitPlaneConstants));
 }
 
 } // namespace
 
-FitPlane::FitPlane(gpu::Device& device, const DepthNoise& noise, double largest_radius_px)
-    : device_(device), noise_(noise), largest_radius_px_(largest_radius_px) {
+FitPlane::FitPlane(gpu::Device& device, const DepthNoise& noise, const FitPlaneOptions& options)
+    : device_(device), noise_(noise), options_(options) {
     if (!noise.any()) throw Error("a plane fit needs a noise above zero");
 }
 
 FittedDepth FitPlane::compute(const DepthImage& depth) {
     const cv::Size size = depth.z_m.size();
-    if (!program_ || size != size_) program_ = program_for(device_, size);
+    const bool planes = options_.smoothing > 0;
+    if (!program_ || size != size_) program_ = program_for(device_, size, planes);
     size_ = size;
     const shared::Pinhole camera = depth.camera.on_gpu();
-    const shared::FitPlaneConstants constants{{size.width, size.height}, camera.fx, camera.fy, camera.cx, camera.cy,
-                                              static_cast<float>(noise_.floor_m), static_cast<float>(noise_.per_z2),
-                                              static_cast<float>(largest_radius_px_)};
+    const double window = window_scale * noise_.grain_px * options_.smoothing * options_.smoothing;
+    const shared::FitPlaneConstants constants{{size.width, size.height},
+                                              camera.fx,
+                                              camera.fy,
+                                              camera.cx,
+                                              camera.cy,
+                                              static_cast<float>(noise_.floor_m),
+                                              static_cast<float>(noise_.per_z2),
+                                              static_cast<float>(window),
+                                              static_cast<float>(options_.largest_radius_px),
+                                              options_.drop_flying ? 1 : 0};
     const cv::Mat1f z = depth.z_m.isContinuous() ? depth.z_m : depth.z_m.clone();
-    std::memcpy(program_->host(depth_in).data(), z.data, z.total() * 4);
+    std::memcpy(program_->host(recorded).data(), z.data, z.total() * 4);
     program_->run(std::as_bytes(std::span(&constants, 1)));
     timings_ = program_->timings();
-    FittedDepth fitted{{depth.camera, cv::Mat1f(size), depth.source}, {cv::Mat3f(size)}};
+    FittedDepth fitted{{depth.camera, cv::Mat1f(size), depth.source}, {}};
+    if (!planes) {
+        const auto* inverse = reinterpret_cast<const float*>(program_->host(kept).data());
+        std::transform(z.begin(), z.end(), inverse, fitted.depth.z_m.begin(), [](float z_m, float w) { return w > 0 ? z_m : 0; });
+        return fitted;
+    }
+    fitted.normals.normals.create(size);
     std::memcpy(fitted.depth.z_m.data, program_->host(depth_out).data(), z.total() * 4);
     std::memcpy(fitted.normals.normals.data, program_->host(normals_out).data(), z.total() * 12);
     return fitted;
@@ -52,7 +78,9 @@ FittedDepth FitPlane::compute(const DepthImage& depth) {
 
 AoMap OnFittedDepth::compute(const View& view) {
     const FittedDepth fitted = fit_.compute(view.depth);
-    AoMap ao = method_.compute({fitted.depth, view.normals ? view.normals : &fitted.normals, noise_, true});
+    const bool planes = !fitted.normals.normals.empty();
+    const NormalImage* normals = view.normals || !planes ? view.normals : &fitted.normals;
+    AoMap ao = method_.compute({fitted.depth, normals, fit_.noise(), planes});
     timings_ = fit_.timings();
     timings_.insert(timings_.end(), method_.timings().begin(), method_.timings().end());
     return ao;

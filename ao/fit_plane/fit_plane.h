@@ -1,5 +1,5 @@
-// Depth preparation for noisy sensors: each pixel's depth and normal from a robust plane through its surroundings, on the
-// device. Clean depth does not need it: DepthNoise says.
+// Depth preparation for noisy sensors: flying pixels dropped, then each pixel's depth and normal from a robust plane through
+// its surroundings, on the device. Clean depth does not need it: DepthNoise says.
 #pragma once
 
 #include "ao/gpu/program.h"
@@ -10,26 +10,34 @@
 
 namespace scanshade {
 
-/// Depth and normals of the same size as the input; holes stay holes. Normals are (0, 0, 0) where no plane fits.
+/// Depth and normals of the same size as the input; holes stay holes. Normals are (0, 0, 0) where no plane fits, and empty
+/// where none were asked for.
 struct FittedDepth {
     DepthImage depth;
     NormalImage normals;
 };
 
+struct FitPlaneOptions {
+    bool drop_flying = true; ///< pixels between two surfaces that belong to neither become holes
+    double smoothing = 1;    ///< of the window's radius; 0 leaves depth as it is, and normals to the method
+    double largest_radius_px = 12;
+};
+
 /// Not thread-safe: one frame at a time.
 class FitPlane {
   public:
-    /// `noise.any()` must hold. The window grows with sigma(z) up to `largest_radius_px`.
-    FitPlane(gpu::Device& device, const DepthNoise& noise, double largest_radius_px = 12);
+    /// `noise.any()` must hold. The window's radius grows with the root of sigma(z), and of the grain.
+    FitPlane(gpu::Device& device, const DepthNoise& noise, const FitPlaneOptions& options = {});
 
     [[nodiscard]] FittedDepth compute(const DepthImage& depth);
+    [[nodiscard]] const DepthNoise& noise() const { return noise_; }
     /// Where the time of the last compute() went.
     [[nodiscard]] const Timings& timings() const { return timings_; }
 
   private:
     gpu::Device& device_;
     DepthNoise noise_;
-    double largest_radius_px_;
+    FitPlaneOptions options_;
     cv::Size size_;
     std::unique_ptr<gpu::Program> program_;
     Timings timings_;
@@ -38,7 +46,8 @@ class FitPlane {
 /// A method that looks at fitted depth and normals in place of the recorded ones.
 class OnFittedDepth final : public Method {
   public:
-    OnFittedDepth(gpu::Device& device, const DepthNoise& noise, Method& method) : fit_(device, noise), noise_(noise), method_(method) {}
+    OnFittedDepth(gpu::Device& device, const DepthNoise& noise, Method& method, const FitPlaneOptions& options)
+        : fit_(device, noise, options), method_(method) {}
 
     AoMap compute(const View& view) override;
     [[nodiscard]] const Timings& timings() const override { return timings_; }
@@ -46,7 +55,6 @@ class OnFittedDepth final : public Method {
 
   private:
     FitPlane fit_;
-    DepthNoise noise_;
     Method& method_;
     Timings timings_;
 };

@@ -8,7 +8,9 @@ struct FitPlaneConstants {
     ivec2 size;                       // of the image
     float fx, fy, cx, cy;             // pinhole, pixels
     float noise_floor, noise_per_z2;  // sigma(z) = floor + per_z2 z^2, metres
-    float largest_radius;             // of the window, pixels
+    float window;                     // its radius is sqrt(window sigma fx / z), pixels
+    float largest_radius;             // but at most this
+    int drop_flying;                  // 0 = keep them
 };
 
 SHARED_END

@@ -12,6 +12,8 @@ layout(binding = 0, r32f) readonly uniform imageBuffer depth;
 layout(binding = 16, rg32ui) writeonly uniform uimageBuffer edges;
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
+const int across = 24;
+
 float inverse(float z) { return z > 0.0 ? 1.0 / z : 0.0; }
 
 void main() {
@@ -34,6 +36,8 @@ void main() {
     float b = inverse(first >= 1 ? imageLoad(depth, start + (first - 1) * stride).x : 0.0);
     float c = inverse(imageLoad(depth, start + first * stride).x);
     uint edge = 0u, farther = 0u;
+    float last = 0.0; // w of the last pixel with depth
+    for (int i = first - 1; i >= max(first - across, 0) && last == 0.0; --i) last = inverse(imageLoad(depth, start + i * stride).x);
     for (int i = 0; i < surfel_run; ++i) {
         int next = first + i + 1;
         float d = inverse(next < length ? imageLoad(depth, start + min(next, length - 1) * stride).x : 0.0);
@@ -44,7 +48,15 @@ void main() {
         on = on && b > 0.0 && c > 0.0;
         uint bit = 1u << i;
         edge |= on || first + i == 0 ? 0u : bit;
-        farther |= b < c ? bit : 0u;
+        // Beyond a narrow hole is what lies behind it.
+        if (b > 0.0 && c == 0.0) {
+            float beyond = 0.0;
+            for (int j = first + i + 1; j < min(first + i + across, length) && beyond == 0.0; ++j) beyond = inverse(imageLoad(depth, start + j * stride).x);
+            farther |= b < beyond ? bit : 0u;
+        } else {
+            farther |= (c > 0.0 && b == 0.0 ? last : b) < c ? bit : 0u;
+        }
+        last = c > 0.0 ? c : last;
         a = b;
         b = c;
         c = d;

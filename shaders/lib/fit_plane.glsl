@@ -1,0 +1,88 @@
+// A plane in 1/z through weighted samples: 1/z is linear in the image on any plane. Included by the passes of the plane fit,
+// which declare `samples`, their 1/z (0 where there is none), and `k`.
+
+// w = c + x a + y b, relative to the pixel and its own 1/z.
+struct Plane {
+    float a, b, c;
+};
+const Plane level = Plane(0.0, 0.0, 0.0);
+
+struct Sums {
+    float g, gx, gy, gxx, gxy, gyy, gw, gxw, gyw;
+};
+const Sums nothing = Sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+
+// Weights (1 - (r / tolerance)^2)^2, none beyond it (Tukey's biweight); `narrow` is 1 / tolerance.
+void add(inout Sums s, float w_here, bool ok, int at, float x, float y, Plane plane, float narrow) {
+    float recorded = imageLoad(samples, ok ? at : 0).x;
+    float w = recorded - w_here;
+    float e = (w - (plane.c + x * plane.a + y * plane.b)) * narrow;
+    float g = positive(1.0 - e * e);
+    g = ok && recorded > 0.0 ? g * g : 0.0;
+    float gx = g * x, gy = g * y;
+    s.g += g;
+    s.gx += gx;
+    s.gy += gy;
+    s.gxx += gx * x;
+    s.gxy += gx * y;
+    s.gyy += gy * y;
+    s.gw += g * w;
+    s.gxw += gx * w;
+    s.gyw += gy * w;
+}
+
+// Least squares; false where the samples lie on a line or are too few to tell a plane.
+bool solve(Sums s, out Plane plane) {
+    float n = 1.0 / max(s.g, 1e-6);
+    float mx = s.gx * n, my = s.gy * n, mw = s.gw * n;
+    float xx = s.gxx - mx * s.gx, xy = s.gxy - mx * s.gy, yy = s.gyy - my * s.gy;
+    float xw = s.gxw - mx * s.gw, yw = s.gyw - my * s.gw;
+    float determinant = xx * yy - xy * xy;
+    bool good = s.g > 3.0 && determinant > 0.02 * xx * yy;
+    float d = 1.0 / max(determinant, 1e-12);
+    plane.a = good ? (xw * yy - yw * xy) * d : 0.0;
+    plane.b = good ? (yw * xx - xw * xy) * d : 0.0;
+    plane.c = good ? mw - mx * plane.a - my * plane.b : 0.0;
+    return good;
+}
+
+// The row j of samples `spread` pixels apart, `reach` to either side.
+#define COLUMN(i) { int o = nearest(float(i) * spread); int u = p.x + o; \
+    add(sums, w_here, row_ok && uint(u) < uint(k.size.x), line + u, float(o), y, plane, narrow); }
+
+void row(inout Sums sums, ivec2 p, float w_here, int j, int reach, float spread, Plane plane, float narrow) {
+    int o = nearest(float(j) * spread);
+    int v = p.y + o;
+    bool row_ok = uint(v) < uint(k.size.y);
+    int line = v * k.size.x;
+    float y = float(o);
+    if (reach == 3) COLUMN(-3)
+    COLUMN(-2) COLUMN(-1) COLUMN(0) COLUMN(1) COLUMN(2)
+    if (reach == 3) COLUMN(3)
+}
+
+Sums square5(ivec2 p, float w_here, float spread, Plane plane, float narrow) {
+    Sums sums = nothing;
+    row(sums, p, w_here, -2, 2, spread, plane, narrow);
+    row(sums, p, w_here, -1, 2, spread, plane, narrow);
+    row(sums, p, w_here, 0, 2, spread, plane, narrow);
+    row(sums, p, w_here, 1, 2, spread, plane, narrow);
+    row(sums, p, w_here, 2, 2, spread, plane, narrow);
+    return sums;
+}
+
+Sums square7(ivec2 p, float w_here, float spread, Plane plane, float narrow) {
+    Sums sums = nothing;
+    row(sums, p, w_here, -3, 3, spread, plane, narrow);
+    row(sums, p, w_here, -2, 3, spread, plane, narrow);
+    row(sums, p, w_here, -1, 3, spread, plane, narrow);
+    row(sums, p, w_here, 0, 3, spread, plane, narrow);
+    row(sums, p, w_here, 1, 3, spread, plane, narrow);
+    row(sums, p, w_here, 2, 3, spread, plane, narrow);
+    row(sums, p, w_here, 3, 3, spread, plane, narrow);
+    return sums;
+}
+
+float sigma_of(float z) { return k.noise_floor + k.noise_per_z2 * z * z; }
+
+float window_of(float z) { return clamp(sqrt(k.window * sigma_of(z) * k.fx / z), 1.5, k.largest_radius); }
