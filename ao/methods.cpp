@@ -30,11 +30,11 @@ class SetupOf final : public MethodSetup {
 const std::vector<MethodRow>& methods() {
     static const std::vector<MethodRow> table{
         {"cacao", "tap pairs on de-interleaved depth, edge-aware blur; five qualities, native or half resolution",
-         "FidelityFX CACAO 1.3 (AMD's public documentation)", SetupOf<CacaoOptions, Cacao>::start, 1.9},
+         "FidelityFX CACAO 1.3 (AMD's public documentation)", SetupOf<CacaoOptions, Cacao>::start, 1.6},
         {"luna", "fourteen vectors around the point, occluded by what stands in front of it",
-         "Luna, Introduction to 3D Game Programming with DirectX 12 (2016), ch. 21", SetupOf<LunaOptions, Luna>::start, 1.9},
+         "Luna, Introduction to 3D Game Programming with DirectX 12 (2016), ch. 21", SetupOf<LunaOptions, Luna>::start, 1.6},
         {"hemisphere", "points in the half ball above the surface, tested against what is seen", "tutorials on SSAO with a hemisphere kernel",
-         SetupOf<HemisphereOptions, Hemisphere>::start, 1.9},
+         SetupOf<HemisphereOptions, Hemisphere>::start, 1.6},
         {"hbao", "horizons above the tangent plane, attenuated by distance", "Bavoil, Sainz, Dimitrov 2008", SetupOf<HbaoOptions, Hbao>::start},
         {"gtao", "open arc between two horizons, slice by slice", "Jimenez et al. 2016; XeGTAO (Strugar, McCalla 2021)",
          SetupOf<GtaoOptions, Gtao>::start},

@@ -15,7 +15,7 @@ enum Buffers : int { recorded, kept, averages, depth_out, normals_out };
 
 /// Of the window's radius, squared, in units of grain sigma fx / z (pixels): what left the least error in AO on simulated
 /// sensors. Below it noise tilts normals, above it a plane no longer is what surfaces are.
-constexpr double window_scale = 2.2;
+constexpr double window_scale = 3;
 
 std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bool planes) {
     using Host = gpu::BufferRow::Host;

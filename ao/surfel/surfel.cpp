@@ -25,6 +25,8 @@ SurfelOptions resolved(SurfelOptions options) {
     return options;
 }
 
+constexpr int widest_fill_px = 40;
+
 int divided_up(int n, int by) { return (n + by - 1) / by; }
 
 /// What the passes' work and buffers are counted in.
@@ -80,7 +82,8 @@ void Surfel::add_passes(ScreenTables& tables) const {
     const int sampled = tables.add_buffer({"sampled", bytes(grid.samples.area(), 8), none, Texels::rg32f});
     const int known = tables.add_buffer({"known", bytes(grid.samples.area(), 4), none, Texels::r32f});
 
-    tables.passes.push_back({"edges", "surfel/edges", {screen_depth}, {edges}, groups_of(words), {}});
+    tables.add_pass("fill", "surfel/fill", {}, {screen_surfaces});
+    tables.passes.push_back({"edges", "surfel/edges", {screen_surfaces}, {edges}, groups_of(words), {}});
     tables.passes.push_back({"runs", "surfel/runs", {edges}, {runs}, groups_of(size.width + size.height), {}});
     tables.add_pass("surfels", "surfel/surfels", {screen_surfaces, edges, runs}, {surfels});
     const cv::Size plane = plane_of(grid.samples); // its threads share a rotation
@@ -111,7 +114,9 @@ std::vector<std::byte> Surfel::constants(const shared::ScreenConstants& screen) 
         std::min(options_.hidden, options_.thickest) * r,
         options_.slices * options_.steps <= 4 ? 1.3F : 1.0F, // between few samples gaps would open
         0.05F * r,
-        0.3F * r});
+        0.3F * r,
+        screen.noise_floor > 0 || screen.noise_per_z2 > 0 ? widest_fill_px : 0, // where depth is clean, holes are the sky
+        0.5F * r});
 }
 
 } // namespace scanshade

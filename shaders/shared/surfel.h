@@ -18,6 +18,8 @@ struct SurfelConstants {
     float lengthen;            // factor on the half lengths of surfels: few samples leave gaps
     float jut;                 // metres by which what hides a surface's continuation stands in front of it
     float longest;             // of what is added to a half length there, metres
+    int fill_px;               // holes of a sensor are filled up to this width
+    float fill;                // and up to this, metres
 };
 
 // Specialization constants, besides those of the shared passes.

@@ -8,17 +8,39 @@
 #include "shared/surfel.h"
 
 layout(local_size_x = surfel_group) in;
-layout(binding = 0, r32f) readonly uniform imageBuffer depth;
+layout(binding = 0, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 16, rg32ui) writeonly uniform uimageBuffer edges;
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
-const int across = 24;
+const int narrow = 4;  // a surface may go on behind a hole of fewer pixels
+const int across = 24; // and it is known what lies beyond one of fewer
 
-float inverse(float z) { return z > 0.0 ? 1.0 / z : 0.0; }
+int start, stride, length_px;
+float noise_floor, noise_per_z2;
+
+// 1/z, 0 in holes and outside.
+float inverse(int i) {
+    float z = imageLoad(surfaces, start + clamp(i, 0, length_px - 1) * stride).w;
+    return uint(i) < uint(length_px) && z != 0.0 ? 1.0 / abs(z) : 0.0; // filled holes have a negative depth
+}
+
+// 3 sigma(z) / z^2, or 2 % of the depth.
+float tolerance(float b, float c) {
+    float w = min(b, c);
+    return max(3.0 * (noise_floor * w * w + noise_per_z2), 0.02 * w);
+}
+
+// Whether c, `gap` pixels on from b and its slope, is of the same surface.
+bool goes_on(float b, float slope, float c, int gap) {
+    float most = tolerance(b, c);
+    return gap <= narrow && b > 0.0 && c > 0.0 && (abs(c - b) <= most || abs(c - (b + slope * float(gap))) <= most);
+}
 
 void main() {
     SurfelConstants s = constants;
     ScreenConstants k = s.screen;
+    noise_floor = k.noise_floor;
+    noise_per_z2 = k.noise_per_z2;
     int id = int(gl_GlobalInvocationID.x), rows = s.words.x * k.size.y;
     bool along_row = id < rows;
     int column_id = id - rows;
@@ -27,37 +49,37 @@ void main() {
     int line = along_row ? id - run * k.size.y : column_id - run * k.size.x;
     if (id >= rows + s.words.y * k.size.x) return;
 
-    int length = along_row ? k.size.x : k.size.y;
-    int stride = along_row ? 1 : k.size.x;
-    int start = along_row ? line * k.size.x : line;
+    length_px = along_row ? k.size.x : k.size.y;
+    stride = along_row ? 1 : k.size.x;
+    start = along_row ? line * k.size.x : line;
     int first = run * surfel_run;
-    // w of the pixels at i - 2, i - 1, i, i + 1 of the line.
-    float a = inverse(first >= 2 ? imageLoad(depth, start + (first - 2) * stride).x : 0.0);
-    float b = inverse(first >= 1 ? imageLoad(depth, start + (first - 1) * stride).x : 0.0);
-    float c = inverse(imageLoad(depth, start + first * stride).x);
+    // Of the last pixel with depth before the run: 1/z, its slope, and how far back it lies.
+    float last = inverse(first - 1);
+    int gap = 1;
+    while (last == 0.0 && gap < across && first - gap > 0) last = inverse(first - ++gap);
+    float before = inverse(first - gap - 1);
+    float slope = before > 0.0 && last > 0.0 ? last - before : 0.0;
+    float b = gap == 1 ? last : 0.0, c = inverse(first);
     uint edge = 0u, farther = 0u;
-    float last = 0.0; // w of the last pixel with depth
-    for (int i = first - 1; i >= max(first - across, 0) && last == 0.0; --i) last = inverse(imageLoad(depth, start + i * stride).x);
     for (int i = 0; i < surfel_run; ++i) {
-        int next = first + i + 1;
-        float d = inverse(next < length ? imageLoad(depth, start + min(next, length - 1) * stride).x : 0.0);
-        // 3 sigma(z) / z^2, or 2 % of the depth.
-        float w = min(b, c);
-        float tolerance = max(3.0 * (k.noise_floor * w * w + k.noise_per_z2), 0.02 * w);
-        bool on = abs(c - b) <= tolerance || abs(c - (2.0 * b - a)) <= tolerance || abs(b - (2.0 * c - d)) <= tolerance;
-        on = on && b > 0.0 && c > 0.0;
+        float d = inverse(first + i + 1);
         uint bit = 1u << i;
-        edge |= on || first + i == 0 ? 0u : bit;
-        // Beyond a narrow hole is what lies behind it.
-        if (b > 0.0 && c == 0.0) {
-            float beyond = 0.0;
-            for (int j = first + i + 1; j < min(first + i + across, length) && beyond == 0.0; ++j) beyond = inverse(imageLoad(depth, start + j * stride).x);
-            farther |= b < beyond ? bit : 0u;
-        } else {
-            farther |= (c > 0.0 && b == 0.0 ? last : b) < c ? bit : 0u;
+        bool on, beyond_is_nearer;
+        if (b > 0.0 && c == 0.0) { // where a hole begins: is what lies behind it the same surface, or what?
+            float beyond = d;
+            int width = 2;
+            while (beyond == 0.0 && width < across && first + i + width < length_px) beyond = inverse(first + i - 1 + ++width);
+            on = goes_on(b, slope, beyond, width);
+            beyond_is_nearer = b < beyond;
+        } else { // c may go on from b, or from behind the hole that ends here; a slope that begins may be told from d
+            on = goes_on(last, slope, c, gap) || (b > 0.0 && d > 0.0 && c > 0.0 && abs(b - (2.0 * c - d)) <= tolerance(b, c));
+            beyond_is_nearer = last < c;
         }
-        last = c > 0.0 ? c : last;
-        a = b;
+        edge |= on || first + i == 0 || (b == 0.0 && c == 0.0) ? 0u : bit;
+        farther |= beyond_is_nearer ? bit : 0u;
+        slope = c > 0.0 ? (b > 0.0 ? c - b : 0.0) : slope;
+        last = c > 0.0 ? c : gap < across ? last : 0.0;
+        gap = c > 0.0 ? 1 : gap + 1;
         b = c;
         c = d;
     }

@@ -128,9 +128,10 @@ void main() {
         vec2 along_ray = along * k.ray_step;
         float per_pixel = length(along_ray); // metres at z = 1 m
         float half_pixel = 0.5 * s.lengthen * per_pixel;
-        vec2 room = vec2(to_border(vec2(pixel), along), to_border(vec2(pixel), -along));
+        // Beyond half the image's size outside it a plane is no longer a guess worth a step.
+        vec2 room = vec2(to_border(vec2(pixel), along), to_border(vec2(pixel), -along)) + 0.5 * float(max(k.size.x, k.size.y));
         float full_reach = reach / per_pixel;
-        vec2 first = min(room, 1.0), far = max(min(vec2(full_reach), room), first) - first;
+        vec2 far = max(min(vec2(full_reach), room), 1.0) - 1.0;
         vec2 u = fract(noise.y + golden * vec2(2 * i, 2 * i + 1));
         vec2 flat_tangent = tangent.xy * k.ray_step;
 
@@ -140,24 +141,33 @@ void main() {
         int j = 0;
         do {
             vec4 x = (float(j) + vec4(u, u + 1.0)) * (1.0 / float(steps));
-            vec4 before = spread(x - 1.0 / float(steps)) * far.xyxy + first.xyxy;
-            vec4 now = spread(x) * far.xyxy + first.xyxy, next = spread(x + 1.0 / float(steps)) * far.xyxy + first.xyxy;
+            vec4 before = spread(x - 1.0 / float(steps)) * far.xyxy + 1.0;
+            vec4 now = spread(x) * far.xyxy + 1.0, next = spread(x + 1.0 / float(steps)) * far.xyxy + 1.0;
             if (j == 0) before.xy = vec2(0.0);
             // Whole pixels away.
             vec4 signed_now = now * sides;
             ivec4 ix = nearest(along.x * signed_now), iy = nearest(along.y * signed_now);
-            uvec2 a = imageLoad(surfels, surfel_index(pixel + ivec2(ix.x, iy.x), s.plane)).xy;
-            uvec2 b = imageLoad(surfels, surfel_index(pixel + ivec2(ix.y, iy.y), s.plane)).xy;
-            uvec2 c = imageLoad(surfels, surfel_index(pixel + ivec2(ix.z, iy.z), s.plane)).xy;
-            uvec2 d = imageLoad(surfels, surfel_index(pixel + ivec2(ix.w, iy.w), s.plane)).xy;
+            ivec4 jx = clamp(ix, -pixel.x, k.size.x - 1 - pixel.x), jy = clamp(iy, -pixel.y, k.size.y - 1 - pixel.y);
+            uvec2 a = imageLoad(surfels, surfel_index(pixel + ivec2(jx.x, jy.x), s.plane)).xy;
+            uvec2 b = imageLoad(surfels, surfel_index(pixel + ivec2(jx.y, jy.y), s.plane)).xy;
+            uvec2 c = imageLoad(surfels, surfel_index(pixel + ivec2(jx.z, jy.z), s.plane)).xy;
+            uvec2 d = imageLoad(surfels, surfel_index(pixel + ivec2(jx.w, jy.w), s.plane)).xy;
             vec4 zq = uintBitsToFloat(uvec4(a.x, b.x, c.x, d.x));
             ivec4 shape = ivec4(a.y, b.y, c.y, d.y);
             if (steps % 2 == 1 && j == steps - 1) zq.zw = vec2(0.0);
-            found += mix(vec4(0.0), vec4(1.0), greaterThan(zq, vec4(0.0)));
+            bvec4 inside_image = equal(abs(ix - jx) + abs(iy - jy), ivec4(0));
+            found += mix(vec4(0.0), mix(vec4(0.0), vec4(1.0), inside_image), greaterThan(zq, vec4(0.0)));
 
             // From the pixel's point to the sample's, towards V and towards T (outwards on either side): differences first,
             // far away coordinates cancel badly.
-            vec4 mx = vec4(ix), my = vec4(iy), dz = zq - z;
+            vec4 mx = vec4(ix), my = vec4(iy);
+            vec4 nx = vec4(shape >> 24), ny = vec4(shape << 8 >> 24), nz = vec4(shape << 16 >> 24); // as bytes_of_normal()
+            // Outside the image the surface at its border goes on, a plane, though not towards its horizon.
+            vec4 seen = nx * (ray.x + mx * k.ray_step.x) + ny * (ray.y + my * k.ray_step.y) + nz;
+            vec4 go_on = (nx * (ray.x + vec4(jx) * k.ray_step.x) + ny * (ray.y + vec4(jy) * k.ray_step.y) + nz) / seen;
+            go_on = mix(vec4(0.0), go_on, lessThan(abs(go_on - 1.5), vec4(1.2)));
+            zq = abs(zq) * mix(go_on, vec4(1.0), inside_image); // filled holes have a negative depth
+            vec4 dz = zq - z;
             vec4 pv = zq * (mx * flat_eye.x + my * flat_eye.y) - ray_length * dz;
             vec4 pt = zq * (mx * flat_tangent.x + my * flat_tangent.y) * sides;
             vec4 rise = zq * (mx * flat_normal.x + my * flat_normal.y) + (dz * normal_per_z - least_rise);
@@ -168,7 +178,6 @@ void main() {
             gv *= g;
             vec4 gt = pt * g;
             // Where the surfel lies in the slice: its normal turned by a right angle, outwards.
-            vec4 nx = vec4(shape >> 24), ny = vec4(shape << 8 >> 24), nz = vec4(shape << 16 >> 24); // as bytes_of_normal()
             vec4 lv = -sides * (nx * tangent.x + ny * tangent.y + nz * tangent.z);
             vec4 lt = nx * eye.x + ny * eye.y + nz * eye.z;
             vec4 l = inverse_length(lv * lv + (lt * lt + 1e-30));
@@ -183,7 +192,7 @@ void main() {
             chord *= inverse_length(chord);
             // Half way to its neighbours; farther where a neighbour stands in front of it and of its plane: there it goes on.
             vec4 back = (now - before) * size, ahead = (next - now) * size;
-            vec4 bend = sides * (nx * along_ray.x + ny * along_ray.y) / (nx * (ray.x + mx * k.ray_step.x) + ny * (ray.y + my * k.ray_step.y) + nz);
+            vec4 bend = sides * (nx * along_ray.x + ny * along_ray.y) / seen;
             vec4 z_before = vec4(last, zq.xy), z_next = vec4(zq.zw, 0.0, 0.0); // of the last step's nothing is known yet
             last = zq.zw;
             back += hides(z_before, zq, 1.0 - (now - before) * bend, s.jut) * least(back, vec4(s.longest));
@@ -216,7 +225,7 @@ void main() {
         float measure = weight * full;
         all += measure;
         open += measure * (1.0 - float(bitCount(closed)) * (1.0 / sector_count));
-        met += (found.xy + found.zw) * (far + first) / max(full_reach, 1.0);
+        met += (found.xy + found.zw) * (far + 1.0) / max(full_reach, 1.0);
         ++i;
     } while (i < slices);
     // Where the radius shows as less than a pixel nothing can be seen within it: open and unknown; up to three it fades in.

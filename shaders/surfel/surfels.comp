@@ -41,7 +41,7 @@ void main() {
 
     int across = run_length(p.x, (p.x >> 5) * k.size.y + p.y);
     int along = run_length(p.y, s.words.x * k.size.y + (p.y >> 5) * k.size.x + p.x);
-    float width = min(float(across) / k.camera.fx, float(along) / k.camera.fy) * z;
+    float width = min(float(across) / k.camera.fx, float(along) / k.camera.fy) * abs(z);
     bool ends_in_sight = across < open || along < open;
     float thickness = ends_in_sight ? clamp(0.5 * width, s.thinnest, s.thickest) : s.hidden;
 
