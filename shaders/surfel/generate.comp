@@ -195,8 +195,8 @@ void main() {
             vec4 bend = sides * (nx * along_ray.x + ny * along_ray.y) / seen;
             vec4 z_before = vec4(last, zq.xy), z_next = vec4(zq.zw, 0.0, 0.0); // of the last step's nothing is known yet
             last = zq.zw;
-            back += hides(z_before, zq, 1.0 - (now - before) * bend, s.jut) * least(back, vec4(s.longest));
-            ahead += hides(z_next, zq, 1.0 + (next - now) * bend, s.jut) * least(ahead, vec4(s.longest));
+            back += hides(z_before, zq, 1.0 - (now - before) * bend, s.jut) * least(2.0 * back, vec4(s.longest));
+            ahead += hides(z_next, zq, 1.0 + (next - now) * bend, s.jut) * least(2.0 * ahead, vec4(s.longest));
             back = least(back, middle + chord);
             ahead = least(ahead, chord - middle);
             vec4 fv = pv - lv * back, ft = pt - lt * back, uv = pv + lv * ahead, ut = pt + lt * ahead;
