@@ -6,6 +6,7 @@
 #include "io/npy_file.h"
 #include "io/output_file.h"
 #include "projection/attach.h"
+#include "projection/confidence.h"
 #include "projection/error.h"
 #include "projection/project.h"
 #include "projection/undistort.h"
@@ -32,7 +33,8 @@ struct Work {
     Frame frame = {};
     DepthImage depth = {};
     AoMap ao = {};
-    Attached attached = {};
+    cv::Mat1f confidence_in_view = {}; ///< of `ao`, pixel by pixel
+    Attached attached = {}, confidence = {};
 };
 
 /// Takes one step with a frame and its time; the only place where a frame's failure is caught.
@@ -193,6 +195,9 @@ cv::Mat3b undistorted_colour(const cv::Mat3b& colour, const Camera& camera) {
     return straight;
 }
 
+/// In clouds, where nothing is known of a point it has no confidence.
+float known_or_none(float confidence) { return std::isnan(confidence) ? 0.0F : confidence; }
+
 /// The depth frame's surface as points in camera space, coloured where the colour fits.
 void write_depth_cloud(const std::filesystem::path& file, const Work& work, const Scene& scene,
                        const Outputs& outputs) {
@@ -200,7 +205,7 @@ void write_depth_cloud(const std::filesystem::path& file, const Work& work, cons
     const cv::Mat3b colour = undistorted_colour(scene.colour, work.frame.camera);
     std::vector<Eigen::Vector3d> points;
     std::vector<cv::Vec3b> colours;
-    std::vector<float> visibility;
+    std::vector<float> visibility, confidence;
     for (int v = 0; v < z_m.rows; ++v) {
         for (int u = 0; u < z_m.cols; ++u) {
             const double z = z_m(v, u);
@@ -208,13 +213,14 @@ void write_depth_cloud(const std::filesystem::path& file, const Work& work, cons
                 continue;
             points.emplace_back((u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z);
             visibility.push_back(work.ao.visibility(v, u));
+            confidence.push_back(known_or_none(work.confidence_in_view(v, u)));
             if (!colour.empty())
                 colours.push_back(colour(v, u));
         }
     }
     if (outputs.colour_cloud)
         colours = shaded_colours(colours, visibility, outputs.shade_strength);
-    write_new_ply(file, points, colours, {{"ambient_occlusion", visibility}},
+    write_new_ply(file, points, colours, {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}},
                   {"camera space: x right, y down, z forward, metres"});
 }
 
@@ -223,11 +229,19 @@ void write_recorded_cloud(const std::filesystem::path& file, const Work& work, c
     std::vector<cv::Vec3b> colours;
     if (outputs.colour_cloud)
         colours = shaded_colours(cloud.colours, work.attached.per_point, outputs.shade_strength);
-    write_cloud(file, cloud, {{"ambient_occlusion", work.attached.per_point}}, colours);
+    std::vector<AddedField> fields{{"ambient_occlusion", work.attached.per_point}};
+    std::vector<float> confidence = work.confidence.per_point;
+    std::ranges::transform(confidence, confidence.begin(), known_or_none);
+    if (!confidence.empty())
+        fields.push_back({"ao_confidence", confidence});
+    write_cloud(file, cloud, fields, colours);
 }
 
 std::filesystem::path ao_file(const std::string& name, const Outputs& outputs) {
     return std::filesystem::path("ao") / (name + extension(outputs.format));
+}
+std::filesystem::path confidence_file(const std::string& name, const Outputs& outputs) {
+    return std::filesystem::path("confidence") / (name + extension(outputs.format));
 }
 std::filesystem::path picture_file(const char* kind, const std::string& name) {
     return std::filesystem::path(kind) / (name + ".png");
@@ -244,6 +258,11 @@ void write_all(Work& work, const Scene& scene, const cv::Mat3b& shaded, const Ou
     };
     if (outputs.ao)
         wrote(ao_file(name, outputs), [&](const auto& file) { write_ao(file, scene.visibility, outputs.format); });
+    if (outputs.confidence)
+        wrote(confidence_file(name, outputs), [&](const auto& file) {
+            const bool floats = outputs.format == AoFormat::tiff || outputs.format == AoFormat::exr;
+            write_ao(file, work.confidence.visibility, floats ? outputs.format : AoFormat::png8);
+        });
     if (outputs.shaded)
         wrote(picture_file("shaded", name), [&](const auto& file) { write_picture(file, shaded); });
     if (outputs.panel)
@@ -276,16 +295,24 @@ void write_intermediates(const std::filesystem::path& folder, const std::vector<
     write_atomically(folder / "index.csv", index);
 }
 
+bool wants_confidence(const Work& work, const Outputs& outputs) {
+    return outputs.confidence || (work.frame.cloud ? outputs.cloud : outputs.depth_cloud);
+}
+
 void attach_and_write(Work& work, const BatchOptions& options) {
     Outputs outputs = options.outputs;
     const bool by_points = options.point_method && work.frame.cloud;
     if (by_points)
-        outputs.ao = outputs.shaded = outputs.panel = false;
+        outputs.ao = outputs.confidence = outputs.shaded = outputs.panel = false;
     Scene scene;
     cv::Mat3b shaded;
     take(work, &StageTimes::attach, [&] {
         if (!by_points)
             work.attached = attach(work.frame, work.depth, work.ao);
+        if (!by_points && wants_confidence(work, outputs)) {
+            work.confidence_in_view = confidence_of(work.depth, work.ao.visibility, options.radius_m, options.noise);
+            work.confidence = attach(work.frame, work.depth, {work.confidence_in_view});
+        }
         work.row.coverage = work.attached.coverage;
         work.row.mean_visibility = work.attached.mean_visibility;
         if (!by_points)
@@ -332,6 +359,8 @@ std::vector<std::filesystem::path> files_of(const CaptureEntry& entry, const Out
     const auto add = [&](const std::filesystem::path& file) { files.push_back(outputs.folder / file); };
     if (outputs.ao)
         add(ao_file(entry.name, outputs));
+    if (outputs.confidence)
+        add(confidence_file(entry.name, outputs));
     if (outputs.shaded)
         add(picture_file("shaded", entry.name));
     if (outputs.panel)

@@ -15,14 +15,15 @@
 
 namespace scanshade {
 
-/// What is written of each frame, under `folder`: ao/NAME.png, shaded/NAME.png, panel/NAME.png, clouds/NAME.pcd or
-/// .ply.
+/// What is written of each frame, under `folder`: ao/NAME.png, confidence/NAME.png, shaded/NAME.png, panel/NAME.png,
+/// clouds/NAME.pcd or .ply.
 struct Outputs {
     std::filesystem::path folder;
     bool ao = true;     ///< the visibility map
+    bool confidence = true; ///< how far the visibility can be believed (confidence_of()), as 8 bits or floats
     bool shaded = true; ///< colour times visibility; clay times visibility where colour is not known to fit the depth
     bool panel = false; ///< colour | depth | AO | shaded
-    bool cloud = true;  ///< a cloud input with the field ambient_occlusion, everything else as it was
+    bool cloud = true;  ///< a cloud input with the fields ambient_occlusion and ao_confidence, everything else as it was
     bool depth_cloud = false; ///< a new PLY of a depth frame's points, in camera space
     AoFormat format = AoFormat::png16;
     double shade_strength = 1; ///< 0 leaves the colour, 1 multiplies by visibility
@@ -36,6 +37,8 @@ struct BatchOptions {
     std::vector<std::size_t> frames; ///< indices into capture.entries; the report keeps this order
     Outputs outputs;
     ProjectOptions range;                     ///< depth outside counts as a hole
+    double radius_m = 0;                      ///< the method's, and
+    DepthNoise noise;                         ///< the depth's: what confidence depends on
     std::optional<Registration> registration; ///< what the user said; otherwise what the capture says
     PointMethod* point_method = nullptr;      ///< what clouds and meshes are computed with, where that needs no view: then
                                               ///< the cloud is all that is written of them

@@ -135,7 +135,7 @@ std::optional<RayStart> FusedReference::start(const Vector3d& eye, const Vector3
 }
 
 cv::Mat1f FusedReference::visibility(const TrialFrame& frame) const {
-    AoMap ao{cv::Mat1f(frame.depth.z_m.size(), std::numeric_limits<float>::quiet_NaN()), {}};
+    AoMap ao{cv::Mat1f(frame.depth.z_m.size(), std::numeric_limits<float>::quiet_NaN())};
     if (frame.frame.world_from_camera) {
         const Isometry3d& pose = *frame.frame.world_from_camera;
         const RayHemisphere hemisphere(*surface_, directions_, radius_m_, false);

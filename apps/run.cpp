@@ -94,8 +94,8 @@ std::set<std::string> words_of(const std::string& list) {
     std::set<std::string> words;
     std::istringstream stream(list);
     for (std::string word; std::getline(stream, word, ',');) {
-        if (word != "ao" && word != "shaded" && word != "cloud" && word != "panel")
-            throw Misuse("write: '" + word + "' given, expected any of ao,shaded,cloud,panel");
+        if (word != "ao" && word != "confidence" && word != "shaded" && word != "cloud" && word != "panel")
+            throw Misuse("write: '" + word + "' given, expected any of ao,confidence,shaded,cloud,panel");
         words.insert(word);
     }
     return words;
@@ -109,6 +109,7 @@ Outputs outputs_from(const RunSettings& settings) {
     if (settings.write != "auto") {
         const std::set<std::string> words = words_of(settings.write);
         outputs.ao = words.contains("ao");
+        outputs.confidence = words.contains("confidence");
         outputs.shaded = words.contains("shaded");
         outputs.panel = words.contains("panel");
         outputs.cloud = outputs.depth_cloud = words.contains("cloud");
@@ -166,7 +167,7 @@ void refuse_to_overwrite(const Job& job) {
 /// Clears what a killed run left, and the report of an earlier one: a manifest says that what lies beside it is
 /// complete.
 void prepare_folder(const fs::path& folder) {
-    for (const char* part : {"", "ao", "shaded", "panel", "clouds"})
+    for (const char* part : {"", "ao", "confidence", "shaded", "panel", "clouds"})
         remove_leftovers(folder / part);
     for (const char* report : {"manifest.json", "frames.csv"})
         fs::remove(folder / report);
@@ -331,7 +332,7 @@ class Run final : public Command {
               {"device", "index or part of the name of a Vulkan device; empty = the fastest kind", &s.device}}},
             {"output",
              {{"out", "folder of the results; several captures get a folder each in it", &s.out},
-              {"write", "any of ao,shaded,cloud,panel; auto = ao,shaded, and cloud for clouds", &s.write},
+              {"write", "any of ao,confidence,shaded,cloud,panel; auto = ao,confidence,shaded, and cloud for clouds", &s.write},
               {.name = "format",
                .help = "of the ao maps",
                .value = &s.format,
@@ -462,6 +463,7 @@ class Run final : public Command {
             asked_.budget.any() ? keep_to_budget(job, device) : std::vector<std::string>{};
         const std::unique_ptr<Method> plain = chosen_setup().make(device);
         job.batch.point_method = dynamic_cast<PointMethod*>(plain.get());
+        job.batch.radius_m = std::stod(value_text(*row_named(chosen_setup().parameters(), "radius")));
         say(fmt::format("{} on {} ({})", asked_.method, device.info().name, device.info().driver));
         const DepthNoise noise = noise_of(job.capture, job.batch.frames, asked_.depth_noise);
         std::optional<OnFittedDepth> fitted;
@@ -470,6 +472,7 @@ class Run final : public Command {
                            FitPlaneOptions{.drop_flying = asked_.flying_pixels == "drop",
                                            .smoothing = asked_.depth_smoothing * method_named(asked_.method).smoothing});
         Method& method = fitted ? static_cast<Method&>(*fitted) : *plain;
+        job.batch.noise = noise;
         RunReport report = report_on(job, device.info());
         report.depth_noise = noise_sentence(noise);
         report.budget = budget;

@@ -22,8 +22,6 @@ struct NormalImage {
 /// Ambient occlusion as visibility: 1 open, 0 closed, NaN where there is no surface.
 struct AoMap {
     cv::Mat1f visibility;
-    /// Share of the wanted samples that fell on known depth, 0 in holes; empty where a method does not say.
-    cv::Mat1f coverage = {};
 };
 
 } // namespace scanshade

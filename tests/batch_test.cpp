@@ -67,7 +67,7 @@ TEST_F(BatchTest, every_frame_gets_its_row_and_files) {
         EXPECT_EQ(row.coverage, 1);
         EXPECT_NEAR(row.mean_visibility, half_open, 1e-6);
         EXPECT_EQ(row.passes.size(), 1u);
-        EXPECT_EQ(row.files.size(), 2u); // ao and shaded: a depth frame's cloud is written only when asked for
+        EXPECT_EQ(row.files.size(), 3u); // ao, confidence and shaded: a depth frame's cloud is written only when asked for
         for (const fs::path& file : row.files)
             EXPECT_TRUE(fs::exists(folder / "out" / file)) << file;
     }
@@ -146,7 +146,7 @@ TEST_F(BatchTest, bytes_do_not_depend_on_how_many_frames_are_in_flight) {
     const auto one = run("one", 1), many = run("many", 8);
     for (std::size_t i = 0; i < one.size(); ++i) {
         ASSERT_EQ(one[i].files, many[i].files);
-        EXPECT_EQ(one[i].files.size(), 4u);
+        EXPECT_EQ(one[i].files.size(), 5u);
         for (const fs::path& file : one[i].files)
             EXPECT_EQ(read_bytes(folder / "one" / file), read_bytes(folder / "many" / file)) << file;
     }

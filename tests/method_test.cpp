@@ -182,17 +182,6 @@ TEST_P(Laws, any_size_works) {
     }
 }
 
-TEST_P(Laws, coverage_is_a_share_and_nothing_in_holes) {
-    const DepthImage depth = with_holes(ball_on_floor(test_camera()), 0.15);
-    const cv::Mat1f coverage = ao(depth).coverage;
-    if (coverage.empty())
-        GTEST_SKIP() << "this method does not tell its coverage";
-    ASSERT_EQ(coverage.size(), depth.z_m.size());
-    EXPECT_TRUE(cv::checkRange(coverage, true, nullptr, 0.0, 1.0 + 1e-6));
-    EXPECT_EQ(cv::countNonZero((depth.z_m == 0) & (coverage != 0)), 0);
-    EXPECT_GT(cv::mean(coverage, depth.z_m > 0)[0], 0.4) << "most of what is near is known";
-}
-
 TEST_P(Laws, normals_of_the_surface_may_be_brought_along) {
     // A plane with its own normals is as open as with derived ones, also where some are missing.
     const DepthImage depth = tilted_plane(test_camera(), 40);

@@ -93,7 +93,7 @@ void Hemisphere::add_passes(ScreenTables& tables) const {
     const int table = tables.add_buffer(
         {"kernel", kernel.size() * 4, gpu::BufferRow::Host::none, gpu::BufferRow::Texels::rgba32f, kernel});
     tables.add_pass("generate", "hemisphere/generate", {screen_depth, screen_surfaces, screen_noise, table},
-                    {screen_raw, screen_coverage},
+                    {screen_raw},
                     {{shared::spec_published, published}, {shared::spec_renormalise, options_.renormalise}});
     tables.add_blurs(options_.blurs, {0.370F, 0.317F, 0.198F, 0.115F});
 }

@@ -53,7 +53,6 @@ std::vector<gpu::BufferRow> shared_buffers(std::size_t pixels, bool supplied, in
         {"surfaces", pixels * 16, Host::none, gpu::BufferRow::Texels::rgba32f},
         {"noise", noise.size() * 4, Host::none, pairs, noise},
         {"raw", pixels * 4, Host::none, floats},
-        {"coverage", pixels * 4, Host::download, floats},
         {"visibility", pixels * 4, Host::download, floats},
     };
 }
@@ -161,8 +160,7 @@ AoMap ScreenMethod::compute(const View& view) {
     const auto uploaded = std::chrono::steady_clock::now();
     program_->run(block);
     const auto ran = std::chrono::steady_clock::now();
-    AoMap ao{downloaded(program_->host_as<float>(screen_visibility), size),
-             downloaded(program_->host_as<float>(screen_coverage), size)};
+    AoMap ao{downloaded(program_->host_as<float>(screen_visibility), size)};
     const auto done = std::chrono::steady_clock::now();
     const auto ms = [](auto from, auto to) { return std::chrono::duration<double, std::milli>(to - from).count(); };
     timings_.assign({{"host upload", ms(start, uploaded)}});

@@ -32,7 +32,6 @@ enum ScreenBuffer : int {
     screen_surfaces,   ///< rgba32f: normal, unit, facing the camera, (0, 0, 0) exactly in holes; depth
     screen_noise,      ///< rg32f, 64x64: see lib/noise.glsl
     screen_raw,        ///< r32f: visibility before denoise, finite everywhere
-    screen_coverage,   ///< r32f: share of the wanted samples that fell on known depth, 0 in holes
     screen_visibility, ///< r32f: the result, NaN in holes
     screen_own
 };
@@ -63,8 +62,7 @@ class ScreenMethod : public Method {
   protected:
     ScreenMethod(gpu::Device& device, const ScreenOptions& options) : device_(device), options_(options) {}
 
-    /// Appends the room's buffers and passes: screen_depth, screen_surfaces, screen_noise -> screen_raw,
-    /// screen_coverage.
+    /// Appends the room's buffers and passes: screen_depth, screen_surfaces, screen_noise -> screen_raw.
     virtual void add_passes(ScreenTables& tables) const = 0;
     /// Appends what makes screen_visibility of screen_raw: the shared 5x5 mean, unless a room has its own.
     virtual void add_denoise(ScreenTables& tables) const;

@@ -58,7 +58,7 @@ shared::GtaoConstants slice_constants(const SliceOptions& options, const shared:
 void add_slice_pass(ScreenTables& tables, const SliceOptions& options, std::vector<std::pair<int, int>> constants) {
     constants.emplace_back(shared::spec_square, options.distribution == 2);
     tables.add_pass("generate", "gtao/generate", {screen_depth, screen_surfaces, screen_noise},
-                    {screen_raw, screen_coverage}, std::move(constants));
+                    {screen_raw}, std::move(constants));
 }
 
 } // namespace scanshade

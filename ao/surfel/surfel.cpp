@@ -80,7 +80,6 @@ void Surfel::add_passes(ScreenTables& tables) const {
     const int runs = tables.add_buffer({"runs", bytes(words, 8), none, Texels::r32ui});
     const int surfels = tables.add_buffer({"surfels", bytes(16 * plane_of(size).area(), 8), none, Texels::rg32ui});
     const int sampled = tables.add_buffer({"sampled", bytes(grid.samples.area(), 8), none, Texels::rg32f});
-    const int known = tables.add_buffer({"known", bytes(grid.samples.area(), 4), none, Texels::r32f});
 
     tables.add_pass("fill", "surfel/fill", {}, {screen_surfaces});
     tables.passes.push_back({"edges", "surfel/edges", {screen_surfaces}, {edges}, groups_of(words), {}});
@@ -92,11 +91,11 @@ void Surfel::add_passes(ScreenTables& tables) const {
     tables.passes.push_back({"generate",
                              "surfel/generate",
                              {surfels, screen_surfaces, screen_noise},
-                             {sampled, known},
+                             {sampled},
                              {16 * tiles(plane.width), tiles(plane.height), 1},
                              {{shared::spec_slices, options_.slices}, {shared::spec_steps, options_.steps}, spacing}});
-    tables.add_pass("resolve", "surfel/resolve", {surfels, screen_surfaces, sampled, known},
-                    {screen_visibility, screen_coverage}, {{shared::spec_denoise, options_.screen.denoise}, spacing},
+    tables.add_pass("resolve", "surfel/resolve", {surfels, screen_surfaces, sampled},
+                    {screen_visibility}, {{shared::spec_denoise, options_.screen.denoise}, spacing},
                     2);
 }
 

@@ -20,7 +20,6 @@ layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 1, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 2, rg32f) readonly uniform imageBuffer noise_table;
 layout(binding = 16, r32f) uniform writeonly imageBuffer raw;
-layout(binding = 17, r32f) uniform writeonly imageBuffer coverage;
 layout(binding = 32, scalar) uniform Constants { GtaoConstants constants; };
 
 #include "lib/normal.glsl"
@@ -81,7 +80,6 @@ float falloff_weight(float away2, float away) {
 struct Side {
     float horizon; // cosine of the horizon, gtao
     uint occupied; // sectors, bitmask
-    float known;   // samples on known depth
 };
 
 void look(Surface s, Slice slice, ivec2 q, float side, inout Side met) {
@@ -92,7 +90,6 @@ void look(Surface s, Slice slice, ivec2 q, float side, inout Side met) {
     float weight = falloff_weight(away2, away);
     bool counts = z > 0.0 && weight > 0.0 && rises(s, apart, away);
     float front = dot(apart, s.eye) * inverse;
-    met.known += z > 0.0 ? 1.0 : 0.0;
     if (bitmask == 0) {
         float low = -side * slice.sine;
         float horizon = falloff == falloff_hard ? front : low + (front - low) * weight;
@@ -119,7 +116,7 @@ void main() {
     vec2 turned = vec2(cos(phi), sin(phi));
     float inverse_steps = 1.0 / float(g.steps);
 
-    float open = 0.0, full = 0.0, known = 0.0;
+    float open = 0.0, full = 0.0;
     int i = 0;
     do {
         vec3 d = e1 * turned.x + e2 * turned.y, axis = cross(d, s.eye);
@@ -138,7 +135,7 @@ void main() {
 
         March ahead, behind;
         march_both_ways(s, vec2(p), d, ahead, behind);
-        Side plus = Side(-slice.sine, 0u, 0.0), minus = Side(slice.sine, 0u, 0.0);
+        Side plus = Side(-slice.sine, 0u), minus = Side(slice.sine, 0u);
         float jitter = noise.y + float(i) * golden;
         int j = 0;
         do { // a loop that asks first runs once more on lavapipe, with every lane off
@@ -154,7 +151,6 @@ void main() {
         weight = weight2 < 1e-10 ? 0.0 : weight;
         open += weight * measure;
         full += weight * slice.full;
-        known += plus.known * (ahead.within / ahead.reach) + minus.known * (behind.within / behind.reach);
     } while (++i < g.slices);
-    finish(s, !(z > 0.0), here, open / max(full, 1e-6), known * inverse_steps / float(2 * g.slices));
+    finish(s, !(z > 0.0), here, open / max(full, 1e-6));
 }

@@ -14,7 +14,6 @@ layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 1, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 2, rg32f) readonly uniform imageBuffer noise_table;
 layout(binding = 16, r32f) uniform writeonly imageBuffer raw;
-layout(binding = 17, r32f) uniform writeonly imageBuffer coverage;
 layout(binding = 32, scalar) uniform Constants { HbaoConstants constants; };
 
 #include "lib/normal.glsl"
@@ -49,7 +48,7 @@ void main() {
     vec2 turned = vec2(cos(phi), sin(phi));
     float inverse_r2 = h.attenuation / (k.radius * k.radius), inverse_steps = 1.0 / float(h.steps + 1);
 
-    float occlusion = 0.0, known = 0.0;
+    float occlusion = 0.0;
     int i = 0;
     do { // loops ask last: one that asks first runs once more on lavapipe, with every lane off
         // The circle of radius R parallel to the image; pixels need not be square.
@@ -58,23 +57,20 @@ void main() {
         float reach = length(line);
         March march = cut_at_border(vec2(p), line / reach, reach);
         float horizon = biased_tangent(s, march.direction);
-        float jitter = fract(noise.y + float(i) * 0.6180339887), met = 0.0;
+        float jitter = fract(noise.y + float(i) * 0.6180339887);
         int j = 0;
         do {
             ivec2 q = pixel_along(vec2(p), march, 1.0 + (float(j) + jitter) * inverse_steps * march.within);
             float zq = imageLoad(depth_in, index_of(q)).x;
             vec3 apart = ray_of(vec2(q)) * zq - s.point;
             float away2 = dot(apart, apart) + 1e-20, inverse = quick_scale * quick_inversesqrt(away2); // to 7e-4
-            bool seen = zq > 0.0;
-            bool counts = seen && away2 < k.radius * k.radius && rises(s, apart, away2 * inverse);
+            bool counts = zq > 0.0 && away2 < k.radius * k.radius && rises(s, apart, away2 * inverse);
             float sine = -apart.z * inverse;
             bool higher = counts && sine > horizon;
             occlusion += higher ? (1.0 - away2 * inverse_r2) * (sine - horizon) : 0.0;
             horizon = higher ? sine : horizon;
-            met += seen ? 1.0 : 0.0;
         } while (++j < h.steps);
-        known += met * (march.within / march.reach);
     } while (++i < h.directions);
     float share = 1.0 / float(h.directions);
-    finish(s, !(z > 0.0), here, 1.0 - h.contrast * occlusion * share, known * share / float(h.steps));
+    finish(s, !(z > 0.0), here, 1.0 - h.contrast * occlusion * share);
 }

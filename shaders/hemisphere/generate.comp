@@ -17,7 +17,6 @@ layout(binding = 1, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 2, rg32f) readonly uniform imageBuffer noise_table;
 layout(binding = 3, rgba32f) readonly uniform imageBuffer kernel; // tangent, bitangent, normal
 layout(binding = 16, r32f) uniform writeonly imageBuffer raw;
-layout(binding = 17, r32f) uniform writeonly imageBuffer coverage;
 layout(binding = 32, scalar) uniform Constants { HemisphereConstants constants; };
 
 #include "lib/normal.glsl"
@@ -61,5 +60,5 @@ void main() {
     known /= float(h.count);
     weights = published != 0 ? float(h.count) : max(weights, 1e-6);
     occluded /= renormalise != 0 ? weights * max(known, 0.5) : weights;
-    finish(s, !(z > 0.0), here, 1.0 - occluded, known);
+    finish(s, !(z > 0.0), here, 1.0 - occluded);
 }

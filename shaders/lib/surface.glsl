@@ -1,5 +1,5 @@
 // The surface point a pixel asks for, how far its neighbourhood reaches, and what is done with the answer: expects the
-// texel buffers `surfaces`, and `raw` and `coverage` to write.
+// texel buffers `surfaces`, and `raw` to write.
 #include "lib/cheap.glsl"
 
 struct Surface {
@@ -73,11 +73,9 @@ void march_both_ways(Surface s, vec2 p, vec3 d, out March ahead, out March behin
     behind = cut_at_border(p, -direction, reach.y);
 }
 
-// Writes a pixel's result. Below a radius of one pixel nothing can be seen within it: open and unknown; up to three the
-// occlusion fades in. `known` is the share of the wanted samples that met known depth.
-void finish(Surface s, bool hole, int index, float visibility, float known) {
+// Writes a pixel's result. Below a radius of one pixel nothing can be seen within it: open; up to three the occlusion fades in.
+void finish(Surface s, bool hole, int index, float visibility) {
     float occlusion = 1.0 - visibility;
     occlusion *= clamp(0.5 * s.radius_px - 0.5, 0.0, 1.0);
     imageStore(raw, index, vec4(hole ? 1.0 : clamp(1.0 - occlusion, 0.0, 1.0)));
-    imageStore(coverage, index, vec4(hole || s.radius_px < 1.0 ? 0.0 : known));
 }

@@ -18,7 +18,6 @@ layout(binding = 1, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 2, rg32f) readonly uniform imageBuffer noise_table;
 layout(binding = 3, rgba32f) readonly uniform imageBuffer vectors; // set after set, each vector as long as it shall be
 layout(binding = 16, r32f) uniform writeonly imageBuffer raw;
-layout(binding = 17, r32f) uniform writeonly imageBuffer coverage;
 layout(binding = 32, scalar) uniform Constants { LunaConstants constants; };
 
 #include "lib/normal.glsl"
@@ -67,5 +66,5 @@ void main() {
     float share = 1.0 / float(l.sets * l.count);
     known *= share;
     occlusion *= renormalise != 0 ? share / max(known, 0.5) : share;
-    finish(s, !(z > 0.0), here, 1.0 - occlusion, known);
+    finish(s, !(z > 0.0), here, 1.0 - occlusion);
 }

@@ -23,7 +23,6 @@ layout(binding = 0, rg32ui) readonly uniform uimageBuffer surfels;
 layout(binding = 1, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 2, rg32f) readonly uniform imageBuffer noise_table;
 layout(binding = 16, rg32f) writeonly uniform imageBuffer sampled; // open and whole measure
-layout(binding = 17, r32f) writeonly uniform imageBuffer known;    // share of the reads that met known depth
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 #include "lib/noise.glsl"
@@ -103,7 +102,6 @@ void main() {
     float thickness_step = s.thickest * (1.0 / 255.0);
     float lowest2 = k.tangent_sine * k.tangent_sine;
     float open = 0.0, all = 0.0;
-    vec2 met = vec2(0.0);
 
     // Loops ask last: lavapipe would run a `for` once more with nobody in it.
     int i = 0;
@@ -136,7 +134,6 @@ void main() {
         vec2 flat_tangent = tangent.xy * k.ray_step;
 
         uint closed = 0u;
-        vec4 found = vec4(0.0);
         vec2 last = vec2(0.0); // depths of the step before, on either side
         int j = 0;
         do {
@@ -156,7 +153,6 @@ void main() {
             ivec4 shape = ivec4(a.y, b.y, c.y, d.y);
             if (steps % 2 == 1 && j == steps - 1) zq.zw = vec2(0.0);
             bvec4 inside_image = equal(abs(ix - jx) + abs(iy - jy), ivec4(0));
-            found += mix(vec4(0.0), mix(vec4(0.0), vec4(1.0), inside_image), greaterThan(zq, vec4(0.0)));
 
             // From the pixel's point to the sample's, towards V and towards T (outwards on either side): differences first,
             // far away coordinates cancel badly.
@@ -225,13 +221,11 @@ void main() {
         float measure = weight * full;
         all += measure;
         open += measure * (1.0 - float(bitCount(closed)) * (1.0 / sector_count));
-        met += (found.xy + found.zw) * (far + 1.0) / max(full_reach, 1.0);
         ++i;
     } while (i < slices);
-    // Where the radius shows as less than a pixel nothing can be seen within it: open and unknown; up to three it fades in.
+    // Where the radius shows as less than a pixel nothing can be seen within it: open; up to three it fades in.
     float shows = k.radius * sqrt(k.camera.fx * k.camera.fy) / z;
     open = mix(all, open, clamp(0.5 * shows - 0.5, 0.0, 1.0));
     int index = at.y * s.samples.x + at.x;
     imageStore(sampled, index, own > 0.0 ? vec4(open, all, 0.0, 0.0) : vec4(0.0));
-    imageStore(known, index, vec4(own > 0.0 && shows >= 1.0 ? (met.x + met.y) / float(2 * slices * steps) : 0.0));
 }

@@ -17,9 +17,7 @@ layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(binding = 0, rg32ui) readonly uniform uimageBuffer surfels;
 layout(binding = 1, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 2, rg32f) readonly uniform imageBuffer sampled;
-layout(binding = 3, r32f) readonly uniform imageBuffer known;
 layout(binding = 16, r32f) writeonly uniform imageBuffer visibility;
-layout(binding = 17, r32f) writeonly uniform imageBuffer coverage;
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 #include "lib/surfel.glsl"
@@ -68,12 +66,11 @@ void add(inout Mean mean, Tap tap, float share) {
     mean.sum += share * weight * tap.measure;
 }
 
-void put(ivec2 p, float z, Mean mean, float known_share) {
+void put(ivec2 p, float z, Mean mean) {
     if (!inside(p)) return;
     bool hole = !(z > 0.0);
     float v = mean.sum.y > 0.0 ? mean.sum.x / mean.sum.y : 1.0;
     imageStore(visibility, index_of(p), vec4(hole ? uintBitsToFloat(not_a_number) : shown(clamp(v, 0.0, 1.0))));
-    imageStore(coverage, index_of(p), vec4(hole ? 0.0 : known_share));
 }
 
 // Share of a sample x columns (or rows) from the first pixel's in the mean of the first and the second pixel.
@@ -99,10 +96,8 @@ void main() {
     Mean a = mean_at(p, za), b = mean_at(p + ivec2(1, 0), zb), c = mean_at(p + ivec2(0, 1), zc), d = mean_at(p + ivec2(1, 1), zd);
     ROW(-2) ROW(-1) ROW(0) ROW(1) ROW(2)
     if (spacing == 1) { ROW(3) }
-    // Each pixel's own share of known samples, or that of the pixel sampled in its stead.
-    ivec2 other = min(spacing == 1 ? q + 1 : q, samples - 1);
-    put(p, za, a, imageLoad(known, q.y * samples.x + q.x).x);
-    put(p + ivec2(1, 0), zb, b, imageLoad(known, q.y * samples.x + other.x).x);
-    put(p + ivec2(0, 1), zc, c, imageLoad(known, other.y * samples.x + q.x).x);
-    put(p + ivec2(1, 1), zd, d, imageLoad(known, other.y * samples.x + other.x).x);
+    put(p, za, a);
+    put(p + ivec2(1, 0), zb, b);
+    put(p + ivec2(0, 1), zc, c);
+    put(p + ivec2(1, 1), zd, d);
 }
