@@ -103,7 +103,7 @@ std::vector<Parameter> CacaoOptions::parameters() {
         {"shadow-power", "strength of the effect, exponent of visibility", &shadow_power, "", 0.5, 5},
         {"shadow-clamp", "darkest obscurance before the exponent", &shadow_clamp, "", 0, 1},
         {"horizon-angle", "samples lower above the surface than this do not occlude", &horizon_angle, "sine", 0, 0.2},
-        {"fade-from", "depth at which AO starts to fade out", &fade_from, "m", 0, 1e6},
+        {"fade-from", "depth at which AO starts to fade out; this and the next 0: never in scan, 50 to 300 m in the reference", &fade_from, "m", 0, 1e6},
         {"fade-to", "depth at which AO has faded out", &fade_to, "m", 0, 1e6},
         {"adaptive-limit", "highest: mean importance above which extra taps are rationed", &adaptive_limit, "", 0, 1},
         {"blur-passes", "edge-aware blur steps", &blur_passes, "", 0, 8},
@@ -149,8 +149,10 @@ CacaoConstants constants_from(const CacaoOptions& options, const Pinhole& camera
     k.shadow_power = std::clamp(options.shadow_power * (calibrated ? 5.0F / 1.5F : 1.0F), 0.0F, calibrated ? 100.0F : 10.0F);
     k.shadow_clamp = std::clamp(options.shadow_clamp, 0.0F, 1.0F);
     k.horizon = std::clamp(options.horizon_angle, 0.0F, 1.0F);
-    k.fade_mul = -1.0F / (options.fade_to - options.fade_from);
-    k.fade_add = options.fade_from / (options.fade_to - options.fade_from) + 1.0F;
+    const bool documented = options.fade_to == 0 && options.fade_from == 0 && !options.scan();
+    const float from = documented ? 50.0F : options.fade_from, to = documented ? 300.0F : options.fade_to;
+    k.fade_mul = to > from ? -1.0F / (to - from) : 0.0F;
+    k.fade_add = to > from ? from / (to - from) + 1.0F : 1.0F;
     k.all_ones = ~0U;
     k.depth_offset = 0.9992F;
     k.load_counter_div = static_cast<float>(9.0 / (static_cast<double>(texels(k.importance)) * 255.0));
@@ -289,7 +291,7 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
 
 Cacao::Cacao(gpu::Device& device, CacaoOptions options) : device_(device), options_(std::move(options)) {
     for (const Parameter& row : options_.parameters()) check(row);
-    if (options_.fade_to <= options_.fade_from) throw Misuse("fade-to must lie beyond fade-from");
+    if (options_.fade_to <= options_.fade_from && options_.fade_to > 0) throw Misuse("fade-to must lie beyond fade-from");
     if (options_.near_m == options_.far_m) throw Misuse("near and far must differ");
 }
 

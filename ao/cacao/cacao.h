@@ -29,8 +29,7 @@ struct CacaoOptions {
     float shadow_power = 1.5F;
     float shadow_clamp = 0.98F;
     float horizon_angle = 0.06F;
-    float fade_from = 50.0F;
-    float fade_to = 300.0F;
+    float fade_from = 0.0F, fade_to = 0.0F; ///< both 0: never in `scan`, 50 .. 300 m in `reference`
     float adaptive_limit = 0.45F;
     int blur_passes = 2;
     float sharpness = 0.98F;

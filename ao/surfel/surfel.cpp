@@ -25,7 +25,8 @@ SurfelOptions resolved(SurfelOptions options) {
     return options;
 }
 
-constexpr int widest_fill_px = 40;
+/// Where depth is clean, wide holes are the sky; noisy sensors have shadows beside whatever stands in front of something.
+constexpr int widest_fill_px = 40, narrowest_fill_px = 4;
 
 int divided_up(int n, int by) { return (n + by - 1) / by; }
 
@@ -103,6 +104,7 @@ std::vector<std::byte> Surfel::constants(const shared::ScreenConstants& screen) 
     const cv::Size size(screen.size.x, screen.size.y), plane = plane_of(size);
     const Grid grid(size, options_.downsampled);
     const float r = screen.radius;
+    const bool noisy = screen.noise_floor > 0 || screen.noise_per_z2 > 0;
     return bytes_of(shared::SurfelConstants{
         screen,
         {grid.words.width, grid.words.height},
@@ -114,7 +116,7 @@ std::vector<std::byte> Surfel::constants(const shared::ScreenConstants& screen) 
         options_.slices * options_.steps <= 4 ? 1.3F : 1.0F, // between few samples gaps would open
         0.05F * r,
         0.3F * r,
-        screen.noise_floor > 0 || screen.noise_per_z2 > 0 ? widest_fill_px : 0, // where depth is clean, holes are the sky
+        noisy ? widest_fill_px : narrowest_fill_px,
         0.5F * r});
 }
 

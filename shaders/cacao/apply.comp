@@ -40,7 +40,7 @@ void put(ivec2 p, float v) {
     int here = p.y * k.image.x + p.x;
     if (scan != 0) {
         bool surface = v >= 0.0 && (two_slices == 0 || imageLoad(depth_in, here).x > 0.0);
-        visibility[here] = surface ? v : uintBitsToFloat(0x7fc00000u);
+        visibility[here] = surface ? min(v, 1.0) : uintBitsToFloat(0x7fc00000u);
     } else {
         visibility[here] = stored(power != 0 ? pow(v, 2.2) : v);
     }

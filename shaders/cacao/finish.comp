@@ -79,7 +79,7 @@ void put(ivec2 g, float v) {
         if (all(lessThan(g + 2, k.grid))) imageStore(staged, (g.y + 2) * k.grid.x + g.x + 2, vec4(v, own ? depth_at(2 * g) : 0.0, 0.0, 0.0));
     } else if (all(lessThan(g, k.image))) {
         bool surface = v >= 0.0 && (own || depth_at(g) > 0.0);
-        visibility[g.y * k.image.x + g.x] = surface ? v : uintBitsToFloat(0x7fc00000u);
+        visibility[g.y * k.image.x + g.x] = surface ? min(v, 1.0) : uintBitsToFloat(0x7fc00000u);
     }
 }
 

@@ -124,7 +124,7 @@ vec4 upsampled(int at, vec4 z) {
 void put(ivec2 p, float zf, float v) {
     if (any(greaterThanEqual(p, k.image))) return;
     if (scan != 0)
-        visibility[p.y * k.image.x + p.x] = zf > 0.0 ? v : uintBitsToFloat(0x7fc00000u);
+        visibility[p.y * k.image.x + p.x] = zf > 0.0 ? min(v, 1.0) : uintBitsToFloat(0x7fc00000u);
     else
         visibility[p.y * k.image.x + p.x] = stored(power != 0 ? pow(v, 2.2) : v);
 }
