@@ -1,5 +1,6 @@
 #include "ao/cacao/cacao.h"
 
+#include "ao/gpu/transfer.h"
 #include "projection/error.h"
 #include "shaders/lib/cacao_pattern.glsl"
 
@@ -318,20 +319,16 @@ AoMap Cacao::compute(const View& view) {
                                 view.depth.camera.size.height));
     if (view.normals && view.normals->normals.size() != z.size()) throw Error("normals and depth differ in size");
     prepare(view);
-    const auto upload = [&](int buffer, const cv::Mat& image) {
-        std::byte* to = program_->host(buffer).data();
-        const std::size_t row = static_cast<std::size_t>(image.cols) * image.elemSize();
-        for (int y = 0; y < image.rows; ++y) std::memcpy(to + static_cast<std::size_t>(y) * row, image.ptr(y), row);
-    };
     const auto start = std::chrono::steady_clock::now();
-    upload(cacao_depth_in, z);
-    if (view.normals) upload(cacao_normals_in, view.normals->normals);
+    if (options_.scan() && options_.depth_input == "metric")
+        gpu::upload_depth(z, program_->host_as<float>(cacao_depth_in));
+    else
+        gpu::upload(z, program_->host(cacao_depth_in));
+    if (view.normals) gpu::upload(view.normals->normals, program_->host(cacao_normals_in));
     const auto uploaded = std::chrono::steady_clock::now();
     program_->run(std::as_bytes(std::span(&constants_, 1)));
     const auto ran = std::chrono::steady_clock::now();
-    AoMap ao{cv::Mat1f(z.size())};
-    const auto result = program_->host(cacao_out);
-    std::memcpy(ao.visibility.data, result.data(), result.size());
+    AoMap ao{gpu::downloaded(program_->host_as<float>(cacao_out), z.size())};
     const auto done = std::chrono::steady_clock::now();
     const auto ms = [](auto from, auto to) { return std::chrono::duration<double, std::milli>(to - from).count(); };
     timings_.assign({{"host upload", ms(start, uploaded)}});

@@ -1,5 +1,6 @@
 #include "ao/fit_plane/fit_plane.h"
 
+#include "ao/gpu/transfer.h"
 #include "projection/error.h"
 #include "shaders/shared/fit_plane.h"
 
@@ -60,18 +61,19 @@ FittedDepth FitPlane::compute(const DepthImage& depth) {
                                               static_cast<float>(window),
                                               static_cast<float>(options_.largest_radius_px),
                                               options_.drop_flying ? 1 : 0};
-    const cv::Mat1f z = depth.z_m.isContinuous() ? depth.z_m : depth.z_m.clone();
-    std::memcpy(program_->host(recorded).data(), z.data, z.total() * 4);
+    const cv::Mat1f& z = depth.z_m;
+    gpu::upload_depth(z, program_->host_as<float>(recorded));
     program_->run(std::as_bytes(std::span(&constants, 1)));
     timings_ = program_->timings();
-    FittedDepth fitted{{depth.camera, cv::Mat1f(size), depth.source}, {}};
+    FittedDepth fitted{{depth.camera, {}, depth.source}, {}};
     if (!planes) {
+        fitted.depth.z_m.create(size);
         const auto* inverse = reinterpret_cast<const float*>(program_->host(kept).data());
         std::transform(z.begin(), z.end(), inverse, fitted.depth.z_m.begin(), [](float z_m, float w) { return w > 0 ? z_m : 0; });
         return fitted;
     }
     fitted.normals.normals.create(size);
-    std::memcpy(fitted.depth.z_m.data, program_->host(depth_out).data(), z.total() * 4);
+    fitted.depth.z_m = gpu::downloaded(program_->host_as<float>(depth_out), size);
     std::memcpy(fitted.normals.normals.data, program_->host(normals_out).data(), z.total() * 12);
     return fitted;
 }

@@ -1,15 +1,13 @@
 #include "ao/screen/screen.h"
 
+#include "ao/gpu/transfer.h"
 #include "ao/screen/noise.h"
 
 #include <chrono>
-#include <cstring>
 #include <fmt/format.h>
 
 namespace scanshade {
 namespace {
-
-constexpr float nearest_m = 1e-4F, farthest_m = 1e6F; // beyond them single precision, not the scene, would decide
 
 void refuse_odd_sizes(const View& view) {
     const cv::Size depth = view.depth.z_m.size(), camera = view.depth.camera.size;
@@ -19,28 +17,6 @@ void refuse_odd_sizes(const View& view) {
     if (view.normals && view.normals->normals.size() != depth)
         throw Error(fmt::format("normals of {}x{} for a depth image of {}x{}", view.normals->normals.cols,
                                 view.normals->normals.rows, depth.width, depth.height));
-}
-
-/// What is no depth becomes a hole here, once, so that the shaders only ask z > 0.
-void upload_depth(const cv::Mat1f& z_m, std::span<float> to) {
-    for (int y = 0; y < z_m.rows; ++y) {
-        const float* const from = z_m[y];
-        float* const row = to.data() + static_cast<std::ptrdiff_t>(y) * z_m.cols;
-        for (int x = 0; x < z_m.cols; ++x)
-            row[x] = from[x] >= nearest_m && from[x] <= farthest_m ? from[x] : 0.0F;
-    }
-}
-
-void upload_normals(const cv::Mat3f& normals, std::span<std::byte> to) {
-    const std::size_t row = static_cast<std::size_t>(normals.cols) * normals.elemSize();
-    for (int y = 0; y < normals.rows; ++y)
-        std::memcpy(to.data() + static_cast<std::size_t>(y) * row, normals.ptr(y), row);
-}
-
-cv::Mat1f downloaded(std::span<const float> from, cv::Size size) {
-    cv::Mat1f image(size);
-    std::memcpy(image.data, from.data(), from.size_bytes());
-    return image;
 }
 
 std::vector<gpu::BufferRow> shared_buffers(std::size_t pixels, bool supplied, int seed) {
@@ -154,13 +130,13 @@ AoMap ScreenMethod::compute(const View& view) {
         supplied_ = supplied;
     }
     const auto start = std::chrono::steady_clock::now();
-    upload_depth(view.depth.z_m, program_->host_as<float>(screen_depth));
+    gpu::upload_depth(view.depth.z_m, program_->host_as<float>(screen_depth));
     if (supplied)
-        upload_normals(view.normals->normals, program_->host(screen_given));
+        gpu::upload(view.normals->normals, program_->host(screen_given));
     const auto uploaded = std::chrono::steady_clock::now();
     program_->run(block);
     const auto ran = std::chrono::steady_clock::now();
-    AoMap ao{downloaded(program_->host_as<float>(screen_visibility), size)};
+    AoMap ao{gpu::downloaded(program_->host_as<float>(screen_visibility), size)};
     const auto done = std::chrono::steady_clock::now();
     const auto ms = [](auto from, auto to) { return std::chrono::duration<double, std::milli>(to - from).count(); };
     timings_.assign({{"host upload", ms(start, uploaded)}});
