@@ -120,6 +120,7 @@ struct Scene {
     cv::Mat3b colour; ///< empty unless it fits the depth
     Pinhole camera;
     cv::Mat1b colour_known = {}; ///< 0 where `colour` has none; empty = known everywhere
+    cv::Mat1f confidence = {};   ///< in the colour view; empty = as attached
 };
 
 /// Whether colour is carried over from a camera of its own.
@@ -131,9 +132,12 @@ bool colour_from_beside(const Frame& frame) {
 Scene scene_beside(const Work& work, bool colour_view) {
     const Frame& frame = work.frame;
     const SurfaceInColour surface = surface_in_colour(frame.depth_m, frame.camera, *frame.colour_camera);
-    if (colour_view)
-        return {surface.z_m, on_colour_pixels(work.attached.visibility, surface), frame.colour,
-                frame.colour_camera->camera.pinhole};
+    if (colour_view) {
+        const cv::Mat1f& confidence = work.confidence.visibility;
+        return {surface.z_m,  on_colour_pixels(work.attached.visibility, surface),
+                frame.colour, frame.colour_camera->camera.pinhole,
+                {},           confidence.empty() ? cv::Mat1f() : on_colour_pixels(confidence, surface)};
+    }
     const auto [colour, known] =
         colour_on_depth(frame.colour, frame.depth_m, frame.camera, *frame.colour_camera, surface);
     return {frame.depth_m, work.attached.visibility, colour, frame.camera.pinhole, known};
@@ -297,7 +301,8 @@ void write_all(Work& work, const Scene& scene, const cv::Mat3b& shaded, const Ou
     if (outputs.confidence)
         wrote(confidence_file(name, outputs), [&](const auto& file) {
             const bool floats = outputs.format == AoFormat::tiff || outputs.format == AoFormat::exr;
-            write_ao(file, work.confidence.visibility, floats ? outputs.format : AoFormat::png8);
+            write_ao(file, scene.confidence.empty() ? work.confidence.visibility : scene.confidence,
+                     floats ? outputs.format : AoFormat::png8);
         });
     if (outputs.shaded)
         wrote(picture_file("shaded", name), [&](const auto& file) { write_picture(file, shaded); });
