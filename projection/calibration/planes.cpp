@@ -118,7 +118,7 @@ std::string Planes::degeneracy() const {
     for (const Plane& plane : planes_)
         directions += static_cast<double>(plane.cells.size()) * plane.normal * plane.normal.transpose();
     const Eigen::Vector3d spread = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(directions).eigenvalues();
-    const double across = std::sqrt((spread(0) + spread(1)) / spread.sum()) * 180 / CV_PI;
+    const double across = std::sqrt(std::max(0.0, spread(0) + spread(1)) / spread.sum()) * 180 / CV_PI;
     constexpr double least_degrees = 10;
     if (across < least_degrees)
         return fmt::format("all planes face one way (to {:.0f} degrees): focal length, depth scale and the planes' own "
