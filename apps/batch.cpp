@@ -6,6 +6,7 @@
 #include "io/npy_file.h"
 #include "io/output_file.h"
 #include "projection/attach.h"
+#include "projection/colour_view.h"
 #include "projection/confidence.h"
 #include "projection/error.h"
 #include "projection/project.h"
@@ -118,7 +119,29 @@ struct Scene {
     cv::Mat1f z_m, visibility;
     cv::Mat3b colour; ///< empty unless it fits the depth
     Pinhole camera;
+    cv::Mat1b colour_known = {}; ///< 0 where `colour` has none; empty = known everywhere
+    cv::Mat1f confidence = {};   ///< in the colour view; empty = as attached
 };
+
+/// Whether colour is carried over from a camera of its own.
+bool colour_from_beside(const Frame& frame) {
+    return frame.registration != Registration::yes && frame.colour_camera && !frame.colour.empty();
+}
+
+/// Colour warped into the depth view, or everything else into the colour view.
+Scene scene_beside(const Work& work, bool colour_view) {
+    const Frame& frame = work.frame;
+    const SurfaceInColour surface = surface_in_colour(frame.depth_m, frame.camera, *frame.colour_camera);
+    if (colour_view) {
+        const cv::Mat1f& confidence = work.confidence.visibility;
+        return {surface.z_m,  on_colour_pixels(work.attached.visibility, surface),
+                frame.colour, frame.colour_camera->camera.pinhole,
+                {},           confidence.empty() ? cv::Mat1f() : on_colour_pixels(confidence, surface)};
+    }
+    const auto [colour, known] =
+        colour_on_depth(frame.colour, frame.depth_m, frame.camera, *frame.colour_camera, surface);
+    return {frame.depth_m, work.attached.visibility, colour, frame.camera.pinhole, known};
+}
 
 cv::Mat3b colour_in_view(const Cloud& cloud, const DepthImage& depth) {
     if (cloud.colours.empty())
@@ -143,11 +166,14 @@ cv::Mat1f depth_on_grid(const Cloud& cloud) {
 }
 
 /// A depth frame is shown on its recorded pixels, an organised cloud on its grid, other clouds as projected.
-/// A point's colour is its own; a depth pixel's colour is claimed only where the images are registered.
-Scene scene_of(const Work& work) {
+/// A point's colour is its own; a depth pixel's colour is claimed only where the images are registered, or where it is
+/// known how the colour camera stands beside the depth camera.
+Scene scene_of(const Work& work, bool colour_view) {
     const Frame& frame = work.frame;
     const cv::Mat1f& visibility = work.attached.visibility;
     if (!frame.cloud) {
+        if (colour_from_beside(frame))
+            return scene_beside(work, colour_view);
         const bool fits = frame.registration == Registration::yes && frame.colour.size() == frame.depth_m.size();
         return {frame.depth_m, visibility, fits ? frame.colour : cv::Mat3b(), frame.camera.pinhole};
     }
@@ -159,8 +185,14 @@ Scene scene_of(const Work& work) {
 }
 
 /// Clay has no pixel colours to keep where there is no surface, so both kinds go through the same multiplication.
+/// What the colour camera did not see is clay, too.
 cv::Mat3b shaded_picture(const Scene& scene, double strength) {
-    return shade(scene.colour.empty() ? clay(scene.z_m, scene.camera) : scene.colour, scene.visibility, strength);
+    cv::Mat3b base = scene.colour;
+    if (base.empty() || !scene.colour_known.empty())
+        base = clay(scene.z_m, scene.camera);
+    if (!scene.colour_known.empty())
+        scene.colour.copyTo(base, scene.colour_known);
+    return shade(base, scene.visibility, strength);
 }
 
 cv::Mat3b panel_picture(const Frame& frame, const Scene& scene, const cv::Mat3b& shaded) {
@@ -183,29 +215,33 @@ std::vector<cv::Vec3b> shaded_colours(const std::vector<cv::Vec3b>& colours, con
     return {shaded.begin(), shaded.end()};
 }
 
-/// The colour of each undistorted pixel; the lens bends where to look. Black where it saw nothing.
-cv::Mat3b undistorted_colour(const cv::Mat3b& colour, const Camera& camera) {
-    if (colour.empty() || !camera.distortion.any())
-        return colour;
+/// What each undistorted pixel shows of an image; the lens bends where to look. Zero where it saw nothing.
+template <class Pixel>
+cv::Mat_<Pixel> undistorted_image(const cv::Mat_<Pixel>& image, const Camera& camera) {
+    if (image.empty() || !camera.distortion.any())
+        return image;
     const auto maps = Undistortion::of(camera);
-    cv::Mat3b straight(colour.size());
-    std::transform(maps->recorded_pixel().begin(), maps->recorded_pixel().end(), straight.begin(), [&](int pixel) {
-        return pixel < 0 ? cv::Vec3b() : colour(pixel / colour.cols, pixel % colour.cols);
-    });
+    cv::Mat_<Pixel> straight(image.size());
+    std::transform(maps->recorded_pixel().begin(), maps->recorded_pixel().end(), straight.begin(),
+                   [&](int pixel) { return pixel < 0 ? Pixel() : image(pixel / image.cols, pixel % image.cols); });
     return straight;
 }
 
 /// In clouds, where nothing is known of a point it has no confidence.
 float known_or_none(float confidence) { return std::isnan(confidence) ? 0.0F : confidence; }
 
-/// The depth frame's surface as points in camera space, coloured where the colour fits.
-void write_depth_cloud(const std::filesystem::path& file, const Work& work, const Scene& scene,
+/// The depth frame's surface as points in camera space, coloured where the colour fits. Points that the colour camera
+/// did not see are black, and colour_known says 0.
+void write_depth_cloud(const std::filesystem::path& file, const Work& work, const Scene& shown,
                        const Outputs& outputs) {
     const auto& [camera, z_m, source] = work.depth;
-    const cv::Mat3b colour = undistorted_colour(scene.colour, work.frame.camera);
+    const bool beside = colour_from_beside(work.frame);
+    const Scene scene = beside && outputs.colour_view ? scene_beside(work, false) : shown;
+    const cv::Mat3b colour = undistorted_image(scene.colour, work.frame.camera);
+    const cv::Mat1b colour_known = undistorted_image(scene.colour_known, work.frame.camera);
     std::vector<Eigen::Vector3d> points;
     std::vector<cv::Vec3b> colours;
-    std::vector<float> visibility, confidence;
+    std::vector<float> visibility, confidence, known;
     for (int v = 0; v < z_m.rows; ++v) {
         for (int u = 0; u < z_m.cols; ++u) {
             const double z = z_m(v, u);
@@ -216,12 +252,16 @@ void write_depth_cloud(const std::filesystem::path& file, const Work& work, cons
             confidence.push_back(known_or_none(work.confidence_in_view(v, u)));
             if (!colour.empty())
                 colours.push_back(colour(v, u));
+            if (!colour_known.empty())
+                known.push_back(colour_known(v, u) > 0 ? 1.0F : 0.0F);
         }
     }
     if (outputs.colour_cloud)
         colours = shaded_colours(colours, visibility, outputs.shade_strength);
-    write_new_ply(file, points, colours, {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}},
-                  {"camera space: x right, y down, z forward, metres"});
+    std::vector<AddedField> added = {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}};
+    if (beside)
+        added.push_back({"colour_known", known});
+    write_new_ply(file, points, colours, added, {"camera space: x right, y down, z forward, metres"});
 }
 
 void write_recorded_cloud(const std::filesystem::path& file, const Work& work, const Outputs& outputs) {
@@ -261,7 +301,8 @@ void write_all(Work& work, const Scene& scene, const cv::Mat3b& shaded, const Ou
     if (outputs.confidence)
         wrote(confidence_file(name, outputs), [&](const auto& file) {
             const bool floats = outputs.format == AoFormat::tiff || outputs.format == AoFormat::exr;
-            write_ao(file, work.confidence.visibility, floats ? outputs.format : AoFormat::png8);
+            write_ao(file, scene.confidence.empty() ? work.confidence.visibility : scene.confidence,
+                     floats ? outputs.format : AoFormat::png8);
         });
     if (outputs.shaded)
         wrote(picture_file("shaded", name), [&](const auto& file) { write_picture(file, shaded); });
@@ -316,7 +357,7 @@ void attach_and_write(Work& work, const BatchOptions& options) {
         work.row.coverage = work.attached.coverage;
         work.row.mean_visibility = work.attached.mean_visibility;
         if (!by_points)
-            scene = scene_of(work);
+            scene = scene_of(work, outputs.colour_view);
         if (outputs.shaded || outputs.panel)
             shaded = shaded_picture(scene, outputs.shade_strength);
     });

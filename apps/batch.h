@@ -27,6 +27,7 @@ struct Outputs {
     bool depth_cloud = false; ///< a new PLY of a depth frame's points, in camera space
     AoFormat format = AoFormat::png16;
     double shade_strength = 1; ///< 0 leaves the colour, 1 multiplies by visibility
+    bool colour_view = false;  ///< maps and pictures of frames with a colour camera have the colour image's pixels
     bool colour_cloud = false; ///< replaces the cloud's colour by colour times visibility
 };
 
@@ -40,11 +41,11 @@ struct BatchOptions {
     double radius_m = 0;                      ///< the method's, and
     DepthNoise noise;                         ///< the depth's: what confidence depends on
     std::optional<Registration> registration; ///< what the user said; otherwise what the capture says
-    PointMethod* point_method = nullptr;      ///< what clouds and meshes are computed with, where that needs no view: then
-                                              ///< the cloud is all that is written of them
-    std::filesystem::path dump;               ///< folder for the method's intermediates, frame by frame; empty = none
-    int frames_in_memory = 0;                 ///< 0 = cores + 2
-    const std::atomic<bool>* stop = nullptr;  ///< set = begin no further frame
+    PointMethod* point_method = nullptr; ///< what clouds and meshes are computed with, where that needs no view: then
+                                         ///< the cloud is all that is written of them
+    std::filesystem::path dump;          ///< folder for the method's intermediates, frame by frame; empty = none
+    int frames_in_memory = 0;            ///< 0 = cores + 2
+    const std::atomic<bool>* stop = nullptr; ///< set = begin no further frame
 };
 
 enum class FrameStatus { ok, failed, skipped };

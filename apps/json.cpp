@@ -14,6 +14,14 @@ json to_json(const Camera& camera) {
     return text;
 }
 
+json to_json(const ColourCamera& colour) {
+    json text = to_json(colour.camera);
+    const Eigen::Matrix4d matrix = colour.colour_from_depth.matrix();
+    for (int row = 0; row < 4; ++row)
+        text["colour_from_depth"].push_back({matrix(row, 0), matrix(row, 1), matrix(row, 2), matrix(row, 3)});
+    return text;
+}
+
 std::string_view name_of(Registration registration) {
     switch (registration) {
     case Registration::yes:

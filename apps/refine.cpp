@@ -7,6 +7,7 @@
 #include "projection/error.h"
 
 #include <chrono>
+#include <cmath>
 #include <fmt/format.h>
 #include <numeric>
 
@@ -48,7 +49,13 @@ class Refine final : public Command {
                .value = &dictionary_,
                .choices = dictionary_names()}}},
             {"recording",
-             {{.name = "registered",
+             {{.name = "evidence",
+               .help =
+                   "tracks of points in the colour images, or depth alone: surfaces that are planes must come out as "
+                   "planes; auto = tracks where there is colour",
+               .value = &recording_.evidence,
+               .choices = {"auto", "tracks", "depth"}},
+              {.name = "registered",
                .help =
                    "whether colour pixels lie on depth pixels; where not, the colour camera and its place are refined",
                .value = &recording_.registered,
@@ -62,8 +69,13 @@ class Refine final : public Command {
               {"frames", "at most so many frames, evenly spread", &recording_.frames, "", 3, 1000},
               {"depth-scale", "mm, tum, sun, nyu, m, or units per metre; replaces the capture's own", &depth_scale_}}},
             {"camera",
-             {{"camera", "where to start: a camera file, or fx,fy,cx,cy; otherwise the capture's own, or a guess",
+             {{"camera",
+               "where to start: a camera file, fx,fy,cx,cy, or the name of a known one; otherwise the capture's own, "
+               "the "
+               "pictures' EXIF, or a guess",
                &first_.camera},
+              {"colour-camera", "the same for the camera beside the depth camera, where colour is not registered",
+               &first_.colour_camera},
               {"fov", "where to start: angle of view across the image; 0 = not known", &first_.fov_degrees, "degrees",
                0, 175},
               {.name = "lens",
@@ -100,10 +112,10 @@ class Refine final : public Command {
         refuse_to_overwrite();
         settle_options();
         const auto start = std::chrono::steady_clock::now();
-        const Refinement result = board_.empty() ? from_capture(path) : from_boards(path);
+        const RecordingResult found = board_.empty() ? from_capture(path) : camera_alone(from_boards(path));
         const double took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        fmt::print("{}", summary_of(result, took_s));
-        write(result, format, took_s);
+        fmt::print("{}", summary_of(found.refinement, took_s));
+        write(found, format, took_s);
         return all_well;
     }
 
@@ -138,16 +150,18 @@ class Refine final : public Command {
                                   options_);
     }
 
-    Refinement from_capture(const fs::path& path) const {
-        const Capture capture = open_capture(path, {{}, depth_scale_, 0.02});
+    static RecordingResult camera_alone(Refinement refinement) {
+        CameraFile file{.camera = refinement.after, .depth_units_per_metre = {}, .warnings = {}};
+        return {.refinement = std::move(refinement), .file = std::move(file)};
+    }
+
+    RecordingResult from_capture(const fs::path& path) const {
+        Capture capture = open_capture(path, {first_.camera, depth_scale_, 0.02});
         std::vector<std::size_t> frames(capture.entries.size());
         std::iota(frames.begin(), frames.end(), std::size_t{0});
         if (!capture.entries.front().cloud.empty())
-            return refine_from_clouds(capture, frames, first_, options_);
-        RecordingResult result = refine_from_recording(capture, frames, first_, recording_, options_);
-        if (!trajectory_.empty())
-            write_atomically(trajectory_, trajectory_of(result));
-        return std::move(result.refinement);
+            return camera_alone(refine_from_clouds(capture, frames, first_, options_));
+        return refine_from_recording(std::move(capture), frames, first_, recording_, options_);
     }
 
     /// TUM's rows: time tx ty tz qx qy qz qw.
@@ -162,14 +176,19 @@ class Refine final : public Command {
         return rows;
     }
 
-    void write(const Refinement& result, CameraFormat format, double took_s) const {
-        CameraQuality quality{.rms_px = result.climb.train_px, .view_rms_px = {}, .details = {}};
-        for (const ViewRow& view : result.views)
-            quality.view_rms_px.push_back(view.score.rms());
+    void write(const RecordingResult& found, CameraFormat format, double took_s) const {
+        const Refinement& result = found.refinement;
+        CameraQuality quality{.rms_px = std::nan(""), .view_rms_px = {}, .details = {}};
+        if (result.unit == "px") {
+            quality.rms_px = result.climb.train_px;
+            for (const ViewRow& view : result.views)
+                quality.view_rms_px.push_back(view.score.rms());
+        }
         quality.details = details_of(result, took_s).dump();
         if (!out_.empty())
-            write_camera_file(out_, {.camera = result.after, .depth_units_per_metre = {}, .warnings = {}}, format,
-                              quality);
+            write_camera_file(out_, found.file, format, quality);
+        if (!trajectory_.empty())
+            write_atomically(trajectory_, trajectory_of(found));
         if (!report_.empty())
             write_atomically(report_, page_of(result, took_s));
         for (const std::string& file : {out_, report_, trajectory_})

@@ -19,7 +19,7 @@ struct NumberRow {
 
 std::vector<NumberRow> numbers_of(const Refinement& r) {
     const Fit& fit = r.climb.fit;
-    const Model before = model_of(r.before);
+    const Model& before = r.climb.start.model;
     const auto sigma = [&](Unknown unknown) {
         return r.climb.free[unknown] && fit.covariance.size() > 0 ? fit.sigma(unknown) : std::nan("");
     };
@@ -85,7 +85,7 @@ double largest(const cv::Mat1d& grid) {
 std::string status_of(const Refinement& r) { return r.changed() ? "refined" : "unchanged"; }
 
 json details_of(const Refinement& r, double took_s) {
-    json text{{"status", status_of(r)}, {"source", r.source}, {"took_s", took_s}};
+    json text{{"status", status_of(r)}, {"source", r.source}, {"took_s", took_s}, {"error_unit", r.unit}};
     text["before"] = to_json(r.before);
     for (const NumberRow& row : numbers_of(r))
         text["numbers"][row.name] = {{"before", row.before}, {"after", row.after}, {"sigma", finite(row.sigma)}};
@@ -117,7 +117,7 @@ std::string summary_of(const Refinement& r, double took_s) {
     for (const NumberRow& row : numbers_of(r))
         text += fmt::format("  {:<14} {:>12.6g} {:>12.6g} {:>10}\n", row.name, row.before, row.after,
                             std::isnan(row.sigma) ? "kept" : fmt::format("{:.2g}", row.sigma));
-    text += fmt::format("\n  {:<14} {:>12} {:>12}\n", "error, px rms", "before", "after");
+    text += fmt::format("\n  {:<14} {:>12} {:>12}\n", fmt::format("error, {} rms", r.unit), "before", "after");
     text += fmt::format("  {:<14} {:>12.4g} {:>12.4g}\n", "fitted", r.climb.train_before_px, r.climb.train_px);
     text += fmt::format("  {:<14} {:>12.4g} {:>12.4g}\n", "held out", r.climb.held_out_before_px, r.climb.held_out_px);
     if (r.full)
@@ -216,9 +216,9 @@ std::string view_bars(const Refinement& r) {
         const double width = 380 * view.score.rms() / most;
         svg += fmt::format(
             "<text class='name' x='160' y='{0}'>{1}</text><rect x='166' y='{2}' width='{3:.1f}' height='12' "
-            "class='{4}'/><text class='value' x='{5:.1f}' y='{0}'>{6:.3g} px{7}</text>",
+            "class='{4}'/><text class='value' x='{5:.1f}' y='{0}'>{6:.3g} {8}{7}</text>",
             line * i + 14, page::escaped(view.name), line * i + 4, width, view.outlying ? "bad" : "good", 172 + width,
-            view.score.rms(), view.used ? "" : ", dropped");
+            view.score.rms(), view.used ? "" : ", dropped", r.unit);
     }
     return svg + "</svg>\n";
 }
@@ -258,9 +258,9 @@ std::string page_of(const Refinement& r, double took_s) {
     std::vector<page::Section> sections = {
         {"Found", found},
         {"Numbers", page::table({"", "before", "after", "sigma"}, numbers)},
-        {"Error, pixels rms", page::table({"", "fitted views", "held-out views"}, errors)},
+        {fmt::format("Error, {} rms", r.unit), page::table({"", "fitted views", "held-out views"}, errors)},
         {"Ladder", page::table({"rung", "", "why"}, steps, freed)},
-        {"Residuals", arrows(r) + scatter(r)},
+        {"Residuals", r.residuals.empty() ? page::paragraph("of depth, not of pixels") : arrows(r) + scatter(r)},
         {"Views", view_bars(r)},
         {"Image", heat_map(r.coverage.counts, "Observations", "{:.0f}") +
                       heat_map(r.pixel_sigma, "Sigma of a pixel, px", "{:.2g}")}};

@@ -64,6 +64,10 @@ json capture_json(const RunReport& report) {
     text["depth"] = {{"encoding", capture.depth.name},
                      {"units_per_metre", capture.depth.units_per_metre},
                      {"origin", capture.depth.origin}};
+    if (const DepthCorrection& c = capture.depth_correction; c.any())
+        text["depth"]["correction"] = {{"scale", c.scale}, {"offset_m", c.offset_m}, {"curve_per_m", c.curve_per_m}};
+    if (capture.colour_camera)
+        text["colour_camera"] = to_json(*capture.colour_camera);
     text["registration"] = {{"registered", name_of(report.registration)}, {"reason", report.registration_reason}};
     text["warnings"] = warnings;
     return text;

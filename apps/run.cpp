@@ -85,7 +85,7 @@ struct RunSettings {
     double association_limit_s = 0.02;
     std::string method = "cacao", radius, quality, device, settings;
     Budget budget;
-    std::string out, write = "auto", format = "png16", dump;
+    std::string out, write = "auto", format = "png16", view = "depth", dump;
     double shade_strength = 1;
     bool colour_cloud = false, overwrite = false;
 };
@@ -106,6 +106,7 @@ Outputs outputs_from(const RunSettings& settings) {
     outputs.format = ao_format(settings.format);
     outputs.shade_strength = settings.shade_strength;
     outputs.colour_cloud = settings.colour_cloud;
+    outputs.colour_view = settings.view == "colour";
     if (settings.write != "auto") {
         const std::set<std::string> words = words_of(settings.write);
         outputs.ao = words.contains("ao");
@@ -185,6 +186,9 @@ std::string shading_sentence(const Capture& capture, Registration registration) 
         return "shaded pictures show grey clay made from depth: the capture has no colour images.";
     if (registration == Registration::yes)
         return "shaded pictures show the colour images.";
+    if (capture.colour_camera)
+        return "shaded pictures show the colour images, carried over from the camera that took them (" +
+               describe(capture.colour_camera->camera) + "); what it did not see is grey clay.";
     const std::string why = registration == Registration::no ? "do not lie on" : "are not known to lie on";
     return fmt::format(
         "shaded pictures show grey clay made from depth, because the colour images {} the depth pixels{}; "
@@ -202,6 +206,8 @@ void introduce(const RunReport& report) {
         say(fmt::format("  depth: {} ({})", capture.depth.name, capture.depth.origin));
     if (capture.camera)
         say(fmt::format("  camera: {} ({})", describe(*capture.camera), capture.camera->origin));
+    if (capture.depth_correction.any())
+        say(fmt::format("  depth correction: {} ({})", describe(capture.depth_correction), capture.camera->origin));
     say("  depth noise: " + report.depth_noise);
     for (const std::string& warning : capture.warnings)
         say("  warning: " + warning);
@@ -337,10 +343,15 @@ class Run final : public Command {
                .help = "of the ao maps",
                .value = &s.format,
                .choices = {"png16", "png8", "tiff", "exr"}},
+              {.name = "view",
+               .help = "whose pixels maps and pictures have, where a colour camera stands beside the depth camera",
+               .value = &s.view,
+               .choices = {"depth", "colour"}},
               {"shade-strength", "0 leaves the colour, 1 multiplies it by visibility", &s.shade_strength, "", 0, 1},
               {"colour-cloud", "replace the clouds' colour by colour times visibility", &s.colour_cloud},
               {"overwrite", "replace the results of an earlier run", &s.overwrite},
-              {"dump", "folder for what lies between the method's passes, as .npy files with an index.csv per frame", &s.dump}}}};
+              {"dump", "folder for what lies between the method's passes, as .npy files with an index.csv per frame",
+               &s.dump}}}};
     }
 
     static std::vector<std::string> method_names() {
@@ -400,6 +411,7 @@ class Run final : public Command {
                 asked_.paths.size() == 1 ? fs::path(asked_.out) : asked_.out / fs::path(folder_name(path, taken));
             try {
                 Job job{open_capture(path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s}), {}};
+                refuse_absent_view(job.capture);
                 job.batch.frames = slice(asked_.frames, job.capture.entries.size());
                 job.batch.outputs = outputs_;
                 job.batch.outputs.folder = folder;
@@ -417,6 +429,12 @@ class Run final : public Command {
             }
         }
         return jobs;
+    }
+
+    void refuse_absent_view(const Capture& capture) const {
+        if (outputs_.colour_view && !capture.colour_camera)
+            throw Error(capture.path.string() +
+                        ": --view colour needs to know the colour camera beside the depth camera; refine finds it");
     }
 
     RunReport report_on(const Job& job, const gpu::DeviceInfo& device) {

@@ -1,5 +1,6 @@
 // Cameras on disk: which format a file is in, told by its content, and which one to write, told by name.
 #include "io/camera_formats.h"
+#include "io/known_cameras.h"
 #include "io/output_file.h"
 #include "io/text.h"
 #include "projection/error.h"
@@ -30,6 +31,19 @@ void check_numbers(const fs::path& file, const Pinhole& camera, const std::array
                             "flip the images or negate it yourself; nothing is mirrored silently)",
                             names[i], values[i]));
     }
+}
+
+Eigen::Isometry3d rigid_from(const fs::path& file, const Eigen::Matrix4d& matrix, const std::string& key) {
+    constexpr double close = 1e-3;
+    const Eigen::Matrix3d turn = matrix.topLeftCorner<3, 3>();
+    const bool rotation =
+        turn.determinant() > 0 && (turn * turn.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < close;
+    if (!rotation || matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1))
+        refuse_camera(file, fmt::format("\"{}\" is not a rotation and a shift", key));
+    Eigen::Isometry3d rigid = Eigen::Isometry3d::Identity();
+    rigid.linear() = Eigen::Quaterniond(turn).normalized().toRotationMatrix();
+    rigid.translation() = matrix.topRightCorner<3, 1>();
+    return rigid;
 }
 
 namespace {
@@ -68,6 +82,20 @@ CameraFile read_any(const fs::path& file, const std::string& bytes) {
     return is_colmap(lines) ? camera_from_colmap(file, lines) : camera_from_matrix(file, lines);
 }
 
+void refuse_what_is_only_ours(const CameraFile& camera, CameraFormat format) {
+    if (format == CameraFormat::scanshade)
+        return;
+    if (camera.colour && format != CameraFormat::kalibr)
+        throw Error("this format holds one camera, and there is a colour camera beside the depth camera; write .json "
+                    "(ours) or --format kalibr");
+    if (camera.depth_correction.any())
+        throw Error(fmt::format("this format has no depth correction, and there is one ({}); write .json (ours)",
+                                describe(camera.depth_correction)));
+    if (camera.pose_time_offset_s != 0)
+        throw Error(fmt::format("this format has no time offset, and there is one ({:g} s); write .json (ours)",
+                                camera.pose_time_offset_s));
+}
+
 } // namespace
 
 CameraFile read_camera_file(const fs::path& file) {
@@ -78,6 +106,8 @@ CameraFile read_camera_file(const fs::path& file) {
         refuse_camera(file, "empty file, expected a camera");
     CameraFile result = read_any(file, bytes);
     result.camera.origin = file.string();
+    if (result.colour)
+        result.colour->camera.origin = file.string();
     return result;
 }
 
@@ -92,8 +122,12 @@ CameraFile camera_from_argument(const std::string& text) {
     }
     std::error_code ignored;
     if (parts.size() != 4 || fs::exists(text, ignored)) {
-        if (!fs::exists(text, ignored))
-            throw Misuse(fmt::format("--camera {}: neither a file nor fx,fy,cx,cy", in_quotes(text)));
+        if (!fs::exists(text, ignored)) {
+            if (const auto known = known_camera(text))
+                return {.camera = *known, .depth_units_per_metre = {}, .warnings = {}};
+            throw Misuse(fmt::format("--camera {}: neither a file, nor fx,fy,cx,cy, nor one of {}", in_quotes(text),
+                                     fmt::join(known_camera_names(), ", ")));
+        }
         CameraFile result = read_camera_file(text);
         result.camera.origin = "--camera " + text;
         return result;
@@ -136,7 +170,10 @@ CameraFormat camera_format(const fs::path& file, const std::string& name) {
 void write_camera_file(const fs::path& file, const CameraFile& camera, CameraFormat format,
                        const CameraQuality& quality) {
     check(camera.camera);
+    if (camera.colour)
+        check(camera.colour->camera);
     const std::string text = during(file.string(), [&] {
+        refuse_what_is_only_ours(camera, format);
         switch (format) {
         case CameraFormat::open3d:
             return camera_as_open3d(camera.camera);
@@ -145,7 +182,7 @@ void write_camera_file(const fs::path& file, const CameraFile& camera, CameraFor
         case CameraFormat::ros:
             return camera_as_ros(camera.camera);
         case CameraFormat::kalibr:
-            return camera_as_kalibr(camera.camera);
+            return camera_as_kalibr(camera);
         case CameraFormat::colmap:
             return camera_as_colmap(camera.camera);
         case CameraFormat::scanshade:

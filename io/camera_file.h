@@ -19,14 +19,20 @@ struct CameraFile {
     std::optional<double> depth_units_per_metre;
     Registration registration = Registration::unknown;
     std::vector<std::string> warnings;
+    DepthCorrection depth_correction = {};   ///< of the depths that this camera records
+    std::optional<ColourCamera> colour = {}; ///< the camera beside it, where colour was taken with another one
+    double pose_time_offset_s = 0;           ///< an image stamped t was taken at t + offset of the poses' clock
 };
 
 /// Reads, told apart by content:
 /// - ours: {"fx","fy","cx","cy","width","height", optional "distortion":[k1,k2,p1,p2,k3], "depth_units_per_metre",
-/// "registered"}; a fisheye has "fisheye":[k1,k2,k3,k4] instead of "distortion"
+/// "registered", "depth_correction":{"scale","offset_m","curve_per_m"}, "pose_time_offset_s", "colour": a camera of the
+/// same keys with "colour_from_depth":[[4 numbers] x 4], row by row}; a fisheye has "fisheye":[k1,k2,k3,k4] instead of
+/// "distortion"
 /// - Open3D: {"width","height","intrinsic_matrix":[9 numbers, column-major]}
 /// - OpenCV's yml (camera_matrix, distortion_coefficients; `fisheye_model: 1` for a fisheye), ROS's camera_info yaml
-///   (plumb_bob, equidistant), Kalibr's camchain yaml (pinhole with radtan, equidistant or none; its first camera)
+///   (plumb_bob, equidistant), Kalibr's camchain yaml (pinhole with radtan, equidistant or none; cam0, and cam1 with
+///   its T_cn_cnm1 as the colour camera)
 /// - COLMAP's cameras.txt (its first camera; SIMPLE_PINHOLE to FULL_OPENCV and OPENCV_FISHEYE)
 /// - a 3x3 row-major text matrix (7-Scenes, BundleFusion), BundleFusion's info.txt
 /// Throws Error naming the file, and the key, line or column, for: JSON syntax, missing keys, wrong counts, non-finite,
@@ -34,7 +40,8 @@ struct CameraFile {
 /// matrices.
 [[nodiscard]] CameraFile read_camera_file(const std::filesystem::path& file);
 
-/// `text` is a file's path, or "fx,fy,cx,cy". Throws Misuse when it is neither.
+/// `text` is a file's path, the name of a known camera (io/known_cameras.h), or "fx,fy,cx,cy". Throws Misuse when it is
+/// none of these.
 [[nodiscard]] CameraFile camera_from_argument(const std::string& text);
 
 enum class CameraFormat { scanshade, open3d, opencv, ros, kalibr, colmap };
@@ -50,7 +57,8 @@ struct CameraQuality {
 };
 
 /// Writes atomically. Throws Error naming the file where the format cannot say what the camera is (a lens for Open3D,
-/// k3 for Kalibr): nothing is dropped.
+/// k3 for Kalibr, a colour camera for all but ours and Kalibr's, a depth correction for all but ours): nothing is
+/// dropped.
 void write_camera_file(const std::filesystem::path& file, const CameraFile& camera,
                        CameraFormat format = CameraFormat::scanshade, const CameraQuality& quality = {});
 

@@ -17,6 +17,10 @@ inline constexpr int widest_image = 1 << 16;
 /// Focal lengths that a pinhole can have; `names` are the words the file uses for fx, fy, cx, cy.
 void check_numbers(const std::filesystem::path& file, const Pinhole& camera, const std::array<std::string, 4>& names);
 
+/// A 4x4 matrix as a rigid transform, its rotation made exact. Throws Error naming the key where it is none to 1e-3.
+[[nodiscard]] Eigen::Isometry3d rigid_from(const std::filesystem::path& file, const Eigen::Matrix4d& matrix,
+                                           const std::string& key);
+
 // Each throws Error naming file and place.
 [[nodiscard]] CameraFile camera_from_json(const std::filesystem::path& file, const std::string& text);
 [[nodiscard]] CameraFile camera_from_yaml(const std::filesystem::path& file, const std::string& text);
@@ -31,7 +35,7 @@ void check_numbers(const std::filesystem::path& file, const Pinhole& camera, con
 [[nodiscard]] std::string camera_as_open3d(const Camera& camera);
 [[nodiscard]] std::string camera_as_opencv(const Camera& camera, const CameraQuality& quality);
 [[nodiscard]] std::string camera_as_ros(const Camera& camera);
-[[nodiscard]] std::string camera_as_kalibr(const Camera& camera);
+[[nodiscard]] std::string camera_as_kalibr(const CameraFile& camera);
 [[nodiscard]] std::string camera_as_colmap(const Camera& camera);
 
 } // namespace scanshade

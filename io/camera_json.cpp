@@ -120,6 +120,55 @@ Pinhole from_keys(const fs::path& file, const Json& object) {
     return camera;
 }
 
+Camera one_camera(const fs::path& file, const Json& object) {
+    Camera camera;
+    camera.pinhole = object.contains("intrinsic_matrix")
+                         ? from_columns(file, numbers_of(file, object, "intrinsic_matrix", 9))
+                         : from_keys(file, object);
+    camera.pinhole.size = {size_of(file, object, "width"), size_of(file, object, "height")};
+    if (object.contains("distortion")) {
+        const auto d = numbers_of(file, object, "distortion", 5);
+        camera.distortion = {d[0], d[1], d[2], d[3], d[4]};
+    }
+    if (object.contains("fisheye")) {
+        if (object.contains("distortion"))
+            refuse_camera(file, "\"distortion\" and \"fisheye\" are both there, one lens expected");
+        const auto k = numbers_of(file, object, "fisheye", 4);
+        camera.distortion = {k[0], k[1], 0, 0, k[2], k[3], LensModel::kannala_brandt};
+    }
+    return camera;
+}
+
+DepthCorrection correction_of(const fs::path& file, const Json& object) {
+    if (!object.is_object())
+        refuse_camera(file, "\"depth_correction\" is not an object of scale, offset_m and curve_per_m");
+    const auto value = [&](const std::string& key, double otherwise) {
+        return object.contains(key) ? number_of(file, object[key], key) : otherwise;
+    };
+    const DepthCorrection correction{value("scale", 1), value("offset_m", 0), value("curve_per_m", 0)};
+    if (correction.scale <= 0)
+        refuse_camera(file, fmt::format("\"scale\" is {}, a positive number expected", correction.scale));
+    return correction;
+}
+
+/// The camera that stands beside the main one.
+ColourCamera beside(const fs::path& file, const Json& object) {
+    if (!object.is_object())
+        refuse_camera(file, "not an object that describes a camera");
+    const Json& rows = member(file, object, "colour_from_depth");
+    Eigen::Matrix4d matrix;
+    if (!rows.is_array() || rows.size() != 4)
+        refuse_camera(file, "\"colour_from_depth\" is not a list of 4 rows");
+    for (int row = 0; row < 4; ++row) {
+        const auto values = numbers_of(file, {{"colour_from_depth", rows[row]}}, "colour_from_depth", 4);
+        matrix.row(row) = Eigen::Vector4d::Map(values.data()).transpose();
+    }
+    ColourCamera colour{one_camera(file, object), {}};
+    colour.colour_from_depth = rigid_from(file, matrix, "colour_from_depth");
+    check(colour.camera);
+    return colour;
+}
+
 } // namespace
 
 CameraFile camera_from_json(const fs::path& file, const std::string& text) {
@@ -129,20 +178,7 @@ CameraFile camera_from_json(const fs::path& file, const std::string& text) {
     if (!object.contains("intrinsic_matrix") && !object.contains("fx"))
         refuse_camera(file, "\"intrinsic_matrix\" (Open3D's layout) and \"fx\" (ours) are both missing");
     CameraFile result;
-    Pinhole& pinhole = result.camera.pinhole;
-    pinhole = object.contains("intrinsic_matrix") ? from_columns(file, numbers_of(file, object, "intrinsic_matrix", 9))
-                                                  : from_keys(file, object);
-    pinhole.size = {size_of(file, object, "width"), size_of(file, object, "height")};
-    if (object.contains("distortion")) {
-        const auto d = numbers_of(file, object, "distortion", 5);
-        result.camera.distortion = {d[0], d[1], d[2], d[3], d[4]};
-    }
-    if (object.contains("fisheye")) {
-        if (object.contains("distortion"))
-            refuse_camera(file, "\"distortion\" and \"fisheye\" are both there, one lens expected");
-        const auto k = numbers_of(file, object, "fisheye", 4);
-        result.camera.distortion = {k[0], k[1], 0, 0, k[2], k[3], LensModel::kannala_brandt};
-    }
+    result.camera = one_camera(file, object);
     if (object.contains("depth_units_per_metre")) {
         const double units = number_of(file, object["depth_units_per_metre"], "depth_units_per_metre");
         if (units <= 0)
@@ -154,26 +190,48 @@ CameraFile camera_from_json(const fs::path& file, const std::string& text) {
             refuse_camera(file, "\"registered\" is not true or false");
         result.registration = object["registered"].get<bool>() ? Registration::yes : Registration::no;
     }
+    if (object.contains("depth_correction"))
+        result.depth_correction = correction_of(file, object["depth_correction"]);
+    if (object.contains("pose_time_offset_s"))
+        result.pose_time_offset_s = number_of(file, object["pose_time_offset_s"], "pose_time_offset_s");
+    if (object.contains("colour"))
+        result.colour = during("\"colour\"", [&] { return beside(file, object["colour"]); });
     return result;
 }
 
-std::string camera_as_json(const CameraFile& camera, const std::string& details) {
-    const Pinhole& pinhole = camera.camera.pinhole;
-    nlohmann::ordered_json object{{"fx", pinhole.fx},
-                                  {"fy", pinhole.fy},
-                                  {"cx", pinhole.cx},
-                                  {"cy", pinhole.cy},
-                                  {"width", pinhole.size.width},
-                                  {"height", pinhole.size.height}};
-    const Distortion& d = camera.camera.distortion;
+namespace {
+
+nlohmann::ordered_json as_object(const Camera& camera) {
+    const auto& [fx, fy, cx, cy, size] = camera.pinhole;
+    nlohmann::ordered_json object{
+        {"fx", fx}, {"fy", fy}, {"cx", cx}, {"cy", cy}, {"width", size.width}, {"height", size.height}};
+    const Distortion& d = camera.distortion;
     if (d.model == LensModel::kannala_brandt)
         object["fisheye"] = {d.k1, d.k2, d.k3, d.k4};
     else if (d.any())
         object["distortion"] = {d.k1, d.k2, d.p1, d.p2, d.k3};
+    return object;
+}
+
+} // namespace
+
+std::string camera_as_json(const CameraFile& camera, const std::string& details) {
+    nlohmann::ordered_json object = as_object(camera.camera);
     if (camera.depth_units_per_metre)
         object["depth_units_per_metre"] = *camera.depth_units_per_metre;
     if (camera.registration != Registration::unknown)
         object["registered"] = camera.registration == Registration::yes;
+    if (const DepthCorrection& c = camera.depth_correction; c.any())
+        object["depth_correction"] = {{"scale", c.scale}, {"offset_m", c.offset_m}, {"curve_per_m", c.curve_per_m}};
+    if (camera.pose_time_offset_s != 0)
+        object["pose_time_offset_s"] = camera.pose_time_offset_s;
+    if (camera.colour) {
+        object["colour"] = as_object(camera.colour->camera);
+        const Eigen::Matrix4d matrix = camera.colour->colour_from_depth.matrix();
+        for (int row = 0; row < 4; ++row)
+            object["colour"]["colour_from_depth"].push_back(
+                {matrix(row, 0), matrix(row, 1), matrix(row, 2), matrix(row, 3)});
+    }
     if (!details.empty())
         object["refinement"] = nlohmann::ordered_json::parse(details);
     return object.dump(2) + "\n";

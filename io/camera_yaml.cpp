@@ -117,28 +117,58 @@ CameraFile from_matrices(const fs::path& file, const cv::FileNode& root) {
     return result;
 }
 
-CameraFile from_camchain(const fs::path& file, const cv::FileNode& root) {
-    const cv::FileNode camera = root["cam0"];
-    CameraFile result;
-    if (!root["cam1"].empty())
-        result.warnings.push_back(file.string() + ": more than one camera; cam0 is used.");
-    const std::string model = camera["camera_model"].isString() ? camera["camera_model"].string() : "";
+/// One camera of a camchain.
+Camera of_chain(const fs::path& file, const cv::FileNode& node) {
+    const std::string model = node["camera_model"].isString() ? node["camera_model"].string() : "";
     if (model != "pinhole")
         refuse_camera(file, fmt::format("\"camera_model\" is {}, expected pinhole", in_quotes(model)));
-    const auto k = numbers_of(file, camera, "intrinsics", 4);
-    result.camera.pinhole = {k[0], k[1], k[2], k[3], {}};
-    check_numbers(file, result.camera.pinhole,
+    const auto k = numbers_of(file, node, "intrinsics", 4);
+    Camera camera{{k[0], k[1], k[2], k[3], {}}, {}, {}};
+    check_numbers(file, camera.pinhole,
                   {"\"intrinsics\" fx", "\"intrinsics\" fy", "\"intrinsics\" cx", "\"intrinsics\" cy"});
-    const auto size = numbers_of(file, camera, "resolution", 2);
-    result.camera.pinhole.size = checked_size(file, size[0], size[1]);
-    const std::string lens = camera["distortion_model"].isString() ? camera["distortion_model"].string() : "none";
+    const auto size = numbers_of(file, node, "resolution", 2);
+    camera.pinhole.size = checked_size(file, size[0], size[1]);
+    const std::string lens = node["distortion_model"].isString() ? node["distortion_model"].string() : "none";
     if (lens == "equidistant")
-        result.camera.distortion = fisheye(file, "distortion_coeffs", numbers_of(file, camera, "distortion_coeffs"));
+        camera.distortion = fisheye(file, "distortion_coeffs", numbers_of(file, node, "distortion_coeffs"));
     else if (lens == "radtan")
-        result.camera.distortion = polynomial(file, "distortion_coeffs", numbers_of(file, camera, "distortion_coeffs"));
+        camera.distortion = polynomial(file, "distortion_coeffs", numbers_of(file, node, "distortion_coeffs"));
     else if (lens != "none")
         refuse_camera(file,
                       fmt::format("\"distortion_model\" is {}, expected radtan, equidistant or none", in_quotes(lens)));
+    return camera;
+}
+
+Eigen::Isometry3d place_in_chain(const fs::path& file, const cv::FileNode& node) {
+    Eigen::Matrix4d matrix;
+    int row = 0;
+    for (const cv::FileNode& values : node) {
+        int column = 0;
+        for (const cv::FileNode& value : values)
+            if (row < 4 && column < 4)
+                matrix(row, column++) = value.real();
+        if (column != 4)
+            break;
+        ++row;
+    }
+    if (row != 4 || node.size() != 4)
+        refuse_camera(file, "\"T_cn_cnm1\" is not 4 rows of 4 numbers");
+    return rigid_from(file, matrix, "T_cn_cnm1");
+}
+
+/// cam0 is the depth camera; a cam1 whose place is told is the colour camera.
+CameraFile from_camchain(const fs::path& file, const cv::FileNode& root) {
+    CameraFile result;
+    result.camera = of_chain(file, root["cam0"]);
+    if (const cv::FileNode beside = root["cam1"]; !beside.empty()) {
+        if (beside["T_cn_cnm1"].empty()) {
+            result.warnings.push_back(file.string() + ": more than one camera; cam0 is used.");
+        } else {
+            result.colour = ColourCamera{of_chain(file, beside), place_in_chain(file, beside["T_cn_cnm1"])};
+            result.warnings.push_back(file.string() +
+                                      ": cam0 is taken as the depth camera, cam1 as the colour camera.");
+        }
+    }
     return result;
 }
 
@@ -202,7 +232,9 @@ std::string camera_as_ros(const Camera& camera) {
            matrix("projection_matrix", "", 3, 4, {p.fx, 0, p.cx, 0, 0, p.fy, p.cy, 0, 0, 0, 1, 0});
 }
 
-std::string camera_as_kalibr(const Camera& camera) {
+namespace {
+
+std::string in_chain(const char* name, const Camera& camera) {
     const Pinhole& p = camera.pinhole;
     const Distortion& d = camera.distortion;
     const bool fisheye_lens = d.model == LensModel::kannala_brandt;
@@ -211,9 +243,23 @@ std::string camera_as_kalibr(const Camera& camera) {
     auto k = coefficients(d);
     k.resize(4);
     return fmt::format(
-        "cam0:\n  camera_model: pinhole\n  intrinsics: {}\n  distortion_model: {}\n  distortion_coeffs: {}\n"
+        "{}:\n  camera_model: pinhole\n  intrinsics: {}\n  distortion_model: {}\n  distortion_coeffs: {}\n"
         "  resolution: [{}, {}]\n",
-        list({p.fx, p.fy, p.cx, p.cy}), fisheye_lens ? "equidistant" : "radtan", list(k), p.size.width, p.size.height);
+        name, list({p.fx, p.fy, p.cx, p.cy}), fisheye_lens ? "equidistant" : "radtan", list(k), p.size.width,
+        p.size.height);
+}
+
+} // namespace
+
+std::string camera_as_kalibr(const CameraFile& camera) {
+    std::string text = in_chain("cam0", camera.camera);
+    if (!camera.colour)
+        return text;
+    text += in_chain("cam1", camera.colour->camera) + "  T_cn_cnm1:\n";
+    const Eigen::Matrix4d m = camera.colour->colour_from_depth.matrix();
+    for (int row = 0; row < 4; ++row)
+        text += fmt::format("  - {}\n", list({m(row, 0), m(row, 1), m(row, 2), m(row, 3)}));
+    return text;
 }
 
 } // namespace scanshade

@@ -107,6 +107,13 @@ void settle_camera(Listing& listing, const CaptureOptions& options) {
         check(*capture.camera);
     if (found->depth_units_per_metre)
         capture.depth = depth_encoding(fmt::format("{}", *found->depth_units_per_metre), found->camera.origin);
+    capture.depth_correction = found->depth_correction;
+    capture.pose_time_offset_s = found->pose_time_offset_s;
+    capture.colour_camera = found->colour;
+    if (found->colour && found->registration == Registration::unknown) {
+        capture.registration = Registration::no;
+        capture.registration_reason = "a camera of its own took the colour, according to " + found->camera.origin;
+    }
     if (found->registration == Registration::unknown)
         return;
     capture.registration = found->registration;
@@ -134,12 +141,21 @@ void load_colour(const fs::path& file, Frame& frame) {
         frame.warnings.push_back(fmt::format("{}; processed without colour.", failure.what()));
         return;
     }
-    const cv::Size colour = frame.colour.size(), depth = frame.depth_m.size();
-    if (colour == depth)
+    const cv::Size colour = frame.colour.size(),
+                   expected = frame.colour_camera ? frame.colour_camera->camera.pinhole.size : frame.depth_m.size();
+    if (colour == expected)
         return;
-    frame.warnings.push_back(fmt::format("{}: colour is {}, depth is {}; processed without colour.", file.string(),
-                                         text(colour), text(depth)));
+    frame.warnings.push_back(fmt::format("{}: colour is {}, {} is {}; processed without colour.", file.string(),
+                                         text(colour), frame.colour_camera ? "its camera" : "depth", text(expected)));
     frame.colour = cv::Mat3b();
+}
+
+void correct(cv::Mat1f& depth_m, const DepthCorrection& correction) {
+    if (!correction.any())
+        return;
+    std::transform(depth_m.begin(), depth_m.end(), depth_m.begin(), [&](float z) {
+        return z > 0 ? std::max(0.0F, static_cast<float>(correction(z))) : z; // what is corrected away is a hole
+    });
 }
 
 void load_depth(const Capture& capture, const CaptureEntry& entry, Frame& frame) {
@@ -155,6 +171,8 @@ void load_depth(const Capture& capture, const CaptureEntry& entry, Frame& frame)
     }
     const auto doubts = doubts_about(frame.depth_m, stored, capture.depth);
     frame.warnings.insert(frame.warnings.end(), doubts.begin(), doubts.end());
+    correct(frame.depth_m, capture.depth_correction);
+    frame.colour_camera = capture.colour_camera;
     if (!entry.colour.empty())
         load_colour(entry.colour, frame);
 }
@@ -199,6 +217,8 @@ Capture open_capture(const fs::path& path, const CaptureOptions& options) {
     capture.path = path;
     settle_names(capture.entries);
     settle_camera(listing, options);
+    if (listing.find_poses)
+        listing.find_poses(capture, capture.pose_time_offset_s);
     if (!options.depth_scale.empty())
         capture.depth = depth_encoding(options.depth_scale, "--depth-scale");
     return std::move(capture);

@@ -4,6 +4,7 @@
 #include "io/camera_file.h"
 #include "io/image_file.h"
 #include "projection/frame.h"
+#include "projection/motion.h"
 
 #include <filesystem>
 #include <optional>
@@ -24,7 +25,9 @@ struct CaptureEntry {
     std::string name;                           ///< unique in the capture
     std::filesystem::path colour, depth, cloud; ///< empty where there is none
     std::optional<Eigen::Isometry3d> world_from_camera;
-    std::optional<double> stamp_s;
+    std::optional<double> stamp_s;        ///< of the depth image
+    std::optional<double> colour_stamp_s; ///< of the colour image paired with it
+    Motion motion;                        ///< of the camera then, where its trajectory tells
     std::string problem; ///< why this frame cannot be loaded (names file and line); empty = it may be tried
     std::vector<std::string> warnings; ///< what was odd in the listing of this frame
 };
@@ -36,6 +39,9 @@ struct Capture {
         kind; ///< "TUM RGB-D", "7-Scenes", "Redwood / Open3D", "colour and depth folders", "depth image", "cloud"
     std::optional<Camera> camera; ///< none: clouds recover theirs; depth images need --camera
     DepthEncoding depth;
+    DepthCorrection depth_correction;          ///< from the camera's file; load() applies it
+    std::optional<ColourCamera> colour_camera; ///< where colour images were taken, if it is known and not the depth's
+    double pose_time_offset_s = 0;             ///< from the camera's file; already in the poses
     Registration registration = Registration::unknown;
     std::string registration_reason;
     std::vector<CaptureEntry> entries; ///< in recording order

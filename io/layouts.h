@@ -17,6 +17,9 @@ struct Listing {
     /// The layout's camera for depth images of this size (0x0 where no image could be read); may add to the warnings.
     /// Called only when the user named no camera.
     std::function<std::optional<CameraFile>(cv::Size depth_size, std::vector<std::string>& warnings)> find_camera;
+    /// Gives entries their poses by time; none where the layout ties poses to frames itself. Called once the camera is
+    /// known, whose file may tell how far the clocks are apart.
+    std::function<void(Capture& capture, double pose_time_offset_s)> find_poses = {};
 };
 
 // Each returns nothing when the folder is not in its layout, and throws Error when it is but cannot be used.

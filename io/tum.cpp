@@ -97,18 +97,37 @@ std::vector<std::optional<std::size_t>> pair_by_time(const std::vector<ListedIma
     return colour_of;
 }
 
-std::optional<Eigen::Isometry3d> nearest_pose(const std::vector<StampedPose>& poses, double stamp_s, double limit_s) {
-    const auto after = std::lower_bound(poses.begin(), poses.end(), stamp_s,
-                                        [](const StampedPose& pose, double stamp) { return pose.stamp_s < stamp; });
-    auto best = after;
-    if (after != poses.begin()) {
-        const auto before = std::prev(after);
-        if (after == poses.end() || stamp_s - before->stamp_s <= after->stamp_s - stamp_s)
-            best = before;
+auto first_after(const std::vector<StampedPose>& poses, double stamp_s) {
+    return std::lower_bound(poses.begin(), poses.end(), stamp_s,
+                            [](const StampedPose& pose, double stamp) { return pose.stamp_s < stamp; });
+}
+
+/// Between the poses before and after where both are near enough in time, else the nearer one.
+std::optional<Eigen::Isometry3d> pose_at(const std::vector<StampedPose>& poses, double stamp_s, double limit_s) {
+    const auto near_enough = [&](const StampedPose& pose) { return std::abs(pose.stamp_s - stamp_s) <= limit_s; };
+    const auto after = first_after(poses, stamp_s);
+    const bool after_near = after != poses.end() && near_enough(*after);
+    const bool before_near = after != poses.begin() && near_enough(*std::prev(after));
+    if (after_near && before_near) {
+        const auto& [from_s, from] = *std::prev(after);
+        const auto& [to_s, to] = *after;
+        return pose_between(from, to, (stamp_s - from_s) / (to_s - from_s));
     }
-    if (best == poses.end() || std::abs(best->stamp_s - stamp_s) > limit_s)
-        return std::nullopt;
-    return best->world_from_camera;
+    if (after_near)
+        return after->world_from_camera;
+    return before_near ? std::optional(std::prev(after)->world_from_camera) : std::nullopt;
+}
+
+/// From the poses at least 10 ms away on either side; zero where the trajectory has gaps.
+Motion motion_at(const std::vector<StampedPose>& poses, double stamp_s, const Eigen::Isometry3d& at) {
+    constexpr double least_s = 0.01, most_s = 0.1;
+    const auto after = first_after(poses, stamp_s + least_s), next = first_after(poses, stamp_s - least_s);
+    if (after == poses.end() || next == poses.begin())
+        return {};
+    const StampedPose& before = *std::prev(next);
+    if (after->stamp_s - stamp_s > most_s || stamp_s - before.stamp_s > most_s)
+        return {};
+    return motion_between(before.world_from_camera, after->world_from_camera, after->stamp_s - before.stamp_s, at);
 }
 
 // --- frames ---
@@ -124,6 +143,7 @@ CaptureEntry entry_of(const fs::path& folder, const ListedImage& depth) {
 }
 
 void add_colour(const fs::path& folder, const ListedImage& colour, CaptureEntry& entry) {
+    entry.colour_stamp_s = colour.stamp_s;
     const auto trouble = trouble_with(folder, colour.name);
     if (trouble.empty())
         entry.colour = folder / colour.name;
@@ -165,7 +185,7 @@ void add_colours(const fs::path& folder, const std::vector<ListedImage>& depths,
                                                counted(colours.size() - pairs, "colour image"), limit_s));
 }
 
-void add_poses(const fs::path& folder, double limit_s, Capture& capture) {
+void add_poses(const fs::path& folder, double limit_s, double offset_s, Capture& capture) {
     std::error_code ignored;
     const fs::path list = folder / "groundtruth.txt";
     if (!fs::is_regular_file(list, ignored))
@@ -177,7 +197,10 @@ void add_poses(const fs::path& folder, double limit_s, Capture& capture) {
     }
     std::size_t without = 0;
     for (CaptureEntry& entry : capture.entries) {
-        entry.world_from_camera = nearest_pose(poses, *entry.stamp_s, limit_s);
+        const double stamp_s = *entry.stamp_s + offset_s;
+        entry.world_from_camera = pose_at(poses, stamp_s, limit_s);
+        if (entry.world_from_camera)
+            entry.motion = motion_at(poses, stamp_s, *entry.world_from_camera);
         without += !entry.world_from_camera;
         if (!entry.world_from_camera)
             entry.warnings.push_back(fmt::format("no pose within {} s in groundtruth.txt.", limit_s));
@@ -272,7 +295,6 @@ std::optional<Listing> list_tum(const fs::path& folder, const CaptureOptions& op
     for (const ListedImage& depth : depths)
         capture.entries.push_back(entry_of(folder, depth));
     add_colours(folder, depths, options.association_limit_s, capture);
-    add_poses(folder, options.association_limit_s, capture);
     const bool none_there = std::all_of(capture.entries.begin(), capture.entries.end(),
                                         [](const CaptureEntry& entry) { return !entry.problem.empty(); });
     if (none_there)
@@ -280,6 +302,9 @@ std::optional<Listing> list_tum(const fs::path& folder, const CaptureOptions& op
                                                counted(depths.size(), "image")));
     listing.find_camera = [folder](cv::Size size, std::vector<std::string>& warnings) {
         return tum_camera(folder, size, warnings);
+    };
+    listing.find_poses = [folder, limit_s = options.association_limit_s](Capture& found, double offset_s) {
+        add_poses(folder, limit_s, offset_s, found);
     };
     return listing;
 }

@@ -59,4 +59,11 @@ std::string describe(const Camera& camera) {
     return text;
 }
 
+std::string describe(const DepthCorrection& c) {
+    std::string text = fmt::format("{:g} z", c.scale);
+    if (c.curve_per_m != 0)
+        text += fmt::format(" {} {:g} z^2", c.curve_per_m < 0 ? '-' : '+', std::abs(c.curve_per_m));
+    return text + fmt::format(" {} {:g} m", c.offset_m < 0 ? '-' : '+', std::abs(c.offset_m));
+}
+
 } // namespace scanshade

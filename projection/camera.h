@@ -83,6 +83,14 @@ void distort_fisheye(const Number* coefficients, const Number& x, const Number& 
     y_bent = y * bent / r;
 }
 
+/// What a recorded depth is worth: true z = scale z + offset + curve z^2, metres. As it stands it changes nothing.
+struct DepthCorrection {
+    double scale = 1, offset_m = 0, curve_per_m = 0;
+    [[nodiscard]] bool any() const { return scale != 1 || offset_m != 0 || curve_per_m != 0; }
+    [[nodiscard]] double operator()(double z_m) const { return offset_m + z_m * (scale + z_m * curve_per_m); }
+    friend bool operator==(const DepthCorrection&, const DepthCorrection&) = default;
+};
+
 /// Refuses a camera that cannot be: non-finite or non-positive focal lengths, principal point far outside the image,
 /// empty size. Throws Error naming the value and `camera.origin`.
 void check(const Camera& camera);
@@ -92,5 +100,7 @@ void check(const Camera& camera);
 
 /// "fx 585.00 fy 585.00 cx 320.00 cy 240.00 (640x480)", with distortion where there is any.
 [[nodiscard]] std::string describe(const Camera& camera);
+/// "1.012 z + 0.003 m"
+[[nodiscard]] std::string describe(const DepthCorrection& correction);
 
 } // namespace scanshade

@@ -29,12 +29,19 @@ struct Cloud {
 /// Whether colour pixel (u, v) and depth pixel (u, v) see the same thing. Claimed only where the data say so.
 enum class Registration { unknown, yes, no };
 
+/// A camera that took the colour images from beside the depth camera.
+struct ColourCamera {
+    Camera camera;
+    Eigen::Isometry3d colour_from_depth = Eigen::Isometry3d::Identity(); ///< depth camera space to colour camera space
+};
+
 /// One recorded instant. Either `depth_m` or `cloud` is there.
 struct Frame {
-    std::string name;         ///< names the outputs: unique in its capture, no path separators
-    Camera camera;            ///< of the depth image or the organised cloud's grid
-    cv::Mat3b colour;         ///< BGR, may be empty
-    cv::Mat1f depth_m;        ///< recorded (distorted) depth, metres along +z; 0 = hole
+    std::string name;                          ///< names the outputs: unique in its capture, no path separators
+    Camera camera;                             ///< of the depth image or the organised cloud's grid
+    cv::Mat3b colour;                          ///< BGR, may be empty
+    std::optional<ColourCamera> colour_camera; ///< where `colour` was taken, if it is known and not the depth camera's
+    cv::Mat1f depth_m; ///< recorded (distorted geometry) depth, corrected, metres along +z; 0 = hole
     std::optional<Cloud> cloud;
     std::optional<Eigen::Isometry3d> world_from_camera;
     Registration registration = Registration::unknown;

@@ -145,17 +145,22 @@ int same_pixel_near(const cv::Mat1i& recorded_pixel, cv::Point nearest, int reco
     return nearest.y * recorded_pixel.cols + nearest.x;
 }
 
-cv::Mat1i map_to_undistorted(const Camera& camera, double limit_r2, const cv::Mat1i& recorded_pixel) {
-    const Pinhole& pinhole = camera.pinhole;
+cv::Mat2f directions(const Camera& camera, double limit_r2) {
+    constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
+    cv::Mat2f map(camera.pinhole.size, cv::Vec2f(nowhere, nowhere));
+    for (int v = 0; v < map.rows; ++v)
+        for (int u = 0; u < map.cols; ++u)
+            if (const auto straight = undistorted_within(camera.distortion, normalised(camera.pinhole, u, v), limit_r2))
+                map(v, u) = {static_cast<float>(straight->x()), static_cast<float>(straight->y())};
+    return map;
+}
+
+cv::Mat1i map_to_undistorted(const Pinhole& pinhole, const cv::Mat2f& direction, const cv::Mat1i& recorded_pixel) {
     cv::Mat1i map(pinhole.size, -1);
     for (int v = 0; v < map.rows; ++v)
-        for (int u = 0; u < map.cols; ++u) {
-            const auto straight = undistorted_within(camera.distortion, normalised(pinhole, u, v), limit_r2);
-            if (!straight)
-                continue;
-            if (const auto pixel = pixel_at(pinhole, *straight))
+        for (int u = 0; u < map.cols; ++u)
+            if (const auto pixel = pixel_at(pinhole, {direction(v, u)[0], direction(v, u)[1]})) // none for NaN
                 map(v, u) = same_pixel_near(recorded_pixel, *pixel, v * map.cols + u);
-        }
     return map;
 }
 
@@ -193,7 +198,8 @@ Undistortion::Undistortion(const Camera& camera) {
     const double limit_r2 = fold_r2(camera.distortion);
     recorded_at_ = places_in_recorded(camera, limit_r2);
     recorded_pixel_ = nearest_pixels(recorded_at_);
-    undistorted_pixel_ = map_to_undistorted(camera, limit_r2, recorded_pixel_);
+    direction_ = directions(camera, limit_r2);
+    undistorted_pixel_ = map_to_undistorted(camera.pinhole, direction_, recorded_pixel_);
 }
 
 std::shared_ptr<const Undistortion> Undistortion::of(const Camera& camera) {

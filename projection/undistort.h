@@ -38,9 +38,11 @@ class Undistortion {
     /// For each recorded pixel the index of the undistorted pixel that shows it, or is nearest to it; -1 outside the
     /// image.
     [[nodiscard]] const cv::Mat1i& undistorted_pixel() const { return undistorted_pixel_; }
+    /// For each recorded pixel the direction it looks in as x and y at z = 1; NaN where the lens has none.
+    [[nodiscard]] const cv::Mat2f& direction() const { return direction_; }
 
   private:
-    cv::Mat2f recorded_at_;
+    cv::Mat2f recorded_at_, direction_;
     cv::Mat1i recorded_pixel_, undistorted_pixel_;
 };
 

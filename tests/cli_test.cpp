@@ -1,4 +1,5 @@
 // The program as a person or a script meets it: exit codes, files, reports, and what a killed run leaves.
+#include "io/camera_file.h"
 #include "io/cloud_file.h"
 #include "io/image_file.h"
 #include "tests/support/small_capture.h"
@@ -158,6 +159,42 @@ TEST_F(CliTest, a_cloud_keeps_its_points_and_gains_a_field) {
     EXPECT_NE(describe(*cloud.records).find("ambient_occlusion"), std::string::npos) << describe(*cloud.records);
     EXPECT_NE(describe(*cloud.records).find("label"), std::string::npos);
     EXPECT_NE(manifest()["frames"][0]["camera"]["origin"].get<std::string>().find("recovered"), std::string::npos);
+}
+
+TEST_F(CliTest, a_colour_camera_beside_depth_is_warped_by_either_way_and_told) {
+    CameraFile file{tests::small_camera(), 1000, Registration::no, {}};
+    ColourCamera colour{tests::small_camera(), Eigen::Isometry3d::Identity()};
+    colour.camera.pinhole = scaled(colour.camera.pinhole, {96, 72});
+    colour.colour_from_depth.translation().x() = -0.1; // the rightmost of the wall is out of its sight
+    file.colour = colour;
+    file.depth_correction.offset_m = 0.05;
+    write_camera_file(capture() / "camera.json", file);
+    for (int i = 0; i < 4; ++i)
+        write_picture(capture() / fmt::format("color/{:03}.png", i), cv::Mat3b(72, 96, cv::Vec3b(40, 120, 200)));
+    ASSERT_EQ(run("--write ao,shaded,cloud --shade-strength 0").exit_code, 0);
+    EXPECT_EQ(read_ao(out() / "ao/000.png").size(), cv::Size(64, 48));
+    const cv::Mat3b shaded = read_colour(out() / "shaded/000.png");
+    EXPECT_EQ(shaded(24, 30), cv::Vec3b(40, 120, 200));
+    EXPECT_NE(shaded(24, 0), cv::Vec3b(40, 120, 200)); // clay
+    const json text = manifest();
+    EXPECT_EQ(text["capture"]["colour_camera"]["width"], 96);
+    EXPECT_EQ(text["capture"]["depth"]["correction"]["offset_m"], 0.05);
+    EXPECT_NE(text["shading"].get<std::string>().find("carried over"), std::string::npos);
+    const std::string cloud = read_bytes(out() / "clouds/000.ply");
+    EXPECT_NE(cloud.find("property float colour_known"), std::string::npos);
+
+    ASSERT_EQ(run("--overwrite --view colour --shade-strength 0").exit_code, 0);
+    const cv::Mat1f visibility = read_ao(out() / "ao/000.png");
+    EXPECT_EQ(visibility.size(), cv::Size(96, 72));
+    EXPECT_FALSE(std::isnan(visibility(36, 40)));
+    EXPECT_TRUE(std::isnan(visibility(36, 95))); // what depth did not see
+    EXPECT_EQ(read_colour(out() / "shaded/000.png").size(), cv::Size(96, 72));
+}
+
+TEST_F(CliTest, a_colour_view_without_a_colour_camera_is_refused) {
+    const Ran ran = run("--view colour");
+    EXPECT_EQ(ran.exit_code, 3);
+    EXPECT_NE(ran.err.find("refine finds it"), std::string::npos) << ran.err;
 }
 
 TEST_F(CliTest, several_captures_get_a_folder_each) {

@@ -1,10 +1,12 @@
 // Files and values: images, cameras, atomic output and captures of every layout come back as they were written.
 #include "io/camera_file.h"
 #include "io/capture.h"
+#include "io/exif.h"
 #include "io/image_file.h"
 #include "io/output_file.h"
 #include "tests/support/files.h"
 
+#include <array>
 #include <cmath>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -270,6 +272,135 @@ TEST(camera_files, our_json_comes_back_bit_for_bit) {
     EXPECT_TRUE(says(read.camera.origin, "camera.json"));
 }
 
+CameraFile two_cameras() {
+    CameraFile file;
+    file.camera = {{585, 585, 320, 240, {640, 480}}, {}, ""};
+    ColourCamera colour{{{525.25, 524.75, 319.5, 239.25, {1280, 960}}, {-0.06, 0.01, 1e-3, -2e-3, 0}, ""}, {}};
+    colour.colour_from_depth = Eigen::Isometry3d::Identity();
+    colour.colour_from_depth.linear() = Eigen::AngleAxisd(0.03, Eigen::Vector3d(1, 2, -2) / 3).toRotationMatrix();
+    colour.colour_from_depth.translation() = Eigen::Vector3d(0.025, -0.001, 0.002);
+    file.colour = colour;
+    return file;
+}
+
+TEST(camera_files, a_colour_camera_a_depth_correction_and_a_clock_come_back) {
+    const TemporaryFolder folder;
+    CameraFile written = two_cameras();
+    written.depth_correction = {1.01, -0.004, 0.002};
+    written.pose_time_offset_s = -0.0125;
+    write_camera_file(folder / "camera.json", written);
+    const CameraFile read = read_camera_file(folder / "camera.json");
+    EXPECT_EQ(read.depth_correction, written.depth_correction);
+    EXPECT_EQ(read.pose_time_offset_s, -0.0125);
+    ASSERT_TRUE(read.colour);
+    EXPECT_EQ(read.colour->camera.pinhole.size, cv::Size(1280, 960));
+    EXPECT_EQ(read.colour->camera.pinhole.fx, 525.25);
+    EXPECT_EQ(read.colour->camera.distortion, written.colour->camera.distortion);
+    EXPECT_TRUE(read.colour->colour_from_depth.isApprox(written.colour->colour_from_depth, 1e-12));
+
+    write_camera_file(folder / "chain.yaml", two_cameras(), CameraFormat::kalibr);
+    const CameraFile chain = read_camera_file(folder / "chain.yaml");
+    EXPECT_EQ(chain.camera.pinhole.fx, 585);
+    ASSERT_TRUE(chain.colour);
+    EXPECT_EQ(chain.colour->camera.distortion, written.colour->camera.distortion);
+    EXPECT_TRUE(chain.colour->colour_from_depth.isApprox(written.colour->colour_from_depth, 1e-12));
+    EXPECT_TRUE(warned(chain.warnings, "cam1 as the colour camera"));
+}
+
+TEST(camera_files, what_only_ours_can_hold_is_refused_elsewhere) {
+    const TemporaryFolder folder;
+    CameraFile corrected, late;
+    corrected.camera = late.camera = two_cameras().camera;
+    corrected.depth_correction.scale = 1.02;
+    late.pose_time_offset_s = 0.01;
+    for (const CameraFormat format :
+         {CameraFormat::open3d, CameraFormat::opencv, CameraFormat::ros, CameraFormat::colmap})
+        EXPECT_TRUE(says(refusal([&] { write_camera_file(folder / "c", two_cameras(), format); }), "holds one camera"));
+    EXPECT_TRUE(says(refusal([&] { write_camera_file(folder / "c", corrected, CameraFormat::kalibr); }),
+                     "no depth correction, and there is one (1.02 z"));
+    EXPECT_TRUE(says(refusal([&] { write_camera_file(folder / "c", late, CameraFormat::ros); }), "no time offset"));
+    EXPECT_FALSE(fs::exists(folder / "c"));
+}
+
+TEST(camera_files, damage_beside_the_main_camera_names_the_key) {
+    const TemporaryFolder folder;
+    const std::string main = R"({"fx":5,"fy":5,"cx":1,"cy":1,"width":4,"height":4)";
+    const auto message = [&](const std::string& more) {
+        return refusal([&] { (void)read_camera_file(write_file(folder / "c.json", main + "," + more + "}")); });
+    };
+    const std::string beside = R"("fx":5,"fy":5,"cx":1,"cy":1,"width":4,"height":4)";
+    EXPECT_TRUE(says(message(R"("colour":3)"), "not an object that describes a camera"));
+    EXPECT_TRUE(says(message(R"("colour":{)" + beside + "}"), "\"colour_from_depth\" is missing"));
+    EXPECT_TRUE(
+        says(message(R"("colour":{)" + beside + R"(,"colour_from_depth":[[1,0,0,0]]})"), "not a list of 4 rows"));
+    EXPECT_TRUE(
+        says(message(R"("colour":{)" + beside + R"(,"colour_from_depth":[[2,0,0,0],[0,2,0,0],[0,0,2,0],[0,0,0,1]]})"),
+             "not a rotation and a shift"));
+    EXPECT_TRUE(says(message(R"("depth_correction":1)"), "\"depth_correction\""));
+    EXPECT_TRUE(says(message(R"("depth_correction":{"scale":0})"), "\"scale\" is 0"));
+    EXPECT_TRUE(says(message(R"("depth_correction":{"offset_m":"far"})"), "\"offset_m\""));
+    EXPECT_TRUE(says(message(R"("pose_time_offset_s":[])"), "\"pose_time_offset_s\""));
+}
+
+TEST(camera_files, known_cameras_go_by_name) {
+    const CameraFile known = camera_from_argument("tum-fr1");
+    EXPECT_EQ(known.camera.pinhole.fx, 517.3);
+    EXPECT_EQ(known.camera.distortion.k1, 0.2624);
+    EXPECT_TRUE(says(known.camera.origin, "freiburg1"));
+    EXPECT_TRUE(says(refusal([] { (void)camera_from_argument("tum-fr9"); }), "primesense"));
+}
+
+/// A JPEG with an EXIF block of little-endian tags in its Exif directory: number, type (3 short, 4 long, 5 ratio),
+/// value.
+fs::path jpeg_with(const fs::path& file, const std::vector<std::array<unsigned, 4>>& tags) {
+    std::string tiff("II*\0\x08\0\0\0", 8);
+    const auto add = [&](unsigned value, int bytes) {
+        for (int i = 0; i < bytes; ++i)
+            tiff += static_cast<char>((value >> (8 * i)) & 0xFF);
+    };
+    add(1, 2); // one entry: where the Exif directory is
+    add(0x8769, 2), add(4, 2), add(1, 4), add(26, 4), add(0, 4);
+    add(static_cast<unsigned>(tags.size()), 2);
+    unsigned ratios = 26 + 2 + 12 * static_cast<unsigned>(tags.size()) + 4;
+    for (const auto& [tag, type, value, under] : tags) {
+        add(tag, 2), add(type, 2), add(1, 4), add(type == 5 ? ratios : value, 4);
+        ratios += type == 5 ? 8 : 0;
+    }
+    add(0, 4);
+    for (const auto& [tag, type, value, under] : tags)
+        if (type == 5)
+            add(value, 4), add(under, 4);
+    std::vector<unsigned char> encoded;
+    cv::imencode(".jpg", cv::Mat3b(60, 80, cv::Vec3b(10, 20, 30)), encoded);
+    std::string jpeg(encoded.begin(), encoded.end());
+    const std::string block = std::string("Exif\0\0", 6) + tiff;
+    const auto length = static_cast<unsigned>(block.size() + 2);
+    jpeg.insert(2,
+                std::string("\xFF\xE1", 2) + static_cast<char>(length >> 8) + static_cast<char>(length & 0xFF) + block);
+    return write_file(file, jpeg);
+}
+
+TEST(exif, tells_the_focal_length_in_pixels) {
+    const TemporaryFolder folder;
+    const cv::Size size(80, 60); // its diagonal is 100
+    // 26 mm on film of 43.27 mm diagonal.
+    const auto film = exif_focal_length_px(jpeg_with(folder / "film.jpg", {{0xA405, 3, 26, 0}}), size);
+    ASSERT_TRUE(film);
+    EXPECT_NEAR(*film, 26 / 43.2666 * 100, 1e-9);
+    // 4.2 mm before a sensor of 200 pixels per centimetre that was 800 x 600 pixels large: 84 px then, a tenth now.
+    const auto sensor = exif_focal_length_px(
+        jpeg_with(
+            folder / "sensor.jpg",
+            {{0x920A, 5, 42, 10}, {0xA002, 4, 800, 0}, {0xA003, 4, 600, 0}, {0xA20E, 5, 200, 1}, {0xA210, 3, 3, 0}}),
+        size);
+    ASSERT_TRUE(sensor);
+    EXPECT_NEAR(*sensor, 8.4, 1e-9);
+    EXPECT_FALSE(exif_focal_length_px(jpeg_with(folder / "none.jpg", {{0x920A, 5, 42, 10}}), size)); // of what sensor?
+    EXPECT_FALSE(exif_focal_length_px(jpeg_with(folder / "zero.jpg", {{0xA405, 3, 0, 0}}), size));
+    EXPECT_FALSE(exif_focal_length_px(write_file(folder / "broken.jpg", "\xFF\xD8\xFF\xE1"), size));
+    EXPECT_FALSE(exif_focal_length_px(folder / "nowhere.jpg", size));
+}
+
 TEST(camera_files, a_text_matrix_is_read_by_rows_and_names_no_size) {
     const TemporaryFolder folder;
     const auto read = read_camera_file(write_file(folder / "k.txt", "\xEF\xBB\xBF"
@@ -301,15 +432,16 @@ TEST(camera_files, every_format_comes_back_as_it_was_written) {
         const char* name;
         std::vector<Distortion> lenses;
     };
-    for (const Row& row : {Row{CameraFormat::scanshade, "a.json", {none, brown, fisheye}},
-                           Row{CameraFormat::open3d, "b.json", {none}},
-                           Row{CameraFormat::opencv, "c.yml", {none, brown, fisheye}},
-                           Row{CameraFormat::ros, "d.yaml", {none, brown, fisheye}},
-                           Row{CameraFormat::kalibr, "e.yaml", {none, four, fisheye}},
-                           Row{CameraFormat::colmap, "f.txt", {none, four, brown, fisheye}}})
+    for (const Row& row :
+         {Row{CameraFormat::scanshade, "a.json", {none, brown, fisheye}}, Row{CameraFormat::open3d, "b.json", {none}},
+          Row{CameraFormat::opencv, "c.yml", {none, brown, fisheye}},
+          Row{CameraFormat::ros, "d.yaml", {none, brown, fisheye}},
+          Row{CameraFormat::kalibr, "e.yaml", {none, four, fisheye}},
+          Row{CameraFormat::colmap, "f.txt", {none, four, brown, fisheye}}})
         for (const Distortion& lens : row.lenses) {
             const fs::path file = folder / row.name;
-            write_camera_file(file, {.camera = {pinhole, lens, ""}, .depth_units_per_metre = {}, .warnings = {}}, row.format);
+            write_camera_file(file, {.camera = {pinhole, lens, ""}, .depth_units_per_metre = {}, .warnings = {}},
+                              row.format);
             const Camera read = read_camera_file(file).camera;
             EXPECT_NEAR(read.pinhole.fx, pinhole.fx, 1e-9) << row.name;
             EXPECT_NEAR(read.pinhole.fy, pinhole.fy, 1e-9) << row.name;
@@ -325,7 +457,8 @@ TEST(camera_files, what_a_format_cannot_say_is_refused_not_dropped) {
     const CameraFile bent{.camera = {{525, 525, 319.5, 239.5, {640, 480}}, {0.1, 0, 0, 0, 0.2}, ""},
                           .depth_units_per_metre = {},
                           .warnings = {}};
-    EXPECT_TRUE(says(refusal([&] { write_camera_file(folder / "a.json", bent, CameraFormat::open3d); }), "no lens distortion"));
+    EXPECT_TRUE(
+        says(refusal([&] { write_camera_file(folder / "a.json", bent, CameraFormat::open3d); }), "no lens distortion"));
     EXPECT_TRUE(says(refusal([&] { write_camera_file(folder / "a.yaml", bent, CameraFormat::kalibr); }), "k3"));
     EXPECT_FALSE(fs::exists(folder / "a.json"));
 }
@@ -335,7 +468,8 @@ TEST(camera_files, yaml_and_colmap_of_the_wrong_shape_name_the_place) {
     const auto message = [&](const std::string& text) {
         return refusal([&] { (void)read_camera_file(write_file(folder / "c.yaml", text)); });
     };
-    EXPECT_TRUE(says(message("camera_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1]\n"), "has 5 numbers, expected 9"));
+    EXPECT_TRUE(
+        says(message("camera_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1]\n"), "has 5 numbers, expected 9"));
     EXPECT_TRUE(says(message("cam0:\n  camera_model: omni\n"), "\"omni\", expected pinhole"));
     EXPECT_TRUE(says(message("image_width: 640\n"), "\"camera_matrix\""));
     const std::string fine = "camera_matrix:\n  rows: 3\n  cols: 3\n  data: [5., 0., 1., 0., 5., 1., 0., 0., 1.]\n";
@@ -423,6 +557,42 @@ TEST(captures, tum_pairs_by_time_and_reads_poses) {
     // A quarter turn about z takes x to y.
     EXPECT_NEAR((*frame.world_from_camera * Eigen::Vector3d::UnitX()).y(), 3, 1e-9);
     EXPECT_TRUE(frame.warnings.empty()) << joined(frame.warnings);
+}
+
+TEST(captures, a_cameras_depth_correction_reaches_the_frames_and_holes_stay) {
+    const TemporaryFolder folder;
+    write_tum(folder.path(), 1);
+    write_camera(folder / "camera.json");
+    const cv::Mat1f plain = open_capture(folder.path()).load(0).depth_m;
+    CameraFile file = read_camera_file(folder / "camera.json");
+    file.depth_correction = {1.02, -0.01, 0.005};
+    write_camera_file(folder / "camera.json", file);
+    const Capture capture = open_capture(folder.path());
+    EXPECT_EQ(capture.depth_correction, file.depth_correction);
+    const cv::Mat1f corrected = capture.load(0).depth_m;
+    for (int i = 0; i < corrected.size().area(); ++i) {
+        const double z = plain.ptr<float>()[i];
+        EXPECT_NEAR(corrected.ptr<float>()[i], z > 0 ? 1.02 * z - 0.01 + 0.005 * z * z : 0, 1e-6);
+    }
+}
+
+TEST(captures, tum_poses_are_taken_between_their_neighbours_and_by_the_cameras_clock) {
+    const TemporaryFolder folder;
+    write_tum(folder.path(), 3);
+    write_camera(folder / "camera.json");
+    std::string rows; // 100 poses a second, moving a metre a second along x
+    for (int i = 0; i < 60; ++i)
+        rows += fmt::format("{:.3f} {} 0 0 0 0 0 1\n", 9.903 + 0.01 * i, 9.903 + 0.01 * i);
+    write_file(folder / "groundtruth.txt", rows);
+    const CaptureEntry plain = open_capture(folder.path()).entries[1];
+    ASSERT_TRUE(plain.world_from_camera);
+    EXPECT_NEAR(plain.world_from_camera->translation().x(), *plain.stamp_s, 1e-9);
+    EXPECT_NEAR(plain.motion.shift_per_s.x(), 1, 1e-6);
+    CameraFile file = read_camera_file(folder / "camera.json");
+    file.pose_time_offset_s = 0.0123;
+    write_camera_file(folder / "camera.json", file);
+    const CaptureEntry late = open_capture(folder.path()).entries[1];
+    EXPECT_NEAR(late.world_from_camera->translation().x(), *late.stamp_s + 0.0123, 1e-9);
 }
 
 TEST(captures, tum_limit_is_obeyed) {

@@ -1,6 +1,4 @@
 // Cameras refined from targets, clouds and sequences: what is recovered, how sure it is, and when nothing is changed.
-#include "apps/generate.h"
-#include "apps/refine_sources.h"
 #include "io/cloud_file.h"
 #include "io/image_file.h"
 #include "projection/calibration/board_detection.h"
@@ -502,63 +500,69 @@ TEST(Clouds, DistortionLeftInACloudsGridIsFound) {
     EXPECT_NEAR(result.after.distortion.k2, 0.05, 2e-3);
 }
 
-// ---------------------------------------------------------------------------------------------------- recordings
+/// Each damaged picture of data/broken/chessboard, and what must be said of it.
+struct BrokenPicture {
+    const char *name, *said;
+};
+constexpr BrokenPicture broken_pictures[] = {
+    {"left01_truncated.jpg", "left01_truncated.jpg: JPEG ends early"},
+    {"no_board.jpg", "no board found in"},
+    {"other_size.jpg", "other_size.jpg: 320x240 among pictures of 640x480"},
+};
 
-/// A generated office seen by a Kinect: noise that grows with depth, in steps, and colour 4 ms before depth.
-const Capture& office() {
-    static const tests::TemporaryFolder folder;
-    static const Capture capture = [] {
-        GenerateOptions options;
-        options.frames = 12;
-        options.truth = false;
-        generate(options, folder / "office");
-        return open_capture(folder / "office");
-    }();
-    return capture;
-}
-
-std::vector<std::size_t> all_of(const Capture& capture) {
-    std::vector<std::size_t> frames(capture.entries.size());
-    std::iota(frames.begin(), frames.end(), std::size_t{0});
-    return frames;
-}
-
-TEST(Recordings, AWrongFocalLengthIsFoundAndTheRightOneKept) {
-    // 5 % is 26 px; the truth is 525.
-    const RecordingResult wrong =
-        refine_from_recording(office(), all_of(office()), {.camera = "551,551,319.5,239.5"}, {}, {});
-    const Refinement& r = wrong.refinement;
-    std::printf("%s: fx %.1f +- %.1f\n", r.source.c_str(), r.after.pinhole.fx, r.climb.fit.sigma(f));
-    ASSERT_TRUE(r.climb.free[f]);
-    EXPECT_NEAR(r.after.pinhole.fx, 525, 3 * r.climb.fit.sigma(f));
-    EXPECT_NEAR(r.after.pinhole.fx, 525, 8);
-    EXPECT_LT(r.climb.held_out_px, r.climb.held_out_before_px);
-    const RecordingResult right = refine_from_recording(office(), all_of(office()), {}, {}, {});
-    EXPECT_FALSE(right.refinement.changed());
-}
-
-TEST(Recordings, WithoutPosesTheCameraIsFollowed) {
-    const RecordingResult result = refine_from_recording(office(), all_of(office()), {}, {.poses = "ignore"}, {});
-    EXPECT_FALSE(result.refinement.changed());
-    ASSERT_EQ(result.poses.size(), office().entries.size());
-    const Eigen::Isometry3d start = *office().entries[0].world_from_camera; // the followed world is the first camera's
-    for (std::size_t i = 0; i < result.poses.size(); ++i) {
-        const Eigen::Isometry3d truth = start.inverse() * *office().entries[i].world_from_camera;
-        const Eigen::Isometry3d found = result.poses[0].second.inverse() * result.poses[i].second;
-        EXPECT_LT((found.translation() - truth.translation()).norm(), 0.03)
-            << result.poses[i].first; // a Kinect's noise at 2.4 m is 9 mm
+TEST(BrokenData, DamagedPicturesAreLeftOutByNameAndTheOthersUsed) {
+    const fs::path folder = data_folder() / "broken/chessboard", sound = data_folder() / "chessboard_left";
+    NEEDS(folder);
+    for (const BrokenPicture& broken : broken_pictures) {
+        const tests::TemporaryFolder mixed;
+        for (const auto& file : fs::directory_iterator(sound))
+            if (file.path().extension() == ".jpg")
+                fs::copy_file(file.path(), mixed / file.path().filename());
+        fs::copy_file(folder / broken.name, mixed / broken.name);
+        const tests::Ran ran = tests::run_program("refine '" + mixed.path().string() + "' --board 9x6");
+        EXPECT_EQ(ran.exit_code, 0) << broken.name << ran.err;
+        EXPECT_TRUE(says(ran.out, broken.said));
+        EXPECT_TRUE(says(ran.out, "in 13 of"));
     }
 }
 
-TEST(BrokenData, ChessboardsAreRefusedByNameAndReason) {
+TEST(BrokenData, TheSameViewFourTimesIsToldApartFromACalibration) {
     const fs::path folder = data_folder() / "broken/chessboard";
     NEEDS(folder);
     const tests::Ran ran = tests::run_program("refine '" + folder.string() + "' --board 9x6");
     EXPECT_EQ(ran.exit_code, 3);
-    EXPECT_TRUE(says(ran.err, "left01_truncated.jpg: JPEG ends early"));
-    EXPECT_TRUE(says(ran.err, "no board found in"));
-    EXPECT_TRUE(says(ran.err, "other_size.jpg: 320x240"));
     EXPECT_TRUE(says(ran.err, "1 different view of the board among 4 images"));
+    for (const BrokenPicture& broken : broken_pictures) // what was left out is told with it
+        EXPECT_TRUE(says(ran.err, broken.said));
+}
+
+/// Each case of data/broken/camera as refine's first camera.
+struct BrokenCamera {
+    const char *name, *said; ///< empty = it is sound
+};
+constexpr BrokenCamera broken_cameras[] = {
+    {"ok_open3d.json", ""},
+    {"row_major.json", "row by row"},
+    {"negative_fx.json", "fx is -525"},
+    {"zero_fy.json", "fy is 0"},
+    {"nan_cx.json", "NaN"},
+    {"wrong_size.json", "320x240"},
+    {"trailing_comma.json", "line 3, column 16"},
+    {"missing_matrix.json", "\"intrinsic_matrix\""},
+    {"matrix_8_numbers.json", "has 8 numbers, expected 9"},
+};
+
+TEST(BrokenData, ADamagedFirstCameraIsRefusedByName) {
+    const fs::path folder = data_folder() / "broken/camera", boards = data_folder() / "chessboard_left";
+    NEEDS(folder);
+    for (const BrokenCamera& broken : broken_cameras) {
+        const tests::Ran ran = tests::run_program("refine '" + boards.string() + "' --board 9x6 --camera '" +
+                                                  (folder / broken.name).string() + "'");
+        EXPECT_EQ(ran.exit_code, *broken.said ? 3 : 0) << broken.name << ran.err;
+        EXPECT_TRUE(says(ran.err, broken.said)) << broken.name;
+        if (*broken.said)
+            EXPECT_TRUE(says(ran.err, broken.name));
+    }
 }
 
 } // namespace

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace scanshade::calibration {
@@ -41,6 +42,8 @@ class Evidence {
 
     [[nodiscard]] virtual std::size_t views() const = 0;
     [[nodiscard]] virtual std::string view_name(std::size_t view) const = 0;
+    /// What residuals are counted in.
+    [[nodiscard]] virtual std::string_view unit() const { return "px"; }
     /// How much each view counts from now on, as the factor on its residuals; 1 until set.
     virtual void weigh(const std::vector<double>& weights) = 0;
     /// Nothing free yet: the evidence's own unknowns fitted to the model as it is.
@@ -49,7 +52,8 @@ class Evidence {
     [[nodiscard]] virtual Fit fit(const Fit& from, const Free& free, const Views& used, bool covariance) const = 0;
     /// Each marked view's residuals under the model; the view's own unknowns are fitted, the model's are not.
     [[nodiscard]] virtual std::vector<ViewScore> score(const Fit& fit, const Views& wanted) const = 0;
-    /// Where in the image a view saw something, and by how much the model misses it there (predicted - seen), pixels.
+    /// Where in the image a view saw something, and by how much the model misses it there (predicted - seen), pixels;
+    /// no residuals where they are not of pixels.
     [[nodiscard]] virtual std::vector<cv::Point2d> pixels_of(std::size_t view) const = 0;
     [[nodiscard]] virtual std::vector<Eigen::Vector2d> residuals(const Fit& fit, std::size_t view) const = 0;
     /// Depths of what was seen, metres, for the effect in millimetres.

@@ -202,7 +202,7 @@ class Ladder {
             rung.unknowns.insert(rung.unknowns.end(), rungs_[indices[i]].unknowns.begin(),
                                  rungs_[indices[i]].unknowns.end());
         if (const double rms = train_rms(climb_.fit); rms < options_.enough_px && !must(rung)) {
-            say(indices, false, fmt::format("not needed: the error is {:.1g} px without it", rms));
+            say(indices, false, fmt::format("not needed: the error is {:.1g} {} without it", rms, evidence_.unit()));
             return Outcome::refused;
         }
         Free free = climb_.free;

@@ -7,7 +7,7 @@ std::string_view name_of(Unknown unknown) {
     constexpr std::array<std::string_view, unknown_count> names = {
         "f",      "fy/fx",  "cx",      "cy",          "k1",           "k2",          "p1",
         "p2",     "k3",     "k4",      "depth scale", "depth offset", "depth curve", "turn x",
-        "turn y", "turn z", "shift x", "shift y",     "shift z"};
+        "turn y", "turn z", "shift x", "shift y",     "shift z",      "time offset"};
     return names[unknown];
 }
 
@@ -42,6 +42,8 @@ std::vector<Rung> camera_rungs(LensModel lens) {
         rungs.insert(rungs.end(), {{"p1, p2", {p1, p2}}, {"k3", {k3}}});
     return rungs;
 }
+
+Rung place_rung() { return {"place", {turn_x, turn_y, turn_z, shift_x, shift_y, shift_z}}; }
 
 std::vector<Rung> depth_rungs() {
     return {{"depth offset", {depth_offset}}, {"depth scale", {depth_scale}}, {"depth curve", {depth_curve}}};

@@ -29,11 +29,12 @@ enum Unknown : int {
     turn_z,
     shift_x,
     shift_y,
-    shift_z, // colour_from_depth: axis times angle, metres
+    shift_z,     // colour_from_depth: axis times angle, metres
+    time_offset, // the images' clock against the poses', seconds: an image stamped t was taken at pose time t + offset
     unknown_count
 };
 inline constexpr int camera_unknowns = depth_scale, depth_unknowns = turn_x - depth_scale;
-inline constexpr int place_unknowns = unknown_count - turn_x;
+inline constexpr int place_unknowns = time_offset - turn_x;
 
 [[nodiscard]] std::string_view name_of(Unknown unknown);
 
@@ -60,6 +61,8 @@ struct Rung {
 };
 /// f, fx fy, cx cy, k1, k2, p1 p2, k3; for a fisheye f, fx fy, cx cy, k1, k2, k3, k4.
 [[nodiscard]] std::vector<Rung> camera_rungs(LensModel lens);
+/// Where the colour camera is beside the depth camera.
+[[nodiscard]] Rung place_rung();
 /// Depth offset, scale, curve.
 [[nodiscard]] std::vector<Rung> depth_rungs();
 

@@ -43,11 +43,11 @@ Climb climbed(const Evidence& evidence, const Fit& start, const std::vector<Rung
                                               : climb(evidence, start, rungs, used, options.ladder);
 }
 
-std::string names_of_outlying(const std::vector<ViewRow>& rows) {
+std::string names_of_outlying(const std::vector<ViewRow>& rows, const std::string& unit) {
     std::vector<std::string> names;
     for (const ViewRow& row : rows)
         if (row.outlying)
-            names.push_back(fmt::format("{} ({:.2f} px)", row.name, row.score.rms()));
+            names.push_back(fmt::format("{} ({:.2f} {})", row.name, row.score.rms(), unit));
     constexpr std::size_t most = 10;
     const std::string more = names.size() > most ? fmt::format(" and {} more", names.size() - most) : "";
     names.resize(std::min(names.size(), most));
@@ -58,12 +58,18 @@ std::string names_of_outlying(const std::vector<ViewRow>& rows) {
 
 Refinement refine(Evidence& evidence, const Camera& before, const std::vector<Rung>& rungs,
                   const RefineOptions& options, const std::string& cannot) {
+    return refine(evidence, model_of(before), before, rungs, options, cannot);
+}
+
+Refinement refine(Evidence& evidence, const Model& first, const Camera& before, const std::vector<Rung>& rungs,
+                  const RefineOptions& options, const std::string& cannot) {
     if (!cannot.empty() && options.ladder.guessed)
         throw Error("no camera can be found: " + cannot);
     Refinement result;
     result.before = before;
+    result.unit = evidence.unit();
     Views used(evidence.views(), true);
-    const Fit start = evidence.start(model_of(before));
+    const Fit start = evidence.start(first);
     if (!cannot.empty()) {
         result.notes.push_back("nothing is determined: " + cannot + ".");
         result.climb = climb(evidence, start, {}, used, options.ladder);
@@ -78,7 +84,7 @@ Refinement refine(Evidence& evidence, const Camera& before, const std::vector<Ru
                                : options.outliers == Outliers::drop ? "dropped"
                                                                     : "weighed down to the median's error";
             result.notes.push_back(fmt::format("outlying views, more than {:.0f} times the median error: {}; {}.",
-                                               outlying_ratio, names_of_outlying(result.views), done));
+                                               outlying_ratio, names_of_outlying(result.views, result.unit), done));
         }
         if (outlying > 0 && options.outliers != Outliers::keep) {
             std::vector<double> weights(result.views.size(), 1.0);
@@ -87,11 +93,11 @@ Refinement refine(Evidence& evidence, const Camera& before, const std::vector<Ru
                 weights[i] = options.outliers == Outliers::downweight ? result.views[i].weight : 1;
             }
             evidence.weigh(weights);
-            const std::vector<ViewRow> first = result.views;
+            const std::vector<ViewRow> all = result.views;
             result.climb = climbed(evidence, start, rungs, used, options);
             result.views = rows_of(evidence, result.climb.fit);
-            for (std::size_t i = 0; i < first.size(); ++i) {
-                result.views[i].outlying = first[i].outlying;
+            for (std::size_t i = 0; i < all.size(); ++i) {
+                result.views[i].outlying = all[i].outlying;
                 result.views[i].weight = weights[i];
                 result.views[i].used = used[i];
             }
@@ -110,12 +116,15 @@ Refinement refine(Evidence& evidence, const Camera& before, const std::vector<Ru
         const std::vector<Eigen::Vector2d> residuals = evidence.residuals(result.climb.fit, i);
         for (std::size_t point = 0; point < pixels.size(); ++point) {
             seen.push_back(pixels[point]);
-            result.residuals.emplace_back(pixels[point], residuals[point]);
+            if (point < residuals.size())
+                result.residuals.emplace_back(pixels[point], residuals[point]);
         }
     }
     result.coverage = coverage_of(seen, before.pinhole.size);
     result.pixel_sigma = pixel_sigmas(result.climb.fit);
-    if (result.changed() && !options.ladder.guessed) // a change from a guess says nothing
+    const auto& free = result.climb.free;
+    const bool of_camera = std::any_of(free.begin(), free.begin() + camera_unknowns, [](bool open) { return open; });
+    if (of_camera && !options.ladder.guessed) // a change from a guess says nothing
         result.effects = effects(before, result.after, evidence.depths_m(result.climb.fit));
     return result;
 }

@@ -28,6 +28,7 @@ struct ViewRow {
 
 struct Refinement {
     std::string source; ///< "chessboard of 9x6 corners, 25 mm, in 13 images"
+    std::string unit;   ///< of its errors: px, or mm of depth
     Camera before, after;
     Climb climb;
     std::optional<Climb> full; ///< the full model on the same views, for comparison
@@ -46,5 +47,10 @@ struct Refinement {
 /// evidence determines nothing, if it does not: then nothing is climbed, and a guessed camera is an Error.
 [[nodiscard]] Refinement refine(Evidence& evidence, const Camera& before, const std::vector<Rung>& rungs,
                                 const RefineOptions& options, const std::string& cannot);
+/// The same where more than the camera is known before: its depth correction, its place. `before` is `first`'s camera
+/// with its origin.
+[[nodiscard]] Refinement refine(Evidence& evidence, const Model& first, const Camera& before,
+                                const std::vector<Rung>& rungs, const RefineOptions& options,
+                                const std::string& cannot);
 
 } // namespace scanshade::calibration

@@ -1,7 +1,9 @@
 // A recorded RGB-D sequence as evidence: bundle adjustment of tracks, depths, poses and the camera.
 #pragma once
 
+#include "projection/calibration/edges.h"
 #include "projection/calibration/evidence.h"
+#include "projection/calibration/geometry.h"
 #include "projection/calibration/tracks.h"
 
 #include <Eigen/Geometry>
@@ -12,13 +14,16 @@ namespace scanshade::calibration {
 /// One frame as the adjustment needs it.
 struct SequenceFrame {
     std::string name;
-    cv::Mat1b grey;                                     ///< the colour image
-    cv::Mat1f depth_m;                                  ///< recorded depth, 0 = hole
-    std::optional<Eigen::Isometry3d> world_from_camera; ///< of the depth camera, as recorded
+    cv::Mat1b grey;                                          ///< the colour image
+    cv::Mat1f depth_m;                                       ///< recorded depth, 0 = hole
+    std::optional<Eigen::Isometry3d> world_from_camera = {}; ///< of the depth camera, as recorded
+    Motion motion = {};                                      ///< of the depth camera then
+    double colour_later_s = 0;                               ///< than depth, by their stamps
 };
 
 struct SequenceOptions {
     bool registered = true;   ///< colour pixel (u, v) and depth pixel (u, v) see the same thing
+    bool outlines = true;     ///< of unregistered images: depth edges lie on colour edges
     bool refine_poses = true; ///< recorded poses are good to the sigmas below; otherwise they are the truth
     double pose_shift_sigma_m = 0.005, pose_turn_sigma = 0.0035; ///< metres and radians
     double pixel_sigma_px = 0.5;
@@ -28,7 +33,7 @@ struct SequenceOptions {
 
 /// Registered: one camera takes colour and depth; a track's point must project onto its sightings, and lie at the depth
 /// recorded there. Unregistered: the model is the colour camera and its place, `depth_camera` stays as it is; the point
-/// must lie on the surface that the depth camera saw.
+/// must lie on the surface that the depth camera saw, and outlines of near things on edges of the colour image.
 class Sequence final : public Evidence {
   public:
     /// Finds tracks; where a pose is missing, follows the camera from frame to frame (PnP on matches with depth).
@@ -48,13 +53,16 @@ class Sequence final : public Evidence {
 
     /// Poses of the depth camera under a fit, world_from_camera.
     [[nodiscard]] std::vector<Eigen::Isometry3d> poses(const Fit& fit) const;
+    /// How far depth edges lie from colour edges, pixels (median, at most 20); NaN where images are registered.
+    [[nodiscard]] double outline_miss_px(const Model& model) const;
+    [[nodiscard]] std::size_t outline_points() const;
+    /// Whether the clocks of poses and images can be compared: the poses are kept, and the camera's motion is known.
+    [[nodiscard]] bool tells_time() const;
     [[nodiscard]] std::size_t points() const { return tracks_.size(); }
     [[nodiscard]] std::size_t sightings() const;
     /// Why these frames cannot determine a camera: pure forward motion, one plane, hardly any motion. Empty = they may.
     [[nodiscard]] std::string degeneracy(const Fit& fit) const;
-    /// Median distance of frame-to-frame overlapping surfaces along the optical axis, millimetres: each frame's depth
-    /// lifted, moved into the next frames and compared with their depth. NaN where nothing overlaps.
-    [[nodiscard]] double overlap_mm(const Model& depth_model, const std::vector<Eigen::Isometry3d>& poses) const;
+    [[nodiscard]] std::vector<cv::Mat1f> depth_images() const;
 
   private:
     friend class SequenceProblem;
@@ -66,14 +74,31 @@ class Sequence final : public Evidence {
     struct Point {
         std::vector<Sighting> sightings;
     };
+    struct Miss {
+        double pixels = 0, depth = 0; ///< in the residuals' unit
+    };
+    void pair_outlines(const Model& first);
+    void leave_out_far_outlines(const Fit& fit);
     void follow_camera(const Model& first);
+    [[nodiscard]] Eigen::Isometry3d placed_by_points(int frame, const Camera& camera,
+                                                     const std::vector<std::optional<Eigen::Vector3d>>& world) const;
     void prune(const Model& first);
+    void leave_out_absurd(const Fit& fit);
+    [[nodiscard]] Fit robust_fit(const Fit& from) const;
+    [[nodiscard]] std::vector<std::vector<Miss>> misses_of(const Fit& fit) const;
+    void leave_out_beyond(const std::vector<std::vector<Miss>>& misses, const Miss& most);
+    /// Worth keeping: seen often enough, with a depth somewhere.
+    [[nodiscard]] bool useful(const Point& point) const;
     [[nodiscard]] Fit initial(const Model& model) const;
 
     std::vector<SequenceFrame> frames_;
     Camera depth_camera_;
     SequenceOptions options_;
     std::vector<Point> tracks_;
+    std::vector<std::vector<OutlinePoint>> outlines_; ///< of unregistered frames
+    std::vector<ColourEdges> edges_;
+    std::vector<std::vector<OutlinePair>> pairs_;
+    double outline_sigma_px_ = 2;
     std::vector<double> weights_;
     std::vector<Eigen::Isometry3d> start_poses_;
     double depth_weight_ = 1; ///< rescales the assumed depth sigma to what residuals show

@@ -4,6 +4,7 @@
 #include "projection/error.h"
 
 #include <Eigen/Dense>
+#include <glog/logging.h>
 #include <map>
 
 namespace scanshade::calibration {
@@ -12,7 +13,8 @@ namespace {
 struct Block {
     int first, size;
 };
-constexpr Block blocks[] = {{0, camera_unknowns}, {depth_scale, depth_unknowns}, {turn_x, place_unknowns}};
+constexpr Block blocks[] = {
+    {0, camera_unknowns}, {depth_scale, depth_unknowns}, {turn_x, place_unknowns}, {time_offset, 1}};
 
 std::vector<int> free_in(const Block& block, const Free& free) {
     std::vector<int> indices;
@@ -49,6 +51,7 @@ void freeze(ceres::Problem& problem, Model& model, const Free& free) {
 }
 
 void solve(ceres::Problem& problem, Fit& fit, bool many_unknowns) {
+    FLAGS_minloglevel = google::GLOG_ERROR; // a step that fails is taken again, shorter: nothing to warn of
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_SCHUR; // poses and model are few, points are eliminated
     options.max_num_iterations = many_unknowns ? 40 : 100;

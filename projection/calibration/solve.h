@@ -7,7 +7,7 @@
 
 namespace scanshade::calibration {
 
-/// The model's numbers are three blocks of a problem: camera, depth, place. Those in the problem are frozen where not
+/// The model's numbers are blocks of a problem: camera, depth, place, clock. Those in the problem are frozen where not
 /// free.
 void freeze(ceres::Problem& problem, Model& model, const Free& free);
 

@@ -1,0 +1,131 @@
+// Depth edges, colour edges, and which belongs to which.
+#include "projection/calibration/edges.h"
+
+#include "projection/calibration/geometry.h"
+#include "projection/calibration/solve.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace scanshade::calibration {
+namespace {
+
+/// The pixel at which the colour camera sees a point of the depth camera's space; none behind it or outside the image.
+std::optional<Eigen::Vector2d> seen_at(const Model& colour, const Eigen::Vector3d& in_depth) {
+    Eigen::Vector3d in_colour;
+    moved(colour.values.data() + turn_x, in_depth.data(), in_colour.data());
+    if (in_colour.z() <= 0.05)
+        return std::nullopt;
+    Eigen::Vector2d pixel;
+    pixel_of(colour.lens, colour.values.data(), in_colour.data(), pixel.data());
+    const bool inside =
+        pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < colour.size.width - 1 && pixel.y() < colour.size.height - 1;
+    return inside ? std::optional(pixel) : std::nullopt;
+}
+
+/// The nearest edge pixel along a line through a place, both ways.
+std::optional<cv::Point> edge_along(const ColourEdges& edges, const Eigen::Vector2d& from,
+                                    const Eigen::Vector2d& direction, double reach_px) {
+    constexpr double step_px = 0.5, same_direction = 0.85; // cosine of 32 degrees
+    for (double away = 0; away <= reach_px; away += step_px)
+        for (const double side : {1.0, -1.0}) {
+            const Eigen::Vector2d at = from + side * away * direction;
+            const cv::Point pixel(static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y())));
+            if (!cv::Rect({}, edges.edges.size()).contains(pixel) || !edges.edges(pixel))
+                continue;
+            const cv::Vec2f across = edges.across(pixel);
+            if (std::abs(across[0] * direction.x() + across[1] * direction.y()) > same_direction)
+                return pixel;
+        }
+    return std::nullopt;
+}
+
+/// Where the surface of a pixel ends right beside it with something farther behind: the direction it ends in.
+std::optional<Eigen::Vector2d> outward_at(const cv::Mat1f& depth_m, int u, int v) {
+    constexpr double farther = 1.08, flat = 1.02;
+    constexpr int longest_shadow = 30; // of a Kinect's projector, pixels
+    const float near = depth_m(v, u);
+    if (!(near > 0))
+        return std::nullopt;
+    Eigen::Vector2d outward = Eigen::Vector2d::Zero();
+    for (int dv = -2; dv <= 2; ++dv)
+        for (int du = -2; du <= 2; ++du)
+            if (const float z = depth_m(v + dv, u + du); !(z > 0) || z > farther * near)
+                outward += Eigen::Vector2d(du, dv);
+    if (outward.norm() < 3)
+        return std::nullopt;
+    outward.normalize();
+    const auto beside = [&](double steps) {
+        const cv::Point at(u + static_cast<int>(std::lround(steps * outward.x())),
+                           v + static_cast<int>(std::lround(steps * outward.y())));
+        return cv::Rect({}, depth_m.size()).contains(at) ? depth_m(at) : 0.0F;
+    };
+    if (beside(-3) > flat * near || beside(-3) < near / flat)
+        return std::nullopt; // no surface that goes on evenly
+    for (double steps = 1.5; steps < longest_shadow; ++steps)
+        if (const float behind = beside(steps); behind > 0)
+            return behind > farther * near ? std::optional(outward) : std::nullopt;
+    return std::nullopt;
+}
+
+} // namespace
+
+std::vector<OutlinePoint> outline_of(const cv::Mat1f& depth_m, const Camera& camera, std::size_t most) {
+    constexpr int margin = 4;
+    std::vector<OutlinePoint> all;
+    for (int v = margin; v < depth_m.rows - margin; v += 2)
+        for (int u = margin; u < depth_m.cols - margin; u += 2)
+            if (const auto outward = outward_at(depth_m, u, v))
+                all.push_back({depth_m(v, u) * ray_of(camera, Eigen::Vector2d(u, v)), *outward});
+    if (all.size() <= most)
+        return all;
+    std::vector<OutlinePoint> chosen;
+    for (std::size_t i = 0; i < most; ++i)
+        chosen.push_back(all[i * all.size() / most]);
+    return chosen;
+}
+
+ColourEdges colour_edges_of(const cv::Mat1b& grey) {
+    cv::Mat1b smooth, edges;
+    cv::GaussianBlur(grey, smooth, {5, 5}, 1.2);
+    cv::Canny(smooth, edges, 25, 60);
+    cv::Mat1f du, dv;
+    cv::Sobel(smooth, du, CV_32F, 1, 0);
+    cv::Sobel(smooth, dv, CV_32F, 0, 1);
+    cv::Mat2f across(grey.size(), cv::Vec2f());
+    for (int v = 0; v < grey.rows; ++v)
+        for (int u = 0; u < grey.cols; ++u)
+            if (const float length = std::hypot(du(v, u), dv(v, u)); length > 0)
+                across(v, u) = {du(v, u) / length, dv(v, u) / length};
+    return {edges, across};
+}
+
+std::vector<OutlinePair> paired(const std::vector<OutlinePoint>& outline, const ColourEdges& edges, const Model& colour,
+                                double reach_px) {
+    std::vector<OutlinePair> pairs;
+    for (const OutlinePoint& point : outline) {
+        const auto pixel = seen_at(colour, point.in_depth);
+        if (!pixel)
+            continue;
+        if (const auto edge = edge_along(edges, *pixel, point.outward, reach_px)) {
+            const cv::Vec2f across = edges.across(*edge);
+            pairs.push_back({point.in_depth, {edge->x, edge->y}, {across[0], across[1]}});
+        }
+    }
+    return pairs;
+}
+
+double outline_miss_px(const std::vector<std::vector<OutlinePoint>>& outlines, const std::vector<ColourEdges>& edges,
+                       const Model& colour, double reach_px) {
+    std::vector<double> misses;
+    for (std::size_t i = 0; i < outlines.size(); ++i)
+        for (const OutlinePoint& point : outlines[i])
+            if (const auto pixel = seen_at(colour, point.in_depth)) {
+                const auto edge = edge_along(edges[i], *pixel, point.outward, reach_px);
+                misses.push_back(edge ? (Eigen::Vector2d(edge->x, edge->y) - *pixel).norm() : reach_px);
+            }
+    return median_of(misses);
+}
+
+} // namespace scanshade::calibration

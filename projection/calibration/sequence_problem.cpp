@@ -1,0 +1,106 @@
+// The residuals of a recording's tracks, depths and poses, put together.
+#include "projection/calibration/sequence_problem.h"
+
+#include "projection/calibration/sequence_residuals.h"
+
+namespace scanshade::calibration {
+
+void SequenceProblem::add(std::size_t track, const Sequence::Sighting& s, ceres::LossFunction* loss) {
+    const double weight = sequence_.weights_[s.frame];
+    const auto [motion, later_s] = motion_of(s.frame);
+    const LensModel lens = fit_.model.lens;
+    double* camera = fit_.model.values.data();
+    if (sequence_.options_.registered)
+        problem.AddResidualBlock(
+            new ceres::AutoDiffCostFunction<SightingResidual, 2, camera_unknowns, 1, pose_unknowns, point_unknowns>(
+                new SightingResidual{lens, s.pixel, motion, later_s, weight}),
+            loss, camera, clock(), pose(s.frame), point(track));
+    else
+        problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PlacedSightingResidual, 2, camera_unknowns,
+                                                                 place_unknowns, 1, pose_unknowns, point_unknowns>(
+                                     new PlacedSightingResidual{lens, s.pixel, motion, later_s, weight}),
+                                 loss, camera, place(), clock(), pose(s.frame), point(track));
+    sightings.push_back(problem.NumResidualBlocks() - 1);
+    add_depth(track, s, loss);
+}
+
+void SequenceProblem::add_outlines(int frame, double robust_px) {
+    if (sequence_.pairs_.empty())
+        return;
+    const auto [motion, later_s] = motion_of(frame);
+    const double weight =
+        outline_share * sequence_.weights_[frame] * sequence_.options_.pixel_sigma_px / sequence_.outline_sigma_px_;
+    for (const OutlinePair& pair : sequence_.pairs_[frame])
+        problem.AddResidualBlock(
+            new ceres::AutoDiffCostFunction<OutlineResidual, 1, camera_unknowns, place_unknowns, 1>(new OutlineResidual{
+                fit_.model.lens, pair.in_depth, pair.on_edge, pair.across, motion, later_s, weight}),
+            robust_px > 0 ? new ceres::CauchyLoss(robust_px) : nullptr, fit_.model.values.data(), place(), clock());
+}
+
+/// Where poses are refined they are those at which colour was taken, and what the camera did around them is left out.
+std::pair<Motion, double> SequenceProblem::motion_of(int frame) const {
+    const SequenceFrame& part = sequence_.frames_[frame];
+    return sequence_.options_.refine_poses ? std::pair(Motion(), 0.0) : std::pair(part.motion, part.colour_later_s);
+}
+
+void SequenceProblem::add_depth(std::size_t track, const Sequence::Sighting& s, ceres::LossFunction* loss) {
+    const int before = problem.NumResidualBlocks();
+    if (sequence_.options_.registered && s.depth_m > 0)
+        add_recorded_depth(track, s, loss);
+    else if (!sequence_.options_.registered && s.depth_m >= 0)
+        add_surface(track, s, loss);
+    if (problem.NumResidualBlocks() > before)
+        depths.push_back(before);
+}
+
+void SequenceProblem::add_recorded_depth(std::size_t track, const Sequence::Sighting& s, ceres::LossFunction* loss) {
+    const double weight = sequence_.weights_[s.frame] * depth_weight(s.depth_m);
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<DepthResidual, 1, depth_unknowns, 1, pose_unknowns, point_unknowns>(
+            new DepthResidual{s.depth_m, motion_of(s.frame).first, weight}),
+        loss, fit_.model.values.data() + depth_scale, clock(), pose(s.frame), point(track));
+}
+
+void SequenceProblem::add_surface(std::size_t track, const Sequence::Sighting& s, ceres::LossFunction* loss) {
+    constexpr double same_surface = 0.05; // of the depth: farther off it is another one, and says nothing of this point
+    Eigen::Vector3d in_depth;
+    moved(pose(s.frame), point(track), in_depth.data());
+    const auto surface = surface_at(sequence_.frames_[s.frame].depth_m, sequence_.depth_camera_.pinhole, in_depth);
+    if (!surface || std::abs(surface->normal.dot(in_depth - surface->centre)) > same_surface * in_depth.z())
+        return;
+    const double weight = sequence_.weights_[s.frame] * depth_weight(in_depth.z());
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<SurfaceResidual, 1, pose_unknowns, point_unknowns>(
+                                 new SurfaceResidual{surface->centre, surface->normal, weight}),
+                             loss, pose(s.frame), point(track));
+}
+
+double SequenceProblem::depth_weight(double z_m) const {
+    const SequenceOptions& o = sequence_.options_;
+    return sequence_.depth_weight_ * o.pixel_sigma_px / (o.depth_floor_m + o.depth_per_z2 * z_m * z_m);
+}
+
+void SequenceProblem::hold_poses(const Views& used) {
+    bool first = true;
+    for (std::size_t i = 0; i < used.size(); ++i) {
+        if (!problem.HasParameterBlock(pose(static_cast<int>(i))))
+            continue;
+        if (!sequence_.options_.refine_poses || (first && !sequence_.frames_[i].world_from_camera))
+            problem.SetParameterBlockConstant(pose(static_cast<int>(i)));
+        else
+            hold_near_recorded(static_cast<int>(i));
+        first = false;
+    }
+}
+
+void SequenceProblem::hold_near_recorded(int frame) {
+    const auto& recorded = sequence_.frames_[frame].world_from_camera;
+    if (!recorded)
+        return;
+    const SequenceOptions& o = sequence_.options_;
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PoseResidual, 6, pose_unknowns>(new PoseResidual{
+                                 Eigen::Quaterniond(recorded->linear()).inverse().normalized(), recorded->translation(),
+                                 o.pixel_sigma_px / o.pose_turn_sigma, o.pixel_sigma_px / o.pose_shift_sigma_m}),
+                             nullptr, pose(frame));
+}
+
+} // namespace scanshade::calibration
