@@ -560,8 +560,9 @@ TEST(BrokenData, ADamagedFirstCameraIsRefusedByName) {
                                                   (folder / broken.name).string() + "'");
         EXPECT_EQ(ran.exit_code, *broken.said ? 3 : 0) << broken.name << ran.err;
         EXPECT_TRUE(says(ran.err, broken.said)) << broken.name;
-        if (*broken.said)
+        if (*broken.said) {
             EXPECT_TRUE(says(ran.err, broken.name));
+        }
     }
 }
 
