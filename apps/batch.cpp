@@ -1,6 +1,7 @@
 // The walk for many frames: load, project, compute, attach, write, with a bounded number of frames in memory.
 #include "apps/batch.h"
 
+#include "apps/cloud_walk.h"
 #include "apps/picture.h"
 #include "io/cloud_file.h"
 #include "io/npy_file.h"
@@ -36,6 +37,7 @@ struct Work {
     AoMap ao = {};
     cv::Mat1f confidence_in_view = {}; ///< of `ao`, pixel by pixel
     Attached attached = {}, confidence = {};
+    bool by_points = false; ///< no view: values come from the points themselves
 };
 
 /// Takes one step with a frame and its time; the only place where a frame's failure is caught.
@@ -99,19 +101,7 @@ Attached attach_points(const Frame& frame, PointMethod& method) {
     const Cloud& cloud = *frame.cloud;
     const auto normals = recorded_normals(cloud);
     const auto triangles = triangles_of(cloud);
-    Attached attached;
-    attached.per_point = method.compute({cloud.points, normals, triangles});
-    std::ptrdiff_t known = 0, valid = 0;
-    double sum = 0;
-    for (std::size_t i = 0; i < cloud.points.size(); ++i) {
-        const bool has_value = !std::isnan(attached.per_point[i]);
-        valid += cloud.points[i].allFinite();
-        known += has_value;
-        sum += has_value ? static_cast<double>(attached.per_point[i]) : 0;
-    }
-    attached.coverage = share(known, static_cast<std::size_t>(valid));
-    attached.mean_visibility = known > 0 ? sum / static_cast<double>(known) : unknown;
-    return attached;
+    return attached_points(cloud, method.compute({cloud.points, normals, triangles}));
 }
 
 /// What the pictures of a frame show, all on one pixel grid.
@@ -316,6 +306,14 @@ void write_all(Work& work, const Scene& scene, const cv::Mat3b& shaded, const Ou
         wrote(cloud_file(name, ".ply"), [&](const auto& file) { write_depth_cloud(file, work, scene, outputs); });
 }
 
+/// A cloud without a view, as it looks from two opposite sides.
+void write_sides(Work& work, const Outputs& outputs) {
+    const std::filesystem::path file = picture_file("shaded", work.entry.name);
+    write_picture(outputs.folder / file,
+                  two_sides(*work.frame.cloud, work.attached.per_point, outputs.shade_strength));
+    work.row.files.push_back(file);
+}
+
 /// A failed frame leaves neither part of its own files nor those of an earlier run: what lies there is what the row
 /// says.
 void remove_files(Work& work, const Outputs& outputs) {
@@ -342,7 +340,7 @@ bool wants_confidence(const Work& work, const Outputs& outputs) {
 
 void attach_and_write(Work& work, const BatchOptions& options) {
     Outputs outputs = options.outputs;
-    const bool by_points = options.point_method && work.frame.cloud;
+    const bool by_points = work.by_points;
     if (by_points)
         outputs.ao = outputs.confidence = outputs.shaded = outputs.panel = false;
     Scene scene;
@@ -361,7 +359,11 @@ void attach_and_write(Work& work, const BatchOptions& options) {
         if (outputs.shaded || outputs.panel)
             shaded = shaded_picture(scene, outputs.shade_strength);
     });
-    take(work, &StageTimes::write, [&] { write_all(work, scene, shaded, outputs); });
+    take(work, &StageTimes::write, [&] {
+        write_all(work, scene, shaded, outputs);
+        if (by_points && options.outputs.shaded)
+            write_sides(work, options.outputs);
+    });
     if (work.row.status == FrameStatus::failed)
         remove_files(work, outputs);
     else
@@ -409,7 +411,8 @@ std::vector<std::filesystem::path> files_of(const CaptureEntry& entry, const Out
     if (entry.cloud.empty() ? outputs.depth_cloud : outputs.cloud)
         add(cloud_file(entry.name, ".ply"));
     if (!entry.cloud.empty() && outputs.cloud)
-        add(cloud_file(entry.name, ".pcd"));
+        for (const char* other : {".pcd", ".las", ".xyz", ".pts", ".ptx"})
+            add(cloud_file(entry.name, other));
     return files;
 }
 
@@ -433,8 +436,12 @@ std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const Ba
             work->frame = load(capture, work->row.index, options.registration);
             describe_frame(*work);
         });
-        if (options.point_method && work->frame.cloud)
+        if (work->row.status != FrameStatus::failed && work->frame.cloud)
+            work->by_points = options.point_method || takes_points(work->frame, options, work->row.notes);
+        if (work->by_points) {
+            work->row.ms.project = 0;
             return work;
+        }
         take(*work, &StageTimes::project, [&] {
             work->frame.camera = work->row.camera = camera_of(work->frame);
             work->depth = project(work->frame, options.range);
@@ -444,8 +451,16 @@ std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const Ba
     };
     const auto compute = [&](Token work) {
         take(*work, &StageTimes::compute, [&] {
-            if (options.point_method && work->frame.cloud) {
+            if (work->by_points && options.point_method) {
                 work->attached = attach_points(work->frame, *options.point_method);
+                return;
+            }
+            if (work->by_points) {
+                CloudVisibility found = cloud_visibility(work->frame, *options.cloud_ao);
+                std::ranges::move(found.notes, std::back_inserter(work->row.notes));
+                work->row.passes = found.timings;
+                work->confidence.per_point = std::move(found.confidence);
+                work->attached = attached_points(*work->frame.cloud, std::move(found.visibility));
                 return;
             }
             work->ao = method.compute({work->depth});

@@ -1,6 +1,7 @@
 // The walk for many frames: load, project, compute, attach, write, with a bounded number of frames in memory.
 #pragma once
 
+#include "ao/cloud/cloud_ao.h"
 #include "ao/method.h"
 #include "io/capture.h"
 #include "io/image_file.h"
@@ -34,6 +35,9 @@ struct Outputs {
 /// The files that `outputs` makes of a frame; of a cloud both possible names, since only its content tells the format.
 [[nodiscard]] std::vector<std::filesystem::path> files_of(const CaptureEntry& entry, const Outputs& outputs);
 
+/// How clouds are taken: rays from each of their points, one camera's view, or points unless one camera saw them all.
+enum class CloudWalk { automatic, points, view };
+
 struct BatchOptions {
     std::vector<std::size_t> frames; ///< indices into capture.entries; the report keeps this order
     Outputs outputs;
@@ -41,11 +45,13 @@ struct BatchOptions {
     double radius_m = 0;                      ///< the method's, and
     DepthNoise noise;                         ///< the depth's: what confidence depends on
     std::optional<Registration> registration; ///< what the user said; otherwise what the capture says
-    PointMethod* point_method = nullptr; ///< what clouds and meshes are computed with, where that needs no view: then
-                                         ///< the cloud is all that is written of them
-    std::filesystem::path dump;          ///< folder for the method's intermediates, frame by frame; empty = none
-    int frames_in_memory = 0;            ///< 0 = cores + 2
-    const std::atomic<bool>* stop = nullptr; ///< set = begin no further frame
+    PointMethod* point_method = nullptr;      ///< what clouds and meshes are computed with, where that needs no view: then
+                                              ///< the cloud is all that is written of them
+    const CloudAo* cloud_ao = nullptr;        ///< what other clouds are computed with, where `cloud_walk` says so
+    CloudWalk cloud_walk = CloudWalk::automatic;
+    std::filesystem::path dump;               ///< folder for the method's intermediates, frame by frame; empty = none
+    int frames_in_memory = 0;                 ///< 0 = cores + 2
+    const std::atomic<bool>* stop = nullptr;  ///< set = begin no further frame
 };
 
 enum class FrameStatus { ok, failed, skipped };
@@ -70,6 +76,7 @@ struct FrameRow {
     StageTimes ms;
     Timings passes; ///< the method's own account of `ms.compute`
     std::vector<std::string> warnings;
+    std::vector<std::string> notes; ///< what was chosen for this frame, and why
     std::vector<std::filesystem::path> files; ///< written, relative to Outputs::folder
 };
 

@@ -21,6 +21,8 @@ std::string line_of(const FrameRow& row) {
                     100 * row.coverage, visibility, ms.load + ms.project + ms.compute + ms.attach + ms.write);
     for (const std::string& warning : row.warnings)
         line += "; warning: " + warning;
+    for (const std::string& note : row.notes)
+        line += "\n    " + note;
     return line;
 }
 
@@ -30,7 +32,7 @@ Progress::Progress(std::size_t total) : total_(total), on_terminal_(isatty(STDER
 
 void Progress::add(const FrameRow& row) {
     ++done_;
-    const bool remarkable = row.status != FrameStatus::ok || !row.warnings.empty();
+    const bool remarkable = row.status != FrameStatus::ok || !row.warnings.empty() || !row.notes.empty();
     if (!on_terminal_ || remarkable)
         fmt::print(stderr, "{}  {}\n", on_terminal_ ? clear_line : "", line_of(row));
     if (on_terminal_)

@@ -102,6 +102,8 @@ json frame_json(const FrameRow& row, bool with_camera) {
     text["ms"] = stage_json(row.ms);
     text["passes"] = passes_json(row.passes);
     text["warnings"] = row.warnings;
+    if (!row.notes.empty())
+        text["notes"] = row.notes;
     text["files"] = json::array();
     for (const auto& file : row.files)
         text["files"].push_back(file.generic_string());

@@ -83,7 +83,7 @@ struct RunSettings {
     std::string depth_noise = "auto", depth_range, flying_pixels = "drop";
     double depth_smoothing = 1;
     double association_limit_s = 0.02;
-    std::string method = "cacao", radius, quality, device, settings;
+    std::string method = "cacao", radius, quality, device, settings, clouds = "auto";
     Budget budget;
     std::string out, write = "auto", format = "png16", view = "depth", dump;
     double shade_strength = 1;
@@ -254,6 +254,7 @@ class Run final : public Command {
         std::vector<Stage> all = common_stages();
         for (const auto& [name, setup] : setups_)
             all.push_back(method_stage(name, *setup));
+        all.push_back(cloud_stage());
         return all;
     }
 
@@ -315,6 +316,11 @@ class Run final : public Command {
                .help = "which method computes the visibility",
                .value = &s.method,
                .choices = method_names()},
+              {.name = "clouds",
+               .help = "clouds by rays from every point, or as one camera's view; auto = points, unless a grid or --camera "
+                       "tells the camera",
+               .value = &s.clouds,
+               .choices = {"auto", "points", "view"}},
               {"radius", "how far away a surface may still occlude, in metres" + radius, &s.radius},
               {"quality", "the method's quality level" + quality, &s.quality},
               {"max-error",
@@ -354,6 +360,22 @@ class Run final : public Command {
                &s.dump}}}};
     }
 
+    /// --cloud.rays and so on.
+    Stage cloud_stage() {
+        Stage stage{"clouds, from every point", cloud_options_.parameters()};
+        for (Parameter& row : stage.rows)
+            row.name = "cloud." + row.name;
+        return stage;
+    }
+
+    /// As given; --radius holds for clouds, too, and --cloud.radius before it.
+    CloudAo cloud_ao() const {
+        CloudAoOptions options = cloud_options_;
+        if (options.radius == 0 && !asked_.radius.empty())
+            options.radius = std::stod(asked_.radius);
+        return CloudAo(options);
+    }
+
     static std::vector<std::string> method_names() {
         std::vector<std::string> names;
         for (const MethodRow& row : methods())
@@ -385,6 +407,7 @@ class Run final : public Command {
             throw Misuse("a budget (--max-error, --max-ms) picks the quality: leave --quality out");
         if (!asked_.depth_scale.empty())
             (void)depth_encoding(asked_.depth_scale, "--depth-scale");
+        (void)cloud_ao();
     }
 
     /// The chosen method's settings, --radius and --quality put in their rows.
@@ -454,6 +477,7 @@ class Run final : public Command {
         for (const auto& [name, setup] : setups_)
             if (name == asked_.method)
                 report.settings.push_back(method_stage(name, *setup));
+        report.settings.push_back(cloud_stage());
         return report;
     }
 
@@ -482,6 +506,11 @@ class Run final : public Command {
         const std::unique_ptr<Method> plain = chosen_setup().make(device);
         job.batch.point_method = dynamic_cast<PointMethod*>(plain.get());
         job.batch.radius_m = std::stod(value_text(*row_named(chosen_setup().parameters(), "radius")));
+        const CloudAo of_clouds = cloud_ao();
+        job.batch.cloud_ao = &of_clouds;
+        job.batch.cloud_walk = asked_.clouds == "points" ? CloudWalk::points
+                               : asked_.clouds == "view" ? CloudWalk::view
+                                                         : CloudWalk::automatic;
         say(fmt::format("{} on {} ({})", asked_.method, device.info().name, device.info().driver));
         const DepthNoise noise = noise_of(job.capture, job.batch.frames, asked_.depth_noise);
         std::optional<OnFittedDepth> fitted;
@@ -528,6 +557,7 @@ class Run final : public Command {
     RunSettings asked_;
     Outputs outputs_;
     ProjectOptions range_;
+    CloudAoOptions cloud_options_;
     Configuration before_budget_; ///< of the method that a budget picked for the capture before this one
     std::vector<std::pair<std::string, std::unique_ptr<MethodSetup>>> setups_;
 };

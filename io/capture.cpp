@@ -34,13 +34,13 @@ Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
         return *std::move(listing);
     throw Error(fmt::format(
         "no frames found in {}: looked for depth.txt (TUM), frame-NNNNNN.depth.png (7-Scenes), a folder depth/ "
-        "(Redwood, RealSense), 16-bit or float depth images, and .pcd or .ply clouds",
+        "(Redwood, RealSense), 16-bit or float depth images, and clouds (.pcd, .ply, .las, .xyz, .pts, .ptx, .bin)",
         folder.string()));
 }
 
 bool is_cloud(const fs::path& file) {
     const std::string start = read_bytes(file, 16);
-    for (const std::string_view beginning : {"ply\n", "ply\r", "# .PCD", "VERSION", "FIELDS"})
+    for (const std::string_view beginning : {"ply\n", "ply\r", "# .PCD", "VERSION", "FIELDS", "LASF", "ASTM-E57"})
         if (start.starts_with(beginning))
             return true;
     return image_format(start) == ImageFormat::unknown && has_cloud_extension(file);
@@ -60,7 +60,7 @@ Listing list_file(const fs::path& file) {
         const bool image = image_format(read_bytes(file, 16)) != ImageFormat::unknown;
         if (!image && !has_depth_extension(file))
             throw Error(file.string() +
-                        ": neither a folder, a depth image (PNG, PGM, TIFF, EXR, PFM) nor a cloud (PCD, PLY)");
+                        ": neither a folder, a depth image (PNG, PGM, TIFF, EXR, PFM) nor a cloud (PCD, PLY, LAS, XYZ, PTS, PTX, KITTI's .bin)");
         entry.depth = file;
         listing.capture.kind = "depth image";
         listing.capture.depth = assumed_encoding(file);

@@ -2,6 +2,7 @@
 #include "io/cloud_file.h"
 
 #include "io/cloud_records.h"
+#include "io/layouts.h"
 #include "io/output_file.h"
 #include "io/text.h"
 #include "projection/error.h"
@@ -31,9 +32,21 @@ CloudRecords read_records(const fs::path& file, std::vector<std::string>& warnin
     if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r"))
         return read_ply(bytes, file, warnings);
     for (const std::string_view start : {"# .PCD", "VERSION", "FIELDS", "COLUMNS", "#"})
-        if (bytes.starts_with(start))
+        if (bytes.starts_with(start) && !is_text_cloud(file))
             return read_pcd(bytes, file, warnings);
-    throw Error(file.string() + ": neither PCD nor PLY (expected \"# .PCD\" or \"ply\" at its start)");
+    if (bytes.starts_with("LASF"))
+        return read_las(bytes, file, warnings);
+    if (bytes.starts_with("ASTM-E57"))
+        throw Error(file.string() + ": E57, which is not read; CloudCompare or `pdal translate IN.e57 OUT.las` makes LAS "
+                                    "or PLY of it");
+    const std::string extension = lower_extension(file);
+    if (extension == ".las" || extension == ".laz")
+        throw Error(fmt::format("{}: begins with {}, expected the signature LASF", file.string(), in_quotes(bytes.substr(0, 4))));
+    if (extension == ".bin")
+        return read_kitti(bytes, file);
+    if (is_text_cloud(file))
+        return read_text_cloud(bytes, file, warnings);
+    throw Error(file.string() + ": neither PCD, PLY nor LAS (expected \"# .PCD\", \"ply\" or \"LASF\" at its start)");
 }
 
 /// A coordinate of every point, its place looked up once where records are alike.
@@ -47,12 +60,25 @@ void read_coordinate(const CloudRecords& records, std::size_t field, int axis, s
                                 : value_at(records, records.record(i), field);
 }
 
+/// The same in the cloud's unit.
+void place_coordinate(const CloudRecords& records, const char* name, int axis, std::vector<Eigen::Vector3d>& points) {
+    read_coordinate(records, *records.field_named(name), axis, points);
+    const double scale = records.scale[static_cast<std::size_t>(axis)], shift = records.shift[static_cast<std::size_t>(axis)];
+    if (scale == 1 && shift == 0)
+        return;
+    for (Eigen::Vector3d& point : points)
+        point[axis] = point[axis] * scale + shift;
+}
+
 std::vector<Eigen::Vector3d> points_of(const CloudRecords& records, const fs::path& file,
                                        std::vector<std::string>& warnings) {
-    std::vector<Eigen::Vector3d> points(records.point_count);
-    read_coordinate(records, *records.field_named("x"), 0, points);
-    read_coordinate(records, *records.field_named("y"), 1, points);
-    read_coordinate(records, *records.field_named("z"), 2, points);
+    std::vector<Eigen::Vector3d> points = records.placed;
+    if (points.empty()) {
+        points.resize(records.point_count);
+        place_coordinate(records, "x", 0, points);
+        place_coordinate(records, "y", 1, points);
+        place_coordinate(records, "z", 2, points);
+    }
     std::size_t absurd = 0, valid = 0;
     for (Eigen::Vector3d& point : points) {
         const bool usable = (point.array().abs() <= largest_coordinate).all();
@@ -75,7 +101,32 @@ cv::Vec3b bgr_of(std::uint32_t bits) {
     return {static_cast<uchar>(bits), static_cast<uchar>(bits >> 8), static_cast<uchar>(bits >> 16)};
 }
 
+/// LAS has 16 bits a channel; many writers put bytes in them all the same. What the values are divided by.
+unsigned las_colour_step(const CloudRecords& records, const std::array<std::size_t, 3>& bgr) {
+    for (std::size_t i = 0; i < records.point_count; ++i)
+        for (const std::size_t channel : bgr)
+            if (value_at(records, records.record(i), channel) > 255)
+                return 256;
+    return 1;
+}
+
+std::optional<std::array<std::size_t, 3>> las_colours(const CloudRecords& records) {
+    const auto blue = records.field_named("blue"), green = records.field_named("green"), red = records.field_named("red");
+    if (records.format != Format::las || !blue || !green || !red)
+        return std::nullopt;
+    return std::array{*blue, *green, *red};
+}
+
 std::vector<cv::Vec3b> colours_of(const CloudRecords& records) {
+    if (const auto bgr = las_colours(records)) {
+        const double step = las_colour_step(records, *bgr);
+        std::vector<cv::Vec3b> colours(records.point_count);
+        for (std::size_t i = 0; i < colours.size(); ++i)
+            for (std::size_t channel = 0; channel < 3; ++channel)
+                colours[i][static_cast<int>(channel)] =
+                    static_cast<uchar>(value_at(records, records.record(i), (*bgr)[channel]) / step);
+        return colours;
+    }
     const ColourFields fields = colour_fields(records);
     std::vector<cv::Vec3b> colours;
     if (!fields.packed && !fields.bgr)
@@ -136,6 +187,13 @@ void replace_colours(const CloudRecords& records, std::span<const cv::Vec3b> col
                  const auto bits = alpha | std::uint32_t(c[2]) << 16 | std::uint32_t(c[1]) << 8 | c[0];
                  return encoded_bits(records, records.fields[field].type, bits);
              }});
+    } else if (const auto wide = las_colours(records)) {
+        const double step = las_colour_step(records, *wide) == 256 ? 257 : 1; // 255 is 65535 then
+        for (int channel = 0; channel < 3; ++channel)
+            replacements.push_back({(*wide)[static_cast<std::size_t>(channel)],
+                                    [&records, colours, channel, step](std::size_t point, std::string_view) {
+                                        return encoded(records, Scalar::uint16, step * colours[point][channel]);
+                                    }});
     } else if (fields.bgr) {
         for (int channel = 0; channel < 3; ++channel)
             replacements.push_back({(*fields.bgr)[static_cast<std::size_t>(channel)],
@@ -212,8 +270,17 @@ void write_cloud(const fs::path& file, const Cloud& cloud, const std::vector<Add
         std::sort(replacements.begin(), replacements.end(),
                   [](const FieldReplacement& a, const FieldReplacement& b) { return a.field < b.field; });
         const std::string points = edited_points(records, replacements, additions);
-        return records.format == Format::pcd ? pcd_bytes(records, points, additions)
-                                             : ply_bytes(records, points, additions);
+        switch (records.format) {
+        case Format::pcd:
+            return pcd_bytes(records, points, additions);
+        case Format::las:
+            return las_bytes(records, points, additions);
+        case Format::text:
+            return text_bytes(records, points, additions);
+        case Format::ply:
+            break;
+        }
+        return ply_bytes(records, points, additions);
     });
     write_atomically(file, bytes);
 }
@@ -261,21 +328,41 @@ void write_new_ply(const fs::path& file, const std::vector<Eigen::Vector3d>& poi
     write_atomically(file, bytes);
 }
 
-std::string describe(const CloudRecords& records) {
-    std::string names;
-    for (const CloudField& field : records.fields)
-        names += " " + field.name;
-    const std::string encoding = records.encoding == Encoding::ascii        ? "ascii"
-                                 : records.encoding == Encoding::compressed ? "binary_compressed"
-                                 : records.encoding == Encoding::big_endian ? "binary_big_endian"
-                                 : records.format == Format::ply            ? "binary_little_endian"
-                                                                            : "binary";
-    const std::string grid =
-        records.grid.height > 1 ? fmt::format(", {}x{} organised", records.grid.width, records.grid.height) : "";
-    return fmt::format("{} {}, {}{}, fields{}", records.format == Format::pcd ? "PCD" : "PLY", encoding,
-                       counted(records.point_count, "point"), grid, names);
+namespace {
+
+std::string encoding_name(const CloudRecords& records) {
+    switch (records.encoding) {
+    case Encoding::ascii:
+        return "ascii";
+    case Encoding::compressed:
+        return "binary_compressed";
+    case Encoding::big_endian:
+        return "binary_big_endian";
+    case Encoding::binary:
+        break;
+    }
+    return records.format == Format::ply ? "binary_little_endian" : "binary";
 }
 
-std::string extension(const CloudRecords& records) { return records.format == Format::pcd ? ".pcd" : ".ply"; }
+} // namespace
+
+std::string describe(const CloudRecords& records) {
+    std::string names, kind = extension(records).substr(1);
+    std::transform(kind.begin(), kind.end(), kind.begin(), [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+    for (const CloudField& field : records.fields)
+        names += " " + field.name;
+    const std::string grid =
+        records.grid.height > 1 ? fmt::format(", {}x{} organised", records.grid.width, records.grid.height) : "";
+    return fmt::format("{} {}, {}{}, fields{}{}", kind, encoding_name(records), counted(records.point_count, "point"), grid,
+                       names, records.unit.empty() ? "" : ", in " + records.unit);
+}
+
+std::string unit_of(const CloudRecords& records) { return records.unit; }
+
+std::string extension(const CloudRecords& records) {
+    if (!records.name_end.empty())
+        return records.name_end;
+    return records.format == Format::pcd ? ".pcd" : records.format == Format::las ? ".las" : ".ply";
+}
 
 } // namespace scanshade

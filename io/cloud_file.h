@@ -1,4 +1,4 @@
-// PLY and PCD clouds: points out, every other field, face and comment kept as the file's own bytes and written back.
+// Clouds (PLY, PCD, LAS, lines of text, KITTI): points out, every other field, face and comment kept as the file's own bytes and written back.
 #pragma once
 
 #include "projection/frame.h"
@@ -11,8 +11,9 @@
 
 namespace scanshade {
 
-/// Reads PCD (ascii, binary, binary_compressed) or PLY (ascii, both endians; float or double; list properties walked),
-/// told by content. Infinite or absurd (> 1e30) coordinates become NaN. Throws Error naming the file and the line or
+/// Reads PCD (ascii, binary, binary_compressed), PLY (ascii, both endians; float or double; list properties walked) or
+/// LAS 1.0 to 1.4 (not LAZ), told by content; .xyz, .pts, .ptx and KITTI's .bin, told by name. Coordinates in the
+/// file's unit. Infinite or absurd (> 1e30) coordinates become NaN. Throws Error naming the file and the line or
 /// byte offset for every damage the header or body shows; nothing is allocated from an unchecked number. `warnings`
 /// receives what was odd but readable.
 [[nodiscard]] Cloud read_cloud(const std::filesystem::path& file, std::vector<std::string>& warnings);
@@ -43,7 +44,9 @@ void write_new_ply(const std::filesystem::path& file, const std::vector<Eigen::V
 
 /// Properties of the file as people ask for them: format, encoding, fields, grid.
 [[nodiscard]] std::string describe(const CloudRecords& records);
-/// ".pcd" or ".ply", as read.
+/// What the coordinates count, and who says so; empty for the formats whose custom is metres.
+[[nodiscard]] std::string unit_of(const CloudRecords& records);
+/// ".pcd", ".ply", ".las" ..., as read; what was read without a header is written as ".ply".
 [[nodiscard]] std::string extension(const CloudRecords& records);
 
 } // namespace scanshade

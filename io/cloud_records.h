@@ -33,7 +33,7 @@ struct CloudField {
 /// The file, taken apart but not changed: header, before, points, after in this order are its bytes (a compressed PCD's
 /// points are unpacked and put point after point).
 struct CloudRecords {
-    enum class Format { pcd, ply };
+    enum class Format { pcd, ply, las, text };
     enum class Encoding { ascii, binary, big_endian, compressed };
 
     Format format = Format::pcd;
@@ -48,6 +48,10 @@ struct CloudRecords {
     std::vector<std::size_t>
         ends;          ///< where each record ends in `points` (text: behind its last word), when stride is 0
     std::string after; ///< faces, other elements, left-over lines
+    std::array<double, 3> scale{1, 1, 1}, shift{0, 0, 0}; ///< coordinates are field values times scale plus shift
+    std::vector<Eigen::Vector3d> placed; ///< the points, where fields alone do not tell them
+    std::string unit;                    ///< of the coordinates, and who says so; empty: metres, as clouds have by custom
+    std::string name_end;                ///< of a file of this kind: ".xyz"; empty: the format's own
     std::optional<Eigen::Isometry3d> viewpoint; ///< world_from_camera as the PCD says, where it says something
 
     [[nodiscard]] bool text() const { return encoding == Encoding::ascii; }
@@ -116,11 +120,26 @@ class TextRecords {
                                     std::vector<std::string>& warnings);
 [[nodiscard]] CloudRecords read_ply(std::string_view bytes, const std::filesystem::path& file,
                                     std::vector<std::string>& warnings);
+/// LAS 1.0 to 1.4, uncompressed, every point format (ASPRS, "LAS Specification 1.4 - R15"); everything but the points is
+/// kept as it is. Fields are named after the specification; those of an extra bytes record keep their names.
+[[nodiscard]] CloudRecords read_las(std::string_view bytes, const std::filesystem::path& file,
+                                    std::vector<std::string>& warnings);
+/// One point a line: .xyz (a line of names may come first), .pts (the count comes first), .ptx (one scan: sizes,
+/// pose, then the grid; "0 0 0" = nothing seen).
+[[nodiscard]] CloudRecords read_text_cloud(std::string_view bytes, const std::filesystem::path& file,
+                                           std::vector<std::string>& warnings);
+/// KITTI's Velodyne sweeps: x y z reflectance as floats, no header. The records are those of a PLY.
+[[nodiscard]] CloudRecords read_kitti(std::string_view bytes, const std::filesystem::path& file);
 /// Faces as triangles, polygons fanned from their first corner; -1 for an index that names no vertex. Tristrips are not read.
 [[nodiscard]] std::vector<std::array<int, 3>> ply_triangles(const CloudRecords& records);
 /// The file again with `points` (from edited_points) and the header naming `additions`.
 [[nodiscard]] std::string pcd_bytes(const CloudRecords& records, const std::string& points,
                                     const std::vector<FieldAddition>& additions);
+/// `additions` become extra bytes: floats behind each point, and a record that names them.
+[[nodiscard]] std::string las_bytes(const CloudRecords& records, const std::string& points,
+                                    const std::vector<FieldAddition>& additions);
+[[nodiscard]] std::string text_bytes(const CloudRecords& records, const std::string& points,
+                                     const std::vector<FieldAddition>& additions);
 [[nodiscard]] std::string ply_bytes(const CloudRecords& records, const std::string& points,
                                     const std::vector<FieldAddition>& additions);
 

@@ -86,7 +86,10 @@ bool has_depth_extension(const fs::path& file) {
 bool has_colour_extension(const fs::path& file) {
     return one_of(lower_extension(file), {".png", ".jpg", ".jpeg", ".ppm", ".pgm", ".bmp", ".tif", ".tiff", ".webp"});
 }
-bool has_cloud_extension(const fs::path& file) { return one_of(lower_extension(file), {".pcd", ".ply"}); }
+bool is_text_cloud(const fs::path& file) { return one_of(lower_extension(file), {".xyz", ".pts", ".ptx"}); }
+bool has_cloud_extension(const fs::path& file) {
+    return is_text_cloud(file) || one_of(lower_extension(file), {".pcd", ".ply", ".las", ".laz", ".e57", ".bin"});
+}
 
 std::string trouble_with(const fs::path& folder, const std::string& name) {
     const fs::path relative = fs::path(name).lexically_normal();

@@ -39,6 +39,8 @@ struct Listing {
 [[nodiscard]] bool has_depth_extension(const std::filesystem::path& file);
 [[nodiscard]] bool has_colour_extension(const std::filesystem::path& file);
 [[nodiscard]] bool has_cloud_extension(const std::filesystem::path& file);
+/// .xyz, .pts, .ptx: lines of numbers, which nothing but the name tells apart.
+[[nodiscard]] bool is_text_cloud(const std::filesystem::path& file);
 
 /// Why a file that a list names cannot be opened: outside the capture's folder, or missing. Empty = it is there.
 [[nodiscard]] std::string trouble_with(const std::filesystem::path& folder, const std::string& name);

@@ -1,6 +1,7 @@
 // Visibility of a point by rays, eight at a time.
 #include "ao/raycast/ray_hemisphere.h"
 
+#include "ao/raycast/low_discrepancy.h"
 #include "projection/error.h"
 #include "projection/hash.h"
 
@@ -18,34 +19,6 @@ namespace {
 using Eigen::Vector3d, Eigen::Vector3f;
 
 // ---------------------------------------------------------------------------------------------------- directions
-
-std::uint32_t reversed(std::uint32_t x) {
-    x = (x >> 16) | (x << 16);
-    x = ((x & 0x00ff00ffU) << 8) | ((x & 0xff00ff00U) >> 8);
-    x = ((x & 0x0f0f0f0fU) << 4) | ((x & 0xf0f0f0f0U) >> 4);
-    x = ((x & 0x33333333U) << 2) | ((x & 0xccccccccU) >> 2);
-    return ((x & 0x55555555U) << 1) | ((x & 0xaaaaaaaaU) >> 1);
-}
-
-/// Owen's scrambling as a hash in which every bit depends on the higher ones alone (Laine and Karras 2011, with the
-/// constants of Burley 2020, "Practical Hash-based Owen Scrambling").
-std::uint32_t owen_scrambled(std::uint32_t x, std::uint32_t seed) {
-    x = reversed(x) + seed;
-    x ^= x * 0x6c50b47cU;
-    x ^= x * 0xb82f1e52U;
-    x ^= x * 0xc7afe638U;
-    x ^= x * 0x8d22f6e6U;
-    return reversed(x);
-}
-
-/// Second dimension of Sobol's sequence; the first is the reversed index.
-std::uint32_t sobol(std::uint32_t index) {
-    std::uint32_t x = 0;
-    for (std::uint32_t v = 1U << 31; index; index >>= 1, v ^= v >> 1)
-        if (index & 1U)
-            x ^= v;
-    return x;
-}
 
 /// Where a direction lies on a coarse grid of the hemisphere: sectors of azimuth, walked to and fro through elevation.
 int place_of(const CosineDirections::Direction& d, int rays) {
@@ -143,7 +116,7 @@ CosineDirections::CosineDirections(int rays, int seed) : rays_(rays), sets_(std:
         const std::uint32_t key = hash(static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(set));
         for (int i = 0; i < rays_; ++i) {
             const auto index = static_cast<std::uint32_t>(i);
-            const double a = (owen_scrambled(reversed(index), hash(key)) + 0.5) * 0x1p-32;
+            const double a = (owen_scrambled(bits_reversed(index), hash(key)) + 0.5) * 0x1p-32;
             const double b = owen_scrambled(sobol(index), hash(key ^ 0x5bd1e995U)) * 0x1p-32 * 2 * std::numbers::pi;
             directions_.push_back({static_cast<float>(std::sqrt(a) * std::cos(b)),
                                    static_cast<float>(std::sqrt(a) * std::sin(b)), static_cast<float>(std::sqrt(1 - a)),

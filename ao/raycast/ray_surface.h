@@ -24,10 +24,12 @@ struct Disc {
 };
 
 /// Discs overlap, so a ray from one meets its neighbours at once: discs that are met closer than reach_m, in a plane
-/// that passes within depth_m of `point`, do not count. Means nothing to triangles.
+/// that passes within depth_m of `point`, do not count, unless they are turned more than 45 degrees from `normal`
+/// (where there is one): those belong to the other wall of a corner. Means nothing to triangles.
 struct OwnSurface {
     Eigen::Vector3f point = Eigen::Vector3f::Zero(); ///< local: RaySurface::local()
     float reach_m = 0, depth_m = 0;
+    Eigen::Vector3f normal = Eigen::Vector3f::Zero();
 };
 
 /// Eight rays from one origin, as Embree takes them: directions of unit length.

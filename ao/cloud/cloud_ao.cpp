@@ -1,0 +1,452 @@
+// Visibility of every point of a cloud: neighbours, planes, sides, discs, rays, and the mean of what neighbours saw.
+#include "ao/cloud/cloud_ao.h"
+
+#include "ao/cloud/ray_fan.h"
+#include "ao/raycast/ray_surface.h"
+#include "ao/raycast/raycast.h"
+#include "projection/error.h"
+#include "projection/hash.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+#include <limits>
+#include <numbers>
+#include <tbb/parallel_for.h>
+
+namespace scanshade {
+namespace {
+
+using Eigen::Vector3d, Eigen::Vector3f;
+constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
+
+/// "1,0,-2.5" as three numbers; none where it is anything else.
+std::optional<Vector3d> triple(const std::string& text) {
+    Vector3d values;
+    const char *at = text.data(), *end = at + text.size();
+    for (int axis = 0; axis < 3; ++axis) {
+        if (axis > 0 && (at == end || *at++ != ','))
+            return std::nullopt;
+        const auto [stop, trouble] = std::from_chars(at, end, values[axis]);
+        if (trouble != std::errc() || !std::isfinite(values[axis]))
+            return std::nullopt;
+        at = stop;
+    }
+    return at == end ? std::optional(values) : std::nullopt;
+}
+
+/// Time between stages, by name.
+class Watch {
+  public:
+    explicit Watch(Timings& timings) : timings_(timings) {}
+    void lap(const std::string& name) {
+        const auto now = std::chrono::steady_clock::now();
+        const double ms = std::chrono::duration<double, std::milli>(now - last_).count();
+        const auto row = std::find_if(timings_.begin(), timings_.end(), [&](const auto& t) { return t.first == name; });
+        row == timings_.end() ? void(timings_.emplace_back(name, ms)) : void(row->second += ms);
+        last_ = now;
+    }
+
+  private:
+    Timings& timings_;
+    std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+/// About `wanted` of the points, chosen by a hash: recording order would take whole lines of a scan or none of them.
+std::vector<Vector3d> sampled(std::span<const Vector3d> points, std::size_t wanted) {
+    const double share = std::min(1.0, static_cast<double>(wanted) / static_cast<double>(std::max<std::size_t>(points.size(), 1)));
+    const auto chosen = static_cast<std::uint64_t>(share * 0x1p32);
+    std::vector<Vector3d> some;
+    for (std::size_t i = 0; i < points.size(); ++i)
+        if (points[i].allFinite() && hash(static_cast<std::uint32_t>(i)) < chosen)
+            some.push_back(points[i]);
+    return some;
+}
+
+/// The diagonal of the box that holds all but the lowest and highest hundredth of the points along each axis.
+double extent_of(std::span<const Vector3d> points) {
+    Vector3d extent = Vector3d::Zero();
+    for (int axis = 0; axis < 3; ++axis) {
+        std::vector<double> along;
+        for (const Vector3d& point : points)
+            along.push_back(point[axis]);
+        if (along.empty())
+            return 0;
+        std::sort(along.begin(), along.end());
+        const std::size_t cut = along.size() / 100;
+        extent[axis] = along[along.size() - 1 - cut] - along[cut];
+    }
+    return extent.norm();
+}
+
+/// Axes with z along `normal` (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
+Eigen::Matrix3f axes_about(const Vector3f& normal) {
+    const float sign = std::copysign(1.0F, normal.z()), a = -1 / (sign + normal.z()), b = normal.x() * normal.y() * a;
+    Eigen::Matrix3f axes;
+    axes << Vector3f(1 + sign * normal.x() * normal.x() * a, sign * b, -sign * normal.x()),
+        Vector3f(b, sign + normal.y() * normal.y() * a, -normal.y()), normal;
+    return axes;
+}
+
+/// Rays from the points of a surface against its discs.
+class DiscRays {
+  public:
+    DiscRays(const CloudSurface& surface, const RayFan& fan, float radius, const std::optional<Vector3f>& up)
+        : surface_(surface), fan_(fan), radius_(radius), up_(up), discs_(discs(surface)) {}
+
+    /// Share of a point's rays that come free.
+    [[nodiscard]] float open(std::size_t place) const {
+        const Vector3f& normal = surface_.normals[place];
+        const float disc = surface_.disc_radius[place], rough = surface_.roughness[place];
+        const float lift = std::max({neighbours_tilt * disc, rough, static_cast<float>(discs_.rounding_m())});
+        const Eigen::Matrix3f axes = axes_about(normal);
+        const Vector3d at = surface_.tree[place].cast<double>();
+        RayBundle bundle;
+        bundle.origin = discs_.local(at + static_cast<double>(lift) * normal.cast<double>());
+        bundle.far_m = std::max(radius_ - lift, 0.0F);
+        bundle.own = {discs_.local(at), 2 * disc, std::max(0.2F * disc, 2 * rough), normal};
+        const RayFan::Run run = fan_.run(place);
+        int free = 0;
+        for (int first = 0; first < run.count; first += RayBundle::size) {
+            const int eight = std::min(RayBundle::size, run.count - first);
+            for (int i = 0; i < RayBundle::size; ++i) {
+                const int ray = first + std::min(i, eight - 1);
+                const Vector3f direction = axes * Vector3f(run.x[ray], run.y[ray], run.z[ray]);
+                const auto lane = static_cast<std::size_t>(i);
+                bundle.x[lane] = direction.x(), bundle.y[lane] = direction.y(), bundle.z[lane] = direction.z();
+                bundle.live[lane] = i < eight && !(up_ && direction.dot(*up_) <= 0) ? -1 : 0;
+            }
+            discs_.drop_blocked(bundle);
+            for (const int live : bundle.live)
+                free += live != 0;
+        }
+        return static_cast<float>(free) / static_cast<float>(run.count);
+    }
+
+  private:
+    static constexpr float neighbours_tilt = 0.088F; ///< half of tan 10 degrees: so far neighbouring discs stand out
+
+    static RaySurface discs(const CloudSurface& surface) {
+        std::vector<Disc> all(surface.size());
+        for (std::size_t i = 0; i < all.size(); ++i)
+            all[i] = {surface.tree[i].cast<double>(), surface.normals[i].cast<double>(),
+                      surface.normals[i].isZero() ? 0 : static_cast<double>(surface.disc_radius[i])};
+        return RaySurface(std::span<const Disc>(all));
+    }
+
+    const CloudSurface& surface_;
+    const RayFan& fan_;
+    float radius_;
+    std::optional<Vector3f> up_;
+    RaySurface discs_;
+};
+
+/// The mean of a value and those beside it on the same surface: planes alike, near against the radius.
+std::vector<float> smoothed(const CloudSurface& surface, const std::vector<float>& values, float radius) {
+    std::vector<float> means(values.size(), nothing);
+    const float reach = 0.1F * radius; // visibility hardly changes over a tenth of the radius
+    const float falloff = std::isfinite(reach) ? -1 / (2 * reach * reach) : 0;
+    tbb::parallel_for(std::size_t(0), values.size(), [&](std::size_t i) {
+        if (std::isnan(values[i]))
+            return;
+        float sum = values[i], weights = 1;
+        for (const std::uint32_t j : surface.near[i]) {
+            const float alike = surface.normals[i].dot(surface.normals[j]);
+            if (j == i || std::isnan(values[j]) || !(alike > 0.9F))
+                continue;
+            const Vector3f apart = surface.tree[j] - surface.tree[i];
+            const float off_plane = std::abs(apart.dot(surface.normals[i]));
+            if (off_plane > 0.5F * surface.disc_radius[i] + 2 * surface.roughness[i])
+                continue;
+            const float weight = std::exp(falloff * apart.squaredNorm());
+            sum += weight * values[j];
+            weights += weight;
+        }
+        means[i] = sum / weights;
+    });
+    return means;
+}
+
+/// Discs that span the radius: 0 for one, 1 for four or more.
+float resolution(float radius, float disc) { return disc > 0 ? std::clamp((radius / disc - 1) / 3, 0.0F, 1.0F) : 0.0F; }
+
+} // namespace
+
+std::vector<Parameter> CloudAoOptions::parameters() {
+    return {
+        {"radius", "how far away a surface may still occlude, in the cloud's unit; 0 = from the cloud's extent and spacing",
+         &radius, "", 0, 1e9},
+        {"rays", "per point", &rays, "", 1, 16384},
+        {"smooth", "how often a value becomes the mean of those beside it on the same surface", &smooth, "", 0, 16},
+        {"sky", "how much of the sky a point sees, at any distance, in place of what is open within the radius", &sky},
+        {"up", "where the sky is, x,y,z", &up},
+        {"outside", "where estimated normals point: auto, up, outward, inward, or to the scanner's place x,y,z", &outside},
+        {"normals", "which to take; auto = recorded ones where they lie on the planes of the points", &normals, "", 0, 0,
+         {"auto", "recorded", "estimated"}},
+        {"memory", "of the points in work at once; larger clouds are taken in tiles", &memory_mib, "MiB", 64, 1 << 20},
+        {"seed", "of the rays' scrambling", &seed, "", 0, 2147483647},
+    };
+}
+
+double default_radius(double extent, double spacing) {
+    return std::clamp(extent / 20, 10 * spacing, std::max(200 * spacing, 0.0));
+}
+
+CloudAo::CloudAo(CloudAoOptions options) : options_(std::move(options)) {
+    for (const Parameter& row : options_.parameters())
+        check(row);
+    const auto up = triple(options_.up);
+    if (!up || !(up->norm() > 0))
+        throw Misuse(fmt::format("up: '{}' given, expected a direction x,y,z such as 0,0,1", options_.up));
+    up_ = up->normalized();
+    viewpoint_ = triple(options_.outside);
+    constexpr std::array words{"auto", "up", "outward", "inward"};
+    if (!viewpoint_ && std::find(words.begin(), words.end(), options_.outside) == words.end())
+        throw Misuse(fmt::format("outside: '{}' given, expected auto, up, outward, inward, or a place x,y,z",
+                                 options_.outside));
+}
+
+/// One cloud on its way: what holds for all tiles, and the results so far.
+class CloudAo::Work {
+  public:
+    Work(const CloudAoOptions& options, const Vector3d& up, const std::optional<Vector3d>& viewpoint,
+         const PointSet& cloud, const std::optional<Vector3d>& scanner)
+        : options_(options), up_(up), cloud_(cloud), watch_(result_.timings), fan_(options.rays, options.seed) {
+        result_.visibility.assign(cloud.points.size(), nothing);
+        result_.confidence.assign(cloud.points.size(), 0.0F);
+        for (std::size_t i = 0; i < cloud.points.size(); ++i)
+            if (cloud.points[i].allFinite())
+                valid_.push_back(static_cast<std::uint32_t>(i));
+        const std::vector<Vector3d> some = sampled(cloud.points, enough_to_judge);
+        settle_outside(viewpoint, scanner, some);
+        settle_radius(some);
+        watch_.lap("survey");
+    }
+
+    CloudVisibility run() {
+        const double reach = result_.radius + 16 * result_.spacing;
+        if (options_.sky || valid_.size() <= at_once())
+            tile(valid_, valid_);
+        else
+            divide(valid_, valid_, reach, 0);
+        tell();
+        return std::move(result_);
+    }
+
+  private:
+    static constexpr std::size_t enough_to_judge = 60000;
+    static constexpr double bytes_per_point = 420; ///< measured, with Embree's tree
+
+    [[nodiscard]] std::size_t at_once() const {
+        return static_cast<std::size_t>(options_.memory_mib * 1048576.0 / bytes_per_point);
+    }
+
+    void settle_outside(const std::optional<Vector3d>& viewpoint, const std::optional<Vector3d>& scanner,
+                        const std::vector<Vector3d>& some) {
+        using Kind = Outside::Kind;
+        if (viewpoint)
+            outside_ = {Kind::viewpoint, *viewpoint, "the place given by --cloud.outside"};
+        else if (options_.outside == "auto")
+            outside_ = guessed_outside(some, scanner);
+        else
+            outside_ = {options_.outside == "up"        ? Kind::direction
+                        : options_.outside == "outward" ? Kind::outward
+                                                        : Kind::inward,
+                        up_, options_.outside + ", as given"};
+        if (outside_.kind == Kind::direction)
+            outside_.point = up_;
+    }
+
+    /// A part of the points stands farther apart by the root of its share, as points on surfaces do.
+    void settle_radius(const std::vector<Vector3d>& some) {
+        if (some.empty())
+            return;
+        const double share = static_cast<double>(some.size()) / static_cast<double>(valid_.size());
+        result_.spacing = static_cast<double>(cloud_surface(some, {}).spacing) * std::sqrt(share);
+        const double extent = extent_of(some);
+        result_.radius = options_.radius > 0 ? options_.radius : default_radius(extent, result_.spacing);
+        result_.notes.push_back(fmt::format("points stand {:.4g} apart (median), over {:.4g}.", result_.spacing, extent));
+        if (options_.sky)
+            result_.notes.push_back("visibility is the share of the sky, at any distance.");
+        else
+            result_.notes.push_back(
+                fmt::format("radius {:.4g} ({}).", result_.radius,
+                            options_.radius > 0 ? "as given" : "a twentieth of the extent, within 10 .. 200 spacings"));
+    }
+
+    /// Halves the points of `core` until one half and all that lies within `reach` of it fit the memory.
+    void divide(const std::vector<std::uint32_t>& core, const std::vector<std::uint32_t>& round, double reach, int depth) {
+        constexpr std::size_t least = 10000;
+        if (round.size() <= at_once() || core.size() <= least) {
+            tile(core, round);
+            return;
+        }
+        const auto box_of = [&](const std::vector<std::uint32_t>& points) {
+            Eigen::AlignedBox3d box;
+            for (const std::uint32_t i : points)
+                box.extend(cloud_.points[i]);
+            return box;
+        };
+        int axis = 0;
+        box_of(core).sizes().maxCoeff(&axis);
+        std::vector<std::uint32_t> halves = core;
+        const auto middle = halves.begin() + static_cast<std::ptrdiff_t>(halves.size() / 2);
+        std::nth_element(halves.begin(), middle, halves.end(), [&](std::uint32_t a, std::uint32_t b) {
+            const double at = cloud_.points[a][axis], bt = cloud_.points[b][axis];
+            return at != bt ? at < bt : a < b;
+        });
+        for (const auto& [from, to] : {std::pair(halves.begin(), middle), std::pair(middle, halves.end())}) {
+            const std::vector<std::uint32_t> half(from, to);
+            Eigen::AlignedBox3d box = box_of(half);
+            box.min().array() -= reach;
+            box.max().array() += reach;
+            std::vector<std::uint32_t> near;
+            std::copy_if(round.begin(), round.end(), std::back_inserter(near),
+                         [&](std::uint32_t i) { return box.contains(cloud_.points[i]); });
+            divide(half, near, reach, depth + 1);
+        }
+    }
+
+    /// Values for `core`, which lies within `round`.
+    void tile(const std::vector<std::uint32_t>& core, const std::vector<std::uint32_t>& round) {
+        if (round.empty())
+            return;
+        std::vector<char> wanted(core.size() == round.size() ? 0 : cloud_.points.size(), 0);
+        if (!wanted.empty())
+            for (const std::uint32_t i : core)
+                wanted[i] = 1;
+        const CloudSurface surface = surface_of(round);
+        const auto is_wanted = [&](std::size_t place) { return wanted.empty() || wanted[round[surface.tree.index(place)]]; };
+        const auto is_beside = [&](std::size_t place) { // whose values the smoothing asks for
+            return is_wanted(place) || std::any_of(surface.near[place].begin(), surface.near[place].end(), is_wanted);
+        };
+        const float radius = options_.sky ? std::numeric_limits<float>::max() : static_cast<float>(result_.radius);
+        std::vector<float> values(surface.size(), nothing);
+        {
+            const DiscRays rays(surface, fan_, radius,
+                                options_.sky ? std::optional<Vector3f>(up_.cast<float>()) : std::nullopt);
+            watch_.lap("tree");
+            tbb::parallel_for(tbb::blocked_range<std::size_t>(0, surface.size(), 64), [&](const auto& range) {
+                for (std::size_t i = range.begin(); i < range.end(); ++i)
+                    if (!surface.normals[i].isZero() && is_beside(i))
+                        values[i] = rays.open(i);
+            });
+        }
+        watch_.lap("rays");
+        for (int pass = 0; pass < options_.smooth; ++pass)
+            values = smoothed(surface, values, radius);
+        for (std::size_t i = 0; i < surface.size(); ++i) {
+            if (!is_wanted(i) || std::isnan(values[i]))
+                continue;
+            const std::size_t point = round[surface.tree.index(i)];
+            result_.visibility[point] = values[i];
+            result_.confidence[point] = surface.flatness[i] * resolution(radius, surface.disc_radius[i]);
+        }
+        watch_.lap("smooth");
+        result_.tiles = ++tiles_;
+    }
+
+    /// Neighbours, planes and sides of these points.
+    CloudSurface surface_of(const std::vector<std::uint32_t>& which) {
+        std::vector<Vector3d> points(which.size()), normals;
+        const auto pick = [&](std::span<const Vector3d> from, std::vector<Vector3d>& to) {
+            to.resize(which.size());
+            std::transform(which.begin(), which.end(), to.begin(), [&](std::uint32_t i) { return from[i]; });
+        };
+        pick(cloud_.points, points);
+        if (!cloud_.normals.empty() && options_.normals != "estimated" && !normals_refused_)
+            pick(cloud_.normals, normals);
+        CloudSurface surface = cloud_surface(points, normals);
+        constexpr double same_planes = 0.8, too_many_opposed = 0.05;
+        if (!normals.empty() && options_.normals == "auto" && surface.agreement < same_planes) {
+            normals_refused_ = true;
+            result_.notes.push_back(
+                fmt::format("recorded normals are not used: the median angle between them and the planes of the points is "
+                            "{:.0f} degrees; --cloud.normals recorded takes them all the same.",
+                            std::acos(surface.agreement) * 180 / std::numbers::pi));
+            normals.clear();
+            surface = cloud_surface(points, {});
+        }
+        watch_.lap("planes");
+        sides_opposed_ |= !normals.empty() && options_.normals == "auto" && surface.discord > too_many_opposed;
+        if (normals.empty() || sides_opposed_)
+            turn_outside(surface, outside_);
+        watch_.lap("sides");
+        return surface;
+    }
+
+    void tell() {
+        const bool recorded = !cloud_.normals.empty() && options_.normals != "estimated" && !normals_refused_;
+        const std::string facing = outside_.kind == Outside::Kind::viewpoint ? "turned to " : "turned ";
+        if (recorded && sides_opposed_)
+            result_.notes.push_back("normals: recorded, but neighbours' oppose each other; " + facing + outside_.why + ".");
+        else
+            result_.notes.push_back(recorded ? "normals: recorded."
+                                             : "normals: from planes through 16 neighbours, " + facing + outside_.why + ".");
+        const bool apart = outside_.kind == Outside::Kind::outward || outside_.kind == Outside::Kind::inward;
+        if (tiles_ > 1)
+            result_.notes.push_back(
+                fmt::format("in {} tiles of at most {} points each{}.", tiles_, at_once(),
+                            apart && !recorded ? ", whose normals were turned tile by tile: where they look wrong, give "
+                                                 "--cloud.outside or more --cloud.memory"
+                                               : ""));
+        std::size_t unknown = 0;
+        for (const std::uint32_t i : valid_)
+            unknown += std::isnan(result_.visibility[i]);
+        if (unknown > 0)
+            result_.notes.push_back(fmt::format("{} of {} points have no surface round them; their visibility is unknown.",
+                                                unknown, valid_.size()));
+    }
+
+    const CloudAoOptions& options_;
+    Vector3d up_;
+    const PointSet& cloud_;
+    CloudVisibility result_;
+    Watch watch_;
+    RayFan fan_;
+    Outside outside_;
+    std::vector<std::uint32_t> valid_;
+    bool normals_refused_ = false, sides_opposed_ = false;
+    int tiles_ = 0;
+};
+
+CloudVisibility CloudAo::compute(const PointSet& cloud, const std::optional<Vector3d>& scanner) const {
+    if (!cloud.triangles.empty() && !options_.sky)
+        return of_mesh(cloud);
+    return Work(options_, up_, viewpoint_, cloud, scanner).run();
+}
+
+/// Vertices see exactly what the faces hide; no mean over neighbours is needed, but more rays.
+CloudVisibility CloudAo::of_mesh(const PointSet& mesh) const {
+    CloudVisibility result;
+    std::vector<float> sides;
+    for (const auto& [a, b, c] : mesh.triangles)
+        if (std::min({a, b, c}) >= 0)
+            sides.push_back(static_cast<float>((mesh.points[static_cast<std::size_t>(a)] - mesh.points[static_cast<std::size_t>(b)]).norm()));
+    if (!sides.empty()) {
+        const auto middle = sides.begin() + static_cast<std::ptrdiff_t>(sides.size() / 2);
+        std::nth_element(sides.begin(), middle, sides.end());
+        result.spacing = static_cast<double>(*middle);
+    }
+    const double extent = extent_of(sampled(mesh.points, 60000));
+    result.radius = std::clamp(options_.radius > 0 ? options_.radius : default_radius(extent, result.spacing), 1e-6, 1e6);
+    const int rays = 4 * options_.rays;
+    Raycast raycast({.radius_m = result.radius, .rays = rays, .mesh = "vertices", .seed = options_.seed});
+    result.visibility = raycast.compute(mesh);
+    result.timings = raycast.timings();
+    result.confidence.assign(result.visibility.size(), 0.0F);
+    for (std::size_t i = 0; i < result.visibility.size(); ++i)
+        if (!std::isnan(result.visibility[i]))
+            result.confidence[i] = 1;
+    result.notes = {fmt::format("{} faces: {} rays from every vertex against them, about the mean of their normals.",
+                                mesh.triangles.size(), rays),
+                    fmt::format("radius {:.4g} ({}).", result.radius,
+                                options_.radius > 0 ? "as given" : "a twentieth of the extent, within 10 .. 200 edge lengths")};
+    return result;
+}
+
+} // namespace scanshade

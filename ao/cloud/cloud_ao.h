@@ -1,0 +1,61 @@
+// Visibility of every point of a cloud of any kind: rays from the points against the discs they make up. No view needed.
+#pragma once
+
+#include "ao/cloud/cloud_surface.h"
+#include "ao/method.h"
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace scanshade {
+
+/// What a person sets.
+struct CloudAoOptions {
+    double radius = 0; ///< in the cloud's unit; 0 = from the cloud: see default_radius()
+    int rays = 16;     ///< per point; neighbours' rays make one even set, so that their mean counts several times as many
+    int smooth = 2;    ///< times that a value becomes the mean of those beside it on the same surface
+    bool sky = false;  ///< how much of the sky a point sees, however far what hides it
+    std::string up = "0,0,1";
+    std::string outside = "auto"; ///< "auto", "up", "outward", "inward", or the scanner's place x,y,z
+    std::string normals = "auto"; ///< "auto" | "recorded" | "estimated"
+    int memory_mib = 4096;        ///< of the points in work; larger clouds are taken in tiles
+    int seed = 1;
+
+    [[nodiscard]] std::vector<Parameter> parameters();
+};
+
+/// What came out, and what was chosen on the way.
+struct CloudVisibility {
+    std::vector<float> visibility; ///< per point; NaN where it is not finite or its neighbours make no surface
+    std::vector<float> confidence; ///< 0 .. 1: how flat the surface is round the point, times how many discs span the radius
+    double radius = 0, spacing = 0; ///< as used; in the cloud's unit
+    int tiles = 1;
+    std::vector<std::string> notes; ///< sentences: what was chosen and why
+    Timings timings;
+};
+
+/// A twentieth of the cloud's extent (of the box that holds all but one in a hundred points, each way), but at least 10
+/// and at most 200 spacings: fewer would see single points, more would cost without end.
+[[nodiscard]] double default_radius(double extent, double spacing);
+
+/// Deterministic: the result depends neither on the number of threads nor on their timing.
+class CloudAo {
+  public:
+    /// Throws Misuse naming a setting out of its range.
+    explicit CloudAo(CloudAoOptions options);
+
+    /// `scanner`: where the file says that the cloud was seen from. Where there are faces, rays are cast from the vertices
+    /// against them in place of discs.
+    [[nodiscard]] CloudVisibility compute(const PointSet& cloud, const std::optional<Eigen::Vector3d>& scanner = {}) const;
+
+  private:
+    class Work;
+    [[nodiscard]] CloudVisibility of_mesh(const PointSet& mesh) const;
+
+    CloudAoOptions options_;
+    Eigen::Vector3d up_;
+    std::optional<Eigen::Vector3d> viewpoint_; ///< said by the user
+};
+
+} // namespace scanshade

@@ -1,0 +1,128 @@
+// Who lies next to whom: median splits along the widest side, and a search that opens the nearer half first.
+#include "ao/cloud/neighbours.h"
+
+#include <algorithm>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+
+namespace scanshade {
+
+using Eigen::Vector3f;
+
+void Nearest::begin(std::size_t wanted, float reach2) {
+    count_ = 0;
+    wanted_ = std::min(wanted, most);
+    reach2_ = reach2;
+}
+
+void Nearest::offer(float distance2, std::uint32_t point) {
+    if (distance2 > reach2_)
+        return;
+    const auto before = [](const Neighbour& a, const Neighbour& b) {
+        return a.distance2 != b.distance2 ? a.distance2 < b.distance2 : a.point < b.point;
+    };
+    const Neighbour offered{distance2, point};
+    std::size_t at = count_;
+    if (count_ == wanted_) {
+        if (!before(offered, found_[count_ - 1]))
+            return;
+        at = count_ - 1;
+    } else {
+        ++count_;
+    }
+    for (; at > 0 && before(offered, found_[at - 1]); --at)
+        found_[at] = found_[at - 1];
+    found_[at] = offered;
+    if (count_ == wanted_)
+        reach2_ = found_[count_ - 1].distance2;
+}
+
+float NeighbourTree::Box::distance2(const Vector3f& point) const {
+    return (low - point).cwiseMax(point - high).cwiseMax(0).squaredNorm();
+}
+
+struct NeighbourTree::Placed {
+    Vector3f point;
+    std::uint32_t index;
+};
+
+NeighbourTree::NeighbourTree(std::span<const Vector3f> points) {
+    std::vector<Placed> placed(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i)
+        placed[i] = {points[i], static_cast<std::uint32_t>(i)};
+    while ((points.size() >> levels_) >= leaf)
+        ++levels_;
+    boxes_.resize((std::size_t(2) << levels_) - 1);
+    build(placed, 0, levels_);
+    points_.resize(points.size());
+    index_.resize(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        points_[i] = placed[i].point;
+        index_[i] = placed[i].index;
+    }
+}
+
+void NeighbourTree::build(std::span<Placed> points, std::size_t node, int levels) {
+    Box& box = boxes_[node];
+    box.low.setConstant(std::numeric_limits<float>::infinity());
+    box.high = -box.low;
+    for (const Placed& placed : points) {
+        box.low = box.low.cwiseMin(placed.point);
+        box.high = box.high.cwiseMax(placed.point);
+    }
+    if (levels == 0)
+        return;
+    int axis = 0;
+    (box.high - box.low).maxCoeff(&axis);
+    const std::size_t half = points.size() / 2;
+    std::nth_element(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(half), points.end(),
+                     [axis](const Placed& a, const Placed& b) {
+                         return a.point[axis] != b.point[axis] ? a.point[axis] < b.point[axis] : a.index < b.index;
+                     });
+    const auto left = [&] { build(points.first(half), 2 * node + 1, levels - 1); };
+    const auto right = [&] { build(points.subspan(half), 2 * node + 2, levels - 1); };
+    constexpr std::size_t worth_a_task = 4096;
+    if (points.size() > worth_a_task) {
+        tbb::parallel_invoke(left, right);
+    } else {
+        left();
+        right();
+    }
+}
+
+void NeighbourTree::find_round(std::size_t place, std::size_t wanted, Nearest& found, float reach2) const {
+    found.begin(wanted, reach2);
+    const Vector3f at = points_[place];
+    struct Visit {
+        std::size_t node, begin, end;
+        int levels;
+        float distance2;
+    };
+    std::array<Visit, 64> stack;
+    std::size_t depth = 0;
+    stack[depth++] = {0, 0, points_.size(), levels_, 0};
+    while (depth > 0) {
+        Visit visit = stack[--depth];
+        if (visit.distance2 > found.reach2())
+            continue;
+        while (visit.levels > 0) { // down to the leaf on the nearer side; the other side waits
+            const std::size_t middle = visit.begin + (visit.end - visit.begin) / 2;
+            Visit left{2 * visit.node + 1, visit.begin, middle, visit.levels - 1, 0};
+            Visit right{2 * visit.node + 2, middle, visit.end, visit.levels - 1, 0};
+            left.distance2 = boxes_[left.node].distance2(at);
+            right.distance2 = boxes_[right.node].distance2(at);
+            const bool left_first = left.distance2 != right.distance2 ? left.distance2 < right.distance2 : place < middle;
+            const Visit& later = left_first ? right : left;
+            if (later.distance2 <= found.reach2())
+                stack[depth++] = later;
+            visit = left_first ? left : right;
+        }
+        if (visit.distance2 > found.reach2())
+            continue;
+        for (std::size_t other = visit.begin; other < visit.end; ++other)
+            if (other != place)
+                found.offer((points_[other] - at).squaredNorm(), static_cast<std::uint32_t>(other));
+    }
+}
+
+} // namespace scanshade

@@ -1,0 +1,68 @@
+// Who lies next to whom: a cloud's points in the order of a k-d tree, and the nearest ones round each of them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <Eigen/Core>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace scanshade {
+
+/// The nearest points found so far, nearest first, at most as many as were wanted.
+class Nearest {
+  public:
+    static constexpr std::size_t most = 64;
+    struct Neighbour {
+        float distance2 = 0;
+        std::uint32_t point = 0;
+    };
+
+    void begin(std::size_t wanted, float reach2);
+    void offer(float distance2, std::uint32_t point);
+    /// What lies farther cannot be among them.
+    [[nodiscard]] float reach2() const { return reach2_; }
+    [[nodiscard]] std::span<const Neighbour> all() const { return {found_.data(), count_}; }
+
+  private:
+    std::array<Neighbour, most> found_;
+    std::size_t count_ = 0, wanted_ = 0;
+    float reach2_ = 0;
+};
+
+/// A balanced k-d tree whose points are stored in its order, so that points with near numbers lie near each other.
+/// Immutable once made; safe to use from several threads.
+class NeighbourTree {
+  public:
+    /// `points` must be finite.
+    explicit NeighbourTree(std::span<const Eigen::Vector3f> points);
+
+    [[nodiscard]] std::size_t size() const { return points_.size(); }
+    /// By place in the tree's order.
+    [[nodiscard]] const Eigen::Vector3f& operator[](std::size_t place) const { return points_[place]; }
+    /// Which of the points given stands at a place.
+    [[nodiscard]] std::uint32_t index(std::size_t place) const { return index_[place]; }
+
+    /// The `wanted` nearest places round a place, itself not among them. `reach2`: a squared distance within which that
+    /// many are known to lie; infinite where nothing is known. Ties go to the lower place.
+    void find_round(std::size_t place, std::size_t wanted, Nearest& found,
+                    float reach2 = std::numeric_limits<float>::infinity()) const;
+
+  private:
+    struct Box {
+        Eigen::Vector3f low, high;
+        [[nodiscard]] float distance2(const Eigen::Vector3f& point) const;
+    };
+    static constexpr std::size_t leaf = 12; ///< points, at most
+
+    struct Placed;
+    void build(std::span<Placed> points, std::size_t node, int levels);
+
+    std::vector<Eigen::Vector3f> points_;
+    std::vector<std::uint32_t> index_;
+    std::vector<Box> boxes_; ///< node n has the children 2n + 1 and 2n + 2, which halve its points
+    int levels_ = 0;         ///< of nodes above the leaves
+};
+
+} // namespace scanshade

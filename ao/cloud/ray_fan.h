@@ -1,0 +1,31 @@
+// Cosine-weighted directions for many neighbouring points: each has a few of one long even sequence.
+#pragma once
+
+#include <cstdint>
+#include <Eigen/Core>
+#include <vector>
+
+namespace scanshade {
+
+/// One scrambled Sobol sequence (Burley 2020) on the hemisphere about z, cut into runs of `rays`. Points in the order of
+/// a tree that take run after run hold, eight or sixteen together, an even set of their own: the mean over neighbours is
+/// as good as that many times the rays.
+class RayFan {
+  public:
+    RayFan(int rays, int seed);
+
+    struct Run {
+        const float *x, *y, *z;
+        int count;
+    };
+    [[nodiscard]] Run run(std::size_t place) const {
+        const std::size_t first = place % runs_ * rays_;
+        return {x_.data() + first, y_.data() + first, z_.data() + first, static_cast<int>(rays_)};
+    }
+
+  private:
+    std::size_t rays_, runs_;
+    std::vector<float> x_, y_, z_;
+};
+
+} // namespace scanshade
