@@ -120,7 +120,8 @@ struct Drawable {
 std::optional<Vector3d> seen_side(const World& world, const std::vector<Vector3d>& eyes, const Vector3d& point,
                                   const Vector3d& normal, std::size_t first) {
     const double clear = 2 * world.surface().rounding_m();
-    for (std::size_t i = 0; i < eyes.size(); ++i) {
+    constexpr std::size_t tried = 64; // of a hidden surface each would be tried in vain
+    for (std::size_t i = 0; i < tried; ++i) {
         const Vector3d& eye = eyes[(first + i) % eyes.size()];
         const Vector3d facing = normal.dot(eye - point) < 0 ? Vector3d(-normal) : normal;
         if (!world.surface().blocked(eye, point + clear * facing))

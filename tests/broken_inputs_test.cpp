@@ -216,7 +216,7 @@ TEST_F(BrokenClouds, pcd_headers_are_checked_line_by_line) {
     EXPECT_TRUE(says(with("DATA ascii\n", ""), "no DATA line"));
     EXPECT_TRUE(says(with("DATA ascii", "DATA base64"), "line 9: DATA \"base64\""));
     EXPECT_TRUE(says(with("HEIGHT 1", "POINTS 2"), "second time"));
-    EXPECT_TRUE(says(cloud_refusal("hello"), "neither PCD nor PLY"));
+    EXPECT_TRUE(says(cloud_refusal("hello"), "neither PCD, PLY nor LAS"));
     EXPECT_TRUE(says(cloud_refusal(""), "empty file"));
 }
 
@@ -409,6 +409,16 @@ const Case cases[] = {
     // The data's README says line 9, the second vertex; lines counted from 1, it is the tenth (the first stands in line
     // 9).
     {"ply/ascii_missing_column.ply", Reader::cloud, true, "line 10: 2 values, expected 3 (record 2"},
+    {"las/truncated.las", Reader::cloud, true, "the header says 1065 points"},
+    {"las/count_huge.las", Reader::cloud, true, "4000000000 points"},
+    {"las/bad_signature.las", Reader::cloud, true, "LAZF"},
+    {"las/scale_zero.las", Reader::cloud, true, "x scale factor"},
+    {"las/scale_nan.las", Reader::cloud, true, "y scale factor"},
+    {"las/offset_beyond_file.las", Reader::cloud, true, "points are said to begin at byte"},
+    {"las/bbox_lies.las", Reader::cloud, false, "the header's box"},
+    {"las/real_bad_vlr_count.las", Reader::cloud, false, "variable length records"},
+    {"las/real_empty_geotiff_vlrs.las", Reader::cloud, false, ""},
+    {"las/real_no_points.las", Reader::cloud, false, "no points"},
     {"camera/ok_open3d.json", Reader::camera, false, ""},
     {"camera/row_major.json", Reader::camera, true, "row by row"},
     {"camera/negative_fx.json", Reader::camera, true, "fx is -525"},

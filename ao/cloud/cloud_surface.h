@@ -24,7 +24,8 @@ struct Outside {
 
 /// Where a cloud was seen from: from `recorded`, the viewpoint its file names, if nearly all points are seen first from
 /// there. Else what the cloud itself tells: one nearly all of which is seen first from the origin of its coordinates was
-/// recorded from there; one much wider than high is terrain, its outside above; one that hides many of its points from
+/// recorded from there; one with hardly anything above anything is
+/// terrain, its outside above; one that hides many of its points from
 /// all sides is a room; else outward. `points` must be finite.
 [[nodiscard]] Outside guessed_outside(std::span<const Eigen::Vector3d> points,
                                       const std::optional<Eigen::Vector3d>& recorded = {});

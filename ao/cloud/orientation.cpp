@@ -77,6 +77,32 @@ LookFrom look_from(const Vector3d& place, std::span<const Vector3d> points) {
             range_at(0.05) > 0 ? range_at(0.95) / range_at(0.05) : std::numeric_limits<double>::infinity()};
 }
 
+/// Share of the points that are seen from straight above, in cells of about four.
+double seen_from_above(std::span<const Vector3d> points) {
+    Eigen::AlignedBox3d box;
+    std::size_t count = 0;
+    for_some(points, [&](const Vector3d& point) {
+        box.extend(point);
+        ++count;
+    });
+    if (count == 0 || !(box.sizes().x() > 0) || !(box.sizes().y() > 0))
+        return 0;
+    const double side = std::sqrt(4 * box.sizes().x() * box.sizes().y() / static_cast<double>(count));
+    const auto columns = static_cast<std::size_t>(box.sizes().x() / side) + 1;
+    const auto rows = static_cast<std::size_t>(box.sizes().y() / side) + 1;
+    if (columns * rows > 4 * enough_to_judge) // a cloud as thin as a wall
+        return 0;
+    std::vector<double> top(columns * rows, -std::numeric_limits<double>::infinity());
+    const auto cell = [&](const Vector3d& p) {
+        return static_cast<std::size_t>((p.y() - box.min().y()) / side) * columns +
+               static_cast<std::size_t>((p.x() - box.min().x()) / side);
+    };
+    for_some(points, [&](const Vector3d& point) { top[cell(point)] = std::max(top[cell(point)], point.z()); });
+    std::size_t seen = 0;
+    for_some(points, [&](const Vector3d& point) { seen += point.z() > top[cell(point)] - 3 * side; });
+    return static_cast<double>(seen) / static_cast<double>(count);
+}
+
 /// Directions spread evenly over the sphere (Fibonacci's spiral).
 std::vector<Vector3d> spread_directions(int count) {
     std::vector<Vector3d> directions;
@@ -254,14 +280,9 @@ Outside guessed_outside(std::span<const Vector3d> points, const std::optional<Ve
         return {Outside::Kind::viewpoint, Vector3d::Zero(),
                 fmt::format("the origin of the coordinates, from where {:.0f} % of the points are seen first",
                             100 * look.seen_first)};
-    Vector3d low = Vector3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
-    for_some(points, [&](const Vector3d& point) {
-        low = low.cwiseMin(point);
-        high = high.cwiseMax(point);
-    });
-    const Vector3d extent = high - low;
-    if (constexpr double flat = 0.25; extent.z() < flat * std::min(extent.x(), extent.y()))
-        return {Outside::Kind::direction, Vector3d::UnitZ(), "up along z, as the cloud is much wider than high"};
+    if (const double above = seen_from_above(points); above >= nearly_all)
+        return {Outside::Kind::direction, Vector3d::UnitZ(),
+                fmt::format("up along z, as of terrain: {:.0f} % of the points have nothing above them", 100 * above)};
     if (const double hidden = hidden_share(points); hidden > 0.05)
         return {Outside::Kind::inward, Vector3d::Zero(),
                 fmt::format("inward, as of a room: {:.0f} % of the points lie inside, hidden from all round", 100 * hidden)};
