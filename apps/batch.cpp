@@ -38,6 +38,7 @@ struct Work {
     cv::Mat1f confidence_in_view = {}; ///< of `ao`, pixel by pixel
     Attached attached = {}, confidence = {};
     bool by_points = false; ///< no view: values come from the points themselves
+    CloudVisibility of_points = {}; ///< what they are, where a CloudAo found them
 };
 
 /// Takes one step with a frame and its time; the only place where a frame's failure is caught.
@@ -310,7 +311,7 @@ void write_all(Work& work, const Scene& scene, const cv::Mat3b& shaded, const Ou
 void write_sides(Work& work, const Outputs& outputs) {
     const std::filesystem::path file = picture_file("shaded", work.entry.name);
     write_picture(outputs.folder / file,
-                  two_sides(*work.frame.cloud, work.attached.per_point, outputs.shade_strength));
+                  two_sides(*work.frame.cloud, work.of_points, outputs.shade_strength));
     work.row.files.push_back(file);
 }
 
@@ -361,7 +362,7 @@ void attach_and_write(Work& work, const BatchOptions& options) {
     });
     take(work, &StageTimes::write, [&] {
         write_all(work, scene, shaded, outputs);
-        if (by_points && options.outputs.shaded)
+        if (by_points && options.outputs.shaded && !work.of_points.visibility.empty())
             write_sides(work, options.outputs);
     });
     if (work.row.status == FrameStatus::failed)
@@ -456,11 +457,11 @@ std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const Ba
                 return;
             }
             if (work->by_points) {
-                CloudVisibility found = cloud_visibility(work->frame, *options.cloud_ao);
-                std::ranges::move(found.notes, std::back_inserter(work->row.notes));
-                work->row.passes = found.timings;
-                work->confidence.per_point = std::move(found.confidence);
-                work->attached = attached_points(*work->frame.cloud, std::move(found.visibility));
+                work->of_points = cloud_visibility(work->frame, *options.cloud_ao);
+                std::ranges::copy(work->of_points.notes, std::back_inserter(work->row.notes));
+                work->confidence.per_point = work->of_points.confidence;
+                work->row.passes = work->of_points.timings;
+                work->attached = attached_points(*work->frame.cloud, work->of_points.visibility);
                 return;
             }
             work->ao = method.compute({work->depth});

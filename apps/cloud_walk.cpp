@@ -1,6 +1,7 @@
 // Clouds that no single camera sees.
 #include "apps/cloud_walk.h"
 
+#include "apps/picture.h"
 #include "io/cloud_file.h"
 #include "io/cloud_records.h"
 #include "projection/error.h"
@@ -70,7 +71,7 @@ namespace {
 
 constexpr int side_px = 900;
 
-/// The box of all but the lowest and highest two in a thousand points along each axis: strays must not shrink the rest.
+/// The box of all but the lowest and highest of a hundred points along each axis: strays must not shrink the rest.
 Eigen::AlignedBox3d framed_box(const Cloud& cloud) {
     Eigen::AlignedBox3d box;
     for (int axis = 0; axis < 3; ++axis) {
@@ -82,63 +83,66 @@ Eigen::AlignedBox3d framed_box(const Cloud& cloud) {
         if (along.empty())
             return {};
         std::sort(along.begin(), along.end());
-        box.min()[axis] = along[along.size() / 500];
-        box.max()[axis] = along[along.size() - 1 - along.size() / 500];
+        box.min()[axis] = along[along.size() / 100];
+        box.max()[axis] = along[along.size() - 1 - along.size() / 100];
     }
     return box;
 }
 
-/// Where the points fall, looking along `forward`; the nearest wins.
-cv::Mat1i nearest_points(const Cloud& cloud, const Eigen::AlignedBox3d& box, const Vector3d& forward, int px) {
+/// What is seen along a direction: colour and visibility, where the nearest point's square covers the pixel.
+struct SideView {
+    cv::Mat3b colour = cv::Mat3b(side_px, side_px, nothing_there);
+    cv::Mat1f visibility = cv::Mat1f(side_px, side_px, std::numeric_limits<float>::quiet_NaN());
+    cv::Mat1f depth = cv::Mat1f(side_px, side_px, std::numeric_limits<float>::infinity());
+
+    static inline const cv::Vec3b nothing_there{64, 40, 28}, clay{200, 205, 210};
+
+    void put(int u, int v, float z, const cv::Vec3b& of_point, float value) {
+        if (u < 0 || v < 0 || u >= side_px || v >= side_px || z >= depth(v, u))
+            return;
+        depth(v, u) = z;
+        colour(v, u) = std::isnan(value) ? nothing_there : of_point;
+        visibility(v, u) = value;
+    }
+};
+
+SideView side_view(const Cloud& cloud, const CloudVisibility& found, const Eigen::AlignedBox3d& box,
+                   const Vector3d& forward) {
     const Vector3d right = Vector3d(forward.y(), -forward.x(), 0).normalized(), down = forward.cross(right);
-    const double scale = 0.96 * px / std::max(box.diagonal().norm(), 1e-12);
-    cv::Mat1i shown(px, px, -1);
-    cv::Mat1d depth(px, px, std::numeric_limits<double>::infinity());
+    const double scale = 0.96 * side_px / std::max(box.diagonal().norm(), 1e-12);
+    const int reach = std::clamp(static_cast<int>(std::lround(0.75 * found.spacing * scale)), 0, 4);
+    SideView view;
     for (std::size_t i = 0; i < cloud.points.size(); ++i) {
-        if (!cloud.points[i].allFinite())
+        const bool away = !found.normals.empty() && found.normals[i].dot(forward.cast<float>()) > 0.05F;
+        if (!cloud.points[i].allFinite() || away)
             continue;
         const Vector3d offset = cloud.points[i] - box.center();
-        const int u = static_cast<int>(std::floor(px / 2.0 + scale * offset.dot(right)));
-        const int v = static_cast<int>(std::floor(px / 2.0 + scale * offset.dot(down)));
-        if (u < 0 || v < 0 || u >= px || v >= px || offset.dot(forward) >= depth(v, u))
+        const double x = side_px / 2.0 + scale * offset.dot(right), y = side_px / 2.0 + scale * offset.dot(down);
+        if (!(std::abs(x) < 4 * side_px && std::abs(y) < 4 * side_px))
             continue;
-        depth(v, u) = offset.dot(forward);
-        shown(v, u) = static_cast<int>(i);
+        const int u = static_cast<int>(std::floor(x)), v = static_cast<int>(std::floor(y));
+        for (int dv = -reach; dv <= reach; ++dv)
+            for (int du = -reach; du <= reach; ++du)
+                view.put(u + du, v + dv, static_cast<float>(offset.dot(forward)),
+                         cloud.colours.empty() ? SideView::clay : cloud.colours[i], found.visibility[i]);
     }
-    return shown;
-}
-
-/// As many pixels as can show about two points each.
-int picture_px(const Cloud& cloud) {
-    const auto wanted = static_cast<int>(1.5 * std::sqrt(static_cast<double>(cloud.points.size())));
-    return std::clamp(wanted, 64, side_px);
+    return view;
 }
 
 } // namespace
 
-cv::Mat3b two_sides(const Cloud& cloud, const std::vector<float>& visibility, double strength) {
-    const cv::Vec3b none(64, 40, 28), clay(200, 205, 210);
+cv::Mat3b two_sides(const Cloud& cloud, const CloudVisibility& found, double strength) {
+    cv::Mat3b picture(2 * side_px, 2 * side_px, SideView::nothing_there);
     const Eigen::AlignedBox3d box = framed_box(cloud);
-    const int px = picture_px(cloud);
-    cv::Mat3b picture(side_px, 2 * side_px, none);
     if (box.isEmpty())
         return picture;
     for (int side = 0; side < 2; ++side) {
         const double turn = (side == 0 ? 0.15 : 1.15) * std::numbers::pi, tilt = 35 * std::numbers::pi / 180;
         const Vector3d forward(std::cos(tilt) * std::cos(turn), std::cos(tilt) * std::sin(turn), -std::sin(tilt));
-        const cv::Mat1i shown = nearest_points(cloud, box, forward, px);
-        cv::Mat3b colour(px, px, none);
-        cv::Mat1f seen(px, px, 1.0F);
-        for (int v = 0; v < px; ++v)
-            for (int u = 0; u < px; ++u)
-                if (const int point = shown(v, u); point >= 0 && !std::isnan(visibility[static_cast<std::size_t>(point)])) {
-                    colour(v, u) = cloud.colours.empty() ? clay : cloud.colours[static_cast<std::size_t>(point)];
-                    seen(v, u) = visibility[static_cast<std::size_t>(point)];
-                }
-        const cv::Mat3b shaded = shade(colour, seen, strength);
-        for (int v = 0; v < side_px; ++v)
-            for (int u = 0; u < side_px; ++u)
-                picture(v, side * side_px + u) = shaded(v * px / side_px, u * px / side_px);
+        const SideView view = side_view(cloud, found, box, forward);
+        const cv::Rect above(side * side_px, 0, side_px, side_px), below(side * side_px, side_px, side_px, side_px);
+        shade(view.colour, view.visibility, strength).copyTo(picture(above));
+        visibility_picture(view.visibility).copyTo(picture(below));
     }
     return picture;
 }

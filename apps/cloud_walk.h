@@ -21,8 +21,9 @@ namespace scanshade {
 /// Values of points, with how many of the valid ones have one.
 [[nodiscard]] Attached attached_points(const Cloud& cloud, std::vector<float> visibility);
 
-/// The cloud's points from two opposite sides, obliquely from above (z up): colours, or light grey, times visibility.
-/// Points without a value are a dim blue; gaps up to a few spacings are closed.
-[[nodiscard]] cv::Mat3b two_sides(const Cloud& cloud, const std::vector<float>& visibility, double strength);
+/// The cloud's points from two opposite sides, obliquely from above (z up): colours, or light grey, times visibility;
+/// below them visibility alone. Points are as large as they stand apart; those without a value are a dim blue; those that
+/// face away are left out, so that one looks into rooms.
+[[nodiscard]] cv::Mat3b two_sides(const Cloud& cloud, const CloudVisibility& found, double strength);
 
 } // namespace scanshade

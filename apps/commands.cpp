@@ -25,6 +25,10 @@ class Generate final : public Command {
             throw Misuse("generate needs -o FOLDER for the capture");
         options_.scene = scene_.front();
         generate(options_, out_, [](int done, int total) { fmt::print(stderr, "  frame {} of {}\n", done, total); });
+        if (options_.cloud > 0) {
+            fmt::print(stderr, "{}: a cloud of {} points -> {}\n", options_.scene, options_.cloud, out_);
+            return all_well;
+        }
         fmt::print(stderr, "{} seen by {}: {} frames -> {}\n", options_.scene, options_.sensor, options_.frames, out_);
         return all_well;
     }

@@ -5,6 +5,7 @@
 #include "apps/json.h"
 #include "apps/map_set.h"
 #include "apps/picture.h"
+#include "io/cloud_file.h"
 #include "io/image_file.h"
 #include "io/output_file.h"
 #include "projection/error.h"
@@ -26,11 +27,21 @@ struct Row {
 
 void say(const std::string& line) { fmt::print(stderr, "{}\n", line); }
 
+/// A map, or what a cloud's points hold as ambient_occlusion, in a row.
+cv::Mat1f values_of(const fs::path& file) {
+    if (!is_cloud_file(file))
+        return read_ao(file);
+    std::vector<std::string> warnings;
+    const std::vector<float> values = recorded_field(read_cloud(file, warnings), "ambient_occlusion", file);
+    return cv::Mat1f(values, true).reshape(0, 1);
+}
+
 class Compare final : public Command {
   public:
     Words words() override {
         return {"PATH",
-                "A and B: runs' outputs, folders of maps, maps, or as B a generated capture, whose truth is taken",
+                "A and B: runs' outputs, folders of maps, maps, clouds with the field ambient_occlusion, or as B a generated "
+                "capture, whose truth is taken",
                 &paths_, 1, 2};
     }
 
@@ -78,10 +89,10 @@ class Compare final : public Command {
 
     Row compared(const MapPair& pair, PairSums& pairs) const {
         try {
-            const cv::Mat1f a = read_ao(pair.a), b = read_ao(pair.b);
+            const cv::Mat1f a = values_of(pair.a), b = values_of(pair.b);
             Row row{pair.name, during(pair.a.string() + " and " + pair.b.string(), [&] { return compare(a, b); }), {}};
             pairs.add(pair_sums(a, b));
-            if (!out_.empty())
+            if (!out_.empty() && a.rows > 1)
                 write_difference(pair.name, a, b);
             return row;
         } catch (const std::exception& failure) {

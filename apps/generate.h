@@ -22,6 +22,8 @@ struct GenerateOptions {
     double truth_radius_m = 0;          ///< occluders farther than this do not count; 0 = the scene's own
     int truth_rays = 256;               ///< per pixel
     std::string truth_falloff = "hard"; ///< any of hard,quad,lin
+    int cloud = 0;                      ///< points; 0 = a recording
+    bool cloud_normals = true;          ///< whether the cloud has them
     bool overwrite = false;
 
     /// Every setting but the scene, which the command line takes as a word of its own.
@@ -36,6 +38,8 @@ using GenerateProgress = std::function<void(int done, int total)>;
 /// truth/depth/<stamp>.tiff (exact z in metres), truth/normals/<stamp>.tiff (exact, x y z), truth/ao/<stamp>.tiff
 /// (cosine-weighted visibility within truth_radius_m; ao_quad and ao_lin for those falloffs). Same options, same bytes,
 /// however many threads there are, and a frame is the same whatever first and step it is reached by.
+/// With `cloud` set: NAME.ply, points of equal density on all that can be seen of the scene, and truth/NAME.ply, the same
+/// with the field ambient_occlusion, in place of images.
 /// Throws Misuse for options out of range, an `out` that holds something and is not to be overwritten, or (even then)
 /// is not a generated capture; Error where a file cannot be written.
 void generate(const GenerateOptions& options, const std::filesystem::path& out, const GenerateProgress& progress = {});

@@ -251,6 +251,18 @@ std::vector<Eigen::Vector3d> recorded_normals(const Cloud& cloud) {
     return {};
 }
 
+bool is_cloud_file(const fs::path& file) { return has_cloud_extension(file); }
+
+std::vector<float> recorded_field(const Cloud& cloud, const std::string& name, const fs::path& file) {
+    const auto field = cloud.records ? cloud.records->field_named(name) : std::nullopt;
+    if (!field)
+        throw Error(fmt::format("{}: no field {}", file.string(), name));
+    std::vector<float> values(cloud.points.size());
+    for (std::size_t i = 0; i < values.size(); ++i)
+        values[i] = static_cast<float>(value_at(*cloud.records, cloud.records->record(i), *field));
+    return values;
+}
+
 void write_cloud(const fs::path& file, const Cloud& cloud, const std::vector<AddedField>& added,
                  std::span<const cv::Vec3b> colours) {
     if (!cloud.records)

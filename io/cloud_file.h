@@ -25,6 +25,12 @@ namespace scanshade {
 /// points with coordinates have one of unit length.
 [[nodiscard]] std::vector<Eigen::Vector3d> recorded_normals(const Cloud& cloud);
 
+/// Whether the name is that of a cloud in one of these formats.
+[[nodiscard]] bool is_cloud_file(const std::filesystem::path& file);
+/// One value per point; throws Error naming `file` where the cloud has no such field.
+[[nodiscard]] std::vector<float> recorded_field(const Cloud& cloud, const std::string& name,
+                                                const std::filesystem::path& file);
+
 /// A float field to add to each point. NaN = unknown.
 struct AddedField {
     std::string name;

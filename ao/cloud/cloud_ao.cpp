@@ -218,6 +218,7 @@ class CloudAo::Work {
         : options_(options), up_(up), cloud_(cloud), watch_(result_.timings), fan_(options.rays, options.seed) {
         result_.visibility.assign(cloud.points.size(), nothing);
         result_.confidence.assign(cloud.points.size(), 0.0F);
+        result_.normals.assign(cloud.points.size(), Vector3f::Zero());
         for (std::size_t i = 0; i < cloud.points.size(); ++i)
             if (cloud.points[i].allFinite())
                 valid_.push_back(static_cast<std::uint32_t>(i));
@@ -344,6 +345,7 @@ class CloudAo::Work {
                 continue;
             const std::size_t point = round[surface.tree.index(i)];
             result_.visibility[point] = values[i];
+            result_.normals[point] = surface.normals[i];
             result_.confidence[point] = surface.flatness[i] * resolution(radius, surface.disc_radius[i]);
         }
         watch_.lap("smooth");

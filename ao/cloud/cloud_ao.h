@@ -29,7 +29,8 @@ struct CloudAoOptions {
 struct CloudVisibility {
     std::vector<float> visibility; ///< per point; NaN where it is not finite or its neighbours make no surface
     std::vector<float> confidence; ///< 0 .. 1: how flat the surface is round the point, times how many discs span the radius
-    double radius = 0, spacing = 0; ///< as used; in the cloud's unit
+    std::vector<Eigen::Vector3f> normals; ///< as used; zero where there is none; empty for meshes
+    double radius = 0, spacing = 0;       ///< as used; in the cloud's unit
     int tiles = 1;
     std::vector<std::string> notes; ///< sentences: what was chosen and why
     Timings timings;

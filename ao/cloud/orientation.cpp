@@ -220,42 +220,52 @@ Pieces joined_pieces(const CloudSurface& surface) {
     return pieces;
 }
 
-/// The point of each piece that lies farthest in a direction faces it: for all pieces, over many directions.
-std::vector<double> outward_evidence(const CloudSurface& surface, Pieces& pieces) {
-    constexpr int looks = 64;
-    std::vector<std::uint32_t> piece(surface.size());
-    std::vector<double> evidence(surface.size(), 0.0);
+/// For every point how far it faces out of its piece, from the points that lie farthest in many directions; and by piece
+/// in how many of these it reaches as far as the whole cloud.
+struct Outward {
+    static constexpr int looks = 64;
+    std::vector<double> evidence;
+    std::vector<int> reached;
+};
+
+Outward outward_evidence(const CloudSurface& surface, Pieces& pieces) {
+    constexpr auto nobody = std::numeric_limits<std::uint32_t>::max();
+    Outward found{std::vector<double>(surface.size(), 0.0), std::vector<int>(surface.size(), 0)};
+    std::vector<std::uint32_t> piece(surface.size()), farthest(surface.size());
     for (std::size_t i = 0; i < surface.size(); ++i)
         piece[i] = pieces.find(static_cast<std::uint32_t>(i)).piece;
-    std::vector<std::uint32_t> farthest(surface.size());
-    for (const Vector3d& look : spread_directions(looks)) {
+    for (const Vector3d& look : spread_directions(Outward::looks)) {
         const Vector3f direction = look.cast<float>();
-        std::fill(farthest.begin(), farthest.end(), std::numeric_limits<std::uint32_t>::max());
+        std::fill(farthest.begin(), farthest.end(), nobody);
+        float low = std::numeric_limits<float>::infinity(), high = -low;
         for (std::size_t i = 0; i < surface.size(); ++i) {
             std::uint32_t& best = farthest[piece[i]];
-            if (best == std::numeric_limits<std::uint32_t>::max() ||
-                surface.tree[i].dot(direction) > surface.tree[best].dot(direction))
+            const float along = surface.tree[i].dot(direction);
+            low = std::min(low, along), high = std::max(high, along);
+            if (best == nobody || along > surface.tree[best].dot(direction))
                 best = static_cast<std::uint32_t>(i);
         }
-        for (const std::uint32_t best : farthest)
-            if (best != std::numeric_limits<std::uint32_t>::max())
-                evidence[best] += static_cast<double>(surface.normals[best].dot(direction));
+        for (std::size_t p = 0; p < farthest.size(); ++p)
+            if (const std::uint32_t best = farthest[p]; best != nobody) {
+                found.evidence[best] += static_cast<double>(surface.normals[best].dot(direction));
+                found.reached[p] += surface.tree[best].dot(direction) > high - 0.05F * (high - low);
+            }
     }
-    return evidence;
+    return found;
 }
 
+/// In a room the walls, which reach to its ends on many sides, face in; what stands about in it faces out.
 void turn_pieces(CloudSurface& surface, const Outside& outside) {
     Pieces pieces = joined_pieces(surface);
     const Vector3f up = outside.point.cast<float>();
-    std::vector<double> evidence;
-    if (outside.kind != Outside::Kind::direction)
-        evidence = outward_evidence(surface, pieces);
-    const double sign = outside.kind == Outside::Kind::inward ? -1 : 1;
+    const bool by_up = outside.kind == Outside::Kind::direction;
+    const Outward outward = by_up ? Outward{} : outward_evidence(surface, pieces);
     std::vector<double> votes(surface.size(), 0.0);
     for (std::size_t i = 0; i < surface.size(); ++i) {
         const auto [piece, turned] = pieces.find(static_cast<std::uint32_t>(i));
-        const double own = evidence.empty() ? static_cast<double>(surface.normals[i].dot(up)) : evidence[i];
-        votes[piece] += sign * (turned ? -own : own);
+        const double own = by_up ? static_cast<double>(surface.normals[i].dot(up)) : outward.evidence[i];
+        const bool encloses = outside.kind == Outside::Kind::inward && 4 * outward.reached[piece] > Outward::looks;
+        votes[piece] += turned != encloses ? -own : own;
     }
     for (std::size_t i = 0; i < surface.size(); ++i) {
         const auto [piece, turned] = pieces.find(static_cast<std::uint32_t>(i));
