@@ -372,7 +372,7 @@ class Run final : public Command {
     CloudAo cloud_ao() const {
         CloudAoOptions options = cloud_options_;
         if (options.radius == 0 && !asked_.radius.empty())
-            options.radius = std::stod(asked_.radius);
+            set({"radius", "", &options.radius}, asked_.radius);
         return CloudAo(options);
     }
 

@@ -54,7 +54,7 @@ Listing list_file(const fs::path& file) {
     if (is_cloud(file)) {
         entry.cloud = file;
         listing.capture.kind = "cloud";
-        listing.capture.depth = depth_encoding("m", "clouds hold metres");
+        listing.capture.depth = depth_encoding("m", "of clouds: metres by custom, or the unit that the file names");
         listing.capture.registration_reason = "colours belong to the points";
     } else {
         const bool image = image_format(read_bytes(file, 16)) != ImageFormat::unknown;

@@ -310,7 +310,7 @@ std::optional<Listing> list_clouds(const fs::path& folder) {
     if (listing.capture.entries.empty())
         return std::nullopt;
     listing.capture.kind = "clouds";
-    listing.capture.depth = depth_encoding("m", "clouds hold metres");
+    listing.capture.depth = depth_encoding("m", "of clouds: metres by custom, or the unit that the file names");
     listing.capture.registration_reason = "colours belong to the points";
     listing.find_camera = [](cv::Size, std::vector<std::string>&) { return std::nullopt; };
     return listing;

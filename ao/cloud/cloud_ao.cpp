@@ -180,8 +180,11 @@ std::vector<Parameter> CloudAoOptions::parameters() {
     return {
         {"radius", "how far away a surface may still occlude, in the cloud's unit; 0 = from the cloud's extent and spacing",
          &radius, "", 0, 1e9},
-        {"rays", "per point", &rays, "", 1, 16384},
-        {"smooth", "how often a value becomes the mean of those beside it on the same surface", &smooth, "", 0, 16},
+        {"rays", "per point; 0 = 16, fewer where the radius spans many spacings", &rays, "", 0, 16384},
+        {"smooth",
+         "how often a value becomes the mean of those beside it on the same surface; -1 = twice, or more where the radius "
+         "spans many spacings",
+         &smooth, "", -1, 16},
         {"sky", "how much of the sky a point sees, at any distance, in place of what is open within the radius", &sky},
         {"up", "where the sky is, x,y,z", &up},
         {"outside", "where estimated normals point: auto, up, outward, inward, or to the scanner's place x,y,z", &outside},
@@ -215,7 +218,7 @@ class CloudAo::Work {
   public:
     Work(const CloudAoOptions& options, const Vector3d& up, const std::optional<Vector3d>& viewpoint,
          const PointSet& cloud, const std::optional<Vector3d>& scanner)
-        : options_(options), up_(up), cloud_(cloud), watch_(result_.timings), fan_(options.rays, options.seed) {
+        : options_(options), up_(up), cloud_(cloud), watch_(result_.timings) {
         result_.visibility.assign(cloud.points.size(), nothing);
         result_.confidence.assign(cloud.points.size(), 0.0F);
         result_.normals.assign(cloud.points.size(), Vector3f::Zero());
@@ -225,6 +228,7 @@ class CloudAo::Work {
         const std::vector<Vector3d> some = sampled(cloud.points, enough_to_judge);
         settle_outside(viewpoint, scanner, some);
         settle_radius(some);
+        settle_rays();
         watch_.lap("survey");
     }
 
@@ -279,6 +283,16 @@ class CloudAo::Work {
                             options_.radius > 0 ? "as given" : "a twentieth of the extent, within 10 .. 200 spacings"));
     }
 
+    /// Visibility changes over parts of the radius: the more points these hold, the more of them may be taken together.
+    void settle_rays() {
+        const double spacings = options_.sky || !(result_.spacing > 0) ? 0 : result_.radius / result_.spacing;
+        const int level = spacings > 120 ? 2 : spacings > 60 ? 1 : 0;
+        const int rays = options_.rays > 0 ? options_.rays : std::array{16, 8, 4}[static_cast<std::size_t>(level)];
+        passes_ = options_.smooth >= 0 ? options_.smooth : std::array{2, 3, 5}[static_cast<std::size_t>(level)];
+        fan_.emplace(rays, options_.seed);
+        result_.notes.push_back(fmt::format("{} rays a point, {} times the mean over neighbours.", rays, passes_));
+    }
+
     /// Halves the points of `core` until one half and all that lies within `reach` of it fit the memory.
     void divide(const std::vector<std::uint32_t>& core, const std::vector<std::uint32_t>& round, double reach, int depth) {
         constexpr std::size_t least = 10000;
@@ -328,7 +342,7 @@ class CloudAo::Work {
         const float radius = options_.sky ? std::numeric_limits<float>::max() : static_cast<float>(result_.radius);
         std::vector<float> values(surface.size(), nothing);
         {
-            const DiscRays rays(surface, fan_, radius,
+            const DiscRays rays(surface, *fan_, radius,
                                 options_.sky ? std::optional<Vector3f>(up_.cast<float>()) : std::nullopt);
             watch_.lap("tree");
             tbb::parallel_for(tbb::blocked_range<std::size_t>(0, surface.size(), 64), [&](const auto& range) {
@@ -338,7 +352,7 @@ class CloudAo::Work {
             });
         }
         watch_.lap("rays");
-        for (int pass = 0; pass < options_.smooth; ++pass)
+        for (int pass = 0; pass < passes_; ++pass)
             values = smoothed(surface, values, radius);
         for (std::size_t i = 0; i < surface.size(); ++i) {
             if (!is_wanted(i) || std::isnan(values[i]))
@@ -409,11 +423,11 @@ class CloudAo::Work {
     const PointSet& cloud_;
     CloudVisibility result_;
     Watch watch_;
-    RayFan fan_;
+    std::optional<RayFan> fan_;
     Outside outside_;
     std::vector<std::uint32_t> valid_;
     bool normals_refused_ = false, sides_opposed_ = false;
-    int tiles_ = 0;
+    int tiles_ = 0, passes_ = 2;
 };
 
 CloudVisibility CloudAo::compute(const PointSet& cloud, const std::optional<Vector3d>& scanner) const {
@@ -436,7 +450,7 @@ CloudVisibility CloudAo::of_mesh(const PointSet& mesh) const {
     }
     const double extent = extent_of(sampled(mesh.points, 60000));
     result.radius = std::clamp(options_.radius > 0 ? options_.radius : default_radius(extent, result.spacing), 1e-6, 1e6);
-    const int rays = 4 * options_.rays;
+    const int rays = options_.rays > 0 ? options_.rays : 64;
     Raycast raycast({.radius_m = result.radius, .rays = rays, .mesh = "vertices", .seed = options_.seed});
     result.visibility = raycast.compute(mesh);
     result.timings = raycast.timings();

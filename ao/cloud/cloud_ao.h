@@ -13,8 +13,10 @@ namespace scanshade {
 /// What a person sets.
 struct CloudAoOptions {
     double radius = 0; ///< in the cloud's unit; 0 = from the cloud: see default_radius()
-    int rays = 16;     ///< per point; neighbours' rays make one even set, so that their mean counts several times as many
-    int smooth = 2;    ///< times that a value becomes the mean of those beside it on the same surface
+    int rays = 0;      ///< per point; neighbours' rays make one even set, so that their mean counts several times as many.
+                       ///< 0 = 16; 8 and 4 where the radius spans more than 60 and 120 spacings
+    int smooth = -1;   ///< times that a value becomes the mean of those beside it on the same surface; -1 = 2; 3 and 5
+                       ///< where so many spacings make neighbours near against the radius
     bool sky = false;  ///< how much of the sky a point sees, however far what hides it
     std::string up = "0,0,1";
     std::string outside = "auto"; ///< "auto", "up", "outward", "inward", or the scanner's place x,y,z
