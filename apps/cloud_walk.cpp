@@ -62,8 +62,7 @@ Attached attached_points(const Cloud& cloud, std::vector<float> visibility) {
         sum += has_value ? static_cast<double>(attached.per_point[i]) : 0;
     }
     attached.coverage = valid > 0 ? static_cast<double>(known) / static_cast<double>(valid) : 0;
-    attached.mean_visibility =
-        known > 0 ? sum / static_cast<double>(known) : std::numeric_limits<double>::quiet_NaN();
+    attached.mean_visibility = known > 0 ? sum / static_cast<double>(known) : std::numeric_limits<double>::quiet_NaN();
     return attached;
 }
 

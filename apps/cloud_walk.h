@@ -22,8 +22,8 @@ namespace scanshade {
 [[nodiscard]] Attached attached_points(const Cloud& cloud, std::vector<float> visibility);
 
 /// The cloud's points from two opposite sides, obliquely from above (z up): colours, or light grey, times visibility;
-/// below them visibility alone. Points are as large as they stand apart; those without a value are a dim blue; those that
-/// face away are left out, so that one looks into rooms.
+/// below them visibility alone. Points are as large as they stand apart; those without a value are a dim blue; those
+/// that face away are left out, so that one looks into rooms.
 [[nodiscard]] cv::Mat3b two_sides(const Cloud& cloud, const CloudVisibility& found, double strength);
 
 } // namespace scanshade

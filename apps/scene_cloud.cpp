@@ -162,7 +162,8 @@ std::vector<float> true_visibility(const World& world, const SceneCloud& cloud, 
     std::vector<float> truth(cloud.points.size(), std::numeric_limits<float>::quiet_NaN());
     tbb::parallel_for(std::size_t(0), (truth.size() + step - 1) / step, [&](std::size_t k) {
         const std::size_t i = k * step;
-        truth[i] = hemisphere.at({cloud.points[i], cloud.normals[i], hash(static_cast<std::uint32_t>(i))}).visibility[0];
+        truth[i] =
+            hemisphere.at({cloud.points[i], cloud.normals[i], hash(static_cast<std::uint32_t>(i))}).visibility[0];
     });
     return truth;
 }

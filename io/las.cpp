@@ -51,9 +51,7 @@ CloudField field(std::string name, Scalar type, std::size_t count = 1) {
     return {std::move(name), type, count, std::nullopt, 0};
 }
 
-void add(std::vector<CloudField>& fields, std::initializer_list<CloudField> more) {
-    fields.insert(fields.end(), more);
-}
+void add(std::vector<CloudField>& fields, std::initializer_list<CloudField> more) { fields.insert(fields.end(), more); }
 
 /// What a record of point format 0 .. 10 holds.
 std::vector<CloudField> fields_of_format(int format) {
@@ -114,15 +112,17 @@ bool names_extra_bytes(const Vlr& vlr) { return vlr.user == "LASF_Spec" && vlr.i
 
 /// Fields behind the format's own, as far as a record describes them; what is left is one field of bytes.
 void add_extra_fields(std::vector<CloudField>& fields, const std::vector<Vlr>& vlrs, std::size_t record_length) {
-    static constexpr std::array types{Scalar::uint8, Scalar::int8,  Scalar::uint16, Scalar::int16,   Scalar::uint32,
-                                      Scalar::int32, Scalar::uint64, Scalar::int64, Scalar::float32, Scalar::float64};
+    static constexpr std::array types{Scalar::uint8, Scalar::int8,   Scalar::uint16, Scalar::int16,   Scalar::uint32,
+                                      Scalar::int32, Scalar::uint64, Scalar::int64,  Scalar::float32, Scalar::float64};
     for (const Vlr& vlr : vlrs) {
         if (!names_extra_bytes(vlr))
             continue;
         for (std::size_t at = 0; at + descriptor_size <= vlr.data.size(); at += descriptor_size) {
-            const auto type = read_at<std::uint8_t>(vlr.data, at + 2), options = read_at<std::uint8_t>(vlr.data, at + 3);
+            const auto type = read_at<std::uint8_t>(vlr.data, at + 2),
+                       options = read_at<std::uint8_t>(vlr.data, at + 3);
             const std::string name(fixed_text(vlr.data, at + 4, 32));
-            // 1 .. 10 are scalars, 11 .. 30 the same in twos and threes (withdrawn in 1.4 R14, but written), 0 raw bytes.
+            // 1 .. 10 are scalars, 11 .. 30 the same in twos and threes (withdrawn in 1.4 R14, but written), 0 raw
+            // bytes.
             const std::size_t copies = type == 0 ? options : (type + 9U) / 10;
             CloudField extra = field(name, type == 0 || type > 30 ? Scalar::uint8 : types[(type - 1U) % 10], copies);
             if (copies == 0 || type > 30 || stride_of(fields) + extra.bytes() > record_length)
@@ -160,8 +160,7 @@ std::string unit_of(const std::vector<Vlr>& vlrs) {
         if (at != std::string_view::npos)
             return std::string(text.substr(at + 6, text.find('"', at + 6) - at - 6)) + " (well-known text)";
     }
-    static const std::map<std::uint16_t, std::string> names{
-        {9001, "metres"}, {9002, "feet"}, {9003, "US survey feet"}};
+    static const std::map<std::uint16_t, std::string> names{{9001, "metres"}, {9002, "feet"}, {9003, "US survey feet"}};
     if (model == 2)
         return "degrees (GeoTIFF keys)";
     const auto name = names.find(linear);
@@ -203,9 +202,10 @@ void doubt_box(const CloudRecords& records, std::string_view header, const fs::p
         const double slack = std::max(2 * std::abs(records.scale[axis]), 1e-3 * (high - low));
         if (std::abs(said_low - low) <= slack && std::abs(said_high - high) <= slack)
             continue;
-        warnings.push_back(fmt::format("{}: the header's box says {} is {} .. {}, the points lie in {} .. {}; the points "
-                                       "are believed.",
-                                       file.string(), "xyz"[axis], said_low, said_high, low, high));
+        warnings.push_back(
+            fmt::format("{}: the header's box says {} is {} .. {}, the points lie in {} .. {}; the points "
+                        "are believed.",
+                        file.string(), "xyz"[axis], said_low, said_high, low, high));
         return;
     }
 }
@@ -225,15 +225,18 @@ CloudRecords read_las(std::string_view bytes, const fs::path& file, std::vector<
         refuse(file, fmt::format("a LAS header of {} bytes expected, found {}", least_header, bytes.size()));
     const int minor = read_at<std::uint8_t>(bytes, at_minor);
     if (read_at<std::uint8_t>(bytes, at_minor - 1) != 1 || minor > 4)
-        refuse(file, fmt::format("LAS version {}.{}, expected 1.0 .. 1.4", read_at<std::uint8_t>(bytes, at_minor - 1), minor));
+        refuse(file, fmt::format("LAS version {}.{}, expected 1.0 .. 1.4", read_at<std::uint8_t>(bytes, at_minor - 1),
+                                 minor));
     const std::size_t header_size = read_at<std::uint16_t>(bytes, at_header_size);
     const std::size_t needed = minor >= 4 ? 375 : minor == 3 ? 235 : least_header;
     if (header_size < needed || header_size > bytes.size())
-        refuse(file, fmt::format("header size {} at byte {}, expected {} .. {}", header_size, at_header_size, needed, bytes.size()));
+        refuse(file, fmt::format("header size {} at byte {}, expected {} .. {}", header_size, at_header_size, needed,
+                                 bytes.size()));
     const int format = read_at<std::uint8_t>(bytes, at_format);
     if (format & 0xc0)
-        refuse(file, "compressed (LAZ), which is not read; `laszip -i IN.laz -o OUT.las` or `pdal translate IN.laz OUT.las` "
-                     "unpacks it");
+        refuse(file,
+               "compressed (LAZ), which is not read; `laszip -i IN.laz -o OUT.las` or `pdal translate IN.laz OUT.las` "
+               "unpacks it");
     if (format > 10)
         refuse(file, fmt::format("point format {} at byte {}, expected 0 .. 10", format, at_format));
     const std::size_t points_at = read_at<std::uint32_t>(bytes, at_points);
@@ -251,7 +254,8 @@ CloudRecords read_las(std::string_view bytes, const fs::path& file, std::vector<
                                  format, stride_of(records.fields)));
     const std::size_t count = point_count(bytes, minor), room = (bytes.size() - points_at) / records.stride;
     if (count > room)
-        refuse(file, fmt::format("the header says {} points of {} bytes, the file holds {}", count, records.stride, room));
+        refuse(file,
+               fmt::format("the header says {} points of {} bytes, the file holds {}", count, records.stride, room));
     if (count > most_points)
         refuse(file, fmt::format("{} points, at most {} are read", count, most_points));
     check_scales(records, bytes, file);
@@ -332,7 +336,8 @@ std::size_t describe_extra_bytes(std::string& header, const std::string& descrip
 
 } // namespace
 
-std::string las_bytes(const CloudRecords& records, const std::string& points, const std::vector<FieldAddition>& additions) {
+std::string las_bytes(const CloudRecords& records, const std::string& points,
+                      const std::vector<FieldAddition>& additions) {
     if (additions.empty())
         return records.header + points + records.after;
     std::string descriptors;

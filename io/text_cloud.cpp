@@ -54,7 +54,8 @@ std::vector<std::string> names_in(const std::vector<std::string_view>& words) {
         if (word.empty())
             continue;
         std::string name(word);
-        std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+        std::transform(name.begin(), name.end(), name.begin(),
+                       [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
         name = name == "r" ? "red" : name == "g" ? "green" : name == "b" ? "blue" : name;
         names.push_back(name);
     }
@@ -101,7 +102,8 @@ std::vector<std::vector<std::string_view>> header_lines(std::string_view bytes, 
     return lines;
 }
 
-std::vector<double> numbers_of(const std::vector<std::string_view>& words, std::size_t expected, int line, const fs::path& file) {
+std::vector<double> numbers_of(const std::vector<std::string_view>& words, std::size_t expected, int line,
+                               const fs::path& file) {
     std::vector<double> values;
     for (const auto word : words)
         if (const auto value = number(word); value && std::isfinite(*value))
@@ -111,7 +113,8 @@ std::vector<double> numbers_of(const std::vector<std::string_view>& words, std::
     return values;
 }
 
-/// Leica's PTX: columns, rows, the scanner's place and three axes, a 4x4 for row vectors; then the grid, column by column.
+/// Leica's PTX: columns, rows, the scanner's place and three axes, a 4x4 for row vectors; then the grid, column by
+/// column.
 CloudRecords read_ptx(std::string_view bytes, const fs::path& file) {
     CloudRecords records;
     std::size_t length = 0;
@@ -120,7 +123,8 @@ CloudRecords read_ptx(std::string_view bytes, const fs::path& file) {
     for (std::size_t i = 0; i < 2; ++i) {
         const auto size = lines[i].size() == 1 ? whole_number(lines[i][0]) : std::nullopt;
         if (!size || *size == 0 || *size > 1U << 20)
-            throw Error(fmt::format("{}: expected the number of {}", at_line(file, static_cast<int>(i) + 1), i == 0 ? "columns" : "rows"));
+            throw Error(fmt::format("{}: expected the number of {}", at_line(file, static_cast<int>(i) + 1),
+                                    i == 0 ? "columns" : "rows"));
         sizes[i] = *size;
     }
     for (std::size_t i = 2; i < 6; ++i)
@@ -139,7 +143,8 @@ CloudRecords read_ptx(std::string_view bytes, const fs::path& file) {
     TextRecords peek(bytes.substr(length), 11);
     for (std::uint64_t i = 0; i <= expected && peek.next(); ++i)
         if (i == expected)
-            throw Error(fmt::format("{}: a second scan begins; files of one scan are read", at_line(file, peek.line())));
+            throw Error(
+                fmt::format("{}: a second scan begins; files of one scan are read", at_line(file, peek.line())));
     read_lines(records, bytes.substr(length), 11, file);
     if (records.point_count != expected)
         throw Error(fmt::format("{}: {} columns of {} rows are {} points, the file holds {}", file.string(), sizes[0],
@@ -152,8 +157,9 @@ CloudRecords read_ptx(std::string_view bytes, const fs::path& file) {
     for (std::size_t i = 0; i < records.point_count; ++i) {
         const auto at = words(records.record(i));
         const Eigen::Vector3d point(*number(at[0]), *number(at[1]), *number(at[2]));
-        records.placed[i] = point.isZero() ? Eigen::Vector3d(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()))
-                                           : Eigen::Vector3d((world_from_scan * point.homogeneous()).head<3>());
+        records.placed[i] = point.isZero()
+                                ? Eigen::Vector3d(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()))
+                                : Eigen::Vector3d((world_from_scan * point.homogeneous()).head<3>());
     }
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     pose.translation() = world_from_scan.topRightCorner<3, 1>();
@@ -189,18 +195,22 @@ CloudRecords read_text_cloud(std::string_view bytes, const fs::path& file, std::
     records.header = bytes.substr(0, length);
     read_lines(records, bytes.substr(length), length > 0 ? 2 : 1, file);
     if (records.fields.size() < 3 && records.point_count > 0)
-        throw Error(fmt::format("{}: {} a line, expected x y z at least", file.string(), counted(records.fields.size(), "value")));
+        throw Error(fmt::format("{}: {} a line, expected x y z at least", file.string(),
+                                counted(records.fields.size(), "value")));
     if (records.fields.empty())
         records.fields = fields_named(usual_names(3));
     if (counted_first && said != records.point_count)
-        warnings.push_back(fmt::format("{}: says {} points, holds {}; all are read.", file.string(), said, records.point_count));
+        warnings.push_back(
+            fmt::format("{}: says {} points, holds {}; all are read.", file.string(), said, records.point_count));
     return records;
 }
 
-std::string text_bytes(const CloudRecords& records, const std::string& points, const std::vector<FieldAddition>& additions) {
+std::string text_bytes(const CloudRecords& records, const std::string& points,
+                       const std::vector<FieldAddition>& additions) {
     std::string header = records.header;
     const auto names = words(header);
-    if (!names.empty() && records.name_end != ".ptx" && !number(names[0])) // a line of names gets those of the new columns
+    if (!names.empty() && records.name_end != ".ptx" &&
+        !number(names[0])) // a line of names gets those of the new columns
         for (const FieldAddition& addition : additions)
             header.insert(header.find_last_not_of("\r\n") + 1, " " + addition.name);
     return header + points + records.after;

@@ -19,7 +19,9 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 /// Random numbers that are the same on every machine.
 class Dice {
   public:
-    double roll() { return static_cast<double>((state_ = state_ * 6364136223846793005ULL + 1442695040888963407ULL) >> 11) * 0x1p-53; }
+    double roll() {
+        return static_cast<double>((state_ = state_ * 6364136223846793005ULL + 1442695040888963407ULL) >> 11) * 0x1p-53;
+    }
 
   private:
     std::uint64_t state_ = 42;
@@ -49,7 +51,8 @@ Points sphere(std::size_t count, const Vector3d& centre) {
     Points points;
     for (std::size_t i = 0; i < count; ++i) {
         const double z = 1 - (2 * static_cast<double>(i) + 1) / static_cast<double>(count);
-        const double turn = static_cast<double>(i) * std::numbers::pi * (3 - std::sqrt(5.0)), across = std::sqrt(1 - z * z);
+        const double turn = static_cast<double>(i) * std::numbers::pi * (3 - std::sqrt(5.0)),
+                     across = std::sqrt(1 - z * z);
         points.push_back(centre + Vector3d(across * std::cos(turn), across * std::sin(turn), z));
     }
     return points;
@@ -139,7 +142,8 @@ TEST(CloudAo, density_changes_hardly_anything) {
     const scene::World world(scene::scene_named("office"));
     const auto all = scene::scene_cloud(world, 200000);
     const auto with = [&](std::size_t count) {
-        return visibility({all.points.begin(), all.points.begin() + static_cast<std::ptrdiff_t>(count)}, {.radius = 0.5},
+        return visibility({all.points.begin(), all.points.begin() + static_cast<std::ptrdiff_t>(count)},
+                          {.radius = 0.5},
                           {all.normals.begin(), all.normals.begin() + static_cast<std::ptrdiff_t>(count)});
     };
     const auto half = with(100000), whole = with(200000);
@@ -198,7 +202,8 @@ TEST(CloudAo, the_sky_is_seen_by_its_share) {
     EXPECT_NEAR(mean(visibility(wall, {.sky = true, .outside = "0,-9,0"}).visibility), 0.5, 0.01);
     for (const float v : visibility(square(10000), {.sky = true, .outside = "0,0,-9"}).visibility)
         ASSERT_EQ(v, 0.0F); // a ceiling
-    EXPECT_NEAR(mean(visibility(square(10000), {.sky = true, .up = "1,0,0", .outside = "0,0,9"}).visibility), 0.5, 0.01);
+    EXPECT_NEAR(mean(visibility(square(10000), {.sky = true, .up = "1,0,0", .outside = "0,0,9"}).visibility), 0.5,
+                0.01);
 }
 
 TEST(CloudAo, odd_clouds_are_results_not_failures) {
@@ -290,7 +295,8 @@ TEST(Neighbours, are_those_that_trying_all_points_finds) {
     Dice dice;
     std::vector<Eigen::Vector3f> points(700);
     for (auto& p : points)
-        p = Eigen::Vector3f(static_cast<float>(dice.roll()), static_cast<float>(dice.roll() * dice.roll()), static_cast<float>(std::round(4 * dice.roll())));
+        p = Eigen::Vector3f(static_cast<float>(dice.roll()), static_cast<float>(dice.roll() * dice.roll()),
+                            static_cast<float>(std::round(4 * dice.roll())));
     points[10] = points[20] = points[30];
     const NeighbourTree tree(points);
     Nearest found;
@@ -310,12 +316,14 @@ TEST(Neighbours, are_those_that_trying_all_points_finds) {
 
 TEST(CloudAo, run_gives_a_plain_cloud_a_value_on_every_point) {
     const tests::TemporaryFolder folder;
-    std::string text = "ply\nformat ascii 1.0\nelement vertex 2000\nproperty double x\nproperty double y\nproperty double z\nend_header\n";
+    std::string text = "ply\nformat ascii 1.0\nelement vertex 2000\nproperty double x\nproperty double y\nproperty "
+                       "double z\nend_header\n";
     const Points points = corner(2000);
     for (const Vector3d& p : points)
         text += std::to_string(p.x() + 1e6) + " " + std::to_string(p.y()) + " " + std::to_string(p.z()) + "\n";
     tests::write_file(folder / "c.ply", text);
-    const tests::Ran ran = tests::run_program("run " + (folder / "c.ply").string() + " -o " + (folder / "out").string());
+    const tests::Ran ran =
+        tests::run_program("run " + (folder / "c.ply").string() + " -o " + (folder / "out").string());
     ASSERT_EQ(ran.exit_code, 0) << ran.err;
     const std::string written = tests::file_bytes(folder / "out/clouds/c.ply");
     EXPECT_NE(written.find("property float ambient_occlusion\nproperty float ao_confidence\n"), std::string::npos);

@@ -1,6 +1,8 @@
-// cloud_bench: visibility of a scene's points, from the points alone, against rays on the scene itself: error, time, memory.
+// cloud_bench: visibility of a scene's points, from the points alone, against rays on the scene itself: error, time,
+// memory.
 //   cloud_bench [--scene office] [--points 1000000] [--rays 8,16,32] [--no-normals] [--raycast]
-//   cloud_bench --sky [--scene outdoor] [--raster 512,1024,2048]     the sky's share, also by depth images from 256 sides
+//   cloud_bench --sky [--scene outdoor] [--raster 512,1024,2048]     the sky's share, also by depth images from 256
+//   sides
 // All rows are of one run, each judged at the same points (about 50000); seconds are the wall's and the processor's.
 #include "ao/cloud/cloud_ao.h"
 #include "ao/compare.h"
@@ -26,7 +28,8 @@ namespace {
 double peak_memory_mib() {
     std::ifstream status("/proc/self/status");
     for (std::string word; status >> word;)
-        if (double kib = 0; word == "VmHWM:" && status >> kib) return kib / 1024;
+        if (double kib = 0; word == "VmHWM:" && status >> kib)
+            return kib / 1024;
     return 0;
 }
 
@@ -44,7 +47,8 @@ struct Judge {
         std::copy(values.begin(), values.end(), ours.begin());
         std::copy(truth.begin(), truth.end(), exact.begin());
         const Difference d = compare(ours, exact);
-        fmt::print("{:<26} RMSE {:.4f}  bias {:+.4f}  corr. {:.4f}  95 % {:.3f}  wall {:7.2f} s  cpu {:7.2f} s  peak {:6.0f} MiB\n",
+        fmt::print("{:<26} RMSE {:.4f}  bias {:+.4f}  corr. {:.4f}  95 % {:.3f}  wall {:7.2f} s  cpu {:7.2f} s  peak "
+                   "{:6.0f} MiB\n",
                    name, d.rms, d.bias, d.correlation, d.percentile_95, wall_s, cpu_s, peak_memory_mib());
         std::fflush(stdout);
     }
@@ -62,7 +66,8 @@ std::vector<float> true_sky(const scene::World& world, const scene::SceneCloud& 
         const Vector3d from = cloud.points[i] + 2 * world.surface().rounding_m() * n;
         int open = 0;
         for (const auto& d : directions.set_for(hash(static_cast<std::uint32_t>(i)))) {
-            const Vector3d along = static_cast<double>(d.x) * x + static_cast<double>(d.y) * y + static_cast<double>(d.z) * n;
+            const Vector3d along =
+                static_cast<double>(d.x) * x + static_cast<double>(d.y) * y + static_cast<double>(d.z) * n;
             open += along.z() > 0 && !world.surface().blocked(from, from + far_away * along);
         }
         truth[i] = static_cast<float>(open) / rays;
@@ -70,18 +75,23 @@ std::vector<float> true_sky(const scene::World& world, const scene::SceneCloud& 
     return truth;
 }
 
-/// The sky by orthographic depth images from `views` sides of the upper half sphere (after ShadeVis and CloudCompare's PCV,
-/// with normals: cosine-weighted, so that flat and open reads 1): splats of 1.5 spacings, tolerance 0.2 % of the extent.
+/// The sky by orthographic depth images from `views` sides of the upper half sphere (after ShadeVis and CloudCompare's
+/// PCV, with normals: cosine-weighted, so that flat and open reads 1): splats of 1.5 spacings, tolerance 0.2 % of the
+/// extent.
 std::vector<float> sky_by_views(const scene::SceneCloud& cloud, double spacing, int views, int raster) {
     Eigen::AlignedBox3d box;
-    for (const Vector3d& p : cloud.points) box.extend(p);
+    for (const Vector3d& p : cloud.points)
+        box.extend(p);
     const double extent = box.diagonal().norm(), pixel = extent / raster, bias = std::max(0.002 * extent, 2 * pixel);
     const int reach = static_cast<int>(std::lround(0.75 * spacing / pixel));
     tbb::combinable<std::vector<float>> lit([&] { return std::vector<float>(cloud.points.size(), 0.0F); });
-    tbb::combinable<std::vector<float>> front([&] { return std::vector<float>(static_cast<std::size_t>(raster * raster)); });
+    tbb::combinable<std::vector<float>> front(
+        [&] { return std::vector<float>(static_cast<std::size_t>(raster * raster)); });
     tbb::parallel_for(0, views, [&](int view) {
-        const double z = (view + 0.5) / views, turn = view * std::numbers::pi * (3 - std::sqrt(5.0)), across = std::sqrt(1 - z * z);
-        const Vector3d towards(across * std::cos(turn), across * std::sin(turn), z), x = towards.unitOrthogonal(), y = towards.cross(x);
+        const double z = (view + 0.5) / views, turn = view * std::numbers::pi * (3 - std::sqrt(5.0)),
+                     across = std::sqrt(1 - z * z);
+        const Vector3d towards(across * std::cos(turn), across * std::sin(turn), z), x = towards.unitOrthogonal(),
+                                                                                     y = towards.cross(x);
         std::vector<float>&sum = lit.local(), &depth = front.local();
         std::fill(depth.begin(), depth.end(), -1e30F);
         const auto place = [&](const Vector3d& p, int& u, int& v) {
@@ -95,7 +105,8 @@ std::vector<float> sky_by_views(const scene::SceneCloud& cloud, double spacing, 
             const float near = place(p, u, v);
             for (int dv = std::max(v - reach, 0); dv <= std::min(v + reach, raster - 1); ++dv)
                 for (int du = std::max(u - reach, 0); du <= std::min(u + reach, raster - 1); ++du)
-                    depth[static_cast<std::size_t>(dv * raster + du)] = std::max(depth[static_cast<std::size_t>(dv * raster + du)], near);
+                    depth[static_cast<std::size_t>(dv * raster + du)] =
+                        std::max(depth[static_cast<std::size_t>(dv * raster + du)], near);
         }
         for (std::size_t i = 0; i < sum.size(); ++i) {
             const double cosine = cloud.normals[i].dot(towards);
@@ -107,7 +118,8 @@ std::vector<float> sky_by_views(const scene::SceneCloud& cloud, double spacing, 
     });
     std::vector<float> sky(cloud.points.size(), 0.0F);
     lit.combine_each([&](const std::vector<float>& part) {
-        for (std::size_t i = 0; i < sky.size(); ++i) sky[i] += part[i];
+        for (std::size_t i = 0; i < sky.size(); ++i)
+            sky[i] += part[i];
     });
     return sky;
 }
@@ -133,9 +145,11 @@ int main(int argc, char** argv) {
     const auto cloud = scene::scene_cloud(world, points);
     const std::size_t step = std::max<std::size_t>(1, points / 50000);
     const double radius = world.scene().ao_radius_m;
-    const Judge judge{sky ? true_sky(world, cloud, step) : scene::true_visibility(world, cloud, {radius, 1024, 1, false}, step)};
+    const Judge judge{sky ? true_sky(world, cloud, step)
+                          : scene::true_visibility(world, cloud, {radius, 1024, 1, false}, step)};
     const PointSet set{cloud.points, no_normals ? std::span<const Vector3d>() : cloud.normals};
-    fmt::print("{}: {} points, radius {} m; judged at every {}. point\n", world.scene().name, points, sky ? 0 : radius, step);
+    fmt::print("{}: {} points, radius {} m; judged at every {}. point\n", world.scene().name, points, sky ? 0 : radius,
+               step);
     double spacing = 0;
     for (const int count : rays)
         judge.row(fmt::format("{} rays a point", count), [&] {
@@ -145,7 +159,8 @@ int main(int argc, char** argv) {
         });
     if (sky)
         for (const int raster : rasters)
-            judge.row(fmt::format("256 views of {0}x{0}", raster), [&] { return sky_by_views(cloud, spacing, 256, raster); });
+            judge.row(fmt::format("256 views of {0}x{0}", raster),
+                      [&] { return sky_by_views(cloud, spacing, 256, raster); });
     if (with_raycast)
         judge.row("raycast, 64 rays", [&] { return Raycast({.radius_m = radius, .rays = 64}).compute(set); });
 }

@@ -44,7 +44,8 @@ constexpr std::array<std::size_t, 11> base_length{20, 28, 26, 34, 57, 63, 30, 36
 
 /// Three points of raw coordinates 100, 200, 300 (+1, +2 each), scale 0.01, offset 1000; a record of our own; `extra`
 /// bytes nobody describes; in 1.4 a record behind the points.
-std::string las(int minor, int format, std::size_t extra = 0, const std::string& more_vlrs = "", unsigned vlr_count = 1) {
+std::string las(int minor, int format, std::size_t extra = 0, const std::string& more_vlrs = "",
+                unsigned vlr_count = 1) {
     const std::size_t header_size = minor >= 4 ? 375 : minor == 3 ? 235 : 227;
     const std::string vlrs = vlr("ours", 7, "kept") + more_vlrs;
     const std::size_t length = base_length[static_cast<std::size_t>(format)] + extra;
@@ -114,7 +115,8 @@ TEST(Las, every_version_and_point_format_gains_fields_and_loses_nothing) {
                 write_cloud(folder / "same.las", cloud, {});
                 EXPECT_EQ(file_bytes(folder / "same.las"), before);
 
-                write_cloud(folder / "b.las", cloud, {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}});
+                write_cloud(folder / "b.las", cloud,
+                            {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}});
                 const std::string after = file_bytes(folder / "b.las");
                 const Cloud back = read(folder / "b.las");
                 EXPECT_EQ(value(back, 1, "ambient_occlusion"), 0.5);
@@ -134,7 +136,8 @@ TEST(Las, every_version_and_point_format_gains_fields_and_loses_nothing) {
                 // Everything else of the header is as it was.
                 std::string header = after.substr(0, 227);
                 for (const auto& [at, length] : {std::pair(96, 4), {100, 4}, {105, 2}})
-                    header.replace(static_cast<std::size_t>(at), static_cast<std::size_t>(length), before, static_cast<std::size_t>(at), static_cast<std::size_t>(length));
+                    header.replace(static_cast<std::size_t>(at), static_cast<std::size_t>(length), before,
+                                   static_cast<std::size_t>(at), static_cast<std::size_t>(length));
                 EXPECT_EQ(header, before.substr(0, 227));
 
                 const std::array second{0.1F, 0.2F, 0.3F};
@@ -162,7 +165,8 @@ TEST(Las, units_are_told_not_guessed) {
     const TemporaryFolder folder;
     const auto unit = [&](const std::string& more) {
         std::vector<std::string> warnings;
-        return unit_of(*read_cloud(write_file(folder / "a.las", las(2, 1, 0, more, more.empty() ? 1 : 2)), warnings).records);
+        return unit_of(
+            *read_cloud(write_file(folder / "a.las", las(2, 1, 0, more, more.empty() ? 1 : 2)), warnings).records);
     };
     const auto keys = [](std::uint16_t key, std::uint16_t code) {
         std::string data(16, '\0');
@@ -174,7 +178,9 @@ TEST(Las, units_are_told_not_guessed) {
     EXPECT_TRUE(says(unit(keys(3076, 9003)), "US survey feet"));
     EXPECT_TRUE(says(unit(keys(3076, 9001)), "metres"));
     EXPECT_TRUE(says(unit(keys(1024, 2)), "degrees"));
-    EXPECT_TRUE(says(unit(vlr("LASF_Projection", 2112, "PROJCS[\"x\",GEOGCS[UNIT[\"degree\",0.01]],UNIT[\"foot\",0.3048]]")), "foot"));
+    EXPECT_TRUE(
+        says(unit(vlr("LASF_Projection", 2112, "PROJCS[\"x\",GEOGCS[UNIT[\"degree\",0.01]],UNIT[\"foot\",0.3048]]")),
+             "foot"));
 }
 
 TEST(Las, colours_of_eight_and_sixteen_bits_are_told_apart) {
@@ -221,12 +227,16 @@ TEST(TextClouds, keep_every_word_and_get_two_more) {
         return file_bytes(folder / ("out-" + name));
     };
     EXPECT_EQ(with_ao("a.xyz", "1.00 2 3\n4 5 6e0\n"), "1.00 2 3 0.25\n4 5 6e0 0.5\n");
-    EXPECT_EQ(with_ao("b.xyz", "//X Y Z R G B\n1 2 3 9 8 7\n4 5 6 9 8 7"), "//X Y Z R G B ambient_occlusion\n1 2 3 9 8 7 0.25\n4 5 6 9 8 7 0.5");
-    EXPECT_EQ(with_ao("c.pts", "2\r\n1 2 3 -5 1 2 3\r\n4 5 6 7 1 2 3\r\n"), "2\r\n1 2 3 -5 1 2 3 0.25\r\n4 5 6 7 1 2 3 0.5\r\n");
+    EXPECT_EQ(with_ao("b.xyz", "//X Y Z R G B\n1 2 3 9 8 7\n4 5 6 9 8 7"),
+              "//X Y Z R G B ambient_occlusion\n1 2 3 9 8 7 0.25\n4 5 6 9 8 7 0.5");
+    EXPECT_EQ(with_ao("c.pts", "2\r\n1 2 3 -5 1 2 3\r\n4 5 6 7 1 2 3\r\n"),
+              "2\r\n1 2 3 -5 1 2 3 0.25\r\n4 5 6 7 1 2 3 0.5\r\n");
     EXPECT_EQ(read(folder / "c.pts").colours[0], cv::Vec3b(3, 2, 1));
     std::vector<std::string> warnings;
-    EXPECT_TRUE(says(refusal([&] { (void)read_cloud(write_file(folder / "d.xyz", "1 2 3\n1 2\n"), warnings); }), "line 2: 2 values, expected 3"));
-    EXPECT_TRUE(says(refusal([&] { (void)read_cloud(write_file(folder / "e.xyz", "1 2 3\n1 2 x\n"), warnings); }), "line 2"));
+    EXPECT_TRUE(says(refusal([&] { (void)read_cloud(write_file(folder / "d.xyz", "1 2 3\n1 2\n"), warnings); }),
+                     "line 2: 2 values, expected 3"));
+    EXPECT_TRUE(
+        says(refusal([&] { (void)read_cloud(write_file(folder / "e.xyz", "1 2 3\n1 2 x\n"), warnings); }), "line 2"));
     (void)read_cloud(write_file(folder / "f.pts", "5\n1 2 3\n"), warnings);
     EXPECT_TRUE(warned(warnings, "says 5 points, holds 1"));
 }
@@ -244,8 +254,11 @@ TEST(TextClouds, ptx_is_a_grid_placed_by_its_matrix) {
     write_cloud(folder / "b.ptx", cloud, {{"ambient_occlusion", values}});
     EXPECT_EQ(file_bytes(folder / "b.ptx"), head + "1 0 0 0.5 0.5\n0 0 0 0.5 0.5\n0 1 0 0.5 0.5\n0 0 1 0.5 0.25\n");
     std::vector<std::string> warnings;
-    EXPECT_TRUE(says(refusal([&] { (void)read_cloud(write_file(folder / "c.ptx", head + body + head + body), warnings); }), "a second scan"));
-    EXPECT_TRUE(says(refusal([&] { (void)read_cloud(write_file(folder / "d.ptx", head + "1 0 0 1\n"), warnings); }), "4 points, the file holds 1"));
+    EXPECT_TRUE(
+        says(refusal([&] { (void)read_cloud(write_file(folder / "c.ptx", head + body + head + body), warnings); }),
+             "a second scan"));
+    EXPECT_TRUE(says(refusal([&] { (void)read_cloud(write_file(folder / "d.ptx", head + "1 0 0 1\n"), warnings); }),
+                     "4 points, the file holds 1"));
 }
 
 TEST(Kitti, sweeps_become_ply) {
@@ -261,7 +274,8 @@ TEST(Kitti, sweeps_become_ply) {
     EXPECT_EQ(value(back, 1, "reflectance"), 0.25);
     EXPECT_EQ(value(back, 1, "ambient_occlusion"), 0.25);
     std::vector<std::string> warnings;
-    EXPECT_TRUE(says(refusal([&] { (void)read_cloud(write_file(folder / "b.bin", bytes + "x"), warnings); }), "33 bytes"));
+    EXPECT_TRUE(
+        says(refusal([&] { (void)read_cloud(write_file(folder / "b.bin", bytes + "x"), warnings); }), "33 bytes"));
 }
 
 } // namespace

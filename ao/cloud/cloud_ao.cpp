@@ -58,7 +58,8 @@ class Watch {
 
 /// About `wanted` of the points, chosen by a hash: recording order would take whole lines of a scan or none of them.
 std::vector<Vector3d> sampled(std::span<const Vector3d> points, std::size_t wanted) {
-    const double share = std::min(1.0, static_cast<double>(wanted) / static_cast<double>(std::max<std::size_t>(points.size(), 1)));
+    const double share =
+        std::min(1.0, static_cast<double>(wanted) / static_cast<double>(std::max<std::size_t>(points.size(), 1)));
     const auto chosen = static_cast<std::uint64_t>(share * 0x1p32);
     std::vector<Vector3d> some;
     for (std::size_t i = 0; i < points.size(); ++i)
@@ -178,17 +179,25 @@ float resolution(float radius, float disc) { return disc > 0 ? std::clamp((radiu
 
 std::vector<Parameter> CloudAoOptions::parameters() {
     return {
-        {"radius", "how far away a surface may still occlude, in the cloud's unit; 0 = from the cloud's extent and spacing",
+        {"radius",
+         "how far away a surface may still occlude, in the cloud's unit; 0 = from the cloud's extent and spacing",
          &radius, "", 0, 1e9},
         {"rays", "per point; 0 = 16, fewer where the radius spans many spacings", &rays, "", 0, 16384},
         {"smooth",
-         "how often a value becomes the mean of those beside it on the same surface; -1 = twice, or more where the radius "
+         "how often a value becomes the mean of those beside it on the same surface; -1 = twice, or more where the "
+         "radius "
          "spans many spacings",
          &smooth, "", -1, 16},
         {"sky", "how much of the sky a point sees, at any distance, in place of what is open within the radius", &sky},
         {"up", "where the sky is, x,y,z", &up},
-        {"outside", "where estimated normals point: auto, up, outward, inward, or to the scanner's place x,y,z", &outside},
-        {"normals", "which to take; auto = recorded ones where they lie on the planes of the points", &normals, "", 0, 0,
+        {"outside", "where estimated normals point: auto, up, outward, inward, or to the scanner's place x,y,z",
+         &outside},
+        {"normals",
+         "which to take; auto = recorded ones where they lie on the planes of the points",
+         &normals,
+         "",
+         0,
+         0,
          {"auto", "recorded", "estimated"}},
         {"memory", "of the points in work at once; larger clouds are taken in tiles", &memory_mib, "MiB", 64, 1 << 20},
         {"seed", "of the rays' scrambling", &seed, "", 0, 2147483647},
@@ -209,8 +218,8 @@ CloudAo::CloudAo(CloudAoOptions options) : options_(std::move(options)) {
     viewpoint_ = triple(options_.outside);
     constexpr std::array words{"auto", "up", "outward", "inward"};
     if (!viewpoint_ && std::find(words.begin(), words.end(), options_.outside) == words.end())
-        throw Misuse(fmt::format("outside: '{}' given, expected auto, up, outward, inward, or a place x,y,z",
-                                 options_.outside));
+        throw Misuse(
+            fmt::format("outside: '{}' given, expected auto, up, outward, inward, or a place x,y,z", options_.outside));
 }
 
 /// One cloud on its way: what holds for all tiles, and the results so far.
@@ -274,7 +283,8 @@ class CloudAo::Work {
         result_.spacing = static_cast<double>(cloud_surface(some, {}).spacing) * std::sqrt(share);
         const double extent = extent_of(some);
         result_.radius = options_.radius > 0 ? options_.radius : default_radius(extent, result_.spacing);
-        result_.notes.push_back(fmt::format("points stand {:.4g} apart (median), over {:.4g}.", result_.spacing, extent));
+        result_.notes.push_back(
+            fmt::format("points stand {:.4g} apart (median), over {:.4g}.", result_.spacing, extent));
         if (options_.sky)
             result_.notes.push_back("visibility is the share of the sky, at any distance.");
         else
@@ -294,7 +304,8 @@ class CloudAo::Work {
     }
 
     /// Halves the points of `core` until one half and all that lies within `reach` of it fit the memory.
-    void divide(const std::vector<std::uint32_t>& core, const std::vector<std::uint32_t>& round, double reach, int depth) {
+    void divide(const std::vector<std::uint32_t>& core, const std::vector<std::uint32_t>& round, double reach,
+                int depth) {
         constexpr std::size_t least = 10000;
         if (round.size() <= at_once() || core.size() <= least) {
             tile(core, round);
@@ -335,7 +346,9 @@ class CloudAo::Work {
             for (const std::uint32_t i : core)
                 wanted[i] = 1;
         const CloudSurface surface = surface_of(round);
-        const auto is_wanted = [&](std::size_t place) { return wanted.empty() || wanted[round[surface.tree.index(place)]]; };
+        const auto is_wanted = [&](std::size_t place) {
+            return wanted.empty() || wanted[round[surface.tree.index(place)]];
+        };
         const auto is_beside = [&](std::size_t place) { // whose values the smoothing asks for
             return is_wanted(place) || std::any_of(surface.near[place].begin(), surface.near[place].end(), is_wanted);
         };
@@ -380,10 +393,10 @@ class CloudAo::Work {
         constexpr double same_planes = 0.8, too_many_opposed = 0.05;
         if (!normals.empty() && options_.normals == "auto" && surface.agreement < same_planes) {
             normals_refused_ = true;
-            result_.notes.push_back(
-                fmt::format("recorded normals are not used: the median angle between them and the planes of the points is "
-                            "{:.0f} degrees; --cloud.normals recorded takes them all the same.",
-                            std::acos(surface.agreement) * 180 / std::numbers::pi));
+            result_.notes.push_back(fmt::format(
+                "recorded normals are not used: the median angle between them and the planes of the points is "
+                "{:.0f} degrees; --cloud.normals recorded takes them all the same.",
+                std::acos(surface.agreement) * 180 / std::numbers::pi));
             normals.clear();
             surface = cloud_surface(points, {});
         }
@@ -399,23 +412,25 @@ class CloudAo::Work {
         const bool recorded = !cloud_.normals.empty() && options_.normals != "estimated" && !normals_refused_;
         const std::string facing = outside_.kind == Outside::Kind::viewpoint ? "turned to " : "turned ";
         if (recorded && sides_opposed_)
-            result_.notes.push_back("normals: recorded, but neighbours' oppose each other; " + facing + outside_.why + ".");
+            result_.notes.push_back("normals: recorded, but neighbours' oppose each other; " + facing + outside_.why +
+                                    ".");
         else
-            result_.notes.push_back(recorded ? "normals: recorded."
-                                             : "normals: from planes through 16 neighbours, " + facing + outside_.why + ".");
+            result_.notes.push_back(recorded
+                                        ? "normals: recorded."
+                                        : "normals: from planes through 16 neighbours, " + facing + outside_.why + ".");
         const bool apart = outside_.kind == Outside::Kind::outward || outside_.kind == Outside::Kind::inward;
         if (tiles_ > 1)
-            result_.notes.push_back(
-                fmt::format("in {} tiles of at most {} points each{}.", tiles_, at_once(),
-                            apart && !recorded ? ", whose normals were turned tile by tile: where they look wrong, give "
-                                                 "--cloud.outside or more --cloud.memory"
-                                               : ""));
+            result_.notes.push_back(fmt::format(
+                "in {} tiles of at most {} points each{}.", tiles_, at_once(),
+                apart && !recorded ? ", whose normals were turned tile by tile: where they look wrong, give "
+                                     "--cloud.outside or more --cloud.memory"
+                                   : ""));
         std::size_t unknown = 0;
         for (const std::uint32_t i : valid_)
             unknown += std::isnan(result_.visibility[i]);
         if (unknown > 0)
-            result_.notes.push_back(fmt::format("{} of {} points have no surface round them; their visibility is unknown.",
-                                                unknown, valid_.size()));
+            result_.notes.push_back(fmt::format(
+                "{} of {} points have no surface round them; their visibility is unknown.", unknown, valid_.size()));
     }
 
     const CloudAoOptions& options_;
@@ -442,14 +457,16 @@ CloudVisibility CloudAo::of_mesh(const PointSet& mesh) const {
     std::vector<float> sides;
     for (const auto& [a, b, c] : mesh.triangles)
         if (std::min({a, b, c}) >= 0)
-            sides.push_back(static_cast<float>((mesh.points[static_cast<std::size_t>(a)] - mesh.points[static_cast<std::size_t>(b)]).norm()));
+            sides.push_back(static_cast<float>(
+                (mesh.points[static_cast<std::size_t>(a)] - mesh.points[static_cast<std::size_t>(b)]).norm()));
     if (!sides.empty()) {
         const auto middle = sides.begin() + static_cast<std::ptrdiff_t>(sides.size() / 2);
         std::nth_element(sides.begin(), middle, sides.end());
         result.spacing = static_cast<double>(*middle);
     }
     const double extent = extent_of(sampled(mesh.points, 60000));
-    result.radius = std::clamp(options_.radius > 0 ? options_.radius : default_radius(extent, result.spacing), 1e-6, 1e6);
+    result.radius =
+        std::clamp(options_.radius > 0 ? options_.radius : default_radius(extent, result.spacing), 1e-6, 1e6);
     const int rays = options_.rays > 0 ? options_.rays : 64;
     Raycast raycast({.radius_m = result.radius, .rays = rays, .mesh = "vertices", .seed = options_.seed});
     result.visibility = raycast.compute(mesh);
@@ -458,10 +475,11 @@ CloudVisibility CloudAo::of_mesh(const PointSet& mesh) const {
     for (std::size_t i = 0; i < result.visibility.size(); ++i)
         if (!std::isnan(result.visibility[i]))
             result.confidence[i] = 1;
-    result.notes = {fmt::format("{} faces: {} rays from every vertex against them, about the mean of their normals.",
-                                mesh.triangles.size(), rays),
-                    fmt::format("radius {:.4g} ({}).", result.radius,
-                                options_.radius > 0 ? "as given" : "a twentieth of the extent, within 10 .. 200 edge lengths")};
+    result.notes = {
+        fmt::format("{} faces: {} rays from every vertex against them, about the mean of their normals.",
+                    mesh.triangles.size(), rays),
+        fmt::format("radius {:.4g} ({}).", result.radius,
+                    options_.radius > 0 ? "as given" : "a twentieth of the extent, within 10 .. 200 edge lengths")};
     return result;
 }
 

@@ -1,4 +1,5 @@
-// Visibility of every point of a cloud of any kind: rays from the points against the discs they make up. No view needed.
+// Visibility of every point of a cloud of any kind: rays from the points against the discs they make up. No view
+// needed.
 #pragma once
 
 #include "ao/cloud/cloud_surface.h"
@@ -13,11 +14,11 @@ namespace scanshade {
 /// What a person sets.
 struct CloudAoOptions {
     double radius = 0; ///< in the cloud's unit; 0 = from the cloud: see default_radius()
-    int rays = 0;      ///< per point; neighbours' rays make one even set, so that their mean counts several times as many.
-                       ///< 0 = 16; 8 and 4 where the radius spans more than 60 and 120 spacings
-    int smooth = -1;   ///< times that a value becomes the mean of those beside it on the same surface; -1 = 2; 3 and 5
-                       ///< where so many spacings make neighbours near against the radius
-    bool sky = false;  ///< how much of the sky a point sees, however far what hides it
+    int rays = 0; ///< per point; neighbours' rays make one even set, so that their mean counts several times as many.
+                  ///< 0 = 16; 8 and 4 where the radius spans more than 60 and 120 spacings
+    int smooth = -1;  ///< times that a value becomes the mean of those beside it on the same surface; -1 = 2; 3 and 5
+                      ///< where so many spacings make neighbours near against the radius
+    bool sky = false; ///< how much of the sky a point sees, however far what hides it
     std::string up = "0,0,1";
     std::string outside = "auto"; ///< "auto", "up", "outward", "inward", or the scanner's place x,y,z
     std::string normals = "auto"; ///< "auto" | "recorded" | "estimated"
@@ -30,7 +31,8 @@ struct CloudAoOptions {
 /// What came out, and what was chosen on the way.
 struct CloudVisibility {
     std::vector<float> visibility; ///< per point; NaN where it is not finite or its neighbours make no surface
-    std::vector<float> confidence; ///< 0 .. 1: how flat the surface is round the point, times how many discs span the radius
+    std::vector<float>
+        confidence; ///< 0 .. 1: how flat the surface is round the point, times how many discs span the radius
     std::vector<Eigen::Vector3f> normals; ///< as used; zero where there is none; empty for meshes
     double radius = 0, spacing = 0;       ///< as used; in the cloud's unit
     int tiles = 1;
@@ -48,9 +50,10 @@ class CloudAo {
     /// Throws Misuse naming a setting out of its range.
     explicit CloudAo(CloudAoOptions options);
 
-    /// `scanner`: where the file says that the cloud was seen from. Where there are faces, rays are cast from the vertices
-    /// against them in place of discs.
-    [[nodiscard]] CloudVisibility compute(const PointSet& cloud, const std::optional<Eigen::Vector3d>& scanner = {}) const;
+    /// `scanner`: where the file says that the cloud was seen from. Where there are faces, rays are cast from the
+    /// vertices against them in place of discs.
+    [[nodiscard]] CloudVisibility compute(const PointSet& cloud,
+                                          const std::optional<Eigen::Vector3d>& scanner = {}) const;
 
   private:
     class Work;

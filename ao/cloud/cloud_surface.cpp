@@ -20,7 +20,7 @@ constexpr float disc_over_gap = 0.8F;
 /// The plane of least squares through a neighbourhood: near points weigh most, so that edges stay edges.
 struct Plane {
     Vector3f normal = Vector3f::Zero();
-    float variance_across = 0;                ///< along the normal
+    float variance_across = 0;                    ///< along the normal
     float variance_narrow = 0, variance_wide = 0; ///< within the plane
 };
 
@@ -117,7 +117,8 @@ CloudSurface cloud_surface(std::span<const Vector3d> points, std::span<const Vec
     std::vector<float> sixth(count);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 512), [&](const auto& range) {
         Nearest found;
-        float reach = std::numeric_limits<float>::infinity(); // of the place before; its neighbours are not far from ours
+        float reach =
+            std::numeric_limits<float>::infinity(); // of the place before; its neighbours are not far from ours
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
             const float moved = i > range.begin() ? (surface.tree[i] - surface.tree[i - 1]).norm() : 0;
             const float known = (reach + moved) * (1 + 1e-5F);

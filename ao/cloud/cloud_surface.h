@@ -23,10 +23,9 @@ struct Outside {
 };
 
 /// Where a cloud was seen from: from `recorded`, the viewpoint its file names, if nearly all points are seen first from
-/// there. Else what the cloud itself tells: one nearly all of which is seen first from the origin of its coordinates was
-/// recorded from there; one with hardly anything above anything is
-/// terrain, its outside above; one that hides many of its points from
-/// all sides is a room; else outward. `points` must be finite.
+/// there. Else what the cloud itself tells: one nearly all of which is seen first from the origin of its coordinates
+/// was recorded from there; one with hardly anything above anything is terrain, its outside above; one that hides many
+/// of its points from all sides is a room; else outward. `points` must be finite.
 [[nodiscard]] Outside guessed_outside(std::span<const Eigen::Vector3d> points,
                                       const std::optional<Eigen::Vector3d>& recorded = {});
 
@@ -41,7 +40,7 @@ struct CloudSurface {
     std::vector<float> disc_radius;                    ///< covers the gaps between neighbours; 0 for a lonely point
     std::vector<float> roughness; ///< one sigma of the neighbours' distances from the plane, in the cloud's unit
     std::vector<float> flatness;  ///< 1 - 3 times the surface variation (Pauly, Gross and Kobbelt 2002): 1 = a plane
-    float spacing = 0; ///< median over the points of the side of a square that holds one of them
+    float spacing = 0;            ///< median over the points of the side of a square that holds one of them
     double agreement = 1; ///< median |cosine| between given normals and planes: near 1/2 where the former are noise
     double discord = 0;   ///< share of points whose given normal opposes the nearest one's on the same plane
 

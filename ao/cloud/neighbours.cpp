@@ -111,7 +111,8 @@ void NeighbourTree::find_round(std::size_t place, std::size_t wanted, Nearest& f
             Visit right{2 * visit.node + 2, middle, visit.end, visit.levels - 1, 0};
             left.distance2 = boxes_[left.node].distance2(at);
             right.distance2 = boxes_[right.node].distance2(at);
-            const bool left_first = left.distance2 != right.distance2 ? left.distance2 < right.distance2 : place < middle;
+            const bool left_first =
+                left.distance2 != right.distance2 ? left.distance2 < right.distance2 : place < middle;
             const Visit& later = left_first ? right : left;
             if (later.distance2 <= found.reach2())
                 stack[depth++] = later;

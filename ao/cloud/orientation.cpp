@@ -204,8 +204,8 @@ Pieces joined_pieces(const CloudSurface& surface) {
     const auto for_each_pair = [&](auto&& visit) {
         for (std::size_t i = 0; i < surface.size(); ++i)
             for (const std::uint32_t j : surface.near[i])
-                if (const bool once = i < j || std::find(surface.near[j].begin(), surface.near[j].end(), i) ==
-                                                   surface.near[j].end();
+                if (const bool once =
+                        i < j || std::find(surface.near[j].begin(), surface.near[j].end(), i) == surface.near[j].end();
                     once && i != j)
                     if (const int like = likeness(i, j); like >= least)
                         visit(static_cast<std::uint32_t>(i), j, static_cast<std::size_t>(classes - 1 - like));
@@ -220,8 +220,8 @@ Pieces joined_pieces(const CloudSurface& surface) {
     return pieces;
 }
 
-/// For every point how far it faces out of its piece, from the points that lie farthest in many directions; and by piece
-/// in how many of these it reaches as far as the whole cloud.
+/// For every point how far it faces out of its piece, from the points that lie farthest in many directions; and by
+/// piece in how many of these it reaches as far as the whole cloud.
 struct Outward {
     static constexpr int looks = 64;
     std::vector<double> evidence;
@@ -280,7 +280,8 @@ Outside guessed_outside(std::span<const Vector3d> points, const std::optional<Ve
     constexpr double nearly_all = 0.85, clearly_off = 0.5, many_ranges = 3;
     constexpr double too_far = 20; // in radii of the cloud: from there nothing is behind anything, and tells nothing
     if (recorded)
-        if (const LookFrom look = look_from(*recorded, points); look.seen_first >= nearly_all && look.off_centre < too_far)
+        if (const LookFrom look = look_from(*recorded, points);
+            look.seen_first >= nearly_all && look.off_centre < too_far)
             return {Outside::Kind::viewpoint, *recorded,
                     fmt::format("the recorded viewpoint, from where {:.0f} % of the points are seen first",
                                 100 * look.seen_first)};
@@ -295,7 +296,8 @@ Outside guessed_outside(std::span<const Vector3d> points, const std::optional<Ve
                 fmt::format("up along z, as of terrain: {:.0f} % of the points have nothing above them", 100 * above)};
     if (const double hidden = hidden_share(points); hidden > 0.05)
         return {Outside::Kind::inward, Vector3d::Zero(),
-                fmt::format("inward, as of a room: {:.0f} % of the points lie inside, hidden from all round", 100 * hidden)};
+                fmt::format("inward, as of a room: {:.0f} % of the points lie inside, hidden from all round",
+                            100 * hidden)};
     return {Outside::Kind::outward, Vector3d::Zero(), "outward, as nothing tells where the scanner stood"};
 }
 
@@ -310,7 +312,8 @@ void turn_outside(CloudSurface& surface, const Outside& outside) {
         turn_pieces(surface, outside);
     for (std::size_t i = 0; i < surface.size(); ++i) {
         Vector3f& normal = surface.normals[i];
-        const bool looks_somewhere = outside.kind == Outside::Kind::viewpoint || outside.kind == Outside::Kind::direction;
+        const bool looks_somewhere =
+            outside.kind == Outside::Kind::viewpoint || outside.kind == Outside::Kind::direction;
         if (normal.isZero() && looks_somewhere)
             normal = facing(i);
         else if (outside.kind == Outside::Kind::viewpoint && normal.dot(facing(i)) < 0)

@@ -15,7 +15,8 @@ namespace {
 /// Eight rays travel together: those of a sector of azimuth, up one sector and down the next.
 int place_of(const Eigen::Vector3f& d, std::size_t rays) {
     const int sectors = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(rays) / 8)));
-    const double turn = std::atan2(static_cast<double>(d.y()), static_cast<double>(d.x())) / (2 * std::numbers::pi) + 0.5;
+    const double turn =
+        std::atan2(static_cast<double>(d.y()), static_cast<double>(d.x())) / (2 * std::numbers::pi) + 0.5;
     const int sector = std::min(static_cast<int>(turn * sectors), sectors - 1), height = static_cast<int>(1000 * d.z());
     return sector * 2048 + (sector % 2 ? height : 1024 - height);
 }

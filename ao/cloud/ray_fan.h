@@ -7,9 +7,9 @@
 
 namespace scanshade {
 
-/// One scrambled Sobol sequence (Burley 2020) on the hemisphere about z, cut into runs of `rays`. Points in the order of
-/// a tree that take run after run hold, eight or sixteen together, an even set of their own: the mean over neighbours is
-/// as good as that many times the rays.
+/// One scrambled Sobol sequence (Burley 2020) on the hemisphere about z, cut into runs of `rays`. Points in the order
+/// of a tree that take run after run hold, eight or sixteen together, an even set of their own: the mean over
+/// neighbours is as good as that many times the rays.
 class RayFan {
   public:
     RayFan(int rays, int seed);
