@@ -184,8 +184,12 @@ std::string sizes_text(const std::map<std::pair<int, int>, int>& sizes) {
 
 void print_depth(const Findings& found) {
     const DepthEncoding& depth = found.capture.depth;
-    if (found.samples.clouds.empty())
-        line("depth unit", fmt::format("{} ({})", depth.name, depth.origin));
+    if (!found.samples.clouds.empty()) { // z is no depth where a cloud has no camera, and may count feet
+        line("z", fmt::format("{:.3f} .. {:.3f}, median {:.3f}", found.nearest_m, found.farthest_m, found.median_m));
+        line("holes", fmt::format("{:.1f} %", 100 * hole_share(found.samples)));
+        return;
+    }
+    line("depth unit", fmt::format("{} ({})", depth.name, depth.origin));
     line("depth range",
          fmt::format("{:.3f} .. {:.3f} m, median {:.3f} m", found.nearest_m, found.farthest_m, found.median_m));
     line("holes", fmt::format("{:.1f} %", 100 * hole_share(found.samples)));
@@ -224,7 +228,7 @@ void print(const Findings& found) {
     if (const auto& camera = samples.camera ? samples.camera : capture.camera)
         line("camera", fmt::format("{} ({})", describe(*camera), camera->origin));
     else
-        line("camera", "none: --camera gives one");
+        line("camera", samples.clouds.empty() ? "none: --camera gives one" : "none: run casts rays from every point");
     line("poses", found.poses == 0 ? "none" : fmt::format("{}, path {:.2f} m", found.poses, found.path_length_m));
     const std::string registered(samples.clouds.empty() ? name_of(capture.registration) : "by its nature");
     line("registered",

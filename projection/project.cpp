@@ -106,7 +106,7 @@ Camera framing_camera(const Cloud& cloud) {
     if (framing.seen < enough * framing.valid)
         throw Error(
             fmt::format("the cloud has no single camera: {} of its {} valid points lie in front of its origin (z > 0, "
-                        "within 70 degrees of the axis), and AO from several views is not there yet",
+                        "within 70 degrees of the axis)",
                         framing.seen, framing.valid));
     const double area = framing.width() * framing.height() * occupied_share(cloud, framing);
     const double one_per_pixel = std::sqrt(framing.seen / area);
