@@ -1,6 +1,7 @@
 // How far a run has come: a bar with rate and remaining time on a terminal, one line per frame elsewhere. On stderr.
 #include "apps/progress.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <unistd.h>
@@ -26,6 +27,14 @@ std::string line_of(const FrameRow& row) {
 
 } // namespace
 
+void say(const std::string& line) { fmt::print(stderr, "{}\n", line); }
+
+std::string duration_text(double seconds) {
+    const auto whole = static_cast<long>(std::lround(std::max(seconds, 0.0)));
+    const long h = whole / 3600, m = whole / 60 % 60, s = whole % 60;
+    return h > 0 ? fmt::format("{}:{:02}:{:02}", h, m, s) : fmt::format("{}:{:02}", m, s);
+}
+
 Progress::Progress(std::size_t total) : total_(total), on_terminal_(isatty(STDERR_FILENO) == 1) {}
 
 void Progress::add(const FrameRow& row) {
@@ -41,10 +50,10 @@ void Progress::draw() {
     constexpr std::size_t width = 30;
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
     const double rate = static_cast<double>(done_) / seconds;
-    const int left = static_cast<int>(static_cast<double>(total_ - done_) / rate + 0.5);
+    const std::string left = duration_text(static_cast<double>(total_ - done_) / rate);
     const std::size_t filled = width * done_ / total_;
-    fmt::print(stderr, "{}  [{:#<{}}{:.<{}}] {}/{}  {:.1f} frames/s  {}:{:02} left", clear_line, "", filled, "",
-               width - filled, done_, total_, rate, left / 60, left % 60);
+    fmt::print(stderr, "{}  [{:#<{}}{:.<{}}] {}/{}  {:.1f} frames/s  {} left", clear_line, "", filled, "",
+               width - filled, done_, total_, rate, left);
     std::fflush(stderr);
 }
 

@@ -7,6 +7,12 @@
 
 namespace scanshade {
 
+/// A line on stderr.
+void say(const std::string& line);
+
+/// "1:02:03" or "2:03"
+[[nodiscard]] std::string duration_text(double seconds);
+
 class Progress {
   public:
     explicit Progress(std::size_t total);

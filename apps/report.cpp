@@ -20,17 +20,6 @@ namespace {
 
 std::string number(double value, int digits) { return std::isnan(value) ? "" : fmt::format("{:.{}f}", value, digits); }
 
-std::string csv_line(const FrameRow& row) {
-    const auto ms = [](double value) { return number(value, 2); };
-    const bool loaded = !row.size.empty();
-    return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.index, csv_field(row.name),
-                       name_of(row.status), csv_field(row.why), loaded ? std::to_string(row.size.width) : "",
-                       loaded ? std::to_string(row.size.height) : "", number(row.valid_share, 4),
-                       number(row.coverage, 4), number(row.mean_visibility, 4), ms(row.ms.load), ms(row.ms.project),
-                       ms(row.ms.compute), ms(row.ms.attach), ms(row.ms.write),
-                       csv_field(fmt::format("{}", fmt::join(row.warnings, "; "))));
-}
-
 /// JSON knows no NaN: what is not known is null.
 json known(double value, int digits = 4) {
     const double scale = std::pow(10.0, digits);
@@ -73,14 +62,6 @@ json capture_json(const RunReport& report) {
     return text;
 }
 
-json stage_json(const StageTimes& ms) {
-    return {{"load", known(ms.load, 3)},
-            {"project", known(ms.project, 3)},
-            {"compute", known(ms.compute, 3)},
-            {"attach", known(ms.attach, 3)},
-            {"write", known(ms.write, 3)}};
-}
-
 json passes_json(const Timings& passes) {
     json text = json::array(); // a list: a pass may run twice under one name
     for (const auto& [pass, ms] : passes)
@@ -120,9 +101,7 @@ double peak_memory_mib() {
 json totals_json(const RunReport& report) {
     StageTimes sum;
     for (const FrameRow& row : report.frames)
-        for (double StageTimes::*stage :
-             {&StageTimes::load, &StageTimes::project, &StageTimes::compute, &StageTimes::attach, &StageTimes::write})
-            sum.*stage += std::isnan(row.ms.*stage) ? 0 : row.ms.*stage;
+        sum = sum + row.ms;
     const std::size_t ok = count(report.frames, FrameStatus::ok);
     return {{"frames", report.frames.size()},
             {"ok", ok},
@@ -140,14 +119,39 @@ std::string utc(std::chrono::system_clock::time_point time) {
 
 } // namespace
 
+std::string csv_head() {
+    return "index,name,status,why,width,height,valid_share,coverage,mean_visibility,"
+           "load_ms,project_ms,compute_ms,attach_ms,write_ms,warnings\n";
+}
+
+std::string csv_line(const FrameRow& row) {
+    const auto ms = [](double value) { return number(value, 2); };
+    const bool loaded = !row.size.empty();
+    return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.index, csv_field(row.name),
+                       name_of(row.status), csv_field(row.why), loaded ? std::to_string(row.size.width) : "",
+                       loaded ? std::to_string(row.size.height) : "", number(row.valid_share, 4),
+                       number(row.coverage, 4), number(row.mean_visibility, 4), ms(row.ms.load), ms(row.ms.project),
+                       ms(row.ms.compute), ms(row.ms.attach), ms(row.ms.write),
+                       csv_field(fmt::format("{}", fmt::join(row.warnings, "; "))));
+}
+
+std::string csv_line(const std::string& capture, const FrameRow& row) { return csv_field(capture) + "," + csv_line(row); }
+
+json stage_json(const StageTimes& ms) {
+    return {{"load", known(ms.load, 3)},
+            {"project", known(ms.project, 3)},
+            {"compute", known(ms.compute, 3)},
+            {"attach", known(ms.attach, 3)},
+            {"write", known(ms.write, 3)}};
+}
+
 std::size_t count(const std::vector<FrameRow>& rows, FrameStatus status) {
     return static_cast<std::size_t>(
         std::count_if(rows.begin(), rows.end(), [&](const FrameRow& row) { return row.status == status; }));
 }
 
 void write_frames_csv(const std::filesystem::path& file, const std::vector<FrameRow>& frames) {
-    std::string text = "index,name,status,why,width,height,valid_share,coverage,mean_visibility,"
-                       "load_ms,project_ms,compute_ms,attach_ms,write_ms,warnings\n";
+    std::string text = csv_head();
     for (const FrameRow& row : frames)
         text += csv_line(row);
     write_atomically(file, text);

@@ -4,6 +4,7 @@
 #include "ao/gpu/device.h"
 #include "apps/batch.h"
 #include "apps/command.h"
+#include "apps/json.h"
 
 #include <chrono>
 #include <filesystem>
@@ -27,6 +28,13 @@ struct RunReport {
     std::vector<FrameRow> frames;
     double took_ms = 0; ///< from the first frame's begin to the last one's end
 };
+
+/// frames.csv's first line, and a frame's; of a job, with the capture in front.
+[[nodiscard]] std::string csv_head();
+[[nodiscard]] std::string csv_line(const FrameRow& row);
+[[nodiscard]] std::string csv_line(const std::string& capture, const FrameRow& row);
+/// {"load": ms, ...}, rounded.
+[[nodiscard]] json stage_json(const StageTimes& ms);
 
 /// Header and one line per frame, in the report's order. Fields with commas, quotes or line ends are quoted. Atomic.
 void write_frames_csv(const std::filesystem::path& file, const std::vector<FrameRow>& frames);
