@@ -13,6 +13,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <fstream>
+#include <limits>
+#include <tbb/info.h>
 #include <type_traits>
 
 namespace scanshade {
@@ -103,12 +105,18 @@ json totals_json(const RunReport& report) {
     for (const FrameRow& row : report.frames)
         sum = sum + row.ms;
     const std::size_t ok = count(report.frames, FrameStatus::ok);
+    const Rates rates = rates_of(report);
     return {{"frames", report.frames.size()},
             {"ok", ok},
             {"failed", count(report.frames, FrameStatus::failed)},
             {"skipped", count(report.frames, FrameStatus::skipped)},
             {"took_ms", known(report.took_ms, 3)},
-            {"frames_per_second", known(static_cast<double>(ok) * 1000 / report.took_ms, 2)},
+            {"done_now", report.done_now},
+            {"frames_per_second", known(rates.pipeline, 2)},
+            {"stage_frames_per_second", stage_json(rates.stage)},
+            {"slowest_stage", rates.slowest},
+            {"share_of_slowest_stage", known(rates.share_of_slowest)},
+            {"device_busy_share", known(rates.device_busy)},
             {"stage_ms", stage_json(sum)},
             {"peak_memory_mib", known(peak_memory_mib(), 1)}};
 }
@@ -143,6 +151,36 @@ json stage_json(const StageTimes& ms) {
             {"compute", known(ms.compute, 3)},
             {"attach", known(ms.attach, 3)},
             {"write", known(ms.write, 3)}};
+}
+
+Rates rates_of(const RunReport& report) {
+    const auto done = static_cast<double>(report.done_now);
+    const int cores = tbb::info::default_concurrency();
+    Rates rates;
+    rates.pipeline = report.took_ms > 0 ? done * 1000 / report.took_ms : 0;
+    rates.device_busy = report.took_ms > 0 ? report.ms_now.compute / report.took_ms : 0;
+    double least = std::numeric_limits<double>::infinity();
+    const auto stage = [&](const char* name, double StageTimes::*ms, int at_once) {
+        const double rate = report.ms_now.*ms > 0 ? done * 1000 * at_once / report.ms_now.*ms : std::nan("");
+        rates.stage.*ms = rate;
+        if (rate < least) {
+            least = rate;
+            rates.slowest = name;
+            rates.share_of_slowest = rates.pipeline / rate;
+        }
+    };
+    stage("load", &StageTimes::load, cores);
+    stage("project", &StageTimes::project, cores);
+    stage("compute", &StageTimes::compute, 1);
+    stage("attach", &StageTimes::attach, cores);
+    stage("write", &StageTimes::write, cores);
+    return rates;
+}
+
+std::string describe(const Rates& rates) {
+    const std::string share =
+        rates.slowest.empty() ? "" : fmt::format(", {:.0f} % of {} alone", 100 * rates.share_of_slowest, rates.slowest);
+    return fmt::format("{:.1f} frames/s{}", rates.pipeline, share);
 }
 
 std::size_t count(const std::vector<FrameRow>& rows, FrameStatus status) {

@@ -152,6 +152,8 @@ std::vector<FrameRow> run_recorded(const Capture& capture, Method& method, const
     journal.forget(capture, left.frames);
     const auto record = [&](const FrameRow& row) {
         journal.add(row, capture.entries[row.index], recording.settings, recording.device);
+        if (recording.finished && row.status != FrameStatus::skipped && row.fault != Fault::outage)
+            ++*recording.finished;
         if (on_frame)
             on_frame(row);
     };

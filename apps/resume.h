@@ -34,6 +34,8 @@ struct Recording {
     /// A process before this one died of a frame: each frame goes alone, and the one that was begun and never ended is
     /// marked as a crash instead of being tried again.
     bool carefully = false;
+    /// Counted up with each frame that is settled, well or badly, but by no outage.
+    std::atomic<std::uint64_t>* finished = nullptr;
 };
 
 /// run_batch() over the frames that the journal does not have; rows of all come back, in the order of options.frames.

@@ -214,8 +214,9 @@ std::string names_of_failed(const std::vector<FrameRow>& rows) {
 
 void conclude(const RunReport& report, const fs::path& table) {
     const std::size_t ok = count(report.frames, FrameStatus::ok);
-    say(fmt::format("  {} of {} frames in {:.1f} s ({:.1f} frames/s) -> {}", ok, report.frames.size(),
-                    report.took_ms / 1000, static_cast<double>(ok) * 1000 / report.took_ms, table.parent_path().string()));
+    const std::string before = ok > report.done_now ? fmt::format(", {} of them before", ok - report.done_now) : "";
+    say(fmt::format("  {} of {} frames{} in {:.1f} s ({}) -> {}", ok, report.frames.size(), before,
+                    report.took_ms / 1000, describe(rates_of(report)), table.parent_path().string()));
     if (count(report.frames, FrameStatus::failed) > 0)
         say(fmt::format("  failed: {} ({} says why)", names_of_failed(report.frames), table.string()));
     if (const std::size_t skipped = count(report.frames, FrameStatus::skipped); skipped > 0)
@@ -560,13 +561,14 @@ class Run final : public Command {
                                   .task = task,
                                   .device = device.info().name,
                                   .retry = asked_.retry,
-                                  .carefully = shift.carefully};
+                                  .carefully = shift.carefully,
+                                  .finished = shift.finished};
         Progress progress(job.batch.frames.size());
         const auto start = std::chrono::steady_clock::now();
         report.frames = run_recorded(job.capture, method, job.batch, recording, [&](const FrameRow& row) {
             progress.add(row);
-            if (shift.finished)
-                ++*shift.finished;
+            report.done_now += row.status == FrameStatus::ok;
+            report.ms_now = report.ms_now + row.ms;
         });
         report.took_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
         progress.end();
