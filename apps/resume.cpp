@@ -32,6 +32,8 @@ std::string outputs_text(const Outputs& outputs) {
     std::string text;
     if (outputs.ao)
         text += fmt::format("ao {};", static_cast<int>(outputs.format));
+    if (outputs.confidence)
+        text += fmt::format("confidence {};", static_cast<int>(outputs.format));
     if (outputs.shaded)
         text += "shaded;";
     if (outputs.panel)
