@@ -58,7 +58,7 @@ struct RunSettings {
     std::string out, write = "auto", format = "png16", view = "depth", dump;
     double shade_strength = 1;
     bool colour_cloud = false, overwrite = false, resume = false, retry = false;
-    std::string shard;
+    std::string shard, log = "text";
 };
 
 std::set<std::string> words_of(const std::string& list) {
@@ -242,6 +242,8 @@ class Run final : public Command {
     }
 
     int run() override {
+        if (asked_.log == "json")
+            log_as_json();
         if (std::ranges::any_of(asked_.paths, is_job))
             return run_planned();
         check_settings();
@@ -337,6 +339,10 @@ class Run final : public Command {
               {"overwrite", "replace the results of an earlier run", &s.overwrite},
               {"resume", "go on with an earlier run: what is done, from the same input and settings, stays", &s.resume},
               {"retry", "with --resume: frames that failed are tried again, too", &s.retry},
+              {.name = "log",
+               .help = "what stderr gets: prose, or a JSON object per line",
+               .value = &s.log,
+               .choices = {"text", "json"}},
               {"shard", "of a job, the I-th of N parts: I/N; empty = as Slurm or Kubernetes number this one, else all", &s.shard},
               {"dump", "folder for what lies between the method's passes, as .npy files with an index.csv per frame", &s.dump}}}};
     }

@@ -2,6 +2,7 @@
 #include "apps/worker.h"
 
 #include "apps/command.h"
+#include "apps/progress.h"
 #include "projection/error.h"
 
 #include <algorithm>
@@ -155,8 +156,7 @@ int supervise(int workers, const std::function<int(const Shift&)>& work) {
             Post& post = found.mapped();
             const bool killed = WIFSIGNALED(status);
             if (killed)
-                fmt::print(stderr, "scanshade: worker {} was killed: {}\n", post.shift.worker + 1,
-                           strsignal(WTERMSIG(status)));
+                say(fmt::format("worker {} was killed: {}", post.shift.worker + 1, strsignal(WTERMSIG(status))));
             if (!interrupted && goes_on(post, status)) {
                 posts.emplace(start(post, signals, work), post);
                 continue;

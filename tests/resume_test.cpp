@@ -2,6 +2,7 @@
 // This program computes nothing itself: what it starts has its threads, so it may fork.
 #include "apps/command.h"
 #include "apps/job_run.h"
+#include "apps/json.h"
 #include "apps/resume.h"
 #include "projection/error.h"
 #include "tests/support/files.h"
@@ -17,6 +18,7 @@
 #include <map>
 #include <numeric>
 #include <random>
+#include <sstream>
 #include <sys/mount.h>
 #include <sys/wait.h>
 #include <thread>
@@ -400,6 +402,25 @@ TEST_F(ResumeTest, shards_together_do_everything_and_a_late_one_stands_in_for_a_
     EXPECT_EQ(run_program("merge " + job().string()).exit_code, 0);
     const std::string table = read_bytes(job() / "frames.csv");
     EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 1 + 3 + 4 + 5 + 6);
+}
+
+TEST_F(ResumeTest, the_log_is_json_line_by_line_when_asked) {
+    record(3);
+    fs::resize_file(capture() / "depth/001.png", 60);
+    const Ran ran = run("--log json");
+    EXPECT_EQ(ran.exit_code, 2);
+    std::istringstream lines(ran.err);
+    int frames = 0;
+    for (std::string line; std::getline(lines, line);) {
+        const json text = json::parse(line, nullptr, false);
+        ASSERT_TRUE(text.is_object() && text.contains("time")) << line;
+        if (!text.contains("frame"))
+            continue;
+        ++frames;
+        EXPECT_EQ(text["fault"], text["frame"] == "001" ? "input" : "none");
+        EXPECT_EQ(text["done"], frames);
+    }
+    EXPECT_EQ(frames, 3);
 }
 
 TEST_F(ResumeTest, gnu_parallel_runs_the_shards) {
