@@ -141,8 +141,15 @@ std::vector<fs::path> inputs_of(const CaptureEntry& entry) {
     return files;
 }
 
+/// What the listing says of a frame that its results depend on: where colour lies depends on how the camera moved.
+std::string listed(const CaptureEntry& entry) {
+    const Eigen::Vector3d &turn = entry.motion.turn_per_s, &shift = entry.motion.shift_per_s;
+    const double between_s = entry.stamp_s && entry.colour_stamp_s ? *entry.colour_stamp_s - *entry.stamp_s : 0;
+    return fmt::format("{}|{}|{}|{}|", entry.problem, between_s, fmt::join(turn, " "), fmt::join(shift, " "));
+}
+
 std::string stamps_of(const CaptureEntry& entry) {
-    std::string all = entry.problem;
+    std::string all = listed(entry);
     for (const fs::path& file : inputs_of(entry))
         all += fmt::format("{}|", stamp_of(file));
     return all;
@@ -150,7 +157,7 @@ std::string stamps_of(const CaptureEntry& entry) {
 
 /// A file that cannot be read is its own content: the frame fails, and fails again until it can.
 std::string hashes_of(const CaptureEntry& entry) {
-    std::string all = entry.problem;
+    std::string all = listed(entry);
     for (const fs::path& file : inputs_of(entry)) {
         try {
             all += hash_of_file(file) + "|";

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <limits>
 #include <map>
 
@@ -47,10 +48,20 @@ std::string outputs_text(const Outputs& outputs) {
     return text;
 }
 
+std::string camera_text(const Camera& camera) {
+    return to_json(camera).dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
 std::string capture_text(const Capture& capture) {
-    return fmt::format(
-        "{} {} {}", capture.camera ? to_json(*capture.camera).dump(-1, ' ', false, json::error_handler_t::replace) : "",
-        capture.depth.name, capture.depth.units_per_metre);
+    const auto& [scale, offset_m, curve_per_m] = capture.depth_correction;
+    std::string text =
+        fmt::format("{} {} {} {} {}", capture.depth.name, capture.depth.units_per_metre, scale, offset_m, curve_per_m);
+    if (capture.camera)
+        text += camera_text(*capture.camera);
+    if (capture.colour_camera)
+        text += fmt::format("{} {}", camera_text(capture.colour_camera->camera),
+                            fmt::join(capture.colour_camera->colour_from_depth.matrix().reshaped(), " "));
+    return text;
 }
 
 std::string stamps(const CaptureEntry& entry) {
