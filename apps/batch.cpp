@@ -41,17 +41,29 @@ struct Work {
     CloudVisibility of_points = {}; ///< what they are, where a CloudAo found them
 };
 
+void blame(FrameRow& row, FrameStatus status, Fault fault, const std::exception& failure) {
+    row.status = status;
+    row.fault = fault;
+    row.why = failure.what();
+}
+
 /// Takes one step with a frame and its time; the only place where a frame's failure is caught.
 template <class Step>
 void take(Work& work, double StageTimes::*stage, Step&& step) {
-    if (work.row.status == FrameStatus::failed)
+    if (!work.row.why.empty())
         return;
     const auto start = std::chrono::steady_clock::now();
     try {
         step();
-    } catch (const std::exception& failure) {
-        work.row.status = FrameStatus::failed;
-        work.row.why = failure.what();
+    } catch (const DeviceLost& failure) { // no fault of the frame: another device may do it
+        blame(work.row, FrameStatus::skipped, Fault::outage, failure);
+    } catch (const Outage& failure) {
+        blame(work.row, FrameStatus::failed, Fault::outage, failure);
+    } catch (const Error& failure) {
+        blame(work.row, FrameStatus::failed, Fault::input, failure);
+    } catch (const std::exception& failure) { // while loading, a library's word on the file
+        const bool loading = stage == &StageTimes::load || stage == &StageTimes::project;
+        blame(work.row, FrameStatus::failed, loading ? Fault::input : Fault::internal, failure);
     }
     work.row.ms.*stage = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
@@ -365,7 +377,7 @@ void attach_and_write(Work& work, const BatchOptions& options) {
         if (by_points && options.outputs.shaded && !work.of_points.visibility.empty())
             write_sides(work, options.outputs);
     });
-    if (work.row.status == FrameStatus::failed)
+    if (!work.row.why.empty())
         remove_files(work, outputs);
     else
         work.row.status = FrameStatus::ok;
@@ -373,14 +385,8 @@ void attach_and_write(Work& work, const BatchOptions& options) {
 
 std::vector<FrameRow> planned_rows(const Capture& capture, const std::vector<std::size_t>& frames) {
     std::vector<FrameRow> rows;
-    for (const std::size_t index : frames) {
-        FrameRow& row = rows.emplace_back();
-        row.index = index;
-        row.name = capture.entries.at(index).name;
-        row.why = "interrupted";
-        row.valid_share = row.coverage = row.mean_visibility = unknown;
-        row.ms = {unknown, unknown, unknown, unknown, unknown};
-    }
+    for (const std::size_t index : frames)
+        rows.push_back(skipped_row(capture, index));
     return rows;
 }
 
@@ -394,6 +400,28 @@ std::string_view name_of(FrameStatus status) {
         return "failed";
     case FrameStatus::skipped:
         return "skipped";
+    }
+    return "";
+}
+
+StageTimes operator+(const StageTimes& a, const StageTimes& b) {
+    const auto sum = [](double x, double y) { return (std::isnan(x) ? 0 : x) + (std::isnan(y) ? 0 : y); };
+    return {sum(a.load, b.load), sum(a.project, b.project), sum(a.compute, b.compute), sum(a.attach, b.attach),
+            sum(a.write, b.write)};
+}
+
+std::string_view name_of(Fault fault) {
+    switch (fault) {
+    case Fault::none:
+        return "none";
+    case Fault::input:
+        return "input";
+    case Fault::outage:
+        return "outage";
+    case Fault::internal:
+        return "internal";
+    case Fault::crash:
+        return "crash";
     }
     return "";
 }
@@ -417,14 +445,25 @@ std::vector<std::filesystem::path> files_of(const CaptureEntry& entry, const Out
     return files;
 }
 
+FrameRow skipped_row(const Capture& capture, std::size_t index) {
+    FrameRow row;
+    row.index = index;
+    row.name = capture.entries.at(index).name;
+    row.why = "interrupted";
+    row.valid_share = row.coverage = row.mean_visibility = unknown;
+    row.ms = {unknown, unknown, unknown, unknown, unknown};
+    return row;
+}
+
 std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const BatchOptions& options,
                                 const std::function<void(const FrameRow&)>& on_frame) {
     std::vector<FrameRow> rows = planned_rows(capture, options.frames);
     std::size_t begun = 0;
+    std::atomic<bool> given_up = false;
     using Token = std::shared_ptr<Work>;
 
     const auto begin = [&](tbb::flow_control& flow) -> Token {
-        if (begun == rows.size() || (options.stop && *options.stop)) {
+        if (begun == rows.size() || (options.stop && *options.stop) || given_up) {
             flow.stop();
             return {};
         }
@@ -469,13 +508,17 @@ std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const Ba
             if (!options.dump.empty())
                 write_intermediates(options.dump / work->entry.name, method.intermediates());
         });
+        given_up = given_up || (work->row.status == FrameStatus::skipped && work->row.fault == Fault::outage);
         return work;
     };
     const auto finish = [&](const Token& work) {
         attach_and_write(*work, options);
         return &work->row; // the images end here
     };
+    int outages = 0; // in a row: a full disk does not empty itself, and whoever goes on wastes the rest
     const auto report = [&](const FrameRow* row) {
+        outages = row->fault == Fault::outage ? outages + 1 : 0;
+        given_up = given_up || outages >= 4;
         if (on_frame)
             on_frame(*row);
     };

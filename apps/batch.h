@@ -61,6 +61,12 @@ enum class FrameStatus { ok, failed, skipped };
 struct StageTimes {
     double load = 0, project = 0, compute = 0, attach = 0, write = 0;
 };
+/// Sums; a time that is not known (NaN) counts as none.
+[[nodiscard]] StageTimes operator+(const StageTimes& a, const StageTimes& b);
+
+/// Who is to blame for a frame that has no result. Only an outage is worth another try.
+enum class Fault { none, input, outage, internal, crash };
+[[nodiscard]] std::string_view name_of(Fault fault);
 
 /// What became of one frame: a row of frames.csv. NaN and empty where the frame did not come that far.
 struct FrameRow {
@@ -68,6 +74,7 @@ struct FrameRow {
     std::string name;
     FrameStatus status = FrameStatus::skipped;
     std::string why; ///< of a failed or skipped frame
+    Fault fault = Fault::none;
     cv::Size size;
     double valid_share = 0; ///< pixels or points with a depth / all of them
     double coverage = 0;    ///< pixels or points with a visibility / those with a depth
@@ -80,7 +87,11 @@ struct FrameRow {
     std::vector<std::filesystem::path> files; ///< written, relative to Outputs::folder
 };
 
-/// Runs the walk over the frames. A frame that fails says why in its row, leaves no file, and stops no other.
+/// The row of a frame that was not begun.
+[[nodiscard]] FrameRow skipped_row(const Capture& capture, std::size_t index);
+
+/// Runs the walk over the frames. A frame that fails says why in its row, leaves no file, and stops no other. A lost
+/// device ends the run: frames in flight and those after them come back as skipped, the fault of an outage.
 /// `on_frame` is called once per row, in the order of `options.frames`, never concurrently.
 /// Rows come back in that order too; what is written does not depend on timing.
 [[nodiscard]] std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const BatchOptions& options,

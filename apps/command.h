@@ -11,7 +11,14 @@
 namespace scanshade {
 
 /// What the program's exit code tells a script.
-enum ExitCode : int { all_well = 0, misuse = 1, some_failed = 2, nothing_done = 3 };
+enum ExitCode : int {
+    all_well = 0,
+    misuse = 1,
+    some_failed = 2,    ///< some frames' input is bad, and which; the others are done. Trying again will not help
+    nothing_done = 3,   ///< nothing could be done
+    unfinished = 4,     ///< interrupted, a device lost, a disk full: the same again with --resume goes on
+    internal_error = 5, ///< the program's own mistake, or a frame that crashed it
+};
 
 /// Flags of one stage of the walk, as the help groups them. Row "radius" is the flag --radius; row "out" is also -o.
 struct Stage {
@@ -46,6 +53,9 @@ struct CommandRow {
 
 std::unique_ptr<Command> inspect_command();
 std::unique_ptr<Command> run_command();
+std::unique_ptr<Command> plan_command();
+std::unique_ptr<Command> status_command();
+std::unique_ptr<Command> merge_command();
 std::unique_ptr<Command> refine_command();
 std::unique_ptr<Command> compare_command();
 std::unique_ptr<Command> bench_command();

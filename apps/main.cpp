@@ -15,6 +15,10 @@ namespace {
 const std::array commands = {
     CommandRow{"inspect", "what is in a capture: frames, sizes, depth range, holes, camera, poses", inspect_command},
     CommandRow{"run", "ambient occlusion for every frame: maps, shaded pictures, clouds, a report", run_command},
+    CommandRow{"plan", "finds a dataset's captures and cuts them into tasks, for run on any number of machines",
+               plan_command},
+    CommandRow{"status", "how a planned job stands: tasks, frames, who is at work, failures by reason", status_command},
+    CommandRow{"merge", "a planned job's reports in one", merge_command},
     CommandRow{"refine", "the camera, from pictures of a board, organised clouds or a recording, and how sure", refine_command},
     CommandRow{"compare", "two results, or a result and truth, as numbers and difference pictures", compare_command},
     CommandRow{"bench", "methods and settings against truth: milliseconds, errors, the front, as one page",
@@ -41,7 +45,8 @@ void print_overview() {
         fmt::print("  scanshade {:<14} {}\n", row.name, row.summary);
     fmt::print("  scanshade {:<14} {}\n  scanshade {:<14} {}\n", "help",
                "this, or the flags of one command: help COMMAND", "--version", "the version");
-    fmt::print("\nExit code: 0 all well, 1 misuse, 2 some frames failed, 3 nothing could be done.\n");
+    fmt::print("\nExit code: 0 all well, 1 misuse, 2 some frames' input is bad (the others are done), 3 nothing could be done,\n"
+               "           4 interrupted, device lost or disk full: try again, `run --resume` goes on, 5 internal error.\n");
 }
 
 std::string flag_names(const Parameter& row) { return row.name == "out" ? "-o,--out" : "--" + row.name; }
@@ -149,8 +154,14 @@ int main(int count, char** words) {
         fmt::print(stderr, "scanshade: {}\n  `scanshade help` lists the commands, `scanshade help COMMAND` its flags\n",
                    failure.what());
         return misuse;
-    } catch (const std::exception& failure) {
+    } catch (const Outage& failure) {
+        fmt::print(stderr, "scanshade: {}\n", failure.what());
+        return unfinished;
+    } catch (const Error& failure) {
         fmt::print(stderr, "scanshade: {}\n", failure.what());
         return nothing_done;
+    } catch (const std::exception& failure) {
+        fmt::print(stderr, "scanshade: internal error: {}\n", failure.what());
+        return internal_error;
     }
 }

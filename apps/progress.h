@@ -7,6 +7,16 @@
 
 namespace scanshade {
 
+/// From now on, stderr gets one JSON object per line instead of prose: {"time", "message"}, and of frames {"time",
+/// "frame", "status", "fault", "why", "warnings", "ms", "done", "of", "left_s"}. For programs that watch.
+void log_as_json();
+
+/// A line on stderr.
+void say(const std::string& line);
+
+/// "1:02:03" or "2:03"
+[[nodiscard]] std::string duration_text(double seconds);
+
 class Progress {
   public:
     explicit Progress(std::size_t total);
@@ -16,6 +26,7 @@ class Progress {
 
   private:
     void draw();
+    [[nodiscard]] double seconds_left() const; ///< at the pace so far
 
     std::size_t total_, done_ = 0;
     bool on_terminal_;

@@ -13,23 +13,14 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <fstream>
+#include <limits>
+#include <tbb/info.h>
 #include <type_traits>
 
 namespace scanshade {
 namespace {
 
 std::string number(double value, int digits) { return std::isnan(value) ? "" : fmt::format("{:.{}f}", value, digits); }
-
-std::string csv_line(const FrameRow& row) {
-    const auto ms = [](double value) { return number(value, 2); };
-    const bool loaded = !row.size.empty();
-    return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.index, csv_field(row.name),
-                       name_of(row.status), csv_field(row.why), loaded ? std::to_string(row.size.width) : "",
-                       loaded ? std::to_string(row.size.height) : "", number(row.valid_share, 4),
-                       number(row.coverage, 4), number(row.mean_visibility, 4), ms(row.ms.load), ms(row.ms.project),
-                       ms(row.ms.compute), ms(row.ms.attach), ms(row.ms.write),
-                       csv_field(fmt::format("{}", fmt::join(row.warnings, "; "))));
-}
 
 /// JSON knows no NaN: what is not known is null.
 json known(double value, int digits = 4) {
@@ -73,14 +64,6 @@ json capture_json(const RunReport& report) {
     return text;
 }
 
-json stage_json(const StageTimes& ms) {
-    return {{"load", known(ms.load, 3)},
-            {"project", known(ms.project, 3)},
-            {"compute", known(ms.compute, 3)},
-            {"attach", known(ms.attach, 3)},
-            {"write", known(ms.write, 3)}};
-}
-
 json passes_json(const Timings& passes) {
     json text = json::array(); // a list: a pass may run twice under one name
     for (const auto& [pass, ms] : passes)
@@ -122,16 +105,20 @@ double peak_memory_mib() {
 json totals_json(const RunReport& report) {
     StageTimes sum;
     for (const FrameRow& row : report.frames)
-        for (double StageTimes::*stage :
-             {&StageTimes::load, &StageTimes::project, &StageTimes::compute, &StageTimes::attach, &StageTimes::write})
-            sum.*stage += std::isnan(row.ms.*stage) ? 0 : row.ms.*stage;
+        sum = sum + row.ms;
     const std::size_t ok = count(report.frames, FrameStatus::ok);
+    const Rates rates = rates_of(report);
     return {{"frames", report.frames.size()},
             {"ok", ok},
             {"failed", count(report.frames, FrameStatus::failed)},
             {"skipped", count(report.frames, FrameStatus::skipped)},
             {"took_ms", known(report.took_ms, 3)},
-            {"frames_per_second", known(static_cast<double>(ok) * 1000 / report.took_ms, 2)},
+            {"done_now", report.done_now},
+            {"frames_per_second", known(rates.pipeline, 2)},
+            {"stage_frames_per_second", stage_json(rates.stage)},
+            {"slowest_stage", rates.slowest},
+            {"share_of_slowest_stage", known(rates.share_of_slowest)},
+            {"device_busy_share", known(rates.device_busy)},
             {"stage_ms", stage_json(sum)},
             {"peak_memory_mib", known(peak_memory_mib(), 1)}};
 }
@@ -142,14 +129,69 @@ std::string utc(std::chrono::system_clock::time_point time) {
 
 } // namespace
 
+std::string csv_head() {
+    return "index,name,status,why,width,height,valid_share,coverage,mean_visibility,"
+           "load_ms,project_ms,compute_ms,attach_ms,write_ms,warnings\n";
+}
+
+std::string csv_line(const FrameRow& row) {
+    const auto ms = [](double value) { return number(value, 2); };
+    const bool loaded = !row.size.empty();
+    return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.index, csv_field(row.name),
+                       name_of(row.status), csv_field(row.why), loaded ? std::to_string(row.size.width) : "",
+                       loaded ? std::to_string(row.size.height) : "", number(row.valid_share, 4),
+                       number(row.coverage, 4), number(row.mean_visibility, 4), ms(row.ms.load), ms(row.ms.project),
+                       ms(row.ms.compute), ms(row.ms.attach), ms(row.ms.write),
+                       csv_field(fmt::format("{}", fmt::join(row.warnings, "; "))));
+}
+
+std::string csv_line(const std::string& capture, const FrameRow& row) { return csv_field(capture) + "," + csv_line(row); }
+
+json stage_json(const StageTimes& ms) {
+    return {{"load", known(ms.load, 3)},
+            {"project", known(ms.project, 3)},
+            {"compute", known(ms.compute, 3)},
+            {"attach", known(ms.attach, 3)},
+            {"write", known(ms.write, 3)}};
+}
+
+Rates rates_of(const RunReport& report) {
+    const auto done = static_cast<double>(report.done_now);
+    const int cores = tbb::info::default_concurrency();
+    Rates rates;
+    rates.pipeline = report.took_ms > 0 ? done * 1000 / report.took_ms : 0;
+    rates.device_busy = report.took_ms > 0 ? report.ms_now.compute / report.took_ms : 0;
+    double least = std::numeric_limits<double>::infinity();
+    const auto stage = [&](const char* name, double StageTimes::*ms, int at_once) {
+        const double rate = report.ms_now.*ms > 0 ? done * 1000 * at_once / report.ms_now.*ms : std::nan("");
+        rates.stage.*ms = rate;
+        if (rate < least) {
+            least = rate;
+            rates.slowest = name;
+            rates.share_of_slowest = rates.pipeline / rate;
+        }
+    };
+    stage("load", &StageTimes::load, cores);
+    stage("project", &StageTimes::project, cores);
+    stage("compute", &StageTimes::compute, 1);
+    stage("attach", &StageTimes::attach, cores);
+    stage("write", &StageTimes::write, cores);
+    return rates;
+}
+
+std::string describe(const Rates& rates) {
+    const std::string share =
+        rates.slowest.empty() ? "" : fmt::format(", {:.0f} % of {} alone", 100 * rates.share_of_slowest, rates.slowest);
+    return fmt::format("{:.1f} frames/s{}", rates.pipeline, share);
+}
+
 std::size_t count(const std::vector<FrameRow>& rows, FrameStatus status) {
     return static_cast<std::size_t>(
         std::count_if(rows.begin(), rows.end(), [&](const FrameRow& row) { return row.status == status; }));
 }
 
 void write_frames_csv(const std::filesystem::path& file, const std::vector<FrameRow>& frames) {
-    std::string text = "index,name,status,why,width,height,valid_share,coverage,mean_visibility,"
-                       "load_ms,project_ms,compute_ms,attach_ms,write_ms,warnings\n";
+    std::string text = csv_head();
     for (const FrameRow& row : frames)
         text += csv_line(row);
     write_atomically(file, text);

@@ -4,6 +4,7 @@
 #include "ao/gpu/device.h"
 #include "apps/batch.h"
 #include "apps/command.h"
+#include "apps/json.h"
 
 #include <chrono>
 #include <filesystem>
@@ -25,8 +26,30 @@ struct RunReport {
     std::vector<std::string> budget; ///< what an error or time budget picked, expects and found; empty without one
     std::string shading; ///< what the shaded pictures show, and why
     std::vector<FrameRow> frames;
-    double took_ms = 0; ///< from the first frame's begin to the last one's end
+    std::size_t done_now = 0; ///< frames that this process did; others were done before
+    StageTimes ms_now{};      ///< what they spent in each stage, summed
+    double took_ms = 0;       ///< from the first frame's begin to the last one's end
 };
+
+/// Frames per second of the pipeline, and of each stage had it the machine as it was to itself: as many frames at once
+/// as there are cores, in `compute` one. Where the device is the same cores, stages slow each other down.
+struct Rates {
+    double pipeline = 0;
+    StageTimes stage{};          ///< frames per second, not milliseconds
+    std::string slowest;         ///< the stage that sets the pace
+    double share_of_slowest = 0; ///< the pipeline's rate / that stage's
+    double device_busy = 0;      ///< share of the time that `compute` was at work
+};
+[[nodiscard]] Rates rates_of(const RunReport& report);
+/// "12.3 frames/s, 94 % of compute alone"
+[[nodiscard]] std::string describe(const Rates& rates);
+
+/// frames.csv's first line, and a frame's; of a job, with the capture in front.
+[[nodiscard]] std::string csv_head();
+[[nodiscard]] std::string csv_line(const FrameRow& row);
+[[nodiscard]] std::string csv_line(const std::string& capture, const FrameRow& row);
+/// {"load": ms, ...}, rounded.
+[[nodiscard]] json stage_json(const StageTimes& ms);
 
 /// Header and one line per frame, in the report's order. Fields with commas, quotes or line ends are quoted. Atomic.
 void write_frames_csv(const std::filesystem::path& file, const std::vector<FrameRow>& frames);

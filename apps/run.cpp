@@ -5,9 +5,12 @@
 #include "apps/batch.h"
 #include "apps/budget.h"
 #include "apps/command.h"
+#include "apps/job_run.h"
 #include "apps/progress.h"
 #include "apps/report.h"
+#include "apps/resume.h"
 #include "apps/settings_file.h"
+#include "apps/slice.h"
 #include "apps/trial.h"
 #include "io/output_file.h"
 #include "projection/error.h"
@@ -42,39 +45,6 @@ void end_gracefully_on_signals() {
     sigaction(SIGTERM, &action, nullptr);
 }
 
-// ---------------------------------------------------------------------------------------------------- frames a:b:step
-
-/// The indices that Python's slice a:b:step takes of 0 .. count - 1; a lone number takes that one frame.
-std::vector<std::size_t> slice(const std::string& text, std::size_t count) {
-    const auto refuse = [&] {
-        throw Misuse("frames: '" + text + "' given, expected a:b:step, such as 10:50:2, :100 or 7");
-    };
-    std::vector<std::string> parts;
-    std::istringstream stream(text + ":");
-    for (std::string part; std::getline(stream, part, ':');)
-        parts.push_back(part);
-    if (parts.size() > 3)
-        refuse();
-    const auto total = static_cast<int>(count);
-    const auto number = [&](std::size_t part, int otherwise) {
-        int value = otherwise;
-        if (part < parts.size() && !parts[part].empty())
-            set({"frames", "", &value}, parts[part]);
-        return value;
-    };
-    const auto from_end = [&](int index) { return index < 0 ? index + total : index; };
-    const int first = from_end(number(0, 0)), step = number(2, 1);
-    const int end = parts.size() == 1 && !text.empty() ? first + 1 : from_end(number(1, total));
-    if (step < 1)
-        refuse();
-    std::vector<std::size_t> chosen;
-    for (int index = std::max(first, 0); index < std::min(end, total); index += step)
-        chosen.push_back(static_cast<std::size_t>(index));
-    if (chosen.empty())
-        throw Misuse(fmt::format("frames: '{}' takes none of the {} frames", text, count));
-    return chosen;
-}
-
 // ---------------------------------------------------------------------------------------------------- what is asked
 
 struct RunSettings {
@@ -87,7 +57,8 @@ struct RunSettings {
     Budget budget;
     std::string out, write = "auto", format = "png16", view = "depth", dump;
     double shade_strength = 1;
-    bool colour_cloud = false, overwrite = false;
+    bool colour_cloud = false, overwrite = false, resume = false, retry = false;
+    std::string shard, log = "text";
 };
 
 std::set<std::string> words_of(const std::string& list) {
@@ -141,6 +112,8 @@ std::optional<Registration> registration_from(const std::string& text) {
 struct Job {
     Capture capture;
     BatchOptions batch;
+    std::vector<std::size_t> of = {}; ///< all that is taken of the capture, of which batch.frames may be a block
+    std::string block = {};           ///< "" = all, else as Task::block() says
 };
 
 /// "office" of captures/office/ and captures/office.pcd; "office-2" when another capture has that name.
@@ -157,21 +130,34 @@ std::string folder_name(const fs::path& path, std::set<std::string>& taken) {
 /// Nothing is begun when something would be lost: an earlier result is replaced only with --overwrite.
 void refuse_to_overwrite(const Job& job) {
     const Outputs& outputs = job.batch.outputs;
-    std::vector<fs::path> files = {outputs.folder / "manifest.json", outputs.folder / "frames.csv"};
+    std::vector<fs::path> files = {outputs.folder / "manifest.json", outputs.folder / "frames.csv",
+                                   journal_file(outputs.folder, "")};
     for (const std::size_t index : job.batch.frames)
         std::ranges::copy(files_of(job.capture.entries[index], outputs), std::back_inserter(files));
     const auto there = std::ranges::find_if(files, [](const fs::path& file) { return fs::exists(file); });
     if (there != files.end())
-        throw Misuse(there->string() + " exists already: --overwrite replaces earlier results, or choose another -o");
+        throw Misuse(there->string() + " exists already: --resume goes on with an earlier run, --overwrite replaces its "
+                                       "results, or choose another -o");
 }
 
 /// Clears what a killed run left, and the report of an earlier one: a manifest says that what lies beside it is
-/// complete.
-void prepare_folder(const fs::path& folder) {
-    for (const char* part : {"", "ao", "confidence", "shaded", "panel", "clouds"})
-        remove_leftovers(folder / part);
-    for (const char* report : {"manifest.json", "frames.csv"})
+/// complete. The journal is held.
+void prepare_folder(const Job& job, const std::vector<fs::path>& reports) {
+    const fs::path& folder = job.batch.outputs.folder;
+    std::set<std::string, std::less<>> stems;
+    for (const std::size_t index : job.batch.frames)
+        stems.insert(job.capture.entries[index].name);
+    for (const fs::path& report : reports) {
+        stems.insert(report.stem().string());
         fs::remove(folder / report);
+    }
+    for (const char* part : {"", "ao", "confidence", "shaded", "panel", "clouds"})
+        remove_leftovers(folder / part, [&](std::string_view stem) { return stems.contains(stem); });
+}
+
+/// "frames.csv", or "frames.0-500.csv" of a block.
+std::string report_name(const std::string& stem, const std::string& block, const char* extension) {
+    return block.empty() ? stem + extension : stem + "." + block + extension;
 }
 
 // ---------------------------------------------------------------------------------------------------- what is said
@@ -195,8 +181,6 @@ std::string shading_sentence(const Capture& capture, Registration registration) 
         "--registered yes shades the colour images anyway.",
         why, capture.registration_reason.empty() ? "" : " (" + capture.registration_reason + ")");
 }
-
-void say(const std::string& line) { fmt::print(stderr, "{}\n", line); }
 
 void introduce(const RunReport& report) {
     const Capture& capture = report.capture;
@@ -228,15 +212,15 @@ std::string names_of_failed(const std::vector<FrameRow>& rows) {
     return fmt::format("{}{}", fmt::join(names, ", "), more);
 }
 
-void conclude(const RunReport& report, const fs::path& folder) {
+void conclude(const RunReport& report, const fs::path& table) {
     const std::size_t ok = count(report.frames, FrameStatus::ok);
-    say(fmt::format("  {} of {} frames in {:.1f} s ({:.1f} frames/s) -> {}", ok, report.frames.size(),
-                    report.took_ms / 1000, static_cast<double>(ok) * 1000 / report.took_ms, folder.string()));
+    const std::string before = ok > report.done_now ? fmt::format(", {} of them before", ok - report.done_now) : "";
+    say(fmt::format("  {} of {} frames{} in {:.1f} s ({}) -> {}", ok, report.frames.size(), before,
+                    report.took_ms / 1000, describe(rates_of(report)), table.parent_path().string()));
     if (count(report.frames, FrameStatus::failed) > 0)
-        say(fmt::format("  failed: {} ({} says why)", names_of_failed(report.frames),
-                        (folder / "frames.csv").string()));
+        say(fmt::format("  failed: {} ({} says why)", names_of_failed(report.frames), table.string()));
     if (const std::size_t skipped = count(report.frames, FrameStatus::skipped); skipped > 0)
-        say(fmt::format("  interrupted: {} frames were not begun", skipped));
+        say(fmt::format("  not finished: {} frames are left; --resume goes on with them", skipped));
 }
 
 // ---------------------------------------------------------------------------------------------------- the command
@@ -259,24 +243,27 @@ class Run final : public Command {
     }
 
     int run() override {
+        if (asked_.log == "json")
+            log_as_json();
+        if (std::ranges::any_of(asked_.paths, is_job))
+            return run_planned();
         check_settings();
         if (!asked_.budget.any())
             (void)chosen_setup(); // refuses before anything is opened
         int unopened = 0;
         std::vector<Job> jobs = plan(unopened);
         for (const Job& job : jobs)
-            if (!asked_.overwrite)
+            if (!asked_.overwrite && !asked_.resume)
                 refuse_to_overwrite(job);
         if (jobs.empty())
             return nothing_done;
 
-        gpu::Device device(asked_.device);
         cv::setNumThreads(1); // frames are the parallelism; threads inside a frame would only compete with them
         end_gracefully_on_signals();
         std::vector<FrameRow> rows;
         for (const Job& job : jobs)
             if (!interrupted)
-                std::ranges::move(process(job, device), std::back_inserter(rows));
+                std::ranges::move(process(job), std::back_inserter(rows));
         return exit_code(rows, unopened);
     }
 
@@ -356,8 +343,14 @@ class Run final : public Command {
               {"shade-strength", "0 leaves the colour, 1 multiplies it by visibility", &s.shade_strength, "", 0, 1},
               {"colour-cloud", "replace the clouds' colour by colour times visibility", &s.colour_cloud},
               {"overwrite", "replace the results of an earlier run", &s.overwrite},
-              {"dump", "folder for what lies between the method's passes, as .npy files with an index.csv per frame",
-               &s.dump}}}};
+              {"resume", "go on with an earlier run: what is done, from the same input and settings, stays", &s.resume},
+              {"retry", "with --resume: frames that failed are tried again, too", &s.retry},
+              {.name = "log",
+               .help = "what stderr gets: prose, or a JSON object per line",
+               .value = &s.log,
+               .choices = {"text", "json"}},
+              {"shard", "of a job, the I-th of N parts: I/N; empty = as Slurm or Kubernetes number this one, else all", &s.shard},
+              {"dump", "folder for what lies between the method's passes, as .npy files with an index.csv per frame", &s.dump}}}};
     }
 
     /// --cloud.rays and so on.
@@ -425,6 +418,20 @@ class Run final : public Command {
         return setup;
     }
 
+    Job job_from(const fs::path& path, const fs::path& folder) const {
+        Job job{open_capture(path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s}), {}};
+        refuse_absent_view(job.capture);
+        job.batch.frames = job.of = slice(asked_.frames, job.capture.entries.size());
+        job.batch.outputs = outputs_;
+        job.batch.outputs.folder = folder;
+        if (!asked_.dump.empty())
+            job.batch.dump = fs::path(asked_.dump) / folder.lexically_relative(asked_.out);
+        job.batch.registration = registration_from(asked_.registered);
+        job.batch.range = range_;
+        job.batch.stop = &interrupted;
+        return job;
+    }
+
     /// Opens what is to be processed. A capture that cannot be opened is told and counted; it stops no other.
     std::vector<Job> plan(int& unopened) {
         std::vector<Job> jobs;
@@ -433,17 +440,7 @@ class Run final : public Command {
             const fs::path folder =
                 asked_.paths.size() == 1 ? fs::path(asked_.out) : asked_.out / fs::path(folder_name(path, taken));
             try {
-                Job job{open_capture(path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s}), {}};
-                refuse_absent_view(job.capture);
-                job.batch.frames = slice(asked_.frames, job.capture.entries.size());
-                job.batch.outputs = outputs_;
-                job.batch.outputs.folder = folder;
-                if (!asked_.dump.empty())
-                    job.batch.dump = fs::path(asked_.dump) / folder.lexically_relative(asked_.out);
-                job.batch.registration = registration_from(asked_.registered);
-                job.batch.range = range_;
-                job.batch.stop = &interrupted;
-                jobs.push_back(std::move(job));
+                jobs.push_back(job_from(path, folder));
             } catch (const Misuse&) {
                 throw;
             } catch (const std::exception& failure) {
@@ -485,7 +482,7 @@ class Run final : public Command {
     std::vector<std::string> keep_to_budget(const Job& job, gpu::Device& device) {
         const TrialRequest request{.depth_noise = asked_.depth_noise,
                                    .capture = {asked_.camera, asked_.depth_scale, asked_.association_limit_s},
-                                   .among = job.batch.frames,
+                                   .among = job.of,
                                    .leave_bad_out = true};
         const TrialCapture trial = load_trial(job.capture.path, request);
         const double radius_m = asked_.radius.empty() ? request.radius_m : std::stod(asked_.radius);
@@ -499,12 +496,81 @@ class Run final : public Command {
         return choice.sentences;
     }
 
-    std::vector<FrameRow> process(Job job, gpu::Device& device) {
+    /// A job made by `plan`: in worker processes, task by task.
+    int run_planned() {
+        if (asked_.paths.size() != 1 || !asked_.out.empty() || asked_.overwrite)
+            throw Misuse("run JOB goes on with that job, in its own folder: neither other captures, nor -o, nor --overwrite");
+        const fs::path job = asked_.paths.front();
+        const Plan plan = read_plan(job);
+        const Shard shard = shard_from(asked_.shard);
+        for (const Stage& stage : stages())
+            for (const auto& [name, value] : plan.settings)
+                if (const Parameter* row = row_named(stage.rows, name))
+                    set(*row, value);
+        asked_.out = (job / "results").string();
+        asked_.resume = true;
+        check_settings();
+        (void)chosen_setup();
+        return supervise(1, [&](const Shift& shift) {
+            cv::setNumThreads(1);
+            end_gracefully_on_signals();
+            return work_through(job, plan, shard, interrupted,
+                                [&](const Task& task) { return exit_code(process(job_of(job, task), shift), 0); });
+        });
+    }
+
+    Job job_of(const fs::path& folder, const Task& task) {
+        // The plan opened it: whatever is in the way now may be gone the next time.
+        if (std::error_code ignored; !fs::exists(task.capture, ignored))
+            throw Outage(task.capture.string() + ": not there any more");
+        Job job = job_from(task.capture, results_of(folder, task));
+        if (job.of.size() != task.of)
+            throw Error(fmt::format("{}: planned with {} frames, has {} now: plan anew", task.capture.string(), task.of,
+                                    job.of.size()));
+        job.block = task.block();
+        job.batch.frames = {job.of.begin() + static_cast<std::ptrdiff_t>(task.first),
+                            job.of.begin() + static_cast<std::ptrdiff_t>(task.first + task.frames)};
+        return job;
+    }
+
+    /// Opened when the first frame needs it: where all is done already, never.
+    gpu::Device& device() {
+        if (!device_)
+            device_ = std::make_unique<gpu::Device>(asked_.device);
+        return *device_;
+    }
+
+    /// Kept from capture to capture while its settings stay: its shaders are compiled once.
+    Method& method_as_set(gpu::Device& device) {
+        MethodSetup& setup = chosen_setup();
+        const Configuration wanted{asked_.method, "", values_of(setup)};
+        if (!method_ || wanted.method != made_.method || wanted.settings != made_.settings) {
+            method_ = setup.make(device);
+            made_ = wanted;
+        }
+        return *method_;
+    }
+
+    std::vector<FrameRow> process(Job job, const Shift& shift = {}) {
         const fs::path& folder = job.batch.outputs.folder;
+        Journal journal(folder, job.block);
+        if (asked_.overwrite)
+            journal.clear();
+        std::vector<Stage> all_settings = common_stages();
+        all_settings.push_back(method_stage(asked_.method, chosen_setup()));
+        all_settings.push_back(cloud_stage());
+        const std::string task = task_key(all_settings, job.capture, job.of);
+        const fs::path table = report_name("frames", job.block, ".csv"), manifest = report_name("manifest", job.block, ".json");
+        if (auto rows = rows_if_complete(journal, task, job.capture, job.batch.frames, asked_.retry);
+            rows && fs::exists(folder / manifest)) {
+            say(fmt::format("{}: done already, {} frames -> {}", job.capture.path.string(), rows->size(), folder.string()));
+            return *std::move(rows);
+        }
+        gpu::Device& device = this->device();
         const std::vector<std::string> budget =
             asked_.budget.any() ? keep_to_budget(job, device) : std::vector<std::string>{};
-        const std::unique_ptr<Method> plain = chosen_setup().make(device);
-        job.batch.point_method = dynamic_cast<PointMethod*>(plain.get());
+        Method& plain = method_as_set(device);
+        job.batch.point_method = dynamic_cast<PointMethod*>(&plain);
         job.batch.radius_m = std::stod(value_text(*row_named(chosen_setup().parameters(), "radius")));
         const CloudAo of_clouds = cloud_ao();
         job.batch.cloud_ao = &of_clouds;
@@ -512,28 +578,39 @@ class Run final : public Command {
                                : asked_.clouds == "view" ? CloudWalk::view
                                                          : CloudWalk::automatic;
         say(fmt::format("{} on {} ({})", asked_.method, device.info().name, device.info().driver));
-        const DepthNoise noise = noise_of(job.capture, job.batch.frames, asked_.depth_noise);
+        const DepthNoise noise = noise_of(job.capture, job.of, asked_.depth_noise);
         std::optional<OnFittedDepth> fitted;
         if (noise.any())
-            fitted.emplace(device, noise, *plain,
+            fitted.emplace(device, noise, plain,
                            FitPlaneOptions{.drop_flying = asked_.flying_pixels == "drop",
                                            .smoothing = asked_.depth_smoothing * method_named(asked_.method).smoothing});
-        Method& method = fitted ? static_cast<Method&>(*fitted) : *plain;
+        Method& method = fitted ? static_cast<Method&>(*fitted) : plain;
         job.batch.noise = noise;
         RunReport report = report_on(job, device.info());
         report.depth_noise = noise_sentence(noise);
         report.budget = budget;
         report.frames.resize(job.batch.frames.size());
         introduce(report);
-        prepare_folder(folder);
+        prepare_folder(job, {table, manifest});
+        const Recording recording{.journal = journal,
+                                  .settings = settings_key(report, job.batch.outputs, noise),
+                                  .task = task,
+                                  .device = device.info().name,
+                                  .retry = asked_.retry,
+                                  .carefully = shift.carefully,
+                                  .finished = shift.finished};
         Progress progress(job.batch.frames.size());
         const auto start = std::chrono::steady_clock::now();
-        report.frames = run_batch(job.capture, method, job.batch, [&](const FrameRow& row) { progress.add(row); });
+        report.frames = run_recorded(job.capture, method, job.batch, recording, [&](const FrameRow& row) {
+            progress.add(row);
+            report.done_now += row.status == FrameStatus::ok;
+            report.ms_now = report.ms_now + row.ms;
+        });
         report.took_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
         progress.end();
-        write_frames_csv(folder / "frames.csv", report.frames);
-        write_manifest(folder / "manifest.json", report);
-        conclude(report, folder);
+        write_frames_csv(folder / table, report.frames);
+        write_manifest(folder / manifest, report);
+        conclude(report, folder / table);
         return report.frames;
     }
 
@@ -548,16 +625,24 @@ class Run final : public Command {
     }
 
     static int exit_code(const std::vector<FrameRow>& rows, int unopened) {
+        const auto any = [&](Fault fault) { return std::ranges::count(rows, fault, &FrameRow::fault) > 0; };
         const std::size_t ok = count(rows, FrameStatus::ok);
-        if (ok == rows.size() && unopened == 0 && !interrupted)
+        if (interrupted || any(Fault::outage))
+            return unfinished;
+        if (any(Fault::internal) || any(Fault::crash))
+            return internal_error;
+        if (ok == rows.size() && unopened == 0)
             return all_well;
-        return ok == 0 && !interrupted ? nothing_done : some_failed;
+        return ok == 0 ? nothing_done : some_failed;
     }
 
     RunSettings asked_;
     Outputs outputs_;
     ProjectOptions range_;
     CloudAoOptions cloud_options_;
+    std::unique_ptr<gpu::Device> device_; ///< outlives what was made on it
+    std::unique_ptr<Method> method_;
+    Configuration made_; ///< what method_ was made from
     Configuration before_budget_; ///< of the method that a budget picked for the capture before this one
     std::vector<std::pair<std::string, std::unique_ptr<MethodSetup>>> setups_;
 };

@@ -191,8 +191,19 @@ std::vector<double> camera_matrix(const Pinhole& p) { return {p.fx, 0, p.cx, 0, 
 
 } // namespace
 
+namespace {
+
+/// Kalibr writes a matrix's rows as deep as their key, which YAML allows and OpenCV's parser does not.
+std::string with_deeper_rows(std::string text) {
+    for (std::size_t at = text.find("\n  - ["); at != std::string::npos; at = text.find("\n  - [", at))
+        text.insert(at + 1, "  ");
+    return text;
+}
+
+} // namespace
+
 CameraFile camera_from_yaml(const fs::path& file, const std::string& text) {
-    const cv::FileStorage storage = opened(file, text);
+    const cv::FileStorage storage = opened(file, with_deeper_rows(text));
     const cv::FileNode root = storage.root();
     if (!root.isMap())
         refuse_camera(file, "not a map of keys and values");

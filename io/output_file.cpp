@@ -6,7 +6,6 @@
 
 #include <atomic>
 #include <cerrno>
-#include <csignal>
 #include <cstdio>
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -49,25 +48,18 @@ void write_bytes(const fs::path& file, std::string_view bytes) {
         throw std::system_error(errno, std::generic_category(), "cannot be written");
 }
 
-/// The process number in a name that temporary_name() made; nothing for any other name.
-std::optional<std::uint64_t> maker_of(std::string_view name) {
+/// The stem in a name that temporary_name() made; nothing for any other name.
+std::optional<std::string_view> target_of(std::string_view name) {
     constexpr std::string_view mark = ".tmp-";
     const auto at = name.rfind(mark);
     if (!name.starts_with('.') || at == std::string_view::npos)
         return std::nullopt;
     const std::string_view numbers = name.substr(at + mark.size(), name.find('.', at + mark.size()) - at - mark.size());
     const auto dash = numbers.find('-');
-    if (dash == std::string_view::npos || !whole_number(numbers.substr(dash + 1)))
+    if (dash == std::string_view::npos || !whole_number(numbers.substr(0, dash)) ||
+        !whole_number(numbers.substr(dash + 1)))
         return std::nullopt;
-    return whole_number(numbers.substr(0, dash));
-}
-
-/// Whether the process that made a temporary file may still be writing it. Our own number counts as dead: in a fresh
-/// container a killed run's number is often ours again, and leftovers are removed before anything is written.
-bool still_writing(std::uint64_t pid) {
-    if (pid == 0 || pid > 0x7fffffff || static_cast<pid_t>(pid) == ::getpid())
-        return false;
-    return ::kill(static_cast<pid_t>(pid), 0) == 0 || errno == EPERM;
+    return name.substr(1, at - 1);
 }
 
 } // namespace
@@ -84,7 +76,7 @@ void write_atomically(const fs::path& target, const std::function<void(const fs:
     } catch (const std::exception& failure) {
         std::error_code ignored;
         fs::remove(temporary, ignored);
-        throw Error(target.string() + ": not written: " + failure.what());
+        throw Outage(target.string() + ": not written: " + failure.what());
     }
 }
 
@@ -92,12 +84,13 @@ void write_atomically(const fs::path& target, std::string_view bytes) {
     write_atomically(target, [&](const fs::path& temporary) { write_bytes(temporary, bytes); });
 }
 
-int remove_leftovers(const fs::path& folder) {
+int remove_leftovers(const fs::path& folder, const std::function<bool(std::string_view)>& ours) {
     int removed = 0;
     std::error_code trouble;
     for (fs::directory_iterator entry(folder, trouble), end; !trouble && entry != end; entry.increment(trouble)) {
-        const auto maker = maker_of(entry->path().filename().string());
-        if (!maker || still_writing(*maker))
+        const std::string name = entry->path().filename().string();
+        const auto stem = target_of(name);
+        if (!stem || !ours(*stem))
             continue;
         std::error_code ignored;
         if (entry->is_regular_file(ignored) && fs::remove(entry->path(), ignored))

@@ -241,16 +241,17 @@ TEST(atomic_output, an_existing_file_stays_whole_until_the_new_one_is) {
     EXPECT_EQ(file_bytes(target), "new");
 }
 
-TEST(atomic_output, leftovers_of_dead_runs_are_removed_and_nothing_else) {
+TEST(atomic_output, leftovers_of_ones_own_targets_are_removed_and_nothing_else) {
     const TemporaryFolder folder;
-    const std::string living = std::to_string(::getppid());
     write_file(folder / ".map.tmp-999999999-3.png", "half");
-    write_file(folder / fmt::format(".map.tmp-{}-3.png", living), "another run is writing this");
+    write_file(folder / ".other.tmp-999999999-3.png", "another machine is writing this");
     write_file(folder / "map.tmp-999999999-3.png", "the user's");
+    write_file(folder / ".map.tmp-x-3.png", "the user's");
     write_file(folder / ".hidden", "the user's");
-    EXPECT_EQ(remove_leftovers(folder.path()), 1);
-    EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 3);
-    EXPECT_EQ(remove_leftovers(folder / "nowhere"), 0);
+    const auto ours = [](std::string_view stem) { return stem == "map"; };
+    EXPECT_EQ(remove_leftovers(folder.path(), ours), 1);
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 4);
+    EXPECT_EQ(remove_leftovers(folder / "nowhere", ours), 0);
 }
 
 // --- cameras ---

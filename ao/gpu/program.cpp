@@ -373,10 +373,14 @@ struct Program::State {
 
     void submit(const vk::raii::CommandBuffer& recorded) {
         const vk::CommandBufferSubmitInfo info(*recorded);
-        gpu.queue.submit2(vk::SubmitInfo2({}, {}, info), *fence);
         constexpr std::uint64_t patience_ns = 120'000'000'000;
-        if (gpu.device.waitForFences(*fence, VK_TRUE, patience_ns) != vk::Result::eSuccess)
-            throw Error(fmt::format("{} did not finish within 120 s", gpu.info.name));
+        try {
+            gpu.queue.submit2(vk::SubmitInfo2({}, {}, info), *fence);
+            if (gpu.device.waitForFences(*fence, VK_TRUE, patience_ns) != vk::Result::eSuccess)
+                throw DeviceLost(fmt::format("{} did not finish within 120 s", gpu.info.name));
+        } catch (const vk::DeviceLostError& failure) {
+            throw DeviceLost(fmt::format("{}: {}", gpu.info.name, failure.what()));
+        }
         gpu.device.resetFences(*fence);
     }
 };

@@ -1,0 +1,19 @@
+// A shard of a job, task by task; and, once its own are done, what other shards have left lying.
+#pragma once
+
+#include "apps/job.h"
+#include "apps/worker.h"
+
+#include <atomic>
+#include <functional>
+
+namespace scanshade {
+
+/// Calls `run_task` for every task of the shard, then for those of other shards that nobody holds and nobody has
+/// completed: a machine that died is stood in for. `run_task` returns an exit code and throws Busy for a task that
+/// another process is at; other failures are told and make the task nothing_done (unfinished where an Outage was).
+/// Tells after each task how far the shard is and how long it will take. Returns the exit code that tells most.
+[[nodiscard]] int work_through(const std::filesystem::path& job, const Plan& plan, const Shard& shard,
+                               const std::atomic<bool>& stop, const std::function<int(const Task&)>& run_task);
+
+} // namespace scanshade
