@@ -26,7 +26,7 @@ struct FitPlaneOptions {
 /// Not thread-safe: one frame at a time.
 class FitPlane {
   public:
-    /// `noise.any()` must hold. The window's radius grows with the root of sigma(z), and of the grain.
+    /// `noise.any()` must hold. The window's radius grows with the root of sigma(z), and with the grain.
     FitPlane(gpu::Device& device, const DepthNoise& noise, const FitPlaneOptions& options = {});
 
     [[nodiscard]] FittedDepth compute(const DepthImage& depth);
