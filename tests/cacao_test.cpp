@@ -1,6 +1,7 @@
 // CACAO's own tests: what profile `scan` corrects, each shown against `reference`, which must fail it; the shaders
 // against the formulas of AMD's documentation; every table of passes; kinds of depth; and a few golden maps.
 #include "ao/cacao/cacao.h"
+#include "ao/gpu/transfer.h"
 #include "io/image_file.h"
 #include "tests/reference/cacao_cpu.h"
 #include "tests/support/scenes.h"
@@ -110,8 +111,7 @@ class Shared {
 
 void upload(gpu::Program& program, int buffer, const cv::Mat& image) {
     ASSERT_EQ(program.host(buffer).size(), image.total() * image.elemSize());
-    const cv::Mat whole = image.clone(); // one block
-    std::memcpy(program.host(buffer).data(), whole.data, program.host(buffer).size());
+    gpu::upload(image, program.host(buffer));
 }
 
 Seen run_tables(const CacaoOptions& o, const CacaoConstants& k, const CacaoTables& tables, const DepthImage& depth,
@@ -375,6 +375,24 @@ TEST_F(cacao_scan, mips_know_the_radius) {
     EXPECT_LE(highest(difference(one.scan.visibility, large.scan.visibility)), 1e-4);
     EXPECT_LE(highest(difference(one.scan.visibility, at(0.125F).scan.visibility)), 1e-4);
     EXPECT_GT(average(difference(one.reference.visibility, large.reference.visibility)), 0.01);
+}
+
+TEST_F(cacao_scan, distance_alone_takes_nothing_away) {
+    // A hall 400 m away under a radius to match is the picture of a room 2 m away. AMD's AO fades out from 50 to 300 m
+    // unless told otherwise: depths of games, not of scans.
+    const DepthImage near = wall_corner(test_camera(usual));
+    const auto at = [&](float scale) {
+        CacaoOptions o = options("");
+        o.radius = 0.5F * scale;
+        return both(o, {near.camera, cv::Mat1f(near.z_m * scale), {}});
+    };
+    const Both room = at(1), hall = at(256);
+    const auto darkness = [](const cv::Mat1f& v) { return 1 - average(v); };
+    measured("256 times as large, darkness left", darkness(hall.scan.visibility) / darkness(room.scan.visibility),
+             darkness(hall.reference.visibility) / darkness(room.reference.visibility));
+    EXPECT_LE(highest(difference(room.scan.visibility, hall.scan.visibility)), 1e-4);
+    EXPECT_GT(darkness(room.reference.visibility), 0.05);
+    EXPECT_LT(darkness(hall.reference.visibility), 0.001);
 }
 
 TEST_F(cacao_scan, what_lies_outside_the_image_is_unknown) {

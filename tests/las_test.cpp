@@ -13,13 +13,7 @@ namespace scanshade {
 namespace {
 
 namespace fs = std::filesystem;
-using tests::file_bytes;
-using tests::joined;
-using tests::refusal;
-using tests::says;
-using tests::TemporaryFolder;
-using tests::warned;
-using tests::write_file;
+using namespace tests;
 
 template <class Number>
 void put(std::string& bytes, std::size_t at, Number value) {

@@ -5,7 +5,6 @@
 #include "shaders/shared/fit_plane.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 
 namespace scanshade {
@@ -69,8 +68,8 @@ FittedDepth FitPlane::compute(const DepthImage& depth) {
     FittedDepth fitted{{depth.camera, {}, depth.source}, {}};
     if (!planes) {
         fitted.depth.z_m.create(size);
-        const auto* inverse = reinterpret_cast<const float*>(program_->host(kept).data());
-        std::transform(z.begin(), z.end(), inverse, fitted.depth.z_m.begin(), [](float z_m, float w) { return w > 0 ? z_m : 0; });
+        const auto inverse = program_->host_as<float>(kept);
+        std::transform(z.begin(), z.end(), inverse.begin(), fitted.depth.z_m.begin(), [](float z_m, float w) { return w > 0 ? z_m : 0; });
         return fitted;
     }
     fitted.normals.normals.create(size);

@@ -2,6 +2,9 @@
 // and the surfels that a slice of the hemisphere meets close the sectors they cover. An open plane is open to the last
 // bit.
 //
+// Outside the image surfaces go on as they are at its border, and in narrow holes (a sensor's shadows) as on their farther
+// side: as occluders only, never as pixels.
+//
 // Visibility bitmask after Therrien, Levesque and Gilet (2023), slices and cosine measure after Jimenez et al. (2016);
 // surfel segments, thickness from silhouette width and the self-normalised estimate are our own.
 #pragma once

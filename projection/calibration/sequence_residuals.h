@@ -9,14 +9,15 @@
 
 namespace scanshade::calibration {
 
+/// How far from `pixel` the camera sees a point, times `weight`.
 template <class Number>
-bool seen_at(LensModel lens, const Number* camera, const Number* in_camera, const Eigen::Vector2d& pixel,
+bool seen_at(LensModel lens, const Number* camera, const Number* in_camera, const Eigen::Vector2d& pixel, double weight,
              Number* residual) {
     if (in_camera[2] < Number(0.01))
         return false; // at or behind the camera: the solver takes a shorter step
     pixel_of(lens, camera, in_camera, residual);
-    residual[0] -= Number(pixel.x());
-    residual[1] -= Number(pixel.y());
+    residual[0] = Number(weight) * (residual[0] - Number(pixel.x()));
+    residual[1] = Number(weight) * (residual[1] - Number(pixel.y()));
     return true;
 }
 
@@ -44,10 +45,7 @@ struct SightingResidual {
         Number in_camera[3];
         moved(pose, point, in_camera);
         seen_later(motion, Number(*clock + later_s), in_camera);
-        const bool seen = seen_at(lens, camera, in_camera, pixel, residual);
-        residual[0] *= Number(weight);
-        residual[1] *= Number(weight);
-        return seen;
+        return seen_at(lens, camera, in_camera, pixel, weight, residual);
     }
 };
 
@@ -65,10 +63,7 @@ struct PlacedSightingResidual {
         moved(pose, point, in_depth);
         seen_later(motion, Number(*clock + later_s), in_depth);
         moved(place, in_depth, in_camera);
-        const bool seen = seen_at(lens, camera, in_camera, pixel, residual);
-        residual[0] *= Number(weight);
-        residual[1] *= Number(weight);
-        return seen;
+        return seen_at(lens, camera, in_camera, pixel, weight, residual);
     }
 };
 
@@ -86,8 +81,8 @@ struct OutlineResidual {
                miss[2] = {Number(0), Number(0)};
         seen_later(motion, Number(*clock + later_s), then);
         moved(place, then, in_camera);
-        const bool seen = seen_at(lens, camera, in_camera, on_edge, miss);
-        residual[0] = Number(weight) * (Number(across[0]) * miss[0] + Number(across[1]) * miss[1]);
+        const bool seen = seen_at(lens, camera, in_camera, on_edge, weight, miss);
+        residual[0] = Number(across[0]) * miss[0] + Number(across[1]) * miss[1];
         return seen;
     }
 };
