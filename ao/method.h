@@ -6,7 +6,7 @@
 #include "projection/parameters.h"
 
 #include <array>
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <memory>
 #include <span>
 #include <string>
@@ -20,12 +20,26 @@ namespace gpu {
 class Device;
 }
 
+/// Depth and normals as shaders/lib/surfel.glsl packs them, two words a pixel; depth 0 = hole.
+struct PackedSurfaces {
+    Pinhole camera;
+    cv::Mat2i words;
+};
+
+/// Another view of the same scene, which saw what hides from this one.
+struct Neighbour {
+    const PackedSurfaces* surfaces;
+    Eigen::Isometry3d here_from_there; ///< that camera's space to this one's
+};
+
 /// What a method looks at. Normals are optional: without them the method derives its own from depth.
 struct View {
     const DepthImage& depth;
     const NormalImage* normals = nullptr;
     DepthNoise noise = {}; ///< sigma(z) of `depth` as recorded; none = clean. Methods may widen their tolerances by it
     bool smoothed = false; ///< the noise is gone from within surfaces; at their edges it is not
+    std::span<const Neighbour> neighbours = {}; ///< of the same image size; most methods have no use for them
+    int instant = 0; ///< another number, another pattern of samples, so that frames of a recording can be averaged
 };
 
 /// Milliseconds per named pass or transfer, in execution order.

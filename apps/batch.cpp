@@ -16,9 +16,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <deque>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <limits>
+#include <map>
 #include <memory>
 #include <tbb/info.h>
 #include <tbb/parallel_pipeline.h>
@@ -37,6 +39,7 @@ struct Work {
     AoMap ao = {};
     cv::Mat1f confidence_in_view = {}; ///< of `ao`, pixel by pixel
     Attached attached = {}, confidence = {};
+    bool wanted = true;     ///< false: loaded for the frames around it
     bool by_points = false; ///< no view: values come from the points themselves
     CloudVisibility of_points = {}; ///< what they are, where a CloudAo found them
 };
@@ -383,6 +386,88 @@ void attach_and_write(Work& work, const BatchOptions& options) {
         work.row.status = FrameStatus::ok;
 }
 
+using Token = std::shared_ptr<Work>;
+
+/// Which frames enter the pipeline, in the recording's order: those wanted, and those within reach of one. Then as many empty
+/// tokens as frames may still wait for what lies around them.
+class Walk {
+  public:
+    Walk(const Capture& capture, std::vector<FrameRow>& rows, std::size_t reach) : capture_(capture), empty_(reach > 0 ? rows.size() : 0) {
+        for (FrameRow& row : rows) {
+            const std::size_t first = row.index - std::min(row.index, reach);
+            for (std::size_t i = first; i <= std::min(row.index + reach, capture.entries.size() - 1); ++i)
+                steps_.try_emplace(i, nullptr);
+            steps_[row.index] = &row;
+        }
+        next_ = steps_.begin();
+    }
+    [[nodiscard]] bool goes_on() const { return next_ != steps_.end() || empty_ > 0; }
+    [[nodiscard]] Token next() {
+        if (next_ == steps_.end()) {
+            --empty_;
+            return {};
+        }
+        const auto [index, row] = *next_++;
+        if (!row)
+            beside_.push_back(skipped_row(capture_, index));
+        auto work = std::make_shared<Work>(Work{capture_.entries[index], row ? *row : beside_.back()});
+        work->row.why.clear();
+        work->wanted = row != nullptr;
+        return work;
+    }
+
+  private:
+    const Capture& capture_;
+    std::map<std::size_t, FrameRow*> steps_; ///< null: only beside others
+    std::map<std::size_t, FrameRow*>::const_iterator next_;
+    std::deque<FrameRow> beside_; ///< rows of those
+    std::size_t empty_;
+};
+
+/// Frames of a sequence, held back until what lies around them has arrived. Without a sequence they pass as they come.
+class Waiting {
+  public:
+    explicit Waiting(Sequence* sequence) : sequence_(sequence) {}
+
+    /// Takes a frame (or none, when all have come) and gives the next one that is complete, or none.
+    [[nodiscard]] Token pass(Token arrived) {
+        if (!sequence_)
+            return arrived;
+        if (arrived) {
+            newest_ = arrived->row.index;
+            if (arrived->row.why.empty() && !arrived->by_points)
+                sequence_->add(newest_, arrived->depth, arrived->frame.world_from_camera);
+            if (arrived->wanted)
+                queue_.push_back(std::move(arrived));
+        } else {
+            newest_ = std::numeric_limits<std::size_t>::max();
+        }
+        if (queue_.empty() || newest_ - queue_.front()->row.index < sequence_->reach())
+            return {};
+        Token complete = std::move(queue_.front());
+        queue_.pop_front();
+        sequence_->forget_before(complete->row.index - std::min(complete->row.index, sequence_->reach()));
+        return complete;
+    }
+    [[nodiscard]] const std::deque<Token>& rest() const { return queue_; }
+
+  private:
+    Sequence* sequence_;
+    std::size_t newest_ = 0;
+    std::deque<Token> queue_;
+};
+
+void compute_view(Work& work, Method& method, Sequence* sequence) {
+    if (!sequence) {
+        work.ao = method.compute({work.depth});
+        work.row.passes = method.timings();
+        return;
+    }
+    SequenceResult result = sequence->compute(work.row.index);
+    work.ao = std::move(result.ao);
+    work.row.passes = std::move(result.timings);
+}
+
 std::vector<FrameRow> planned_rows(const Capture& capture, const std::vector<std::size_t>& frames) {
     std::vector<FrameRow> rows;
     for (const std::size_t index : frames)
@@ -458,20 +543,19 @@ FrameRow skipped_row(const Capture& capture, std::size_t index) {
 std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const BatchOptions& options,
                                 const std::function<void(const FrameRow&)>& on_frame) {
     std::vector<FrameRow> rows = planned_rows(capture, options.frames);
-    std::size_t begun = 0;
+    Walk walk(capture, rows, options.sequence ? options.sequence->reach() : 0);
     std::atomic<bool> given_up = false;
-    using Token = std::shared_ptr<Work>;
 
     const auto begin = [&](tbb::flow_control& flow) -> Token {
-        if (begun == rows.size() || (options.stop && *options.stop) || given_up) {
+        if (!walk.goes_on() || (options.stop && *options.stop) || given_up) {
             flow.stop();
             return {};
         }
-        FrameRow& row = rows[begun++];
-        row.why.clear();
-        return std::make_shared<Work>(Work{capture.entries[row.index], row});
+        return walk.next();
     };
     const auto load_and_project = [&](Token work) {
+        if (!work)
+            return work;
         take(*work, &StageTimes::load, [&] {
             work->frame = load(capture, work->row.index, options.registration);
             describe_frame(*work);
@@ -489,7 +573,11 @@ std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const Ba
         });
         return work;
     };
-    const auto compute = [&](Token work) {
+    Waiting waiting(options.sequence);
+    const auto compute = [&](Token arrived) {
+        Token work = waiting.pass(std::move(arrived));
+        if (!work)
+            return work;
         take(*work, &StageTimes::compute, [&] {
             if (work->by_points && options.point_method) {
                 work->attached = attach_points(work->frame, *options.point_method);
@@ -503,20 +591,23 @@ std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const Ba
                 work->attached = attached_points(*work->frame.cloud, work->of_points.visibility);
                 return;
             }
-            work->ao = method.compute({work->depth});
-            work->row.passes = method.timings();
+            compute_view(*work, method, options.sequence);
             if (!options.dump.empty())
                 write_intermediates(options.dump / work->entry.name, method.intermediates());
         });
         given_up = given_up || (work->row.status == FrameStatus::skipped && work->row.fault == Fault::outage);
         return work;
     };
-    const auto finish = [&](const Token& work) {
+    const auto finish = [&](const Token& work) -> FrameRow* {
+        if (!work)
+            return nullptr;
         attach_and_write(*work, options);
         return &work->row; // the images end here
     };
     int outages = 0; // in a row: a full disk does not empty itself, and whoever goes on wastes the rest
     const auto report = [&](const FrameRow* row) {
+        if (!row)
+            return;
         outages = row->fault == Fault::outage ? outages + 1 : 0;
         given_up = given_up || outages >= 4;
         if (on_frame)
@@ -532,6 +623,8 @@ std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const Ba
                                tbb::make_filter<Token, Token>(filter_mode::serial_in_order, compute) &
                                tbb::make_filter<Token, FrameRow*>(filter_mode::parallel, finish) &
                                tbb::make_filter<FrameRow*, void>(filter_mode::serial_in_order, report));
+    for (const Token& unfinished : waiting.rest()) // interrupted before what lies around them was there
+        unfinished->row = skipped_row(capture, unfinished->row.index);
     return rows;
 }
 

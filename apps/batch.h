@@ -3,6 +3,7 @@
 
 #include "ao/cloud/cloud_ao.h"
 #include "ao/method.h"
+#include "ao/sequence/sequence.h"
 #include "io/capture.h"
 #include "io/image_file.h"
 #include "projection/project.h"
@@ -49,6 +50,8 @@ struct BatchOptions {
                                               ///< the cloud is all that is written of them
     const CloudAo* cloud_ao = nullptr;        ///< what other clouds are computed with, where `cloud_walk` says so
     CloudWalk cloud_walk = CloudWalk::automatic;
+    Sequence* sequence = nullptr;             ///< what frames are computed with instead of the method, together with those
+                                              ///< around them; these are loaded whether or not `frames` has them
     std::filesystem::path dump;               ///< folder for the method's intermediates, frame by frame; empty = none
     int frames_in_memory = 0;                 ///< 0 = cores + 2
     const std::atomic<bool>* stop = nullptr;  ///< set = begin no further frame

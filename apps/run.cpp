@@ -239,6 +239,7 @@ class Run final : public Command {
         for (const auto& [name, setup] : setups_)
             all.push_back(method_stage(name, *setup));
         all.push_back(cloud_stage());
+        all.push_back(sequence_stage());
         return all;
     }
 
@@ -361,6 +362,14 @@ class Run final : public Command {
         return stage;
     }
 
+    /// --sequence.layers and so on.
+    Stage sequence_stage() {
+        Stage stage{"sequences, frames together with those around them", sequence_options_.parameters()};
+        for (Parameter& row : stage.rows)
+            row.name = "sequence." + row.name;
+        return stage;
+    }
+
     /// As given; --radius holds for clouds, too, and --cloud.radius before it.
     CloudAo cloud_ao() const {
         CloudAoOptions options = cloud_options_;
@@ -475,6 +484,7 @@ class Run final : public Command {
             if (name == asked_.method)
                 report.settings.push_back(method_stage(name, *setup));
         report.settings.push_back(cloud_stage());
+        report.settings.push_back(sequence_stage());
         return report;
     }
 
@@ -559,6 +569,7 @@ class Run final : public Command {
         std::vector<Stage> all_settings = common_stages();
         all_settings.push_back(method_stage(asked_.method, chosen_setup()));
         all_settings.push_back(cloud_stage());
+        all_settings.push_back(sequence_stage());
         const std::string task = task_key(all_settings, job.capture, job.of);
         const fs::path table = report_name("frames", job.block, ".csv"), manifest = report_name("manifest", job.block, ".json");
         if (auto rows = rows_if_complete(journal, task, job.capture, job.batch.frames, asked_.retry);
@@ -579,11 +590,16 @@ class Run final : public Command {
                                                          : CloudWalk::automatic;
         say(fmt::format("{} on {} ({})", asked_.method, device.info().name, device.info().driver));
         const DepthNoise noise = noise_of(job.capture, job.of, asked_.depth_noise);
+        const FitPlaneOptions fit{.drop_flying = asked_.flying_pixels == "drop",
+                                  .smoothing = asked_.depth_smoothing * method_named(asked_.method).smoothing};
         std::optional<OnFittedDepth> fitted;
         if (noise.any())
-            fitted.emplace(device, noise, plain,
-                           FitPlaneOptions{.drop_flying = asked_.flying_pixels == "drop",
-                                           .smoothing = asked_.depth_smoothing * method_named(asked_.method).smoothing});
+            fitted.emplace(device, noise, plain, fit);
+        std::optional<Sequence> sequence;
+        if (sequence_options_.any()) {
+            sequence.emplace(device, plain, noise, fit, sequence_options_);
+            job.batch.sequence = &*sequence;
+        }
         Method& method = fitted ? static_cast<Method&>(*fitted) : plain;
         job.batch.noise = noise;
         RunReport report = report_on(job, device.info());
@@ -640,6 +656,7 @@ class Run final : public Command {
     Outputs outputs_;
     ProjectOptions range_;
     CloudAoOptions cloud_options_;
+    SequenceOptions sequence_options_;
     std::unique_ptr<gpu::Device> device_; ///< outlives what was made on it
     std::unique_ptr<Method> method_;
     Configuration made_; ///< what method_ was made from

@@ -89,7 +89,8 @@ vec3 derived_normal(ivec2 p, float z, bool hole) {
 void main() {
     k = constants;
     ivec2 p = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(p, k.size))) return;
+    if (any(greaterThanEqual(p, k.window))) return;
+    p += k.origin;
     int here = index_of(p);
     float z = imageLoad(depth_in, here).x;
     bool hole = !(z > 0.0);

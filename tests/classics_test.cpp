@@ -176,7 +176,7 @@ struct SharedPasses {
                                        {"raw", pixels * 4, Row::Host::upload, Row::Texels::r32f},
                                        {"surfaces", pixels * 16, Row::Host::download, Row::Texels::rgba32f},
                                        {"visibility", pixels * 4, Row::Host::download, Row::Texels::r32f}};
-        ScreenTables tables{size, {}, {}};
+        ScreenTables tables{{{}, size}, size, 0, {}, {}};
         tables.add_pass("normals", "normals", {depth, given}, {surfaces}, {{shared::spec_supplied, supplied}});
         tables.add_pass("denoise", "denoise", {surfaces, raw}, {visibility}, {}, 2);
         program = std::make_unique<gpu::Program>(device(), buffers, tables.passes, sizeof(shared::ScreenConstants));

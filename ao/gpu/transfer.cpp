@@ -10,11 +10,11 @@ void upload(const cv::Mat& image, std::span<std::byte> to) {
         std::memcpy(to.data() + static_cast<std::size_t>(y) * row, image.ptr(y), row);
 }
 
-void upload_depth(const cv::Mat1f& z_m, std::span<float> to) {
+void upload_depth(const cv::Mat1f& z_m, cv::Mat1f to) {
     constexpr float nearest_m = 1e-4F, farthest_m = 1e6F; // beyond them single precision, not the scene, would decide
     for (int y = 0; y < z_m.rows; ++y) {
         const float* const from = z_m[y];
-        float* const row = to.data() + static_cast<std::ptrdiff_t>(y) * z_m.cols;
+        float* const row = to[y];
         for (int x = 0; x < z_m.cols; ++x)
             row[x] = from[x] >= nearest_m && from[x] <= farthest_m ? from[x] : 0.0F;
     }

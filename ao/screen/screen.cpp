@@ -3,7 +3,9 @@
 #include "ao/gpu/transfer.h"
 #include "ao/screen/noise.h"
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <fmt/format.h>
 
 namespace scanshade {
@@ -33,6 +35,21 @@ std::vector<gpu::BufferRow> shared_buffers(std::size_t pixels, bool supplied, in
     };
 }
 
+/// Where it stands as shared::neighbour_floats numbers: rotation row by row, translation, and what makes a ray of a pixel.
+void upload_neighbour(const Neighbour& neighbour, std::size_t index, gpu::Program& program) {
+    const cv::Mat2i& words = neighbour.surfaces->words;
+    const std::size_t bytes = words.total() * words.elemSize();
+    gpu::upload(words, program.host(screen_neighbours).subspan(index * bytes, bytes));
+    const auto floats = program.host_as<float>(screen_poses).subspan(index * shared::neighbour_floats, shared::neighbour_floats);
+    const Pinhole& camera = neighbour.surfaces->camera;
+    const Eigen::Matrix<float, 3, 3, Eigen::RowMajor> turn = neighbour.here_from_there.linear().cast<float>();
+    const Eigen::Vector3f shift = neighbour.here_from_there.translation().cast<float>();
+    std::copy_n(turn.data(), 9, floats.begin());
+    std::copy_n(shift.data(), 3, floats.begin() + 9);
+    const std::array<double, 4> rays{1 / camera.fx, 1 / camera.fy, -camera.cx / camera.fx, -camera.cy / camera.fy};
+    std::transform(rays.begin(), rays.end(), floats.begin() + 12, [](double x) { return static_cast<float>(x); });
+}
+
 } // namespace
 
 std::vector<Parameter> ScreenOptions::parameters() {
@@ -55,15 +72,15 @@ int ScreenTables::add_buffer(gpu::BufferRow row) {
     return static_cast<int>(buffers.size()) - 1;
 }
 
-void ScreenTables::add_pass(std::string name, std::string_view shader, std::vector<int> reads, std::vector<int> writes,
-                            std::vector<std::pair<int, int>> constants, int pixels_a_side) {
+void ScreenTables::add_pass_over(cv::Size over, std::string name, std::string_view shader, std::vector<int> reads,
+                                 std::vector<int> writes, std::vector<std::pair<int, int>> constants, int pixels_a_side) {
     const int tile = shared::screen_tile * pixels_a_side;
     const auto groups = [&](int n) { return static_cast<std::uint32_t>((n + tile - 1) / tile); };
     passes.push_back({std::move(name),
                       shader,
                       std::move(reads),
                       std::move(writes),
-                      {groups(size.width), groups(size.height), 1},
+                      {groups(over.width), groups(over.height), 1},
                       std::move(constants)});
 }
 
@@ -86,11 +103,20 @@ std::vector<Parameter> joined(std::vector<Parameter> rows, const std::vector<Par
     return rows;
 }
 
-shared::ScreenConstants constants_from(const ScreenOptions& options, const View& view) {
-    const Pinhole& camera = view.depth.camera;
+int guard_px(cv::Size size) { return (std::max(size.width, size.height) / 5 + 3) / 4 * 4; }
+
+shared::ScreenConstants constants_from(const ScreenOptions& options, const View& view, int guard) {
+    Pinhole camera = view.depth.camera;
+    camera.cx += guard;
+    camera.cy += guard;
     shared::ScreenConstants k{};
     k.camera = camera.on_gpu();
-    k.size = {camera.size.width, camera.size.height};
+    k.size = {camera.size.width + 2 * guard, camera.size.height + 2 * guard};
+    k.origin = {guard, guard};
+    k.window = {camera.size.width, camera.size.height};
+    // Multiples of the plane's most even steps (R2, Roberts 2018).
+    const auto turned = [&](double by) { return static_cast<float>(std::fmod(view.instant * by, 1.0)); };
+    k.turn = {turned(0.7548776662466927), turned(0.5698402909980532)};
     k.ray_step = {static_cast<float>(1 / camera.fx), static_cast<float>(1 / camera.fy)};
     k.ray_base = {static_cast<float>(-camera.cx / camera.fx), static_cast<float>(-camera.cy / camera.fy)};
     k.radius = options.radius;
@@ -108,39 +134,66 @@ void ScreenMethod::add_denoise(ScreenTables& tables) const {
                     {{shared::spec_denoise, options_.denoise}}, 2);
 }
 
-ScreenTables ScreenMethod::tables(cv::Size size, bool supplied) const {
-    ScreenTables all{size, shared_buffers(static_cast<std::size_t>(size.area()), supplied, options_.seed), {}};
+ScreenTables ScreenMethod::tables(cv::Size size, bool supplied, int neighbours) const {
+    const int guard = neighbours > 0 ? guard_px(size) : 0;
+    const cv::Size image(size.width + 2 * guard, size.height + 2 * guard);
+    ScreenTables all{{{guard, guard}, size}, image, neighbours, shared_buffers(static_cast<std::size_t>(image.area()), supplied, options_.seed), {}};
+    if (neighbours > 0) {
+        const auto each = static_cast<std::size_t>(neighbours);
+        all.add_buffer({"neighbours", each * static_cast<std::size_t>(size.area()) * 8, gpu::BufferRow::Host::upload, gpu::BufferRow::Texels::rg32ui});
+        all.add_buffer({"poses", each * shared::neighbour_floats * 4, gpu::BufferRow::Host::upload, gpu::BufferRow::Texels::r32f});
+    }
     // Without normals of the view, depth fills their slot; nothing reads it.
-    all.add_pass("normals", "normals", {screen_depth, supplied ? screen_given : screen_depth}, {screen_surfaces},
-                 {{shared::spec_supplied, supplied}});
+    all.add_pass_over(size, "normals", "normals", {screen_depth, supplied ? screen_given : screen_depth}, {screen_surfaces},
+                      {{shared::spec_supplied, supplied}});
     add_passes(all);
     add_denoise(all);
     return all;
+}
+
+/// Programs are kept for one image size: with neighbours and without.
+gpu::Program& ScreenMethod::program_for(const Shape& shape, std::size_t constants_bytes) {
+    const auto [width, height, supplied, neighbours] = shape;
+    if (!programs_.empty()) {
+        const auto [other_width, other_height, s, n] = programs_.begin()->first;
+        if (width != other_width || height != other_height)
+            programs_.clear();
+    }
+    std::unique_ptr<gpu::Program>& program = programs_[shape];
+    if (!program) {
+        const ScreenTables all = tables({width, height}, supplied, neighbours);
+        program = std::make_unique<gpu::Program>(device_, all.buffers, all.passes, constants_bytes);
+    }
+    return *program;
 }
 
 AoMap ScreenMethod::compute(const View& view) {
     refuse_odd_sizes(view);
     const cv::Size size = view.depth.z_m.size();
     const bool supplied = view.normals != nullptr;
-    const auto block = constants(constants_from(options_, view));
-    if (!program_ || size != size_ || supplied != supplied_) {
-        const ScreenTables all = tables(size, supplied);
-        program_ = std::make_unique<gpu::Program>(device_, all.buffers, all.passes, block.size());
-        size_ = size;
-        supplied_ = supplied;
-    }
+    const auto neighbours = looks_at_neighbours() ? view.neighbours : std::span<const Neighbour>{};
+    const int most = neighbours.empty() ? 0 : (static_cast<int>(neighbours.size()) + 3) / 4 * 4;
+    const int guard = most > 0 ? guard_px(size) : 0;
+    shared::ScreenConstants screen = constants_from(options_, view, guard);
+    screen.neighbours = static_cast<int>(neighbours.size());
+    const auto block = constants(screen);
+    gpu::Program& program = program_for({size.width, size.height, supplied, most}, block.size());
     const auto start = std::chrono::steady_clock::now();
-    gpu::upload_depth(view.depth.z_m, program_->host_as<float>(screen_depth));
+    const cv::Rect window({guard, guard}, size);
+    const cv::Size image(screen.size.x, screen.size.y);
+    gpu::upload_depth(view.depth.z_m, gpu::image_on<float>(program.host(screen_depth), image)(window));
     if (supplied)
-        gpu::upload(view.normals->normals, program_->host(screen_given));
+        view.normals->normals.copyTo(gpu::image_on<cv::Vec3f>(program.host(screen_given), image)(window));
+    for (std::size_t i = 0; i < neighbours.size(); ++i)
+        upload_neighbour(neighbours[i], i, program);
     const auto uploaded = std::chrono::steady_clock::now();
-    program_->run(block);
+    program.run(block);
     const auto ran = std::chrono::steady_clock::now();
-    AoMap ao{gpu::downloaded(program_->host_as<float>(screen_visibility), size)};
+    AoMap ao{gpu::image_on<float>(program.host(screen_visibility), image)(window).clone()};
     const auto done = std::chrono::steady_clock::now();
     const auto ms = [](auto from, auto to) { return std::chrono::duration<double, std::milli>(to - from).count(); };
     timings_.assign({{"host upload", ms(start, uploaded)}});
-    timings_.insert(timings_.end(), program_->timings().begin(), program_->timings().end());
+    timings_.insert(timings_.end(), program.timings().begin(), program.timings().end());
     timings_.emplace_back("host download", ms(ran, done));
     return ao;
 }

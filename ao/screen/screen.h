@@ -7,8 +7,10 @@
 #include "projection/error.h"
 #include "shaders/shared/screen.h"
 
+#include <map>
 #include <memory>
 #include <string>
+#include <tuple>
 #include <vector>
 
 namespace scanshade {
@@ -33,20 +35,29 @@ enum ScreenBuffer : int {
     screen_noise,      ///< rg32f, 64x64: see lib/noise.glsl
     screen_raw,        ///< r32f: visibility before denoise, finite everywhere
     screen_visibility, ///< r32f: the result, NaN in holes
-    screen_own
+    screen_own,
+    screen_neighbours = screen_own, ///< only where there are any: rg32ui, their surfaces (lib/surfel.glsl) one after the other
+    screen_poses                    ///< and r32f, neighbour_floats each: where they stand, and their rays
 };
 
 /// Everything one configuration runs, as plain data.
 struct ScreenTables {
-    cv::Size size;
+    cv::Rect window;    ///< where what was recorded lies in the image
+    cv::Size size;      ///< of the image, with its guard band where there is one
+    int neighbours = 0; ///< other views there may be at most
     std::vector<gpu::BufferRow> buffers;
     std::vector<gpu::PassRow> passes;
 
     /// Appends a buffer and tells its index.
     int add_buffer(gpu::BufferRow row);
-    /// Appends a pass of one thread per `pixels_a_side` squared pixels.
+    /// Appends a pass of one thread per `pixels_a_side` squared pixels of the image.
     void add_pass(std::string name, std::string_view shader, std::vector<int> reads, std::vector<int> writes,
-                  std::vector<std::pair<int, int>> constants = {}, int pixels_a_side = 1);
+                  std::vector<std::pair<int, int>> constants = {}, int pixels_a_side = 1) {
+        add_pass_over(size, std::move(name), shader, std::move(reads), std::move(writes), std::move(constants), pixels_a_side);
+    }
+    /// The same of an image of size `over`.
+    void add_pass_over(cv::Size over, std::string name, std::string_view shader, std::vector<int> reads, std::vector<int> writes,
+                       std::vector<std::pair<int, int>> constants = {}, int pixels_a_side = 1);
     /// Appends so many iterations of a separable blur of screen_raw over the pixels of the same surface; `weights` are
     /// those of offsets 0, 1, 2 ... to either side.
     void add_blurs(int iterations, const std::vector<float>& weights);
@@ -68,15 +79,18 @@ class ScreenMethod : public Method {
     virtual void add_denoise(ScreenTables& tables) const;
     /// The room's constant block. It begins with `screen`.
     [[nodiscard]] virtual std::vector<std::byte> constants(const shared::ScreenConstants& screen) const = 0;
+    /// Whether View::neighbours are looked at; then the image has a guard band of guard_px() on every side, and
+    /// add_passes() finds buffers for them.
+    [[nodiscard]] virtual bool looks_at_neighbours() const { return false; }
 
   private:
-    [[nodiscard]] ScreenTables tables(cv::Size size, bool supplied) const;
+    using Shape = std::tuple<int, int, bool, int>; // width, height, whether normals are supplied, most neighbours
+    [[nodiscard]] ScreenTables tables(cv::Size size, bool supplied, int neighbours) const;
+    gpu::Program& program_for(const Shape& shape, std::size_t constants_bytes);
 
     gpu::Device& device_;
     ScreenOptions options_;
-    cv::Size size_; // that program_ was made for
-    bool supplied_ = false;
-    std::unique_ptr<gpu::Program> program_;
+    std::map<Shape, std::unique_ptr<gpu::Program>> programs_; // of one image size
     Timings timings_;
 };
 
@@ -92,8 +106,11 @@ template <class Levels>
 /// The rows all rooms have, then a room's own.
 [[nodiscard]] std::vector<Parameter> joined(std::vector<Parameter> rows, const std::vector<Parameter>& more);
 
-/// The constants of one view.
-[[nodiscard]] shared::ScreenConstants constants_from(const ScreenOptions& options, const View& view);
+/// Pixels by which the image is widened on every side, where there are neighbours: they saw what lies outside it.
+[[nodiscard]] int guard_px(cv::Size size);
+
+/// The constants of one view, widened by `guard` pixels.
+[[nodiscard]] shared::ScreenConstants constants_from(const ScreenOptions& options, const View& view, int guard = 0);
 
 /// The bytes of a constant block.
 template <class Constants>

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <fmt/format.h>
 
 namespace scanshade {
 namespace {
@@ -30,14 +32,32 @@ constexpr int widest_fill_px = 40, narrowest_fill_px = 4;
 
 int divided_up(int n, int by) { return (n + by - 1) / by; }
 
+/// Half the thickness of what other views saw behind this one's surfaces, in radii.
+constexpr float hidden_layer = 0.05F;
+
+/// What other views saw behind this one's surfaces and outside its image: the buffers "behind" and "shapes".
+std::pair<int, int> add_layers(ScreenTables& tables) {
+    using Texels = gpu::BufferRow::Texels;
+    const int behind = tables.add_buffer({"behind", 2 * tables.pixels() * 4, gpu::BufferRow::Host::none, Texels::r32ui});
+    const int shapes = tables.add_buffer({"shapes", 2 * tables.pixels() * 4, gpu::BufferRow::Host::none, Texels::r32ui});
+    tables.passes.push_back({"clear layers", "", {}, {behind, shapes}, {1, 1, 1}, {}});
+    for (int round = 0; round < 3; ++round) {
+        tables.add_pass_over(tables.window.size(), fmt::format("reproject {}", round + 1), "surfel/reproject",
+                             {screen_neighbours, screen_poses, screen_depth}, {behind, shapes}, {{shared::spec_round, round}});
+        tables.passes.back().groups[2] = static_cast<std::uint32_t>(tables.neighbours);
+    }
+    tables.add_pass("widen", "surfel/widen", {screen_depth, behind, shapes}, {screen_surfaces});
+    return {behind, shapes};
+}
+
 /// What the passes' work and buffers are counted in.
 struct Grid {
     cv::Size words;   ///< of edges: along a row, along a column
     cv::Size samples; ///< pixels that slices are marched from
 
-    Grid(cv::Size size, bool downsampled)
+    Grid(cv::Size size, cv::Size window, bool downsampled)
         : words(divided_up(size.width, shared::surfel_run), divided_up(size.height, shared::surfel_run)),
-          samples(downsampled ? cv::Size(divided_up(size.width, 2), divided_up(size.height, 2)) : size) {}
+          samples(downsampled ? cv::Size(divided_up(window.width, 2), divided_up(window.height, 2)) : window) {}
 };
 
 /// One of the 16 planes of what lies 4 apart.
@@ -72,20 +92,24 @@ void Surfel::add_passes(ScreenTables& tables) const {
     using Texels = gpu::BufferRow::Texels;
     constexpr auto none = gpu::BufferRow::Host::none;
     const cv::Size size = tables.size;
-    const Grid grid(size, options_.downsampled);
+    const Grid grid(size, tables.window.size(), options_.downsampled);
     const int words = grid.words.width * size.height + grid.words.height * size.width;
     const auto bytes = [](int count, int each) {
         return static_cast<std::size_t>(count) * static_cast<std::size_t>(each);
     };
     const int edges = tables.add_buffer({"edges", bytes(words, 8), none, Texels::rg32ui});
     const int runs = tables.add_buffer({"runs", bytes(words, 8), none, Texels::r32ui});
-    const int surfels = tables.add_buffer({"surfels", bytes(16 * plane_of(size).area(), 8), none, Texels::rg32ui});
+    const int layers = tables.neighbours > 0 ? 3 : 1;
+    const int surfels = tables.add_buffer({"surfels", bytes(layers * 16 * plane_of(size).area(), 8), none, Texels::rg32ui});
     const int sampled = tables.add_buffer({"sampled", bytes(grid.samples.area(), 8), none, Texels::rg32f});
 
-    tables.add_pass("fill", "surfel/fill", {}, {screen_surfaces});
+    // Without neighbours nothing reads what fills the slots of their layers.
+    const auto [behind, shapes] = layers > 1 ? add_layers(tables) : std::pair(runs, runs);
+    tables.add_pass_over(tables.window.size(), "fill", "surfel/fill", {}, {screen_surfaces});
     tables.passes.push_back({"edges", "surfel/edges", {screen_surfaces}, {edges}, groups_of(words), {}});
     tables.passes.push_back({"runs", "surfel/runs", {edges}, {runs}, groups_of(size.width + size.height), {}});
-    tables.add_pass("surfels", "surfel/surfels", {screen_surfaces, edges, runs}, {surfels});
+    const std::pair<int, int> of_layers{shared::spec_layers, layers};
+    tables.add_pass("surfels", "surfel/surfels", {screen_surfaces, edges, runs, screen_depth, behind, shapes, layers > 1 ? screen_neighbours : runs, layers > 1 ? screen_poses : screen_depth}, {surfels}, {of_layers});
     const cv::Size plane = plane_of(grid.samples); // its threads share a rotation
     const auto tiles = [](int n) { return static_cast<std::uint32_t>(divided_up(n, shared::screen_tile)); };
     const std::pair<int, int> spacing{shared::spec_spacing, options_.downsampled ? 2 : 1};
@@ -94,15 +118,14 @@ void Surfel::add_passes(ScreenTables& tables) const {
                              {surfels, screen_surfaces, screen_noise},
                              {sampled},
                              {16 * tiles(plane.width), tiles(plane.height), 1},
-                             {{shared::spec_slices, options_.slices}, {shared::spec_steps, options_.steps}, spacing}});
-    tables.add_pass("resolve", "surfel/resolve", {surfels, screen_surfaces, sampled},
-                    {screen_visibility}, {{shared::spec_denoise, options_.screen.denoise}, spacing},
-                    2);
+                             {{shared::spec_slices, options_.slices}, {shared::spec_steps, options_.steps}, spacing, of_layers}});
+    tables.add_pass_over(tables.window.size(), "resolve", "surfel/resolve", {surfels, screen_surfaces, sampled}, {screen_visibility},
+                         {{shared::spec_denoise, options_.screen.denoise}, spacing}, 2);
 }
 
 std::vector<std::byte> Surfel::constants(const shared::ScreenConstants& screen) const {
     const cv::Size size(screen.size.x, screen.size.y), plane = plane_of(size);
-    const Grid grid(size, options_.downsampled);
+    const Grid grid(size, {screen.window.x, screen.window.y}, options_.downsampled);
     const float r = screen.radius;
     const bool noisy = screen.noise_floor > 0 || screen.noise_per_z2 > 0;
     return bytes_of(shared::SurfelConstants{
@@ -117,7 +140,9 @@ std::vector<std::byte> Surfel::constants(const shared::ScreenConstants& screen) 
         0.05F * r,
         0.3F * r,
         noisy ? widest_fill_px : narrowest_fill_px,
-        0.5F * r});
+        0.5F * r,
+        0.03F * r,
+        static_cast<int>(std::lround(255 * hidden_layer / options_.thickest))});
 }
 
 } // namespace scanshade

@@ -38,6 +38,7 @@ class Surfel final : public ScreenMethod {
     void add_passes(ScreenTables& tables) const override;
     void add_denoise(ScreenTables& tables) const override { (void)tables; } // its own, in add_passes
     [[nodiscard]] std::vector<std::byte> constants(const shared::ScreenConstants& screen) const override;
+    [[nodiscard]] bool looks_at_neighbours() const override { return true; }
 
   private:
     SurfelOptions options_;

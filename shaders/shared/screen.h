@@ -7,18 +7,24 @@ SHARED_BEGIN
 // A room's own constant block begins with this one, so that the passes all rooms share can read it there.
 struct ScreenConstants {
     Pinhole camera;
-    ivec2 size;                       // of the image
+    ivec2 size;                       // of the image, with its guard band where there is one
+    ivec2 origin, window;             // what was recorded lies in it from here on, so large; all of it but for a guard band
+    vec2 turn;                        // added to the noise table's numbers: differs from instant to instant
     vec2 ray_step, ray_base;          // the ray of pixel p is (p ray_step + ray_base, 1): divisions are dear
     float radius;                     // R, metres
     float noise_floor, noise_per_z2;  // sigma(z) = floor + per_z2 z^2 of the depth looked at, metres
     float tangent_sine;               // beta_t: samples lower above the tangent plane than this do not count (sine)
     float tangent_sigmas;             // kappa: nor do those within so many sigma(z) of it
     float strength, power;            // of what is shown: (1 - strength (1 - V))^power
+    int neighbours;                   // other views there are of this one
 };
 
 // Pixels of the noise table's side, and of a work group's.
 const int noise_side = 64;
 const int screen_tile = 8;
+
+// Of one neighbour's place: rotation row by row, translation, ray_step, ray_base.
+const int neighbour_floats = 16;
 
 // Specialization constants of the shared passes.
 const int spec_supplied = 0;    // normals: 1 = the view brings some

@@ -20,12 +20,16 @@ struct SurfelConstants {
     float longest;             // of what is added to a half length there, metres
     int fill_px;               // holes of a sensor are filled up to this width
     float fill;                // and up to this, metres
+    float apart;               // metres that a layer lies behind the one before it at least
+    int hidden_shape;          // half the thickness of what other views saw behind this one's surfaces, as a surfel has it
 };
 
 // Specialization constants, besides those of the shared passes.
 const int spec_slices = 10;
 const int spec_steps = 11;   // on either side of a slice
 const int spec_spacing = 12; // of the samples, pixels
+const int spec_layers = 13;  // of surfaces a pixel: 1, or 3 with neighbours
+const int spec_round = 14;   // of reproject
 
 SHARED_END
 #endif

@@ -37,8 +37,8 @@ bool may_be_narrow(ivec2 p, int half_width) {
 void main() {
     SurfelConstants s = constants;
     k = s.screen;
-    ivec2 p = ivec2(gl_GlobalInvocationID.xy);
-    if (s.fill_px == 0 || !inside(p) || has_depth(p) || !may_be_narrow(p, s.fill_px / 2)) return;
+    ivec2 p = ivec2(gl_GlobalInvocationID.xy) + k.origin;
+    if (s.fill_px == 0 || !inside(p) || imageLoad(surfaces, index_of(p)).w != 0.0 || !may_be_narrow(p, s.fill_px / 2)) return;
     vec4 before, after;
     int left = to_depth(p, -1, s.fill_px, before), right = to_depth(p, 1, s.fill_px, after);
     // One side may be the border of the image.

@@ -17,6 +17,7 @@
 layout(constant_id = spec_slices) const int slices = 2;
 layout(constant_id = spec_steps) const int steps = 8;
 layout(constant_id = spec_spacing) const int spacing = 1;
+layout(constant_id = spec_layers) const int layers = 1;
 
 layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(binding = 0, rg32ui) readonly uniform uimageBuffer surfels;
@@ -77,7 +78,7 @@ void main() {
     SurfelConstants s = constants;
     k = s.screen;
     ivec2 group = ivec2(gl_WorkGroupID.xy), phase = ivec2(group.x & 3, (group.x >> 2) & 3);
-    ivec2 at = 4 * (screen_tile * ivec2(group.x >> 4, group.y) + ivec2(gl_LocalInvocationID.xy)) + phase, pixel = at * spacing;
+    ivec2 at = 4 * (screen_tile * ivec2(group.x >> 4, group.y) + ivec2(gl_LocalInvocationID.xy)) + phase, pixel = at * spacing + s.screen.origin;
     if (any(greaterThanEqual(at, s.samples))) return;
     vec4 surface = imageLoad(surfaces, index_of(pixel));
     float own = surface.w;
@@ -135,7 +136,7 @@ void main() {
 
         uint closed = 0u;
         vec2 last = vec2(0.0); // depths of the step before, on either side
-        int j = 0;
+        int j = 0, layer = 0;
         do {
             vec4 x = (float(j) + vec4(u, u + 1.0)) * (1.0 / float(steps));
             vec4 before = spread(x - 1.0 / float(steps)) * far.xyxy + 1.0;
@@ -145,10 +146,11 @@ void main() {
             vec4 signed_now = now * sides;
             ivec4 ix = nearest(along.x * signed_now), iy = nearest(along.y * signed_now);
             ivec4 jx = clamp(ix, -pixel.x, k.size.x - 1 - pixel.x), jy = clamp(iy, -pixel.y, k.size.y - 1 - pixel.y);
-            uvec2 a = imageLoad(surfels, surfel_index(pixel + ivec2(jx.x, jy.x), s.plane)).xy;
-            uvec2 b = imageLoad(surfels, surfel_index(pixel + ivec2(jx.y, jy.y), s.plane)).xy;
-            uvec2 c = imageLoad(surfels, surfel_index(pixel + ivec2(jx.z, jy.z), s.plane)).xy;
-            uvec2 d = imageLoad(surfels, surfel_index(pixel + ivec2(jx.w, jy.w), s.plane)).xy;
+            int behind = layers == 1 ? 0 : layer * 16 * s.plane.x * s.plane.y;
+            uvec2 a = imageLoad(surfels, behind + surfel_index(pixel + ivec2(jx.x, jy.x), s.plane)).xy;
+            uvec2 b = imageLoad(surfels, behind + surfel_index(pixel + ivec2(jx.y, jy.y), s.plane)).xy;
+            uvec2 c = imageLoad(surfels, behind + surfel_index(pixel + ivec2(jx.z, jy.z), s.plane)).xy;
+            uvec2 d = imageLoad(surfels, behind + surfel_index(pixel + ivec2(jx.w, jy.w), s.plane)).xy;
             vec4 zq = uintBitsToFloat(uvec4(a.x, b.x, c.x, d.x));
             ivec4 shape = ivec4(a.y, b.y, c.y, d.y);
             if (steps % 2 == 1 && j == steps - 1) zq.zw = vec2(0.0);
@@ -161,7 +163,7 @@ void main() {
             // Outside the image the surface at its border goes on, a plane, though not towards its horizon.
             vec4 seen = nx * (ray.x + mx * k.ray_step.x) + ny * (ray.y + my * k.ray_step.y) + nz;
             vec4 go_on = (nx * (ray.x + vec4(jx) * k.ray_step.x) + ny * (ray.y + vec4(jy) * k.ray_step.y) + nz) / seen;
-            go_on = mix(vec4(0.0), go_on, lessThan(abs(go_on - 1.5), vec4(1.2)));
+            go_on = mix(vec4(0.0), go_on, lessThan(abs(go_on - 1.5), vec4(layer == 0 ? 1.2 : 0.0)));
             zq = abs(zq) * mix(go_on, vec4(1.0), inside_image); // filled holes have a negative depth
             vec4 dz = zq - z;
             vec4 pv = zq * (mx * flat_eye.x + my * flat_eye.y) - ray_length * dz;
@@ -190,9 +192,10 @@ void main() {
             vec4 back = (now - before) * size, ahead = (next - now) * size;
             vec4 bend = sides * (nx * along_ray.x + ny * along_ray.y) / seen;
             vec4 z_before = vec4(last, zq.xy), z_next = vec4(zq.zw, 0.0, 0.0); // of the last step's nothing is known yet
-            last = zq.zw;
-            back += hides(z_before, zq, 1.0 - (now - before) * bend, s.jut) * least(2.0 * back, vec4(s.longest));
-            ahead += hides(z_next, zq, 1.0 + (next - now) * bend, s.jut) * least(2.0 * ahead, vec4(s.longest));
+            last = layer == 0 ? zq.zw : last;
+            float longest = layer == 0 ? s.longest : 0.0; // hidden layers have neither
+            back += hides(z_before, zq, 1.0 - (now - before) * bend, s.jut) * least(2.0 * back, vec4(longest));
+            ahead += hides(z_next, zq, 1.0 + (next - now) * bend, s.jut) * least(2.0 * ahead, vec4(longest));
             back = least(back, middle + chord);
             ahead = least(ahead, chord - middle);
             vec4 fv = pv - lv * back, ft = pt - lt * back, uv = pv + lv * ahead, ut = pt + lt * ahead;
@@ -216,7 +219,10 @@ void main() {
             ivec4 misses = (floatBitsToInt(height) | floatBitsToInt(radius2 - d2) | (floatBitsToInt(zq) - 1)) >> 31;
             mask &= ~uvec4(misses);
             closed |= mask.x | mask.y | mask.z | mask.w;
-            j += 2;
+            // What lies behind these samples comes before the next ones.
+            bool deeper = layers > 1 && ((a.x | b.x | c.x | d.x) & 1u) != 0u;
+            layer = deeper ? layer + 1 : 0;
+            j += deeper ? 0 : 2;
         } while (j < steps);
         float measure = weight * full;
         all += measure;

@@ -39,7 +39,7 @@ struct Mean {
 Tap tap_at(ivec2 q) {
     bool exists = all(lessThan(uvec2(q), uvec2(samples)));
     q = exists ? q : ivec2(0);
-    ivec2 p = q * spacing;
+    ivec2 p = q * spacing + k.origin;
     uvec2 word = imageLoad(surfels, surfel_index(p, plane)).xy;
     float z = exists ? uintBitsToFloat(word.x) : 0.0;
     vec2 measure = imageLoad(sampled, q.y * samples.x + q.x).xy;
@@ -91,7 +91,8 @@ void main() {
     plane = s.plane;
     samples = s.samples;
     ivec2 p = 2 * ivec2(gl_GlobalInvocationID.xy), q = p / spacing;
-    if (any(greaterThanEqual(p, k.size))) return;
+    if (any(greaterThanEqual(p, k.window))) return;
+    p += k.origin;
     float za, zb, zc, zd;
     Mean a = mean_at(p, za), b = mean_at(p + ivec2(1, 0), zb), c = mean_at(p + ivec2(0, 1), zc), d = mean_at(p + ivec2(1, 1), zd);
     ROW(-2) ROW(-1) ROW(0) ROW(1) ROW(2)

@@ -1,0 +1,43 @@
+#include "ao/sequence/pack.h"
+
+#include "ao/gpu/transfer.h"
+#include "ao/screen/screen.h"
+
+namespace scanshade {
+namespace {
+
+enum Buffers : int { depth_in, given, surfaces, words };
+
+std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bool supplied) {
+    using Host = gpu::BufferRow::Host;
+    using Texels = gpu::BufferRow::Texels;
+    const auto pixels = static_cast<std::size_t>(size.area());
+    ScreenTables all{{{}, size}, size, 0, {}, {}};
+    all.buffers = {{"depth", pixels * 4, Host::upload, Texels::r32f},
+                   {"given normals", supplied ? pixels * 12 : 4, supplied ? Host::upload : Host::none, Texels::r32f},
+                   {"surfaces", pixels * 16, Host::none, Texels::rgba32f},
+                   {"words", pixels * 8, Host::download, Texels::rg32ui}};
+    all.add_pass("normals", "normals", {depth_in, supplied ? given : depth_in}, {surfaces}, {{shared::spec_supplied, supplied}});
+    all.add_pass("pack", "sequence/pack", {surfaces}, {words});
+    return std::make_unique<gpu::Program>(device, all.buffers, all.passes, sizeof(shared::ScreenConstants));
+}
+
+} // namespace
+
+PackedSurfaces PackSurfaces::compute(const View& view) {
+    const cv::Size size = view.depth.z_m.size();
+    const bool supplied = view.normals != nullptr;
+    if (!program_ || size != size_ || supplied != supplied_)
+        program_ = program_for(device_, size, supplied);
+    size_ = size;
+    supplied_ = supplied;
+    gpu::upload_depth(view.depth.z_m, program_->host_as<float>(depth_in));
+    if (supplied)
+        gpu::upload(view.normals->normals, program_->host(given));
+    const shared::ScreenConstants constants = constants_from({}, view);
+    program_->run(std::as_bytes(std::span(&constants, 1)));
+    timings_ = program_->timings();
+    return {view.depth.camera, gpu::image_on<cv::Vec2i>(program_->host(words), size).clone()};
+}
+
+} // namespace scanshade

@@ -1,0 +1,67 @@
+// Frames of one recording, each looked at together with those around it: what hides from one view, another has seen.
+#pragma once
+
+#include "ao/fit_plane/fit_plane.h"
+#include "ao/method.h"
+#include "ao/sequence/pack.h"
+
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace scanshade {
+
+struct SequenceOptions {
+    int layers = 0;  ///< other views whose surfaces occlude; 0 = none
+    int reach = 9;   ///< how many frames away they may be
+
+    [[nodiscard]] std::vector<Parameter> parameters();
+    [[nodiscard]] bool any() const { return layers > 0; }
+};
+
+/// What came of one frame, and which others it was looked at with.
+struct SequenceResult {
+    AoMap ao;
+    Timings timings;
+    std::vector<std::size_t> neighbours; ///< places
+};
+
+/// Not thread-safe: one call at a time. A frame's result depends on the frames within reach() of it and on nothing else.
+class Sequence {
+  public:
+    /// Keeps references to device and method.
+    Sequence(gpu::Device& device, Method& method, const DepthNoise& noise, const FitPlaneOptions& fit, const SequenceOptions& options);
+
+    /// How many frames before and behind it a frame's result depends on.
+    [[nodiscard]] std::size_t reach() const { return static_cast<std::size_t>(options_.reach); }
+    /// Frame `place` of the recording. Without a pose it is looked at by itself.
+    void add(std::size_t place, const DepthImage& depth, const std::optional<Eigen::Isometry3d>& world_from_camera);
+    /// Of an added frame; what lies within reach of it has been added, too, or is missing for good.
+    [[nodiscard]] SequenceResult compute(std::size_t place);
+    /// Frames before `place` are needed no more.
+    void forget_before(std::size_t place);
+
+  private:
+    struct Slot {
+        DepthImage depth;
+        std::optional<Eigen::Isometry3d> world_from_camera;
+        std::optional<FittedDepth> fitted;
+        std::optional<PackedSurfaces> packed;
+    };
+    [[nodiscard]] View view_of(Slot& slot);
+    [[nodiscard]] const PackedSurfaces& packed(Slot& slot);
+    [[nodiscard]] std::vector<std::size_t> neighbours_of(std::size_t place) const;
+    void account(std::string_view step, const Timings& timings);
+
+    Method& method_;
+    SequenceOptions options_;
+    DepthNoise noise_;
+    std::optional<FitPlane> fit_;
+    PackSurfaces pack_;
+    std::map<std::size_t, Slot> slots_;
+    Timings timings_; ///< since the last result
+};
+
+} // namespace scanshade

@@ -1,0 +1,36 @@
+// Where this view has no surface, outside its image and in its holes, it takes what other views saw there; outside the image,
+// where they saw nothing either, the surface at its border goes on, a plane. In holes the depth is negative: these surfaces
+// occlude, but are no pixels.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "shared/surfel.h"
+#include "lib/screen.glsl"
+#include "lib/cheap.glsl"
+
+layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
+layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
+layout(binding = 1, r32ui) readonly uniform uimageBuffer behind;
+layout(binding = 2, r32ui) readonly uniform uimageBuffer shapes;
+layout(binding = 16, rgba32f) uniform imageBuffer surfaces; // where there is depth only read, elsewhere only written
+layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
+
+#include "lib/depth.glsl"
+#include "lib/surfel.glsl"
+
+void main() {
+    SurfelConstants s = constants;
+    k = s.screen;
+    ivec2 p = ivec2(gl_GlobalInvocationID.xy);
+    if (!inside(p) || depth_at(p) > 0.0) return;
+    int here = index_of(p);
+    ivec2 border = clamp(p, k.origin, k.origin + k.window - 1);
+    bool hole = border == p;
+    uint first = imageLoad(behind, here).x;
+    vec4 seen = vec4(vec3(bytes_of_normal(imageLoad(shapes, here).x)) / 127.0, 1.0 / uintBitsToFloat(first));
+    vec4 last = hole ? vec4(0.0) : imageLoad(surfaces, index_of(border));
+    float ratio = dot(last.xyz, ray_of(vec2(border))) / dot(last.xyz, ray_of(vec2(p)));
+    vec4 goes_on = last.w > 0.0 && abs(ratio - 1.5) < 1.2 ? vec4(last.xyz, last.w * ratio) : vec4(0.0);
+    vec4 surface = first != 0u ? seen : goes_on;
+    imageStore(surfaces, here, vec4(surface.xyz, hole ? -surface.w : surface.w));
+}
