@@ -35,19 +35,28 @@ std::vector<gpu::BufferRow> shared_buffers(std::size_t pixels, bool supplied, in
     };
 }
 
-/// Where it stands as shared::neighbour_floats numbers: rotation row by row, translation, and what makes a ray of a pixel.
-void upload_neighbour(const Neighbour& neighbour, std::size_t index, gpu::Program& program) {
-    const cv::Mat2i& words = neighbour.surfaces->words;
-    const std::size_t bytes = words.total() * words.elemSize();
-    gpu::upload(words, program.host(screen_neighbours).subspan(index * bytes, bytes));
-    const auto floats = program.host_as<float>(screen_poses).subspan(index * shared::neighbour_floats, shared::neighbour_floats);
+shared::NeighbourPlace place_of(const Neighbour& neighbour) {
     const Pinhole& camera = neighbour.surfaces->camera;
-    const Eigen::Matrix<float, 3, 3, Eigen::RowMajor> turn = neighbour.here_from_there.linear().cast<float>();
-    const Eigen::Vector3f shift = neighbour.here_from_there.translation().cast<float>();
-    std::copy_n(turn.data(), 9, floats.begin());
-    std::copy_n(shift.data(), 3, floats.begin() + 9);
-    const std::array<double, 4> rays{1 / camera.fx, 1 / camera.fy, -camera.cx / camera.fx, -camera.cy / camera.fy};
-    std::transform(rays.begin(), rays.end(), floats.begin() + 12, [](double x) { return static_cast<float>(x); });
+    const auto row = [](const Eigen::Vector3d& v) {
+        return shared::vec3(static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z()));
+    };
+    const Eigen::Matrix3d turn = neighbour.here_from_there.linear();
+    return {row(turn.row(0)),
+            row(turn.row(1)),
+            row(turn.row(2)),
+            row(neighbour.here_from_there.translation()),
+            {static_cast<float>(1 / camera.fx), static_cast<float>(1 / camera.fy)},
+            {static_cast<float>(-camera.cx / camera.fx), static_cast<float>(-camera.cy / camera.fy)}};
+}
+
+/// Those looked at; throws Error where one is of another size, or there are too many.
+std::span<const Neighbour> checked_neighbours(const View& view) {
+    if (view.neighbours.size() > shared::most_neighbours)
+        throw Error(fmt::format("{} neighbours, {} are the most", view.neighbours.size(), shared::most_neighbours));
+    for (const Neighbour& neighbour : view.neighbours)
+        if (neighbour.surfaces->words.size() != view.depth.z_m.size())
+            throw Error("a neighbour of another image size");
+    return view.neighbours;
 }
 
 } // namespace
@@ -141,7 +150,6 @@ ScreenTables ScreenMethod::tables(cv::Size size, bool supplied, int neighbours) 
     if (neighbours > 0) {
         const auto each = static_cast<std::size_t>(neighbours);
         all.add_buffer({"neighbours", each * static_cast<std::size_t>(size.area()) * 8, gpu::BufferRow::Host::upload, gpu::BufferRow::Texels::rg32ui});
-        all.add_buffer({"poses", each * shared::neighbour_floats * 4, gpu::BufferRow::Host::upload, gpu::BufferRow::Texels::r32f});
     }
     // Without normals of the view, depth fills their slot; nothing reads it.
     all.add_pass_over(size, "normals", "normals", {screen_depth, supplied ? screen_given : screen_depth}, {screen_surfaces},
@@ -171,11 +179,12 @@ AoMap ScreenMethod::compute(const View& view) {
     refuse_odd_sizes(view);
     const cv::Size size = view.depth.z_m.size();
     const bool supplied = view.normals != nullptr;
-    const auto neighbours = looks_at_neighbours() ? view.neighbours : std::span<const Neighbour>{};
+    const auto neighbours = looks_at_neighbours() ? checked_neighbours(view) : std::span<const Neighbour>{};
     const int most = neighbours.empty() ? 0 : (static_cast<int>(neighbours.size()) + 3) / 4 * 4;
     const int guard = most > 0 ? guard_px(size) : 0;
     shared::ScreenConstants screen = constants_from(options_, view, guard);
     screen.neighbours = static_cast<int>(neighbours.size());
+    std::ranges::transform(neighbours, screen.places, place_of);
     const auto block = constants(screen);
     gpu::Program& program = program_for({size.width, size.height, supplied, most}, block.size());
     const auto start = std::chrono::steady_clock::now();
@@ -184,8 +193,9 @@ AoMap ScreenMethod::compute(const View& view) {
     gpu::upload_depth(view.depth.z_m, gpu::image_on<float>(program.host(screen_depth), image)(window));
     if (supplied)
         view.normals->normals.copyTo(gpu::image_on<cv::Vec3f>(program.host(screen_given), image)(window));
+    const std::size_t words_bytes = static_cast<std::size_t>(size.area()) * 8;
     for (std::size_t i = 0; i < neighbours.size(); ++i)
-        upload_neighbour(neighbours[i], i, program);
+        gpu::upload(neighbours[i].surfaces->words, program.host(screen_neighbours).subspan(i * words_bytes));
     const auto uploaded = std::chrono::steady_clock::now();
     program.run(block);
     const auto ran = std::chrono::steady_clock::now();

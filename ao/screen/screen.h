@@ -36,8 +36,7 @@ enum ScreenBuffer : int {
     screen_raw,        ///< r32f: visibility before denoise, finite everywhere
     screen_visibility, ///< r32f: the result, NaN in holes
     screen_own,
-    screen_neighbours = screen_own, ///< only where there are any: rg32ui, their surfaces (lib/surfel.glsl) one after the other
-    screen_poses                    ///< and r32f, neighbour_floats each: where they stand, and their rays
+    screen_neighbours = screen_own ///< only where there are any: rg32ui, their surfaces (lib/surfel.glsl) one after the other
 };
 
 /// Everything one configuration runs, as plain data.

@@ -35,19 +35,22 @@ int divided_up(int n, int by) { return (n + by - 1) / by; }
 /// Half the thickness of what other views saw behind this one's surfaces, in radii.
 constexpr float hidden_layer = 0.05F;
 
-/// What other views saw behind this one's surfaces and outside its image: the buffers "behind" and "shapes".
+/// What other views saw behind this one's surfaces and outside its image, and how thick these can be: two buffers.
 std::pair<int, int> add_layers(ScreenTables& tables) {
     using Texels = gpu::BufferRow::Texels;
     const int behind = tables.add_buffer({"behind", 2 * tables.pixels() * 4, gpu::BufferRow::Host::none, Texels::r32ui});
-    const int shapes = tables.add_buffer({"shapes", 2 * tables.pixels() * 4, gpu::BufferRow::Host::none, Texels::r32ui});
-    tables.passes.push_back({"clear layers", "", {}, {behind, shapes}, {1, 1, 1}, {}});
-    for (int round = 0; round < 3; ++round) {
+    const cv::Size blocks(divided_up(tables.size.width, 2), divided_up(tables.size.height, 2));
+    const int limits = tables.add_buffer(
+        {"limits", static_cast<std::size_t>(blocks.area()) * 4, gpu::BufferRow::Host::none, Texels::r32f});
+    tables.passes.push_back({"clear layers", "", {}, {behind}, {1, 1, 1}, {}});
+    for (int round = 0; round < 2; ++round) {
         tables.add_pass_over(tables.window.size(), fmt::format("reproject {}", round + 1), "surfel/reproject",
-                             {screen_neighbours, screen_poses, screen_depth}, {behind, shapes}, {{shared::spec_round, round}});
+                             {screen_neighbours, screen_depth}, {behind}, {{shared::spec_round, round}});
         tables.passes.back().groups[2] = static_cast<std::uint32_t>(tables.neighbours);
     }
-    tables.add_pass("widen", "surfel/widen", {screen_depth, behind, shapes}, {screen_surfaces});
-    return {behind, shapes};
+    tables.add_pass("widen", "surfel/widen", {screen_depth, behind}, {screen_surfaces});
+    tables.add_pass_over(blocks, "carve", "surfel/carve", {screen_neighbours, screen_surfaces}, {limits});
+    return {behind, limits};
 }
 
 /// What the passes' work and buffers are counted in.
@@ -104,12 +107,12 @@ void Surfel::add_passes(ScreenTables& tables) const {
     const int sampled = tables.add_buffer({"sampled", bytes(grid.samples.area(), 8), none, Texels::rg32f});
 
     // Without neighbours nothing reads what fills the slots of their layers.
-    const auto [behind, shapes] = layers > 1 ? add_layers(tables) : std::pair(runs, runs);
+    const auto [behind, limits] = layers > 1 ? add_layers(tables) : std::pair(runs, screen_depth);
     tables.add_pass_over(tables.window.size(), "fill", "surfel/fill", {}, {screen_surfaces});
     tables.passes.push_back({"edges", "surfel/edges", {screen_surfaces}, {edges}, groups_of(words), {}});
     tables.passes.push_back({"runs", "surfel/runs", {edges}, {runs}, groups_of(size.width + size.height), {}});
     const std::pair<int, int> of_layers{shared::spec_layers, layers};
-    tables.add_pass("surfels", "surfel/surfels", {screen_surfaces, edges, runs, screen_depth, behind, shapes, layers > 1 ? screen_neighbours : runs, layers > 1 ? screen_poses : screen_depth}, {surfels}, {of_layers});
+    tables.add_pass("surfels", "surfel/surfels", {screen_surfaces, edges, runs, screen_depth, behind, limits}, {surfels}, {of_layers});
     const cv::Size plane = plane_of(grid.samples); // its threads share a rotation
     const auto tiles = [](int n) { return static_cast<std::uint32_t>(divided_up(n, shared::screen_tile)); };
     const std::pair<int, int> spacing{shared::spec_spacing, options_.downsampled ? 2 : 1};

@@ -8,13 +8,6 @@ uvec2 surfel(float z, vec3 n, float thickness) {
 // The normal as whole numbers, up to rounding 127 long.
 ivec3 bytes_of_normal(uint shape) { return ivec3(int(shape)) << ivec3(0, 8, 16) >> 24; }
 
-// A surfel's second word with its normal turned and no thickness.
-uint rotated(uint shape, mat3 turn) {
-    vec3 n = turn * vec3(bytes_of_normal(shape));
-    ivec3 q = ivec3(nearest(n.x), nearest(n.y), nearest(n.z)) & 0xff;
-    return uint(q.x << 24 | q.y << 16 | q.z << 8);
-}
-
 // Pixels 4 apart lie side by side, one plane for each place in a 4x4 tile: threads of one plane share their rotation and
 // steps, so what they read lies side by side too.
 int surfel_index(ivec2 p, ivec2 plane) { return (((p.y & 3) * 4 + (p.x & 3)) * plane.y + (p.y >> 2)) * plane.x + (p.x >> 2); }

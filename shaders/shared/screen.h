@@ -4,6 +4,13 @@
 #include "camera.h"
 SHARED_BEGIN
 
+// Where a neighbour stands: a point of it is turned to (dot(x, p), dot(y, p), dot(z, p)) and shifted; its rays.
+struct NeighbourPlace {
+    vec3 x, y, z, shift;
+    vec2 ray_step, ray_base;
+};
+const int most_neighbours = 16;
+
 // A room's own constant block begins with this one, so that the passes all rooms share can read it there.
 struct ScreenConstants {
     Pinhole camera;
@@ -17,14 +24,12 @@ struct ScreenConstants {
     float tangent_sigmas;             // kappa: nor do those within so many sigma(z) of it
     float strength, power;            // of what is shown: (1 - strength (1 - V))^power
     int neighbours;                   // other views there are of this one
+    NeighbourPlace places[most_neighbours];
 };
 
 // Pixels of the noise table's side, and of a work group's.
 const int noise_side = 64;
 const int screen_tile = 8;
-
-// Of one neighbour's place: rotation row by row, translation, ray_step, ray_base.
-const int neighbour_floats = 16;
 
 // Specialization constants of the shared passes.
 const int spec_supplied = 0;    // normals: 1 = the view brings some

@@ -220,7 +220,11 @@ void main() {
             mask &= ~uvec4(misses);
             closed |= mask.x | mask.y | mask.z | mask.w;
             // What lies behind these samples comes before the next ones.
-            bool deeper = layers > 1 && ((a.x | b.x | c.x | d.x) & 1u) != 0u;
+            ivec4 next_layer = ivec4(a.x, b.x, c.x, d.x) & 15; // quarters of a radius behind this one, rounded up
+            vec4 beyond = dz * (4.0 / k.radius) + vec4(next_layer);
+            // It may lie within the radius; 15 is that or farther.
+            ivec4 near = ivec4(lessThan(beyond, vec4(5.0))) & (ivec4(greaterThan(beyond, vec4(-4.0))) | ivec4(equal(next_layer, ivec4(15))));
+            bool deeper = layers > 1 && any(greaterThan(next_layer * near, ivec4(0)));
             layer = deeper ? layer + 1 : 0;
             j += deeper ? 0 : 2;
         } while (j < steps);

@@ -7,6 +7,7 @@
 #include "lib/screen.glsl"
 #include "lib/cheap.glsl"
 #include "lib/surfel.glsl"
+#include "lib/layer.glsl"
 
 layout(constant_id = spec_layers) const int layers = 1;
 
@@ -16,9 +17,7 @@ layout(binding = 1, rg32ui) readonly uniform uimageBuffer edges;
 layout(binding = 2, r32ui) readonly uniform uimageBuffer runs;
 layout(binding = 3, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 4, r32ui) readonly uniform uimageBuffer behind;
-layout(binding = 5, r32ui) readonly uniform uimageBuffer shapes;
-layout(binding = 6, rg32ui) readonly uniform uimageBuffer neighbours;
-layout(binding = 7, r32f) readonly uniform imageBuffer poses;
+layout(binding = 5, r32f) readonly uniform imageBuffer limits;
 layout(binding = 16, rg32ui) writeonly uniform uimageBuffer surfels;
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
@@ -39,31 +38,17 @@ int run_length(int i, int index) {
     return (before & after & 1u) == 1u ? int(after >> 1) - int(before >> 1) : open;
 }
 
-float pose(int neighbour, int i) { return imageLoad(poses, neighbour * neighbour_floats + i).x; }
-vec3 row(int neighbour, int i) { return vec3(pose(neighbour, i), pose(neighbour, i + 1), pose(neighbour, i + 2)); }
+// How far behind depth z the next layer lies, 0 where there is none, in the four last bits of a depth: quarters of the radius.
+const uint place_mask = 15u;
 
-// Whether a neighbour looked through a point of this view.
-bool free(int i, vec3 point, float margin) {
-    vec3 away = point - row(i, 9);
-    vec3 there = away.x * row(i, 0) + away.y * row(i, 3) + away.z * row(i, 6); // the inverse rotation
-    vec2 at = (there.xy / there.z - vec2(pose(i, 14), pose(i, 15))) / vec2(pose(i, 12), pose(i, 13));
-    bool sees = there.z > 0.0 && all(greaterThan(at, vec2(-0.5))) && all(lessThan(at, vec2(k.window) - 0.5));
-    ivec2 p = sees ? ivec2(floor(at + 0.5)) : ivec2(0);
-    float z = uintBitsToFloat(imageLoad(neighbours, (i * k.window.y + p.y) * k.window.x + p.x).x);
-    return sees && z > there.z + margin;
+// The surfel of a layer, thin; `place` is its depth's last bits.
+uvec2 hidden_surfel(uint word, SurfelConstants s, uint place) {
+    uvec2 w = surfel(layer_depth(word, k.radius), layer_normal(word), 0.0);
+    return word == 0u ? uvec2(0u) : uvec2((w.x & ~place_mask) | place, w.y | uint(s.hidden_shape));
 }
 
-// The share of a thickness that no neighbour looked through.
-float solid(vec3 point, float thickness) {
-    vec3 away = normalize(point) * thickness;
-    float margin = max(0.02 * k.radius, 0.01 * point.z) + 3.0 * sigma_of(point.z), share = 1.0;
-    for (int i = 0; i < k.neighbours; ++i) {
-        share = share > 0.75 && free(i, point + away, margin) ? 0.75 : share;
-        share = share > 0.37 && free(i, point + 0.5 * away, margin) ? 0.37 : share;
-        share = share > 0.18 && free(i, point + 0.25 * away, margin) ? 0.18 : share;
-        share = share > 0.09 && free(i, point + 0.125 * away, margin) ? 0.09 : share;
-    }
-    return share;
+uint place_of(uint word, float z) {
+    return word == 0u ? 0u : uint(clamp(1 + int((layer_depth(word, k.radius) - z) * 4.0 / k.radius), 1, 15));
 }
 
 void main() {
@@ -85,20 +70,19 @@ void main() {
         return;
     }
     // What other views saw behind this pixel; where this one saw nothing the first of it is the surface itself.
-    int here = p.y * k.size.x + p.x, pixels = k.size.x * k.size.y;
+    int here = index_of(p);
     bool own = imageLoad(depth_in, here).x > 0.0;
-    uvec2 one = uvec2(imageLoad(behind, here).x, imageLoad(shapes, here).x);
-    uvec2 two = uvec2(imageLoad(behind, pixels + here).x, imageLoad(shapes, pixels + here).x);
-    uvec2 second = own ? one : two, third = own ? two : uvec2(0u);
-    float beyond = 1.0 / uintBitsToFloat(second.x);
-    // No surface is thicker than the way to what was seen behind it.
-    thickness = second.x != 0u ? max(min(thickness, 0.7 * (beyond - abs(z))), s.thinnest) : thickness;
-    if (z != 0.0) thickness = max(thickness * solid(ray_of(vec2(p)) * abs(z), thickness), s.thinnest);
+    uint one = imageLoad(behind, here).x, two = imageLoad(behind, k.size.x * k.size.y + here).x;
+    uint second = own ? one : two, third = own ? two : 0u;
+    // No surface is thicker than the way to what was seen behind it, or than where others looked through.
+    ivec2 tested = p & ~1;
+    float other = imageLoad(surfaces, index_of(tested)).w;
+    float limit = imageLoad(limits, (p.y >> 1) * ((k.size.x + 1) >> 1) + (p.x >> 1)).x;
+    limit = abs(abs(other) - abs(z)) < 0.1 * k.radius ? limit : s.thickest;
+    thickness = max(min(thickness, min(limit, 0.7 * (layer_depth(second, k.radius) - abs(z)))), s.thinnest);
     uvec2 word = surfel(z, surface.xyz, thickness / s.thickest);
-    // The last bit of a depth tells that there is another layer.
     int at = surfel_index(p, s.plane), layer = 16 * s.plane.x * s.plane.y;
-    imageStore(surfels, at, uvec4((word.x & ~1u) | uint(second.x != 0u), word.y, 0u, 0u));
-    imageStore(surfels, layer + at,
-               uvec4(second.x == 0u ? 0u : (floatBitsToUint(beyond) & ~1u) | uint(third.x != 0u), second.y, 0u, 0u));
-    imageStore(surfels, 2 * layer + at, uvec4(third.x == 0u ? 0u : floatBitsToUint(1.0 / uintBitsToFloat(third.x)) & ~1u, third.y, 0u, 0u));
+    imageStore(surfels, at, uvec4((word.x & ~place_mask) | place_of(second, abs(z)), word.y, 0u, 0u));
+    imageStore(surfels, layer + at, uvec4(hidden_surfel(second, s, place_of(third, layer_depth(second, k.radius))), 0u, 0u));
+    imageStore(surfels, 2 * layer + at, uvec4(hidden_surfel(third, s, 0u), 0u, 0u));
 }

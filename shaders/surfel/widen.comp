@@ -11,12 +11,11 @@
 layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 1, r32ui) readonly uniform uimageBuffer behind;
-layout(binding = 2, r32ui) readonly uniform uimageBuffer shapes;
 layout(binding = 16, rgba32f) uniform imageBuffer surfaces; // where there is depth only read, elsewhere only written
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 #include "lib/depth.glsl"
-#include "lib/surfel.glsl"
+#include "lib/layer.glsl"
 
 void main() {
     SurfelConstants s = constants;
@@ -27,7 +26,8 @@ void main() {
     ivec2 border = clamp(p, k.origin, k.origin + k.window - 1);
     bool hole = border == p;
     uint first = imageLoad(behind, here).x;
-    vec4 seen = vec4(vec3(bytes_of_normal(imageLoad(shapes, here).x)) / 127.0, 1.0 / uintBitsToFloat(first));
+    vec3 n = layer_normal(first);
+    vec4 seen = vec4(dot(n, ray_of(vec2(p))) > 0.0 ? -n : n, layer_depth(first, k.radius));
     vec4 last = hole ? vec4(0.0) : imageLoad(surfaces, index_of(border));
     float ratio = dot(last.xyz, ray_of(vec2(border))) / dot(last.xyz, ray_of(vec2(p)));
     vec4 goes_on = last.w > 0.0 && abs(ratio - 1.5) < 1.2 ? vec4(last.xyz, last.w * ratio) : vec4(0.0);

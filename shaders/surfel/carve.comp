@@ -1,0 +1,40 @@
+// How thick a surface can be where another view looked through what lies behind it: one pixel of 2x2, two depths.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "shared/surfel.h"
+#include "lib/screen.glsl"
+#include "lib/cheap.glsl"
+
+layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
+layout(binding = 0, rg32ui) readonly uniform uimageBuffer neighbours;
+layout(binding = 1, rgba32f) readonly uniform imageBuffer surfaces;
+layout(binding = 16, r32f) writeonly uniform imageBuffer limits; // metres
+layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
+
+// Whether neighbour i looked through a point of this view.
+bool is_free(int i, NeighbourPlace place, vec3 point, float margin) {
+    vec3 away = point - place.shift;
+    vec3 there = away.x * place.x + away.y * place.y + away.z * place.z; // the inverse rotation
+    vec2 at = (there.xy * (1.0 / there.z) - place.ray_base) / place.ray_step;
+    bool sees = there.z > 0.0 && all(greaterThan(at, vec2(-0.5))) && all(lessThan(at, vec2(k.window) - 0.5));
+    int index = sees ? (i * k.window.y + nearest(at.y)) * k.window.x + nearest(at.x) : 0;
+    return sees && uintBitsToFloat(imageLoad(neighbours, index).x) > there.z + margin;
+}
+
+void main() {
+    SurfelConstants s = constants;
+    k = s.screen;
+    ivec2 block = ivec2(gl_GlobalInvocationID.xy), p = 2 * block;
+    if (!inside(p)) return;
+    float z = abs(imageLoad(surfaces, index_of(p)).w);
+    vec3 point = ray_of(vec2(p)) * z, away = normalize(ray_of(vec2(p))) * s.thickest;
+    float margin = max(max(0.02 * k.radius, 0.01 * z), 3.0 * sigma_of(z)), limit = 1.0;
+    int i = 0;
+    do {
+        NeighbourPlace place = constants.screen.places[i];
+        limit = limit > 0.4 && is_free(i, place, point + 0.5 * away, margin) ? 0.37 : limit;
+        limit = is_free(i, place, point + 0.125 * away, margin) ? 0.09 : limit;
+    } while (++i < k.neighbours);
+    imageStore(limits, block.y * ((k.size.x + 1) >> 1) + block.x, vec4(limit * s.thickest));
+}
