@@ -6,19 +6,20 @@
 
 #include <algorithm>
 #include <cstring>
+#include <fmt/format.h>
 
 namespace scanshade {
 namespace {
 
-// The order of buffers; the last two only where planes are fitted.
-enum Buffers : int { recorded, kept, averages, depth_out, normals_out };
+// The order of buffers; all but the first two only where planes are fitted, the last three only where frames are fused.
+enum Buffers : int { recorded, kept, averages, depth_out, normals_out, others_in, fused, relief };
 
 /// Of the window's radius, squared, in units of grain^2 sigma fx / z (pixels). Below it noise tilts normals, above it a plane no
 /// longer is what surfaces are. Without grain this leaves the least error in AO on simulated sensors. With grain the least error
 /// lies somewhat lower, but a real Kinect errs alike over more pixels than the grain tells, and its walls would stay mottled.
 constexpr double window_scale = 1.8;
 
-std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bool planes) {
+std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bool planes, bool fuse) {
     using Host = gpu::BufferRow::Host;
     constexpr auto floats = gpu::BufferRow::Texels::r32f;
     const auto pixels = static_cast<std::size_t>(size.area());
@@ -31,8 +32,16 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
         buffers.insert(buffers.end(), {{"averages", pixels * 4, Host::none, floats},
                                        {"depth out", pixels * 4, Host::download, floats},
                                        {"normals out", pixels * 12, Host::download, floats}});
-        passes.push_back({"average", "fit_plane/average", {kept}, {averages}, groups, {}});
-        passes.push_back({"fit plane", "fit_plane/fit", {averages}, {depth_out, normals_out}, groups, {}});
+        if (fuse) {
+            buffers.insert(buffers.end(), {{"others", shared::most_neighbours * pixels * 4, Host::upload, floats},
+                                           {"fused", pixels * 4, Host::none, floats},
+                                           {"relief", pixels * 4, Host::none, floats}});
+            passes.push_back({"fuse", "fit_plane/fuse", {kept, others_in}, {fused, relief}, groups, {}});
+        }
+        const std::vector<std::pair<int, int>> is_fused{{shared::spec_fused, fuse}};
+        const int samples = fuse ? fused : kept, errs = fuse ? relief : kept; // unread without
+        passes.push_back({"average", "fit_plane/average", {samples, errs}, {averages}, groups, is_fused});
+        passes.push_back({"fit plane", "fit_plane/fit", {averages, errs}, {depth_out, normals_out}, groups, is_fused});
     }
     return std::make_unique<gpu::Program>(device, buffers, passes, sizeof(shared::FitPlaneConstants));
 }
@@ -44,14 +53,17 @@ FitPlane::FitPlane(gpu::Device& device, const DepthNoise& noise, const FitPlaneO
     if (!noise.any()) throw Error("a plane fit needs a noise above zero");
 }
 
-FittedDepth FitPlane::compute(const DepthImage& depth) {
+FittedDepth FitPlane::compute(const DepthImage& depth, std::span<const OtherDepth> others) {
     const cv::Size size = depth.z_m.size();
-    const bool planes = options_.smoothing > 0;
-    if (!program_ || size != size_) program_ = program_for(device_, size, planes);
+    const bool planes = options_.smoothing > 0, fuse = planes && !others.empty();
+    if (others.size() > shared::most_neighbours)
+        throw Error(fmt::format("{} other frames, {} are the most", others.size(), shared::most_neighbours));
+    if (!program_ || size != size_ || fuse != fused_) program_ = program_for(device_, size, planes, fuse);
     size_ = size;
+    fused_ = fuse;
     const shared::Pinhole camera = depth.camera.on_gpu();
     const double window = window_scale * noise_.grain_px * noise_.grain_px * options_.smoothing * options_.smoothing;
-    const shared::FitPlaneConstants constants{{size.width, size.height},
+    shared::FitPlaneConstants constants{{size.width, size.height},
                                               camera.fx,
                                               camera.fy,
                                               camera.cx,
@@ -60,7 +72,14 @@ FittedDepth FitPlane::compute(const DepthImage& depth) {
                                               static_cast<float>(noise_.per_z2),
                                               static_cast<float>(window),
                                               static_cast<float>(options_.largest_radius_px),
-                                              options_.drop_flying ? 1 : 0};
+                                              options_.drop_flying ? 1 : 0,
+                                              fuse ? static_cast<int>(others.size()) : 0,
+                                              {}};
+    for (std::size_t i = 0; fuse && i < others.size(); ++i) {
+        if (others[i].depth->z_m.size() != size) throw Error("another frame of another image size");
+        constants.places[i] = gpu::place_of(others[i].depth->camera, others[i].here_from_there);
+        gpu::upload_depth(others[i].depth->z_m, program_->host_as<float>(others_in).subspan(i * depth.z_m.total(), depth.z_m.total()));
+    }
     const cv::Mat1f& z = depth.z_m;
     gpu::upload_depth(z, program_->host_as<float>(recorded));
     program_->run(std::as_bytes(std::span(&constants, 1)));

@@ -23,13 +23,21 @@ struct FitPlaneOptions {
     double largest_radius_px = 12;
 };
 
+/// What another frame of the recording saw, flying pixels dropped; of the same image size.
+struct OtherDepth {
+    const DepthImage* depth;
+    Eigen::Isometry3d here_from_there;
+};
+
 /// Not thread-safe: one frame at a time.
 class FitPlane {
   public:
     /// `noise.any()` must hold. The window's radius grows with the root of sigma(z), and with the grain.
     FitPlane(gpu::Device& device, const DepthNoise& noise, const FitPlaneOptions& options = {});
 
-    [[nodiscard]] FittedDepth compute(const DepthImage& depth);
+    /// With others, each pixel's depth is first averaged with what they saw of its surface, and the windows shrink with what
+    /// that leaves of sigma.
+    [[nodiscard]] FittedDepth compute(const DepthImage& depth, std::span<const OtherDepth> others = {});
     [[nodiscard]] const DepthNoise& noise() const { return noise_; }
     /// Where the time of the last compute() went.
     [[nodiscard]] const Timings& timings() const { return timings_; }
@@ -39,6 +47,7 @@ class FitPlane {
     DepthNoise noise_;
     FitPlaneOptions options_;
     cv::Size size_;
+    bool fused_ = false;
     std::unique_ptr<gpu::Program> program_;
     Timings timings_;
 };

@@ -20,6 +20,18 @@ void upload_depth(const cv::Mat1f& z_m, cv::Mat1f to) {
     }
 }
 
+shared::NeighbourPlace place_of(const Pinhole& camera, const Eigen::Isometry3d& here_from_there) {
+    const auto single = [](double x) { return static_cast<float>(x); };
+    const auto row = [&](const Eigen::Vector3d& v) { return shared::vec3(single(v.x()), single(v.y()), single(v.z())); };
+    const Eigen::Matrix3d turn = here_from_there.linear();
+    return {row(turn.row(0)),
+            row(turn.row(1)),
+            row(turn.row(2)),
+            row(here_from_there.translation()),
+            {single(1 / camera.fx), single(1 / camera.fy)},
+            {single(-camera.cx / camera.fx), single(-camera.cy / camera.fy)}};
+}
+
 cv::Mat1f downloaded(std::span<const float> from, cv::Size size) {
     cv::Mat1f image(size);
     std::memcpy(image.data, from.data(), from.size_bytes());

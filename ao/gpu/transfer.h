@@ -1,6 +1,10 @@
-// Images to and from a program's buffers, whatever rows of memory they have on the host.
+// Images to and from a program's buffers, whatever rows of memory they have on the host, and poses.
 #pragma once
 
+#include "projection/camera.h"
+#include "shaders/shared/neighbour.h"
+
+#include <Eigen/Geometry>
 #include <opencv2/core.hpp>
 #include <span>
 
@@ -17,6 +21,7 @@ template <class Pixel>
 [[nodiscard]] cv::Mat_<Pixel> image_on(std::span<std::byte> buffer, cv::Size size) {
     return cv::Mat_<Pixel>(size.height, size.width, reinterpret_cast<Pixel*>(buffer.data()));
 }
+[[nodiscard]] shared::NeighbourPlace place_of(const Pinhole& camera, const Eigen::Isometry3d& here_from_there);
 [[nodiscard]] cv::Mat1f downloaded(std::span<const float> from, cv::Size size);
 
 } // namespace scanshade::gpu

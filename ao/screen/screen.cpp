@@ -35,20 +35,6 @@ std::vector<gpu::BufferRow> shared_buffers(std::size_t pixels, bool supplied, in
     };
 }
 
-shared::NeighbourPlace place_of(const Neighbour& neighbour) {
-    const Pinhole& camera = neighbour.surfaces->camera;
-    const auto row = [](const Eigen::Vector3d& v) {
-        return shared::vec3(static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z()));
-    };
-    const Eigen::Matrix3d turn = neighbour.here_from_there.linear();
-    return {row(turn.row(0)),
-            row(turn.row(1)),
-            row(turn.row(2)),
-            row(neighbour.here_from_there.translation()),
-            {static_cast<float>(1 / camera.fx), static_cast<float>(1 / camera.fy)},
-            {static_cast<float>(-camera.cx / camera.fx), static_cast<float>(-camera.cy / camera.fy)}};
-}
-
 /// Those looked at; throws Error where one is of another size, or there are too many.
 std::span<const Neighbour> checked_neighbours(const View& view) {
     if (view.neighbours.size() > shared::most_neighbours)
@@ -184,7 +170,9 @@ AoMap ScreenMethod::compute(const View& view) {
     const int guard = most > 0 ? guard_px(size) : 0;
     shared::ScreenConstants screen = constants_from(options_, view, guard);
     screen.neighbours = static_cast<int>(neighbours.size());
-    std::ranges::transform(neighbours, screen.places, place_of);
+    std::ranges::transform(neighbours, screen.places, [](const Neighbour& other) {
+        return gpu::place_of(other.surfaces->camera, other.here_from_there);
+    });
     const auto block = constants(screen);
     gpu::Program& program = program_for({size.width, size.height, supplied, most}, block.size());
     const auto start = std::chrono::steady_clock::now();

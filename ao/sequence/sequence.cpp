@@ -8,36 +8,58 @@ namespace scanshade {
 
 std::vector<Parameter> SequenceOptions::parameters() {
     return {{"layers", "other views whose surfaces occlude what a frame shows; 0 = none", &layers, "", 0, 32},
-            {"reach", "how many frames away they may be", &reach, "frames", 1, 1000}};
+            {"reach", "how many frames away they may be", &reach, "frames", 1, 1000},
+            {"fuse", "frames around each that noisy depth is averaged with; 0 = none", &fuse, "", 0, 16}};
 }
 
 Sequence::Sequence(gpu::Device& device, Method& method, const DepthNoise& noise, const FitPlaneOptions& fit,
                    const SequenceOptions& options)
     : method_(method), options_(options), noise_(noise), pack_(device) {
-    if (noise.any())
-        fit_.emplace(device, noise, fit);
+    if (!noise.any())
+        return;
+    FitPlaneOptions only_drop = fit, after_drop = fit;
+    only_drop.smoothing = 0;
+    after_drop.drop_flying = false;
+    drop_flying_.emplace(device, noise, only_drop);
+    fit_.emplace(device, noise, after_drop);
 }
 
 void Sequence::add(std::size_t place, const DepthImage& depth, const std::optional<Eigen::Isometry3d>& world_from_camera) {
-    slots_[place] = {depth, world_from_camera, {}, {}};
+    slots_[place] = {depth, world_from_camera, {}, {}, {}};
 }
 
 void Sequence::forget_before(std::size_t place) { slots_.erase(slots_.begin(), slots_.lower_bound(place)); }
 
-View Sequence::view_of(Slot& slot) {
+const DepthImage& Sequence::kept(Slot& slot) {
+    if (!slot.kept) {
+        slot.kept = drop_flying_->compute(slot.depth).depth;
+        account("flying pixels", drop_flying_->timings());
+    }
+    return *slot.kept;
+}
+
+View Sequence::view_of(std::size_t place) {
+    Slot& slot = slots_.at(place);
     if (!fit_)
         return {slot.depth};
     if (!slot.fitted) {
-        slot.fitted = fit_->compute(slot.depth);
+        std::vector<OtherDepth> others;
+        const auto half = static_cast<std::size_t>((options_.fuse + 1) / 2);
+        for (std::size_t step = 1; step <= half && slot.world_from_camera; ++step)
+            for (const std::size_t other : {place - step, place + step})
+                if (slots_.contains(other) && slots_.at(other).world_from_camera)
+                    others.push_back({&kept(slots_.at(other)), slot.world_from_camera->inverse() * *slots_.at(other).world_from_camera});
+        slot.fitted = fit_->compute(kept(slot), others);
         account("prepare", fit_->timings());
     }
     const bool planes = !slot.fitted->normals.normals.empty();
     return {slot.fitted->depth, planes ? &slot.fitted->normals : nullptr, noise_, planes};
 }
 
-const PackedSurfaces& Sequence::packed(Slot& slot) {
+const PackedSurfaces& Sequence::packed(std::size_t place) {
+    Slot& slot = slots_.at(place);
     if (!slot.packed) {
-        slot.packed = pack_.compute(view_of(slot));
+        slot.packed = pack_.compute(view_of(place));
         account("pack", pack_.timings());
     }
     return *slot.packed;
@@ -64,15 +86,15 @@ void Sequence::account(std::string_view step, const Timings& timings) {
 
 SequenceResult Sequence::compute(std::size_t place) {
     Slot& slot = slots_.at(place);
-    View view = view_of(slot);
+    View view = view_of(place);
     SequenceResult result;
     std::vector<Neighbour> neighbours;
     if (slot.world_from_camera) {
         result.neighbours = neighbours_of(place);
         const Eigen::Isometry3d here_from_world = slot.world_from_camera->inverse();
         for (const std::size_t other : result.neighbours) {
-            Slot& there = slots_.at(other);
-            neighbours.push_back({&packed(there), here_from_world * *there.world_from_camera});
+            const Eigen::Isometry3d& there = *slots_.at(other).world_from_camera;
+            neighbours.push_back({&packed(other), here_from_world * there});
         }
     }
     view.neighbours = neighbours;

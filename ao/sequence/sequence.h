@@ -16,9 +16,10 @@ namespace scanshade {
 struct SequenceOptions {
     int layers = 0;  ///< other views whose surfaces occlude; 0 = none
     int reach = 9;   ///< how many frames away they may be
+    int fuse = 0;    ///< frames around it that noisy depth is averaged with; 0 = none
 
     [[nodiscard]] std::vector<Parameter> parameters();
-    [[nodiscard]] bool any() const { return layers > 0; }
+    [[nodiscard]] bool any() const { return layers > 0 || fuse > 0; }
 };
 
 /// What came of one frame, and which others it was looked at with.
@@ -35,7 +36,7 @@ class Sequence {
     Sequence(gpu::Device& device, Method& method, const DepthNoise& noise, const FitPlaneOptions& fit, const SequenceOptions& options);
 
     /// How many frames before and behind it a frame's result depends on.
-    [[nodiscard]] std::size_t reach() const { return static_cast<std::size_t>(options_.reach); }
+    [[nodiscard]] std::size_t reach() const { return static_cast<std::size_t>((options_.layers > 0 ? options_.reach : 0) + (options_.fuse + 1) / 2); }
     /// Frame `place` of the recording. Without a pose it is looked at by itself.
     void add(std::size_t place, const DepthImage& depth, const std::optional<Eigen::Isometry3d>& world_from_camera);
     /// Of an added frame; what lies within reach of it has been added, too, or is missing for good.
@@ -47,18 +48,20 @@ class Sequence {
     struct Slot {
         DepthImage depth;
         std::optional<Eigen::Isometry3d> world_from_camera;
+        std::optional<DepthImage> kept; ///< without flying pixels
         std::optional<FittedDepth> fitted;
         std::optional<PackedSurfaces> packed;
     };
-    [[nodiscard]] View view_of(Slot& slot);
-    [[nodiscard]] const PackedSurfaces& packed(Slot& slot);
+    [[nodiscard]] const DepthImage& kept(Slot& slot);
+    [[nodiscard]] View view_of(std::size_t place);
+    [[nodiscard]] const PackedSurfaces& packed(std::size_t place);
     [[nodiscard]] std::vector<std::size_t> neighbours_of(std::size_t place) const;
     void account(std::string_view step, const Timings& timings);
 
     Method& method_;
     SequenceOptions options_;
     DepthNoise noise_;
-    std::optional<FitPlane> fit_;
+    std::optional<FitPlane> drop_flying_, fit_;
     PackSurfaces pack_;
     std::map<std::size_t, Slot> slots_;
     Timings timings_; ///< since the last result

@@ -8,6 +8,7 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0, r32f) readonly uniform imageBuffer samples; // 1/z, 0 where there is none
+layout(binding = 1, r32f) readonly uniform imageBuffer relief;
 layout(binding = 16, r32f) uniform writeonly imageBuffer averages;
 layout(binding = 32, scalar) uniform Constants { FitPlaneConstants k; };
 
@@ -22,7 +23,7 @@ void main() {
     float wc = hole ? 1.0 : w, zc = 1.0 / wc;
     Plane plane;
     // A slope up to 45 degrees is still the pixel's own surface.
-    float narrow = 1.0 / (3.0 * sigma_of(zc) * wc * wc + 0.7 * 2.8 * wc / k.fx);
+    float narrow = 1.0 / (3.0 * sigma_of(zc) * relief_at(here) * wc * wc + 0.7 * 2.8 * wc / k.fx);
     bool good = solve(square5(p, wc, 1.0, level, narrow), plane); // not good: the plane is level, the pixel stays as it is
     imageStore(averages, here, vec4(hole ? 0.0 : wc + plane.c));
 }

@@ -12,6 +12,7 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0, r32f) readonly uniform imageBuffer samples; // averages of 1/z, 0 where there is none
+layout(binding = 1, r32f) readonly uniform imageBuffer relief;
 layout(binding = 16, r32f) uniform writeonly imageBuffer depth_out;
 layout(binding = 17, r32f) uniform writeonly imageBuffer normals_out;
 layout(binding = 32, scalar) uniform Constants { FitPlaneConstants k; };
@@ -25,8 +26,8 @@ void main() {
     float w = imageLoad(samples, here).x;
     bool hole = !(w > 0.0);
     float wc = hole ? 1.0 : w, zc = 1.0 / wc;
-    float sigma = sigma_of(zc) * wc * wc; // of 1/z
-    float radius = window_of(zc);
+    float sigma_z = sigma_of(zc) * relief_at(here), sigma = sigma_z * wc * wc; // of 1/z
+    float radius = window_of(zc, sigma_z);
 
     Plane first, plane;
     // A slope up to 45 degrees is still the pixel's own surface in the first round.

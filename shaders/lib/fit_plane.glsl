@@ -1,5 +1,5 @@
 // A plane in 1/z through weighted samples: 1/z is linear in the image on any plane. Included by the passes of the plane fit,
-// which declare `samples`, their 1/z (0 where there is none), and `k`.
+// which declare `samples`, their 1/z (0 where there is none), `relief`, and `k`.
 
 // w = c + x a + y b, relative to the pixel and its own 1/z.
 struct Plane {
@@ -83,6 +83,11 @@ Sums square7(ivec2 p, float w_here, float spread, Plane plane, float narrow) {
     return sums;
 }
 
+layout(constant_id = spec_fused) const int is_fused = 0;
+
+// Of a single frame's sigma, what is left where several have been averaged.
+float relief_at(int index) { return is_fused == 0 ? 1.0 : imageLoad(relief, index).x; }
+
 float sigma_of(float z) { return k.noise_floor + k.noise_per_z2 * z * z; }
 
-float window_of(float z) { return clamp(sqrt(k.window * sigma_of(z) * k.fx / z), 1.5, k.largest_radius); }
+float window_of(float z, float sigma) { return clamp(sqrt(k.window * sigma * k.fx / z), 1.5, k.largest_radius); }

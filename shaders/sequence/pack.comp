@@ -12,10 +12,25 @@ layout(binding = 32, scalar) uniform Constants { ScreenConstants constants; };
 
 #include "lib/surfel.glsl"
 
+const int reach = 1;
+
 void main() {
     k = constants;
     ivec2 p = ivec2(gl_GlobalInvocationID.xy);
     if (!inside(p)) return;
     vec4 surface = imageLoad(surfaces, index_of(p));
+    // A noisy sensor's outlines lie elsewhere in every frame.
+    bool noisy = k.noise_floor > 0.0 || k.noise_per_z2 > 0.0;
+    if (noisy) {
+        float tolerance = 3.0 * sigma_of(surface.w) + 4.0 * surface.w * k.ray_step.x * float(reach);
+        bool edge = false;
+        for (int i = 0; i < 8; ++i) {
+            int j = i < 4 ? i : i + 1;
+            ivec2 q = p + reach * (ivec2(j % 3, j / 3) - 1);
+            float z = inside(q) ? imageLoad(surfaces, index_of(q)).w : surface.w;
+            edge = edge || abs(z - surface.w) > tolerance;
+        }
+        surface.w = edge ? 0.0 : surface.w;
+    }
     imageStore(words, index_of(p), uvec4(surfel(surface.w, surface.xyz, 0.0), 0u, 0u));
 }

@@ -1,7 +1,7 @@
 // What host and shader share of the plane fit (shaders/fit_plane.comp).
 #ifndef SCANSHADE_SHARED_FIT_PLANE_H
 #define SCANSHADE_SHARED_FIT_PLANE_H
-#include "types.h"
+#include "neighbour.h"
 SHARED_BEGIN
 
 struct FitPlaneConstants {
@@ -11,7 +11,12 @@ struct FitPlaneConstants {
     float window;                     // its radius is sqrt(window sigma fx / z), pixels
     float largest_radius;             // but at most this
     int drop_flying;                  // 0 = keep them
+    int neighbours;                   // other frames to average with
+    NeighbourPlace places[most_neighbours];
 };
+
+// Specialization constant: 1 = samples have been averaged over frames, and tell by how much less they err.
+const int spec_fused = 0;
 
 SHARED_END
 #endif

@@ -1,15 +1,8 @@
 // What host and shaders share of every screen-space room but CACAO's: the view, the radius, and how the result is shown.
 #ifndef SCANSHADE_SHARED_SCREEN_H
 #define SCANSHADE_SHARED_SCREEN_H
-#include "camera.h"
+#include "neighbour.h"
 SHARED_BEGIN
-
-// Where a neighbour stands: a point of it is turned to (dot(x, p), dot(y, p), dot(z, p)) and shifted; its rays.
-struct NeighbourPlace {
-    vec3 x, y, z, shift;
-    vec2 ray_step, ray_base;
-};
-const int most_neighbours = 16;
 
 // A room's own constant block begins with this one, so that the passes all rooms share can read it there.
 struct ScreenConstants {

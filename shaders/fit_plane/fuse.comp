@@ -1,0 +1,43 @@
+// Between the first pass of depth preparation and the second, in a recording: the mean of what this frame and those around it
+// recorded of a pixel's surface. Frames that saw something else there have no say.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "shared/fit_plane.h"
+#include "lib/cheap.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(binding = 0, r32f) readonly uniform imageBuffer kept;       // 1/z, 0 where there is none
+layout(binding = 1, r32f) readonly uniform imageBuffer neighbours; // z of each, one image after the other
+layout(binding = 16, r32f) uniform writeonly imageBuffer fused;    // 1/z
+layout(binding = 17, r32f) uniform writeonly imageBuffer relief;   // of what one frame errs, how much is left
+layout(binding = 32, scalar) uniform Constants { FitPlaneConstants constants; };
+
+void main() {
+    FitPlaneConstants k = constants;
+    ivec2 p = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(p, k.size))) return;
+    int here = p.y * k.size.x + p.x;
+    float w = imageLoad(kept, here).x;
+    bool hole = !(w > 0.0);
+    float z = hole ? 1.0 : 1.0 / w;
+    vec3 ray = vec3((float(p.x) - k.cx) / k.fx, (float(p.y) - k.cy) / k.fy, 1.0);
+    float narrow = 1.0 / (3.5 * (k.noise_floor + k.noise_per_z2 * z * z));
+    float weights = 1.0, sum = 0.0; // of weights and of differences of z
+    int i = 0;
+    do {
+        NeighbourPlace place = constants.places[i];
+        vec3 away = ray * z - place.shift;
+        vec3 there = away.x * place.x + away.y * place.y + away.z * place.z; // the inverse rotation
+        float along = ray.x * place.x.z + ray.y * place.y.z + ray.z * place.z.z; // its z per z of this view
+        vec2 at = (there.xy * (1.0 / there.z) - place.ray_base) / place.ray_step;
+        bool sees = there.z > 0.0 && along > 0.2 && all(greaterThan(at, vec2(-0.5))) && all(lessThan(at, vec2(k.size) - 0.5));
+        int index = sees ? (i * k.size.y + nearest(at.y)) * k.size.x + nearest(at.x) : 0;
+        float recorded = imageLoad(neighbours, index).x, apart = (recorded - there.z) * narrow;
+        float weight = sees && recorded > 0.0 ? positive(1.0 - apart * apart) : 0.0;
+        weights += weight;
+        sum += weight * (recorded - there.z) / along;
+    } while (++i < k.neighbours);
+    imageStore(fused, here, vec4(hole ? 0.0 : 1.0 / (z + sum / weights)));
+    imageStore(relief, here, vec4(inversesqrt(weights)));
+}
