@@ -597,7 +597,7 @@ class Run final : public Command {
             fitted.emplace(device, noise, plain, fit);
         std::optional<Sequence> sequence;
         if (sequence_options_.any()) {
-            sequence.emplace(device, plain, noise, fit, sequence_options_);
+            sequence.emplace(device, plain, job.batch.radius_m, noise, fit, sequence_options_);
             job.batch.sequence = &*sequence;
         }
         Method& method = fitted ? static_cast<Method&>(*fitted) : plain;

@@ -9,12 +9,13 @@ namespace scanshade {
 std::vector<Parameter> SequenceOptions::parameters() {
     return {{"layers", "other views whose surfaces occlude what a frame shows; 0 = none", &layers, "", 0, 32},
             {"reach", "how many frames away they may be", &reach, "frames", 1, 1000},
-            {"fuse", "frames around each that noisy depth is averaged with; 0 = none", &fuse, "", 0, 16}};
+            {"fuse", "frames around each that noisy depth is averaged with; 0 = none", &fuse, "", 0, 16},
+            {"average", "frames around each whose visibility is averaged with its own; 0 = none", &average, "", 0, 64}};
 }
 
-Sequence::Sequence(gpu::Device& device, Method& method, const DepthNoise& noise, const FitPlaneOptions& fit,
+Sequence::Sequence(gpu::Device& device, Method& method, double radius_m, const DepthNoise& noise, const FitPlaneOptions& fit,
                    const SequenceOptions& options)
-    : method_(method), options_(options), noise_(noise), pack_(device) {
+    : method_(method), options_(options), noise_(noise), pack_(device), gather_(device), radius_m_(radius_m) {
     if (!noise.any())
         return;
     FitPlaneOptions only_drop = fit, after_drop = fit;
@@ -25,7 +26,7 @@ Sequence::Sequence(gpu::Device& device, Method& method, const DepthNoise& noise,
 }
 
 void Sequence::add(std::size_t place, const DepthImage& depth, const std::optional<Eigen::Isometry3d>& world_from_camera) {
-    slots_[place] = {depth, world_from_camera, {}, {}, {}};
+    slots_[place] = {depth, world_from_camera, {}, {}, {}, {}};
 }
 
 void Sequence::forget_before(std::size_t place) { slots_.erase(slots_.begin(), slots_.lower_bound(place)); }
@@ -84,22 +85,40 @@ void Sequence::account(std::string_view step, const Timings& timings) {
     timings_.emplace_back(step, sum);
 }
 
-SequenceResult Sequence::compute(std::size_t place) {
+const AoMap& Sequence::visibility(std::size_t place) {
     Slot& slot = slots_.at(place);
+    if (slot.ao)
+        return *slot.ao;
     View view = view_of(place);
-    SequenceResult result;
     std::vector<Neighbour> neighbours;
     if (slot.world_from_camera) {
-        result.neighbours = neighbours_of(place);
         const Eigen::Isometry3d here_from_world = slot.world_from_camera->inverse();
-        for (const std::size_t other : result.neighbours) {
+        for (const std::size_t other : neighbours_of(place)) {
             const Eigen::Isometry3d& there = *slots_.at(other).world_from_camera;
             neighbours.push_back({&packed(other), here_from_world * there});
         }
     }
     view.neighbours = neighbours;
-    result.ao = method_.compute(view);
+    view.instant = options_.average > 0 ? static_cast<int>(place % 65536) : 0; // so that what is averaged differs
+    slot.ao = method_.compute(view);
     timings_.insert(timings_.end(), method_.timings().begin(), method_.timings().end());
+    return *slot.ao;
+}
+
+SequenceResult Sequence::compute(std::size_t place) {
+    SequenceResult result;
+    const Slot& slot = slots_.at(place);
+    result.ao = visibility(place);
+    std::vector<Seen> others;
+    const auto half = static_cast<std::size_t>((options_.average + 1) / 2);
+    for (std::size_t step = 1; step <= half && slot.world_from_camera; ++step)
+        for (const std::size_t other : {place - step, place + step})
+            if (slots_.contains(other) && slots_.at(other).world_from_camera)
+                others.push_back({&packed(other), &visibility(other).visibility, slot.world_from_camera->inverse() * *slots_.at(other).world_from_camera});
+    if (!others.empty()) {
+        result.ao = gather_.compute({&packed(place), &result.ao.visibility}, others, radius_m_, noise_).mean;
+        account("gather", gather_.timings());
+    }
     result.timings = std::move(timings_);
     timings_.clear();
     return result;

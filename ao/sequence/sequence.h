@@ -3,6 +3,7 @@
 
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/method.h"
+#include "ao/sequence/gather.h"
 #include "ao/sequence/pack.h"
 
 #include <cstddef>
@@ -17,9 +18,10 @@ struct SequenceOptions {
     int layers = 0;  ///< other views whose surfaces occlude; 0 = none
     int reach = 9;   ///< how many frames away they may be
     int fuse = 0;    ///< frames around it that noisy depth is averaged with; 0 = none
+    int average = 0; ///< frames around it whose visibility is averaged with its own; 0 = none
 
     [[nodiscard]] std::vector<Parameter> parameters();
-    [[nodiscard]] bool any() const { return layers > 0 || fuse > 0; }
+    [[nodiscard]] bool any() const { return layers > 0 || fuse > 0 || average > 0; }
 };
 
 /// What came of one frame, and which others it was looked at with.
@@ -33,10 +35,11 @@ struct SequenceResult {
 class Sequence {
   public:
     /// Keeps references to device and method.
-    Sequence(gpu::Device& device, Method& method, const DepthNoise& noise, const FitPlaneOptions& fit, const SequenceOptions& options);
+    Sequence(gpu::Device& device, Method& method, double radius_m, const DepthNoise& noise, const FitPlaneOptions& fit,
+             const SequenceOptions& options);
 
     /// How many frames before and behind it a frame's result depends on.
-    [[nodiscard]] std::size_t reach() const { return static_cast<std::size_t>((options_.layers > 0 ? options_.reach : 0) + (options_.fuse + 1) / 2); }
+    [[nodiscard]] std::size_t reach() const { return static_cast<std::size_t>((options_.layers > 0 ? options_.reach : 0) + (options_.fuse + 1) / 2 + (options_.average + 1) / 2); }
     /// Frame `place` of the recording. Without a pose it is looked at by itself.
     void add(std::size_t place, const DepthImage& depth, const std::optional<Eigen::Isometry3d>& world_from_camera);
     /// Of an added frame; what lies within reach of it has been added, too, or is missing for good.
@@ -51,10 +54,12 @@ class Sequence {
         std::optional<DepthImage> kept; ///< without flying pixels
         std::optional<FittedDepth> fitted;
         std::optional<PackedSurfaces> packed;
+        std::optional<AoMap> ao; ///< before any averaging
     };
     [[nodiscard]] const DepthImage& kept(Slot& slot);
     [[nodiscard]] View view_of(std::size_t place);
     [[nodiscard]] const PackedSurfaces& packed(std::size_t place);
+    [[nodiscard]] const AoMap& visibility(std::size_t place);
     [[nodiscard]] std::vector<std::size_t> neighbours_of(std::size_t place) const;
     void account(std::string_view step, const Timings& timings);
 
@@ -63,6 +68,8 @@ class Sequence {
     DepthNoise noise_;
     std::optional<FitPlane> drop_flying_, fit_;
     PackSurfaces pack_;
+    Gather gather_;
+    double radius_m_;
     std::map<std::size_t, Slot> slots_;
     Timings timings_; ///< since the last result
 };

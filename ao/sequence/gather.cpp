@@ -1,0 +1,67 @@
+#include "ao/sequence/gather.h"
+
+#include "ao/gpu/transfer.h"
+#include "ao/screen/screen.h"
+#include "projection/error.h"
+#include "shaders/shared/gather.h"
+
+#include <fmt/format.h>
+
+namespace scanshade {
+namespace {
+
+enum Buffers : int { own_surfaces, own_visibility, surfaces, visibilities, mean, spread };
+
+std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, std::size_t most) {
+    using Host = gpu::BufferRow::Host;
+    using Texels = gpu::BufferRow::Texels;
+    const auto pixels = static_cast<std::size_t>(size.area());
+    ScreenTables all{{{}, size}, size, 0, {}, {}};
+    all.buffers = {{"own surfaces", pixels * 8, Host::upload, Texels::rg32ui},
+                   {"own visibility", pixels * 4, Host::upload, Texels::r32f},
+                   {"surfaces", most * pixels * 8, Host::upload, Texels::rg32ui},
+                   {"visibilities", most * pixels * 4, Host::upload, Texels::r32f},
+                   {"mean", pixels * 4, Host::download, Texels::r32f},
+                   {"spread", pixels * 8, Host::download, Texels::rg32f}};
+    all.add_pass("gather", "sequence/gather", {own_surfaces, own_visibility, surfaces, visibilities}, {mean, spread});
+    return std::make_unique<gpu::Program>(device, all.buffers, all.passes, sizeof(shared::GatherConstants));
+}
+
+} // namespace
+
+GatheredAo Gather::compute(const Seen& own, std::span<const Seen> others, double radius_m, const DepthNoise& noise) {
+    const cv::Size size = own.visibility->size();
+    if (others.size() > shared::most_gathered)
+        throw Error(fmt::format("{} frames to average, {} are the most", others.size(), shared::most_gathered));
+    if (!program_ || size != size_ || others.size() > most_) {
+        most_ = std::max(others.size(), std::size_t{1});
+        program_ = program_for(device_, size, most_);
+    }
+    size_ = size;
+    const DepthImage camera_only{own.surfaces->camera, {}, {}};
+    ScreenOptions options;
+    options.radius = static_cast<float>(radius_m);
+    shared::GatherConstants constants{constants_from(options, {.depth = camera_only, .noise = noise}), static_cast<int>(others.size()), 0.002F, 0.005F, {}, {}};
+    const std::size_t pixels = own.visibility->total();
+    gpu::upload(own.surfaces->words, program_->host(own_surfaces));
+    gpu::upload(*own.visibility, program_->host(own_visibility));
+    for (std::size_t i = 0; i < others.size(); ++i) {
+        const Seen& other = others[i];
+        if (other.visibility->size() != size)
+            throw Error("a frame of another image size");
+        constants.places[i] = gpu::place_of(other.surfaces->camera, other.here_from_there);
+        constants.shares[i] = other.share;
+        gpu::upload(other.surfaces->words, program_->host(surfaces).subspan(i * pixels * 8));
+        gpu::upload(*other.visibility, program_->host(visibilities).subspan(i * pixels * 4));
+    }
+    program_->run(std::as_bytes(std::span(&constants, 1)));
+    timings_ = program_->timings();
+    GatheredAo gathered{{gpu::image_on<float>(program_->host(mean), size).clone()}, {}, {}};
+    cv::Mat1f channels[2];
+    cv::split(gpu::image_on<cv::Vec2f>(program_->host(spread), size), channels);
+    gathered.frames = channels[0];
+    gathered.deviation = channels[1];
+    return gathered;
+}
+
+} // namespace scanshade

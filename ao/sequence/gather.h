@@ -1,0 +1,46 @@
+// The mean of several frames' visibility on one frame's pixels: sampling noise, the sensor's noise and single views' blind
+// spots average out. Any method's visibility will do.
+//
+// Reverse reprojection caching (Nehab et al. 2007) without its recursion: offline, every frame can be asked itself.
+#pragma once
+
+#include "ao/gpu/program.h"
+#include "ao/method.h"
+
+#include <memory>
+
+namespace scanshade {
+
+/// One frame's visibility and where it was found.
+struct Seen {
+    const PackedSurfaces* surfaces;
+    const cv::Mat1f* visibility;
+    Eigen::Isometry3d here_from_there = Eigen::Isometry3d::Identity();
+    float share = 1; ///< in the mean
+};
+
+struct GatheredAo {
+    AoMap mean;
+    cv::Mat1f frames;    ///< how many went into a pixel, counted in views as good as the frame's own
+    cv::Mat1f deviation; ///< between them
+};
+
+/// Not thread-safe: one frame at a time.
+class Gather {
+  public:
+    explicit Gather(gpu::Device& device) : device_(device) {}
+
+    /// Of frame `own`, whose pixels without visibility stay without. `radius_m` is that of the visibility.
+    [[nodiscard]] GatheredAo compute(const Seen& own, std::span<const Seen> others, double radius_m, const DepthNoise& noise);
+    /// Where the time of the last compute() went.
+    [[nodiscard]] const Timings& timings() const { return timings_; }
+
+  private:
+    gpu::Device& device_;
+    cv::Size size_;
+    std::size_t most_ = 0;
+    std::unique_ptr<gpu::Program> program_;
+    Timings timings_;
+};
+
+} // namespace scanshade
