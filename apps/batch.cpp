@@ -466,6 +466,7 @@ void compute_view(Work& work, Method& method, Sequence* sequence) {
     SequenceResult result = sequence->compute(work.row.index);
     work.ao = std::move(result.ao);
     work.row.passes = std::move(result.timings);
+    std::ranges::move(result.notes, std::back_inserter(work.row.notes));
 }
 
 std::vector<FrameRow> planned_rows(const Capture& capture, const std::vector<std::size_t>& frames) {

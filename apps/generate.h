@@ -17,7 +17,9 @@ struct GenerateOptions {
     int frames = 8;
     int first = 0, step = 1;            ///< frames first, first + step, ... of the scene's walk, ten per second
     std::string size = "640x480";       ///< width x height in pixels; the field of view stays that of a Kinect
-    int seed = 1;                       ///< of the sensor's noise and the truth's rays
+    int seed = 1;                       ///< of the sensor's and the poses' noise and the truth's rays
+    double pose_noise_m = 0;            ///< sigma of recorded places along each axis
+    double pose_noise_deg = 0;          ///< and of recorded attitudes about each
     bool truth = true;                  ///< whether truth/depth, truth/normals and truth/ao are written
     double truth_radius_m = 0;          ///< occluders farther than this do not count; 0 = the scene's own
     int truth_rays = 256;               ///< per pixel

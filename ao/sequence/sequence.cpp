@@ -6,6 +6,8 @@
 
 namespace scanshade {
 
+using Eigen::Isometry3d;
+
 std::vector<Parameter> SequenceOptions::parameters() {
     return {{"layers", "other views whose surfaces occlude what a frame shows; 0 = none", &layers, "", 0, 32},
             {"reach", "how many frames away they may be", &reach, "frames", 1, 1000},
@@ -26,7 +28,7 @@ Sequence::Sequence(gpu::Device& device, Method& method, double radius_m, const D
 }
 
 void Sequence::add(std::size_t place, const DepthImage& depth, const std::optional<Eigen::Isometry3d>& world_from_camera) {
-    slots_[place] = {depth, world_from_camera, {}, {}, {}, {}};
+    slots_[place] = {depth, world_from_camera, {}, {}, {}, {}, {}, {}, {}};
 }
 
 void Sequence::forget_before(std::size_t place) { slots_.erase(slots_.begin(), slots_.lower_bound(place)); }
@@ -66,15 +68,55 @@ const PackedSurfaces& Sequence::packed(std::size_t place) {
     return *slot.packed;
 }
 
-std::vector<std::size_t> Sequence::neighbours_of(std::size_t place) const {
-    std::vector<std::size_t> chosen;
-    const int sides = options_.layers / 2;
-    for (int i = 1; i <= sides; ++i) {
-        const auto step = static_cast<std::size_t>(std::lround(static_cast<double>(options_.reach) * i / sides));
-        for (const std::size_t other : {place - step, place + step})
-            if (slots_.contains(other) && slots_.at(other).world_from_camera)
-                chosen.push_back(other);
+std::optional<Sequence::Fitting> Sequence::fitting(std::size_t here, std::size_t there) {
+    Slot& slot = slots_.at(here);
+    const auto other = slots_.find(there);
+    if (other == slots_.end() || !slot.world_from_camera || !other->second.world_from_camera)
+        return std::nullopt;
+    const auto [known, is_new] = slot.fittings.try_emplace(there);
+    if (!is_new)
+        return known->second;
+    const Isometry3d recorded = slot.world_from_camera->inverse() * *other->second.world_from_camera;
+    const Pair pair{packed(here), packed(there), radius_m_, noise_};
+    const Isometry3d pose = aligned(pair, recorded);
+    const Agreement agreed = agreement(pair, pose);
+    if (agreed.fits())
+        known->second = Fitting{there, pose};
+    else
+        slot.notes.push_back(fmt::format("frame {} is left out: {:.0f} % of it in common, {:.0f} % of that contradicted, {:.1f} of the "
+                                         "tolerable misfit.", there, 100 * agreed.overlap, 100 * agreed.contradicted, agreed.misfit));
+    return known->second;
+}
+
+/// As far away as they may be, and evenly between: near views see little that this one does not. Where the recording ends, or
+/// a frame does not fit, the next nearer one, and more from the other side.
+std::vector<Sequence::Fitting> Sequence::spread_views(std::size_t place) {
+    std::vector<Fitting> chosen;
+    const int sides = (options_.layers + 1) / 2;
+    const auto try_frame = [&](std::size_t other) {
+        const bool had = std::ranges::any_of(chosen, [&](const Fitting& each) { return each.place == other; });
+        if (had || static_cast<int>(chosen.size()) == options_.layers)
+            return had;
+        const auto fits = fitting(place, other);
+        if (fits)
+            chosen.push_back(*fits);
+        return fits.has_value();
+    };
+    for (int i = sides; i >= 1; --i) {
+        const int outer = cvRound(static_cast<double>(options_.reach) * i / sides), inner = cvRound(static_cast<double>(options_.reach) * (i - 1) / sides);
+        for (const int side : {-1, 1})
+            for (int step = outer; step > inner && !try_frame(place + static_cast<std::size_t>(side * step)); --step) {}
     }
+    return chosen;
+}
+
+/// The nearest ones on either side.
+std::vector<Sequence::Fitting> Sequence::adjacent_views(std::size_t place, int count) {
+    std::vector<Fitting> chosen;
+    for (int step = 1; step <= (count + 1) / 2; ++step)
+        for (const int side : {-1, 1})
+            if (const auto fits = fitting(place, place + static_cast<std::size_t>(side * step)))
+                chosen.push_back(*fits);
     return chosen;
 }
 
@@ -91,12 +133,9 @@ const AoMap& Sequence::visibility(std::size_t place) {
         return *slot.ao;
     View view = view_of(place);
     std::vector<Neighbour> neighbours;
-    if (slot.world_from_camera) {
-        const Eigen::Isometry3d here_from_world = slot.world_from_camera->inverse();
-        for (const std::size_t other : neighbours_of(place)) {
-            const Eigen::Isometry3d& there = *slots_.at(other).world_from_camera;
-            neighbours.push_back({&packed(other), here_from_world * there});
-        }
+    for (const Fitting& other : spread_views(place)) {
+        neighbours.push_back({&packed(other.place), other.here_from_there});
+        slot.neighbours.push_back(other.place);
     }
     view.neighbours = neighbours;
     view.instant = options_.average > 0 ? static_cast<int>(place % 65536) : 0; // so that what is averaged differs
@@ -110,15 +149,14 @@ SequenceResult Sequence::compute(std::size_t place) {
     const Slot& slot = slots_.at(place);
     result.ao = visibility(place);
     std::vector<Seen> others;
-    const auto half = static_cast<std::size_t>((options_.average + 1) / 2);
-    for (std::size_t step = 1; step <= half && slot.world_from_camera; ++step)
-        for (const std::size_t other : {place - step, place + step})
-            if (slots_.contains(other) && slots_.at(other).world_from_camera)
-                others.push_back({&packed(other), &visibility(other).visibility, slot.world_from_camera->inverse() * *slots_.at(other).world_from_camera});
+    for (const Fitting& other : adjacent_views(place, options_.average))
+        others.push_back({&packed(other.place), &visibility(other.place).visibility, other.here_from_there});
     if (!others.empty()) {
         result.ao = gather_.compute({&packed(place), &result.ao.visibility}, others, radius_m_, noise_).mean;
         account("gather", gather_.timings());
     }
+    result.neighbours = slot.neighbours;
+    result.notes = slot.notes;
     result.timings = std::move(timings_);
     timings_.clear();
     return result;

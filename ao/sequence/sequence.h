@@ -3,6 +3,7 @@
 
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/method.h"
+#include "ao/sequence/agreement.h"
 #include "ao/sequence/gather.h"
 #include "ao/sequence/pack.h"
 
@@ -28,7 +29,8 @@ struct SequenceOptions {
 struct SequenceResult {
     AoMap ao;
     Timings timings;
-    std::vector<std::size_t> neighbours; ///< places
+    std::vector<std::size_t> neighbours; ///< places of the views whose surfaces occlude
+    std::vector<std::string> notes;      ///< what was left out, and why
 };
 
 /// Not thread-safe: one call at a time. A frame's result depends on the frames within reach() of it and on nothing else.
@@ -48,6 +50,11 @@ class Sequence {
     void forget_before(std::size_t place);
 
   private:
+    /// A frame that fits together with another, and from where it saw it.
+    struct Fitting {
+        std::size_t place;
+        Eigen::Isometry3d here_from_there;
+    };
     struct Slot {
         DepthImage depth;
         std::optional<Eigen::Isometry3d> world_from_camera;
@@ -55,12 +62,17 @@ class Sequence {
         std::optional<FittedDepth> fitted;
         std::optional<PackedSurfaces> packed;
         std::optional<AoMap> ao; ///< before any averaging
+        std::map<std::size_t, std::optional<Fitting>> fittings;
+        std::vector<std::size_t> neighbours;
+        std::vector<std::string> notes;
     };
     [[nodiscard]] const DepthImage& kept(Slot& slot);
     [[nodiscard]] View view_of(std::size_t place);
     [[nodiscard]] const PackedSurfaces& packed(std::size_t place);
     [[nodiscard]] const AoMap& visibility(std::size_t place);
-    [[nodiscard]] std::vector<std::size_t> neighbours_of(std::size_t place) const;
+    [[nodiscard]] std::optional<Fitting> fitting(std::size_t here, std::size_t there);
+    [[nodiscard]] std::vector<Fitting> spread_views(std::size_t place);
+    [[nodiscard]] std::vector<Fitting> adjacent_views(std::size_t place, int count);
     void account(std::string_view step, const Timings& timings);
 
     Method& method_;

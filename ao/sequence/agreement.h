@@ -1,0 +1,33 @@
+// Whether two frames of a recording fit together where their poses put them, and a pose that makes them fit.
+#pragma once
+
+#include "ao/method.h"
+
+#include <Eigen/Geometry>
+
+namespace scanshade {
+
+/// Of the surfaces of one frame, seen from the other.
+struct Agreement {
+    double overlap = 0;      ///< share of them that meet the other's surfaces
+    double contradicted = 0; ///< share of these and of those that would hide what the other has seen, of the latter
+    double misfit = 0;       ///< median distance of the former from the other's planes, in what is tolerable: 2 % of the AO's radius
+                             ///< and the sensor's sigma
+    [[nodiscard]] bool fits() const { return overlap > 0.05 && contradicted < 0.15 && misfit < 1; }
+};
+
+/// Two frames' surfaces, and what is tolerable between them.
+struct Pair {
+    const PackedSurfaces& here;
+    const PackedSurfaces& there;
+    double radius_m;
+    DepthNoise noise;
+};
+
+[[nodiscard]] Agreement agreement(const Pair& pair, const Eigen::Isometry3d& here_from_there);
+
+/// The pose next to the given one in which the planes of both frames lie on each other (point-to-plane, Chen and Medioni 1991,
+/// points paired along the view as Blais and Levine 1995 do). What the surfaces leave open stays as given.
+[[nodiscard]] Eigen::Isometry3d aligned(const Pair& pair, const Eigen::Isometry3d& here_from_there);
+
+} // namespace scanshade
