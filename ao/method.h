@@ -30,6 +30,7 @@ struct PackedSurfaces {
 struct Neighbour {
     const PackedSurfaces* surfaces;
     Eigen::Isometry3d here_from_there; ///< that camera's space to this one's
+    double misfit_m = 0;               ///< by which the surfaces of both lie apart where they should not
 };
 
 /// What a method looks at. Normals are optional: without them the method derives its own from depth.

@@ -170,6 +170,8 @@ AoMap ScreenMethod::compute(const View& view) {
     const int guard = most > 0 ? guard_px(size) : 0;
     shared::ScreenConstants screen = constants_from(options_, view, guard);
     screen.neighbours = static_cast<int>(neighbours.size());
+    for (const Neighbour& other : neighbours)
+        screen.misfit = std::max(screen.misfit, static_cast<float>(2 * other.misfit_m));
     std::ranges::transform(neighbours, screen.places, [](const Neighbour& other) {
         return gpu::place_of(other.surfaces->camera, other.here_from_there);
     });

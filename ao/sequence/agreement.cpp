@@ -61,17 +61,19 @@ std::vector<Meeting> meetings(const Pair& pair, const Isometry3d& here_from_ther
     return all;
 }
 
-double median(std::vector<double>& values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
+/// What the share of them stays below.
+double quantile(std::vector<double>& values, double share) {
+    const auto rank = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), rank, values.end());
+    return *rank;
 }
 
-std::vector<double> misfits(const std::vector<Meeting>& all) {
+/// Distances of the planes that meet, in what is tolerable or in metres.
+std::vector<double> misfits(const std::vector<Meeting>& all, bool in_metres = false) {
     std::vector<double> values;
     for (const Meeting& each : all)
         if (each.meets)
-            values.push_back(std::abs(each.distance_m) / each.tolerable_m);
+            values.push_back(std::abs(each.distance_m) / (in_metres ? 1 : each.tolerable_m));
     return values;
 }
 
@@ -88,13 +90,13 @@ Isometry3d moved(const Eigen::Matrix<double, 6, 1>& by) {
 
 Agreement agreement(const Pair& pair, const Isometry3d& here_from_there) {
     const std::vector<Meeting> all = meetings(pair, here_from_there);
-    std::vector<double> values = misfits(all);
+    std::vector<double> values = misfits(all), metres = misfits(all, true);
     if (values.empty())
         return {};
     const double met = static_cast<double>(values.size());
     const auto hiding = static_cast<double>(std::ranges::count(all, true, &Meeting::hides));
     const double looked_at = static_cast<double>(pair.there.words.total()) / (apart_px * apart_px);
-    return {met / looked_at, hiding / (met + hiding), median(values)};
+    return {met / looked_at, hiding / (met + hiding), quantile(metres, 0.9), quantile(values, 0.5)};
 }
 
 Isometry3d aligned(const Pair& pair, const Isometry3d& here_from_there) {
@@ -110,7 +112,7 @@ Isometry3d aligned(const Pair& pair, const Isometry3d& here_from_there) {
         std::vector<double> values = misfits(all);
         if (values.size() < 30)
             return here_from_there;
-        const double limit = std::max(3 * median(values), 0.3);
+        const double limit = std::max(3 * quantile(values, 0.5), 0.3);
         // A point's error is that of its patch, not of one pixel among many: a hundredth of them count as independent.
         Matrix6d normal_matrix = prior.asDiagonal();
         Vector6d gradient = prior.cwiseProduct(whole);

@@ -81,7 +81,7 @@ std::optional<Sequence::Fitting> Sequence::fitting(std::size_t here, std::size_t
     const Isometry3d pose = aligned(pair, recorded);
     const Agreement agreed = agreement(pair, pose);
     if (agreed.fits())
-        known->second = Fitting{there, pose};
+        known->second = Fitting{there, pose, agreed.misfit_m};
     else
         slot.notes.push_back(fmt::format("frame {} is left out: {:.0f} % of it in common, {:.0f} % of that contradicted, {:.1f} of the "
                                          "tolerable misfit.", there, 100 * agreed.overlap, 100 * agreed.contradicted, agreed.misfit));
@@ -134,7 +134,7 @@ const AoMap& Sequence::visibility(std::size_t place) {
     View view = view_of(place);
     std::vector<Neighbour> neighbours;
     for (const Fitting& other : spread_views(place)) {
-        neighbours.push_back({&packed(other.place), other.here_from_there});
+        neighbours.push_back({&packed(other.place), other.here_from_there, other.misfit_m});
         slot.neighbours.push_back(other.place);
     }
     view.neighbours = neighbours;

@@ -54,6 +54,7 @@ class Sequence {
     struct Fitting {
         std::size_t place;
         Eigen::Isometry3d here_from_there;
+        double misfit_m;
     };
     struct Slot {
         DepthImage depth;

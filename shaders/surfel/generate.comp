@@ -169,6 +169,8 @@ void main() {
             vec4 pv = zq * (mx * flat_eye.x + my * flat_eye.y) - ray_length * dz;
             vec4 pt = zq * (mx * flat_tangent.x + my * flat_tangent.y) * sides;
             vec4 rise = zq * (mx * flat_normal.x + my * flat_normal.y) + (dz * normal_per_z - least_rise);
+            // What other views saw lies off by some misfit; it must not occlude the surface that it continues.
+            if (layers > 1) rise -= vec4((ivec4(a.x, b.x, c.x, d.x) >> 4) & 1) * k.misfit;
             vec4 d2 = pv * pv + pt * pt;
             // The gaze at the sample; across it, outwards: (gt, -gv).
             vec4 gv = pv - distance;

@@ -39,12 +39,13 @@ int run_length(int i, int index) {
 }
 
 // How far behind depth z the next layer lies, 0 where there is none, in the four last bits of a depth: quarters of the radius.
-const uint place_mask = 15u;
+// The bit before them tells what other views saw, or may have.
+const uint place_mask = 31u, foreign = 16u;
 
 // The surfel of a layer, thin; `place` is its depth's last bits.
 uvec2 hidden_surfel(uint word, SurfelConstants s, uint place) {
     uvec2 w = surfel(layer_depth(word, k.radius), layer_normal(word), 0.0);
-    return word == 0u ? uvec2(0u) : uvec2((w.x & ~place_mask) | place, w.y | uint(s.hidden_shape));
+    return word == 0u ? uvec2(0u) : uvec2((w.x & ~place_mask) | place | foreign, w.y | uint(s.hidden_shape));
 }
 
 uint place_of(uint word, float z) {
@@ -82,7 +83,7 @@ void main() {
     thickness = max(min(thickness, min(limit, 0.7 * (layer_depth(second, k.radius) - abs(z)))), s.thinnest);
     uvec2 word = surfel(z, surface.xyz, thickness / s.thickest);
     int at = surfel_index(p, s.plane), layer = 16 * s.plane.x * s.plane.y;
-    imageStore(surfels, at, uvec4((word.x & ~place_mask) | place_of(second, abs(z)), word.y, 0u, 0u));
+    imageStore(surfels, at, uvec4((word.x & ~place_mask) | place_of(second, abs(z)) | (own ? 0u : foreign), word.y, 0u, 0u));
     imageStore(surfels, layer + at, uvec4(hidden_surfel(second, s, place_of(third, layer_depth(second, k.radius))), 0u, 0u));
     imageStore(surfels, 2 * layer + at, uvec4(hidden_surfel(third, s, 0u), 0u, 0u));
 }
