@@ -1,11 +1,8 @@
 #include "ao/sequence/agreement.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstdint>
 #include <numbers>
-#include <vector>
 
 namespace scanshade {
 namespace {
@@ -13,20 +10,45 @@ namespace {
 using Eigen::Isometry3d;
 using Eigen::Vector3d;
 
-constexpr int apart_px = 12; // of the pixels looked at
+constexpr int apart_px = 12; // of the facets
 
-/// A packed pixel (shaders/lib/surfel.glsl); depth 0 = hole.
-struct Surface {
-    Vector3d point, normal;
-    [[nodiscard]] bool known() const { return point.z() > 0; }
-};
-
-Surface surface_at(const PackedSurfaces& surfaces, int u, int v) {
-    const cv::Vec2i word = surfaces.words(v, u);
-    const Pinhole& camera = surfaces.camera;
-    const double z = std::bit_cast<float>(word[0]);
-    const auto byte = [&](int shift) { return static_cast<double>(static_cast<std::int8_t>(word[1] >> shift)) / 127; };
-    return {{(u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z}, {byte(24), byte(16), byte(8)}};
+/// The plane w = W + a x + b y in 1/z round a pixel, by least squares over 5x5 samples, twice: what is of another surface has no
+/// say in the second round.
+Facets::Facet facet_at(const DepthImage& depth, int u, int v, const DepthNoise& noise) {
+    const double z = depth.z_m(v, u);
+    if (!(z > 0))
+        return {Vector3d::Zero(), Vector3d::Zero()};
+    const Pinhole& camera = depth.camera;
+    const double here = 1 / z, sigma = noise.at(z) * here * here;
+    const double radius = std::clamp(std::sqrt(1.8 * noise.grain_px * noise.grain_px * noise.at(z) * camera.fx / z), 2.0, 12.0);
+    Vector3d plane = Vector3d::Zero(); // a, b, offset from `here`
+    for (int round = 0; round < 2; ++round) {
+        const double limit = 4 * sigma + (round == 0 ? 0.7 * radius * here / camera.fx : 1e-3 * here);
+        Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
+        Vector3d right = Vector3d::Zero();
+        int used = 0;
+        for (int j = -2; j <= 2; ++j)
+            for (int i = -2; i <= 2; ++i) {
+                const int x = cvRound(i * radius / 2), y = cvRound(j * radius / 2);
+                if (u + x < 0 || v + y < 0 || u + x >= depth.z_m.cols || v + y >= depth.z_m.rows)
+                    continue;
+                const double other = depth.z_m(v + y, u + x);
+                const Vector3d row(x, y, 1);
+                if (!(other > 0) || std::abs(1 / other - here - row.dot(plane)) > limit)
+                    continue;
+                products += row * row.transpose();
+                right += (1 / other - here) * row;
+                ++used;
+            }
+        if (used < 10)
+            return {Vector3d::Zero(), Vector3d::Zero()};
+        plane = products.ldlt().solve(right);
+    }
+    const double w = here + plane.z(), fitted = 1 / w;
+    const Vector3d normal(camera.fx * plane.x(), camera.fy * plane.y(), w - plane.x() * (u - camera.cx) - plane.y() * (v - camera.cy));
+    if (!(w > 0) || std::abs(plane.z()) > 4 * sigma + 1e-3 * here)
+        return {Vector3d::Zero(), Vector3d::Zero()};
+    return {{(u - camera.cx) / camera.fx * fitted, (v - camera.cy) / camera.fy * fitted, fitted}, -normal.normalized()};
 }
 
 /// A point of the one frame, and the plane of the other that it meets or misses.
@@ -39,25 +61,25 @@ struct Meeting {
 
 std::vector<Meeting> meetings(const Pair& pair, const Isometry3d& here_from_there) {
     std::vector<Meeting> all;
-    const Pinhole& camera = pair.here.camera;
-    for (int v = apart_px / 2; v < pair.there.words.rows; v += apart_px)
-        for (int u = apart_px / 2; u < pair.there.words.cols; u += apart_px) {
-            const Surface there = surface_at(pair.there, u, v);
-            const Vector3d point = here_from_there * there.point;
-            if (!there.known() || point.z() <= 1e-3 * pair.radius_m)
-                continue;
-            const double x = camera.fx * point.x() / point.z() + camera.cx, y = camera.fy * point.y() / point.z() + camera.cy;
-            if (!(x > -0.5 && y > -0.5 && x < pair.here.words.cols - 0.5 && y < pair.here.words.rows - 0.5))
-                continue;
-            const Surface here = surface_at(pair.here, cvRound(x), cvRound(y));
-            if (!here.known())
-                continue;
-            const double distance = here.normal.dot(point - here.point), sigma = pair.noise.at(point.z());
-            const double gate = 0.1 * pair.radius_m + 4 * sigma;
-            const bool alike = here.normal.dot(here_from_there.linear() * there.normal) > 0.7;
-            all.push_back({point, here.normal, distance, 0.02 * pair.radius_m + sigma, alike && std::abs(distance) < gate,
-                           point.z() < here.point.z() - gate && distance > gate});
-        }
+    const Pinhole& camera = pair.here.depth.camera;
+    const cv::Mat1f& z_m = pair.here.depth.z_m;
+    for (const Facets::Facet& there : pair.there.all) {
+        const Vector3d point = here_from_there * there.point;
+        if (there.normal.isZero() || point.z() <= 1e-3 * pair.radius_m)
+            continue;
+        const double x = camera.fx * point.x() / point.z() + camera.cx, y = camera.fy * point.y() / point.z() + camera.cy;
+        if (!(x > -0.5 && y > -0.5 && x < z_m.cols - 0.5 && y < z_m.rows - 0.5) || !(z_m(cvRound(y), cvRound(x)) > 0))
+            continue;
+        const int column = std::min(static_cast<int>(x) / apart_px, pair.here.grid.width - 1);
+        const int row = std::min(static_cast<int>(y) / apart_px, pair.here.grid.height - 1);
+        const Facets::Facet& here = pair.here.all[static_cast<std::size_t>(std::max(row, 0) * pair.here.grid.width + std::max(column, 0))];
+        const double sigma = pair.noise.at(point.z()), gate = 0.1 * pair.radius_m + 4 * sigma;
+        const double distance = here.normal.dot(point - here.point);
+        const bool alike = here.normal.dot(here_from_there.linear() * there.normal) > 0.7;
+        const bool hides = point.z() < z_m(cvRound(y), cvRound(x)) - gate;
+        all.push_back({point, here.normal, distance, 0.02 * pair.radius_m + sigma, alike && std::abs(distance) < gate,
+                       hides && !(alike && std::abs(distance) < gate)});
+    }
     return all;
 }
 
@@ -88,6 +110,15 @@ Isometry3d moved(const Eigen::Matrix<double, 6, 1>& by) {
 
 } // namespace
 
+Facets facets_of(const DepthImage& depth, const DepthNoise& noise) {
+    Facets facets{depth, {std::max(depth.z_m.cols / apart_px, 1), std::max(depth.z_m.rows / apart_px, 1)}, {}};
+    for (int v = 0; v < facets.grid.height; ++v)
+        for (int u = 0; u < facets.grid.width; ++u)
+            facets.all.push_back(facet_at(depth, std::min(u * apart_px + apart_px / 2, depth.z_m.cols - 1),
+                                          std::min(v * apart_px + apart_px / 2, depth.z_m.rows - 1), noise));
+    return facets;
+}
+
 Agreement agreement(const Pair& pair, const Isometry3d& here_from_there) {
     const std::vector<Meeting> all = meetings(pair, here_from_there);
     std::vector<double> values = misfits(all), metres = misfits(all, true);
@@ -95,8 +126,8 @@ Agreement agreement(const Pair& pair, const Isometry3d& here_from_there) {
         return {};
     const double met = static_cast<double>(values.size());
     const auto hiding = static_cast<double>(std::ranges::count(all, true, &Meeting::hides));
-    const double looked_at = static_cast<double>(pair.there.words.total()) / (apart_px * apart_px);
-    return {met / looked_at, hiding / (met + hiding), quantile(metres, 0.9), quantile(values, 0.5)};
+    const auto known = std::ranges::count_if(pair.there.all, [](const auto& facet) { return !facet.normal.isZero(); });
+    return {met / static_cast<double>(known), hiding / (met + hiding), quantile(metres, 0.9), quantile(values, 0.5)};
 }
 
 Isometry3d aligned(const Pair& pair, const Isometry3d& here_from_there) {

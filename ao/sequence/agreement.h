@@ -1,25 +1,40 @@
 // Whether two frames of a recording fit together where their poses put them, and a pose that makes them fit.
 #pragma once
 
-#include "ao/method.h"
+#include "projection/maps.h"
+#include "projection/noise.h"
 
 #include <Eigen/Geometry>
+#include <vector>
 
 namespace scanshade {
 
-/// Of the surfaces of one frame, seen from the other.
+/// Pieces of plane on a wide grid of a depth image's pixels: enough to lay frames onto each other.
+struct Facets {
+    struct Facet {
+        Eigen::Vector3d point, normal; ///< camera space; the normal is zero where no plane fits
+    };
+    DepthImage depth;
+    cv::Size grid;
+    std::vector<Facet> all; ///< row by row
+};
+
+/// Planes are fitted in 1/z over windows that grow with the noise.
+[[nodiscard]] Facets facets_of(const DepthImage& depth, const DepthNoise& noise);
+
+/// Of the facets of one frame, seen from the other.
 struct Agreement {
-    double overlap = 0;      ///< share of them that meet the other's surfaces
+    double overlap = 0;      ///< share of them that meet the other's
     double contradicted = 0; ///< share of these and of those that would hide what the other has seen, of the latter
     double misfit_m = 0;     ///< distance from the other's planes that nine tenths of the former stay below
     double misfit = 0;       ///< median of these distances in what is tolerable: 2 % of the AO's radius and the sensor's sigma
     [[nodiscard]] bool fits() const { return overlap > 0.05 && contradicted < 0.15 && misfit < 1; }
 };
 
-/// Two frames' surfaces, and what is tolerable between them.
+/// Two frames, and what is tolerable between them.
 struct Pair {
-    const PackedSurfaces& here;
-    const PackedSurfaces& there;
+    const Facets& here;
+    const Facets& there;
     double radius_m;
     DepthNoise noise;
 };

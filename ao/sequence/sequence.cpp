@@ -28,7 +28,7 @@ Sequence::Sequence(gpu::Device& device, Method& method, double radius_m, const D
 }
 
 void Sequence::add(std::size_t place, const DepthImage& depth, const std::optional<Eigen::Isometry3d>& world_from_camera) {
-    slots_[place] = {depth, world_from_camera, {}, {}, {}, {}, {}, {}, {}};
+    slots_[place] = {depth, world_from_camera, {}, {}, {}, {}, {}, {}, {}, {}};
 }
 
 void Sequence::forget_before(std::size_t place) { slots_.erase(slots_.begin(), slots_.lower_bound(place)); }
@@ -41,17 +41,20 @@ const DepthImage& Sequence::kept(Slot& slot) {
     return *slot.kept;
 }
 
+const Facets& Sequence::facets(Slot& slot) {
+    if (!slot.facets)
+        slot.facets = facets_of(fit_ ? kept(slot) : slot.depth, noise_);
+    return *slot.facets;
+}
+
 View Sequence::view_of(std::size_t place) {
     Slot& slot = slots_.at(place);
     if (!fit_)
         return {slot.depth};
     if (!slot.fitted) {
         std::vector<OtherDepth> others;
-        const auto half = static_cast<std::size_t>((options_.fuse + 1) / 2);
-        for (std::size_t step = 1; step <= half && slot.world_from_camera; ++step)
-            for (const std::size_t other : {place - step, place + step})
-                if (slots_.contains(other) && slots_.at(other).world_from_camera)
-                    others.push_back({&kept(slots_.at(other)), slot.world_from_camera->inverse() * *slots_.at(other).world_from_camera});
+        for (const Fitting& other : adjacent_views(place, options_.fuse))
+            others.push_back({&kept(slots_.at(other.place)), other.here_from_there});
         slot.fitted = fit_->compute(kept(slot), others);
         account("prepare", fit_->timings());
     }
@@ -77,7 +80,7 @@ std::optional<Sequence::Fitting> Sequence::fitting(std::size_t here, std::size_t
     if (!is_new)
         return known->second;
     const Isometry3d recorded = slot.world_from_camera->inverse() * *other->second.world_from_camera;
-    const Pair pair{packed(here), packed(there), radius_m_, noise_};
+    const Pair pair{facets(slot), facets(other->second), radius_m_, noise_};
     const Isometry3d pose = aligned(pair, recorded);
     const Agreement agreed = agreement(pair, pose);
     if (agreed.fits())

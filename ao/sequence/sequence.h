@@ -60,6 +60,7 @@ class Sequence {
         DepthImage depth;
         std::optional<Eigen::Isometry3d> world_from_camera;
         std::optional<DepthImage> kept; ///< without flying pixels
+        std::optional<Facets> facets;
         std::optional<FittedDepth> fitted;
         std::optional<PackedSurfaces> packed;
         std::optional<AoMap> ao; ///< before any averaging
@@ -68,6 +69,7 @@ class Sequence {
         std::vector<std::string> notes;
     };
     [[nodiscard]] const DepthImage& kept(Slot& slot);
+    [[nodiscard]] const Facets& facets(Slot& slot);
     [[nodiscard]] View view_of(std::size_t place);
     [[nodiscard]] const PackedSurfaces& packed(std::size_t place);
     [[nodiscard]] const AoMap& visibility(std::size_t place);
