@@ -36,6 +36,7 @@ struct Work {
     FrameRow& row;
     Frame frame = {};
     DepthImage depth = {};
+    DepthImage looked_at = {}; ///< of a sequence: what the methods saw in place of `depth`
     AoMap ao = {};
     cv::Mat1f confidence_in_view = {}; ///< of `ao`, pixel by pixel
     Attached attached = {}, confidence = {};
@@ -350,8 +351,9 @@ void write_intermediates(const std::filesystem::path& folder, const std::vector<
     write_atomically(folder / "index.csv", index);
 }
 
-bool wants_confidence(const Work& work, const Outputs& outputs) {
-    return outputs.confidence || (work.frame.cloud ? outputs.cloud : outputs.depth_cloud);
+bool wants_confidence(const Work& work, const BatchOptions& options) {
+    const Outputs& outputs = options.outputs;
+    return options.cloud || outputs.confidence || (work.frame.cloud ? outputs.cloud : outputs.depth_cloud);
 }
 
 void attach_and_write(Work& work, const BatchOptions& options) {
@@ -364,7 +366,7 @@ void attach_and_write(Work& work, const BatchOptions& options) {
     take(work, &StageTimes::attach, [&] {
         if (!by_points)
             work.attached = attach(work.frame, work.depth, work.ao);
-        if (!by_points && wants_confidence(work, outputs)) {
+        if (!by_points && wants_confidence(work, options)) {
             work.confidence_in_view = confidence_of(work.depth, work.ao.visibility, options.radius_m, options.noise);
             work.confidence = attach(work.frame, work.depth, {work.confidence_in_view});
         }
@@ -465,8 +467,17 @@ void compute_view(Work& work, Method& method, Sequence* sequence) {
     }
     SequenceResult result = sequence->compute(work.row.index);
     work.ao = std::move(result.ao);
+    work.looked_at = std::move(result.depth);
     work.row.passes = std::move(result.timings);
     std::ranges::move(result.notes, std::back_inserter(work.row.notes));
+}
+
+void add_to(RecordingCloud& cloud, const Work& work) {
+    if (!work.frame.world_from_camera || work.looked_at.z_m.empty())
+        return;
+    const Scene scene = scene_of(work, false);
+    cloud.add({work.looked_at, work.ao.visibility, work.confidence_in_view, undistorted_image(scene.colour, work.frame.camera),
+               undistorted_image(scene.colour_known, work.frame.camera), *work.frame.world_from_camera});
 }
 
 std::vector<FrameRow> planned_rows(const Capture& capture, const std::vector<std::size_t>& frames) {
@@ -599,16 +610,18 @@ std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const Ba
         given_up = given_up || (work->row.status == FrameStatus::skipped && work->row.fault == Fault::outage);
         return work;
     };
-    const auto finish = [&](const Token& work) -> FrameRow* {
-        if (!work)
-            return nullptr;
-        attach_and_write(*work, options);
-        return &work->row; // the images end here
+    const auto finish = [&](Token work) {
+        if (work)
+            attach_and_write(*work, options);
+        return work;
     };
     int outages = 0; // in a row: a full disk does not empty itself, and whoever goes on wastes the rest
-    const auto report = [&](const FrameRow* row) {
-        if (!row)
+    const auto report = [&](const Token& work) { // the images end here
+        if (!work)
             return;
+        if (options.cloud && work->row.status == FrameStatus::ok)
+            add_to(*options.cloud, *work);
+        const FrameRow* const row = &work->row;
         outages = row->fault == Fault::outage ? outages + 1 : 0;
         given_up = given_up || outages >= 4;
         if (on_frame)
@@ -622,8 +635,8 @@ std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const Ba
                            tbb::make_filter<void, Token>(filter_mode::serial_in_order, begin) &
                                tbb::make_filter<Token, Token>(filter_mode::parallel, load_and_project) &
                                tbb::make_filter<Token, Token>(filter_mode::serial_in_order, compute) &
-                               tbb::make_filter<Token, FrameRow*>(filter_mode::parallel, finish) &
-                               tbb::make_filter<FrameRow*, void>(filter_mode::serial_in_order, report));
+                               tbb::make_filter<Token, Token>(filter_mode::parallel, finish) &
+                               tbb::make_filter<Token, void>(filter_mode::serial_in_order, report));
     for (const Token& unfinished : waiting.rest()) // interrupted before what lies around them was there
         unfinished->row = skipped_row(capture, unfinished->row.index);
     return rows;

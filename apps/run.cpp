@@ -57,6 +57,8 @@ struct RunSettings {
     Budget budget;
     std::string out, write = "auto", format = "png16", view = "depth", dump;
     double shade_strength = 1;
+    std::string recording_cloud;
+    double cloud_resolution_m = 0;
     bool colour_cloud = false, overwrite = false, resume = false, retry = false;
     std::string shard, log = "text";
 };
@@ -342,6 +344,8 @@ class Run final : public Command {
                .value = &s.view,
                .choices = {"depth", "colour"}},
               {"shade-strength", "0 leaves the colour, 1 multiplies it by visibility", &s.shade_strength, "", 0, 1},
+              {"cloud", "a PLY file: one cloud of all frames with poses, points of the same place merged", &s.recording_cloud},
+              {"cloud-resolution", "within cubes of this side; 0 = one and a half times what a pixel covers", &s.cloud_resolution_m, "m", 0, 100},
               {"colour-cloud", "replace the clouds' colour by colour times visibility", &s.colour_cloud},
               {"overwrite", "replace the results of an earlier run", &s.overwrite},
               {"resume", "go on with an earlier run: what is done, from the same input and settings, stays", &s.resume},
@@ -405,6 +409,8 @@ class Run final : public Command {
         if (asked_.depth_noise != "auto")
             (void)noise_from_text(asked_.depth_noise);
         range_ = depth_range_from(asked_.depth_range);
+        if (!asked_.recording_cloud.empty() && (asked_.resume || asked_.paths.size() > 1))
+            throw Misuse("cloud: is made of all frames of one capture in one run, without --resume");
         if (asked_.budget.any() && !asked_.quality.empty())
             throw Misuse("a budget (--max-error, --max-ms) picks the quality: leave --quality out");
         if (!asked_.depth_scale.empty())
@@ -596,7 +602,12 @@ class Run final : public Command {
         if (noise.any())
             fitted.emplace(device, noise, plain, fit);
         std::optional<Sequence> sequence;
-        if (sequence_options_.any()) {
+        std::optional<RecordingCloud> cloud;
+        if (!asked_.recording_cloud.empty()) {
+            cloud.emplace(asked_.cloud_resolution_m);
+            job.batch.cloud = &*cloud;
+        }
+        if (sequence_options_.any() || cloud) {
             sequence.emplace(device, plain, job.batch.radius_m, noise, fit, sequence_options_);
             job.batch.sequence = &*sequence;
         }
@@ -627,7 +638,18 @@ class Run final : public Command {
         write_frames_csv(folder / table, report.frames);
         write_manifest(folder / manifest, report);
         conclude(report, folder / table);
+        if (cloud && !interrupted)
+            write_recording(*cloud);
         return report.frames;
+    }
+
+    void write_recording(const RecordingCloud& cloud) const {
+        if (cloud.points() == 0) {
+            say("  no frame had a pose: " + asked_.recording_cloud + " is not written");
+            return;
+        }
+        cloud.write(asked_.recording_cloud);
+        say(fmt::format("  {} points, merged within {:.4f} m -> {}", cloud.points(), cloud.resolution_m(), asked_.recording_cloud));
     }
 
     /// What is known of the depth's noise, and what is done about it.

@@ -158,6 +158,7 @@ SequenceResult Sequence::compute(std::size_t place) {
         result.ao = gather_.compute({&packed(place), &result.ao.visibility}, others, radius_m_, noise_).mean;
         account("gather", gather_.timings());
     }
+    result.depth = view_of(place).depth;
     result.neighbours = slot.neighbours;
     result.notes = slot.notes;
     result.timings = std::move(timings_);

@@ -28,6 +28,7 @@ struct SequenceOptions {
 /// What came of one frame, and which others it was looked at with.
 struct SequenceResult {
     AoMap ao;
+    DepthImage depth; ///< as it was looked at: of noisy depth, the fitted planes'
     Timings timings;
     std::vector<std::size_t> neighbours; ///< places of the views whose surfaces occlude
     std::vector<std::string> notes;      ///< what was left out, and why

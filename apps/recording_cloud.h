@@ -1,0 +1,56 @@
+// One cloud of a whole recording: what several frames saw of a place becomes one point.
+#pragma once
+
+#include "projection/maps.h"
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <unordered_map>
+#include <vector>
+
+namespace scanshade {
+
+/// What one frame adds. All images have the depth's size; `colour` may be empty, `colour_known` too where it is known everywhere.
+struct CloudFrame {
+    const DepthImage& depth;
+    const cv::Mat1f& visibility;
+    const cv::Mat1f& confidence;
+    const cv::Mat3b& colour;
+    const cv::Mat1b& colour_known;
+    Eigen::Isometry3d world_from_camera;
+};
+
+/// Its memory grows with the surface recorded, not with the number of frames. Frames must come in the same order every time.
+class RecordingCloud {
+  public:
+    /// Points are merged within cubes of this side; 0 = one and a half times what a pixel covers at the first frame's median depth.
+    explicit RecordingCloud(double resolution_m) : resolution_m_(resolution_m) {}
+
+    /// Nearer and more confident views of a place count more. Pixels without visibility add nothing.
+    void add(const CloudFrame& frame);
+    [[nodiscard]] std::size_t points() const { return cells_.size(); }
+    [[nodiscard]] double resolution_m() const { return resolution_m_; }
+    /// Binary PLY in world coordinates: ambient_occlusion, ao_confidence, ao_views. Atomic.
+    void write(const std::filesystem::path& file) const;
+
+  private:
+    struct Cell {
+        Eigen::Vector3d point = Eigen::Vector3d::Zero();
+        Eigen::Vector3f colour = Eigen::Vector3f::Zero();
+        double weight = 0;
+        float colour_weight = 0, visibility = 0, confidence = 0;
+        int last_frame = -1, views = 0;
+    };
+    using Key = std::array<std::int32_t, 3>;
+    struct KeyHash {
+        std::size_t operator()(const Key& key) const;
+    };
+    double resolution_m_;
+    int frames_ = 0;
+    std::vector<Cell> cells_; ///< in the order they were met
+    std::unordered_map<Key, std::size_t, KeyHash> index_;
+};
+
+} // namespace scanshade
