@@ -26,13 +26,13 @@ void main() {
     float w = imageLoad(samples, here).x;
     bool hole = !(w > 0.0);
     float wc = hole ? 1.0 : w, zc = 1.0 / wc;
-    float sigma_z = sigma_of(zc) * relief_at(here), sigma = sigma_z * wc * wc; // of 1/z
-    float radius = window_of(zc, sigma_z);
+    float relief_here = relief_at(here), sigma = sigma_of(zc) * wc * wc; // of 1/z, of a single frame
+    float radius = window_of(zc, sigma_of(zc) * relief_here);
 
     Plane first, plane;
     // A slope up to 45 degrees is still the pixel's own surface in the first round.
     bool good = solve(square5(p, wc, max(radius * 0.5, 1.0), level, 1.0 / (3.0 * sigma + 0.7 * radius * wc / k.fx)), first);
-    float narrow = 1.0 / (3.0 * sigma);
+    float narrow = 1.0 / (3.0 * sigma * relief_here);
     good = solve(square7(p, wc, max(radius * (1.0 / 3.0), 1.0), first, narrow), plane) && good;
 
     // Plane w = W + a u + b v  =>  n ~ (fx a, fy b, w at the principal point), turned to the camera.
@@ -40,7 +40,7 @@ void main() {
     float w_principal = w_here - plane.a * (float(p.x) - k.cx) - plane.b * (float(p.y) - k.cy);
     vec3 n = -vec3(k.fx * plane.a, k.fy * plane.b, w_principal);
     n *= inversesqrt(max(dot(n, n), 1e-30));
-    bool near = abs(plane.c) * narrow < 1.0; // within the tolerance of what lies there
+    bool near = abs(plane.c) < 3.0 * sigma; // within the tolerance of what lies there
     good = good && near && w_here > 0.0 && !hole;
     imageStore(depth_out, here, vec4(hole ? 0.0 : good ? 1.0 / w_here : zc));
     n = good ? n : vec3(0.0);
