@@ -60,6 +60,8 @@ class Method {
     virtual ~Method() = default;
     /// Visibility of each pixel: same size as view.depth.z_m; NaN exactly where there is no surface.
     virtual AoMap compute(const View& view) = 0;
+    /// Whether View::neighbours make a difference.
+    [[nodiscard]] virtual bool looks_at_neighbours() const { return false; }
     /// Where the time of the last compute() went.
     [[nodiscard]] virtual const Timings& timings() const = 0;
     /// What lay between the passes of the last compute(), for study; most methods have nothing to show.

@@ -37,6 +37,7 @@ struct Work {
     Frame frame = {};
     DepthImage depth = {};
     DepthImage looked_at = {}; ///< of a sequence: what the methods saw in place of `depth`
+    std::vector<Intermediate> averaging = {}; ///< over frames, for study
     AoMap ao = {};
     cv::Mat1f confidence_in_view = {}; ///< of `ao`, pixel by pixel
     Attached attached = {}, confidence = {};
@@ -459,7 +460,12 @@ class Waiting {
     std::deque<Token> queue_;
 };
 
-void compute_view(Work& work, Method& method, Sequence* sequence) {
+Intermediate map_for_study(std::string name, const cv::Mat1f& map, std::string meaning) {
+    const auto* const first = reinterpret_cast<const std::byte*>(map.data);
+    return {std::move(name), "f4", {map.rows, map.cols}, {first, first + map.total() * 4}, std::move(meaning)};
+}
+
+void compute_view(Work& work, const Capture& capture, Method& method, Sequence* sequence) {
     if (!sequence) {
         work.ao = method.compute({work.depth});
         work.row.passes = method.timings();
@@ -468,8 +474,26 @@ void compute_view(Work& work, Method& method, Sequence* sequence) {
     SequenceResult result = sequence->compute(work.row.index);
     work.ao = std::move(result.ao);
     work.looked_at = std::move(result.depth);
+    if (!result.frames.empty())
+        work.averaging = {map_for_study("averaged_frames", result.frames, "frames averaged, counted in views as good as this one"),
+                          map_for_study("averaged_deviation", result.deviation, "standard deviation of visibility between them")};
     work.row.passes = std::move(result.timings);
-    std::ranges::move(result.notes, std::back_inserter(work.row.notes));
+    const auto names = [&](const std::vector<std::size_t>& places) {
+        std::vector<std::string> all;
+        for (const std::size_t place : places)
+            all.push_back(capture.entries[place].name);
+        return fmt::format("{}", fmt::join(all, ", "));
+    };
+    if (!result.fused.empty())
+        work.row.notes.push_back("depth is averaged with frames " + names(result.fused) + ".");
+    if (!result.neighbours.empty())
+        work.row.notes.push_back("surfaces of frames " + names(result.neighbours) + " occlude, too.");
+    if (!result.averaged.empty())
+        work.row.notes.push_back("visibility is averaged with frames " + names(result.averaged) + ".");
+    for (const LeftOut& other : result.left_out)
+        work.row.notes.push_back(fmt::format("frame {} is left out: {:.0f} % of its surfaces meet this one's, {:.0f} % contradict it, "
+                                             "{:.1f} of the tolerable misfit.", capture.entries[other.place].name, 100 * other.agreement.overlap,
+                                             100 * other.agreement.contradicted, other.agreement.misfit));
 }
 
 void add_to(RecordingCloud& cloud, const Work& work) {
@@ -603,9 +627,12 @@ std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const Ba
                 work->attached = attached_points(*work->frame.cloud, work->of_points.visibility);
                 return;
             }
-            compute_view(*work, method, options.sequence);
-            if (!options.dump.empty())
-                write_intermediates(options.dump / work->entry.name, method.intermediates());
+            compute_view(*work, capture, method, options.sequence);
+            if (!options.dump.empty()) {
+                std::vector<Intermediate> all = method.intermediates();
+                std::ranges::move(work->averaging, std::back_inserter(all));
+                write_intermediates(options.dump / work->entry.name, all);
+            }
         });
         given_up = given_up || (work->row.status == FrameStatus::skipped && work->row.fault == Fault::outage);
         return work;

@@ -21,7 +21,8 @@ constexpr std::array aside = {"frames",     "camera",      "depth-scale",    "as
                               "quality",    "max-error",   "max-ms",         "settings",
                               "device",     "out",         "write",          "format",
                               "overwrite",  "dump",        "resume",         "retry",
-                              "shard",      "log",         "shade-strength", "colour-cloud"};
+                              "shard",      "log",         "shade-strength", "colour-cloud",
+                              "cloud",      "cloud-resolution"};
 
 /// Rows that shape nothing when they are typed differently.
 constexpr std::array elsewhere = {"out", "overwrite", "dump", "resume", "retry", "shard", "log", "device"};
@@ -68,6 +69,18 @@ std::string stamps(const CaptureEntry& entry) {
     return fmt::format("{} {} {} {} {}", entry.name, entry.problem, entry.colour.empty() ? "" : stamp_of(entry.colour),
                        entry.depth.empty() ? "" : stamp_of(entry.depth),
                        entry.cloud.empty() ? "" : stamp_of(entry.cloud));
+}
+
+/// What a frame's result depends on beside its own files: the frames within reach, and where each of them stood.
+std::string around(const Capture& capture, std::size_t index, std::size_t reach) {
+    if (reach == 0)
+        return "";
+    std::string text;
+    for (std::size_t i = index - std::min(index, reach); i <= std::min(index + reach, capture.entries.size() - 1); ++i) {
+        const auto& pose = capture.entries[i].world_from_camera;
+        text += stamps(capture.entries[i]) + (pose ? fmt::format("{}", fmt::join(pose->matrix().reshaped(), " ")) : "none");
+    }
+    return text;
 }
 
 FrameRow crash_row(const Capture& capture, std::size_t index) {
@@ -121,8 +134,10 @@ std::string settings_key(const RunReport& report, const Outputs& outputs, const 
 }
 
 std::string task_key(const std::vector<Stage>& settings, const Capture& capture,
-                     const std::vector<std::size_t>& frames) {
+                     const std::vector<std::size_t>& frames, bool together) {
     std::vector<std::string> parts = {capture_text(capture)};
+    if (together && !capture.entries.empty())
+        parts.push_back(around(capture, 0, capture.entries.size()));
     for (const Stage& stage : settings)
         for (const Parameter& row : stage.rows)
             if (!std::ranges::count(elsewhere, row.name))
@@ -153,18 +168,22 @@ std::optional<std::vector<FrameRow>> rows_if_complete(Journal& journal, const st
 std::vector<FrameRow> run_recorded(const Capture& capture, Method& method, const BatchOptions& options,
                                    const Recording& recording, const std::function<void(const FrameRow&)>& on_frame) {
     Journal& journal = recording.journal;
+    const auto settings_of = [&](std::size_t index) {
+        const std::string others = around(capture, index, options.sequence ? options.sequence->reach() : 0);
+        return others.empty() ? recording.settings : key_of({recording.settings, others});
+    };
     std::map<std::size_t, FrameRow> rows; // by index
     BatchOptions left = options;
     left.frames.clear();
     for (const std::size_t index : options.frames) {
-        if (auto row = journal.done(capture.entries[index], recording.settings, recording.retry))
+        if (auto row = journal.done(capture.entries[index], settings_of(index), recording.retry))
             rows.emplace(index, *std::move(row)).first->second.index = index;
         else
             left.frames.push_back(index);
     }
     journal.forget(capture, left.frames);
     const auto record = [&](const FrameRow& row) {
-        journal.add(row, capture.entries[row.index], recording.settings, recording.device);
+        journal.add(row, capture.entries[row.index], settings_of(row.index), recording.device);
         if (recording.finished && row.status != FrameStatus::skipped && row.fault != Fault::outage)
             ++*recording.finished;
         if (on_frame)

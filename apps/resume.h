@@ -16,9 +16,9 @@ namespace scanshade {
 [[nodiscard]] std::string settings_key(const RunReport& report, const Outputs& outputs, const DepthNoise& noise);
 
 /// Settings as typed, and stamps of every input: equal only where nothing at all has changed, and found without
-/// decoding a frame.
+/// decoding a frame. `together`: results depend on other frames and on poses, too.
 [[nodiscard]] std::string task_key(const std::vector<Stage>& settings, const Capture& capture,
-                                   const std::vector<std::size_t>& frames);
+                                   const std::vector<std::size_t>& frames, bool together = false);
 
 /// The rows of a task that is complete under this key, all its files in place; else nothing.
 [[nodiscard]] std::optional<std::vector<FrameRow>> rows_if_complete(Journal& journal, const std::string& task,

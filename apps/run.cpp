@@ -53,7 +53,7 @@ struct RunSettings {
     std::string depth_noise = "auto", depth_range, flying_pixels = "drop";
     double depth_smoothing = 1;
     double association_limit_s = 0.02;
-    std::string method = "cacao", radius, quality, device, settings, clouds = "auto";
+    std::string sequence = "off", method = "cacao", radius, quality, device, settings, clouds = "auto";
     Budget budget;
     std::string out, write = "auto", format = "png16", view = "depth", dump;
     double shade_strength = 1;
@@ -311,6 +311,10 @@ class Run final : public Command {
                        "tells the camera",
                .value = &s.clouds,
                .choices = {"auto", "points", "view"}},
+              {.name = "sequence",
+               .help = "on: frames of a recording with poses are looked at together with those around them (sequences, below)",
+               .value = &s.sequence,
+               .choices = {"off", "on"}},
               {"radius", "how far away a surface may still occlude, in metres" + radius, &s.radius},
               {"quality", "the method's quality level" + quality, &s.quality},
               {"max-error",
@@ -368,7 +372,7 @@ class Run final : public Command {
 
     /// --sequence.layers and so on.
     Stage sequence_stage() {
-        Stage stage{"sequences, frames together with those around them", sequence_options_.parameters()};
+        Stage stage{"sequences: with --sequence on, frames together with those around them", sequence_options_.parameters()};
         for (Parameter& row : stage.rows)
             row.name = "sequence." + row.name;
         return stage;
@@ -576,7 +580,7 @@ class Run final : public Command {
         all_settings.push_back(method_stage(asked_.method, chosen_setup()));
         all_settings.push_back(cloud_stage());
         all_settings.push_back(sequence_stage());
-        const std::string task = task_key(all_settings, job.capture, job.of);
+        const std::string task = task_key(all_settings, job.capture, job.of, asked_.sequence == "on");
         const fs::path table = report_name("frames", job.block, ".csv"), manifest = report_name("manifest", job.block, ".json");
         if (auto rows = rows_if_complete(journal, task, job.capture, job.batch.frames, asked_.retry);
             rows && fs::exists(folder / manifest)) {
@@ -607,8 +611,8 @@ class Run final : public Command {
             cloud.emplace(asked_.cloud_resolution_m);
             job.batch.cloud = &*cloud;
         }
-        if (sequence_options_.any() || cloud) {
-            sequence.emplace(device, plain, job.batch.radius_m, noise, fit, sequence_options_);
+        if (asked_.sequence == "on" || cloud) {
+            sequence.emplace(device, plain, job.batch.radius_m, noise, fit, asked_.sequence == "on" ? sequence_options_ : alone());
             job.batch.sequence = &*sequence;
         }
         Method& method = fitted ? static_cast<Method&>(*fitted) : plain;

@@ -63,7 +63,8 @@ struct ScreenTables {
     [[nodiscard]] std::size_t pixels() const { return static_cast<std::size_t>(size.area()); }
 };
 
-/// A method of which the room itself is only the part from depth and normals to raw visibility.
+/// A method of which the room itself is only the part from depth and normals to raw visibility. Where it looks at neighbours
+/// and there are any, the image has a guard band of guard_px() on every side, and add_passes() finds buffers for them.
 class ScreenMethod : public Method {
   public:
     AoMap compute(const View& view) final;
@@ -78,10 +79,6 @@ class ScreenMethod : public Method {
     virtual void add_denoise(ScreenTables& tables) const;
     /// The room's constant block. It begins with `screen`.
     [[nodiscard]] virtual std::vector<std::byte> constants(const shared::ScreenConstants& screen) const = 0;
-    /// Whether View::neighbours are looked at; then the image has a guard band of guard_px() on every side, and
-    /// add_passes() finds buffers for them.
-    [[nodiscard]] virtual bool looks_at_neighbours() const { return false; }
-
   private:
     using Shape = std::tuple<int, int, bool, int>; // width, height, whether normals are supplied, most neighbours
     [[nodiscard]] ScreenTables tables(cv::Size size, bool supplied, int neighbours) const;

@@ -9,17 +9,21 @@ namespace scanshade {
 using Eigen::Isometry3d;
 
 std::vector<Parameter> SequenceOptions::parameters() {
-    return {{"layers", "other views whose surfaces occlude what a frame shows; 0 = none", &layers, "", 0, 32},
-            {"reach", "how many frames away they may be", &reach, "frames", 1, 1000},
-            {"fuse", "frames around each that noisy depth is averaged with; 0 = none", &fuse, "", 0, 16},
+    return {{"fuse", "frames around each that noisy depth is averaged with; 0 = none", &fuse, "", 0, 16},
+            {"layers", "other views whose surfaces occlude what a frame shows (surfel); 0 = none", &layers, "", 0, 16},
+            {"reach", "how many frames away those may be", &reach, "frames", 1, 1000},
             {"average", "frames around each whose visibility is averaged with its own; 0 = none", &average, "", 0, 64}};
 }
 
 Sequence::Sequence(gpu::Device& device, Method& method, double radius_m, const DepthNoise& noise, const FitPlaneOptions& fit,
                    const SequenceOptions& options)
     : method_(method), options_(options), noise_(noise), pack_(device), gather_(device), radius_m_(radius_m) {
-    if (!noise.any())
+    if (!method.looks_at_neighbours())
+        options_.layers = 0;
+    if (!noise.any()) {
+        options_.fuse = 0;
         return;
+    }
     FitPlaneOptions only_drop = fit, after_drop = fit;
     only_drop.smoothing = 0;
     after_drop.drop_flying = false;
@@ -28,7 +32,9 @@ Sequence::Sequence(gpu::Device& device, Method& method, double radius_m, const D
 }
 
 void Sequence::add(std::size_t place, const DepthImage& depth, const std::optional<Eigen::Isometry3d>& world_from_camera) {
-    slots_[place] = {depth, world_from_camera, {}, {}, {}, {}, {}, {}, {}, {}};
+    Slot& slot = slots_[place];
+    slot.depth = depth;
+    slot.world_from_camera = world_from_camera;
 }
 
 void Sequence::forget_before(std::size_t place) { slots_.erase(slots_.begin(), slots_.lower_bound(place)); }
@@ -53,8 +59,10 @@ View Sequence::view_of(std::size_t place) {
         return {slot.depth};
     if (!slot.fitted) {
         std::vector<OtherDepth> others;
-        for (const Fitting& other : adjacent_views(place, options_.fuse))
+        for (const Fitting& other : adjacent_views(place, options_.fuse)) {
             others.push_back({&kept(slots_.at(other.place)), other.here_from_there});
+            slot.fused.push_back(other.place);
+        }
         slot.fitted = fit_->compute(kept(slot), others);
         account("prepare", fit_->timings());
     }
@@ -86,8 +94,7 @@ std::optional<Sequence::Fitting> Sequence::fitting(std::size_t here, std::size_t
     if (agreed.fits())
         known->second = Fitting{there, pose, agreed.misfit_m};
     else
-        slot.notes.push_back(fmt::format("frame {} is left out: {:.0f} % of it in common, {:.0f} % of that contradicted, {:.1f} of the "
-                                         "tolerable misfit.", there, 100 * agreed.overlap, 100 * agreed.contradicted, agreed.misfit));
+        slot.left_out.push_back({there, agreed});
     return known->second;
 }
 
@@ -149,18 +156,24 @@ const AoMap& Sequence::visibility(std::size_t place) {
 
 SequenceResult Sequence::compute(std::size_t place) {
     SequenceResult result;
-    const Slot& slot = slots_.at(place);
     result.ao = visibility(place);
     std::vector<Seen> others;
-    for (const Fitting& other : adjacent_views(place, options_.average))
+    for (const Fitting& other : adjacent_views(place, options_.average)) {
         others.push_back({&packed(other.place), &visibility(other.place).visibility, other.here_from_there});
-    if (!others.empty()) {
-        result.ao = gather_.compute({&packed(place), &result.ao.visibility}, others, radius_m_, noise_).mean;
-        account("gather", gather_.timings());
+        result.averaged.push_back(other.place);
     }
+    if (!others.empty()) {
+        GatheredAo gathered = gather_.compute({&packed(place), &result.ao.visibility}, others, radius_m_, noise_);
+        account("average", gather_.timings());
+        result.ao = std::move(gathered.mean);
+        result.frames = std::move(gathered.frames);
+        result.deviation = std::move(gathered.deviation);
+    }
+    const Slot& slot = slots_.at(place);
     result.depth = view_of(place).depth;
+    result.fused = slot.fused;
     result.neighbours = slot.neighbours;
-    result.notes = slot.notes;
+    result.left_out = slot.left_out;
     result.timings = std::move(timings_);
     timings_.clear();
     return result;

@@ -15,14 +15,26 @@
 
 namespace scanshade {
 
+/// A recording's frames can be fused, seen through each other, and averaged; 0 = not so.
 struct SequenceOptions {
-    int layers = 0;  ///< other views whose surfaces occlude; 0 = none
-    int reach = 9;   ///< how many frames away they may be
-    int fuse = 0;    ///< frames around it that noisy depth is averaged with; 0 = none
-    int average = 0; ///< frames around it whose visibility is averaged with its own; 0 = none
+    int fuse = 8;    ///< frames around each that noisy depth is averaged with
+    int layers = 6;  ///< other views whose surfaces occlude what a frame shows; of use to surfel
+    int reach = 12;  ///< how many frames away these may be
+    int average = 8; ///< frames around each whose visibility is averaged with its own
 
     [[nodiscard]] std::vector<Parameter> parameters();
-    [[nodiscard]] bool any() const { return layers > 0 || fuse > 0 || average > 0; }
+    /// How many frames before and behind it a frame's result may depend on.
+    [[nodiscard]] std::size_t farthest() const {
+        return static_cast<std::size_t>((layers > 0 ? reach : 0) + (fuse + 1) / 2 + (average + 1) / 2);
+    }
+};
+/// Frames that are looked at by themselves, though prepared like those of a recording.
+[[nodiscard]] inline SequenceOptions alone() { return {.fuse = 0, .layers = 0, .average = 0}; }
+
+/// A frame that would have been looked at, had it agreed.
+struct LeftOut {
+    std::size_t place;
+    Agreement agreement;
 };
 
 /// What came of one frame, and which others it was looked at with.
@@ -30,8 +42,9 @@ struct SequenceResult {
     AoMap ao;
     DepthImage depth; ///< as it was looked at: of noisy depth, the fitted planes'
     Timings timings;
-    std::vector<std::size_t> neighbours; ///< places of the views whose surfaces occlude
-    std::vector<std::string> notes;      ///< what was left out, and why
+    std::vector<std::size_t> fused, neighbours, averaged; ///< places of the frames it was looked at with
+    std::vector<LeftOut> left_out;
+    cv::Mat1f frames, deviation; ///< of averaged visibility: how many frames went into a pixel, and what lies between them
 };
 
 /// Not thread-safe: one call at a time. A frame's result depends on the frames within reach() of it and on nothing else.
@@ -42,7 +55,7 @@ class Sequence {
              const SequenceOptions& options);
 
     /// How many frames before and behind it a frame's result depends on.
-    [[nodiscard]] std::size_t reach() const { return static_cast<std::size_t>((options_.layers > 0 ? options_.reach : 0) + (options_.fuse + 1) / 2 + (options_.average + 1) / 2); }
+    [[nodiscard]] std::size_t reach() const { return options_.farthest(); }
     /// Frame `place` of the recording. Without a pose it is looked at by itself.
     void add(std::size_t place, const DepthImage& depth, const std::optional<Eigen::Isometry3d>& world_from_camera);
     /// Of an added frame; what lies within reach of it has been added, too, or is missing for good.
@@ -66,8 +79,8 @@ class Sequence {
         std::optional<PackedSurfaces> packed;
         std::optional<AoMap> ao; ///< before any averaging
         std::map<std::size_t, std::optional<Fitting>> fittings;
-        std::vector<std::size_t> neighbours;
-        std::vector<std::string> notes;
+        std::vector<std::size_t> fused, neighbours;
+        std::vector<LeftOut> left_out;
     };
     [[nodiscard]] const DepthImage& kept(Slot& slot);
     [[nodiscard]] const Facets& facets(Slot& slot);

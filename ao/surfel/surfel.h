@@ -33,12 +33,12 @@ class Surfel final : public ScreenMethod {
   public:
     /// Throws Misuse naming a setting out of its range.
     Surfel(gpu::Device& device, const SurfelOptions& options);
+    [[nodiscard]] bool looks_at_neighbours() const override { return true; }
 
   protected:
     void add_passes(ScreenTables& tables) const override;
     void add_denoise(ScreenTables& tables) const override { (void)tables; } // its own, in add_passes
     [[nodiscard]] std::vector<std::byte> constants(const shared::ScreenConstants& screen) const override;
-    [[nodiscard]] bool looks_at_neighbours() const override { return true; }
 
   private:
     SurfelOptions options_;
