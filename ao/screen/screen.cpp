@@ -109,9 +109,9 @@ shared::ScreenConstants constants_from(const ScreenOptions& options, const View&
     k.size = {camera.size.width + 2 * guard, camera.size.height + 2 * guard};
     k.origin = {guard, guard};
     k.window = {camera.size.width, camera.size.height};
-    // Multiples of the plane's most even steps (R2, Roberts 2018).
+    // Each by itself evenly spread over any few instants: the golden ratio and the square root of two.
     const auto turned = [&](double by) { return static_cast<float>(std::fmod(view.instant * by, 1.0)); };
-    k.turn = {turned(0.7548776662466927), turned(0.5698402909980532)};
+    k.turn = {turned(0.6180339887498949), turned(0.4142135623730951)};
     k.ray_step = {static_cast<float>(1 / camera.fx), static_cast<float>(1 / camera.fy)};
     k.ray_base = {static_cast<float>(-camera.cx / camera.fx), static_cast<float>(-camera.cy / camera.fy)};
     k.radius = options.radius;

@@ -20,7 +20,7 @@ struct SequenceOptions {
     int fuse = 8;    ///< frames around each that noisy depth is averaged with
     int layers = 6;  ///< other views whose surfaces occlude what a frame shows; of use to surfel
     int reach = 12;  ///< how many frames away these may be
-    int average = 8; ///< frames around each whose visibility is averaged with its own
+    int average = 12; ///< frames around each whose visibility is averaged with its own
 
     [[nodiscard]] std::vector<Parameter> parameters();
     /// How many frames before and behind it a frame's result may depend on.
