@@ -2,6 +2,7 @@
 #include "io/camera_formats.h"
 #include "projection/error.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -15,11 +16,32 @@ namespace {
 
 // --- reading ---
 
+/// OpenCV's parser recurses into whatever nests, and a stack ends.
+void check_nesting(const fs::path& file, std::string_view text) {
+    constexpr long deepest = 64;
+    long brackets = 0;
+    for (const TextLine& line : text_lines(text)) {
+        long most = brackets, entries = 0; // "- - - a" and "a: b: c" nest within their line
+        for (std::size_t i = 0; i < line.text.size(); ++i) {
+            const char c = line.text[i], next = i + 1 < line.text.size() ? line.text[i + 1] : ' ';
+            brackets += c == '[' || c == '{' ? 1 : c == ']' || c == '}' ? -1 : 0;
+            most = std::max(most, brackets);
+            entries += (c == '-' || c == ':') && (next == ' ' || next == '\t') ? 1 : 0;
+        }
+        const auto indent = std::min(line.text.find_first_not_of(' '), line.text.size());
+        if (std::max({most, entries, static_cast<long>(indent / 4)}) > deepest)
+            throw Error(fmt::format("{}: nested deeper than {} levels", at_line(file, line.number), deepest));
+    }
+}
+
 /// The parser wants its own first line, and says where it stopped as "(LINE): why".
 cv::FileStorage opened(const fs::path& file, const std::string& text) {
+    check_nesting(file, text);
     const std::string first = text.starts_with("%YAML") ? "" : "%YAML:1.0\n";
     try {
         return {first + text, cv::FileStorage::READ | cv::FileStorage::MEMORY | cv::FileStorage::FORMAT_YAML};
+    } catch (const std::length_error&) { // a key of no letters, for one
+        refuse_camera(file, "not YAML");
     } catch (const cv::Exception& failure) {
         int line = 0;
         // It hands the place and the reason over as the function's name, and the function's name as the reason.
@@ -119,6 +141,8 @@ CameraFile from_matrices(const fs::path& file, const cv::FileNode& root) {
 
 /// One camera of a camchain.
 Camera of_chain(const fs::path& file, const cv::FileNode& node) {
+    if (!node.isMap())
+        refuse_camera(file, fmt::format("\"{}\" is not a map of keys and values", node.name()));
     const std::string model = node["camera_model"].isString() ? node["camera_model"].string() : "";
     if (model != "pinhole")
         refuse_camera(file, fmt::format("\"camera_model\" is {}, expected pinhole", in_quotes(model)));
@@ -203,14 +227,18 @@ std::string with_deeper_rows(std::string text) {
 } // namespace
 
 CameraFile camera_from_yaml(const fs::path& file, const std::string& text) {
-    const cv::FileStorage storage = opened(file, with_deeper_rows(text));
-    const cv::FileNode root = storage.root();
-    if (!root.isMap())
-        refuse_camera(file, "not a map of keys and values");
-    if (!root["camera_matrix"].empty())
-        return from_matrices(file, root);
-    if (!root["cam0"].empty())
-        return from_camchain(file, root);
+    try {
+        const cv::FileStorage storage = opened(file, with_deeper_rows(text));
+        const cv::FileNode root = storage.root();
+        if (!root.isMap())
+            refuse_camera(file, "not a map of keys and values");
+        if (!root["camera_matrix"].empty())
+            return from_matrices(file, root);
+        if (!root["cam0"].empty())
+            return from_camchain(file, root);
+    } catch (const cv::Exception& failure) { // a value of another type than its key's
+        refuse_camera(file, "not usable YAML: " + failure.err);
+    }
     refuse_camera(file, "\"camera_matrix\" (OpenCV, ROS) and \"cam0\" (Kalibr) are both missing");
 }
 
