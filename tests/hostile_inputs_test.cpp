@@ -165,8 +165,12 @@ TEST_F(Hostile, small_images_do_not_ask_for_large_ones) {
     const auto refused = [&](const std::string& bytes) {
         const fs::path file = write_file(folder / "image", bytes);
         const LittleMemory little;
-        const std::string depth = refusal([&] { (void)read_stored_depth(file); });
-        return depth.empty() ? depth : refusal([&] { (void)read_colour(file); });
+        return refusal([&] { (void)read_stored_depth(file); });
+    };
+    const auto colour_refused = [&](const std::string& bytes) {
+        const fs::path file = write_file(folder / "image", bytes);
+        const LittleMemory little;
+        return refusal([&] { (void)read_colour(file); });
     };
     EXPECT_EQ(refused(png(8, 4, 16, 0, 4)), "");
     EXPECT_TRUE(says(refused(png(16000, 16000, 16, 0, 4)), "cannot become 16000x16000 pixels"));
@@ -186,11 +190,16 @@ TEST_F(Hostile, small_images_do_not_ask_for_large_ones) {
     const auto frame = jpeg.find("\xff\xc0");
     ASSERT_NE(frame, std::string::npos);
     jpeg.replace(frame + 5, 4, "\x3e\x80\x3e\x80");
-    EXPECT_TRUE(says(refused(jpeg), "cannot become 16000x16000 pixels"));
-    EXPECT_TRUE(says(refused(std::string("BM") + std::string(12, '\0') + "\x28" + std::string(3, '\0') + "\0\0\1\0" +
-                             std::string("\0\0\1\0", 4) + std::string(28, '\0')),
-                     "BMP"));
-    EXPECT_TRUE(says(refused("GIF89a and so on"), "neither PNG"));
+    EXPECT_TRUE(says(colour_refused(jpeg), "cannot become 16000x16000 pixels"));
+    const auto bmp = [](const std::string& width, const std::string& height) {
+        return "BM" + std::string(12, '\0') + "\x28" + std::string(3, '\0') + width + height + std::string(28, '\0');
+    };
+    EXPECT_TRUE(says(colour_refused(bmp(std::string("\0\0\1\0", 4), std::string("\0\0\1\0", 4))), "2^28"));
+    EXPECT_TRUE(says(colour_refused(bmp("\xff\xff\xff\xff", std::string("\1\0\0\0", 4))), "at least 1x1"));
+    EXPECT_TRUE(says(colour_refused("GIF89a and so on"), "neither PNG"));
+    std::vector<uchar> pfm;
+    cv::imencode(".pfm", cv::Mat1f(2, 2, 0.5F), pfm);
+    EXPECT_TRUE(says(colour_refused({pfm.begin(), pfm.end()}), "floats"));
 }
 
 TEST_F(Hostile, files_larger_than_memory_are_refused_unread) {
@@ -233,8 +242,12 @@ TEST_F(Hostile, what_nests_deeply_is_refused_before_anything_recurses_into_it) {
     for (const std::string& text :
          {"%YAML:1.0\ncamera_matrix: " + repeated("[", deep), "camera_matrix: " + repeated("{a: ", deep),
           "camera_matrix:\n  " + repeated("- ", deep) + "1\n", "cam0: " + repeated("a: ", deep) + "1\n",
-          "camera_matrix:\n" + repeated(" ", deep) + "a: 1\n"})
-        EXPECT_TRUE(says(camera_refusal(text), "nested deeper than 64 levels"));
+          "camera_matrix:\n" + repeated(" ", deep) + "- 1\n"})
+        EXPECT_NE(camera_refusal(text), "") << text.substr(0, 40);
+    for (const char* text : {"-----h\nh\ncamera_matrix:", "camera_matrix:\n--------{\n\"\\u--{\n\"\\u",
+                             "cam0:\n  camera_model: pinhole\n  : [0.1, -0.2]\n", "cam0: 3\n", "cam0: [1, 2]\n",
+                             "cam0: &a [*a]\n", "camera_matrix: &a {data: *a}\n"})
+        EXPECT_NE(camera_refusal(text), "") << text; // OpenCV's parser never came back from the first two
     const fs::path settings = write_file(folder / "s.json", "{\"settings\":{\"method\":{\"radius\":" +
                                                                 repeated("[", deep) + repeated("]", deep) + "}}}");
     const Ran ran = run_program(fmt::format("run {} -o {} --settings {}", folder.path().string(),
@@ -250,8 +263,9 @@ TEST_F(Hostile, lists_named_like_coordinates_are_not_read_as_such) {
     const std::string start = "ply\nformat binary_little_endian 1.0\nelement vertex 1\n",
                       place = "property float x\nproperty float y\nproperty float z\n", twelve(12, '\0');
     for (const std::string& lists :
-         {"property list uchar double x\n", "property list uchar double nx\nproperty float ny\nproperty float nz\n",
-          "property list uchar double ambient_occlusion\n"}) {
+         std::vector<std::string>{"property list uchar double x\n",
+                                  "property list uchar double nx\nproperty float ny\nproperty float nz\n",
+                                  "property list uchar double ambient_occlusion\n"}) {
         const std::string body = twelve + (lists.find("ny") == std::string::npos ? "" : std::string(8, '\0')) + '\0';
         const fs::path file = write_file(folder / "a.ply", start + place + lists + "end_header\n" + body);
         std::vector<std::string> warnings;
