@@ -37,8 +37,8 @@ struct Found {
 /// Opens the folder where it is a capture, told by its content; else looks into its folders. Folders that hold
 /// nothing are passed over, those that hold something broken are told.
 /// `walked` are the folders of folders seen so far: links may lead back to them.
-void find_in(const fs::path& folder, const std::string& name, const CaptureOptions& options,
-             std::set<fs::path>& walked, const std::function<void(Found)>& found) {
+void find_in(const fs::path& folder, const std::string& name, const CaptureOptions& options, std::set<fs::path>& walked,
+             const std::function<void(Found)>& found) {
     if (is_result(folder))
         return;
     constexpr std::string_view nothing = "no frames found in";
@@ -207,7 +207,8 @@ class PlanCommand final : public Command {
 
     void add(Found found, Plan& plan) {
         if (found.capture && as_utf8(found.path.string()) != found.path.string())
-            found = {found.path, "", std::nullopt, as_utf8(found.path.string()) + ": the name is not UTF-8, as a plan's must be"};
+            found = {found.path, "", std::nullopt,
+                     as_utf8(found.path.string()) + ": the name is not UTF-8, as a plan's must be"};
         if (!found.capture) {
             plan.refused.push_back(found.refused);
             return;

@@ -174,7 +174,8 @@ std::string fit_for_a_file(const std::string& name) {
     constexpr std::size_t longest = 160; // of the 255 bytes that file systems have
     std::string fit = as_utf8(name.substr(0, longest));
     std::replace_if(
-        fit.begin(), fit.end(), [](char c) { return c == '/' || c == '\\' || static_cast<unsigned char>(c) < ' '; }, '_');
+        fit.begin(), fit.end(), [](char c) { return c == '/' || c == '\\' || static_cast<unsigned char>(c) < ' '; },
+        '_');
     if (fit.starts_with('.')) // temporary files and those of other programs begin so
         fit[0] = '_';
     return fit.empty() ? "frame" : fit;

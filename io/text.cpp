@@ -109,7 +109,9 @@ std::string_view trimmed(std::string_view text) {
 std::string as_utf8(std::string_view text) {
     std::string clean;
     for (std::size_t at = 0; at < text.size();) {
-        const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(at + i < text.size() ? text[at + i] : 0); };
+        const auto byte = [&](std::size_t i) {
+            return static_cast<unsigned char>(at + i < text.size() ? text[at + i] : 0);
+        };
         const auto follows = [&](std::size_t i) { return (byte(i) & 0xc0) == 0x80; };
         const unsigned first = byte(0), second = byte(1);
         std::size_t length = 0; // table 3-7 of the Unicode standard: no overlong forms, surrogates, or beyond 10ffff

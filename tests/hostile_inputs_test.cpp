@@ -91,9 +91,18 @@ TEST_F(Hostile, a_capture_reached_through_a_link_is_no_way_out) {
 }
 
 TEST_F(Hostile, names_of_frames_become_names_of_files_in_the_output_folder) {
-    const std::vector<std::string> names = {
-        "..", ".", "", ".hidden", "a/b", "a\\b", "a\nb", "\x1b[2J", "caf\xe9", "caf\xc3\xa9", std::string(1000, 'x'),
-        ".x.tmp-1-2"};
+    const std::vector<std::string> names = {"..",
+                                            ".",
+                                            "",
+                                            ".hidden",
+                                            "a/b",
+                                            "a\\b",
+                                            "a\nb",
+                                            "\x1b[2J",
+                                            "caf\xe9",
+                                            "caf\xc3\xa9",
+                                            std::string(1000, 'x'),
+                                            ".x.tmp-1-2"};
     std::vector<CaptureEntry> entries;
     for (const std::string& name : names)
         entries.emplace_back().name = name;
@@ -207,11 +216,13 @@ TEST_F(Hostile, files_larger_than_memory_are_refused_unread) {
         const fs::path file = write_file(folder / name, std::string(name) == "a.las" ? "LASF" : "ply\n");
         fs::resize_file(file, std::uintmax_t(1) << 42); // a hole of 4 TiB
         std::vector<std::string> warnings;
-        EXPECT_TRUE(says(refusal([&] { (void)read_cloud(file, warnings); }), "more than this machine's memory")) << name;
+        EXPECT_TRUE(says(refusal([&] { (void)read_cloud(file, warnings); }), "more than this machine's memory"))
+            << name;
     }
     const fs::path image_file = write_file(folder / "d.png", png(8, 4, 16, 0, 4));
     fs::resize_file(image_file, std::uintmax_t(1) << 32);
-    EXPECT_TRUE(says(refusal([&] { (void)read_stored_depth(image_file); }), "4294967296 bytes, too large for an image"));
+    EXPECT_TRUE(
+        says(refusal([&] { (void)read_stored_depth(image_file); }), "4294967296 bytes, too large for an image"));
 }
 
 TEST_F(Hostile, lists_have_an_end) {
@@ -235,9 +246,8 @@ std::string repeated(const std::string& text, int times) {
 
 TEST_F(Hostile, what_nests_deeply_is_refused_before_anything_recurses_into_it) {
     const int deep = 100'000;
-    for (const std::string& text :
-         {"{\"fx\":" + repeated("[", deep) + repeated("]", deep) + "}", repeated("[", deep),
-          "{\"fx\":" + repeated("{\"a\":", deep) + "1" + repeated("}", deep) + "}"})
+    for (const std::string& text : {"{\"fx\":" + repeated("[", deep) + repeated("]", deep) + "}", repeated("[", deep),
+                                    "{\"fx\":" + repeated("{\"a\":", deep) + "1" + repeated("}", deep) + "}"})
         EXPECT_TRUE(says(camera_refusal(text), "nested deeper than 64 levels"));
     for (const std::string& text :
          {"%YAML:1.0\ncamera_matrix: " + repeated("[", deep), "camera_matrix: " + repeated("{a: ", deep),
@@ -248,8 +258,9 @@ TEST_F(Hostile, what_nests_deeply_is_refused_before_anything_recurses_into_it) {
                              "cam0:\n  camera_model: pinhole\n  : [0.1, -0.2]\n", "cam0: 3\n", "cam0: [1, 2]\n",
                              "cam0: &a [*a]\n", "camera_matrix: &a {data: *a}\n"})
         EXPECT_NE(camera_refusal(text), "") << text; // OpenCV's parser never came back from the first two
-    const fs::path settings = write_file(folder / "s.json", "{\"settings\":{\"method\":{\"radius\":" +
-                                                                repeated("[", deep) + repeated("]", deep) + "}}}");
+    const fs::path settings =
+        write_file(folder / "s.json",
+                   "{\"settings\":{\"method\":{\"radius\":" + repeated("[", deep) + repeated("]", deep) + "}}}");
     const Ran ran = run_program(fmt::format("run {} -o {} --settings {}", folder.path().string(),
                                             (folder / "out").string(), settings.string()));
     EXPECT_EQ(ran.exit_code, 1);
@@ -262,10 +273,9 @@ TEST_F(Hostile, lists_named_like_coordinates_are_not_read_as_such) {
     // An empty list has no first value: reading one went past the end of the file.
     const std::string start = "ply\nformat binary_little_endian 1.0\nelement vertex 1\n",
                       place = "property float x\nproperty float y\nproperty float z\n", twelve(12, '\0');
-    for (const std::string& lists :
-         std::vector<std::string>{"property list uchar double x\n",
-                                  "property list uchar double nx\nproperty float ny\nproperty float nz\n",
-                                  "property list uchar double ambient_occlusion\n"}) {
+    for (const std::string& lists : std::vector<std::string>{
+             "property list uchar double x\n", "property list uchar double nx\nproperty float ny\nproperty float nz\n",
+             "property list uchar double ambient_occlusion\n"}) {
         const std::string body = twelve + (lists.find("ny") == std::string::npos ? "" : std::string(8, '\0')) + '\0';
         const fs::path file = write_file(folder / "a.ply", start + place + lists + "end_header\n" + body);
         std::vector<std::string> warnings;
@@ -274,9 +284,10 @@ TEST_F(Hostile, lists_named_like_coordinates_are_not_read_as_such) {
         EXPECT_TRUE(recorded_normals(cloud).empty());
         EXPECT_TRUE(says(refusal([&] { (void)recorded_field(cloud, "ambient_occlusion", file); }), "no field"));
     }
-    EXPECT_TRUE(says(cloud_refusal("b.ply", start + "property list uchar double x\nproperty float y\nproperty float z\n" +
-                                                "end_header\n" + std::string(9, '\0')),
-                     "no property x"));
+    EXPECT_TRUE(
+        says(cloud_refusal("b.ply", start + "property list uchar double x\nproperty float y\nproperty float z\n" +
+                                        "end_header\n" + std::string(9, '\0')),
+             "no property x"));
 }
 
 } // namespace
