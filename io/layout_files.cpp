@@ -98,6 +98,14 @@ bool stays_inside(const fs::path& relative) {
     return !relative.empty() && relative.is_relative() && *relative.begin() != "..";
 }
 
+/// Whether a part of the name is a link: few are, and only those need to be followed to their ends.
+bool through_a_link(fs::path at, const fs::path& relative) {
+    return std::any_of(relative.begin(), relative.end(), [&](const fs::path& part) {
+        std::error_code ignored;
+        return fs::is_symlink(at /= part, ignored);
+    });
+}
+
 } // namespace
 
 std::string trouble_with(const fs::path& folder, const std::string& name) {
@@ -107,6 +115,8 @@ std::string trouble_with(const fs::path& folder, const std::string& name) {
     std::error_code missing;
     if (!fs::is_regular_file(folder / relative, missing))
         return fmt::format("{} does not exist", in_quotes(name));
+    if (!through_a_link(folder, relative))
+        return {};
     const fs::path file = fs::canonical(folder / relative, missing);
     if (!stays_inside(file.lexically_relative(fs::canonical(folder, missing))))
         return fmt::format("{} is a link out of the capture's folder, to {}; not opened", in_quotes(name),
