@@ -32,7 +32,7 @@ json task_json(const Task& task) {
 /// A name that stays inside results/, whatever a plan edited by hand says.
 std::string checked_name(const std::string& name) {
     const fs::path path = fs::path(name).lexically_normal();
-    if (name.empty() || path.is_absolute() || *path.begin() == "..")
+    if (name.empty() || name.find('\0') != std::string::npos || path.is_absolute() || *path.begin() == "..")
         throw Error("'" + name + "' is no name inside the job's folder");
     return name;
 }
@@ -40,10 +40,10 @@ std::string checked_name(const std::string& name) {
 Task task_from(const json& text) {
     Task task{text.at("capture").get<std::string>(),
               checked_name(text.at("name")),
-              text.at("first"),
-              text.at("frames"),
-              text.at("of"),
-              text.at("cost")};
+              count_at(text, "first"),
+              count_at(text, "frames"),
+              count_at(text, "of"),
+              text.at("cost").get<double>()};
     if (task.frames == 0 || task.first > task.of || task.frames > task.of - task.first)
         throw Error(fmt::format("frames {} + {} of {} cannot be", task.first, task.frames, task.of));
     return task;
@@ -96,7 +96,7 @@ void write_plan(const fs::path& job, const Plan& plan) {
 Plan read_plan(const fs::path& job) {
     Plan plan;
     during((job / "plan.json").string(), [&] {
-        const json head = json::parse(read_bytes(job / "plan.json", 1 << 28));
+        const json head = json::parse(read_at_most(1 << 28, job / "plan.json", "a plan"));
         for (const auto& [name, value] : head.at("settings").items())
             plan.settings.emplace_back(name, value.get<std::string>());
         plan.refused = head.at("refused").get<std::vector<std::string>>();

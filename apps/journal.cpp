@@ -87,7 +87,7 @@ Enum named(const std::string& name, std::initializer_list<Enum> all) {
 
 FrameRow row_from(const json& text) {
     FrameRow row;
-    row.index = text.at("index");
+    row.index = count_at(text, "index");
     row.name = text.at("name");
     row.status = named(text.at("status"), {FrameStatus::ok, FrameStatus::failed, FrameStatus::skipped});
     row.why = text.at("why");

@@ -1,6 +1,8 @@
 // Values that both the manifest and `inspect --json` tell.
 #include "apps/json.h"
 
+#include "projection/error.h"
+
 namespace scanshade {
 
 json to_json(const Camera& camera) {
@@ -32,6 +34,13 @@ std::string_view name_of(Registration registration) {
         return "unknown";
     }
     return "";
+}
+
+std::size_t count_at(const json& object, const std::string& key) {
+    const json& value = object.at(key);
+    if (!value.is_number_unsigned())
+        throw Error("\"" + key + "\" is no whole number");
+    return value.get<std::size_t>();
 }
 
 std::string text_of(const json& value) { return value.dump(2, ' ', false, json::error_handler_t::replace); }

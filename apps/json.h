@@ -20,6 +20,9 @@ using json = nlohmann::ordered_json;
 /// "yes", "no" or "unknown".
 [[nodiscard]] std::string_view name_of(Registration registration);
 
+/// A member that counts something. Throws Error naming the key where it is no whole number.
+[[nodiscard]] std::size_t count_at(const json& object, const std::string& key);
+
 /// The text as people read it; bytes that are not UTF-8 (file names may hold any) become U+FFFD.
 [[nodiscard]] std::string text_of(const json& value);
 

@@ -5,6 +5,7 @@
 #include "apps/slice.h"
 #include "io/capture.h"
 #include "io/layouts.h"
+#include "io/text.h"
 #include "projection/error.h"
 
 #include <algorithm>
@@ -35,7 +36,8 @@ struct Found {
 
 /// Opens the folder where it is a capture, told by its content; else looks into its folders. Folders that hold
 /// nothing are passed over, those that hold something broken are told.
-void find_in(const fs::path& folder, const std::string& name, const CaptureOptions& options,
+/// `walked` are the folders of folders seen so far: links may lead back to them.
+void find_in(const fs::path& folder, const std::string& name, const CaptureOptions& options, std::set<fs::path>& walked,
              const std::function<void(Found)>& found) {
     if (is_result(folder))
         return;
@@ -51,8 +53,10 @@ void find_in(const fs::path& folder, const std::string& name, const CaptureOptio
             return;
         }
     }
-    std::vector<fs::path> folders;
     std::error_code unreadable;
+    if (!walked.insert(fs::canonical(folder, unreadable)).second)
+        return;
+    std::vector<fs::path> folders;
     for (fs::directory_iterator entry(folder, unreadable), end; !unreadable && entry != end;
          entry.increment(unreadable))
         if (std::error_code ignored; entry->is_directory(ignored) && entry->path().filename().string()[0] != '.')
@@ -61,7 +65,7 @@ void find_in(const fs::path& folder, const std::string& name, const CaptureOptio
         found({folder, name, std::nullopt, folder.string() + ": cannot be listed: " + unreadable.message()});
     std::ranges::sort(folders, natural_less, [](const fs::path& path) { return path.filename().string(); });
     for (const fs::path& each : folders)
-        find_in(each, (fs::path(name) / each.filename()).string(), options, found);
+        find_in(each, (fs::path(name) / each.filename()).string(), options, walked, found);
 }
 
 std::string own_name(const fs::path& path) {
@@ -73,7 +77,8 @@ std::string own_name(const fs::path& path) {
 void find_captures(const fs::path& dataset, const CaptureOptions& options, const std::function<void(Found)>& found) {
     const fs::path path = fs::canonical(dataset);
     if (fs::is_directory(path)) {
-        find_in(path, own_name(path), options, found);
+        std::set<fs::path> walked;
+        find_in(path, own_name(path), options, walked, found);
         return;
     }
     try {
@@ -201,6 +206,9 @@ class PlanCommand final : public Command {
     }
 
     void add(Found found, Plan& plan) {
+        if (found.capture && as_utf8(found.path.string()) != found.path.string())
+            found = {found.path, "", std::nullopt,
+                     as_utf8(found.path.string()) + ": the name is not UTF-8, as a plan's must be"};
         if (!found.capture) {
             plan.refused.push_back(found.refused);
             return;

@@ -16,6 +16,7 @@
 #include <limits>
 #include <tbb/info.h>
 #include <type_traits>
+#include <utility>
 
 namespace scanshade {
 namespace {
@@ -93,6 +94,14 @@ json frame_json(const FrameRow& row, bool with_camera) {
     return text;
 }
 
+/// With `blanks` before every line but the first.
+std::string indented(const std::string& text, const std::string& blanks) {
+    std::string result;
+    for (const char c : text)
+        c == '\n' ? result += '\n' + blanks : result += c;
+    return result;
+}
+
 /// The largest the process has been, in MiB, as the kernel counts it; NaN where /proc does not tell.
 double peak_memory_mib() {
     std::ifstream status("/proc/self/status");
@@ -145,7 +154,9 @@ std::string csv_line(const FrameRow& row) {
                        csv_field(fmt::format("{}", fmt::join(row.warnings, "; "))));
 }
 
-std::string csv_line(const std::string& capture, const FrameRow& row) { return csv_field(capture) + "," + csv_line(row); }
+std::string csv_line(const std::string& capture, const FrameRow& row) {
+    return csv_field(capture) + "," + csv_line(row);
+}
 
 json stage_json(const StageTimes& ms) {
     return {{"load", known(ms.load, 3)},
@@ -213,11 +224,22 @@ void write_manifest(const std::filesystem::path& file, const RunReport& report) 
               {"depth_noise", report.depth_noise},
               {"budget", report.budget},
               {"shading", report.shading},
-              {"totals", totals_json(report)},
-              {"frames", json::array()}};
-    for (const FrameRow& row : report.frames)
-        text["frames"].push_back(frame_json(row, !report.capture.camera));
-    write_atomically(file, text_of(text) + "\n");
+              {"totals", totals_json(report)}};
+    const std::string whole = text_of(text), head = whole.substr(0, whole.rfind("\n}"));
+    write_atomically(file, [&](const std::filesystem::path& target) {
+        std::ofstream stream(target, std::ios::binary);
+        stream.exceptions(std::ios::failbit | std::ios::badbit);
+        stream
+            << head
+            << ",\n  \"frames\": ["; // one by one: thousands as one value would be what the run needs most memory for
+        const char* between = "";
+        for (const FrameRow& row : report.frames) {
+            stream << std::exchange(between, ",") << "\n    "
+                   << indented(text_of(frame_json(row, !report.capture.camera)), "    ");
+        }
+        stream << (report.frames.empty() ? "]" : "\n  ]") << "\n}\n";
+        stream.flush();
+    });
 }
 
 } // namespace scanshade

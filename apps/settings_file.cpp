@@ -1,5 +1,6 @@
 #include "apps/settings_file.h"
 
+#include "io/shallow_json.h"
 #include "projection/error.h"
 
 #include <fmt/format.h>
@@ -16,11 +17,19 @@ std::string typed(const std::string& name, const json& value) {
     throw Misuse(fmt::format("settings: {}: a number, true, false or text expected, found {}", name, value.dump()));
 }
 
+json parsed(std::istream& stream) {
+    try {
+        return shallow_json<json>(stream);
+    } catch (const std::exception& failure) {
+        throw Misuse(fmt::format("settings: {}", failure.what()));
+    }
+}
+
 } // namespace
 
 std::vector<CLI::ConfigItem> SettingsFile::from_config(std::istream& stream) const {
-    const json text = json::parse(stream, nullptr, false);
-    if (text.is_discarded() || !text.is_object() || !text.contains("settings") || !text["settings"].is_object())
+    const json text = parsed(stream);
+    if (!text.is_object() || !text.contains("settings") || !text["settings"].is_object())
         throw Misuse(
             "settings: JSON with an object \"settings\" expected, as calibrate-look and run's manifest.json have");
     std::vector<CLI::ConfigItem> given;

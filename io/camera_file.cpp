@@ -99,9 +99,7 @@ void refuse_what_is_only_ours(const CameraFile& camera, CameraFormat format) {
 } // namespace
 
 CameraFile read_camera_file(const fs::path& file) {
-    const std::string bytes = read_bytes(file, largest_file + 1);
-    if (bytes.size() > largest_file)
-        refuse_camera(file, "more than 1 MiB, too large for a camera file");
+    const std::string bytes = read_at_most(largest_file, file, "a camera file");
     if (trimmed(bytes).empty())
         refuse_camera(file, "empty file, expected a camera");
     CameraFile result = read_any(file, bytes);

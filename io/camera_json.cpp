@@ -1,5 +1,6 @@
 // Cameras as JSON: ours, and Open3D's.
 #include "io/camera_formats.h"
+#include "io/shallow_json.h"
 #include "projection/error.h"
 
 #include <algorithm>
@@ -52,9 +53,11 @@ bool mentions_not_a_number(std::string_view rest) {
 
 Json parse(const fs::path& file, const std::string& text) {
     try {
-        return Json::parse(text);
+        return shallow_json<Json>(text);
     } catch (const Json::parse_error& failure) {
         explain_syntax(file, text, failure);
+    } catch (const Error& failure) {
+        refuse_camera(file, failure.what());
     } catch (const Json::exception& failure) { // numbers beyond double
         refuse_camera(file, fmt::format("not usable JSON: {}", failure.what()));
     }

@@ -1,11 +1,12 @@
-// Cameras as YAML: OpenCV's own, ROS's camera_info, Kalibr's camchain. OpenCV's parser reads all three.
+// Cameras as YAML: OpenCV's own, ROS's camera_info, Kalibr's camchain. (OpenCV's parser comes to no end with some
+// damaged files; yaml-cpp reads all three.)
 #include "io/camera_formats.h"
 #include "projection/error.h"
 
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <opencv2/core/persistence.hpp>
+#include <yaml-cpp/yaml.h>
 
 namespace scanshade {
 
@@ -15,43 +16,42 @@ namespace {
 
 // --- reading ---
 
-/// The parser wants its own first line, and says where it stopped as "(LINE): why".
-cv::FileStorage opened(const fs::path& file, const std::string& text) {
-    const std::string first = text.starts_with("%YAML") ? "" : "%YAML:1.0\n";
+YAML::Node parsed(const fs::path& file, const std::string& text) {
     try {
-        return {first + text, cv::FileStorage::READ | cv::FileStorage::MEMORY | cv::FileStorage::FORMAT_YAML};
-    } catch (const cv::Exception& failure) {
-        int line = 0;
-        // It hands the place and the reason over as the function's name, and the function's name as the reason.
-        std::string why = failure.func.find("): ") != std::string::npos ? failure.func : failure.err;
-        if (const auto open = why.find('(');
-            open != std::string::npos && std::sscanf(why.c_str() + open, "(%d)", &line) == 1)
-            throw Error(fmt::format("{}: not YAML: {}", at_line(file, line - static_cast<int>(!first.empty())),
-                                    why.substr(why.find(": ", open) + 2)));
-        refuse_camera(file, "not YAML: " + why);
+        return YAML::Load(text);
+    } catch (const YAML::Exception& failure) {
+        throw Error(fmt::format("{}: not YAML: {}", at_line(file, failure.mark.line + 1), failure.msg));
     }
 }
 
+/// The key's plain value; "" where there is none.
+std::string word_of(const YAML::Node& parent, const std::string& key) {
+    const YAML::Node node = parent[key];
+    return node.IsDefined() && node.IsScalar() ? node.Scalar() : "";
+}
+
+double number_of(const YAML::Node& node) {
+    return node.IsScalar() ? number(node.Scalar()).value_or(std::nan("")) : std::nan("");
+}
+
 /// Numbers of a list, or of a matrix given as rows, cols, data.
-std::vector<double> numbers_of(const fs::path& file, const cv::FileNode& parent, const std::string& key) {
-    cv::FileNode node = parent[key];
-    if (node.empty())
+std::vector<double> numbers_of(const fs::path& file, const YAML::Node& parent, const std::string& key) {
+    const YAML::Node node = parent[key];
+    if (!node.IsDefined())
         refuse_camera(file, fmt::format("\"{}\" is missing", key));
-    if (node.isMap())
-        node = node["data"];
-    if (!node.isSeq())
+    const YAML::Node list = node.IsMap() ? node["data"] : node;
+    if (!list.IsDefined() || !list.IsSequence())
         refuse_camera(file, fmt::format("\"{}\" is not a list of numbers", key));
     std::vector<double> values;
-    for (const cv::FileNode& entry : node) {
-        const double value = entry.isReal() || entry.isInt() ? entry.real() : std::nan("");
-        if (!std::isfinite(value))
-            refuse_camera(file, fmt::format("\"{}\": value {} is not a finite number", key, values.size() + 1));
-        values.push_back(value);
+    for (const YAML::Node& entry : list) {
+        values.push_back(number_of(entry));
+        if (!std::isfinite(values.back()))
+            refuse_camera(file, fmt::format("\"{}\": value {} is not a finite number", key, values.size()));
     }
     return values;
 }
 
-std::vector<double> numbers_of(const fs::path& file, const cv::FileNode& parent, const std::string& key,
+std::vector<double> numbers_of(const fs::path& file, const YAML::Node& parent, const std::string& key,
                                std::size_t count) {
     const auto values = numbers_of(file, parent, key);
     if (values.size() != count)
@@ -98,16 +98,17 @@ Distortion polynomial(const fs::path& file, const std::string& key, std::vector<
 }
 
 /// OpenCV's and ROS's: both say camera_matrix and distortion_coefficients.
-CameraFile from_matrices(const fs::path& file, const cv::FileNode& root) {
+CameraFile from_matrices(const fs::path& file, const YAML::Node& root) {
     CameraFile result;
     result.camera.pinhole = from_matrix(file, numbers_of(file, root, "camera_matrix", 9));
-    if (!root["image_width"].empty() || !root["image_height"].empty())
-        result.camera.pinhole.size = checked_size(file, root["image_width"].real(), root["image_height"].real());
+    const std::string width = word_of(root, "image_width"), height = word_of(root, "image_height");
+    if (!width.empty() || !height.empty())
+        result.camera.pinhole.size = checked_size(file, number(width).value_or(0), number(height).value_or(0));
     const std::string key = "distortion_coefficients";
-    if (root[key].empty())
+    if (!root[key].IsDefined())
         return result;
-    const std::string model = root["distortion_model"].isString() ? root["distortion_model"].string() : "plumb_bob";
-    const bool flagged = root["fisheye_model"].isInt() && static_cast<int>(root["fisheye_model"]) != 0;
+    const std::string said = word_of(root, "distortion_model"), model = said.empty() ? "plumb_bob" : said;
+    const bool flagged = number(word_of(root, "fisheye_model")).value_or(0) != 0;
     if (model != "plumb_bob" && model != "rational_polynomial" && model != "equidistant" && model != "fisheye")
         refuse_camera(file,
                       fmt::format("\"distortion_model\" is {}, expected plumb_bob or equidistant", in_quotes(model)));
@@ -118,8 +119,10 @@ CameraFile from_matrices(const fs::path& file, const cv::FileNode& root) {
 }
 
 /// One camera of a camchain.
-Camera of_chain(const fs::path& file, const cv::FileNode& node) {
-    const std::string model = node["camera_model"].isString() ? node["camera_model"].string() : "";
+Camera of_chain(const fs::path& file, const YAML::Node& node) {
+    if (!node.IsMap())
+        refuse_camera(file, "\"cam0\" or \"cam1\" is not a map of keys and values");
+    const std::string model = word_of(node, "camera_model");
     if (model != "pinhole")
         refuse_camera(file, fmt::format("\"camera_model\" is {}, expected pinhole", in_quotes(model)));
     const auto k = numbers_of(file, node, "intrinsics", 4);
@@ -128,7 +131,7 @@ Camera of_chain(const fs::path& file, const cv::FileNode& node) {
                   {"\"intrinsics\" fx", "\"intrinsics\" fy", "\"intrinsics\" cx", "\"intrinsics\" cy"});
     const auto size = numbers_of(file, node, "resolution", 2);
     camera.pinhole.size = checked_size(file, size[0], size[1]);
-    const std::string lens = node["distortion_model"].isString() ? node["distortion_model"].string() : "none";
+    const std::string said = word_of(node, "distortion_model"), lens = said.empty() ? "none" : said;
     if (lens == "equidistant")
         camera.distortion = fisheye(file, "distortion_coeffs", numbers_of(file, node, "distortion_coeffs"));
     else if (lens == "radtan")
@@ -139,29 +142,26 @@ Camera of_chain(const fs::path& file, const cv::FileNode& node) {
     return camera;
 }
 
-Eigen::Isometry3d place_in_chain(const fs::path& file, const cv::FileNode& node) {
-    Eigen::Matrix4d matrix;
-    int row = 0;
-    for (const cv::FileNode& values : node) {
-        int column = 0;
-        for (const cv::FileNode& value : values)
-            if (row < 4 && column < 4)
-                matrix(row, column++) = value.real();
-        if (column != 4)
-            break;
-        ++row;
+Eigen::Isometry3d place_in_chain(const fs::path& file, const YAML::Node& node) {
+    Eigen::Matrix4d matrix = Eigen::Matrix4d::Zero();
+    bool whole = node.IsSequence() && node.size() == 4;
+    for (std::size_t row = 0; row < 4 && whole; ++row) {
+        const YAML::Node values = node[row];
+        whole = values.IsSequence() && values.size() == 4;
+        for (std::size_t column = 0; column < 4 && whole; ++column)
+            matrix(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(column)) = number_of(values[column]);
     }
-    if (row != 4 || node.size() != 4)
+    if (!whole || !matrix.allFinite())
         refuse_camera(file, "\"T_cn_cnm1\" is not 4 rows of 4 numbers");
     return rigid_from(file, matrix, "T_cn_cnm1");
 }
 
 /// cam0 is the depth camera; a cam1 whose place is told is the colour camera.
-CameraFile from_camchain(const fs::path& file, const cv::FileNode& root) {
+CameraFile from_camchain(const fs::path& file, const YAML::Node& root) {
     CameraFile result;
     result.camera = of_chain(file, root["cam0"]);
-    if (const cv::FileNode beside = root["cam1"]; !beside.empty()) {
-        if (beside["T_cn_cnm1"].empty()) {
+    if (const YAML::Node beside = root["cam1"]; beside.IsDefined()) {
+        if (!beside.IsMap() || !beside["T_cn_cnm1"].IsDefined()) {
             result.warnings.push_back(file.string() + ": more than one camera; cam0 is used.");
         } else {
             result.colour = ColourCamera{of_chain(file, beside), place_in_chain(file, beside["T_cn_cnm1"])};
@@ -191,25 +191,13 @@ std::vector<double> camera_matrix(const Pinhole& p) { return {p.fx, 0, p.cx, 0, 
 
 } // namespace
 
-namespace {
-
-/// Kalibr writes a matrix's rows as deep as their key, which YAML allows and OpenCV's parser does not.
-std::string with_deeper_rows(std::string text) {
-    for (std::size_t at = text.find("\n  - ["); at != std::string::npos; at = text.find("\n  - [", at))
-        text.insert(at + 1, "  ");
-    return text;
-}
-
-} // namespace
-
 CameraFile camera_from_yaml(const fs::path& file, const std::string& text) {
-    const cv::FileStorage storage = opened(file, with_deeper_rows(text));
-    const cv::FileNode root = storage.root();
-    if (!root.isMap())
+    const YAML::Node root = parsed(file, text);
+    if (!root.IsMap())
         refuse_camera(file, "not a map of keys and values");
-    if (!root["camera_matrix"].empty())
+    if (root["camera_matrix"].IsDefined())
         return from_matrices(file, root);
-    if (!root["cam0"].empty())
+    if (root["cam0"].IsDefined())
         return from_camchain(file, root);
     refuse_camera(file, "\"camera_matrix\" (OpenCV, ROS) and \"cam0\" (Kalibr) are both missing");
 }

@@ -161,14 +161,16 @@ void sort_out(const CloudRecords& records, const std::vector<AddedField>& added,
               std::vector<FieldReplacement>& replacements, std::vector<FieldAddition>& additions) {
     for (const AddedField& field : added) {
         const auto existing = records.field_named(field.name);
-        if (!existing) {
+        const bool list = std::ranges::any_of(
+            records.fields, [&](const CloudField& f) { return f.name == field.name && f.list_length; });
+        if (!existing && !list) {
             additions.push_back({field.name, field.values});
             continue;
         }
-        const CloudField& old = records.fields[*existing];
-        if (old.count != 1 || old.list_length)
+        if (list || records.fields[*existing].count != 1)
             throw Error(
                 fmt::format("field {} is already there with several values per point; it is not replaced", field.name));
+        const CloudField& old = records.fields[*existing];
         replacements.push_back(
             {*existing, [&records, type = old.type, values = field.values](std::size_t point, std::string_view) {
                  return encoded(records, type, static_cast<double>(values[point]));

@@ -45,7 +45,7 @@ std::string_view CloudRecords::record(std::size_t index) const {
 
 std::optional<std::size_t> CloudRecords::field_named(std::string_view name) const {
     for (std::size_t i = 0; i < fields.size(); ++i)
-        if (fields[i].name == name)
+        if (fields[i].name == name && !fields[i].list_length)
             return i;
     return std::nullopt;
 }

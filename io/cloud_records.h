@@ -57,6 +57,7 @@ struct CloudRecords {
     [[nodiscard]] bool text() const { return encoding == Encoding::ascii; }
     /// Point `index`'s bytes; for text what lies between the last word before it and its own last word.
     [[nodiscard]] std::string_view record(std::size_t index) const;
+    /// The first field of that name that is no list: lists may be empty, and have no value to read.
     [[nodiscard]] std::optional<std::size_t> field_named(std::string_view name) const;
 };
 

@@ -30,6 +30,15 @@ cv::Size checked_size(std::uint64_t width, std::uint64_t height, const std::file
     return {static_cast<int>(width), static_cast<int>(height)};
 }
 
+void check_expansion(std::uint64_t packed, std::uint64_t most, const ImageFacts& facts, int stored_channels,
+                     const std::filesystem::path& file) {
+    const std::uint64_t needed = std::uint64_t(facts.size.area()) * static_cast<unsigned>(stored_channels) *
+                                 static_cast<unsigned>(facts.bits) / 8;
+    if (needed / most > packed)
+        refuse(file, fmt::format("{} bytes of image data cannot become {}x{} pixels", packed, facts.size.width,
+                                 facts.size.height));
+}
+
 std::uint32_t big_endian_32(std::string_view bytes, std::size_t offset) {
     std::uint32_t value = 0;
     for (std::size_t i = 0; i < 4; ++i)
@@ -66,6 +75,7 @@ std::size_t after_scan(std::string_view bytes, std::size_t at) {
 ImageFacts jpeg_facts(std::string_view bytes, const std::filesystem::path& file, bool whole) {
     ImageFacts facts;
     facts.format = ImageFormat::jpeg;
+    bool huffman = false;
     const auto ends_early = [&] {
         refuse(file, fmt::format("JPEG ends early: {} bytes and no end-of-image marker", bytes.size()));
     };
@@ -94,6 +104,7 @@ ImageFacts jpeg_facts(std::string_view bytes, const std::filesystem::path& file,
             facts.bits = static_cast<unsigned char>(bytes[at + 4]);
             facts.size = checked_size(big_endian_16(bytes, at + 7), big_endian_16(bytes, at + 5), file);
             facts.channels = static_cast<unsigned char>(bytes[at + 9]);
+            huffman = marker < 0xc9; // SOF9 and on: arithmetic coding, which knows no such limit
             if (!whole)
                 return facts;
         }
@@ -105,6 +116,8 @@ ImageFacts jpeg_facts(std::string_view bytes, const std::filesystem::path& file,
     }
     if (facts.size.empty())
         refuse(file, "JPEG without a frame header");
+    if (huffman) // every block of 8x8 pixels takes a bit at least
+        check_expansion(bytes.size(), 512, facts, 1, file);
     return facts;
 }
 
@@ -127,6 +140,24 @@ std::uint64_t header_number(std::string_view bytes, std::size_t& at, const std::
     if (!value || *value > UINT32_MAX)
         refuse(file, fmt::format("header's {} is {}, expected a whole number", what, in_quotes(word)));
     return *value;
+}
+
+/// BITMAPINFOHEADER and what came after it; a negative height stores the top row first.
+ImageFacts bmp_header(std::string_view bytes, const std::filesystem::path& file) {
+    if (bytes.size() < 30)
+        refuse(file, fmt::format("BMP ends early: {} bytes", bytes.size()));
+    const auto little_endian_32 = [&](std::size_t at) {
+        return static_cast<std::int32_t>(__builtin_bswap32(big_endian_32(bytes, at)));
+    };
+    if (little_endian_32(14) < 40)
+        refuse(file, fmt::format("BMP header of {} bytes, expected 40 or more", little_endian_32(14)));
+    ImageFacts facts;
+    facts.format = ImageFormat::bmp;
+    facts.size = checked_size(static_cast<std::uint64_t>(std::max(little_endian_32(18), 0)),
+                              static_cast<std::uint64_t>(std::abs(std::int64_t(little_endian_32(22)))), file);
+    facts.bits = 8;
+    facts.channels = 3;
+    return facts;
 }
 
 ImageFacts netpbm_header(std::string_view bytes, const std::filesystem::path& file, ImageFormat format) {
@@ -182,6 +213,10 @@ ImageFormat image_format(std::string_view bytes) {
         return ImageFormat::tiff;
     if (bytes.starts_with("\x76\x2f\x31\x01"sv))
         return ImageFormat::exr;
+    if (bytes.starts_with("BM"sv))
+        return ImageFormat::bmp;
+    if (bytes.starts_with("RIFF"sv) && bytes.substr(std::min<std::size_t>(8, bytes.size())).starts_with("WEBP"sv))
+        return ImageFormat::webp; // of 2^14 pixels a side at most
     const bool netpbm = bytes.size() > 2 && bytes[0] == 'P' && std::isspace(static_cast<unsigned char>(bytes[2]));
     if (!netpbm)
         return ImageFormat::unknown;
@@ -216,6 +251,10 @@ std::string_view format_name(ImageFormat format) {
         return "TIFF";
     case ImageFormat::exr:
         return "EXR";
+    case ImageFormat::bmp:
+        return "BMP";
+    case ImageFormat::webp:
+        return "WebP";
     case ImageFormat::unknown:
         break;
     }
@@ -234,6 +273,8 @@ ImageFacts read_image_header(std::string_view bytes, const std::filesystem::path
         return image_check::tiff_facts(bytes, file);
     if (format == ImageFormat::exr)
         return image_check::exr_facts(bytes, file);
+    if (format == ImageFormat::bmp)
+        return image_check::bmp_header(bytes, file);
     if (image_check::is_netpbm(format))
         return image_check::netpbm_header(bytes, file, format);
     ImageFacts facts;
@@ -246,7 +287,7 @@ ImageFacts check_image(std::string_view bytes, const std::filesystem::path& file
         return image_check::jpeg_facts(bytes, file, true);
     const ImageFacts facts = read_image_header(bytes, file);
     if (facts.format == ImageFormat::png)
-        image_check::check_png_chunks(bytes, file);
+        image_check::check_png_chunks(bytes, file, facts);
     if (image_check::is_netpbm(facts.format))
         image_check::check_sample_count(bytes, file, facts);
     return facts;

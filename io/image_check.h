@@ -9,7 +9,7 @@
 
 namespace scanshade {
 
-enum class ImageFormat { unknown, png, jpeg, pgm, ppm, other_netpbm, pfm, tiff, exr };
+enum class ImageFormat { unknown, png, jpeg, pgm, ppm, other_netpbm, pfm, tiff, exr, bmp, webp };
 
 /// Facts from the header. Fields a format does not fix are left at 0.
 struct ImageFacts {
@@ -39,12 +39,16 @@ constexpr std::uint64_t most_pixels = std::uint64_t(1) << 28;
 
 namespace image_check { // one pair per format; check_image() chooses
 [[nodiscard]] ImageFacts png_header(std::string_view bytes, const std::filesystem::path& file);
-void check_png_chunks(std::string_view bytes, const std::filesystem::path& file);
+void check_png_chunks(std::string_view bytes, const std::filesystem::path& file, const ImageFacts& facts);
 [[nodiscard]] ImageFacts tiff_facts(std::string_view bytes, const std::filesystem::path& file);
 [[nodiscard]] ImageFacts exr_facts(std::string_view bytes, const std::filesystem::path& file);
 
 /// The image size, or Error when a side is 0 or there are more than most_pixels.
 [[nodiscard]] cv::Size checked_size(std::uint64_t width, std::uint64_t height, const std::filesystem::path& file);
+/// Error where `packed` bytes of coded data cannot become an image of that size, for no code makes more than `most`
+/// bytes of one: a small file cannot ask for much memory.
+void check_expansion(std::uint64_t packed, std::uint64_t most, const ImageFacts& facts, int stored_channels,
+                     const std::filesystem::path& file);
 [[nodiscard]] std::uint32_t big_endian_32(std::string_view bytes, std::size_t offset);
 [[noreturn]] void refuse(const std::filesystem::path& file, const std::string& why);
 } // namespace image_check

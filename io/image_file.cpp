@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstring>
 #include <fmt/format.h>
+#include <limits>
 #include <opencv2/imgcodecs.hpp>
 
 namespace scanshade {
@@ -20,7 +21,8 @@ static_assert(std::endian::native == std::endian::little, "byte orders below are
 namespace {
 
 std::string read_image_bytes(const fs::path& file) {
-    std::string bytes = read_bytes(file);
+    constexpr std::size_t most_bytes = 0x7fffffff; // decoders count with 32 bits
+    std::string bytes = read_at_most(most_bytes, file, "an image");
     if (bytes.empty())
         throw Error(file.string() + ": empty file (0 bytes), expected an image");
     return bytes;
@@ -78,6 +80,17 @@ cv::Mat1f unpack_pfm(std::string_view bytes, const ImageFacts& facts) {
         for (auto& value : image)
             value = std::bit_cast<float>(__builtin_bswap32(std::bit_cast<std::uint32_t>(value)));
     return image;
+}
+
+template <class Integer>
+cv::Mat1f from_integers(const cv::Mat_<Integer>& image) {
+    constexpr float steps = std::numeric_limits<Integer>::max() - 1;
+    constexpr float no_surface = std::numeric_limits<float>::quiet_NaN();
+    cv::Mat1f visibility(image.size());
+    for (int y = 0; y < image.rows; ++y)
+        for (int x = 0; x < image.cols; ++x)
+            visibility(y, x) = image(y, x) == 0 ? no_surface : static_cast<float>(image(y, x) - 1) / steps;
+    return visibility;
 }
 
 } // namespace
@@ -165,9 +178,33 @@ cv::Mat1f depth_in_metres(const cv::Mat& stored, const DepthEncoding& encoding) 
 
 cv::Mat3b read_colour(const fs::path& file) {
     const std::string bytes = read_image_bytes(file);
-    (void)check_image(bytes, file);
+    if (check_image(bytes, file).format == ImageFormat::unknown)
+        throw Error(file.string() + ": neither PNG, JPEG, TIFF, EXR, BMP, WebP nor Netpbm");
     // The orientation tag of a photo would turn the colour away from its depth.
-    return decode(bytes, file, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
+    const cv::Mat image = decode(bytes, file, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
+    if (image.type() != CV_8UC3)
+        throw Error(file.string() + ": floats, expected a colour image of 8 or 16 bits");
+    return image;
+}
+
+cv::Mat1f read_ao(const fs::path& file) {
+    const std::string bytes = read_image_bytes(file);
+    const ImageFacts facts = check_image(bytes, file);
+    const bool png = facts.format == ImageFormat::png && facts.channels == 1 && (facts.bits == 8 || facts.bits == 16);
+    const bool floats = facts.floats && facts.channels == 1 && facts.format != ImageFormat::pfm;
+    if (!png && !floats)
+        throw Error(
+            fmt::format("{}: not an AO map: expected 8- or 16-bit grey PNG, or float TIFF or EXR; found {}-bit {} "
+                        "with {} channels",
+                        file.string(), facts.bits, format_name(facts.format), facts.channels));
+    const cv::Mat image = decode(bytes, file, cv::IMREAD_UNCHANGED);
+    if (image.type() == CV_16UC1)
+        return from_integers<ushort>(image);
+    if (image.type() == CV_8UC1)
+        return from_integers<uchar>(image);
+    if (image.type() == CV_32FC1)
+        return image;
+    throw Error(file.string() + ": AO map cannot be decoded");
 }
 
 } // namespace scanshade

@@ -56,17 +56,6 @@ cv::Mat_<Integer> as_integers(const cv::Mat1f& visibility) {
     return image;
 }
 
-template <class Integer>
-cv::Mat1f from_integers(const cv::Mat_<Integer>& image) {
-    constexpr float steps = std::numeric_limits<Integer>::max() - 1;
-    constexpr float no_surface = std::numeric_limits<float>::quiet_NaN();
-    cv::Mat1f visibility(image.size());
-    for (int y = 0; y < image.rows; ++y)
-        for (int x = 0; x < image.cols; ++x)
-            visibility(y, x) = image(y, x) == 0 ? no_surface : static_cast<float>(image(y, x) - 1) / steps;
-    return visibility;
-}
-
 } // namespace
 
 AoFormat ao_format(const std::string& name) {
@@ -98,27 +87,6 @@ void write_ao(const fs::path& file, const cv::Mat1f& visibility, AoFormat format
     case AoFormat::exr:
         return write_encoded(file, visibility, ".exr", fast_exr);
     }
-}
-
-cv::Mat1f read_ao(const fs::path& file) {
-    const std::string bytes = read_bytes(file);
-    const ImageFacts facts = check_image(bytes, file);
-    const bool png = facts.format == ImageFormat::png && facts.channels == 1 && (facts.bits == 8 || facts.bits == 16);
-    const bool floats = facts.floats && facts.channels == 1 && facts.format != ImageFormat::pfm;
-    if (!png && !floats)
-        throw Error(
-            fmt::format("{}: not an AO map: expected 8- or 16-bit grey PNG, or float TIFF or EXR; found {}-bit {} "
-                        "with {} channels",
-                        file.string(), facts.bits, format_name(facts.format), facts.channels));
-    const cv::Mat view(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
-    const cv::Mat image = cv::imdecode(view, cv::IMREAD_UNCHANGED);
-    if (image.type() == CV_16UC1)
-        return from_integers<ushort>(image);
-    if (image.type() == CV_8UC1)
-        return from_integers<uchar>(image);
-    if (image.type() == CV_32FC1)
-        return image;
-    throw Error(file.string() + ": AO map cannot be decoded");
 }
 
 void write_picture(const fs::path& file, const cv::Mat3b& picture) {

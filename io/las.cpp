@@ -110,13 +110,17 @@ std::vector<Vlr> vlrs_of(std::string_view header, std::size_t first, std::uint32
 
 bool names_extra_bytes(const Vlr& vlr) { return vlr.user == "LASF_Spec" && vlr.id == 4; }
 
-/// Fields behind the format's own, as far as a record describes them; what is left is one field of bytes.
-void add_extra_fields(std::vector<CloudField>& fields, const std::vector<Vlr>& vlrs, std::size_t record_length) {
+/// Fields behind the format's own, as far as a record describes them; what is left is one field of bytes. Returns where
+/// in the header the last description that makes sense ends; 0 where there is no such record.
+std::size_t add_extra_fields(std::vector<CloudField>& fields, const std::vector<Vlr>& vlrs, std::size_t record_length) {
     static constexpr std::array types{Scalar::uint8, Scalar::int8,   Scalar::uint16, Scalar::int16,   Scalar::uint32,
                                       Scalar::int32, Scalar::uint64, Scalar::int64,  Scalar::float32, Scalar::float64};
+    std::size_t end = 0;
+    bool sense = true;
     for (const Vlr& vlr : vlrs) {
-        if (!names_extra_bytes(vlr))
+        if (!names_extra_bytes(vlr) || !sense)
             continue;
+        end = vlr.begin + vlr_header;
         for (std::size_t at = 0; at + descriptor_size <= vlr.data.size(); at += descriptor_size) {
             const auto type = read_at<std::uint8_t>(vlr.data, at + 2),
                        options = read_at<std::uint8_t>(vlr.data, at + 3);
@@ -125,13 +129,16 @@ void add_extra_fields(std::vector<CloudField>& fields, const std::vector<Vlr>& v
             // bytes.
             const std::size_t copies = type == 0 ? options : (type + 9U) / 10;
             CloudField extra = field(name, type == 0 || type > 30 ? Scalar::uint8 : types[(type - 1U) % 10], copies);
-            if (copies == 0 || type > 30 || stride_of(fields) + extra.bytes() > record_length)
+            sense = copies > 0 && type <= 30 && stride_of(fields) + extra.bytes() <= record_length;
+            if (!sense)
                 break;
             fields.push_back(std::move(extra));
+            end = vlr.begin + vlr_header + at + descriptor_size;
         }
     }
     if (const std::size_t known = stride_of(fields); known < record_length)
         fields.push_back(field("undocumented", Scalar::uint8, record_length - known));
+    return end;
 }
 
 // --- units ---
@@ -266,7 +273,7 @@ CloudRecords read_las(std::string_view bytes, const fs::path& file, std::vector<
         warnings.push_back(fmt::format("{}: the header says {} variable length records, {} are there; they are kept as "
                                        "they are.",
                                        file.string(), said_vlrs, vlrs.size()));
-    add_extra_fields(records.fields, vlrs, records.stride);
+    (void)add_extra_fields(records.fields, vlrs, records.stride);
     std::size_t offset = 0;
     for (CloudField& f : records.fields) {
         f.offset = offset;
@@ -299,29 +306,40 @@ std::string descriptor(const std::string& name) {
 }
 
 /// Extra bytes that nothing describes must be stepped over before ours are.
-std::string descriptor_of_raw_bytes(std::size_t count) {
-    std::string bytes(descriptor_size, '\0');
-    bytes[3] = static_cast<char>(count);
-    std::string_view("undocumented").copy(bytes.data() + 4, 31);
-    return bytes;
+std::string descriptors_of_raw_bytes(std::size_t count) {
+    constexpr std::size_t most = 255; // the number is a byte
+    std::string all;
+    for (; count > 0; count -= std::min(count, most)) {
+        std::string bytes(descriptor_size, '\0');
+        bytes[3] = static_cast<char>(std::min(count, most));
+        std::string_view("undocumented").copy(bytes.data() + 4, 31);
+        all += bytes;
+    }
+    return all;
 }
 
-/// Adds the descriptors to the record that describes extra bytes, or makes one behind the last record. Returns by how
-/// much the header grew.
-std::size_t describe_extra_bytes(std::string& header, const std::string& descriptors) {
+/// Adds the descriptors to the record that describes extra bytes, before what makes no sense in it, or makes a record
+/// behind the last one. Returns by how much the header grew.
+std::size_t describe_extra_bytes(std::string& header, const std::string& descriptors, std::size_t stride) {
     const std::size_t first = read_at<std::uint16_t>(header, at_header_size);
     const auto count = read_at<std::uint32_t>(header, at_vlr_count);
     const std::string copy = header;
     const auto vlrs = vlrs_of(copy, first, count);
-    for (const Vlr& vlr : vlrs)
-        if (names_extra_bytes(vlr)) {
-            const std::size_t length = vlr.data.size() + descriptors.size();
-            if (length > 0xffff)
-                throw Error("the LAS file describes more extra bytes than one record can hold");
-            header.insert(vlr.begin + vlr_header + vlr.data.size(), descriptors);
-            put(header, vlr.begin + 20, static_cast<std::uint16_t>(length));
-            return descriptors.size();
-        }
+    auto fields = fields_of_format(read_at<std::uint8_t>(header, at_format));
+    const std::size_t place = add_extra_fields(fields, vlrs, stride);
+    for (const Vlr& vlr : vlrs) {
+        const std::size_t begin = vlr.begin + vlr_header;
+        if (place < begin || place > begin + vlr.data.size() || !names_extra_bytes(vlr))
+            continue;
+        const std::size_t length = vlr.data.size() + descriptors.size();
+        if (length > 0xffff)
+            throw Error("the LAS file describes more extra bytes than one record can hold");
+        header.insert(place, descriptors);
+        put(header, vlr.begin + 20, static_cast<std::uint16_t>(length));
+        return descriptors.size();
+    }
+    if (descriptors.size() > 0xffff)
+        throw Error("the LAS file has more extra bytes than one record can describe");
     std::string record(vlr_header, '\0');
     std::string_view("LASF_Spec").copy(record.data() + 2, 16);
     put(record, 18, std::uint16_t(4));
@@ -343,11 +361,11 @@ std::string las_bytes(const CloudRecords& records, const std::string& points,
     std::string descriptors;
     const bool described = records.fields.back().name != "undocumented";
     if (!described)
-        descriptors += descriptor_of_raw_bytes(records.fields.back().count);
+        descriptors += descriptors_of_raw_bytes(records.fields.back().count);
     for (const FieldAddition& addition : additions)
         descriptors += descriptor(addition.name);
     std::string header = records.header;
-    const std::size_t grown = describe_extra_bytes(header, descriptors);
+    const std::size_t grown = describe_extra_bytes(header, descriptors, records.stride);
     const std::size_t wider = additions.size() * sizeof(float) * records.point_count;
     const std::size_t length = records.stride + additions.size() * sizeof(float);
     if (length > 0xffff)

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cctype>
 #include <fmt/format.h>
+#include <map>
 #include <set>
 
 namespace scanshade {
@@ -91,13 +92,35 @@ bool has_cloud_extension(const fs::path& file) {
     return is_text_cloud(file) || one_of(lower_extension(file), {".pcd", ".ply", ".las", ".laz", ".e57", ".bin"});
 }
 
+namespace {
+
+bool stays_inside(const fs::path& relative) {
+    return !relative.empty() && relative.is_relative() && *relative.begin() != "..";
+}
+
+/// Whether a part of the name is a link: few are, and only those need to be followed to their ends.
+bool through_a_link(fs::path at, const fs::path& relative) {
+    return std::any_of(relative.begin(), relative.end(), [&](const fs::path& part) {
+        std::error_code ignored;
+        return fs::is_symlink(at /= part, ignored);
+    });
+}
+
+} // namespace
+
 std::string trouble_with(const fs::path& folder, const std::string& name) {
     const fs::path relative = fs::path(name).lexically_normal();
-    if (relative.is_absolute() || (!relative.empty() && *relative.begin() == ".."))
+    if (!stays_inside(relative) || name.find('\0') != std::string::npos)
         return fmt::format("{} leaves the capture's folder; not opened", in_quotes(name));
-    std::error_code ignored;
-    if (!fs::is_regular_file(folder / relative, ignored))
-        return fmt::format("{} does not exist", name);
+    std::error_code missing;
+    if (!fs::is_regular_file(folder / relative, missing))
+        return fmt::format("{} does not exist", in_quotes(name));
+    if (!through_a_link(folder, relative))
+        return {};
+    const fs::path file = fs::canonical(folder / relative, missing);
+    if (!stays_inside(file.lexically_relative(fs::canonical(folder, missing))))
+        return fmt::format("{} is a link out of the capture's folder, to {}; not opened", in_quotes(name),
+                           in_quotes(file.string()));
     return {};
 }
 
@@ -155,17 +178,28 @@ DepthEncoding assumed_encoding(const fs::path& first_depth) {
     return depth_encoding("mm", "assumed: 16-bit integers are millimetres");
 }
 
+namespace {
+
+std::string fit_for_a_file(const std::string& name) {
+    constexpr std::size_t longest = 160; // of the 255 bytes that file systems have
+    std::string fit = as_utf8(name.substr(0, longest));
+    std::replace_if(
+        fit.begin(), fit.end(), [](char c) { return c == '/' || c == '\\' || static_cast<unsigned char>(c) < ' '; },
+        '_');
+    if (fit.starts_with('.')) // temporary files and those of other programs begin so
+        fit[0] = '_';
+    return fit.empty() ? "frame" : fit;
+}
+
+} // namespace
+
 void settle_names(std::vector<CaptureEntry>& entries) {
     std::set<std::string> taken;
+    std::map<std::string, int> next; // of names that are wanted again and again
     for (CaptureEntry& entry : entries) {
-        std::replace_if(
-            entry.name.begin(), entry.name.end(),
-            [](char c) { return c == '/' || c == '\\' || static_cast<unsigned char>(c) < ' '; }, '_');
-        if (entry.name.empty())
-            entry.name = "frame";
-        const std::string wanted = entry.name;
-        for (int n = 2; !taken.insert(entry.name).second; ++n)
-            entry.name = fmt::format("{}-{}", wanted, n);
+        const std::string wanted = fit_for_a_file(entry.name);
+        for (entry.name = wanted; !taken.insert(entry.name).second;)
+            entry.name = fmt::format("{}-{}", wanted, ++next.emplace(wanted, 1).first->second);
     }
 }
 

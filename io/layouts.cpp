@@ -133,7 +133,7 @@ std::vector<fs::path> images_in(const std::optional<fs::path>& folder, bool (*wa
 /// rgbd.match: "depth/00000.png color/00000.jpg" per line, in either order.
 void entries_from_match(const fs::path& folder, const fs::path& depth_folder, Capture& capture) {
     const fs::path list = folder / "rgbd.match";
-    const std::string bytes = read_bytes(list);
+    const std::string bytes = read_list_file(list);
     for (const TextLine& line : text_lines(bytes)) {
         auto names = words(line.text);
         if (names.empty() || names[0].starts_with('#'))

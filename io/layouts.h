@@ -42,7 +42,8 @@ struct Listing {
 /// .xyz, .pts, .ptx: lines of numbers, which nothing but the name tells apart.
 [[nodiscard]] bool is_text_cloud(const std::filesystem::path& file);
 
-/// Why a file that a list names cannot be opened: outside the capture's folder, or missing. Empty = it is there.
+/// Why a file that a list names cannot be opened: outside the capture's folder, by its name or through a link, or
+/// missing. Empty = it is there.
 [[nodiscard]] std::string trouble_with(const std::filesystem::path& folder, const std::string& name);
 
 /// Size and type of an image from its first bytes; throws Error where they make no sense.
@@ -57,7 +58,8 @@ struct Listing {
 /// "assumed: 16-bit integers are millimetres", or metres where `first_depth` holds floats.
 [[nodiscard]] DepthEncoding assumed_encoding(const std::filesystem::path& first_depth);
 
-/// Makes the entries' names unique, and fit for file names.
+/// Makes the entries' names unique, and fit for file names: UTF-8 without slashes and control characters, short enough
+/// to have something added, not hidden.
 void settle_names(std::vector<CaptureEntry>& entries);
 
 } // namespace scanshade

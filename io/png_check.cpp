@@ -51,7 +51,8 @@ ImageFacts png_header(std::string_view bytes, const std::filesystem::path& file)
     return facts;
 }
 
-void check_png_chunks(std::string_view bytes, const std::filesystem::path& file) {
+void check_png_chunks(std::string_view bytes, const std::filesystem::path& file, const ImageFacts& facts) {
+    std::uint64_t packed = 0;
     for (std::size_t at = signature_length;;) {
         if (bytes.size() - at < chunk_overhead)
             refuse(file, fmt::format("PNG ends early at byte {} of its data: no end chunk IEND", bytes.size()));
@@ -66,8 +67,13 @@ void check_png_chunks(std::string_view bytes, const std::filesystem::path& file)
             refuse(file, fmt::format("PNG is damaged: checksum (CRC) of the chunk at byte {} does not match", at));
         if (type == "IEND")
             break;
+        if (type == "IDAT")
+            packed += length;
         at += chunk_overhead + length;
     }
+    constexpr std::uint64_t deflate_most = 1032; // a match of 258 bytes takes two bits
+    constexpr char palette = 3;
+    check_expansion(packed, deflate_most, facts, bytes[25] == palette ? 1 : facts.channels, file);
 }
 
 } // namespace scanshade::image_check

@@ -9,8 +9,18 @@
 #include <cstdlib>
 #include <fmt/format.h>
 #include <memory>
+#include <unistd.h>
 
 namespace scanshade {
+
+namespace {
+
+std::uintmax_t memory_bytes() {
+    return static_cast<std::uintmax_t>(::sysconf(_SC_PHYS_PAGES)) *
+           static_cast<std::uintmax_t>(::sysconf(_SC_PAGE_SIZE));
+}
+
+} // namespace
 
 std::string read_bytes(const std::filesystem::path& file, std::size_t limit) {
     std::error_code trouble;
@@ -23,6 +33,9 @@ std::string read_bytes(const std::filesystem::path& file, std::size_t limit) {
     if (trouble)
         throw Error(file.string() + ": cannot be read: " + trouble.message());
 
+    if (std::min<std::uintmax_t>(size, limit) > memory_bytes())
+        throw Error(fmt::format("{}: {} bytes, more than this machine's memory holds", file.string(), size));
+
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "rb"), &std::fclose);
     if (!stream)
         throw Error(file.string() + ": cannot be opened for reading");
@@ -30,6 +43,29 @@ std::string read_bytes(const std::filesystem::path& file, std::size_t limit) {
     bytes.resize(std::fread(bytes.data(), 1, bytes.size(), stream.get()));
     if (std::ferror(stream.get()))
         throw Error(file.string() + ": cannot be read to its end");
+    return bytes;
+}
+
+std::string read_at_most(std::uintmax_t most, const std::filesystem::path& file, std::string_view what) {
+    std::error_code trouble; // read_bytes() will tell of it
+    if (const auto size = std::filesystem::file_size(file, trouble); !trouble && size > most)
+        throw Error(fmt::format("{}: {} bytes, too large for {} (at most {})", file.string(), size, what, most));
+    return read_bytes(file);
+}
+
+std::string read_list_file(const std::filesystem::path& file) {
+    constexpr std::size_t most_bytes = 1 << 28, most_lines = 1 << 22, longest_line = 1 << 13;
+    std::string bytes = read_at_most(most_bytes, file, "a list");
+    std::size_t lines = 0;
+    for (std::size_t at = 0; at < bytes.size();) {
+        const std::size_t end = std::min(bytes.find('\n', at), bytes.size());
+        if (++lines > most_lines)
+            throw Error(fmt::format("{}: more than {} lines", file.string(), most_lines));
+        if (end - at > longest_line)
+            throw Error(fmt::format("{}: {} bytes, expected at most {} in a line of a list",
+                                    at_line(file, static_cast<int>(lines)), end - at, longest_line));
+        at = end + 1;
+    }
     return bytes;
 }
 
@@ -68,6 +104,31 @@ std::string_view trimmed(std::string_view text) {
     if (start == std::string_view::npos)
         return {};
     return text.substr(start, text.find_last_not_of(blanks) - start + 1);
+}
+
+std::string as_utf8(std::string_view text) {
+    std::string clean;
+    for (std::size_t at = 0; at < text.size();) {
+        const auto byte = [&](std::size_t i) {
+            return static_cast<unsigned char>(at + i < text.size() ? text[at + i] : 0);
+        };
+        const auto follows = [&](std::size_t i) { return (byte(i) & 0xc0) == 0x80; };
+        const unsigned first = byte(0), second = byte(1);
+        std::size_t length = 0; // table 3-7 of the Unicode standard: no overlong forms, surrogates, or beyond 10ffff
+        if (first < 0x80)
+            length = 1;
+        else if (first >= 0xc2 && first <= 0xdf && follows(1))
+            length = 2;
+        else if (first >= 0xe0 && first <= 0xef && follows(1) && follows(2) && (first != 0xe0 || second >= 0xa0) &&
+                 (first != 0xed || second < 0xa0))
+            length = 3;
+        else if (first >= 0xf0 && first <= 0xf4 && follows(1) && follows(2) && follows(3) &&
+                 (first != 0xf0 || second >= 0x90) && (first != 0xf4 || second < 0x90))
+            length = 4;
+        clean += length == 0 ? std::string_view("_") : text.substr(at, length);
+        at += std::max<std::size_t>(length, 1);
+    }
+    return clean;
 }
 
 std::string in_quotes(std::string_view text) {

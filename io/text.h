@@ -11,8 +11,13 @@
 namespace scanshade {
 
 /// The whole file, or its first `limit` bytes. Throws Error naming the file when it is missing, a folder, or
-/// unreadable.
+/// unreadable, or larger than the machine's memory.
 [[nodiscard]] std::string read_bytes(const std::filesystem::path& file, std::size_t limit = SIZE_MAX);
+/// The whole file. Throws Error, too, where it is larger than `most` bytes, before it is read: "too large for `what`".
+[[nodiscard]] std::string read_at_most(std::uintmax_t most, const std::filesystem::path& file, std::string_view what);
+/// A whole file of lines that fit into a vector: a list, a trajectory. Throws Error, too, for more than 2^28 bytes or
+/// 2^22 lines, or a line of more than 2^13 bytes: that is another kind of file.
+[[nodiscard]] std::string read_list_file(const std::filesystem::path& file);
 
 /// One line of a text file without its line end; numbers start at 1.
 struct TextLine {
@@ -28,6 +33,8 @@ struct TextLine {
 [[nodiscard]] std::vector<std::string_view> words(std::string_view line);
 /// Without blanks at either end.
 [[nodiscard]] std::string_view trimmed(std::string_view text);
+/// With "_" for every byte that is no part of UTF-8: what JSON can hold and read back.
+[[nodiscard]] std::string as_utf8(std::string_view text);
 /// A word or line cut and cleaned so that it can stand in a message, in quotes.
 [[nodiscard]] std::string in_quotes(std::string_view text);
 

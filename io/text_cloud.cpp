@@ -36,6 +36,16 @@ std::vector<std::string> usual_names(std::size_t columns) {
     return names;
 }
 
+/// PTX has an intensity and may have colours; what comes behind them is not PTX's own (our AO, for one).
+std::vector<std::string> ptx_names(std::size_t columns) {
+    std::vector<std::string> names{"x", "y", "z", "intensity"};
+    if (columns >= 7)
+        names.insert(names.end(), {"red", "green", "blue"});
+    while (names.size() < columns)
+        names.push_back(fmt::format("column_{}", names.size() + 1));
+    return names;
+}
+
 std::vector<CloudField> fields_named(const std::vector<std::string>& names) {
     std::vector<CloudField> fields;
     for (const std::string& name : names) {
@@ -66,6 +76,12 @@ bool all_numbers(const std::vector<std::string_view>& words) {
     return std::all_of(words.begin(), words.end(), [](std::string_view word) { return number(word).has_value(); });
 }
 
+void check_point_count(std::uint64_t count, const fs::path& file) {
+    constexpr std::uint64_t most_points = 0x7fffffff; // points are numbered with 32 bits
+    if (count > most_points)
+        throw Error(fmt::format("{}: {} points, at most {} are read", file.string(), count, most_points));
+}
+
 /// The lines of `body` as records of equally many words.
 void read_lines(CloudRecords& records, std::string_view body, int first_line, const fs::path& file) {
     TextRecords lines(body, first_line);
@@ -81,6 +97,7 @@ void read_lines(CloudRecords& records, std::string_view body, int first_line, co
         records.ends.push_back(lines.end());
     }
     records.point_count = records.ends.size();
+    check_point_count(records.point_count, file);
     const std::size_t used = records.ends.empty() ? 0 : records.ends.back();
     records.points = body.substr(0, used);
     records.after = body.substr(used);
@@ -141,17 +158,22 @@ CloudRecords read_ptx(std::string_view bytes, const fs::path& file) {
     records.header = bytes.substr(0, length);
     const std::uint64_t expected = sizes[0] * sizes[1];
     TextRecords peek(bytes.substr(length), 11);
-    for (std::uint64_t i = 0; i <= expected && peek.next(); ++i)
+    std::size_t columns = 0;
+    for (std::uint64_t i = 0; i <= expected && peek.next(); ++i) {
         if (i == expected)
             throw Error(
                 fmt::format("{}: a second scan begins; files of one scan are read", at_line(file, peek.line())));
+        if (i == 0)
+            columns = peek.words().size();
+    }
+    if (columns < 4)
+        throw Error(fmt::format("{}: {} a point, expected x y z intensity [red green blue]", at_line(file, 11),
+                                counted(columns, "value")));
+    records.fields = fields_named(ptx_names(columns));
     read_lines(records, bytes.substr(length), 11, file);
     if (records.point_count != expected)
         throw Error(fmt::format("{}: {} columns of {} rows are {} points, the file holds {}", file.string(), sizes[0],
                                 sizes[1], expected, records.point_count));
-    if (records.fields.size() != 4 && records.fields.size() != 7)
-        throw Error(fmt::format("{}: {} a point, expected x y z intensity [red green blue]", at_line(file, 11),
-                                counted(records.fields.size(), "value")));
     records.grid = {static_cast<int>(sizes[1]), static_cast<int>(sizes[0])};
     records.placed.resize(records.point_count);
     for (std::size_t i = 0; i < records.point_count; ++i) {
@@ -221,6 +243,7 @@ CloudRecords read_kitti(std::string_view bytes, const fs::path& file) {
     if (bytes.size() % stride != 0)
         throw Error(fmt::format("{}: {} bytes are not whole points of {} (x y z reflectance as floats)", file.string(),
                                 bytes.size(), stride));
+    check_point_count(bytes.size() / stride, file);
     CloudRecords records;
     records.format = CloudRecords::Format::ply;
     records.encoding = CloudRecords::Encoding::binary;

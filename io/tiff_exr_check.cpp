@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstring>
 #include <fmt/format.h>
+#include <numeric>
 #include <optional>
 #include <vector>
 
@@ -79,6 +80,23 @@ void check_pieces(const TiffReader& tiff, const std::vector<std::uint64_t>& offs
                                           tiff.bytes.size(), i + 1, offsets[i], offsets[i] + counts[i]));
 }
 
+/// How many bytes one coded byte can become; none where nothing is known of the compression.
+std::optional<std::uint64_t> tiff_expansion(std::uint64_t compression) {
+    switch (compression) {
+    case 1:
+        return 1; // none
+    case 5:
+        return 4096; // LZW: a code of 12 bits stands for fewer bytes than there are codes
+    case 8:
+    case 32946:
+        return 1032; // deflate
+    case 32773:
+        return 128; // PackBits
+    default:
+        return std::nullopt;
+    }
+}
+
 // --- EXR ---
 
 std::uint32_t little_endian_32(std::string_view bytes, std::size_t at) {
@@ -136,7 +154,11 @@ ImageFacts tiff_facts(std::string_view bytes, const std::filesystem::path& file)
     facts.bits = static_cast<int>(std::min<std::uint64_t>(one(258, 1), 255));
     facts.floats = one(339, 1) == 3;
     const bool tiled = !values(tiff, entries, 324).empty();
-    check_pieces(tiff, values(tiff, entries, tiled ? 324 : 273), values(tiff, entries, tiled ? 325 : 279));
+    const auto lengths = values(tiff, entries, tiled ? 325 : 279);
+    check_pieces(tiff, values(tiff, entries, tiled ? 324 : 273), lengths);
+    if (const auto most = tiff_expansion(one(259, 1)))
+        check_expansion(std::accumulate(lengths.begin(), lengths.end(), std::uint64_t(0)), *most, facts, facts.channels,
+                        file);
     return facts;
 }
 

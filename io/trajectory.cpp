@@ -93,7 +93,7 @@ std::string read_row(const TextLine& line, Eigen::Matrix4d& matrix, int row) {
 } // namespace
 
 std::vector<StampedPose> read_tum_trajectory(const fs::path& file, std::vector<std::string>& warnings) {
-    const std::string bytes = read_bytes(file);
+    const std::string bytes = read_list_file(file);
     std::vector<StampedPose> poses;
     RepeatedWarning left_out(warnings), mended(warnings);
     bool first = true;
@@ -129,7 +129,7 @@ std::vector<StampedPose> read_tum_trajectory(const fs::path& file, std::vector<s
 }
 
 std::map<std::size_t, Eigen::Isometry3d> read_pose_rows(const fs::path& file, std::vector<std::string>& warnings) {
-    const std::string bytes = read_bytes(file);
+    const std::string bytes = read_list_file(file);
     std::map<std::size_t, Eigen::Isometry3d> poses;
     RepeatedWarning left_out(warnings), mended(warnings);
     std::size_t number_of_row = 0;
@@ -154,7 +154,7 @@ std::map<std::size_t, Eigen::Isometry3d> read_pose_rows(const fs::path& file, st
 }
 
 std::map<std::size_t, Eigen::Isometry3d> read_redwood_log(const fs::path& file, std::vector<std::string>& warnings) {
-    const std::string bytes = read_bytes(file);
+    const std::string bytes = read_list_file(file);
     const auto lines = content_lines(bytes);
     std::map<std::size_t, Eigen::Isometry3d> poses;
     RepeatedWarning left_out(warnings);
@@ -187,7 +187,7 @@ std::map<std::size_t, Eigen::Isometry3d> read_redwood_log(const fs::path& file, 
 
 MatrixPose read_matrix_pose(const fs::path& file) {
     MatrixPose result;
-    const std::string bytes = read_bytes(file);
+    const std::string bytes = read_list_file(file);
     const auto lines = content_lines(bytes);
     Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
     if (lines.size() != 3 && lines.size() != 4) {

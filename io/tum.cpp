@@ -40,7 +40,7 @@ void sort_by_time(std::vector<ListedImage>& images, const fs::path& list, std::v
 
 /// "time file name" per line; what cannot be used is left out with a warning.
 std::vector<ListedImage> read_list(const fs::path& list, std::vector<std::string>& warnings) {
-    const std::string bytes = read_bytes(list);
+    const std::string bytes = read_list_file(list);
     std::vector<ListedImage> images;
     RepeatedWarning left_out(warnings);
     bool first = true;

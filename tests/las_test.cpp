@@ -155,6 +155,29 @@ TEST(Las, described_extra_bytes_keep_their_names) {
     EXPECT_EQ(get<std::uint32_t>(file_bytes(folder / "b.las"), 100), 2u); // one record describes both
 }
 
+TEST(Las, what_describes_nothing_does_not_hide_our_fields) {
+    // A description of no bytes, and one of more than a record holds: what comes behind them is not understood.
+    const TemporaryFolder folder;
+    std::string nothing(192, '\0'), sound(192, '\0'), too_long(192, '\0');
+    sound[2] = 9;
+    std::string("height").copy(sound.data() + 4, 6);
+    too_long[2] = 10;
+    for (const std::string& descriptions : {nothing, nothing + sound, sound + too_long, too_long})
+        for (const std::size_t extra : {4u, 300u}) {
+            SCOPED_TRACE(fmt::format("{} descriptions, {} bytes", descriptions.size() / 192, extra));
+            const Cloud cloud =
+                read(write_file(folder / "a.las", las(2, 0, extra, vlr("LASF_Spec", 4, descriptions), 2)));
+            EXPECT_EQ(cloud.records->field_named("height").has_value(), descriptions.starts_with(sound));
+            write_cloud(folder / "b.las", cloud, {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}});
+            const Cloud again = read(folder / "b.las");
+            for (std::size_t point = 0; point < 3; ++point) {
+                EXPECT_EQ(value(again, point, "ao_confidence"), confidence[point]);
+                EXPECT_EQ(again.records->record(point).substr(0, 20 + extra), cloud.records->record(point));
+            }
+            EXPECT_EQ(value(again, 1, "ambient_occlusion"), 0.5);
+        }
+}
+
 TEST(Las, units_are_told_not_guessed) {
     const TemporaryFolder folder;
     const auto unit = [&](const std::string& more) {
@@ -247,6 +270,11 @@ TEST(TextClouds, ptx_is_a_grid_placed_by_its_matrix) {
     const std::array values{0.5F, 0.5F, 0.5F, 0.25F};
     write_cloud(folder / "b.ptx", cloud, {{"ambient_occlusion", values}});
     EXPECT_EQ(file_bytes(folder / "b.ptx"), head + "1 0 0 0.5 0.5\n0 0 0 0.5 0.5\n0 1 0 0.5 0.5\n0 0 1 0.5 0.25\n");
+    const std::vector<float> twice{1, 2, 3, 4};
+    write_cloud(folder / "b.ptx", cloud, {{"ambient_occlusion", values}, {"ao_confidence", twice}});
+    const Cloud again = read(folder / "b.ptx");
+    EXPECT_EQ(again.points[0], cloud.points[0]);
+    EXPECT_TRUE(again.colours.empty()) << "six columns, but no colours";
     std::vector<std::string> warnings;
     EXPECT_TRUE(
         says(refusal([&] { (void)read_cloud(write_file(folder / "c.ptx", head + body + head + body), warnings); }),

@@ -436,6 +436,24 @@ TEST_F(ResumeTest, gnu_parallel_runs_the_shards) {
     EXPECT_EQ(count_in(job(), "{\"frame\":"), 18u);
 }
 
+TEST_F(ResumeTest, a_kubernetes_indexed_job_runs_the_shards) {
+    for (int i = 0; i < 6; ++i)
+        tests::write_capture(folder / fmt::format("data/many/{}", i), 3);
+    ASSERT_EQ(plan("--write ao").exit_code, 0);
+    setenv("JOB_COMPLETIONS", "3", 1);
+    std::vector<pid_t> pods;
+    for (const char* index : {"0", "1", "2"}) {
+        setenv("JOB_COMPLETION_INDEX", index, 1);
+        pods.push_back(start("run " + job().string()));
+    }
+    unsetenv("JOB_COMPLETION_INDEX");
+    unsetenv("JOB_COMPLETIONS");
+    for (const pid_t pod : pods)
+        EXPECT_EQ(wait_for(pod), 0);
+    EXPECT_EQ(run_program("status " + job().string()).exit_code, 0);
+    EXPECT_EQ(count_in(job(), "{\"frame\":"), 18u) << "each once";
+}
+
 TEST(CutTest, every_task_is_in_one_shard_and_the_slowest_is_near_the_mean) {
     std::mt19937 random(5);
     std::lognormal_distribution<double> size(3, 1);

@@ -1,0 +1,41 @@
+// Any cloud: read, asked for all it may hold, written with a field more and read again.
+#pragma once
+
+#include "io/cloud_file.h"
+#include "io/cloud_records.h"
+#include "tests/fuzz/fuzz.h"
+
+namespace scanshade::fuzz {
+
+inline void ask_for_all(const Cloud& cloud, const std::filesystem::path& file) {
+    must_hold(cloud.colours.empty() || cloud.colours.size() == cloud.points.size());
+    must_hold(static_cast<std::size_t>(cloud.grid.area()) == cloud.points.size());
+    for (const auto& corners : triangles_of(cloud))
+        for (const int corner : corners)
+            must_hold(corner >= -1 && corner < static_cast<int>(cloud.points.size()));
+    const auto normals = recorded_normals(cloud);
+    must_hold(normals.empty() || normals.size() == cloud.points.size());
+    (void)accepted([&] { (void)recorded_field(cloud, "ambient_occlusion", file); });
+    (void)accepted([&] { (void)recorded_field(cloud, "intensity", file); });
+    (void)describe(*cloud.records);
+}
+
+inline void take_cloud(std::string_view bytes, const std::string& name) {
+    const std::filesystem::path file = as_file(bytes, name);
+    std::vector<std::string> warnings;
+    Cloud cloud;
+    if (!accepted([&] { cloud = read_cloud(file, warnings); }))
+        return;
+    ask_for_all(cloud, file);
+    const std::vector<float> values(cloud.points.size(), 0.5F);
+    const std::filesystem::path more = folder() / ("more-" + name);
+    if (!accepted([&] { write_cloud(more, cloud, {{"ambient_occlusion", values}}, cloud.colours); }))
+        return;
+    const Cloud again = read_cloud(more, warnings);
+    must_hold(again.points.size() == cloud.points.size());
+    must_hold(again.grid == cloud.grid);
+    const bool text = cloud.records->format == CloudRecords::Format::text; // whose columns may have no names
+    must_hold(text || recorded_field(again, "ambient_occlusion", more).size() == values.size());
+}
+
+} // namespace scanshade::fuzz

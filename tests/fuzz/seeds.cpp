@@ -1,0 +1,189 @@
+// Small sound files of every format, for the fuzz targets to start from: fuzz_seeds FOLDER writes FOLDER/TARGET/NAME.
+#include "io/camera_file.h"
+#include "io/cloud_file.h"
+#include "io/image_file.h"
+#include "tests/fuzz/fuzz.h"
+
+#include <array>
+#include <cstring>
+#include <opencv2/imgcodecs.hpp>
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace scanshade;
+
+fs::path root;
+
+void seed(const std::string& target, const std::string& name, const std::string& bytes) {
+    fs::create_directories(root / target);
+    std::ofstream(root / target / name, std::ios::binary) << bytes;
+}
+
+template <class Number>
+std::string raw(Number value) {
+    std::string bytes(sizeof value, '\0');
+    std::memcpy(bytes.data(), &value, sizeof value);
+    return bytes;
+}
+
+void images() {
+    cv::Mat1w depth(4, 8, ushort(1500));
+    cv::randu(depth, 500, 4000);
+    cv::Mat1f metres;
+    depth.convertTo(metres, CV_32F, 1e-3);
+    for (const char* kind : {".png", ".pgm", ".tiff", ".exr", ".pfm", ".jpg", ".bmp", ".webp"}) {
+        const std::string name(kind);
+        const bool integers = name == ".png" || name == ".pgm",
+                   floats = name == ".tiff" || name == ".exr" || name == ".pfm";
+        const cv::Mat image = integers ? cv::Mat(depth)
+                              : floats ? cv::Mat(metres)
+                                       : cv::Mat(cv::Mat3b(8, 16, {9, 99, 199}));
+        std::vector<uchar> bytes;
+        cv::imencode(kind, image, bytes);
+        seed("image", "seed" + name, {bytes.begin(), bytes.end()});
+    }
+}
+
+void clouds() {
+    const std::vector<Eigen::Vector3d> points{{0, 0, 1}, {1, 0, 1}, {0, 1, 2}};
+    const std::vector<float> values{0.5F, 1, 0};
+    write_new_ply(root / "ply/new.ply", points, {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}}, {{"ambient_occlusion", values}});
+    const std::string vertex =
+        "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float nx\n"
+        "property float ny\nproperty float nz\nproperty list uchar int more\nproperty uchar red\n"
+        "property uchar green\nproperty uchar blue\n";
+    seed("ply", "ascii.ply",
+         "ply\nformat ascii 1.0\ncomment c\nobj_info num_cols 3\nobj_info num_rows 1\n" + vertex +
+             "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 1 0 0 1 2 5 6 1 2 3\n"
+             "1 0 1 0 0 1 0 1 2 3\nnan 0 1 0 0 1 1 7 1 2 3\n3 0 1 2\n");
+    const std::string fields = "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z rgb normal_x\nSIZE 4 4 4 4 8\nTYPE F F F F F\n"
+                               "COUNT 1 1 1 1 1\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 0 0 1 1 0 0 0\nPOINTS 2\nDATA ";
+    seed("pcd", "ascii.pcd", fields + "ascii\n1 2 3 4.2e6 0.5\nnan nan nan 0 nan\n");
+    std::string body;
+    for (int i = 0; i < 2; ++i)
+        body += raw(1.0F) + raw(2.0F) + raw(3.0F) + raw(0x00ffeeddU) + raw(0.5);
+    seed("pcd", "binary.pcd", fields + "binary\n" + body);
+    const std::string packed = '\x1f' + body.substr(0, 32) + '\x0f' + body.substr(32); // LZF's literal runs
+    seed("pcd", "compressed.pcd",
+         fields + "binary_compressed\n" + raw(static_cast<std::uint32_t>(packed.size())) +
+             raw(static_cast<std::uint32_t>(body.size())) + packed);
+    seed("text_cloud", "xyz", std::string(1, '\0') + "//X Y Z R G B\n1 2 3 4 5 6\n1 2 4 5 6 7\n");
+    seed("text_cloud", "pts",
+         "\x01"
+         "2\n1 2 3 -5 1 2 3\n1 2 4 6 1 2 3\n");
+    seed("text_cloud", "ptx",
+         "\x02"
+         "2\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n5 6 7 1\n1 2 3 0.5\n0 0 0 0.5\n");
+    seed("text_cloud", "bin", "\x03" + raw(1.0F) + raw(2.0F) + raw(3.0F) + raw(0.5F));
+}
+
+/// LAS 1.2, point format 2, with a record that describes extra bytes.
+void las() {
+    std::string header(227, '\0'), record(54, '\0'), descriptor(192, '\0');
+    const auto put = [](std::string& bytes, std::size_t at, const std::string& value) {
+        bytes.replace(at, value.size(), value);
+    };
+    put(record, 2, "LASF_Spec");
+    put(record, 18, raw(std::uint16_t(4)) + raw(std::uint16_t(192)));
+    put(descriptor, 2, "\x09");
+    put(descriptor, 4, "height");
+    put(header, 0, "LASF");
+    put(header, 24, "\x01\x02");
+    put(header, 94,
+        raw(std::uint16_t(227)) + raw(std::uint32_t(227 + 54 + 192)) + raw(std::uint32_t(1)) + "\x02" +
+            raw(std::uint16_t(30)) + raw(std::uint32_t(2)));
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        put(header, 131 + 8 * axis, raw(0.01));
+        put(header, 155 + 8 * axis, raw(1000.0));
+    }
+    std::string points;
+    for (int i = 0; i < 2; ++i)
+        points += raw(100 + i) + raw(200) + raw(300) + std::string(14, '\x07') + raw(1.5F);
+    seed("las", "seed.las", header + record + descriptor + points);
+}
+
+void cameras() {
+    CameraFile camera;
+    camera.camera = {{525, 526, 319.5, 239.5, {640, 480}}, {0.1, -0.2, 0.001, 0.002, 0}, {}};
+    for (const std::string& name : camera_format_names()) {
+        CameraFile each = camera;
+        if (name == "open3d")
+            each.camera.distortion = {};
+        const fs::path file = root / "camera" / ("seed." + name);
+        write_camera_file(file, each, camera_format(file, name));
+    }
+    camera.colour = ColourCamera{camera.camera, Eigen::Isometry3d::Identity()};
+    write_camera_file(root / "camera/beside.json", camera, CameraFormat::scanshade);
+    write_camera_file(root / "camera/beside.yaml", camera, CameraFormat::kalibr);
+    seed("camera", "matrix.txt", "585 0 320\n0 585 240\n0 0 1\n");
+    seed("camera", "info.txt",
+         "m_depthWidth = 640\nm_depthHeight = 480\nm_depthShift = 1000\n"
+         "m_calibrationDepthIntrinsic = 583 0 320 0 0 583 240 0 0 0 1 0 0 0 0 1\n");
+}
+
+void texts() {
+    const std::string matrix = "1 0 0 0.5\n0 1 0 0\n0 0 1 2\n0 0 0 1\n",
+                      camera = R"({"fx":2,"fy":2,"cx":0.5,"cy":0.5,"width":2,"height":2})";
+    seed("trajectory", "tum", std::string(1, '\0') + "# t\n1.5 0 0 1 0 0 0 1\n1.6 0 0 1 0 0 0.7 0.7\n");
+    seed("trajectory", "rows",
+         "\x01"
+         "0 0 1 0 0 0 1\n0 0 2 0 0 1 0\n");
+    seed("trajectory", "log",
+         "\x02"
+         "0 0 1\n" +
+             matrix + "1 1 2\n" + matrix);
+    seed("trajectory", "matrix", "\x03" + matrix);
+    seed("lists", "tum",
+         std::string(1, '\0') +
+             "# depth\n1.0 depth/1.pgm\n2.0 depth/2.pgm\n3 ../outside.pgm\n=====\n1.01 color/1.pgm\n"
+             "2.01 color/2.pgm\n=====\n0.9 0 0 1 0 0 0 1\n2.1 0 0 2 0 0 0 1\n=====\n" +
+             camera);
+    seed("lists", "redwood",
+         "\x01"
+         "depth/1.pgm color/1.pgm\ncolor/2.pgm depth/2.pgm\n=====\n0 0 1\n" +
+             matrix + "1 1 2\n" + matrix + "=====\n" + camera);
+    seed("lists", "slam",
+         "\x02"
+         "0 0 1 0 0 0 1\n0 0 2 0 0 1 0\n=====\n2 0 0.5\n0 2 0.5\n0 0 1\n");
+    seed(
+        "job", "journal",
+        std::string(1, '\0') +
+            R"({"process":{"host":"h","pid":1,"device":"d","started":"2026-01-01T00:00:00Z","version":"0.1.0"}})"
+            "\n"
+            R"({"frame":{"index":0,"name":"000","status":"ok","why":"","fault":"none","size":[64,48],"valid":0.9,"coverage":1.0,"visibility":0.8,"camera":)" +
+            camera.substr(0, camera.size() - 1) +
+            R"(,"origin":"o"},"warnings":["w"],"ms":{"load":1.0,"project":0.1,"compute":2.0,"attach":0.1,"write":null},)"
+            R"("passes":[["p",0.5]],"files":["ao/000.png"]},"settings":"s","stamp":"1","input":"2","sizes":[10]})"
+            "\n"
+            R"({"again":["001"]})"
+            "\n"
+            R"({"begun":"002"})"
+            "\n"
+            R"({"complete":"k"})"
+            "\n");
+    seed("job", "plan",
+         "\x01"
+         R"({"program":"scanshade","version":"0.1.0","settings":{"radius":"0.4"},"tasks":1,"cost":1.0,"refused":["a"]})"
+         "\n=====\n"
+         R"({"capture":"/data/a","name":"a/b","first":0,"frames":2,"of":4,"cost":1.5})"
+         "\n");
+    seed("job", "settings",
+         "\x02"
+         R"({"settings":{"method":{"method":"cacao"},"method cacao":{"cacao.radius":0.3,"x":true,"y":"z"}}})"
+         "\n");
+}
+
+} // namespace
+
+int main(int count, char** words) {
+    if (count != 2)
+        return 1;
+    root = words[1];
+    images();
+    clouds();
+    las();
+    cameras();
+    texts();
+    return 0;
+}
