@@ -87,6 +87,23 @@ TEST_F(MeasureTest, truth_is_found_from_the_run_or_in_the_capture) {
     EXPECT_NEAR(read(folder / "out/compare.json")["total"]["rms"].get<double>(), total(images, {}).rms, 1e-6);
 }
 
+TEST_F(MeasureTest, errors_by_confidence_share_out_all_pixels) {
+    ASSERT_EQ(run_program(fmt::format("compare {} --truth -o {}", made(), out())).exit_code, 0);
+    const json report = read(folder / "out/compare.json");
+    double pixels = 0, squares = 0, all = 0, all_squares = 0;
+    for (const json& part : report["by_confidence"]) {
+        pixels += part["pixels"].get<double>();
+        squares += part["pixels"].get<double>() * std::pow(part["rms"].get<double>(), 2);
+    }
+    for (const json& image : report["images"]) {
+        const double n = image["difference"]["pixels"].get<double>();
+        all += n, all_squares += n * std::pow(image["difference"]["rms"].get<double>(), 2);
+    }
+    EXPECT_GT(report["by_confidence"].size(), 1u);
+    EXPECT_EQ(pixels, all);
+    EXPECT_NEAR(squares, all_squares, 1e-4 * all_squares);
+}
+
 TEST_F(MeasureTest, maps_of_another_radius_are_told) {
     ASSERT_EQ(run_program(fmt::format("run {} -o {} --write ao --radius 0.2", capture(), out())).exit_code, 0);
     EXPECT_TRUE(says(run_program(fmt::format("compare {} --truth", out())).err, "radius of 0.2 m, B with 0.5 m"));
