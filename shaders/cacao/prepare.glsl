@@ -55,8 +55,15 @@ vec2 ray_of(ivec2 p0, ivec2 step) {
     return k.view_mul * ((vec2(p0) + 0.5) * k.image_inv + vec2(step) * float(spacing) * k.image_inv) + k.view_add;
 }
 
-// Normal of one pixel from its depth c and the depths left, right, above and below; w are their inverses.
-vec3 derived(float c, vec4 around, float wc, vec4 w, vec3 ray_x, vec3 ray_y) {
+// Normal of one pixel from its depth c and the depths left, right, above and below; w are their inverses. Scan: across holes of
+// one pixel the line of 1/z to what lies `beyond` them goes on, straight on any plane.
+vec3 derived(float c, vec4 around, float wc, vec4 w, vec4 beyond, vec3 ray_x, vec3 ray_y) {
+    if (scan != 0) {
+        vec4 line = 0.5 * (wc + beyond);
+        bvec4 bridged = lessThan(w, vec4(lessThan(vec4(0.0), beyond)) * 1e-30);
+        w = mix(w, line, bridged);
+        around = mix(around, 1.0 / line, bridged);
+    }
     vec4 edges = scan != 0 ? edges_from_inverse(wc, w) : edges_from_depth(c, around);
     return normal_from_neighbours(edges, vec3(ray_x.y, ray_y.y, 1.0) * c, vec3(ray_x.x, ray_y.y, 1.0) * around.x,
                                   vec3(ray_x.z, ray_y.y, 1.0) * around.y, vec3(ray_x.y, ray_y.x, 1.0) * around.z,
@@ -94,15 +101,22 @@ vec4 prepared(ivec2 t) {
     float c0 = neighbour(p0 + spacing * ivec2(-1, 1)), c1 = neighbour(p0 + spacing * ivec2(0, 1)),
           c2 = neighbour(p0 + spacing * ivec2(1, 1)), c3 = neighbour(p0 + spacing * ivec2(2, 1));
     float d1 = neighbour(p0 + spacing * ivec2(0, 2)), d2 = neighbour(p0 + spacing * ivec2(1, 2));
+    vec4 beyond_x = vec4(0.0), beyond_y = vec4(0.0); // 1/z at columns -2 and 3 of both rows, at rows -2 and 3 of both columns
+    if (scan != 0 && supplied == 0) {
+        beyond_x = inverse_or_hole(vec4(neighbour(p0 + spacing * ivec2(-2, 0)), neighbour(p0 + spacing * ivec2(3, 0)),
+                                        neighbour(p0 + spacing * ivec2(-2, 1)), neighbour(p0 + spacing * ivec2(3, 1))));
+        beyond_y = inverse_or_hole(vec4(neighbour(p0 + spacing * ivec2(0, -2)), neighbour(p0 + spacing * ivec2(0, 3)),
+                                        neighbour(p0 + spacing * ivec2(1, -2)), neighbour(p0 + spacing * ivec2(1, 3))));
+    }
 
     vec2 r0 = ray_of(p0, ivec2(-1)), r1 = ray_of(p0, ivec2(0)), r2 = ray_of(p0, ivec2(1)), r3 = ray_of(p0, ivec2(2));
     vec3 x0 = vec3(r0.x, r1.x, r2.x), x1 = vec3(r1.x, r2.x, r3.x), y0 = vec3(r0.y, r1.y, r2.y), y1 = vec3(r1.y, r2.y, r3.y);
     vec4 wad = inverse_or_hole(vec4(a1, a2, d1, d2));
     vec4 wb = inverse_or_hole(vec4(b0, b1, b2, b3)), wc = inverse_or_hole(vec4(c0, c1, c2, c3));
-    vec3 n0 = derived(b1, vec4(b0, b2, a1, c1), wb.y, vec4(wb.x, wb.z, wad.x, wc.y), x0, y0);
-    vec3 n1 = derived(b2, vec4(b1, b3, a2, c2), wb.z, vec4(wb.y, wb.w, wad.y, wc.z), x1, y0);
-    vec3 n2 = derived(c1, vec4(c0, c2, b1, d1), wc.y, vec4(wc.x, wc.z, wb.y, wad.z), x0, y1);
-    vec3 n3 = derived(c2, vec4(c1, c3, b2, d2), wc.z, vec4(wc.y, wc.w, wb.z, wad.w), x1, y1);
+    vec3 n0 = derived(b1, vec4(b0, b2, a1, c1), wb.y, vec4(wb.x, wb.z, wad.x, wc.y), vec4(beyond_x.x, wb.w, beyond_y.x, wad.z), x0, y0);
+    vec3 n1 = derived(b2, vec4(b1, b3, a2, c2), wb.z, vec4(wb.y, wb.w, wad.y, wc.z), vec4(wb.x, beyond_x.y, beyond_y.z, wad.w), x1, y0);
+    vec3 n2 = derived(c1, vec4(c0, c2, b1, d1), wc.y, vec4(wc.x, wc.z, wb.y, wad.z), vec4(beyond_x.z, wc.w, wad.x, beyond_y.y), x0, y1);
+    vec3 n3 = derived(c2, vec4(c1, c3, b2, d2), wc.z, vec4(wc.y, wc.w, wb.z, wad.w), vec4(wc.x, beyond_x.w, wad.y, beyond_y.w), x1, y1);
     put(0, t, p0, b1, completed(n0, b1, vec3(b2, c1, c2), n1, n2, n3));
     put(1, t, p0, b2, completed(n1, b2, vec3(b1, c1, c2), n0, n2, n3));
     put(2, t, p0, c1, completed(n2, c1, vec3(b1, b2, c2), n0, n1, n3));
