@@ -35,12 +35,14 @@ float neighbour(ivec2 p) {
     return spacing == 1 || inside(p) ? z : k.outside_depth;
 }
 
+// Scan: zero where none was given.
 vec3 supplied_normal(ivec2 p) {
     ivec2 q = clamp(p, ivec2(0), k.image - 1);
     int at = 3 * (q.y * k.image.x + q.x);
     vec3 given = vec3(imageLoad(normals_in, at).x, imageLoad(normals_in, at + 1).x, imageLoad(normals_in, at + 2).x);
     vec3 n = (inside(p) ? given : vec3(0.0)) * k.normals_mul + k.normals_add;
-    return n * vec3(1.0, -1.0, 1.0); // camera space has y down, this room y up
+    n *= vec3(1.0, -1.0, 1.0); // camera space has y down, this room y up
+    return scan == 0 || dot(n, n) < 1e6 ? n : vec3(0.0); // false for NaN
 }
 
 // What the slice holds. AMD's LOWEST loads zero outside the image, the others replicate.
@@ -55,12 +57,13 @@ vec2 ray_of(ivec2 p0, ivec2 step) {
     return k.view_mul * ((vec2(p0) + 0.5) * k.image_inv + vec2(step) * float(spacing) * k.image_inv) + k.view_add;
 }
 
-// Normal of one pixel from its depth c and the depths left, right, above and below; w are their inverses. Scan: across holes of
+// Normal of pixel p from its depth c and the depths left, right, above and below; w are their inverses. Scan: across holes of
 // one pixel the line of 1/z to what lies `beyond` them goes on, straight on any plane.
-vec3 derived(float c, vec4 around, float wc, vec4 w, vec4 beyond, vec3 ray_x, vec3 ray_y) {
+vec3 normal_of(ivec2 p, float c, vec4 around, float wc, vec4 w, vec4 beyond, vec3 ray_x, vec3 ray_y) {
+    if (supplied != 0) return supplied_normal(p);
     if (scan != 0) {
         vec4 line = 0.5 * (wc + beyond);
-        bvec4 bridged = lessThan(w, vec4(lessThan(vec4(0.0), beyond)) * 1e-30);
+        bvec4 bridged = lessThan(w, vec4(greaterThan(beyond, vec4(0.0))) * 1e-30);
         w = mix(w, line, bridged);
         around = mix(around, 1.0 / line, bridged);
     }
@@ -68,6 +71,15 @@ vec3 derived(float c, vec4 around, float wc, vec4 w, vec4 beyond, vec3 ray_x, ve
     return normal_from_neighbours(edges, vec3(ray_x.y, ray_y.y, 1.0) * c, vec3(ray_x.x, ray_y.y, 1.0) * around.x,
                                   vec3(ray_x.z, ray_y.y, 1.0) * around.y, vec3(ray_x.y, ray_y.x, 1.0) * around.z,
                                   vec3(ray_x.y, ray_y.z, 1.0) * around.w);
+}
+
+// Scan: a hole of one pixel between two of the same surface, as its neighbours need it: they find what occludes them, and what to
+// blur with. It gets no visibility itself.
+float filled(float z, vec4 w) {
+    vec2 sum = vec2(w.x + w.y, w.z + w.w);
+    vec2 same = vec2(lessThan(abs(w.xz - w.yw), 0.025 * sum)); // no other hole is
+    float count = same.x + same.y;
+    return scan != 0 && !(z > 0.0) && count > 0.0 ? 2.0 * count / dot(same, sum) : z;
 }
 
 // Scan: where holes leave a pixel no whole quadrant, the other three pixels lend theirs if they lie as deep.
@@ -82,45 +94,55 @@ void store_depth(int slice, ivec2 t, float z) { imageStore(depths[0], ivec3(t, s
 void store_depth(int slice, ivec2 t, float z) { imageStore(depths, depth_index(slice, 0, t), vec4(whole(z))); }
 #endif
 
-void put(int slice, ivec2 t, ivec2 p0, float c, vec3 n) {
-    ivec2 p = p0 + spacing * ivec2(slice & 1, slice >> 1);
+// `seen` is the recorded depth, c the filled one: without a normal it would only brighten.
+void put(int slice, ivec2 t, ivec2 p, float seen, float c, vec3 n) {
     bool used = two_slices == 0 || slice == 0 || slice == 3;
+    if (scan != 0) {
+        c = dot(n, n) > 1e-8 ? c : seen;
+        n = unit(n);
+    } else if (supplied == 0) {
+        n = unit(n);
+    }
     if (used) store_depth(slice, t, stored_depth(p, c));
     if (used || scan == 0) // AMD's LOWEST writes all four normals
-        imageStore(normals, slice_index(slice, t), uvec4(whole(pack_normal(supplied != 0 ? supplied_normal(p) : unit(n)))));
+        imageStore(normals, slice_index(slice, t), uvec4(whole(pack_normal(n))));
 }
 
 // The four pixels of slice texel t; returns their depths.
 vec4 prepared(ivec2 t) {
-    ivec2 p0 = 2 * spacing * t;
+    ivec2 p0 = 2 * spacing * t, p1 = p0 + spacing * ivec2(1, 0), p2 = p0 + spacing * ivec2(0, 1), p3 = p0 + spacing * ivec2(1, 1);
 
-    // Rows and columns -1 .. 2 around the four pixels; the corners are not needed.
+    // Rows and columns -1 .. 2 around the four pixels; the corners are not needed. Beyond them, where holes are bridged, -2 and 3.
     float a1 = neighbour(p0 + spacing * ivec2(0, -1)), a2 = neighbour(p0 + spacing * ivec2(1, -1));
     float b0 = neighbour(p0 + spacing * ivec2(-1, 0)), b1 = neighbour(p0), b2 = neighbour(p0 + spacing * ivec2(1, 0)),
           b3 = neighbour(p0 + spacing * ivec2(2, 0));
     float c0 = neighbour(p0 + spacing * ivec2(-1, 1)), c1 = neighbour(p0 + spacing * ivec2(0, 1)),
           c2 = neighbour(p0 + spacing * ivec2(1, 1)), c3 = neighbour(p0 + spacing * ivec2(2, 1));
     float d1 = neighbour(p0 + spacing * ivec2(0, 2)), d2 = neighbour(p0 + spacing * ivec2(1, 2));
-    vec4 beyond_x = vec4(0.0), beyond_y = vec4(0.0); // 1/z at columns -2 and 3 of both rows, at rows -2 and 3 of both columns
+    vec4 beyond_x = vec4(0.0), beyond_y = vec4(0.0); // 1/z, left and right of either row, above and below either column
     if (scan != 0 && supplied == 0) {
-        beyond_x = inverse_or_hole(vec4(neighbour(p0 + spacing * ivec2(-2, 0)), neighbour(p0 + spacing * ivec2(3, 0)),
-                                        neighbour(p0 + spacing * ivec2(-2, 1)), neighbour(p0 + spacing * ivec2(3, 1))));
-        beyond_y = inverse_or_hole(vec4(neighbour(p0 + spacing * ivec2(0, -2)), neighbour(p0 + spacing * ivec2(0, 3)),
-                                        neighbour(p0 + spacing * ivec2(1, -2)), neighbour(p0 + spacing * ivec2(1, 3))));
+        beyond_x = inverse_or_hole(vec4(neighbour(p0 - spacing * ivec2(2, 0)), neighbour(p0 + spacing * ivec2(3, 0)),
+                                        neighbour(p2 - spacing * ivec2(2, 0)), neighbour(p0 + spacing * ivec2(3, 1))));
+        beyond_y = inverse_or_hole(vec4(neighbour(p0 - spacing * ivec2(0, 2)), neighbour(p0 + spacing * ivec2(0, 3)),
+                                        neighbour(p1 - spacing * ivec2(0, 2)), neighbour(p0 + spacing * ivec2(1, 3))));
     }
 
     vec2 r0 = ray_of(p0, ivec2(-1)), r1 = ray_of(p0, ivec2(0)), r2 = ray_of(p0, ivec2(1)), r3 = ray_of(p0, ivec2(2));
     vec3 x0 = vec3(r0.x, r1.x, r2.x), x1 = vec3(r1.x, r2.x, r3.x), y0 = vec3(r0.y, r1.y, r2.y), y1 = vec3(r1.y, r2.y, r3.y);
     vec4 wad = inverse_or_hole(vec4(a1, a2, d1, d2));
     vec4 wb = inverse_or_hole(vec4(b0, b1, b2, b3)), wc = inverse_or_hole(vec4(c0, c1, c2, c3));
-    vec3 n0 = derived(b1, vec4(b0, b2, a1, c1), wb.y, vec4(wb.x, wb.z, wad.x, wc.y), vec4(beyond_x.x, wb.w, beyond_y.x, wad.z), x0, y0);
-    vec3 n1 = derived(b2, vec4(b1, b3, a2, c2), wb.z, vec4(wb.y, wb.w, wad.y, wc.z), vec4(wb.x, beyond_x.y, beyond_y.z, wad.w), x1, y0);
-    vec3 n2 = derived(c1, vec4(c0, c2, b1, d1), wc.y, vec4(wc.x, wc.z, wb.y, wad.z), vec4(beyond_x.z, wc.w, wad.x, beyond_y.y), x0, y1);
-    vec3 n3 = derived(c2, vec4(c1, c3, b2, d2), wc.z, vec4(wc.y, wc.w, wb.z, wad.w), vec4(wc.x, beyond_x.w, wad.y, beyond_y.w), x1, y1);
-    put(0, t, p0, b1, completed(n0, b1, vec3(b2, c1, c2), n1, n2, n3));
-    put(1, t, p0, b2, completed(n1, b2, vec3(b1, c1, c2), n0, n2, n3));
-    put(2, t, p0, c1, completed(n2, c1, vec3(b1, b2, c2), n0, n1, n3));
-    put(3, t, p0, c2, completed(n3, c2, vec3(b1, b2, c1), n0, n1, n2));
+    vec4 w0 = vec4(wb.x, wb.z, wad.x, wc.y), w1 = vec4(wb.y, wb.w, wad.y, wc.z); // left, right, above, below
+    vec4 w2 = vec4(wc.x, wc.z, wb.y, wad.z), w3 = vec4(wc.y, wc.w, wb.z, wad.w);
+    float z0 = filled(b1, w0), z1 = filled(b2, w1), z2 = filled(c1, w2), z3 = filled(c2, w3);
+    vec4 w = scan != 0 ? inverse_or_hole(vec4(z0, z1, z2, z3)) : vec4(0.0);
+    vec3 n0 = normal_of(p0, z0, vec4(b0, b2, a1, c1), w.x, w0, vec4(beyond_x.x, wb.w, beyond_y.x, wad.z), x0, y0);
+    vec3 n1 = normal_of(p1, z1, vec4(b1, b3, a2, c2), w.y, w1, vec4(wb.x, beyond_x.y, beyond_y.z, wad.w), x1, y0);
+    vec3 n2 = normal_of(p2, z2, vec4(c0, c2, b1, d1), w.z, w2, vec4(beyond_x.z, wc.w, wad.x, beyond_y.y), x0, y1);
+    vec3 n3 = normal_of(p3, z3, vec4(c1, c3, b2, d2), w.w, w3, vec4(wc.x, beyond_x.w, wad.y, beyond_y.w), x1, y1);
+    put(0, t, p0, b1, z0, completed(n0, z0, vec3(z1, z2, z3), n1, n2, n3));
+    put(1, t, p1, b2, z1, completed(n1, z1, vec3(z0, z2, z3), n0, n2, n3));
+    put(2, t, p2, c1, z2, completed(n2, z2, vec3(z0, z1, z3), n0, n1, n3));
+    put(3, t, p3, c2, z3, completed(n3, z3, vec3(z0, z1, z2), n0, n1, n2));
     return vec4(b1, b2, c1, c2);
 }
 

@@ -1,13 +1,16 @@
 // hard_cases: every method over what recorded depth has that rendered depth has not.
-//   hard_cases [--methods cacao,surfel] [--only TEXT] [--cases] [--device NAME]
+//   hard_cases [--methods cacao,surfel] [--only TEXT] [--cases] [--write FOLDER] [--device NAME]
 // Prints a table per method: difference to the expected answer, worst pixel, pixels that are NaN without reason or outside
-// 0 .. 1, cases whose second run gave other bytes. Exit 0 all gates kept, 1 some missed.
+// 0 .. 1, cases whose second run gave other bytes. --write draws each case: depth, what was expected, what came out, their
+// difference. Exit 0 all gates kept, 1 some missed.
 #include "tests/hard_cases/cases.h"
 
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/gpu/device.h"
 #include "ao/method.h"
 #include "apps/configurations.h"
+#include "apps/picture.h"
+#include "io/image_file.h"
 #include "projection/error.h"
 
 #include <CLI/CLI.hpp>
@@ -96,16 +99,26 @@ std::string missed(const Gate& gate, const Score& score, bool expects) {
     return why;
 }
 
+void draw(const std::filesystem::path& file, const Case& one, const cv::Mat1f& expected, const cv::Mat1f& found) {
+    std::vector<Tile> tiles{{"depth", depth_picture(one.depth.z_m)}, {"found", visibility_picture(found)}};
+    if (!expected.empty()) {
+        tiles.push_back({"expected", visibility_picture(expected)});
+        tiles.push_back({"found - expected, blue -0.3 .. red +0.3", difference_picture(cv::Mat1f(found - expected), 0.3)});
+    }
+    write_picture(file, panel(tiles));
+}
+
 } // namespace
 
 int main(int argc, char** argv) {
     std::vector<std::string> names{"cacao", "surfel"};
-    std::string only, device_name;
+    std::string only, device_name, folder;
     bool each = false;
     CLI::App app{"Every method over the hard cases"};
     app.add_option("--methods", names, "which methods")->delimiter(',');
     app.add_option("--only", only, "families whose name holds this");
     app.add_flag("--cases", each, "a line for each case, too");
+    app.add_option("--write", folder, "draw every case into this folder");
     app.add_option("--device", device_name, "index or part of the name of a Vulkan device");
     CLI11_PARSE(app, argc, argv);
     try {
@@ -123,6 +136,8 @@ int main(int argc, char** argv) {
                 const auto count = [&](const Case& one, const cv::Mat1f& expected) {
                     const cv::Mat1f found = subject.visibility(one);
                     const Score score = judge(one, found, subject.visibility(one), expected);
+                    if (!folder.empty())
+                        draw(std::filesystem::path(folder) / fmt::format("{}, {}, {}.png", name, family.name, one.name), one, expected, found);
                     const std::string why = missed(family.gate, score, !expected.empty());
                     if (each)
                         fmt::print("  {}: {}: rmse {:.4f} worst {:.3f} mean {:.3f} least {:.3f}{}\n", family.name, one.name, score.rmse(),
