@@ -834,7 +834,8 @@ TEST_F(cacao_formulas, mips_are_means_of_the_nearest_surface) {
 TEST_F(cacao_formulas, normals_are_those_of_the_four_quadrants) {
     // Every derived normal of a scene with holes, from depth, up to one step of its storage. The reference replicates
     // depth at the rim and knows no holes (it is given none); scan takes a hole of one pixel to lie on the line of 1/z
-    // to what is beyond it, and has no normal where no quadrant is whole.
+    // to what is beyond it, within the block of 2x2 and the pixels around it, and has no normal where no quadrant is
+    // whole.
     const DepthImage whole = ball_on_floor(camera_of(125)), punched = with_holes(whole, 0.2);
     for (const bool scan : {true, false}) {
         const DepthImage& depth = scan ? punched : whole;
@@ -858,7 +859,8 @@ TEST_F(cacao_formulas, normals_are_those_of_the_four_quadrants) {
                 const float own = z_at(x, y);
                 const auto towards = [&](int dx, int dy) {
                     const float next = z_at(x + dx, y + dy), beyond = z_at(x + 2 * dx, y + 2 * dy);
-                    return scan && next == 0 && beyond > 0 ? 2 / (1 / own + 1 / beyond) : next;
+                    const bool across_the_block = dx == 1 - 2 * (x % 2) || dy == 1 - 2 * (y % 2);
+                    return scan && across_the_block && next == 0 && beyond > 0 ? 2 / (1 / own + 1 / beyond) : next;
                 };
                 const Around z{towards(-1, 0), towards(1, 0), towards(0, -1), towards(0, 1)};
                 const Around e = scan ? reference::edges_of_inverse(own, z) : reference::edges(own, z);

@@ -57,29 +57,30 @@ vec2 ray_of(ivec2 p0, ivec2 step) {
     return k.view_mul * ((vec2(p0) + 0.5) * k.image_inv + vec2(step) * float(spacing) * k.image_inv) + k.view_add;
 }
 
-// Normal of pixel p from its depth c and the depths left, right, above and below; w are their inverses. Scan: across holes of
-// one pixel the line of 1/z to what lies `beyond` them goes on, straight on any plane.
-vec3 normal_of(ivec2 p, float c, vec4 around, float wc, vec4 w, vec4 beyond, vec3 ray_x, vec3 ray_y) {
+// What a pixel shows: its point, and 1/z. The point's z is the depth.
+vec4 shown(float x, float y, float z, float w) { return vec4(vec3(x, y, 1.0) * z, w); }
+
+// Scan: across a hole of one pixel, what lies beyond it: the direction is the same, and on any plane 1/z half way is the mean.
+vec4 bridged(vec4 next, vec4 beyond, float wc) {
+    bool bridge = scan != 0 && next.w == 0.0 && beyond.w > 0.0;
+    return bridge ? vec4(beyond.xyz, 0.5 * (wc + beyond.w)) : next;
+}
+
+// Normal of pixel p from what it and those left, right, above and below show.
+vec3 normal_of(ivec2 p, vec4 c, vec4 left, vec4 right, vec4 top, vec4 bottom) {
     if (supplied != 0) return supplied_normal(p);
-    if (scan != 0) {
-        vec4 line = 0.5 * (wc + beyond);
-        bvec4 bridged = lessThan(w, vec4(greaterThan(beyond, vec4(0.0))) * 1e-30);
-        w = mix(w, line, bridged);
-        around = mix(around, 1.0 / line, bridged);
-    }
-    vec4 edges = scan != 0 ? edges_from_inverse(wc, w) : edges_from_depth(c, around);
-    return normal_from_neighbours(edges, vec3(ray_x.y, ray_y.y, 1.0) * c, vec3(ray_x.x, ray_y.y, 1.0) * around.x,
-                                  vec3(ray_x.z, ray_y.y, 1.0) * around.y, vec3(ray_x.y, ray_y.x, 1.0) * around.z,
-                                  vec3(ray_x.y, ray_y.z, 1.0) * around.w);
+    vec4 edges = scan != 0 ? edges_from_inverse(c.w, vec4(left.w, right.w, top.w, bottom.w))
+                           : edges_from_depth(c.z, vec4(left.z, right.z, top.z, bottom.z));
+    return normal_from_neighbours(edges, c.xyz, left.xyz, right.xyz, top.xyz, bottom.xyz);
 }
 
 // Scan: a hole of one pixel between two of the same surface, as its neighbours need it: they find what occludes them, and what to
 // blur with. It gets no visibility itself.
-float filled(float z, vec4 w) {
+vec4 filled(vec4 own, vec4 w, vec2 ray) {
     vec2 sum = vec2(w.x + w.y, w.z + w.w);
     vec2 same = vec2(lessThan(abs(w.xz - w.yw), 0.025 * sum)); // no other hole is
-    float count = same.x + same.y;
-    return scan != 0 && !(z > 0.0) && count > 0.0 ? 2.0 * count / dot(same, sum) : z;
+    float mean = 0.5 * dot(same, sum) / max(same.x + same.y, 1.0);
+    return scan != 0 && own.w == 0.0 && mean > 0.0 ? shown(ray.x, ray.y, 1.0 / mean, mean) : own;
 }
 
 // Scan: where holes leave a pixel no whole quadrant, the other three pixels lend theirs if they lie as deep.
@@ -112,37 +113,31 @@ void put(int slice, ivec2 t, ivec2 p, float seen, float c, vec3 n) {
 vec4 prepared(ivec2 t) {
     ivec2 p0 = 2 * spacing * t, p1 = p0 + spacing * ivec2(1, 0), p2 = p0 + spacing * ivec2(0, 1), p3 = p0 + spacing * ivec2(1, 1);
 
-    // Rows and columns -1 .. 2 around the four pixels; the corners are not needed. Beyond them, where holes are bridged, -2 and 3.
+    // Rows and columns -1 .. 2 around the four pixels; the corners are not needed.
     float a1 = neighbour(p0 + spacing * ivec2(0, -1)), a2 = neighbour(p0 + spacing * ivec2(1, -1));
     float b0 = neighbour(p0 + spacing * ivec2(-1, 0)), b1 = neighbour(p0), b2 = neighbour(p0 + spacing * ivec2(1, 0)),
           b3 = neighbour(p0 + spacing * ivec2(2, 0));
     float c0 = neighbour(p0 + spacing * ivec2(-1, 1)), c1 = neighbour(p0 + spacing * ivec2(0, 1)),
           c2 = neighbour(p0 + spacing * ivec2(1, 1)), c3 = neighbour(p0 + spacing * ivec2(2, 1));
     float d1 = neighbour(p0 + spacing * ivec2(0, 2)), d2 = neighbour(p0 + spacing * ivec2(1, 2));
-    vec4 beyond_x = vec4(0.0), beyond_y = vec4(0.0); // 1/z, left and right of either row, above and below either column
-    if (scan != 0 && supplied == 0) {
-        beyond_x = inverse_or_hole(vec4(neighbour(p0 - spacing * ivec2(2, 0)), neighbour(p0 + spacing * ivec2(3, 0)),
-                                        neighbour(p2 - spacing * ivec2(2, 0)), neighbour(p0 + spacing * ivec2(3, 1))));
-        beyond_y = inverse_or_hole(vec4(neighbour(p0 - spacing * ivec2(0, 2)), neighbour(p0 + spacing * ivec2(0, 3)),
-                                        neighbour(p1 - spacing * ivec2(0, 2)), neighbour(p0 + spacing * ivec2(1, 3))));
-    }
-
-    vec2 r0 = ray_of(p0, ivec2(-1)), r1 = ray_of(p0, ivec2(0)), r2 = ray_of(p0, ivec2(1)), r3 = ray_of(p0, ivec2(2));
-    vec3 x0 = vec3(r0.x, r1.x, r2.x), x1 = vec3(r1.x, r2.x, r3.x), y0 = vec3(r0.y, r1.y, r2.y), y1 = vec3(r1.y, r2.y, r3.y);
     vec4 wad = inverse_or_hole(vec4(a1, a2, d1, d2));
     vec4 wb = inverse_or_hole(vec4(b0, b1, b2, b3)), wc = inverse_or_hole(vec4(c0, c1, c2, c3));
-    vec4 w0 = vec4(wb.x, wb.z, wad.x, wc.y), w1 = vec4(wb.y, wb.w, wad.y, wc.z); // left, right, above, below
-    vec4 w2 = vec4(wc.x, wc.z, wb.y, wad.z), w3 = vec4(wc.y, wc.w, wb.z, wad.w);
-    float z0 = filled(b1, w0), z1 = filled(b2, w1), z2 = filled(c1, w2), z3 = filled(c2, w3);
-    vec4 w = scan != 0 ? inverse_or_hole(vec4(z0, z1, z2, z3)) : vec4(0.0);
-    vec3 n0 = normal_of(p0, z0, vec4(b0, b2, a1, c1), w.x, w0, vec4(beyond_x.x, wb.w, beyond_y.x, wad.z), x0, y0);
-    vec3 n1 = normal_of(p1, z1, vec4(b1, b3, a2, c2), w.y, w1, vec4(wb.x, beyond_x.y, beyond_y.z, wad.w), x1, y0);
-    vec3 n2 = normal_of(p2, z2, vec4(c0, c2, b1, d1), w.z, w2, vec4(beyond_x.z, wc.w, wad.x, beyond_y.y), x0, y1);
-    vec3 n3 = normal_of(p3, z3, vec4(c1, c3, b2, d2), w.w, w3, vec4(wc.x, beyond_x.w, wad.y, beyond_y.w), x1, y1);
-    put(0, t, p0, b1, z0, completed(n0, z0, vec3(z1, z2, z3), n1, n2, n3));
-    put(1, t, p1, b2, z1, completed(n1, z1, vec3(z0, z2, z3), n0, n2, n3));
-    put(2, t, p2, c1, z2, completed(n2, z2, vec3(z0, z1, z3), n0, n1, n3));
-    put(3, t, p3, c2, z3, completed(n3, z3, vec3(z0, z1, z2), n0, n1, n2));
+
+    vec2 r0 = ray_of(p0, ivec2(-1)), r1 = ray_of(p0, ivec2(0)), r2 = ray_of(p0, ivec2(1)), r3 = ray_of(p0, ivec2(2));
+    vec4 A1 = shown(r1.x, r0.y, a1, wad.x), A2 = shown(r2.x, r0.y, a2, wad.y);
+    vec4 B0 = shown(r0.x, r1.y, b0, wb.x), B1 = shown(r1.x, r1.y, b1, wb.y), B2 = shown(r2.x, r1.y, b2, wb.z), B3 = shown(r3.x, r1.y, b3, wb.w);
+    vec4 C0 = shown(r0.x, r2.y, c0, wc.x), C1 = shown(r1.x, r2.y, c1, wc.y), C2 = shown(r2.x, r2.y, c2, wc.z), C3 = shown(r3.x, r2.y, c3, wc.w);
+    vec4 D1 = shown(r1.x, r3.y, d1, wad.z), D2 = shown(r2.x, r3.y, d2, wad.w);
+    vec4 s0 = filled(B1, vec4(B0.w, B2.w, A1.w, C1.w), vec2(r1.x, r1.y)), s1 = filled(B2, vec4(B1.w, B3.w, A2.w, C2.w), vec2(r2.x, r1.y));
+    vec4 s2 = filled(C1, vec4(C0.w, C2.w, B1.w, D1.w), vec2(r1.x, r2.y)), s3 = filled(C2, vec4(C1.w, C3.w, B2.w, D2.w), vec2(r2.x, r2.y));
+    vec3 n0 = normal_of(p0, s0, B0, bridged(B2, B3, s0.w), A1, bridged(C1, D1, s0.w));
+    vec3 n1 = normal_of(p1, s1, bridged(B1, B0, s1.w), B3, A2, bridged(C2, D2, s1.w));
+    vec3 n2 = normal_of(p2, s2, C0, bridged(C2, C3, s2.w), bridged(B1, A1, s2.w), D1);
+    vec3 n3 = normal_of(p3, s3, bridged(C1, C0, s3.w), C3, bridged(B2, A2, s3.w), D2);
+    put(0, t, p0, b1, s0.z, completed(n0, s0.z, vec3(s1.z, s2.z, s3.z), n1, n2, n3));
+    put(1, t, p1, b2, s1.z, completed(n1, s1.z, vec3(s0.z, s2.z, s3.z), n0, n2, n3));
+    put(2, t, p2, c1, s2.z, completed(n2, s2.z, vec3(s0.z, s1.z, s3.z), n0, n1, n3));
+    put(3, t, p3, c2, s3.z, completed(n3, s3.z, vec3(s0.z, s1.z, s2.z), n0, n1, n2));
     return vec4(b1, b2, c1, c2);
 }
 
