@@ -634,7 +634,7 @@ class Run final : public Command {
     std::string noise_sentence(const DepthNoise& noise) const {
         const std::string origin = asked_.depth_noise == "auto" ? "measured" : "--depth-noise";
         if (!noise.any())
-            return fmt::format("none to mind ({}); depth is used as recorded", origin);
+            return fmt::format("{} to mind ({}); depth is used as recorded", describe(noise), origin);
         return fmt::format("{} ({}); flying pixels are {}; {}", describe(noise), origin,
                            asked_.flying_pixels == "drop" ? "dropped" : "kept",
                            asked_.depth_smoothing > 0 ? "depth and normals come from plane fits" : "depth is used as recorded");
