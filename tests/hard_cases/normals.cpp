@@ -39,7 +39,7 @@ std::vector<Sighted> views_of(const scene::Scene& scene, const Sensor& sensor) {
 FittedDepth from_depth(gpu::Device& device, const DepthImage& depth) {
     using Host = gpu::BufferRow::Host;
     const std::size_t pixels = depth.z_m.total();
-    ScreenTables tables{depth.z_m.size(),
+    ScreenTables tables{{{}, depth.z_m.size()}, depth.z_m.size(), 0,
                         {{"depth", pixels * 4, Host::upload, gpu::BufferRow::Texels::r32f},
                          {"surfaces", pixels * 16, Host::download, gpu::BufferRow::Texels::rgba32f}},
                         {}};
