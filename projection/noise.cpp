@@ -119,7 +119,7 @@ Step step_by(const std::vector<float>& values_m, int power) {
     std::vector<double> gaps;
     for (std::size_t i = 1; i < values_m.size(); ++i)
         gaps.push_back((static_cast<double>(values_m[i]) - values_m[i - 1]) / std::pow(values_m[i], power));
-    if (gaps.size() < enough) return {};
+    if (gaps.size() < 50) return {}; // a disparity sensor has some hundred values in all
     const auto low = gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 10);
     std::nth_element(gaps.begin(), low, gaps.end());
     double sum = 0, count = 0;
