@@ -36,7 +36,7 @@ class Trials {
 
     /// The median over frames and rounds, after a warm-up.
     Tried of(const Configuration& configuration) const {
-        Trial trial(device_, configuration, capture_.noise, radius_m_);
+        Trial trial(device_, configuration, capture_.noise, radius_m_, capture_.preparation);
         Tried tried;
         for (const TrialFrame& frame : capture_.frames)
             tried.maps.push_back(trial.compute(frame));

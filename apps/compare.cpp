@@ -1,6 +1,7 @@
 // `scanshade compare`: how far the maps of one run are from those of another, or from truth, as numbers and pictures.
 #include "ao/compare.h"
 #include "apps/command.h"
+#include "apps/error_classes.h"
 #include "apps/figures.h"
 #include "apps/json.h"
 #include "apps/map_set.h"
@@ -40,7 +41,8 @@ class Compare final : public Command {
   public:
     Words words() override {
         return {"PATH",
-                "A and B: runs' outputs, folders of maps, maps, clouds with the field ambient_occlusion, or as B a generated "
+                "A and B: runs' outputs, folders of maps, maps, clouds with the field ambient_occlusion, or as B a "
+                "generated "
                 "capture, whose truth is taken",
                 &paths_, 1, 2};
     }
@@ -65,7 +67,7 @@ class Compare final : public Command {
         PairSums pairs;
         std::vector<Row> rows;
         for (const MapPair& pair : paired(a, b))
-            rows.push_back(compared(pair, pairs));
+            rows.push_back(compared(pair, pairs, a.confidence));
         return conclude(a, b, rows, pairs);
     }
 
@@ -87,11 +89,13 @@ class Compare final : public Command {
                             *a.radius_m, *b.radius_m));
     }
 
-    Row compared(const MapPair& pair, PairSums& pairs) const {
+    Row compared(const MapPair& pair, PairSums& pairs, const std::map<std::string, fs::path>& confidence) {
         try {
             const cv::Mat1f a = values_of(pair.a), b = values_of(pair.b);
             Row row{pair.name, during(pair.a.string() + " and " + pair.b.string(), [&] { return compare(a, b); }), {}};
             pairs.add(pair_sums(a, b));
+            if (const auto believed = confidence.find(pair.name); believed != confidence.end() && a.rows > 1)
+                by_confidence_.add(a, b, of_one_size(read_ao(believed->second), a, believed->second));
             if (!out_.empty() && a.rows > 1)
                 write_difference(pair.name, a, b);
             return row;
@@ -99,6 +103,13 @@ class Compare final : public Command {
             say(fmt::format("failed: {}", failure.what()));
             return {pair.name, {}, failure.what()};
         }
+    }
+
+    static PixelClasses of_one_size(const cv::Mat1f& confidence, const cv::Mat1f& map, const fs::path& file) {
+        if (confidence.size() != map.size())
+            throw Error(fmt::format("{}: {}x{} expected, as its map, found {}x{}", file.string(), map.cols, map.rows,
+                                    confidence.cols, confidence.rows));
+        return by_confidence(confidence);
     }
 
     void write_difference(const std::string& name, const cv::Mat1f& a, const cv::Mat1f& b) const {
@@ -114,6 +125,7 @@ class Compare final : public Command {
                 good.push_back(row.difference);
         const Difference all = total(good, pairs);
         print_table(rows, all);
+        print_confidence();
         const std::size_t alone = a.files.size() + b.files.size() - 2 * rows.size();
         if (alone > 0)
             say(fmt::format("{} maps have no partner of their name", alone));
@@ -131,6 +143,26 @@ class Compare final : public Command {
         fmt::print("{:<24}{}\n", "all (rms over images)", figure_cells(all));
     }
 
+    /// Whether what A believes less is farther off, too.
+    void print_confidence() const {
+        if (by_confidence_.names().empty())
+            return;
+        fmt::print("\n{:<24}{:>10}{:>9}\n", "A's confidence", "pixels", "RMSE");
+        for (std::size_t i = 0; i < by_confidence_.names().size(); ++i)
+            fmt::print("{:<24}{:>10.0f}{:>9.4f}\n", by_confidence_.names()[i], by_confidence_.pixels(i),
+                       by_confidence_.rms(i));
+    }
+
+    json confidence_json() const {
+        json classes = json::array();
+        for (std::size_t i = 0; i < by_confidence_.names().size(); ++i)
+            if (by_confidence_.pixels(i) > 0)
+                classes.push_back({{"confidence", by_confidence_.names()[i]},
+                                   {"pixels", by_confidence_.pixels(i)},
+                                   {"rms", by_confidence_.rms(i)}});
+        return classes;
+    }
+
     void write_reports(const MapSet& a, const MapSet& b, const std::vector<Row>& rows, const Difference& all) const {
         std::string csv = "image," + figure_csv_heads() + ",why\n";
         json images = json::array();
@@ -140,13 +172,15 @@ class Compare final : public Command {
                                              : json{{"image", row.name}, {"why", row.why}});
         }
         const json text{{"a", a.path.string()}, {"b", b.path.string()},  {"b_is", b.kind},
-                        {"scale", scale_},      {"total", to_json(all)}, {"images", images}};
+                        {"scale", scale_},      {"total", to_json(all)}, {"by_confidence", confidence_json()},
+                        {"images", images}};
         write_atomically(fs::path(out_) / "compare.csv", csv);
         write_atomically(fs::path(out_) / "compare.json", text_of(text) + "\n"); // last: it says that the rest is there
     }
 
     std::vector<std::string> paths_;
     std::string out_;
+    ErrorByClass by_confidence_;
     double scale_ = 0.5;
     bool truth_ = false, overwrite_ = false;
 };

@@ -80,6 +80,11 @@ PixelClasses by_grazing_angle(const cv::Mat1f& z_m, const Pinhole& camera) {
 
 PixelClasses by_range(const cv::Mat1f& z_m) { return classified(z_m, z_m, {1, 2, 3, 4, 6, 10, 20, 50}, " m"); }
 
+PixelClasses by_confidence(const cv::Mat1f& confidence) {
+    const cv::Mat1f known(confidence + 1); // 0 and NaN are no surface to classified()
+    return classified(confidence, known, {0.25, 0.5, 0.7, 0.85}, "");
+}
+
 void ErrorByClass::add(const cv::Mat1f& a, const cv::Mat1f& b, const PixelClasses& classes) {
     names_ = classes.names;
     sums_.resize(names_.size());

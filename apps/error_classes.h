@@ -1,4 +1,4 @@
-// Where errors live: pixels by their distance from depth edges, by how grazing they are seen, by range.
+// Where errors live: pixels by their distance from depth edges, by how grazing they are seen, by range, by confidence.
 #pragma once
 
 #include "projection/camera.h"
@@ -23,6 +23,9 @@ struct PixelClasses {
 [[nodiscard]] PixelClasses by_grazing_angle(const cv::Mat1f& z_m, const Pinhole& camera);
 /// By depth.
 [[nodiscard]] PixelClasses by_range(const cv::Mat1f& z_m);
+
+/// By confidence (projection/confidence.h); pixels without one, NaN, belong nowhere.
+[[nodiscard]] PixelClasses by_confidence(const cv::Mat1f& confidence);
 
 /// Squared differences of two maps, gathered by class over any number of images.
 class ErrorByClass {

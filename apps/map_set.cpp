@@ -90,10 +90,12 @@ std::string some_names(const MapSet& set) {
 } // namespace
 
 MapSet find_maps(const fs::path& path) {
-    MapSet set{path, "", {}, {}, {}, {}};
+    MapSet set{path, "", {}, {}, {}, {}, {}};
     if (fs::is_directory(path / "ao")) {
         set.kind = "run";
         set.files = maps_in(path / "ao");
+        if (fs::is_directory(path / "confidence"))
+            set.confidence = maps_in(path / "confidence");
         learn_from_manifest(set);
     } else if (fs::is_directory(path / "truth/ao")) {
         set.kind = "truth";
@@ -120,7 +122,7 @@ MapSet truth_of(const MapSet& run) {
     if (!fs::is_directory(run.capture / "truth/ao"))
         throw Error(fmt::format("{}: made from {}, which has no truth/ao (generated captures have)", run.path.string(),
                                 run.capture.string()));
-    MapSet truth{run.capture, "truth", maps_in(run.capture / "truth/ao"), {}, {}, {}};
+    MapSet truth{run.capture, "truth", maps_in(run.capture / "truth/ao"), {}, {}, {}, {}};
     learn_from_truth(truth);
     return truth;
 }

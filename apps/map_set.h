@@ -16,8 +16,10 @@ struct MapSet {
     std::string kind;           ///< "run", "truth", "folder" or "map"
     std::map<std::string, std::filesystem::path> files;
     std::filesystem::path
-        capture;        ///< of a run: what it was made from, as its manifest says; of truth: the capture itself
-    std::string sensor; ///< of a generated capture: the one simulated, where its truth.json says
+        capture; ///< of a run: what it was made from, as its manifest says; of truth: the capture itself
+    std::map<std::string, std::filesystem::path>
+        confidence;                 ///< of a run: maps of how far each of `files` can be believed
+    std::string sensor;             ///< of a generated capture: the one simulated, where its truth.json says
     std::optional<double> radius_m; ///< the method's or the truth's, where it is said
 };
 

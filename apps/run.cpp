@@ -503,7 +503,9 @@ class Run final : public Command {
         const TrialRequest request{.depth_noise = asked_.depth_noise,
                                    .capture = {asked_.camera, asked_.depth_scale, asked_.association_limit_s},
                                    .among = job.of,
-                                   .leave_bad_out = true};
+                                   .leave_bad_out = true,
+                                   .preparation = {.drop_flying = asked_.flying_pixels == "drop",
+                                                   .smoothing = asked_.depth_smoothing}};
         const TrialCapture trial = load_trial(job.capture.path, request);
         const double radius_m = asked_.radius.empty() ? request.radius_m : std::stod(asked_.radius);
         const Choice choice = choose(device, shipped_front(), trial, radius_m, asked_.budget);
@@ -660,7 +662,7 @@ class Run final : public Command {
     std::string noise_sentence(const DepthNoise& noise) const {
         const std::string origin = asked_.depth_noise == "auto" ? "measured" : "--depth-noise";
         if (!noise.any())
-            return fmt::format("none to mind ({}); depth is used as recorded", origin);
+            return fmt::format("{} to mind ({}); depth is used as recorded", describe(noise), origin);
         return fmt::format("{} ({}); flying pixels are {}; {}", describe(noise), origin,
                            asked_.flying_pixels == "drop" ? "dropped" : "kept",
                            asked_.depth_smoothing > 0 ? "depth and normals come from plane fits" : "depth is used as recorded");

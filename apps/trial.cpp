@@ -124,6 +124,7 @@ TrialCapture load_trial(const fs::path& path, const TrialRequest& request) {
     trial.noise = noise_of(capture, among, request.depth_noise);
     trial.noise_origin = request.depth_noise == "auto" ? "measured" : "--depth-noise";
     trial.sensor = class_of(trial.noise);
+    trial.preparation = request.preparation;
     if (truth.ao) {
         trial.sensor = class_of_simulated(truth.ao->sensor).value_or(trial.sensor);
         trial.radius_m = truth.ao->radius_m.value_or(request.radius_m);
@@ -156,11 +157,12 @@ std::unique_ptr<MethodSetup> set_up(const Configuration& configuration, double r
 
 } // namespace
 
-Trial::Trial(gpu::Device& device, Configuration configuration, const DepthNoise& noise, double radius_m)
+Trial::Trial(gpu::Device& device, Configuration configuration, const DepthNoise& noise, double radius_m,
+             FitPlaneOptions preparation)
     : configuration_(std::move(configuration)), setup_(set_up(configuration_, radius_m)), plain_(setup_->make(device)) {
+    preparation.smoothing *= method_named(configuration_.method).smoothing;
     if (noise.any())
-        fitted_ = std::make_unique<OnFittedDepth>(
-            device, noise, *plain_, FitPlaneOptions{.smoothing = method_named(configuration_.method).smoothing});
+        fitted_ = std::make_unique<OnFittedDepth>(device, noise, *plain_, preparation);
 }
 
 cv::Mat1f Trial::compute(const TrialFrame& frame) {

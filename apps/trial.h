@@ -45,6 +45,7 @@ struct TrialCapture {
     SensorClass sensor = SensorClass::clean; ///< a generated capture's own, else class_of(noise)
     std::string reference;                   ///< what `truth` is, or empty
     std::vector<TrialFrame> frames;
+    FitPlaneOptions preparation = {}; ///< as requested
 };
 
 struct TrialRequest {
@@ -52,8 +53,9 @@ struct TrialRequest {
     double radius_m = 0.5; ///< where the capture's truth does not say
     std::string depth_noise = "auto";
     CaptureOptions capture;
-    std::vector<std::size_t> among; ///< indices of the frames that may be taken; empty = all
-    bool leave_bad_out = false;     ///< frames that cannot be loaded are left out instead of being an Error
+    std::vector<std::size_t> among;   ///< indices of the frames that may be taken; empty = all
+    bool leave_bad_out = false;       ///< frames that cannot be loaded are left out instead of being an Error
+    FitPlaneOptions preparation = {}; ///< of noisy depth; its smoothing goes over each method's own
 };
 
 /// `count` of `total` indices, spread evenly from the first on.
@@ -66,8 +68,10 @@ struct TrialRequest {
 /// One configuration on one device, as `run` would use it on depth of that noise.
 class Trial {
   public:
-    /// `radius_m` goes into the method's radius, before the configuration's own settings.
-    Trial(gpu::Device& device, Configuration configuration, const DepthNoise& noise, double radius_m);
+    /// `radius_m` goes into the method's radius, before the configuration's own settings; the preparation's smoothing
+    /// is multiplied by the method's.
+    Trial(gpu::Device& device, Configuration configuration, const DepthNoise& noise, double radius_m,
+          FitPlaneOptions preparation = {});
 
     /// Visibility on the recorded pixels.
     [[nodiscard]] cv::Mat1f compute(const TrialFrame& frame);

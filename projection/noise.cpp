@@ -111,6 +111,32 @@ double grain_of(double ratio) {
     return std::max(1.0, std::sqrt(2 * std::numbers::pi) * low);
 }
 
+/// What one step is if steps grow with that power of z, and the share of gaps between values that occur which are one.
+struct Step {
+    double size = 0, share = 0;
+};
+Step step_by(const std::vector<float>& values_m, int power) {
+    std::vector<double> gaps;
+    for (std::size_t i = 1; i < values_m.size(); ++i)
+        gaps.push_back((static_cast<double>(values_m[i]) - values_m[i - 1]) / std::pow(values_m[i], power));
+    if (gaps.size() < 50) return {}; // a disparity sensor has some hundred values in all
+    const auto low = gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 10);
+    std::nth_element(gaps.begin(), low, gaps.end());
+    double sum = 0, count = 0;
+    for (const double gap : gaps)
+        if (gap > 0.75 * *low && gap < 1.35 * *low) sum += gap, ++count;
+    return {sum / count, count / static_cast<double>(gaps.size())};
+}
+
+void tell_steps(DepthNoise& noise, std::vector<float> values_m) {
+    std::sort(values_m.begin(), values_m.end());
+    values_m.erase(std::unique(values_m.begin(), values_m.end()), values_m.end());
+    const Step even = step_by(values_m, 0), growing = step_by(values_m, 2);
+    constexpr double told = 0.25; // of unquantised values a fiftieth lie so
+    if (std::max(even.share, growing.share) < told) return;
+    (even.share >= growing.share ? noise.step_m : noise.step_per_z2) = (even.share >= growing.share ? even : growing).size;
+}
+
 /// floor + per_z2 z^2 through the bands by least squares of relative error, both terms at least zero.
 DepthNoise law_through(const std::vector<Measured>& points) {
     double s00 = 0, s01 = 0, s11 = 0, t0 = 0, t1 = 0;
@@ -137,19 +163,24 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
     std::array<Band, bands> all;
     for (const DepthImage& image : images) collect(image.z_m, all);
     std::vector<Measured> points;
+    std::vector<float> values_m;
     for (Band& band : all) {
+        values_m.insert(values_m.end(), band.depths_m.begin(), band.depths_m.end());
         if (band.spread_m.size() < enough) continue;
         const double count = static_cast<double>(band.spread_m.size());
         const Spread spread = spread_of(band);
         points.push_back({band.z_sum / count, std::max(spread.distant, 1e-6), spread.adjacent, count});
     }
-    if (points.empty()) return {};
+    DepthNoise steps;
+    tell_steps(steps, std::move(values_m));
+    if (points.empty()) return steps;
     DepthNoise noise = law_through(points);
+    noise.step_m = steps.step_m, noise.step_per_z2 = steps.step_per_z2;
     double ratios = 0, weights = 0;
     for (const Measured& p : points) ratios += p.weight * p.adjacent / p.sigma, weights += p.weight;
     noise.grain_px = grain_of(ratios / weights);
     const bool clean = std::all_of(points.begin(), points.end(), [&](const Measured& p) { return noise.at(p.z) < std::max(1e-4 * p.z, 1.2e-4); });
-    return clean ? DepthNoise{} : noise;
+    return clean ? steps : noise;
 }
 
 DepthNoise noise_from_text(const std::string& text) {
@@ -171,7 +202,11 @@ DepthNoise noise_from_text(const std::string& text) {
 }
 
 std::string describe(const DepthNoise& noise) {
-    return noise.any() ? fmt::format("sigma {:.5f} + {:.5f} z^2 m, grain {:.1f} px", noise.floor_m, noise.per_z2, noise.grain_px) : "none";
+    std::string text = "none";
+    if (noise.any()) text = fmt::format("sigma {:.5f} + {:.5f} z^2 m, grain {:.1f} px", noise.floor_m, noise.per_z2, noise.grain_px);
+    if (noise.step_m > 0) text += fmt::format(", steps of {:.2g} m", noise.step_m);
+    if (noise.step_per_z2 > 0) text += fmt::format(", steps of {:.2g} z^2 m", noise.step_per_z2);
+    return text;
 }
 
 } // namespace scanshade

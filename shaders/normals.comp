@@ -29,11 +29,16 @@ float bend(float w, float z1, float z2, float z_f) {
 
 float slope(float z, float z1, float f) { return z1 > 0.0 ? abs(z1 - z) * f / z : never; }
 
+// Depth of the next pixel on a side, in a hole of one pixel that on the line of 1/z to what lies beyond it.
+float next_z(float w, float z1, float z2) { return z1 > 0.0 || !(z2 > 0.0) ? z1 : 2.0 / (w + 1.0 / z2); }
+
 // Tangent along one axis from the depths at -2, -1, +1, +2; zero where neither side will do.
 vec3 tangent(float z, float w, vec4 along, vec3 here, vec3 ray_before, vec3 ray_after, float f) {
-    vec3 back = here - ray_before * along.y, ahead = ray_after * along.z - here;
+    vec2 next = vec2(next_z(w, along.y, along.x), next_z(w, along.z, along.w));
+    vec3 back = here - ray_before * next.x, ahead = ray_after * next.y - here;
     vec2 bends = vec2(bend(w, along.y, along.x, z * f), bend(w, along.z, along.w, z * f));
-    vec2 slopes = vec2(slope(z, along.y, f), slope(z, along.z, f));
+    vec2 slopes = vec2(slope(z, next.x, f), slope(z, next.y, f));
+    slopes += mix(vec2(0.0), slopes + 1.0, equal(along.yz, vec2(0.0))); // across a crease the line of 1/z is too gentle
     bool by_bend = min(bends.x, bends.y) < straight_px;
     vec2 cost = by_bend ? bends : slopes;
     bool any_side = by_bend || min(slopes.x, slopes.y) < steep;

@@ -37,7 +37,7 @@ class MeasureTest : public testing::Test {
                 fmt::format("generate office -o {} --sensor ideal --frames 2 --size 64x48 --truth-rays 16", capture()))
                 .exit_code,
             0);
-        ASSERT_EQ(run_program(fmt::format("run {} -o {} --write ao --depth-noise none", capture(), made())).exit_code,
+        ASSERT_EQ(run_program(fmt::format("run {} -o {} --write ao,confidence --depth-noise none", capture(), made())).exit_code,
                   0);
     }
     static void TearDownTestSuite() { shared_folder().reset(); }
@@ -85,6 +85,23 @@ TEST_F(MeasureTest, truth_is_found_from_the_run_or_in_the_capture) {
         images.push_back(compare(read_ao(file.path()), read_ao(truth)));
     }
     EXPECT_NEAR(read(folder / "out/compare.json")["total"]["rms"].get<double>(), total(images, {}).rms, 1e-6);
+}
+
+TEST_F(MeasureTest, errors_by_confidence_share_out_all_pixels) {
+    ASSERT_EQ(run_program(fmt::format("compare {} --truth -o {}", made(), out())).exit_code, 0);
+    const json report = read(folder / "out/compare.json");
+    double pixels = 0, squares = 0, all = 0, all_squares = 0;
+    for (const json& part : report["by_confidence"]) {
+        pixels += part["pixels"].get<double>();
+        squares += part["pixels"].get<double>() * std::pow(part["rms"].get<double>(), 2);
+    }
+    for (const json& image : report["images"]) {
+        const double n = image["difference"]["pixels"].get<double>();
+        all += n, all_squares += n * std::pow(image["difference"]["rms"].get<double>(), 2);
+    }
+    EXPECT_GT(report["by_confidence"].size(), 1u);
+    EXPECT_EQ(pixels, all);
+    EXPECT_NEAR(squares, all_squares, 1e-4 * all_squares);
 }
 
 TEST_F(MeasureTest, maps_of_another_radius_are_told) {
@@ -206,7 +223,7 @@ TEST(BudgetTest, what_cannot_be_kept_is_told_with_what_could) {
 
 TEST_F(MeasureTest, a_budget_picks_says_and_verifies) {
     const Ran ran =
-        run_program(fmt::format("run {} -o {} --write ao --depth-noise none --max-ms 100000", capture(), out()));
+        run_program(fmt::format("run {} -o {} --write ao,confidence --depth-noise none --max-ms 100000", capture(), out()));
     ASSERT_EQ(ran.exit_code, 0) << ran.err;
     EXPECT_TRUE(says(ran.err, "picked"));
     EXPECT_TRUE(says(ran.err, "to truth"));

@@ -106,6 +106,23 @@ TEST(noise, grain_is_that_of_the_sensors_window) {
     }
 }
 
+TEST(noise, steps_are_told_and_nothing_is_taken_for_one) {
+    const Pinhole camera = test_camera({320, 240});
+    const DepthImage slope = tilted_plane(camera, 50, 2), unquantised = noisy(slope, {0.002, 0.001});
+    const DepthNoise disparity = measure_noise(std::vector{noisy(slope, {0.0012, 0.0018}, 2.85e-3)});
+    EXPECT_NEAR(disparity.step_per_z2, 2.85e-3, 0.05 * 2.85e-3);
+    EXPECT_EQ(disparity.step_m, 0);
+    for (const double step_m : {0.001, 0.0002}) {
+        DepthImage stored{camera, unquantised.z_m.clone(), {}};
+        for (float& z : stored.z_m) z = static_cast<float>(std::round(z / step_m) * step_m);
+        const DepthNoise even = measure_noise(std::vector{stored});
+        EXPECT_NEAR(even.step_m, step_m, 0.05 * step_m);
+        EXPECT_EQ(even.step_per_z2, 0);
+    }
+    const DepthNoise none = measure_noise(std::vector{unquantised});
+    EXPECT_EQ(none.step_m + none.step_per_z2, 0) << describe(none);
+}
+
 TEST(noise, text_is_checked) {
     EXPECT_FALSE(noise_from_text("none").any());
     EXPECT_DOUBLE_EQ(noise_from_text("0.001,0.002").at(2), 0.009);

@@ -277,6 +277,21 @@ TEST(Rays, the_standard_error_is_what_it_says) {
     }
 }
 
+TEST(Rays, the_standard_error_of_an_image_can_be_dumped) {
+    const DepthImage depth = with_holes(ball_on_floor(test_camera()), 0.1);
+    Raycast raycast(RaycastOptions{.rays = 16});
+    EXPECT_TRUE(raycast.intermediates().empty());
+    const cv::Mat1f visibility = raycast.compute({depth}).visibility;
+    const std::vector<Intermediate> all = raycast.intermediates();
+    ASSERT_EQ(all.size(), 1U);
+    EXPECT_EQ(all[0].shape, (std::vector<int>{depth.z_m.rows, depth.z_m.cols}));
+    ASSERT_EQ(all[0].data.size(), visibility.total() * sizeof(float));
+    cv::Mat1f error(visibility.size());
+    std::memcpy(error.data, all[0].data.data(), all[0].data.size());
+    EXPECT_EQ(cv::countNonZero((error == error) != (visibility == visibility)), 0) << "NaN where there is no value";
+    EXPECT_GT(cv::countNonZero(error > 0.01F), 100) << "in the shade of the ball rays disagree";
+}
+
 TEST(Rays, threads_do_not_matter) {
     const DepthImage depth = with_holes(ball_on_floor(test_camera()), 0.1);
     const cv::Mat1f all = Raycast(RaycastOptions{.rays = 32}).compute({depth}).visibility;

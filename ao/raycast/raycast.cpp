@@ -12,6 +12,7 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <span>
 #include <tbb/parallel_for.h>
 #include <utility>
 
@@ -152,10 +153,23 @@ AoMap Raycast::compute(const View& view) {
         return RayStart{point, normal, key, view.noise.at(z) * std::abs(normal.dot(point)) / z};
     });
     watch.lap("rays");
+    size_ = z_m.size();
     return {cv::Mat1f(values, true).reshape(0, z_m.rows)};
 }
 
+std::vector<Intermediate> Raycast::intermediates() {
+    if (size_.empty() || standard_error_.size() != static_cast<std::size_t>(size_.area()))
+        return {};
+    const auto bytes = std::as_bytes(std::span(standard_error_));
+    return {{"standard_error",
+             "float32",
+             {size_.height, size_.width},
+             {bytes.begin(), bytes.end()},
+             "one standard error of each pixel's visibility; NaN where there is none"}};
+}
+
 std::vector<float> Raycast::compute(const PointSet& points) {
+    size_ = {};
     return points.triangles.empty() ? of_cloud(points) : of_mesh(points);
 }
 

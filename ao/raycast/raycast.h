@@ -37,6 +37,8 @@ class Raycast final : public Method, public PointMethod {
     [[nodiscard]] const Timings& timings() const override { return timings_; }
     /// One standard error of each value of the last compute(), in its order (row by row); NaN where there is no value.
     [[nodiscard]] const std::vector<float>& standard_error() const { return standard_error_; }
+    /// The standard error of the last depth image: what `run --dump` writes. Empty before.
+    [[nodiscard]] std::vector<Intermediate> intermediates() override;
 
   private:
     std::vector<float> of_cloud(const PointSet& points);
@@ -49,6 +51,7 @@ class Raycast final : public Method, public PointMethod {
     CosineDirections directions_;
     Timings timings_;
     std::vector<float> standard_error_;
+    cv::Size size_; // of the last depth image
 };
 
 } // namespace scanshade

@@ -39,7 +39,7 @@ void put(ivec2 p, float v) {
     if (any(greaterThanEqual(p, k.image))) return;
     int here = p.y * k.image.x + p.x;
     if (scan != 0) {
-        bool surface = v >= 0.0 && (two_slices == 0 || imageLoad(depth_in, here).x > 0.0);
+        bool surface = v >= 0.0 && imageLoad(depth_in, here).x > 0.0; // filled holes have a value, too
         visibility[here] = surface ? min(v, 1.0) : uintBitsToFloat(0x7fc00000u);
     } else {
         visibility[here] = stored(power != 0 ? pow(v, 2.2) : v);

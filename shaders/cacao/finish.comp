@@ -71,14 +71,14 @@ float depth_at(ivec2 p) {
     return device_depth != 0 ? linear_depth(d) : d;
 }
 
-// Grid pixel g, whose visibility is v, -1 for none. LOWEST tells holes of odd pixels by their depth alone; what it has not
-// computed itself, and holes, are kept out of the upsampler by depth 0.
+// Grid pixel g, whose visibility is v, -1 for none. Holes are told by their depth: filled ones have a value, too, and LOWEST has
+// none of odd pixels. What it has not computed itself, and holes, are kept out of the upsampler by depth 0.
 void put(ivec2 g, float v) {
     bool own = two_slices == 0 || (g.x & 1) == (g.y & 1);
     if (spacing == 2) {
         if (all(lessThan(g + 2, k.grid))) imageStore(staged, (g.y + 2) * k.grid.x + g.x + 2, vec4(v, own ? depth_at(2 * g) : 0.0, 0.0, 0.0));
     } else if (all(lessThan(g, k.image))) {
-        bool surface = v >= 0.0 && (own || depth_at(g) > 0.0);
+        bool surface = v >= 0.0 && depth_at(g) > 0.0;
         visibility[g.y * k.image.x + g.x] = surface ? min(v, 1.0) : uintBitsToFloat(0x7fc00000u);
     }
 }

@@ -277,10 +277,11 @@ uint generated(int slice, ivec2 t) {
     s.point *= k.depth_offset;
 
     Sum sum = Sum(0.0, 0.0);
-    vec4 edges = vec4(1.0);
+    vec4 edges = vec4(1.0), unknown = vec4(0.0);
     if (detailed || (scan != 0 && base == 0)) { // scan never blurs across a depth edge, whatever the quality
         vec4 z = neighbour_depths(s.slice, t);
         edges = scan != 0 ? edges_from_inverse(1.0 / zc, inverse_or_hole(z)) : edges_from_depth(zc, z);
+        if (scan != 0) unknown = vec4(equal(z, vec4(0.0)));
         if (detailed) sum.obscurance = detail(s, step_m, z, edges);
         if (kernel >= 2) edges *= normal_edges(s.normal, s.slice, t);
     }
@@ -305,8 +306,9 @@ uint generated(int slice, ivec2 t) {
     float o = scan != 0 ? sum.obscurance / max(sum.weight, 1e-6) : sum.obscurance / sum.weight;
     if (base != 0) return quantised(o, value_levels()) | quantised(sum.weight / weight_range, weight_levels()) << 16;
     float fade = clamp(s.point.z * k.fade_mul + k.fade_add, 0.0, 1.0);
-    if (detailed) {
-        vec2 cut = clamp(0.35 * (1.0 - edges.xz - edges.yw), 0.0, 1.0);
+    if (detailed) { // fades what stands out on two sides; a hole does not say that a surface ends
+        vec4 on = edges + unknown;
+        vec2 cut = clamp(0.35 * (1.0 - on.xz - on.yw), 0.0, 1.0);
         fade *= clamp(1.0 - cut.x - cut.y, 0.0, 1.0);
     }
     float visibility = clamp(1.0 - fade * min(k.shadow_strength * o, k.shadow_clamp), 0.0, 1.0);

@@ -35,12 +35,14 @@ float neighbour(ivec2 p) {
     return spacing == 1 || inside(p) ? z : k.outside_depth;
 }
 
+// Scan: zero where none was given.
 vec3 supplied_normal(ivec2 p) {
     ivec2 q = clamp(p, ivec2(0), k.image - 1);
     int at = 3 * (q.y * k.image.x + q.x);
     vec3 given = vec3(imageLoad(normals_in, at).x, imageLoad(normals_in, at + 1).x, imageLoad(normals_in, at + 2).x);
     vec3 n = (inside(p) ? given : vec3(0.0)) * k.normals_mul + k.normals_add;
-    return n * vec3(1.0, -1.0, 1.0); // camera space has y down, this room y up
+    n *= vec3(1.0, -1.0, 1.0); // camera space has y down, this room y up
+    return scan == 0 || dot(n, n) < 1e6 ? n : vec3(0.0); // false for NaN
 }
 
 // What the slice holds. AMD's LOWEST loads zero outside the image, the others replicate.
@@ -55,12 +57,30 @@ vec2 ray_of(ivec2 p0, ivec2 step) {
     return k.view_mul * ((vec2(p0) + 0.5) * k.image_inv + vec2(step) * float(spacing) * k.image_inv) + k.view_add;
 }
 
-// Normal of one pixel from its depth c and the depths left, right, above and below; w are their inverses.
-vec3 derived(float c, vec4 around, float wc, vec4 w, vec3 ray_x, vec3 ray_y) {
-    vec4 edges = scan != 0 ? edges_from_inverse(wc, w) : edges_from_depth(c, around);
-    return normal_from_neighbours(edges, vec3(ray_x.y, ray_y.y, 1.0) * c, vec3(ray_x.x, ray_y.y, 1.0) * around.x,
-                                  vec3(ray_x.z, ray_y.y, 1.0) * around.y, vec3(ray_x.y, ray_y.x, 1.0) * around.z,
-                                  vec3(ray_x.y, ray_y.z, 1.0) * around.w);
+// What a pixel shows: its point, and 1/z. The point's z is the depth.
+vec4 shown(float x, float y, float z, float w) { return vec4(vec3(x, y, 1.0) * z, w); }
+
+// Scan: across a hole of one pixel, what lies beyond it: the direction is the same, and on any plane 1/z half way is the mean.
+vec4 bridged(vec4 next, vec4 beyond, float wc) {
+    bool bridge = scan != 0 && next.w == 0.0 && beyond.w > 0.0;
+    return bridge ? vec4(beyond.xyz, 0.5 * (wc + beyond.w)) : next;
+}
+
+// Normal of pixel p from what it and those left, right, above and below show.
+vec3 normal_of(ivec2 p, vec4 c, vec4 left, vec4 right, vec4 top, vec4 bottom) {
+    if (supplied != 0) return supplied_normal(p);
+    vec4 edges = scan != 0 ? edges_from_inverse(c.w, vec4(left.w, right.w, top.w, bottom.w))
+                           : edges_from_depth(c.z, vec4(left.z, right.z, top.z, bottom.z));
+    return normal_from_neighbours(edges, c.xyz, left.xyz, right.xyz, top.xyz, bottom.xyz);
+}
+
+// Scan: a hole of one pixel between two of the same surface, as its neighbours need it: they find what occludes them, and what to
+// blur with. It gets no visibility itself.
+vec4 filled(vec4 own, vec4 w, vec2 ray) {
+    vec2 sum = vec2(w.x + w.y, w.z + w.w);
+    vec2 same = vec2(lessThan(abs(w.xz - w.yw), 0.025 * sum)); // no other hole is
+    float mean = 0.5 * dot(same, sum) / max(same.x + same.y, 1.0);
+    return scan != 0 && own.w == 0.0 && mean > 0.0 ? shown(ray.x, ray.y, 1.0 / mean, mean) : own;
 }
 
 // Scan: where holes leave a pixel no whole quadrant, the other three pixels lend theirs if they lie as deep.
@@ -75,17 +95,23 @@ void store_depth(int slice, ivec2 t, float z) { imageStore(depths[0], ivec3(t, s
 void store_depth(int slice, ivec2 t, float z) { imageStore(depths, depth_index(slice, 0, t), vec4(whole(z))); }
 #endif
 
-void put(int slice, ivec2 t, ivec2 p0, float c, vec3 n) {
-    ivec2 p = p0 + spacing * ivec2(slice & 1, slice >> 1);
+// `seen` is the recorded depth, c the filled one: without a normal it would only brighten.
+void put(int slice, ivec2 t, ivec2 p, float seen, float c, vec3 n) {
     bool used = two_slices == 0 || slice == 0 || slice == 3;
+    if (scan != 0) {
+        c = dot(n, n) > 1e-8 ? c : seen;
+        n = unit(n);
+    } else if (supplied == 0) {
+        n = unit(n);
+    }
     if (used) store_depth(slice, t, stored_depth(p, c));
     if (used || scan == 0) // AMD's LOWEST writes all four normals
-        imageStore(normals, slice_index(slice, t), uvec4(whole(pack_normal(supplied != 0 ? supplied_normal(p) : unit(n)))));
+        imageStore(normals, slice_index(slice, t), uvec4(whole(pack_normal(n))));
 }
 
 // The four pixels of slice texel t; returns their depths.
 vec4 prepared(ivec2 t) {
-    ivec2 p0 = 2 * spacing * t;
+    ivec2 p0 = 2 * spacing * t, p1 = p0 + spacing * ivec2(1, 0), p2 = p0 + spacing * ivec2(0, 1), p3 = p0 + spacing * ivec2(1, 1);
 
     // Rows and columns -1 .. 2 around the four pixels; the corners are not needed.
     float a1 = neighbour(p0 + spacing * ivec2(0, -1)), a2 = neighbour(p0 + spacing * ivec2(1, -1));
@@ -94,19 +120,24 @@ vec4 prepared(ivec2 t) {
     float c0 = neighbour(p0 + spacing * ivec2(-1, 1)), c1 = neighbour(p0 + spacing * ivec2(0, 1)),
           c2 = neighbour(p0 + spacing * ivec2(1, 1)), c3 = neighbour(p0 + spacing * ivec2(2, 1));
     float d1 = neighbour(p0 + spacing * ivec2(0, 2)), d2 = neighbour(p0 + spacing * ivec2(1, 2));
-
-    vec2 r0 = ray_of(p0, ivec2(-1)), r1 = ray_of(p0, ivec2(0)), r2 = ray_of(p0, ivec2(1)), r3 = ray_of(p0, ivec2(2));
-    vec3 x0 = vec3(r0.x, r1.x, r2.x), x1 = vec3(r1.x, r2.x, r3.x), y0 = vec3(r0.y, r1.y, r2.y), y1 = vec3(r1.y, r2.y, r3.y);
     vec4 wad = inverse_or_hole(vec4(a1, a2, d1, d2));
     vec4 wb = inverse_or_hole(vec4(b0, b1, b2, b3)), wc = inverse_or_hole(vec4(c0, c1, c2, c3));
-    vec3 n0 = derived(b1, vec4(b0, b2, a1, c1), wb.y, vec4(wb.x, wb.z, wad.x, wc.y), x0, y0);
-    vec3 n1 = derived(b2, vec4(b1, b3, a2, c2), wb.z, vec4(wb.y, wb.w, wad.y, wc.z), x1, y0);
-    vec3 n2 = derived(c1, vec4(c0, c2, b1, d1), wc.y, vec4(wc.x, wc.z, wb.y, wad.z), x0, y1);
-    vec3 n3 = derived(c2, vec4(c1, c3, b2, d2), wc.z, vec4(wc.y, wc.w, wb.z, wad.w), x1, y1);
-    put(0, t, p0, b1, completed(n0, b1, vec3(b2, c1, c2), n1, n2, n3));
-    put(1, t, p0, b2, completed(n1, b2, vec3(b1, c1, c2), n0, n2, n3));
-    put(2, t, p0, c1, completed(n2, c1, vec3(b1, b2, c2), n0, n1, n3));
-    put(3, t, p0, c2, completed(n3, c2, vec3(b1, b2, c1), n0, n1, n2));
+
+    vec2 r0 = ray_of(p0, ivec2(-1)), r1 = ray_of(p0, ivec2(0)), r2 = ray_of(p0, ivec2(1)), r3 = ray_of(p0, ivec2(2));
+    vec4 A1 = shown(r1.x, r0.y, a1, wad.x), A2 = shown(r2.x, r0.y, a2, wad.y);
+    vec4 B0 = shown(r0.x, r1.y, b0, wb.x), B1 = shown(r1.x, r1.y, b1, wb.y), B2 = shown(r2.x, r1.y, b2, wb.z), B3 = shown(r3.x, r1.y, b3, wb.w);
+    vec4 C0 = shown(r0.x, r2.y, c0, wc.x), C1 = shown(r1.x, r2.y, c1, wc.y), C2 = shown(r2.x, r2.y, c2, wc.z), C3 = shown(r3.x, r2.y, c3, wc.w);
+    vec4 D1 = shown(r1.x, r3.y, d1, wad.z), D2 = shown(r2.x, r3.y, d2, wad.w);
+    vec4 s0 = filled(B1, vec4(B0.w, B2.w, A1.w, C1.w), vec2(r1.x, r1.y)), s1 = filled(B2, vec4(B1.w, B3.w, A2.w, C2.w), vec2(r2.x, r1.y));
+    vec4 s2 = filled(C1, vec4(C0.w, C2.w, B1.w, D1.w), vec2(r1.x, r2.y)), s3 = filled(C2, vec4(C1.w, C3.w, B2.w, D2.w), vec2(r2.x, r2.y));
+    vec3 n0 = normal_of(p0, s0, B0, bridged(B2, B3, s0.w), A1, bridged(C1, D1, s0.w));
+    vec3 n1 = normal_of(p1, s1, bridged(B1, B0, s1.w), B3, A2, bridged(C2, D2, s1.w));
+    vec3 n2 = normal_of(p2, s2, C0, bridged(C2, C3, s2.w), bridged(B1, A1, s2.w), D1);
+    vec3 n3 = normal_of(p3, s3, bridged(C1, C0, s3.w), C3, bridged(B2, A2, s3.w), D2);
+    put(0, t, p0, b1, s0.z, completed(n0, s0.z, vec3(s1.z, s2.z, s3.z), n1, n2, n3));
+    put(1, t, p1, b2, s1.z, completed(n1, s1.z, vec3(s0.z, s2.z, s3.z), n0, n2, n3));
+    put(2, t, p2, c1, s2.z, completed(n2, s2.z, vec3(s0.z, s1.z, s3.z), n0, n1, n3));
+    put(3, t, p3, c2, s3.z, completed(n3, s3.z, vec3(s0.z, s1.z, s2.z), n0, n1, n2));
     return vec4(b1, b2, c1, c2);
 }
 

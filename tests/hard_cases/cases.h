@@ -23,7 +23,6 @@ struct Case {
 /// Limits that every case of a family has to keep. RMSE and worst are differences to what is expected.
 struct Gate {
     std::optional<double> rmse = {}, least = {}, mean = {}; ///< least and mean: visibility itself, from below
-    std::optional<double> wanted_rmse = {};                 ///< what we want: counted and told, no gate
 };
 
 struct Family {
