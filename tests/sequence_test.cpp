@@ -3,8 +3,12 @@
 #include "ao/gpu/device.h"
 #include "ao/sequence/sequence.h"
 #include "ao/surfel/surfel.h"
+#include "apps/batch.h"
+#include "apps/generate.h"
 #include "apps/scene.h"
 #include "apps/sensor.h"
+#include "io/cloud_file.h"
+#include "tests/support/small_capture.h"
 
 #include <cmath>
 #include <cstdio>
@@ -247,6 +251,54 @@ TEST(Sequence, static_points_flicker_a_third_as_much) {
     const double before = flicker(frames, all(alone()), 8, 16), after = flicker(frames, all(only(8, 0, 12)), 8, 16);
     std::printf("flicker of static points: %.4f frame by frame, %.4f together\n", before, after);
     EXPECT_LT(after, before / 3);
+}
+
+/// Runs some frames of a recording as `run --sequence on --cloud` does.
+std::vector<FrameRow> run_together(const Capture& capture, const std::vector<std::size_t>& frames, const std::filesystem::path& out,
+                                   RecordingCloud* cloud = nullptr) {
+    Surfel surfel(device(), quality("low"));
+    Sequence sequence(device(), surfel, radius_m, kinect, {}, only(2, 2, 2, 2));
+    BatchOptions options;
+    options.frames = frames;
+    options.outputs.folder = out;
+    options.radius_m = radius_m;
+    options.noise = kinect;
+    options.sequence = &sequence;
+    options.cloud = cloud;
+    return run_batch(capture, surfel, options);
+}
+
+TEST(Sequence, a_block_of_frames_writes_the_same_bytes_and_a_bad_frame_fails_alone) {
+    const tests::TemporaryFolder folder;
+    GenerateOptions made{.frames = 9, .size = "160x120"};
+    made.truth = false;
+    generate(made, folder / "capture");
+    std::vector<std::filesystem::path> depths;
+    for (const auto& file : std::filesystem::directory_iterator(folder / "capture" / "depth"))
+        depths.push_back(file);
+    std::ranges::sort(depths);
+    std::filesystem::resize_file(depths[6], 100);
+    const Capture capture = open_capture(folder / "capture");
+    RecordingCloud cloud(0);
+    const auto rows = run_together(capture, {0, 1, 2, 3, 4, 5, 6, 7, 8}, folder / "whole", &cloud);
+    ASSERT_EQ(rows.size(), 9U);
+    for (const FrameRow& row : rows)
+        EXPECT_EQ(row.status, row.index == 6 ? FrameStatus::failed : FrameStatus::ok) << row.index << row.why;
+    EXPECT_FALSE(rows[4].notes.empty());
+    (void)run_together(capture, {3, 4}, folder / "block");
+    for (const std::size_t index : {3U, 4U})
+        for (const auto& file : rows[index].files)
+            EXPECT_EQ(tests::read_bytes(folder / "whole" / file), tests::read_bytes(folder / "block" / file)) << file;
+
+    cloud.write(folder / "all.ply");
+    std::vector<std::string> warnings;
+    const Cloud all = read_cloud(folder / "all.ply", warnings);
+    EXPECT_EQ(all.points.size(), cloud.points());
+    EXPECT_LT(all.points.size(), 8U * 160 * 120 * 2 / 3) << "hardly anything was merged";
+    EXPECT_FALSE(all.colours.empty());
+    // What was merged lies where the scene is: an office of a few metres.
+    for (const Vector3d& point : all.points)
+        ASSERT_LT(point.norm(), 10);
 }
 
 TEST(Sequence, what_was_removed_is_gone_beyond_the_window) {
