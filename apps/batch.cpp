@@ -430,7 +430,7 @@ class Walk {
 /// Frames of a sequence, held back until what lies around them has arrived. Without a sequence they pass as they come.
 class Waiting {
   public:
-    explicit Waiting(Sequence* sequence) : sequence_(sequence) {}
+    explicit Waiting(Neighbourhood* sequence) : sequence_(sequence) {}
 
     /// Takes a frame (or none, when all have come) and gives the next one that is complete, or none.
     [[nodiscard]] Token pass(Token arrived) {
@@ -455,7 +455,7 @@ class Waiting {
     [[nodiscard]] const std::deque<Token>& rest() const { return queue_; }
 
   private:
-    Sequence* sequence_;
+    Neighbourhood* sequence_;
     std::size_t newest_ = 0;
     std::deque<Token> queue_;
 };
@@ -465,13 +465,13 @@ Intermediate map_for_study(std::string name, const cv::Mat1f& map, std::string m
     return {std::move(name), "f4", {map.rows, map.cols}, {first, first + map.total() * 4}, std::move(meaning)};
 }
 
-void compute_view(Work& work, const Capture& capture, Method& method, Sequence* sequence) {
+void compute_view(Work& work, const Capture& capture, Method& method, Neighbourhood* sequence) {
     if (!sequence) {
         work.ao = method.compute({work.depth});
         work.row.passes = method.timings();
         return;
     }
-    SequenceResult result = sequence->compute(work.row.index);
+    NeighbourhoodResult result = sequence->compute(work.row.index);
     work.ao = std::move(result.ao);
     work.looked_at = std::move(result.depth);
     if (!result.frames.empty())

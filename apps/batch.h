@@ -3,7 +3,7 @@
 
 #include "ao/cloud/cloud_ao.h"
 #include "ao/method.h"
-#include "ao/sequence/sequence.h"
+#include "ao/sequence/neighbourhood.h"
 #include "apps/recording_cloud.h"
 #include "io/capture.h"
 #include "io/image_file.h"
@@ -52,7 +52,7 @@ struct BatchOptions {
     const CloudAo* cloud_ao = nullptr;        ///< what other clouds are computed with, where `cloud_walk` says so
     CloudWalk cloud_walk = CloudWalk::automatic;
     RecordingCloud* cloud = nullptr;          ///< what frames with a pose are added to
-    Sequence* sequence = nullptr;             ///< what frames are computed with instead of the method, together with those
+    Neighbourhood* sequence = nullptr;             ///< what frames are computed with instead of the method, together with those
                                               ///< around them; these are loaded whether or not `frames` has them
     std::filesystem::path dump;               ///< folder for the method's intermediates, frame by frame; empty = none
     int frames_in_memory = 0;                 ///< 0 = cores + 2

@@ -607,7 +607,7 @@ class Run final : public Command {
         std::optional<OnFittedDepth> fitted;
         if (noise.any())
             fitted.emplace(device, noise, plain, fit);
-        std::optional<Sequence> sequence;
+        std::optional<Neighbourhood> sequence;
         std::optional<RecordingCloud> cloud;
         if (!asked_.recording_cloud.empty()) {
             cloud.emplace(asked_.cloud_resolution_m);
@@ -684,7 +684,7 @@ class Run final : public Command {
     Outputs outputs_;
     ProjectOptions range_;
     CloudAoOptions cloud_options_;
-    SequenceOptions sequence_options_;
+    NeighbourhoodOptions sequence_options_;
     std::unique_ptr<gpu::Device> device_; ///< outlives what was made on it
     std::unique_ptr<Method> method_;
     Configuration made_; ///< what method_ was made from

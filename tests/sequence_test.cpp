@@ -1,7 +1,7 @@
 // Frames of a recording together: what other views add, what averaging takes away, and that nothing is ever worse than a frame
 // by itself.
 #include "ao/gpu/device.h"
-#include "ao/sequence/sequence.h"
+#include "ao/sequence/neighbourhood.h"
 #include "ao/surfel/surfel.h"
 #include "apps/batch.h"
 #include "apps/generate.h"
@@ -80,8 +80,8 @@ SurfelOptions quality(const char* name) {
     return options;
 }
 
-SequenceOptions only(int fuse, int layers, int average, int reach = 12) {
-    SequenceOptions options;
+NeighbourhoodOptions only(int fuse, int layers, int average, int reach = 12) {
+    NeighbourhoodOptions options;
     options.fuse = fuse;
     options.layers = layers;
     options.average = average;
@@ -91,10 +91,10 @@ SequenceOptions only(int fuse, int layers, int average, int reach = 12) {
 
 const DepthNoise kinect{0.0015, 0.0018, 3};
 
-SequenceResult together(const std::vector<Recorded>& frames, const SequenceOptions& options, std::size_t place, const DepthNoise& noise = {},
+NeighbourhoodResult together(const std::vector<Recorded>& frames, const NeighbourhoodOptions& options, std::size_t place, const DepthNoise& noise = {},
                         const char* level = "high") {
     Surfel surfel(device(), quality(level));
-    Sequence sequence(device(), surfel, radius_m, noise, {}, options);
+    Neighbourhood sequence(device(), surfel, radius_m, noise, {}, options);
     for (std::size_t i = 0; i < frames.size(); ++i)
         sequence.add(i, frames[i].depth, frames[i].pose);
     return sequence.compute(place);
@@ -103,10 +103,10 @@ SequenceResult together(const std::vector<Recorded>& frames, const SequenceOptio
 TEST(Sequence, a_frame_without_pose_is_what_it_is_by_itself) {
     const auto frames = walk("clutter", "ideal", 3, 0.2, 3);
     Surfel surfel(device(), quality("high"));
-    Sequence sequence(device(), surfel, radius_m, {}, {}, {});
+    Neighbourhood sequence(device(), surfel, radius_m, {}, {}, {});
     for (std::size_t i = 0; i < 3; ++i)
         sequence.add(i, frames[i].depth, i == 1 ? std::nullopt : std::optional(frames[i].pose));
-    const SequenceResult result = sequence.compute(1);
+    const NeighbourhoodResult result = sequence.compute(1);
     EXPECT_TRUE(result.neighbours.empty() && result.averaged.empty());
     // The pattern of samples goes with the frame's place.
     View view{frames[1].depth};
@@ -120,7 +120,7 @@ TEST(Sequence, other_views_see_what_hides_from_one) {
         const auto frames = walk(name, "ideal", 5.5, 0.6, 9);
         const cv::Mat1f truth = truth_of(name, frames[4]);
         const double one = rms(together(frames, alone(), 4).ao.visibility, truth);
-        const SequenceResult seen = together(frames, only(0, 6, 0, 4), 4);
+        const NeighbourhoodResult seen = together(frames, only(0, 6, 0, 4), 4);
         const double seven = rms(seen.ao.visibility, truth);
         EXPECT_EQ(seen.neighbours.size(), 6U);
         EXPECT_LT(seven, 0.97 * one) << name;
@@ -136,7 +136,7 @@ TEST(Sequence, noisy_depth_is_averaged_before_its_planes_are_fitted) {
         const auto frames = walk(name, "kinect", 5.5, 0.1, 9);
         const cv::Mat1f truth = truth_of(name, frames[4]);
         const double one = rms(together(frames, alone(), 4, kinect).ao.visibility, truth);
-        const SequenceResult fused = together(frames, only(8, 0, 0), 4, kinect);
+        const NeighbourhoodResult fused = together(frames, only(8, 0, 0), 4, kinect);
         EXPECT_EQ(fused.fused.size(), 8U);
         const double nine = rms(fused.ao.visibility, truth);
         EXPECT_LT(nine, 0.97 * one) << name;
@@ -148,7 +148,7 @@ TEST(Sequence, a_frame_whose_pose_is_wrong_is_left_out) {
     auto frames = walk("office", "ideal", 5.5, 0.3, 3);
     const cv::Mat1f by_itself = together({frames[0], frames[1]}, only(0, 2, 2, 1), 1).ao.visibility; // without the last one
     frames[2].pose = frames[2].pose * Eigen::Translation3d(0.4, 0, 0) * Eigen::AngleAxisd(0.2, Vector3d::UnitY());
-    const SequenceResult result = together(frames, only(0, 2, 2, 1), 1);
+    const NeighbourhoodResult result = together(frames, only(0, 2, 2, 1), 1);
     ASSERT_EQ(result.left_out.size(), 1U);
     EXPECT_EQ(result.left_out[0].place, 2U);
     EXPECT_EQ(result.neighbours, std::vector<std::size_t>{0});
@@ -187,7 +187,7 @@ TEST(Sequence, averaging_a_static_camera_leaves_the_mean_of_all_patterns) {
     }
     cv::Mat1f mean;
     cv::Mat(sum / 31).convertTo(mean, CV_32F);
-    const SequenceResult result = together(frames, only(0, 0, 30), 15, {}, "low");
+    const NeighbourhoodResult result = together(frames, only(0, 0, 30), 15, {}, "low");
     EXPECT_LT(rms(result.ao.visibility, mean), 1e-4);
     EXPECT_NEAR(result.frames(120, 160), 31, 0.1);
     // Noise falls as the root of the number of frames: between means of 15 and 15 others.
@@ -238,9 +238,9 @@ double flicker(const std::vector<Recorded>& frames, const std::vector<cv::Mat1f>
 
 TEST(Sequence, static_points_flicker_a_third_as_much) {
     const auto frames = walk("office", "kinect", 5.5, 1.0 / 30, 25);
-    const auto all = [&](const SequenceOptions& options) {
+    const auto all = [&](const NeighbourhoodOptions& options) {
         Surfel surfel(device(), quality("high"));
-        Sequence sequence(device(), surfel, radius_m, kinect, {}, options);
+        Neighbourhood sequence(device(), surfel, radius_m, kinect, {}, options);
         for (std::size_t i = 0; i < frames.size(); ++i)
             sequence.add(i, frames[i].depth, frames[i].pose);
         std::vector<cv::Mat1f> visibility(frames.size());
@@ -257,7 +257,7 @@ TEST(Sequence, static_points_flicker_a_third_as_much) {
 std::vector<FrameRow> run_together(const Capture& capture, const std::vector<std::size_t>& frames, const std::filesystem::path& out,
                                    RecordingCloud* cloud = nullptr) {
     Surfel surfel(device(), quality("low"));
-    Sequence sequence(device(), surfel, radius_m, kinect, {}, only(2, 2, 2, 2));
+    Neighbourhood sequence(device(), surfel, radius_m, kinect, {}, only(2, 2, 2, 2));
     BatchOptions options;
     options.frames = frames;
     options.outputs.folder = out;
@@ -318,7 +318,7 @@ TEST(Sequence, what_was_removed_is_gone_beyond_the_window) {
         frames.push_back(record(i < 8 ? full : empty));
         never.push_back(record(empty));
     }
-    const SequenceOptions options = only(0, 0, 8);
+    const NeighbourhoodOptions options = only(0, 0, 8);
     const cv::Mat1f later = together(frames, options, 12).ao.visibility, clean = together(never, options, 12).ao.visibility;
     EXPECT_TRUE(same_bytes(later, clean));
     // Where the box stood, the frame after has only its own side of time: no ghost of the box itself.

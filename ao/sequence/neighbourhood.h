@@ -16,7 +16,7 @@
 namespace scanshade {
 
 /// A recording's frames can be fused, seen through each other, and averaged; 0 = not so.
-struct SequenceOptions {
+struct NeighbourhoodOptions {
     int fuse = 8;    ///< frames around each that noisy depth is averaged with
     int layers = 6;  ///< other views whose surfaces occlude what a frame shows; of use to surfel
     int reach = 12;  ///< how many frames away these may be
@@ -29,7 +29,7 @@ struct SequenceOptions {
     }
 };
 /// Frames that are looked at by themselves, though prepared like those of a recording.
-[[nodiscard]] inline SequenceOptions alone() { return {.fuse = 0, .layers = 0, .average = 0}; }
+[[nodiscard]] inline NeighbourhoodOptions alone() { return {.fuse = 0, .layers = 0, .average = 0}; }
 
 /// A frame that would have been looked at, had it agreed.
 struct LeftOut {
@@ -38,7 +38,7 @@ struct LeftOut {
 };
 
 /// What came of one frame, and which others it was looked at with.
-struct SequenceResult {
+struct NeighbourhoodResult {
     AoMap ao;
     DepthImage depth; ///< as it was looked at: of noisy depth, the fitted planes'
     Timings timings;
@@ -48,18 +48,18 @@ struct SequenceResult {
 };
 
 /// Not thread-safe: one call at a time. A frame's result depends on the frames within reach() of it and on nothing else.
-class Sequence {
+class Neighbourhood {
   public:
     /// Keeps references to device and method.
-    Sequence(gpu::Device& device, Method& method, double radius_m, const DepthNoise& noise, const FitPlaneOptions& fit,
-             const SequenceOptions& options);
+    Neighbourhood(gpu::Device& device, Method& method, double radius_m, const DepthNoise& noise, const FitPlaneOptions& fit,
+             const NeighbourhoodOptions& options);
 
     /// How many frames before and behind it a frame's result depends on.
     [[nodiscard]] std::size_t reach() const { return options_.farthest(); }
     /// Frame `place` of the recording. Without a pose it is looked at by itself.
     void add(std::size_t place, const DepthImage& depth, const std::optional<Eigen::Isometry3d>& world_from_camera);
     /// Of an added frame; what lies within reach of it has been added, too, or is missing for good.
-    [[nodiscard]] SequenceResult compute(std::size_t place);
+    [[nodiscard]] NeighbourhoodResult compute(std::size_t place);
     /// Frames before `place` are needed no more.
     void forget_before(std::size_t place);
 
@@ -93,7 +93,7 @@ class Sequence {
     void account(std::string_view step, const Timings& timings);
 
     Method& method_;
-    SequenceOptions options_;
+    NeighbourhoodOptions options_;
     DepthNoise noise_;
     std::optional<FitPlane> drop_flying_, fit_;
     PackSurfaces pack_;

@@ -1,4 +1,4 @@
-#include "ao/sequence/sequence.h"
+#include "ao/sequence/neighbourhood.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,15 +8,15 @@ namespace scanshade {
 
 using Eigen::Isometry3d;
 
-std::vector<Parameter> SequenceOptions::parameters() {
+std::vector<Parameter> NeighbourhoodOptions::parameters() {
     return {{"fuse", "frames around each that noisy depth is averaged with; 0 = none", &fuse, "", 0, 16},
             {"layers", "other views whose surfaces occlude what a frame shows (surfel); 0 = none", &layers, "", 0, 16},
             {"reach", "how many frames away those may be", &reach, "frames", 1, 1000},
             {"average", "frames around each whose visibility is averaged with its own; 0 = none", &average, "", 0, 64}};
 }
 
-Sequence::Sequence(gpu::Device& device, Method& method, double radius_m, const DepthNoise& noise, const FitPlaneOptions& fit,
-                   const SequenceOptions& options)
+Neighbourhood::Neighbourhood(gpu::Device& device, Method& method, double radius_m, const DepthNoise& noise, const FitPlaneOptions& fit,
+                   const NeighbourhoodOptions& options)
     : method_(method), options_(options), noise_(noise), pack_(device), gather_(device), radius_m_(radius_m) {
     if (!method.looks_at_neighbours())
         options_.layers = 0;
@@ -31,15 +31,15 @@ Sequence::Sequence(gpu::Device& device, Method& method, double radius_m, const D
     fit_.emplace(device, noise, after_drop);
 }
 
-void Sequence::add(std::size_t place, const DepthImage& depth, const std::optional<Eigen::Isometry3d>& world_from_camera) {
+void Neighbourhood::add(std::size_t place, const DepthImage& depth, const std::optional<Eigen::Isometry3d>& world_from_camera) {
     Slot& slot = slots_[place];
     slot.depth = depth;
     slot.world_from_camera = world_from_camera;
 }
 
-void Sequence::forget_before(std::size_t place) { slots_.erase(slots_.begin(), slots_.lower_bound(place)); }
+void Neighbourhood::forget_before(std::size_t place) { slots_.erase(slots_.begin(), slots_.lower_bound(place)); }
 
-const DepthImage& Sequence::kept(Slot& slot) {
+const DepthImage& Neighbourhood::kept(Slot& slot) {
     if (!slot.kept) {
         slot.kept = drop_flying_->compute(slot.depth).depth;
         account("flying pixels", drop_flying_->timings());
@@ -47,13 +47,13 @@ const DepthImage& Sequence::kept(Slot& slot) {
     return *slot.kept;
 }
 
-const Facets& Sequence::facets(Slot& slot) {
+const Facets& Neighbourhood::facets(Slot& slot) {
     if (!slot.facets)
         slot.facets = facets_of(fit_ ? kept(slot) : slot.depth, noise_);
     return *slot.facets;
 }
 
-View Sequence::view_of(std::size_t place) {
+View Neighbourhood::view_of(std::size_t place) {
     Slot& slot = slots_.at(place);
     if (!fit_)
         return {slot.depth};
@@ -70,7 +70,7 @@ View Sequence::view_of(std::size_t place) {
     return {slot.fitted->depth, planes ? &slot.fitted->normals : nullptr, noise_, planes};
 }
 
-const PackedSurfaces& Sequence::packed(std::size_t place) {
+const PackedSurfaces& Neighbourhood::packed(std::size_t place) {
     Slot& slot = slots_.at(place);
     if (!slot.packed) {
         slot.packed = pack_.compute(view_of(place));
@@ -79,7 +79,7 @@ const PackedSurfaces& Sequence::packed(std::size_t place) {
     return *slot.packed;
 }
 
-std::optional<Sequence::Fitting> Sequence::fitting(std::size_t here, std::size_t there) {
+std::optional<Neighbourhood::Fitting> Neighbourhood::fitting(std::size_t here, std::size_t there) {
     Slot& slot = slots_.at(here);
     const auto other = slots_.find(there);
     if (other == slots_.end() || !slot.world_from_camera || !other->second.world_from_camera)
@@ -100,7 +100,7 @@ std::optional<Sequence::Fitting> Sequence::fitting(std::size_t here, std::size_t
 
 /// As far away as they may be, and evenly between: near views see little that this one does not. Where the recording ends, or
 /// a frame does not fit, the next nearer one, and more from the other side.
-std::vector<Sequence::Fitting> Sequence::spread_views(std::size_t place) {
+std::vector<Neighbourhood::Fitting> Neighbourhood::spread_views(std::size_t place) {
     std::vector<Fitting> chosen;
     const int sides = (options_.layers + 1) / 2;
     const auto try_frame = [&](std::size_t other) {
@@ -121,7 +121,7 @@ std::vector<Sequence::Fitting> Sequence::spread_views(std::size_t place) {
 }
 
 /// The nearest ones on either side.
-std::vector<Sequence::Fitting> Sequence::adjacent_views(std::size_t place, int count) {
+std::vector<Neighbourhood::Fitting> Neighbourhood::adjacent_views(std::size_t place, int count) {
     std::vector<Fitting> chosen;
     for (int step = 1; step <= (count + 1) / 2; ++step)
         for (const int side : {-1, 1})
@@ -130,14 +130,14 @@ std::vector<Sequence::Fitting> Sequence::adjacent_views(std::size_t place, int c
     return chosen;
 }
 
-void Sequence::account(std::string_view step, const Timings& timings) {
+void Neighbourhood::account(std::string_view step, const Timings& timings) {
     double sum = 0;
     for (const auto& [name, ms] : timings)
         sum += ms;
     timings_.emplace_back(step, sum);
 }
 
-const AoMap& Sequence::visibility(std::size_t place) {
+const AoMap& Neighbourhood::visibility(std::size_t place) {
     Slot& slot = slots_.at(place);
     if (slot.ao)
         return *slot.ao;
@@ -154,8 +154,8 @@ const AoMap& Sequence::visibility(std::size_t place) {
     return *slot.ao;
 }
 
-SequenceResult Sequence::compute(std::size_t place) {
-    SequenceResult result;
+NeighbourhoodResult Neighbourhood::compute(std::size_t place) {
+    NeighbourhoodResult result;
     result.ao = visibility(place);
     std::vector<Seen> others;
     for (const Fitting& other : adjacent_views(place, options_.average)) {
