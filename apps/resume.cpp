@@ -22,7 +22,7 @@ constexpr std::array aside = {"frames",     "camera",      "depth-scale",    "as
                               "device",     "out",         "write",          "format",
                               "overwrite",  "dump",        "resume",         "retry",
                               "shard",      "log",         "shade-strength", "colour-cloud",
-                              "cloud",      "cloud-resolution"};
+                              "cloud",      "cloud-resolution", "poses"};
 
 /// Rows that shape nothing when they are typed differently.
 constexpr std::array elsewhere = {"out", "overwrite", "dump", "resume", "retry", "shard", "log", "device"};

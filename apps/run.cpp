@@ -49,7 +49,7 @@ void end_gracefully_on_signals() {
 
 struct RunSettings {
     std::vector<std::string> paths;
-    std::string frames, camera, depth_scale, registered = "auto";
+    std::string frames, camera, poses, depth_scale, registered = "auto";
     std::string depth_noise = "auto", depth_range, flying_pixels = "drop";
     double depth_smoothing = 1;
     double association_limit_s = 0.02;
@@ -279,6 +279,7 @@ class Run final : public Command {
              {{"frames", "which frames, by index: first:end:step, end not included; negative counts from the end",
                &s.frames},
               {"camera", "a camera file, or fx,fy,cx,cy; replaces the capture's own", &s.camera},
+              {"poses", "a trajectory in TUM's rows, as refine --trajectory writes it; replaces the capture's own poses", &s.poses},
               {"depth-scale", "mm, tum, sun, nyu, m, or units per metre; replaces the capture's own", &s.depth_scale},
               {.name = "registered",
                .help = "whether colour pixels lie on depth pixels",
@@ -438,7 +439,7 @@ class Run final : public Command {
     }
 
     Job job_from(const fs::path& path, const fs::path& folder) const {
-        Job job{open_capture(path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s}), {}};
+        Job job{open_capture(path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s, asked_.poses}), {}};
         refuse_absent_view(job.capture);
         job.batch.frames = job.of = slice(asked_.frames, job.capture.entries.size());
         job.batch.outputs = outputs_;

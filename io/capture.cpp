@@ -5,6 +5,7 @@
 #include "io/cloud_file.h"
 #include "io/cloud_records.h"
 #include "io/layouts.h"
+#include "io/trajectory.h"
 #include "io/plausibility.h"
 #include "io/text.h"
 #include "projection/error.h"
@@ -208,6 +209,26 @@ void load_cloud(const Capture& capture, const CaptureEntry& entry, Frame& frame)
 
 } // namespace
 
+namespace {
+
+/// Poses of a file in place of the recording's own. Throws Error where no frame finds one.
+void take_poses(Capture& capture, const CaptureOptions& options) {
+    const std::vector<StampedPose> poses = read_tum_trajectory(options.poses, capture.warnings);
+    std::size_t found = 0;
+    for (std::size_t i = 0; i < capture.entries.size(); ++i) {
+        CaptureEntry& entry = capture.entries[i];
+        entry.world_from_camera = entry.stamp_s ? pose_at(poses, *entry.stamp_s, options.association_limit_s)
+                                                : pose_at(poses, static_cast<double>(i), 0.01);
+        found += entry.world_from_camera.has_value();
+    }
+    if (found == 0)
+        throw Error(fmt::format("{}: none of its {} poses belongs to a frame of {} (by {})", options.poses.string(), poses.size(), capture.path.string(),
+                                capture.entries.front().stamp_s ? "time" : "index"));
+    capture.warnings.push_back(fmt::format("{} of {} frames have a pose in {}.", found, capture.entries.size(), options.poses.string()));
+}
+
+} // namespace
+
 Capture open_capture(const fs::path& path, const CaptureOptions& options) {
     std::error_code ignored;
     if (!fs::exists(path, ignored))
@@ -221,6 +242,8 @@ Capture open_capture(const fs::path& path, const CaptureOptions& options) {
         listing.find_poses(capture, capture.pose_time_offset_s);
     if (!options.depth_scale.empty())
         capture.depth = depth_encoding(options.depth_scale, "--depth-scale");
+    if (!options.poses.empty())
+        take_poses(capture, options);
     return std::move(capture);
 }
 

@@ -18,6 +18,7 @@ struct CaptureOptions {
     std::string camera;                ///< file or "fx,fy,cx,cy"; empty = from the capture
     std::string depth_scale;           ///< as depth_encoding() takes it; empty = from the layout
     double association_limit_s = 0.02; ///< colour, depth and poses farther apart in time are not paired (TUM)
+    std::filesystem::path poses = {};  ///< TUM's rows, by time or, where frames have none, by index; empty = the capture's own
 };
 
 /// One frame's listing: where its parts lie. Nothing is decoded yet.

@@ -3,6 +3,7 @@
 
 #include "io/text.h"
 #include "projection/error.h"
+#include "projection/motion.h"
 
 #include <algorithm>
 #include <array>
@@ -126,6 +127,22 @@ std::vector<StampedPose> read_tum_trajectory(const fs::path& file, std::vector<s
         std::stable_sort(poses.begin(), poses.end(), earlier);
     }
     return poses;
+}
+
+std::optional<Eigen::Isometry3d> pose_at(const std::vector<StampedPose>& poses, double stamp_s, double limit_s) {
+    const auto near_enough = [&](const StampedPose& pose) { return std::abs(pose.stamp_s - stamp_s) <= limit_s; };
+    const auto after = std::lower_bound(poses.begin(), poses.end(), stamp_s,
+                                        [](const StampedPose& pose, double stamp) { return pose.stamp_s < stamp; });
+    const bool after_near = after != poses.end() && near_enough(*after);
+    const bool before_near = after != poses.begin() && near_enough(*std::prev(after));
+    if (after_near && before_near) {
+        const auto& [from_s, from] = *std::prev(after);
+        const auto& [to_s, to] = *after;
+        return pose_between(from, to, (stamp_s - from_s) / (to_s - from_s));
+    }
+    if (after_near)
+        return after->world_from_camera;
+    return before_near ? std::optional(std::prev(after)->world_from_camera) : std::nullopt;
 }
 
 std::map<std::size_t, Eigen::Isometry3d> read_pose_rows(const fs::path& file, std::vector<std::string>& warnings) {

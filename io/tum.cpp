@@ -102,22 +102,6 @@ auto first_after(const std::vector<StampedPose>& poses, double stamp_s) {
                             [](const StampedPose& pose, double stamp) { return pose.stamp_s < stamp; });
 }
 
-/// Between the poses before and after where both are near enough in time, else the nearer one.
-std::optional<Eigen::Isometry3d> pose_at(const std::vector<StampedPose>& poses, double stamp_s, double limit_s) {
-    const auto near_enough = [&](const StampedPose& pose) { return std::abs(pose.stamp_s - stamp_s) <= limit_s; };
-    const auto after = first_after(poses, stamp_s);
-    const bool after_near = after != poses.end() && near_enough(*after);
-    const bool before_near = after != poses.begin() && near_enough(*std::prev(after));
-    if (after_near && before_near) {
-        const auto& [from_s, from] = *std::prev(after);
-        const auto& [to_s, to] = *after;
-        return pose_between(from, to, (stamp_s - from_s) / (to_s - from_s));
-    }
-    if (after_near)
-        return after->world_from_camera;
-    return before_near ? std::optional(std::prev(after)->world_from_camera) : std::nullopt;
-}
-
 /// From the poses at least 10 ms away on either side; zero where the trajectory has gaps.
 Motion motion_at(const std::vector<StampedPose>& poses, double stamp_s, const Eigen::Isometry3d& at) {
     constexpr double least_s = 0.01, most_s = 0.1;

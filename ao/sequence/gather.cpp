@@ -29,7 +29,7 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, st
 
 } // namespace
 
-GatheredAo Gather::compute(const Seen& own, std::span<const Seen> others, double radius_m, const DepthNoise& noise) {
+GatheredAo Gather::compute(const Seen& own, std::span<const Seen> others, const GatherOptions& how) {
     const cv::Size size = own.visibility->size();
     if (others.size() > shared::most_gathered)
         throw Error(fmt::format("{} frames to average, {} are the most", others.size(), shared::most_gathered));
@@ -40,8 +40,8 @@ GatheredAo Gather::compute(const Seen& own, std::span<const Seen> others, double
     size_ = size;
     const DepthImage camera_only{own.surfaces->camera, {}, {}};
     ScreenOptions options;
-    options.radius = static_cast<float>(radius_m);
-    shared::GatherConstants constants{constants_from(options, {.depth = camera_only, .noise = noise}), static_cast<int>(others.size()), 0.002F, 0.005F, {}, {}};
+    options.radius = static_cast<float>(how.radius_m);
+    shared::GatherConstants constants{constants_from(options, {.depth = camera_only, .noise = how.noise}), static_cast<int>(others.size()), 0.002F, 0.005F, how.clamp, {}, {}};
     const std::size_t pixels = own.visibility->total();
     gpu::upload(own.surfaces->words, program_->host(own_surfaces));
     gpu::upload(*own.visibility, program_->host(own_visibility));

@@ -25,13 +25,19 @@ struct GatheredAo {
     cv::Mat1f deviation; ///< between them
 };
 
+struct GatherOptions {
+    double radius_m; ///< of the visibility
+    DepthNoise noise;
+    float clamp = 1; ///< others' visibility counts as no farther from the frame's own than this
+};
+
 /// Not thread-safe: one frame at a time.
 class Gather {
   public:
     explicit Gather(gpu::Device& device) : device_(device) {}
 
-    /// Of frame `own`, whose pixels without visibility stay without. `radius_m` is that of the visibility.
-    [[nodiscard]] GatheredAo compute(const Seen& own, std::span<const Seen> others, double radius_m, const DepthNoise& noise);
+    /// Of frame `own`, whose pixels without visibility stay without.
+    [[nodiscard]] GatheredAo compute(const Seen& own, std::span<const Seen> others, const GatherOptions& options);
     /// Where the time of the last compute() went.
     [[nodiscard]] const Timings& timings() const { return timings_; }
 

@@ -12,7 +12,9 @@ std::vector<Parameter> NeighbourhoodOptions::parameters() {
     return {{"fuse", "frames around each that noisy depth is averaged with; 0 = none", &fuse, "", 0, 16},
             {"layers", "other views whose surfaces occlude what a frame shows (surfel); 0 = none", &layers, "", 0, 16},
             {"reach", "how many frames away those may be", &reach, "frames", 1, 1000},
-            {"average", "frames around each whose visibility is averaged with its own; 0 = none", &average, "", 0, 64}};
+            {"average", "frames around each whose visibility is averaged with its own; 0 = none", &average, "", 0, 64},
+            {"blend", "mean of frames before and after; exponential: of frames before, each a 29/30 of the next younger one", &blend, "", {}, {}, {"mean", "exponential"}},
+            {"clamp", "visibility of other frames counts as no farther from the frame's own than this; 1 = as it is", &clamp, "", 0, 1}};
 }
 
 Neighbourhood::Neighbourhood(gpu::Device& device, Method& method, double radius_m, const DepthNoise& noise, const FitPlaneOptions& fit,
@@ -120,12 +122,14 @@ std::vector<Neighbourhood::Fitting> Neighbourhood::spread_views(std::size_t plac
     return chosen;
 }
 
-/// The nearest ones on either side.
-std::vector<Neighbourhood::Fitting> Neighbourhood::adjacent_views(std::size_t place, int count) {
+/// The nearest ones on either side, or before it.
+std::vector<Neighbourhood::Fitting> Neighbourhood::adjacent_views(std::size_t place, int count, bool only_before) {
     std::vector<Fitting> chosen;
-    for (int step = 1; step <= (count + 1) / 2; ++step)
+    for (int step = 1; step <= (only_before ? count : (count + 1) / 2); ++step)
         for (const int side : {-1, 1})
-            if (const auto fits = fitting(place, place + static_cast<std::size_t>(side * step)))
+            if (only_before && side > 0)
+                continue;
+            else if (const auto fits = fitting(place, place + static_cast<std::size_t>(side * step)))
                 chosen.push_back(*fits);
     return chosen;
 }
@@ -158,12 +162,14 @@ NeighbourhoodResult Neighbourhood::compute(std::size_t place) {
     NeighbourhoodResult result;
     result.ao = visibility(place);
     std::vector<Seen> others;
-    for (const Fitting& other : adjacent_views(place, options_.average)) {
-        others.push_back({&packed(other.place), &visibility(other.place).visibility, other.here_from_there});
+    const bool exponential = options_.blend == "exponential";
+    for (const Fitting& other : adjacent_views(place, options_.average, exponential)) {
+        const double share = exponential ? std::pow(29.0 / 30, static_cast<double>(place - other.place)) : 1;
+        others.push_back({&packed(other.place), &visibility(other.place).visibility, other.here_from_there, static_cast<float>(share)});
         result.averaged.push_back(other.place);
     }
     if (!others.empty()) {
-        GatheredAo gathered = gather_.compute({&packed(place), &result.ao.visibility}, others, radius_m_, noise_);
+        GatheredAo gathered = gather_.compute({&packed(place), &result.ao.visibility}, others, {radius_m_, noise_, options_.clamp});
         account("average", gather_.timings());
         result.ao = std::move(gathered.mean);
         result.frames = std::move(gathered.frames);

@@ -21,11 +21,13 @@ struct NeighbourhoodOptions {
     int layers = 6;  ///< other views whose surfaces occlude what a frame shows; of use to surfel
     int reach = 12;  ///< how many frames away these may be
     int average = 12; ///< frames around each whose visibility is averaged with its own
+    std::string blend = "mean"; ///< of these; "exponential": of those before, each older one 29/30 of the next
+    float clamp = 1;  ///< other frames' visibility counts as no farther from the frame's own than this
 
     [[nodiscard]] std::vector<Parameter> parameters();
     /// How many frames before and behind it a frame's result may depend on.
     [[nodiscard]] std::size_t farthest() const {
-        return static_cast<std::size_t>((layers > 0 ? reach : 0) + (fuse + 1) / 2 + (average + 1) / 2);
+        return static_cast<std::size_t>((layers > 0 ? reach : 0) + (fuse + 1) / 2 + (blend == "mean" ? (average + 1) / 2 : average));
     }
 };
 /// Frames that are looked at by themselves, though prepared like those of a recording.
@@ -89,7 +91,7 @@ class Neighbourhood {
     [[nodiscard]] const AoMap& visibility(std::size_t place);
     [[nodiscard]] std::optional<Fitting> fitting(std::size_t here, std::size_t there);
     [[nodiscard]] std::vector<Fitting> spread_views(std::size_t place);
-    [[nodiscard]] std::vector<Fitting> adjacent_views(std::size_t place, int count);
+    [[nodiscard]] std::vector<Fitting> adjacent_views(std::size_t place, int count, bool only_before = false);
     void account(std::string_view step, const Timings& timings);
 
     Method& method_;

@@ -58,7 +58,7 @@ void main() {
         float weight = positive(1.0 - apart * apart) * worth(there, turned, at) * closer * constants.shares[i];
         bool same = sees && met.z > 0.0 && dot(turned, normal) > 0.7 && then >= 0.0;
         weight = same ? weight : 0.0;
-        then = same ? then : 0.0;
+        then = same ? clamp(then, v - constants.clamp_to, v + constants.clamp_to) : 0.0;
         weights += weight;
         sum += weight * then;
         squares += weight * then * then;
