@@ -391,26 +391,30 @@ void attach_and_write(Work& work, const BatchOptions& options) {
 
 using Token = std::shared_ptr<Work>;
 
-/// Which frames enter the pipeline, in the recording's order: those wanted, and those within reach of one. Then as many empty
-/// tokens as frames may still wait for what lies around them.
+/// Which frames enter the pipeline: those wanted, as they come; with a reach, in the recording's order, those wanted and those
+/// within reach of one, then as many empty tokens as frames may still wait for what lies around them.
 class Walk {
   public:
     Walk(const Capture& capture, std::vector<FrameRow>& rows, std::size_t reach) : capture_(capture), empty_(reach > 0 ? rows.size() : 0) {
+        std::map<std::size_t, FrameRow*> around;
         for (FrameRow& row : rows) {
             const std::size_t first = row.index - std::min(row.index, reach);
-            for (std::size_t i = first; i <= std::min(row.index + reach, capture.entries.size() - 1); ++i)
-                steps_.try_emplace(i, nullptr);
-            steps_[row.index] = &row;
+            for (std::size_t i = first; reach > 0 && i <= std::min(row.index + reach, capture.entries.size() - 1); ++i)
+                around.try_emplace(i, nullptr);
+            if (reach > 0)
+                around[row.index] = &row;
+            else
+                steps_.emplace_back(row.index, &row);
         }
-        next_ = steps_.begin();
+        steps_.insert(steps_.end(), around.begin(), around.end());
     }
-    [[nodiscard]] bool goes_on() const { return next_ != steps_.end() || empty_ > 0; }
+    [[nodiscard]] bool goes_on() const { return next_ < steps_.size() || empty_ > 0; }
     [[nodiscard]] Token next() {
-        if (next_ == steps_.end()) {
+        if (next_ == steps_.size()) {
             --empty_;
             return {};
         }
-        const auto [index, row] = *next_++;
+        const auto [index, row] = steps_[next_++];
         if (!row)
             beside_.push_back(skipped_row(capture_, index));
         auto work = std::make_shared<Work>(Work{capture_.entries[index], row ? *row : beside_.back()});
@@ -421,8 +425,8 @@ class Walk {
 
   private:
     const Capture& capture_;
-    std::map<std::size_t, FrameRow*> steps_; ///< null: only beside others
-    std::map<std::size_t, FrameRow*>::const_iterator next_;
+    std::vector<std::pair<std::size_t, FrameRow*>> steps_; ///< null: only beside others
+    std::size_t next_ = 0;
     std::deque<FrameRow> beside_; ///< rows of those
     std::size_t empty_;
 };

@@ -8,6 +8,9 @@ namespace scanshade {
 
 using Eigen::Isometry3d;
 
+/// Share of the tolerable misfit below which recorded poses are as good as aligned ones.
+constexpr double aligned_already = 0.05;
+
 std::vector<Parameter> NeighbourhoodOptions::parameters() {
     return {{"fuse", "frames around each that noisy depth is averaged with; 0 = none", &fuse, "", 0, 16},
             {"layers", "other views whose surfaces occlude what a frame shows (surfel); 0 = none", &layers, "", 0, 16},
@@ -81,23 +84,35 @@ const PackedSurfaces& Neighbourhood::packed(std::size_t place) {
     return *slot.packed;
 }
 
-std::optional<Neighbourhood::Fitting> Neighbourhood::fitting(std::size_t here, std::size_t there) {
-    Slot& slot = slots_.at(here);
-    const auto other = slots_.find(there);
-    if (other == slots_.end() || !slot.world_from_camera || !other->second.world_from_camera)
-        return std::nullopt;
-    const auto [known, is_new] = slot.fittings.try_emplace(there);
+/// Found once for both, from the earlier one's side, whichever asks first: results must not hang on the order of questions.
+const Neighbourhood::Meeting& Neighbourhood::meeting(std::size_t earlier, std::size_t later) {
+    Slot& slot = slots_.at(earlier);
+    const auto [known, is_new] = slot.meetings.try_emplace(later);
     if (!is_new)
         return known->second;
-    const Isometry3d recorded = slot.world_from_camera->inverse() * *other->second.world_from_camera;
-    const Pair pair{facets(slot), facets(other->second), radius_m_, noise_};
-    const Isometry3d pose = aligned(pair, recorded);
-    const Agreement agreed = agreement(pair, pose);
-    if (agreed.fits())
-        known->second = Fitting{there, pose, agreed.misfit_m};
-    else
-        slot.left_out.push_back({there, agreed});
+    const Slot& other = slots_.at(later);
+    const Pair pair{facets(slot), facets(slots_.at(later)), radius_m_, noise_};
+    Isometry3d pose = slot.world_from_camera->inverse() * *other.world_from_camera;
+    Agreement agreed = agreement(pair, pose);
+    if (agreed.misfit > aligned_already || agreed.overlap == 0) {
+        pose = aligned(pair, pose);
+        agreed = agreement(pair, pose);
+    }
+    known->second = {agreed, pose};
     return known->second;
+}
+
+std::optional<Neighbourhood::Fitting> Neighbourhood::fitting(std::size_t here, std::size_t there) {
+    const auto own = slots_.find(here), other = slots_.find(there);
+    if (other == slots_.end() || !own->second.world_from_camera || !other->second.world_from_camera)
+        return std::nullopt;
+    const Meeting& met = meeting(std::min(here, there), std::max(here, there));
+    if (met.agreement.fits())
+        return Fitting{there, here < there ? met.earlier_from_later : met.earlier_from_later.inverse(), met.agreement.misfit_m};
+    std::vector<LeftOut>& left_out = own->second.left_out;
+    if (std::ranges::none_of(left_out, [&](const LeftOut& each) { return each.place == there; }))
+        left_out.push_back({there, met.agreement});
+    return std::nullopt;
 }
 
 /// As far away as they may be, and evenly between: near views see little that this one does not. Where the recording ends, or

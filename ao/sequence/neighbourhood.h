@@ -72,6 +72,11 @@ class Neighbourhood {
         Eigen::Isometry3d here_from_there;
         double misfit_m;
     };
+    /// How two frames lie to each other.
+    struct Meeting {
+        Agreement agreement;
+        Eigen::Isometry3d earlier_from_later;
+    };
     struct Slot {
         DepthImage depth;
         std::optional<Eigen::Isometry3d> world_from_camera;
@@ -80,7 +85,7 @@ class Neighbourhood {
         std::optional<FittedDepth> fitted;
         std::optional<PackedSurfaces> packed;
         std::optional<AoMap> ao; ///< before any averaging
-        std::map<std::size_t, std::optional<Fitting>> fittings;
+        std::map<std::size_t, Meeting> meetings; ///< with later frames
         std::vector<std::size_t> fused, neighbours;
         std::vector<LeftOut> left_out;
     };
@@ -89,6 +94,7 @@ class Neighbourhood {
     [[nodiscard]] View view_of(std::size_t place);
     [[nodiscard]] const PackedSurfaces& packed(std::size_t place);
     [[nodiscard]] const AoMap& visibility(std::size_t place);
+    [[nodiscard]] const Meeting& meeting(std::size_t earlier, std::size_t later);
     [[nodiscard]] std::optional<Fitting> fitting(std::size_t here, std::size_t there);
     [[nodiscard]] std::vector<Fitting> spread_views(std::size_t place);
     [[nodiscard]] std::vector<Fitting> adjacent_views(std::size_t place, int count, bool only_before = false);
