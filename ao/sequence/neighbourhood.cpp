@@ -90,15 +90,14 @@ const Neighbourhood::Meeting& Neighbourhood::meeting(std::size_t earlier, std::s
     const auto [known, is_new] = slot.meetings.try_emplace(later);
     if (!is_new)
         return known->second;
-    const Slot& other = slots_.at(later);
-    const Pair pair{facets(slot), facets(slots_.at(later)), radius_m_, noise_};
-    Isometry3d pose = slot.world_from_camera->inverse() * *other.world_from_camera;
-    Agreement agreed = agreement(pair, pose);
-    if (agreed.misfit > aligned_already || agreed.overlap == 0) {
-        pose = aligned(pair, pose);
-        agreed = agreement(pair, pose);
-    }
-    known->second = {agreed, pose};
+    Slot& other = slots_.at(later);
+    const Pair pair{facets(slot), facets(other), radius_m_, noise_}, back{pair.there, pair.here, radius_m_, noise_};
+    const Isometry3d recorded = slot.world_from_camera->inverse() * *other.world_from_camera;
+    const Isometry3d pose = agreement(pair, recorded).misfit > aligned_already ? aligned(pair, recorded) : recorded;
+    // Each must agree with the other: what one has looked through tells nothing of what is hidden from it.
+    const Agreement there = agreement(pair, pose), here = agreement(back, pose.inverse());
+    known->second = {{std::min(there.overlap, here.overlap), std::max(there.contradicted, here.contradicted),
+                      std::max(there.misfit_m, here.misfit_m), std::max(there.misfit, here.misfit)}, pose};
     return known->second;
 }
 
