@@ -38,18 +38,19 @@ constexpr float hidden_layer = 0.05F;
 /// What other views saw behind this one's surfaces and outside its image, and how thick these can be: two buffers.
 std::pair<int, int> add_layers(ScreenTables& tables) {
     using Texels = gpu::BufferRow::Texels;
-    const int behind = tables.add_buffer({"behind", 2 * tables.pixels() * 4, gpu::BufferRow::Host::none, Texels::r32ui});
-    const cv::Size blocks(divided_up(tables.size.width, 2), divided_up(tables.size.height, 2));
-    const int limits = tables.add_buffer(
-        {"limits", static_cast<std::size_t>(blocks.area()) * 4, gpu::BufferRow::Host::none, Texels::r32f});
+    const auto halved = [](cv::Size size) { return cv::Size(divided_up(size.width, 2), divided_up(size.height, 2)); };
+    const cv::Size blocks = halved(tables.size);
+    const auto bytes = static_cast<std::size_t>(blocks.area()) * 4;
+    const int behind = tables.add_buffer({"behind", 2 * bytes, gpu::BufferRow::Host::none, Texels::r32ui});
+    const int limits = tables.add_buffer({"limits", bytes, gpu::BufferRow::Host::none, Texels::r32f});
     tables.passes.push_back({"clear layers", "", {}, {behind}, {1, 1, 1}, {}});
     for (int round = 0; round < 2; ++round) {
-        tables.add_pass_over(tables.window.size(), fmt::format("reproject {}", round + 1), "surfel/reproject",
+        tables.add_pass_over(halved(tables.window.size()), fmt::format("reproject {}", round + 1), "surfel/reproject",
                              {screen_neighbours, screen_depth}, {behind}, {{shared::spec_round, round}});
         tables.passes.back().groups[2] = static_cast<std::uint32_t>(tables.neighbours);
     }
     tables.add_pass("widen", "surfel/widen", {screen_depth, behind}, {screen_surfaces});
-    tables.add_pass_over(blocks, "carve", "surfel/carve", {screen_neighbours, screen_surfaces}, {limits});
+    tables.add_pass_over(halved(tables.window.size()), "carve", "surfel/carve", {screen_neighbours, screen_surfaces}, {limits});
     return {behind, limits};
 }
 

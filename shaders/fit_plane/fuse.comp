@@ -5,6 +5,7 @@
 #extension GL_EXT_scalar_block_layout : require
 #include "shared/fit_plane.h"
 #include "lib/cheap.glsl"
+#include "lib/neighbour.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0, r32f) readonly uniform imageBuffer kept;       // 1/z, 0 where there is none
@@ -27,12 +28,11 @@ void main() {
     int i = 0;
     do {
         NeighbourPlace place = constants.places[i];
-        vec3 away = ray * z - place.shift;
-        vec3 there = away.x * place.x + away.y * place.y + away.z * place.z; // the inverse rotation
-        float along = ray.x * place.x.z + ray.y * place.y.z + ray.z * place.z.z; // its z per z of this view
-        vec2 at = (there.xy * (1.0 / there.z) - place.ray_base) / place.ray_step;
-        bool sees = there.z > 0.0 && along > 0.2 && all(greaterThan(at, vec2(-0.5))) && all(lessThan(at, vec2(k.size) - 0.5));
-        int index = sees ? (i * k.size.y + nearest(at.y)) * k.size.x + nearest(at.x) : 0;
+        vec3 there = point_there(ray * z, place);
+        float along = turned_there(ray, place).z; // its z per z of this view
+        vec2 at;
+        bool sees = seen_there(there, place, k.size, at) && along > 0.2;
+        int index = index_there(i, at, k.size, sees);
         float recorded = imageLoad(neighbours, index).x, apart = (recorded - there.z) * narrow;
         float weight = sees && recorded > 0.0 ? positive(1.0 - apart * apart) : 0.0;
         weights += weight;

@@ -6,6 +6,7 @@
 #include "shared/gather.h"
 #include "lib/screen.glsl"
 #include "lib/cheap.glsl"
+#include "lib/neighbour.glsl"
 
 layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(binding = 0, rg32ui) readonly uniform uimageBuffer own_surfaces;
@@ -42,15 +43,12 @@ void main() {
     int i = 0;
     do {
         NeighbourPlace place = constants.places[i];
-        vec3 away = point - place.shift;
-        vec3 there = away.x * place.x + away.y * place.y + away.z * place.z; // the inverse rotation
-        vec3 turned = n.x * place.x + n.y * place.y + n.z * place.z;
-        vec2 at = (there.xy * (1.0 / there.z) - place.ray_base) / place.ray_step;
-        bool sees = there.z > 0.0 && all(greaterThan(at, vec2(-0.5))) && all(lessThan(at, vec2(k.window) - 0.5));
-        ivec2 q = ivec2(nearest(at.x), nearest(at.y));
-        int index = sees ? (i * k.window.y + q.y) * k.window.x + q.x : 0;
+        vec3 there = point_there(point, place), turned = turned_there(n, place);
+        vec2 at;
+        bool sees = seen_there(there, place, k.window, at);
+        int index = index_there(i, at, k.window, sees);
         uvec2 other = imageLoad(surfaces, index).xy;
-        vec3 met = vec3(vec2(q) * place.ray_step + place.ray_base, 1.0) * uintBitsToFloat(other.x);
+        vec3 met = ray_there(vec2(nearest(at.x), nearest(at.y)), place) * uintBitsToFloat(other.x);
         vec3 normal = vec3(bytes_of_normal(other.y)) * (1.0 / 127.0);
         float apart = dot(turned, met - there) * narrow;
         float then = imageLoad(visibilities, index).x;

@@ -5,6 +5,7 @@
 #include "shared/surfel.h"
 #include "lib/screen.glsl"
 #include "lib/cheap.glsl"
+#include "lib/neighbour.glsl"
 
 layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(binding = 0, rg32ui) readonly uniform uimageBuffer neighbours;
@@ -14,19 +15,18 @@ layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 // Whether neighbour i looked through a point of this view.
 bool is_free(int i, NeighbourPlace place, vec3 point, float margin) {
-    vec3 away = point - place.shift;
-    vec3 there = away.x * place.x + away.y * place.y + away.z * place.z; // the inverse rotation
-    vec2 at = (there.xy * (1.0 / there.z) - place.ray_base) / place.ray_step;
-    bool sees = there.z > 0.0 && all(greaterThan(at, vec2(-0.5))) && all(lessThan(at, vec2(k.window) - 0.5));
-    int index = sees ? (i * k.window.y + nearest(at.y)) * k.window.x + nearest(at.x) : 0;
-    return sees && uintBitsToFloat(imageLoad(neighbours, index).x) > there.z + margin;
+    vec3 there = point_there(point, place);
+    vec2 at;
+    bool sees = seen_there(there, place, k.window, at);
+    return sees && uintBitsToFloat(imageLoad(neighbours, index_there(i, at, k.window, sees)).x) > there.z + margin;
 }
 
 void main() {
     SurfelConstants s = constants;
     k = s.screen;
-    ivec2 block = ivec2(gl_GlobalInvocationID.xy), p = 2 * block;
-    if (!inside(p)) return;
+    ivec2 p = 2 * ivec2(gl_GlobalInvocationID.xy), block = (p + k.origin) >> 1;
+    if (any(greaterThanEqual(p, k.window))) return;
+    p = 2 * block;
     float z = abs(imageLoad(surfaces, index_of(p)).w);
     vec3 point = ray_of(vec2(p)) * z, away = normalize(ray_of(vec2(p))) * s.thickest;
     float margin = max(max(0.02 * k.radius, 0.01 * z), 3.0 * sigma_of(z)), limit = 1.0;

@@ -43,13 +43,13 @@ int run_length(int i, int index) {
 const uint place_mask = 31u, foreign = 16u;
 
 // The surfel of a layer, thin; `place` is its depth's last bits.
-uvec2 hidden_surfel(uint word, SurfelConstants s, uint place) {
-    uvec2 w = surfel(layer_depth(word, k.radius), layer_normal(word), 0.0);
+uvec2 hidden_surfel(uint word, ivec2 p, SurfelConstants s, uint place) {
+    uvec2 w = surfel(layer_depth_at(word, p), layer_normal(word), 0.0);
     return word == 0u ? uvec2(0u) : uvec2((w.x & ~place_mask) | place | foreign, w.y | uint(s.hidden_shape));
 }
 
-uint place_of(uint word, float z) {
-    return word == 0u ? 0u : uint(clamp(1 + int((layer_depth(word, k.radius) - z) * 4.0 / k.radius), 1, 15));
+uint place_of(uint word, ivec2 p, float z) {
+    return word == 0u ? 0u : uint(clamp(1 + int((layer_depth_at(word, p) - z) * 4.0 / k.radius), 1, 15));
 }
 
 void main() {
@@ -71,19 +71,21 @@ void main() {
         return;
     }
     // What other views saw behind this pixel; where this one saw nothing the first of it is the surface itself.
-    int here = index_of(p);
-    bool own = imageLoad(depth_in, here).x > 0.0;
-    uint one = imageLoad(behind, here).x, two = imageLoad(behind, k.size.x * k.size.y + here).x;
-    uint second = own ? one : two, third = own ? two : 0u;
+    bool own = imageLoad(depth_in, index_of(p)).x > 0.0;
+    int block = layer_index(p >> 1);
+    uint one = imageLoad(behind, block).x, two = imageLoad(behind, layers_size() + block).x;
+    // What lies behind the nearest pixel of the block need not lie behind this one.
+    bool behind_this = own && layer_depth_at(one, p) > z + layer_gap(z, s);
+    uint second = behind_this ? one : two, third = behind_this ? two : 0u;
     // No surface is thicker than the way to what was seen behind it, or than where others looked through.
     ivec2 tested = p & ~1;
     float other = imageLoad(surfaces, index_of(tested)).w;
-    float limit = imageLoad(limits, (p.y >> 1) * ((k.size.x + 1) >> 1) + (p.x >> 1)).x;
-    limit = abs(abs(other) - abs(z)) < 0.1 * k.radius ? limit : s.thickest;
-    thickness = max(min(thickness, min(limit, 0.7 * (layer_depth(second, k.radius) - abs(z)))), s.thinnest);
+    float limit = imageLoad(limits, block).x;
+    limit = own && abs(other - z) < 0.1 * k.radius ? limit : s.thickest;
+    thickness = max(min(thickness, min(limit, 0.7 * (layer_depth_at(second, p) - abs(z)))), s.thinnest);
     uvec2 word = surfel(z, surface.xyz, thickness / s.thickest);
     int at = surfel_index(p, s.plane), layer = 16 * s.plane.x * s.plane.y;
-    imageStore(surfels, at, uvec4((word.x & ~place_mask) | place_of(second, abs(z)) | (own ? 0u : foreign), word.y, 0u, 0u));
-    imageStore(surfels, layer + at, uvec4(hidden_surfel(second, s, place_of(third, layer_depth(second, k.radius))), 0u, 0u));
-    imageStore(surfels, 2 * layer + at, uvec4(hidden_surfel(third, s, 0u), 0u, 0u));
+    imageStore(surfels, at, uvec4((word.x & ~place_mask) | place_of(second, p, abs(z)) | (own ? 0u : foreign), word.y, 0u, 0u));
+    imageStore(surfels, layer + at, uvec4(hidden_surfel(second, p, s, place_of(third, p, layer_depth_at(second, p))), 0u, 0u));
+    imageStore(surfels, 2 * layer + at, uvec4(hidden_surfel(third, p, s, 0u), 0u, 0u));
 }

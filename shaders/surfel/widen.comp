@@ -25,9 +25,9 @@ void main() {
     int here = index_of(p);
     ivec2 border = clamp(p, k.origin, k.origin + k.window - 1);
     bool hole = border == p;
-    uint first = imageLoad(behind, here).x;
+    uint first = imageLoad(behind, layer_index(p >> 1)).x;
     vec3 n = layer_normal(first);
-    vec4 seen = vec4(dot(n, ray_of(vec2(p))) > 0.0 ? -n : n, layer_depth(first, k.radius));
+    vec4 seen = vec4(dot(n, ray_of(vec2(p))) > 0.0 ? -n : n, layer_depth_at(first, p));
     vec4 last = hole ? vec4(0.0) : imageLoad(surfaces, index_of(border));
     float ratio = dot(last.xyz, ray_of(vec2(border))) / dot(last.xyz, ray_of(vec2(p)));
     vec4 goes_on = last.w > 0.0 && abs(ratio - 1.5) < 1.2 ? vec4(last.xyz, last.w * ratio) : vec4(0.0);
