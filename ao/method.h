@@ -18,12 +18,13 @@ namespace scanshade {
 
 namespace gpu {
 class Device;
+class DeviceBytes;
 }
 
-/// Depth and normals as shaders/lib/surfel.glsl packs them, two words a pixel; depth 0 = hole.
+/// Depth and normals as shaders/lib/surfel.glsl packs them, two 32-bit words a pixel, on the device; depth 0 = hole.
 struct PackedSurfaces {
     Pinhole camera;
-    cv::Mat2i words;
+    std::shared_ptr<const gpu::DeviceBytes> words;
 };
 
 /// Another view of the same scene, which saw what hides from this one.

@@ -33,7 +33,7 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
                                        {"depth out", pixels * 4, Host::download, floats},
                                        {"normals out", pixels * 12, Host::download, floats}});
         if (fuse) {
-            buffers.insert(buffers.end(), {{"others", shared::most_neighbours * pixels * 4, Host::upload, floats},
+            buffers.insert(buffers.end(), {{"others", shared::most_neighbours * pixels * 4, Host::taken, floats},
                                            {"fused", pixels * 4, Host::none, floats},
                                            {"relief", pixels * 4, Host::none, floats}});
             passes.push_back({"fuse", "fit_plane/fuse", {kept, others_in}, {fused, relief}, groups, {}});
@@ -76,9 +76,9 @@ FittedDepth FitPlane::compute(const DepthImage& depth, std::span<const OtherDept
                                               fuse ? static_cast<int>(others.size()) : 0,
                                               {}};
     for (std::size_t i = 0; fuse && i < others.size(); ++i) {
-        if (others[i].depth->z_m.size() != size) throw Error("another frame of another image size");
-        constants.places[i] = gpu::place_of(others[i].depth->camera, others[i].here_from_there);
-        gpu::upload_depth(others[i].depth->z_m, program_->host_as<float>(others_in).subspan(i * depth.z_m.total(), depth.z_m.total()));
+        if (others[i].camera.size != size) throw Error("another frame of another image size");
+        constants.places[i] = gpu::place_of(others[i].camera, others[i].here_from_there);
+        program_->take(others_in, i * others[i].z_m->size(), others[i].z_m);
     }
     const cv::Mat1f& z = depth.z_m;
     gpu::upload_depth(z, program_->host_as<float>(recorded));

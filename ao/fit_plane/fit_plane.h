@@ -23,9 +23,10 @@ struct FitPlaneOptions {
     double largest_radius_px = 12;
 };
 
-/// What another frame of the recording saw, flying pixels dropped; of the same image size.
+/// What another frame of the recording saw, flying pixels dropped: metres, 0 = hole; of the same image size.
 struct OtherDepth {
-    const DepthImage* depth;
+    Pinhole camera;
+    std::shared_ptr<const gpu::DeviceBytes> z_m;
     Eigen::Isometry3d here_from_there;
 };
 

@@ -1,5 +1,6 @@
 #include "ao/gpu/program.h"
 
+#include "ao/gpu/bound_buffer.h"
 #include "ao/gpu/shader_table.h"
 #include "ao/gpu/vulkan.h"
 #include "projection/error.h"
@@ -17,32 +18,6 @@ constexpr std::uint32_t first_write_binding = 16, constants_binding = 32;
 using Stage = vk::PipelineStageFlagBits2;
 using Access = vk::AccessFlagBits2;
 using Memory = vk::MemoryPropertyFlagBits;
-
-/// Memory that a shader and the host can both reach at full speed: then nothing is copied.
-constexpr auto shared_memory = Memory::eDeviceLocal | Memory::eHostVisible | Memory::eHostCoherent | Memory::eHostCached;
-
-struct BoundBuffer {
-    vk::raii::DeviceMemory memory = nullptr;
-    vk::raii::Buffer buffer = nullptr;
-    vk::raii::BufferView view = nullptr; // texel buffers only
-    std::byte* mapped = nullptr;
-    std::size_t bytes = 0;
-
-    BoundBuffer() = default;
-    BoundBuffer(const Device::State& gpu, std::size_t size, vk::BufferUsageFlags usage, std::initializer_list<vk::MemoryPropertyFlags> wishes)
-        : bytes(size) {
-        buffer = gpu.device.createBuffer({{}, size, usage});
-        const auto needs = buffer.getMemoryRequirements();
-        int type = -1;
-        vk::MemoryPropertyFlags flags;
-        for (const auto& wish : wishes)
-            if (type < 0 && (type = gpu.memory_type(needs.memoryTypeBits, wish)) >= 0) flags = wish;
-        if (type < 0) throw Error("the device has no fitting memory");
-        memory = gpu.device.allocateMemory({needs.size, static_cast<std::uint32_t>(type)});
-        buffer.bindMemory(*memory, 0);
-        if (flags & Memory::eHostVisible) mapped = static_cast<std::byte*>(memory.mapMemory(0, size));
-    }
-};
 
 /// An image of float layers: a view of everything to sample from, and one of each mip to write to.
 struct BoundImage {
@@ -132,7 +107,7 @@ std::vector<std::string> problems(std::span<const BufferRow> buffers, std::span<
     std::vector<std::string> found;
     std::vector<char> written(buffers.size());
     for (std::size_t i = 0; i < buffers.size(); ++i) {
-        written[i] = buffers[i].host == BufferRow::Host::upload || !buffers[i].initial.empty();
+        written[i] = buffers[i].host == BufferRow::Host::upload || buffers[i].host == BufferRow::Host::taken || !buffers[i].initial.empty();
         if (buffers[i].bytes == 0) found.push_back(fmt::format("buffer {} is empty", buffers[i].name));
         if (buffers[i].image.width > 0 && buffers[i].bytes != image_bytes(buffers[i].image))
             found.push_back(fmt::format("image {} has {} bytes, not {}", buffers[i].name, image_bytes(buffers[i].image), buffers[i].bytes));
@@ -174,7 +149,13 @@ struct Program::State {
     std::vector<std::string> intervals; // what lies between one time stamp and the next
     vk::raii::QueryPool queries = nullptr;
     vk::raii::Fence fence = nullptr;
-    vk::raii::CommandBuffer commands = nullptr;
+    vk::raii::CommandBuffer commands = nullptr, before = nullptr, after = nullptr; // the latter two: copies of the next run
+    struct Copy {
+        int buffer;
+        std::size_t offset;
+        std::shared_ptr<const DeviceBytes> bytes; // held until they are copied
+    };
+    std::vector<Copy> taken, given;
 
     State(Device::State& gpu_, std::vector<BufferRow> rows_, std::vector<PassRow> passes_)
         : gpu(gpu_), rows(std::move(rows_)), passes(std::move(passes_)) {}
@@ -200,7 +181,7 @@ struct Program::State {
                 buffers.back().view =
                     gpu.device.createBufferView({{}, *buffers.back().buffer, format_of(row.texels), 0, VK_WHOLE_SIZE});
             }
-            if (row.host == BufferRow::Host::none || buffers.back().mapped) continue;
+            if (row.host == BufferRow::Host::none || row.host == BufferRow::Host::taken || buffers.back().mapped) continue;
             const vk::MemoryPropertyFlags visible = Memory::eHostVisible | Memory::eHostCoherent;
             const bool upload = row.host == BufferRow::Host::upload;
             staging[i] = upload ? BoundBuffer(gpu, row.bytes, Usage::eTransferSrc, {visible})
@@ -368,14 +349,31 @@ struct Program::State {
         }
         compute_barrier(once);
         once.end();
-        submit(once);
+        submit({*once});
     }
 
-    void submit(const vk::raii::CommandBuffer& recorded) {
-        const vk::CommandBufferSubmitInfo info(*recorded);
+    /// What is taken before a run or given after it; null where there is nothing.
+    vk::CommandBuffer record_copies(vk::raii::CommandBuffer& into, std::vector<Copy>& copies, bool in) {
+        if (copies.empty()) return nullptr;
+        if (!*into) into = std::move(gpu.device.allocateCommandBuffers({*gpu.pool, vk::CommandBufferLevel::ePrimary, 1}).front());
+        into.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
+        compute_barrier(into);
+        for (const auto& [buffer, offset, bytes] : copies) {
+            const vk::Buffer own = *buffers[buffer].buffer, other = *bytes->state().buffer.buffer;
+            into.copyBuffer(in ? other : own, in ? own : other, vk::BufferCopy(in ? 0 : offset, in ? offset : 0, bytes->size()));
+        }
+        compute_barrier(into);
+        into.end();
+        return *into;
+    }
+
+    void submit(std::initializer_list<vk::CommandBuffer> recorded) {
+        std::vector<vk::CommandBufferSubmitInfo> infos;
+        for (const vk::CommandBuffer each : recorded)
+            if (each) infos.emplace_back(each);
         constexpr std::uint64_t patience_ns = 120'000'000'000;
         try {
-            gpu.queue.submit2(vk::SubmitInfo2({}, {}, info), *fence);
+            gpu.queue.submit2(vk::SubmitInfo2({}, {}, infos), *fence);
             if (gpu.device.waitForFences(*fence, VK_TRUE, patience_ns) != vk::Result::eSuccess)
                 throw DeviceLost(fmt::format("{} did not finish within 120 s", gpu.info.name));
         } catch (const vk::DeviceLostError& failure) {
@@ -407,10 +405,28 @@ std::span<std::byte> Program::host(int buffer) {
     return {reached.mapped, own.bytes};
 }
 
+void Program::take(int buffer, std::size_t offset, std::shared_ptr<const DeviceBytes> from) {
+    const BufferRow& row = state_->rows.at(buffer);
+    if (row.host != BufferRow::Host::taken || offset + from->size() > row.bytes)
+        throw Error(fmt::format("{} bytes at {} do not go into buffer {}", from->size(), offset, row.name));
+    state_->taken.push_back({buffer, offset, std::move(from)});
+}
+
+void Program::give(int buffer, std::shared_ptr<DeviceBytes> to) {
+    const BufferRow& row = state_->rows.at(buffer);
+    if (to->size() > row.bytes)
+        throw Error(fmt::format("buffer {} has {} bytes, not {}", row.name, row.bytes, to->size()));
+    state_->given.push_back({buffer, 0, std::move(to)});
+}
+
 void Program::run(std::span<const std::byte> constants) {
     State& s = *state_;
     std::memcpy(s.constants.mapped, constants.data(), std::min(constants.size(), s.constants.bytes));
-    during(s.gpu.info.name, [&] { s.submit(s.commands); });
+    during(s.gpu.info.name, [&] {
+        s.submit({s.record_copies(s.before, s.taken, true), *s.commands, s.record_copies(s.after, s.given, false)});
+    });
+    s.taken.clear();
+    s.given.clear();
     timings_.clear();
     if (!s.gpu.has_timestamps) return;
     const auto count = s.intervals.size() + 1;
@@ -431,7 +447,7 @@ std::vector<std::byte> Program::read_back(int buffer) {
     s.copy_out(commands, buffer, *copy.buffer);
     barrier(commands, Stage::eHost, Access::eHostRead);
     commands.end();
-    s.submit(commands);
+    s.submit({*commands});
     return {copy.mapped, copy.mapped + bytes};
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "ao/gpu/device.h"
+#include "ao/gpu/device_bytes.h"
 
 #include <array>
 #include <cstddef>
@@ -16,9 +17,10 @@
 
 namespace scanshade::gpu {
 
-/// A buffer (or image) of the program, zero to begin with. Host buffers can be reached by Program::host() before (upload) or after (download) a run.
+/// A buffer (or image) of the program, zero to begin with. Host buffers can be reached by Program::host() before (upload) or after
+/// (download) a run; Program::take() fills the others that are no pass's result.
 struct BufferRow {
-    enum class Host { none, upload, download };
+    enum class Host { none, upload, download, taken };
     std::string_view name;
     std::size_t bytes = 0;
     Host host = Host::none;
@@ -73,6 +75,11 @@ class Program {
         const auto bytes = host(buffer);
         return {reinterpret_cast<T*>(bytes.data()), bytes.size() / sizeof(T)};
     }
+
+    /// Copies on the device, as part of the next run and of no other: `from` into a `taken` buffer from byte `offset` on, before the
+    /// passes; a buffer's first bytes into `to`, after them.
+    void take(int buffer, std::size_t offset, std::shared_ptr<const DeviceBytes> from);
+    void give(int buffer, std::shared_ptr<DeviceBytes> to);
 
     /// Uploads, runs all passes, downloads; returns when the results are on the host. Throws Error on device loss.
     void run(std::span<const std::byte> constants);

@@ -40,7 +40,7 @@ std::span<const Neighbour> checked_neighbours(const View& view) {
     if (view.neighbours.size() > shared::most_neighbours)
         throw Error(fmt::format("{} neighbours, {} are the most", view.neighbours.size(), shared::most_neighbours));
     for (const Neighbour& neighbour : view.neighbours)
-        if (neighbour.surfaces->words.size() != view.depth.z_m.size())
+        if (neighbour.surfaces->camera.size != view.depth.z_m.size())
             throw Error("a neighbour of another image size");
     return view.neighbours;
 }
@@ -135,7 +135,7 @@ ScreenTables ScreenMethod::tables(cv::Size size, bool supplied, int neighbours) 
     ScreenTables all{{{guard, guard}, size}, image, neighbours, shared_buffers(static_cast<std::size_t>(image.area()), supplied, options_.seed), {}};
     if (neighbours > 0) {
         const auto each = static_cast<std::size_t>(neighbours);
-        all.add_buffer({"neighbours", each * static_cast<std::size_t>(size.area()) * 8, gpu::BufferRow::Host::upload, gpu::BufferRow::Texels::rg32ui});
+        all.add_buffer({"neighbours", each * static_cast<std::size_t>(size.area()) * 8, gpu::BufferRow::Host::taken, gpu::BufferRow::Texels::rg32ui});
     }
     // Without normals of the view, depth fills their slot; nothing reads it.
     all.add_pass_over(size, "normals", "normals", {screen_depth, supplied ? screen_given : screen_depth}, {screen_surfaces},
@@ -183,9 +183,8 @@ AoMap ScreenMethod::compute(const View& view) {
     gpu::upload_depth(view.depth.z_m, gpu::image_on<float>(program.host(screen_depth), image)(window));
     if (supplied)
         view.normals->normals.copyTo(gpu::image_on<cv::Vec3f>(program.host(screen_given), image)(window));
-    const std::size_t words_bytes = static_cast<std::size_t>(size.area()) * 8;
-    for (std::size_t i = 0; i < neighbours.size(); ++i)
-        gpu::upload(neighbours[i].surfaces->words, program.host(screen_neighbours).subspan(i * words_bytes));
+    for (std::size_t i = 0; const Neighbour& other : neighbours)
+        program.take(screen_neighbours, i++ * other.surfaces->words->size(), other.surfaces->words);
     const auto uploaded = std::chrono::steady_clock::now();
     program.run(block);
     const auto ran = std::chrono::steady_clock::now();

@@ -17,10 +17,10 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, st
     using Texels = gpu::BufferRow::Texels;
     const auto pixels = static_cast<std::size_t>(size.area());
     ScreenTables all{{{}, size}, size, 0, {}, {}};
-    all.buffers = {{"own surfaces", pixels * 8, Host::upload, Texels::rg32ui},
-                   {"own visibility", pixels * 4, Host::upload, Texels::r32f},
-                   {"surfaces", most * pixels * 8, Host::upload, Texels::rg32ui},
-                   {"visibilities", most * pixels * 4, Host::upload, Texels::r32f},
+    all.buffers = {{"own surfaces", pixels * 8, Host::taken, Texels::rg32ui},
+                   {"own visibility", pixels * 4, Host::taken, Texels::r32f},
+                   {"surfaces", most * pixels * 8, Host::taken, Texels::rg32ui},
+                   {"visibilities", most * pixels * 4, Host::taken, Texels::r32f},
                    {"mean", pixels * 4, Host::download, Texels::r32f},
                    {"spread", pixels * 8, Host::download, Texels::rg32f}};
     all.add_pass("gather", "sequence/gather", {own_surfaces, own_visibility, surfaces, visibilities}, {mean, spread});
@@ -30,7 +30,7 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, st
 } // namespace
 
 GatheredAo Gather::compute(const Seen& own, std::span<const Seen> others, const GatherOptions& how) {
-    const cv::Size size = own.visibility->size();
+    const cv::Size size = own.surfaces->camera.size;
     if (others.size() > shared::most_gathered)
         throw Error(fmt::format("{} frames to average, {} are the most", others.size(), shared::most_gathered));
     if (!program_ || size != size_ || others.size() > most_) {
@@ -42,17 +42,17 @@ GatheredAo Gather::compute(const Seen& own, std::span<const Seen> others, const 
     ScreenOptions options;
     options.radius = static_cast<float>(how.radius_m);
     shared::GatherConstants constants{constants_from(options, {.depth = camera_only, .noise = how.noise}), static_cast<int>(others.size()), 0.002F, 0.005F, how.clamp, {}, {}};
-    const std::size_t pixels = own.visibility->total();
-    gpu::upload(own.surfaces->words, program_->host(own_surfaces));
-    gpu::upload(*own.visibility, program_->host(own_visibility));
+    const std::size_t pixels = static_cast<std::size_t>(size.area());
+    program_->take(own_surfaces, 0, own.surfaces->words);
+    program_->take(own_visibility, 0, own.visibility);
     for (std::size_t i = 0; i < others.size(); ++i) {
         const Seen& other = others[i];
-        if (other.visibility->size() != size)
+        if (other.surfaces->camera.size != size)
             throw Error("a frame of another image size");
         constants.places[i] = gpu::place_of(other.surfaces->camera, other.here_from_there);
         constants.shares[i] = other.share;
-        gpu::upload(other.surfaces->words, program_->host(surfaces).subspan(i * pixels * 8));
-        gpu::upload(*other.visibility, program_->host(visibilities).subspan(i * pixels * 4));
+        program_->take(surfaces, i * pixels * 8, other.surfaces->words);
+        program_->take(visibilities, i * pixels * 4, other.visibility);
     }
     program_->run(std::as_bytes(std::span(&constants, 1)));
     timings_ = program_->timings();

@@ -11,10 +11,10 @@
 
 namespace scanshade {
 
-/// One frame's visibility and where it was found.
+/// One frame's visibility, a 32-bit float a pixel, and where it was found.
 struct Seen {
     const PackedSurfaces* surfaces;
-    const cv::Mat1f* visibility;
+    std::shared_ptr<const gpu::DeviceBytes> visibility;
     Eigen::Isometry3d here_from_there = Eigen::Isometry3d::Identity();
     float share = 1; ///< in the mean
 };

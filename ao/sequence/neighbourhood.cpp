@@ -22,7 +22,7 @@ std::vector<Parameter> NeighbourhoodOptions::parameters() {
 
 Neighbourhood::Neighbourhood(gpu::Device& device, Method& method, double radius_m, const DepthNoise& noise, const FitPlaneOptions& fit,
                    const NeighbourhoodOptions& options)
-    : method_(method), options_(options), noise_(noise), pack_(device), gather_(device), radius_m_(radius_m) {
+    : method_(method), options_(options), noise_(noise), pack_(device), upload_(device), gather_(device), radius_m_(radius_m) {
     if (!method.looks_at_neighbours())
         options_.layers = 0;
     if (!noise.any()) {
@@ -65,7 +65,10 @@ View Neighbourhood::view_of(std::size_t place) {
     if (!slot.fitted) {
         std::vector<OtherDepth> others;
         for (const Fitting& other : adjacent_views(place, options_.fuse)) {
-            others.push_back({&kept(slots_.at(other.place)), other.here_from_there});
+            Slot& there = slots_.at(other.place);
+            if (!there.kept_there)
+                there.kept_there = upload_(kept(there).z_m);
+            others.push_back({there.depth.camera, there.kept_there, other.here_from_there});
             slot.fused.push_back(other.place);
         }
         slot.fitted = fit_->compute(kept(slot), others);
@@ -172,6 +175,14 @@ const AoMap& Neighbourhood::visibility(std::size_t place) {
     return *slot.ao;
 }
 
+Seen Neighbourhood::seen(std::size_t place) {
+    const AoMap& ao = visibility(place);
+    Slot& slot = slots_.at(place);
+    if (!slot.ao_there)
+        slot.ao_there = upload_(ao.visibility);
+    return {&packed(place), slot.ao_there};
+}
+
 NeighbourhoodResult Neighbourhood::compute(std::size_t place) {
     NeighbourhoodResult result;
     result.ao = visibility(place);
@@ -179,11 +190,13 @@ NeighbourhoodResult Neighbourhood::compute(std::size_t place) {
     const bool exponential = options_.blend == "exponential";
     for (const Fitting& other : adjacent_views(place, options_.average, exponential)) {
         const double share = exponential ? std::pow(29.0 / 30, static_cast<double>(place - other.place)) : 1;
-        others.push_back({&packed(other.place), &visibility(other.place).visibility, other.here_from_there, static_cast<float>(share)});
+        others.push_back(seen(other.place));
+        others.back().here_from_there = other.here_from_there;
+        others.back().share = static_cast<float>(share);
         result.averaged.push_back(other.place);
     }
     if (!others.empty()) {
-        GatheredAo gathered = gather_.compute({&packed(place), &result.ao.visibility}, others, {radius_m_, noise_, options_.clamp});
+        GatheredAo gathered = gather_.compute(seen(place), others, {radius_m_, noise_, options_.clamp});
         account("average", gather_.timings());
         result.ao = std::move(gathered.mean);
         result.frames = std::move(gathered.frames);

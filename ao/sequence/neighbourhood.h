@@ -2,6 +2,7 @@
 #pragma once
 
 #include "ao/fit_plane/fit_plane.h"
+#include "ao/gpu/image_upload.h"
 #include "ao/method.h"
 #include "ao/sequence/agreement.h"
 #include "ao/sequence/gather.h"
@@ -81,6 +82,7 @@ class Neighbourhood {
         DepthImage depth;
         std::optional<Eigen::Isometry3d> world_from_camera;
         std::optional<DepthImage> kept; ///< without flying pixels
+        std::shared_ptr<const gpu::DeviceBytes> kept_there, ao_there; ///< on the device
         std::optional<Facets> facets;
         std::optional<FittedDepth> fitted;
         std::optional<PackedSurfaces> packed;
@@ -94,6 +96,7 @@ class Neighbourhood {
     [[nodiscard]] View view_of(std::size_t place);
     [[nodiscard]] const PackedSurfaces& packed(std::size_t place);
     [[nodiscard]] const AoMap& visibility(std::size_t place);
+    [[nodiscard]] Seen seen(std::size_t place);
     [[nodiscard]] const Meeting& meeting(std::size_t earlier, std::size_t later);
     [[nodiscard]] std::optional<Fitting> fitting(std::size_t here, std::size_t there);
     [[nodiscard]] std::vector<Fitting> spread_views(std::size_t place);
@@ -105,6 +108,7 @@ class Neighbourhood {
     DepthNoise noise_;
     std::optional<FitPlane> drop_flying_, fit_;
     PackSurfaces pack_;
+    gpu::ImageUpload upload_;
     Gather gather_;
     double radius_m_;
     std::map<std::size_t, Slot> slots_;

@@ -16,7 +16,7 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
     all.buffers = {{"depth", pixels * 4, Host::upload, Texels::r32f},
                    {"given normals", supplied ? pixels * 12 : 4, supplied ? Host::upload : Host::none, Texels::r32f},
                    {"surfaces", pixels * 16, Host::none, Texels::rgba32f},
-                   {"words", pixels * 8, Host::download, Texels::rg32ui}};
+                   {"words", pixels * 8, Host::none, Texels::rg32ui}};
     all.add_pass("normals", "normals", {depth_in, supplied ? given : depth_in}, {surfaces}, {{shared::spec_supplied, supplied}});
     all.add_pass("pack", "sequence/pack", {surfaces}, {words});
     return std::make_unique<gpu::Program>(device, all.buffers, all.passes, sizeof(shared::ScreenConstants));
@@ -35,9 +35,11 @@ PackedSurfaces PackSurfaces::compute(const View& view) {
     if (supplied)
         gpu::upload(view.normals->normals, program_->host(given));
     const shared::ScreenConstants constants = constants_from({}, view);
+    const std::shared_ptr<gpu::DeviceBytes> packed = pool_.get(view.depth.z_m.total() * 8);
+    program_->give(words, packed);
     program_->run(std::as_bytes(std::span(&constants, 1)));
     timings_ = program_->timings();
-    return {view.depth.camera, gpu::image_on<cv::Vec2i>(program_->host(words), size).clone()};
+    return {view.depth.camera, packed};
 }
 
 } // namespace scanshade

@@ -11,7 +11,7 @@ namespace scanshade {
 /// Not thread-safe: one frame at a time.
 class PackSurfaces {
   public:
-    explicit PackSurfaces(gpu::Device& device) : device_(device) {}
+    explicit PackSurfaces(gpu::Device& device) : device_(device), pool_(device) {}
 
     /// Normals that are missing or zero are derived from the depth.
     [[nodiscard]] PackedSurfaces compute(const View& view);
@@ -20,6 +20,7 @@ class PackSurfaces {
 
   private:
     gpu::Device& device_;
+    gpu::DeviceBytesPool pool_;
     cv::Size size_;
     bool supplied_ = false;
     std::unique_ptr<gpu::Program> program_;

@@ -1,0 +1,45 @@
+// A Vulkan buffer with its memory, for the files of this folder alone.
+#pragma once
+
+#include "ao/gpu/device_bytes.h"
+#include "ao/gpu/vulkan.h"
+#include "projection/error.h"
+
+#include <cstddef>
+#include <initializer_list>
+
+namespace scanshade::gpu {
+
+/// Memory that a shader and the host can both reach at full speed: then nothing is copied.
+constexpr auto shared_memory = vk::MemoryPropertyFlagBits::eDeviceLocal | vk::MemoryPropertyFlagBits::eHostVisible |
+                               vk::MemoryPropertyFlagBits::eHostCoherent | vk::MemoryPropertyFlagBits::eHostCached;
+
+/// In the first kind of memory wished for that there is; mapped where the host can reach it.
+struct BoundBuffer {
+    vk::raii::DeviceMemory memory = nullptr;
+    vk::raii::Buffer buffer = nullptr;
+    vk::raii::BufferView view = nullptr; // texel buffers only
+    std::byte* mapped = nullptr;
+    std::size_t bytes = 0;
+
+    BoundBuffer() = default;
+    BoundBuffer(const Device::State& gpu, std::size_t size, vk::BufferUsageFlags usage, std::initializer_list<vk::MemoryPropertyFlags> wishes)
+        : bytes(size) {
+        buffer = gpu.device.createBuffer({{}, size, usage});
+        const auto needs = buffer.getMemoryRequirements();
+        int type = -1;
+        vk::MemoryPropertyFlags flags;
+        for (const auto& wish : wishes)
+            if (type < 0 && (type = gpu.memory_type(needs.memoryTypeBits, wish)) >= 0) flags = wish;
+        if (type < 0) throw Error("the device has no fitting memory");
+        memory = gpu.device.allocateMemory({needs.size, static_cast<std::uint32_t>(type)});
+        buffer.bindMemory(*memory, 0);
+        if (flags & vk::MemoryPropertyFlagBits::eHostVisible) mapped = static_cast<std::byte*>(memory.mapMemory(0, size));
+    }
+};
+
+struct DeviceBytes::State {
+    BoundBuffer buffer;
+};
+
+} // namespace scanshade::gpu

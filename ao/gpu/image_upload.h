@@ -1,0 +1,24 @@
+// Images of the host brought to the device, to stay there.
+#pragma once
+
+#include "ao/gpu/program.h"
+
+#include <opencv2/core.hpp>
+
+namespace scanshade::gpu {
+
+/// Not thread-safe: one image at a time.
+class ImageUpload {
+  public:
+    explicit ImageUpload(Device& device) : device_(device), pool_(device) {}
+    /// Single-channel floats, rows side by side.
+    [[nodiscard]] std::shared_ptr<const DeviceBytes> operator()(const cv::Mat1f& image);
+
+  private:
+    Device& device_;
+    DeviceBytesPool pool_;
+    std::size_t bytes_ = 0;
+    std::unique_ptr<Program> program_; ///< one buffer and no pass
+};
+
+} // namespace scanshade::gpu
