@@ -1,5 +1,5 @@
-// Depth preparation for noisy sensors: flying pixels dropped, then each pixel's depth and normal from a robust plane through
-// its surroundings, on the device. Clean depth does not need it: DepthNoise says.
+// Depth preparation for noisy sensors: flying pixels dropped, then each pixel's depth and normal from a robust plane
+// through its surroundings, on the device. Clean depth does not need it: DepthNoise says.
 #pragma once
 
 #include "ao/gpu/program.h"
@@ -10,8 +10,8 @@
 
 namespace scanshade {
 
-/// Depth and normals of the same size as the input; holes stay holes. Normals are (0, 0, 0) where no plane fits, and empty
-/// where none were asked for.
+/// Depth and normals of the same size as the input; holes stay holes. Normals are (0, 0, 0) where no plane fits, and
+/// empty where none were asked for.
 struct FittedDepth {
     DepthImage depth;
     NormalImage normals;
@@ -36,8 +36,8 @@ class FitPlane {
     /// `noise.any()` must hold. The window's radius grows with the root of sigma(z), and with the grain.
     FitPlane(gpu::Device& device, const DepthNoise& noise, const FitPlaneOptions& options = {});
 
-    /// With others, each pixel's depth is first averaged with what they saw of its surface, and the windows shrink with what
-    /// that leaves of sigma.
+    /// With others, each pixel's depth is first averaged with what they saw of its surface, and the windows shrink with
+    /// what that leaves of sigma.
     [[nodiscard]] FittedDepth compute(const DepthImage& depth, std::span<const OtherDepth> others = {});
     [[nodiscard]] const DepthNoise& noise() const { return noise_; }
     /// Where the time of the last compute() went.

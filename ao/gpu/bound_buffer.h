@@ -23,18 +23,22 @@ struct BoundBuffer {
     std::size_t bytes = 0;
 
     BoundBuffer() = default;
-    BoundBuffer(const Device::State& gpu, std::size_t size, vk::BufferUsageFlags usage, std::initializer_list<vk::MemoryPropertyFlags> wishes)
+    BoundBuffer(const Device::State& gpu, std::size_t size, vk::BufferUsageFlags usage,
+                std::initializer_list<vk::MemoryPropertyFlags> wishes)
         : bytes(size) {
         buffer = gpu.device.createBuffer({{}, size, usage});
         const auto needs = buffer.getMemoryRequirements();
         int type = -1;
         vk::MemoryPropertyFlags flags;
         for (const auto& wish : wishes)
-            if (type < 0 && (type = gpu.memory_type(needs.memoryTypeBits, wish)) >= 0) flags = wish;
-        if (type < 0) throw Error("the device has no fitting memory");
+            if (type < 0 && (type = gpu.memory_type(needs.memoryTypeBits, wish)) >= 0)
+                flags = wish;
+        if (type < 0)
+            throw Error("the device has no fitting memory");
         memory = gpu.device.allocateMemory({needs.size, static_cast<std::uint32_t>(type)});
         buffer.bindMemory(*memory, 0);
-        if (flags & vk::MemoryPropertyFlagBits::eHostVisible) mapped = static_cast<std::byte*>(memory.mapMemory(0, size));
+        if (flags & vk::MemoryPropertyFlagBits::eHostVisible)
+            mapped = static_cast<std::byte*>(memory.mapMemory(0, size));
     }
 };
 

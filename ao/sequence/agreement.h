@@ -27,7 +27,8 @@ struct Agreement {
     double overlap = 0;      ///< share of them that meet the other's
     double contradicted = 0; ///< share of these and of those that would hide what the other has seen, of the latter
     double misfit_m = 0;     ///< distance from the other's planes that nine tenths of the former stay below
-    double misfit = 0;       ///< median of these distances in what is tolerable: 2 % of the AO's radius and the sensor's sigma
+    double misfit =
+        0; ///< median of these distances in what is tolerable: 2 % of the AO's radius and the sensor's sigma
     [[nodiscard]] bool fits() const { return overlap > 0.1 && contradicted < 0.15 && misfit < 0.5; }
 };
 
@@ -41,8 +42,13 @@ struct Pair {
 
 [[nodiscard]] Agreement agreement(const Pair& pair, const Eigen::Isometry3d& here_from_there);
 
-/// The pose next to the given one in which the planes of both frames lie on each other (point-to-plane, Chen and Medioni 1991,
-/// points paired along the view as Blais and Levine 1995 do). What the surfaces leave open stays as given.
-[[nodiscard]] Eigen::Isometry3d aligned(const Pair& pair, const Eigen::Isometry3d& here_from_there);
+/// The pose next to the given one in which the planes of both frames lie on each other (point-to-plane, Chen and
+/// Medioni 1991, points paired along the view as Blais and Levine 1995 do). What the surfaces leave open stays as
+/// given.
+struct Aligned {
+    Eigen::Isometry3d here_from_there;
+    double sigma_m = 0; ///< of where it puts the surfaces, in the direction that they tell least about
+};
+[[nodiscard]] Aligned aligned(const Pair& pair, const Eigen::Isometry3d& here_from_there);
 
 } // namespace scanshade

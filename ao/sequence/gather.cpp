@@ -41,7 +41,13 @@ GatheredAo Gather::compute(const Seen& own, std::span<const Seen> others, const 
     const DepthImage camera_only{own.surfaces->camera, {}, {}};
     ScreenOptions options;
     options.radius = static_cast<float>(how.radius_m);
-    shared::GatherConstants constants{constants_from(options, {.depth = camera_only, .noise = how.noise}), static_cast<int>(others.size()), 0.002F, 0.005F, how.clamp, {}, {}};
+    shared::GatherConstants constants{constants_from(options, {.depth = camera_only, .noise = how.noise}),
+                                      static_cast<int>(others.size()),
+                                      0.002F,
+                                      0.005F,
+                                      how.clamp,
+                                      {},
+                                      {}};
     const std::size_t pixels = static_cast<std::size_t>(size.area());
     program_->take(own_surfaces, 0, own.surfaces->words);
     program_->take(own_visibility, 0, own.visibility);

@@ -1,5 +1,5 @@
-// The mean of several frames' visibility on one frame's pixels: sampling noise, the sensor's noise and single views' blind
-// spots average out. Any method's visibility will do.
+// The mean of several frames' visibility on one frame's pixels: sampling noise, the sensor's noise and single views'
+// blind spots average out. Any method's visibility will do.
 //
 // Reverse reprojection caching (Nehab et al. 2007) without its recursion: offline, every frame can be asked itself.
 #pragma once

@@ -1,28 +1,47 @@
 #include "ao/sequence/neighbourhood.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
-#include <fmt/format.h>
+#include <tbb/parallel_for_each.h>
 
 namespace scanshade {
+
+namespace {
 
 using Eigen::Isometry3d;
 
 /// Share of the tolerable misfit below which recorded poses are as good as aligned ones.
 constexpr double aligned_already = 0.05;
+/// Of what an alignment leaves open, how much counts as misfit: most of it slides surfaces along themselves.
+constexpr double slides = 0.25;
+
+double ms_since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+} // namespace
 
 std::vector<Parameter> NeighbourhoodOptions::parameters() {
     return {{"fuse", "frames around each that noisy depth is averaged with; 0 = none", &fuse, "", 0, 16},
             {"layers", "other views whose surfaces occlude what a frame shows (surfel); 0 = none", &layers, "", 0, 16},
             {"reach", "how many frames away those may be", &reach, "frames", 1, 1000},
             {"average", "frames around each whose visibility is averaged with its own; 0 = none", &average, "", 0, 64},
-            {"blend", "mean of frames before and after; exponential: of frames before, each a 29/30 of the next younger one", &blend, "", {}, {}, {"mean", "exponential"}},
-            {"clamp", "visibility of other frames counts as no farther from the frame's own than this; 1 = as it is", &clamp, "", 0, 1}};
+            {"blend",
+             "mean of frames before and after; exponential: of frames before, each a 29/30 of the next younger one",
+             &blend,
+             "",
+             {},
+             {},
+             {"mean", "exponential"}},
+            {"clamp", "visibility of other frames counts as no farther from the frame's own than this; 1 = as it is",
+             &clamp, "", 0, 1}};
 }
 
-Neighbourhood::Neighbourhood(gpu::Device& device, Method& method, double radius_m, const DepthNoise& noise, const FitPlaneOptions& fit,
-                   const NeighbourhoodOptions& options)
-    : method_(method), options_(options), noise_(noise), pack_(device), upload_(device), gather_(device), radius_m_(radius_m) {
+Neighbourhood::Neighbourhood(gpu::Device& device, Method& method, double radius_m, const DepthNoise& noise,
+                             const FitPlaneOptions& fit, const NeighbourhoodOptions& options)
+    : method_(method), options_(options), noise_(noise), pack_(device), upload_(device), gather_(device),
+      radius_m_(radius_m) {
     if (!method.looks_at_neighbours())
         options_.layers = 0;
     if (!noise.any()) {
@@ -36,7 +55,8 @@ Neighbourhood::Neighbourhood(gpu::Device& device, Method& method, double radius_
     fit_.emplace(device, noise, after_drop);
 }
 
-void Neighbourhood::add(std::size_t place, const DepthImage& depth, const std::optional<Eigen::Isometry3d>& world_from_camera) {
+void Neighbourhood::add(std::size_t place, const DepthImage& depth,
+                        const std::optional<Eigen::Isometry3d>& world_from_camera) {
     Slot& slot = slots_[place];
     slot.depth = depth;
     slot.world_from_camera = world_from_camera;
@@ -53,8 +73,12 @@ const DepthImage& Neighbourhood::kept(Slot& slot) {
 }
 
 const Facets& Neighbourhood::facets(Slot& slot) {
-    if (!slot.facets)
-        slot.facets = facets_of(fit_ ? kept(slot) : slot.depth, noise_);
+    if (!slot.facets) {
+        const DepthImage& depth = fit_ ? kept(slot) : slot.depth;
+        const auto start = std::chrono::steady_clock::now();
+        slot.facets = facets_of(depth, noise_);
+        timings_.emplace_back("facets", ms_since(start));
+    }
     return *slot.facets;
 }
 
@@ -87,38 +111,61 @@ const PackedSurfaces& Neighbourhood::packed(std::size_t place) {
     return *slot.packed;
 }
 
-/// Found once for both, from the earlier one's side, whichever asks first: results must not hang on the order of questions.
-const Neighbourhood::Meeting& Neighbourhood::meeting(std::size_t earlier, std::size_t later) {
-    Slot& slot = slots_.at(earlier);
-    const auto [known, is_new] = slot.meetings.try_emplace(later);
-    if (!is_new)
-        return known->second;
-    Slot& other = slots_.at(later);
-    const Pair pair{facets(slot), facets(other), radius_m_, noise_}, back{pair.there, pair.here, radius_m_, noise_};
-    const Isometry3d recorded = slot.world_from_camera->inverse() * *other.world_from_camera;
-    const Isometry3d pose = agreement(pair, recorded).misfit > aligned_already ? aligned(pair, recorded) : recorded;
+/// From the earlier one's side, whichever asks: results must not hang on the order of questions.
+Neighbourhood::Meeting Neighbourhood::meeting_of(const Slot& earlier, const Slot& later) const {
+    const Pair pair{*earlier.facets, *later.facets, radius_m_, noise_}, back{pair.there, pair.here, radius_m_, noise_};
+    const Isometry3d recorded = earlier.world_from_camera->inverse() * *later.world_from_camera;
+    const auto [pose, sigma_m] =
+        agreement(pair, recorded).misfit > aligned_already ? aligned(pair, recorded) : Aligned{recorded};
     // Each must agree with the other: what one has looked through tells nothing of what is hidden from it.
     const Agreement there = agreement(pair, pose), here = agreement(back, pose.inverse());
-    known->second = {{std::min(there.overlap, here.overlap), std::max(there.contradicted, here.contradicted),
-                      std::max(there.misfit_m, here.misfit_m), std::max(there.misfit, here.misfit)}, pose};
-    return known->second;
+    return {{std::min(there.overlap, here.overlap), std::max(there.contradicted, here.contradicted),
+             std::max({there.misfit_m, here.misfit_m, slides * sigma_m}), std::max(there.misfit, here.misfit)},
+            pose};
+}
+
+void Neighbourhood::meet(std::size_t place, std::span<const std::size_t> others) {
+    struct Task {
+        const Slot *earlier, *later;
+        Meeting* meeting;
+    };
+    std::vector<Task> tasks;
+    for (const std::size_t other : others) {
+        const auto there = slots_.find(other);
+        if (there == slots_.end() || !there->second.world_from_camera || !slots_.at(place).world_from_camera)
+            continue;
+        Slot &earlier = slots_.at(std::min(place, other)), &later = slots_.at(std::max(place, other));
+        const auto [known, is_new] = earlier.meetings.try_emplace(std::max(place, other));
+        if (!is_new)
+            continue;
+        (void)facets(earlier);
+        (void)facets(later);
+        tasks.push_back({&earlier, &later, &known->second});
+    }
+    if (tasks.empty())
+        return;
+    const auto start = std::chrono::steady_clock::now();
+    tbb::parallel_for_each(tasks, [&](const Task& task) { *task.meeting = meeting_of(*task.earlier, *task.later); });
+    timings_.emplace_back("align", ms_since(start));
 }
 
 std::optional<Neighbourhood::Fitting> Neighbourhood::fitting(std::size_t here, std::size_t there) {
     const auto own = slots_.find(here), other = slots_.find(there);
     if (other == slots_.end() || !own->second.world_from_camera || !other->second.world_from_camera)
         return std::nullopt;
-    const Meeting& met = meeting(std::min(here, there), std::max(here, there));
+    meet(here, {&there, 1});
+    const Meeting& met = slots_.at(std::min(here, there)).meetings.at(std::max(here, there));
     if (met.agreement.fits())
-        return Fitting{there, here < there ? met.earlier_from_later : met.earlier_from_later.inverse(), met.agreement.misfit_m};
+        return Fitting{there, here < there ? met.earlier_from_later : met.earlier_from_later.inverse(),
+                       met.agreement.misfit_m};
     std::vector<LeftOut>& left_out = own->second.left_out;
     if (std::ranges::none_of(left_out, [&](const LeftOut& each) { return each.place == there; }))
         left_out.push_back({there, met.agreement});
     return std::nullopt;
 }
 
-/// As far away as they may be, and evenly between: near views see little that this one does not. Where the recording ends, or
-/// a frame does not fit, the next nearer one, and more from the other side.
+/// As far away as they may be, and evenly between: near views see little that this one does not. Where the recording
+/// ends, or a frame does not fit, the next nearer one, and more from the other side.
 std::vector<Neighbourhood::Fitting> Neighbourhood::spread_views(std::size_t place) {
     std::vector<Fitting> chosen;
     const int sides = (options_.layers + 1) / 2;
@@ -131,23 +178,33 @@ std::vector<Neighbourhood::Fitting> Neighbourhood::spread_views(std::size_t plac
             chosen.push_back(*fits);
         return fits.has_value();
     };
-    for (int i = sides; i >= 1; --i) {
-        const int outer = cvRound(static_cast<double>(options_.reach) * i / sides), inner = cvRound(static_cast<double>(options_.reach) * (i - 1) / sides);
+    const auto ring = [&](int i) { return cvRound(static_cast<double>(options_.reach) * i / sides); };
+    std::vector<std::size_t> first_choice;
+    for (int i = sides; i >= 1; --i)
         for (const int side : {-1, 1})
-            for (int step = outer; step > inner && !try_frame(place + static_cast<std::size_t>(side * step)); --step) {}
-    }
+            first_choice.push_back(place + static_cast<std::size_t>(side * ring(i)));
+    meet(place, first_choice);
+    for (int i = sides; i >= 1; --i)
+        for (const int side : {-1, 1})
+            for (int step = ring(i); step > ring(i - 1) && !try_frame(place + static_cast<std::size_t>(side * step));
+                 --step) {
+            }
     return chosen;
 }
 
 /// The nearest ones on either side, or before it.
 std::vector<Neighbourhood::Fitting> Neighbourhood::adjacent_views(std::size_t place, int count, bool only_before) {
     std::vector<Fitting> chosen;
-    for (int step = 1; step <= (only_before ? count : (count + 1) / 2); ++step)
-        for (const int side : {-1, 1})
-            if (only_before && side > 0)
-                continue;
-            else if (const auto fits = fitting(place, place + static_cast<std::size_t>(side * step)))
-                chosen.push_back(*fits);
+    std::vector<std::size_t> candidates;
+    for (int step = 1; step <= (only_before ? count : (count + 1) / 2); ++step) {
+        candidates.push_back(place - static_cast<std::size_t>(step));
+        if (!only_before)
+            candidates.push_back(place + static_cast<std::size_t>(step));
+    }
+    meet(place, candidates);
+    for (const std::size_t other : candidates)
+        if (const auto fits = fitting(place, other))
+            chosen.push_back(*fits);
     return chosen;
 }
 

@@ -18,17 +18,18 @@ namespace scanshade {
 
 /// A recording's frames can be fused, seen through each other, and averaged; 0 = not so.
 struct NeighbourhoodOptions {
-    int fuse = 8;    ///< frames around each that noisy depth is averaged with
-    int layers = 6;  ///< other views whose surfaces occlude what a frame shows; of use to surfel
-    int reach = 12;  ///< how many frames away these may be
-    int average = 12; ///< frames around each whose visibility is averaged with its own
+    int fuse = 8;               ///< frames around each that noisy depth is averaged with
+    int layers = 6;             ///< other views whose surfaces occlude what a frame shows; of use to surfel
+    int reach = 12;             ///< how many frames away these may be
+    int average = 12;           ///< frames around each whose visibility is averaged with its own
     std::string blend = "mean"; ///< of these; "exponential": of those before, each older one 29/30 of the next
-    float clamp = 1;  ///< other frames' visibility counts as no farther from the frame's own than this
+    float clamp = 1;            ///< other frames' visibility counts as no farther from the frame's own than this
 
     [[nodiscard]] std::vector<Parameter> parameters();
     /// How many frames before and behind it a frame's result may depend on.
     [[nodiscard]] std::size_t farthest() const {
-        return static_cast<std::size_t>((layers > 0 ? reach : 0) + (fuse + 1) / 2 + (blend == "mean" ? (average + 1) / 2 : average));
+        return static_cast<std::size_t>((layers > 0 ? reach : 0) + (fuse + 1) / 2 +
+                                        (blend == "mean" ? (average + 1) / 2 : average));
     }
 };
 /// Frames that are looked at by themselves, though prepared like those of a recording.
@@ -47,15 +48,17 @@ struct NeighbourhoodResult {
     Timings timings;
     std::vector<std::size_t> fused, neighbours, averaged; ///< places of the frames it was looked at with
     std::vector<LeftOut> left_out;
-    cv::Mat1f frames, deviation; ///< of averaged visibility: how many frames went into a pixel, and what lies between them
+    cv::Mat1f frames,
+        deviation; ///< of averaged visibility: how many frames went into a pixel, and what lies between them
 };
 
-/// Not thread-safe: one call at a time. A frame's result depends on the frames within reach() of it and on nothing else.
+/// Not thread-safe: one call at a time. A frame's result depends on the frames within reach() of it and on nothing
+/// else.
 class Neighbourhood {
   public:
     /// Keeps references to device and method.
-    Neighbourhood(gpu::Device& device, Method& method, double radius_m, const DepthNoise& noise, const FitPlaneOptions& fit,
-             const NeighbourhoodOptions& options);
+    Neighbourhood(gpu::Device& device, Method& method, double radius_m, const DepthNoise& noise,
+                  const FitPlaneOptions& fit, const NeighbourhoodOptions& options);
 
     /// How many frames before and behind it a frame's result depends on.
     [[nodiscard]] std::size_t reach() const { return options_.farthest(); }
@@ -81,12 +84,12 @@ class Neighbourhood {
     struct Slot {
         DepthImage depth;
         std::optional<Eigen::Isometry3d> world_from_camera;
-        std::optional<DepthImage> kept; ///< without flying pixels
+        std::optional<DepthImage> kept;                               ///< without flying pixels
         std::shared_ptr<const gpu::DeviceBytes> kept_there, ao_there; ///< on the device
         std::optional<Facets> facets;
         std::optional<FittedDepth> fitted;
         std::optional<PackedSurfaces> packed;
-        std::optional<AoMap> ao; ///< before any averaging
+        std::optional<AoMap> ao;                 ///< before any averaging
         std::map<std::size_t, Meeting> meetings; ///< with later frames
         std::vector<std::size_t> fused, neighbours;
         std::vector<LeftOut> left_out;
@@ -97,7 +100,9 @@ class Neighbourhood {
     [[nodiscard]] const PackedSurfaces& packed(std::size_t place);
     [[nodiscard]] const AoMap& visibility(std::size_t place);
     [[nodiscard]] Seen seen(std::size_t place);
-    [[nodiscard]] const Meeting& meeting(std::size_t earlier, std::size_t later);
+    /// How it lies to those of the others that there are, all at once.
+    void meet(std::size_t place, std::span<const std::size_t> others);
+    [[nodiscard]] Meeting meeting_of(const Slot& earlier, const Slot& later) const;
     [[nodiscard]] std::optional<Fitting> fitting(std::size_t here, std::size_t there);
     [[nodiscard]] std::vector<Fitting> spread_views(std::size_t place);
     [[nodiscard]] std::vector<Fitting> adjacent_views(std::size_t place, int count, bool only_before = false);

@@ -17,7 +17,8 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
                    {"given normals", supplied ? pixels * 12 : 4, supplied ? Host::upload : Host::none, Texels::r32f},
                    {"surfaces", pixels * 16, Host::none, Texels::rgba32f},
                    {"words", pixels * 8, Host::none, Texels::rg32ui}};
-    all.add_pass("normals", "normals", {depth_in, supplied ? given : depth_in}, {surfaces}, {{shared::spec_supplied, supplied}});
+    all.add_pass("normals", "normals", {depth_in, supplied ? given : depth_in}, {surfaces},
+                 {{shared::spec_supplied, supplied}});
     all.add_pass("pack", "sequence/pack", {surfaces}, {words});
     return std::make_unique<gpu::Program>(device, all.buffers, all.passes, sizeof(shared::ScreenConstants));
 }
