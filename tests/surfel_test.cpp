@@ -64,8 +64,9 @@ TEST(Surfel, a_right_angled_corner_is_as_dark_as_the_closed_form) {
     EXPECT_LT(many.rms, 0.01);
     EXPECT_LT(few.rms, 0.01);
     EXPECT_LT(alike.rms, 0.01); // nothing in a corner has ends, so its thickness does not show
-    std::printf("right-angled corner: RMS %.4f at 32 reads (worst pixel %.4f), %.4f at 8 (%.4f), %.4f at lowest (%.4f)\n",
-                many.rms, many.worst, few.rms, few.worst, alike.rms, alike.worst);
+    std::printf(
+        "right-angled corner: RMS %.4f at 32 reads (worst pixel %.4f), %.4f at 8 (%.4f), %.4f at lowest (%.4f)\n",
+        many.rms, many.worst, few.rms, few.worst, alike.rms, alike.worst);
 }
 
 TEST(Surfel, a_plane_is_open_at_any_tilt_and_distance) {

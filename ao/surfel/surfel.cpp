@@ -15,7 +15,8 @@ struct Level {
     int slices, steps;
     bool alike = false; ///< all surfaces are taken to be equally thick, and clean depth's narrow holes stay
 };
-constexpr std::array levels{Level{"lowest", 1, 4, true}, Level{"low", 1, 4}, Level{"medium", 1, 8}, Level{"high", 2, 8}, Level{"highest", 2, 16}};
+constexpr std::array levels{Level{"lowest", 1, 4, true}, Level{"low", 1, 4}, Level{"medium", 1, 8}, Level{"high", 2, 8},
+                            Level{"highest", 2, 16}};
 
 /// Slices and steps of the quality, where none are given.
 SurfelOptions resolved(SurfelOptions options) {
@@ -105,8 +106,8 @@ int add_surfels(ScreenTables& tables, int layers) {
     add_fill(tables);
     tables.passes.push_back({"edges", "surfel/edges", {screen_surfaces}, {edges}, groups_of(words), {}});
     tables.passes.push_back({"runs", "surfel/runs", {edges}, {runs}, groups_of(size.width + size.height), {}});
-    tables.add_pass("surfels", "surfel/surfels", {screen_surfaces, edges, runs, screen_depth, behind, limits}, {surfels},
-                    {{shared::spec_layers, layers}});
+    tables.add_pass("surfels", "surfel/surfels", {screen_surfaces, edges, runs, screen_depth, behind, limits},
+                    {surfels}, {{shared::spec_layers, layers}});
     return surfels;
 }
 
@@ -116,15 +117,19 @@ std::vector<Parameter> SurfelOptions::parameters() {
     return joined(
         screen.parameters(),
         {{"quality",
-          "reads a pixel: lowest 8, of surfaces taken to be all equally thick (RMSE 0.103, 0.37 of high's time on a CPU), "
+          "reads a pixel: lowest 8, of surfaces taken to be all equally thick (RMSE 0.103, 0.37 of high's time on a "
+          "CPU), "
           "low 8 (0.095, 0.5), medium 16 (0.085, 0.65), high 32 (0.081), highest 64 (0.080, 1.6)",
           &quality,
           "",
           {},
           {},
           {"lowest", "low", "medium", "high", "highest"}},
-         {"downsampled", "march from every other pixel of every other row, and fill in the rest: lowest RMSE 0.109, 0.18 of high's time on "
-          "a CPU, low 0.101, 0.27, high 0.085, 0.41", &downsampled},
+         {"downsampled",
+          "march from every other pixel of every other row, and fill in the rest: lowest RMSE 0.109, 0.18 of high's "
+          "time on "
+          "a CPU, low 0.101, 0.27, high 0.085, 0.41",
+          &downsampled},
          {"slices", "of the hemisphere; 0 = the quality's", &slices, "", 0, 64},
          {"steps", "reads on either side of a slice; 0 = the quality's", &steps, "", 0, 256},
          {"thinnest", "half the thickness of a surface at least", &thinnest, "radii", 0, 10},
@@ -143,7 +148,8 @@ void Surfel::add_passes(ScreenTables& tables) const {
     constexpr auto none = gpu::BufferRow::Host::none;
     const cv::Size samples = samples_of(tables.window.size(), options_.downsampled);
     const int layers = tables.neighbours > 0 ? 3 : 1;
-    const bool packed = layers > 1 || !level_of(levels, options_.quality).alike; // where other views saw between, none are alike
+    const bool packed =
+        layers > 1 || !level_of(levels, options_.quality).alike; // where other views saw between, none are alike
     const int surfels = packed ? add_surfels(tables, layers) : add_surfaces_alike(tables);
     const int sampled = tables.add_buffer({"sampled", bytes_of_texels(samples.area()), none, Texels::rg32f});
     const cv::Size plane = plane_of(samples); // its threads share a rotation
@@ -155,14 +161,19 @@ void Surfel::add_passes(ScreenTables& tables) const {
                              {surfels, screen_surfaces, screen_noise},
                              {sampled},
                              {16 * tiles(plane.width), tiles(plane.height), 1},
-                             {{shared::spec_slices, options_.slices}, {shared::spec_steps, options_.steps}, spacing, of_layers, of_packed}});
-    tables.add_pass_over(tables.window.size(), "resolve", "surfel/resolve", {surfels, screen_surfaces, sampled}, {screen_visibility},
-                         {{shared::spec_denoise, options_.screen.denoise}, spacing, of_packed}, 2);
+                             {{shared::spec_slices, options_.slices},
+                              {shared::spec_steps, options_.steps},
+                              spacing,
+                              of_layers,
+                              of_packed}});
+    tables.add_pass_over(tables.window.size(), "resolve", "surfel/resolve", {surfels, screen_surfaces, sampled},
+                         {screen_visibility}, {{shared::spec_denoise, options_.screen.denoise}, spacing, of_packed}, 2);
 }
 
 std::vector<std::byte> Surfel::constants(const shared::ScreenConstants& screen) const {
     const cv::Size size(screen.size.x, screen.size.y), plane = plane_of(size);
-    const cv::Size words = words_of(size), samples = samples_of({screen.window.x, screen.window.y}, options_.downsampled);
+    const cv::Size words = words_of(size),
+                   samples = samples_of({screen.window.x, screen.window.y}, options_.downsampled);
     const float r = screen.radius;
     const bool noisy = screen.noise_floor > 0 || screen.noise_per_z2 > 0;
     return bytes_of(shared::SurfelConstants{

@@ -2,8 +2,8 @@
 // and the surfels that a slice of the hemisphere meets close the sectors they cover. An open plane is open to the last
 // bit.
 //
-// Outside the image surfaces go on as they are at its border, and in narrow holes (a sensor's shadows) as on their farther
-// side: as occluders only, never as pixels.
+// Outside the image surfaces go on as they are at its border, and in narrow holes (a sensor's shadows) as on their
+// farther side: as occluders only, never as pixels.
 //
 // At quality `lowest` all surfaces are taken to be equally thick, which saves the passes that find widths (edges, runs,
 // surfels) for 0.008 of error.
