@@ -81,6 +81,8 @@ class PointMethod {
     virtual ~PointMethod() = default;
     /// Visibility of each point; NaN where a point has no surface round it.
     virtual std::vector<float> compute(const PointSet& points) = 0;
+    /// What the last compute() found besides, for study.
+    [[nodiscard]] virtual std::vector<Intermediate> intermediates() { return {}; }
 };
 
 /// A method's settings before it is made: rows to fill, then make().

@@ -621,6 +621,8 @@ std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const Ba
         take(*work, &StageTimes::compute, [&] {
             if (work->by_points && options.point_method) {
                 work->attached = attach_points(work->frame, *options.point_method);
+                if (!options.dump.empty())
+                    write_intermediates(options.dump / work->entry.name, options.point_method->intermediates());
                 return;
             }
             if (work->by_points) {

@@ -16,6 +16,7 @@ const std::vector<Configuration>& more() {
         {"cacao", "high downsampled", {{"quality", "high"}, {"downsampled", "true"}}},
         {"cacao", "highest downsampled", {{"quality", "highest"}, {"downsampled", "true"}}},
         {"cacao", "high, as AMD ships it", {{"quality", "high"}, {"profile", "reference"}}},
+        {"surfel", "lowest downsampled", {{"quality", "lowest"}, {"downsampled", "true"}}},
         {"surfel", "low downsampled", {{"quality", "low"}, {"downsampled", "true"}}},
         {"surfel", "high downsampled", {{"quality", "high"}, {"downsampled", "true"}}},
         {"raycast", "depth surface, 16 rays", {{"rays", "16"}}},

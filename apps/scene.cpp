@@ -2,13 +2,11 @@
 #include "apps/scene.h"
 
 #include "apps/noise.h"
-#include "projection/error.h"
 #include "projection/srgb.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fmt/format.h>
 #include <numbers>
 #include <tbb/parallel_for.h>
 
@@ -316,16 +314,6 @@ cv::Vec3b stored(const Vector3d& linear) {
 }
 
 } // namespace
-
-const Scene& scene_named(std::string_view name) {
-    std::string names;
-    for (const Scene& scene : scenes()) {
-        if (scene.name == name)
-            return scene;
-        names += fmt::format("{}{}", names.empty() ? "" : ", ", scene.name);
-    }
-    throw Misuse(fmt::format("no scene '{}', there are: {}", name, names));
-}
 
 Eigen::Isometry3d looking_at(const Vector3d& eye, const Vector3d& target) {
     const Vector3d forward = (target - eye).normalized();

@@ -84,7 +84,7 @@ struct Scene {
     double far_m = 10;        ///< nothing is seen beyond
 };
 
-/// The table of scenes (apps/scenes.cpp).
+/// The table of scenes (apps/scenes/).
 [[nodiscard]] const std::vector<Scene>& scenes();
 /// Throws Misuse listing the names there are.
 [[nodiscard]] const Scene& scene_named(std::string_view name);

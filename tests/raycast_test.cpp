@@ -489,6 +489,31 @@ TEST(Meshes, vertices_without_a_triangle_have_no_value) {
     }
 }
 
+/// One array of NumPy's, whose bytes are those of so many floats.
+void expect_floats(const std::filesystem::path& file, const std::string& shape, std::size_t count) {
+    const std::string bytes = file_bytes(file);
+    ASSERT_GT(bytes.size(), 4 * count) << file;
+    const std::string header = bytes.substr(0, bytes.size() - 4 * count);
+    EXPECT_TRUE(header.ends_with("\n")) << header;
+    EXPECT_NE(header.find("'<f4'"), std::string::npos) << header;
+    EXPECT_NE(header.find("'shape': " + shape), std::string::npos) << header;
+}
+
+TEST(Rays, a_run_writes_the_standard_error_of_every_pixel_when_asked) {
+    const TemporaryFolder folder;
+    write_capture(folder / "capture", 2);
+    const Ran ran = run_program("run " + (folder / "capture").string() + " -o " + (folder / "out").string() +
+                                " --method raycast --raycast.rays 16 --dump " + (folder / "dump").string());
+    ASSERT_EQ(ran.exit_code, 0) << ran.err;
+    int frames = 0;
+    for (const auto& frame : std::filesystem::directory_iterator(folder / "dump")) {
+        ++frames;
+        expect_floats(frame.path() / "standard_error.npy", "(48, 64,)", 64 * 48);
+        EXPECT_NE(file_bytes(frame.path() / "index.csv").find("standard_error,f4,48x64,"), std::string::npos);
+    }
+    EXPECT_EQ(frames, 2);
+}
+
 TEST(Meshes, the_file_comes_back_with_one_property_more) {
     const TemporaryFolder folder;
     // Two triangles of a valley and a quad; a comment, a colour and a face property that are none of our business.
@@ -503,8 +528,10 @@ TEST(Meshes, the_file_comes_back_with_one_property_more) {
     const std::string rest = "4 0 2 3 1 5\n4 1 5 4 0 6\n";
     write_file(folder / "valley.ply", head + faces + body + rest);
     const Ran ran = run_program("run " + (folder / "valley.ply").string() + " -o " + (folder / "out").string() +
-                                " --method raycast --radius 100 --raycast.mesh vertices --raycast.rays 1024");
+                                " --method raycast --radius 100 --raycast.mesh vertices --raycast.rays 1024 --dump " +
+                                (folder / "dump").string());
     ASSERT_EQ(ran.exit_code, 0) << ran.err;
+    expect_floats(folder / "dump/valley/standard_error.npy", "(6,)", 6);
     const std::string written = file_bytes(folder / "out/clouds/valley.ply");
     EXPECT_TRUE(written.starts_with(head + "property float ambient_occlusion\n" + faces)) << written;
     EXPECT_TRUE(written.ends_with(rest));

@@ -88,7 +88,7 @@ Face face_of(std::span<const Vector3d> vertices, const std::array<int, 3>& trian
 std::vector<Parameter> RaycastOptions::parameters() {
     return {
         {"radius", "occluders farther away do not count", &radius_m, "m", 1e-6, 1e6, {}},
-        {"rays", "per value; the error falls as rays^-3/4, and powers of two spread best", &rays, "", 1, 65536, {}},
+        {"rays", "per value; the error falls as rays^-3/4, and powers of two spread best; --dump writes each value's standard error", &rays, "", 1, 65536, {}},
         {"falloff",
          "how much an occluder counts with its distance: all, 1 - t^2 / R^2, or (R - t) / (0.615 R)",
          &falloff,
@@ -158,14 +158,15 @@ AoMap Raycast::compute(const View& view) {
 }
 
 std::vector<Intermediate> Raycast::intermediates() {
-    if (size_.empty() || standard_error_.size() != static_cast<std::size_t>(size_.area()))
+    if (standard_error_.empty())
         return {};
     const auto bytes = std::as_bytes(std::span(standard_error_));
-    return {{"standard_error",
-             "float32",
-             {size_.height, size_.width},
-             {bytes.begin(), bytes.end()},
-             "one standard error of each pixel's visibility; NaN where there is none"}};
+    return {
+        {"standard_error",
+         "f4",
+         size_.empty() ? std::vector{static_cast<int>(standard_error_.size())} : std::vector{size_.height, size_.width},
+         {bytes.begin(), bytes.end()},
+         "one standard error of each visibility; NaN where there is none"}};
 }
 
 std::vector<float> Raycast::compute(const PointSet& points) {

@@ -37,7 +37,7 @@ class Raycast final : public Method, public PointMethod {
     [[nodiscard]] const Timings& timings() const override { return timings_; }
     /// One standard error of each value of the last compute(), in its order (row by row); NaN where there is no value.
     [[nodiscard]] const std::vector<float>& standard_error() const { return standard_error_; }
-    /// The standard error of the last depth image: what `run --dump` writes. Empty before.
+    /// The standard error of the last depth image, cloud or mesh: what `run --dump` writes. Empty before.
     [[nodiscard]] std::vector<Intermediate> intermediates() override;
 
   private:

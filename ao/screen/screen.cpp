@@ -129,10 +129,12 @@ void ScreenMethod::add_denoise(ScreenTables& tables) const {
                     {{shared::spec_denoise, options_.denoise}}, 2);
 }
 
-ScreenTables ScreenMethod::tables(cv::Size size, bool supplied, int neighbours) const {
+ScreenTables ScreenMethod::tables(const Shape& shape) const {
+    const auto [width, height, supplied, neighbours, noisy] = shape;
+    const cv::Size size(width, height);
     const int guard = neighbours > 0 ? guard_px(size) : 0;
     const cv::Size image(size.width + 2 * guard, size.height + 2 * guard);
-    ScreenTables all{{{guard, guard}, size}, image, neighbours, shared_buffers(static_cast<std::size_t>(image.area()), supplied, options_.seed), {}};
+    ScreenTables all{{{guard, guard}, size}, image, neighbours, shared_buffers(static_cast<std::size_t>(image.area()), supplied, options_.seed), {}, noisy};
     if (neighbours > 0) {
         const auto each = static_cast<std::size_t>(neighbours);
         all.add_buffer({"neighbours", each * static_cast<std::size_t>(size.area()) * 8, gpu::BufferRow::Host::taken, gpu::BufferRow::Texels::rg32ui});
@@ -147,15 +149,15 @@ ScreenTables ScreenMethod::tables(cv::Size size, bool supplied, int neighbours) 
 
 /// Programs are kept for one image size: with neighbours and without.
 gpu::Program& ScreenMethod::program_for(const Shape& shape, std::size_t constants_bytes) {
-    const auto [width, height, supplied, neighbours] = shape;
+    const auto [width, height, supplied, neighbours, noisy] = shape;
     if (!programs_.empty()) {
-        const auto [other_width, other_height, s, n] = programs_.begin()->first;
+        const auto [other_width, other_height, s, n, y] = programs_.begin()->first;
         if (width != other_width || height != other_height)
             programs_.clear();
     }
     std::unique_ptr<gpu::Program>& program = programs_[shape];
     if (!program) {
-        const ScreenTables all = tables({width, height}, supplied, neighbours);
+        const ScreenTables all = tables(shape);
         program = std::make_unique<gpu::Program>(device_, all.buffers, all.passes, constants_bytes);
     }
     return *program;
@@ -170,13 +172,14 @@ AoMap ScreenMethod::compute(const View& view) {
     const int guard = most > 0 ? guard_px(size) : 0;
     shared::ScreenConstants screen = constants_from(options_, view, guard);
     screen.neighbours = static_cast<int>(neighbours.size());
+    const bool noisy = screen.noise_floor > 0 || screen.noise_per_z2 > 0;
     for (const Neighbour& other : neighbours)
         screen.misfit = std::max(screen.misfit, static_cast<float>(2 * other.misfit_m));
     std::ranges::transform(neighbours, screen.places, [](const Neighbour& other) {
         return gpu::place_of(other.surfaces->camera, other.here_from_there);
     });
     const auto block = constants(screen);
-    gpu::Program& program = program_for({size.width, size.height, supplied, most}, block.size());
+    gpu::Program& program = program_for({size.width, size.height, supplied, most, noisy}, block.size());
     const auto start = std::chrono::steady_clock::now();
     const cv::Rect window({guard, guard}, size);
     const cv::Size image(screen.size.x, screen.size.y);

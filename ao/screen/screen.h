@@ -46,6 +46,7 @@ struct ScreenTables {
     int neighbours = 0; ///< other views there may be at most
     std::vector<gpu::BufferRow> buffers;
     std::vector<gpu::PassRow> passes;
+    bool noisy = false; ///< whether depth has noise
 
     /// Appends a buffer and tells its index.
     int add_buffer(gpu::BufferRow row);
@@ -80,8 +81,8 @@ class ScreenMethod : public Method {
     /// The room's constant block. It begins with `screen`.
     [[nodiscard]] virtual std::vector<std::byte> constants(const shared::ScreenConstants& screen) const = 0;
   private:
-    using Shape = std::tuple<int, int, bool, int>; // width, height, whether normals are supplied, most neighbours
-    [[nodiscard]] ScreenTables tables(cv::Size size, bool supplied, int neighbours) const;
+    using Shape = std::tuple<int, int, bool, int, bool>; // width, height, whether normals are supplied, most neighbours, noisy
+    [[nodiscard]] ScreenTables tables(const Shape& shape) const;
     gpu::Program& program_for(const Shape& shape, std::size_t constants_bytes);
 
     gpu::Device& device_;

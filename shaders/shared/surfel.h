@@ -14,6 +14,7 @@ struct SurfelConstants {
     ivec2 plane;               // size of one of the 16 planes that the surfels are stored in
     ivec2 samples;             // pixels that slices are marched from: all, or every other one of every other row
     float thinnest, thickest;  // half a surfel's thickness at least and at most, metres
+    float alike;               // half a surfel's thickness where all are alike, metres
     float hidden;              // half the thickness of what ends out of sight, metres; at most the thickest
     float lengthen;            // factor on the half lengths of surfels: few samples leave gaps
     float jut;                 // metres by which what hides a surface's continuation stands in front of it
@@ -30,6 +31,7 @@ const int spec_steps = 11;   // on either side of a slice
 const int spec_spacing = 12; // of the samples, pixels
 const int spec_layers = 13;  // of surfaces a pixel: 1, or 3 with neighbours
 const int spec_round = 14;   // of reproject
+const int spec_packed = 15;  // 0: surfaces themselves are read as surfels, all alike in thickness
 
 SHARED_END
 #endif

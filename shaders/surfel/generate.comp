@@ -18,6 +18,7 @@ layout(constant_id = spec_slices) const int slices = 2;
 layout(constant_id = spec_steps) const int steps = 8;
 layout(constant_id = spec_spacing) const int spacing = 1;
 layout(constant_id = spec_layers) const int layers = 1;
+layout(constant_id = spec_packed) const int packed = 1;
 
 layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(binding = 0, rg32ui) readonly uniform uimageBuffer surfels;
@@ -72,6 +73,31 @@ float to_border(vec2 p, vec2 direction) {
     return min(at.x, at.y);
 }
 
+// Four surfels: depth, normal of any length, half the thickness, and the last bits of the depth.
+struct Four {
+    vec4 z, nx, ny, nz, thickness;
+    ivec4 marks;
+};
+
+Four packed_surfels(ivec4 x, ivec4 y, int layer, SurfelConstants s) {
+    int behind = layers == 1 ? 0 : layer * 16 * s.plane.x * s.plane.y;
+    uvec2 a = imageLoad(surfels, behind + surfel_index(ivec2(x.x, y.x), s.plane)).xy;
+    uvec2 b = imageLoad(surfels, behind + surfel_index(ivec2(x.y, y.y), s.plane)).xy;
+    uvec2 c = imageLoad(surfels, behind + surfel_index(ivec2(x.z, y.z), s.plane)).xy;
+    uvec2 d = imageLoad(surfels, behind + surfel_index(ivec2(x.w, y.w), s.plane)).xy;
+    uvec4 depths = uvec4(a.x, b.x, c.x, d.x);
+    ivec4 shape = ivec4(a.y, b.y, c.y, d.y); // normals as bytes_of_normal()
+    return Four(uintBitsToFloat(depths), vec4(shape >> 24), vec4(shape << 8 >> 24), vec4(shape << 16 >> 24),
+                vec4(shape & 0xff) * (s.thickest * (1.0 / 255.0)), ivec4(depths));
+}
+
+Four surfaces_alike(ivec4 x, ivec4 y, SurfelConstants s) {
+    vec4 a = imageLoad(surfaces, index_of(ivec2(x.x, y.x))), b = imageLoad(surfaces, index_of(ivec2(x.y, y.y)));
+    vec4 c = imageLoad(surfaces, index_of(ivec2(x.z, y.z))), d = imageLoad(surfaces, index_of(ivec2(x.w, y.w)));
+    return Four(vec4(a.w, b.w, c.w, d.w), vec4(a.x, b.x, c.x, d.x), vec4(a.y, b.y, c.y, d.y), vec4(a.z, b.z, c.z, d.z),
+                vec4(s.alike), ivec4(0));
+}
+
 uvec4 bits_below(ivec4 n) { return (uvec4(1u) << n) - 1u; }
 
 void main() {
@@ -100,7 +126,6 @@ void main() {
     float normal_per_z = dot(n, vec3(ray, 1.0));
     // Rounding of depth in single precision is a noise, too.
     float least_rise = (k.tangent_sigmas * sigma_of(z) + 1e-6 * z) * abs(normal_per_z);
-    float thickness_step = s.thickest * (1.0 / 255.0);
     float lowest2 = k.tangent_sine * k.tangent_sine;
     float open = 0.0, all = 0.0;
 
@@ -146,20 +171,16 @@ void main() {
             vec4 signed_now = now * sides;
             ivec4 ix = nearest(along.x * signed_now), iy = nearest(along.y * signed_now);
             ivec4 jx = clamp(ix, -pixel.x, k.size.x - 1 - pixel.x), jy = clamp(iy, -pixel.y, k.size.y - 1 - pixel.y);
-            int behind = layers == 1 ? 0 : layer * 16 * s.plane.x * s.plane.y;
-            uvec2 a = imageLoad(surfels, behind + surfel_index(pixel + ivec2(jx.x, jy.x), s.plane)).xy;
-            uvec2 b = imageLoad(surfels, behind + surfel_index(pixel + ivec2(jx.y, jy.y), s.plane)).xy;
-            uvec2 c = imageLoad(surfels, behind + surfel_index(pixel + ivec2(jx.z, jy.z), s.plane)).xy;
-            uvec2 d = imageLoad(surfels, behind + surfel_index(pixel + ivec2(jx.w, jy.w), s.plane)).xy;
-            vec4 zq = uintBitsToFloat(uvec4(a.x, b.x, c.x, d.x));
-            ivec4 shape = ivec4(a.y, b.y, c.y, d.y);
+            Four four;
+            if (packed != 0) four = packed_surfels(pixel.x + jx, pixel.y + jy, layer, s);
+            else four = surfaces_alike(pixel.x + jx, pixel.y + jy, s);
+            vec4 zq = four.z, nx = four.nx, ny = four.ny, nz = four.nz;
             if (steps % 2 == 1 && j == steps - 1) zq.zw = vec2(0.0);
             bvec4 inside_image = equal(abs(ix - jx) + abs(iy - jy), ivec4(0));
 
             // From the pixel's point to the sample's, towards V and towards T (outwards on either side): differences first,
             // far away coordinates cancel badly.
             vec4 mx = vec4(ix), my = vec4(iy);
-            vec4 nx = vec4(shape >> 24), ny = vec4(shape << 8 >> 24), nz = vec4(shape << 16 >> 24); // as bytes_of_normal()
             // Outside the image the surface at its border goes on, a plane, though not towards its horizon.
             vec4 seen = nx * (ray.x + mx * k.ray_step.x) + ny * (ray.y + my * k.ray_step.y) + nz;
             vec4 go_on = (nx * (ray.x + vec4(jx) * k.ray_step.x) + ny * (ray.y + vec4(jy) * k.ray_step.y) + nz) / seen;
@@ -170,7 +191,7 @@ void main() {
             vec4 pt = zq * (mx * flat_tangent.x + my * flat_tangent.y) * sides;
             vec4 rise = zq * (mx * flat_normal.x + my * flat_normal.y) + (dz * normal_per_z - least_rise);
             // What other views saw lies off by some misfit; it must not occlude the surface that it continues.
-            if (layers > 1) rise -= vec4((ivec4(a.x, b.x, c.x, d.x) >> 4) & 1) * k.misfit;
+            if (layers > 1) rise -= vec4((four.marks >> 4) & 1) * k.misfit;
             vec4 d2 = pv * pv + pt * pt;
             // The gaze at the sample; across it, outwards: (gt, -gv).
             vec4 gv = pv - distance;
@@ -202,7 +223,7 @@ void main() {
             ahead = least(ahead, chord - middle);
             vec4 fv = pv - lv * back, ft = pt - lt * back, uv = pv + lv * ahead, ut = pt + lt * ahead;
             // Thickness lies behind, as the eye sees it: seen from the pixel, farther outwards.
-            vec4 deep = vec4(shape & 0xff) * thickness_step;
+            vec4 deep = four.thickness;
             vec4 fdv = fv + gv * deep, fdt = ft + gt * deep, udv = uv + gv * deep, udt = ut + gt * deep;
             bvec4 turns = greaterThan(fv * ut, ft * uv), deep_turns = greaterThan(fdv * udt, fdt * udv);
             vec4 low = turn(mix(uv, fv, turns), abs(mix(ut, ft, turns)));
@@ -222,7 +243,7 @@ void main() {
             mask &= ~uvec4(misses);
             closed |= mask.x | mask.y | mask.z | mask.w;
             // What lies behind these samples comes before the next ones.
-            ivec4 next_layer = ivec4(a.x, b.x, c.x, d.x) & 15; // quarters of a radius behind this one, rounded up
+            ivec4 next_layer = four.marks & 15; // quarters of a radius behind this one, rounded up
             vec4 beyond = dz * (4.0 / k.radius) + vec4(next_layer);
             // It may lie within the radius; 15 is that or farther.
             ivec4 near = ivec4(lessThan(beyond, vec4(5.0))) & (ivec4(greaterThan(beyond, vec4(-4.0))) | ivec4(equal(next_layer, ivec4(15))));

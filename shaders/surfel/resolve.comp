@@ -12,6 +12,7 @@
 
 layout(constant_id = spec_denoise) const int denoise = 1;
 layout(constant_id = spec_spacing) const int spacing = 1;
+layout(constant_id = spec_packed) const int packed = 1;
 
 layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(binding = 0, rg32ui) readonly uniform uimageBuffer surfels;
@@ -36,14 +37,21 @@ struct Mean {
     vec2 sum;
 };
 
+// Normal and depth, from fewer bytes where surfels are packed.
+vec4 surface_at(ivec2 p) {
+    if (packed == 0) return imageLoad(surfaces, index_of(p));
+    uvec2 word = imageLoad(surfels, surfel_index(p, plane)).xy;
+    return vec4(vec3(bytes_of_normal(word.y)) * (1.0 / 127.0), uintBitsToFloat(word.x));
+}
+
 Tap tap_at(ivec2 q) {
     bool exists = all(lessThan(uvec2(q), uvec2(samples)));
     q = exists ? q : ivec2(0);
     ivec2 p = q * spacing + k.origin;
-    uvec2 word = imageLoad(surfels, surfel_index(p, plane)).xy;
-    float z = exists ? uintBitsToFloat(word.x) : 0.0;
+    vec4 surface = surface_at(p);
+    float z = exists ? surface.w : 0.0;
     vec2 measure = imageLoad(sampled, q.y * samples.x + q.x).xy;
-    return Tap(ray_of(vec2(p)) * z, vec3(bytes_of_normal(word.y)) * (z > 0.0 ? 1.0 / 127.0 : 0.0), z > 0.0 ? measure : vec2(0.0));
+    return Tap(ray_of(vec2(p)) * z, z > 0.0 ? surface.xyz : vec3(0.0), z > 0.0 ? measure : vec2(0.0));
 }
 
 Mean mean_at(ivec2 p, out float z) {

@@ -1,0 +1,110 @@
+// Things let down one by one, each on what lies there already.
+#include "apps/scenes/heap.h"
+
+#include "apps/scenes/materials.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace scanshade::scene {
+namespace {
+
+/// Where things come to rest that are let down one by one: the height of what lies there so far, on a grid of 2 cm.
+class Heap {
+  public:
+    Heap(const Vector2d& low, const Vector2d& high, double floor_z)
+        : low_(low), columns_(cells(high.x() - low.x())), rows_(cells(high.y() - low.y())),
+          top_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), floor_z) {}
+
+    /// Lets a thing with a round footprint down; returns the height it rests at.
+    double settle(const Vector2d& at, double radius, double height) {
+        double rest = -1e9;
+        for_cells(at, radius, [&](double& top) { rest = std::max(rest, top); });
+        for_cells(at, radius, [&](double& top) { top = rest + height; });
+        return rest;
+    }
+
+  private:
+    static constexpr double cell = 0.02;
+    static int cells(double length) { return static_cast<int>(std::ceil(length / cell)); }
+    template <class Visit>
+    void for_cells(const Vector2d& at, double radius, Visit&& visit) {
+        const auto index = [&](double offset, int count) {
+            return std::clamp(static_cast<int>(offset / cell), 0, count - 1);
+        };
+        for (int row = index(at.y() - radius - low_.y(), rows_); row <= index(at.y() + radius - low_.y(), rows_); ++row)
+            for (int column = index(at.x() - radius - low_.x(), columns_);
+                 column <= index(at.x() + radius - low_.x(), columns_); ++column)
+                if ((low_ + cell * Vector2d(column + 0.5, row + 0.5) - at).norm() <= radius + cell)
+                    visit(top_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
+                               static_cast<std::size_t>(column)]);
+    }
+
+    Vector2d low_;
+    int columns_, rows_;
+    std::vector<double> top_;
+};
+
+/// One thing of about `size`, let down on a heap: boxes, some tipped over, balls, cans, bowls, pipes, open cartons.
+void drop(Bodies& bodies, Heap& heap, const Vector2d& at, double size, Dice& dice) {
+    const Material paint = dice.one_of({card, red, green, yellow, white, cloth, books, steel, clay});
+    const double yaw = dice.between(0, pi), tall = size * dice.between(0.4, 1.3);
+    switch (dice.below(8)) {
+    case 0:
+    case 1:
+    case 2: {
+        const double wide = size * dice.between(0.6, 1), deep = size * dice.between(0.4, 0.9);
+        const double z = heap.settle(at, 0.42 * std::min(wide, deep), tall);
+        add(bodies, paint, {box_on(z, at.x(), at.y(), wide, deep, tall, yaw)});
+        break;
+    }
+    case 3: { // tipped over, resting on an edge
+        const double tilt = dice.between(0.3, 1.2), half = size * 0.35;
+        const double high = 2 * half * (std::sin(tilt) + std::cos(tilt));
+        const double z = heap.settle(at, half, high * 0.9);
+        const Eigen::Matrix3d axes = turned(yaw) * Eigen::AngleAxisd(tilt, Vector3d::UnitX()).toRotationMatrix();
+        add(bodies, paint, {Box{{at.x(), at.y(), z + high / 2}, {half * 1.3, half, half}, axes}});
+        break;
+    }
+    case 4: {
+        const double radius = size * 0.4, z = heap.settle(at, radius * 0.7, 1.8 * radius);
+        add(bodies, paint, {Sphere{{at.x(), at.y(), z + radius}, radius}});
+        break;
+    }
+    case 5: {
+        const double radius = size * 0.35, z = heap.settle(at, radius, tall);
+        add(bodies, paint, {Cylinder{{at.x(), at.y(), z}, radius, tall}});
+        break;
+    }
+    case 6: { // a bowl or bucket
+        const double z = heap.settle(at, size * 0.4, tall * 0.3);
+        turn_on_lathe(bodies, paint, {at.x(), at.y(), z},
+                      {{0, 0.004}, {0.28 * size, 0.004}, {0.42 * size, 0.35 * tall}, {0.48 * size, 0.9 * tall}}, 20);
+        break;
+    }
+    default: { // an open carton
+        const double half = size * 0.5, z = heap.settle(at, half, 0.3 * tall), wall = 0.006;
+        const Place place{{at.x(), at.y(), z}, yaw};
+        add(bodies, card,
+            {place.box(0, 0, 0, 2 * half, 2 * half, wall), place.box(-half, 0, 0, wall, 2 * half, tall),
+             place.box(half, 0, 0, wall, 2 * half, tall), place.box(0, -half, 0, 2 * half, wall, tall),
+             place.box(0, half, 0, 2 * half, wall, tall)});
+        const Eigen::Matrix3d flap = turned(yaw) * Eigen::AngleAxisd(0.5, Vector3d::UnitY()).toRotationMatrix();
+        add(bodies, card, {Box{place(half + 0.07, 0, tall - 0.04), {0.08, half, wall / 2}, flap}});
+    }
+    }
+}
+
+} // namespace
+
+void drop_many(Bodies& bodies, const Vector2d& low, const Vector2d& high, double floor_z, int count, double smallest,
+               double largest, Dice& dice) {
+    Heap heap(low, high, floor_z);
+    for (int i = 0; i < count; ++i) { // large things first, as they lie in real heaps
+        const double size = largest - (largest - smallest) * i / count, rim = size / 2;
+        drop(bodies, heap, {dice.between(low.x() + rim, high.x() - rim), dice.between(low.y() + rim, high.y() - rim)},
+             size, dice);
+    }
+}
+
+} // namespace scanshade::scene
