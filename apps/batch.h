@@ -4,6 +4,7 @@
 #include "ao/cloud/cloud_ao.h"
 #include "ao/method.h"
 #include "ao/sequence/neighbourhood.h"
+#include "apps/frame_row.h"
 #include "apps/recording_cloud.h"
 #include "io/capture.h"
 #include "io/image_file.h"
@@ -58,42 +59,6 @@ struct BatchOptions {
     int frames_in_memory = 0;                 ///< 0 = cores + 2
     const std::atomic<bool>* stop = nullptr;  ///< set = begin no further frame
 };
-
-enum class FrameStatus { ok, failed, skipped };
-[[nodiscard]] std::string_view name_of(FrameStatus status);
-
-/// Milliseconds that one frame spent in each stage of the walk.
-struct StageTimes {
-    double load = 0, project = 0, compute = 0, attach = 0, write = 0;
-};
-/// Sums; a time that is not known (NaN) counts as none.
-[[nodiscard]] StageTimes operator+(const StageTimes& a, const StageTimes& b);
-
-/// Who is to blame for a frame that has no result. Only an outage is worth another try.
-enum class Fault { none, input, outage, internal, crash };
-[[nodiscard]] std::string_view name_of(Fault fault);
-
-/// What became of one frame: a row of frames.csv. NaN and empty where the frame did not come that far.
-struct FrameRow {
-    std::size_t index = 0; ///< in capture.entries
-    std::string name;
-    FrameStatus status = FrameStatus::skipped;
-    std::string why; ///< of a failed or skipped frame
-    Fault fault = Fault::none;
-    cv::Size size;
-    double valid_share = 0; ///< pixels or points with a depth / all of them
-    double coverage = 0;    ///< pixels or points with a visibility / those with a depth
-    double mean_visibility = 0;
-    Camera camera; ///< as used
-    StageTimes ms;
-    Timings passes; ///< the method's own account of `ms.compute`
-    std::vector<std::string> warnings;
-    std::vector<std::string> notes; ///< what was chosen for this frame, and why
-    std::vector<std::filesystem::path> files; ///< written, relative to Outputs::folder
-};
-
-/// The row of a frame that was not begun.
-[[nodiscard]] FrameRow skipped_row(const Capture& capture, std::size_t index);
 
 /// Runs the walk over the frames. A frame that fails says why in its row, leaves no file, and stops no other. A lost
 /// device ends the run: frames in flight and those after them come back as skipped, the fault of an outage.
