@@ -13,8 +13,12 @@
 #include <algorithm>
 #include <chrono>
 #include <fmt/format.h>
+#include <mutex>
+#include <tbb/concurrent_queue.h>
+#include <tbb/global_control.h>
 #include <tbb/info.h>
 #include <tbb/parallel_pipeline.h>
+#include <tbb/task_arena.h>
 
 namespace scanshade {
 namespace {
@@ -152,35 +156,60 @@ std::vector<FrameRow> planned_rows(const Capture& capture, const std::vector<std
     return rows;
 }
 
+/// Methods made alike, lent to one frame at a time each.
+class Crew {
+  public:
+    explicit Crew(std::span<Method* const> methods) {
+        for (Method* method : methods)
+            free_.push(method);
+    }
+    /// Calls use(method) with one of them, once one is free.
+    template <class Use>
+    void lend(Use&& use) {
+        Method* method = nullptr;
+        free_.pop(method);
+        use(*method); // does not throw: take() catches
+        free_.push(method);
+    }
+
+  private:
+    tbb::concurrent_bounded_queue<Method*> free_;
+};
+
 /// The walk as one pipeline; the frames' rows are filled in on the way.
 class Pipeline {
   public:
-    Pipeline(const Capture& capture, Method& method, const BatchOptions& options,
+    Pipeline(const Capture& capture, std::span<Method* const> methods, const BatchOptions& options,
              const std::function<void(const FrameRow&)>& on_frame)
-        : capture_(capture), method_(method), options_(options), on_frame_(on_frame),
-          rows_(planned_rows(capture, options.frames)),
+        : capture_(capture), crew_(methods), at_once_(options.sequence ? 1 : static_cast<int>(methods.size())),
+          options_(options), on_frame_(on_frame), rows_(planned_rows(capture, options.frames)),
           walk_(capture, rows_, options.sequence ? options.sequence->reach() : 0), waiting_(options.sequence) {}
 
     [[nodiscard]] std::vector<FrameRow> run() {
         using tbb::filter_mode;
         using Flow = tbb::flow_control;
-        tbb::parallel_pipeline(
-            frames_in_memory(),
+        const auto computing = at_once_ > 1 ? filter_mode::parallel : filter_mode::serial_in_order;
+        const auto filters =
             tbb::make_filter<void, Token>(filter_mode::serial_in_order, [&](Flow& flow) { return begin(flow); }) &
-                tbb::make_filter<Token, Token>(filter_mode::parallel, [&](Token work) { return prepared(work); }) &
-                tbb::make_filter<Token, Token>(filter_mode::serial_in_order,
-                                               [&](Token work) { return computed(work); }) &
-                tbb::make_filter<Token, Token>(filter_mode::parallel, [&](Token work) { return finished(work); }) &
-                tbb::make_filter<Token, void>(filter_mode::serial_in_order, [&](const Token& work) { report(work); }));
+            tbb::make_filter<Token, Token>(filter_mode::parallel, [&](Token work) { return prepared(work); }) &
+            tbb::make_filter<Token, Token>(computing, [&](Token work) { return computed(work); }) &
+            tbb::make_filter<Token, Token>(filter_mode::parallel, [&](Token work) { return finished(work); }) &
+            tbb::make_filter<Token, void>(filter_mode::serial_in_order, [&](const Token& work) { report(work); });
+        // Who waits for a device leaves its core to others.
+        const int threads = cores() + (at_once_ > 1 ? at_once_ : 0);
+        const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism,
+                                          static_cast<std::size_t>(threads));
+        tbb::task_arena(threads).execute([&] { tbb::parallel_pipeline(frames_in_memory(), filters); });
         for (const Token& unfinished : waiting_.rest()) // interrupted before what lies around them was there
             unfinished->row = skipped_row(capture_, unfinished->row.index);
         return std::move(rows_);
     }
 
   private:
+    [[nodiscard]] static int cores() { return tbb::info::default_concurrency(); }
     [[nodiscard]] std::size_t frames_in_memory() const {
         return static_cast<std::size_t>(options_.frames_in_memory > 0 ? options_.frames_in_memory
-                                                                      : tbb::info::default_concurrency() + 2);
+                                                                      : cores() + 2 * at_once_);
     }
 
     Token begin(tbb::flow_control& flow) {
@@ -214,28 +243,31 @@ class Pipeline {
 
     Token computed(Token arrived) {
         Token work = waiting_.pass(std::move(arrived));
-        if (!work)
+        if (!work || !work->row.why.empty())
             return work;
-        take(*work, &StageTimes::compute, [&] {
-            if (work->by_points)
-                compute_points(*work, options_);
-            else
-                compute_view(*work);
-        });
-        given_up_ = given_up_ || (work->row.status == FrameStatus::skipped && work->row.fault == Fault::outage);
+        if (work->by_points) { // one at a time takes all cores and much memory; nor may it begin another while it waits
+            const std::lock_guard alone(points_);
+            tbb::this_task_arena::isolate(
+                [&] { take(*work, &StageTimes::compute, [&] { compute_points(*work, options_); }); });
+        } else {
+            crew_.lend(
+                [&](Method& method) { take(*work, &StageTimes::compute, [&] { compute_view(*work, method); }); });
+        }
+        if (work->row.status == FrameStatus::skipped && work->row.fault == Fault::outage)
+            given_up_ = true;
         return work;
     }
 
-    void compute_view(Work& work) {
+    void compute_view(Work& work, Method& method) const {
         if (options_.sequence) {
             compute_in_sequence(work, capture_, *options_.sequence);
         } else {
-            work.ao = method_.compute({work.depth});
-            work.row.passes = method_.timings();
+            work.ao = method.compute({work.depth});
+            work.row.passes = method.timings();
         }
         if (options_.dump.empty())
             return;
-        std::vector<Intermediate> all = method_.intermediates();
+        std::vector<Intermediate> all = method.intermediates();
         std::ranges::move(work.averaging, std::back_inserter(all));
         write_intermediates(options_.dump / work.entry.name, all);
     }
@@ -259,7 +291,9 @@ class Pipeline {
     }
 
     const Capture& capture_;
-    Method& method_;
+    Crew crew_;
+    std::mutex points_;
+    int at_once_;
     const BatchOptions& options_;
     const std::function<void(const FrameRow&)>& on_frame_;
     std::vector<FrameRow> rows_;
@@ -271,9 +305,9 @@ class Pipeline {
 
 } // namespace
 
-std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const BatchOptions& options,
+std::vector<FrameRow> run_batch(const Capture& capture, std::span<Method* const> methods, const BatchOptions& options,
                                 const std::function<void(const FrameRow&)>& on_frame) {
-    return Pipeline(capture, method, options, on_frame).run();
+    return Pipeline(capture, methods, options, on_frame).run();
 }
 
 } // namespace scanshade

@@ -10,10 +10,12 @@
 #include "io/image_file.h"
 #include "projection/project.h"
 
+#include <array>
 #include <atomic>
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -23,11 +25,11 @@ namespace scanshade {
 /// clouds/NAME.pcd or .ply.
 struct Outputs {
     std::filesystem::path folder;
-    bool ao = true;     ///< the visibility map
+    bool ao = true;         ///< the visibility map
     bool confidence = true; ///< how far the visibility can be believed (confidence_of()), as 8 bits or floats
     bool shaded = true; ///< colour times visibility; clay times visibility where colour is not known to fit the depth
     bool panel = false; ///< colour | depth | AO | shaded
-    bool cloud = true;  ///< a cloud input with the fields ambient_occlusion and ao_confidence, everything else as it was
+    bool cloud = true; ///< a cloud input with the fields ambient_occlusion and ao_confidence, everything else as it was
     bool depth_cloud = false; ///< a new PLY of a depth frame's points, in camera space
     AoFormat format = AoFormat::png16;
     double shade_strength = 1; ///< 0 leaves the colour, 1 multiplies by visibility
@@ -48,23 +50,31 @@ struct BatchOptions {
     double radius_m = 0;                      ///< the method's, and
     DepthNoise noise;                         ///< the depth's: what confidence depends on
     std::optional<Registration> registration; ///< what the user said; otherwise what the capture says
-    PointMethod* point_method = nullptr;      ///< what clouds and meshes are computed with, where that needs no view: then
-                                              ///< the cloud is all that is written of them
-    const CloudAo* cloud_ao = nullptr;        ///< what other clouds are computed with, where `cloud_walk` says so
+    PointMethod* point_method = nullptr; ///< what clouds and meshes are computed with, where that needs no view: then
+                                         ///< the cloud is all that is written of them
+    const CloudAo* cloud_ao = nullptr;   ///< what other clouds are computed with, where `cloud_walk` says so
     CloudWalk cloud_walk = CloudWalk::automatic;
-    RecordingCloud* cloud = nullptr;          ///< what frames with a pose are added to
-    Neighbourhood* sequence = nullptr;             ///< what frames are computed with instead of the method, together with those
-                                              ///< around them; these are loaded whether or not `frames` has them
-    std::filesystem::path dump;               ///< folder for the method's intermediates, frame by frame; empty = none
-    int frames_in_memory = 0;                 ///< 0 = cores + 2
-    const std::atomic<bool>* stop = nullptr;  ///< set = begin no further frame
+    RecordingCloud* cloud = nullptr;   ///< what frames with a pose are added to
+    Neighbourhood* sequence = nullptr; ///< what frames are computed with instead of the method, together with those
+                                       ///< around them; these are loaded whether or not `frames` has them
+    std::filesystem::path dump;        ///< folder for the method's intermediates, frame by frame; empty = none
+    int frames_in_memory = 0;          ///< 0 = cores, and two for each method
+    const std::atomic<bool>* stop = nullptr; ///< set = begin no further frame
 };
 
-/// Runs the walk over the frames. A frame that fails says why in its row, leaves no file, and stops no other. A lost
-/// device ends the run: frames in flight and those after them come back as skipped, the fault of an outage.
+/// Runs the walk over the frames, as many of them computed at once as there are methods, which are made alike; a
+/// sequence takes one after the other. A frame that fails says why in its row, leaves no file, and stops no other. A
+/// lost device ends the run: frames in flight and those after them come back as skipped, the fault of an outage.
 /// `on_frame` is called once per row, in the order of `options.frames`, never concurrently.
 /// Rows come back in that order too; what is written does not depend on timing.
-[[nodiscard]] std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const BatchOptions& options,
+[[nodiscard]] std::vector<FrameRow> run_batch(const Capture& capture, std::span<Method* const> methods,
+                                              const BatchOptions& options,
                                               const std::function<void(const FrameRow&)>& on_frame = {});
+/// With one method.
+[[nodiscard]] inline std::vector<FrameRow> run_batch(const Capture& capture, Method& method,
+                                                     const BatchOptions& options,
+                                                     const std::function<void(const FrameRow&)>& on_frame = {}) {
+    return run_batch(capture, std::array{&method}, options, on_frame);
+}
 
 } // namespace scanshade

@@ -1,6 +1,4 @@
 // `scanshade run`: ambient occlusion for every frame of one or more captures.
-#include "ao/fit_plane/fit_plane.h"
-#include "ao/gpu/device.h"
 #include "apps/batch.h"
 #include "apps/job_run.h"
 #include "apps/progress.h"
@@ -9,6 +7,7 @@
 #include "apps/run_talk.h"
 #include "apps/slice.h"
 #include "apps/trial.h"
+#include "apps/workers.h"
 #include "io/output_file.h"
 #include "projection/error.h"
 
@@ -243,22 +242,11 @@ class Run final : public Command {
         return job;
     }
 
-    /// Opened when the first frame needs it: where all is done already, never.
-    gpu::Device& device() {
-        if (!device_)
-            device_ = std::make_unique<gpu::Device>(asked_.device);
-        return *device_;
-    }
-
-    /// Kept from capture to capture while its settings stay: its shaders are compiled once.
-    Method& method_as_set(gpu::Device& device) {
-        MethodSetup& setup = asked_.chosen_setup();
-        const Configuration wanted{asked_.method, "", values_of(setup)};
-        if (!method_ || wanted.method != made_.method || wanted.settings != made_.settings) {
-            method_ = setup.make(device);
-            made_ = wanted;
-        }
-        return *method_;
+    /// Opened when the first frame needs them: where all is done already, never.
+    Workers& workers() {
+        if (!workers_)
+            workers_ = std::make_unique<Workers>(asked_.device, asked_.in_flight);
+        return *workers_;
     }
 
     std::vector<FrameRow> process(Job job, const Shift& shift = {}) {
@@ -275,21 +263,21 @@ class Run final : public Command {
                             folder.string()));
             return *std::move(rows);
         }
-        gpu::Device& device = this->device();
+        Workers& workers = this->workers();
+        gpu::Device& device = workers.device();
         const std::vector<std::string> budget =
             asked_.budget.any() ? keep_to_budget(job, device) : std::vector<std::string>{};
-        Method& plain = method_as_set(device);
+        workers.make(asked_.method, asked_.chosen_setup());
+        Method& plain = workers.plain();
         job.batch.point_method = dynamic_cast<PointMethod*>(&plain);
         job.batch.radius_m = asked_.radius_m();
         const CloudAo of_clouds = asked_.cloud_ao();
         job.batch.cloud_ao = &of_clouds;
         job.batch.cloud_walk = asked_.cloud_walk();
-        say(fmt::format("{} on {} ({})", asked_.method, device.info().name, device.info().driver));
+        say(fmt::format("{} on {}", asked_.method, workers.description()));
         const DepthNoise noise = noise_of(job.capture, job.of, asked_.depth_noise);
         const FitPlaneOptions fit = asked_.fit();
-        std::optional<OnFittedDepth> fitted;
-        if (noise.any())
-            fitted.emplace(device, noise, plain, fit);
+        const std::vector<Method*> methods = workers.methods(noise, fit);
         std::optional<Neighbourhood> sequence;
         std::optional<RecordingCloud> cloud;
         if (!asked_.recording_cloud.empty()) {
@@ -300,12 +288,15 @@ class Run final : public Command {
             sequence.emplace(device, plain, job.batch.radius_m, noise, fit,
                              asked_.sequence == "on" ? asked_.sequences : alone());
             job.batch.sequence = &*sequence;
+            if (methods.size() > 1)
+                say("  frames of a sequence are computed one at a time, in their order");
         }
-        Method& method = fitted ? static_cast<Method&>(*fitted) : plain;
         job.batch.noise = noise;
         RunReport report = report_on(job, device.info());
         report.depth_noise = noise_sentence(noise, asked_);
         report.budget = budget;
+        report.devices = workers.devices();
+        report.at_once = job.batch.sequence ? 1 : methods.size();
         report.frames.resize(job.batch.frames.size());
         introduce(report);
         prepare_folder(job, {table, manifest});
@@ -318,7 +309,7 @@ class Run final : public Command {
                                   .finished = shift.finished};
         Progress progress(job.batch.frames.size());
         const auto start = std::chrono::steady_clock::now();
-        report.frames = run_recorded(job.capture, method, job.batch, recording, [&](const FrameRow& row) {
+        report.frames = run_recorded(job.capture, methods, job.batch, recording, [&](const FrameRow& row) {
             progress.add(row);
             report.done_now += row.status == FrameStatus::ok;
             report.ms_now = report.ms_now + row.ms;
@@ -356,9 +347,7 @@ class Run final : public Command {
     }
 
     RunSettings asked_;
-    std::unique_ptr<gpu::Device> device_; ///< outlives what was made on it
-    std::unique_ptr<Method> method_;
-    Configuration made_;          ///< what method_ was made from
+    std::unique_ptr<Workers> workers_;
     Configuration before_budget_; ///< of the method that a budget picked for the capture before this one
 };
 

@@ -130,7 +130,11 @@ std::vector<Stage> RunSettings::common_stages() {
            "file of settings, from calibrate-look or an earlier run's manifest.json; flags given "
            "here win",
            &s.settings},
-          {"device", "index or part of the name of a Vulkan device; empty = the fastest kind", &s.device}}},
+          {"device",
+           "index or part of the name of a Vulkan device; empty = the fastest kind; all = every GPU like the fastest",
+           &s.device},
+          {"in-flight", "frames computed at once on each device; 0 = 3 on a GPU, 1 on a processor", &s.in_flight, "", 0,
+           64}}},
         {"output",
          {{"out", "folder of the results; several captures get a folder each in it", &s.out},
           {"write", "any of ao,confidence,shaded,cloud,panel; auto = ao,confidence,shaded, and cloud for clouds",

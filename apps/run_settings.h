@@ -27,6 +27,7 @@ class RunSettings {
     double depth_smoothing = 1;
     double association_limit_s = 0.02;
     std::string sequence = "off", method = "cacao", radius, quality, device, settings, clouds = "auto";
+    int in_flight = 0;
     Budget budget;
     std::string out, write = "auto", format = "png16", view = "depth", dump;
     double shade_strength = 1;
