@@ -2,49 +2,26 @@
 #include "apps/batch.h"
 
 #include "apps/cloud_walk.h"
-#include "apps/picture.h"
+#include "apps/frame_files.h"
+#include "apps/sequence_walk.h"
 #include "io/cloud_file.h"
-#include "io/npy_file.h"
-#include "io/output_file.h"
 #include "projection/attach.h"
-#include "projection/colour_view.h"
 #include "projection/confidence.h"
 #include "projection/error.h"
 #include "projection/project.h"
-#include "projection/undistort.h"
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
-#include <deque>
 #include <fmt/format.h>
-#include <fmt/ranges.h>
-#include <limits>
-#include <map>
-#include <memory>
+#include <mutex>
+#include <tbb/concurrent_queue.h>
+#include <tbb/global_control.h>
 #include <tbb/info.h>
 #include <tbb/parallel_pipeline.h>
+#include <tbb/task_arena.h>
 
 namespace scanshade {
 namespace {
-
-constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-
-/// One frame on its way through the pipeline.
-struct Work {
-    const CaptureEntry& entry;
-    FrameRow& row;
-    Frame frame = {};
-    DepthImage depth = {};
-    DepthImage looked_at = {}; ///< of a sequence: what the methods saw in place of `depth`
-    std::vector<Intermediate> averaging = {}; ///< over frames, for study
-    AoMap ao = {};
-    cv::Mat1f confidence_in_view = {}; ///< of `ao`, pixel by pixel
-    Attached attached = {}, confidence = {};
-    bool wanted = true;     ///< false: loaded for the frames around it
-    bool by_points = false; ///< no view: values come from the points themselves
-    CloudVisibility of_points = {}; ///< what they are, where a CloudAo found them
-};
 
 void blame(FrameRow& row, FrameStatus status, Fault fault, const std::exception& failure) {
     row.status = status;
@@ -122,234 +99,19 @@ Attached attach_points(const Frame& frame, PointMethod& method) {
     return attached_points(cloud, method.compute({cloud.points, normals, triangles}));
 }
 
-/// What the pictures of a frame show, all on one pixel grid.
-struct Scene {
-    cv::Mat1f z_m, visibility;
-    cv::Mat3b colour; ///< empty unless it fits the depth
-    Pinhole camera;
-    cv::Mat1b colour_known = {}; ///< 0 where `colour` has none; empty = known everywhere
-    cv::Mat1f confidence = {};   ///< in the colour view; empty = as attached
-};
-
-/// Whether colour is carried over from a camera of its own.
-bool colour_from_beside(const Frame& frame) {
-    return frame.registration != Registration::yes && frame.colour_camera && !frame.colour.empty();
-}
-
-/// Colour warped into the depth view, or everything else into the colour view.
-Scene scene_beside(const Work& work, bool colour_view) {
-    const Frame& frame = work.frame;
-    const SurfaceInColour surface = surface_in_colour(frame.depth_m, frame.camera, *frame.colour_camera);
-    if (colour_view) {
-        const cv::Mat1f& confidence = work.confidence.visibility;
-        return {surface.z_m,  on_colour_pixels(work.attached.visibility, surface),
-                frame.colour, frame.colour_camera->camera.pinhole,
-                {},           confidence.empty() ? cv::Mat1f() : on_colour_pixels(confidence, surface)};
+/// Values from the points themselves: no view.
+void compute_points(Work& work, const BatchOptions& options) {
+    if (options.point_method) {
+        work.attached = attach_points(work.frame, *options.point_method);
+        if (!options.dump.empty())
+            write_intermediates(options.dump / work.entry.name, options.point_method->intermediates());
+        return;
     }
-    const auto [colour, known] =
-        colour_on_depth(frame.colour, frame.depth_m, frame.camera, *frame.colour_camera, surface);
-    return {frame.depth_m, work.attached.visibility, colour, frame.camera.pinhole, known};
-}
-
-cv::Mat3b colour_in_view(const Cloud& cloud, const DepthImage& depth) {
-    if (cloud.colours.empty())
-        return {};
-    cv::Mat3b colour(depth.z_m.size(), cv::Vec3b(64, 40, 28));
-    std::transform(depth.source.begin(), depth.source.end(), colour.begin(), colour.begin(),
-                   [&](int point, const cv::Vec3b& none) { return point < 0 ? none : cloud.colours[point]; });
-    return colour;
-}
-
-/// Values of an organised cloud's points as an image; shares their memory.
-template <class Pixel>
-cv::Mat_<Pixel> on_grid(const std::vector<Pixel>& values, cv::Size grid) {
-    return cv::Mat_<Pixel>(grid.height, grid.width, const_cast<Pixel*>(values.data()));
-}
-
-cv::Mat1f depth_on_grid(const Cloud& cloud) {
-    cv::Mat1f z_m(cloud.grid);
-    std::transform(cloud.points.begin(), cloud.points.end(), z_m.begin(),
-                   [](const Eigen::Vector3d& p) { return p.allFinite() ? static_cast<float>(p.z()) : 0.0f; });
-    return z_m;
-}
-
-/// A depth frame is shown on its recorded pixels, an organised cloud on its grid, other clouds as projected.
-/// A point's colour is its own; a depth pixel's colour is claimed only where the images are registered, or where it is
-/// known how the colour camera stands beside the depth camera.
-Scene scene_of(const Work& work, bool colour_view) {
-    const Frame& frame = work.frame;
-    const cv::Mat1f& visibility = work.attached.visibility;
-    if (!frame.cloud) {
-        if (colour_from_beside(frame))
-            return scene_beside(work, colour_view);
-        const bool fits = frame.registration == Registration::yes && frame.colour.size() == frame.depth_m.size();
-        return {frame.depth_m, visibility, fits ? frame.colour : cv::Mat3b(), frame.camera.pinhole};
-    }
-    const Cloud& cloud = *frame.cloud;
-    if (!cloud.organised())
-        return {work.depth.z_m, visibility, colour_in_view(cloud, work.depth), work.depth.camera};
-    const cv::Mat3b colour = cloud.colours.empty() ? cv::Mat3b() : on_grid(cloud.colours, cloud.grid);
-    return {depth_on_grid(cloud), visibility, colour, frame.camera.pinhole};
-}
-
-/// Clay has no pixel colours to keep where there is no surface, so both kinds go through the same multiplication.
-/// What the colour camera did not see is clay, too.
-cv::Mat3b shaded_picture(const Scene& scene, double strength) {
-    cv::Mat3b base = scene.colour;
-    if (base.empty() || !scene.colour_known.empty())
-        base = clay(scene.z_m, scene.camera);
-    if (!scene.colour_known.empty())
-        scene.colour.copyTo(base, scene.colour_known);
-    return shade(base, scene.visibility, strength);
-}
-
-cv::Mat3b panel_picture(const Frame& frame, const Scene& scene, const cv::Mat3b& shaded) {
-    const bool fits = !scene.colour.empty();
-    const std::string colour = fits                   ? "colour"
-                               : frame.colour.empty() ? "no colour"
-                                                      : "colour (not known to fit the depth)";
-    return panel({{colour, fits ? scene.colour : frame.colour},
-                  {"depth", depth_picture(scene.z_m)},
-                  {"ambient occlusion", visibility_picture(scene.visibility)},
-                  {fits ? "colour x AO" : "clay x AO", shaded}});
-}
-
-std::vector<cv::Vec3b> shaded_colours(const std::vector<cv::Vec3b>& colours, const std::vector<float>& visibility,
-                                      double strength) {
-    const cv::Size row(static_cast<int>(colours.size()), 1);
-    if (row.empty())
-        return {};
-    const cv::Mat3b shaded = shade(on_grid(colours, row), on_grid(visibility, row), strength);
-    return {shaded.begin(), shaded.end()};
-}
-
-/// What each undistorted pixel shows of an image; the lens bends where to look. Zero where it saw nothing.
-template <class Pixel>
-cv::Mat_<Pixel> undistorted_image(const cv::Mat_<Pixel>& image, const Camera& camera) {
-    if (image.empty() || !camera.distortion.any())
-        return image;
-    const auto maps = Undistortion::of(camera);
-    cv::Mat_<Pixel> straight(image.size());
-    std::transform(maps->recorded_pixel().begin(), maps->recorded_pixel().end(), straight.begin(),
-                   [&](int pixel) { return pixel < 0 ? Pixel() : image(pixel / image.cols, pixel % image.cols); });
-    return straight;
-}
-
-/// In clouds, where nothing is known of a point it has no confidence.
-float known_or_none(float confidence) { return std::isnan(confidence) ? 0.0F : confidence; }
-
-/// The depth frame's surface as points in camera space, coloured where the colour fits. Points that the colour camera
-/// did not see are black, and colour_known says 0.
-void write_depth_cloud(const std::filesystem::path& file, const Work& work, const Scene& shown,
-                       const Outputs& outputs) {
-    const auto& [camera, z_m, source] = work.depth;
-    const bool beside = colour_from_beside(work.frame);
-    const Scene scene = beside && outputs.colour_view ? scene_beside(work, false) : shown;
-    const cv::Mat3b colour = undistorted_image(scene.colour, work.frame.camera);
-    const cv::Mat1b colour_known = undistorted_image(scene.colour_known, work.frame.camera);
-    std::vector<Eigen::Vector3d> points;
-    std::vector<cv::Vec3b> colours;
-    std::vector<float> visibility, confidence, known;
-    for (int v = 0; v < z_m.rows; ++v) {
-        for (int u = 0; u < z_m.cols; ++u) {
-            const double z = z_m(v, u);
-            if (z <= 0)
-                continue;
-            points.emplace_back((u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z);
-            visibility.push_back(work.ao.visibility(v, u));
-            confidence.push_back(known_or_none(work.confidence_in_view(v, u)));
-            if (!colour.empty())
-                colours.push_back(colour(v, u));
-            if (!colour_known.empty())
-                known.push_back(colour_known(v, u) > 0 ? 1.0F : 0.0F);
-        }
-    }
-    if (outputs.colour_cloud)
-        colours = shaded_colours(colours, visibility, outputs.shade_strength);
-    std::vector<AddedField> added = {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}};
-    if (beside)
-        added.push_back({"colour_known", known});
-    write_new_ply(file, points, colours, added, {"camera space: x right, y down, z forward, metres"});
-}
-
-void write_recorded_cloud(const std::filesystem::path& file, const Work& work, const Outputs& outputs) {
-    const Cloud& cloud = *work.frame.cloud;
-    std::vector<cv::Vec3b> colours;
-    if (outputs.colour_cloud)
-        colours = shaded_colours(cloud.colours, work.attached.per_point, outputs.shade_strength);
-    std::vector<AddedField> fields{{"ambient_occlusion", work.attached.per_point}};
-    std::vector<float> confidence = work.confidence.per_point;
-    std::ranges::transform(confidence, confidence.begin(), known_or_none);
-    if (!confidence.empty())
-        fields.push_back({"ao_confidence", confidence});
-    write_cloud(file, cloud, fields, colours);
-}
-
-std::filesystem::path ao_file(const std::string& name, const Outputs& outputs) {
-    return std::filesystem::path("ao") / (name + extension(outputs.format));
-}
-std::filesystem::path confidence_file(const std::string& name, const Outputs& outputs) {
-    return std::filesystem::path("confidence") / (name + extension(outputs.format));
-}
-std::filesystem::path picture_file(const char* kind, const std::string& name) {
-    return std::filesystem::path(kind) / (name + ".png");
-}
-std::filesystem::path cloud_file(const std::string& name, const std::string& extension) {
-    return std::filesystem::path("clouds") / (name + extension);
-}
-
-void write_all(Work& work, const Scene& scene, const cv::Mat3b& shaded, const Outputs& outputs) {
-    const std::string& name = work.entry.name;
-    const auto wrote = [&](const std::filesystem::path& file, const auto& write) {
-        write(outputs.folder / file);
-        work.row.files.push_back(file);
-    };
-    if (outputs.ao)
-        wrote(ao_file(name, outputs), [&](const auto& file) { write_ao(file, scene.visibility, outputs.format); });
-    if (outputs.confidence)
-        wrote(confidence_file(name, outputs), [&](const auto& file) {
-            const bool floats = outputs.format == AoFormat::tiff || outputs.format == AoFormat::exr;
-            write_ao(file, scene.confidence.empty() ? work.confidence.visibility : scene.confidence,
-                     floats ? outputs.format : AoFormat::png8);
-        });
-    if (outputs.shaded)
-        wrote(picture_file("shaded", name), [&](const auto& file) { write_picture(file, shaded); });
-    if (outputs.panel)
-        wrote(picture_file("panel", name),
-              [&](const auto& file) { write_picture(file, panel_picture(work.frame, scene, shaded)); });
-    if (work.frame.cloud && outputs.cloud)
-        wrote(cloud_file(name, extension(*work.frame.cloud->records)),
-              [&](const auto& file) { write_recorded_cloud(file, work, outputs); });
-    if (!work.frame.cloud && outputs.depth_cloud)
-        wrote(cloud_file(name, ".ply"), [&](const auto& file) { write_depth_cloud(file, work, scene, outputs); });
-}
-
-/// A cloud without a view, as it looks from two opposite sides.
-void write_sides(Work& work, const Outputs& outputs) {
-    const std::filesystem::path file = picture_file("shaded", work.entry.name);
-    write_picture(outputs.folder / file,
-                  two_sides(*work.frame.cloud, work.of_points, outputs.shade_strength));
-    work.row.files.push_back(file);
-}
-
-/// A failed frame leaves neither part of its own files nor those of an earlier run: what lies there is what the row
-/// says.
-void remove_files(Work& work, const Outputs& outputs) {
-    work.row.files.clear();
-    for (const auto& file : files_of(work.entry, outputs)) {
-        std::error_code gone_already;
-        std::filesystem::remove(file, gone_already);
-    }
-}
-
-/// Every array as .npy, and index.csv that says what they are.
-void write_intermediates(const std::filesystem::path& folder, const std::vector<Intermediate>& all) {
-    std::string index = "name,type,shape,meaning\n";
-    for (const Intermediate& each : all) {
-        write_npy(folder / (each.name + ".npy"), each.type, each.shape, each.data);
-        index += fmt::format("{},{},{},\"{}\"\n", each.name, each.type, fmt::join(each.shape, "x"), each.meaning);
-    }
-    write_atomically(folder / "index.csv", index);
+    work.of_points = cloud_visibility(work.frame, *options.cloud_ao);
+    std::ranges::copy(work.of_points.notes, std::back_inserter(work.row.notes));
+    work.confidence.per_point = work.of_points.confidence;
+    work.row.passes = work.of_points.timings;
+    work.attached = attached_points(*work.frame.cloud, work.of_points.visibility);
 }
 
 bool wants_confidence(const Work& work, const BatchOptions& options) {
@@ -389,125 +151,6 @@ void attach_and_write(Work& work, const BatchOptions& options) {
         work.row.status = FrameStatus::ok;
 }
 
-using Token = std::shared_ptr<Work>;
-
-/// Which frames enter the pipeline: those wanted, as they come; with a reach, in the recording's order, those wanted and those
-/// within reach of one, then as many empty tokens as frames may still wait for what lies around them.
-class Walk {
-  public:
-    Walk(const Capture& capture, std::vector<FrameRow>& rows, std::size_t reach) : capture_(capture), empty_(reach > 0 ? rows.size() : 0) {
-        std::map<std::size_t, FrameRow*> around;
-        for (FrameRow& row : rows) {
-            const std::size_t first = row.index - std::min(row.index, reach);
-            for (std::size_t i = first; reach > 0 && i <= std::min(row.index + reach, capture.entries.size() - 1); ++i)
-                around.try_emplace(i, nullptr);
-            if (reach > 0)
-                around[row.index] = &row;
-            else
-                steps_.emplace_back(row.index, &row);
-        }
-        steps_.insert(steps_.end(), around.begin(), around.end());
-    }
-    [[nodiscard]] bool goes_on() const { return next_ < steps_.size() || empty_ > 0; }
-    [[nodiscard]] Token next() {
-        if (next_ == steps_.size()) {
-            --empty_;
-            return {};
-        }
-        const auto [index, row] = steps_[next_++];
-        if (!row)
-            beside_.push_back(skipped_row(capture_, index));
-        auto work = std::make_shared<Work>(Work{capture_.entries[index], row ? *row : beside_.back()});
-        work->row.why.clear();
-        work->wanted = row != nullptr;
-        return work;
-    }
-
-  private:
-    const Capture& capture_;
-    std::vector<std::pair<std::size_t, FrameRow*>> steps_; ///< null: only beside others
-    std::size_t next_ = 0;
-    std::deque<FrameRow> beside_; ///< rows of those
-    std::size_t empty_;
-};
-
-/// Frames of a sequence, held back until what lies around them has arrived. Without a sequence they pass as they come.
-class Waiting {
-  public:
-    explicit Waiting(Neighbourhood* sequence) : sequence_(sequence) {}
-
-    /// Takes a frame (or none, when all have come) and gives the next one that is complete, or none.
-    [[nodiscard]] Token pass(Token arrived) {
-        if (!sequence_)
-            return arrived;
-        if (arrived) {
-            newest_ = arrived->row.index;
-            if (arrived->row.why.empty() && !arrived->by_points)
-                sequence_->add(newest_, arrived->depth, arrived->frame.world_from_camera);
-            if (arrived->wanted)
-                queue_.push_back(std::move(arrived));
-        } else {
-            newest_ = std::numeric_limits<std::size_t>::max();
-        }
-        if (queue_.empty() || newest_ - queue_.front()->row.index < sequence_->reach())
-            return {};
-        Token complete = std::move(queue_.front());
-        queue_.pop_front();
-        sequence_->forget_before(complete->row.index - std::min(complete->row.index, sequence_->reach()));
-        return complete;
-    }
-    [[nodiscard]] const std::deque<Token>& rest() const { return queue_; }
-
-  private:
-    Neighbourhood* sequence_;
-    std::size_t newest_ = 0;
-    std::deque<Token> queue_;
-};
-
-Intermediate map_for_study(std::string name, const cv::Mat1f& map, std::string meaning) {
-    const auto* const first = reinterpret_cast<const std::byte*>(map.data);
-    return {std::move(name), "f4", {map.rows, map.cols}, {first, first + map.total() * 4}, std::move(meaning)};
-}
-
-void compute_view(Work& work, const Capture& capture, Method& method, Neighbourhood* sequence) {
-    if (!sequence) {
-        work.ao = method.compute({work.depth});
-        work.row.passes = method.timings();
-        return;
-    }
-    NeighbourhoodResult result = sequence->compute(work.row.index);
-    work.ao = std::move(result.ao);
-    work.looked_at = std::move(result.depth);
-    if (!result.frames.empty())
-        work.averaging = {map_for_study("averaged_frames", result.frames, "frames averaged, counted in views as good as this one"),
-                          map_for_study("averaged_deviation", result.deviation, "standard deviation of visibility between them")};
-    work.row.passes = std::move(result.timings);
-    const auto names = [&](const std::vector<std::size_t>& places) {
-        std::vector<std::string> all;
-        for (const std::size_t place : places)
-            all.push_back(capture.entries[place].name);
-        return fmt::format("{}", fmt::join(all, ", "));
-    };
-    if (!result.fused.empty())
-        work.row.notes.push_back("depth is averaged with frames " + names(result.fused) + ".");
-    if (!result.neighbours.empty())
-        work.row.notes.push_back("surfaces of frames " + names(result.neighbours) + " occlude, too.");
-    if (!result.averaged.empty())
-        work.row.notes.push_back("visibility is averaged with frames " + names(result.averaged) + ".");
-    for (const LeftOut& other : result.left_out)
-        work.row.notes.push_back(fmt::format("frame {} is left out: {:.0f} % of its surfaces meet this one's, {:.0f} % contradict it, "
-                                             "{:.1f} of the tolerable misfit.", capture.entries[other.place].name, 100 * other.agreement.overlap,
-                                             100 * other.agreement.contradicted, other.agreement.misfit));
-}
-
-void add_to(RecordingCloud& cloud, const Work& work) {
-    if (!work.frame.world_from_camera || work.looked_at.z_m.empty())
-        return;
-    const Scene scene = scene_of(work, false);
-    cloud.add({work.looked_at, work.ao.visibility, work.confidence_in_view, undistorted_image(scene.colour, work.frame.camera),
-               undistorted_image(scene.colour_known, work.frame.camera), *work.frame.world_from_camera});
-}
-
 std::vector<FrameRow> planned_rows(const Capture& capture, const std::vector<std::size_t>& frames) {
     std::vector<FrameRow> rows;
     for (const std::size_t index : frames)
@@ -515,164 +158,158 @@ std::vector<FrameRow> planned_rows(const Capture& capture, const std::vector<std
     return rows;
 }
 
-} // namespace
-
-std::string_view name_of(FrameStatus status) {
-    switch (status) {
-    case FrameStatus::ok:
-        return "ok";
-    case FrameStatus::failed:
-        return "failed";
-    case FrameStatus::skipped:
-        return "skipped";
+/// Methods made alike, lent to one frame at a time each.
+class Crew {
+  public:
+    explicit Crew(std::span<Method* const> methods) {
+        for (Method* method : methods)
+            free_.push(method);
     }
-    return "";
-}
-
-StageTimes operator+(const StageTimes& a, const StageTimes& b) {
-    const auto sum = [](double x, double y) { return (std::isnan(x) ? 0 : x) + (std::isnan(y) ? 0 : y); };
-    return {sum(a.load, b.load), sum(a.project, b.project), sum(a.compute, b.compute), sum(a.attach, b.attach),
-            sum(a.write, b.write)};
-}
-
-std::string_view name_of(Fault fault) {
-    switch (fault) {
-    case Fault::none:
-        return "none";
-    case Fault::input:
-        return "input";
-    case Fault::outage:
-        return "outage";
-    case Fault::internal:
-        return "internal";
-    case Fault::crash:
-        return "crash";
+    /// Calls use(method) with one of them, once one is free.
+    template <class Use>
+    void lend(Use&& use) {
+        Method* method = nullptr;
+        free_.pop(method);
+        use(*method); // does not throw: take() catches
+        free_.push(method);
     }
-    return "";
-}
 
-std::vector<std::filesystem::path> files_of(const CaptureEntry& entry, const Outputs& outputs) {
-    std::vector<std::filesystem::path> files;
-    const auto add = [&](const std::filesystem::path& file) { files.push_back(outputs.folder / file); };
-    if (outputs.ao)
-        add(ao_file(entry.name, outputs));
-    if (outputs.confidence)
-        add(confidence_file(entry.name, outputs));
-    if (outputs.shaded)
-        add(picture_file("shaded", entry.name));
-    if (outputs.panel)
-        add(picture_file("panel", entry.name));
-    if (entry.cloud.empty() ? outputs.depth_cloud : outputs.cloud)
-        add(cloud_file(entry.name, ".ply"));
-    if (!entry.cloud.empty() && outputs.cloud)
-        for (const char* other : {".pcd", ".las", ".xyz", ".pts", ".ptx"})
-            add(cloud_file(entry.name, other));
-    return files;
-}
+  private:
+    tbb::concurrent_bounded_queue<Method*> free_;
+};
 
-FrameRow skipped_row(const Capture& capture, std::size_t index) {
-    FrameRow row;
-    row.index = index;
-    row.name = capture.entries.at(index).name;
-    row.why = "interrupted";
-    row.valid_share = row.coverage = row.mean_visibility = unknown;
-    row.ms = {unknown, unknown, unknown, unknown, unknown};
-    return row;
-}
+/// The walk as one pipeline; the frames' rows are filled in on the way.
+class Pipeline {
+  public:
+    Pipeline(const Capture& capture, std::span<Method* const> methods, const BatchOptions& options,
+             const std::function<void(const FrameRow&)>& on_frame)
+        : capture_(capture), crew_(methods), at_once_(options.sequence ? 1 : static_cast<int>(methods.size())),
+          options_(options), on_frame_(on_frame), rows_(planned_rows(capture, options.frames)),
+          walk_(capture, rows_, options.sequence ? options.sequence->reach() : 0), waiting_(options.sequence) {}
 
-std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const BatchOptions& options,
-                                const std::function<void(const FrameRow&)>& on_frame) {
-    std::vector<FrameRow> rows = planned_rows(capture, options.frames);
-    Walk walk(capture, rows, options.sequence ? options.sequence->reach() : 0);
-    std::atomic<bool> given_up = false;
+    [[nodiscard]] std::vector<FrameRow> run() {
+        using tbb::filter_mode;
+        using Flow = tbb::flow_control;
+        const auto computing = at_once_ > 1 ? filter_mode::parallel : filter_mode::serial_in_order;
+        const auto filters =
+            tbb::make_filter<void, Token>(filter_mode::serial_in_order, [&](Flow& flow) { return begin(flow); }) &
+            tbb::make_filter<Token, Token>(filter_mode::parallel, [&](Token work) { return prepared(work); }) &
+            tbb::make_filter<Token, Token>(computing, [&](Token work) { return computed(work); }) &
+            tbb::make_filter<Token, Token>(filter_mode::parallel, [&](Token work) { return finished(work); }) &
+            tbb::make_filter<Token, void>(filter_mode::serial_in_order, [&](const Token& work) { report(work); });
+        // Who waits for a device leaves its core to others.
+        const int threads = cores() + (at_once_ > 1 ? at_once_ : 0);
+        const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism,
+                                          static_cast<std::size_t>(threads));
+        tbb::task_arena(threads).execute([&] { tbb::parallel_pipeline(frames_in_memory(), filters); });
+        for (const Token& unfinished : waiting_.rest()) // interrupted before what lies around them was there
+            unfinished->row = skipped_row(capture_, unfinished->row.index);
+        return std::move(rows_);
+    }
 
-    const auto begin = [&](tbb::flow_control& flow) -> Token {
-        if (!walk.goes_on() || (options.stop && *options.stop) || given_up) {
-            flow.stop();
-            return {};
-        }
-        return walk.next();
-    };
-    const auto load_and_project = [&](Token work) {
+  private:
+    [[nodiscard]] static int cores() { return tbb::info::default_concurrency(); }
+    [[nodiscard]] std::size_t frames_in_memory() const {
+        return static_cast<std::size_t>(options_.frames_in_memory > 0 ? options_.frames_in_memory
+                                                                      : cores() + 2 * at_once_);
+    }
+
+    Token begin(tbb::flow_control& flow) {
+        if (walk_.goes_on() && !(options_.stop && *options_.stop) && !given_up_)
+            return walk_.next();
+        flow.stop();
+        return {};
+    }
+
+    /// Loaded and projected.
+    Token prepared(Token work) const {
         if (!work)
             return work;
         take(*work, &StageTimes::load, [&] {
-            work->frame = load(capture, work->row.index, options.registration);
+            work->frame = load(capture_, work->row.index, options_.registration);
             describe_frame(*work);
         });
         if (work->row.status != FrameStatus::failed && work->frame.cloud)
-            work->by_points = options.point_method || takes_points(work->frame, options, work->row.notes);
+            work->by_points = options_.point_method || takes_points(work->frame, options_, work->row.notes);
         if (work->by_points) {
             work->row.ms.project = 0;
             return work;
         }
         take(*work, &StageTimes::project, [&] {
             work->frame.camera = work->row.camera = camera_of(work->frame);
-            work->depth = project(work->frame, options.range);
+            work->depth = project(work->frame, options_.range);
             refuse_blind_view(*work);
         });
         return work;
-    };
-    Waiting waiting(options.sequence);
-    const auto compute = [&](Token arrived) {
-        Token work = waiting.pass(std::move(arrived));
-        if (!work)
+    }
+
+    Token computed(Token arrived) {
+        Token work = waiting_.pass(std::move(arrived));
+        if (!work || !work->row.why.empty())
             return work;
-        take(*work, &StageTimes::compute, [&] {
-            if (work->by_points && options.point_method) {
-                work->attached = attach_points(work->frame, *options.point_method);
-                if (!options.dump.empty())
-                    write_intermediates(options.dump / work->entry.name, options.point_method->intermediates());
-                return;
-            }
-            if (work->by_points) {
-                work->of_points = cloud_visibility(work->frame, *options.cloud_ao);
-                std::ranges::copy(work->of_points.notes, std::back_inserter(work->row.notes));
-                work->confidence.per_point = work->of_points.confidence;
-                work->row.passes = work->of_points.timings;
-                work->attached = attached_points(*work->frame.cloud, work->of_points.visibility);
-                return;
-            }
-            compute_view(*work, capture, method, options.sequence);
-            if (!options.dump.empty()) {
-                std::vector<Intermediate> all = method.intermediates();
-                std::ranges::move(work->averaging, std::back_inserter(all));
-                write_intermediates(options.dump / work->entry.name, all);
-            }
-        });
-        given_up = given_up || (work->row.status == FrameStatus::skipped && work->row.fault == Fault::outage);
+        if (work->by_points) { // one at a time takes all cores and much memory; nor may it begin another while it waits
+            const std::lock_guard alone(points_);
+            tbb::this_task_arena::isolate(
+                [&] { take(*work, &StageTimes::compute, [&] { compute_points(*work, options_); }); });
+        } else {
+            crew_.lend(
+                [&](Method& method) { take(*work, &StageTimes::compute, [&] { compute_view(*work, method); }); });
+        }
+        if (work->row.status == FrameStatus::skipped && work->row.fault == Fault::outage)
+            given_up_ = true;
         return work;
-    };
-    const auto finish = [&](Token work) {
+    }
+
+    void compute_view(Work& work, Method& method) const {
+        if (options_.sequence) {
+            compute_in_sequence(work, capture_, *options_.sequence);
+        } else {
+            work.ao = method.compute({work.depth});
+            work.row.passes = method.timings();
+        }
+        if (options_.dump.empty())
+            return;
+        std::vector<Intermediate> all = method.intermediates();
+        std::ranges::move(work.averaging, std::back_inserter(all));
+        write_intermediates(options_.dump / work.entry.name, all);
+    }
+
+    Token finished(Token work) const {
         if (work)
-            attach_and_write(*work, options);
+            attach_and_write(*work, options_);
         return work;
-    };
-    int outages = 0; // in a row: a full disk does not empty itself, and whoever goes on wastes the rest
-    const auto report = [&](const Token& work) { // the images end here
+    }
+
+    /// The images end here.
+    void report(const Token& work) {
         if (!work)
             return;
-        if (options.cloud && work->row.status == FrameStatus::ok)
-            add_to(*options.cloud, *work);
-        const FrameRow* const row = &work->row;
-        outages = row->fault == Fault::outage ? outages + 1 : 0;
-        given_up = given_up || outages >= 4;
-        if (on_frame)
-            on_frame(*row);
-    };
+        if (options_.cloud && work->row.status == FrameStatus::ok)
+            add_to(*options_.cloud, *work);
+        outages_ = work->row.fault == Fault::outage ? outages_ + 1 : 0;
+        given_up_ = given_up_ || outages_ >= 4;
+        if (on_frame_)
+            on_frame_(work->row);
+    }
 
-    using tbb::filter_mode;
-    const int in_memory =
-        options.frames_in_memory > 0 ? options.frames_in_memory : tbb::info::default_concurrency() + 2;
-    tbb::parallel_pipeline(static_cast<std::size_t>(in_memory),
-                           tbb::make_filter<void, Token>(filter_mode::serial_in_order, begin) &
-                               tbb::make_filter<Token, Token>(filter_mode::parallel, load_and_project) &
-                               tbb::make_filter<Token, Token>(filter_mode::serial_in_order, compute) &
-                               tbb::make_filter<Token, Token>(filter_mode::parallel, finish) &
-                               tbb::make_filter<Token, void>(filter_mode::serial_in_order, report));
-    for (const Token& unfinished : waiting.rest()) // interrupted before what lies around them was there
-        unfinished->row = skipped_row(capture, unfinished->row.index);
-    return rows;
+    const Capture& capture_;
+    Crew crew_;
+    std::mutex points_;
+    int at_once_;
+    const BatchOptions& options_;
+    const std::function<void(const FrameRow&)>& on_frame_;
+    std::vector<FrameRow> rows_;
+    Walk walk_;
+    Waiting waiting_;
+    std::atomic<bool> given_up_ = false;
+    int outages_ = 0; ///< in a row: a full disk does not empty itself, and whoever goes on wastes the rest
+};
+
+} // namespace
+
+std::vector<FrameRow> run_batch(const Capture& capture, std::span<Method* const> methods, const BatchOptions& options,
+                                const std::function<void(const FrameRow&)>& on_frame) {
+    return Pipeline(capture, methods, options, on_frame).run();
 }
 
 } // namespace scanshade

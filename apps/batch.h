@@ -4,15 +4,18 @@
 #include "ao/cloud/cloud_ao.h"
 #include "ao/method.h"
 #include "ao/sequence/neighbourhood.h"
+#include "apps/frame_row.h"
 #include "apps/recording_cloud.h"
 #include "io/capture.h"
 #include "io/image_file.h"
 #include "projection/project.h"
 
+#include <array>
 #include <atomic>
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,11 +25,11 @@ namespace scanshade {
 /// clouds/NAME.pcd or .ply.
 struct Outputs {
     std::filesystem::path folder;
-    bool ao = true;     ///< the visibility map
+    bool ao = true;         ///< the visibility map
     bool confidence = true; ///< how far the visibility can be believed (confidence_of()), as 8 bits or floats
     bool shaded = true; ///< colour times visibility; clay times visibility where colour is not known to fit the depth
     bool panel = false; ///< colour | depth | AO | shaded
-    bool cloud = true;  ///< a cloud input with the fields ambient_occlusion and ao_confidence, everything else as it was
+    bool cloud = true; ///< a cloud input with the fields ambient_occlusion and ao_confidence, everything else as it was
     bool depth_cloud = false; ///< a new PLY of a depth frame's points, in camera space
     AoFormat format = AoFormat::png16;
     double shade_strength = 1; ///< 0 leaves the colour, 1 multiplies by visibility
@@ -47,59 +50,31 @@ struct BatchOptions {
     double radius_m = 0;                      ///< the method's, and
     DepthNoise noise;                         ///< the depth's: what confidence depends on
     std::optional<Registration> registration; ///< what the user said; otherwise what the capture says
-    PointMethod* point_method = nullptr;      ///< what clouds and meshes are computed with, where that needs no view: then
-                                              ///< the cloud is all that is written of them
-    const CloudAo* cloud_ao = nullptr;        ///< what other clouds are computed with, where `cloud_walk` says so
+    PointMethod* point_method = nullptr; ///< what clouds and meshes are computed with, where that needs no view: then
+                                         ///< the cloud is all that is written of them
+    const CloudAo* cloud_ao = nullptr;   ///< what other clouds are computed with, where `cloud_walk` says so
     CloudWalk cloud_walk = CloudWalk::automatic;
-    RecordingCloud* cloud = nullptr;          ///< what frames with a pose are added to
-    Neighbourhood* sequence = nullptr;             ///< what frames are computed with instead of the method, together with those
-                                              ///< around them; these are loaded whether or not `frames` has them
-    std::filesystem::path dump;               ///< folder for the method's intermediates, frame by frame; empty = none
-    int frames_in_memory = 0;                 ///< 0 = cores + 2
-    const std::atomic<bool>* stop = nullptr;  ///< set = begin no further frame
+    RecordingCloud* cloud = nullptr;   ///< what frames with a pose are added to
+    Neighbourhood* sequence = nullptr; ///< what frames are computed with instead of the method, together with those
+                                       ///< around them; these are loaded whether or not `frames` has them
+    std::filesystem::path dump;        ///< folder for the method's intermediates, frame by frame; empty = none
+    int frames_in_memory = 0;          ///< 0 = cores, and two for each method
+    const std::atomic<bool>* stop = nullptr; ///< set = begin no further frame
 };
 
-enum class FrameStatus { ok, failed, skipped };
-[[nodiscard]] std::string_view name_of(FrameStatus status);
-
-/// Milliseconds that one frame spent in each stage of the walk.
-struct StageTimes {
-    double load = 0, project = 0, compute = 0, attach = 0, write = 0;
-};
-/// Sums; a time that is not known (NaN) counts as none.
-[[nodiscard]] StageTimes operator+(const StageTimes& a, const StageTimes& b);
-
-/// Who is to blame for a frame that has no result. Only an outage is worth another try.
-enum class Fault { none, input, outage, internal, crash };
-[[nodiscard]] std::string_view name_of(Fault fault);
-
-/// What became of one frame: a row of frames.csv. NaN and empty where the frame did not come that far.
-struct FrameRow {
-    std::size_t index = 0; ///< in capture.entries
-    std::string name;
-    FrameStatus status = FrameStatus::skipped;
-    std::string why; ///< of a failed or skipped frame
-    Fault fault = Fault::none;
-    cv::Size size;
-    double valid_share = 0; ///< pixels or points with a depth / all of them
-    double coverage = 0;    ///< pixels or points with a visibility / those with a depth
-    double mean_visibility = 0;
-    Camera camera; ///< as used
-    StageTimes ms;
-    Timings passes; ///< the method's own account of `ms.compute`
-    std::vector<std::string> warnings;
-    std::vector<std::string> notes; ///< what was chosen for this frame, and why
-    std::vector<std::filesystem::path> files; ///< written, relative to Outputs::folder
-};
-
-/// The row of a frame that was not begun.
-[[nodiscard]] FrameRow skipped_row(const Capture& capture, std::size_t index);
-
-/// Runs the walk over the frames. A frame that fails says why in its row, leaves no file, and stops no other. A lost
-/// device ends the run: frames in flight and those after them come back as skipped, the fault of an outage.
+/// Runs the walk over the frames, as many of them computed at once as there are methods, which are made alike; a
+/// sequence takes one after the other. A frame that fails says why in its row, leaves no file, and stops no other. A
+/// lost device ends the run: frames in flight and those after them come back as skipped, the fault of an outage.
 /// `on_frame` is called once per row, in the order of `options.frames`, never concurrently.
 /// Rows come back in that order too; what is written does not depend on timing.
-[[nodiscard]] std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const BatchOptions& options,
+[[nodiscard]] std::vector<FrameRow> run_batch(const Capture& capture, std::span<Method* const> methods,
+                                              const BatchOptions& options,
                                               const std::function<void(const FrameRow&)>& on_frame = {});
+/// With one method.
+[[nodiscard]] inline std::vector<FrameRow> run_batch(const Capture& capture, Method& method,
+                                                     const BatchOptions& options,
+                                                     const std::function<void(const FrameRow&)>& on_frame = {}) {
+    return run_batch(capture, std::array{&method}, options, on_frame);
+}
 
 } // namespace scanshade

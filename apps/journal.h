@@ -2,7 +2,7 @@
 // `merge` read it.
 #pragma once
 
-#include "apps/batch.h"
+#include "apps/frame_row.h"
 #include "projection/error.h"
 
 #include <filesystem>

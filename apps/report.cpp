@@ -171,7 +171,8 @@ Rates rates_of(const RunReport& report) {
     const int cores = tbb::info::default_concurrency();
     Rates rates;
     rates.pipeline = report.took_ms > 0 ? done * 1000 / report.took_ms : 0;
-    rates.device_busy = report.took_ms > 0 ? report.ms_now.compute / report.took_ms : 0;
+    const double could_ms = report.took_ms * static_cast<double>(report.at_once);
+    rates.device_busy = could_ms > 0 ? report.ms_now.compute / could_ms : 0;
     double least = std::numeric_limits<double>::infinity();
     const auto stage = [&](const char* name, double StageTimes::*ms, int at_once) {
         const double rate = report.ms_now.*ms > 0 ? done * 1000 * at_once / report.ms_now.*ms : std::nan("");
@@ -184,7 +185,7 @@ Rates rates_of(const RunReport& report) {
     };
     stage("load", &StageTimes::load, cores);
     stage("project", &StageTimes::project, cores);
-    stage("compute", &StageTimes::compute, 1);
+    stage("compute", &StageTimes::compute, static_cast<int>(report.at_once));
     stage("attach", &StageTimes::attach, cores);
     stage("write", &StageTimes::write, cores);
     return rates;
@@ -217,7 +218,9 @@ void write_manifest(const std::filesystem::path& file, const RunReport& report) 
                {{"name", report.device.name},
                 {"kind", report.device.kind},
                 {"driver", report.device.driver},
-                {"api", report.device.api}}},
+                {"api", report.device.api},
+                {"count", report.devices},
+                {"frames_at_once", report.at_once}}},
               {"method", report.method},
               {"settings", settings_json(report.settings)},
               {"capture", capture_json(report)},

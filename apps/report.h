@@ -17,6 +17,8 @@ namespace scanshade {
 struct RunReport {
     std::chrono::system_clock::time_point started;
     gpu::DeviceInfo device;
+    std::size_t devices = 1; ///< of its kind
+    std::size_t at_once = 1; ///< frames computed at the same time, on all of them
     std::string method;
     std::vector<Stage> settings; ///< every row as used
     const Capture& capture;
@@ -32,13 +34,13 @@ struct RunReport {
 };
 
 /// Frames per second of the pipeline, and of each stage had it the machine as it was to itself: as many frames at once
-/// as there are cores, in `compute` one. Where the device is the same cores, stages slow each other down.
+/// as there are cores, in `compute` RunReport::at_once. Where the device is the same cores, stages slow each other down.
 struct Rates {
     double pipeline = 0;
     StageTimes stage{};          ///< frames per second, not milliseconds
     std::string slowest;         ///< the stage that sets the pace
     double share_of_slowest = 0; ///< the pipeline's rate / that stage's
-    double device_busy = 0;      ///< share of the time that `compute` was at work
+    double device_busy = 0;      ///< share of the time that `compute` was at work, of all it could
 };
 [[nodiscard]] Rates rates_of(const RunReport& report);
 /// "12.3 frames/s, 94 % of compute alone"

@@ -1,20 +1,15 @@
 // `scanshade run`: ambient occlusion for every frame of one or more captures.
-#include "ao/fit_plane/fit_plane.h"
-#include "ao/gpu/device.h"
-#include "ao/method.h"
 #include "apps/batch.h"
-#include "apps/budget.h"
-#include "apps/command.h"
 #include "apps/job_run.h"
 #include "apps/progress.h"
-#include "apps/report.h"
 #include "apps/resume.h"
-#include "apps/settings_file.h"
+#include "apps/run_settings.h"
+#include "apps/run_talk.h"
 #include "apps/slice.h"
 #include "apps/trial.h"
+#include "apps/workers.h"
 #include "io/output_file.h"
 #include "projection/error.h"
-#include "projection/project.h"
 
 #include <algorithm>
 #include <atomic>
@@ -24,7 +19,6 @@
 #include <fmt/ranges.h>
 #include <opencv2/core/utility.hpp>
 #include <set>
-#include <sstream>
 
 namespace scanshade {
 namespace {
@@ -43,69 +37,6 @@ void end_gracefully_on_signals() {
     action.sa_flags = static_cast<int>(SA_RESETHAND) | SA_RESTART;
     sigaction(SIGINT, &action, nullptr);
     sigaction(SIGTERM, &action, nullptr);
-}
-
-// ---------------------------------------------------------------------------------------------------- what is asked
-
-struct RunSettings {
-    std::vector<std::string> paths;
-    std::string frames, camera, poses, depth_scale, registered = "auto";
-    std::string depth_noise = "auto", depth_range, flying_pixels = "drop";
-    double depth_smoothing = 1;
-    double association_limit_s = 0.02;
-    std::string sequence = "off", method = "cacao", radius, quality, device, settings, clouds = "auto";
-    Budget budget;
-    std::string out, write = "auto", format = "png16", view = "depth", dump;
-    double shade_strength = 1;
-    std::string recording_cloud;
-    double cloud_resolution_m = 0;
-    bool colour_cloud = false, overwrite = false, resume = false, retry = false;
-    std::string shard, log = "text";
-};
-
-std::set<std::string> words_of(const std::string& list) {
-    std::set<std::string> words;
-    std::istringstream stream(list);
-    for (std::string word; std::getline(stream, word, ',');) {
-        if (word != "ao" && word != "confidence" && word != "shaded" && word != "cloud" && word != "panel")
-            throw Misuse("write: '" + word + "' given, expected any of ao,confidence,shaded,cloud,panel");
-        words.insert(word);
-    }
-    return words;
-}
-
-Outputs outputs_from(const RunSettings& settings) {
-    Outputs outputs;
-    outputs.format = ao_format(settings.format);
-    outputs.shade_strength = settings.shade_strength;
-    outputs.colour_cloud = settings.colour_cloud;
-    outputs.colour_view = settings.view == "colour";
-    if (settings.write != "auto") {
-        const std::set<std::string> words = words_of(settings.write);
-        outputs.ao = words.contains("ao");
-        outputs.confidence = words.contains("confidence");
-        outputs.shaded = words.contains("shaded");
-        outputs.panel = words.contains("panel");
-        outputs.cloud = outputs.depth_cloud = words.contains("cloud");
-    }
-    return outputs;
-}
-
-ProjectOptions depth_range_from(const std::string& text) {
-    ProjectOptions range;
-    int used = 0;
-    if (text.empty())
-        return range;
-    if (std::sscanf(text.c_str(), "%lf,%lf%n", &range.near_m, &range.far_m, &used) != 2 ||
-        used != static_cast<int>(text.size()) || !(range.near_m >= 0 && range.far_m > range.near_m))
-        throw Misuse("depth-range: '" + text + "' given, expected NEAR,FAR in metres, such as 0.4,5");
-    return range;
-}
-
-std::optional<Registration> registration_from(const std::string& text) {
-    if (text == "auto")
-        return std::nullopt;
-    return text == "yes" ? Registration::yes : Registration::no;
 }
 
 // ---------------------------------------------------------------------------------------------------- jobs
@@ -138,8 +69,9 @@ void refuse_to_overwrite(const Job& job) {
         std::ranges::copy(files_of(job.capture.entries[index], outputs), std::back_inserter(files));
     const auto there = std::ranges::find_if(files, [](const fs::path& file) { return fs::exists(file); });
     if (there != files.end())
-        throw Misuse(there->string() + " exists already: --resume goes on with an earlier run, --overwrite replaces its "
-                                       "results, or choose another -o");
+        throw Misuse(there->string() +
+                     " exists already: --resume goes on with an earlier run, --overwrite replaces its "
+                     "results, or choose another -o");
 }
 
 /// Clears what a killed run left, and the report of an earlier one: a manifest says that what lies beside it is
@@ -162,97 +94,22 @@ std::string report_name(const std::string& stem, const std::string& block, const
     return block.empty() ? stem + extension : stem + "." + block + extension;
 }
 
-// ---------------------------------------------------------------------------------------------------- what is said
-
-/// What the shaded pictures of this capture show, and how to have it otherwise.
-std::string shading_sentence(const Capture& capture, Registration registration) {
-    const bool clouds = std::ranges::all_of(capture.entries, [](const auto& entry) { return !entry.cloud.empty(); });
-    const bool colour = std::ranges::any_of(capture.entries, [](const auto& entry) { return !entry.colour.empty(); });
-    if (clouds)
-        return "shaded pictures show the points' own colours, or grey clay where they have none.";
-    if (!colour)
-        return "shaded pictures show grey clay made from depth: the capture has no colour images.";
-    if (registration == Registration::yes)
-        return "shaded pictures show the colour images.";
-    if (capture.colour_camera)
-        return "shaded pictures show the colour images, carried over from the camera that took them (" +
-               describe(capture.colour_camera->camera) + "); what it did not see is grey clay.";
-    const std::string why = registration == Registration::no ? "do not lie on" : "are not known to lie on";
-    return fmt::format(
-        "shaded pictures show grey clay made from depth, because the colour images {} the depth pixels{}; "
-        "--registered yes shades the colour images anyway.",
-        why, capture.registration_reason.empty() ? "" : " (" + capture.registration_reason + ")");
-}
-
-void introduce(const RunReport& report) {
-    const Capture& capture = report.capture;
-    say(fmt::format("{}: {}, {} of {} frames", capture.path.string(), capture.kind, report.frames.size(),
-                    capture.entries.size()));
-    if (!capture.depth.origin.empty())
-        say(fmt::format("  depth: {} ({})", capture.depth.name, capture.depth.origin));
-    if (capture.camera)
-        say(fmt::format("  camera: {} ({})", describe(*capture.camera), capture.camera->origin));
-    if (capture.depth_correction.any())
-        say(fmt::format("  depth correction: {} ({})", describe(capture.depth_correction), capture.camera->origin));
-    say("  depth noise: " + report.depth_noise);
-    for (const std::string& warning : capture.warnings)
-        say("  warning: " + warning);
-    for (const std::string& sentence : report.budget)
-        say("  " + sentence);
-    say("  " + report.shading);
-}
-
-/// The first ten by name, the rest by number.
-std::string names_of_failed(const std::vector<FrameRow>& rows) {
-    std::vector<std::string> names;
-    for (const FrameRow& row : rows)
-        if (row.status == FrameStatus::failed)
-            names.push_back(row.name);
-    constexpr std::size_t most = 10;
-    const std::string more = names.size() > most ? fmt::format(" and {} more", names.size() - most) : "";
-    names.resize(std::min(names.size(), most));
-    return fmt::format("{}{}", fmt::join(names, ", "), more);
-}
-
-void conclude(const RunReport& report, const fs::path& table) {
-    const std::size_t ok = count(report.frames, FrameStatus::ok);
-    const std::string before = ok > report.done_now ? fmt::format(", {} of them before", ok - report.done_now) : "";
-    say(fmt::format("  {} of {} frames{} in {:.1f} s ({}) -> {}", ok, report.frames.size(), before,
-                    report.took_ms / 1000, describe(rates_of(report)), table.parent_path().string()));
-    if (count(report.frames, FrameStatus::failed) > 0)
-        say(fmt::format("  failed: {} ({} says why)", names_of_failed(report.frames), table.string()));
-    if (const std::size_t skipped = count(report.frames, FrameStatus::skipped); skipped > 0)
-        say(fmt::format("  not finished: {} frames are left; --resume goes on with them", skipped));
-}
-
 // ---------------------------------------------------------------------------------------------------- the command
 
 class Run final : public Command {
   public:
-    Run() {
-        for (const MethodRow& row : methods())
-            setups_.emplace_back(row.name, row.setup());
-    }
-
     Words words() override { return {"PATH", "captures: folders, depth images or clouds", &asked_.paths, 1, 1 << 20}; }
 
-    std::vector<Stage> stages() override {
-        std::vector<Stage> all = common_stages();
-        for (const auto& [name, setup] : setups_)
-            all.push_back(method_stage(name, *setup));
-        all.push_back(cloud_stage());
-        all.push_back(sequence_stage());
-        return all;
-    }
+    std::vector<Stage> stages() override { return asked_.stages(); }
 
     int run() override {
         if (asked_.log == "json")
             log_as_json();
         if (std::ranges::any_of(asked_.paths, is_job))
             return run_planned();
-        check_settings();
+        asked_.check();
         if (!asked_.budget.any())
-            (void)chosen_setup(); // refuses before anything is opened
+            (void)asked_.chosen_setup(); // refuses before anything is opened
         int unopened = 0;
         std::vector<Job> jobs = plan(unopened);
         for (const Job& job : jobs)
@@ -271,183 +128,16 @@ class Run final : public Command {
     }
 
   private:
-    std::vector<Stage> common_stages() {
-        RunSettings& s = asked_;
-        const auto [radius, quality] = method_defaults();
-        return {
-            {"input",
-             {{"frames", "which frames, by index: first:end:step, end not included; negative counts from the end",
-               &s.frames},
-              {"camera", "a camera file, or fx,fy,cx,cy; replaces the capture's own", &s.camera},
-              {"poses", "a trajectory in TUM's rows, as refine --trajectory writes it; replaces the capture's own poses", &s.poses},
-              {"depth-scale", "mm, tum, sun, nyu, m, or units per metre; replaces the capture's own", &s.depth_scale},
-              {.name = "registered",
-               .help = "whether colour pixels lie on depth pixels",
-               .value = &s.registered,
-               .choices = {"auto", "yes", "no"}},
-              {"association-limit", "colour, depth and poses farther apart in time are not paired",
-               &s.association_limit_s, "s", 0, 1e6}}},
-            {"depth preparation",
-             {{"depth-range", "NEAR,FAR in metres: depth outside is taken as not recorded; empty = all of it",
-               &s.depth_range},
-              {"depth-noise",
-               "sigma of one depth value, FLOOR,PER_Z2[,GRAIN] for FLOOR + PER_Z2 z^2 metres that err alike over GRAIN "
-               "pixels, or auto (measured), none, kinect, tof; what follows is done only where there is any",
-               &s.depth_noise},
-              {.name = "flying-pixels",
-               .help = "where a sensor saw two surfaces at once: drop leaves them unknown",
-               .value = &s.flying_pixels,
-               .choices = {"drop", "keep"}},
-              {"depth-smoothing",
-               "radius of the plane fits that depth and normals come from, in those that the noise and the method ask "
-               "for; 0 = depth as recorded",
-               &s.depth_smoothing, "", 0, 10}}},
-            {"method",
-             {{.name = "method",
-               .help = "which method computes the visibility",
-               .value = &s.method,
-               .choices = method_names()},
-              {.name = "clouds",
-               .help = "clouds by rays from every point, or as one camera's view; auto = points, unless a grid or --camera "
-                       "tells the camera",
-               .value = &s.clouds,
-               .choices = {"auto", "points", "view"}},
-              {.name = "sequence",
-               .help = "on: frames of a recording with poses are looked at together with those around them (sequences, below)",
-               .value = &s.sequence,
-               .choices = {"off", "on"}},
-              {"radius", "how far away a surface may still occlude, in metres" + radius, &s.radius},
-              {"quality", "the method's quality level" + quality, &s.quality},
-              {"max-error",
-               "picks method and quality: the cheapest within this RMSE to truth; 0 = no limit",
-               &s.budget.max_error,
-               "",
-               0,
-               1,
-               {}},
-              {"max-ms",
-               "picks method and quality: the most accurate within these device milliseconds per frame; 0 = no limit",
-               &s.budget.max_ms,
-               "ms",
-               0,
-               1e6,
-               {}},
-              {std::string(settings_flag),
-               "file of settings, from calibrate-look or an earlier run's manifest.json; flags given "
-               "here win",
-               &s.settings},
-              {"device", "index or part of the name of a Vulkan device; empty = the fastest kind", &s.device}}},
-            {"output",
-             {{"out", "folder of the results; several captures get a folder each in it", &s.out},
-              {"write", "any of ao,confidence,shaded,cloud,panel; auto = ao,confidence,shaded, and cloud for clouds", &s.write},
-              {.name = "format",
-               .help = "of the ao maps",
-               .value = &s.format,
-               .choices = {"png16", "png8", "tiff", "exr"}},
-              {.name = "view",
-               .help = "whose pixels maps and pictures have, where a colour camera stands beside the depth camera",
-               .value = &s.view,
-               .choices = {"depth", "colour"}},
-              {"shade-strength", "0 leaves the colour, 1 multiplies it by visibility", &s.shade_strength, "", 0, 1},
-              {"cloud", "a PLY file: one cloud of all frames with poses, points of the same place merged", &s.recording_cloud},
-              {"cloud-resolution", "within cubes of this side; 0 = one and a half times what a pixel covers", &s.cloud_resolution_m, "m", 0, 100},
-              {"colour-cloud", "replace the clouds' colour by colour times visibility", &s.colour_cloud},
-              {"overwrite", "replace the results of an earlier run", &s.overwrite},
-              {"resume", "go on with an earlier run: what is done, from the same input and settings, stays", &s.resume},
-              {"retry", "with --resume: frames that failed are tried again, too", &s.retry},
-              {.name = "log",
-               .help = "what stderr gets: prose, or a JSON object per line",
-               .value = &s.log,
-               .choices = {"text", "json"}},
-              {"shard", "of a job, the I-th of N parts: I/N; empty = as Slurm or Kubernetes number this one, else all", &s.shard},
-              {"dump", "folder for what lies between the method's passes, as .npy files with an index.csv per frame", &s.dump}}}};
-    }
-
-    /// --cloud.rays and so on.
-    Stage cloud_stage() {
-        Stage stage{"clouds, from every point", cloud_options_.parameters()};
-        for (Parameter& row : stage.rows)
-            row.name = "cloud." + row.name;
-        return stage;
-    }
-
-    /// --sequence.layers and so on.
-    Stage sequence_stage() {
-        Stage stage{"sequences: with --sequence on, frames together with those around them", sequence_options_.parameters()};
-        for (Parameter& row : stage.rows)
-            row.name = "sequence." + row.name;
-        return stage;
-    }
-
-    /// As given; --radius holds for clouds, too, and --cloud.radius before it.
-    CloudAo cloud_ao() const {
-        CloudAoOptions options = cloud_options_;
-        if (options.radius == 0 && !asked_.radius.empty())
-            set({"radius", "", &options.radius}, asked_.radius);
-        return CloudAo(options);
-    }
-
-    static std::vector<std::string> method_names() {
-        std::vector<std::string> names;
-        for (const MethodRow& row : methods())
-            names.emplace_back(row.name);
-        return names;
-    }
-
-    /// What --radius and --quality are when not given, as their help says it.
-    std::pair<std::string, std::string> method_defaults() {
-        std::string radius, quality;
-        for (const auto& [name, setup] : setups_) {
-            const std::vector<Parameter> rows = setup->parameters();
-            if (const Parameter* row = row_named(rows, "radius"))
-                radius += fmt::format("; {}: {} by default", name, value_text(*row));
-            if (const Parameter* row = row_named(rows, "quality"))
-                quality += fmt::format("; {}: {}, {} by default", name, range_text(*row), value_text(*row));
-        }
-        return {radius, quality};
-    }
-
-    void check_settings() {
-        if (asked_.out.empty())
-            throw Misuse("run needs -o FOLDER for its results");
-        outputs_ = outputs_from(asked_);
-        if (asked_.depth_noise != "auto")
-            (void)noise_from_text(asked_.depth_noise);
-        range_ = depth_range_from(asked_.depth_range);
-        if (!asked_.recording_cloud.empty() && (asked_.resume || asked_.paths.size() > 1))
-            throw Misuse("cloud: is made of all frames of one capture in one run, without --resume");
-        if (asked_.budget.any() && !asked_.quality.empty())
-            throw Misuse("a budget (--max-error, --max-ms) picks the quality: leave --quality out");
-        if (!asked_.depth_scale.empty())
-            (void)depth_encoding(asked_.depth_scale, "--depth-scale");
-        (void)cloud_ao();
-    }
-
-    /// The chosen method's settings, --radius and --quality put in their rows.
-    MethodSetup& chosen_setup() {
-        MethodSetup& setup = *std::ranges::find(setups_, asked_.method, [](const auto& s) { return s.first; })->second;
-        const std::vector<Parameter> rows = setup.parameters();
-        for (const auto& [name, text] : {std::pair("radius", asked_.radius), std::pair("quality", asked_.quality)}) {
-            if (text.empty())
-                continue;
-            const Parameter* row = row_named(rows, name);
-            if (!row)
-                throw Misuse(fmt::format("{}: the method {} has no such setting", name, asked_.method));
-            set(*row, text);
-        }
-        return setup;
-    }
-
     Job job_from(const fs::path& path, const fs::path& folder) const {
         Job job{open_capture(path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s, asked_.poses}), {}};
         refuse_absent_view(job.capture);
         job.batch.frames = job.of = slice(asked_.frames, job.capture.entries.size());
-        job.batch.outputs = outputs_;
+        job.batch.outputs = asked_.outputs();
         job.batch.outputs.folder = folder;
         if (!asked_.dump.empty())
             job.batch.dump = fs::path(asked_.dump) / folder.lexically_relative(asked_.out);
-        job.batch.registration = registration_from(asked_.registered);
-        job.batch.range = range_;
+        job.batch.registration = asked_.registration();
+        job.batch.range = asked_.range();
         job.batch.stop = &interrupted;
         return job;
     }
@@ -472,7 +162,7 @@ class Run final : public Command {
     }
 
     void refuse_absent_view(const Capture& capture) const {
-        if (outputs_.colour_view && !capture.colour_camera)
+        if (asked_.outputs().colour_view && !capture.colour_camera)
             throw Error(capture.path.string() +
                         ": --view colour needs to know the colour camera beside the depth camera; refine finds it");
     }
@@ -483,7 +173,7 @@ class Run final : public Command {
         RunReport report{.started = std::chrono::system_clock::now(),
                          .device = device,
                          .method = asked_.method,
-                         .settings = common_stages(),
+                         .settings = asked_.stages_in_use(),
                          .capture = job.capture,
                          .registration = registration,
                          .registration_reason = said ? "--registered" : job.capture.registration_reason,
@@ -491,29 +181,24 @@ class Run final : public Command {
                          .budget = {},
                          .shading = shading_sentence(job.capture, registration),
                          .frames = {}};
-        for (const auto& [name, setup] : setups_)
-            if (name == asked_.method)
-                report.settings.push_back(method_stage(name, *setup));
-        report.settings.push_back(cloud_stage());
-        report.settings.push_back(sequence_stage());
         return report;
     }
 
     /// Picks method and settings for the capture, from where the command line left them. Says what it did.
     std::vector<std::string> keep_to_budget(const Job& job, gpu::Device& device) {
-        const TrialRequest request{.depth_noise = asked_.depth_noise,
-                                   .capture = {asked_.camera, asked_.depth_scale, asked_.association_limit_s},
-                                   .among = job.of,
-                                   .leave_bad_out = true,
-                                   .preparation = {.drop_flying = asked_.flying_pixels == "drop",
-                                                   .smoothing = asked_.depth_smoothing}};
+        const TrialRequest request{
+            .depth_noise = asked_.depth_noise,
+            .capture = {asked_.camera, asked_.depth_scale, asked_.association_limit_s},
+            .among = job.of,
+            .leave_bad_out = true,
+            .preparation = {.drop_flying = asked_.flying_pixels == "drop", .smoothing = asked_.depth_smoothing}};
         const TrialCapture trial = load_trial(job.capture.path, request);
         const double radius_m = asked_.radius.empty() ? request.radius_m : std::stod(asked_.radius);
         const Choice choice = choose(device, shipped_front(), trial, radius_m, asked_.budget);
         if (!before_budget_.settings.empty())
-            apply(before_budget_, chosen_setup());
+            apply(before_budget_, asked_.chosen_setup());
         asked_.method = choice.configuration.method;
-        MethodSetup& setup = chosen_setup();
+        MethodSetup& setup = asked_.chosen_setup();
         before_budget_ = {asked_.method, "as given", values_of(setup)};
         apply(choice.configuration, setup);
         return choice.sentences;
@@ -522,7 +207,8 @@ class Run final : public Command {
     /// A job made by `plan`: in worker processes, task by task.
     int run_planned() {
         if (asked_.paths.size() != 1 || !asked_.out.empty() || asked_.overwrite)
-            throw Misuse("run JOB goes on with that job, in its own folder: neither other captures, nor -o, nor --overwrite");
+            throw Misuse("run JOB goes on with that job, in its own folder: neither other captures, nor -o, nor "
+                         "--overwrite");
         const fs::path job = asked_.paths.front();
         const Plan plan = read_plan(job);
         const Shard shard = shard_from(asked_.shard);
@@ -532,8 +218,8 @@ class Run final : public Command {
                     set(*row, value);
         asked_.out = (job / "results").string();
         asked_.resume = true;
-        check_settings();
-        (void)chosen_setup();
+        asked_.check();
+        (void)asked_.chosen_setup();
         return supervise(1, [&](const Shift& shift) {
             cv::setNumThreads(1);
             end_gracefully_on_signals();
@@ -556,22 +242,11 @@ class Run final : public Command {
         return job;
     }
 
-    /// Opened when the first frame needs it: where all is done already, never.
-    gpu::Device& device() {
-        if (!device_)
-            device_ = std::make_unique<gpu::Device>(asked_.device);
-        return *device_;
-    }
-
-    /// Kept from capture to capture while its settings stay: its shaders are compiled once.
-    Method& method_as_set(gpu::Device& device) {
-        MethodSetup& setup = chosen_setup();
-        const Configuration wanted{asked_.method, "", values_of(setup)};
-        if (!method_ || wanted.method != made_.method || wanted.settings != made_.settings) {
-            method_ = setup.make(device);
-            made_ = wanted;
-        }
-        return *method_;
+    /// Opened when the first frame needs them: where all is done already, never.
+    Workers& workers() {
+        if (!workers_)
+            workers_ = std::make_unique<Workers>(asked_.device, asked_.in_flight);
+        return *workers_;
     }
 
     std::vector<FrameRow> process(Job job, const Shift& shift = {}) {
@@ -579,35 +254,30 @@ class Run final : public Command {
         Journal journal(folder, job.block);
         if (asked_.overwrite)
             journal.clear();
-        std::vector<Stage> all_settings = common_stages();
-        all_settings.push_back(method_stage(asked_.method, chosen_setup()));
-        all_settings.push_back(cloud_stage());
-        all_settings.push_back(sequence_stage());
-        const std::string task = task_key(all_settings, job.capture, job.of, asked_.sequence == "on");
-        const fs::path table = report_name("frames", job.block, ".csv"), manifest = report_name("manifest", job.block, ".json");
+        const std::string task = task_key(asked_.stages_in_use(), job.capture, job.of, asked_.sequence == "on");
+        const fs::path table = report_name("frames", job.block, ".csv"),
+                       manifest = report_name("manifest", job.block, ".json");
         if (auto rows = rows_if_complete(journal, task, job.capture, job.batch.frames, asked_.retry);
             rows && fs::exists(folder / manifest)) {
-            say(fmt::format("{}: done already, {} frames -> {}", job.capture.path.string(), rows->size(), folder.string()));
+            say(fmt::format("{}: done already, {} frames -> {}", job.capture.path.string(), rows->size(),
+                            folder.string()));
             return *std::move(rows);
         }
-        gpu::Device& device = this->device();
+        Workers& workers = this->workers();
+        gpu::Device& device = workers.device();
         const std::vector<std::string> budget =
             asked_.budget.any() ? keep_to_budget(job, device) : std::vector<std::string>{};
-        Method& plain = method_as_set(device);
+        workers.make(asked_.method, asked_.chosen_setup());
+        Method& plain = workers.plain();
         job.batch.point_method = dynamic_cast<PointMethod*>(&plain);
-        job.batch.radius_m = std::stod(value_text(*row_named(chosen_setup().parameters(), "radius")));
-        const CloudAo of_clouds = cloud_ao();
+        job.batch.radius_m = asked_.radius_m();
+        const CloudAo of_clouds = asked_.cloud_ao();
         job.batch.cloud_ao = &of_clouds;
-        job.batch.cloud_walk = asked_.clouds == "points" ? CloudWalk::points
-                               : asked_.clouds == "view" ? CloudWalk::view
-                                                         : CloudWalk::automatic;
-        say(fmt::format("{} on {} ({})", asked_.method, device.info().name, device.info().driver));
+        job.batch.cloud_walk = asked_.cloud_walk();
+        say(fmt::format("{} on {}", asked_.method, workers.description()));
         const DepthNoise noise = noise_of(job.capture, job.of, asked_.depth_noise);
-        const FitPlaneOptions fit{.drop_flying = asked_.flying_pixels == "drop",
-                                  .smoothing = asked_.depth_smoothing * method_named(asked_.method).smoothing};
-        std::optional<OnFittedDepth> fitted;
-        if (noise.any())
-            fitted.emplace(device, noise, plain, fit);
+        const FitPlaneOptions fit = asked_.fit();
+        const std::vector<Method*> methods = workers.methods(noise, fit);
         std::optional<Neighbourhood> sequence;
         std::optional<RecordingCloud> cloud;
         if (!asked_.recording_cloud.empty()) {
@@ -615,14 +285,18 @@ class Run final : public Command {
             job.batch.cloud = &*cloud;
         }
         if (asked_.sequence == "on" || cloud) {
-            sequence.emplace(device, plain, job.batch.radius_m, noise, fit, asked_.sequence == "on" ? sequence_options_ : alone());
+            sequence.emplace(device, plain, job.batch.radius_m, noise, fit,
+                             asked_.sequence == "on" ? asked_.sequences : alone());
             job.batch.sequence = &*sequence;
+            if (methods.size() > 1)
+                say("  frames of a sequence are computed one at a time, in their order");
         }
-        Method& method = fitted ? static_cast<Method&>(*fitted) : plain;
         job.batch.noise = noise;
         RunReport report = report_on(job, device.info());
-        report.depth_noise = noise_sentence(noise);
+        report.depth_noise = noise_sentence(noise, asked_);
         report.budget = budget;
+        report.devices = workers.devices();
+        report.at_once = job.batch.sequence ? 1 : methods.size();
         report.frames.resize(job.batch.frames.size());
         introduce(report);
         prepare_folder(job, {table, manifest});
@@ -635,7 +309,7 @@ class Run final : public Command {
                                   .finished = shift.finished};
         Progress progress(job.batch.frames.size());
         const auto start = std::chrono::steady_clock::now();
-        report.frames = run_recorded(job.capture, method, job.batch, recording, [&](const FrameRow& row) {
+        report.frames = run_recorded(job.capture, methods, job.batch, recording, [&](const FrameRow& row) {
             progress.add(row);
             report.done_now += row.status == FrameStatus::ok;
             report.ms_now = report.ms_now + row.ms;
@@ -656,17 +330,8 @@ class Run final : public Command {
             return;
         }
         cloud.write(asked_.recording_cloud);
-        say(fmt::format("  {} points, merged within {:.4f} m -> {}", cloud.points(), cloud.resolution_m(), asked_.recording_cloud));
-    }
-
-    /// What is known of the depth's noise, and what is done about it.
-    std::string noise_sentence(const DepthNoise& noise) const {
-        const std::string origin = asked_.depth_noise == "auto" ? "measured" : "--depth-noise";
-        if (!noise.any())
-            return fmt::format("{} to mind ({}); depth is used as recorded", describe(noise), origin);
-        return fmt::format("{} ({}); flying pixels are {}; {}", describe(noise), origin,
-                           asked_.flying_pixels == "drop" ? "dropped" : "kept",
-                           asked_.depth_smoothing > 0 ? "depth and normals come from plane fits" : "depth is used as recorded");
+        say(fmt::format("  {} points, merged within {:.4f} m -> {}", cloud.points(), cloud.resolution_m(),
+                        asked_.recording_cloud));
     }
 
     static int exit_code(const std::vector<FrameRow>& rows, int unopened) {
@@ -682,15 +347,8 @@ class Run final : public Command {
     }
 
     RunSettings asked_;
-    Outputs outputs_;
-    ProjectOptions range_;
-    CloudAoOptions cloud_options_;
-    NeighbourhoodOptions sequence_options_;
-    std::unique_ptr<gpu::Device> device_; ///< outlives what was made on it
-    std::unique_ptr<Method> method_;
-    Configuration made_; ///< what method_ was made from
+    std::unique_ptr<Workers> workers_;
     Configuration before_budget_; ///< of the method that a budget picked for the capture before this one
-    std::vector<std::pair<std::string, std::unique_ptr<MethodSetup>>> setups_;
 };
 
 } // namespace

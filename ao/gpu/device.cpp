@@ -138,9 +138,11 @@ std::string listing(const std::vector<DeviceInfo>& all) {
 }
 
 void open_device(Device::State& state) {
+    constexpr std::uint32_t most_lanes = 8;
     state.queue_family = static_cast<std::uint32_t>(compute_family(state.physical));
-    const float priority = 1;
-    const vk::DeviceQueueCreateInfo queue({}, state.queue_family, 1, &priority);
+    const auto family = state.physical.getQueueFamilyProperties()[state.queue_family];
+    const std::vector<float> priorities(std::min(family.queueCount, most_lanes), 1.0F);
+    const vk::DeviceQueueCreateInfo queue({}, state.queue_family, priorities);
     vk::PhysicalDeviceVulkan13Features features13;
     features13.synchronization2 = features13.maintenance4 = VK_TRUE;
     vk::PhysicalDeviceVulkan12Features features12;
@@ -148,11 +150,12 @@ void open_device(Device::State& state) {
     features12.pNext = &features13;
     const vk::DeviceCreateInfo info({}, queue, {}, push_descriptors, nullptr, &features12);
     state.device = vk::raii::Device(state.physical, info);
-    state.queue = state.device.getQueue(state.queue_family, 0);
-    state.pool = state.device.createCommandPool({vk::CommandPoolCreateFlagBits::eResetCommandBuffer, state.queue_family});
+    for (std::uint32_t i = 0; i < priorities.size(); ++i)
+        state.lanes.emplace_back(state.device.getQueue(state.queue_family, i));
+    state.pipelines = state.device.createPipelineCache({});
     state.memory = state.physical.getMemoryProperties();
     state.nanoseconds_per_tick = state.physical.getProperties().limits.timestampPeriod;
-    state.has_timestamps = state.physical.getQueueFamilyProperties()[state.queue_family].timestampValidBits > 0;
+    state.has_timestamps = family.timestampValidBits > 0;
 }
 
 } // namespace
@@ -191,6 +194,18 @@ Device::Device(const std::string& choice) : state_(std::make_unique<State>()) {
 }
 
 Device::~Device() = default;
+
+std::vector<std::unique_ptr<Device>> open_devices(const std::string& choice) {
+    std::vector<std::unique_ptr<Device>> opened;
+    opened.push_back(std::make_unique<Device>(choice == "all" ? std::string() : choice));
+    const DeviceInfo first = opened.front()->info();
+    if (choice != "all" || is_cpu(first))
+        return opened;
+    for (const DeviceInfo& info : list_devices())
+        if (info.unusable.empty() && info.index != first.index && info.name == first.name && info.driver == first.driver)
+            opened.push_back(std::make_unique<Device>(std::to_string(info.index)));
+    return opened;
+}
 
 const DeviceInfo& Device::info() const { return state_->info; }
 bool Device::validating() const { return state_->validating; }

@@ -18,10 +18,14 @@ struct DeviceInfo {
     std::string unusable;   ///< what it lacks; empty = usable
 };
 
+/// Whether "the device" is the processor's own cores.
+[[nodiscard]] inline bool is_cpu(const DeviceInfo& info) { return info.kind == "CPU"; }
+
 /// Every device the loader knows, usable or not. Empty without a driver; throws Error only when there is no Vulkan loader.
 [[nodiscard]] std::vector<DeviceInfo> list_devices();
 
-/// One opened device. Owns the Vulkan objects; programs made from it must not outlive it.
+/// One opened device. Owns the Vulkan objects; programs made from it must not outlive it. Threads may make and run programs of
+/// their own on it side by side.
 class Device {
   public:
     /// `choice`: empty = discrete GPU, else integrated, else any usable (lavapipe); an index; or part of a name, case-insensitive.
@@ -43,5 +47,9 @@ class Device {
   private:
     std::unique_ptr<State> state_;
 };
+
+/// The device that `choice` names, as Device takes it. "all": the fastest GPU and every other of the same name and driver, so
+/// that it makes no difference which of them computes a frame; a software device only where there is no GPU.
+[[nodiscard]] std::vector<std::unique_ptr<Device>> open_devices(const std::string& choice);
 
 } // namespace scanshade::gpu

@@ -132,6 +132,8 @@ std::vector<std::string> problems(std::span<const BufferRow> buffers, std::span<
 
 struct Program::State {
     Device::State& gpu;
+    Lane& lane;
+    vk::raii::CommandPool pool; // of its own: pools, like programs, are one thread's at a time
     std::vector<BufferRow> rows;
     std::vector<PassRow> passes;
     std::vector<BoundBuffer> buffers;
@@ -158,7 +160,9 @@ struct Program::State {
     std::vector<Copy> taken, given;
 
     State(Device::State& gpu_, std::vector<BufferRow> rows_, std::vector<PassRow> passes_)
-        : gpu(gpu_), rows(std::move(rows_)), passes(std::move(passes_)) {}
+        : gpu(gpu_), lane(gpu.lanes[gpu.programs++ % gpu.lanes.size()]),
+          pool(gpu.device.createCommandPool({vk::CommandPoolCreateFlagBits::eResetCommandBuffer, gpu.queue_family})),
+          rows(std::move(rows_)), passes(std::move(passes_)) {}
 
     void make_buffers(std::size_t constants_bytes) {
         using Usage = vk::BufferUsageFlagBits;
@@ -226,7 +230,7 @@ struct Program::State {
         const vk::raii::ShaderModule module_ =
             gpu.device.createShaderModule({{}, words.size_bytes(), words.data()});
         const vk::PipelineShaderStageCreateInfo stage({}, vk::ShaderStageFlagBits::eCompute, *module_, "main", &specialization);
-        made.pipeline = gpu.device.createComputePipeline(nullptr, {{}, stage, *made.layout});
+        made.pipeline = gpu.device.createComputePipeline(gpu.pipelines, {{}, stage, *made.layout});
         return made;
     }
 
@@ -282,7 +286,7 @@ struct Program::State {
         const auto count = static_cast<std::uint32_t>(intervals.size() + 1);
         queries = gpu.device.createQueryPool({{}, vk::QueryType::eTimestamp, count});
         fence = gpu.device.createFence({});
-        commands = std::move(gpu.device.allocateCommandBuffers({*gpu.pool, vk::CommandBufferLevel::ePrimary, 1}).front());
+        commands = std::move(gpu.device.allocateCommandBuffers({*pool, vk::CommandBufferLevel::ePrimary, 1}).front());
         commands.begin(vk::CommandBufferBeginInfo{});
         if (gpu.has_timestamps) commands.resetQueryPool(*queries, 0, count);
         std::uint32_t query = 0;
@@ -337,7 +341,7 @@ struct Program::State {
     }
 
     void fill_buffers() {
-        const auto once = std::move(gpu.device.allocateCommandBuffers({*gpu.pool, vk::CommandBufferLevel::ePrimary, 1}).front());
+        const auto once = std::move(gpu.device.allocateCommandBuffers({*pool, vk::CommandBufferLevel::ePrimary, 1}).front());
         once.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
         for (std::size_t i = 0; i < rows.size(); ++i) {
             if (is_image(static_cast<int>(i)))
@@ -355,7 +359,7 @@ struct Program::State {
     /// What is taken before a run or given after it; null where there is nothing.
     vk::CommandBuffer record_copies(vk::raii::CommandBuffer& into, std::vector<Copy>& copies, bool in) {
         if (copies.empty()) return nullptr;
-        if (!*into) into = std::move(gpu.device.allocateCommandBuffers({*gpu.pool, vk::CommandBufferLevel::ePrimary, 1}).front());
+        if (!*into) into = std::move(gpu.device.allocateCommandBuffers({*pool, vk::CommandBufferLevel::ePrimary, 1}).front());
         into.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
         compute_barrier(into);
         for (const auto& [buffer, offset, bytes] : copies) {
@@ -373,7 +377,10 @@ struct Program::State {
             if (each) infos.emplace_back(each);
         constexpr std::uint64_t patience_ns = 120'000'000'000;
         try {
-            gpu.queue.submit2(vk::SubmitInfo2({}, {}, infos), *fence);
+            {
+                const std::lock_guard alone(lane.submitting);
+                lane.queue.submit2(vk::SubmitInfo2({}, {}, infos), *fence);
+            }
             if (gpu.device.waitForFences(*fence, VK_TRUE, patience_ns) != vk::Result::eSuccess)
                 throw DeviceLost(fmt::format("{} did not finish within 120 s", gpu.info.name));
         } catch (const vk::DeviceLostError& failure) {
@@ -441,7 +448,7 @@ std::vector<std::byte> Program::read_back(int buffer) {
     State& s = *state_;
     const std::size_t bytes = s.rows.at(static_cast<std::size_t>(buffer)).bytes;
     BoundBuffer copy(s.gpu, bytes, vk::BufferUsageFlagBits::eTransferDst, {Memory::eHostVisible | Memory::eHostCoherent});
-    const auto commands = std::move(s.gpu.device.allocateCommandBuffers({*s.gpu.pool, vk::CommandBufferLevel::ePrimary, 1}).front());
+    const auto commands = std::move(s.gpu.device.allocateCommandBuffers({*s.pool, vk::CommandBufferLevel::ePrimary, 1}).front());
     commands.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
     compute_barrier(commands);
     s.copy_out(commands, buffer, *copy.buffer);

@@ -3,6 +3,8 @@
 
 #include "ao/gpu/device.h"
 
+#include <atomic>
+#include <deque>
 #include <mutex>
 #include <vulkan/vulkan_raii.hpp>
 
@@ -13,6 +15,12 @@ struct Messages {
     std::vector<std::string> texts;
 };
 
+/// A queue that one thread at a time may submit to.
+struct Lane {
+    vk::raii::Queue queue;
+    std::mutex submitting = {};
+};
+
 struct Device::State {
     vk::raii::Context context;
     std::unique_ptr<Messages> messages = std::make_unique<Messages>(); // outlives the messenger that writes into it
@@ -21,9 +29,10 @@ struct Device::State {
     vk::raii::DebugUtilsMessengerEXT messenger = nullptr;
     vk::raii::PhysicalDevice physical = nullptr;
     vk::raii::Device device = nullptr;
-    vk::raii::Queue queue = nullptr;
     std::uint32_t queue_family = 0;
-    vk::raii::CommandPool pool = nullptr;
+    std::deque<Lane> lanes; ///< programs take them in turns: what one waits for does not hold up the others
+    std::atomic<std::size_t> programs = 0;
+    vk::raii::PipelineCache pipelines = nullptr; ///< programs made alike compile once
     vk::PhysicalDeviceMemoryProperties memory;
     double nanoseconds_per_tick = 1;
     bool has_timestamps = false;
