@@ -270,7 +270,8 @@ class Pipeline {
         if (options_.dump.empty())
             return;
         std::vector<Intermediate> all = method.intermediates();
-        std::ranges::move(work.averaging, std::back_inserter(all));
+        if (options_.sequence)
+            std::ranges::move(options_.sequence->intermediates(), std::back_inserter(all));
         write_intermediates(options_.dump / work.entry.name, all);
     }
 

@@ -10,11 +10,6 @@
 namespace scanshade {
 namespace {
 
-Intermediate map_for_study(std::string name, const cv::Mat1f& map, std::string meaning) {
-    const auto* const first = reinterpret_cast<const std::byte*>(map.data);
-    return {std::move(name), "f4", {map.rows, map.cols}, {first, first + map.total() * 4}, std::move(meaning)};
-}
-
 std::string names_of(const Capture& capture, const std::vector<std::size_t>& places) {
     std::vector<std::string> names;
     for (const std::size_t place : places)
@@ -77,10 +72,6 @@ void compute_in_sequence(Work& work, const Capture& capture, Neighbourhood& sequ
     NeighbourhoodResult result = sequence.compute(work.row.index);
     work.ao = std::move(result.ao);
     work.looked_at = std::move(result.depth);
-    if (!result.frames.empty())
-        work.averaging = {
-            map_for_study("averaged_frames", result.frames, "frames averaged, counted in views as good as this one"),
-            map_for_study("averaged_deviation", result.deviation, "standard deviation of visibility between them")};
     work.row.passes = std::move(result.timings);
     if (!result.fused.empty())
         work.row.notes.push_back("depth is averaged with frames " + names_of(capture, result.fused) + ".");

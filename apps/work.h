@@ -14,7 +14,6 @@ struct Work {
     Frame frame = {};
     DepthImage depth = {};
     DepthImage looked_at = {};                ///< of a sequence: what the methods saw in place of `depth`
-    std::vector<Intermediate> averaging = {}; ///< over frames, for study
     AoMap ao = {};
     cv::Mat1f confidence_in_view = {}; ///< of `ao`, pixel by pixel
     Attached attached = {}, confidence = {};

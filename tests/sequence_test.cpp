@@ -187,9 +187,13 @@ TEST(Sequence, averaging_a_static_camera_leaves_the_mean_of_all_patterns) {
     }
     cv::Mat1f mean;
     cv::Mat(sum / 31).convertTo(mean, CV_32F);
-    const NeighbourhoodResult result = together(frames, only(0, 0, 30), 15, {}, "low");
+    Neighbourhood sequence(device(), surfel, radius_m, {}, {}, only(0, 0, 30));
+    for (std::size_t i = 0; i < frames.size(); ++i)
+        sequence.add(i, frames[i].depth, frames[i].pose);
+    const NeighbourhoodResult result = sequence.compute(15);
     EXPECT_LT(rms(result.ao.visibility, mean), 1e-4);
-    EXPECT_NEAR(result.frames(120, 160), 31, 0.1);
+    const Intermediate averaged_frames = sequence.intermediates().at(0);
+    EXPECT_NEAR(reinterpret_cast<const float*>(averaged_frames.data.data())[120 * 320 + 160], 31, 0.1);
     // Noise falls as the root of the number of frames: between means of 15 and 15 others.
     cv::Mat1f first(240, 320, 0.0F), second(240, 320, 0.0F);
     for (int i = 0; i < 15; ++i) {

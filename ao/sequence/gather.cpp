@@ -5,7 +5,9 @@
 #include "projection/error.h"
 #include "shaders/shared/gather.h"
 
+#include <algorithm>
 #include <fmt/format.h>
+#include <iterator>
 
 namespace scanshade {
 namespace {
@@ -29,7 +31,7 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, st
 
 } // namespace
 
-GatheredAo Gather::compute(const Seen& own, std::span<const Seen> others, const GatherOptions& how) {
+AoMap Gather::compute(const Seen& own, std::span<const Seen> others, const GatherOptions& how) {
     const cv::Size size = own.surfaces->camera.size;
     if (others.size() > shared::most_gathered)
         throw Error(fmt::format("{} frames to average, {} are the most", others.size(), shared::most_gathered));
@@ -62,12 +64,19 @@ GatheredAo Gather::compute(const Seen& own, std::span<const Seen> others, const 
     }
     program_->run(std::as_bytes(std::span(&constants, 1)));
     timings_ = program_->timings();
-    GatheredAo gathered{{gpu::image_on<float>(program_->host(mean), size).clone()}, {}, {}};
-    cv::Mat1f channels[2];
-    cv::split(gpu::image_on<cv::Vec2f>(program_->host(spread), size), channels);
-    gathered.frames = channels[0];
-    gathered.deviation = channels[1];
-    return gathered;
+    return {gpu::image_on<float>(program_->host(mean), size).clone()};
+}
+
+std::vector<Intermediate> Gather::intermediates() {
+    const auto each = program_->host_as<cv::Vec2f>(spread);
+    const auto map = [&](int channel, const char* name, const char* meaning) {
+        std::vector<float> values;
+        std::ranges::transform(each, std::back_inserter(values), [&](const cv::Vec2f& both) { return both[channel]; });
+        const auto bytes = std::as_bytes(std::span(values));
+        return Intermediate{name, "f4", {size_.height, size_.width}, {bytes.begin(), bytes.end()}, meaning};
+    };
+    return {map(0, "averaged_frames", "frames averaged, counted in views as good as this one"),
+            map(1, "averaged_deviation", "standard deviation of visibility between them")};
 }
 
 } // namespace scanshade

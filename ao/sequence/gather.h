@@ -19,12 +19,6 @@ struct Seen {
     float share = 1; ///< in the mean
 };
 
-struct GatheredAo {
-    AoMap mean;
-    cv::Mat1f frames;    ///< how many went into a pixel, counted in views as good as the frame's own
-    cv::Mat1f deviation; ///< between them
-};
-
 struct GatherOptions {
     double radius_m; ///< of the visibility
     DepthNoise noise;
@@ -37,9 +31,11 @@ class Gather {
     explicit Gather(gpu::Device& device) : device_(device) {}
 
     /// Of frame `own`, whose pixels without visibility stay without.
-    [[nodiscard]] GatheredAo compute(const Seen& own, std::span<const Seen> others, const GatherOptions& options);
+    [[nodiscard]] AoMap compute(const Seen& own, std::span<const Seen> others, const GatherOptions& options);
     /// Where the time of the last compute() went.
     [[nodiscard]] const Timings& timings() const { return timings_; }
+    /// Of the last compute(), pixel by pixel: how many frames went into the mean, and the deviation between them.
+    [[nodiscard]] std::vector<Intermediate> intermediates();
 
   private:
     gpu::Device& device_;

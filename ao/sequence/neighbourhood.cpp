@@ -253,12 +253,10 @@ NeighbourhoodResult Neighbourhood::compute(std::size_t place) {
         result.averaged.push_back(other.place);
     }
     if (!others.empty()) {
-        GatheredAo gathered = gather_.compute(seen(place), others, {radius_m_, noise_, options_.clamp});
+        result.ao = gather_.compute(seen(place), others, {radius_m_, noise_, options_.clamp});
         account("average", gather_.timings());
-        result.ao = std::move(gathered.mean);
-        result.frames = std::move(gathered.frames);
-        result.deviation = std::move(gathered.deviation);
     }
+    averaged_ = !others.empty();
     const Slot& slot = slots_.at(place);
     result.depth = view_of(place).depth;
     result.fused = slot.fused;

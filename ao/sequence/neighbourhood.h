@@ -48,8 +48,6 @@ struct NeighbourhoodResult {
     Timings timings;
     std::vector<std::size_t> fused, neighbours, averaged; ///< places of the frames it was looked at with
     std::vector<LeftOut> left_out;
-    cv::Mat1f frames,
-        deviation; ///< of averaged visibility: how many frames went into a pixel, and what lies between them
 };
 
 /// Not thread-safe: one call at a time. A frame's result depends on the frames within reach() of it and on nothing
@@ -66,6 +64,8 @@ class Neighbourhood {
     void add(std::size_t place, const DepthImage& depth, const std::optional<Eigen::Isometry3d>& world_from_camera);
     /// Of an added frame; what lies within reach of it has been added, too, or is missing for good.
     [[nodiscard]] NeighbourhoodResult compute(std::size_t place);
+    /// Of the last compute(): how visibility was averaged, if it was.
+    [[nodiscard]] std::vector<Intermediate> intermediates() { return averaged_ ? gather_.intermediates() : std::vector<Intermediate>(); }
     /// Frames before `place` are needed no more.
     void forget_before(std::size_t place);
 
@@ -118,6 +118,7 @@ class Neighbourhood {
     double radius_m_;
     std::map<std::size_t, Slot> slots_;
     Timings timings_; ///< since the last result
+    bool averaged_ = false;
 };
 
 } // namespace scanshade
