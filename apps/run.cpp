@@ -4,6 +4,7 @@
 #include "apps/progress.h"
 #include "apps/resume.h"
 #include "apps/run_settings.h"
+#include "apps/sequence_walk.h"
 #include "apps/run_talk.h"
 #include "apps/slice.h"
 #include "apps/trial.h"
@@ -285,8 +286,9 @@ class Run final : public Command {
             job.batch.cloud = &*cloud;
         }
         if (asked_.sequence == "on" || cloud) {
-            sequence.emplace(device, plain, job.batch.radius_m, noise, fit,
-                             asked_.sequence == "on" ? asked_.sequences : alone());
+            const NeighbourhoodOptions together =
+                asked_.sequence == "on" ? sequence_options(asked_.sequences, job.capture, job.batch.radius_m) : alone();
+            sequence.emplace(device, plain, job.batch.radius_m, noise, fit, together);
             job.batch.sequence = &*sequence;
             if (methods.size() > 1)
                 say("  frames of a sequence are computed one at a time, in their order");
@@ -299,6 +301,8 @@ class Run final : public Command {
         report.at_once = job.batch.sequence ? 1 : methods.size();
         report.frames.resize(job.batch.frames.size());
         introduce(report);
+        if (sequence && sequence->reach() > 0)
+            say(fmt::format("  frames within {} of each other are looked at together", sequence->reach()));
         prepare_folder(job, {table, manifest});
         const Recording recording{.journal = journal,
                                   .settings = settings_key(report, job.batch.outputs, noise),

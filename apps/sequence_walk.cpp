@@ -68,6 +68,15 @@ Token Waiting::pass(Token arrived) {
     return complete;
 }
 
+NeighbourhoodOptions sequence_options(NeighbourhoodOptions asked, const Capture& capture, double radius_m) {
+    if (asked.reach > 0)
+        return asked;
+    std::vector<std::optional<Eigen::Isometry3d>> poses;
+    std::ranges::transform(capture.entries, std::back_inserter(poses), &CaptureEntry::world_from_camera);
+    asked.reach = reach_for(poses, radius_m);
+    return asked;
+}
+
 void compute_in_sequence(Work& work, const Capture& capture, Neighbourhood& sequence) {
     NeighbourhoodResult result = sequence.compute(work.row.index);
     work.ao = std::move(result.ao);

@@ -44,6 +44,9 @@ class Waiting {
     std::deque<Token> queue_;
 };
 
+/// What is asked, with the reach that the capture's poses ask for where none is given.
+[[nodiscard]] NeighbourhoodOptions sequence_options(NeighbourhoodOptions asked, const Capture& capture, double radius_m);
+
 /// A frame's visibility together with the frames around it; its row's notes say which these were, and which were left
 /// out and why.
 void compute_in_sequence(Work& work, const Capture& capture, Neighbourhood& sequence);

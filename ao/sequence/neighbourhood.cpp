@@ -25,7 +25,9 @@ double ms_since(std::chrono::steady_clock::time_point start) {
 std::vector<Parameter> NeighbourhoodOptions::parameters() {
     return {{"fuse", "frames around each that noisy depth is averaged with; 0 = none", &fuse, "", 0, 16},
             {"layers", "other views whose surfaces occlude what a frame shows (surfel); 0 = none", &layers, "", 0, 16},
-            {"reach", "how many frames away those may be", &reach, "frames", 1, 1000},
+            {"reach",
+             "how many frames away those may be; 0 = so many as the camera takes to move by 1.5 radii, 4 to 30", &reach,
+             "frames", 0, 1000},
             {"average", "frames around each whose visibility is averaged with its own; 0 = none", &average, "", 0, 64},
             {"blend",
              "mean of frames before and after; exponential: of frames before, each a 29/30 of the next younger one",
@@ -53,6 +55,24 @@ Neighbourhood::Neighbourhood(gpu::Device& device, Method& method, double radius_
     after_drop.drop_flying = false;
     drop_flying_.emplace(device, noise, only_drop);
     fit_.emplace(device, noise, after_drop);
+}
+
+int reach_for(std::span<const std::optional<Isometry3d>> world_from_camera, double radius_m) {
+    constexpr int least = 4, most = 30;
+    for (int step = least; step < most; ++step) {
+        std::vector<double> moved;
+        for (std::size_t i = static_cast<std::size_t>(step); i < world_from_camera.size(); ++i)
+            if (const auto& before = world_from_camera[i - static_cast<std::size_t>(step)],
+                &after = world_from_camera[i];
+                before && after)
+                moved.push_back((after->translation() - before->translation()).norm());
+        if (moved.empty())
+            break;
+        std::ranges::nth_element(moved, moved.begin() + static_cast<std::ptrdiff_t>(moved.size() / 2));
+        if (moved[moved.size() / 2] >= 1.5 * radius_m)
+            return step;
+    }
+    return most;
 }
 
 void Neighbourhood::add(std::size_t place, const DepthImage& depth,

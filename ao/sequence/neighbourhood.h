@@ -20,7 +20,7 @@ namespace scanshade {
 struct NeighbourhoodOptions {
     int fuse = 8;               ///< frames around each that noisy depth is averaged with
     int layers = 6;             ///< other views whose surfaces occlude what a frame shows; of use to surfel
-    int reach = 12;             ///< how many frames away these may be
+    int reach = 0;              ///< how many frames away these may be; 0 = as reach_for() has it, which the caller asks
     int average = 12;           ///< frames around each whose visibility is averaged with its own
     std::string blend = "mean"; ///< of these; "exponential": of those before, each older one 29/30 of the next
     float clamp = 1;            ///< other frames' visibility counts as no farther from the frame's own than this
@@ -32,6 +32,11 @@ struct NeighbourhoodOptions {
                                         (blend == "mean" ? (average + 1) / 2 : average));
     }
 };
+
+/// How many frames away neighbours may be: so many as the camera takes to move by 1.5 radii, since from nearer ones
+/// less is seen that a frame itself does not see; at least 4, at most 30.
+[[nodiscard]] int reach_for(std::span<const std::optional<Eigen::Isometry3d>> world_from_camera, double radius_m);
+
 /// Frames that are looked at by themselves, though prepared like those of a recording.
 [[nodiscard]] inline NeighbourhoodOptions alone() { return {.fuse = 0, .layers = 0, .average = 0}; }
 
@@ -65,7 +70,9 @@ class Neighbourhood {
     /// Of an added frame; what lies within reach of it has been added, too, or is missing for good.
     [[nodiscard]] NeighbourhoodResult compute(std::size_t place);
     /// Of the last compute(): how visibility was averaged, if it was.
-    [[nodiscard]] std::vector<Intermediate> intermediates() { return averaged_ ? gather_.intermediates() : std::vector<Intermediate>(); }
+    [[nodiscard]] std::vector<Intermediate> intermediates() {
+        return averaged_ ? gather_.intermediates() : std::vector<Intermediate>();
+    }
     /// Frames before `place` are needed no more.
     void forget_before(std::size_t place);
 
