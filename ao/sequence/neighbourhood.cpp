@@ -26,7 +26,7 @@ std::vector<Parameter> NeighbourhoodOptions::parameters() {
     return {{"fuse", "frames around each that noisy depth is averaged with; 0 = none", &fuse, "", 0, 16},
             {"layers", "other views whose surfaces occlude what a frame shows (surfel); 0 = none", &layers, "", 0, 16},
             {"reach",
-             "how many frames away those may be; 0 = so many as the camera takes to move by 1.5 radii, 4 to 30", &reach,
+             "how many frames away those may be; 0 = so many as the camera takes to move by the radius, 4 to 30", &reach,
              "frames", 0, 1000},
             {"average", "frames around each whose visibility is averaged with its own; 0 = none", &average, "", 0, 64},
             {"blend",
@@ -69,7 +69,7 @@ int reach_for(std::span<const std::optional<Isometry3d>> world_from_camera, doub
         if (moved.empty())
             break;
         std::ranges::nth_element(moved, moved.begin() + static_cast<std::ptrdiff_t>(moved.size() / 2));
-        if (moved[moved.size() / 2] >= 1.5 * radius_m)
+        if (moved[moved.size() / 2] >= radius_m)
             return step;
     }
     return most;

@@ -33,7 +33,7 @@ struct NeighbourhoodOptions {
     }
 };
 
-/// How many frames away neighbours may be: so many as the camera takes to move by 1.5 radii, since from nearer ones
+/// How many frames away neighbours may be: so many as the camera takes to move by the radius, since from nearer ones
 /// less is seen that a frame itself does not see; at least 4, at most 30.
 [[nodiscard]] int reach_for(std::span<const std::optional<Eigen::Isometry3d>> world_from_camera, double radius_m);
 
