@@ -178,6 +178,7 @@ class Bench final : public Command {
                   {"first",
                    "their first frame's place on the scene's walk, in tenths of a second: another one, other views",
                    &generate_.first, "", 0, 100000},
+                  {"step", "from one frame to the next, in tenths of a second", &generate_.step, "", 1, 100000},
                   {"truth-rays", "rays per pixel of their truth", &generate_.truth_rays, "", 1, 65536},
                   {"frames", "frames taken of each capture, spread evenly", &request_.frames, "", 1, 100000},
                   {"radius", "how far away a surface may occlude, where the capture's truth does not say",
@@ -190,7 +191,7 @@ class Bench final : public Command {
                    "", 1, 1000},
                   {"device", "index or part of the name of a Vulkan device; empty = the fastest kind", &device_}}},
                 {"output",
-                 {{"out", "folder of the report: index.html, bench.csv, bench.json", &out_},
+                 {{"out", "folder of the report: index.html, bench.csv, bench.json, a plot of each sensor class as .svg", &out_},
                   {"front", "file for the measured front, as `run --max-error` has it; other sensors' parts of it stay",
                    &front_},
                   {"overwrite", "replace an earlier report", &overwrite_}}}};
@@ -265,7 +266,6 @@ class Bench final : public Command {
         options.scene = scene;
         options.sensor = sensor;
         options.frames = request_.frames;
-        options.step = 25; // tenths of a second: views that differ
         options.overwrite = overwrite_;
         const fs::path folder = fs::path(out_) / "captures" / fmt::format("{}-{}", scene, sensor);
         say(fmt::format("generating {}", folder.string()));
@@ -273,10 +273,18 @@ class Bench final : public Command {
         return folder;
     }
 
+    static std::string plot_name(SensorClass sensor) {
+        std::string name = fmt::format("{}.svg", name_of(sensor));
+        std::ranges::replace(name, ' ', '-');
+        return name;
+    }
+
     void write(const BenchReport& report) const {
         const fs::path folder = out_;
         write_atomically(folder / "bench.csv", bench_csv(report));
         write_atomically(folder / "bench.json", text_of(bench_json(report)) + "\n");
+        for (const BenchGroup& group : report.groups)
+            write_atomically(folder / plot_name(group.sensor), bench_plot(group));
         if (!front_.empty())
             write_front(front_of(report));
         write_atomically(folder / "index.html", bench_page(report)); // last: it says that the rest is there
@@ -304,7 +312,7 @@ class Bench final : public Command {
     }
 
     std::vector<std::string> paths_;
-    GenerateOptions generate_{.truth_rays = 256};
+    GenerateOptions generate_{.step = 25, .truth_rays = 256}; // views that differ
     TrialRequest request_;
     std::string scenes_ = "all", sensors_ = "ideal", methods_ = "all", device_, out_, front_;
     int rounds_ = 3;
