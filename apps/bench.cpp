@@ -16,8 +16,11 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <map>
 #include <set>
 #include <sstream>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_for_each.h>
 
 namespace scanshade {
 namespace {
@@ -60,10 +63,29 @@ std::string settings_text(const std::vector<Parameter>& rows) {
 
 // ---------------------------------------------------------------------------------------------------- one capture
 
+/// Trials are kept from capture to capture, by what they are made with.
+class Trials {
+  public:
+    explicit Trials(gpu::Device& device) : device_(device) {}
+
+    /// The configuration's, ready for the capture. Throws where it cannot be made.
+    Trial& of(const Configuration& configuration, const TrialCapture& capture) {
+        auto& trial = made_[{configuration.full_name(), capture.radius_m}];
+        if (!trial)
+            trial = std::make_unique<Trial>(device_, configuration, capture.noise, capture.radius_m);
+        trial->set_noise(capture.noise);
+        return *trial;
+    }
+
+  private:
+    gpu::Device& device_;
+    std::map<std::pair<std::string, double>, std::unique_ptr<Trial>> made_;
+};
+
 /// All configurations on one capture: errors once, since same input gives same bytes, then rounds of times.
 class CaptureBench {
   public:
-    CaptureBench(gpu::Device& device, const TrialCapture& capture, const std::vector<Configuration>& all)
+    CaptureBench(Trials& trials, const TrialCapture& capture, const std::vector<Configuration>& all)
         : capture_(capture) {
         result_ = {capture.name,
                    capture.path.string(),
@@ -83,12 +105,19 @@ class CaptureBench {
                                 by_range(frame.exact_z_m)});
         }
         for (const Configuration& configuration : all)
-            begin(device, configuration);
+            begin(trials, configuration);
     }
 
     BenchCapture run(int rounds) {
+        std::vector<std::vector<cv::Mat1f>> maps(trials_.size());
         for (std::size_t i = 0; i < trials_.size(); ++i)
-            attempt(i, [&] { judge(i); });
+            attempt(i, [&] {
+                for (const TrialFrame& frame : capture_.frames)
+                    maps[i].push_back(trials_[i]->compute(frame));
+            });
+        // Finding the best look of a map takes longer than the map.
+        tbb::parallel_for(std::size_t{0}, trials_.size(),
+                          [&](std::size_t i) { attempt(i, [&] { judge(i, maps[i]); }); });
         for (int round = 0; round < rounds; ++round) {
             say(fmt::format("  {}: round {} of {}", capture_.name, round + 1, rounds));
             for (const TrialFrame& frame : capture_.frames)
@@ -97,20 +126,19 @@ class CaptureBench {
                     attempt(i, [&] { time(i, frame); });
                 }
         }
-        for (Measured& measured : result_.measured)
-            measured.sum_up();
+        tbb::parallel_for_each(result_.measured, [](Measured& measured) { measured.sum_up(); });
         return std::move(result_);
     }
 
   private:
-    void begin(gpu::Device& device, const Configuration& configuration) {
+    void begin(Trials& trials, const Configuration& configuration) {
         const std::size_t i = trials_.size();
         trials_.emplace_back();
         result_.measured.emplace_back();
         result_.measured.back().configuration = configuration;
         result_.visibilities.emplace_back();
         attempt(i, [&] {
-            trials_[i] = std::make_unique<Trial>(device, configuration, capture_.noise, capture_.radius_m);
+            trials_[i] = &trials.of(configuration, capture_);
             result_.measured[i].settings = settings_text(trials_[i]->settings());
         });
     }
@@ -129,11 +157,11 @@ class CaptureBench {
         }
     }
 
-    void judge(std::size_t i) {
+    void judge(std::size_t i, const std::vector<cv::Mat1f>& maps) {
         Measured& measured = result_.measured[i];
         for (std::size_t n = 0; n < capture_.frames.size(); ++n) {
             const TrialFrame& frame = capture_.frames[n];
-            const cv::Mat1f map = trials_[i]->compute(frame);
+            const cv::Mat1f& map = maps[n];
             measured.images.push_back(compare(map, frame.truth));
             measured.pairs.add(pair_sums(map, frame.truth));
             for (std::size_t by = 0; by < error_by_count; ++by)
@@ -155,7 +183,7 @@ class CaptureBench {
 
     const TrialCapture& capture_;
     std::vector<std::array<PixelClasses, error_by_count>> classes_;
-    std::vector<std::unique_ptr<Trial>> trials_;
+    std::vector<Trial*> trials_; ///< null where none could be made
     BenchCapture result_;
 };
 
@@ -170,30 +198,33 @@ class Bench final : public Command {
     }
 
     std::vector<Stage> stages() override {
-        return {{"captures",
-                 {{"generated", "generate captures of the scenes first, in REPORT/captures", &generated_},
-                  {"scenes", "which scenes: all, or names with commas", &scenes_},
-                  {"sensor", "which sensors see them: all, or names with commas", &sensors_},
-                  {"size", "their image size, width x height", &generate_.size, "pixels"},
-                  {"first",
-                   "their first frame's place on the scene's walk, in tenths of a second: another one, other views",
-                   &generate_.first, "", 0, 100000},
-                  {"truth-rays", "rays per pixel of their truth", &generate_.truth_rays, "", 1, 65536},
-                  {"frames", "frames taken of each capture, spread evenly", &request_.frames, "", 1, 100000},
-                  {"radius", "how far away a surface may occlude, where the capture's truth does not say",
-                   &request_.radius_m, "m", 1e-4, 1e5},
-                  {"depth-noise", "as run takes it: auto (measured), none, kinect, tof or FLOOR,PER_Z2",
-                   &request_.depth_noise}}},
-                {"method",
-                 {{"methods", "which methods: all, or names with commas", &methods_},
-                  {"rounds", "how often each configuration is timed on each frame, in turns with all others", &rounds_,
-                   "", 1, 1000},
-                  {"device", "index or part of the name of a Vulkan device; empty = the fastest kind", &device_}}},
-                {"output",
-                 {{"out", "folder of the report: index.html, bench.csv, bench.json", &out_},
-                  {"front", "file for the measured front, as `run --max-error` has it; other sensors' parts of it stay",
-                   &front_},
-                  {"overwrite", "replace an earlier report", &overwrite_}}}};
+        return {
+            {"captures",
+             {{"generated", "generate captures of the scenes first, in REPORT/captures", &generated_},
+              {"scenes", "which scenes: all, or names with commas", &scenes_},
+              {"sensor", "which sensors see them: all, or names with commas", &sensors_},
+              {"size", "their image size, width x height", &generate_.size, "pixels"},
+              {"first",
+               "their first frame's place on the scene's walk, in tenths of a second: another one, other views",
+               &generate_.first, "", 0, 100000},
+              {"step", "from one frame to the next, in tenths of a second", &generate_.step, "", 1, 100000},
+              {"truth-rays", "rays per pixel of their truth", &generate_.truth_rays, "", 1, 65536},
+              {"frames", "frames taken of each capture, spread evenly", &request_.frames, "", 1, 100000},
+              {"radius", "how far away a surface may occlude, where the capture's truth does not say",
+               &request_.radius_m, "m", 1e-4, 1e5},
+              {"depth-noise", "as run takes it: auto (measured), none, kinect, tof or FLOOR,PER_Z2",
+               &request_.depth_noise}}},
+            {"method",
+             {{"methods", "which methods: all, or names with commas", &methods_},
+              {"rounds", "how often each configuration is timed on each frame, in turns with all others", &rounds_, "",
+               1, 1000},
+              {"device", "index or part of the name of a Vulkan device; empty = the fastest kind", &device_}}},
+            {"output",
+             {{"out", "folder of the report: index.html, bench.csv, bench.json, a plot of each sensor class as .svg",
+               &out_},
+              {"front", "file for the measured front, as `run --max-error` has it; other sensors' parts of it stay",
+               &front_},
+              {"overwrite", "replace an earlier report", &overwrite_}}}};
     }
 
     int run() override {
@@ -211,11 +242,12 @@ class Bench final : public Command {
                            rounds_,
                            {},
                            {}};
+        Trials trials(device);
         for (const fs::path& path : captures()) {
             const TrialCapture capture = loaded(device, path);
             say(fmt::format("{}: {} frames, {} depth ({}, {})", path.string(), capture.frames.size(),
                             name_of(capture.sensor), describe(capture.noise), capture.noise_origin));
-            report.captures.push_back(CaptureBench(device, capture, all).run(rounds_));
+            report.captures.push_back(CaptureBench(trials, capture, all).run(rounds_));
         }
         report.groups = grouped(report);
         write(report);
@@ -265,7 +297,6 @@ class Bench final : public Command {
         options.scene = scene;
         options.sensor = sensor;
         options.frames = request_.frames;
-        options.step = 25; // tenths of a second: views that differ
         options.overwrite = overwrite_;
         const fs::path folder = fs::path(out_) / "captures" / fmt::format("{}-{}", scene, sensor);
         say(fmt::format("generating {}", folder.string()));
@@ -273,10 +304,18 @@ class Bench final : public Command {
         return folder;
     }
 
+    static std::string plot_name(SensorClass sensor) {
+        std::string name = fmt::format("{}.svg", name_of(sensor));
+        std::ranges::replace(name, ' ', '-');
+        return name;
+    }
+
     void write(const BenchReport& report) const {
         const fs::path folder = out_;
         write_atomically(folder / "bench.csv", bench_csv(report));
         write_atomically(folder / "bench.json", text_of(bench_json(report)) + "\n");
+        for (const BenchGroup& group : report.groups)
+            write_atomically(folder / plot_name(group.sensor), bench_plot(group));
         if (!front_.empty())
             write_front(front_of(report));
         write_atomically(folder / "index.html", bench_page(report)); // last: it says that the rest is there
@@ -304,7 +343,7 @@ class Bench final : public Command {
     }
 
     std::vector<std::string> paths_;
-    GenerateOptions generate_{.truth_rays = 256};
+    GenerateOptions generate_{.step = 25, .truth_rays = 256}; // views that differ
     TrialRequest request_;
     std::string scenes_ = "all", sensors_ = "ideal", methods_ = "all", device_, out_, front_;
     int rounds_ = 3;

@@ -162,6 +162,8 @@ std::string settings_table(const BenchReport& report) {
 
 } // namespace
 
+std::string bench_plot(const BenchGroup& group) { return page::svg_file(speed_plot(group, false)); }
+
 std::string bench_page(const BenchReport& report) {
     std::vector<page::Section> sections;
     sections.push_back(

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <limits>
+#include <tbb/parallel_for_each.h>
 
 namespace scanshade {
 namespace {
@@ -123,11 +124,9 @@ std::vector<BenchGroup> grouped(const BenchReport& report) {
                 group->measured.push_back(capture.measured[i]);
     }
     for (BenchGroup& group : groups) {
+        tbb::parallel_for_each(group.measured, [](Measured& m) { m.sum_up(); });
         std::vector<Priced> points;
-        for (Measured& m : group.measured) {
-            m.sum_up();
-            points.push_back(priced(m));
-        }
+        std::ranges::transform(group.measured, std::back_inserter(points), priced);
         group.front = on_front(points);
     }
     return groups;

@@ -76,6 +76,8 @@ struct BenchReport {
 [[nodiscard]] json bench_json(const BenchReport& report);
 /// The whole report as one self-contained page.
 [[nodiscard]] std::string bench_page(const BenchReport& report);
+/// Speed against error of one sensor class, as a picture (SVG).
+[[nodiscard]] std::string bench_plot(const BenchGroup& group);
 /// The fronts of all groups.
 [[nodiscard]] Front front_of(const BenchReport& report);
 

@@ -164,6 +164,14 @@ std::string legend(const Plot& plot) {
     return drawn;
 }
 
+std::string everything(const Plot& plot) {
+    const Axis x = x_axis(plot), y = y_axis(plot);
+    std::string drawn = frame(plot, x, y);
+    for (std::size_t i = 0; i < plot.series.size(); ++i)
+        drawn += drawn_series(plot, plot.series[i], x, y, colours[i % colours.size()]);
+    return drawn + legend(plot);
+}
+
 constexpr int figure_width = 340; ///< px, as the style has it: a page of fifty pictures stays below some megabytes
 
 std::string base64(const std::vector<uchar>& bytes) {
@@ -178,12 +186,17 @@ std::string base64(const std::vector<uchar>& bytes) {
     return coded;
 }
 
+/// What a plot looks like, in a page and in a file of its own.
+constexpr std::string_view plot_style = R"css(
+svg text { font: 12px system-ui, sans-serif; fill: #333; }
+svg .title { font-weight: 600; font-size: 14px; } .grid { stroke: #e4e4e4; } .axis { stroke: #777; }
+.ring { fill: none; stroke: #222; stroke-width: 1.2; }
+)css";
+
 constexpr std::string_view style = R"css(
 body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 1100px; margin: 2em auto; padding: 0 1em; }
 h1 { font-size: 1.5em; } h2 { font-size: 1.15em; margin-top: 2em; border-bottom: 1px solid #ccc; }
-svg { max-width: 100%; height: auto; display: block; } svg text { font: 12px system-ui, sans-serif; fill: #333; }
-svg .title { font-weight: 600; font-size: 14px; } .grid { stroke: #e4e4e4; } .axis { stroke: #777; }
-.ring { fill: none; stroke: #222; stroke-width: 1.2; }
+svg { max-width: 100%; height: auto; display: block; }
 table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums; }
 th, td { padding: 2px 9px; text-align: right; border-bottom: 1px solid #eee; }
 th { border-bottom: 1px solid #999; } th:first-child, td:first-child { text-align: left; }
@@ -238,12 +251,15 @@ std::string escaped(std::string_view text) {
 }
 
 std::string svg(const Plot& plot) {
-    const Axis x = x_axis(plot), y = y_axis(plot);
-    std::string drawn = fmt::format("<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\">\n{2}",
-                                    width, height, frame(plot, x, y));
-    for (std::size_t i = 0; i < plot.series.size(); ++i)
-        drawn += drawn_series(plot, plot.series[i], x, y, colours[i % colours.size()]);
-    return drawn + legend(plot) + "</svg>\n";
+    return fmt::format("<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\">\n{2}</svg>\n", width,
+                       height, everything(plot));
+}
+
+std::string svg_file(const Plot& plot) {
+    return fmt::format(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\">\n"
+        "<style>{2}</style>\n<rect width=\"{0}\" height=\"{1}\" fill=\"#fff\"/>\n{3}</svg>\n",
+        width, height, plot_style, everything(plot));
 }
 
 std::string table(const std::vector<std::string>& heads, const std::vector<std::vector<std::string>>& rows,
@@ -271,8 +287,8 @@ std::string paragraph(std::string_view text) { return fmt::format("<p>{}</p>\n",
 std::string document(std::string_view title, const std::vector<Section>& sections) {
     std::string html =
         fmt::format("<!doctype html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"><title>{0}</title>\n"
-                    "<style>{1}</style></head>\n<body>\n<h1>{0}</h1>\n",
-                    escaped(title), style);
+                    "<style>{1}{2}</style></head>\n<body>\n<h1>{0}</h1>\n",
+                    escaped(title), style, plot_style);
     for (const Section& section : sections)
         html += fmt::format("<h2>{}</h2>\n{}", escaped(section.heading), section.html);
     return html + "</body>\n</html>\n";

@@ -40,6 +40,8 @@ struct Plot {
 [[nodiscard]] std::string escaped(std::string_view text);
 
 [[nodiscard]] std::string svg(const Plot& plot);
+/// The plot as a file of its own, on white.
+[[nodiscard]] std::string svg_file(const Plot& plot);
 /// Cells of the first column are aligned left, others right. `marked` rows (by index) stand out.
 [[nodiscard]] std::string table(const std::vector<std::string>& heads,
                                 const std::vector<std::vector<std::string>>& rows,

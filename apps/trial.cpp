@@ -159,14 +159,22 @@ std::unique_ptr<MethodSetup> set_up(const Configuration& configuration, double r
 
 Trial::Trial(gpu::Device& device, Configuration configuration, const DepthNoise& noise, double radius_m,
              FitPlaneOptions preparation)
-    : configuration_(std::move(configuration)), setup_(set_up(configuration_, radius_m)), plain_(setup_->make(device)) {
-    preparation.smoothing *= method_named(configuration_.method).smoothing;
-    if (noise.any())
-        fitted_ = std::make_unique<OnFittedDepth>(device, noise, *plain_, preparation);
+    : device_(device), configuration_(std::move(configuration)), preparation_(preparation),
+      setup_(set_up(configuration_, radius_m)), plain_(setup_->make(device)) {
+    preparation_.smoothing *= method_named(configuration_.method).smoothing;
+    set_noise(noise);
+}
+
+void Trial::set_noise(const DepthNoise& noise) {
+    noisy_ = noise.any();
+    if (noisy_ && fitted_)
+        fitted_->set_noise(noise);
+    else if (noisy_)
+        fitted_ = std::make_unique<OnFittedDepth>(device_, noise, *plain_, preparation_);
 }
 
 cv::Mat1f Trial::compute(const TrialFrame& frame) {
-    Method& method = fitted_ ? static_cast<Method&>(*fitted_) : *plain_;
+    Method& method = noisy_ ? static_cast<Method&>(*fitted_) : *plain_;
     const auto start = std::chrono::steady_clock::now();
     const AoMap ao = method.compute({frame.depth});
     wall_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();

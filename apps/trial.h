@@ -65,7 +65,7 @@ struct TrialRequest {
 /// where none is left.
 [[nodiscard]] TrialCapture load_trial(const std::filesystem::path& path, const TrialRequest& request);
 
-/// One configuration on one device, as `run` would use it on depth of that noise.
+/// One configuration on one device, as `run` would use it on depth of some noise.
 class Trial {
   public:
     /// `radius_m` goes into the method's radius, before the configuration's own settings; the preparation's smoothing
@@ -73,6 +73,8 @@ class Trial {
     Trial(gpu::Device& device, Configuration configuration, const DepthNoise& noise, double radius_m,
           FitPlaneOptions preparation = {});
 
+    /// From now on depth has that noise, or none. Pipelines stay: making them is most of a trial's time.
+    void set_noise(const DepthNoise& noise);
     /// Visibility on the recorded pixels.
     [[nodiscard]] cv::Mat1f compute(const TrialFrame& frame);
 
@@ -84,10 +86,13 @@ class Trial {
     [[nodiscard]] std::vector<Parameter> settings() const { return setup_->parameters(); }
 
   private:
+    gpu::Device& device_;
     Configuration configuration_;
+    FitPlaneOptions preparation_;
     std::unique_ptr<MethodSetup> setup_;
     std::unique_ptr<Method> plain_;
     std::unique_ptr<OnFittedDepth> fitted_;
+    bool noisy_ = false;
     double device_ms_ = 0, wall_ms_ = 0;
 };
 

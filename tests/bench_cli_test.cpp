@@ -265,6 +265,9 @@ TEST_F(MeasureTest, bench_leaves_one_page_with_everything_in_it) {
     ASSERT_EQ(ran.exit_code, 0) << ran.err;
     EXPECT_TRUE(says(ran.out, "cacao high"));
     const std::string html = read_bytes(folder / "out/index.html");
+    const std::string plot = read_bytes(folder / "out/clean.svg"); // stands alone: name space and style of its own
+    EXPECT_TRUE(plot.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\"")) << plot.substr(0, 80);
+    EXPECT_TRUE(says(plot, ".ring {") && says(plot, "Speed against error, clean depth") && says(plot, "</svg>"));
     for (const char* part : {"<svg", "Speed against error", "Error by capture", "distance from depth edges", "range",
                              "angle to the surface", "class=\"ring\"", "data:image/png;base64,", "quality=high"})
         EXPECT_TRUE(html.find(part) != std::string::npos) << part;

@@ -49,8 +49,13 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
 } // namespace
 
 FitPlane::FitPlane(gpu::Device& device, const DepthNoise& noise, const FitPlaneOptions& options)
-    : device_(device), noise_(noise), options_(options) {
+    : device_(device), options_(options) {
+    set_noise(noise);
+}
+
+void FitPlane::set_noise(const DepthNoise& noise) {
     if (!noise.any()) throw Error("a plane fit needs a noise above zero");
+    noise_ = noise;
 }
 
 FittedDepth FitPlane::compute(const DepthImage& depth, std::span<const OtherDepth> others) {

@@ -40,6 +40,8 @@ class FitPlane {
     /// what that leaves of sigma.
     [[nodiscard]] FittedDepth compute(const DepthImage& depth, std::span<const OtherDepth> others = {});
     [[nodiscard]] const DepthNoise& noise() const { return noise_; }
+    /// From now on depth has that noise; throws Error where it is none.
+    void set_noise(const DepthNoise& noise);
     /// Where the time of the last compute() went.
     [[nodiscard]] const Timings& timings() const { return timings_; }
 
@@ -60,6 +62,7 @@ class OnFittedDepth final : public Method {
         : fit_(device, noise, options), method_(method) {}
 
     AoMap compute(const View& view) override;
+    void set_noise(const DepthNoise& noise) { fit_.set_noise(noise); }
     [[nodiscard]] const Timings& timings() const override { return timings_; }
     [[nodiscard]] std::vector<Intermediate> intermediates() override { return method_.intermediates(); }
 
