@@ -22,7 +22,7 @@ class WorkersTest : public testing::TestWithParam<const char*> {
   protected:
     void SetUp() override {
         setenv("SCANSHADE_VALIDATE", "1", 1); // read when a device is opened
-        tests::write_capture(folder / "capture", 12);
+        tests::write_capture(folder / "capture", 6);
     }
     /// The capture's maps by a method at its lowest quality, as many frames at once.
     std::vector<FrameRow> run(int in_flight, const DepthNoise& noise, const fs::path& out) {
