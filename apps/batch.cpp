@@ -50,12 +50,18 @@ void take(Work& work, double StageTimes::*stage, Step&& step) {
     work.row.ms.*stage = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
-Frame load(const Capture& capture, std::size_t index, const std::optional<Registration>& registration) {
+/// Whether anything that is written shows the colour images.
+bool shows_colour(const BatchOptions& options) {
+    const Outputs& outputs = options.outputs;
+    return outputs.shaded || outputs.panel || outputs.depth_cloud || outputs.colour_view || options.cloud;
+}
+
+Frame load(const Capture& capture, std::size_t index, const BatchOptions& options) {
     if (const std::string& problem = capture.entries[index].problem; !problem.empty())
         throw Error(problem);
-    Frame frame = capture.load(index);
-    if (registration)
-        frame.registration = *registration;
+    Frame frame = capture.load(index, shows_colour(options));
+    if (options.registration)
+        frame.registration = *options.registration;
     return frame;
 }
 
@@ -226,7 +232,7 @@ class Pipeline {
         if (!work)
             return work;
         take(*work, &StageTimes::load, [&] {
-            work->frame = load(capture_, work->row.index, options_.registration);
+            work->frame = load(capture_, work->row.index, options_);
             describe_frame(*work);
         });
         if (work->row.status != FrameStatus::failed && work->frame.cloud)

@@ -300,15 +300,21 @@ std::optional<FrameRow> Journal::done(const CaptureEntry& entry, const std::stri
     return record.row;
 }
 
-void Journal::append(const std::string& line) {
+void Journal::append(const std::string& line, Sync sync) {
     // A torn line, which only a full disk or a power cut leaves, ends here.
     const off_t end = ::lseek(handle_, 0, SEEK_END);
     char last = '\n';
     if (end > 0 && ::pread(handle_, &last, 1, end - 1) != 1)
         fail(file_, "cannot be read");
     const std::string whole = (last == '\n' ? "" : "\n") + line + "\n";
-    if (::write(handle_, whole.data(), whole.size()) != static_cast<ssize_t>(whole.size()) || ::fdatasync(handle_) != 0)
+    if (::write(handle_, whole.data(), whole.size()) != static_cast<ssize_t>(whole.size()))
         fail(file_, "cannot be written");
+    const auto now = std::chrono::steady_clock::now();
+    if (sync == Sync::soon && now - synced_ < std::chrono::seconds(1))
+        return;
+    if (::fdatasync(handle_) != 0)
+        fail(file_, "cannot be written");
+    synced_ = now;
 }
 
 void Journal::add(const FrameRow& row, const CaptureEntry& entry, const std::string& settings,
@@ -332,7 +338,7 @@ void Journal::add(const FrameRow& row, const CaptureEntry& entry, const std::str
                     {"stamp", record.stamp},
                     {"input", record.input},
                     {"sizes", record.sizes}};
-    append(line.dump(-1, ' ', false, json::error_handler_t::replace));
+    append(line.dump(-1, ' ', false, json::error_handler_t::replace), Sync::soon);
     facts_.complete.clear();
     facts_.records.insert_or_assign(row.name, std::move(record));
 }

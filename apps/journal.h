@@ -5,6 +5,7 @@
 #include "apps/frame_row.h"
 #include "projection/error.h"
 
+#include <chrono>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -66,7 +67,9 @@ class Journal {
     /// The frame's row if it was made from the same settings and input, and its files lie there in full; a failed row
     /// counts unless its fault was an outage or `retry` asks for all.
     [[nodiscard]] std::optional<FrameRow> done(const CaptureEntry& entry, const std::string& settings, bool retry);
-    /// One line, on the disk when this returns. Skipped frames are not recorded. Throws Outage where it cannot be.
+    /// One line, the kernel's when this returns, so that it outlives the process; the disk has it a second later: a
+    /// frame whose line a power cut takes is done again. Skipped frames are not recorded. Throws Outage where it cannot
+    /// be.
     void add(const FrameRow& row, const CaptureEntry& entry, const std::string& settings, const std::string& device);
     /// Frames that are about to be done again: their records no longer say what lies in their files.
     void forget(const Capture& capture, const std::vector<std::size_t>& frames);
@@ -77,12 +80,14 @@ class Journal {
     [[nodiscard]] const JournalFacts& facts() const { return facts_; }
 
   private:
-    void append(const std::string& line);
+    enum class Sync { now, soon };
+    void append(const std::string& line, Sync sync = Sync::now);
     [[nodiscard]] bool files_are_there(const Record& record) const;
 
     std::filesystem::path folder_, file_;
     int handle_ = -1;
     bool introduced_ = false;
+    std::chrono::steady_clock::time_point synced_; ///< when the disk last had every line
     JournalFacts facts_;
 };
 

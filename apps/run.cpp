@@ -18,6 +18,7 @@
 #include <csignal>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <future>
 #include <opencv2/core/utility.hpp>
 #include <set>
 
@@ -48,6 +49,7 @@ struct Job {
     BatchOptions batch;
     std::vector<std::size_t> of = {}; ///< all that is taken of the capture, of which batch.frames may be a block
     std::string block = {};           ///< "" = all, else as Task::block() says
+    std::shared_future<DepthNoise> noise = {}; ///< measured ahead, where it is
 };
 
 /// "office" of captures/office/ and captures/office.pcd; "office-2" when another capture has that name.
@@ -122,9 +124,11 @@ class Run final : public Command {
         cv::setNumThreads(1); // frames are the parallelism; threads inside a frame would only compete with them
         end_gracefully_on_signals();
         std::vector<FrameRow> rows;
-        for (const Job& job : jobs)
-            if (!interrupted)
-                std::ranges::move(process(job), std::back_inserter(rows));
+        for (std::size_t i = 0; i < jobs.size() && !interrupted; ++i) {
+            if (i + 1 < jobs.size())
+                look_ahead(jobs[i + 1]);
+            std::ranges::move(process(jobs[i]), std::back_inserter(rows));
+        }
         return exit_code(rows, unopened);
     }
 
@@ -250,6 +254,12 @@ class Run final : public Command {
         return *workers_;
     }
 
+    /// Measures a capture's noise while the one before is at work: a GPU may be done with that in no more time.
+    void look_ahead(Job& job) const {
+        if (asked_.depth_noise == "auto" && !is_complete(journal_file(job.batch.outputs.folder, job.block)))
+            job.noise = std::async(std::launch::async, [&job] { return noise_of(job.capture, job.of); });
+    }
+
     std::vector<FrameRow> process(Job job, const Shift& shift = {}) {
         const fs::path& folder = job.batch.outputs.folder;
         Journal journal(folder, job.block);
@@ -276,7 +286,8 @@ class Run final : public Command {
         job.batch.cloud_ao = &of_clouds;
         job.batch.cloud_walk = asked_.cloud_walk();
         say(fmt::format("{} on {}", asked_.method, workers.description()));
-        const DepthNoise noise = noise_of(job.capture, job.of, asked_.depth_noise);
+        const DepthNoise noise =
+            job.noise.valid() ? job.noise.get() : noise_of(job.capture, job.of, asked_.depth_noise);
         const FitPlaneOptions fit = asked_.fit();
         const std::vector<Method*> methods = workers.methods(noise, fit);
         std::optional<Neighbourhood> sequence;

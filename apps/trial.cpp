@@ -93,7 +93,7 @@ DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& fram
     std::vector<DepthImage> images;
     for (const std::size_t place : spread(most, frames.size())) {
         try {
-            const Frame frame = capture.load(frames[place]);
+            const Frame frame = capture.load(frames[place], false);
             if (!frame.cloud || frame.cloud->organised())
                 images.push_back(project(frame));
         } catch (const std::exception&) { // whoever processes the frame says what is wrong with it

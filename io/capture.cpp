@@ -159,7 +159,7 @@ void correct(cv::Mat1f& depth_m, const DepthCorrection& correction) {
     });
 }
 
-void load_depth(const Capture& capture, const CaptureEntry& entry, Frame& frame) {
+void load_depth(const Capture& capture, const CaptureEntry& entry, Frame& frame, bool with_colour) {
     const cv::Mat stored = read_stored_depth(entry.depth);
     frame.depth_m = during(entry.depth.string(), [&] { return depth_in_metres(stored, capture.depth); });
     if (capture.camera) {
@@ -174,7 +174,7 @@ void load_depth(const Capture& capture, const CaptureEntry& entry, Frame& frame)
     frame.warnings.insert(frame.warnings.end(), doubts.begin(), doubts.end());
     correct(frame.depth_m, capture.depth_correction);
     frame.colour_camera = capture.colour_camera;
-    if (!entry.colour.empty())
+    if (with_colour && !entry.colour.empty())
         load_colour(entry.colour, frame);
 }
 
@@ -247,7 +247,7 @@ Capture open_capture(const fs::path& path, const CaptureOptions& options) {
     return std::move(capture);
 }
 
-Frame Capture::load(std::size_t index) const {
+Frame Capture::load(std::size_t index, bool with_colour) const {
     if (index >= entries.size())
         throw Error(fmt::format("{}: frame {} of {}", path.string(), index, entries.size()));
     const CaptureEntry& entry = entries[index];
@@ -258,7 +258,7 @@ Frame Capture::load(std::size_t index) const {
     frame.warnings = entry.warnings;
     frame.world_from_camera = entry.world_from_camera;
     frame.registration = registration;
-    entry.cloud.empty() ? load_depth(*this, entry, frame) : load_cloud(*this, entry, frame);
+    entry.cloud.empty() ? load_depth(*this, entry, frame, with_colour) : load_cloud(*this, entry, frame);
     return frame;
 }
 

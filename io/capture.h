@@ -49,8 +49,8 @@ struct Capture {
     std::vector<std::string> warnings; ///< about the capture as a whole
 
     /// Decodes frame `index`; safe to call from several threads. Throws Error naming file and place; a damaged colour
-    /// image is a warning, not a failure.
-    [[nodiscard]] Frame load(std::size_t index) const;
+    /// image is a warning, not a failure. Without colour, whose decoding takes as long as the depth's, it is not looked at.
+    [[nodiscard]] Frame load(std::size_t index, bool with_colour = true) const;
 };
 
 /// Opens a folder (layout told by its content), a single depth image, or a cloud file.

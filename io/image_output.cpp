@@ -3,6 +3,7 @@
 
 #include "io/image_check.h"
 #include "io/output_file.h"
+#include "io/png_output.h"
 #include "io/text.h"
 #include "projection/error.h"
 
@@ -18,9 +19,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// No compression level: OpenCV then filters with SUB alone at zlib's fastest level, which takes half the time of asking
-// for level 1 (640x480 16-bit AO: 8 ms against 14) at the same size.
-const std::vector<int> fast_png{cv::IMWRITE_PNG_STRATEGY, cv::IMWRITE_PNG_STRATEGY_RLE};
 const std::vector<int> plain_tiff{cv::IMWRITE_TIFF_COMPRESSION, 1};
 // ZIP, the default, takes ten times as long for a tenth of the size.
 const std::vector<int> fast_exr{cv::IMWRITE_EXR_TYPE, cv::IMWRITE_EXR_TYPE_FLOAT, //
@@ -38,6 +36,10 @@ void write_encoded(const fs::path& file, const cv::Mat& image, const std::string
     if (!done)
         throw Error(fmt::format("{}: cannot be encoded as {}", file.string(), extension));
     write_atomically(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
+void write_png(const fs::path& file, const cv::Mat& image) {
+    write_atomically(file, during(file.string(), [&] { return encoded_png(image); }));
 }
 
 /// 0 = no surface, 1 .. largest = visibility 0 .. 1. Plain rows, so that the compiler makes vectors of them.
@@ -79,9 +81,9 @@ std::string extension(AoFormat format) {
 void write_ao(const fs::path& file, const cv::Mat1f& visibility, AoFormat format) {
     switch (format) {
     case AoFormat::png16:
-        return write_encoded(file, as_integers<ushort>(visibility), ".png", fast_png);
+        return write_png(file, as_integers<ushort>(visibility));
     case AoFormat::png8:
-        return write_encoded(file, as_integers<uchar>(visibility), ".png", fast_png);
+        return write_png(file, as_integers<uchar>(visibility));
     case AoFormat::tiff:
         return write_encoded(file, visibility, ".tiff", plain_tiff);
     case AoFormat::exr:
@@ -97,7 +99,7 @@ void write_picture(const fs::path& file, const cv::Mat3b& picture) {
         return write_encoded(file, picture, ".jpg", {cv::IMWRITE_JPEG_QUALITY, 95});
     if (kind != ".png")
         throw Error(file.string() + ": pictures are written as .png, .jpg or .jpeg");
-    write_encoded(file, picture, ".png", fast_png);
+    write_png(file, picture);
 }
 
 void write_depth_png(const fs::path& file, const cv::Mat1f& depth_m, double units_per_metre) {
@@ -107,7 +109,7 @@ void write_depth_png(const fs::path& file, const cv::Mat1f& depth_m, double unit
         const double value = std::round(metres * units_per_metre);
         return value >= 1 && value < 65535 ? static_cast<ushort>(value) : ushort(0);
     });
-    write_encoded(file, image, ".png", fast_png);
+    write_png(file, image);
 }
 
 void write_float_tiff(const fs::path& file, const cv::Mat& image) { write_encoded(file, image, ".tiff", plain_tiff); }

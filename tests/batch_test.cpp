@@ -6,9 +6,14 @@
 #include "projection/error.h"
 #include "tests/support/small_capture.h"
 
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
 #include <gtest/gtest.h>
 #include <limits>
 #include <numeric>
+#include <thread>
 
 namespace scanshade {
 namespace {
@@ -67,7 +72,8 @@ TEST_F(BatchTest, every_frame_gets_its_row_and_files) {
         EXPECT_EQ(row.coverage, 1);
         EXPECT_NEAR(row.mean_visibility, half_open, 1e-6);
         EXPECT_EQ(row.passes.size(), 1u);
-        EXPECT_EQ(row.files.size(), 3u); // ao, confidence and shaded: a depth frame's cloud is written only when asked for
+        EXPECT_EQ(row.files.size(),
+                  3u); // ao, confidence and shaded: a depth frame's cloud is written only when asked for
         for (const fs::path& file : row.files)
             EXPECT_TRUE(fs::exists(folder / "out" / file)) << file;
     }
@@ -150,6 +156,46 @@ TEST_F(BatchTest, bytes_do_not_depend_on_how_many_frames_are_in_flight) {
         for (const fs::path& file : one[i].files)
             EXPECT_EQ(read_bytes(folder / "one" / file), read_bytes(folder / "many" / file)) << file;
     }
+}
+
+/// Frames that are computed at once have a method each, and the order of results is that of the question.
+TEST_F(BatchTest, several_methods_take_a_frame_each_and_rows_keep_their_order) {
+    const Capture recorded = capture(24);
+    std::array<std::atomic<int>, 3> busy{};
+    std::atomic<int> at_once = 0, most = 0;
+    std::vector<HalfOpen> crew;
+    for (std::atomic<int>& own : busy)
+        crew.emplace_back([&](int) {
+            EXPECT_EQ(own++, 0) << "a method computes one frame at a time";
+            most = std::max(most.load(), ++at_once);
+            std::this_thread::sleep_for(std::chrono::milliseconds(20));
+            --at_once;
+            --own;
+        });
+    const std::array<Method*, 3> methods{&crew[0], &crew[1], &crew[2]};
+    std::vector<std::size_t> told;
+    BatchOptions options = all_frames(recorded, folder / "out");
+    options.outputs.shaded = options.outputs.confidence = false;
+    const auto rows = run_batch(recorded, methods, options, [&](const FrameRow& row) { told.push_back(row.index); });
+    EXPECT_EQ(count(rows, FrameStatus::ok), 24u);
+    EXPECT_EQ(told, options.frames);
+    EXPECT_GT(most, 1) << "one waits for its device while another begins";
+}
+
+TEST_F(BatchTest, one_lost_device_of_three_ends_the_run) {
+    const Capture recorded = capture(24);
+    HalfOpen sound, as_sound, lost([](int call) {
+        if (call == 1)
+            throw DeviceLost("the device is lost");
+    });
+    const std::array<Method*, 3> methods{&sound, &lost, &as_sound};
+    BatchOptions options = all_frames(recorded, folder / "out");
+    options.frames_in_memory = 4;
+    const auto rows = run_batch(recorded, methods, options);
+    ASSERT_EQ(rows.size(), 24u);
+    EXPECT_EQ(std::ranges::count(rows, Fault::outage, &FrameRow::fault), 1);
+    EXPECT_GT(count(rows, FrameStatus::skipped), 1u) << "those after it are not begun";
+    EXPECT_EQ(count(rows, FrameStatus::failed), 0u) << "no frame is to blame";
 }
 
 TEST_F(BatchTest, holes_have_no_visibility_and_surfaces_have_it) {

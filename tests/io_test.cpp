@@ -4,6 +4,8 @@
 #include "io/exif.h"
 #include "io/image_file.h"
 #include "io/output_file.h"
+#include "io/png_output.h"
+#include "projection/error.h"
 #include "tests/support/files.h"
 
 #include <array>
@@ -773,6 +775,26 @@ TEST(captures, a_wrong_depth_scale_is_doubted_with_the_alternatives) {
     CaptureOptions right;
     right.depth_scale = "tum";
     EXPECT_FALSE(warned(open_capture(folder / "d.png", right).load(0).warnings, "implausible"));
+}
+
+/// Decoded by a library that had no part in writing it.
+TEST(images, our_pngs_come_back_bit_by_bit) {
+    cv::theRNG().state = 9;
+    for (const int type : {CV_8UC1, CV_16UC1, CV_8UC3, CV_16UC3})
+        for (const cv::Size size : {cv::Size(1, 1), cv::Size(13, 7), cv::Size(641, 479)}) {
+            cv::Mat image(size, type);
+            cv::randu(image, cv::Scalar::all(0), cv::Scalar::all(image.depth() == CV_8U ? 256 : 65536));
+            const std::string bytes = encoded_png(image);
+            const cv::Mat view(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
+            const cv::Mat back = cv::imdecode(view, cv::IMREAD_UNCHANGED);
+            ASSERT_EQ(back.type(), type);
+            ASSERT_EQ(back.size(), size);
+            EXPECT_EQ(cv::norm(back, image, cv::NORM_INF), 0);
+            const cv::Mat inner = image(cv::Rect(0, 0, (size.width + 1) / 2, size.height)); // rows lie apart in memory
+            EXPECT_EQ(encoded_png(inner), encoded_png(inner.clone()));
+        }
+    EXPECT_THROW((void)encoded_png(cv::Mat1f(4, 4, 0.5F)), Error);
+    EXPECT_THROW((void)encoded_png(cv::Mat()), Error);
 }
 
 TEST(captures, noise_in_place_of_surfaces_is_doubted) {
