@@ -340,7 +340,7 @@ void Journal::add(const FrameRow& row, const CaptureEntry& entry, const std::str
                     {"sizes", record.sizes}};
     append(line.dump(-1, ' ', false, json::error_handler_t::replace), Sync::soon);
     facts_.complete.clear();
-    facts_.records.insert_or_assign(row.name, std::move(record));
+    facts_.records.erase(row.name); // its line says it; thousands of them would be what a run takes memory for
 }
 
 void Journal::forget(const Capture& capture, const std::vector<std::size_t>& frames) {
