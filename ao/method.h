@@ -34,6 +34,12 @@ struct Neighbour {
     double misfit_m = 0;               ///< by which the surfaces of both lie apart where they should not
 };
 
+/// Depth and normals that are on the device already.
+struct PreparedSurfaces {
+    std::shared_ptr<const gpu::DeviceBytes> z_m;     ///< a 32-bit float a pixel, metres, 0 = hole
+    std::shared_ptr<const gpu::DeviceBytes> normals; ///< three a pixel, (0, 0, 0) where there is none
+};
+
 /// What a method looks at. Normals are optional: without them the method derives its own from depth.
 struct View {
     const DepthImage& depth;
@@ -41,6 +47,7 @@ struct View {
     DepthNoise noise = {}; ///< sigma(z) of `depth` as recorded; none = clean. Methods may widen their tolerances by it
     bool smoothed = false; ///< the noise is gone from within surfaces; at their edges it is not
     std::span<const Neighbour> neighbours = {}; ///< of the same image size; most methods have no use for them
+    const PreparedSurfaces* prepared = nullptr; ///< in place of depth.z_m and normals, for methods that take them
     int instant = 0; ///< another number, another pattern of samples, so that frames of a recording can be averaged
 };
 
@@ -63,6 +70,8 @@ class Method {
     virtual AoMap compute(const View& view) = 0;
     /// Whether View::neighbours make a difference.
     [[nodiscard]] virtual bool looks_at_neighbours() const { return false; }
+    /// Whether it reads View::prepared where there is one: then nothing goes by the host.
+    [[nodiscard]] virtual bool takes_prepared() const { return false; }
     /// Where the time of the last compute() went.
     [[nodiscard]] virtual const Timings& timings() const = 0;
     /// What lay between the passes of the last compute(), for study; most methods have nothing to show.

@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <malloc.h>
 
 namespace scanshade {
 namespace {
@@ -147,6 +148,10 @@ int execute(const std::vector<std::string>& arguments) {
 
 int main(int count, char** words) {
     using namespace scanshade;
+    // Images come and go by the megabyte: what one frame gives back the next one takes. By default each would ask the system for
+    // fresh pages, which costs more than most of what is done with them.
+    mallopt(M_MMAP_THRESHOLD, 32 << 20);
+    mallopt(M_TRIM_THRESHOLD, 1 << 30);
     const std::vector<std::string> arguments(words + std::min(count, 1), words + count);
     try {
         return execute(arguments);

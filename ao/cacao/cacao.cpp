@@ -298,7 +298,7 @@ Cacao::Cacao(gpu::Device& device, CacaoOptions options) : device_(device), optio
 
 void Cacao::prepare(const View& view) {
     const Pinhole& camera = view.depth.camera;
-    const bool supplied = view.normals != nullptr;
+    const bool supplied = view.normals || view.prepared;
     if (program_ && supplied == normals_supplied_ && camera.size == camera_.size) {
         if (std::memcmp(&camera, &camera_, sizeof camera) == 0) return;
     } else {
@@ -320,11 +320,15 @@ AoMap Cacao::compute(const View& view) {
     if (view.normals && view.normals->normals.size() != z.size()) throw Error("normals and depth differ in size");
     prepare(view);
     const auto start = std::chrono::steady_clock::now();
-    if (options_.scan() && options_.depth_input == "metric")
+    if (view.prepared) {
+        program_->take(cacao_depth_in, 0, view.prepared->z_m);
+        program_->take(cacao_normals_in, 0, view.prepared->normals);
+    } else if (options_.scan() && options_.depth_input == "metric") {
         gpu::upload_depth(z, program_->host_as<float>(cacao_depth_in));
-    else
+    } else {
         gpu::upload(z, program_->host(cacao_depth_in));
-    if (view.normals) gpu::upload(view.normals->normals, program_->host(cacao_normals_in));
+    }
+    if (view.normals && !view.prepared) gpu::upload(view.normals->normals, program_->host(cacao_normals_in));
     const auto uploaded = std::chrono::steady_clock::now();
     program_->run(std::as_bytes(std::span(&constants_, 1)));
     const auto ran = std::chrono::steady_clock::now();

@@ -49,7 +49,7 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
 } // namespace
 
 FitPlane::FitPlane(gpu::Device& device, const DepthNoise& noise, const FitPlaneOptions& options)
-    : device_(device), options_(options) {
+    : device_(device), pool_(device), options_(options) {
     set_noise(noise);
 }
 
@@ -58,39 +58,54 @@ void FitPlane::set_noise(const DepthNoise& noise) {
     noise_ = noise;
 }
 
-FittedDepth FitPlane::compute(const DepthImage& depth, std::span<const OtherDepth> others) {
+void FitPlane::prepare(const DepthImage& depth, std::span<const OtherDepth> others) {
     const cv::Size size = depth.z_m.size();
-    const bool planes = options_.smoothing > 0, fuse = planes && !others.empty();
+    const bool fuse = planes() && !others.empty();
     if (others.size() > shared::most_neighbours)
         throw Error(fmt::format("{} other frames, {} are the most", others.size(), shared::most_neighbours));
-    if (!program_ || size != size_ || fuse != fused_) program_ = program_for(device_, size, planes, fuse);
+    if (!program_ || size != size_ || fuse != fused_) program_ = program_for(device_, size, planes(), fuse);
     size_ = size;
     fused_ = fuse;
     const shared::Pinhole camera = depth.camera.on_gpu();
     const double window = window_scale * noise_.grain_px * noise_.grain_px * options_.smoothing * options_.smoothing;
-    shared::FitPlaneConstants constants{{size.width, size.height},
-                                              camera.fx,
-                                              camera.fy,
-                                              camera.cx,
-                                              camera.cy,
-                                              static_cast<float>(noise_.floor_m),
-                                              static_cast<float>(noise_.per_z2),
-                                              static_cast<float>(window),
-                                              static_cast<float>(options_.largest_radius_px),
-                                              options_.drop_flying ? 1 : 0,
-                                              fuse ? static_cast<int>(others.size()) : 0,
-                                              {}};
+    constants_ = {{size.width, size.height},
+                  camera.fx,
+                  camera.fy,
+                  camera.cx,
+                  camera.cy,
+                  static_cast<float>(noise_.floor_m),
+                  static_cast<float>(noise_.per_z2),
+                  static_cast<float>(window),
+                  static_cast<float>(options_.largest_radius_px),
+                  options_.drop_flying ? 1 : 0,
+                  fuse ? static_cast<int>(others.size()) : 0,
+                  {}};
     for (std::size_t i = 0; fuse && i < others.size(); ++i) {
         if (others[i].camera.size != size) throw Error("another frame of another image size");
-        constants.places[i] = gpu::place_of(others[i].camera, others[i].here_from_there);
+        constants_.places[i] = gpu::place_of(others[i].camera, others[i].here_from_there);
         program_->take(others_in, i * others[i].z_m->size(), others[i].z_m);
     }
-    const cv::Mat1f& z = depth.z_m;
-    gpu::upload_depth(z, program_->host_as<float>(recorded));
-    program_->run(std::as_bytes(std::span(&constants, 1)));
+    gpu::upload_depth(depth.z_m, program_->host_as<float>(recorded));
+}
+
+PreparedSurfaces FitPlane::compute_on_device(const DepthImage& depth) {
+    prepare(depth, {});
+    const std::shared_ptr<gpu::DeviceBytes> z_m = pool_.get(depth.z_m.total() * 4), normals = pool_.get(depth.z_m.total() * 12);
+    program_->give(depth_out, z_m);
+    program_->give(normals_out, normals);
+    program_->run(std::as_bytes(std::span(&constants_, 1)), gpu::Program::Results::on_device);
     timings_ = program_->timings();
+    return {z_m, normals};
+}
+
+FittedDepth FitPlane::compute(const DepthImage& depth, std::span<const OtherDepth> others) {
+    prepare(depth, others);
+    program_->run(std::as_bytes(std::span(&constants_, 1)));
+    timings_ = program_->timings();
+    const cv::Mat1f& z = depth.z_m;
+    const cv::Size size = z.size();
     FittedDepth fitted{{depth.camera, {}, depth.source}, {}};
-    if (!planes) {
+    if (!planes()) {
         fitted.depth.z_m.create(size);
         const auto inverse = program_->host_as<float>(kept);
         std::transform(z.begin(), z.end(), inverse.begin(), fitted.depth.z_m.begin(), [](float z_m, float w) { return w > 0 ? z_m : 0; });
@@ -103,10 +118,15 @@ FittedDepth FitPlane::compute(const DepthImage& depth, std::span<const OtherDept
 }
 
 AoMap OnFittedDepth::compute(const View& view) {
-    const FittedDepth fitted = fit_.compute(view.depth);
-    const bool planes = !fitted.normals.normals.empty();
-    const NormalImage* normals = view.normals || !planes ? view.normals : &fitted.normals;
-    AoMap ao = method_.compute({fitted.depth, normals, fit_.noise(), planes});
+    AoMap ao;
+    if (fit_.planes() && !view.normals && method_.takes_prepared()) {
+        const PreparedSurfaces prepared = fit_.compute_on_device(view.depth);
+        ao = method_.compute({.depth = view.depth, .noise = fit_.noise(), .smoothed = true, .prepared = &prepared});
+    } else {
+        const FittedDepth fitted = fit_.compute(view.depth);
+        const bool planes = !fitted.normals.normals.empty();
+        ao = method_.compute({fitted.depth, view.normals || !planes ? view.normals : &fitted.normals, fit_.noise(), planes});
+    }
     timings_ = fit_.timings();
     timings_.insert(timings_.end(), method_.timings().begin(), method_.timings().end());
     return ao;

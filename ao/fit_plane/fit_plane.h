@@ -5,6 +5,7 @@
 #include "ao/gpu/program.h"
 #include "ao/method.h"
 #include "projection/noise.h"
+#include "shaders/shared/fit_plane.h"
 
 #include <memory>
 
@@ -39,6 +40,10 @@ class FitPlane {
     /// With others, each pixel's depth is first averaged with what they saw of its surface, and the windows shrink with
     /// what that leaves of sigma.
     [[nodiscard]] FittedDepth compute(const DepthImage& depth, std::span<const OtherDepth> others = {});
+    /// The same of one frame, left on the device; planes() must hold.
+    [[nodiscard]] PreparedSurfaces compute_on_device(const DepthImage& depth);
+    /// Whether depth and normals come from planes, and not depth alone, without flying pixels.
+    [[nodiscard]] bool planes() const { return options_.smoothing > 0; }
     [[nodiscard]] const DepthNoise& noise() const { return noise_; }
     /// From now on depth has that noise; throws Error where it is none.
     void set_noise(const DepthNoise& noise);
@@ -46,11 +51,16 @@ class FitPlane {
     [[nodiscard]] const Timings& timings() const { return timings_; }
 
   private:
+    /// Uploads what is to be fitted.
+    void prepare(const DepthImage& depth, std::span<const OtherDepth> others);
+
     gpu::Device& device_;
+    gpu::DeviceBytesPool pool_;
     DepthNoise noise_;
     FitPlaneOptions options_;
     cv::Size size_;
     bool fused_ = false;
+    shared::FitPlaneConstants constants_ = {};
     std::unique_ptr<gpu::Program> program_;
     Timings timings_;
 };

@@ -151,7 +151,9 @@ struct Program::State {
     std::vector<std::string> intervals; // what lies between one time stamp and the next
     vk::raii::QueryPool queries = nullptr;
     vk::raii::Fence fence = nullptr;
-    vk::raii::CommandBuffer commands = nullptr, before = nullptr, after = nullptr; // the latter two: copies of the next run
+    // A run submits them in this order: begin, taken, uploads, commands, download, given, end.
+    vk::raii::CommandBuffer begin = nullptr, taking = nullptr, commands = nullptr, download = nullptr, giving = nullptr, end = nullptr;
+    std::vector<vk::raii::CommandBuffer> uploads; // per row; null where there is nothing to upload
     struct Copy {
         int buffer;
         std::size_t offset;
@@ -260,24 +262,32 @@ struct Program::State {
         commands.pushDescriptorSetKHR(vk::PipelineBindPoint::eCompute, *pipeline.layout, 0, writes);
     }
 
-    void stamp(std::uint32_t query) {
-        if (gpu.has_timestamps) commands.writeTimestamp2(Stage::eAllCommands, *queries, query);
+    void stamp(const vk::raii::CommandBuffer& into, std::uint32_t query) {
+        if (gpu.has_timestamps) into.writeTimestamp2(Stage::eAllCommands, *queries, query);
     }
 
-    void record_transfers(BufferRow::Host side) {
-        bool any = false;
-        for (std::size_t i = 0; i < rows.size(); ++i) {
-            if (rows[i].host != side || staging[i].bytes == 0) continue;
-            const bool upload = side == BufferRow::Host::upload;
-            if (!upload && !any) compute_barrier(commands);
-            commands.copyBuffer(upload ? *staging[i].buffer : *buffers[i].buffer, upload ? *buffers[i].buffer : *staging[i].buffer,
-                                vk::BufferCopy(0, 0, rows[i].bytes));
-            any = true;
-        }
-        if (any && side == BufferRow::Host::upload) compute_barrier(commands);
+    vk::raii::CommandBuffer new_commands() {
+        return std::move(gpu.device.allocateCommandBuffers({*pool, vk::CommandBufferLevel::ePrimary, 1}).front());
     }
 
-    /// The command buffer is the same every frame, so it is recorded once.
+    void record_upload(std::size_t row) {
+        uploads[row] = new_commands();
+        uploads[row].begin(vk::CommandBufferBeginInfo{});
+        uploads[row].copyBuffer(*staging[row].buffer, *buffers[row].buffer, vk::BufferCopy(0, 0, rows[row].bytes));
+        uploads[row].end();
+    }
+
+    void record_downloads() {
+        download = new_commands();
+        download.begin(vk::CommandBufferBeginInfo{});
+        compute_barrier(download);
+        for (std::size_t i = 0; i < rows.size(); ++i)
+            if (rows[i].host == BufferRow::Host::download && staging[i].bytes > 0)
+                download.copyBuffer(*buffers[i].buffer, *staging[i].buffer, vk::BufferCopy(0, 0, rows[i].bytes));
+        download.end();
+    }
+
+    /// The command buffers are the same every frame, so they are recorded once.
     void record() {
         intervals = {"upload"};
         if (stamps == Stamps::total) intervals.emplace_back("passes");
@@ -286,13 +296,22 @@ struct Program::State {
         const auto count = static_cast<std::uint32_t>(intervals.size() + 1);
         queries = gpu.device.createQueryPool({{}, vk::QueryType::eTimestamp, count});
         fence = gpu.device.createFence({});
-        commands = std::move(gpu.device.allocateCommandBuffers({*pool, vk::CommandBufferLevel::ePrimary, 1}).front());
-        commands.begin(vk::CommandBufferBeginInfo{});
-        if (gpu.has_timestamps) commands.resetQueryPool(*queries, 0, count);
+        uploads.reserve(rows.size());
+        for (std::size_t i = 0; i < rows.size(); ++i) {
+            uploads.emplace_back(nullptr);
+            if (rows[i].host == BufferRow::Host::upload && staging[i].bytes > 0) record_upload(i);
+        }
+        record_downloads();
         std::uint32_t query = 0;
-        stamp(query++);
-        record_transfers(BufferRow::Host::upload);
-        stamp(query++);
+        begin = new_commands();
+        begin.begin(vk::CommandBufferBeginInfo{});
+        if (gpu.has_timestamps) begin.resetQueryPool(*queries, 0, count);
+        stamp(begin, query++);
+        begin.end();
+        commands = new_commands();
+        commands.begin(vk::CommandBufferBeginInfo{});
+        compute_barrier(commands);
+        stamp(commands, query++);
         Hazards hazards(rows.size());
         for (std::size_t i = 0; i < passes.size(); ++i) {
             const PassRow& pass = passes[i];
@@ -308,13 +327,15 @@ struct Program::State {
                 push_descriptors(pass, pipelines[i]);
                 commands.dispatch(pass.groups[0], pass.groups[1], pass.groups[2]);
             }
-            if (stamps == Stamps::passes) stamp(query++);
+            if (stamps == Stamps::passes) stamp(commands, query++);
         }
-        if (stamps == Stamps::total) stamp(query++);
-        record_transfers(BufferRow::Host::download);
-        barrier(commands, Stage::eHost, Access::eHostRead);
-        stamp(query++);
+        if (stamps == Stamps::total) stamp(commands, query++);
         commands.end();
+        end = new_commands();
+        end.begin(vk::CommandBufferBeginInfo{});
+        barrier(end, Stage::eHost, Access::eHostRead);
+        stamp(end, query++);
+        end.end();
     }
 
     /// Images stay in the general layout from here on.
@@ -341,7 +362,7 @@ struct Program::State {
     }
 
     void fill_buffers() {
-        const auto once = std::move(gpu.device.allocateCommandBuffers({*pool, vk::CommandBufferLevel::ePrimary, 1}).front());
+        const auto once = new_commands();
         once.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
         for (std::size_t i = 0; i < rows.size(); ++i) {
             if (is_image(static_cast<int>(i)))
@@ -359,7 +380,7 @@ struct Program::State {
     /// What is taken before a run or given after it; null where there is nothing.
     vk::CommandBuffer record_copies(vk::raii::CommandBuffer& into, std::vector<Copy>& copies, bool in) {
         if (copies.empty()) return nullptr;
-        if (!*into) into = std::move(gpu.device.allocateCommandBuffers({*pool, vk::CommandBufferLevel::ePrimary, 1}).front());
+        if (!*into) into = new_commands();
         into.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
         compute_barrier(into);
         for (const auto& [buffer, offset, bytes] : copies) {
@@ -371,7 +392,18 @@ struct Program::State {
         return *into;
     }
 
-    void submit(std::initializer_list<vk::CommandBuffer> recorded) {
+    /// Everything of one run.
+    std::vector<vk::CommandBuffer> all_commands(Results results) {
+        std::vector<vk::CommandBuffer> all{*begin, record_copies(taking, taken, true)};
+        for (std::size_t i = 0; i < rows.size(); ++i)
+            if (std::ranges::none_of(taken, [&](const Copy& copy) { return copy.buffer == static_cast<int>(i); })) all.push_back(*uploads[i]);
+        all.push_back(*commands);
+        if (results == Results::on_host) all.push_back(*download);
+        all.insert(all.end(), {record_copies(giving, given, false), *end});
+        return all;
+    }
+
+    void submit(const std::vector<vk::CommandBuffer>& recorded) {
         std::vector<vk::CommandBufferSubmitInfo> infos;
         for (const vk::CommandBuffer each : recorded)
             if (each) infos.emplace_back(each);
@@ -414,7 +446,9 @@ std::span<std::byte> Program::host(int buffer) {
 
 void Program::take(int buffer, std::size_t offset, std::shared_ptr<const DeviceBytes> from) {
     const BufferRow& row = state_->rows.at(buffer);
-    if (row.host != BufferRow::Host::taken || offset + from->size() > row.bytes)
+    const bool fits = row.host == BufferRow::Host::taken ? offset + from->size() <= row.bytes
+                                                         : row.host == BufferRow::Host::upload && offset == 0 && from->size() == row.bytes;
+    if (!fits)
         throw Error(fmt::format("{} bytes at {} do not go into buffer {}", from->size(), offset, row.name));
     state_->taken.push_back({buffer, offset, std::move(from)});
 }
@@ -426,12 +460,10 @@ void Program::give(int buffer, std::shared_ptr<DeviceBytes> to) {
     state_->given.push_back({buffer, 0, std::move(to)});
 }
 
-void Program::run(std::span<const std::byte> constants) {
+void Program::run(std::span<const std::byte> constants, Results results) {
     State& s = *state_;
     std::memcpy(s.constants.mapped, constants.data(), std::min(constants.size(), s.constants.bytes));
-    during(s.gpu.info.name, [&] {
-        s.submit({s.record_copies(s.before, s.taken, true), *s.commands, s.record_copies(s.after, s.given, false)});
-    });
+    during(s.gpu.info.name, [&] { s.submit(s.all_commands(results)); });
     s.taken.clear();
     s.given.clear();
     timings_.clear();
@@ -448,7 +480,7 @@ std::vector<std::byte> Program::read_back(int buffer) {
     State& s = *state_;
     const std::size_t bytes = s.rows.at(static_cast<std::size_t>(buffer)).bytes;
     BoundBuffer copy(s.gpu, bytes, vk::BufferUsageFlagBits::eTransferDst, {Memory::eHostVisible | Memory::eHostCoherent});
-    const auto commands = std::move(s.gpu.device.allocateCommandBuffers({*s.pool, vk::CommandBufferLevel::ePrimary, 1}).front());
+    const auto commands = s.new_commands();
     commands.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
     compute_barrier(commands);
     s.copy_out(commands, buffer, *copy.buffer);

@@ -20,7 +20,7 @@ namespace scanshade::gpu {
 /// A buffer (or image) of the program, zero to begin with. Host buffers can be reached by Program::host() before (upload) or after
 /// (download) a run; Program::take() fills the others that are no pass's result.
 struct BufferRow {
-    enum class Host { none, upload, download, taken };
+    enum class Host { none, upload, download, taken }; // what is uploaded may be taken, too
     std::string_view name;
     std::size_t bytes = 0;
     Host host = Host::none;
@@ -76,13 +76,15 @@ class Program {
         return {reinterpret_cast<T*>(bytes.data()), bytes.size() / sizeof(T)};
     }
 
-    /// Copies on the device, as part of the next run and of no other: `from` into a `taken` buffer from byte `offset` on, before the
-    /// passes; a buffer's first bytes into `to`, after them.
+    /// Copies on the device, as part of the next run and of no other: `from` into a `taken` buffer from byte `offset` on, or into an
+    /// upload buffer instead of what the host has written there, before the passes; a buffer's first bytes into `to`, after them.
     void take(int buffer, std::size_t offset, std::shared_ptr<const DeviceBytes> from);
     void give(int buffer, std::shared_ptr<DeviceBytes> to);
 
-    /// Uploads, runs all passes, downloads; returns when the results are on the host. Throws Error on device loss.
-    void run(std::span<const std::byte> constants);
+    /// Uploads, runs all passes, downloads, unless the results are wanted on the device alone; returns when all is done. Throws Error
+    /// on device loss.
+    enum class Results { on_host, on_device };
+    void run(std::span<const std::byte> constants, Results results = Results::on_host);
 
     /// Device milliseconds of the last run: "upload", each pass by name, "download".
     [[nodiscard]] const std::vector<std::pair<std::string, double>>& timings() const { return timings_; }

@@ -16,6 +16,8 @@ void refuse_odd_sizes(const View& view) {
     if (depth.empty() || depth != camera)
         throw Error(fmt::format("depth image of {}x{} with a camera of {}x{}", depth.width, depth.height, camera.width,
                                 camera.height));
+    if (view.prepared && !view.neighbours.empty())
+        throw Error("surfaces prepared on the device have no room for a guard band");
     if (view.normals && view.normals->normals.size() != depth)
         throw Error(fmt::format("normals of {}x{} for a depth image of {}x{}", view.normals->normals.cols,
                                 view.normals->normals.rows, depth.width, depth.height));
@@ -166,7 +168,7 @@ gpu::Program& ScreenMethod::program_for(const Shape& shape, std::size_t constant
 AoMap ScreenMethod::compute(const View& view) {
     refuse_odd_sizes(view);
     const cv::Size size = view.depth.z_m.size();
-    const bool supplied = view.normals != nullptr;
+    const bool supplied = view.normals || view.prepared;
     const auto neighbours = looks_at_neighbours() ? checked_neighbours(view) : std::span<const Neighbour>{};
     const int most = neighbours.empty() ? 0 : (static_cast<int>(neighbours.size()) + 3) / 4 * 4;
     const int guard = most > 0 ? guard_px(size) : 0;
@@ -183,8 +185,13 @@ AoMap ScreenMethod::compute(const View& view) {
     const auto start = std::chrono::steady_clock::now();
     const cv::Rect window({guard, guard}, size);
     const cv::Size image(screen.size.x, screen.size.y);
-    gpu::upload_depth(view.depth.z_m, gpu::image_on<float>(program.host(screen_depth), image)(window));
-    if (supplied)
+    if (view.prepared) {
+        program.take(screen_depth, 0, view.prepared->z_m);
+        program.take(screen_given, 0, view.prepared->normals);
+    } else {
+        gpu::upload_depth(view.depth.z_m, gpu::image_on<float>(program.host(screen_depth), image)(window));
+    }
+    if (view.normals && !view.prepared)
         view.normals->normals.copyTo(gpu::image_on<cv::Vec3f>(program.host(screen_given), image)(window));
     for (std::size_t i = 0; const Neighbour& other : neighbours)
         program.take(screen_neighbours, i++ * other.surfaces->words->size(), other.surfaces->words);

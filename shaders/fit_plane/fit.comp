@@ -41,7 +41,7 @@ void main() {
     vec3 n = -vec3(k.fx * plane.a, k.fy * plane.b, w_principal);
     n *= inversesqrt(max(dot(n, n), 1e-30));
     bool near = abs(plane.c) < 3.0 * sigma; // within the tolerance of what lies there
-    good = good && near && w_here > 0.0 && !hole;
+    good = good && near && w_here > 1e-6 && !hole; // a kilometre of kilometres
     imageStore(depth_out, here, vec4(hole ? 0.0 : good ? 1.0 / w_here : zc));
     n = good ? n : vec3(0.0);
     imageStore(normals_out, 3 * here, vec4(n.x));
