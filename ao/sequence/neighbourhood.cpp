@@ -122,11 +122,18 @@ View Neighbourhood::view_of(std::size_t place) {
     return {slot.fitted->depth, planes ? &slot.fitted->normals : nullptr, noise_, planes};
 }
 
+/// A frame's normals are asked for twice: to pack them, and to look from them.
+void Neighbourhood::let_go(Slot& slot) {
+    if (slot.fitted && slot.packed && slot.ao)
+        slot.fitted->normals = {};
+}
+
 const PackedSurfaces& Neighbourhood::packed(std::size_t place) {
     Slot& slot = slots_.at(place);
     if (!slot.packed) {
         slot.packed = pack_.compute(view_of(place));
         account("pack", pack_.timings());
+        let_go(slot);
     }
     return *slot.packed;
 }
@@ -248,6 +255,7 @@ const AoMap& Neighbourhood::visibility(std::size_t place) {
     view.neighbours = neighbours;
     view.instant = options_.average > 0 ? static_cast<int>(place % 65536) : 0; // so that what is averaged differs
     slot.ao = method_.compute(view);
+    let_go(slot);
     timings_.insert(timings_.end(), method_.timings().begin(), method_.timings().end());
     return *slot.ao;
 }

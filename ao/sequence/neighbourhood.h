@@ -104,6 +104,7 @@ class Neighbourhood {
     [[nodiscard]] const DepthImage& kept(Slot& slot);
     [[nodiscard]] const Facets& facets(Slot& slot);
     [[nodiscard]] View view_of(std::size_t place);
+    static void let_go(Slot& slot);
     [[nodiscard]] const PackedSurfaces& packed(std::size_t place);
     [[nodiscard]] const AoMap& visibility(std::size_t place);
     [[nodiscard]] Seen seen(std::size_t place);
