@@ -175,7 +175,8 @@ Rates rates_of(const RunReport& report) {
     rates.device_busy = could_ms > 0 ? report.ms_now.compute / could_ms : 0;
     double least = std::numeric_limits<double>::infinity();
     const auto stage = [&](const char* name, double StageTimes::*ms, int at_once) {
-        const double rate = report.ms_now.*ms > 0 && done > 0 ? done * 1000 * at_once / report.ms_now.*ms : std::nan("");
+        const double rate =
+            report.ms_now.*ms > 0 && done > 0 ? done * 1000 * at_once / report.ms_now.*ms : std::nan("");
         rates.stage.*ms = rate;
         if (rate < least) {
             least = rate;
