@@ -63,6 +63,8 @@ void FitPlane::prepare(const DepthImage& depth, std::span<const OtherDepth> othe
     const bool fuse = planes() && !others.empty();
     if (others.size() > shared::most_neighbours)
         throw Error(fmt::format("{} other frames, {} are the most", others.size(), shared::most_neighbours));
+    for (const OtherDepth& other : others) // before any is taken: a run that fails must leave nothing to the next
+        if (other.camera.size != size) throw Error("another frame of another image size");
     if (!program_ || size != size_ || fuse != fused_) program_ = program_for(device_, size, planes(), fuse);
     size_ = size;
     fused_ = fuse;
@@ -81,7 +83,6 @@ void FitPlane::prepare(const DepthImage& depth, std::span<const OtherDepth> othe
                   fuse ? static_cast<int>(others.size()) : 0,
                   {}};
     for (std::size_t i = 0; fuse && i < others.size(); ++i) {
-        if (others[i].camera.size != size) throw Error("another frame of another image size");
         constants_.places[i] = gpu::place_of(others[i].camera, others[i].here_from_there);
         program_->take(others_in, i * others[i].z_m->size(), others[i].z_m);
     }

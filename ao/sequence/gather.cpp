@@ -35,6 +35,9 @@ AoMap Gather::compute(const Seen& own, std::span<const Seen> others, const Gathe
     const cv::Size size = own.surfaces->camera.size;
     if (others.size() > shared::most_gathered)
         throw Error(fmt::format("{} frames to average, {} are the most", others.size(), shared::most_gathered));
+    for (const Seen& other : others) // before any is taken: a run that fails must leave nothing to the next
+        if (other.surfaces->camera.size != size)
+            throw Error("a frame of another image size");
     if (!program_ || size != size_ || others.size() > most_) {
         most_ = std::max(others.size(), std::size_t{1});
         program_ = program_for(device_, size, most_);
@@ -55,8 +58,6 @@ AoMap Gather::compute(const Seen& own, std::span<const Seen> others, const Gathe
     program_->take(own_visibility, 0, own.visibility);
     for (std::size_t i = 0; i < others.size(); ++i) {
         const Seen& other = others[i];
-        if (other.surfaces->camera.size != size)
-            throw Error("a frame of another image size");
         constants.places[i] = gpu::place_of(other.surfaces->camera, other.here_from_there);
         constants.shares[i] = other.share;
         program_->take(surfaces, i * pixels * 8, other.surfaces->words);

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <tbb/parallel_for_each.h>
+#include <tbb/task_arena.h>
 
 namespace scanshade {
 
@@ -26,8 +27,8 @@ std::vector<Parameter> NeighbourhoodOptions::parameters() {
     return {{"fuse", "frames around each that noisy depth is averaged with; 0 = none", &fuse, "", 0, 16},
             {"layers", "other views whose surfaces occlude what a frame shows (surfel); 0 = none", &layers, "", 0, 16},
             {"reach",
-             "how many frames away those may be; 0 = so many as the camera takes to move by the radius, 4 to 30", &reach,
-             "frames", 0, 1000},
+             "how many frames away those may be; 0 = so many as the camera takes to move by the radius, 4 to 30",
+             &reach, "frames", 0, 1000},
             {"average", "frames around each whose visibility is averaged with its own; 0 = none", &average, "", 0, 64},
             {"blend",
              "mean of frames before and after; exponential: of frames before, each a 29/30 of the next younger one",
@@ -96,7 +97,7 @@ const Facets& Neighbourhood::facets(Slot& slot) {
     if (!slot.facets) {
         const DepthImage& depth = fit_ ? kept(slot) : slot.depth;
         const auto start = std::chrono::steady_clock::now();
-        slot.facets = facets_of(depth, noise_);
+        tbb::this_task_arena::isolate([&] { slot.facets = facets_of(depth, noise_); });
         timings_.emplace_back("facets", ms_since(start));
     }
     return *slot.facets;
@@ -172,7 +173,10 @@ void Neighbourhood::meet(std::size_t place, std::span<const std::size_t> others)
     if (tasks.empty())
         return;
     const auto start = std::chrono::steady_clock::now();
-    tbb::parallel_for_each(tasks, [&](const Task& task) { *task.meeting = meeting_of(*task.earlier, *task.later); });
+    tbb::this_task_arena::isolate([&] { // no other frame is begun while this one waits
+        tbb::parallel_for_each(tasks,
+                               [&](const Task& task) { *task.meeting = meeting_of(*task.earlier, *task.later); });
+    });
     timings_.emplace_back("align", ms_since(start));
 }
 
