@@ -14,7 +14,7 @@
 #include <chrono>
 #include <fmt/format.h>
 #include <mutex>
-#include <tbb/concurrent_queue.h>
+#include <optional>
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 #include <tbb/parallel_pipeline.h>
@@ -164,32 +164,12 @@ std::vector<FrameRow> planned_rows(const Capture& capture, const std::vector<std
     return rows;
 }
 
-/// Methods made alike, lent to one frame at a time each.
-class Crew {
-  public:
-    explicit Crew(std::span<Method* const> methods) {
-        for (Method* method : methods)
-            free_.push(method);
-    }
-    /// Calls use(method) with one of them, once one is free.
-    template <class Use>
-    void lend(Use&& use) {
-        Method* method = nullptr;
-        free_.pop(method);
-        use(*method); // does not throw: take() catches
-        free_.push(method);
-    }
-
-  private:
-    tbb::concurrent_bounded_queue<Method*> free_;
-};
-
 /// The walk as one pipeline; the frames' rows are filled in on the way.
 class Pipeline {
   public:
-    Pipeline(const Capture& capture, std::span<Method* const> methods, const BatchOptions& options,
+    Pipeline(const Capture& capture, Crew& crew, const BatchOptions& options,
              const std::function<void(const FrameRow&)>& on_frame)
-        : capture_(capture), crew_(methods), at_once_(options.sequence ? 1 : static_cast<int>(methods.size())),
+        : capture_(capture), crew_(crew), at_once_(options.sequence ? 1 : static_cast<int>(crew.size())),
           options_(options), on_frame_(on_frame), rows_(planned_rows(capture, options.frames)),
           walk_(capture, rows_, options.sequence ? options.sequence->reach() : 0), waiting_(options.sequence) {}
 
@@ -224,6 +204,8 @@ class Pipeline {
         if (walk_.goes_on() && !(options_.stop && *options_.stop) && !given_up_)
             return walk_.next();
         flow.stop();
+        if (options_.all_begun)
+            options_.all_begun();
         return {};
     }
 
@@ -254,12 +236,15 @@ class Pipeline {
         if (!work || !work->row.why.empty())
             return work;
         if (work->by_points) { // one at a time takes all cores and much memory; nor may it begin another while it waits
-            const std::lock_guard alone(points_);
+            const std::lock_guard alone(crew_.alone());
+            std::optional<Crew::Loan> rays;
+            if (options_.point_method)
+                rays.emplace(crew_);
             tbb::this_task_arena::isolate(
                 [&] { take(*work, &StageTimes::compute, [&] { compute_points(*work, options_); }); });
         } else {
-            crew_.lend(
-                [&](Method& method) { take(*work, &StageTimes::compute, [&] { compute_view(*work, method); }); });
+            const Crew::Loan method = crew_.lend();
+            take(*work, &StageTimes::compute, [&] { compute_view(*work, *method); });
         }
         if (work->row.status == FrameStatus::skipped && work->row.fault == Fault::outage)
             given_up_ = true;
@@ -270,7 +255,7 @@ class Pipeline {
         if (options_.sequence) {
             compute_in_sequence(work, capture_, *options_.sequence);
         } else {
-            work.ao = method.compute({work.depth});
+            work.ao = method.compute({.depth = work.depth, .noise = options_.noise});
             work.row.passes = method.timings();
         }
         if (options_.dump.empty())
@@ -300,8 +285,7 @@ class Pipeline {
     }
 
     const Capture& capture_;
-    Crew crew_;
-    std::mutex points_;
+    Crew& crew_;
     int at_once_;
     const BatchOptions& options_;
     const std::function<void(const FrameRow&)>& on_frame_;
@@ -314,9 +298,9 @@ class Pipeline {
 
 } // namespace
 
-std::vector<FrameRow> run_batch(const Capture& capture, std::span<Method* const> methods, const BatchOptions& options,
+std::vector<FrameRow> run_batch(const Capture& capture, Crew& crew, const BatchOptions& options,
                                 const std::function<void(const FrameRow&)>& on_frame) {
-    return Pipeline(capture, methods, options, on_frame).run();
+    return Pipeline(capture, crew, options, on_frame).run();
 }
 
 } // namespace scanshade

@@ -3,6 +3,7 @@
 
 #include "ao/cloud/cloud_ao.h"
 #include "ao/method.h"
+#include "apps/crew.h"
 #include "ao/sequence/neighbourhood.h"
 #include "apps/frame_row.h"
 #include "apps/recording_cloud.h"
@@ -10,12 +11,10 @@
 #include "io/image_file.h"
 #include "projection/project.h"
 
-#include <array>
 #include <atomic>
 #include <filesystem>
 #include <functional>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -60,21 +59,15 @@ struct BatchOptions {
     std::filesystem::path dump;        ///< folder for the method's intermediates, frame by frame; empty = none
     int frames_in_memory = 0;          ///< 0 = cores, and two for each method
     const std::atomic<bool>* stop = nullptr; ///< set = begin no further frame
+    std::function<void()> all_begun;         ///< called once no further frame will begin: another batch may
 };
 
-/// Runs the walk over the frames, as many of them computed at once as there are methods, which are made alike; a
-/// sequence takes one after the other. A frame that fails says why in its row, leaves no file, and stops no other. A
+/// Runs the walk over the frames, as many of them computed at once as the crew has methods free; a sequence takes one
+/// after the other. A frame that fails says why in its row, leaves no file, and stops no other. A
 /// lost device ends the run: frames in flight and those after them come back as skipped, the fault of an outage.
 /// `on_frame` is called once per row, in the order of `options.frames`, never concurrently.
 /// Rows come back in that order too; what is written does not depend on timing.
-[[nodiscard]] std::vector<FrameRow> run_batch(const Capture& capture, std::span<Method* const> methods,
-                                              const BatchOptions& options,
+[[nodiscard]] std::vector<FrameRow> run_batch(const Capture& capture, Crew& crew, const BatchOptions& options,
                                               const std::function<void(const FrameRow&)>& on_frame = {});
-/// With one method.
-[[nodiscard]] inline std::vector<FrameRow> run_batch(const Capture& capture, Method& method,
-                                                     const BatchOptions& options,
-                                                     const std::function<void(const FrameRow&)>& on_frame = {}) {
-    return run_batch(capture, std::array{&method}, options, on_frame);
-}
 
 } // namespace scanshade

@@ -96,7 +96,7 @@ FrameRow crash_row(const Capture& capture, std::size_t index) {
 }
 
 /// Each frame by itself, so that a crash names its frame.
-std::vector<FrameRow> run_one_by_one(const Capture& capture, std::span<Method* const> methods, BatchOptions options, Journal& journal,
+std::vector<FrameRow> run_one_by_one(const Capture& capture, Crew& crew, BatchOptions options, Journal& journal,
                                      const std::function<void(const FrameRow&)>& on_frame) {
     const std::string killer = journal.facts().begun;
     std::vector<FrameRow> rows;
@@ -113,7 +113,7 @@ std::vector<FrameRow> run_one_by_one(const Capture& capture, std::span<Method* c
         if (!options.stop || !*options.stop)
             journal.begin_alone(capture.entries[index].name);
         options.frames = {index};
-        std::ranges::move(run_batch(capture, methods, options, on_frame), std::back_inserter(rows));
+        std::ranges::move(run_batch(capture, crew, options, on_frame), std::back_inserter(rows));
         if (rows.back().status == FrameStatus::skipped && rows.back().fault == Fault::outage)
             break;
     }
@@ -165,7 +165,7 @@ std::optional<std::vector<FrameRow>> rows_if_complete(Journal& journal, const st
     return rows;
 }
 
-std::vector<FrameRow> run_recorded(const Capture& capture, std::span<Method* const> methods, const BatchOptions& options,
+std::vector<FrameRow> run_recorded(const Capture& capture, Crew& crew, const BatchOptions& options,
                                    const Recording& recording, const std::function<void(const FrameRow&)>& on_frame) {
     Journal& journal = recording.journal;
     const auto settings_of = [&](std::size_t index) {
@@ -189,8 +189,8 @@ std::vector<FrameRow> run_recorded(const Capture& capture, std::span<Method* con
         if (on_frame)
             on_frame(row);
     };
-    for (FrameRow& row : recording.carefully ? run_one_by_one(capture, methods, left, journal, record)
-                                             : run_batch(capture, methods, left, record))
+    for (FrameRow& row : recording.carefully ? run_one_by_one(capture, crew, left, journal, record)
+                                             : run_batch(capture, crew, left, record))
         rows.insert_or_assign(row.index, std::move(row));
     std::vector<FrameRow> all;
     bool finished = true;

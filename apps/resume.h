@@ -6,7 +6,6 @@
 
 #include <functional>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -41,8 +40,8 @@ struct Recording {
 
 /// run_batch() over the frames that the journal does not have; rows of all come back, in the order of options.frames.
 /// `on_frame` is told of those that were run.
-[[nodiscard]] std::vector<FrameRow> run_recorded(const Capture& capture, std::span<Method* const> methods,
-                                                 const BatchOptions& options, const Recording& recording,
+[[nodiscard]] std::vector<FrameRow> run_recorded(const Capture& capture, Crew& crew, const BatchOptions& options,
+                                                 const Recording& recording,
                                                  const std::function<void(const FrameRow&)>& on_frame = {});
 
 } // namespace scanshade

@@ -1,6 +1,7 @@
 // `scanshade run`: ambient occlusion for every frame of one or more captures.
 #include "apps/batch.h"
 #include "apps/job_run.h"
+#include "apps/overlap.h"
 #include "apps/progress.h"
 #include "apps/resume.h"
 #include "apps/run_settings.h"
@@ -18,9 +19,11 @@
 #include <csignal>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <future>
+#include <mutex>
 #include <opencv2/core/utility.hpp>
+#include <semaphore>
 #include <set>
+#include <utility>
 
 namespace scanshade {
 namespace {
@@ -49,7 +52,6 @@ struct Job {
     BatchOptions batch;
     std::vector<std::size_t> of = {}; ///< all that is taken of the capture, of which batch.frames may be a block
     std::string block = {};           ///< "" = all, else as Task::block() says
-    std::shared_future<DepthNoise> noise = {}; ///< measured ahead, where it is
 };
 
 /// "office" of captures/office/ and captures/office.pcd; "office-2" when another capture has that name.
@@ -97,6 +99,48 @@ std::string report_name(const std::string& stem, const std::string& block, const
     return block.empty() ? stem + extension : stem + "." + block + extension;
 }
 
+/// A capture's frames together, on a device and with a method that are lent for the whole of it.
+struct Together {
+    Together(Workers& workers, const Job& job, const RunSettings& asked)
+        : loan(workers.crew()), crew(*loan), worker(workers.who_is(*loan)),
+          sequence(*worker.device, *worker.plain, job.batch.radius_m, job.batch.noise, asked.fit(),
+                   asked.sequence == "on" ? sequence_options(asked.sequences, job.capture, job.batch.radius_m)
+                                          : alone()) {
+        if (workers.crew().size() > workers.devices())
+            say("  frames of a sequence are computed one at a time, in their order");
+        if (sequence.reach() > 0)
+            say(fmt::format("  frames within {} of each other are looked at together", sequence.reach()));
+    }
+    Crew::Loan loan;
+    Crew crew; ///< of the one
+    const Workers::Worker& worker;
+    Neighbourhood sequence;
+};
+
+/// What became of the frames, for the exit code.
+class Tally {
+  public:
+    void add(const std::vector<FrameRow>& rows) {
+        all_ += rows.size();
+        ok_ += count(rows, FrameStatus::ok);
+        for (const FrameRow& row : rows)
+            faults_.insert(row.fault);
+    }
+    [[nodiscard]] int exit_code(int unopened) const {
+        if (interrupted || faults_.contains(Fault::outage))
+            return unfinished;
+        if (faults_.contains(Fault::internal) || faults_.contains(Fault::crash))
+            return internal_error;
+        if (ok_ == all_ && unopened == 0)
+            return all_well;
+        return ok_ == 0 ? nothing_done : some_failed;
+    }
+
+  private:
+    std::size_t all_ = 0, ok_ = 0;
+    std::set<Fault> faults_;
+};
+
 // ---------------------------------------------------------------------------------------------------- the command
 
 class Run final : public Command {
@@ -123,13 +167,16 @@ class Run final : public Command {
 
         cv::setNumThreads(1); // frames are the parallelism; threads inside a frame would only compete with them
         end_gracefully_on_signals();
-        std::vector<FrameRow> rows;
-        for (std::size_t i = 0; i < jobs.size() && !interrupted; ++i) {
-            if (i + 1 < jobs.size())
-                look_ahead(jobs[i + 1]);
-            std::ranges::move(process(jobs[i]), std::back_inserter(rows));
-        }
-        return exit_code(rows, unopened);
+        Tally tally;
+        std::mutex counting;
+        overlapped(jobs.size(), at_once(), [&](std::size_t i, Turn& turn) {
+            if (interrupted)
+                return;
+            const std::vector<FrameRow> rows = process(std::move(jobs[i]), turn);
+            const std::lock_guard alone(counting);
+            tally.add(rows);
+        });
+        return tally.exit_code(unopened);
     }
 
   private:
@@ -172,20 +219,22 @@ class Run final : public Command {
                         ": --view colour needs to know the colour camera beside the depth camera; refine finds it");
     }
 
-    RunReport report_on(const Job& job, const gpu::DeviceInfo& device) {
+    RunReport report_on(const Job& job, Workers& workers) {
         const auto& said = job.batch.registration;
         const Registration registration = said.value_or(job.capture.registration);
         RunReport report{.started = std::chrono::system_clock::now(),
-                         .device = device,
+                         .device = workers.device().info(),
                          .method = asked_.method,
                          .settings = asked_.stages_in_use(),
                          .capture = job.capture,
                          .registration = registration,
                          .registration_reason = said ? "--registered" : job.capture.registration_reason,
-                         .depth_noise = {},
+                         .depth_noise = noise_sentence(job.batch.noise, asked_),
                          .budget = {},
                          .shading = shading_sentence(job.capture, registration),
                          .frames = {}};
+        report.devices = workers.devices();
+        report.frames.resize(job.batch.frames.size());
         return report;
     }
 
@@ -228,8 +277,12 @@ class Run final : public Command {
         return supervise(1, [&](const Shift& shift) {
             cv::setNumThreads(1);
             end_gracefully_on_signals();
-            return work_through(job, plan, shard, interrupted,
-                                [&](const Task& task) { return exit_code(process(job_of(job, task), shift), 0); });
+            return work_through(job, plan, shard, interrupted, shift.carefully ? 1 : at_once(),
+                                [&](const Task& task, Turn& turn) {
+                                    Tally tally;
+                                    tally.add(process(job_of(job, task), turn, shift));
+                                    return tally.exit_code(0);
+                                });
         });
     }
 
@@ -247,6 +300,17 @@ class Run final : public Command {
         return job;
     }
 
+    /// Captures: one whose frames enter the walk, one whose last frames leave it, one that is made ready. A budget
+    /// measures, which nothing may disturb, and picks other settings for each.
+    [[nodiscard]] std::size_t at_once() {
+        if (asked_.budget.any())
+            return 1;
+        // A sequence keeps one device busy.
+        const std::size_t devices = asked_.sequence == "on" && asked_.device == "all" ? workers().devices() : 1;
+        entrance_.release(static_cast<std::ptrdiff_t>(devices - 1));
+        return devices + 2;
+    }
+
     /// Opened when the first frame needs them: where all is done already, never.
     Workers& workers() {
         if (!workers_)
@@ -254,85 +318,90 @@ class Run final : public Command {
         return *workers_;
     }
 
-    /// Measures a capture's noise while the one before is at work: a GPU may be done with that in no more time.
-    void look_ahead(Job& job) const {
-        if (asked_.depth_noise == "auto" && !is_complete(journal_file(job.batch.outputs.folder, job.block)))
-            job.noise = std::async(std::launch::async, [&job] { return noise_of(job.capture, job.of); });
-    }
+    /// The right to send frames into the walk.
+    class Entrance {
+      public:
+        explicit Entrance(std::counting_semaphore<>& free) : free_(free) { free_.acquire(); }
+        ~Entrance() { leave(); }
+        Entrance(const Entrance&) = delete;
+        Entrance& operator=(const Entrance&) = delete;
+        void leave() {
+            if (!left_.exchange(true))
+                free_.release();
+        }
 
-    std::vector<FrameRow> process(Job job, const Shift& shift = {}) {
+      private:
+        std::counting_semaphore<>& free_;
+        std::atomic<bool> left_ = false;
+    };
+
+    std::vector<FrameRow> process(Job job, Turn& turn, const Shift& shift = {}) {
         const fs::path& folder = job.batch.outputs.folder;
+        turn.is_of(job.capture.path.string());
         Journal journal(folder, job.block);
         if (asked_.overwrite)
             journal.clear();
-        const std::string task = task_key(asked_.stages_in_use(), job.capture, job.of, asked_.sequence == "on");
         const fs::path table = report_name("frames", job.block, ".csv"),
                        manifest = report_name("manifest", job.block, ".json");
+        std::unique_lock alone(alone_);
+        const std::string task = task_key(asked_.stages_in_use(), job.capture, job.of, asked_.sequence == "on");
+        alone.unlock();
         if (auto rows = rows_if_complete(journal, task, job.capture, job.batch.frames, asked_.retry);
             rows && fs::exists(folder / manifest)) {
             say(fmt::format("{}: done already, {} frames -> {}", job.capture.path.string(), rows->size(),
                             folder.string()));
             return *std::move(rows);
         }
+        job.batch.noise = noise_of(job.capture, job.of, asked_.depth_noise);
+
+        alone.lock();
         Workers& workers = this->workers();
-        gpu::Device& device = workers.device();
         const std::vector<std::string> budget =
-            asked_.budget.any() ? keep_to_budget(job, device) : std::vector<std::string>{};
-        workers.make(asked_.method, asked_.chosen_setup());
-        Method& plain = workers.plain();
-        job.batch.point_method = dynamic_cast<PointMethod*>(&plain);
+            asked_.budget.any() ? keep_to_budget(job, workers.device()) : std::vector<std::string>{};
+        workers.make(asked_.method, asked_.chosen_setup(), asked_.fit());
+        job.batch.point_method = dynamic_cast<PointMethod*>(workers.any().plain.get());
         job.batch.radius_m = asked_.radius_m();
         const CloudAo of_clouds = asked_.cloud_ao();
         job.batch.cloud_ao = &of_clouds;
         job.batch.cloud_walk = asked_.cloud_walk();
-        say(fmt::format("{} on {}", asked_.method, workers.description()));
-        const DepthNoise noise =
-            job.noise.valid() ? job.noise.get() : noise_of(job.capture, job.of, asked_.depth_noise);
-        const FitPlaneOptions fit = asked_.fit();
-        const std::vector<Method*> methods = workers.methods(noise, fit);
-        std::optional<Neighbourhood> sequence;
-        std::optional<RecordingCloud> cloud;
-        if (!asked_.recording_cloud.empty()) {
-            cloud.emplace(asked_.cloud_resolution_m);
-            job.batch.cloud = &*cloud;
-        }
-        if (asked_.sequence == "on" || cloud) {
-            const NeighbourhoodOptions together =
-                asked_.sequence == "on" ? sequence_options(asked_.sequences, job.capture, job.batch.radius_m) : alone();
-            sequence.emplace(device, plain, job.batch.radius_m, noise, fit, together);
-            job.batch.sequence = &*sequence;
-            if (methods.size() > 1)
-                say("  frames of a sequence are computed one at a time, in their order");
-        }
-        job.batch.noise = noise;
-        RunReport report = report_on(job, device.info());
-        report.depth_noise = noise_sentence(noise, asked_);
+        RunReport report = report_on(job, workers);
         report.budget = budget;
-        report.devices = workers.devices();
-        report.at_once = job.batch.sequence ? 1 : methods.size();
-        report.frames.resize(job.batch.frames.size());
+        const std::string settings = settings_key(report, job.batch.outputs, job.batch.noise);
+        alone.unlock();
+
+        std::optional<RecordingCloud> cloud;
+        if (!asked_.recording_cloud.empty())
+            job.batch.cloud = &cloud.emplace(asked_.cloud_resolution_m);
+        say(fmt::format("{} on {}", asked_.method, workers.description()));
         introduce(report);
-        if (sequence && sequence->reach() > 0)
-            say(fmt::format("  frames within {} of each other are looked at together", sequence->reach()));
         prepare_folder(job, {table, manifest});
+        Entrance entrance(entrance_);
+        job.batch.all_begun = [&] { entrance.leave(); };
+        std::optional<Together> together;
+        if (asked_.sequence == "on" || cloud)
+            job.batch.sequence = &together.emplace(workers, job, asked_).sequence;
+        report.at_once = together ? 1 : workers.crew().size();
         const Recording recording{.journal = journal,
-                                  .settings = settings_key(report, job.batch.outputs, noise),
+                                  .settings = settings,
                                   .task = task,
-                                  .device = device.info().name,
+                                  .device = workers.device().info().name,
                                   .retry = asked_.retry,
                                   .carefully = shift.carefully,
                                   .finished = shift.finished};
         Progress progress(job.batch.frames.size());
         const auto start = std::chrono::steady_clock::now();
-        report.frames = run_recorded(job.capture, methods, job.batch, recording, [&](const FrameRow& row) {
-            progress.add(row);
-            report.done_now += row.status == FrameStatus::ok;
-            report.ms_now = report.ms_now + row.ms;
-        });
+        report.frames = run_recorded(job.capture, together ? together->crew : workers.crew(), job.batch, recording,
+                                     [&](const FrameRow& row) {
+                                         progress.add(row);
+                                         report.done_now += row.status == FrameStatus::ok;
+                                         report.ms_now = report.ms_now + row.ms;
+                                     });
         report.took_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
         progress.end();
+        alone.lock(); // the report names settings
         write_frames_csv(folder / table, report.frames);
         write_manifest(folder / manifest, report);
+        alone.unlock();
         conclude(report, folder / table);
         if (cloud && !interrupted)
             write_recording(*cloud);
@@ -349,19 +418,9 @@ class Run final : public Command {
                         asked_.recording_cloud));
     }
 
-    static int exit_code(const std::vector<FrameRow>& rows, int unopened) {
-        const auto any = [&](Fault fault) { return std::ranges::count(rows, fault, &FrameRow::fault) > 0; };
-        const std::size_t ok = count(rows, FrameStatus::ok);
-        if (interrupted || any(Fault::outage))
-            return unfinished;
-        if (any(Fault::internal) || any(Fault::crash))
-            return internal_error;
-        if (ok == rows.size() && unopened == 0)
-            return all_well;
-        return ok == 0 ? nothing_done : some_failed;
-    }
-
     RunSettings asked_;
+    std::mutex alone_; ///< held while settings and devices are used by a capture, but not while frames are computed
+    std::counting_semaphore<> entrance_{1};
     std::unique_ptr<Workers> workers_;
     Configuration before_budget_; ///< of the method that a budget picked for the capture before this one
 };

@@ -155,30 +155,23 @@ std::unique_ptr<MethodSetup> set_up(const Configuration& configuration, double r
     return setup;
 }
 
+FitPlaneOptions widened_for(const std::string& method, FitPlaneOptions preparation) {
+    preparation.smoothing *= method_named(method).smoothing;
+    return preparation;
+}
+
 } // namespace
 
 Trial::Trial(gpu::Device& device, Configuration configuration, const DepthNoise& noise, double radius_m,
              FitPlaneOptions preparation)
-    : device_(device), configuration_(std::move(configuration)), preparation_(preparation),
-      setup_(set_up(configuration_, radius_m)), plain_(setup_->make(device)) {
-    preparation_.smoothing *= method_named(configuration_.method).smoothing;
-    set_noise(noise);
-}
-
-void Trial::set_noise(const DepthNoise& noise) {
-    noisy_ = noise.any();
-    if (noisy_ && fitted_)
-        fitted_->set_noise(noise);
-    else if (noisy_)
-        fitted_ = std::make_unique<OnFittedDepth>(device_, noise, *plain_, preparation_);
-}
+    : configuration_(std::move(configuration)), setup_(set_up(configuration_, radius_m)), plain_(setup_->make(device)),
+      method_(device, *plain_, widened_for(configuration_.method, preparation)), noise_(noise) {}
 
 cv::Mat1f Trial::compute(const TrialFrame& frame) {
-    Method& method = noisy_ ? static_cast<Method&>(*fitted_) : *plain_;
     const auto start = std::chrono::steady_clock::now();
-    const AoMap ao = method.compute({frame.depth});
+    const AoMap ao = method_.compute({.depth = frame.depth, .noise = noise_});
     wall_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-    device_ms_ = scanshade::device_ms(method.timings());
+    device_ms_ = scanshade::device_ms(method_.timings());
     return attach(frame.frame, frame.depth, ao).visibility;
 }
 

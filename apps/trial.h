@@ -74,7 +74,7 @@ class Trial {
           FitPlaneOptions preparation = {});
 
     /// From now on depth has that noise, or none. Pipelines stay: making them is most of a trial's time.
-    void set_noise(const DepthNoise& noise);
+    void set_noise(const DepthNoise& noise) { noise_ = noise; }
     /// Visibility on the recorded pixels.
     [[nodiscard]] cv::Mat1f compute(const TrialFrame& frame);
 
@@ -86,13 +86,11 @@ class Trial {
     [[nodiscard]] std::vector<Parameter> settings() const { return setup_->parameters(); }
 
   private:
-    gpu::Device& device_;
     Configuration configuration_;
-    FitPlaneOptions preparation_;
     std::unique_ptr<MethodSetup> setup_;
     std::unique_ptr<Method> plain_;
-    std::unique_ptr<OnFittedDepth> fitted_;
-    bool noisy_ = false;
+    OnFittedDepth method_;
+    DepthNoise noise_;
     double device_ms_ = 0, wall_ms_ = 0;
 };
 

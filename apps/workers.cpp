@@ -1,6 +1,7 @@
 // The devices of a run, and what computes frames on them: as many methods, made alike, as frames are computed at once.
 #include "apps/workers.h"
 
+#include <algorithm>
 #include <fmt/format.h>
 
 namespace scanshade {
@@ -10,27 +11,31 @@ Workers::Workers(const std::string& choice, int in_flight) : devices_(gpu::open_
     in_flight_ = in_flight > 0 ? static_cast<std::size_t>(in_flight) : gpu::is_cpu(device().info()) ? 1 : of_a_gpu;
 }
 
-void Workers::make(const std::string& method, MethodSetup& setup) {
+void Workers::make(const std::string& method, MethodSetup& setup, const FitPlaneOptions& fit) {
     const Configuration wanted{method, "", values_of(setup)};
-    if (!made_.empty() && wanted.method == configuration_.method && wanted.settings == configuration_.settings)
+    if (crew_ && wanted.method == configuration_.method && wanted.settings == configuration_.settings && fit == fit_)
         return;
+    crew_.reset();
     made_.clear();
-    made_.push_back({&device(), setup.make(device()), nullptr});
-    const bool rays = dynamic_cast<PointMethod*>(&plain()) != nullptr; // keep all cores busy already
-    for (std::size_t i = 1; !rays && i < in_flight_ * devices_.size(); ++i) {
-        gpu::Device& next = *devices_[i % devices_.size()];
-        made_.push_back({&next, setup.make(next), nullptr});
-    }
+    const auto add = [&](gpu::Device& device) {
+        Worker worker{&device, setup.make(device), nullptr};
+        worker.method = std::make_unique<OnFittedDepth>(device, *worker.plain, fit);
+        made_.push_back(std::move(worker));
+    };
+    add(device());
+    const bool rays = dynamic_cast<PointMethod*>(any().plain.get()) != nullptr; // keep all cores busy already
+    for (std::size_t i = 1; !rays && i < in_flight_ * devices_.size(); ++i)
+        add(*devices_[i % devices_.size()]);
+    std::vector<Method*> methods;
+    for (const Worker& worker : made_)
+        methods.push_back(worker.method.get());
+    crew_ = std::make_unique<Crew>(methods);
     configuration_ = wanted;
+    fit_ = fit;
 }
 
-std::vector<Method*> Workers::methods(const DepthNoise& noise, const FitPlaneOptions& fit) {
-    std::vector<Method*> all;
-    for (auto& [device, plain, fitted] : made_) {
-        fitted = noise.any() ? std::make_unique<OnFittedDepth>(*device, noise, *plain, fit) : nullptr;
-        all.push_back(fitted ? static_cast<Method*>(fitted.get()) : plain.get());
-    }
-    return all;
+const Workers::Worker& Workers::who_is(const Method& lent) const {
+    return *std::ranges::find(made_, &lent, [](const Worker& worker) -> const Method* { return worker.method.get(); });
 }
 
 std::string Workers::description() const {

@@ -5,6 +5,7 @@
 #include "ao/gpu/device.h"
 #include "ao/method.h"
 #include "apps/configurations.h"
+#include "apps/crew.h"
 
 #include <memory>
 #include <string>
@@ -22,29 +23,33 @@ class Workers {
 
     /// The one that everything runs on that takes one frame after the other.
     [[nodiscard]] gpu::Device& device() { return *devices_.front(); }
-    /// Makes the methods anew where method or settings are others than before: shaders are compiled once for all
-    /// captures.
-    void make(const std::string& method, MethodSetup& setup);
-    /// One of the methods as made. Valid until make().
-    [[nodiscard]] Method& plain() { return *made_.front().plain; }
-    /// All of them, on depth as recorded or, where there is noise, as fitted. Valid until the next call. Methods that
-    /// keep all cores busy by themselves are one.
-    [[nodiscard]] std::vector<Method*> methods(const DepthNoise& noise, const FitPlaneOptions& fit);
+    /// Makes the crew anew where method or settings are others than before: shaders are compiled once for all captures.
+    /// Nothing of it may be lent then.
+    void make(const std::string& method, MethodSetup& setup, const FitPlaneOptions& fit);
+    /// Methods as made, on depth as recorded or, where View::noise says so, as fitted. Those that keep all cores busy by
+    /// themselves are one.
+    [[nodiscard]] Crew& crew() { return *crew_; }
 
-    /// "NVIDIA H100 (NVIDIA 550.54)", "2 x NVIDIA ..., 3 frames at once on each"
+    /// What one of the crew is made of.
+    struct Worker {
+        gpu::Device* device;
+        std::unique_ptr<Method> plain;
+        std::unique_ptr<OnFittedDepth> method; ///< what the crew lends
+    };
+    [[nodiscard]] const Worker& who_is(const Method& lent) const;
+    [[nodiscard]] const Worker& any() const { return made_.front(); }
+
+    /// "NVIDIA H100 (NVIDIA 550.54)", "2 x NVIDIA ..., 6 frames at once"
     [[nodiscard]] std::string description() const;
     [[nodiscard]] std::size_t devices() const { return devices_.size(); }
 
   private:
-    struct Worker {
-        gpu::Device* device;
-        std::unique_ptr<Method> plain;
-        std::unique_ptr<OnFittedDepth> fitted; ///< null where depth has no noise
-    };
     std::vector<std::unique_ptr<gpu::Device>> devices_; ///< outlive what is made on them
     std::size_t in_flight_;
-    Configuration configuration_; ///< what made_ was made from
+    Configuration configuration_; ///< what made_ was made from, and
+    FitPlaneOptions fit_;
     std::vector<Worker> made_;
+    std::unique_ptr<Crew> crew_;
 };
 
 } // namespace scanshade

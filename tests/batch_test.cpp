@@ -24,6 +24,12 @@ namespace fs = std::filesystem;
 
 constexpr float half_open = 0.5f;
 
+std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const BatchOptions& options,
+                                const std::function<void(const FrameRow&)>& on_frame = {}) {
+    Crew crew(method);
+    return scanshade::run_batch(capture, crew, options, on_frame);
+}
+
 /// Every surface is half open. `before` may throw or interrupt; it gets the number of the call, from 0.
 class HalfOpen final : public Method {
   public:
@@ -163,20 +169,20 @@ TEST_F(BatchTest, several_methods_take_a_frame_each_and_rows_keep_their_order) {
     const Capture recorded = capture(24);
     std::array<std::atomic<int>, 3> busy{};
     std::atomic<int> at_once = 0, most = 0;
-    std::vector<HalfOpen> crew;
+    std::vector<HalfOpen> three;
     for (std::atomic<int>& own : busy)
-        crew.emplace_back([&](int) {
+        three.emplace_back([&](int) {
             EXPECT_EQ(own++, 0) << "a method computes one frame at a time";
             most = std::max(most.load(), ++at_once);
             std::this_thread::sleep_for(std::chrono::milliseconds(20));
             --at_once;
             --own;
         });
-    const std::array<Method*, 3> methods{&crew[0], &crew[1], &crew[2]};
+    Crew crew(std::array<Method*, 3>{&three[0], &three[1], &three[2]});
     std::vector<std::size_t> told;
     BatchOptions options = all_frames(recorded, folder / "out");
     options.outputs.shaded = options.outputs.confidence = false;
-    const auto rows = run_batch(recorded, methods, options, [&](const FrameRow& row) { told.push_back(row.index); });
+    const auto rows = run_batch(recorded, crew, options, [&](const FrameRow& row) { told.push_back(row.index); });
     EXPECT_EQ(count(rows, FrameStatus::ok), 24u);
     EXPECT_EQ(told, options.frames);
     EXPECT_GT(most, 1) << "one waits for its device while another begins";
@@ -188,10 +194,10 @@ TEST_F(BatchTest, one_lost_device_of_three_ends_the_run) {
         if (call == 1)
             throw DeviceLost("the device is lost");
     });
-    const std::array<Method*, 3> methods{&sound, &lost, &as_sound};
+    Crew crew(std::array<Method*, 3>{&sound, &lost, &as_sound});
     BatchOptions options = all_frames(recorded, folder / "out");
     options.frames_in_memory = 4;
-    const auto rows = run_batch(recorded, methods, options);
+    const auto rows = run_batch(recorded, crew, options);
     ASSERT_EQ(rows.size(), 24u);
     EXPECT_EQ(std::ranges::count(rows, Fault::outage, &FrameRow::fault), 1);
     EXPECT_GT(count(rows, FrameStatus::skipped), 1u) << "those after it are not begun";

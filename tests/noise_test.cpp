@@ -257,9 +257,9 @@ TEST(fit_plane, what_stays_on_the_device_is_what_the_host_would_have_sent) {
         FitPlane fit(device(), kinect);
         const FittedDepth fitted = fit.compute(depth);
         const cv::Mat1f by_host = method->compute({fitted.depth, &fitted.normals, kinect, true}).visibility;
-        OnFittedDepth on_device(device(), kinect, *method, {});
+        OnFittedDepth on_device(device(), *method, {});
         ASSERT_TRUE(method->takes_prepared()) << name;
-        const cv::Mat1f stayed = on_device.compute({depth}).visibility;
+        const cv::Mat1f stayed = on_device.compute({.depth = depth, .noise = kinect}).visibility;
         EXPECT_EQ(std::memcmp(by_host.data, stayed.data, by_host.total() * 4), 0) << name;
         // And what the host sends next is not what stayed there.
         EXPECT_EQ(std::memcmp(method->compute({fitted.depth, &fitted.normals, kinect, true}).visibility.data, by_host.data, by_host.total() * 4), 0) << name;

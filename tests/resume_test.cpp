@@ -279,7 +279,8 @@ int work(const fs::path& path, const fs::path& out, const Shift& shift,
     std::iota(options.frames.begin(), options.frames.end(), 0);
     options.outputs.folder = out;
     const Recording recording{journal, "settings", "task", "test", false, shift.carefully, shift.finished};
-    const auto rows = run_recorded(capture, std::array{static_cast<Method*>(&method)}, options, recording);
+    Crew crew(method);
+    const auto rows = run_recorded(capture, crew, options, recording);
     const auto any = [&](Fault fault) { return std::ranges::count(rows, fault, &FrameRow::fault) > 0; };
     return any(Fault::outage) ? unfinished : any(Fault::crash) ? internal_error : all_well;
 }

@@ -8,6 +8,7 @@
 #include "shaders/shared/fit_plane.h"
 
 #include <memory>
+#include <optional>
 
 namespace scanshade {
 
@@ -22,6 +23,8 @@ struct FitPlaneOptions {
     bool drop_flying = true; ///< pixels between two surfaces that belong to neither become holes
     double smoothing = 1;    ///< of the window's radius; 0 leaves depth as it is, and normals to the method
     double largest_radius_px = 12;
+
+    bool operator==(const FitPlaneOptions&) const = default;
 };
 
 /// What another frame of the recording saw, flying pixels dropped: metres, 0 = hole; of the same image size.
@@ -65,20 +68,25 @@ class FitPlane {
     Timings timings_;
 };
 
-/// A method that looks at fitted depth and normals in place of the recorded ones.
+/// A method that looks at fitted depth and normals in place of the recorded ones, where View::noise says that depth has
+/// noise; else at these.
 class OnFittedDepth final : public Method {
   public:
-    OnFittedDepth(gpu::Device& device, const DepthNoise& noise, Method& method, const FitPlaneOptions& options)
-        : fit_(device, noise, options), method_(method) {}
+    /// Keeps references to device and method.
+    OnFittedDepth(gpu::Device& device, Method& method, const FitPlaneOptions& options)
+        : device_(device), method_(method), options_(options) {}
 
     AoMap compute(const View& view) override;
-    void set_noise(const DepthNoise& noise) { fit_.set_noise(noise); }
     [[nodiscard]] const Timings& timings() const override { return timings_; }
     [[nodiscard]] std::vector<Intermediate> intermediates() override { return method_.intermediates(); }
 
   private:
-    FitPlane fit_;
+    [[nodiscard]] AoMap on_fitted(const View& view);
+
+    gpu::Device& device_;
     Method& method_;
+    FitPlaneOptions options_;
+    std::optional<FitPlane> fit_; ///< made when noise first asks for it; its pipelines stay for other noise
     Timings timings_;
 };
 

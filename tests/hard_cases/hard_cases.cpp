@@ -50,24 +50,20 @@ class Subject {
             const auto setup = row_.setup();
             const std::vector<Parameter> rows = setup->parameters();
             set(*row_named(rows, "radius"), fmt::format("{}", one.radius_m));
-            fitted_.reset();
+            on_fitted_.reset();
             method_ = setup->make(device_);
+            on_fitted_.emplace(device_, *method_, FitPlaneOptions{.smoothing = row_.smoothing});
             radius_m_ = one.radius_m;
         }
-        if (!one.noise.any()) return method_->compute({one.depth}).visibility;
-        if (!fitted_ || one.noise.floor_m != noise_.floor_m)
-            fitted_.emplace(device_, one.noise, *method_, FitPlaneOptions{.smoothing = row_.smoothing});
-        noise_ = one.noise;
-        return fitted_->compute({one.depth}).visibility;
+        return on_fitted_->compute({.depth = one.depth, .noise = one.noise}).visibility;
     }
 
   private:
     gpu::Device& device_;
     const MethodRow& row_;
     std::unique_ptr<Method> method_;
-    std::optional<OnFittedDepth> fitted_;
+    std::optional<OnFittedDepth> on_fitted_;
     double radius_m_ = 0;
-    DepthNoise noise_;
 };
 
 Score judge(const Case& one, const cv::Mat1f& found, const cv::Mat1f& again, const cv::Mat1f& expected) {
