@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <chrono>
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 namespace scanshade {
 
@@ -90,15 +92,18 @@ SensorClass class_of(const DepthNoise& noise) {
 
 DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& frames) {
     constexpr std::size_t most = 5;
-    std::vector<DepthImage> images;
-    for (const std::size_t place : spread(most, frames.size())) {
-        try {
-            const Frame frame = capture.load(frames[place], false);
-            if (!frame.cloud || frame.cloud->organised())
-                images.push_back(project(frame));
-        } catch (const std::exception&) { // whoever processes the frame says what is wrong with it
-        }
-    }
+    const std::vector<std::size_t> places = spread(most, frames.size());
+    std::vector<DepthImage> images(places.size());
+    tbb::this_task_arena::isolate([&] {
+        tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t i) {
+            try {
+                const Frame frame = capture.load(frames[places[i]], false);
+                if (!frame.cloud || frame.cloud->organised())
+                    images[i] = project(frame);
+            } catch (const std::exception&) { // whoever processes the frame says what is wrong with it
+            }
+        });
+    });
     return measure_noise(images);
 }
 

@@ -1,7 +1,8 @@
-// Depth and colour images from disk: container checked first, decoded by OpenCV (PGM and PFM here), then metres.
+// Depth and colour images from disk: container checked first, decoded by OpenCV (PGM, PFM and grey PNG here), then metres.
 #include "io/image_file.h"
 
 #include "io/image_check.h"
+#include "io/png_input.h"
 #include "io/text.h"
 #include "projection/error.h"
 
@@ -39,6 +40,11 @@ cv::Mat decode(const std::string& bytes, const fs::path& file, int flags) {
     if (image.empty())
         throw Error(fmt::format("{}: cannot be decoded: damaged or not an image", file.string()));
     return image;
+}
+
+cv::Mat decode_grey(const std::string& bytes, const ImageFacts& facts, const fs::path& file) {
+    cv::Mat image = facts.format == ImageFormat::png ? decoded_grey_png(bytes) : cv::Mat();
+    return image.empty() ? decode(bytes, file, cv::IMREAD_UNCHANGED) : image;
 }
 
 void check_is_depth(const ImageFacts& facts, const fs::path& file) {
@@ -125,7 +131,7 @@ cv::Mat read_stored_depth(const fs::path& file) {
         return unpack_pgm(bytes, facts);
     if (facts.format == ImageFormat::pfm)
         return unpack_pfm(bytes, facts);
-    const cv::Mat image = decode(bytes, file, cv::IMREAD_UNCHANGED);
+    const cv::Mat image = decode_grey(bytes, facts, file);
     if (image.size() != facts.size || (image.type() != CV_16UC1 && image.type() != CV_32FC1))
         throw Error(fmt::format("{}: decoded to something else than its header says", file.string()));
     return image;
@@ -197,7 +203,7 @@ cv::Mat1f read_ao(const fs::path& file) {
             fmt::format("{}: not an AO map: expected 8- or 16-bit grey PNG, or float TIFF or EXR; found {}-bit {} "
                         "with {} channels",
                         file.string(), facts.bits, format_name(facts.format), facts.channels));
-    const cv::Mat image = decode(bytes, file, cv::IMREAD_UNCHANGED);
+    const cv::Mat image = decode_grey(bytes, facts, file);
     if (image.type() == CV_16UC1)
         return from_integers<ushort>(image);
     if (image.type() == CV_8UC1)

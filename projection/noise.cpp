@@ -9,6 +9,9 @@
 #include <fmt/format.h>
 #include <numbers>
 #include <numeric>
+#include <optional>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 #include <vector>
 
 namespace scanshade {
@@ -23,7 +26,7 @@ constexpr std::size_t enough = 400; // samples for a band to speak
 struct Band {
     std::vector<float> spread_m;   // |second difference| of depth
     std::vector<float> adjacent_m; // of neighbouring pixels
-    std::vector<float> depths_m; // at their middles
+    std::vector<float> depths_m;   // at their middles; those that occur, once all are collected
     double z_sum = 0;
 };
 
@@ -68,10 +71,14 @@ double sigma_of(std::vector<float>& spread_m, double share, double mean_of_share
     return std::accumulate(spread_m.begin(), at, 0.0) / count / (mean_of_share * std::sqrt(6.0));
 }
 
+/// The values that occur, in order.
+void keep_distinct(std::vector<float>& values) {
+    std::sort(values.begin(), values.end());
+    values.erase(std::unique(values.begin(), values.end()), values.end());
+}
+
 /// The usual distance between neighbouring values that occur: the sensor's step where it has one.
-double step_of(std::vector<float>& depths_m) {
-    std::sort(depths_m.begin(), depths_m.end());
-    depths_m.erase(std::unique(depths_m.begin(), depths_m.end()), depths_m.end());
+double step_of(const std::vector<float>& depths_m) {
     if (depths_m.size() < 2) return 0;
     std::vector<float> gaps(depths_m.size() - 1);
     for (std::size_t i = 0; i < gaps.size(); ++i) gaps[i] = depths_m[i + 1] - depths_m[i];
@@ -128,9 +135,7 @@ Step step_by(const std::vector<float>& values_m, int power) {
     return {sum / count, count / static_cast<double>(gaps.size())};
 }
 
-void tell_steps(DepthNoise& noise, std::vector<float> values_m) {
-    std::sort(values_m.begin(), values_m.end());
-    values_m.erase(std::unique(values_m.begin(), values_m.end()), values_m.end());
+void tell_steps(DepthNoise& noise, const std::vector<float>& values_m) {
     const Step even = step_by(values_m, 0), growing = step_by(values_m, 2);
     constexpr double told = 0.25; // of unquantised values a fiftieth lie so
     if (std::max(even.share, growing.share) < told) return;
@@ -162,17 +167,25 @@ DepthNoise law_through(const std::vector<Measured>& points) {
 DepthNoise measure_noise(std::span<const DepthImage> images) {
     std::array<Band, bands> all;
     for (const DepthImage& image : images) collect(image.z_m, all);
+    std::array<std::optional<Measured>, bands> measured;
+    tbb::this_task_arena::isolate([&] {
+        tbb::parallel_for(std::size_t(0), all.size(), [&](std::size_t i) {
+            Band& band = all[i];
+            keep_distinct(band.depths_m);
+            if (band.spread_m.size() < enough) return;
+            const double count = static_cast<double>(band.spread_m.size());
+            const Spread spread = spread_of(band);
+            measured[i] = {band.z_sum / count, std::max(spread.distant, 1e-6), spread.adjacent, count};
+        });
+    });
     std::vector<Measured> points;
-    std::vector<float> values_m;
-    for (Band& band : all) {
-        values_m.insert(values_m.end(), band.depths_m.begin(), band.depths_m.end());
-        if (band.spread_m.size() < enough) continue;
-        const double count = static_cast<double>(band.spread_m.size());
-        const Spread spread = spread_of(band);
-        points.push_back({band.z_sum / count, std::max(spread.distant, 1e-6), spread.adjacent, count});
+    std::vector<float> values_m; // in order, as bands are
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        values_m.insert(values_m.end(), all[i].depths_m.begin(), all[i].depths_m.end());
+        if (measured[i]) points.push_back(*measured[i]);
     }
     DepthNoise steps;
-    tell_steps(steps, std::move(values_m));
+    tell_steps(steps, values_m);
     if (points.empty()) return steps;
     DepthNoise noise = law_through(points);
     noise.step_m = steps.step_m, noise.step_per_z2 = steps.step_per_z2;

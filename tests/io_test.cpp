@@ -2,8 +2,10 @@
 #include "io/camera_file.h"
 #include "io/capture.h"
 #include "io/exif.h"
+#include "io/image_check.h"
 #include "io/image_file.h"
 #include "io/output_file.h"
+#include "io/png_input.h"
 #include "io/png_output.h"
 #include "projection/error.h"
 #include "tests/support/files.h"
@@ -14,6 +16,7 @@
 #include <gtest/gtest.h>
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
+#include <zlib.h>
 
 namespace scanshade {
 namespace {
@@ -790,11 +793,76 @@ TEST(images, our_pngs_come_back_bit_by_bit) {
             ASSERT_EQ(back.type(), type);
             ASSERT_EQ(back.size(), size);
             EXPECT_EQ(cv::norm(back, image, cv::NORM_INF), 0);
+            if (image.channels() == 1) {
+                EXPECT_EQ(cv::norm(decoded_grey_png(bytes), image, cv::NORM_INF), 0);
+            }
             const cv::Mat inner = image(cv::Rect(0, 0, (size.width + 1) / 2, size.height)); // rows lie apart in memory
             EXPECT_EQ(encoded_png(inner), encoded_png(inner.clone()));
         }
     EXPECT_THROW((void)encoded_png(cv::Mat1f(4, 4, 0.5F)), Error);
     EXPECT_THROW((void)encoded_png(cv::Mat()), Error);
+}
+
+/// Grey PNGs that another library wrote, with each of the five filters, in one chunk or many, as it reads them itself;
+/// what is not plain grey is left to it, and so is what is damaged.
+TEST(images, grey_pngs_are_read_as_libpng_reads_them) {
+    cv::theRNG().state = 3;
+    const auto chunk = [](const std::string& type, const std::string& content) {
+        std::string bytes;
+        const auto append = [&](unsigned long value) {
+            for (const int shift : {24, 16, 8, 0})
+                bytes += static_cast<char>(value >> shift & 0xff);
+        };
+        append(content.size());
+        bytes += type + content;
+        append(crc32(0, reinterpret_cast<const Bytef*>(bytes.data()) + 4, static_cast<uInt>(bytes.size() - 4)));
+        return bytes;
+    };
+    const auto png = [&](cv::Size size, int bits, const std::string& filtered, std::size_t piece, bool transparent) {
+        std::string head(8, '\0');
+        for (int i = 0; i < 4; ++i) {
+            head[3 - i] = static_cast<char>(size.width >> (8 * i) & 0xff);
+            head[7 - i] = static_cast<char>(size.height >> (8 * i) & 0xff);
+        }
+        uLongf length = compressBound(filtered.size());
+        std::string packed(length, '\0');
+        compress2(reinterpret_cast<Bytef*>(packed.data()), &length, reinterpret_cast<const Bytef*>(filtered.data()),
+                  filtered.size(), 6);
+        packed.resize(length);
+        std::string file = "\x89PNG\r\n\x1a\n" + chunk("IHDR", head + static_cast<char>(bits) + std::string(4, '\0'));
+        if (transparent)
+            file += chunk("tRNS", std::string(2, '\0'));
+        for (std::size_t at = 0; at < packed.size(); at += piece)
+            file += chunk("IDAT", packed.substr(at, piece));
+        return file + chunk("IEND", "");
+    };
+    const auto libpng = [](const std::string& bytes) {
+        return cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data())),
+                            cv::IMREAD_UNCHANGED);
+    };
+    for (const int bits : {8, 16})
+        for (const cv::Size size : {cv::Size(1, 1), cv::Size(1, 9), cv::Size(37, 11), cv::Size(320, 241)}) {
+            std::string filtered; // any bytes are some image, whatever the filter
+            for (int y = 0; y < size.height; ++y) {
+                filtered += static_cast<char>(y % 5);
+                for (int i = 0; i < size.width * bits / 8; ++i)
+                    filtered += static_cast<char>(cv::theRNG().uniform(0, 256) & cv::theRNG().uniform(0, 256));
+            }
+            for (const std::size_t piece : {std::size_t(7), std::size_t(1) << 20}) {
+                const std::string file = png(size, bits, filtered, piece, false);
+                const cv::Mat ours = decoded_grey_png(file), theirs = libpng(file);
+                ASSERT_EQ(check_image(file, "image").bits, bits);
+                ASSERT_EQ(ours.type(), theirs.type());
+                ASSERT_EQ(ours.size(), size);
+                EXPECT_EQ(cv::norm(ours, theirs, cv::NORM_INF), 0) << size << " of " << bits << " bits";
+            }
+            EXPECT_TRUE(decoded_grey_png(png(size, bits, filtered, 1000, true)).empty()) << "transparency";
+            EXPECT_TRUE(decoded_grey_png(png(size, bits, filtered + "x", 1000, false)).empty()) << "more than pixels";
+            EXPECT_TRUE(decoded_grey_png(png(size, bits, filtered.substr(1), 1000, false)).empty()) << "fewer";
+            filtered[0] = 5;
+            EXPECT_TRUE(decoded_grey_png(png(size, bits, filtered, 1000, false)).empty()) << "no such filter";
+        }
+    EXPECT_TRUE(decoded_grey_png(encoded_png(cv::Mat3b(4, 4, cv::Vec3b(1, 2, 3)))).empty());
 }
 
 TEST(captures, noise_in_place_of_surfaces_is_doubted) {
