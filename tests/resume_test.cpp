@@ -80,26 +80,34 @@ int wait_for(pid_t child) {
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
-/// Starts the program again and again, kills it after a random time, until that has happened `kills` times; whenever
-/// it comes to its end before, `done` looks at the results and clears them.
-void kill_at_random(const std::string& arguments, int kills, double longest_s, const std::function<void()>& done) {
+/// Starts the program again and again and kills it after a random time, until `kills` have met it amid its frames; those
+/// that met it while it started come on top. Whenever it comes to its end before, and at last, `done` looks at the
+/// results in `folder` and clears them.
+void kill_at_random(const std::string& arguments, const fs::path& folder, int kills, double longest_s,
+                    const std::function<void()>& done) {
     std::mt19937 random(20261121);
     std::uniform_real_distribution<double> seconds(0, longest_s);
-    for (int killed = 0; killed < kills;) {
+    const auto frames_done = [&] { return fs::exists(folder) ? count_in(folder, "{\"frame\":") : 0; };
+    int amid = 0, early = 0, looks = 1;
+    while (amid < kills) {
+        const std::size_t before = frames_done();
         const pid_t child = start(arguments);
         std::this_thread::sleep_for(std::chrono::duration<double>(seconds(random)));
         kill(child, SIGKILL);
         const int code = wait_for(child);
         ASSERT_TRUE(code == 0 || code == 128 + SIGKILL) << code;
-        if (code == 0)
+        if (code == 0) {
             done();
-        else
-            ++killed;
+            ++looks;
+        } else {
+            ++(frames_done() > before ? amid : early);
+        }
     }
     // A worker dies with its parent, but a moment later.
     for (int tries = 0; tries < 50 && wait_for(start(arguments)) != 0; ++tries)
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
     done();
+    fmt::print("{} kills amid frames, {} before the first, {} runs to the end\n", amid, early, looks);
 }
 
 /// How often the tests kill: a few times, or as tests/survival says.
@@ -130,33 +138,34 @@ class ResumeTest : public testing::Test {
 
 // ---------------------------------------------------------------------------------------------------- killed
 
+/// Five files of each frame, that there is much to be caught at.
+constexpr const char* all_files = "--write ao,confidence,shaded,panel,cloud";
+
 TEST_F(ResumeTest, a_run_killed_at_random_and_resumed_leaves_the_bytes_of_an_uninterrupted_one) {
     record(200);
     const auto before = std::chrono::steady_clock::now();
-    ASSERT_EQ(run().exit_code, 0);
+    ASSERT_EQ(run(all_files).exit_code, 0);
     const double whole_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count();
     const auto expected = results_in(out());
-    ASSERT_EQ(expected.size(), 600u); // maps, confidence, pictures
+    ASSERT_EQ(expected.size(), 1000u);
     fs::remove_all(out());
-    int looks = 0;
-    kill_at_random(fmt::format("run {} -o {} --resume", capture().string(), out().string()), kills(), whole_s / 2, [&] {
+    const std::string arguments = fmt::format("run {} -o {} --resume {}", capture().string(), out().string(), all_files);
+    kill_at_random(arguments, out(), kills(), whole_s, [&] {
         EXPECT_EQ(results_in(out()), expected);
         EXPECT_TRUE(strays_in(out()).empty()) << strays_in(out()).front();
         fs::remove_all(out());
-        ++looks;
     });
-    fmt::print("{} kills, {} runs to the end\n", kills(), looks);
 }
 
 TEST_F(ResumeTest, a_job_killed_at_random_and_run_again_leaves_the_bytes_of_a_plain_run) {
     record(200);
     const auto before = std::chrono::steady_clock::now();
-    ASSERT_EQ(run().exit_code, 0);
+    ASSERT_EQ(run(all_files).exit_code, 0);
     const double whole_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count();
     const auto expected = results_in(out());
-    ASSERT_EQ(plan("--block 50 --in-flight 3").exit_code, 0); // the plain run computed one frame after the other
+    ASSERT_EQ(plan(fmt::format("--block 50 --in-flight 3 {}", all_files)).exit_code, 0); // the plain run computed one frame after the other
     const fs::path results = job() / "results/data/capture";
-    kill_at_random("run " + job().string(), kills(), whole_s / 2, [&] {
+    kill_at_random("run " + job().string(), job(), kills(), whole_s, [&] {
         const Ran status = run_program("status " + job().string());
         if (status.exit_code != 0) { // tasks that a dying worker still held
             ASSERT_EQ(run_program("run " + job().string()).exit_code, 0);
