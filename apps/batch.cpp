@@ -159,6 +159,7 @@ void attach_and_write(Work& work, const BatchOptions& options) {
 
 std::vector<FrameRow> planned_rows(const Capture& capture, const std::vector<std::size_t>& frames) {
     std::vector<FrameRow> rows;
+    rows.reserve(frames.size());
     for (const std::size_t index : frames)
         rows.push_back(skipped_row(capture, index));
     return rows;
@@ -282,6 +283,8 @@ class Pipeline {
         given_up_ = given_up_ || outages_ >= 4;
         if (on_frame_)
             on_frame_(work->row);
+        if (options_.short_rows)
+            shorten(work->row);
     }
 
     const Capture& capture_;

@@ -46,6 +46,10 @@ struct FrameRow {
     std::vector<std::filesystem::path> files; ///< written, relative to Outputs::folder
 };
 
+/// Lets go of what the journal keeps and only the manifest tells: camera, passes, notes and files. Of thousands of
+/// frames it would be what a run needs most memory for.
+void shorten(FrameRow& row);
+
 /// The row of a frame that was not begun.
 [[nodiscard]] FrameRow skipped_row(const Capture& capture, std::size_t index);
 

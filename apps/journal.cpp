@@ -16,6 +16,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <sys/file.h>
 #include <unistd.h>
@@ -57,6 +58,8 @@ json row_json(
     text["files"] = json::array();
     for (const fs::path& file : row.files)
         text["files"].push_back(file.generic_string());
+    if (!row.notes.empty())
+        text["notes"] = row.notes;
     return text;
 }
 
@@ -104,13 +107,19 @@ FrameRow row_from(const json& text) {
         row.passes.emplace_back(pass.at(0).get<std::string>(), number_or_nan(pass.at(1)));
     for (const json& file : text.at("files"))
         row.files.emplace_back(file.get<std::string>());
+    if (text.contains("notes"))
+        row.notes = text["notes"].get<std::vector<std::string>>();
     return row;
+}
+
+Record record_from(const json& line) {
+    return {row_from(line.at("frame")), line.at("settings"), line.at("stamp"), line.at("input"),
+            line.at("sizes").get<std::vector<std::uintmax_t>>()};
 }
 
 void take_line(const json& line, JournalFacts& facts) {
     if (line.contains("frame")) {
-        Record record{row_from(line.at("frame")), line.at("settings"), line.at("stamp"), line.at("input"),
-                      line.at("sizes").get<std::vector<std::uintmax_t>>()};
+        Record record = record_from(line);
         if (facts.begun == record.row.name)
             facts.begun.clear();
         facts.complete.clear();
@@ -128,6 +137,22 @@ void take_line(const json& line, JournalFacts& facts) {
         facts.begun = line["begun"];
     } else if (line.contains("complete")) {
         facts.complete = line["complete"];
+    }
+}
+
+/// Calls take(line, where it begins) for every line that is JSON and that it makes sense of.
+void for_each_line(const fs::path& file, const std::function<void(const json&, std::int64_t)>& take) {
+    std::ifstream stream(file, std::ios::binary);
+    std::int64_t at = 0;
+    for (std::string line; std::getline(stream, line); at += static_cast<std::int64_t>(line.size()) + 1) {
+        const json text = json::parse(line, nullptr, false);
+        if (!text.is_object())
+            continue;
+        try {
+            take(text, at);
+        } catch (const std::exception&) { // another version's line: its frame is done again
+            continue;
+        }
     }
 }
 
@@ -203,17 +228,7 @@ fs::path journal_file(const fs::path& folder, const std::string& block) {
 
 JournalFacts read_journal(const fs::path& file) {
     JournalFacts facts;
-    std::ifstream stream(file);
-    for (std::string line; std::getline(stream, line);) {
-        const json text = json::parse(line, nullptr, false);
-        if (!text.is_object())
-            continue;
-        try {
-            take_line(text, facts);
-        } catch (const std::exception&) { // another version's line: its frame is done again
-            continue;
-        }
-    }
+    for_each_line(file, [&](const json& line, std::int64_t) { take_line(line, facts); });
     return facts;
 }
 
@@ -259,12 +274,39 @@ Journal::Journal(fs::path folder, const std::string& block)
             throw Busy(file_.string() + ": another run is at work here");
         fail(file_, "cannot be locked");
     }
-    for (const fs::path& other : journals_in(folder_))
-        if (other != file_)
-            facts_.records.merge(read_journal(other).records);
-    JournalFacts own = read_journal(file_);
-    own.records.merge(facts_.records);
-    facts_ = std::move(own);
+    journals_ = journals_in(folder_);
+    std::erase(journals_, file_);
+    journals_.push_back(file_); // its lines outweigh the others'
+    for (std::size_t journal = 0; journal < journals_.size(); ++journal)
+        take_places(journal);
+}
+
+void Journal::take_places(std::size_t journal) {
+    facts_ = {};
+    for_each_line(journals_[journal], [&](const json& line, std::int64_t at) {
+        take_line(line, facts_);
+        for (const auto& [name, record] : facts_.records)
+            places_.insert_or_assign(name, Place{journal, at});
+        facts_.records.clear();
+        if (line.contains("again"))
+            for (const json& name : line["again"])
+                places_.erase(name.get<std::string>());
+    });
+}
+
+std::optional<Record> Journal::record_of(const std::string& frame) const {
+    const auto place = places_.find(frame);
+    if (place == places_.end())
+        return std::nullopt;
+    std::ifstream stream(journals_[place->second.journal], std::ios::binary);
+    stream.seekg(place->second.at);
+    std::string line;
+    std::getline(stream, line);
+    try {
+        return record_from(json::parse(line));
+    } catch (const std::exception&) { // another block's journal, cleared meanwhile
+        return std::nullopt;
+    }
 }
 
 Journal::~Journal() { ::close(handle_); }
@@ -276,6 +318,7 @@ void Journal::clear() {
     if (::ftruncate(handle_, 0) != 0)
         fail(file_, "cannot be cleared");
     facts_ = {};
+    places_.clear();
 }
 
 bool Journal::files_are_there(const Record& record) const {
@@ -287,20 +330,28 @@ bool Journal::files_are_there(const Record& record) const {
     return true;
 }
 
-std::optional<FrameRow> Journal::done(const CaptureEntry& entry, const std::string& settings, bool retry) {
-    const auto found = facts_.records.find(entry.name);
-    if (found == facts_.records.end())
+std::optional<FrameRow> Journal::done(const CaptureEntry& entry, const std::optional<std::string>& settings,
+                                      bool retry) const {
+    std::optional<Record> record = record_of(entry.name);
+    if (!record)
         return std::nullopt;
-    const Record& record = found->second;
-    const bool again = record.row.fault == Fault::outage || (retry && record.row.status == FrameStatus::failed);
-    if (again || record.settings != settings || !files_are_there(record))
+    const bool again = record->row.fault == Fault::outage || (retry && record->row.status == FrameStatus::failed);
+    if (again || record->settings != settings.value_or(record->settings) || !files_are_there(*record))
         return std::nullopt;
-    if (record.stamp != stamps_of(entry) && record.input != hashes_of(entry))
+    if (record->stamp != stamps_of(entry) && record->input != hashes_of(entry))
         return std::nullopt;
-    return record.row;
+    return std::move(record->row);
 }
 
-void Journal::append(const std::string& line, Sync sync) {
+FrameRow Journal::whole(const FrameRow& row) const {
+    std::optional<Record> record = record_of(row.name);
+    if (!record)
+        return row;
+    record->row.index = row.index; // in this listing of the capture
+    return std::move(record->row);
+}
+
+std::int64_t Journal::append(const std::string& line, Sync sync) {
     // A torn line, which only a full disk or a power cut leaves, ends here.
     const off_t end = ::lseek(handle_, 0, SEEK_END);
     char last = '\n';
@@ -310,11 +361,12 @@ void Journal::append(const std::string& line, Sync sync) {
     if (::write(handle_, whole.data(), whole.size()) != static_cast<ssize_t>(whole.size()))
         fail(file_, "cannot be written");
     const auto now = std::chrono::steady_clock::now();
-    if (sync == Sync::soon && now - synced_ < std::chrono::seconds(1))
-        return;
-    if (::fdatasync(handle_) != 0)
-        fail(file_, "cannot be written");
-    synced_ = now;
+    if (sync == Sync::now || now - synced_ >= std::chrono::seconds(1)) {
+        if (::fdatasync(handle_) != 0)
+            fail(file_, "cannot be written");
+        synced_ = now;
+    }
+    return end + (last == '\n' ? 0 : 1);
 }
 
 void Journal::add(const FrameRow& row, const CaptureEntry& entry, const std::string& settings,
@@ -338,15 +390,15 @@ void Journal::add(const FrameRow& row, const CaptureEntry& entry, const std::str
                     {"stamp", record.stamp},
                     {"input", record.input},
                     {"sizes", record.sizes}};
-    append(line.dump(-1, ' ', false, json::error_handler_t::replace), Sync::soon);
+    const std::int64_t at = append(line.dump(-1, ' ', false, json::error_handler_t::replace), Sync::soon);
+    places_.insert_or_assign(row.name, Place{journals_.size() - 1, at});
     facts_.complete.clear();
-    facts_.records.erase(row.name); // its line says it; thousands of them would be what a run takes memory for
 }
 
 void Journal::forget(const Capture& capture, const std::vector<std::size_t>& frames) {
     std::vector<std::string> known;
     for (const std::size_t index : frames)
-        if (facts_.records.erase(capture.entries[index].name) > 0)
+        if (places_.erase(capture.entries[index].name) > 0)
             known.push_back(capture.entries[index].name);
     if (!known.empty())
         append(json{{"again", known}}.dump(-1, ' ', false, json::error_handler_t::replace));

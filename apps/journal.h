@@ -6,10 +6,12 @@
 #include "projection/error.h"
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 namespace scanshade {
@@ -24,10 +26,10 @@ struct Record {
 
 /// Who last wrote to a journal, and how its task stands.
 struct JournalFacts {
-    std::map<std::string, Record> records; ///< by frame name; the latest of each
-    std::string complete;                  ///< Journal::complete()'s key, unless frames were added since
-    std::string host, device, started;     ///< of the last process that worked here
-    std::string begun;                     ///< a frame that was begun alone and did not come to its end
+    std::string complete;              ///< Journal::complete()'s key, unless frames were added since
+    std::string host, device, started; ///< of the last process that worked here
+    std::string begun;                 ///< a frame that was begun alone and did not come to its end
+    std::map<std::string, Record> records = {}; ///< by frame name; the latest of each
 };
 
 /// The journal of a whole capture ("") or of a block of its frames ("0-500") in the folder of its results.
@@ -51,7 +53,7 @@ class Busy : public Outage {
     using Outage::Outage;
 };
 
-/// The journal held for writing. Its lock is the kernel's (flock): it goes with the process, however that ends, so
+/// The journal held for writing; of what it says no more is in memory than where it says it. Its lock is the kernel's (flock): it goes with the process, however that ends, so
 /// that there are no stale ones; over NFS and Lustre it holds between machines.
 class Journal {
   public:
@@ -64,9 +66,12 @@ class Journal {
 
     /// Forgets everything; the journal of a whole capture removes those of blocks beside it.
     void clear();
-    /// The frame's row if it was made from the same settings and input, and its files lie there in full; a failed row
-    /// counts unless its fault was an outage or `retry` asks for all.
-    [[nodiscard]] std::optional<FrameRow> done(const CaptureEntry& entry, const std::string& settings, bool retry);
+    /// The frame's row if it was made from the same settings (where given) and input, and its files lie there in full;
+    /// a failed row counts unless its fault was an outage or `retry` asks for all.
+    [[nodiscard]] std::optional<FrameRow> done(const CaptureEntry& entry, const std::optional<std::string>& settings,
+                                               bool retry) const;
+    /// A row with all that shorten() took of it; rows that are not recorded come back as they are.
+    [[nodiscard]] FrameRow whole(const FrameRow& row) const;
     /// One line, the kernel's when this returns, so that it outlives the process; the disk has it a second later: a
     /// frame whose line a power cut takes is done again. Skipped frames are not recorded. Throws Outage where it cannot
     /// be.
@@ -77,11 +82,20 @@ class Journal {
     void begin_alone(const std::string& frame);
     /// All of the task's frames are recorded; `key` stands for settings and stamps of everything it was made from.
     void complete(const std::string& key);
+    /// Those of this journal, without the records.
     [[nodiscard]] const JournalFacts& facts() const { return facts_; }
 
   private:
+    /// Where a frame's line begins.
+    struct Place {
+        std::size_t journal; ///< of journals_
+        std::int64_t at;     ///< bytes from its begin
+    };
     enum class Sync { now, soon };
-    void append(const std::string& line, Sync sync = Sync::now);
+    /// Where the line begins.
+    std::int64_t append(const std::string& line, Sync sync = Sync::now);
+    void take_places(std::size_t journal);
+    [[nodiscard]] std::optional<Record> record_of(const std::string& frame) const;
     [[nodiscard]] bool files_are_there(const Record& record) const;
 
     std::filesystem::path folder_, file_;
@@ -89,6 +103,8 @@ class Journal {
     bool introduced_ = false;
     std::chrono::steady_clock::time_point synced_; ///< when the disk last had every line
     JournalFacts facts_;
+    std::vector<std::filesystem::path> journals_; ///< of the folder, this one last
+    std::unordered_map<std::string, Place> places_; ///< by frame name
 };
 
 } // namespace scanshade

@@ -210,7 +210,8 @@ void write_frames_csv(const std::filesystem::path& file, const std::vector<Frame
     write_atomically(file, text);
 }
 
-void write_manifest(const std::filesystem::path& file, const RunReport& report) {
+void write_manifest(const std::filesystem::path& file, const RunReport& report,
+                    const std::function<FrameRow(const FrameRow&)>& whole) {
     json text{{"program", "scanshade"},
               {"version", SCANSHADE_VERSION},
               {"command_line", command_line()},
@@ -229,7 +230,7 @@ void write_manifest(const std::filesystem::path& file, const RunReport& report) 
               {"budget", report.budget},
               {"shading", report.shading},
               {"totals", totals_json(report)}};
-    const std::string whole = text_of(text), head = whole.substr(0, whole.rfind("\n}"));
+    const std::string all = text_of(text), head = all.substr(0, all.rfind("\n}"));
     write_atomically(file, [&](const std::filesystem::path& target) {
         std::ofstream stream(target, std::ios::binary);
         stream.exceptions(std::ios::failbit | std::ios::badbit);
@@ -239,7 +240,7 @@ void write_manifest(const std::filesystem::path& file, const RunReport& report) 
         const char* between = "";
         for (const FrameRow& row : report.frames) {
             stream << std::exchange(between, ",") << "\n    "
-                   << indented(text_of(frame_json(row, !report.capture.camera)), "    ");
+                   << indented(text_of(frame_json(whole(row), !report.capture.camera)), "    ");
         }
         stream << (report.frames.empty() ? "]" : "\n  ]") << "\n}\n";
         stream.flush();

@@ -8,6 +8,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -27,7 +28,7 @@ struct RunReport {
     std::string depth_noise; ///< of the recorded depth, who says so, and what is done about it
     std::vector<std::string> budget; ///< what an error or time budget picked, expects and found; empty without one
     std::string shading; ///< what the shaded pictures show, and why
-    std::vector<FrameRow> frames;
+    std::vector<FrameRow> frames; ///< shortened
     std::size_t done_now = 0; ///< frames that this process did; others were done before
     StageTimes ms_now{};      ///< what they spent in each stage, summed
     double took_ms = 0;       ///< from the first frame's begin to the last one's end
@@ -56,8 +57,10 @@ struct Rates {
 /// Header and one line per frame, in the report's order. Fields with commas, quotes or line ends are quoted. Atomic.
 void write_frames_csv(const std::filesystem::path& file, const std::vector<FrameRow>& frames);
 
-/// Written last, so that its presence says that the run came to its end. Atomic.
-void write_manifest(const std::filesystem::path& file, const RunReport& report);
+/// Written last, so that its presence says that the run came to its end. `whole` gives back what shorten() took of a
+/// row. Atomic.
+void write_manifest(const std::filesystem::path& file, const RunReport& report,
+                    const std::function<FrameRow(const FrameRow&)>& whole);
 
 /// How many of the rows have that status.
 [[nodiscard]] std::size_t count(const std::vector<FrameRow>& rows, FrameStatus status);

@@ -147,19 +147,16 @@ std::string task_key(const std::vector<Stage>& settings, const Capture& capture,
     return key_of(parts);
 }
 
-std::optional<std::vector<FrameRow>> rows_if_complete(Journal& journal, const std::string& task, const Capture& capture,
+std::optional<std::vector<FrameRow>> rows_if_complete(const Journal& journal, const std::string& task, const Capture& capture,
                                                       const std::vector<std::size_t>& frames, bool retry) {
     if (journal.facts().complete != task)
         return std::nullopt;
     std::vector<FrameRow> rows;
     for (const std::size_t index : frames) {
-        const CaptureEntry& entry = capture.entries[index];
-        const auto record = journal.facts().records.find(entry.name);
-        if (record == journal.facts().records.end())
-            return std::nullopt;
-        auto row = journal.done(entry, record->second.settings, retry);
+        auto row = journal.done(capture.entries[index], std::nullopt, retry);
         if (!row)
             return std::nullopt;
+        shorten(*row);
         rows.push_back(*std::move(row));
     }
     return rows;
@@ -175,11 +172,14 @@ std::vector<FrameRow> run_recorded(const Capture& capture, Crew& crew, const Bat
     std::map<std::size_t, FrameRow> rows; // by index
     BatchOptions left = options;
     left.frames.clear();
+    left.short_rows = true;
     for (const std::size_t index : options.frames) {
-        if (auto row = journal.done(capture.entries[index], settings_of(index), recording.retry))
+        if (auto row = journal.done(capture.entries[index], settings_of(index), recording.retry)) {
+            shorten(*row);
             rows.emplace(index, *std::move(row)).first->second.index = index;
-        else
+        } else {
             left.frames.push_back(index);
+        }
     }
     journal.forget(capture, left.frames);
     const auto record = [&](const FrameRow& row) {
@@ -193,6 +193,7 @@ std::vector<FrameRow> run_recorded(const Capture& capture, Crew& crew, const Bat
                                              : run_batch(capture, crew, left, record))
         rows.insert_or_assign(row.index, std::move(row));
     std::vector<FrameRow> all;
+    all.reserve(options.frames.size());
     bool finished = true;
     for (const std::size_t index : options.frames) {
         FrameRow row = rows.contains(index) ? std::move(rows.at(index)) : skipped_row(capture, index);

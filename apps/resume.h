@@ -21,7 +21,7 @@ namespace scanshade {
                                    const std::vector<std::size_t>& frames, bool together = false);
 
 /// The rows of a task that is complete under this key, all its files in place; else nothing.
-[[nodiscard]] std::optional<std::vector<FrameRow>> rows_if_complete(Journal& journal, const std::string& task,
+[[nodiscard]] std::optional<std::vector<FrameRow>> rows_if_complete(const Journal& journal, const std::string& task,
                                                                     const Capture& capture,
                                                                     const std::vector<std::size_t>& frames, bool retry);
 
@@ -38,7 +38,8 @@ struct Recording {
     std::atomic<std::uint64_t>* finished = nullptr;
 };
 
-/// run_batch() over the frames that the journal does not have; rows of all come back, in the order of options.frames.
+/// run_batch() over the frames that the journal does not have; rows of all come back shortened, in the order of
+/// options.frames; Journal::whole() has the rest.
 /// `on_frame` is told of those that were run.
 [[nodiscard]] std::vector<FrameRow> run_recorded(const Capture& capture, Crew& crew, const BatchOptions& options,
                                                  const Recording& recording,

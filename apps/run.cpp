@@ -68,15 +68,16 @@ std::string folder_name(const fs::path& path, std::set<std::string>& taken) {
 /// Nothing is begun when something would be lost: an earlier result is replaced only with --overwrite.
 void refuse_to_overwrite(const Job& job) {
     const Outputs& outputs = job.batch.outputs;
-    std::vector<fs::path> files = {outputs.folder / "manifest.json", outputs.folder / "frames.csv",
-                                   journal_file(outputs.folder, "")};
+    const auto refuse = [](const std::vector<fs::path>& files) {
+        const auto there = std::ranges::find_if(files, [](const fs::path& file) { return fs::exists(file); });
+        if (there != files.end())
+            throw Misuse(there->string() +
+                         " exists already: --resume goes on with an earlier run, --overwrite replaces its "
+                         "results, or choose another -o");
+    };
+    refuse({outputs.folder / "manifest.json", outputs.folder / "frames.csv", journal_file(outputs.folder, "")});
     for (const std::size_t index : job.batch.frames)
-        std::ranges::copy(files_of(job.capture.entries[index], outputs), std::back_inserter(files));
-    const auto there = std::ranges::find_if(files, [](const fs::path& file) { return fs::exists(file); });
-    if (there != files.end())
-        throw Misuse(there->string() +
-                     " exists already: --resume goes on with an earlier run, --overwrite replaces its "
-                     "results, or choose another -o");
+        refuse(files_of(job.capture.entries[index], outputs));
 }
 
 /// Clears what a killed run left, and the report of an earlier one: a manifest says that what lies beside it is
@@ -234,7 +235,6 @@ class Run final : public Command {
                          .shading = shading_sentence(job.capture, registration),
                          .frames = {}};
         report.devices = workers.devices();
-        report.frames.resize(job.batch.frames.size());
         return report;
     }
 
@@ -374,7 +374,7 @@ class Run final : public Command {
         if (!asked_.recording_cloud.empty())
             job.batch.cloud = &cloud.emplace(asked_.cloud_resolution_m);
         say(fmt::format("{} on {}", asked_.method, workers.description()));
-        introduce(report);
+        introduce(report, job.batch.frames.size());
         prepare_folder(job, {table, manifest});
         Entrance entrance(entrance_);
         job.batch.all_begun = [&] { entrance.leave(); };
@@ -401,12 +401,12 @@ class Run final : public Command {
         progress.end();
         alone.lock(); // the report names settings
         write_frames_csv(folder / table, report.frames);
-        write_manifest(folder / manifest, report);
+        write_manifest(folder / manifest, report, [&](const FrameRow& row) { return journal.whole(row); });
         alone.unlock();
         conclude(report, folder / table);
         if (cloud && !interrupted)
             write_recording(*cloud);
-        return report.frames;
+        return std::move(report.frames);
     }
 
     void write_recording(const RecordingCloud& cloud) const {

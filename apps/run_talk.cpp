@@ -53,9 +53,9 @@ std::string noise_sentence(const DepthNoise& noise, const RunSettings& settings)
                                                     : "depth is used as recorded");
 }
 
-void introduce(const RunReport& report) {
+void introduce(const RunReport& report, std::size_t frames) {
     const Capture& capture = report.capture;
-    say(fmt::format("{}: {}, {} of {} frames", capture.path.string(), capture.kind, report.frames.size(),
+    say(fmt::format("{}: {}, {} of {} frames", capture.path.string(), capture.kind, frames,
                     capture.entries.size()));
     if (!capture.depth.origin.empty())
         say(fmt::format("  depth: {} ({})", capture.depth.name, capture.depth.origin));

@@ -14,8 +14,8 @@ namespace scanshade {
 /// What is known of the depth's noise, and what is done about it.
 [[nodiscard]] std::string noise_sentence(const DepthNoise& noise, const RunSettings& settings);
 
-/// What is there, and what was chosen for it.
-void introduce(const RunReport& report);
+/// What is there, how many frames of it are taken, and what was chosen for them.
+void introduce(const RunReport& report, std::size_t frames);
 /// How it went; `table` is the run's frames.csv.
 void conclude(const RunReport& report, const std::filesystem::path& table);
 

@@ -161,7 +161,7 @@ void correct(cv::Mat1f& depth_m, const DepthCorrection& correction) {
 
 void load_depth(const Capture& capture, const CaptureEntry& entry, Frame& frame, bool with_colour) {
     const cv::Mat stored = read_stored_depth(entry.depth);
-    frame.depth_m = during(entry.depth.string(), [&] { return depth_in_metres(stored, capture.depth); });
+    frame.depth_m = during(entry.depth, [&] { return depth_in_metres(stored, capture.depth); });
     if (capture.camera) {
         frame.camera = *capture.camera;
         if (frame.camera.pinhole.size.empty())
@@ -191,14 +191,14 @@ void load_cloud(const Capture& capture, const CaptureEntry& entry, Frame& frame)
         if (pinhole.size.empty())
             pinhole.size = grid;
         if (pinhole.size != grid)
-            throw Error(fmt::format("{}: the cloud's grid is {}, but its camera is for {} ({})", entry.cloud.string(),
+            throw Error(fmt::format("{}: the cloud's grid is {}, but its camera is for {} ({})", entry.cloud,
                                     text(grid), text(pinhole.size), frame.camera.origin));
     } else if (pinhole.size.empty()) {
         // Four numbers say nothing about the image; a principal point is usually its middle.
         constexpr double widest = 1 << 14;
         if (!(pinhole.cx >= 0 && pinhole.cy >= 0 && pinhole.cx < widest / 2 && pinhole.cy < widest / 2))
             throw Error(fmt::format("{}: an image size is needed with this camera ({}); give a camera file",
-                                    entry.cloud.string(), frame.camera.origin));
+                                    entry.cloud, frame.camera.origin));
         pinhole.size = {static_cast<int>(std::lround(2 * pinhole.cx + 1)),
                         static_cast<int>(std::lround(2 * pinhole.cy + 1))};
         frame.warnings.push_back(

@@ -23,8 +23,10 @@ struct CaptureOptions {
 
 /// One frame's listing: where its parts lie. Nothing is decoded yet.
 struct CaptureEntry {
-    std::string name;                           ///< unique in the capture
-    std::filesystem::path colour, depth, cloud; ///< empty where there is none
+    std::string name; ///< unique in the capture
+    /// Paths; empty where there is none. Not as std::filesystem::path, which holds every component apart: of thousands
+    /// of frames that would be most of what a capture takes.
+    std::string colour, depth, cloud;
     std::optional<Eigen::Isometry3d> world_from_camera;
     std::optional<double> stamp_s;        ///< of the depth image
     std::optional<double> colour_stamp_s; ///< of the colour image paired with it

@@ -163,9 +163,9 @@ void entries_from_match(const fs::path& folder, const fs::path& depth_folder, Ca
 
 /// Pairs by equal stems; where no stem is shared but there are as many of each, by order.
 void entries_from_names(const std::vector<fs::path>& depths, const std::vector<fs::path>& colours, Capture& capture) {
-    std::map<std::string, fs::path> by_stem;
+    std::map<std::string, const fs::path*> by_stem;
     for (const fs::path& colour : colours)
-        by_stem.emplace(colour.stem().string(), colour);
+        by_stem.emplace(colour.stem().string(), &colour);
     std::size_t shared = 0;
     for (const fs::path& depth : depths)
         shared += by_stem.count(depth.stem().string());
@@ -174,18 +174,18 @@ void entries_from_names(const std::vector<fs::path>& depths, const std::vector<f
         capture.warnings.push_back(
             fmt::format("colour and depth share no file names; paired by order ({} with {}, ...).",
                         colours[0].filename().string(), depths[0].filename().string()));
+    capture.entries.reserve(depths.size());
     for (std::size_t i = 0; i < depths.size(); ++i) {
-        CaptureEntry entry;
+        CaptureEntry& entry = capture.entries.emplace_back();
         entry.name = depths[i].stem().string();
         entry.depth = depths[i];
         const auto same = by_stem.find(entry.name);
         if (by_order)
             entry.colour = colours[i];
         else if (same != by_stem.end())
-            entry.colour = same->second;
+            entry.colour = *same->second;
         else if (!colours.empty())
             entry.warnings.push_back(fmt::format("{} has no colour image.", depths[i].string()));
-        capture.entries.push_back(std::move(entry));
     }
     if (!by_order && shared < colours.size())
         capture.warnings.push_back(fmt::format("{} without a depth image of the same name; not used.",

@@ -219,6 +219,12 @@ TEST_F(ResumeTest, a_resumed_report_tells_of_all_frames) {
     tests::write_capture(capture(), 6);
     EXPECT_EQ(run("--depth-noise none --resume").exit_code, 0);
     EXPECT_EQ(done_frames(), 8u);
+    const json manifest = json::parse(read_bytes(out() / "manifest.json"));
+    ASSERT_EQ(manifest["frames"].size(), 6u);
+    for (const json& frame : manifest["frames"]) { // most of them were done by other processes
+        EXPECT_EQ(frame["files"].size(), 3u) << frame;
+        EXPECT_FALSE(frame["passes"].empty()) << frame;
+    }
 }
 
 TEST_F(ResumeTest, a_torn_line_costs_one_frame) {
