@@ -160,9 +160,9 @@ void for_each_line(const fs::path& file, const std::function<void(const json&, s
 
 std::vector<fs::path> inputs_of(const CaptureEntry& entry) {
     std::vector<fs::path> files;
-    for (const fs::path& file : {entry.colour, entry.depth, entry.cloud})
-        if (!file.empty())
-            files.push_back(file);
+    for (const std::string* file : {&entry.colour, &entry.depth, &entry.cloud})
+        if (!file->empty())
+            files.emplace_back(*file);
     return files;
 }
 
