@@ -124,6 +124,16 @@ std::vector<float> sky_by_views(const scene::SceneCloud& cloud, double spacing, 
     return sky;
 }
 
+/// Of those that have one.
+double share_turned_away(const std::vector<Vector3f>& found, const std::vector<Vector3d>& exact) {
+    double away = 0, all = 0;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+        away += found[i].cast<double>().dot(exact[i]) < 0;
+        all += !found[i].isZero();
+    }
+    return away / std::max(all, 1.0);
+}
+
 } // namespace
 
 int main(int argc, char** argv) {
@@ -150,13 +160,16 @@ int main(int argc, char** argv) {
     const PointSet set{cloud.points, no_normals ? std::span<const Vector3d>() : cloud.normals};
     fmt::print("{}: {} points, radius {} m; judged at every {}. point\n", world.scene().name, points, sky ? 0 : radius,
                step);
-    double spacing = 0;
+    double spacing = 0, sides = 0;
     for (const int count : rays)
         judge.row(fmt::format("{} rays a point", count), [&] {
             const auto found = CloudAo({.radius = radius, .rays = count, .sky = sky}).compute(set);
             spacing = found.spacing;
+            sides = share_turned_away(found.normals, cloud.normals);
             return found.visibility;
         });
+    if (no_normals)
+        fmt::print("{:.2f} % of the points face the wrong side\n", 100 * sides);
     if (sky)
         for (const int raster : rasters)
             judge.row(fmt::format("256 views of {0}x{0}", raster),

@@ -1,8 +1,7 @@
 // Visibility of every point of a cloud: neighbours, planes, sides, discs, rays, and the mean of what neighbours saw.
 #include "ao/cloud/cloud_ao.h"
 
-#include "ao/cloud/ray_fan.h"
-#include "ao/raycast/ray_surface.h"
+#include "ao/cloud/disc_rays.h"
 #include "ao/raycast/raycast.h"
 #include "projection/error.h"
 #include "projection/hash.h"
@@ -83,68 +82,6 @@ double extent_of(std::span<const Vector3d> points) {
     }
     return extent.norm();
 }
-
-/// Axes with z along `normal` (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
-Eigen::Matrix3f axes_about(const Vector3f& normal) {
-    const float sign = std::copysign(1.0F, normal.z()), a = -1 / (sign + normal.z()), b = normal.x() * normal.y() * a;
-    Eigen::Matrix3f axes;
-    axes << Vector3f(1 + sign * normal.x() * normal.x() * a, sign * b, -sign * normal.x()),
-        Vector3f(b, sign + normal.y() * normal.y() * a, -normal.y()), normal;
-    return axes;
-}
-
-/// Rays from the points of a surface against its discs.
-class DiscRays {
-  public:
-    DiscRays(const CloudSurface& surface, const RayFan& fan, float radius, const std::optional<Vector3f>& up)
-        : surface_(surface), fan_(fan), radius_(radius), up_(up), discs_(discs(surface)) {}
-
-    /// Share of a point's rays that come free.
-    [[nodiscard]] float open(std::size_t place) const {
-        const Vector3f& normal = surface_.normals[place];
-        const float disc = surface_.disc_radius[place], rough = surface_.roughness[place];
-        const float lift = std::max({neighbours_tilt * disc, rough, static_cast<float>(discs_.rounding_m())});
-        const Eigen::Matrix3f axes = axes_about(normal);
-        const Vector3d at = surface_.tree[place].cast<double>();
-        RayBundle bundle;
-        bundle.origin = discs_.local(at + static_cast<double>(lift) * normal.cast<double>());
-        bundle.far_m = std::max(radius_ - lift, 0.0F);
-        bundle.own = {discs_.local(at), 2 * disc, std::max(0.2F * disc, 2 * rough), normal};
-        const RayFan::Run run = fan_.run(place);
-        int free = 0;
-        for (int first = 0; first < run.count; first += RayBundle::size) {
-            const int eight = std::min(RayBundle::size, run.count - first);
-            for (int i = 0; i < RayBundle::size; ++i) {
-                const int ray = first + std::min(i, eight - 1);
-                const Vector3f direction = axes * Vector3f(run.x[ray], run.y[ray], run.z[ray]);
-                const auto lane = static_cast<std::size_t>(i);
-                bundle.x[lane] = direction.x(), bundle.y[lane] = direction.y(), bundle.z[lane] = direction.z();
-                bundle.live[lane] = i < eight && !(up_ && direction.dot(*up_) <= 0) ? -1 : 0;
-            }
-            discs_.drop_blocked(bundle);
-            for (const int live : bundle.live)
-                free += live != 0;
-        }
-        return static_cast<float>(free) / static_cast<float>(run.count);
-    }
-
-  private:
-    static constexpr float neighbours_tilt = 0.088F; ///< half of tan 10 degrees: so far neighbouring discs stand out
-
-    static RaySurface discs(const CloudSurface& surface) {
-        std::vector<Disc> all(surface.size());
-        for (std::size_t i = 0; i < all.size(); ++i)
-            all[i] = {surface.tree[i].cast<double>(), surface.normals[i].cast<double>(),
-                      surface.normals[i].isZero() ? 0 : static_cast<double>(surface.disc_radius[i])};
-        return RaySurface(std::span<const Disc>(all));
-    }
-
-    const CloudSurface& surface_;
-    const RayFan& fan_;
-    float radius_;
-    std::optional<Vector3f> up_;
-    RaySurface discs_;
-};
 
 /// The mean of a value and those beside it on the same surface: planes alike, near against the radius.
 std::vector<float> smoothed(const CloudSurface& surface, const std::vector<float>& values, float radius) {
@@ -345,7 +282,14 @@ class CloudAo::Work {
         if (!wanted.empty())
             for (const std::uint32_t i : core)
                 wanted[i] = 1;
-        const CloudSurface surface = surface_of(round);
+        CloudSurface surface = planes_of(round);
+        std::optional<DiscRays> rays;
+        if (sides_unknown()) {
+            if (outside_.kind == Outside::Kind::inward)
+                rays.emplace(surface);
+            turn_outside(surface, outside_, rays ? &*rays : nullptr);
+        }
+        watch_.lap("sides");
         const auto is_wanted = [&](std::size_t place) {
             return wanted.empty() || wanted[round[surface.tree.index(place)]];
         };
@@ -355,14 +299,16 @@ class CloudAo::Work {
         const float radius = options_.sky ? std::numeric_limits<float>::max() : static_cast<float>(result_.radius);
         std::vector<float> values(surface.size(), nothing);
         {
-            const DiscRays rays(surface, *fan_, radius,
-                                options_.sky ? std::optional<Vector3f>(up_.cast<float>()) : std::nullopt);
+            const std::optional<Vector3f> up = options_.sky ? std::optional<Vector3f>(up_.cast<float>()) : std::nullopt;
+            if (!rays)
+                rays.emplace(surface);
             watch_.lap("tree");
             tbb::parallel_for(tbb::blocked_range<std::size_t>(0, surface.size(), 64), [&](const auto& range) {
                 for (std::size_t i = range.begin(); i < range.end(); ++i)
                     if (!surface.normals[i].isZero() && is_beside(i))
-                        values[i] = rays.open(i);
+                        values[i] = rays->open(i, *fan_, radius, up);
             });
+            rays.reset();
         }
         watch_.lap("rays");
         for (int pass = 0; pass < passes_; ++pass)
@@ -379,15 +325,15 @@ class CloudAo::Work {
         result_.tiles = ++tiles_;
     }
 
-    /// Neighbours, planes and sides of these points.
-    CloudSurface surface_of(const std::vector<std::uint32_t>& which) {
+    /// Neighbours and planes of these points.
+    CloudSurface planes_of(const std::vector<std::uint32_t>& which) {
         std::vector<Vector3d> points(which.size()), normals;
         const auto pick = [&](std::span<const Vector3d> from, std::vector<Vector3d>& to) {
             to.resize(which.size());
             std::transform(which.begin(), which.end(), to.begin(), [&](std::uint32_t i) { return from[i]; });
         };
         pick(cloud_.points, points);
-        if (!cloud_.normals.empty() && options_.normals != "estimated" && !normals_refused_)
+        if (recorded())
             pick(cloud_.normals, normals);
         CloudSurface surface = cloud_surface(points, normals);
         constexpr double same_planes = 0.8, too_many_opposed = 0.05;
@@ -402,29 +348,31 @@ class CloudAo::Work {
         }
         watch_.lap("planes");
         sides_opposed_ |= !normals.empty() && options_.normals == "auto" && surface.discord > too_many_opposed;
-        if (normals.empty() || sides_opposed_)
-            turn_outside(surface, outside_);
-        watch_.lap("sides");
         return surface;
     }
 
+    /// Whether recorded normals are taken.
+    [[nodiscard]] bool recorded() const {
+        return !cloud_.normals.empty() && options_.normals != "estimated" && !normals_refused_;
+    }
+    [[nodiscard]] bool sides_unknown() const { return !recorded() || sides_opposed_; }
+
     void tell() {
-        const bool recorded = !cloud_.normals.empty() && options_.normals != "estimated" && !normals_refused_;
         const std::string facing = outside_.kind == Outside::Kind::viewpoint ? "turned to " : "turned ";
-        if (recorded && sides_opposed_)
+        if (recorded() && sides_opposed_)
             result_.notes.push_back("normals: recorded, but neighbours' oppose each other; " + facing + outside_.why +
                                     ".");
         else
-            result_.notes.push_back(recorded
+            result_.notes.push_back(recorded()
                                         ? "normals: recorded."
                                         : "normals: from planes through 16 neighbours, " + facing + outside_.why + ".");
         const bool apart = outside_.kind == Outside::Kind::outward || outside_.kind == Outside::Kind::inward;
         if (tiles_ > 1)
             result_.notes.push_back(fmt::format(
                 "in {} tiles of at most {} points each{}.", tiles_, at_once(),
-                apart && !recorded ? ", whose normals were turned tile by tile: where they look wrong, give "
-                                     "--cloud.outside or more --cloud.memory"
-                                   : ""));
+                apart && !recorded() ? ", whose normals were turned tile by tile: where they look wrong, give "
+                                       "--cloud.outside or more --cloud.memory"
+                                     : ""));
         std::size_t unknown = 0;
         for (const std::uint32_t i : valid_)
             unknown += std::isnan(result_.visibility[i]);

@@ -9,6 +9,8 @@
 
 namespace scanshade {
 
+class DiscRays;
+
 /// Where the outside of a surface without recorded normals is.
 struct Outside {
     enum class Kind {
@@ -53,9 +55,11 @@ struct CloudSurface {
 [[nodiscard]] CloudSurface cloud_surface(std::span<const Eigen::Vector3d> points,
                                          std::span<const Eigen::Vector3d> normals);
 
-/// Turns normals to the outside. Towards a viewpoint each point by itself; else neighbours are made to agree, the
-/// flattest pairs first (a spanning tree as of Hoppe et al. 1992, built as Kruskal's), and every piece that agrees in
-/// itself takes the side that most of it has evidence for. Points without a plane face the viewpoint or the direction.
-void turn_outside(CloudSurface& surface, const Outside& outside);
+/// Turns normals to the outside. Towards a viewpoint each point by itself; else neighbours are made to agree, those
+/// that most surely lie on one surface first (a spanning tree as of Hoppe et al. 1992, built as Kruskal's), and every
+/// piece that agrees in itself takes the side that most of it has evidence for. In rooms (inward) that is the side with
+/// more air, by rays against `rays`, which must be given then; pieces with clear evidence against each other are not
+/// joined. Points without a plane face the viewpoint or the direction.
+void turn_outside(CloudSurface& surface, const Outside& outside, const DiscRays* rays = nullptr);
 
 } // namespace scanshade

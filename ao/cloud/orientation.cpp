@@ -1,5 +1,6 @@
-// Which side of a cloud's planes is outside: what the cloud tells of its scanner, and neighbours that must agree.
+// Where a cloud was seen from: what it tells of its scanner.
 #include "ao/cloud/cloud_surface.h"
+#include "ao/cloud/ray_fan.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +8,6 @@
 #include <fmt/format.h>
 #include <limits>
 #include <numbers>
-#include <numeric>
 
 namespace scanshade {
 namespace {
@@ -103,17 +103,6 @@ double seen_from_above(std::span<const Vector3d> points) {
     return static_cast<double>(seen) / static_cast<double>(count);
 }
 
-/// Directions spread evenly over the sphere (Fibonacci's spiral).
-std::vector<Vector3d> spread_directions(int count) {
-    std::vector<Vector3d> directions;
-    for (int i = 0; i < count; ++i) {
-        const double z = 1 - (2 * i + 1.0) / count, turn = i * std::numbers::pi * (3 - std::sqrt(5.0));
-        const double across = std::sqrt(1 - z * z);
-        directions.emplace_back(across * std::cos(turn), across * std::sin(turn), z);
-    }
-    return directions;
-}
-
 /// Share of the points that lie behind others from wherever outside one looks.
 double hidden_share(std::span<const Vector3d> all) {
     std::vector<Vector3d> points;
@@ -148,132 +137,6 @@ double hidden_share(std::span<const Vector3d> all) {
     return static_cast<double>(std::count(seen.begin(), seen.end(), 0)) / static_cast<double>(points.size());
 }
 
-/// Points joined into pieces, each knowing whether its normal must be turned to agree with its piece.
-class Pieces {
-  public:
-    explicit Pieces(std::size_t count) : parent_(count), turned_(count, 0), size_(count, 1) {
-        std::iota(parent_.begin(), parent_.end(), 0U);
-    }
-
-    struct Place {
-        std::uint32_t piece;
-        bool turned; ///< against the piece's first point
-    };
-    Place find(std::uint32_t point) {
-        bool turned = false;
-        std::uint32_t root = point;
-        for (; parent_[root] != root; root = parent_[root])
-            turned ^= turned_[root] != 0;
-        for (bool rest = turned; parent_[point] != point;) { // all on the way now hang on the root
-            const std::uint32_t next = parent_[point];
-            const bool own = turned_[point] != 0;
-            parent_[point] = root;
-            turned_[point] = rest;
-            rest ^= own;
-            point = next;
-        }
-        return {root, turned};
-    }
-
-    /// The two agree when one of them is turned, or when both are or neither is.
-    void join(std::uint32_t a, std::uint32_t b, bool opposed) {
-        Place one = find(a), other = find(b);
-        if (one.piece == other.piece)
-            return;
-        if (size_[one.piece] < size_[other.piece])
-            std::swap(one, other);
-        parent_[other.piece] = one.piece;
-        turned_[other.piece] = one.turned ^ other.turned ^ opposed;
-        size_[one.piece] += size_[other.piece];
-    }
-
-  private:
-    std::vector<std::uint32_t> parent_;
-    std::vector<char> turned_;
-    std::vector<std::uint32_t> size_;
-};
-
-/// Joins neighbours, those with the most alike planes first; planes more than 75 degrees apart say nothing about each
-/// other's sides.
-Pieces joined_pieces(const CloudSurface& surface) {
-    constexpr int classes = 128, least = 33; // 33 / 128: 75 degrees
-    const auto likeness = [&](std::size_t i, std::uint32_t j) {
-        return static_cast<int>(std::abs(surface.normals[i].dot(surface.normals[j])) * (classes - 1));
-    };
-    std::array<std::size_t, classes + 1> start{};
-    const auto for_each_pair = [&](auto&& visit) {
-        for (std::size_t i = 0; i < surface.size(); ++i)
-            for (const std::uint32_t j : surface.near[i])
-                if (const bool once =
-                        i < j || std::find(surface.near[j].begin(), surface.near[j].end(), i) == surface.near[j].end();
-                    once && i != j)
-                    if (const int like = likeness(i, j); like >= least)
-                        visit(static_cast<std::uint32_t>(i), j, static_cast<std::size_t>(classes - 1 - like));
-    };
-    for_each_pair([&](std::uint32_t, std::uint32_t, std::size_t place) { ++start[place + 1]; });
-    std::partial_sum(start.begin(), start.end(), start.begin());
-    std::vector<std::array<std::uint32_t, 2>> pairs(start.back());
-    for_each_pair([&](std::uint32_t i, std::uint32_t j, std::size_t place) { pairs[start[place]++] = {i, j}; });
-    Pieces pieces(surface.size());
-    for (const auto& [i, j] : pairs)
-        pieces.join(i, j, surface.normals[i].dot(surface.normals[j]) < 0);
-    return pieces;
-}
-
-/// For every point how far it faces out of its piece, from the points that lie farthest in many directions; and by
-/// piece in how many of these it reaches as far as the whole cloud.
-struct Outward {
-    static constexpr int looks = 64;
-    std::vector<double> evidence;
-    std::vector<int> reached;
-};
-
-Outward outward_evidence(const CloudSurface& surface, Pieces& pieces) {
-    constexpr auto nobody = std::numeric_limits<std::uint32_t>::max();
-    Outward found{std::vector<double>(surface.size(), 0.0), std::vector<int>(surface.size(), 0)};
-    std::vector<std::uint32_t> piece(surface.size()), farthest(surface.size());
-    for (std::size_t i = 0; i < surface.size(); ++i)
-        piece[i] = pieces.find(static_cast<std::uint32_t>(i)).piece;
-    for (const Vector3d& look : spread_directions(Outward::looks)) {
-        const Vector3f direction = look.cast<float>();
-        std::fill(farthest.begin(), farthest.end(), nobody);
-        float low = std::numeric_limits<float>::infinity(), high = -low;
-        for (std::size_t i = 0; i < surface.size(); ++i) {
-            std::uint32_t& best = farthest[piece[i]];
-            const float along = surface.tree[i].dot(direction);
-            low = std::min(low, along), high = std::max(high, along);
-            if (best == nobody || along > surface.tree[best].dot(direction))
-                best = static_cast<std::uint32_t>(i);
-        }
-        for (std::size_t p = 0; p < farthest.size(); ++p)
-            if (const std::uint32_t best = farthest[p]; best != nobody) {
-                found.evidence[best] += static_cast<double>(surface.normals[best].dot(direction));
-                found.reached[p] += surface.tree[best].dot(direction) > high - 0.05F * (high - low);
-            }
-    }
-    return found;
-}
-
-/// In a room the walls, which reach to its ends on many sides, face in; what stands about in it faces out.
-void turn_pieces(CloudSurface& surface, const Outside& outside) {
-    Pieces pieces = joined_pieces(surface);
-    const Vector3f up = outside.point.cast<float>();
-    const bool by_up = outside.kind == Outside::Kind::direction;
-    const Outward outward = by_up ? Outward{} : outward_evidence(surface, pieces);
-    std::vector<double> votes(surface.size(), 0.0);
-    for (std::size_t i = 0; i < surface.size(); ++i) {
-        const auto [piece, turned] = pieces.find(static_cast<std::uint32_t>(i));
-        const double own = by_up ? static_cast<double>(surface.normals[i].dot(up)) : outward.evidence[i];
-        const bool encloses = outside.kind == Outside::Kind::inward && 4 * outward.reached[piece] > Outward::looks;
-        votes[piece] += turned != encloses ? -own : own;
-    }
-    for (std::size_t i = 0; i < surface.size(); ++i) {
-        const auto [piece, turned] = pieces.find(static_cast<std::uint32_t>(i));
-        if ((votes[piece] < 0) != turned)
-            surface.normals[i] = -surface.normals[i];
-    }
-}
-
 } // namespace
 
 Outside guessed_outside(std::span<const Vector3d> points, const std::optional<Vector3d>& recorded) {
@@ -299,26 +162,6 @@ Outside guessed_outside(std::span<const Vector3d> points, const std::optional<Ve
                 fmt::format("inward, as of a room: {:.0f} % of the points lie inside, hidden from all round",
                             100 * hidden)};
     return {Outside::Kind::outward, Vector3d::Zero(), "outward, as nothing tells where the scanner stood"};
-}
-
-void turn_outside(CloudSurface& surface, const Outside& outside) {
-    const Vector3f viewpoint = (outside.point - surface.middle).cast<float>();
-    const auto facing = [&](std::size_t i) -> Vector3f {
-        const Vector3f towards = outside.kind == Outside::Kind::viewpoint ? Vector3f(viewpoint - surface.tree[i])
-                                                                          : Vector3f(outside.point.cast<float>());
-        return towards.stableNormalized();
-    };
-    if (outside.kind != Outside::Kind::viewpoint)
-        turn_pieces(surface, outside);
-    for (std::size_t i = 0; i < surface.size(); ++i) {
-        Vector3f& normal = surface.normals[i];
-        const bool looks_somewhere =
-            outside.kind == Outside::Kind::viewpoint || outside.kind == Outside::Kind::direction;
-        if (normal.isZero() && looks_somewhere)
-            normal = facing(i);
-        else if (outside.kind == Outside::Kind::viewpoint && normal.dot(facing(i)) < 0)
-            normal = -normal;
-    }
 }
 
 } // namespace scanshade

@@ -23,6 +23,16 @@ int place_of(const Eigen::Vector3f& d, std::size_t rays) {
 
 } // namespace
 
+std::vector<Eigen::Vector3d> spread_directions(int count) {
+    std::vector<Eigen::Vector3d> directions;
+    for (int i = 0; i < count; ++i) {
+        const double z = 1 - (2 * i + 1.0) / count, turn = i * std::numbers::pi * (3 - std::sqrt(5.0));
+        const double across = std::sqrt(1 - z * z);
+        directions.emplace_back(across * std::cos(turn), across * std::sin(turn), z);
+    }
+    return directions;
+}
+
 RayFan::RayFan(int rays, int seed)
     : rays_(static_cast<std::size_t>(rays)), runs_(std::max<std::size_t>(16384 / rays_, 1)) {
     const std::uint32_t key = hash(static_cast<std::uint32_t>(seed));

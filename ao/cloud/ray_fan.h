@@ -1,4 +1,4 @@
-// Cosine-weighted directions for many neighbouring points: each has a few of one long even sequence.
+// Directions: round the sphere, and cosine-weighted for many neighbouring points, each with a few of one long sequence.
 #pragma once
 
 #include <cstdint>
@@ -6,6 +6,9 @@
 #include <vector>
 
 namespace scanshade {
+
+/// Unit directions spread evenly over the sphere (Fibonacci's spiral).
+[[nodiscard]] std::vector<Eigen::Vector3d> spread_directions(int count);
 
 /// One scrambled Sobol sequence (Burley 2020) on the hemisphere about z, cut into runs of `rays`. Points in the order
 /// of a tree that take run after run hold, eight or sixteen together, an even set of their own: the mean over

@@ -252,9 +252,10 @@ void RaySurface::drop_blocked(RayBundle& bundle) const {
             bundle.live[i] = 0;
 }
 
-std::array<float, RayBundle::size> RaySurface::distances(const RayBundle& bundle) const {
-    std::array<float, RayBundle::size> found;
-    found.fill(std::numeric_limits<float>::infinity());
+RaySurface::Meetings RaySurface::meetings(const RayBundle& bundle) const {
+    Meetings found;
+    found.distance.fill(std::numeric_limits<float>::infinity());
+    found.primitive.fill(-1);
     if (empty())
         return found;
     RTCRayHit8 sought;
@@ -262,9 +263,11 @@ std::array<float, RayBundle::size> RaySurface::distances(const RayBundle& bundle
     std::fill(std::begin(sought.hit.geomID), std::end(sought.hit.geomID), RTC_INVALID_GEOMETRY_ID);
     CastContext context(bundle.own);
     rtcIntersect8(bundle.live.data(), tree_->scene, &context.embree, &sought);
-    for (int i = 0; i < RayBundle::size; ++i)
-        if (bundle.live[i] && sought.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID)
-            found[i] = sought.ray.tfar[i];
+    for (std::size_t i = 0; i < RayBundle::size; ++i)
+        if (bundle.live[i] && sought.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID) {
+            found.distance[i] = sought.ray.tfar[i];
+            found.primitive[i] = tree_->index[sought.hit.primID[i]];
+        }
     return found;
 }
 

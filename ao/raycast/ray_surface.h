@@ -59,6 +59,10 @@ class RaySurface {
         double distance; ///< in lengths of the ray's direction
         int primitive;   ///< index of the triangle or disc, as given
     };
+    struct Meetings {
+        std::array<float, RayBundle::size> distance; ///< infinite where there is none
+        std::array<int, RayBundle::size> primitive;  ///< as in Meeting; -1 where there is none
+    };
     /// The first meeting beyond `near` lengths.
     [[nodiscard]] std::optional<Meeting> nearest(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                                  double near = 0) const;
@@ -72,8 +76,8 @@ class RaySurface {
 
     /// Sets the dead lanes of `bundle` from rays that meet anything closer than far_m: live becomes 0 there.
     void drop_blocked(RayBundle& bundle) const;
-    /// Distance of the first meeting of each live ray, infinite where there is none.
-    [[nodiscard]] std::array<float, RayBundle::size> distances(const RayBundle& bundle) const;
+    /// The first meeting of each live ray.
+    [[nodiscard]] Meetings meetings(const RayBundle& bundle) const;
 
   private:
     struct Tree;

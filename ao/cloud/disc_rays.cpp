@@ -1,0 +1,87 @@
+// Rays from the points of a cloud: lifted off their own disc and those beside it, eight at a time.
+#include "ao/cloud/disc_rays.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace scanshade {
+namespace {
+
+using Eigen::Vector3d, Eigen::Vector3f;
+
+/// Axes with z along `normal` (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
+Eigen::Matrix3f axes_about(const Vector3f& normal) {
+    const float sign = std::copysign(1.0F, normal.z()), a = -1 / (sign + normal.z()), b = normal.x() * normal.y() * a;
+    Eigen::Matrix3f axes;
+    axes << Vector3f(1 + sign * normal.x() * normal.x() * a, sign * b, -sign * normal.x()),
+        Vector3f(b, sign + normal.y() * normal.y() * a, -normal.y()), normal;
+    return axes;
+}
+
+RaySurface discs_of(const CloudSurface& surface) {
+    std::vector<Disc> all(surface.size());
+    for (std::size_t i = 0; i < all.size(); ++i)
+        all[i] = {surface.tree[i].cast<double>(), surface.normals[i].cast<double>(),
+                  surface.normals[i].isZero() ? 0 : static_cast<double>(surface.disc_radius[i])};
+    return RaySurface(std::span<const Disc>(all));
+}
+
+/// Rays `first` .. `first + 7` of a run, as far as there are so many.
+void aim(RayBundle& bundle, const Eigen::Matrix3f& axes, const RayFan::Run& run, int first) {
+    for (int i = 0; i < RayBundle::size; ++i) {
+        const int ray = std::min(first + i, run.count - 1);
+        const Vector3f direction = axes * Vector3f(run.x[ray], run.y[ray], run.z[ray]);
+        const auto lane = static_cast<std::size_t>(i);
+        bundle.x[lane] = direction.x(), bundle.y[lane] = direction.y(), bundle.z[lane] = direction.z();
+        bundle.live[lane] = first + i < run.count ? -1 : 0;
+    }
+}
+
+} // namespace
+
+DiscRays::DiscRays(const CloudSurface& surface) : surface_(surface), discs_(discs_of(surface)) {}
+
+RayBundle DiscRays::bundle_from(std::size_t place, const Vector3f& side, float radius) const {
+    constexpr float neighbours_tilt = 0.088F; // half of tan 10 degrees: so far neighbouring discs stand out
+    const float disc = surface_.disc_radius[place], rough = surface_.roughness[place];
+    const float lift = std::max({neighbours_tilt * disc, rough, static_cast<float>(discs_.rounding_m())});
+    const Vector3d at = surface_.tree[place].cast<double>();
+    RayBundle bundle;
+    bundle.origin = discs_.local(at + static_cast<double>(lift) * side.cast<double>());
+    bundle.far_m = std::max(radius - lift, 0.0F);
+    bundle.own = {discs_.local(at), 2 * disc, std::max(0.2F * disc, 2 * rough), side};
+    return bundle;
+}
+
+float DiscRays::open(std::size_t place, const RayFan& fan, float radius, const std::optional<Vector3f>& up) const {
+    const Vector3f& normal = surface_.normals[place];
+    RayBundle bundle = bundle_from(place, normal, radius);
+    const Eigen::Matrix3f axes = axes_about(normal);
+    const RayFan::Run run = fan.run(place);
+    int free = 0;
+    for (int first = 0; first < run.count; first += RayBundle::size) {
+        aim(bundle, axes, run, first);
+        for (std::size_t i = 0; up && i < RayBundle::size; ++i)
+            if (Vector3f(bundle.x[i], bundle.y[i], bundle.z[i]).dot(*up) <= 0)
+                bundle.live[i] = 0;
+        discs_.drop_blocked(bundle);
+        for (const int live : bundle.live)
+            free += live != 0;
+    }
+    return static_cast<float>(free) / static_cast<float>(run.count);
+}
+
+DiscRays::Looks DiscRays::look(std::size_t place, const Vector3f& side, const RayFan::Run& run) const {
+    RayBundle bundle = bundle_from(place, side, std::numeric_limits<float>::max());
+    aim(bundle, axes_about(side), run, 0);
+    const auto [distance, met] = discs_.meetings(bundle);
+    Looks looks{distance, {}};
+    for (std::size_t i = 0; i < RayBundle::size; ++i)
+        if (met[i] >= 0)
+            looks.facing[i] = -Vector3f(bundle.x[i], bundle.y[i], bundle.z[i])
+                                   .dot(surface_.normals[static_cast<std::size_t>(met[i])]);
+    return looks;
+}
+
+} // namespace scanshade
