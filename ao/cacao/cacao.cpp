@@ -193,6 +193,7 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
     const std::size_t slices = 4 * texels(k.slice);
     const std::size_t haloed = 4 * texels({k.slice.x + 2 * halo, k.slice.y + 2 * halo});
     const bool images = storage == CacaoStorage::images;
+    const int fused = images ? std::min(n, most_fused) : 0;
     const auto padded = [](int size) { return 8 * static_cast<std::uint32_t>(groups(size, 8)); };
     const gpu::BufferRow::Image depth_image{padded(k.slice.x), padded(k.slice.y), 4, 4};
     const std::vector<float> rows = pattern();
@@ -222,6 +223,7 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
         if (shader == "cacao/prepare_image") return {8, 8};
         if (shader == "cacao/generate_image") return {20, 8};
         if (shader == "cacao/blur") return {shared::cacao_row, 1};
+        if (shader == "cacao/finish") return {shared::cacao_wide - 2 * (fused + 1), shared::cacao_high - 2 * (fused + 1)};
         return {shared::cacao_tile, shared::cacao_tile};
     };
     const auto add = [&](std::string name, std::string_view shader, std::vector<int> reads, std::vector<int> writes, ivec2 threads,
@@ -240,7 +242,7 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
     };
 
     const int given = normals_supplied ? cacao_normals_in : cacao_depth_in;
-    add("prepare", images ? "cacao/prepare_image" : "cacao/prepare", {cacao_depth_in, given}, {cacao_depths, cacao_normals}, k.slice, 1,
+    add("prepare", images ? "cacao/prepare_image" : "cacao/prepare", {cacao_depth_in, given}, images ? std::vector<int>{cacao_depths, cacao_normals, cacao_counter} : std::vector<int>{cacao_depths, cacao_normals}, k.slice, 1,
         {{shared::spec_normals, normals_supplied}, {shared::spec_mips, mips}});
     if (mips && !images) {
         add("mips", "cacao/mips", {cacao_depth_in}, {cacao_depths}, {0, 0}, 1);
@@ -250,7 +252,7 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
     // Slots a configuration does not read are filled with a buffer it reads anyway.
     std::vector<int> inputs{cacao_depths, cacao_normals, cacao_normals, cacao_normals, cacao_normals, cacao_pattern};
     if (highest) {
-        tables.passes.push_back({"clear counter", "", {}, {cacao_counter}, {1, 1, 1}, {}});
+        if (!images) tables.passes.push_back({"clear counter", "", {}, {cacao_counter}, {1, 1, 1}, {}});
         add("base", generate, inputs, {cacao_pong}, k.slice, 4, {{shared::spec_base, 1}, {shared::spec_mips, 1}});
         if (images) {
             add("importance", "cacao/importance_smooth", {cacao_pong}, {cacao_importance, cacao_counter}, k.importance, 1);
@@ -265,7 +267,6 @@ CacaoTables cacao_tables(const CacaoOptions& options, const CacaoConstants& k, b
     add("generate", generate, inputs, {cacao_ping}, k.slice, layers, {{shared::spec_mips, mips}});
 
     int from = cacao_ping;
-    const int fused = images ? std::min(n, most_fused) : 0;
     for (int i = 0; i < n - fused; ++i) {
         const bool first = i == 0, last = i == n - 1;
         int to = from == cacao_ping ? cacao_pong : cacao_ping;
@@ -397,7 +398,7 @@ std::vector<Intermediate> Cacao::intermediates() {
     for (int m = 0; m < (level >= CacaoQuality::high ? 4 : 1); ++m) all.push_back(depth_slices(m));
     const std::vector<int> slices{4, k.slice.y, k.slice.x};
     const bool scan = options_.scan();
-    const std::string texel = scan ? "visibility / 65535 in bits 0-15, edges to left, right, above, below / 3 in bits 22, 20, 18, 16, hole in bit 31"
+    const std::string texel = scan ? "visibility / 65535 in bits 0-15, edges to left, right, above, below / 3 in bits 22, 20, 18, 16, filled hole in bit 30, hole in bit 31"
                                    : "visibility / 255 in bits 0-7, edges to left, right, above, below / 3 in bits 22, 20, 18, 16";
     add("normals", slices, cacao_normals,
         scan ? "x right, y up, z forward, each (n - 512) / 511 in 10 bits from bit 0" : "each n / 127 in 8 signed bits from bit 0");

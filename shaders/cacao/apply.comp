@@ -9,12 +9,12 @@ layout(constant_id = spec_resolve) const int resolve = resolve_smart;
 layout(constant_id = spec_power) const int power = 0;
 layout(binding = 0, r32ui) readonly uniform uimageBuffer ao;
 layout(binding = 1, r32f) readonly uniform imageBuffer depth_in;
-layout(binding = 16, scalar) writeonly buffer Out { float visibility[]; };
+#include "lib/cacao_out.glsl"
 
 Texel texel_or_hole(int slice, ivec2 t) {
     bool inside = all(lessThan(uvec2(t), uvec2(k.slice)));
     uint texel = imageLoad(ao, inside ? slice_index(slice, t) : 0).x;
-    return Texel(inside && texel < hole_texel ? float(texel & 0xffffu) : -1.0, ao_edges(texel));
+    return Texel(inside && texel < hole_texel ? float(texel & 0xffffu) : -1.0, texel >> 16);
 }
 #include "lib/cacao_resolve.glsl"
 #include "lib/cacao_resolve_reference.glsl"
@@ -35,15 +35,14 @@ float reference(ivec2 p) {
     return 0.25 * sum;
 }
 
-void put(ivec2 p, float v) {
-    if (any(greaterThanEqual(p, k.image))) return;
-    int here = p.y * k.image.x + p.x;
-    if (scan != 0) {
-        bool surface = v >= 0.0 && imageLoad(depth_in, here).x > 0.0; // filled holes have a value, too
-        visibility[here] = surface ? min(v, 1.0) : uintBitsToFloat(0x7fc00000u);
-    } else {
-        visibility[here] = stored(power != 0 ? pow(v, 2.2) : v);
+float result(ivec2 p, float v) {
+    if (scan == 0) return stored(power != 0 ? pow(v, 2.2) : v);
+    bool surface = v >= 0.0;
+    if (two_slices != 0) { // odd pixels have no hole flag
+        p = min(p, k.image - 1);
+        surface = surface && imageLoad(depth_in, p.y * k.image.x + p.x).x > 0.0;
     }
+    return or_unknown(v, surface);
 }
 
 // 2x2 pixels a thread.
@@ -54,8 +53,6 @@ void main() {
     ivec2 p = 2 * t;
     const ivec2 x = ivec2(1, 0), y = ivec2(0, 1);
     vec4 v = scan != 0 ? resolved_block(t) : vec4(reference(p), reference(p + x), reference(p + y), reference(p + x + y));
-    put(p, v.x);
-    put(p + x, v.y);
-    put(p + y, v.z);
-    put(p + x + y, v.w);
+    store_visibility(p, vec2(result(p, v.x), result(p + x, v.y)));
+    store_visibility(p + y, vec2(result(p + y, v.z), result(p + x + y, v.w)));
 }

@@ -36,6 +36,7 @@ struct Surface {
     vec2 uv;           // reference: of the texel in its slice
     vec2 ray;          // scan: view ray of the slice's texel (0, 0)
     vec2 ray_step;     // scan: its change per slice texel
+    vec2 ray_range;    // scan, images: and from uv = 0 to 1; `ray` is that of uv = 0
     vec2 at;           // scan: the texel as a coordinate of taps
     ivec2 beyond;      // scan, buffers: bits of the first coordinate beyond the slice
     int depth_base;    // scan, buffers: end of the slice's depths
@@ -45,7 +46,7 @@ struct Surface {
     vec3 normal;
     mat2 rotation;  // pattern rotation, scaled to texels
     float falloff;  // F = -1 / R'^2
-    float mip_base; // log2 of the disc radius, biased
+    float mip_base; // log2 of the disc radius, biased; scan, images: a third of it
 };
 
 struct Sum {
@@ -55,7 +56,11 @@ struct Sum {
 float obscurance(vec3 normal, vec3 d, float falloff) {
     float d2 = dot(d, d);
     float facing = scan != 0 ? dot(normal, d) * (quick_scale * quick_inversesqrt(d2)) : dot(normal, d) / sqrt(d2);
+#ifdef FOR_GPU // both are below 1, and this clamp costs nothing
+    return clamp(facing - k.horizon, 0.0, 1.0) * clamp(d2 * falloff + 1.0, 0.0, 1.0);
+#else
     return max(0.0, facing - k.horizon) * max(0.0, d2 * falloff + 1.0);
+#endif
 }
 
 #ifdef FOR_GPU
@@ -69,15 +74,18 @@ const float halo_scale = 0.6;
 void add_scan(Surface s, vec2 ray, float z, inout Sum sum) {
     vec3 d = vec3(ray * z, z) - s.point;
     float d2 = dot(d, d);
-    float facing = positive(dot(s.quick_normal, d) * quick_inversesqrt(d2) - k.horizon);
-#ifdef FOR_GPU // clamping to [0, 1] costs nothing
+    float facing = dot(s.quick_normal, d) * quick_inversesqrt(d2) - k.horizon;
+#ifdef FOR_GPU // clamping to [0, 1] costs nothing, and comparisons run at half the rate of everything else
+    facing = clamp(facing, 0.0, 1.0);
     float near = clamp(d2 * s.falloff + 1.0, 0.0, 1.0);
     float halo = halo_weighted ? 0.6 * clamp(d.z * s.halo_step + 2.0, 0.0, 1.0) + 0.4 : 1.0;
+    float weight = halo * clamp(z * 1e30, 0.0, 1.0);
 #else
+    facing = positive(facing);
     float near = positive(d2 * s.falloff + 1.0);
     float halo = halo_weighted ? at_most_one(at_least(d.z * s.halo_step + 1.6, 0.4)) : 1.0;
-#endif
     float weight = z > 0.0 ? halo : 0.0;
+#endif
     sum.obscurance += facing * near * weight;
     sum.weight += weight;
 }
@@ -144,33 +152,33 @@ float depth_of(int slice, ivec2 t) { return texelFetch(depths, ivec3(t, slice), 
 
 // --- scan, depth in images whose size is a multiple of 8, so that a mip's texel covers whole texels. The sampler finds a texel, and
 // 0, a hole, outside.
-void look(Surface s, vec2 uv, vec2 ray, float mip, inout Sum sum) {
-    add_scan(s, ray, textureLod(depths, vec3(uv, float(s.slice)), mip).x, sum);
+void look(Surface s, vec2 uv, float mip, inout Sum sum) {
+    add_scan(s, s.ray + uv * s.ray_range, textureLod(depths, vec3(uv, float(s.slice)), mip).x, sum);
 }
 
 // Coordinates that are `snap` too large keep 6 bits below one texel, as in a buffer, and clearing bits rounds them down to a texel of
-// any mip. What snap adds to uv and ray is taken off with their offsets: that costs 1e-4 texels of precision.
+// any mip. What snap adds to uv is taken off with its offset, and rays follow from uv: that costs 1e-4 texels of precision.
 void look_both_ways(Surface s, vec2 offset, float mip_bias, inout Sum sum) {
     const float snap = 196608.0; // 1.5 * 2^17
     vec2 uv_step = 1.0 / vec2((k.slice + 7) & ~7);
     if (mips == 0) {
         precise vec2 texels = (offset + magic) - magic;
-        vec2 uv = (s.at + 0.5) * uv_step, ray = s.ray + s.at * s.ray_step;
-        look(s, uv + texels * uv_step, ray + texels * s.ray_step, 0.0, sum);
-        look(s, uv - texels * uv_step, ray - texels * s.ray_step, 0.0, sum);
+        vec2 uv = (s.at + 0.5) * uv_step;
+        look(s, uv + texels * uv_step, 0.0, sum);
+        look(s, uv - texels * uv_step, 0.0, sum);
         return;
     }
-    precise float shifted = 3.0 * clamp((mip_bias + s.mip_base) * (1.0 / 3.0), 0.0, 1.0) + magic; // that clamp costs nothing
+    precise float shifted = 3.0 * clamp(mip_bias * (1.0 / 3.0) + s.mip_base, 0.0, 1.0) + magic; // that clamp costs nothing
     precise float mip = shifted - magic;
     int level = floatBitsToInt(shifted), whole_texels = -64 << (level & 3);
     float texel = intBitsToFloat((level << 23) + 0x3f800000); // 2^mip
-    vec2 uv = (0.5 * texel - snap) * uv_step, ray = s.ray + (0.5 * texel - 0.5 - snap) * s.ray_step;
+    vec2 uv = (0.5 * texel - snap) * uv_step;
     vec2 at = s.at + (snap + 0.5);
     precise vec2 ahead = at + offset, behind = at - offset;
     ahead = intBitsToFloat(floatBitsToInt(ahead) & whole_texels);
     behind = intBitsToFloat(floatBitsToInt(behind) & whole_texels);
-    look(s, uv + ahead * uv_step, ray + ahead * s.ray_step, mip, sum);
-    look(s, uv + behind * uv_step, ray + behind * s.ray_step, mip, sum);
+    look(s, uv + ahead * uv_step, mip, sum);
+    look(s, uv + behind * uv_step, mip, sum);
 }
 
 vec2 coordinate(ivec2 t) { return vec2(t); }
@@ -214,12 +222,14 @@ vec4 neighbour_depths(int slice, ivec2 t) {
 }
 
 vec3 normal_at(int slice, ivec2 t) { return unpack_normal(imageLoad(normals, slice_index(slice, t)).x); }
+vec3 coded_normal_at(int slice, ivec2 t) { return coded_normal(imageLoad(normals, slice_index(slice, t)).x); }
 
 // Edges where normals turn away. Outside the slice there is no normal: the reference halves that edge.
 vec4 normal_edges(vec3 n, int slice, ivec2 t) {
     ivec2 low = max(t - 1, ivec2(0)), high = min(t + 1, k.slice - 1);
-    vec4 c = vec4(dot(n, normal_at(slice, ivec2(low.x, t.y))), dot(n, normal_at(slice, ivec2(high.x, t.y))),
-                  dot(n, normal_at(slice, ivec2(t.x, low.y))), dot(n, normal_at(slice, ivec2(t.x, high.y))));
+    n *= normal_code;
+    vec4 c = vec4(dot(n, coded_normal_at(slice, ivec2(low.x, t.y))), dot(n, coded_normal_at(slice, ivec2(high.x, t.y))),
+                  dot(n, coded_normal_at(slice, ivec2(t.x, low.y))), dot(n, coded_normal_at(slice, ivec2(t.x, high.y))));
     c = mix(vec4(0.0), c, bvec4(t.x > 0, t.x + 1 < k.slice.x, t.y > 0, t.y + 1 < k.slice.y));
     return clamp(c + 0.5, 0.0, 1.0);
 }
@@ -275,6 +285,11 @@ uint generated(int slice, ivec2 t) {
         s.rotation[1].y *= aspect;
     }
     s.point *= k.depth_offset;
+#ifdef FOR_GPU
+    s.ray_range = s.ray_step * vec2((k.slice + 7) & ~7);
+    s.ray -= 0.5 * s.ray_step;
+    s.mip_base *= 1.0 / 3.0;
+#endif
 
     Sum sum = Sum(0.0, 0.0);
     vec4 edges = vec4(1.0), unknown = vec4(0.0);
@@ -296,7 +311,14 @@ uint generated(int slice, ivec2 t) {
         float average = float(imageLoad(load_counter, 0).x) * k.load_counter_div;
         wanted *= clamp(k.adaptive_limit / average, 0.0, 1.0);
         int end = min(31, int(27.0 * wanted + 1.5) + 5);
-        for (int i = 5; i < end; ++i) tap(s, adaptive_tap(i), false, sum);
+        int i = 5;
+#ifdef FOR_GPU // two pairs on their way at a time
+        for (; i + 1 < end; i += 2) {
+            tap(s, adaptive_tap(i), false, sum);
+            tap(s, adaptive_tap(i + 1), false, sum);
+        }
+#endif
+        for (; i < end; ++i) tap(s, adaptive_tap(i), false, sum);
     } else {
         CACAO_PATTERN_0_3(TAP)
         if (kernel >= 1) { CACAO_PATTERN_3_5(TAP) }
@@ -312,7 +334,8 @@ uint generated(int slice, ivec2 t) {
         fade *= clamp(1.0 - cut.x - cut.y, 0.0, 1.0);
     }
     float visibility = clamp(1.0 - fade * min(k.shadow_strength * o, k.shadow_clamp), 0.0, 1.0);
-    return ao_texel(pow(visibility, k.shadow_power), pack_edges(edges));
+    uint filled = scan != 0 ? imageLoad(normals, here).x & filled_texel : 0u;
+    return ao_texel(pow(visibility, k.shadow_power), pack_edges(edges)) | filled;
 }
 
 #ifdef FOR_GPU

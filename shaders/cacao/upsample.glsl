@@ -11,7 +11,7 @@ layout(constant_id = spec_power) const int power = 0;
 layout(constant_id = spec_device_depth) const int device_depth = 0;
 layout(binding = 0, rg32f) readonly uniform imageBuffer staged;
 layout(binding = 1, r32f) readonly uniform imageBuffer depth_in;
-layout(binding = 16, scalar) writeonly buffer Out { float visibility[]; };
+#include "lib/cacao_out.glsl"
 
 const float self_weight = 1e-3;
 
@@ -121,13 +121,7 @@ vec4 upsampled(int at, vec4 z) {
     return mix(vec4(1.0), four.sum / max(four.total, 1e-12), greaterThan(four.total, vec4(0.0)));
 }
 
-void put(ivec2 p, float zf, float v) {
-    if (any(greaterThanEqual(p, k.image))) return;
-    if (scan != 0)
-        visibility[p.y * k.image.x + p.x] = zf > 0.0 ? min(v, 1.0) : uintBitsToFloat(0x7fc00000u);
-    else
-        visibility[p.y * k.image.x + p.x] = stored(power != 0 ? pow(v, 2.2) : v);
-}
+float result(float zf, float v) { return scan != 0 ? or_unknown(v, zf > 0.0) : stored(power != 0 ? pow(v, 2.2) : v); }
 
 float reference(ivec2 g, vec2 shift, float zf) {
     return resolve == resolve_half ? filtered_in_half(g, shift, zf) : gaussian(g, shift, zf);
@@ -147,8 +141,6 @@ void main() {
     else
         v = vec4(reference(g, vec2(0.0), z.x), reference(g, vec2(0.5, 0.0), z.y), reference(g, vec2(0.0, 0.5), z.z),
                  reference(g, vec2(0.5), z.w));
-    put(p, z.x, v.x);
-    put(p + x, z.y, v.y);
-    put(p + y, z.z, v.z);
-    put(p + x + y, z.w, v.w);
+    store_visibility(p, vec2(result(z.x, v.x), result(z.y, v.y)));
+    store_visibility(p + y, vec2(result(z.z, v.z), result(z.w, v.w)));
 }

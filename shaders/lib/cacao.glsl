@@ -14,8 +14,9 @@ layout(constant_id = spec_two_slices) const int two_slices = 0;
 
 const float inv_255 = 1.0 / 255.0;
 const uint hole_texel = 0x80000000u;
+const uint filled_texel = 0x40000000u; // of normals and of AO texels: a hole that prepare filled for its neighbours' sake
 
-// --- AO texel: visibility (or raw obscurance) in bits 0..15, packed edges or sample weight from bit 16, hole flag in bit 31.
+// --- AO texel: visibility (or raw obscurance) in bits 0..15, packed edges or sample weight from bit 16, hole flags in bits 30 and 31.
 // The reference keeps AMD's 8-bit UNORM steps; scan has 16 bits for the value.
 float value_levels() { return scan != 0 ? 65535.0 : 255.0; }
 float weight_levels() { return scan != 0 ? 32767.0 : 255.0; }
@@ -72,6 +73,11 @@ vec4 edges_from_inverse(float wc, vec4 w) {
     bvec4 known = greaterThan(w, vec4(0.0));
     vec4 e = mix(abs(d), min(abs(d), abs(d + d.yxwz)), known.yxwz);
     return mix(vec4(0.0), clamp(1.3 - e * (25.0 / wc), 0.0, 1.0), known);
+}
+// Where there is no hole among them.
+vec4 edges_without_holes(float wc, vec4 w) {
+    vec4 d = w - wc;
+    return clamp(1.3 - min(abs(d), abs(d + d.yxwz)) * (25.0 / wc), 0.0, 1.0);
 }
 vec4 inverse_or_hole(vec4 z) { return mix(vec4(0.0), 1.0 / z, greaterThan(z, vec4(0.0))); }
 uint pack_edges(vec4 edges) {

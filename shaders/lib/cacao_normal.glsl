@@ -26,8 +26,18 @@ uint pack_normal(vec3 n) {
     uvec3 q = uvec3(ivec3(roundEven(n * 127.0))) & 255u;
     return q.x | q.y << 8 | q.z << 16;
 }
-vec3 unpack_normal(uint p) {
-    if (scan != 0) return (vec3(small(p & 1023u), small(p >> 10 & 1023u), small(p >> 20)) - 512.0) * (1.0 / 511.0);
+// As it was stored: in scan 511 times the unit vector.
+vec3 coded_normal(uint p) {
+    if (scan != 0) {
+        uvec3 q = uvec3(p, p >> 10, p >> 20) & 1023u;
+#ifdef FOR_GPU // as small() does it, the 512 in the same subtraction
+        return uintBitsToFloat(0x4b000000u | q) - (8388608.0 + 512.0);
+#else
+        return vec3(q) - 512.0;
+#endif
+    }
     int q = int(p);
     return max(vec3(q << 24 >> 24, q << 16 >> 24, q << 8 >> 24) * (1.0 / 127.0), vec3(-1.0));
 }
+const float normal_code = scan != 0 ? 1.0 / 511.0 : 1.0;
+vec3 unpack_normal(uint p) { return coded_normal(p) * normal_code; }

@@ -6,21 +6,36 @@ struct Known {
     float weight; // 1, or 0 at holes and outside
 };
 
+#ifdef FOR_GPU // comparisons run at half the rate; a hole's value is -1
+Known known_of(Texel texel) {
+    float weight = clamp(texel.value + 1.0, 0.0, 1.0);
+    return Known(texel.value * weight, weight);
+}
+#else
 Known known_of(Texel texel) { return Known(max(texel.value, 0.0), texel.value >= 0.0 ? 1.0 : 0.0); }
+#endif
 Known known(int slice, ivec2 t) { return known_of(texel_or_hole(slice, t)); }
 
-// Own value plus left/right, above/below and diagonal ones, each pair shared out by the edges; AMD's weights, centred on
-// the pixel. Returns visibility, or -1 at a hole.
-float smart(Texel c, Known l, Known r, Known t, Known b, Known lt, Known rt, Known lb, Known rb) {
-    vec4 e = unpack_edges(c.edges);
+// Of left, right, above and below, and of the diagonals, row by row: each pair is shared out by the edges; AMD's weights, centred
+// on the pixel.
+struct Weights {
+    vec4 beside, across;
+};
+Weights smart_weights(uint edges) {
+    vec4 e = unpack_edges(edges);
     float wh = (e.x + e.y) * 0.5, wv = (e.z + e.w) * 0.5, wd = (wh + wv) * 0.5;
     vec2 pull = vec2(e.y - e.x, e.w - e.z) * 0.5;
     float wl = 0.5 - pull.x, wr = 0.5 + pull.x, wt = 0.5 - pull.y, wb = 0.5 + pull.y;
-    float sum = c.value + wh * (wl * l.value + wr * r.value) + wv * (wt * t.value + wb * b.value) +
-                wd * (wt * (wl * lt.value + wr * rt.value) + wb * (wl * lb.value + wr * rb.value));
-    float total = 1.0 + wh * (wl * l.weight + wr * r.weight) + wv * (wt * t.weight + wb * b.weight) +
-                  wd * (wt * (wl * lt.weight + wr * rt.weight) + wb * (wl * lb.weight + wr * rb.weight));
-    return c.value >= 0.0 ? sum / (total * 65535.0) : -1.0;
+    return Weights(vec4(wh * wl, wh * wr, wv * wt, wv * wb), wd * vec4(wt * wl, wt * wr, wb * wl, wb * wr));
+}
+
+// Own value plus those around. Returns visibility, or -1 at a hole.
+float smart(Texel c, Known l, Known r, Known t, Known b, Known lt, Known rt, Known lb, Known rb) {
+    Weights w = smart_weights(c.edges);
+    float sum = c.value + dot(w.beside, vec4(l.value, r.value, t.value, b.value)) + dot(w.across, vec4(lt.value, rt.value, lb.value, rb.value));
+    float total = 1.0 + dot(w.beside, vec4(l.weight, r.weight, t.weight, b.weight)) + dot(w.across, vec4(lt.weight, rt.weight, lb.weight, rb.weight));
+    bool filled = spacing == 1 && (c.edges & filled_texel >> 16) != 0u; // the upsampler leaves these out itself
+    return c.value >= 0.0 && !filled ? sum / (total * 65535.0) : -1.0;
 }
 
 // LOWEST has no value of its own at odd pixels of a row: the four neighbours', by their edges towards it.

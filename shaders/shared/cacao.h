@@ -50,6 +50,7 @@ const int cacao_taps = 31;
 // they share memory on GPUs.
 const int cacao_row = 64;
 const int cacao_tile = 16;
+const int cacao_wide = 32, cacao_high = 32; // finish: with a rim that is lent to neighbours only
 
 // Specialization constants, the same numbers in every CACAO shader.
 const int spec_scan = 0;        // 1: profile `scan`, 0: profile `reference`
