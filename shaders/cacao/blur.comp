@@ -14,8 +14,7 @@ layout(binding = 0, r32ui) readonly uniform uimageBuffer from;
 layout(binding = 16, r32ui) uniform writeonly uimageBuffer to;
 
 int mirrored(int i, int size) {
-    int m = i % (2 * size);
-    if (m < 0) m += 2 * size;
+    int m = (i + 16 * size) % (2 * size); // of negative numbers it is undefined, and NVIDIA's is not the mathematical one; i >= -8
     return m < size ? m : 2 * size - 1 - m;
 }
 
