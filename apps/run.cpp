@@ -300,16 +300,17 @@ class Run final : public Command {
         return job;
     }
 
-    /// Captures: one whose frames enter the walk, and around it those that are made ready and those whose last frames
-    /// leave it; on a GPU, where 40 frames take as little time as opening their capture does, two of each keep it fed. A
-    /// budget measures, which nothing may disturb, and picks other settings for each.
+    /// Captures: those whose frames enter the walk, and around them two that are made ready and two whose last frames
+    /// leave it: on a GPU 40 frames take as little time as opening their capture does. One fills sixteen cores. A budget
+    /// measures, which nothing may disturb, and picks other settings for each.
     [[nodiscard]] std::size_t at_once() {
         if (asked_.budget.any())
             return 1;
-        // A sequence keeps one device busy.
-        const std::size_t devices = asked_.sequence == "on" && asked_.device == "all" ? workers().devices() : 1;
-        entrance_.release(static_cast<std::ptrdiff_t>(devices - 1));
-        return devices + 4;
+        std::size_t entering = std::max(1U, std::thread::hardware_concurrency() / 16);
+        if (asked_.sequence == "on") // keeps one device busy
+            entering = asked_.device == "all" ? workers().devices() : 1;
+        entrance_.release(static_cast<std::ptrdiff_t>(entering - 1));
+        return entering + 4;
     }
 
     /// Opened when the first frame needs them: where all is done already, never.
