@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <fmt/format.h>
 #include <mutex>
 #include <optional>
@@ -191,6 +192,8 @@ class Pipeline {
         tbb::task_arena(threads).execute([&] { tbb::parallel_pipeline(frames_in_memory(), filters); });
         for (const Token& unfinished : waiting_.rest()) // interrupted before what lies around them was there
             unfinished->row = skipped_row(capture_, unfinished->row.index);
+        if (failure_)
+            std::rethrow_exception(failure_);
         return std::move(rows_);
     }
 
@@ -273,18 +276,28 @@ class Pipeline {
         return work;
     }
 
-    /// The images end here.
+    /// The images end here. Where telling fails, the frames under way come to their ends first: TBB never frees those
+    /// of a pipeline that an exception leaves.
     void report(const Token& work) {
-        if (!work)
+        if (!work || failure_)
             return;
-        if (options_.cloud && work->row.status == FrameStatus::ok)
-            add_to(*options_.cloud, *work);
-        outages_ = work->row.fault == Fault::outage ? outages_ + 1 : 0;
+        try {
+            tell(*work);
+        } catch (...) {
+            failure_ = std::current_exception();
+            given_up_ = true;
+        }
+    }
+
+    void tell(Work& work) {
+        if (options_.cloud && work.row.status == FrameStatus::ok)
+            add_to(*options_.cloud, work);
+        outages_ = work.row.fault == Fault::outage ? outages_ + 1 : 0;
         given_up_ = given_up_ || outages_ >= 4;
         if (on_frame_)
-            on_frame_(work->row);
+            on_frame_(work.row);
         if (options_.short_rows)
-            shorten(work->row);
+            shorten(work.row);
     }
 
     const Capture& capture_;
@@ -296,7 +309,8 @@ class Pipeline {
     Walk walk_;
     Waiting waiting_;
     std::atomic<bool> given_up_ = false;
-    int outages_ = 0; ///< in a row: a full disk does not empty itself, and whoever goes on wastes the rest
+    std::exception_ptr failure_; ///< the first while reporting
+    int outages_ = 0;            ///< in a row: a full disk does not empty itself, and whoever goes on wastes the rest
 };
 
 } // namespace

@@ -113,29 +113,36 @@ FrameRow row_from(const json& text) {
 }
 
 Record record_from(const json& line) {
-    return {row_from(line.at("frame")), line.at("settings"), line.at("stamp"), line.at("input"),
-            line.at("sizes").get<std::vector<std::uintmax_t>>()};
+    Record record{row_from(line.at("frame")), line.at("settings"), line.at("stamp"), line.at("input"),
+                  line.at("sizes").get<std::vector<std::uintmax_t>>()};
+    if (record.sizes.size() != record.row.files.size())
+        throw Error("not a size for each file");
+    return record;
 }
 
+/// What a line tells of: its first key.
+std::string kind_of(const json& line) { return line.empty() ? "" : line.begin().key(); }
+
 void take_line(const json& line, JournalFacts& facts) {
-    if (line.contains("frame")) {
+    const std::string kind = kind_of(line);
+    if (kind == "frame") {
         Record record = record_from(line);
         if (facts.begun == record.row.name)
             facts.begun.clear();
         facts.complete.clear();
         facts.records.insert_or_assign(record.row.name, std::move(record));
-    } else if (line.contains("process")) {
+    } else if (kind == "process") {
         facts.host = line["process"].at("host");
         facts.device = line["process"].at("device");
         facts.started = line["process"].at("started");
         facts.begun.clear();
-    } else if (line.contains("again")) {
+    } else if (kind == "again") {
         for (const std::string& name : line["again"].get<std::vector<std::string>>())
             facts.records.erase(name);
         facts.complete.clear();
-    } else if (line.contains("begun")) {
+    } else if (kind == "begun") {
         facts.begun = line["begun"];
-    } else if (line.contains("complete")) {
+    } else if (kind == "complete") {
         facts.complete = line["complete"];
     }
 }
@@ -288,7 +295,7 @@ void Journal::take_places(std::size_t journal) {
         for (const auto& [name, record] : facts_.records)
             places_.insert_or_assign(name, Place{journal, at});
         facts_.records.clear();
-        if (line.contains("again"))
+        if (kind_of(line) == "again")
             for (const json& name : line["again"])
                 places_.erase(name.get<std::string>());
     });

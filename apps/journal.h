@@ -26,9 +26,9 @@ struct Record {
 
 /// Who last wrote to a journal, and how its task stands.
 struct JournalFacts {
-    std::string complete;              ///< Journal::complete()'s key, unless frames were added since
-    std::string host, device, started; ///< of the last process that worked here
-    std::string begun;                 ///< a frame that was begun alone and did not come to its end
+    std::string complete;                       ///< Journal::complete()'s key, unless frames were added since
+    std::string host, device, started;          ///< of the last process that worked here
+    std::string begun;                          ///< a frame that was begun alone and did not come to its end
     std::map<std::string, Record> records = {}; ///< by frame name; the latest of each
 };
 
@@ -53,8 +53,9 @@ class Busy : public Outage {
     using Outage::Outage;
 };
 
-/// The journal held for writing; of what it says no more is in memory than where it says it. Its lock is the kernel's (flock): it goes with the process, however that ends, so
-/// that there are no stale ones; over NFS and Lustre it holds between machines.
+/// The journal held for writing; of what it says no more is in memory than where it says it. Its lock is the kernel's
+/// (flock): it goes with the process, however that ends, so that there are no stale ones; over NFS and Lustre it holds
+/// between machines.
 class Journal {
   public:
     /// Makes the folder and the file where missing, waits for nobody. Throws Busy where another process holds it.
@@ -103,7 +104,7 @@ class Journal {
     bool introduced_ = false;
     std::chrono::steady_clock::time_point synced_; ///< when the disk last had every line
     JournalFacts facts_;
-    std::vector<std::filesystem::path> journals_; ///< of the folder, this one last
+    std::vector<std::filesystem::path> journals_;   ///< of the folder, this one last
     std::unordered_map<std::string, Place> places_; ///< by frame name
 };
 

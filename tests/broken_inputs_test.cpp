@@ -452,6 +452,33 @@ TEST_P(BrokenData, is_refused_or_warned_about_as_the_table_says) {
     else
         EXPECT_TRUE(warned(warnings, c.words));
 }
+
+/// What a run on the input is typed as; cameras come with a truncated frame among sound ones.
+std::string run_on(const fs::path& path, Reader reader) {
+    if (reader == Reader::camera)
+        return fmt::format("{} --camera {}", (data_folder() / "broken/seq_one_truncated").string(), path.string());
+    const std::string name = path.filename().string();
+    const bool tum = name.starts_with("tum_"), image = path.parent_path().filename() == "images";
+    return path.string() + (tum ? " --camera 146.25,146.25,79.5,59.5" : image ? " --camera 585,585,320,240" : "");
+}
+
+TEST_P(BrokenData, the_program_ends_with_the_code_it_deserves) {
+    const Case& c = GetParam();
+    const fs::path path = data_folder() / "broken" / c.path;
+    if (!fs::exists(path))
+        GTEST_SKIP() << path << " is not at hand";
+    const TemporaryFolder folder;
+    const tests::Ran ran =
+        tests::run_program(fmt::format("run {} -o {} --write ao", run_on(path, c.reader), (folder / "out").string()));
+    const int some_frames_are_bad = 2, nothing_could_be_done = 3;
+    EXPECT_EQ(ran.exit_code, c.refused                    ? nothing_could_be_done
+                             : c.reader == Reader::camera ? some_frames_are_bad
+                                                          : 0)
+        << ran.err;
+    if (c.refused) {
+        EXPECT_TRUE(!fs::exists(folder / "out/ao") || fs::is_empty(folder / "out/ao")) << "a result of a refused input";
+    }
+}
 INSTANTIATE_TEST_SUITE_P(readme, BrokenData, ::testing::ValuesIn(cases));
 
 #define NEEDS(path)                                                                                                    \

@@ -80,9 +80,9 @@ int wait_for(pid_t child) {
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
-/// Starts the program again and again and kills it after a random time, until `kills` have met it amid its frames; those
-/// that met it while it started come on top. Whenever it comes to its end before, and at last, `done` looks at the
-/// results in `folder` and clears them.
+/// Starts the program again and again and kills it after a random time, until `kills` have met it amid its frames;
+/// those that met it while it started come on top. Whenever it comes to its end before, and at last, `done` looks at
+/// the results in `folder` and clears them.
 void kill_at_random(const std::string& arguments, const fs::path& folder, int kills, double longest_s,
                     const std::function<void()>& done) {
     std::mt19937 random(20261121);
@@ -149,7 +149,8 @@ TEST_F(ResumeTest, a_run_killed_at_random_and_resumed_leaves_the_bytes_of_an_uni
     const auto expected = results_in(out());
     ASSERT_EQ(expected.size(), 1000u);
     fs::remove_all(out());
-    const std::string arguments = fmt::format("run {} -o {} --resume {}", capture().string(), out().string(), all_files);
+    const std::string arguments =
+        fmt::format("run {} -o {} --resume {}", capture().string(), out().string(), all_files);
     kill_at_random(arguments, out(), kills(), whole_s, [&] {
         EXPECT_EQ(results_in(out()), expected);
         EXPECT_TRUE(strays_in(out()).empty()) << strays_in(out()).front();
@@ -163,7 +164,8 @@ TEST_F(ResumeTest, a_job_killed_at_random_and_run_again_leaves_the_bytes_of_a_pl
     ASSERT_EQ(run(all_files).exit_code, 0);
     const double whole_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count();
     const auto expected = results_in(out());
-    ASSERT_EQ(plan(fmt::format("--block 50 --in-flight 3 {}", all_files)).exit_code, 0); // the plain run computed one frame after the other
+    ASSERT_EQ(plan(fmt::format("--block 50 --in-flight 3 {}", all_files)).exit_code,
+              0); // the plain run computed one frame after the other
     const fs::path results = job() / "results/data/capture";
     kill_at_random("run " + job().string(), job(), kills(), whole_s, [&] {
         const Ran status = run_program("status " + job().string());
@@ -238,6 +240,19 @@ TEST_F(ResumeTest, a_torn_line_costs_one_frame) {
     EXPECT_EQ(read_journal(journal).records.size(), 4u);
     EXPECT_TRUE(is_complete(journal));
     EXPECT_EQ(count_in(out(), "\"name\":\"003\""), 1u);
+}
+
+TEST_F(ResumeTest, a_line_that_contradicts_itself_costs_one_frame) {
+    record(3);
+    ASSERT_EQ(run().exit_code, 0);
+    const fs::path journal = journal_file(out(), "");
+    std::string lines = read_bytes(journal);
+    const auto sizes = lines.rfind("\"sizes\":[") + 9, end = lines.find(']', sizes);
+    tests::write_file(journal, lines.erase(sizes, end - sizes)); // files, but no size of any
+    const Ran resumed = run("--resume");
+    ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+    EXPECT_EQ(count_in(out(), "\"name\":\"002\""), 2u);
+    EXPECT_EQ(count_in(out(), "\"name\":\"001\""), 1u);
 }
 
 // ---------------------------------------------------------------------------------------------------- side by side

@@ -6,7 +6,6 @@
 #include "projection/error.h"
 
 #include <algorithm>
-#include <cstring>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -462,7 +461,7 @@ void Program::give(int buffer, std::shared_ptr<DeviceBytes> to) {
 
 void Program::run(std::span<const std::byte> constants, Results results) {
     State& s = *state_;
-    std::memcpy(s.constants.mapped, constants.data(), std::min(constants.size(), s.constants.bytes));
+    std::copy_n(constants.data(), std::min(constants.size(), s.constants.bytes), s.constants.mapped);
     during(s.gpu.info.name, [&] { s.submit(s.all_commands(results)); });
     s.taken.clear();
     s.given.clear();

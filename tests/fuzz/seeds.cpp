@@ -146,22 +146,23 @@ void texts() {
     seed("lists", "slam",
          "\x02"
          "0 0 1 0 0 0 1\n0 0 2 0 0 1 0\n=====\n2 0 0.5\n0 2 0.5\n0 0 1\n");
-    seed(
-        "job", "journal",
-        std::string(1, '\0') +
-            R"({"process":{"host":"h","pid":1,"device":"d","started":"2026-01-01T00:00:00Z","version":"0.1.0"}})"
-            "\n"
-            R"({"frame":{"index":0,"name":"000","status":"ok","why":"","fault":"none","size":[64,48],"valid":0.9,"coverage":1.0,"visibility":0.8,"camera":)" +
-            camera.substr(0, camera.size() - 1) +
-            R"(,"origin":"o"},"warnings":["w"],"ms":{"load":1.0,"project":0.1,"compute":2.0,"attach":0.1,"write":null},)"
-            R"("passes":[["p",0.5]],"files":["ao/000.png"]},"settings":"s","stamp":"1","input":"2","sizes":[10]})"
-            "\n"
-            R"({"again":["001"]})"
-            "\n"
-            R"({"begun":"002"})"
-            "\n"
-            R"({"complete":"k"})"
-            "\n");
+    const std::string frame =
+        R"({"frame":{"index":0,"name":"000","status":"ok","why":"","fault":"none","size":[64,48],"valid":0.9,"coverage":1.0,"visibility":0.8,"camera":)" +
+        camera.substr(0, camera.size() - 1) +
+        R"(,"origin":"o"},"warnings":["w"],"ms":{"load":1.0,"project":0.1,"compute":2.0,"attach":0.1,"write":null},)"
+        R"("passes":[["p",0.5]],"files":["ao/000.png"],"notes":["n"]},"settings":"s","stamp":"1","input":"2","sizes":[)";
+    seed("job", "journal",
+         std::string(1, '\0') +
+             R"({"process":{"host":"h","pid":1,"device":"d","started":"2026-01-01T00:00:00Z","version":"0.1.0"}})"
+             "\n" +
+             frame + "10]}\n" +
+             R"({"again":["001"]})"
+             "\n"
+             R"({"begun":"002"})"
+             "\n"
+             R"({"complete":"k"})"
+             "\n");
+    seed("job", "contradiction", std::string(1, '\0') + frame + "]}\n");
     seed("job", "plan",
          "\x01"
          R"({"program":"scanshade","version":"0.1.0","settings":{"radius":"0.4"},"tasks":1,"cost":1.0,"refused":["a"]})"
