@@ -232,7 +232,7 @@ RecordingResult refine_tracks(const Capture& capture, Material material, Camera 
                            how.refine_poses ? "refined" : "kept");
     if (!how.registered)
         r.notes.push_back(fmt::format("depth edges lie {:.2f} px from colour edges (median), {:.2f} px before.",
-                                      sequence.outline_miss_px(r.climb.fit.model), sequence.outline_miss_px(first)));
+                                      sequence.outline_miss_px(r.climb.fit), sequence.outline_miss_px(start)));
     take_poses(sequence, sequence.poses(r.climb.fit), result);
     if (how.registered) {
         take_camera(capture, material.stamped, result);

@@ -69,6 +69,27 @@ std::optional<Eigen::Vector2d> outward_at(const cv::Mat1f& depth_m, int u, int v
     return std::nullopt;
 }
 
+OutlinePoint outline_point(const Camera& camera, const Eigen::Vector2d& pixel, double z_m,
+                           const Eigen::Vector2d& outward) {
+    const Eigen::Vector3d here = z_m * ray_of(camera, pixel);
+    return {here, outward, z_m * ray_of(camera, pixel + outward) - here};
+}
+
+/// The steepest place near an edge pixel, along the way across it: the peak of a parabola through three values.
+Eigen::Vector2d steepest(const ColourEdges& edges, const cv::Point& pixel) {
+    const cv::Vec2f across = edges.across(pixel);
+    const auto at = [&](float away) {
+        cv::Mat1f value;
+        cv::getRectSubPix(
+            edges.steepness, {1, 1},
+            {static_cast<float>(pixel.x) + away * across[0], static_cast<float>(pixel.y) + away * across[1]}, value);
+        return static_cast<double>(value(0, 0));
+    };
+    const double before = at(-1), here = at(0), after = at(1), bend = before - 2 * here + after;
+    const double peak = bend < 0 ? std::clamp(0.5 * (before - after) / bend, -0.5, 0.5) : 0;
+    return Eigen::Vector2d(pixel.x, pixel.y) + peak * Eigen::Vector2d(across[0], across[1]);
+}
+
 } // namespace
 
 std::vector<OutlinePoint> outline_of(const cv::Mat1f& depth_m, const Camera& camera, std::size_t most) {
@@ -77,7 +98,7 @@ std::vector<OutlinePoint> outline_of(const cv::Mat1f& depth_m, const Camera& cam
     for (int v = margin; v < depth_m.rows - margin; v += 2)
         for (int u = margin; u < depth_m.cols - margin; u += 2)
             if (const auto outward = outward_at(depth_m, u, v))
-                all.push_back({depth_m(v, u) * ray_of(camera, Eigen::Vector2d(u, v)), *outward});
+                all.push_back(outline_point(camera, {u, v}, depth_m(v, u), *outward));
     if (all.size() <= most)
         return all;
     std::vector<OutlinePoint> chosen;
@@ -94,34 +115,35 @@ ColourEdges colour_edges_of(const cv::Mat1b& grey) {
     cv::Sobel(smooth, du, CV_32F, 1, 0);
     cv::Sobel(smooth, dv, CV_32F, 0, 1);
     cv::Mat2f across(grey.size(), cv::Vec2f());
+    cv::Mat1f steepness(grey.size());
     for (int v = 0; v < grey.rows; ++v)
         for (int u = 0; u < grey.cols; ++u)
-            if (const float length = std::hypot(du(v, u), dv(v, u)); length > 0)
+            if (const float length = steepness(v, u) = std::hypot(du(v, u), dv(v, u)); length > 0)
                 across(v, u) = {du(v, u) / length, dv(v, u) / length};
-    return {edges, across};
+    return {edges, across, steepness};
 }
 
-std::vector<OutlinePair> paired(const std::vector<OutlinePoint>& outline, const ColourEdges& edges, const Model& colour,
-                                double reach_px) {
+std::vector<OutlinePair> paired(const std::vector<OutlinePoint>& outline, double gap_px, const ColourEdges& edges,
+                                const Model& colour, double reach_px) {
     std::vector<OutlinePair> pairs;
     for (const OutlinePoint& point : outline) {
-        const auto pixel = seen_at(colour, point.in_depth);
+        const auto pixel = seen_at(colour, point.edge(gap_px));
         if (!pixel)
             continue;
         if (const auto edge = edge_along(edges, *pixel, point.outward, reach_px)) {
             const cv::Vec2f across = edges.across(*edge);
-            pairs.push_back({point.in_depth, {edge->x, edge->y}, {across[0], across[1]}});
+            pairs.push_back({point, steepest(edges, *edge), {across[0], across[1]}});
         }
     }
     return pairs;
 }
 
-double outline_miss_px(const std::vector<std::vector<OutlinePoint>>& outlines, const std::vector<ColourEdges>& edges,
-                       const Model& colour, double reach_px) {
+double outline_miss_px(const std::vector<std::vector<OutlinePoint>>& outlines, double gap_px,
+                       const std::vector<ColourEdges>& edges, const Model& colour, double reach_px) {
     std::vector<double> misses;
     for (std::size_t i = 0; i < outlines.size(); ++i)
         for (const OutlinePoint& point : outlines[i])
-            if (const auto pixel = seen_at(colour, point.in_depth)) {
+            if (const auto pixel = seen_at(colour, point.edge(gap_px))) {
                 const auto edge = edge_along(edges[i], *pixel, point.outward, reach_px);
                 misses.push_back(edge ? (Eigen::Vector2d(edge->x, edge->y) - *pixel).norm() : reach_px);
             }

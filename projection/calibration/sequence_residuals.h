@@ -67,18 +67,21 @@ struct PlacedSightingResidual {
     }
 };
 
-/// A point of a depth edge lies on an edge of the same frame's colour image: only the way across it counts.
+/// A depth edge, so many pixels beyond the last point before it, lies on an edge of the same frame's colour image: only
+/// the way across it counts.
 struct OutlineResidual {
     LensModel lens;
-    Eigen::Vector3d in_depth;
+    Eigen::Vector3d in_depth, one_px_beyond;
     Eigen::Vector2d on_edge, across;
     Motion motion;
     double later_s;
     double weight;
     template <class Number>
-    bool operator()(const Number* camera, const Number* place, const Number* clock, Number* residual) const {
-        Number then[3] = {Number(in_depth[0]), Number(in_depth[1]), Number(in_depth[2])}, in_camera[3],
-               miss[2] = {Number(0), Number(0)};
+    bool operator()(const Number* camera, const Number* place, const Number* clock, const Number* gap_px,
+                    Number* residual) const {
+        Number then[3], in_camera[3], miss[2] = {Number(0), Number(0)};
+        for (int i = 0; i < 3; ++i)
+            then[i] = Number(in_depth[i]) + *gap_px * Number(one_px_beyond[i]);
         seen_later(motion, Number(*clock + later_s), then);
         moved(place, then, in_camera);
         const bool seen = seen_at(lens, camera, in_camera, on_edge, weight, miss);
@@ -117,6 +120,16 @@ struct SurfaceResidual {
         for (int i = 0; i < 3; ++i)
             residual[0] += Number(normal[i]) * (in_camera[i] - Number(on_surface[i]));
         residual[0] *= Number(weight);
+        return true;
+    }
+};
+
+/// A number is near what is expected of it, in sigmas.
+struct ExpectedResidual {
+    double expected, weight;
+    template <class Number>
+    bool operator()(const Number* value, Number* residual) const {
+        residual[0] = Number(weight) * (*value - Number(expected));
         return true;
     }
 };

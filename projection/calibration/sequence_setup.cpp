@@ -47,19 +47,43 @@ Sequence::Sequence(std::vector<SequenceFrame> frames, const Camera& depth_camera
                         tracks_.size(), least));
 }
 
-/// As the nearest point of a surface is found in turns with the place: by what the tracks say first, then by ever
-/// nearer edges.
+/// From several places, since points alone hardly tell a shift from a turn and the nearest edge is often another one:
+/// where the most outlines find an edge is the place.
 void Sequence::pair_outlines(const Model& first) {
     for (const SequenceFrame& frame : frames_) {
         outlines_.push_back(outline_of(frame.depth_m, depth_camera_));
         edges_.push_back(colour_edges_of(frame.grey));
     }
-    Fit fit = robust_fit(initial(first));
-    for (const double reach_px : {12.0, 8.0, 5.0, 5.0}) {
+    struct Found {
+        std::vector<std::vector<OutlinePair>> pairs;
+        std::size_t count = 0;
+        double sigma_px = 0;
+    } best;
+    const double sigma_px = outline_sigma_px_;
+    for (const double aside_m : {0.0, -0.05, 0.05}) { // a housing's cameras are side by side
+        outline_sigma_px_ = sigma_px;
+        Model from = first;
+        from[shift_x] += aside_m;
+        pair_outlines_from(from);
+        if (outline_points() > best.count || best.pairs.empty())
+            best = {pairs_, outline_points(), outline_sigma_px_};
+    }
+    pairs_ = std::move(best.pairs);
+    outline_sigma_px_ = best.sigma_px;
+}
+
+/// As the nearest point of a surface is found in turns with the place: by what the tracks say first, then by ever
+/// nearer edges.
+void Sequence::pair_outlines_from(const Model& first) {
+    pairs_.clear();
+    Fit fit = robust_fit(initial(first), first);
+    for (int round = 0; round < 2; ++round) // with the surfaces that points then lie on
+        fit = robust_fit(fit, first);
+    for (const double reach_px : {12.0, 8.0, 5.0, 3.0, 2.0, 2.0, 2.0}) {
         pairs_.assign(frames_.size(), {});
         for (std::size_t i = 0; i < frames_.size(); ++i)
-            pairs_[i] = paired(outlines_[i], edges_[i], fit.model, reach_px);
-        fit = robust_fit(fit);
+            pairs_[i] = paired(outlines_[i], fit.nuisance.back(), edges_[i], fit.model, reach_px);
+        fit = robust_fit(fit, first);
         leave_out_far_outlines(fit);
     }
 }
@@ -146,7 +170,8 @@ Eigen::Isometry3d Sequence::placed_by_points(int frame, const Camera& camera,
 
 Fit Sequence::initial(const Model& model) const {
     Fit fit{.model = model, .used = Views(frames_.size(), true)};
-    fit.nuisance.resize(frames_.size() * pose_unknowns + tracks_.size() * point_unknowns);
+    fit.nuisance.resize(frames_.size() * pose_unknowns + tracks_.size() * point_unknowns + 1);
+    fit.nuisance.back() = expected_gap_px;
     for (std::size_t i = 0; i < frames_.size(); ++i)
         to_six(start_poses_[i].inverse(), &fit.nuisance[i * pose_unknowns]);
     const Camera camera = calibration::camera_of(model);
@@ -198,7 +223,7 @@ void Sequence::leave_out_absurd(const Fit& fit) {
 }
 
 /// With the usual suspects free: a wrong camera must not cost the image's corners.
-Fit Sequence::robust_fit(const Fit& from) const {
+Fit Sequence::robust_fit(const Fit& from, const Model& first) const {
     constexpr double robust_px = 1;
     Fit fit = from;
     SequenceProblem adjustment(*this, fit);
@@ -206,10 +231,12 @@ Fit Sequence::robust_fit(const Fit& from) const {
         for (const Sighting& s : tracks_[i].sightings)
             adjustment.add(i, s, new ceres::CauchyLoss(robust_px));
     for (std::size_t i = 0; i < frames_.size(); ++i)
-        adjustment.add_outlines(static_cast<int>(i), robust_px);
+        adjustment.add_outlines(static_cast<int>(i), true);
+    adjustment.hold_gap();
+    adjustment.hold_place(first);
     Free free{};
-    for (const Unknown unknown : {f, cx, cy, k1})
-        free[unknown] = true;
+    free[f] = free[k1] = true;
+    free[cx] = free[cy] = options_.registered; // beside a turn of the camera the principal point is hardly seen
     for (int i = turn_x; i < time_offset; ++i)
         free[i] = !options_.registered;
     free[time_offset] = tells_time();
@@ -255,9 +282,12 @@ void Sequence::leave_out_beyond(const std::vector<std::vector<Miss>>& misses, co
 /// of each.
 void Sequence::prune(const Model& first) {
     constexpr double most_sigmas = 4;
+    Model near = first;
     for (int round = 0; round < 3 && !tracks_.empty(); ++round) {
-        leave_out_absurd(initial(first));
-        const Fit fit = robust_fit(initial(first));
+        leave_out_absurd(initial(near));
+        const Fit fit = robust_fit(initial(near), first);
+        if (!options_.registered) // so that each point is looked for on the surface that it lies on
+            near = fit.model;
         const std::vector<std::vector<Miss>> misses = misses_of(fit);
         std::vector<double> pixels, depths;
         for (const auto& of_track : misses)
