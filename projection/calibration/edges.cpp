@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <tbb/parallel_for.h>
 
 namespace scanshade::calibration {
 namespace {
@@ -136,6 +137,93 @@ std::vector<OutlinePair> paired(const std::vector<OutlinePoint>& outline, double
         }
     }
     return pairs;
+}
+
+namespace {
+
+/// Outline points of all frames, each with its image; and how many of them come to lie on edges.
+class OutlineCount {
+  public:
+    OutlineCount(const std::vector<std::vector<OutlinePoint>>& outlines, const std::vector<ColourEdges>& edges) {
+        std::vector<Seen> all;
+        for (std::size_t i = 0; i < outlines.size(); ++i)
+            for (const OutlinePoint& point : outlines[i])
+                all.push_back({point.edge(expected_gap_px), point.outward, &edges[i]});
+        constexpr std::size_t enough = 800;
+        const std::size_t step = std::max<std::size_t>(1, all.size() / enough);
+        std::vector<double> depths;
+        for (std::size_t i = 0; i < all.size(); i += step) {
+            points_.push_back(all[i]);
+            depths.push_back(all[i].in_depth.z());
+        }
+        usual_depth_m_ = median_of(depths);
+    }
+    [[nodiscard]] double usual_depth_m() const { return usual_depth_m_; }
+    /// An edge at a point's place counts 1, one `reach_px` away 0.
+    [[nodiscard]] double operator()(const Model& colour, double reach_px) const {
+        double sum = 0;
+        for (const Seen& point : points_)
+            if (const auto pixel = seen_at(colour, point.in_depth))
+                if (const auto edge = edge_along(*point.edges, *pixel, point.outward, reach_px))
+                    sum += std::max(0.0, 1 - (Eigen::Vector2d(edge->x, edge->y) - *pixel).norm() / reach_px);
+        return sum;
+    }
+
+  private:
+    struct Seen {
+        Eigen::Vector3d in_depth;
+        Eigen::Vector2d outward;
+        const ColourEdges* edges;
+    };
+    std::vector<Seen> points_;
+    double usual_depth_m_ = 1;
+};
+
+/// How a camera is moved aside: metres, and pixels by which things at the usual depth move.
+using Aside = Eigen::Vector4d;
+
+Model moved_aside(const Model& tracked, const Model& first, double usual_depth_m, const Aside& by) {
+    Eigen::Isometry3d place = from_six(tracked.values.data() + turn_x);
+    const Eigen::Vector3d there =
+        from_six(first.values.data() + turn_x).translation() + Eigen::Vector3d(by[0], by[1], 0);
+    const Eigen::Vector3d by_m = there - place.translation();
+    const Eigen::Vector2d turn = by.tail<2>() / tracked[f] - by_m.head<2>() / usual_depth_m;
+    place.linear() = Eigen::AngleAxisd(turn.x(), Eigen::Vector3d::UnitY()) *
+                     Eigen::AngleAxisd(-turn.y(), Eigen::Vector3d::UnitX()) * place.linear();
+    place.translation() = there;
+    Model model = tracked;
+    to_six(place, model.values.data() + turn_x);
+    return model;
+}
+
+} // namespace
+
+Model placed_by_outlines(const std::vector<std::vector<OutlinePoint>>& outlines, const std::vector<ColourEdges>& edges,
+                         const Model& tracked, const Model& first) {
+    const OutlineCount count(outlines, edges);
+    struct Best {
+        Aside aside = Aside::Zero();
+        double count = -1;
+    } best;
+    const auto look_around = [&](const Aside& centre, const Aside& step, const Eigen::Vector4i& steps,
+                                 double reach_px) {
+        std::vector<Best> all;
+        Eigen::Vector4i at;
+        for (at[0] = -steps[0]; at[0] <= steps[0]; ++at[0])
+            for (at[1] = -steps[1]; at[1] <= steps[1]; ++at[1])
+                for (at[2] = -steps[2]; at[2] <= steps[2]; ++at[2])
+                    for (at[3] = -steps[3]; at[3] <= steps[3]; ++at[3])
+                        all.push_back({centre + at.cast<double>().cwiseProduct(step)});
+        tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
+            all[i].count = count(moved_aside(tracked, first, count.usual_depth_m(), all[i].aside), reach_px);
+        });
+        best =
+            *std::max_element(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.count < b.count; });
+    };
+    look_around(Aside::Zero(), {0.02, 0.02, 6, 6}, {4, 1, 4, 4}, 10);
+    look_around(best.aside, {0.01, 0.01, 3, 3}, {1, 1, 1, 1}, 6);
+    look_around(best.aside, {0.005, 0.005, 1.5, 1.5}, {1, 1, 1, 1}, 4);
+    return moved_aside(tracked, first, count.usual_depth_m(), best.aside);
 }
 
 double outline_miss_px(const std::vector<std::vector<OutlinePoint>>& outlines, double gap_px,

@@ -42,6 +42,13 @@ struct OutlinePair {
 [[nodiscard]] std::vector<OutlinePair> paired(const std::vector<OutlinePoint>& outline, double gap_px,
                                               const ColourEdges& edges, const Model& colour, double reach_px);
 
+/// The place of a colour camera whose tracks are explained by `tracked`, so far as outlines tell it: tracks hardly tell
+/// a shift from a turn, and the nearest edge is often another one, so that places all around `first` are looked at, the
+/// camera each time turned so that things at the usual depth stay where `tracked` has them, or up to a few pixels
+/// aside.
+[[nodiscard]] Model placed_by_outlines(const std::vector<std::vector<OutlinePoint>>& outlines,
+                                       const std::vector<ColourEdges>& edges, const Model& tracked, const Model& first);
+
 /// How far outlines lie from colour edges under a model, pixels: the median over all frames' points, those without an
 /// edge within `reach_px` counting as that far.
 [[nodiscard]] double outline_miss_px(const std::vector<std::vector<OutlinePoint>>& outlines, double gap_px,

@@ -51,7 +51,7 @@ Fit Sequence::fit(const Fit& from, const Free& free, const Views& used, bool cov
 }
 
 void Sequence::add_covariance(SequenceProblem& adjustment, Fit& fit, const Free& free) const {
-    constexpr double share_of_depth = 0.3; // a piece of furniture
+    constexpr double share_of_depth = 0.6; // a piece of furniture: what is seen of it errs together
     const double side_m = share_of_depth * median_of(depths_m(fit));
     std::vector<double*> kept = {adjustment.gap()};
     Clusters clusters{.many = true};

@@ -72,6 +72,7 @@ class Sequence final : public Evidence {
         int frame = 0;
         Eigen::Vector2d pixel;
         double depth_m = 0; ///< recorded there; 0 = unknown, negative = not to be used
+        std::optional<SurfacePiece> surface = {}; ///< that the point must lie on, of unregistered frames
     };
     struct Point {
         std::vector<Sighting> sightings;
@@ -80,15 +81,17 @@ class Sequence final : public Evidence {
         double pixels = 0, depth = 0; ///< in the residuals' unit
     };
     void add_covariance(SequenceProblem& adjustment, Fit& fit, const Free& free) const;
-    void pair_outlines(const Model& first);
-    void pair_outlines_from(const Model& first);
+    [[nodiscard]] Model place_by_outlines(const Model& first);
+    void pair_ever_nearer(const Model& near, const Model& first);
+    void pair_outlines(const Fit& fit, double reach_px);
     void leave_out_far_outlines(const Fit& fit);
     void follow_camera(const Model& first);
     [[nodiscard]] Eigen::Isometry3d placed_by_points(int frame, const Camera& camera,
                                                      const std::vector<std::optional<Eigen::Vector3d>>& world) const;
-    void prune(const Model& first);
+    void prune(Model near, const Model& first);
     void leave_out_absurd(const Fit& fit);
-    [[nodiscard]] Fit robust_fit(const Fit& from, const Model& first) const;
+    void find_surfaces(const Fit& fit);
+    [[nodiscard]] Fit robust_fit(const Fit& from, const Model& first);
     [[nodiscard]] std::vector<std::vector<Miss>> misses_of(const Fit& fit) const;
     void leave_out_beyond(const std::vector<std::vector<Miss>>& misses, const Miss& most);
     /// Worth keeping: seen often enough, with a depth somewhere.

@@ -72,7 +72,7 @@ void SequenceProblem::add_depth(std::size_t track, const Sequence::Sighting& s, 
     const int before = problem.NumResidualBlocks();
     if (sequence_.options_.registered && s.depth_m > 0)
         add_recorded_depth(track, s, loss);
-    else if (!sequence_.options_.registered && s.depth_m >= 0)
+    else if (s.surface)
         add_surface(track, s, loss);
     if (problem.NumResidualBlocks() > before)
         depths.push_back(before);
@@ -87,15 +87,9 @@ void SequenceProblem::add_recorded_depth(std::size_t track, const Sequence::Sigh
 }
 
 void SequenceProblem::add_surface(std::size_t track, const Sequence::Sighting& s, ceres::LossFunction* loss) {
-    constexpr double same_surface = 0.05; // of the depth: farther off it is another one, and says nothing of this point
-    Eigen::Vector3d in_depth;
-    moved(pose(s.frame), point(track), in_depth.data());
-    const auto surface = surface_at(sequence_.frames_[s.frame].depth_m, sequence_.depth_camera_.pinhole, in_depth);
-    if (!surface || std::abs(surface->normal.dot(in_depth - surface->centre)) > same_surface * in_depth.z())
-        return;
-    const double weight = sequence_.weights_[s.frame] * depth_weight(in_depth.z());
+    const double weight = sequence_.weights_[s.frame] * depth_weight(s.surface->centre.z());
     problem.AddResidualBlock(new ceres::AutoDiffCostFunction<SurfaceResidual, 1, pose_unknowns, point_unknowns>(
-                                 new SurfaceResidual{surface->centre, surface->normal, weight}),
+                                 new SurfaceResidual{s.surface->centre, s.surface->normal, weight}),
                              loss, pose(s.frame), point(track));
 }
 

@@ -37,9 +37,13 @@ Sequence::Sequence(std::vector<SequenceFrame> frames, const Camera& depth_camera
                         "frames too far apart",
                         tracks_.size(), frames_.size(), least));
     follow_camera(first);
-    prune(first);
-    if (options_.outlines && !options_.registered && !tracks_.empty())
-        pair_outlines(first);
+    if (options_.registered || !options_.outlines) {
+        prune(first, first);
+    } else {
+        const Model near = place_by_outlines(first);
+        prune(near, first);
+        pair_ever_nearer(near, first);
+    }
     if (tracks_.size() < least)
         throw Error(
             fmt::format("{} points fit together, at least {} expected: the poses, the depth unit or the camera are far "
@@ -47,45 +51,37 @@ Sequence::Sequence(std::vector<SequenceFrame> frames, const Camera& depth_camera
                         tracks_.size(), least));
 }
 
-/// From several places, since points alone hardly tell a shift from a turn and the nearest edge is often another one:
-/// where the most outlines find an edge is the place.
-void Sequence::pair_outlines(const Model& first) {
+/// From where the most outlines find an edge: of all places that tracks allow, since the nearest edge is often another
+/// one.
+Model Sequence::place_by_outlines(const Model& first) {
     for (const SequenceFrame& frame : frames_) {
         outlines_.push_back(outline_of(frame.depth_m, depth_camera_));
         edges_.push_back(colour_edges_of(frame.grey));
     }
-    struct Found {
-        std::vector<std::vector<OutlinePair>> pairs;
-        std::size_t count = 0;
-        double sigma_px = 0;
-    } best;
-    const double sigma_px = outline_sigma_px_;
-    for (const double aside_m : {0.0, -0.05, 0.05}) { // a housing's cameras are side by side
-        outline_sigma_px_ = sigma_px;
-        Model from = first;
-        from[shift_x] += aside_m;
-        pair_outlines_from(from);
-        if (outline_points() > best.count || best.pairs.empty())
-            best = {pairs_, outline_points(), outline_sigma_px_};
-    }
-    pairs_ = std::move(best.pairs);
-    outline_sigma_px_ = best.sigma_px;
+    leave_out_absurd(initial(first));
+    const Model near = placed_by_outlines(outlines_, edges_, robust_fit(initial(first), first).model, first);
+    constexpr double reach_px = 8; // a step of the search, and what tracks have wrong
+    pair_outlines(initial(near), reach_px);
+    return near;
 }
 
-/// As the nearest point of a surface is found in turns with the place: by what the tracks say first, then by ever
-/// nearer edges.
-void Sequence::pair_outlines_from(const Model& first) {
-    pairs_.clear();
-    Fit fit = robust_fit(initial(first), first);
-    for (int round = 0; round < 2; ++round) // with the surfaces that points then lie on
-        fit = robust_fit(fit, first);
-    for (const double reach_px : {12.0, 8.0, 5.0, 3.0, 2.0, 2.0, 2.0}) {
-        pairs_.assign(frames_.size(), {});
-        for (std::size_t i = 0; i < frames_.size(); ++i)
-            pairs_[i] = paired(outlines_[i], fit.nuisance.back(), edges_[i], fit.model, reach_px);
+/// As the nearest point of a surface is found, in turns with the place: points slide along their surfaces, edges along
+/// theirs, so that it takes a few rounds.
+void Sequence::pair_ever_nearer(const Model& near, const Model& first) {
+    constexpr int rounds = 10;
+    constexpr double nearest_px = 2;
+    Fit fit = robust_fit(initial(near), first);
+    for (int round = 0; round < rounds; ++round) {
+        pair_outlines(fit, std::max(nearest_px, 5.0 - round));
         fit = robust_fit(fit, first);
         leave_out_far_outlines(fit);
     }
+}
+
+void Sequence::pair_outlines(const Fit& fit, double reach_px) {
+    pairs_.assign(frames_.size(), {});
+    for (std::size_t i = 0; i < frames_.size(); ++i)
+        pairs_[i] = paired(outlines_[i], fit.nuisance.back(), edges_[i], fit.model, reach_px);
 }
 
 /// Scales the outlines' sigma to what is seen, and leaves out what is farther off than three of them.
@@ -222,10 +218,30 @@ void Sequence::leave_out_absurd(const Fit& fit) {
     tracks_ = std::move(kept);
 }
 
+/// Of unregistered frames: the piece of surface nearest to where each point is, along the depth camera's ray.
+void Sequence::find_surfaces(const Fit& fit) {
+    constexpr double same_surface = 0.05; // of the depth: farther off it is another one, and says nothing of this point
+    for (std::size_t i = 0; i < tracks_.size(); ++i) {
+        const Eigen::Map<const Eigen::Vector3d> point(
+            &fit.nuisance[frames_.size() * pose_unknowns + i * point_unknowns]);
+        for (Sighting& s : tracks_[i].sightings) {
+            const Eigen::Vector3d in_depth = from_six(&fit.nuisance[s.frame * pose_unknowns]) * point;
+            s.surface = {};
+            if (s.depth_m != unusable)
+                s.surface = surface_at(frames_[s.frame].depth_m, depth_camera_.pinhole, in_depth);
+            if (s.surface &&
+                std::abs(s.surface->normal.dot(in_depth - s.surface->centre)) > same_surface * in_depth.z())
+                s.surface = {};
+        }
+    }
+}
+
 /// With the usual suspects free: a wrong camera must not cost the image's corners.
-Fit Sequence::robust_fit(const Fit& from, const Model& first) const {
+Fit Sequence::robust_fit(const Fit& from, const Model& first) {
     constexpr double robust_px = 1;
     Fit fit = from;
+    if (!options_.registered)
+        find_surfaces(fit);
     SequenceProblem adjustment(*this, fit);
     for (std::size_t i = 0; i < tracks_.size(); ++i)
         for (const Sighting& s : tracks_[i].sightings)
@@ -269,8 +285,10 @@ void Sequence::leave_out_beyond(const std::vector<std::vector<Miss>>& misses, co
             if (misses[i][s].pixels > most.pixels)
                 continue;
             point.sightings.push_back(tracks_[i].sightings[s]);
-            if (misses[i][s].depth > most.depth)
+            if (misses[i][s].depth > most.depth) {
                 point.sightings.back().depth_m = unusable;
+                point.sightings.back().surface = {};
+            }
         }
         if (useful(point))
             kept.push_back(std::move(point));
@@ -280,9 +298,8 @@ void Sequence::leave_out_beyond(const std::vector<std::vector<Miss>>& misses, co
 
 /// Leaves out what does not fit, judged by a robust fit, and scales the depths' sigma to the pixels', by the residuals
 /// of each.
-void Sequence::prune(const Model& first) {
+void Sequence::prune(Model near, const Model& first) {
     constexpr double most_sigmas = 4;
-    Model near = first;
     for (int round = 0; round < 3 && !tracks_.empty(); ++round) {
         leave_out_absurd(initial(near));
         const Fit fit = robust_fit(initial(near), first);
