@@ -222,17 +222,31 @@ TEST(Planes, RecoverFocalLengthAndLensTogether) {
 }
 
 TEST(Planes, AScaleIsNotTakenForAFocalLengthInABareRoom) {
-    // A corner of two walls seen from afar, with little turning: a focal length 5 % too long looks much like depths
-    // that are too short.
-    const std::vector<Eigen::Vector4d> corner = {{0, 0, 1, 2.5}, {0.6, 0, 0.8, 2.4}, {0, 0.6, 0.8, 2.3}};
-    Camera wrong = small;
-    wrong.pinhole.fx = wrong.pinhole.fy = 275;
-    Planes planes(frames_of_walls(small, corner, looks_around()), model_of(wrong));
-    const Refinement r = refined(planes, wrong);
-    std::printf("%s: f %.2f +- %.2f%s\n", planes.summary().c_str(), r.climb.fit.model[f], r.climb.fit.sigma(f),
-                steps_of(r).c_str());
-    EXPECT_FALSE(r.climb.free[depth_scale]);
-    EXPECT_TRUE(says(steps_of(r), "depth scale and focal length cannot be told apart here"));
+    // A camera that moves only sideways sees a room that is s times deeper as one whose focal length is s times longer:
+    // x z / f and y z / f stay what they are, and no wall tells how it ought to slant. One turn of the camera does.
+    const Camera tiny{{131.25, 131.25, 79.5, 59.5, {160, 120}}, {}, "tiny"};
+    const auto refined_moving = [&](double turn) {
+        std::vector<Eigen::Isometry3d> poses(5, Eigen::Isometry3d::Identity());
+        for (int i = 0; i < 5; ++i) {
+            poses[i].translation() = Eigen::Vector3d(0.15 * (i - 2), 0.1 * (i % 3), 0);
+            poses[i].linear() = Eigen::AngleAxisd(turn * (i - 2), Eigen::Vector3d(0.6, 0.8, 0)).toRotationMatrix();
+        }
+        std::vector<PlaneFrame> frames = frames_of_walls(tiny, room, poses);
+        for (PlaneFrame& frame : frames)
+            frame.depth_m /= 1.05F;
+        Planes planes(std::move(frames), model_of(tiny));
+        std::vector<Rung> rungs = planes.ladders().front();
+        std::erase_if(rungs, [](const Rung& rung) { return rung.name != "f" && rung.name != "depth scale"; });
+        RefineOptions options;
+        options.ladder.least_sigmas = 5;
+        return refine(planes, tiny, rungs, options, planes.degeneracy());
+    };
+    const Refinement sideways = refined_moving(0), turning = refined_moving(0.15);
+    EXPECT_FALSE(sideways.changed()) << steps_of(sideways);
+    EXPECT_TRUE(says(steps_of(sideways), "focal length and depth scale cannot be told apart here"))
+        << steps_of(sideways);
+    EXPECT_NEAR(turning.climb.fit.model[depth_scale], 1.05, 0.005) << steps_of(turning);
+    EXPECT_NEAR(turning.climb.fit.model[f], 131.25, 0.5) << steps_of(turning);
 }
 
 TEST(Planes, WithoutPosesOnlyTheLensAndDepthsOffsetAreAsked) {

@@ -269,8 +269,9 @@ class Ladder {
             beside.covariance.size() == 0 ? 0 : sigmas_from(beside, climb_.start.model, rung.unknowns);
         if (sigmas >= options_.least_sigmas)
             return {};
-        return fmt::format("{} and {} cannot be told apart here: {:.1f} sigma alone, {:.1f} with both free", rung.name,
-                           *rung.rival == f ? "focal length" : name_of(*rung.rival),
+        const auto called = [](Unknown unknown) { return unknown == f ? "focal length" : name_of(unknown); };
+        return fmt::format("{} and {} cannot be told apart here: {:.1f} sigma alone, {:.1f} with both free",
+                           called(rung.unknowns.front()), called(*rung.rival),
                            sigmas_from(fit, climb_.start.model, rung.unknowns), sigmas);
     }
 
