@@ -4,6 +4,7 @@
 #include "apps/scene.h"
 #include "apps/sensor.h"
 #include "io/camera_file.h"
+#include "projection/calibration/agreement.h"
 #include "projection/calibration/planes_problem.h"
 #include "projection/calibration/sequence.h"
 #include "projection/calibration/sequence_residuals.h"
@@ -303,10 +304,10 @@ TEST(Planes, DegenerateScenesAreNamedAndChangeNothing) {
 
 /// Office frames whose colour comes from a camera 40 mm aside, turned by a degree, of another focal length.
 std::vector<SequenceFrame> frames_beside(const Camera& depth_camera, const ColourCamera& colour, double start_s = 0,
-                                         int seed = 1) {
+                                         int seed = 1, int count = 10) {
     static const scene::World world(scene::scene_named("office"));
     std::vector<SequenceFrame> frames;
-    for (int i = 0; i < 10; ++i) {
+    for (int i = 0; i < count; ++i) {
         const Eigen::Isometry3d pose = scene::world_from_camera(world.scene().walk, start_s + 0.4 * i);
         const scene::Geometry exact = scene::render_geometry(world, depth_camera.pinhole, pose);
         SequenceFrame frame{.name = fmt::format("frame {}", i), .grey = {}, .depth_m = {}};
@@ -338,6 +339,25 @@ double warp_error_px(const Camera& depth_camera, const cv::Mat1f& depth_m, const
             ++count;
         }
     return std::sqrt(squares / count);
+}
+
+TEST(ColourBeside, AgreementIsToldFromChance) {
+    const Camera depth_camera{{585, 585, 320, 240, {640, 480}}, {}, "depth"};
+    ColourCamera truth{{{530, 530, 319.5, 239.5, {640, 480}}, {}, "truth"}, Eigen::Isometry3d::Identity()};
+    truth.colour_from_depth.translation() = Eigen::Vector3d(-0.04, 0.003, -0.002);
+    const std::vector<SequenceFrame> frames = frames_beside(depth_camera, truth, 0, 1, 3);
+    Model right = model_of(truth.camera);
+    to_six(truth.colour_from_depth, right.values.data() + turn_x);
+    const auto sigmas = [&](double off_px) {
+        Model off = right;
+        off[cx] += off_px; // both ways: along a straight edge nothing is seen of a shift
+        off[cy] += off_px;
+        return outline_agreement(frames, depth_camera, off, expected_gap_px).sigmas();
+    };
+    std::printf("sigmas beyond chance: %.1f, 15 px aside %.1f and %.1f\n", sigmas(0), sigmas(15), sigmas(-15));
+    EXPECT_GT(sigmas(0), 5);
+    EXPECT_LT(sigmas(15), 3);
+    EXPECT_LT(sigmas(-15), 3);
 }
 
 TEST(ColourBeside, ColourComesToLieOnDepth) {

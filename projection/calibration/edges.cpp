@@ -226,16 +226,4 @@ Model placed_by_outlines(const std::vector<std::vector<OutlinePoint>>& outlines,
     return moved_aside(tracked, first, count.usual_depth_m(), best.aside);
 }
 
-double outline_miss_px(const std::vector<std::vector<OutlinePoint>>& outlines, double gap_px,
-                       const std::vector<ColourEdges>& edges, const Model& colour, double reach_px) {
-    std::vector<double> misses;
-    for (std::size_t i = 0; i < outlines.size(); ++i)
-        for (const OutlinePoint& point : outlines[i])
-            if (const auto pixel = seen_at(colour, point.edge(gap_px))) {
-                const auto edge = edge_along(edges[i], *pixel, point.outward, reach_px);
-                misses.push_back(edge ? (Eigen::Vector2d(edge->x, edge->y) - *pixel).norm() : reach_px);
-            }
-    return median_of(misses);
-}
-
 } // namespace scanshade::calibration

@@ -49,9 +49,4 @@ struct OutlinePair {
 [[nodiscard]] Model placed_by_outlines(const std::vector<std::vector<OutlinePoint>>& outlines,
                                        const std::vector<ColourEdges>& edges, const Model& tracked, const Model& first);
 
-/// How far outlines lie from colour edges under a model, pixels: the median over all frames' points, those without an
-/// edge within `reach_px` counting as that far.
-[[nodiscard]] double outline_miss_px(const std::vector<std::vector<OutlinePoint>>& outlines, double gap_px,
-                                     const std::vector<ColourEdges>& edges, const Model& colour, double reach_px = 20);
-
 } // namespace scanshade::calibration

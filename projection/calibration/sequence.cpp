@@ -147,10 +147,6 @@ std::vector<Eigen::Isometry3d> Sequence::poses(const Fit& fit) const {
     return all;
 }
 
-double Sequence::outline_miss_px(const Fit& fit) const {
-    return calibration::outline_miss_px(outlines_, fit.nuisance.back(), edges_, fit.model);
-}
-
 std::size_t Sequence::outline_points() const {
     std::size_t sum = 0;
     for (const auto& pairs : pairs_)

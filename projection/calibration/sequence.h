@@ -55,8 +55,8 @@ class Sequence final : public Evidence {
 
     /// Poses of the depth camera under a fit, world_from_camera.
     [[nodiscard]] std::vector<Eigen::Isometry3d> poses(const Fit& fit) const;
-    /// How far depth edges lie from colour edges, pixels (median, at most 20); NaN where images are registered.
-    [[nodiscard]] double outline_miss_px(const Fit& fit) const;
+    /// How far beyond its last point a surface ends, pixels of the depth image.
+    [[nodiscard]] static double gap_px(const Fit& fit) { return fit.nuisance.back(); }
     [[nodiscard]] std::size_t outline_points() const;
     /// Whether the clocks of poses and images can be compared: the poses are kept, and the camera's motion is known.
     [[nodiscard]] bool tells_time() const;
@@ -71,7 +71,7 @@ class Sequence final : public Evidence {
     struct Sighting {
         int frame = 0;
         Eigen::Vector2d pixel;
-        double depth_m = 0; ///< recorded there; 0 = unknown, negative = not to be used
+        double depth_m = 0;                       ///< recorded there; 0 = unknown, negative = not to be used
         std::optional<SurfacePiece> surface = {}; ///< that the point must lie on, of unregistered frames
     };
     struct Point {

@@ -81,7 +81,7 @@ void Sequence::pair_ever_nearer(const Model& near, const Model& first) {
 void Sequence::pair_outlines(const Fit& fit, double reach_px) {
     pairs_.assign(frames_.size(), {});
     for (std::size_t i = 0; i < frames_.size(); ++i)
-        pairs_[i] = paired(outlines_[i], fit.nuisance.back(), edges_[i], fit.model, reach_px);
+        pairs_[i] = paired(outlines_[i], gap_px(fit), edges_[i], fit.model, reach_px);
 }
 
 /// Scales the outlines' sigma to what is seen, and leaves out what is farther off than three of them.
