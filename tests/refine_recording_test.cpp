@@ -515,6 +515,8 @@ TEST(Derivatives, OfEveryResidualOfRecordingsAgreeWithNumericOnes) {
                                                                                 {camera, clock, pose, point});
         expect_right_derivatives<PlacedSightingResidual, 2, camera_unknowns, place_unknowns, 1, 6, 3>(
             {lens, {300, 200}, motion, 0.004, 1.5}, {camera, place, clock, pose, point});
+        expect_right_derivatives<PosedSightingResidual, 2, camera_unknowns, place_unknowns, 1, 3>(
+            {lens, {300, 200}, motion, 0.004, 1.5, from_six(pose.data())}, {camera, place, clock, point});
         // Steps of numeric differences bring the lens's Newton iteration to its own tolerance of 1e-10.
         expect_right_derivatives<OutlineResidual, 1, camera_unknowns, place_unknowns, 1, 1>(
             {lens, {0.3, -0.2, 1.9}, {0.003, -0.001, 0}, {400, 180}, {0.6, 0.8}, motion, 0.004, 1.5},

@@ -96,7 +96,7 @@ std::vector<ViewScore> Sequence::score(const Fit& from, const Views& wanted) con
         freeze(adjustment.problem, fit.model, {});
         if (options_.refine_poses)
             adjustment.hold_near_recorded(static_cast<int>(frame));
-        else
+        else if (adjustment.problem.HasParameterBlock(adjustment.pose(static_cast<int>(frame))))
             adjustment.problem.SetParameterBlockConstant(adjustment.pose(static_cast<int>(frame)));
         Fit alone = fit; // the pose is fitted in place; rss is this view's
         solve(adjustment.problem, alone, false);

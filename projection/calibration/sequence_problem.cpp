@@ -15,6 +15,12 @@ void SequenceProblem::add(std::size_t track, const Sequence::Sighting& s, ceres:
             new ceres::AutoDiffCostFunction<SightingResidual, 2, camera_unknowns, 1, pose_unknowns, point_unknowns>(
                 new SightingResidual{lens, s.pixel, motion, later_s, weight}),
             loss, camera, clock(), pose(s.frame), point(track));
+    else if (!sequence_.options_.refine_poses)
+        problem.AddResidualBlock(
+            new ceres::AutoDiffCostFunction<PosedSightingResidual, 2, camera_unknowns, place_unknowns, 1,
+                                            point_unknowns>(
+                new PosedSightingResidual{lens, s.pixel, motion, later_s, weight, from_six(pose(s.frame))}),
+            loss, camera, place(), clock(), point(track));
     else
         problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PlacedSightingResidual, 2, camera_unknowns,
                                                                  place_unknowns, 1, pose_unknowns, point_unknowns>(

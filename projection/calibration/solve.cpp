@@ -55,7 +55,7 @@ void solve(ceres::Problem& problem, Fit& fit, bool many_unknowns) {
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_SCHUR; // poses and model are few, points are eliminated
     options.max_num_iterations = many_unknowns ? 40 : 100;
-    options.function_tolerance = many_unknowns ? 1e-7 : 1e-10; // of the sum: far below one sigma of any number
+    options.function_tolerance = many_unknowns ? 1e-6 : 1e-10; // of the sum, thousands of sigmas squared
     options.gradient_tolerance = 1e-12;
     options.parameter_tolerance = 1e-10;
     options.logging_type = ceres::SILENT;
