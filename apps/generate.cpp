@@ -104,7 +104,8 @@ std::string image_list(const char* folder, const char* extension, const std::vec
 Eigen::Isometry3d pose_error(const GenerateOptions& options, Microseconds time) {
     const Noise noise(options.seed, static_cast<int>(time / 1000), 77);
     const auto three = [&](int row, double sigma) {
-        return Eigen::Vector3d(sigma * noise.gaussian(0, row), sigma * noise.gaussian(1, row), sigma * noise.gaussian(2, row));
+        return Eigen::Vector3d(sigma * noise.gaussian(0, row), sigma * noise.gaussian(1, row),
+                               sigma * noise.gaussian(2, row));
     };
     Eigen::Isometry3d error = Eigen::Isometry3d::Identity();
     const Eigen::Vector3d turn = three(0, options.pose_noise_deg * std::numbers::pi / 180);
@@ -190,6 +191,7 @@ std::string truth_note(const GenerateOptions& options, const scene::Scene& scene
           {"fy", camera.fy},
           {"cx", camera.cx},
           {"cy", camera.cy},
+          {"k1", options.lens_k1},
           {"width", camera.size.width},
           {"height", camera.size.height}}},
         {"maps", options.truth},
@@ -235,8 +237,8 @@ TruthError write_truth(const GenerateOptions& options, const Sight& sight, const
 }
 
 /// How good the truth is, where it is written.
-std::optional<TruthError> write_frame(const GenerateOptions& options, const scene::World& world, const Pinhole& camera,
-                                      int frame, const fs::path& out) {
+std::optional<TruthError> write_frame(const GenerateOptions& options, const scene::World& world,
+                                      const scene::Optics& camera, int frame, const fs::path& out) {
     const scene::Walk& walk = world.scene().walk;
     const Eigen::Isometry3d colour_pose = scene::world_from_camera(walk, seconds(colour_time(frame)));
     const Eigen::Isometry3d depth_pose = scene::world_from_camera(walk, seconds(depth_time(frame)));
@@ -264,8 +266,7 @@ std::vector<std::string> names_of(const std::vector<Row>& table) {
 
 /// The cloud as a file of floats, and once more with the truth.
 void write_scene_cloud(const GenerateOptions& options, const scene::World& world, const fs::path& out) {
-    const scene::SceneCloud cloud =
-        scene::scene_cloud(world, static_cast<std::size_t>(options.cloud), options.seed);
+    const scene::SceneCloud cloud = scene::scene_cloud(world, static_cast<std::size_t>(options.cloud), options.seed);
     std::array<std::vector<float>, 3> normals;
     std::vector<AddedField> fields;
     constexpr std::array names{"nx", "ny", "nz"};
@@ -294,6 +295,7 @@ std::vector<Parameter> GenerateOptions::parameters() {
         {"first", "the first frame's place on the scene's walk, in tenths of a second", &first, "", 0, 100000, {}},
         {"step", "from one frame to the next, in tenths of a second", &step, "", 1, 100000, {}},
         {"size", "image size, width x height", &size, "pixels", 0, 0, {}},
+        {"lens-k1", "radial distortion of the lens that depth and colour are seen through", &lens_k1, "", -1, 1, {}},
         {"seed", "of the sensor's and the poses' noise and the truth's rays", &seed, "", 0, 2147483647, {}},
         {"pose-noise", "sigma of the recorded places along each axis", &pose_noise_m, "m", 0, 10, {}},
         {"pose-turn-noise", "sigma of the recorded attitudes about each axis", &pose_noise_deg, "degrees", 0, 90, {}},
@@ -307,8 +309,13 @@ std::vector<Parameter> GenerateOptions::parameters() {
          {}},
         {"truth-rays", "rays per pixel of the truth", &truth_rays, "", 1, 65536, {}},
         {"truth-falloff", "any of hard,quad,lin: how much an occluder counts with its distance", &truth_falloff},
-        {"cloud", "a cloud of so many points on the scene's surfaces, in place of a recording; 0 = a recording", &cloud, "",
-         0, 200000000, {}},
+        {"cloud",
+         "a cloud of so many points on the scene's surfaces, in place of a recording; 0 = a recording",
+         &cloud,
+         "",
+         0,
+         200000000,
+         {}},
         {"cloud-normals", "write the cloud's normals", &cloud_normals, "", 0, 1, {}},
         {"overwrite", "replace a generated capture that is there already", &overwrite, "", 0, 1, {}},
     };
@@ -323,6 +330,9 @@ void generate(const GenerateOptions& options, const fs::path& out, const Generat
     const Pinhole camera = camera_of_size(parsed_size(options.size));
     const std::vector<int> frames = frames_of(options);
 
+    const scene::Optics optics(camera, {.k1 = options.lens_k1});
+    (void)optics.direction(0, 0); // the corner is what a lens loses first
+
     make_room(out, options.overwrite);
     const fs::path note = out / "truth" / "truth.json";
     write_atomically(note, truth_note(options, scene, camera, {})); // first: it marks the folder as ours
@@ -330,13 +340,14 @@ void generate(const GenerateOptions& options, const fs::path& out, const Generat
         write_scene_cloud(options, scene::World(scene), out);
         return;
     }
-    write_camera_file(out / "camera.json",
-                      {{camera, {}, "generated"}, fits_png(scene) ? units_per_metre : 1, Registration::yes, {}});
+    write_camera_file(
+        out / "camera.json",
+        {{camera, optics.lens, "generated"}, fits_png(scene) ? units_per_metre : 1, Registration::yes, {}});
     const scene::World world(scene);
     std::vector<TruthError> errors;
     for (std::size_t i = 0; i < frames.size(); ++i) {
         during(fmt::format("frame {}", frames[i]), [&] {
-            if (const auto error = write_frame(options, world, camera, frames[i], out))
+            if (const auto error = write_frame(options, world, optics, frames[i], out))
                 errors.push_back(*error);
         });
         if (progress)

@@ -17,6 +17,7 @@ struct GenerateOptions {
     int frames = 8;
     int first = 0, step = 1;            ///< frames first, first + step, ... of the scene's walk, ten per second
     std::string size = "640x480";       ///< width x height in pixels; the field of view stays that of a Kinect
+    double lens_k1 = 0;                 ///< radial distortion of the lens before both images (Brown 1971)
     int seed = 1;                       ///< of the sensor's and the poses' noise and the truth's rays
     double pose_noise_m = 0;            ///< sigma of recorded places along each axis
     double pose_noise_deg = 0;          ///< and of recorded attitudes about each
@@ -40,10 +41,10 @@ using GenerateProgress = std::function<void(int done, int total)>;
 /// truth/depth/<stamp>.tiff (exact z in metres), truth/normals/<stamp>.tiff (exact, x y z), truth/ao/<stamp>.tiff
 /// (cosine-weighted visibility within truth_radius_m; ao_quad and ao_lin for those falloffs). Same options, same bytes,
 /// however many threads there are, and a frame is the same whatever first and step it is reached by.
-/// With `cloud` set: NAME.ply, points of equal density on all that can be seen of the scene, and truth/NAME.ply, the same
-/// with the field ambient_occlusion, in place of images.
-/// Throws Misuse for options out of range, an `out` that holds something and is not to be overwritten, or (even then)
-/// is not a generated capture; Error where a file cannot be written.
+/// With `cloud` set: NAME.ply, points of equal density on all that can be seen of the scene, and truth/NAME.ply, the
+/// same with the field ambient_occlusion, in place of images. Throws Misuse for options out of range, an `out` that
+/// holds something and is not to be overwritten, or (even then) is not a generated capture; Error where a file cannot
+/// be written.
 void generate(const GenerateOptions& options, const std::filesystem::path& out, const GenerateProgress& progress = {});
 
 } // namespace scanshade

@@ -1,6 +1,7 @@
 // A recording made into evidence: which frames, cameras and poses it starts from, and what comes of it.
 #include "apps/refine_sources.h"
 #include "io/image_file.h"
+#include "projection/calibration/agreement.h"
 #include "projection/calibration/overlap.h"
 #include "projection/calibration/planes.h"
 #include "projection/calibration/sequence.h"
@@ -50,27 +51,39 @@ cv::Mat1b grey_of(const Frame& frame, const CaptureEntry& entry) {
     return grey;
 }
 
+SequenceFrame frame_of(const Capture& capture, std::size_t index, const RecordingOptions& recording, bool with_colour) {
+    const CaptureEntry& entry = capture.entries[index];
+    const Frame frame = capture.load(index);
+    SequenceFrame part{.name = frame.name, .grey = {}, .depth_m = frame.depth_m};
+    if (with_colour)
+        part.grey = grey_of(frame, entry);
+    if (recording.poses != "ignore") {
+        part.world_from_camera = frame.world_from_camera;
+        part.motion = motion_of(capture, index);
+        if (entry.colour_stamp_s && entry.stamp_s)
+            part.colour_later_s = *entry.colour_stamp_s - *entry.stamp_s;
+    }
+    return part;
+}
+
+/// Places of at most so many frames among all, evenly spread.
+std::vector<std::size_t> spread(std::size_t all, std::size_t most) {
+    std::vector<std::size_t> places(std::min(all, most));
+    for (std::size_t i = 0; i < places.size(); ++i)
+        places[i] = places.size() == 1 ? 0 : i * (all - 1) / (places.size() - 1);
+    return places;
+}
+
 /// Some of the frames that can be loaded with what is needed, evenly spread; of the others a note.
 Material material_of(const Capture& capture, const std::vector<std::size_t>& wanted, const RecordingOptions& recording,
                      bool with_colour) {
     Material material{.frames = {}, .stamps_s = {}, .notes = capture.warnings};
-    const std::size_t count = std::min<std::size_t>(wanted.size(), static_cast<std::size_t>(recording.frames));
     std::string first_trouble;
-    for (std::size_t i = 0; i < count; ++i) {
-        const std::size_t index = wanted[count == 1 ? 0 : i * (wanted.size() - 1) / (count - 1)];
+    for (const std::size_t place : spread(wanted.size(), static_cast<std::size_t>(recording.frames))) {
+        const std::size_t index = wanted[place];
         const CaptureEntry& entry = capture.entries[index];
         try {
-            const Frame frame = capture.load(index);
-            SequenceFrame part{.name = frame.name, .grey = {}, .depth_m = frame.depth_m};
-            if (with_colour)
-                part.grey = grey_of(frame, entry);
-            if (recording.poses != "ignore") {
-                part.world_from_camera = frame.world_from_camera;
-                part.motion = motion_of(capture, index);
-                if (entry.colour_stamp_s && entry.stamp_s)
-                    part.colour_later_s = *entry.colour_stamp_s - *entry.stamp_s;
-            }
-            material.frames.push_back(std::move(part));
+            material.frames.push_back(frame_of(capture, index, recording, with_colour));
             material.stamps_s.push_back(entry.stamp_s.value_or(static_cast<double>(index)));
             material.stamped = material.stamped && entry.stamp_s;
         } catch (const std::exception& failure) {
@@ -83,6 +96,24 @@ Material material_of(const Capture& capture, const std::vector<std::size_t>& wan
         throw Error(fmt::format("{}: {} frames with {}depth, at least {} expected{}", capture.path.string(),
                                 material.frames.size(), with_colour ? "colour and " : "", least, first_trouble));
     return material;
+}
+
+/// Frames midway between those that material_of takes; what cannot be loaded is left out.
+std::vector<SequenceFrame> frames_between(const Capture& capture, const std::vector<std::size_t>& wanted,
+                                          const RecordingOptions& recording) {
+    constexpr std::size_t enough = 8;
+    std::vector<std::size_t> between;
+    const std::vector<std::size_t> taken = spread(wanted.size(), static_cast<std::size_t>(recording.frames));
+    for (std::size_t i = 0; i + 1 < taken.size(); ++i)
+        if (taken[i + 1] - taken[i] > 1)
+            between.push_back((taken[i] + taken[i + 1]) / 2);
+    std::vector<SequenceFrame> frames;
+    for (const std::size_t place : spread(between.size(), enough))
+        try {
+            frames.push_back(frame_of(capture, wanted[between[place]], recording, true));
+        } catch (const std::exception&) { // as good as one that is not there
+        }
+    return frames;
 }
 
 // ---------------------------------------------------------------------------------------------------- cameras
@@ -131,6 +162,21 @@ std::string overlap_sentence(double before_mm, double after_mm) {
     return fmt::format(
         "overlapping depths of different frames differ by {:.2f} mm (mean, each up to 5 %), {:.2f} mm before.",
         after_mm, before_mm);
+}
+
+/// Whether depth edges have come to lie on colour edges, on frames that took no part where there are some.
+std::string agreement_sentence(const std::vector<SequenceFrame>& between, const Material& material,
+                               const Camera& depth_camera, const Fit& before, const Fit& after) {
+    const std::vector<SequenceFrame>& frames = between.empty() ? material.frames : between;
+    const auto of = [&](const Fit& fit) {
+        return outline_agreement(frames, depth_camera, fit.model, Sequence::gap_px(fit));
+    };
+    const OutlineAgreement then = of(before), now = of(after);
+    return fmt::format(
+        "{:.0f} % of {} points on depth edges lie on a colour edge, {:.0f} % before; with colour shifted "
+        "at random {:.0f} +- {:.0f} %: {:.1f} sigma beyond chance, {:.1f} before ({} {}).",
+        100 * now.share, now.points, 100 * then.share, 100 * now.by_chance, 100 * now.chance_sigma, now.sigmas(),
+        then.sigmas(), frames.size(), between.empty() ? "frames, the refined ones" : "frames that took no part");
 }
 
 /// Refines; where the overlap of depths gets worse by it, again without the last of what was freed, and so on.
@@ -204,7 +250,8 @@ void take_camera(const Capture& capture, bool stamped, RecordingResult& result) 
         result.file.pose_time_offset_s = capture.pose_time_offset_s + model[time_offset];
 }
 
-RecordingResult refine_tracks(const Capture& capture, Material material, Camera before, SequenceOptions how,
+RecordingResult refine_tracks(const Capture& capture, const Material& material,
+                              const std::vector<SequenceFrame>& between, const Camera& before, SequenceOptions how,
                               const RecordingOptions& recording, RefineOptions options, std::vector<Rung> rungs,
                               const Model& first) {
     RecordingResult result{.refinement = {},
@@ -231,8 +278,7 @@ RecordingResult refine_tracks(const Capture& capture, Material material, Camera 
                                                         sequence.outline_points()),
                            how.refine_poses ? "refined" : "kept");
     if (!how.registered)
-        r.notes.push_back(fmt::format("depth edges lie {:.2f} px from colour edges (median), {:.2f} px before.",
-                                      sequence.outline_miss_px(r.climb.fit.model), sequence.outline_miss_px(first)));
+        r.notes.push_back(agreement_sentence(between, material, *capture.camera, start, r.climb.fit));
     take_poses(sequence, sequence.poses(r.climb.fit), result);
     if (how.registered) {
         take_camera(capture, material.stamped, result);
@@ -315,7 +361,7 @@ RecordingResult refine_from_recording(Capture capture, const std::vector<std::si
             "{}: colour is {}x{}, depth {}x{}: not registered; --registered no refines the colour camera",
             capture.path.string(), colour_size.width, colour_size.height, depth_size.width, depth_size.height));
     if (how.registered)
-        return with_notes(refine_tracks(capture, material, depth_camera, how, recording, options,
+        return with_notes(refine_tracks(capture, material, {}, depth_camera, how, recording, options,
                                         camera_rungs(depth_camera.distortion.model),
                                         first_model(depth_camera, correction)));
     auto beside = given_camera(first.colour_camera, 0, first.lens, colour_size);
@@ -332,7 +378,8 @@ RecordingResult refine_from_recording(Capture capture, const std::vector<std::si
     }
     std::vector<Rung> rungs = camera_rungs(beside->distortion.model);
     rungs.insert(rungs.begin(), place_rung());
-    return with_notes(refine_tracks(capture, material, *beside, how, recording, options, rungs, model));
+    return with_notes(refine_tracks(capture, material, frames_between(capture, wanted, recording), *beside, how,
+                                    recording, options, rungs, model));
 }
 
 } // namespace scanshade

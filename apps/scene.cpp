@@ -2,11 +2,14 @@
 #include "apps/scene.h"
 
 #include "apps/noise.h"
+#include "projection/error.h"
 #include "projection/srgb.h"
+#include "projection/undistort.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <fmt/format.h>
 #include <numbers>
 #include <tbb/parallel_for.h>
 
@@ -217,16 +220,17 @@ Mesh tessellated(const Scene& scene, std::vector<const Body*>& body_of_triangle)
 
 // ---------------------------------------------------------------------------------------------------- pixels
 
-Ray ray_through(const Pinhole& camera, const Eigen::Isometry3d& world_from_camera, double u, double v) {
-    const Vector3d direction((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1); // so that t is depth
+Ray ray_through(const Optics& camera, const Eigen::Isometry3d& world_from_camera, double u, double v) {
+    const Vector3d direction = camera.direction(u, v).homogeneous(); // so that t is depth
     return {world_from_camera.translation(), world_from_camera.linear() * direction};
 }
 
 /// Calls visit(u, v) for every pixel, on all cores.
 template <class Visit>
-void for_each_pixel(const Pinhole& camera, Visit&& visit) {
-    tbb::parallel_for(0, camera.size.height, [&](int v) {
-        for (int u = 0; u < camera.size.width; ++u)
+void for_each_pixel(const Optics& camera, Visit&& visit) {
+    const cv::Size size = camera.pinhole.size;
+    tbb::parallel_for(0, size.height, [&](int v) {
+        for (int u = 0; u < size.width; ++u)
             visit(u, v);
     });
 }
@@ -381,8 +385,16 @@ Hit World::cast(const Ray& ray) const {
     }
 }
 
-Geometry render_geometry(const World& world, const Pinhole& camera, const Eigen::Isometry3d& world_from_camera) {
-    Geometry geometry{cv::Mat1f(camera.size, 0.0F), cv::Mat3f(camera.size, cv::Vec3f(0, 0, 0))};
+Eigen::Vector2d Optics::direction(double u, double v) const {
+    const Eigen::Vector2d bent((u - pinhole.cx) / pinhole.fx, (v - pinhole.cy) / pinhole.fy);
+    const auto straight = lens.any() ? undistorted(lens, bent) : std::optional(bent);
+    if (!straight)
+        throw Misuse(fmt::format("pixel {:.0f}, {:.0f} sees nothing through a lens with k1 {}", u, v, lens.k1));
+    return *straight;
+}
+
+Geometry render_geometry(const World& world, const Optics& camera, const Eigen::Isometry3d& world_from_camera) {
+    Geometry geometry{cv::Mat1f(camera.pinhole.size, 0.0F), cv::Mat3f(camera.pinhole.size, cv::Vec3f(0, 0, 0))};
     for_each_pixel(camera, [&](int u, int v) {
         const Hit hit = world.cast(ray_through(camera, world_from_camera, u, v));
         if (!hit.body)
@@ -394,8 +406,8 @@ Geometry render_geometry(const World& world, const Pinhole& camera, const Eigen:
     return geometry;
 }
 
-cv::Mat3b render_colour(const World& world, const Pinhole& camera, const Eigen::Isometry3d& world_from_camera) {
-    cv::Mat3b colour(camera.size);
+cv::Mat3b render_colour(const World& world, const Optics& camera, const Eigen::Isometry3d& world_from_camera) {
+    cv::Mat3b colour(camera.pinhole.size);
     for_each_pixel(camera, [&](int u, int v) {
         Vector3d sum = Vector3d::Zero();
         for (const double dv : {-0.25, 0.25})
@@ -406,14 +418,14 @@ cv::Mat3b render_colour(const World& world, const Pinhole& camera, const Eigen::
     return colour;
 }
 
-Truth true_visibility(const World& world, const Pinhole& camera, const Eigen::Isometry3d& world_from_camera,
+Truth true_visibility(const World& world, const Optics& camera, const Eigen::Isometry3d& world_from_camera,
                       const TruthOptions& options) {
     const CosineDirections directions(options.rays, options.seed);
     const RayHemisphere hemisphere(world.surface(), directions, options.radius_m, options.all_falloffs);
     const std::size_t kinds = options.all_falloffs ? falloff_names.size() : 1;
     Truth truth;
     for (std::size_t kind = 0; kind < kinds; ++kind)
-        truth.visibility[kind] = cv::Mat1f(camera.size, std::numeric_limits<float>::quiet_NaN());
+        truth.visibility[kind] = cv::Mat1f(camera.pinhole.size, std::numeric_limits<float>::quiet_NaN());
     truth.standard_error = truth.visibility[0].clone();
     for_each_pixel(camera, [&](int u, int v) {
         const Ray sight = ray_through(camera, world_from_camera, u, v);

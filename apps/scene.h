@@ -119,18 +119,27 @@ class World {
 /// The tessellated scene as a mesh.
 [[nodiscard]] Mesh mesh_of(const Scene& scene);
 
+/// What pixels look through: a pinhole, and maybe a lens that bends.
+struct Optics {
+    Pinhole pinhole;
+    Distortion lens;
+    Optics(const Pinhole& camera, const Distortion& distortion = {}) : pinhole(camera), lens(distortion) {}
+    /// x and y at z = 1 of where a pixel looks. Throws Misuse where the lens shows nothing.
+    [[nodiscard]] Eigen::Vector2d direction(double u, double v) const;
+};
+
 /// Exact per-pixel geometry: depth along the optical axis, unit normals in camera space facing the camera; 0 where no
 /// surface is.
 struct Geometry {
     cv::Mat1f z_m;
     cv::Mat3f normals;
 };
-[[nodiscard]] Geometry render_geometry(const World& world, const Pinhole& camera,
+[[nodiscard]] Geometry render_geometry(const World& world, const Optics& camera,
                                        const Eigen::Isometry3d& world_from_camera);
 
 /// BGR as a camera would store it: albedo under window light and a lamp at the camera, four samples per pixel. There
 /// are no shadows and no occlusion in it: those are for the program under test to add.
-[[nodiscard]] cv::Mat3b render_colour(const World& world, const Pinhole& camera,
+[[nodiscard]] cv::Mat3b render_colour(const World& world, const Optics& camera,
                                       const Eigen::Isometry3d& world_from_camera);
 
 struct TruthOptions {
@@ -145,7 +154,7 @@ struct Truth {
     std::array<cv::Mat1f, 3> visibility; ///< by Falloff; quad and lin empty unless all were asked for
     cv::Mat1f standard_error;            ///< of the hard visibility
 };
-[[nodiscard]] Truth true_visibility(const World& world, const Pinhole& camera,
+[[nodiscard]] Truth true_visibility(const World& world, const Optics& camera,
                                     const Eigen::Isometry3d& world_from_camera, const TruthOptions& options);
 
 } // namespace scanshade::scene

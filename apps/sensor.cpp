@@ -34,8 +34,7 @@ bool beside_edge(const Sight& sight, int u, int v) {
 }
 
 Eigen::Vector3d point_at(const Sight& sight, int u, int v, double z_m) {
-    const Pinhole& camera = sight.camera;
-    return {(u - camera.cx) / camera.fx * z_m, (v - camera.cy) / camera.fy * z_m, z_m};
+    return z_m * sight.camera.direction(u, v).homogeneous();
 }
 
 /// Cosine between the surface normal and the direction to the sensor.
@@ -115,7 +114,7 @@ cv::Mat1f record_kinect(const Sight& sight) {
     const cv::Mat1f noise = window_noise(sight, axial), patches = window_noise(sight, grazing);
     const Noise du = noise_of(sight, sideways), dv = noise_of(sight, downward), frayed = noise_of(sight, fraying);
     return per_pixel(sight, [&](int u, int v, double z) -> double {
-        if (u >= sight.camera.size.width - blind_columns)
+        if (u >= sight.camera.pinhole.size.width - blind_columns)
             return 0;
         const bool edge = beside_edge(sight, u, v);
         const bool lost = evenly(patches(v, u)) < grazing_loss(facing(sight, u, v));

@@ -11,7 +11,7 @@ namespace scanshade {
 /// What a sensor looks at. All of one pixel grid.
 struct Sight {
     const scene::World& world;
-    Pinhole camera;
+    scene::Optics camera;
     Eigen::Isometry3d world_from_camera;
     scene::Geometry exact;
     int seed = 1, frame = 0;

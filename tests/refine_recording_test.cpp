@@ -4,14 +4,19 @@
 #include "apps/scene.h"
 #include "apps/sensor.h"
 #include "io/camera_file.h"
+#include "projection/calibration/agreement.h"
 #include "projection/calibration/planes_problem.h"
 #include "projection/calibration/sequence.h"
 #include "projection/calibration/sequence_residuals.h"
+#include "projection/error.h"
 #include "tests/support/files.h"
 
+#include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <map>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
@@ -217,6 +222,36 @@ TEST(Planes, RecoverFocalLengthAndLensTogether) {
     EXPECT_NEAR(fit.model[k1], -0.12, 0.01);
 }
 
+TEST(Planes, AScaleIsNotTakenForAFocalLengthInABareRoom) {
+    // A camera that moves only sideways sees a room that is s times deeper as one whose focal length is s times longer:
+    // x z / f and y z / f stay what they are, and no wall tells how it ought to slant. One turn of the camera does.
+    const Camera tiny{{131.25, 131.25, 79.5, 59.5, {160, 120}}, {}, "tiny"};
+    const auto refined_moving = [&](double turn, const Camera& first, float depths) {
+        std::vector<Eigen::Isometry3d> poses(5, Eigen::Isometry3d::Identity());
+        for (int i = 0; i < 5; ++i) {
+            poses[i].translation() = Eigen::Vector3d(0.15 * (i - 2), 0.1 * (i % 3), 0);
+            poses[i].linear() = Eigen::AngleAxisd(turn * (i - 2), Eigen::Vector3d(0.6, 0.8, 0)).toRotationMatrix();
+        }
+        std::vector<PlaneFrame> frames = frames_of_walls(tiny, room, poses);
+        for (PlaneFrame& frame : frames)
+            frame.depth_m *= depths;
+        Planes planes(std::move(frames), model_of(first));
+        std::vector<Rung> rungs = planes.ladders().front();
+        std::erase_if(rungs, [](const Rung& rung) { return rung.name != "f" && rung.name != "depth scale"; });
+        RefineOptions options;
+        options.ladder.least_sigmas = 5;
+        return refine(planes, first, rungs, options, planes.degeneracy());
+    };
+    Camera wrong = tiny;
+    wrong.pinhole.fx = wrong.pinhole.fy = 1.05 * 131.25;
+    const Refinement sideways = refined_moving(0, tiny, 1 / 1.05F), turning = refined_moving(0.15, wrong, 1);
+    EXPECT_FALSE(sideways.changed()) << steps_of(sideways);
+    EXPECT_TRUE(says(steps_of(sideways), "focal length and depth scale cannot be told apart here"))
+        << steps_of(sideways);
+    EXPECT_FALSE(turning.climb.free[depth_scale]) << steps_of(turning);
+    EXPECT_NEAR(turning.climb.fit.model[f], 131.25, 0.5) << steps_of(turning);
+}
+
 TEST(Planes, WithoutPosesOnlyTheLensAndDepthsOffsetAreAsked) {
     const Camera truth{small.pinhole, {-0.12, 0, 0, 0, 0}, "truth"};
     Planes planes(frames_of_walls(truth, room, looks_around(), false), model_of(small));
@@ -268,14 +303,15 @@ TEST(Planes, DegenerateScenesAreNamedAndChangeNothing) {
 // depth
 
 /// Office frames whose colour comes from a camera 40 mm aside, turned by a degree, of another focal length.
-std::vector<SequenceFrame> frames_beside(const Camera& depth_camera, const ColourCamera& colour) {
-    const scene::World world(scene::scene_named("office"));
+std::vector<SequenceFrame> frames_beside(const Camera& depth_camera, const ColourCamera& colour, double start_s = 0,
+                                         int seed = 1, int count = 10) {
+    static const scene::World world(scene::scene_named("office"));
     std::vector<SequenceFrame> frames;
-    for (int i = 0; i < 10; ++i) {
-        const Eigen::Isometry3d pose = scene::world_from_camera(world.scene().walk, 0.4 * i);
+    for (int i = 0; i < count; ++i) {
+        const Eigen::Isometry3d pose = scene::world_from_camera(world.scene().walk, start_s + 0.4 * i);
         const scene::Geometry exact = scene::render_geometry(world, depth_camera.pinhole, pose);
         SequenceFrame frame{.name = fmt::format("frame {}", i), .grey = {}, .depth_m = {}};
-        frame.depth_m = sensor_named("kinect").record({world, depth_camera.pinhole, pose, exact, 1, i});
+        frame.depth_m = sensor_named("kinect").record({world, depth_camera.pinhole, pose, exact, seed, i});
         cv::cvtColor(scene::render_colour(world, colour.camera.pinhole, pose * colour.colour_from_depth.inverse()),
                      frame.grey, cv::COLOR_BGR2GRAY);
         frame.world_from_camera = pose;
@@ -303,6 +339,25 @@ double warp_error_px(const Camera& depth_camera, const cv::Mat1f& depth_m, const
             ++count;
         }
     return std::sqrt(squares / count);
+}
+
+TEST(ColourBeside, AgreementIsToldFromChance) {
+    const Camera depth_camera{{585, 585, 320, 240, {640, 480}}, {}, "depth"};
+    ColourCamera truth{{{530, 530, 319.5, 239.5, {640, 480}}, {}, "truth"}, Eigen::Isometry3d::Identity()};
+    truth.colour_from_depth.translation() = Eigen::Vector3d(-0.04, 0.003, -0.002);
+    const std::vector<SequenceFrame> frames = frames_beside(depth_camera, truth, 0, 1, 3);
+    Model right = model_of(truth.camera);
+    to_six(truth.colour_from_depth, right.values.data() + turn_x);
+    const auto sigmas = [&](double off_px) {
+        Model off = right;
+        off[cx] += off_px; // both ways: along a straight edge nothing is seen of a shift
+        off[cy] += off_px;
+        return outline_agreement(frames, depth_camera, off, expected_gap_px).sigmas();
+    };
+    std::printf("sigmas beyond chance: %.1f, 15 px aside %.1f and %.1f\n", sigmas(0), sigmas(15), sigmas(-15));
+    EXPECT_GT(sigmas(0), 5);
+    EXPECT_LT(sigmas(15), 3);
+    EXPECT_LT(sigmas(-15), 3);
 }
 
 TEST(ColourBeside, ColourComesToLieOnDepth) {
@@ -346,6 +401,80 @@ TEST(ColourBeside, ColourComesToLieOnDepth) {
     EXPECT_LT(off_px[1], 0.5 * off_px[0]); // points alone hardly tell a shift from a turn
 }
 
+/// Errors in sigmas of one number over several trials.
+struct Trials {
+    std::vector<double> sigmas_off;
+    [[nodiscard]] double within_two() const {
+        const auto inside =
+            std::count_if(sigmas_off.begin(), sigmas_off.end(), [](double z) { return std::abs(z) < 2; });
+        return static_cast<double>(inside) / static_cast<double>(sigmas_off.size());
+    }
+    [[nodiscard]] double rms() const {
+        double squares = 0;
+        for (const double z : sigmas_off)
+            squares += z * z;
+        return std::sqrt(squares / static_cast<double>(sigmas_off.size()));
+    }
+};
+
+/// Places of the walk, noise and the colour camera are other ones in each trial: 2 of them in a test. SCANSHADE_TRIALS
+/// says how many to measure instead, SCANSHADE_FIRST_TRIAL from which on.
+TEST(ColourBeside, SigmasAreHonest) {
+    const auto number_from = [](const char* name, int otherwise) {
+        const char* text = std::getenv(name);
+        return text ? std::atoi(text) : otherwise;
+    };
+    const int trials = number_from("SCANSHADE_TRIALS", 2), first_trial = number_from("SCANSHADE_FIRST_TRIAL", 2);
+    const Camera depth_camera{{585, 585, 320, 240, {640, 480}}, {}, "depth"};
+    const Camera guess{{525, 525, 319.5, 239.5, {640, 480}}, {}, "guess"};
+    const std::vector<Unknown> numbers = {f, turn_x, turn_y, turn_z, shift_x, shift_y, shift_z};
+    std::map<Unknown, Trials> by_number;
+    Trials all;
+    for (int trial = first_trial; trial < first_trial + trials; ++trial) {
+        cv::RNG random(static_cast<std::uint64_t>(trial) + 1);
+        const auto three = [&](double sigma) {
+            return Eigen::Vector3d(random.gaussian(sigma), random.gaussian(sigma), random.gaussian(sigma));
+        };
+        const double f_px = 530 + random.uniform(-15.0, 15.0);
+        ColourCamera truth{{{f_px, f_px, 319.5, 239.5, {640, 480}}, {}, "truth"}, Eigen::Isometry3d::Identity()};
+        truth.colour_from_depth.linear() = Eigen::AngleAxisd(0.02, three(1).normalized()).toRotationMatrix();
+        truth.colour_from_depth.translation() = Eigen::Vector3d(-0.04, 0, 0) + three(0.005);
+        Model right = model_of(truth.camera);
+        to_six(truth.colour_from_depth, right.values.data() + turn_x);
+        constexpr double walk_s = 16, golden = 0.618;
+        const double start_s = walk_s * std::fmod(golden * trial, 1.0);
+        SequenceOptions how;
+        how.registered = how.refine_poses = false;
+        try {
+            const Sequence sequence(frames_beside(depth_camera, truth, start_s, trial + 1), depth_camera,
+                                    model_of(guess), how);
+            Free free{};
+            for (const Unknown number : numbers)
+                free[number] = true;
+            const Fit fit = sequence.fit(sequence.start(model_of(guess)), free, Views(sequence.views(), true), true);
+            ASSERT_GT(fit.covariance.size(), 0);
+            std::printf("trial %d: %zu points, %zu of outlines, ", trial, sequence.points(), sequence.outline_points());
+            for (const Unknown number : numbers) {
+                const double off = fit.model[number] - right[number];
+                by_number[number].sigmas_off.push_back(off / fit.sigma(number));
+                all.sigmas_off.push_back(off / fit.sigma(number));
+                std::printf("%s %.4f +- %.4f%s", std::string(name_of(number)).c_str(), off, fit.sigma(number),
+                            number == shift_z ? "\n" : ", ");
+            }
+        } catch (const Error& failure) { // a wall without texture
+            std::printf("trial %d: %s\n", trial, failure.what());
+        }
+    }
+    for (const auto& [number, of_number] : by_number)
+        std::printf("%s: within 2 sigma %.0f %%, rms %.2f sigma\n", std::string(name_of(number)).c_str(),
+                    100 * of_number.within_two(), of_number.rms());
+    ASSERT_GE(all.sigmas_off.size(), numbers.size() * static_cast<std::size_t>(trials) / 2);
+    std::printf("all: within 2 sigma %.1f %%, rms %.2f sigma\n", 100 * all.within_two(), all.rms());
+    EXPECT_GE(all.within_two(), trials < 20 ? 0.75 : 0.93); // a few fall together
+    EXPECT_LT(all.rms(), 3);
+    EXPECT_GT(all.rms(), 1.0 / 3);
+}
+
 // ---------------------------------------------------------------------------------------------------- derivatives
 
 /// Ceres's Jets against central differences, all blocks of a residual.
@@ -386,9 +515,12 @@ TEST(Derivatives, OfEveryResidualOfRecordingsAgreeWithNumericOnes) {
                                                                                 {camera, clock, pose, point});
         expect_right_derivatives<PlacedSightingResidual, 2, camera_unknowns, place_unknowns, 1, 6, 3>(
             {lens, {300, 200}, motion, 0.004, 1.5}, {camera, place, clock, pose, point});
+        expect_right_derivatives<PosedSightingResidual, 2, camera_unknowns, place_unknowns, 1, 3>(
+            {lens, {300, 200}, motion, 0.004, 1.5, from_six(pose.data())}, {camera, place, clock, point});
         // Steps of numeric differences bring the lens's Newton iteration to its own tolerance of 1e-10.
-        expect_right_derivatives<OutlineResidual, 1, camera_unknowns, place_unknowns, 1>(
-            {lens, {0.3, -0.2, 1.9}, {400, 180}, {0.6, 0.8}, motion, 0.004, 1.5}, {camera, place, clock});
+        expect_right_derivatives<OutlineResidual, 1, camera_unknowns, place_unknowns, 1, 1>(
+            {lens, {0.3, -0.2, 1.9}, {0.003, -0.001, 0}, {400, 180}, {0.6, 0.8}, motion, 0.004, 1.5},
+            {camera, place, clock, {0.7}});
         expect_right_derivatives<PlaneResidual, 1, camera_unknowns, depth_unknowns, 6, 3>(
             {lens, {420, 130}, 1.8, {0.2, -0.1, 0.3}, 10}, {camera, depth, pose, {0.2, 0.1, 0.5}});
     }

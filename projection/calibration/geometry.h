@@ -11,6 +11,8 @@
 
 namespace scanshade::calibration {
 
+/// Between the centre of a surface's last pixel and its edge.
+inline constexpr double expected_gap_px = 0.5;
 inline constexpr int pose_unknowns = 6, point_unknowns = 3;
 
 /// A rigid transform as axis times angle, then translation.

@@ -247,6 +247,8 @@ class Ladder {
                        : "";
         if (const double sigmas = sigmas_from(fit, climb_.start.model, rung.unknowns); sigmas < options_.least_sigmas)
             return fmt::format("not supported: {:.1f} sigma", sigmas);
+        if (const std::string why = stood_in_for(rung, fit, free); !why.empty())
+            return why;
         if (bic(fit) >= bic(climb_.fit))
             return "not supported: BIC does not fall";
         if (const double found = condition(fit, free); found > options_.worst_condition)
@@ -255,6 +257,22 @@ class Ladder {
             !trouble.empty())
             return "not supported: " + trouble;
         return {};
+    }
+
+    /// Gauge check: with the rival free as well, what the rung alone seemed to show may be gone.
+    [[nodiscard]] std::string stood_in_for(const Rung& rung, const Fit& fit, Free free) const {
+        if (!rung.rival || free[*rung.rival])
+            return {};
+        free[*rung.rival] = true;
+        const Fit beside = evidence_.fit(fit, free, used_, true);
+        const double sigmas =
+            beside.covariance.size() == 0 ? 0 : sigmas_from(beside, climb_.start.model, rung.unknowns);
+        if (sigmas >= options_.least_sigmas)
+            return {};
+        const auto called = [](Unknown unknown) { return unknown == f ? "focal length" : name_of(unknown); };
+        return fmt::format("{} and {} cannot be told apart here: {:.1f} sigma alone, {:.1f} with both free",
+                           called(rung.unknowns.front()), called(*rung.rival),
+                           sigmas_from(fit, climb_.start.model, rung.unknowns), sigmas);
     }
 
     /// A number freed early may have stood in for one that came later.

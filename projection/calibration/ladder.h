@@ -32,10 +32,10 @@ struct Climb {
 };
 
 /// Climbs warm-started from `start` over the views used. A rung is climbed only if BIC falls, each new number (jointly,
-/// for a pair) is least_sigmas from its value at the start, sigmas do not inflate, the lens stays monotone to the
-/// image's corners, the normal matrix stays well-conditioned, and the error of held-out views falls by more than its
-/// standard error. Rungs that failed are tried again once others were climbed; what no longer stands at the end is
-/// taken back.
+/// for a pair) is least_sigmas from its value at the start (where it has a rival, also with that one free), sigmas do
+/// not inflate, the lens stays monotone to the image's corners, the normal matrix stays well-conditioned, and the error
+/// of held-out views falls by more than its standard error. Rungs that failed are tried again once others were climbed;
+/// what no longer stands at the end is taken back.
 [[nodiscard]] Climb climb(const Evidence& evidence, const Fit& start, const std::vector<Rung>& rungs, const Views& used,
                           const LadderOptions& options = {});
 

@@ -46,7 +46,7 @@ std::vector<Rung> camera_rungs(LensModel lens) {
 Rung place_rung() { return {"place", {turn_x, turn_y, turn_z, shift_x, shift_y, shift_z}}; }
 
 std::vector<Rung> depth_rungs() {
-    return {{"depth offset", {depth_offset}}, {"depth scale", {depth_scale}}, {"depth curve", {depth_curve}}};
+    return {{"depth offset", {depth_offset}}, {"depth scale", {depth_scale}, f}, {"depth curve", {depth_curve}}};
 }
 
 } // namespace scanshade::calibration

@@ -4,6 +4,7 @@
 #include "projection/camera.h"
 
 #include <array>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -58,6 +59,8 @@ using Free = std::array<bool, unknown_count>;
 struct Rung {
     std::string_view name;
     std::vector<Unknown> unknowns;
+    /// A number that may stand in for these: they must be seen while it is free, too.
+    std::optional<Unknown> rival = {};
 };
 /// f, fx fy, cx cy, k1, k2, p1 p2, k3; for a fisheye f, fx fy, cx cy, k1, k2, k3, k4.
 [[nodiscard]] std::vector<Rung> camera_rungs(LensModel lens);

@@ -98,9 +98,9 @@ std::vector<double> Planes::depths_m(const Fit& fit) const {
 
 /// Tangential distortion and k3 are below what depth noise shows.
 std::vector<std::vector<Rung>> Planes::ladders() const {
-    const Rung focal{"f", {f}}, offset{"depth offset", {depth_offset}}, scale{"depth scale", {depth_scale}},
-        curve{"depth curve", {depth_curve}}, second{"fx, fy", {aspect}}, centre{"cx, cy", {cx, cy}}, lens{"k1", {k1}},
-        lens2{"k2", {k2}};
+    const Rung focal{"f", {f}, depth_scale}, offset{"depth offset", {depth_offset}},
+        scale{"depth scale", {depth_scale}, f}, curve{"depth curve", {depth_curve}}, second{"fx, fy", {aspect}},
+        centre{"cx, cy", {cx, cy}}, lens{"k1", {k1}}, lens2{"k2", {k2}};
     if (!linked_)
         return {{offset, lens, lens2, curve}};
     return {{focal, offset, scale, second, centre, lens, lens2, curve},

@@ -37,11 +37,11 @@ void Planes::Problem::hold_poses() {
 
 void Planes::Problem::add_covariance(const Free& free) {
     std::vector<double*> poses;
-    std::vector<ClusteredPoint> planes;
+    Clusters planes;
     for (std::size_t i = 0; i < planes_.frames_.size(); ++i)
         poses.push_back(pose(static_cast<int>(i)));
     for (std::size_t i = 0; i < planes_.planes_.size(); ++i)
-        planes.push_back({plane(i), static_cast<int>(i)});
+        planes.points.push_back({plane(i), static_cast<int>(i)});
     calibration::add_covariance(problem, fit_, free, poses, planes);
 }
 

@@ -31,6 +31,8 @@ struct SequenceOptions {
            depth_per_z2 = 0.0019; ///< sigma of a depth (Nguyen 2012's order), rescaled by the residuals
 };
 
+class SequenceProblem;
+
 /// Registered: one camera takes colour and depth; a track's point must project onto its sightings, and lie at the depth
 /// recorded there. Unregistered: the model is the colour camera and its place, `depth_camera` stays as it is; the point
 /// must lie on the surface that the depth camera saw, and outlines of near things on edges of the colour image.
@@ -53,8 +55,8 @@ class Sequence final : public Evidence {
 
     /// Poses of the depth camera under a fit, world_from_camera.
     [[nodiscard]] std::vector<Eigen::Isometry3d> poses(const Fit& fit) const;
-    /// How far depth edges lie from colour edges, pixels (median, at most 20); NaN where images are registered.
-    [[nodiscard]] double outline_miss_px(const Model& model) const;
+    /// How far beyond its last point a surface ends, pixels of the depth image.
+    [[nodiscard]] static double gap_px(const Fit& fit) { return fit.nuisance.back(); }
     [[nodiscard]] std::size_t outline_points() const;
     /// Whether the clocks of poses and images can be compared: the poses are kept, and the camera's motion is known.
     [[nodiscard]] bool tells_time() const;
@@ -69,7 +71,8 @@ class Sequence final : public Evidence {
     struct Sighting {
         int frame = 0;
         Eigen::Vector2d pixel;
-        double depth_m = 0; ///< recorded there; 0 = unknown, negative = not to be used
+        double depth_m = 0;                       ///< recorded there; 0 = unknown, negative = not to be used
+        std::optional<SurfacePiece> surface = {}; ///< that the point must lie on, of unregistered frames
     };
     struct Point {
         std::vector<Sighting> sightings;
@@ -77,14 +80,18 @@ class Sequence final : public Evidence {
     struct Miss {
         double pixels = 0, depth = 0; ///< in the residuals' unit
     };
-    void pair_outlines(const Model& first);
+    void add_covariance(SequenceProblem& adjustment, Fit& fit, const Free& free) const;
+    [[nodiscard]] Model place_by_outlines(const Model& first);
+    void pair_ever_nearer(const Model& near, const Model& first);
+    void pair_outlines(const Fit& fit, double reach_px);
     void leave_out_far_outlines(const Fit& fit);
     void follow_camera(const Model& first);
     [[nodiscard]] Eigen::Isometry3d placed_by_points(int frame, const Camera& camera,
                                                      const std::vector<std::optional<Eigen::Vector3d>>& world) const;
-    void prune(const Model& first);
+    void prune(Model near, const Model& first);
     void leave_out_absurd(const Fit& fit);
-    [[nodiscard]] Fit robust_fit(const Fit& from) const;
+    void find_surfaces(const Fit& fit);
+    [[nodiscard]] Fit robust_fit(const Fit& from, const Model& first);
     [[nodiscard]] std::vector<std::vector<Miss>> misses_of(const Fit& fit) const;
     void leave_out_beyond(const std::vector<std::vector<Miss>>& misses, const Miss& most);
     /// Worth keeping: seen often enough, with a depth somewhere.

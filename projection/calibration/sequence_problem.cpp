@@ -15,6 +15,12 @@ void SequenceProblem::add(std::size_t track, const Sequence::Sighting& s, ceres:
             new ceres::AutoDiffCostFunction<SightingResidual, 2, camera_unknowns, 1, pose_unknowns, point_unknowns>(
                 new SightingResidual{lens, s.pixel, motion, later_s, weight}),
             loss, camera, clock(), pose(s.frame), point(track));
+    else if (!sequence_.options_.refine_poses)
+        problem.AddResidualBlock(
+            new ceres::AutoDiffCostFunction<PosedSightingResidual, 2, camera_unknowns, place_unknowns, 1,
+                                            point_unknowns>(
+                new PosedSightingResidual{lens, s.pixel, motion, later_s, weight, from_six(pose(s.frame))}),
+            loss, camera, place(), clock(), point(track));
     else
         problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PlacedSightingResidual, 2, camera_unknowns,
                                                                  place_unknowns, 1, pose_unknowns, point_unknowns>(
@@ -24,17 +30,42 @@ void SequenceProblem::add(std::size_t track, const Sequence::Sighting& s, ceres:
     add_depth(track, s, loss);
 }
 
-void SequenceProblem::add_outlines(int frame, double robust_px) {
+void SequenceProblem::add_outlines(int frame, bool robust) {
     if (sequence_.pairs_.empty())
         return;
     const auto [motion, later_s] = motion_of(frame);
     const double weight =
         outline_share * sequence_.weights_[frame] * sequence_.options_.pixel_sigma_px / sequence_.outline_sigma_px_;
-    for (const OutlinePair& pair : sequence_.pairs_[frame])
-        problem.AddResidualBlock(
-            new ceres::AutoDiffCostFunction<OutlineResidual, 1, camera_unknowns, place_unknowns, 1>(new OutlineResidual{
-                fit_.model.lens, pair.in_depth, pair.on_edge, pair.across, motion, later_s, weight}),
-            robust_px > 0 ? new ceres::CauchyLoss(robust_px) : nullptr, fit_.model.values.data(), place(), clock());
+    const Eigen::Isometry3d world_from_depth = from_six(pose(frame)).inverse();
+    for (const OutlinePair& pair : sequence_.pairs_[frame]) {
+        const ceres::ResidualBlockId block = problem.AddResidualBlock(
+            new ceres::AutoDiffCostFunction<OutlineResidual, 1, camera_unknowns, place_unknowns, 1, 1>(
+                new OutlineResidual{fit_.model.lens, pair.point.in_depth, pair.point.one_px_beyond, pair.on_edge,
+                                    pair.across, motion, later_s, weight}),
+            robust ? new ceres::CauchyLoss(weight * sequence_.outline_sigma_px_) : nullptr, fit_.model.values.data(),
+            place(), clock(), gap());
+        outlines.emplace_back(block, world_from_depth * pair.point.in_depth);
+    }
+}
+
+void SequenceProblem::hold_place(const Model& first) {
+    constexpr double shift_sigma_m = 0.03, turn_sigma = 0.1;
+    if (!problem.HasParameterBlock(place()))
+        return;
+    const Eigen::Isometry3d there = from_six(first.values.data() + turn_x);
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<PoseResidual, 6, place_unknowns>(new PoseResidual{
+            Eigen::Quaterniond(there.linear()).normalized(), there.inverse().translation(),
+            sequence_.options_.pixel_sigma_px / turn_sigma, sequence_.options_.pixel_sigma_px / shift_sigma_m}),
+        nullptr, place());
+}
+
+void SequenceProblem::hold_gap() {
+    constexpr double sigma_px = 0.5;
+    if (problem.HasParameterBlock(gap()))
+        problem.AddResidualBlock(new ceres::AutoDiffCostFunction<ExpectedResidual, 1, 1>(new ExpectedResidual{
+                                     expected_gap_px, sequence_.options_.pixel_sigma_px / sigma_px}),
+                                 nullptr, gap());
 }
 
 /// Where poses are refined they are those at which colour was taken, and what the camera did around them is left out.
@@ -47,7 +78,7 @@ void SequenceProblem::add_depth(std::size_t track, const Sequence::Sighting& s, 
     const int before = problem.NumResidualBlocks();
     if (sequence_.options_.registered && s.depth_m > 0)
         add_recorded_depth(track, s, loss);
-    else if (!sequence_.options_.registered && s.depth_m >= 0)
+    else if (s.surface)
         add_surface(track, s, loss);
     if (problem.NumResidualBlocks() > before)
         depths.push_back(before);
@@ -62,15 +93,9 @@ void SequenceProblem::add_recorded_depth(std::size_t track, const Sequence::Sigh
 }
 
 void SequenceProblem::add_surface(std::size_t track, const Sequence::Sighting& s, ceres::LossFunction* loss) {
-    constexpr double same_surface = 0.05; // of the depth: farther off it is another one, and says nothing of this point
-    Eigen::Vector3d in_depth;
-    moved(pose(s.frame), point(track), in_depth.data());
-    const auto surface = surface_at(sequence_.frames_[s.frame].depth_m, sequence_.depth_camera_.pinhole, in_depth);
-    if (!surface || std::abs(surface->normal.dot(in_depth - surface->centre)) > same_surface * in_depth.z())
-        return;
-    const double weight = sequence_.weights_[s.frame] * depth_weight(in_depth.z());
+    const double weight = sequence_.weights_[s.frame] * depth_weight(s.surface->centre.z());
     problem.AddResidualBlock(new ceres::AutoDiffCostFunction<SurfaceResidual, 1, pose_unknowns, point_unknowns>(
-                                 new SurfaceResidual{surface->centre, surface->normal, weight}),
+                                 new SurfaceResidual{s.surface->centre, s.surface->normal, weight}),
                              loss, pose(s.frame), point(track));
 }
 

@@ -24,6 +24,8 @@ bool seen_at(LensModel lens, const Number* camera, const Number* in_camera, cons
 /// A point in camera space as the camera sees it `seconds` later, moving on as it does.
 template <class Number>
 void seen_later(const Motion& motion, const Number& seconds, Number* in_camera) {
+    if (!motion.any())
+        return;
     Number turn[3], moved_on[3];
     for (int i = 0; i < 3; ++i) {
         turn[i] = -seconds * Number(motion.turn_per_s[i]);
@@ -67,18 +69,42 @@ struct PlacedSightingResidual {
     }
 };
 
-/// A point of a depth edge lies on an edge of the same frame's colour image: only the way across it counts.
+/// The same where poses are kept: most of a fit's time goes into these derivatives, a fourth of them by the pose.
+struct PosedSightingResidual {
+    LensModel lens;
+    Eigen::Vector2d pixel;
+    Motion motion;
+    double later_s;
+    double weight;
+    Eigen::Isometry3d depth_from_world;
+    template <class Number>
+    bool operator()(const Number* camera, const Number* place, const Number* clock, const Number* point,
+                    Number* residual) const {
+        Number in_depth[3], in_camera[3];
+        for (int i = 0; i < 3; ++i)
+            in_depth[i] = depth_from_world(i, 0) * point[0] + depth_from_world(i, 1) * point[1] +
+                          depth_from_world(i, 2) * point[2] + depth_from_world(i, 3);
+        seen_later(motion, Number(*clock + later_s), in_depth);
+        moved(place, in_depth, in_camera);
+        return seen_at(lens, camera, in_camera, pixel, weight, residual);
+    }
+};
+
+/// A depth edge, so many pixels beyond the last point before it, lies on an edge of the same frame's colour image: only
+/// the way across it counts.
 struct OutlineResidual {
     LensModel lens;
-    Eigen::Vector3d in_depth;
+    Eigen::Vector3d in_depth, one_px_beyond;
     Eigen::Vector2d on_edge, across;
     Motion motion;
     double later_s;
     double weight;
     template <class Number>
-    bool operator()(const Number* camera, const Number* place, const Number* clock, Number* residual) const {
-        Number then[3] = {Number(in_depth[0]), Number(in_depth[1]), Number(in_depth[2])}, in_camera[3],
-               miss[2] = {Number(0), Number(0)};
+    bool operator()(const Number* camera, const Number* place, const Number* clock, const Number* gap_px,
+                    Number* residual) const {
+        Number then[3], in_camera[3], miss[2] = {Number(0), Number(0)};
+        for (int i = 0; i < 3; ++i)
+            then[i] = Number(in_depth[i]) + *gap_px * Number(one_px_beyond[i]);
         seen_later(motion, Number(*clock + later_s), then);
         moved(place, then, in_camera);
         const bool seen = seen_at(lens, camera, in_camera, on_edge, weight, miss);
@@ -117,6 +143,16 @@ struct SurfaceResidual {
         for (int i = 0; i < 3; ++i)
             residual[0] += Number(normal[i]) * (in_camera[i] - Number(on_surface[i]));
         residual[0] *= Number(weight);
+        return true;
+    }
+};
+
+/// A number is near what is expected of it, in sigmas.
+struct ExpectedResidual {
+    double expected, weight;
+    template <class Number>
+    bool operator()(const Number* value, Number* residual) const {
+        residual[0] = Number(weight) * (*value - Number(expected));
         return true;
     }
 };

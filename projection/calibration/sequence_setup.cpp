@@ -37,9 +37,13 @@ Sequence::Sequence(std::vector<SequenceFrame> frames, const Camera& depth_camera
                         "frames too far apart",
                         tracks_.size(), frames_.size(), least));
     follow_camera(first);
-    prune(first);
-    if (options_.outlines && !options_.registered && !tracks_.empty())
-        pair_outlines(first);
+    if (options_.registered || !options_.outlines) {
+        prune(first, first);
+    } else {
+        const Model near = place_by_outlines(first);
+        prune(near, first);
+        pair_ever_nearer(near, first);
+    }
     if (tracks_.size() < least)
         throw Error(
             fmt::format("{} points fit together, at least {} expected: the poses, the depth unit or the camera are far "
@@ -47,21 +51,37 @@ Sequence::Sequence(std::vector<SequenceFrame> frames, const Camera& depth_camera
                         tracks_.size(), least));
 }
 
-/// As the nearest point of a surface is found in turns with the place: by what the tracks say first, then by ever
-/// nearer edges.
-void Sequence::pair_outlines(const Model& first) {
+/// From where the most outlines find an edge: of all places that tracks allow, since the nearest edge is often another
+/// one.
+Model Sequence::place_by_outlines(const Model& first) {
     for (const SequenceFrame& frame : frames_) {
         outlines_.push_back(outline_of(frame.depth_m, depth_camera_));
         edges_.push_back(colour_edges_of(frame.grey));
     }
-    Fit fit = robust_fit(initial(first));
-    for (const double reach_px : {12.0, 8.0, 5.0, 5.0}) {
-        pairs_.assign(frames_.size(), {});
-        for (std::size_t i = 0; i < frames_.size(); ++i)
-            pairs_[i] = paired(outlines_[i], edges_[i], fit.model, reach_px);
-        fit = robust_fit(fit);
+    leave_out_absurd(initial(first));
+    const Model near = placed_by_outlines(outlines_, edges_, robust_fit(initial(first), first).model, first);
+    constexpr double reach_px = 8; // a step of the search, and what tracks have wrong
+    pair_outlines(initial(near), reach_px);
+    return near;
+}
+
+/// As the nearest point of a surface is found, in turns with the place: points slide along their surfaces, edges along
+/// theirs, so that it takes a few rounds.
+void Sequence::pair_ever_nearer(const Model& near, const Model& first) {
+    constexpr int rounds = 10;
+    constexpr double nearest_px = 2;
+    Fit fit = robust_fit(initial(near), first);
+    for (int round = 0; round < rounds; ++round) {
+        pair_outlines(fit, std::max(nearest_px, 5.0 - round));
+        fit = robust_fit(fit, first);
         leave_out_far_outlines(fit);
     }
+}
+
+void Sequence::pair_outlines(const Fit& fit, double reach_px) {
+    pairs_.assign(frames_.size(), {});
+    for (std::size_t i = 0; i < frames_.size(); ++i)
+        pairs_[i] = paired(outlines_[i], gap_px(fit), edges_[i], fit.model, reach_px);
 }
 
 /// Scales the outlines' sigma to what is seen, and leaves out what is farther off than three of them.
@@ -146,7 +166,8 @@ Eigen::Isometry3d Sequence::placed_by_points(int frame, const Camera& camera,
 
 Fit Sequence::initial(const Model& model) const {
     Fit fit{.model = model, .used = Views(frames_.size(), true)};
-    fit.nuisance.resize(frames_.size() * pose_unknowns + tracks_.size() * point_unknowns);
+    fit.nuisance.resize(frames_.size() * pose_unknowns + tracks_.size() * point_unknowns + 1);
+    fit.nuisance.back() = expected_gap_px;
     for (std::size_t i = 0; i < frames_.size(); ++i)
         to_six(start_poses_[i].inverse(), &fit.nuisance[i * pose_unknowns]);
     const Camera camera = calibration::camera_of(model);
@@ -197,19 +218,41 @@ void Sequence::leave_out_absurd(const Fit& fit) {
     tracks_ = std::move(kept);
 }
 
+/// Of unregistered frames: the piece of surface nearest to where each point is, along the depth camera's ray.
+void Sequence::find_surfaces(const Fit& fit) {
+    constexpr double same_surface = 0.05; // of the depth: farther off it is another one, and says nothing of this point
+    for (std::size_t i = 0; i < tracks_.size(); ++i) {
+        const Eigen::Map<const Eigen::Vector3d> point(
+            &fit.nuisance[frames_.size() * pose_unknowns + i * point_unknowns]);
+        for (Sighting& s : tracks_[i].sightings) {
+            const Eigen::Vector3d in_depth = from_six(&fit.nuisance[s.frame * pose_unknowns]) * point;
+            s.surface = {};
+            if (s.depth_m != unusable)
+                s.surface = surface_at(frames_[s.frame].depth_m, depth_camera_.pinhole, in_depth);
+            if (s.surface &&
+                std::abs(s.surface->normal.dot(in_depth - s.surface->centre)) > same_surface * in_depth.z())
+                s.surface = {};
+        }
+    }
+}
+
 /// With the usual suspects free: a wrong camera must not cost the image's corners.
-Fit Sequence::robust_fit(const Fit& from) const {
+Fit Sequence::robust_fit(const Fit& from, const Model& first) {
     constexpr double robust_px = 1;
     Fit fit = from;
+    if (!options_.registered)
+        find_surfaces(fit);
     SequenceProblem adjustment(*this, fit);
     for (std::size_t i = 0; i < tracks_.size(); ++i)
         for (const Sighting& s : tracks_[i].sightings)
             adjustment.add(i, s, new ceres::CauchyLoss(robust_px));
     for (std::size_t i = 0; i < frames_.size(); ++i)
-        adjustment.add_outlines(static_cast<int>(i), robust_px);
+        adjustment.add_outlines(static_cast<int>(i), true);
+    adjustment.hold_gap();
+    adjustment.hold_place(first);
     Free free{};
-    for (const Unknown unknown : {f, cx, cy, k1})
-        free[unknown] = true;
+    free[f] = free[k1] = true;
+    free[cx] = free[cy] = options_.registered; // beside a turn of the camera the principal point is hardly seen
     for (int i = turn_x; i < time_offset; ++i)
         free[i] = !options_.registered;
     free[time_offset] = tells_time();
@@ -242,8 +285,10 @@ void Sequence::leave_out_beyond(const std::vector<std::vector<Miss>>& misses, co
             if (misses[i][s].pixels > most.pixels)
                 continue;
             point.sightings.push_back(tracks_[i].sightings[s]);
-            if (misses[i][s].depth > most.depth)
+            if (misses[i][s].depth > most.depth) {
                 point.sightings.back().depth_m = unusable;
+                point.sightings.back().surface = {};
+            }
         }
         if (useful(point))
             kept.push_back(std::move(point));
@@ -253,11 +298,13 @@ void Sequence::leave_out_beyond(const std::vector<std::vector<Miss>>& misses, co
 
 /// Leaves out what does not fit, judged by a robust fit, and scales the depths' sigma to the pixels', by the residuals
 /// of each.
-void Sequence::prune(const Model& first) {
+void Sequence::prune(Model near, const Model& first) {
     constexpr double most_sigmas = 4;
     for (int round = 0; round < 3 && !tracks_.empty(); ++round) {
-        leave_out_absurd(initial(first));
-        const Fit fit = robust_fit(initial(first));
+        leave_out_absurd(initial(near));
+        const Fit fit = robust_fit(initial(near), first);
+        if (!options_.registered) // so that each point is looked for on the surface that it lies on
+            near = fit.model;
         const std::vector<std::vector<Miss>> misses = misses_of(fit);
         std::vector<double> pixels, depths;
         for (const auto& of_track : misses)

@@ -5,7 +5,7 @@
 
 #include <Eigen/Dense>
 #include <glog/logging.h>
-#include <map>
+#include <optional>
 
 namespace scanshade::calibration {
 namespace {
@@ -55,7 +55,7 @@ void solve(ceres::Problem& problem, Fit& fit, bool many_unknowns) {
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_SCHUR; // poses and model are few, points are eliminated
     options.max_num_iterations = many_unknowns ? 40 : 100;
-    options.function_tolerance = many_unknowns ? 1e-7 : 1e-10; // of the sum: far below one sigma of any number
+    options.function_tolerance = many_unknowns ? 1e-6 : 1e-10; // of the sum, thousands of sigmas squared
     options.gradient_tolerance = 1e-12;
     options.parameter_tolerance = 1e-10;
     options.logging_type = ceres::SILENT;
@@ -76,69 +76,89 @@ void solve(ceres::Problem& problem, Fit& fit, bool many_unknowns) {
 
 namespace {
 
-/// The normal equations with the points eliminated. Rows come as a sparse Jacobian whose columns hold the first `kept`
-/// numbers, then three per point.
+constexpr int by_itself = -1;
+
+/// The normal equations with the points eliminated, cluster by cluster. Rows come as a sparse Jacobian whose columns
+/// hold the first `kept` numbers, then three per point.
 class Reduced {
   public:
     Reduced(const ceres::CRSMatrix& jacobian, const std::vector<double>& residuals, Eigen::Index kept,
-            const std::vector<int>& clusters)
-        : kept_(kept), normal_(Eigen::MatrixXd::Zero(kept, kept)), spread_(normal_) {
+            const std::vector<int>& of_points, const std::vector<int>& of_rows)
+        : kept_(kept), by_themselves_(part()), spread_(by_themselves_.normal) {
         points_.resize(static_cast<std::size_t>((jacobian.num_cols - kept) / 3));
         for (int row = 0; row < jacobian.num_rows; ++row)
-            add_row(jacobian, row, residuals[row]);
-        std::map<int, Eigen::VectorXd> pulls;
+            add_row(jacobian, row, residuals[row], of_points, of_rows[row]);
         for (std::size_t i = 0; i < points_.size(); ++i) {
             const Point& point = points_[i];
             if (point.mixed.size() == 0)
                 continue;
             const Eigen::LDLT<Eigen::Matrix3d> own = point.own.ldlt();
-            normal_ -= point.mixed.transpose() * own.solve(point.mixed);
-            const Eigen::VectorXd pull = point.pull - point.mixed.transpose() * own.solve(point.own_pull);
-            const auto [sum, first] = pulls.try_emplace(clusters[i], pull);
-            if (!first)
-                sum->second += pull;
+            Part& around = cluster(of_points[i]);
+            around.normal -= point.mixed.transpose() * own.solve(point.mixed);
+            around.pull -= point.mixed.transpose() * own.solve(point.own_pull);
         }
-        for (const auto& [cluster, pull] : pulls)
-            spread_ += pull * pull.transpose();
-        if (pulls.size() > 1)
-            spread_ *= static_cast<double>(pulls.size()) / static_cast<double>(pulls.size() - 1);
+        normal_ = by_themselves_.normal;
+        for (const auto& [number, part] : clusters_)
+            normal_ += part.normal;
     }
     [[nodiscard]] const Eigen::MatrixXd& normal() const { return normal_; }
-    /// Sum over clusters of the outer product of how each pulls at the kept numbers.
-    [[nodiscard]] const Eigen::MatrixXd& spread() const { return spread_; }
+    /// Of the kept numbers, from how each cluster pulls at them.
+    [[nodiscard]] Eigen::MatrixXd covariance(const Eigen::MatrixXd& inverse, bool many) const {
+        const auto count = static_cast<double>(clusters_.size());
+        Eigen::MatrixXd moves = Eigen::MatrixXd::Zero(kept_, kept_);
+        for (const auto& [number, part] : clusters_) {
+            const Eigen::VectorXd move =
+                many ? Eigen::VectorXd((normal_ - part.normal).ldlt().solve(part.pull)) : inverse * part.pull;
+            moves += move * move.transpose();
+        }
+        if (count > 1)
+            moves *= many ? (count - 1) / count : count / (count - 1);
+        return moves + inverse * spread_ * inverse;
+    }
 
   private:
+    struct Part {
+        Eigen::MatrixXd normal;
+        Eigen::VectorXd pull;
+    };
     struct Point {
         Eigen::Matrix3d own = Eigen::Matrix3d::Zero();
         Eigen::MatrixXd mixed;
-        Eigen::VectorXd pull;
         Eigen::Vector3d own_pull = Eigen::Vector3d::Zero();
     };
 
-    void add_row(const ceres::CRSMatrix& jacobian, int row, double residual) {
+    [[nodiscard]] Part part() const { return {Eigen::MatrixXd::Zero(kept_, kept_), Eigen::VectorXd::Zero(kept_)}; }
+    Part& cluster(int number) {
+        const auto found = clusters_.find(number);
+        return found == clusters_.end() ? clusters_.emplace(number, part()).first->second : found->second;
+    }
+
+    void add_row(const ceres::CRSMatrix& jacobian, int row, double residual, const std::vector<int>& of_points,
+                 int of_row) {
         const int begin = jacobian.rows[row], end = jacobian.rows[row + 1];
-        Point* point = nullptr;
-        for (int a = begin; a < end && !point; ++a)
+        std::optional<std::size_t> about;
+        for (int a = begin; a < end && !about; ++a)
             if (jacobian.cols[a] >= kept_)
-                point = &points_[static_cast<std::size_t>((jacobian.cols[a] - kept_) / 3)];
-        if (point && point->mixed.size() == 0) {
+                about = static_cast<std::size_t>((jacobian.cols[a] - kept_) / 3);
+        Point* point = about ? &points_[*about] : nullptr;
+        if (point && point->mixed.size() == 0)
             point->mixed = Eigen::MatrixXd::Zero(3, kept_);
-            point->pull = Eigen::VectorXd::Zero(kept_);
-        }
-        Eigen::VectorXd alone = point ? Eigen::VectorXd() : Eigen::VectorXd::Zero(kept_);
+        const bool alone = !point && of_row == by_itself;
+        Part& around = alone ? by_themselves_ : cluster(point ? of_points[*about] : of_row);
+        Eigen::VectorXd pull = alone ? Eigen::VectorXd::Zero(kept_) : Eigen::VectorXd();
         for (int a = begin; a < end; ++a) {
             const Eigen::Index at = jacobian.cols[a];
             const double value = jacobian.values[a];
-            (at < kept_ ? (point ? point->pull : alone)(at) : point->own_pull((at - kept_) % 3)) += value * residual;
+            (at < kept_ ? (alone ? pull : around.pull)(at) : point->own_pull((at - kept_) % 3)) += value * residual;
             for (int b = begin; b < end; ++b)
-                add(point, at, jacobian.cols[b], value * jacobian.values[b]);
+                add(around.normal, point, at, jacobian.cols[b], value * jacobian.values[b]);
         }
-        if (!point)
-            spread_ += alone * alone.transpose();
+        if (alone)
+            spread_ += pull * pull.transpose();
     }
-    void add(Point* point, Eigen::Index a, Eigen::Index b, double value) {
+    void add(Eigen::MatrixXd& normal, Point* point, Eigen::Index a, Eigen::Index b, double value) const {
         if (a < kept_ && b < kept_)
-            normal_(a, b) += value;
+            normal(a, b) += value;
         else if (a >= kept_ && b >= kept_)
             point->own((a - kept_) % 3, (b - kept_) % 3) += value;
         else if (a >= kept_)
@@ -146,9 +166,24 @@ class Reduced {
     }
 
     Eigen::Index kept_;
+    Part by_themselves_; ///< rows that hang together with no others
     Eigen::MatrixXd normal_, spread_;
     std::vector<Point> points_;
+    std::map<int, Part> clusters_;
 };
+
+/// Of each row of the Jacobian, in the order of the problem's residual blocks.
+std::vector<int> clusters_of_rows(const ceres::Problem& problem,
+                                  const std::vector<ceres::ResidualBlockId>& residual_blocks,
+                                  const std::map<ceres::ResidualBlockId, int>& clusters) {
+    std::vector<int> of_rows;
+    for (const ceres::ResidualBlockId block : residual_blocks) {
+        const auto found = clusters.find(block);
+        const int rows = problem.GetCostFunctionForResidualBlock(block)->num_residuals();
+        of_rows.insert(of_rows.end(), rows, found == clusters.end() ? by_itself : found->second);
+    }
+    return of_rows;
+}
 
 /// The inverse of a symmetric matrix scaled to a unit diagonal first; empty where it has none worth the name.
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& normal) {
@@ -166,8 +201,8 @@ Eigen::MatrixXd inverse(const Eigen::MatrixXd& normal) {
 
 } // namespace
 
-void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const std::vector<double*>& poses,
-                    const std::vector<ClusteredPoint>& points) {
+void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const std::vector<double*>& kept_blocks,
+                    const Clusters& clusters) {
     fit.covariance.resize(0, 0);
     const int spare = fit.residuals - fit.unknowns;
     if (spare <= 0)
@@ -185,30 +220,32 @@ void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const s
     }
     const auto count = static_cast<Eigen::Index>(places.size());
     auto kept = count;
-    for (double* pose : poses)
-        if (problem.HasParameterBlock(pose) && !problem.IsParameterBlockConstant(pose)) {
-            options.parameter_blocks.push_back(pose);
-            kept += problem.ParameterBlockTangentSize(pose);
+    for (double* block : kept_blocks)
+        if (problem.HasParameterBlock(block) && !problem.IsParameterBlockConstant(block)) {
+            options.parameter_blocks.push_back(block);
+            kept += problem.ParameterBlockTangentSize(block);
         }
-    std::vector<int> clusters;
-    for (const ClusteredPoint& point : points)
+    std::vector<int> of_points;
+    for (const ClusteredPoint& point : clusters.points)
         if (problem.HasParameterBlock(point.values)) {
             options.parameter_blocks.push_back(point.values);
-            clusters.push_back(point.cluster);
+            of_points.push_back(point.cluster);
         }
+    problem.GetResidualBlocks(&options.residual_blocks);
     fit.covariance = Eigen::MatrixXd::Zero(unknown_count, unknown_count);
     if (count == 0)
         return;
     ceres::CRSMatrix jacobian;
     std::vector<double> residuals;
     problem.Evaluate(options, nullptr, &residuals, nullptr, &jacobian);
-    const Reduced reduced(jacobian, residuals, kept, clusters);
+    const Reduced reduced(jacobian, residuals, kept, of_points,
+                          clusters_of_rows(problem, options.residual_blocks, clusters.pointless));
     Eigen::MatrixXd all = inverse(reduced.normal());
     if (all.size() == 0 || !all.allFinite()) {
         fit.covariance.resize(0, 0);
         return;
     }
-    all = points.empty() ? Eigen::MatrixXd(all * (fit.rss / spare)) : Eigen::MatrixXd(all * reduced.spread() * all);
+    all = clusters.points.empty() ? Eigen::MatrixXd(all * (fit.rss / spare)) : reduced.covariance(all, clusters.many);
     for (Eigen::Index a = 0; a < count; ++a)
         for (Eigen::Index b = 0; b < count; ++b)
             fit.covariance(places[a], places[b]) = all(a, b);

@@ -4,6 +4,7 @@
 #include "projection/calibration/evidence.h"
 
 #include <ceres/ceres.h>
+#include <map>
 
 namespace scanshade::calibration {
 
@@ -20,13 +21,23 @@ struct ClusteredPoint {
     int cluster;
 };
 
-/// Fills fit.covariance; leaves it empty where the problem is singular. Without `points` it is the inverse normal
-/// matrix scaled by rss / (residuals - unknowns). `points` are blocks of three that appear together with others but
+/// Which part of the scene residuals belong to: those of points, and those of no point. Others stand for themselves.
+struct Clusters {
+    std::vector<ClusteredPoint> points = {};
+    std::map<ceres::ResidualBlockId, int> pointless = {};
+    /// There are enough of them that each can be spared.
+    bool many = false;
+};
+
+/// Fills fit.covariance; leaves it empty where the problem is singular. Without clusters it is the inverse normal
+/// matrix scaled by rss / (residuals - unknowns). Points are blocks of three that appear together with others but
 /// never with each other: they are eliminated one by one (Schur complement), which keeps what is inverted as small as
-/// the model and `poses`. With them residuals may hang together in any way within a cluster (a piece of wall has the
-/// same depth error from everywhere): the covariance is the cluster-robust one (Liang and Zeger 1986).
-void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const std::vector<double*>& poses,
-                    const std::vector<ClusteredPoint>& points);
+/// the model and `kept`, the evidence's other unknowns. With clusters residuals may hang together in any way within one
+/// (a piece of wall has the same depth error from everywhere, neighbours on an outline are off by the same): the
+/// covariance is the cluster-robust one (Liang and Zeger 1986). Of many clusters each is left out in turn, by one
+/// Newton step (the jackknife of Bell and McCaffrey 2002): one that has pulled the fit to itself has small residuals.
+void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const std::vector<double*>& kept,
+                    const Clusters& clusters);
 
 /// Moves a point by a pose of six numbers: axis times angle, then translation.
 template <class Number>
