@@ -72,9 +72,11 @@ bool is_yaml(const std::string& bytes) {
 
 CameraFile read_any(const fs::path& file, const std::string& bytes) {
     const auto lines = text_lines(bytes);
-    const auto first = bytes.find_first_of("{[");
-    if (first != std::string::npos && bytes.find_first_not_of("\xEF\xBB\xBF \t\r\n") == first)
+    const auto first = bytes.find_first_not_of("\xEF\xBB\xBF \t\r\n");
+    if (first != std::string::npos && (bytes[first] == '{' || bytes[first] == '['))
         return camera_from_json(file, bytes);
+    if (first != std::string::npos && bytes[first] == '<')
+        return camera_from_xml(file, bytes);
     if (is_yaml(bytes))
         return camera_from_yaml(file, bytes);
     if (bytes.find("m_calibration") != std::string::npos)

@@ -1,5 +1,5 @@
-// Cameras on disk: ours, Open3D's, OpenCV's, ROS's, Kalibr's, COLMAP's, 3x3 text matrices, and fx,fy,cx,cy from the
-// command line.
+// Cameras on disk: ours, Open3D's, OpenCV's, ROS's, Kalibr's, COLMAP's, PCL's, 3x3 text matrices, and fx,fy,cx,cy from
+// the command line.
 #pragma once
 
 #include "projection/camera.h"
@@ -34,7 +34,7 @@ struct CameraFile {
 ///   (plumb_bob, equidistant), Kalibr's camchain yaml (pinhole with radtan, equidistant or none; cam0, and cam1 with
 ///   its T_cn_cnm1 as the colour camera)
 /// - COLMAP's cameras.txt (its first camera; SIMPLE_PINHOLE to FULL_OPENCV and OPENCV_FISHEYE)
-/// - a 3x3 row-major text matrix (7-Scenes, BundleFusion), BundleFusion's info.txt
+/// - a 3x3 row-major text matrix (7-Scenes, BundleFusion), BundleFusion's info.txt, PCL's XML beside .pclzf
 /// Throws Error naming the file, and the key, line or column, for: JSON syntax, missing keys, wrong counts, non-finite,
 /// zero or negative focal lengths (with a hint that fy < 0 is ICL-NUIM's flip), a row-major Open3D matrix, short
 /// matrices.

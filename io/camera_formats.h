@@ -24,6 +24,7 @@ void check_numbers(const std::filesystem::path& file, const Pinhole& camera, con
 // Each throws Error naming file and place.
 [[nodiscard]] CameraFile camera_from_json(const std::filesystem::path& file, const std::string& text);
 [[nodiscard]] CameraFile camera_from_yaml(const std::filesystem::path& file, const std::string& text);
+[[nodiscard]] CameraFile camera_from_xml(const std::filesystem::path& file, const std::string& text);
 [[nodiscard]] CameraFile camera_from_info(const std::filesystem::path& file, const std::vector<TextLine>& lines);
 [[nodiscard]] CameraFile camera_from_matrix(const std::filesystem::path& file, const std::vector<TextLine>& lines);
 [[nodiscard]] CameraFile camera_from_colmap(const std::filesystem::path& file, const std::vector<TextLine>& lines);

@@ -27,6 +27,8 @@ Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
         return *std::move(listing);
     if (auto listing = list_seven_scenes(folder))
         return *std::move(listing);
+    if (auto listing = list_pcl_recording(folder))
+        return *std::move(listing);
     if (auto listing = list_image_folders(folder))
         return *std::move(listing);
     if (auto listing = list_depth_images(folder))
@@ -34,7 +36,8 @@ Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
     if (auto listing = list_clouds(folder))
         return *std::move(listing);
     throw Error(fmt::format(
-        "no frames found in {}: looked for depth.txt (TUM), frame-NNNNNN.depth.png (7-Scenes), a folder depth/ "
+        "no frames found in {}: looked for depth.txt (TUM), frame-NNNNNN.depth.png (7-Scenes), "
+        "TIME_depth.pclzf (PCL), a folder depth/ "
         "(Redwood, RealSense), 16-bit or float depth images, and clouds (.pcd, .ply, .las, .xyz, .pts, .ptx, .bin)",
         folder.string()));
 }
@@ -61,11 +64,12 @@ Listing list_file(const fs::path& file) {
         const bool image = image_format(read_bytes(file, 16)) != ImageFormat::unknown;
         if (!image && !has_depth_extension(file))
             throw Error(file.string() +
-                        ": neither a folder, a depth image (PNG, PGM, TIFF, EXR, PFM) nor a cloud (PCD, PLY, LAS, XYZ, PTS, PTX, KITTI's .bin)");
+                        ": neither a folder, a depth image (PNG, PGM, TIFF, EXR, PFM, PCLZF) nor a cloud (PCD, PLY, LAS, XYZ, PTS, PTX, KITTI's .bin)");
         entry.depth = file;
         listing.capture.kind = "depth image";
         listing.capture.depth = assumed_encoding(file);
         listing.capture.registration_reason = "there is no colour";
+        listing.find_camera = [file](cv::Size, std::vector<std::string>&) { return camera_beside_pclzf(file); };
     }
     listing.capture.entries.push_back(std::move(entry));
     return listing;

@@ -39,7 +39,7 @@ struct CaptureEntry {
 struct Capture {
     std::filesystem::path path;
     std::string
-        kind; ///< "TUM RGB-D", "7-Scenes", "Redwood / Open3D", "colour and depth folders", "depth image", "cloud"
+        kind; ///< "TUM RGB-D", "7-Scenes", "PCL recording", "Redwood / Open3D", "colour and depth folders", "depth image", "cloud"
     std::optional<Camera> camera; ///< none: clouds recover theirs; depth images need --camera
     DepthEncoding depth;
     DepthCorrection depth_correction;          ///< from the camera's file; load() applies it

@@ -217,6 +217,8 @@ ImageFormat image_format(std::string_view bytes) {
         return ImageFormat::bmp;
     if (bytes.starts_with("RIFF"sv) && bytes.substr(std::min<std::size_t>(8, bytes.size())).starts_with("WEBP"sv))
         return ImageFormat::webp; // of 2^14 pixels a side at most
+    if (bytes.starts_with("PCLZF"sv))
+        return ImageFormat::pclzf;
     const bool netpbm = bytes.size() > 2 && bytes[0] == 'P' && std::isspace(static_cast<unsigned char>(bytes[2]));
     if (!netpbm)
         return ImageFormat::unknown;
@@ -255,6 +257,8 @@ std::string_view format_name(ImageFormat format) {
         return "BMP";
     case ImageFormat::webp:
         return "WebP";
+    case ImageFormat::pclzf:
+        return "PCLZF";
     case ImageFormat::unknown:
         break;
     }
@@ -275,6 +279,8 @@ ImageFacts read_image_header(std::string_view bytes, const std::filesystem::path
         return image_check::exr_facts(bytes, file);
     if (format == ImageFormat::bmp)
         return image_check::bmp_header(bytes, file);
+    if (format == ImageFormat::pclzf)
+        return image_check::pclzf_header(bytes, file);
     if (image_check::is_netpbm(format))
         return image_check::netpbm_header(bytes, file, format);
     ImageFacts facts;
@@ -290,6 +296,8 @@ ImageFacts check_image(std::string_view bytes, const std::filesystem::path& file
         image_check::check_png_chunks(bytes, file, facts);
     if (image_check::is_netpbm(facts.format))
         image_check::check_sample_count(bytes, file, facts);
+    if (facts.format == ImageFormat::pclzf)
+        image_check::check_pclzf_block(bytes, file, facts);
     return facts;
 }
 

@@ -9,7 +9,7 @@
 
 namespace scanshade {
 
-enum class ImageFormat { unknown, png, jpeg, pgm, ppm, other_netpbm, pfm, tiff, exr, bmp, webp };
+enum class ImageFormat { unknown, png, jpeg, pgm, ppm, other_netpbm, pfm, tiff, exr, bmp, webp, pclzf };
 
 /// Facts from the header. Fields a format does not fix are left at 0.
 struct ImageFacts {
@@ -19,7 +19,7 @@ struct ImageFacts {
     int channels = 0;
     bool floats = false;
     bool big_endian = false;   ///< PFM
-    std::size_t pixels_at = 0; ///< PGM, PPM and PFM: where the samples start
+    std::size_t pixels_at = 0; ///< PGM, PPM, PFM and PCLZF: where the samples start
 };
 
 /// More pixels than this are refused before anything is allocated.
@@ -30,8 +30,8 @@ constexpr std::uint64_t most_pixels = std::uint64_t(1) << 28;
 /// "PNG", "JPEG", ...
 [[nodiscard]] std::string_view format_name(ImageFormat format);
 
-/// Header only: works on the first few hundred bytes of PNG, JPEG (up to its size), PGM, PPM and PFM; TIFF and EXR need
-/// the whole file. Throws Error naming `file` for a header that is cut short or absurd.
+/// Header only: works on the first few hundred bytes of PNG, JPEG (up to its size), PGM, PPM, PFM and PCLZF; TIFF and
+/// EXR need the whole file. Throws Error naming `file` for a header that is cut short or absurd.
 [[nodiscard]] ImageFacts read_image_header(std::string_view bytes, const std::filesystem::path& file);
 
 /// Header and container: every chunk, checksum, strip and byte count. Throws Error naming `file` and the byte offset.
@@ -42,6 +42,8 @@ namespace image_check { // one pair per format; check_image() chooses
 void check_png_chunks(std::string_view bytes, const std::filesystem::path& file, const ImageFacts& facts);
 [[nodiscard]] ImageFacts tiff_facts(std::string_view bytes, const std::filesystem::path& file);
 [[nodiscard]] ImageFacts exr_facts(std::string_view bytes, const std::filesystem::path& file);
+[[nodiscard]] ImageFacts pclzf_header(std::string_view bytes, const std::filesystem::path& file);
+void check_pclzf_block(std::string_view bytes, const std::filesystem::path& file, const ImageFacts& facts);
 
 /// The image size, or Error when a side is 0 or there are more than most_pixels.
 [[nodiscard]] cv::Size checked_size(std::uint64_t width, std::uint64_t height, const std::filesystem::path& file);

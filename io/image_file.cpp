@@ -1,7 +1,8 @@
-// Depth and colour images from disk: container checked first, decoded by OpenCV (PGM, PFM and grey PNG here), then metres.
+// Depth and colour images from disk: container checked first, decoded by OpenCV (PGM, PFM, PCLZF and grey PNG here), then metres.
 #include "io/image_file.h"
 
 #include "io/image_check.h"
+#include "io/pclzf.h"
 #include "io/png_input.h"
 #include "io/text.h"
 #include "projection/error.h"
@@ -54,7 +55,7 @@ void check_is_depth(const ImageFacts& facts, const fs::path& file) {
     const auto format = facts.format;
     const std::string name(format_name(format));
     if (format == ImageFormat::unknown)
-        refuse("neither PNG, PGM, TIFF, EXR nor PFM");
+        refuse("neither PNG, PGM, TIFF, EXR, PFM nor PCLZF");
     if (format == ImageFormat::jpeg)
         refuse("JPEG, which is 8-bit and lossy and cannot hold depth");
     if (format == ImageFormat::other_netpbm)
@@ -131,6 +132,8 @@ cv::Mat read_stored_depth(const fs::path& file) {
         return unpack_pgm(bytes, facts);
     if (facts.format == ImageFormat::pfm)
         return unpack_pfm(bytes, facts);
+    if (facts.format == ImageFormat::pclzf)
+        return decoded_pclzf(bytes, facts, file);
     const cv::Mat image = decode_grey(bytes, facts, file);
     if (image.size() != facts.size || (image.type() != CV_16UC1 && image.type() != CV_32FC1))
         throw Error(fmt::format("{}: decoded to something else than its header says", file.string()));
@@ -184,8 +187,13 @@ cv::Mat1f depth_in_metres(const cv::Mat& stored, const DepthEncoding& encoding) 
 
 cv::Mat3b read_colour(const fs::path& file) {
     const std::string bytes = read_image_bytes(file);
-    if (check_image(bytes, file).format == ImageFormat::unknown)
-        throw Error(file.string() + ": neither PNG, JPEG, TIFF, EXR, BMP, WebP nor Netpbm");
+    const ImageFacts facts = check_image(bytes, file);
+    if (facts.format == ImageFormat::unknown)
+        throw Error(file.string() + ": neither PNG, JPEG, TIFF, EXR, BMP, WebP, PCLZF nor Netpbm");
+    if (facts.format == ImageFormat::pclzf && facts.channels != 3)
+        throw Error(file.string() + ": PCLZF depth, expected a colour image");
+    if (facts.format == ImageFormat::pclzf)
+        return decoded_pclzf(bytes, facts, file);
     // The orientation tag of a photo would turn the colour away from its depth.
     const cv::Mat image = decode(bytes, file, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
     if (image.type() != CV_8UC3)

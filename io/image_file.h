@@ -24,7 +24,7 @@ struct DepthEncoding {
 /// Throws Misuse listing these.
 [[nodiscard]] DepthEncoding depth_encoding(const std::string& text, const std::string& origin);
 
-/// The numbers as stored, one channel: CV_16U (PNG, PGM, TIFF) or CV_32F metres (TIFF, EXR, PFM).
+/// The numbers as stored, one channel: CV_16U (PNG, PGM, TIFF, PCLZF) or CV_32F metres (TIFF, EXR, PFM).
 /// The format is told by the file's signature, not its name. Throws Error naming the file and what was expected for:
 /// missing or empty file, truncation (with byte counts or offset), checksum errors, 8-bit depth, colour images, JPEG,
 /// more than 2^28 pixels (before allocating), PGM size or maxval that do not fit the bytes.

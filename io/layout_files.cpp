@@ -82,10 +82,11 @@ bool one_of(const std::string& text, std::initializer_list<std::string_view> cho
 } // namespace
 
 bool has_depth_extension(const fs::path& file) {
-    return one_of(lower_extension(file), {".png", ".pgm", ".tif", ".tiff", ".exr", ".pfm"});
+    return one_of(lower_extension(file), {".png", ".pgm", ".tif", ".tiff", ".exr", ".pfm", ".pclzf"});
 }
 bool has_colour_extension(const fs::path& file) {
-    return one_of(lower_extension(file), {".png", ".jpg", ".jpeg", ".ppm", ".pgm", ".bmp", ".tif", ".tiff", ".webp"});
+    return one_of(lower_extension(file),
+                  {".png", ".jpg", ".jpeg", ".ppm", ".pgm", ".bmp", ".tif", ".tiff", ".webp", ".pclzf"});
 }
 bool is_text_cloud(const fs::path& file) { return one_of(lower_extension(file), {".xyz", ".pts", ".ptx"}); }
 bool has_cloud_extension(const fs::path& file) {

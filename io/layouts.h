@@ -25,6 +25,7 @@ struct Listing {
 // Each returns nothing when the folder is not in its layout, and throws Error when it is but cannot be used.
 [[nodiscard]] std::optional<Listing> list_tum(const std::filesystem::path& folder, const CaptureOptions& options);
 [[nodiscard]] std::optional<Listing> list_seven_scenes(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_pcl_recording(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_image_folders(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_depth_images(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_clouds(const std::filesystem::path& folder);
@@ -54,6 +55,10 @@ struct Listing {
 /// others are named.
 [[nodiscard]] std::optional<CameraFile> camera_in(const std::filesystem::path& folder,
                                                   std::vector<std::string>& warnings);
+
+/// The camera and depth unit in the XML file that PCL writes beside a depth image of its recordings (TIME.xml beside
+/// TIME_depth.pclzf); nothing where there is none.
+[[nodiscard]] std::optional<CameraFile> camera_beside_pclzf(const std::filesystem::path& depth);
 
 /// "assumed: 16-bit integers are millimetres", or metres where `first_depth` holds floats.
 [[nodiscard]] DepthEncoding assumed_encoding(const std::filesystem::path& first_depth);
