@@ -43,6 +43,20 @@ void images() {
         cv::imencode(kind, image, bytes);
         seed("image", "seed" + name, {bytes.begin(), bytes.end()});
     }
+    const auto pclzf = [](std::string type, std::size_t pixel_bytes) { // 8x4 pixels in LZF's literal runs of 32 bytes
+        const std::string run = '\x1f' + std::string("0123456789abcdefghijklmnopqrstuv");
+        std::string packed;
+        for (std::size_t i = 0; i < pixel_bytes; ++i)
+            packed += run;
+        seed("image", type + ".pclzf",
+             "PCLZF" + raw(8U) + raw(4U) + (type + std::string(16, ' ')).substr(0, 16) +
+                 raw(static_cast<std::uint32_t>(packed.size())) + raw(static_cast<std::uint32_t>(32 * pixel_bytes)) +
+                 packed);
+    };
+    pclzf("depth16", 2);
+    pclzf("rgb24", 3);
+    pclzf("yuv422", 2);
+    pclzf("bayer8", 1);
 }
 
 void clouds() {
@@ -117,6 +131,11 @@ void cameras() {
     write_camera_file(root / "camera/beside.json", camera, CameraFormat::scanshade);
     write_camera_file(root / "camera/beside.yaml", camera, CameraFormat::kalibr);
     seed("camera", "matrix.txt", "585 0 320\n0 585 240\n0 0 1\n");
+    const std::string numbers = "<focal_length_x>525</focal_length_x><focal_length_y>525</focal_length_y>"
+                                "<principal_point_x>320</principal_point_x><principal_point_y>240</principal_point_y>";
+    seed("camera", "pcl.xml",
+         "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<rgb>" + numbers + "</rgb>\n<depth>" + numbers +
+             "<z_multiplication_factor>0.001</z_multiplication_factor></depth>\n");
     seed("camera", "info.txt",
          "m_depthWidth = 640\nm_depthHeight = 480\nm_depthShift = 1000\n"
          "m_calibrationDepthIntrinsic = 583 0 320 0 0 583 240 0 0 0 1 0 0 0 0 1\n");
