@@ -131,7 +131,7 @@ std::optional<Listing> list_pcl_recording(const fs::path& folder) {
     for (const auto& [name, shot] : shots)
         capture.entries.push_back(shot_entry(name, shot, any_colour));
     if (!others.empty())
-        capture.warnings.push_back(fmt::format("{}: {} beside TIME_depth.pclzf and TIME_rgb.pclzf not used ({}{}).",
+        capture.warnings.push_back(fmt::format("{}: {} left out, beside TIME_depth.pclzf and TIME_rgb.pclzf ({}{}).",
                                                folder.string(), counted(others.size(), "image"), others.front(),
                                                others.size() > 1 ? ", ..." : ""));
     const auto recorded = recorded_camera(shots, capture.warnings);

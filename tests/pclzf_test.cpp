@@ -227,7 +227,7 @@ TEST(pcl_recordings, name_what_is_missing_and_what_is_left_out) {
     cv::imwrite((folder / (second + "_depth.tiff")).string(), noise<ushort>(small));
     cv::imwrite((folder / (second + "_rgb.tiff")).string(), noise<cv::Vec3b>(small));
     const Capture capture = open_capture(folder.path());
-    EXPECT_TRUE(warned(capture.warnings, "2 images beside TIME_depth.pclzf"));
+    EXPECT_TRUE(warned(capture.warnings, "2 images left out, beside TIME_depth.pclzf"));
     ASSERT_EQ(capture.entries.size(), 3);
     EXPECT_EQ(capture.entries[0].name, "frame");
     EXPECT_FALSE(capture.entries[0].stamp_s);
@@ -299,7 +299,7 @@ TEST(pcl_recordings, of_a_kinect_are_the_same_as_its_tiffs) {
     if (!fs::exists(folder))
         GTEST_SKIP() << folder << " is not there";
     const Capture capture = open_capture(folder);
-    EXPECT_TRUE(warned(capture.warnings, "2 images beside"));
+    EXPECT_TRUE(warned(capture.warnings, "2 images left out"));
     EXPECT_EQ(capture.depth.units_per_metre, 1000);
     const Pinhole& pinhole = capture.camera->pinhole;
     EXPECT_EQ(std::tuple(pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy), std::tuple(525, 525, 320, 240));
