@@ -3,8 +3,8 @@
 
 #include "ao/cloud/cloud_ao.h"
 #include "ao/method.h"
-#include "apps/crew.h"
 #include "ao/sequence/neighbourhood.h"
+#include "apps/crew.h"
 #include "apps/frame_row.h"
 #include "apps/recording_cloud.h"
 #include "io/capture.h"
@@ -57,7 +57,7 @@ struct BatchOptions {
     Neighbourhood* sequence = nullptr; ///< what frames are computed with instead of the method, together with those
                                        ///< around them; these are loaded whether or not `frames` has them
     std::filesystem::path dump;        ///< folder for the method's intermediates, frame by frame; empty = none
-    bool short_rows = false; ///< rows come back shortened, once on_frame has seen them
+    bool short_rows = false;           ///< rows come back shortened, once on_frame has seen them
     int frames_in_memory = 0;          ///< 0 = cores, and two for each method
     const std::atomic<bool>* stop = nullptr; ///< set = begin no further frame
     std::function<void()> all_begun;         ///< called once no further frame will begin: another batch may

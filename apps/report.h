@@ -25,17 +25,18 @@ struct RunReport {
     const Capture& capture;
     Registration registration = Registration::unknown; ///< as used
     std::string registration_reason;
-    std::string depth_noise; ///< of the recorded depth, who says so, and what is done about it
+    std::string depth_noise;         ///< of the recorded depth, who says so, and what is done about it
     std::vector<std::string> budget; ///< what an error or time budget picked, expects and found; empty without one
-    std::string shading; ///< what the shaded pictures show, and why
-    std::vector<FrameRow> frames; ///< shortened
-    std::size_t done_now = 0; ///< frames that this process did; others were done before
-    StageTimes ms_now{};      ///< what they spent in each stage, summed
-    double took_ms = 0;       ///< from the first frame's begin to the last one's end
+    std::string shading;             ///< what the shaded pictures show, and why
+    std::vector<FrameRow> frames;    ///< shortened
+    std::size_t done_now = 0;        ///< frames that this process did; others were done before
+    StageTimes ms_now{};             ///< what they spent in each stage, summed
+    double took_ms = 0;              ///< from the first frame's begin to the last one's end
 };
 
 /// Frames per second of the pipeline, and of each stage had it the machine as it was to itself: as many frames at once
-/// as there are cores, in `compute` RunReport::at_once. Where the device is the same cores, stages slow each other down.
+/// as there are cores, in `compute` RunReport::at_once. Where the device is the same cores, stages slow each other
+/// down.
 struct Rates {
     double pipeline = 0;
     StageTimes stage{};          ///< frames per second, not milliseconds

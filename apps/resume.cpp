@@ -16,13 +16,20 @@ namespace scanshade {
 namespace {
 
 /// Rows that do not shape results: where and how it runs, what is told as used beside them, what outputs say.
-constexpr std::array aside = {"frames",     "camera",      "depth-scale",    "association-limit",
-                              "registered", "depth-noise", "method",         "radius",
-                              "quality",    "max-error",   "max-ms",         "settings",
-                              "device",     "out",         "write",          "format",
-                              "overwrite",  "dump",        "resume",         "retry",
-                              "shard",      "log",         "shade-strength", "colour-cloud",
-                              "cloud",      "cloud-resolution", "poses",     "in-flight"};
+constexpr std::array aside = {"frames",         "camera",
+                              "depth-scale",    "association-limit",
+                              "registered",     "depth-noise",
+                              "method",         "radius",
+                              "quality",        "max-error",
+                              "max-ms",         "settings",
+                              "device",         "out",
+                              "write",          "format",
+                              "overwrite",      "dump",
+                              "resume",         "retry",
+                              "shard",          "log",
+                              "shade-strength", "colour-cloud",
+                              "cloud",          "cloud-resolution",
+                              "poses",          "in-flight"};
 
 /// Rows that shape nothing when they are typed differently.
 constexpr std::array elsewhere = {"out", "overwrite", "dump", "resume", "retry", "shard", "log", "device", "in-flight"};
@@ -76,9 +83,11 @@ std::string around(const Capture& capture, std::size_t index, std::size_t reach)
     if (reach == 0)
         return "";
     std::string text;
-    for (std::size_t i = index - std::min(index, reach); i <= std::min(index + reach, capture.entries.size() - 1); ++i) {
+    for (std::size_t i = index - std::min(index, reach); i <= std::min(index + reach, capture.entries.size() - 1);
+         ++i) {
         const auto& pose = capture.entries[i].world_from_camera;
-        text += stamps(capture.entries[i]) + (pose ? fmt::format("{}", fmt::join(pose->matrix().reshaped(), " ")) : "none");
+        text +=
+            stamps(capture.entries[i]) + (pose ? fmt::format("{}", fmt::join(pose->matrix().reshaped(), " ")) : "none");
     }
     return text;
 }
@@ -133,8 +142,8 @@ std::string settings_key(const RunReport& report, const Outputs& outputs, const 
     return key_of(parts);
 }
 
-std::string task_key(const std::vector<Stage>& settings, const Capture& capture,
-                     const std::vector<std::size_t>& frames, bool together) {
+std::string task_key(const std::vector<Stage>& settings, const Capture& capture, const std::vector<std::size_t>& frames,
+                     bool together) {
     std::vector<std::string> parts = {capture_text(capture)};
     if (together && !capture.entries.empty())
         parts.push_back(around(capture, 0, capture.entries.size()));
@@ -147,8 +156,9 @@ std::string task_key(const std::vector<Stage>& settings, const Capture& capture,
     return key_of(parts);
 }
 
-std::optional<std::vector<FrameRow>> rows_if_complete(const Journal& journal, const std::string& task, const Capture& capture,
-                                                      const std::vector<std::size_t>& frames, bool retry) {
+std::optional<std::vector<FrameRow>> rows_if_complete(const Journal& journal, const std::string& task,
+                                                      const Capture& capture, const std::vector<std::size_t>& frames,
+                                                      bool retry) {
     if (journal.facts().complete != task)
         return std::nullopt;
     std::vector<FrameRow> rows;

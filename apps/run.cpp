@@ -5,8 +5,8 @@
 #include "apps/progress.h"
 #include "apps/resume.h"
 #include "apps/run_settings.h"
-#include "apps/sequence_walk.h"
 #include "apps/run_talk.h"
+#include "apps/sequence_walk.h"
 #include "apps/slice.h"
 #include "apps/trial.h"
 #include "apps/workers.h"
@@ -301,8 +301,8 @@ class Run final : public Command {
     }
 
     /// Captures: those whose frames enter the walk, and around them two that are made ready and two whose last frames
-    /// leave it: on a GPU 40 frames take as little time as opening their capture does. One fills sixteen cores. A budget
-    /// measures, which nothing may disturb, and picks other settings for each.
+    /// leave it: on a GPU 40 frames take as little time as opening their capture does. One fills sixteen cores. A
+    /// budget measures, which nothing may disturb, and picks other settings for each.
     [[nodiscard]] std::size_t at_once() {
         if (asked_.budget.any())
             return 1;

@@ -55,8 +55,7 @@ std::string noise_sentence(const DepthNoise& noise, const RunSettings& settings)
 
 void introduce(const RunReport& report, std::size_t frames) {
     const Capture& capture = report.capture;
-    say(fmt::format("{}: {}, {} of {} frames", capture.path.string(), capture.kind, frames,
-                    capture.entries.size()));
+    say(fmt::format("{}: {}, {} of {} frames", capture.path.string(), capture.kind, frames, capture.entries.size()));
     if (!capture.depth.origin.empty())
         say(fmt::format("  depth: {} ({})", capture.depth.name, capture.depth.origin));
     if (capture.camera)

@@ -5,9 +5,9 @@
 #include "io/cloud_file.h"
 #include "io/cloud_records.h"
 #include "io/layouts.h"
-#include "io/trajectory.h"
 #include "io/plausibility.h"
 #include "io/text.h"
+#include "io/trajectory.h"
 #include "projection/error.h"
 
 #include <algorithm>
@@ -63,8 +63,8 @@ Listing list_file(const fs::path& file) {
     } else {
         const bool image = image_format(read_bytes(file, 16)) != ImageFormat::unknown;
         if (!image && !has_depth_extension(file))
-            throw Error(file.string() +
-                        ": neither a folder, a depth image (PNG, PGM, TIFF, EXR, PFM, PCLZF) nor a cloud (PCD, PLY, LAS, XYZ, PTS, PTX, KITTI's .bin)");
+            throw Error(file.string() + ": neither a folder, a depth image (PNG, PGM, TIFF, EXR, PFM, PCLZF) nor a "
+                                        "cloud (PCD, PLY, LAS, XYZ, PTS, PTX, KITTI's .bin)");
         entry.depth = file;
         listing.capture.kind = "depth image";
         listing.capture.depth = assumed_encoding(file);
@@ -226,9 +226,11 @@ void take_poses(Capture& capture, const CaptureOptions& options) {
         found += entry.world_from_camera.has_value();
     }
     if (found == 0)
-        throw Error(fmt::format("{}: none of its {} poses belongs to a frame of {} (by {})", options.poses.string(), poses.size(), capture.path.string(),
+        throw Error(fmt::format("{}: none of its {} poses belongs to a frame of {} (by {})", options.poses.string(),
+                                poses.size(), capture.path.string(),
                                 capture.entries.front().stamp_s ? "time" : "index"));
-    capture.warnings.push_back(fmt::format("{} of {} frames have a pose in {}.", found, capture.entries.size(), options.poses.string()));
+    capture.warnings.push_back(
+        fmt::format("{} of {} frames have a pose in {}.", found, capture.entries.size(), options.poses.string()));
 }
 
 } // namespace

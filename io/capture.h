@@ -18,7 +18,8 @@ struct CaptureOptions {
     std::string camera;                ///< file or "fx,fy,cx,cy"; empty = from the capture
     std::string depth_scale;           ///< as depth_encoding() takes it; empty = from the layout
     double association_limit_s = 0.02; ///< colour, depth and poses farther apart in time are not paired (TUM)
-    std::filesystem::path poses = {};  ///< TUM's rows, by time or, where frames have none, by index; empty = the capture's own
+    std::filesystem::path poses =
+        {}; ///< TUM's rows, by time or, where frames have none, by index; empty = the capture's own
 };
 
 /// One frame's listing: where its parts lie. Nothing is decoded yet.
@@ -38,8 +39,8 @@ struct CaptureEntry {
 /// A recording, listed. Opening is cheap; frames are decoded by load().
 struct Capture {
     std::filesystem::path path;
-    std::string
-        kind; ///< "TUM RGB-D", "7-Scenes", "PCL recording", "Redwood / Open3D", "colour and depth folders", "depth image", "cloud"
+    std::string kind; ///< "TUM RGB-D", "7-Scenes", "PCL recording", "Redwood / Open3D", "colour and depth folders",
+                      ///< "depth image", "cloud"
     std::optional<Camera> camera; ///< none: clouds recover theirs; depth images need --camera
     DepthEncoding depth;
     DepthCorrection depth_correction;          ///< from the camera's file; load() applies it
@@ -51,7 +52,8 @@ struct Capture {
     std::vector<std::string> warnings; ///< about the capture as a whole
 
     /// Decodes frame `index`; safe to call from several threads. Throws Error naming file and place; a damaged colour
-    /// image is a warning, not a failure. Without colour, whose decoding takes as long as the depth's, it is not looked at.
+    /// image is a warning, not a failure. Without colour, whose decoding takes as long as the depth's, it is not looked
+    /// at.
     [[nodiscard]] Frame load(std::size_t index, bool with_colour = true) const;
 };
 

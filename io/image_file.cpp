@@ -1,4 +1,5 @@
-// Depth and colour images from disk: container checked first, decoded by OpenCV (PGM, PFM, PCLZF and grey PNG here), then metres.
+// Depth and colour images from disk: container checked first, decoded by OpenCV (PGM, PFM, PCLZF and grey PNG here),
+// then metres.
 #include "io/image_file.h"
 
 #include "io/image_check.h"

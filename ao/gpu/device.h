@@ -15,6 +15,7 @@ struct DeviceInfo {
     std::string kind;       ///< "discrete GPU", "integrated GPU", "virtual GPU", "CPU", "other"
     std::string driver;     ///< driver name and version text
     std::string api;        ///< "1.3.230"
+    int most_threads = 0;   ///< of a work group
     std::string unusable;   ///< what it lacks; empty = usable
 };
 

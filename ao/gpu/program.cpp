@@ -29,20 +29,32 @@ struct BoundImage {
     BoundImage(const Device::State& gpu, const BufferRow::Image& row) {
         using Usage = vk::ImageUsageFlagBits;
         constexpr auto format = vk::Format::eR32Sfloat;
-        image = gpu.device.createImage({{}, vk::ImageType::e2D, format, {row.width, row.height, 1}, row.mips, row.layers,
-                                        vk::SampleCountFlagBits::e1, vk::ImageTiling::eOptimal,
+        image = gpu.device.createImage({{},
+                                        vk::ImageType::e2D,
+                                        format,
+                                        {row.width, row.height, 1},
+                                        row.mips,
+                                        row.layers,
+                                        vk::SampleCountFlagBits::e1,
+                                        vk::ImageTiling::eOptimal,
                                         Usage::eSampled | Usage::eStorage | Usage::eTransferSrc | Usage::eTransferDst});
         const auto needs = image.getMemoryRequirements();
         const int type = gpu.memory_type(needs.memoryTypeBits, Memory::eDeviceLocal);
-        if (type < 0) throw Error("the device has no fitting memory");
+        if (type < 0)
+            throw Error("the device has no fitting memory");
         memory = gpu.device.allocateMemory({needs.size, static_cast<std::uint32_t>(type)});
         image.bindMemory(*memory, 0);
         const auto view = [&](std::uint32_t first, std::uint32_t count) {
-            return gpu.device.createImageView(
-                {{}, *image, vk::ImageViewType::e2DArray, format, {}, {vk::ImageAspectFlagBits::eColor, first, count, 0, row.layers}});
+            return gpu.device.createImageView({{},
+                                               *image,
+                                               vk::ImageViewType::e2DArray,
+                                               format,
+                                               {},
+                                               {vk::ImageAspectFlagBits::eColor, first, count, 0, row.layers}});
         };
         sampled = view(0, row.mips);
-        for (std::uint32_t m = 0; m < row.mips; ++m) mips.push_back(view(m, 1));
+        for (std::uint32_t m = 0; m < row.mips; ++m)
+            mips.push_back(view(m, 1));
     }
 };
 
@@ -50,17 +62,35 @@ struct BoundImage {
 vk::raii::Sampler make_sampler(const Device::State& gpu) {
     constexpr auto nearest = vk::Filter::eNearest;
     constexpr auto border = vk::SamplerAddressMode::eClampToBorder;
-    return gpu.device.createSampler({{}, nearest, nearest, vk::SamplerMipmapMode::eNearest, border, border, border, 0, VK_FALSE, 0,
-                                     VK_FALSE, vk::CompareOp::eNever, 0, VK_LOD_CLAMP_NONE, vk::BorderColor::eFloatTransparentBlack});
+    return gpu.device.createSampler({{},
+                                     nearest,
+                                     nearest,
+                                     vk::SamplerMipmapMode::eNearest,
+                                     border,
+                                     border,
+                                     border,
+                                     0,
+                                     VK_FALSE,
+                                     0,
+                                     VK_FALSE,
+                                     vk::CompareOp::eNever,
+                                     0,
+                                     VK_LOD_CLAMP_NONE,
+                                     vk::BorderColor::eFloatTransparentBlack});
 }
 
 vk::Format format_of(BufferRow::Texels texels) {
     switch (texels) {
-    case BufferRow::Texels::r32f: return vk::Format::eR32Sfloat;
-    case BufferRow::Texels::rg32f: return vk::Format::eR32G32Sfloat;
-    case BufferRow::Texels::rg32ui: return vk::Format::eR32G32Uint;
-    case BufferRow::Texels::rgba32f: return vk::Format::eR32G32B32A32Sfloat;
-    default: return vk::Format::eR32Uint;
+    case BufferRow::Texels::r32f:
+        return vk::Format::eR32Sfloat;
+    case BufferRow::Texels::rg32f:
+        return vk::Format::eR32G32Sfloat;
+    case BufferRow::Texels::rg32ui:
+        return vk::Format::eR32G32Uint;
+    case BufferRow::Texels::rgba32f:
+        return vk::Format::eR32G32B32A32Sfloat;
+    default:
+        return vk::Format::eR32Uint;
     }
 }
 
@@ -78,14 +108,16 @@ struct Hazards {
         std::fill(written.begin(), written.end(), char(0));
     }
     void note(const std::vector<int>& reads, const std::vector<int>& writes) {
-        for (int i : reads) read[i] = 1;
-        for (int i : writes) written[i] = 1;
+        for (int i : reads)
+            read[i] = 1;
+        for (int i : writes)
+            written[i] = 1;
     }
 };
 
 void barrier(const vk::raii::CommandBuffer& commands, vk::PipelineStageFlags2 to_stage, vk::AccessFlags2 to_access) {
-    const vk::MemoryBarrier2 memory(Stage::eComputeShader | Stage::eTransfer, Access::eMemoryRead | Access::eMemoryWrite,
-                                    to_stage, to_access);
+    const vk::MemoryBarrier2 memory(Stage::eComputeShader | Stage::eTransfer,
+                                    Access::eMemoryRead | Access::eMemoryWrite, to_stage, to_access);
     commands.pipelineBarrier2(vk::DependencyInfo({}, memory));
 }
 
@@ -106,10 +138,13 @@ std::vector<std::string> problems(std::span<const BufferRow> buffers, std::span<
     std::vector<std::string> found;
     std::vector<char> written(buffers.size());
     for (std::size_t i = 0; i < buffers.size(); ++i) {
-        written[i] = buffers[i].host == BufferRow::Host::upload || buffers[i].host == BufferRow::Host::taken || !buffers[i].initial.empty();
-        if (buffers[i].bytes == 0) found.push_back(fmt::format("buffer {} is empty", buffers[i].name));
+        written[i] = buffers[i].host == BufferRow::Host::upload || buffers[i].host == BufferRow::Host::taken ||
+                     !buffers[i].initial.empty();
+        if (buffers[i].bytes == 0)
+            found.push_back(fmt::format("buffer {} is empty", buffers[i].name));
         if (buffers[i].image.width > 0 && buffers[i].bytes != image_bytes(buffers[i].image))
-            found.push_back(fmt::format("image {} has {} bytes, not {}", buffers[i].name, image_bytes(buffers[i].image), buffers[i].bytes));
+            found.push_back(fmt::format("image {} has {} bytes, not {}", buffers[i].name, image_bytes(buffers[i].image),
+                                        buffers[i].bytes));
     }
     for (const PassRow& pass : passes) {
         if (std::find(pass.groups.begin(), pass.groups.end(), 0u) != pass.groups.end())
@@ -118,10 +153,13 @@ std::vector<std::string> problems(std::span<const BufferRow> buffers, std::span<
             for (int i : *side)
                 if (i < 0 || i >= static_cast<int>(buffers.size()))
                     found.push_back(fmt::format("pass {} names buffer {} of {}", pass.name, i, buffers.size()));
-        if (!found.empty()) return found;
+        if (!found.empty())
+            return found;
         for (int i : pass.reads)
-            if (!written[i]) found.push_back(fmt::format("pass {} reads {} before anything wrote it", pass.name, buffers[i].name));
-        for (int i : pass.writes) written[i] = 1;
+            if (!written[i])
+                found.push_back(fmt::format("pass {} reads {} before anything wrote it", pass.name, buffers[i].name));
+        for (int i : pass.writes)
+            written[i] = 1;
     }
     for (std::size_t i = 0; i < buffers.size(); ++i)
         if (buffers[i].host == BufferRow::Host::download && !written[i])
@@ -136,7 +174,7 @@ struct Program::State {
     std::vector<BufferRow> rows;
     std::vector<PassRow> passes;
     std::vector<BoundBuffer> buffers;
-    std::vector<BoundImage> images;   // per row; empty where it is a buffer
+    std::vector<BoundImage> images; // per row; empty where it is a buffer
     vk::raii::Sampler sampler = nullptr;
     std::vector<BoundBuffer> staging; // per row; empty where the host reaches the buffer itself
     BoundBuffer constants;
@@ -151,7 +189,8 @@ struct Program::State {
     vk::raii::QueryPool queries = nullptr;
     vk::raii::Fence fence = nullptr;
     // A run submits them in this order: begin, taken, uploads, commands, download, given, end.
-    vk::raii::CommandBuffer begin = nullptr, taking = nullptr, commands = nullptr, download = nullptr, giving = nullptr, end = nullptr;
+    vk::raii::CommandBuffer begin = nullptr, taking = nullptr, commands = nullptr, download = nullptr, giving = nullptr,
+                            end = nullptr;
     std::vector<vk::raii::CommandBuffer> uploads; // per row; null where there is nothing to upload
     struct Copy {
         int buffer;
@@ -173,12 +212,14 @@ struct Program::State {
         for (std::size_t i = 0; i < rows.size(); ++i) {
             const BufferRow& row = rows[i];
             if (row.image.width > 0) {
-                images[i] = during(fmt::format("image {} of {} bytes", row.name, row.bytes), [&] { return BoundImage(gpu, row.image); });
+                images[i] = during(fmt::format("image {} of {} bytes", row.name, row.bytes),
+                                   [&] { return BoundImage(gpu, row.image); });
                 buffers.emplace_back();
                 continue;
             }
             auto usage = Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst;
-            if (row.texels != BufferRow::Texels::none) usage |= Usage::eStorageTexelBuffer;
+            if (row.texels != BufferRow::Texels::none)
+                usage |= Usage::eStorageTexelBuffer;
             buffers.push_back(during(fmt::format("buffer {} of {} bytes", row.name, row.bytes), [&] {
                 return BoundBuffer(gpu, row.bytes, usage, {shared_memory, Memory::eDeviceLocal});
             }));
@@ -186,11 +227,13 @@ struct Program::State {
                 buffers.back().view =
                     gpu.device.createBufferView({{}, *buffers.back().buffer, format_of(row.texels), 0, VK_WHOLE_SIZE});
             }
-            if (row.host == BufferRow::Host::none || row.host == BufferRow::Host::taken || buffers.back().mapped) continue;
+            if (row.host == BufferRow::Host::none || row.host == BufferRow::Host::taken || buffers.back().mapped)
+                continue;
             const vk::MemoryPropertyFlags visible = Memory::eHostVisible | Memory::eHostCoherent;
             const bool upload = row.host == BufferRow::Host::upload;
-            staging[i] = upload ? BoundBuffer(gpu, row.bytes, Usage::eTransferSrc, {visible})
-                                : BoundBuffer(gpu, row.bytes, Usage::eTransferDst, {visible | Memory::eHostCached, visible});
+            staging[i] =
+                upload ? BoundBuffer(gpu, row.bytes, Usage::eTransferSrc, {visible})
+                       : BoundBuffer(gpu, row.bytes, Usage::eTransferDst, {visible | Memory::eHostCached, visible});
         }
         constants = BoundBuffer(gpu, std::max<std::size_t>(constants_bytes, 4), Usage::eUniformBuffer,
                                 {Memory::eHostVisible | Memory::eHostCoherent});
@@ -199,24 +242,28 @@ struct Program::State {
     [[nodiscard]] bool is_image(int row) const { return rows[row].image.width > 0; }
 
     [[nodiscard]] vk::DescriptorType type_of(int buffer, bool written) const {
-        if (is_image(buffer)) return written ? vk::DescriptorType::eStorageImage : vk::DescriptorType::eCombinedImageSampler;
+        if (is_image(buffer))
+            return written ? vk::DescriptorType::eStorageImage : vk::DescriptorType::eCombinedImageSampler;
         return rows[buffer].texels == BufferRow::Texels::none ? vk::DescriptorType::eStorageBuffer
                                                               : vk::DescriptorType::eStorageTexelBuffer;
     }
 
     Pipeline make_pipeline(const PassRow& pass) {
         Pipeline made;
-        if (pass.shader.empty()) return made;
+        if (pass.shader.empty())
+            return made;
         std::vector<vk::DescriptorSetLayoutBinding> bindings;
         const auto add = [&](std::uint32_t binding, vk::DescriptorType type, std::uint32_t count = 1) {
             bindings.emplace_back(binding, type, count, vk::ShaderStageFlagBits::eCompute);
         };
-        for (std::size_t i = 0; i < pass.reads.size(); ++i) add(static_cast<std::uint32_t>(i), type_of(pass.reads[i], false));
+        for (std::size_t i = 0; i < pass.reads.size(); ++i)
+            add(static_cast<std::uint32_t>(i), type_of(pass.reads[i], false));
         for (std::size_t i = 0; i < pass.writes.size(); ++i)
             add(first_write_binding + static_cast<std::uint32_t>(i), type_of(pass.writes[i], true),
                 is_image(pass.writes[i]) ? rows[pass.writes[i]].image.mips : 1);
         add(constants_binding, vk::DescriptorType::eUniformBuffer);
-        made.set = gpu.device.createDescriptorSetLayout({vk::DescriptorSetLayoutCreateFlagBits::ePushDescriptorKHR, bindings});
+        made.set =
+            gpu.device.createDescriptorSetLayout({vk::DescriptorSetLayoutCreateFlagBits::ePushDescriptorKHR, bindings});
         made.layout = gpu.device.createPipelineLayout(vk::PipelineLayoutCreateInfo({}, *made.set));
 
         std::vector<vk::SpecializationMapEntry> entries;
@@ -225,12 +272,12 @@ struct Program::State {
             entries.emplace_back(static_cast<std::uint32_t>(id), static_cast<std::uint32_t>(values.size() * 4), 4);
             values.push_back(value);
         }
-        const vk::SpecializationInfo specialization(static_cast<std::uint32_t>(entries.size()), entries.data(), values.size() * 4,
-                                                    values.data());
+        const vk::SpecializationInfo specialization(static_cast<std::uint32_t>(entries.size()), entries.data(),
+                                                    values.size() * 4, values.data());
         const auto words = shader_words(pass.shader);
-        const vk::raii::ShaderModule module_ =
-            gpu.device.createShaderModule({{}, words.size_bytes(), words.data()});
-        const vk::PipelineShaderStageCreateInfo stage({}, vk::ShaderStageFlagBits::eCompute, *module_, "main", &specialization);
+        const vk::raii::ShaderModule module_ = gpu.device.createShaderModule({{}, words.size_bytes(), words.data()});
+        const vk::PipelineShaderStageCreateInfo stage({}, vk::ShaderStageFlagBits::eCompute, *module_, "main",
+                                                      &specialization);
         made.pipeline = gpu.device.createComputePipeline(gpu.pipelines, {{}, stage, *made.layout});
         return made;
     }
@@ -247,22 +294,29 @@ struct Program::State {
         };
         const auto add = [&](std::uint32_t binding, int row, bool written) {
             const vk::DescriptorType type = type_of(row, written);
-            if (!is_image(row)) return add_buffer(binding, buffers[row], type);
+            if (!is_image(row))
+                return add_buffer(binding, buffers[row], type);
             auto& views = image_infos.emplace_back();
-            if (!written) views.emplace_back(*sampler, *images[row].sampled, vk::ImageLayout::eGeneral);
-            else for (const auto& mip : images[row].mips) views.emplace_back(nullptr, *mip, vk::ImageLayout::eGeneral);
+            if (!written)
+                views.emplace_back(*sampler, *images[row].sampled, vk::ImageLayout::eGeneral);
+            else
+                for (const auto& mip : images[row].mips)
+                    views.emplace_back(nullptr, *mip, vk::ImageLayout::eGeneral);
             writes.emplace_back(vk::WriteDescriptorSet(nullptr, binding, 0, type, views));
         };
         std::uint32_t binding = 0;
-        for (int i : pass.reads) add(binding++, i, false);
+        for (int i : pass.reads)
+            add(binding++, i, false);
         binding = first_write_binding;
-        for (int i : pass.writes) add(binding++, i, true);
+        for (int i : pass.writes)
+            add(binding++, i, true);
         add_buffer(constants_binding, constants, vk::DescriptorType::eUniformBuffer);
         commands.pushDescriptorSetKHR(vk::PipelineBindPoint::eCompute, *pipeline.layout, 0, writes);
     }
 
     void stamp(const vk::raii::CommandBuffer& into, std::uint32_t query) {
-        if (gpu.has_timestamps) into.writeTimestamp2(Stage::eAllCommands, *queries, query);
+        if (gpu.has_timestamps)
+            into.writeTimestamp2(Stage::eAllCommands, *queries, query);
     }
 
     vk::raii::CommandBuffer new_commands() {
@@ -289,8 +343,11 @@ struct Program::State {
     /// The command buffers are the same every frame, so they are recorded once.
     void record() {
         intervals = {"upload"};
-        if (stamps == Stamps::total) intervals.emplace_back("passes");
-        else for (const PassRow& pass : passes) intervals.push_back(pass.name);
+        if (stamps == Stamps::total)
+            intervals.emplace_back("passes");
+        else
+            for (const PassRow& pass : passes)
+                intervals.push_back(pass.name);
         intervals.emplace_back("download");
         const auto count = static_cast<std::uint32_t>(intervals.size() + 1);
         queries = gpu.device.createQueryPool({{}, vk::QueryType::eTimestamp, count});
@@ -298,13 +355,15 @@ struct Program::State {
         uploads.reserve(rows.size());
         for (std::size_t i = 0; i < rows.size(); ++i) {
             uploads.emplace_back(nullptr);
-            if (rows[i].host == BufferRow::Host::upload && staging[i].bytes > 0) record_upload(i);
+            if (rows[i].host == BufferRow::Host::upload && staging[i].bytes > 0)
+                record_upload(i);
         }
         record_downloads();
         std::uint32_t query = 0;
         begin = new_commands();
         begin.begin(vk::CommandBufferBeginInfo{});
-        if (gpu.has_timestamps) begin.resetQueryPool(*queries, 0, count);
+        if (gpu.has_timestamps)
+            begin.resetQueryPool(*queries, 0, count);
         stamp(begin, query++);
         begin.end();
         commands = new_commands();
@@ -320,15 +379,18 @@ struct Program::State {
             }
             hazards.note(pass.reads, pass.writes);
             if (pass.shader.empty()) {
-                for (int w : pass.writes) commands.fillBuffer(*buffers[w].buffer, 0, VK_WHOLE_SIZE, 0);
+                for (int w : pass.writes)
+                    commands.fillBuffer(*buffers[w].buffer, 0, VK_WHOLE_SIZE, 0);
             } else {
                 commands.bindPipeline(vk::PipelineBindPoint::eCompute, *pipelines[i].pipeline);
                 push_descriptors(pass, pipelines[i]);
                 commands.dispatch(pass.groups[0], pass.groups[1], pass.groups[2]);
             }
-            if (stamps == Stamps::passes) stamp(commands, query++);
+            if (stamps == Stamps::passes)
+                stamp(commands, query++);
         }
-        if (stamps == Stamps::total) stamp(commands, query++);
+        if (stamps == Stamps::total)
+            stamp(commands, query++);
         commands.end();
         end = new_commands();
         end.begin(vk::CommandBufferBeginInfo{});
@@ -339,21 +401,25 @@ struct Program::State {
 
     /// Images stay in the general layout from here on.
     static void clear(const vk::raii::CommandBuffer& once, vk::Image image) {
-        const vk::ImageSubresourceRange whole(vk::ImageAspectFlagBits::eColor, 0, VK_REMAINING_MIP_LEVELS, 0, VK_REMAINING_ARRAY_LAYERS);
-        const vk::ImageMemoryBarrier2 general({}, {}, Stage::eTransfer, Access::eTransferWrite, vk::ImageLayout::eUndefined,
-                                              vk::ImageLayout::eGeneral, VK_QUEUE_FAMILY_IGNORED, VK_QUEUE_FAMILY_IGNORED, image, whole);
+        const vk::ImageSubresourceRange whole(vk::ImageAspectFlagBits::eColor, 0, VK_REMAINING_MIP_LEVELS, 0,
+                                              VK_REMAINING_ARRAY_LAYERS);
+        const vk::ImageMemoryBarrier2 general({}, {}, Stage::eTransfer, Access::eTransferWrite,
+                                              vk::ImageLayout::eUndefined, vk::ImageLayout::eGeneral,
+                                              VK_QUEUE_FAMILY_IGNORED, VK_QUEUE_FAMILY_IGNORED, image, whole);
         once.pipelineBarrier2(vk::DependencyInfo({}, {}, {}, general));
         once.clearColorImage(image, vk::ImageLayout::eGeneral, vk::ClearColorValue(0.0F, 0.0F, 0.0F, 0.0F), whole);
     }
 
     void copy_out(const vk::raii::CommandBuffer& commands_, int row, vk::Buffer to) {
-        if (!is_image(row)) return commands_.copyBuffer(*buffers[row].buffer, to, vk::BufferCopy(0, 0, rows[row].bytes));
+        if (!is_image(row))
+            return commands_.copyBuffer(*buffers[row].buffer, to, vk::BufferCopy(0, 0, rows[row].bytes));
         const BufferRow::Image& image = rows[row].image;
         std::vector<vk::BufferImageCopy> copies;
         std::size_t offset = 0;
         for (std::uint32_t m = 0; m < image.mips; ++m) {
             const std::uint32_t width = std::max(1U, image.width >> m), height = std::max(1U, image.height >> m);
-            copies.emplace_back(offset, 0, 0, vk::ImageSubresourceLayers(vk::ImageAspectFlagBits::eColor, m, 0, image.layers),
+            copies.emplace_back(offset, 0, 0,
+                                vk::ImageSubresourceLayers(vk::ImageAspectFlagBits::eColor, m, 0, image.layers),
                                 vk::Offset3D(), vk::Extent3D(width, height, 1));
             offset += std::size_t(width) * height * image.layers * 4;
         }
@@ -378,13 +444,16 @@ struct Program::State {
 
     /// What is taken before a run or given after it; null where there is nothing.
     vk::CommandBuffer record_copies(vk::raii::CommandBuffer& into, std::vector<Copy>& copies, bool in) {
-        if (copies.empty()) return nullptr;
-        if (!*into) into = new_commands();
+        if (copies.empty())
+            return nullptr;
+        if (!*into)
+            into = new_commands();
         into.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
         compute_barrier(into);
         for (const auto& [buffer, offset, bytes] : copies) {
             const vk::Buffer own = *buffers[buffer].buffer, other = *bytes->state().buffer.buffer;
-            into.copyBuffer(in ? other : own, in ? own : other, vk::BufferCopy(in ? 0 : offset, in ? offset : 0, bytes->size()));
+            into.copyBuffer(in ? other : own, in ? own : other,
+                            vk::BufferCopy(in ? 0 : offset, in ? offset : 0, bytes->size()));
         }
         compute_barrier(into);
         into.end();
@@ -395,9 +464,11 @@ struct Program::State {
     std::vector<vk::CommandBuffer> all_commands(Results results) {
         std::vector<vk::CommandBuffer> all{*begin, record_copies(taking, taken, true)};
         for (std::size_t i = 0; i < rows.size(); ++i)
-            if (std::ranges::none_of(taken, [&](const Copy& copy) { return copy.buffer == static_cast<int>(i); })) all.push_back(*uploads[i]);
+            if (std::ranges::none_of(taken, [&](const Copy& copy) { return copy.buffer == static_cast<int>(i); }))
+                all.push_back(*uploads[i]);
         all.push_back(*commands);
-        if (results == Results::on_host) all.push_back(*download);
+        if (results == Results::on_host)
+            all.push_back(*download);
         all.insert(all.end(), {record_copies(giving, given, false), *end});
         return all;
     }
@@ -405,7 +476,8 @@ struct Program::State {
     void submit(const std::vector<vk::CommandBuffer>& recorded) {
         std::vector<vk::CommandBufferSubmitInfo> infos;
         for (const vk::CommandBuffer each : recorded)
-            if (each) infos.emplace_back(each);
+            if (each)
+                infos.emplace_back(each);
         constexpr std::uint64_t patience_ns = 120'000'000'000;
         try {
             {
@@ -421,10 +493,11 @@ struct Program::State {
     }
 };
 
-Program::Program(Device& device, std::vector<BufferRow> buffers, std::vector<PassRow> passes, std::size_t constants_bytes,
-                 Stamps stamps) {
+Program::Program(Device& device, std::vector<BufferRow> buffers, std::vector<PassRow> passes,
+                 std::size_t constants_bytes, Stamps stamps) {
     const auto wrong = problems(buffers, passes);
-    if (!wrong.empty()) throw Error(fmt::format("pass table: {}", fmt::join(wrong, "; ")));
+    if (!wrong.empty())
+        throw Error(fmt::format("pass table: {}", fmt::join(wrong, "; ")));
     state_ = std::make_unique<State>(device.state(), std::move(buffers), std::move(passes));
     state_->stamps = stamps;
     state_->make_buffers(constants_bytes);
@@ -439,14 +512,16 @@ Program::~Program() = default;
 std::span<std::byte> Program::host(int buffer) {
     const BoundBuffer& own = state_->buffers.at(buffer);
     const BoundBuffer& reached = own.mapped ? own : state_->staging.at(buffer);
-    if (!reached.mapped) throw Error(fmt::format("buffer {} is not the host's", state_->rows.at(buffer).name));
+    if (!reached.mapped)
+        throw Error(fmt::format("buffer {} is not the host's", state_->rows.at(buffer).name));
     return {reached.mapped, own.bytes};
 }
 
 void Program::take(int buffer, std::size_t offset, std::shared_ptr<const DeviceBytes> from) {
     const BufferRow& row = state_->rows.at(buffer);
-    const bool fits = row.host == BufferRow::Host::taken ? offset + from->size() <= row.bytes
-                                                         : row.host == BufferRow::Host::upload && offset == 0 && from->size() == row.bytes;
+    const bool fits = row.host == BufferRow::Host::taken
+                          ? offset + from->size() <= row.bytes
+                          : row.host == BufferRow::Host::upload && offset == 0 && from->size() == row.bytes;
     if (!fits)
         throw Error(fmt::format("{} bytes at {} do not go into buffer {}", from->size(), offset, row.name));
     state_->taken.push_back({buffer, offset, std::move(from)});
@@ -466,19 +541,25 @@ void Program::run(std::span<const std::byte> constants, Results results) {
     s.taken.clear();
     s.given.clear();
     timings_.clear();
-    if (!s.gpu.has_timestamps) return;
+    if (!s.gpu.has_timestamps)
+        return;
     const auto count = s.intervals.size() + 1;
-    const auto [result, ticks] =
-        s.queries.getResults<std::uint64_t>(0, static_cast<std::uint32_t>(count), count * 8, 8, vk::QueryResultFlagBits::e64);
-    if (result != vk::Result::eSuccess) return;
-    const auto ms = [&](std::size_t i) { return static_cast<double>(ticks[i + 1] - ticks[i]) * s.gpu.nanoseconds_per_tick * 1e-6; };
-    for (std::size_t i = 0; i < s.intervals.size(); ++i) timings_.emplace_back(s.intervals[i], ms(i));
+    const auto [result, ticks] = s.queries.getResults<std::uint64_t>(0, static_cast<std::uint32_t>(count), count * 8, 8,
+                                                                     vk::QueryResultFlagBits::e64);
+    if (result != vk::Result::eSuccess)
+        return;
+    const auto ms = [&](std::size_t i) {
+        return static_cast<double>(ticks[i + 1] - ticks[i]) * s.gpu.nanoseconds_per_tick * 1e-6;
+    };
+    for (std::size_t i = 0; i < s.intervals.size(); ++i)
+        timings_.emplace_back(s.intervals[i], ms(i));
 }
 
 std::vector<std::byte> Program::read_back(int buffer) {
     State& s = *state_;
     const std::size_t bytes = s.rows.at(static_cast<std::size_t>(buffer)).bytes;
-    BoundBuffer copy(s.gpu, bytes, vk::BufferUsageFlagBits::eTransferDst, {Memory::eHostVisible | Memory::eHostCoherent});
+    BoundBuffer copy(s.gpu, bytes, vk::BufferUsageFlagBits::eTransferDst,
+                     {Memory::eHostVisible | Memory::eHostCoherent});
     const auto commands = s.new_commands();
     commands.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
     compute_barrier(commands);

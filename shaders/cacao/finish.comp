@@ -16,7 +16,7 @@ layout(binding = 0, r32ui) readonly uniform uimageBuffer ao;
 layout(binding = 1, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 17, rg32f) uniform writeonly imageBuffer staged;
 
-const int high = cacao_high, rim = steps + 1, area = cacao_wide * high;
+const int rim = steps + 1, area = cacao_wide * cacao_high;
 shared float values[4 * area + 2 * cacao_wide]; // slice after slice, as in Texel; and a row at each end that nothing needs
 shared uint edges[area];                        // of the four slices, a byte each
 
@@ -84,7 +84,7 @@ void put(ivec2 g, vec2 v) {
 void main() {
     k = constants;
     ivec2 l = ivec2(gl_LocalInvocationID.xy);
-    ivec2 inner = ivec2(cacao_wide - 2 * rim, high - 2 * rim);
+    ivec2 inner = ivec2(cacao_wide - 2 * rim, cacao_high - 2 * rim);
     corner = inner * ivec2(gl_WorkGroupID.xy) - rim;
     ivec2 t = corner + l;
     int here = l.y * cacao_wide + l.x, at = here + cacao_wide;
