@@ -1,6 +1,7 @@
 // Visibility of every point of a cloud: neighbours, planes, sides, discs, rays, and the mean of what neighbours saw.
 #include "ao/cloud/cloud_ao.h"
 
+#include "ao/cloud/cloud_gpu.h"
 #include "ao/cloud/disc_rays.h"
 #include "ao/raycast/raycast.h"
 #include "projection/error.h"
@@ -83,11 +84,13 @@ double extent_of(std::span<const Vector3d> points) {
     return extent.norm();
 }
 
+/// Visibility hardly changes over a tenth of the radius: e^(this distance^2) is a neighbour's weight in the mean.
+float mean_falloff(float radius) { return -1 / (2 * 0.01F * radius * radius); }
+
 /// The mean of a value and those beside it on the same surface: planes alike, near against the radius.
 std::vector<float> smoothed(const CloudSurface& surface, const std::vector<float>& values, float radius) {
     std::vector<float> means(values.size(), nothing);
-    const float reach = 0.1F * radius; // visibility hardly changes over a tenth of the radius
-    const float falloff = std::isfinite(reach) ? -1 / (2 * reach * reach) : 0;
+    const float falloff = mean_falloff(radius);
     tbb::parallel_for(std::size_t(0), values.size(), [&](std::size_t i) {
         if (std::isnan(values[i]))
             return;
@@ -145,7 +148,7 @@ double default_radius(double extent, double spacing) {
     return std::clamp(extent / 20, 10 * spacing, std::max(200 * spacing, 0.0));
 }
 
-CloudAo::CloudAo(CloudAoOptions options) : options_(std::move(options)) {
+CloudAo::CloudAo(CloudAoOptions options, gpu::Device* device) : options_(std::move(options)), device_(device) {
     for (const Parameter& row : options_.parameters())
         check(row);
     const auto up = triple(options_.up);
@@ -162,9 +165,11 @@ CloudAo::CloudAo(CloudAoOptions options) : options_(std::move(options)) {
 /// One cloud on its way: what holds for all tiles, and the results so far.
 class CloudAo::Work {
   public:
-    Work(const CloudAoOptions& options, const Vector3d& up, const std::optional<Vector3d>& viewpoint,
-         const PointSet& cloud, const std::optional<Vector3d>& scanner)
+    Work(const CloudAoOptions& options, gpu::Device* device, const Vector3d& up,
+         const std::optional<Vector3d>& viewpoint, const PointSet& cloud, const std::optional<Vector3d>& scanner)
         : options_(options), up_(up), cloud_(cloud), watch_(result_.timings) {
+        if (device)
+            gpu_.emplace(*device);
         result_.visibility.assign(cloud.points.size(), nothing);
         result_.confidence.assign(cloud.points.size(), 0.0F);
         result_.normals.assign(cloud.points.size(), Vector3f::Zero());
@@ -185,6 +190,8 @@ class CloudAo::Work {
         else
             divide(valid_, valid_, reach, 0);
         tell();
+        if (gpu_)
+            result_.timings.emplace_back("of these on the device", gpu_->device_ms());
         return std::move(result_);
     }
 
@@ -193,7 +200,8 @@ class CloudAo::Work {
     static constexpr double bytes_per_point = 420; ///< measured, with Embree's tree
 
     [[nodiscard]] std::size_t at_once() const {
-        return static_cast<std::size_t>(options_.memory_mib * 1048576.0 / bytes_per_point);
+        const auto fitting = static_cast<std::size_t>(options_.memory_mib * 1048576.0 / bytes_per_point);
+        return gpu_ ? std::min(fitting, gpu_->most_points()) : fitting;
     }
 
     void settle_outside(const std::optional<Vector3d>& viewpoint, const std::optional<Vector3d>& scanner,
@@ -297,22 +305,28 @@ class CloudAo::Work {
             return is_wanted(place) || std::any_of(surface.near[place].begin(), surface.near[place].end(), is_wanted);
         };
         const float radius = options_.sky ? std::numeric_limits<float>::max() : static_cast<float>(result_.radius);
-        std::vector<float> values(surface.size(), nothing);
-        {
-            const std::optional<Vector3f> up = options_.sky ? std::optional<Vector3f>(up_.cast<float>()) : std::nullopt;
+        const std::optional<Vector3f> up = options_.sky ? std::optional<Vector3f>(up_.cast<float>()) : std::nullopt;
+        std::vector<float> values;
+        if (gpu_) {
+            rays.reset();
+            values = gpu_->visibility(surface, *fan_, {radius, up, mean_falloff(radius), passes_});
+            watch_.lap("rays and means");
+        } else {
             if (!rays)
                 rays.emplace(surface);
             watch_.lap("tree");
+            values.assign(surface.size(), nothing);
             tbb::parallel_for(tbb::blocked_range<std::size_t>(0, surface.size(), 64), [&](const auto& range) {
                 for (std::size_t i = range.begin(); i < range.end(); ++i)
                     if (!surface.normals[i].isZero() && is_beside(i))
                         values[i] = rays->open(i, *fan_, radius, up);
             });
             rays.reset();
+            watch_.lap("rays");
+            for (int pass = 0; pass < passes_; ++pass)
+                values = smoothed(surface, values, radius);
+            watch_.lap("means");
         }
-        watch_.lap("rays");
-        for (int pass = 0; pass < passes_; ++pass)
-            values = smoothed(surface, values, radius);
         for (std::size_t i = 0; i < surface.size(); ++i) {
             if (!is_wanted(i) || std::isnan(values[i]))
                 continue;
@@ -321,7 +335,7 @@ class CloudAo::Work {
             result_.normals[point] = surface.normals[i];
             result_.confidence[point] = surface.flatness[i] * resolution(radius, surface.disc_radius[i]);
         }
-        watch_.lap("smooth");
+        watch_.lap("gather");
         result_.tiles = ++tiles_;
     }
 
@@ -335,7 +349,7 @@ class CloudAo::Work {
         pick(cloud_.points, points);
         if (recorded())
             pick(cloud_.normals, normals);
-        CloudSurface surface = cloud_surface(points, normals);
+        CloudSurface surface = cloud_surface(points, normals, gpu_ ? &*gpu_ : nullptr);
         constexpr double same_planes = 0.8, too_many_opposed = 0.05;
         if (!normals.empty() && options_.normals == "auto" && surface.agreement < same_planes) {
             normals_refused_ = true;
@@ -344,7 +358,7 @@ class CloudAo::Work {
                 "{:.0f} degrees; --cloud.normals recorded takes them all the same.",
                 std::acos(surface.agreement) * 180 / std::numbers::pi));
             normals.clear();
-            surface = cloud_surface(points, {});
+            surface = cloud_surface(points, {}, gpu_ ? &*gpu_ : nullptr);
         }
         watch_.lap("planes");
         sides_opposed_ |= !normals.empty() && options_.normals == "auto" && surface.discord > too_many_opposed;
@@ -373,6 +387,8 @@ class CloudAo::Work {
                 apart && !recorded() ? ", whose normals were turned tile by tile: where they look wrong, give "
                                        "--cloud.outside or more --cloud.memory"
                                      : ""));
+        if (gpu_)
+            result_.notes.push_back(fmt::format("neighbours, rays and means on {}.", gpu_->device_name()));
         std::size_t unknown = 0;
         for (const std::uint32_t i : valid_)
             unknown += std::isnan(result_.visibility[i]);
@@ -386,6 +402,7 @@ class CloudAo::Work {
     const PointSet& cloud_;
     CloudVisibility result_;
     Watch watch_;
+    std::optional<CloudGpu> gpu_;
     std::optional<RayFan> fan_;
     Outside outside_;
     std::vector<std::uint32_t> valid_;
@@ -396,7 +413,7 @@ class CloudAo::Work {
 CloudVisibility CloudAo::compute(const PointSet& cloud, const std::optional<Vector3d>& scanner) const {
     if (!cloud.triangles.empty() && !options_.sky)
         return of_mesh(cloud);
-    return Work(options_, up_, viewpoint_, cloud, scanner).run();
+    return Work(options_, device_, up_, viewpoint_, cloud, scanner).run();
 }
 
 /// Vertices see exactly what the faces hide; no mean over neighbours is needed, but more rays.

@@ -1,6 +1,8 @@
 // A cloud as a surface: planes of least squares, discs as wide as the gaps.
 #include "ao/cloud/cloud_surface.h"
 
+#include "ao/cloud/cloud_gpu.h"
+
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Eigenvalues>
@@ -95,7 +97,7 @@ void compare_sides(CloudSurface& surface, std::span<const Vector3d> given) {
 
 } // namespace
 
-CloudSurface cloud_surface(std::span<const Vector3d> points, std::span<const Vector3d> normals) {
+CloudSurface cloud_surface(std::span<const Vector3d> points, std::span<const Vector3d> normals, CloudGpu* gpu) {
     Vector3d low = Vector3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
     for (const Vector3d& point : points) {
         low = low.cwiseMin(point);
@@ -115,41 +117,55 @@ CloudSurface cloud_surface(std::span<const Vector3d> points, std::span<const Vec
     surface.roughness.resize(count);
     surface.flatness.resize(count);
     std::vector<float> sixth(count);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 512), [&](const auto& range) {
-        Nearest found;
-        float reach =
-            std::numeric_limits<float>::infinity(); // of the place before; its neighbours are not far from ours
-        for (std::size_t i = range.begin(); i < range.end(); ++i) {
-            const float moved = i > range.begin() ? (surface.tree[i] - surface.tree[i - 1]).norm() : 0;
-            const float known = (reach + moved) * (1 + 1e-5F);
-            surface.tree.find_round(i, usual, found, known * known);
-            const auto near = found.all();
-            reach = near.size() == usual ? std::sqrt(near.back().distance2) : std::numeric_limits<float>::infinity();
-            for (std::size_t k = 0; k < CloudSurface::kept; ++k)
-                surface.near[i][k] = k < near.size() ? near[k].point : static_cast<std::uint32_t>(i);
-            sixth[i] = near.empty() ? 0 : std::sqrt(near[std::min<std::size_t>(5, near.size() - 1)].distance2);
-
-            Plane plane = plane_round(surface.tree, i, near);
-            if (on_a_line(plane) && near.size() == usual) {
-                surface.tree.find_round(i, wider, found);
-                plane = plane_round(surface.tree, i, found.all());
-            }
-            // Points strewn with one per s^2 have their sixth neighbour at 1.4 s; rows farther apart than their points
-            // spread the plane's narrow side, sqrt(variance) = 0.8 rows.
-            surface.disc_radius[i] = disc_over_gap * std::max(sixth[i], std::sqrt(plane.variance_narrow));
-            surface.roughness[i] = std::sqrt(plane.variance_across);
-            const float variance = plane.variance_across + plane.variance_narrow + plane.variance_wide;
-            surface.flatness[i] = on_a_line(plane) ? 0 : 1 - 3 * plane.variance_across / variance;
-            surface.normals[i] = on_a_line(plane) ? Vector3f(Vector3f::Zero()) : plane.normal;
-            if (normals.empty())
-                continue;
-            if (const Vector3d& given = normals[surface.tree.index(i)]; is_direction(given)) {
-                const Vector3f unit = given.normalized().cast<float>();
-                cosines[i] = surface.normals[i].isZero() ? 1.0F : std::abs(unit.dot(surface.normals[i]));
-                surface.normals[i] = unit;
-            }
+    const auto settle = [&](std::size_t i, std::size_t found, Plane plane) {
+        if (on_a_line(plane) && found == usual) {
+            Nearest far;
+            surface.tree.find_round(i, wider, far);
+            plane = plane_round(surface.tree, i, far.all());
         }
-    });
+        // Points strewn with one per s^2 have their sixth neighbour at 1.4 s; rows farther apart than their points
+        // spread the plane's narrow side, sqrt(variance) = 0.8 rows.
+        surface.disc_radius[i] = disc_over_gap * std::max(sixth[i], std::sqrt(plane.variance_narrow));
+        surface.roughness[i] = std::sqrt(plane.variance_across);
+        const float variance = plane.variance_across + plane.variance_narrow + plane.variance_wide;
+        surface.flatness[i] = on_a_line(plane) ? 0 : 1 - 3 * plane.variance_across / variance;
+        surface.normals[i] = on_a_line(plane) ? Vector3f(Vector3f::Zero()) : plane.normal;
+        if (normals.empty())
+            return;
+        if (const Vector3d& given = normals[surface.tree.index(i)]; is_direction(given)) {
+            const Vector3f unit = given.normalized().cast<float>();
+            cosines[i] = surface.normals[i].isZero() ? 1.0F : std::abs(unit.dot(surface.normals[i]));
+            surface.normals[i] = unit;
+        }
+    };
+    if (gpu) {
+        const CloudGpu::Neighbourhoods all = gpu->neighbourhoods(surface.tree);
+        tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
+            const auto& [normal, sixth_distance, variance, found] = all.rounds[i];
+            surface.near[i] = all.near[i];
+            sixth[i] = sixth_distance;
+            settle(i, found, {{normal.x, normal.y, normal.z}, variance.x, variance.y, variance.z});
+        });
+    } else {
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 512), [&](const auto& range) {
+            Nearest found;
+            float reach =
+                std::numeric_limits<float>::infinity(); // of the place before; its neighbours are not far from ours
+            for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                const float moved = i > range.begin() ? (surface.tree[i] - surface.tree[i - 1]).norm() : 0;
+                const float known = (reach + moved) * (1 + 1e-5F);
+                surface.tree.find_round(i, usual, found, known * known);
+                const auto near = found.all();
+                reach =
+                    near.size() == usual ? std::sqrt(near.back().distance2) : std::numeric_limits<float>::infinity();
+                for (std::size_t k = 0; k < CloudSurface::kept; ++k)
+                    surface.near[i][k] = k < near.size() ? near[k].point : static_cast<std::uint32_t>(i);
+                sixth[i] =
+                    near.empty() ? 0 : std::sqrt(near[std::min<std::size_t>(5, near.size() - 1)].distance2);
+                settle(i, near.size(), plane_round(surface.tree, i, near));
+            }
+        });
+    }
     constexpr float sixth_on_grid = 1.414F;
     surface.spacing = median(std::move(sixth)) / sixth_on_grid;
     limit_discs(surface);

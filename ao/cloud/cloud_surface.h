@@ -9,6 +9,7 @@
 
 namespace scanshade {
 
+class CloudGpu;
 class DiscRays;
 
 /// Where the outside of a surface without recorded normals is.
@@ -51,9 +52,10 @@ struct CloudSurface {
 
 /// Finds neighbours and planes of `points`, which must be finite. Where `normals` holds one per point they are taken,
 /// and those that have no length are filled in from the planes. Planes come from 16 neighbours, weighted by distance;
-/// where these lie on a line, as on a scanner's rings, from 64. `normals` of estimated planes have no side yet.
+/// where these lie on a line, as on a scanner's rings, from 64. `normals` of estimated planes have no side yet. Neighbours and planes are found by `gpu`,
+/// if given.
 [[nodiscard]] CloudSurface cloud_surface(std::span<const Eigen::Vector3d> points,
-                                         std::span<const Eigen::Vector3d> normals);
+                                         std::span<const Eigen::Vector3d> normals, CloudGpu* gpu = nullptr);
 
 /// Turns normals to the outside. Towards a viewpoint each point by itself; else neighbours are made to agree, those
 /// that most surely lie on one surface first (a spanning tree as of Hoppe et al. 1992, built as Kruskal's), and every

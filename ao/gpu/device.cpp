@@ -98,6 +98,7 @@ DeviceInfo info_of(const vk::raii::PhysicalDevice& physical, int index) {
     info.name = properties.deviceName.data();
     info.kind = kind_name(properties.deviceType);
     info.most_threads = static_cast<int>(properties.limits.maxComputeWorkGroupInvocations);
+    info.most_buffer_bytes = properties.limits.maxStorageBufferRange;
     info.driver = fmt::format("{} {}", driver.driverName.data(), driver.driverInfo.data());
     info.api = fmt::format("{}.{}.{}", VK_API_VERSION_MAJOR(api), VK_API_VERSION_MINOR(api), VK_API_VERSION_PATCH(api));
     info.unusable = what_is_missing(physical);
