@@ -46,8 +46,7 @@ class Watch {
     void lap(const std::string& name) {
         const auto now = std::chrono::steady_clock::now();
         const double ms = std::chrono::duration<double, std::milli>(now - last_).count();
-        const auto row = std::find_if(timings_.begin(), timings_.end(), [&](const auto& t) { return t.first == name; });
-        row == timings_.end() ? void(timings_.emplace_back(name, ms)) : void(row->second += ms);
+        add(timings_, name, ms);
         last_ = now;
     }
 
@@ -191,7 +190,8 @@ class CloudAo::Work {
             divide(valid_, valid_, reach, 0);
         tell();
         if (gpu_)
-            result_.timings.emplace_back("of these on the device", gpu_->device_ms());
+            for (const auto& [pass, ms] : gpu_->timings())
+                result_.timings.emplace_back("on the device: " + pass, ms);
         return std::move(result_);
     }
 

@@ -58,7 +58,7 @@ std::size_t CloudGpu::most_points() const {
 void CloudGpu::run(gpu::Program& program, const shared::CloudConstants& constants) {
     program.run(std::as_bytes(std::span(&constants, 1)));
     for (const auto& [name, ms] : program.timings())
-        device_ms_ += ms;
+        add(timings_, name, ms);
 }
 
 CloudGpu::Neighbourhoods CloudGpu::neighbourhoods(const NeighbourTree& tree) {

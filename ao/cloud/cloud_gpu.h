@@ -37,15 +37,15 @@ class CloudGpu {
     /// By place; NaN for points without a plane.
     [[nodiscard]] std::vector<float> visibility(const CloudSurface& surface, const RayFan& fan, const Task& task);
 
-    /// Device milliseconds of all calls so far, transfers included.
-    [[nodiscard]] double device_ms() const { return device_ms_; }
+    /// Device milliseconds of all calls so far, by pass, transfers included.
+    [[nodiscard]] const Timings& timings() const { return timings_; }
     [[nodiscard]] const std::string& device_name() const { return device_.info().name; }
 
   private:
     void run(gpu::Program& program, const shared::CloudConstants& constants);
 
     gpu::Device& device_;
-    double device_ms_ = 0;
+    Timings timings_;
 };
 
 } // namespace scanshade
