@@ -143,10 +143,12 @@ int main(int argc, char** argv) {
     std::vector<int> rays{8, 16, 32}, rasters{512, 1024, 2048};
     bool no_normals = false, with_raycast = false, sky = false;
     std::string device_name;
+    int smooth = -1;
     CLI::App parser("visibility of points against rays on the scene they were taken from");
     parser.add_option("--scene", scene, "office, or outdoor with --sky");
     parser.add_option("--points", points);
     parser.add_option("--rays", rays, "per point")->delimiter(',');
+    parser.add_option("--smooth", smooth, "means over neighbours; -1 = by the spacing");
     parser.add_option("--raster", rasters, "of depth images, pixels a side")->delimiter(',');
     CLI::Option* on_device = parser.add_option("--device", device_name, "a Vulkan device; without it the processor");
     parser.add_flag("--no-normals", no_normals, "the points alone");
@@ -169,7 +171,7 @@ int main(int argc, char** argv) {
         device = std::make_unique<gpu::Device>(device_name);
     for (const int count : rays)
         judge.row(fmt::format("{} rays a point", count), [&] {
-            const auto found = CloudAo({.radius = radius, .rays = count, .sky = sky}, device.get()).compute(set);
+            const auto found = CloudAo({.radius = radius, .rays = count, .smooth = smooth, .sky = sky}, device.get()).compute(set);
             for (const auto& [stage, ms] : found.timings)
                 fmt::print("{} {:.0f} ms; ", stage, ms);
             fmt::print("\n");

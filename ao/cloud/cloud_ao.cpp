@@ -327,28 +327,32 @@ class CloudAo::Work {
                 values = smoothed(surface, values, radius);
             watch_.lap("means");
         }
-        for (std::size_t i = 0; i < surface.size(); ++i) {
+        tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
             if (!is_wanted(i) || std::isnan(values[i]))
-                continue;
+                return;
             const std::size_t point = round[surface.tree.index(i)];
             result_.visibility[point] = values[i];
             result_.normals[point] = surface.normals[i];
             result_.confidence[point] = surface.flatness[i] * resolution(radius, surface.disc_radius[i]);
-        }
+        });
         watch_.lap("gather");
         result_.tiles = ++tiles_;
     }
 
     /// Neighbours and planes of these points.
     CloudSurface planes_of(const std::vector<std::uint32_t>& which) {
-        std::vector<Vector3d> points(which.size()), normals;
+        std::vector<Vector3d> some_points, some_normals;
         const auto pick = [&](std::span<const Vector3d> from, std::vector<Vector3d>& to) {
+            if (which.size() == from.size())
+                return from;
             to.resize(which.size());
-            std::transform(which.begin(), which.end(), to.begin(), [&](std::uint32_t i) { return from[i]; });
+            tbb::parallel_for(std::size_t(0), to.size(), [&](std::size_t i) { to[i] = from[which[i]]; });
+            return std::span<const Vector3d>(to);
         };
-        pick(cloud_.points, points);
+        const std::span<const Vector3d> points = pick(cloud_.points, some_points);
+        std::span<const Vector3d> normals;
         if (recorded())
-            pick(cloud_.normals, normals);
+            normals = pick(cloud_.normals, some_normals);
         CloudSurface surface = cloud_surface(points, normals, gpu_ ? &*gpu_ : nullptr);
         constexpr double same_planes = 0.8, too_many_opposed = 0.05;
         if (!normals.empty() && options_.normals == "auto" && surface.agreement < same_planes) {
@@ -357,7 +361,7 @@ class CloudAo::Work {
                 "recorded normals are not used: the median angle between them and the planes of the points is "
                 "{:.0f} degrees; --cloud.normals recorded takes them all the same.",
                 std::acos(surface.agreement) * 180 / std::numbers::pi));
-            normals.clear();
+            normals = {};
             surface = cloud_surface(points, {}, gpu_ ? &*gpu_ : nullptr);
         }
         watch_.lap("planes");

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 namespace scanshade {
 namespace {
@@ -79,7 +80,7 @@ CloudGpu::Neighbourhoods CloudGpu::neighbourhoods(const NeighbourTree& tree) {
     constants.points = static_cast<std::uint32_t>(count);
     constants.levels = static_cast<std::uint32_t>(tree.levels());
     run(*program, constants);
-    const auto found_near = program->host_as<std::array<std::uint32_t, CloudSurface::kept>>(near);
+    const auto found_near = program->host_as<CloudSurface::Near>(near);
     const auto found_rounds = program->host_as<shared::CloudRound>(rounds);
     return {std::move(program), found_near, found_rounds};
 }
@@ -110,16 +111,21 @@ std::vector<float> CloudGpu::visibility(const CloudSurface& surface, const RayFa
     gpu::Program program(device_, std::move(buffers), std::move(passes), sizeof(shared::CloudConstants));
 
     const auto to_points = program.host_as<vec4>(points), to_normals = program.host_as<vec4>(normals);
-    float farthest = 0;
-    for (std::size_t i = 0; i < count; ++i)
-        farthest = std::max(farthest, tree[i].cwiseAbs().maxCoeff());
+    const float farthest = tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, count), 0.0F,
+        [&](const auto& range, float most) {
+            for (std::size_t i = range.begin(); i < range.end(); ++i)
+                most = std::max(most, tree[i].cwiseAbs().maxCoeff());
+            return most;
+        },
+        [](float a, float b) { return std::max(a, b); });
     tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
         const Eigen::Vector3f &at = tree[i], &n = surface.normals[i];
         to_points[i] = {at.x(), at.y(), at.z(), n.isZero() ? 0 : surface.disc_radius[i]};
         to_normals[i] = {n.x(), n.y(), n.z(), surface.roughness[i]};
     });
     if (task.means > 0)
-        std::ranges::copy(std::as_bytes(std::span(surface.near)), program.host(near).begin());
+        std::ranges::copy(surface.near, program.host_as<CloudSurface::Near>(near).begin());
     const auto to_fan = program.host_as<vec4>(fan_at);
     for (std::size_t i = 0; i < fan.runs(); ++i)
         for (int ray = 0; ray < static_cast<int>(fan.rays()); ++ray) {

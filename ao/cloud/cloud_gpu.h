@@ -22,7 +22,7 @@ class CloudGpu {
     /// What stands round each point, by place; views into the program's memory.
     struct Neighbourhoods {
         std::unique_ptr<gpu::Program> program;
-        std::span<const std::array<std::uint32_t, CloudSurface::kept>> near;
+        std::span<const CloudSurface::Near> near;
         std::span<const shared::CloudRound> rounds;
     };
     [[nodiscard]] Neighbourhoods neighbourhoods(const NeighbourTree& tree);

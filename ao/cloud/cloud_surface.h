@@ -3,6 +3,7 @@
 
 #include "ao/cloud/neighbours.h"
 #include "ao/method.h"
+#include "shaders/shared/cloud.h"
 
 #include <optional>
 #include <string>
@@ -34,11 +35,12 @@ struct Outside {
 
 /// The neighbourhoods, planes and discs of a cloud, in the order of its tree; positions relative to `middle`.
 struct CloudSurface {
-    static constexpr std::size_t kept = 8; ///< neighbours remembered per point
+    static constexpr std::size_t kept = shared::cloud_kept; ///< neighbours remembered per point
+    using Near = std::array<std::uint32_t, kept>;
 
     Eigen::Vector3d middle = Eigen::Vector3d::Zero(); ///< of the box round the points, so that single precision serves
     NeighbourTree tree;
-    std::vector<std::array<std::uint32_t, kept>> near; ///< places, nearest first; the point's own where there are fewer
+    std::vector<Near> near; ///< places, nearest first; the point's own where there are fewer
     std::vector<Eigen::Vector3f> normals;              ///< unit; zero where the neighbours make no plane
     std::vector<float> disc_radius;                    ///< covers the gaps between neighbours; 0 for a lonely point
     std::vector<float> roughness; ///< one sigma of the neighbours' distances from the plane, in the cloud's unit
