@@ -102,7 +102,8 @@ std::vector<float> smoothed(const CloudSurface& surface, const std::vector<float
             const float off_plane = std::abs(apart.dot(surface.normals[i]));
             if (off_plane > 0.5F * surface.disc_radius[i] + 2 * surface.roughness[i])
                 continue;
-            const float weight = std::exp(falloff * apart.squaredNorm());
+            const float off = (values[i] - values[j]) / shared::mean_apart;
+            const float weight = std::exp(falloff * apart.squaredNorm()) * std::max(1 - off * off, 0.0F);
             sum += weight * values[j];
             weights += weight;
         }
@@ -121,7 +122,7 @@ std::vector<Parameter> CloudAoOptions::parameters() {
         {"radius",
          "how far away a surface may still occlude, in the cloud's unit; 0 = from the cloud's extent and spacing",
          &radius, "", 0, 1e9},
-        {"rays", "per point; 0 = 16, fewer where the radius spans many spacings", &rays, "", 0, 16384},
+        {"rays", "per point; 0 = 64 on a GPU, else 16, fewer where the radius spans many spacings", &rays, "", 0, 16384},
         {"smooth",
          "how often a value becomes the mean of those beside it on the same surface; -1 = twice, or more where the "
          "radius "
@@ -242,7 +243,10 @@ class CloudAo::Work {
     void settle_rays() {
         const double spacings = options_.sky || !(result_.spacing > 0) ? 0 : result_.radius / result_.spacing;
         const int level = spacings > 120 ? 2 : spacings > 60 ? 1 : 0;
-        const int rays = options_.rays > 0 ? options_.rays : std::array{16, 8, 4}[static_cast<std::size_t>(level)];
+        constexpr int on_gpu = 64; // they cost a GPU less than the rest costs the host
+        const int rays = options_.rays > 0 ? options_.rays
+                         : gpu_            ? on_gpu
+                                           : std::array{16, 8, 4}[static_cast<std::size_t>(level)];
         passes_ = options_.smooth >= 0 ? options_.smooth : std::array{2, 3, 5}[static_cast<std::size_t>(level)];
         fan_.emplace(rays, options_.seed);
         result_.notes.push_back(fmt::format("{} rays a point, {} times the mean over neighbours.", rays, passes_));

@@ -53,7 +53,10 @@ std::vector<PassRow> box_passes(const NeighbourTree& tree, int normals) {
 } // namespace
 
 std::size_t CloudGpu::most_points() const {
-    return static_cast<std::size_t>(device_.info().most_buffer_bytes) / (shared::cloud_kept * sizeof(std::uint32_t));
+    constexpr std::size_t bytes_per_point = 2 * sizeof(vec4) + sizeof(CloudSurface::Near) + 2 * sizeof(float) + 8;
+    const gpu::DeviceInfo& info = device_.info();
+    return static_cast<std::size_t>(
+        std::min(info.most_buffer_bytes / sizeof(CloudSurface::Near), info.memory_bytes / 2 / bytes_per_point));
 }
 
 void CloudGpu::run(gpu::Program& program, const shared::CloudConstants& constants) {

@@ -16,7 +16,7 @@ class CloudGpu {
   public:
     explicit CloudGpu(gpu::Device& device) : device_(device) {}
 
-    /// How many points fit one call: the device's largest buffer holds so many neighbourhoods.
+    /// How many points fit one call: the device's largest buffer and half of its memory hold so many neighbourhoods.
     [[nodiscard]] std::size_t most_points() const;
 
     /// What stands round each point, by place; views into the program's memory.

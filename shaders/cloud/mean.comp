@@ -24,7 +24,8 @@ void main() {
         vec3 apart = points[other].xyz - point.xyz, n = normals[other].xyz;
         bool same = other != own && !isnan(beside) && dot(normal.xyz, n) > 0.9 &&
                     abs(dot(apart, normal.xyz)) <= 0.5 * point.w + 2.0 * normal.w;
-        float weight = exp(k.falloff * dot(apart, apart));
+        float off = (value - beside) / mean_apart;
+        float weight = exp(k.falloff * dot(apart, apart)) * max(1.0 - off * off, 0.0);
         sum += same ? weight * beside : 0.0;
         weights += same ? weight : 0.0;
     }

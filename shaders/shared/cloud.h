@@ -43,5 +43,9 @@ SHARED_FN float own_reach(float disc) { return 2 * disc; }
 SHARED_FN float own_depth(float disc, float roughness) { return larger(0.2F * disc, 2 * roughness); }
 const float own_alike = 0.7F; // cosine between the planes, at least: the other wall of a corner is not its own
 
+// Values that differ by so much tell of an edge, not of the few rays behind them: neither counts in the other's mean, and the less
+// the closer they come to it (1 - (difference / this)^2).
+const float mean_apart = 0.9F;
+
 SHARED_END
 #endif
