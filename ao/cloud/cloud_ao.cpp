@@ -188,7 +188,7 @@ class CloudAo::Work {
         if (options_.sky || valid_.size() <= at_once())
             tile(valid_, valid_);
         else
-            divide(valid_, valid_, reach, 0);
+            divide(valid_, valid_, reach);
         tell();
         if (gpu_)
             for (const auto& [pass, ms] : gpu_->timings())
@@ -253,37 +253,50 @@ class CloudAo::Work {
     }
 
     /// Halves the points of `core` until one half and all that lies within `reach` of it fit the memory.
-    void divide(const std::vector<std::uint32_t>& core, const std::vector<std::uint32_t>& round, double reach,
-                int depth) {
+    void divide(const std::vector<std::uint32_t>& core, const std::vector<std::uint32_t>& round, double reach) {
         constexpr std::size_t least = 10000;
         if (round.size() <= at_once() || core.size() <= least) {
             tile(core, round);
             return;
         }
-        const auto box_of = [&](const std::vector<std::uint32_t>& points) {
-            Eigen::AlignedBox3d box;
-            for (const std::uint32_t i : points)
-                box.extend(cloud_.points[i]);
-            return box;
-        };
+        const Eigen::AlignedBox3d all = box_of(core);
         int axis = 0;
-        box_of(core).sizes().maxCoeff(&axis);
-        std::vector<std::uint32_t> halves = core;
-        const auto middle = halves.begin() + static_cast<std::ptrdiff_t>(halves.size() / 2);
-        std::nth_element(halves.begin(), middle, halves.end(), [&](std::uint32_t a, std::uint32_t b) {
-            const double at = cloud_.points[a][axis], bt = cloud_.points[b][axis];
-            return at != bt ? at < bt : a < b;
-        });
-        for (const auto& [from, to] : {std::pair(halves.begin(), middle), std::pair(middle, halves.end())}) {
-            const std::vector<std::uint32_t> half(from, to);
-            Eigen::AlignedBox3d box = box_of(half);
+        all.sizes().maxCoeff(&axis);
+        const double middle = middle_of(core, axis);
+        // In the order of the file: to go through its points in another takes several times as long.
+        std::vector<std::uint32_t> low, high;
+        for (const std::uint32_t i : core)
+            (cloud_.points[i][axis] < middle ? low : high).push_back(i);
+        if (low.empty() || high.empty()) // most of them at one coordinate
+            return tile(core, round);
+        for (std::vector<std::uint32_t>* half : {&low, &high}) {
+            Eigen::AlignedBox3d box = box_of(*half);
             box.min().array() -= reach;
             box.max().array() += reach;
             std::vector<std::uint32_t> near;
             std::copy_if(round.begin(), round.end(), std::back_inserter(near),
                          [&](std::uint32_t i) { return box.contains(cloud_.points[i]); });
-            divide(half, near, reach, depth + 1);
+            divide(*half, near, reach);
+            *half = {};
         }
+    }
+
+    [[nodiscard]] Eigen::AlignedBox3d box_of(const std::vector<std::uint32_t>& points) const {
+        Eigen::AlignedBox3d box;
+        for (const std::uint32_t i : points)
+            box.extend(cloud_.points[i]);
+        return box;
+    }
+
+    /// The median coordinate of a part of the points.
+    [[nodiscard]] double middle_of(const std::vector<std::uint32_t>& points, int axis) const {
+        const std::size_t step = std::max<std::size_t>(1, points.size() / enough_to_judge);
+        std::vector<double> along;
+        for (std::size_t i = 0; i < points.size(); i += step)
+            along.push_back(cloud_.points[points[i]][axis]);
+        const auto middle = along.begin() + static_cast<std::ptrdiff_t>(along.size() / 2);
+        std::nth_element(along.begin(), middle, along.end());
+        return *middle;
     }
 
     /// Values for `core`, which lies within `round`.
