@@ -53,6 +53,15 @@ struct View {
 
 /// Milliseconds per named pass or transfer, in execution order.
 using Timings = std::vector<std::pair<std::string, double>>;
+/// To the row of that name, or to a new one.
+inline void add(Timings& timings, const std::string& name, double ms) {
+    for (auto& [known, sum] : timings)
+        if (known == name) {
+            sum += ms;
+            return;
+        }
+    timings.emplace_back(name, ms);
+}
 
 /// An intermediate result, for study: `shape` outermost first, little-endian elements of `type` ("f4", "u4").
 struct Intermediate {

@@ -363,7 +363,8 @@ class Run final : public Command {
         workers.make(asked_.method, asked_.chosen_setup(), asked_.fit());
         job.batch.point_method = dynamic_cast<PointMethod*>(workers.any().plain.get());
         job.batch.radius_m = asked_.radius_m();
-        const CloudAo of_clouds = asked_.cloud_ao();
+        gpu::Device& device = workers.device();
+        const CloudAo of_clouds = asked_.cloud_ao(gpu::is_cpu(device.info()) ? nullptr : &device);
         job.batch.cloud_ao = &of_clouds;
         job.batch.cloud_walk = asked_.cloud_walk();
         RunReport report = report_on(job, workers);

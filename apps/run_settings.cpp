@@ -244,11 +244,11 @@ FitPlaneOptions RunSettings::fit() const {
     return {.drop_flying = flying_pixels == "drop", .smoothing = depth_smoothing * method_named(method).smoothing};
 }
 
-CloudAo RunSettings::cloud_ao() const {
+CloudAo RunSettings::cloud_ao(gpu::Device* on) const {
     CloudAoOptions options = clouds_by_points;
     if (options.radius == 0 && !radius.empty())
         set({"radius", "", &options.radius}, radius);
-    return CloudAo(options);
+    return CloudAo(options, on);
 }
 
 MethodSetup& RunSettings::setup_of(std::string_view name) {

@@ -51,7 +51,7 @@ class RunSettings {
     [[nodiscard]] CloudWalk cloud_walk() const;
     [[nodiscard]] FitPlaneOptions fit() const;
     /// As given; --radius holds for clouds, too, and --cloud.radius before it.
-    [[nodiscard]] CloudAo cloud_ao() const;
+    [[nodiscard]] CloudAo cloud_ao(gpu::Device* on = nullptr) const;
     /// The chosen method's settings, --radius and --quality put in their rows.
     [[nodiscard]] MethodSetup& chosen_setup();
     [[nodiscard]] double radius_m(); ///< the chosen method's

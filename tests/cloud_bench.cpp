@@ -1,11 +1,12 @@
 // cloud_bench: visibility of a scene's points, from the points alone, against rays on the scene itself: error, time,
 // memory.
-//   cloud_bench [--scene office] [--points 1000000] [--rays 8,16,32] [--no-normals] [--raycast]
+//   cloud_bench [--scene office] [--points 1000000] [--rays 8,16,32] [--no-normals] [--raycast] [--device NAME]
 //   cloud_bench --sky [--scene outdoor] [--raster 512,1024,2048]     the sky's share, also by depth images from 256
 //   sides
 // All rows are of one run, each judged at the same points (about 50000); seconds are the wall's and the processor's.
 #include "ao/cloud/cloud_ao.h"
 #include "ao/compare.h"
+#include "ao/gpu/device.h"
 #include "ao/raycast/raycast.h"
 #include "apps/scene_cloud.h"
 #include "projection/hash.h"
@@ -141,11 +142,15 @@ int main(int argc, char** argv) {
     std::size_t points = 1000000;
     std::vector<int> rays{8, 16, 32}, rasters{512, 1024, 2048};
     bool no_normals = false, with_raycast = false, sky = false;
+    std::string device_name;
+    int smooth = -1;
     CLI::App parser("visibility of points against rays on the scene they were taken from");
     parser.add_option("--scene", scene, "office, or outdoor with --sky");
     parser.add_option("--points", points);
     parser.add_option("--rays", rays, "per point")->delimiter(',');
+    parser.add_option("--smooth", smooth, "means over neighbours; -1 = by the spacing");
     parser.add_option("--raster", rasters, "of depth images, pixels a side")->delimiter(',');
+    CLI::Option* on_device = parser.add_option("--device", device_name, "a Vulkan device; without it the processor");
     parser.add_flag("--no-normals", no_normals, "the points alone");
     parser.add_flag("--raycast", with_raycast, "also the method raycast, 64 rays");
     parser.add_flag("--sky", sky, "the share of the sky");
@@ -161,9 +166,15 @@ int main(int argc, char** argv) {
     fmt::print("{}: {} points, radius {} m; judged at every {}. point\n", world.scene().name, points, sky ? 0 : radius,
                step);
     double spacing = 0, sides = 0;
+    std::unique_ptr<gpu::Device> device;
+    if (on_device->count() > 0)
+        device = std::make_unique<gpu::Device>(device_name);
     for (const int count : rays)
         judge.row(fmt::format("{} rays a point", count), [&] {
-            const auto found = CloudAo({.radius = radius, .rays = count, .sky = sky}).compute(set);
+            const auto found = CloudAo({.radius = radius, .rays = count, .smooth = smooth, .sky = sky}, device.get()).compute(set);
+            for (const auto& [stage, ms] : found.timings)
+                fmt::print("{} {:.0f} ms; ", stage, ms);
+            fmt::print("\n");
             spacing = found.spacing;
             sides = share_turned_away(found.normals, cloud.normals);
             return found.visibility;

@@ -1,6 +1,7 @@
 // Visibility of every point of a cloud: neighbours, planes, sides, discs, rays, and the mean of what neighbours saw.
 #include "ao/cloud/cloud_ao.h"
 
+#include "ao/cloud/cloud_gpu.h"
 #include "ao/cloud/disc_rays.h"
 #include "ao/raycast/raycast.h"
 #include "projection/error.h"
@@ -45,8 +46,7 @@ class Watch {
     void lap(const std::string& name) {
         const auto now = std::chrono::steady_clock::now();
         const double ms = std::chrono::duration<double, std::milli>(now - last_).count();
-        const auto row = std::find_if(timings_.begin(), timings_.end(), [&](const auto& t) { return t.first == name; });
-        row == timings_.end() ? void(timings_.emplace_back(name, ms)) : void(row->second += ms);
+        add(timings_, name, ms);
         last_ = now;
     }
 
@@ -83,11 +83,13 @@ double extent_of(std::span<const Vector3d> points) {
     return extent.norm();
 }
 
+/// Visibility hardly changes over a tenth of the radius: e^(this distance^2) is a neighbour's weight in the mean.
+float mean_falloff(float radius) { return -1 / (2 * 0.01F * radius * radius); }
+
 /// The mean of a value and those beside it on the same surface: planes alike, near against the radius.
 std::vector<float> smoothed(const CloudSurface& surface, const std::vector<float>& values, float radius) {
     std::vector<float> means(values.size(), nothing);
-    const float reach = 0.1F * radius; // visibility hardly changes over a tenth of the radius
-    const float falloff = std::isfinite(reach) ? -1 / (2 * reach * reach) : 0;
+    const float falloff = mean_falloff(radius);
     tbb::parallel_for(std::size_t(0), values.size(), [&](std::size_t i) {
         if (std::isnan(values[i]))
             return;
@@ -100,7 +102,8 @@ std::vector<float> smoothed(const CloudSurface& surface, const std::vector<float
             const float off_plane = std::abs(apart.dot(surface.normals[i]));
             if (off_plane > 0.5F * surface.disc_radius[i] + 2 * surface.roughness[i])
                 continue;
-            const float weight = std::exp(falloff * apart.squaredNorm());
+            const float off = (values[i] - values[j]) / shared::mean_apart;
+            const float weight = std::exp(falloff * apart.squaredNorm()) * std::max(1 - off * off, 0.0F);
             sum += weight * values[j];
             weights += weight;
         }
@@ -119,7 +122,7 @@ std::vector<Parameter> CloudAoOptions::parameters() {
         {"radius",
          "how far away a surface may still occlude, in the cloud's unit; 0 = from the cloud's extent and spacing",
          &radius, "", 0, 1e9},
-        {"rays", "per point; 0 = 16, fewer where the radius spans many spacings", &rays, "", 0, 16384},
+        {"rays", "per point; 0 = 64 on a GPU, else 16, fewer where the radius spans many spacings", &rays, "", 0, 16384},
         {"smooth",
          "how often a value becomes the mean of those beside it on the same surface; -1 = twice, or more where the "
          "radius "
@@ -145,7 +148,7 @@ double default_radius(double extent, double spacing) {
     return std::clamp(extent / 20, 10 * spacing, std::max(200 * spacing, 0.0));
 }
 
-CloudAo::CloudAo(CloudAoOptions options) : options_(std::move(options)) {
+CloudAo::CloudAo(CloudAoOptions options, gpu::Device* device) : options_(std::move(options)), device_(device) {
     for (const Parameter& row : options_.parameters())
         check(row);
     const auto up = triple(options_.up);
@@ -162,9 +165,11 @@ CloudAo::CloudAo(CloudAoOptions options) : options_(std::move(options)) {
 /// One cloud on its way: what holds for all tiles, and the results so far.
 class CloudAo::Work {
   public:
-    Work(const CloudAoOptions& options, const Vector3d& up, const std::optional<Vector3d>& viewpoint,
-         const PointSet& cloud, const std::optional<Vector3d>& scanner)
+    Work(const CloudAoOptions& options, gpu::Device* device, const Vector3d& up,
+         const std::optional<Vector3d>& viewpoint, const PointSet& cloud, const std::optional<Vector3d>& scanner)
         : options_(options), up_(up), cloud_(cloud), watch_(result_.timings) {
+        if (device)
+            gpu_.emplace(*device);
         result_.visibility.assign(cloud.points.size(), nothing);
         result_.confidence.assign(cloud.points.size(), 0.0F);
         result_.normals.assign(cloud.points.size(), Vector3f::Zero());
@@ -183,8 +188,11 @@ class CloudAo::Work {
         if (options_.sky || valid_.size() <= at_once())
             tile(valid_, valid_);
         else
-            divide(valid_, valid_, reach, 0);
+            divide(valid_, valid_, reach);
         tell();
+        if (gpu_)
+            for (const auto& [pass, ms] : gpu_->timings())
+                result_.timings.emplace_back("on the device: " + pass, ms);
         return std::move(result_);
     }
 
@@ -193,7 +201,8 @@ class CloudAo::Work {
     static constexpr double bytes_per_point = 420; ///< measured, with Embree's tree
 
     [[nodiscard]] std::size_t at_once() const {
-        return static_cast<std::size_t>(options_.memory_mib * 1048576.0 / bytes_per_point);
+        const auto fitting = static_cast<std::size_t>(options_.memory_mib * 1048576.0 / bytes_per_point);
+        return gpu_ ? std::min(fitting, gpu_->most_points()) : fitting;
     }
 
     void settle_outside(const std::optional<Vector3d>& viewpoint, const std::optional<Vector3d>& scanner,
@@ -234,44 +243,60 @@ class CloudAo::Work {
     void settle_rays() {
         const double spacings = options_.sky || !(result_.spacing > 0) ? 0 : result_.radius / result_.spacing;
         const int level = spacings > 120 ? 2 : spacings > 60 ? 1 : 0;
-        const int rays = options_.rays > 0 ? options_.rays : std::array{16, 8, 4}[static_cast<std::size_t>(level)];
+        constexpr int on_gpu = 64; // they cost a GPU less than the rest costs the host
+        const int rays = options_.rays > 0 ? options_.rays
+                         : gpu_            ? on_gpu
+                                           : std::array{16, 8, 4}[static_cast<std::size_t>(level)];
         passes_ = options_.smooth >= 0 ? options_.smooth : std::array{2, 3, 5}[static_cast<std::size_t>(level)];
         fan_.emplace(rays, options_.seed);
         result_.notes.push_back(fmt::format("{} rays a point, {} times the mean over neighbours.", rays, passes_));
     }
 
     /// Halves the points of `core` until one half and all that lies within `reach` of it fit the memory.
-    void divide(const std::vector<std::uint32_t>& core, const std::vector<std::uint32_t>& round, double reach,
-                int depth) {
+    void divide(const std::vector<std::uint32_t>& core, const std::vector<std::uint32_t>& round, double reach) {
         constexpr std::size_t least = 10000;
         if (round.size() <= at_once() || core.size() <= least) {
             tile(core, round);
             return;
         }
-        const auto box_of = [&](const std::vector<std::uint32_t>& points) {
-            Eigen::AlignedBox3d box;
-            for (const std::uint32_t i : points)
-                box.extend(cloud_.points[i]);
-            return box;
-        };
+        const Eigen::AlignedBox3d all = box_of(core);
         int axis = 0;
-        box_of(core).sizes().maxCoeff(&axis);
-        std::vector<std::uint32_t> halves = core;
-        const auto middle = halves.begin() + static_cast<std::ptrdiff_t>(halves.size() / 2);
-        std::nth_element(halves.begin(), middle, halves.end(), [&](std::uint32_t a, std::uint32_t b) {
-            const double at = cloud_.points[a][axis], bt = cloud_.points[b][axis];
-            return at != bt ? at < bt : a < b;
-        });
-        for (const auto& [from, to] : {std::pair(halves.begin(), middle), std::pair(middle, halves.end())}) {
-            const std::vector<std::uint32_t> half(from, to);
-            Eigen::AlignedBox3d box = box_of(half);
+        all.sizes().maxCoeff(&axis);
+        const double middle = middle_of(core, axis);
+        // In the order of the file: to go through its points in another takes several times as long.
+        std::vector<std::uint32_t> low, high;
+        for (const std::uint32_t i : core)
+            (cloud_.points[i][axis] < middle ? low : high).push_back(i);
+        if (low.empty() || high.empty()) // most of them at one coordinate
+            return tile(core, round);
+        for (std::vector<std::uint32_t>* half : {&low, &high}) {
+            Eigen::AlignedBox3d box = box_of(*half);
             box.min().array() -= reach;
             box.max().array() += reach;
             std::vector<std::uint32_t> near;
             std::copy_if(round.begin(), round.end(), std::back_inserter(near),
                          [&](std::uint32_t i) { return box.contains(cloud_.points[i]); });
-            divide(half, near, reach, depth + 1);
+            divide(*half, near, reach);
+            *half = {};
         }
+    }
+
+    [[nodiscard]] Eigen::AlignedBox3d box_of(const std::vector<std::uint32_t>& points) const {
+        Eigen::AlignedBox3d box;
+        for (const std::uint32_t i : points)
+            box.extend(cloud_.points[i]);
+        return box;
+    }
+
+    /// The median coordinate of a part of the points.
+    [[nodiscard]] double middle_of(const std::vector<std::uint32_t>& points, int axis) const {
+        const std::size_t step = std::max<std::size_t>(1, points.size() / enough_to_judge);
+        std::vector<double> along;
+        for (std::size_t i = 0; i < points.size(); i += step)
+            along.push_back(cloud_.points[points[i]][axis]);
+        const auto middle = along.begin() + static_cast<std::ptrdiff_t>(along.size() / 2);
+        std::nth_element(along.begin(), middle, along.end());
+        return *middle;
     }
 
     /// Values for `core`, which lies within `round`.
@@ -297,45 +322,55 @@ class CloudAo::Work {
             return is_wanted(place) || std::any_of(surface.near[place].begin(), surface.near[place].end(), is_wanted);
         };
         const float radius = options_.sky ? std::numeric_limits<float>::max() : static_cast<float>(result_.radius);
-        std::vector<float> values(surface.size(), nothing);
-        {
-            const std::optional<Vector3f> up = options_.sky ? std::optional<Vector3f>(up_.cast<float>()) : std::nullopt;
+        const std::optional<Vector3f> up = options_.sky ? std::optional<Vector3f>(up_.cast<float>()) : std::nullopt;
+        std::vector<float> values;
+        if (gpu_) {
+            rays.reset();
+            values = gpu_->visibility(surface, *fan_, {radius, up, mean_falloff(radius), passes_});
+            watch_.lap("rays and means");
+        } else {
             if (!rays)
                 rays.emplace(surface);
             watch_.lap("tree");
+            values.assign(surface.size(), nothing);
             tbb::parallel_for(tbb::blocked_range<std::size_t>(0, surface.size(), 64), [&](const auto& range) {
                 for (std::size_t i = range.begin(); i < range.end(); ++i)
                     if (!surface.normals[i].isZero() && is_beside(i))
                         values[i] = rays->open(i, *fan_, radius, up);
             });
             rays.reset();
+            watch_.lap("rays");
+            for (int pass = 0; pass < passes_; ++pass)
+                values = smoothed(surface, values, radius);
+            watch_.lap("means");
         }
-        watch_.lap("rays");
-        for (int pass = 0; pass < passes_; ++pass)
-            values = smoothed(surface, values, radius);
-        for (std::size_t i = 0; i < surface.size(); ++i) {
+        tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
             if (!is_wanted(i) || std::isnan(values[i]))
-                continue;
+                return;
             const std::size_t point = round[surface.tree.index(i)];
             result_.visibility[point] = values[i];
             result_.normals[point] = surface.normals[i];
             result_.confidence[point] = surface.flatness[i] * resolution(radius, surface.disc_radius[i]);
-        }
-        watch_.lap("smooth");
+        });
+        watch_.lap("gather");
         result_.tiles = ++tiles_;
     }
 
     /// Neighbours and planes of these points.
     CloudSurface planes_of(const std::vector<std::uint32_t>& which) {
-        std::vector<Vector3d> points(which.size()), normals;
+        std::vector<Vector3d> some_points, some_normals;
         const auto pick = [&](std::span<const Vector3d> from, std::vector<Vector3d>& to) {
+            if (which.size() == from.size())
+                return from;
             to.resize(which.size());
-            std::transform(which.begin(), which.end(), to.begin(), [&](std::uint32_t i) { return from[i]; });
+            tbb::parallel_for(std::size_t(0), to.size(), [&](std::size_t i) { to[i] = from[which[i]]; });
+            return std::span<const Vector3d>(to);
         };
-        pick(cloud_.points, points);
+        const std::span<const Vector3d> points = pick(cloud_.points, some_points);
+        std::span<const Vector3d> normals;
         if (recorded())
-            pick(cloud_.normals, normals);
-        CloudSurface surface = cloud_surface(points, normals);
+            normals = pick(cloud_.normals, some_normals);
+        CloudSurface surface = cloud_surface(points, normals, gpu_ ? &*gpu_ : nullptr);
         constexpr double same_planes = 0.8, too_many_opposed = 0.05;
         if (!normals.empty() && options_.normals == "auto" && surface.agreement < same_planes) {
             normals_refused_ = true;
@@ -343,8 +378,8 @@ class CloudAo::Work {
                 "recorded normals are not used: the median angle between them and the planes of the points is "
                 "{:.0f} degrees; --cloud.normals recorded takes them all the same.",
                 std::acos(surface.agreement) * 180 / std::numbers::pi));
-            normals.clear();
-            surface = cloud_surface(points, {});
+            normals = {};
+            surface = cloud_surface(points, {}, gpu_ ? &*gpu_ : nullptr);
         }
         watch_.lap("planes");
         sides_opposed_ |= !normals.empty() && options_.normals == "auto" && surface.discord > too_many_opposed;
@@ -373,6 +408,8 @@ class CloudAo::Work {
                 apart && !recorded() ? ", whose normals were turned tile by tile: where they look wrong, give "
                                        "--cloud.outside or more --cloud.memory"
                                      : ""));
+        if (gpu_)
+            result_.notes.push_back(fmt::format("neighbours, rays and means on {}.", gpu_->device_name()));
         std::size_t unknown = 0;
         for (const std::uint32_t i : valid_)
             unknown += std::isnan(result_.visibility[i]);
@@ -386,6 +423,7 @@ class CloudAo::Work {
     const PointSet& cloud_;
     CloudVisibility result_;
     Watch watch_;
+    std::optional<CloudGpu> gpu_;
     std::optional<RayFan> fan_;
     Outside outside_;
     std::vector<std::uint32_t> valid_;
@@ -396,7 +434,7 @@ class CloudAo::Work {
 CloudVisibility CloudAo::compute(const PointSet& cloud, const std::optional<Vector3d>& scanner) const {
     if (!cloud.triangles.empty() && !options_.sky)
         return of_mesh(cloud);
-    return Work(options_, up_, viewpoint_, cloud, scanner).run();
+    return Work(options_, device_, up_, viewpoint_, cloud, scanner).run();
 }
 
 /// Vertices see exactly what the faces hide; no mean over neighbours is needed, but more rays.

@@ -15,7 +15,7 @@ namespace scanshade {
 struct CloudAoOptions {
     double radius = 0; ///< in the cloud's unit; 0 = from the cloud: see default_radius()
     int rays = 0; ///< per point; neighbours' rays make one even set, so that their mean counts several times as many.
-                  ///< 0 = 16; 8 and 4 where the radius spans more than 60 and 120 spacings
+                  ///< 0 = 64 on a GPU, else 16; 8 and 4 where the radius spans more than 60 and 120 spacings
     int smooth = -1;  ///< times that a value becomes the mean of those beside it on the same surface; -1 = 2; 3 and 5
                       ///< where so many spacings make neighbours near against the radius
     bool sky = false; ///< how much of the sky a point sees, however far what hides it
@@ -47,8 +47,9 @@ struct CloudVisibility {
 /// Deterministic: the result depends neither on the number of threads nor on their timing.
 class CloudAo {
   public:
-    /// Throws Misuse naming a setting out of its range.
-    explicit CloudAo(CloudAoOptions options);
+    /// On `device`, or where there is none on the processor (faster there than as Vulkan's device). Throws Misuse naming
+    /// a setting out of its range.
+    explicit CloudAo(CloudAoOptions options, gpu::Device* device = nullptr);
 
     /// `scanner`: where the file says that the cloud was seen from. Where there are faces, rays are cast from the
     /// vertices against them in place of discs.
@@ -60,6 +61,7 @@ class CloudAo {
     [[nodiscard]] CloudVisibility of_mesh(const PointSet& mesh) const;
 
     CloudAoOptions options_;
+    gpu::Device* device_;
     Eigen::Vector3d up_;
     std::optional<Eigen::Vector3d> viewpoint_; ///< said by the user
 };

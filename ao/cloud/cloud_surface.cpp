@@ -1,18 +1,23 @@
 // A cloud as a surface: planes of least squares, discs as wide as the gaps.
 #include "ao/cloud/cloud_surface.h"
 
+#include "ao/cloud/cloud_gpu.h"
+
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <functional>
 #include <limits>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 namespace scanshade {
 namespace {
 
 using Eigen::Vector3d, Eigen::Vector3f;
 
-constexpr std::size_t usual = 16, wider = Nearest::most;
+constexpr std::size_t usual = shared::cloud_neighbours, wider = Nearest::most;
 /// Discs of 1.13 spacings: at random places 2 % of a surface stay uncovered, which costs less than what larger discs
 /// reach beyond edges (cloud_bench: RMSE 0.024; at 1.2 it is 0.046, at 0.6 0.028).
 constexpr float disc_over_gap = 0.8F;
@@ -78,9 +83,15 @@ bool is_direction(const Vector3d& normal) { return normal.allFinite() && normal.
 
 /// Counts given normals that oppose their nearest neighbour's; turns those filled in to the side of given ones beside.
 void compare_sides(CloudSurface& surface, std::span<const Vector3d> given) {
-    std::size_t opposed = 0;
+    const std::size_t opposed = tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, surface.size()), std::size_t(0),
+        [&](const auto& range, std::size_t sum) {
+            for (std::size_t i = range.begin(); i < range.end(); ++i)
+                sum += surface.normals[i].dot(surface.normals[surface.near[i][0]]) < -0.7F;
+            return sum;
+        },
+        std::plus());
     for (std::size_t i = 0; i < surface.size(); ++i) {
-        opposed += surface.normals[i].dot(surface.normals[surface.near[i][0]]) < -0.7F;
         if (is_direction(given[surface.tree.index(i)]))
             continue;
         Vector3f beside = Vector3f::Zero();
@@ -95,16 +106,20 @@ void compare_sides(CloudSurface& surface, std::span<const Vector3d> given) {
 
 } // namespace
 
-CloudSurface cloud_surface(std::span<const Vector3d> points, std::span<const Vector3d> normals) {
-    Vector3d low = Vector3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
-    for (const Vector3d& point : points) {
-        low = low.cwiseMin(point);
-        high = high.cwiseMax(point);
-    }
-    const Vector3d middle = points.empty() ? Vector3d(Vector3d::Zero()) : Vector3d((low + high) / 2);
+CloudSurface cloud_surface(std::span<const Vector3d> points, std::span<const Vector3d> normals, CloudGpu* gpu) {
+    using Box = Eigen::AlignedBox3d;
+    const Box box = tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, points.size()), Box(),
+        [&](const auto& range, Box part) {
+            for (std::size_t i = range.begin(); i < range.end(); ++i)
+                part.extend(points[i]);
+            return part;
+        },
+        [](const Box& a, const Box& b) { return a.merged(b); });
+    const Vector3d middle = points.empty() ? Vector3d(Vector3d::Zero()) : Vector3d(box.center());
     std::vector<Vector3f> local(points.size());
-    std::transform(points.begin(), points.end(), local.begin(),
-                   [&](const Vector3d& point) { return Vector3f((point - middle).cast<float>()); });
+    tbb::parallel_for(std::size_t(0), points.size(),
+                      [&](std::size_t i) { local[i] = (points[i] - middle).cast<float>(); });
 
     CloudSurface surface{middle, NeighbourTree(local), {}, {}, {}, {}, {}};
     std::vector<float> cosines(normals.empty() ? 0 : points.size(), 1.0F); // between given normals and planes
@@ -115,41 +130,55 @@ CloudSurface cloud_surface(std::span<const Vector3d> points, std::span<const Vec
     surface.roughness.resize(count);
     surface.flatness.resize(count);
     std::vector<float> sixth(count);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 512), [&](const auto& range) {
-        Nearest found;
-        float reach =
-            std::numeric_limits<float>::infinity(); // of the place before; its neighbours are not far from ours
-        for (std::size_t i = range.begin(); i < range.end(); ++i) {
-            const float moved = i > range.begin() ? (surface.tree[i] - surface.tree[i - 1]).norm() : 0;
-            const float known = (reach + moved) * (1 + 1e-5F);
-            surface.tree.find_round(i, usual, found, known * known);
-            const auto near = found.all();
-            reach = near.size() == usual ? std::sqrt(near.back().distance2) : std::numeric_limits<float>::infinity();
-            for (std::size_t k = 0; k < CloudSurface::kept; ++k)
-                surface.near[i][k] = k < near.size() ? near[k].point : static_cast<std::uint32_t>(i);
-            sixth[i] = near.empty() ? 0 : std::sqrt(near[std::min<std::size_t>(5, near.size() - 1)].distance2);
-
-            Plane plane = plane_round(surface.tree, i, near);
-            if (on_a_line(plane) && near.size() == usual) {
-                surface.tree.find_round(i, wider, found);
-                plane = plane_round(surface.tree, i, found.all());
-            }
-            // Points strewn with one per s^2 have their sixth neighbour at 1.4 s; rows farther apart than their points
-            // spread the plane's narrow side, sqrt(variance) = 0.8 rows.
-            surface.disc_radius[i] = disc_over_gap * std::max(sixth[i], std::sqrt(plane.variance_narrow));
-            surface.roughness[i] = std::sqrt(plane.variance_across);
-            const float variance = plane.variance_across + plane.variance_narrow + plane.variance_wide;
-            surface.flatness[i] = on_a_line(plane) ? 0 : 1 - 3 * plane.variance_across / variance;
-            surface.normals[i] = on_a_line(plane) ? Vector3f(Vector3f::Zero()) : plane.normal;
-            if (normals.empty())
-                continue;
-            if (const Vector3d& given = normals[surface.tree.index(i)]; is_direction(given)) {
-                const Vector3f unit = given.normalized().cast<float>();
-                cosines[i] = surface.normals[i].isZero() ? 1.0F : std::abs(unit.dot(surface.normals[i]));
-                surface.normals[i] = unit;
-            }
+    const auto settle = [&](std::size_t i, std::size_t found, Plane plane) {
+        if (on_a_line(plane) && found == usual) {
+            Nearest far;
+            surface.tree.find_round(i, wider, far);
+            plane = plane_round(surface.tree, i, far.all());
         }
-    });
+        // Points strewn with one per s^2 have their sixth neighbour at 1.4 s; rows farther apart than their points
+        // spread the plane's narrow side, sqrt(variance) = 0.8 rows.
+        surface.disc_radius[i] = disc_over_gap * std::max(sixth[i], std::sqrt(plane.variance_narrow));
+        surface.roughness[i] = std::sqrt(plane.variance_across);
+        const float variance = plane.variance_across + plane.variance_narrow + plane.variance_wide;
+        surface.flatness[i] = on_a_line(plane) ? 0 : 1 - 3 * plane.variance_across / variance;
+        surface.normals[i] = on_a_line(plane) ? Vector3f(Vector3f::Zero()) : plane.normal;
+        if (normals.empty())
+            return;
+        if (const Vector3d& given = normals[surface.tree.index(i)]; is_direction(given)) {
+            const Vector3f unit = given.normalized().cast<float>();
+            cosines[i] = surface.normals[i].isZero() ? 1.0F : std::abs(unit.dot(surface.normals[i]));
+            surface.normals[i] = unit;
+        }
+    };
+    if (gpu) {
+        const CloudGpu::Neighbourhoods all = gpu->neighbourhoods(surface.tree);
+        tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
+            const auto& [normal, sixth_distance, variance, found] = all.rounds[i];
+            surface.near[i] = all.near[i];
+            sixth[i] = sixth_distance;
+            settle(i, found, {{normal.x, normal.y, normal.z}, variance.x, variance.y, variance.z});
+        });
+    } else {
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 512), [&](const auto& range) {
+            Nearest found;
+            float reach =
+                std::numeric_limits<float>::infinity(); // of the place before; its neighbours are not far from ours
+            for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                const float moved = i > range.begin() ? (surface.tree[i] - surface.tree[i - 1]).norm() : 0;
+                const float known = (reach + moved) * (1 + 1e-5F);
+                surface.tree.find_round(i, usual, found, known * known);
+                const auto near = found.all();
+                reach =
+                    near.size() == usual ? std::sqrt(near.back().distance2) : std::numeric_limits<float>::infinity();
+                for (std::size_t k = 0; k < CloudSurface::kept; ++k)
+                    surface.near[i][k] = k < near.size() ? near[k].point : static_cast<std::uint32_t>(i);
+                sixth[i] =
+                    near.empty() ? 0 : std::sqrt(near[std::min<std::size_t>(5, near.size() - 1)].distance2);
+                settle(i, near.size(), plane_round(surface.tree, i, near));
+            }
+        });
+    }
     constexpr float sixth_on_grid = 1.414F;
     surface.spacing = median(std::move(sixth)) / sixth_on_grid;
     limit_discs(surface);

@@ -3,12 +3,14 @@
 
 #include "ao/cloud/neighbours.h"
 #include "ao/method.h"
+#include "shaders/shared/cloud.h"
 
 #include <optional>
 #include <string>
 
 namespace scanshade {
 
+class CloudGpu;
 class DiscRays;
 
 /// Where the outside of a surface without recorded normals is.
@@ -33,11 +35,12 @@ struct Outside {
 
 /// The neighbourhoods, planes and discs of a cloud, in the order of its tree; positions relative to `middle`.
 struct CloudSurface {
-    static constexpr std::size_t kept = 8; ///< neighbours remembered per point
+    static constexpr std::size_t kept = shared::cloud_kept; ///< neighbours remembered per point
+    using Near = std::array<std::uint32_t, kept>;
 
     Eigen::Vector3d middle = Eigen::Vector3d::Zero(); ///< of the box round the points, so that single precision serves
     NeighbourTree tree;
-    std::vector<std::array<std::uint32_t, kept>> near; ///< places, nearest first; the point's own where there are fewer
+    std::vector<Near> near; ///< places, nearest first; the point's own where there are fewer
     std::vector<Eigen::Vector3f> normals;              ///< unit; zero where the neighbours make no plane
     std::vector<float> disc_radius;                    ///< covers the gaps between neighbours; 0 for a lonely point
     std::vector<float> roughness; ///< one sigma of the neighbours' distances from the plane, in the cloud's unit
@@ -51,9 +54,10 @@ struct CloudSurface {
 
 /// Finds neighbours and planes of `points`, which must be finite. Where `normals` holds one per point they are taken,
 /// and those that have no length are filled in from the planes. Planes come from 16 neighbours, weighted by distance;
-/// where these lie on a line, as on a scanner's rings, from 64. `normals` of estimated planes have no side yet.
+/// where these lie on a line, as on a scanner's rings, from 64. `normals` of estimated planes have no side yet. Neighbours and planes are found by `gpu`,
+/// if given.
 [[nodiscard]] CloudSurface cloud_surface(std::span<const Eigen::Vector3d> points,
-                                         std::span<const Eigen::Vector3d> normals);
+                                         std::span<const Eigen::Vector3d> normals, CloudGpu* gpu = nullptr);
 
 /// Turns normals to the outside. Towards a viewpoint each point by itself; else neighbours are made to agree, those
 /// that most surely lie on one surface first (a spanning tree as of Hoppe et al. 1992, built as Kruskal's), and every

@@ -1,6 +1,8 @@
 // Rays from the points of a cloud: lifted off their own disc and those beside it, eight at a time.
 #include "ao/cloud/disc_rays.h"
 
+#include "shaders/shared/cloud.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -43,14 +45,13 @@ void aim(RayBundle& bundle, const Eigen::Matrix3f& axes, const RayFan::Run& run,
 DiscRays::DiscRays(const CloudSurface& surface) : surface_(surface), discs_(discs_of(surface)) {}
 
 RayBundle DiscRays::bundle_from(std::size_t place, const Vector3f& side, float radius) const {
-    constexpr float neighbours_tilt = 0.088F; // half of tan 10 degrees: so far neighbouring discs stand out
     const float disc = surface_.disc_radius[place], rough = surface_.roughness[place];
-    const float lift = std::max({neighbours_tilt * disc, rough, static_cast<float>(discs_.rounding_m())});
+    const float lift = shared::lift_of(disc, rough, static_cast<float>(discs_.rounding_m()));
     const Vector3d at = surface_.tree[place].cast<double>();
     RayBundle bundle;
     bundle.origin = discs_.local(at + static_cast<double>(lift) * side.cast<double>());
     bundle.far_m = std::max(radius - lift, 0.0F);
-    bundle.own = {discs_.local(at), 2 * disc, std::max(0.2F * disc, 2 * rough), side};
+    bundle.own = {discs_.local(at), shared::own_reach(disc), shared::own_depth(disc, rough), side};
     return bundle;
 }
 

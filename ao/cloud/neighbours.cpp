@@ -48,18 +48,19 @@ struct NeighbourTree::Placed {
 
 NeighbourTree::NeighbourTree(std::span<const Vector3f> points) {
     std::vector<Placed> placed(points.size());
-    for (std::size_t i = 0; i < points.size(); ++i)
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
         placed[i] = {points[i], static_cast<std::uint32_t>(i)};
+    });
     while ((points.size() >> levels_) >= leaf)
         ++levels_;
     boxes_.resize((std::size_t(2) << levels_) - 1);
     build(placed, 0, levels_);
     points_.resize(points.size());
     index_.resize(points.size());
-    for (std::size_t i = 0; i < points.size(); ++i) {
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
         points_[i] = placed[i].point;
         index_[i] = placed[i].index;
-    }
+    });
 }
 
 void NeighbourTree::build(std::span<Placed> points, std::size_t node, int levels) {

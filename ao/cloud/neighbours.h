@@ -39,6 +39,8 @@ class NeighbourTree {
     explicit NeighbourTree(std::span<const Eigen::Vector3f> points);
 
     [[nodiscard]] std::size_t size() const { return points_.size(); }
+    /// Of nodes above the leaves: a node that holds n points has halves of n / 2 (rounded down) and the rest.
+    [[nodiscard]] int levels() const { return levels_; }
     /// By place in the tree's order.
     [[nodiscard]] const Eigen::Vector3f& operator[](std::size_t place) const { return points_[place]; }
     /// Which of the points given stands at a place.

@@ -21,6 +21,9 @@ class RayFan {
         const float *x, *y, *z;
         int count;
     };
+    [[nodiscard]] std::size_t rays() const { return rays_; } ///< of a run
+    [[nodiscard]] std::size_t runs() const { return runs_; }
+    /// Of the point at a place.
     [[nodiscard]] Run run(std::size_t place) const {
         const std::size_t first = place % runs_ * rays_;
         return {x_.data() + first, y_.data() + first, z_.data() + first, static_cast<int>(rays_)};

@@ -98,6 +98,10 @@ DeviceInfo info_of(const vk::raii::PhysicalDevice& physical, int index) {
     info.name = properties.deviceName.data();
     info.kind = kind_name(properties.deviceType);
     info.most_threads = static_cast<int>(properties.limits.maxComputeWorkGroupInvocations);
+    info.most_buffer_bytes = properties.limits.maxStorageBufferRange;
+    for (const vk::MemoryHeap& heap : physical.getMemoryProperties().memoryHeaps)
+        if (heap.flags & vk::MemoryHeapFlagBits::eDeviceLocal)
+            info.memory_bytes = std::max(info.memory_bytes, std::uint64_t(heap.size));
     info.driver = fmt::format("{} {}", driver.driverName.data(), driver.driverInfo.data());
     info.api = fmt::format("{}.{}.{}", VK_API_VERSION_MAJOR(api), VK_API_VERSION_MINOR(api), VK_API_VERSION_PATCH(api));
     info.unusable = what_is_missing(physical);

@@ -16,6 +16,8 @@ struct DeviceInfo {
     std::string driver;     ///< driver name and version text
     std::string api;        ///< "1.3.230"
     int most_threads = 0;   ///< of a work group
+    std::uint64_t most_buffer_bytes = 0; ///< that a shader may reach of a buffer
+    std::uint64_t memory_bytes = 0;      ///< of its largest heap of its own
     std::string unusable;   ///< what it lacks; empty = usable
 };
 

@@ -3,6 +3,7 @@
 
 #include "ao/raycast/embree.h"
 #include "projection/error.h"
+#include "shaders/shared/cloud.h"
 
 #include <algorithm>
 #include <cmath>
@@ -36,6 +37,10 @@ struct Extent {
 };
 
 } // namespace
+
+double rounding_at(float farthest) {
+    return 64.0 * (std::nextafter(farthest, std::numeric_limits<float>::infinity()) - farthest);
+}
 
 RTCDevice embree_device() {
     static const RTCDevice opened = [] {
@@ -75,7 +80,7 @@ void pass_own_surface(const RTCFilterFunctionNArguments* arguments) {
         RTCHitN* hit = arguments->hit;
         const Vector3f normal(RTCHitN_Ng_x(hit, n, i), RTCHitN_Ng_y(hit, n, i), RTCHitN_Ng_z(hit, n, i));
         const float length = normal.norm();
-        const bool alike = own.normal.isZero() || std::abs(normal.dot(own.normal)) > 0.7F * length;
+        const bool alike = own.normal.isZero() || std::abs(normal.dot(own.normal)) > shared::own_alike * length;
         if (alike && std::abs(normal.dot(own.point - met)) <= own.depth_m * length)
             arguments->valid[i] = 0;
     }
@@ -98,8 +103,7 @@ struct RaySurface::Tree {
         if (!extent.any())
             return;
         middle = (extent.low + extent.high) / 2;
-        const auto reach = static_cast<float>((extent.high - middle).maxCoeff());
-        rounding_m = 64.0 * (std::nextafter(reach, std::numeric_limits<float>::infinity()) - reach);
+        rounding_m = rounding_at(static_cast<float>((extent.high - middle).maxCoeff()));
     }
 
     template <class Item>

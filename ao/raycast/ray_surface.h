@@ -42,6 +42,9 @@ struct RayBundle {
     alignas(32) std::array<int, size> live; ///< -1 for rays to cast, 0 for the others
 };
 
+/// Rounding of a coordinate up to `farthest`: 64 float steps there.
+[[nodiscard]] double rounding_at(float farthest);
+
 /// Immutable once made; safe to use from several threads. Coordinates are kept relative to the middle of the geometry,
 /// so that single precision serves far from the origin (methods.md's 2.3: at 500 km a float step is 31 mm).
 class RaySurface {
@@ -70,7 +73,7 @@ class RaySurface {
     [[nodiscard]] bool blocked(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
 
     [[nodiscard]] Eigen::Vector3f local(const Eigen::Vector3d& point) const;
-    /// Rounding of a coordinate anywhere on the geometry: 64 float steps at its farthest coordinate.
+    /// Rounding of a coordinate anywhere on the geometry.
     [[nodiscard]] double rounding_m() const;
     [[nodiscard]] bool empty() const;
 

@@ -1,0 +1,51 @@
+// The heavy stages of a cloud's visibility on a Vulkan device: neighbours and their planes, rays, means.
+#pragma once
+
+#include "ao/cloud/cloud_surface.h"
+#include "ao/cloud/ray_fan.h"
+#include "ao/gpu/program.h"
+#include "shaders/shared/cloud.h"
+
+#include <array>
+#include <optional>
+
+namespace scanshade {
+
+/// Finds what NeighbourTree, DiscRays and the mean over neighbours find, but for rounding. One thread at a time.
+class CloudGpu {
+  public:
+    explicit CloudGpu(gpu::Device& device) : device_(device) {}
+
+    /// How many points fit one call: the device's largest buffer and half of its memory hold so many neighbourhoods.
+    [[nodiscard]] std::size_t most_points() const;
+
+    /// What stands round each point, by place; views into the program's memory.
+    struct Neighbourhoods {
+        std::unique_ptr<gpu::Program> program;
+        std::span<const CloudSurface::Near> near;
+        std::span<const shared::CloudRound> rounds;
+    };
+    [[nodiscard]] Neighbourhoods neighbourhoods(const NeighbourTree& tree);
+
+    /// Where rays go, and how often values become the mean of those beside them.
+    struct Task {
+        float radius = 0; ///< the largest float for the sky
+        std::optional<Eigen::Vector3f> up;
+        float mean_falloff = 0; ///< weights are e^(falloff distance^2)
+        int means = 0;
+    };
+    /// By place; NaN for points without a plane.
+    [[nodiscard]] std::vector<float> visibility(const CloudSurface& surface, const RayFan& fan, const Task& task);
+
+    /// Device milliseconds of all calls so far, by pass, transfers included.
+    [[nodiscard]] const Timings& timings() const { return timings_; }
+    [[nodiscard]] const std::string& device_name() const { return device_.info().name; }
+
+  private:
+    void run(gpu::Program& program, const shared::CloudConstants& constants);
+
+    gpu::Device& device_;
+    Timings timings_;
+};
+
+} // namespace scanshade
