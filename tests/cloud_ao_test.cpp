@@ -260,6 +260,14 @@ TEST(CloudAo, tiles_change_hardly_anything) {
     EXPECT_LT(rms_between(whole.visibility, tiled.visibility), 0.015);
 }
 
+TEST(CloudAo, a_wall_that_holds_most_points_is_divided_too) {
+    Points points = square(200000);
+    for (std::size_t i = 0; i < points.size(); ++i) // most at the lowest coordinate of the longest axis
+        points[i] =
+            i % 4 ? Vector3d(0, points[i].x(), points[i].y()) : Vector3d(3 + 3 * points[i].x(), points[i].y(), 0);
+    EXPECT_GT(visibility(points, {.radius = 0.1, .rays = 4, .outside = "10,0,10", .memory_mib = 64}).tiles, 1);
+}
+
 TEST(CloudAo, same_input_same_bits) {
     const Points points = corner(30000);
     const auto one = visibility(points), other = visibility(points);

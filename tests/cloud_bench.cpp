@@ -1,8 +1,8 @@
 // cloud_bench: visibility of a scene's points, from the points alone, against rays on the scene itself: error, time,
 // memory.
 //   cloud_bench [--scene office] [--points 1000000] [--rays 8,16,32] [--no-normals] [--raycast] [--device NAME]
-//   cloud_bench --sky [--scene outdoor] [--raster 512,1024,2048]     the sky's share, also by depth images from 256
-//   sides
+//   [--smooth 2] cloud_bench --sky [--scene outdoor] [--raster 512,1024,2048]     the sky's share, also by depth images
+//   from 256 sides
 // All rows are of one run, each judged at the same points (about 50000); seconds are the wall's and the processor's.
 #include "ao/cloud/cloud_ao.h"
 #include "ao/compare.h"
@@ -171,7 +171,8 @@ int main(int argc, char** argv) {
         device = std::make_unique<gpu::Device>(device_name);
     for (const int count : rays)
         judge.row(fmt::format("{} rays a point", count), [&] {
-            const auto found = CloudAo({.radius = radius, .rays = count, .smooth = smooth, .sky = sky}, device.get()).compute(set);
+            const auto found =
+                CloudAo({.radius = radius, .rays = count, .smooth = smooth, .sky = sky}, device.get()).compute(set);
             for (const auto& [stage, ms] : found.timings)
                 fmt::print("{} {:.0f} ms; ", stage, ms);
             fmt::print("\n");

@@ -4,7 +4,9 @@
 #include "apps/scene_cloud.h"
 
 #include <cmath>
+#include <cstdio>
 #include <gtest/gtest.h>
+#include <limits>
 
 namespace scanshade {
 namespace {
@@ -93,9 +95,24 @@ TEST(CloudGpu, small_clouds_and_holes_are_no_matter) {
     }
 }
 
+TEST(CloudGpu, tiles_are_those_of_the_processor) {
+    const scene::SceneCloud cloud = scene::scene_cloud(scene::World(scene::scene_named("office")), 170000);
+    const CloudAoOptions options{.radius = 0.2, .rays = 4, .smooth = 3, .memory_mib = 64};
+    ASSERT_EQ(CloudAo(options).compute({cloud.points, cloud.normals}).tiles, 2);
+    expect_alike({cloud.points, cloud.normals}, options, 0.002, 0.25);
+}
+
+TEST(CloudGpu, many_points_at_one_place_are_no_matter) {
+    constexpr std::size_t many = 100000; // each with each, they would take minutes
+    Points points = office().points, normals = office().normals;
+    points.insert(points.end(), many, Vector3d(0.1, 0.2, 0.3));
+    normals.insert(normals.end(), many, Vector3d(0, 0, 1));
+    expect_alike({points, normals}, {.radius = 0.5, .rays = 4}, 0.001, 0.25);
+}
+
 TEST(CloudGpu, same_input_same_bits) {
     const PointSet set{office().points, office().normals};
-    const CloudAo method({.radius = 0.2}, &device());
+    const CloudAo method({.radius = 0.2, .rays = 8}, &device());
     EXPECT_EQ(method.compute(set).visibility, method.compute(set).visibility);
 }
 

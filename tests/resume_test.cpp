@@ -83,15 +83,17 @@ int wait_for(pid_t child) {
 }
 
 /// Starts the program again and again and kills it after a random number of frames and some milliseconds, until `kills`
-/// have met it amid its frames; those that met it while it started come on top. Whenever it comes to its end before, and
-/// at last, `done` looks at the results in `folder` and clears them.
-void kill_at_random(const std::string& arguments, const fs::path& folder, int kills, const std::function<void()>& done) {
+/// have met it amid its frames; those that met it while it started come on top. Whenever it comes to its end before,
+/// and at last, `done` looks at the results in `folder` and clears them.
+void kill_at_random(const std::string& arguments, const fs::path& folder, int kills,
+                    const std::function<void()>& done) {
     std::mt19937 random(20261121);
     std::uniform_int_distribution<int> some_frames(-10, 60), some_ms(0, 50);
     const auto frames_done = [&] { return fs::exists(folder) ? count_in(folder, "{\"frame\":") : 0; };
     int amid = 0, early = 0, looks = 1;
     while (amid < kills) {
-        const std::size_t before = frames_done(), enough = before + static_cast<std::size_t>(std::max(0, some_frames(random)));
+        const std::size_t before = frames_done(),
+                          enough = before + static_cast<std::size_t>(std::max(0, some_frames(random)));
         const pid_t child = start(arguments);
         int status = 0;
         bool ended = false;

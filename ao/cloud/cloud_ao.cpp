@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <charconv>
 #include <chrono>
 #include <cmath>
@@ -122,7 +123,8 @@ std::vector<Parameter> CloudAoOptions::parameters() {
         {"radius",
          "how far away a surface may still occlude, in the cloud's unit; 0 = from the cloud's extent and spacing",
          &radius, "", 0, 1e9},
-        {"rays", "per point; 0 = 64 on a GPU, else 16, fewer where the radius spans many spacings", &rays, "", 0, 16384},
+        {"rays", "per point; 0 = 64 on a GPU, else 16, fewer where the radius spans many spacings", &rays, "", 0,
+         16384},
         {"smooth",
          "how often a value becomes the mean of those beside it on the same surface; -1 = twice, or more where the "
          "radius "
@@ -198,7 +200,7 @@ class CloudAo::Work {
 
   private:
     static constexpr std::size_t enough_to_judge = 60000;
-    static constexpr double bytes_per_point = 420; ///< measured, with Embree's tree
+    static constexpr double bytes_per_point = 420; ///< measured, with Embree's tree; GPUs need less of the host
 
     [[nodiscard]] std::size_t at_once() const {
         const auto fitting = static_cast<std::size_t>(options_.memory_mib * 1048576.0 / bytes_per_point);
@@ -267,18 +269,39 @@ class CloudAo::Work {
         std::vector<std::uint32_t> low, high;
         for (const std::uint32_t i : core)
             (cloud_.points[i][axis] < middle ? low : high).push_back(i);
-        if (low.empty() || high.empty()) // most of them at one coordinate
-            return tile(core, round);
-        for (std::vector<std::uint32_t>* half : {&low, &high}) {
-            Eigen::AlignedBox3d box = box_of(*half);
-            box.min().array() -= reach;
-            box.max().array() += reach;
-            std::vector<std::uint32_t> near;
-            std::copy_if(round.begin(), round.end(), std::back_inserter(near),
-                         [&](std::uint32_t i) { return box.contains(cloud_.points[i]); });
-            divide(*half, near, reach);
-            *half = {};
+        if (low.empty()) { // most of them at the lowest coordinate
+            const auto beyond = std::stable_partition(
+                high.begin(), high.end(), [&](std::uint32_t i) { return cloud_.points[i][axis] <= middle; });
+            low.assign(high.begin(), beyond);
+            high.erase(high.begin(), beyond);
         }
+        if (high.empty()) { // all of them at one place
+            tile(core, round);
+            return;
+        }
+        std::vector<std::uint32_t> near_low = within_reach(low, round, reach),
+                                   near_high = within_reach(high, round, reach);
+        constexpr double no_less = 0.9;
+        const double enough = no_less * static_cast<double>(round.size());
+        if (static_cast<double>(std::min(near_low.size(), near_high.size())) > enough) { // all within reach of all
+            tile(core, round);
+            return;
+        }
+        divide(low, near_low, reach);
+        low = near_low = {};
+        divide(high, near_high, reach);
+    }
+
+    /// Those of `round` in the box about `core` that is `reach` wider.
+    [[nodiscard]] std::vector<std::uint32_t> within_reach(const std::vector<std::uint32_t>& core,
+                                                          const std::vector<std::uint32_t>& round, double reach) const {
+        Eigen::AlignedBox3d box = box_of(core);
+        box.min().array() -= reach;
+        box.max().array() += reach;
+        std::vector<std::uint32_t> near;
+        std::copy_if(round.begin(), round.end(), std::back_inserter(near),
+                     [&](std::uint32_t i) { return box.contains(cloud_.points[i]); });
+        return near;
     }
 
     [[nodiscard]] Eigen::AlignedBox3d box_of(const std::vector<std::uint32_t>& points) const {
@@ -288,26 +311,45 @@ class CloudAo::Work {
         return box;
     }
 
-    /// The median coordinate of a part of the points.
+    /// The median coordinate of a part of the points; recording order must not choose them.
     [[nodiscard]] double middle_of(const std::vector<std::uint32_t>& points, int axis) const {
-        const std::size_t step = std::max<std::size_t>(1, points.size() / enough_to_judge);
+        const auto chosen = static_cast<std::uint64_t>(
+            std::min(1.0, static_cast<double>(enough_to_judge) / static_cast<double>(points.size())) * 0x1p32);
         std::vector<double> along;
-        for (std::size_t i = 0; i < points.size(); i += step)
-            along.push_back(cloud_.points[points[i]][axis]);
+        for (const std::uint32_t i : points)
+            if (hash(i) < chosen)
+                along.push_back(cloud_.points[i][axis]);
+        if (along.empty())
+            return cloud_.points[points.front()][axis];
         const auto middle = along.begin() + static_cast<std::ptrdiff_t>(along.size() / 2);
         std::nth_element(along.begin(), middle, along.end());
         return *middle;
     }
 
-    /// Values for `core`, which lies within `round`.
+    /// Values for `core`, which lies within `round`; on the GPU, where it has the memory for it.
     void tile(const std::vector<std::uint32_t>& core, const std::vector<std::uint32_t>& round) {
         if (round.empty())
             return;
+        if (gpu_ && round.size() <= gpu_->most_points()) {
+            try {
+                tile(core, round, &*gpu_);
+                ++gpu_tiles_;
+                return;
+            } catch (const Outage&) { // what concerns more than this cloud
+                throw;
+            } catch (const std::exception& failure) { // no memory, most likely: other programs' counts, too
+                result_.notes.push_back(fmt::format("{}: {}", gpu_->device_name(), failure.what()));
+            }
+        }
+        tile(core, round, nullptr);
+    }
+
+    void tile(const std::vector<std::uint32_t>& core, const std::vector<std::uint32_t>& round, CloudGpu* gpu) {
         std::vector<char> wanted(core.size() == round.size() ? 0 : cloud_.points.size(), 0);
         if (!wanted.empty())
             for (const std::uint32_t i : core)
                 wanted[i] = 1;
-        CloudSurface surface = planes_of(round);
+        CloudSurface surface = planes_of(round, gpu);
         std::optional<DiscRays> rays;
         if (sides_unknown()) {
             if (outside_.kind == Outside::Kind::inward)
@@ -318,24 +360,23 @@ class CloudAo::Work {
         const auto is_wanted = [&](std::size_t place) {
             return wanted.empty() || wanted[round[surface.tree.index(place)]];
         };
-        const auto is_beside = [&](std::size_t place) { // whose values the smoothing asks for
-            return is_wanted(place) || std::any_of(surface.near[place].begin(), surface.near[place].end(), is_wanted);
-        };
         const float radius = options_.sky ? std::numeric_limits<float>::max() : static_cast<float>(result_.radius);
         const std::optional<Vector3f> up = options_.sky ? std::optional<Vector3f>(up_.cast<float>()) : std::nullopt;
         std::vector<float> values;
-        if (gpu_) {
+        if (gpu) {
             rays.reset();
-            values = gpu_->visibility(surface, *fan_, {radius, up, mean_falloff(radius), passes_});
+            values = gpu->visibility(surface, *fan_, {radius, up, mean_falloff(radius), passes_});
             watch_.lap("rays and means");
         } else {
             if (!rays)
                 rays.emplace(surface);
             watch_.lap("tree");
             values.assign(surface.size(), nothing);
+            const std::vector<char> asked =
+                wanted.empty() ? std::vector<char>(surface.size(), 1) : asked_by_means(surface, is_wanted);
             tbb::parallel_for(tbb::blocked_range<std::size_t>(0, surface.size(), 64), [&](const auto& range) {
                 for (std::size_t i = range.begin(); i < range.end(); ++i)
-                    if (!surface.normals[i].isZero() && is_beside(i))
+                    if (!surface.normals[i].isZero() && asked[i])
                         values[i] = rays->open(i, *fan_, radius, up);
             });
             rays.reset();
@@ -356,8 +397,25 @@ class CloudAo::Work {
         result_.tiles = ++tiles_;
     }
 
+    /// By place, 1 for those whose values the means over neighbours of the wanted ones hang on.
+    template <class IsWanted>
+    [[nodiscard]] std::vector<char> asked_by_means(const CloudSurface& surface, const IsWanted& is_wanted) const {
+        std::vector<char> asked(surface.size());
+        tbb::parallel_for(std::size_t(0), asked.size(), [&](std::size_t i) { asked[i] = is_wanted(i); });
+        for (int pass = 0; pass < passes_; ++pass) {
+            std::vector<char> further = asked;
+            tbb::parallel_for(std::size_t(0), asked.size(), [&](std::size_t i) {
+                if (asked[i])
+                    for (const std::uint32_t j : surface.near[i])
+                        std::atomic_ref(further[j]).store(1, std::memory_order_relaxed);
+            });
+            asked = std::move(further);
+        }
+        return asked;
+    }
+
     /// Neighbours and planes of these points.
-    CloudSurface planes_of(const std::vector<std::uint32_t>& which) {
+    CloudSurface planes_of(const std::vector<std::uint32_t>& which, CloudGpu* gpu) {
         std::vector<Vector3d> some_points, some_normals;
         const auto pick = [&](std::span<const Vector3d> from, std::vector<Vector3d>& to) {
             if (which.size() == from.size())
@@ -370,7 +428,7 @@ class CloudAo::Work {
         std::span<const Vector3d> normals;
         if (recorded())
             normals = pick(cloud_.normals, some_normals);
-        CloudSurface surface = cloud_surface(points, normals, gpu_ ? &*gpu_ : nullptr);
+        CloudSurface surface = cloud_surface(points, normals, gpu);
         constexpr double same_planes = 0.8, too_many_opposed = 0.05;
         if (!normals.empty() && options_.normals == "auto" && surface.agreement < same_planes) {
             normals_refused_ = true;
@@ -379,7 +437,7 @@ class CloudAo::Work {
                 "{:.0f} degrees; --cloud.normals recorded takes them all the same.",
                 std::acos(surface.agreement) * 180 / std::numbers::pi));
             normals = {};
-            surface = cloud_surface(points, {}, gpu_ ? &*gpu_ : nullptr);
+            surface = cloud_surface(points, {}, gpu);
         }
         watch_.lap("planes");
         sides_opposed_ |= !normals.empty() && options_.normals == "auto" && surface.discord > too_many_opposed;
@@ -408,8 +466,11 @@ class CloudAo::Work {
                 apart && !recorded() ? ", whose normals were turned tile by tile: where they look wrong, give "
                                        "--cloud.outside or more --cloud.memory"
                                      : ""));
-        if (gpu_)
+        if (gpu_ && gpu_tiles_ > 0)
             result_.notes.push_back(fmt::format("neighbours, rays and means on {}.", gpu_->device_name()));
+        if (gpu_ && gpu_tiles_ < tiles_)
+            result_.notes.push_back(fmt::format("{} of {} tiles were too large for {}; the processor took them.",
+                                                tiles_ - gpu_tiles_, tiles_, gpu_->device_name()));
         std::size_t unknown = 0;
         for (const std::uint32_t i : valid_)
             unknown += std::isnan(result_.visibility[i]);
@@ -428,7 +489,7 @@ class CloudAo::Work {
     Outside outside_;
     std::vector<std::uint32_t> valid_;
     bool normals_refused_ = false, sides_opposed_ = false;
-    int tiles_ = 0, passes_ = 2;
+    int tiles_ = 0, gpu_tiles_ = 0, passes_ = 2;
 };
 
 CloudVisibility CloudAo::compute(const PointSet& cloud, const std::optional<Vector3d>& scanner) const {

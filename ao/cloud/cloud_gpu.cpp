@@ -4,7 +4,8 @@
 #include "ao/raycast/ray_surface.h"
 
 #include <algorithm>
-#include <fmt/format.h>
+#include <array>
+#include <Eigen/Geometry>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
@@ -14,11 +15,15 @@ namespace {
 using gpu::BufferRow, gpu::PassRow;
 using shared::vec4;
 
-/// Groups of threads for so many items, in rows that every device allows.
-std::array<std::uint32_t, 3> groups_for(std::size_t items) {
-    const std::size_t groups = (items + shared::cloud_group - 1) / shared::cloud_group;
+/// So many groups of threads, in rows that every device allows.
+std::array<std::uint32_t, 3> in_rows(std::size_t groups) {
     constexpr std::size_t row = 65535;
     return {static_cast<std::uint32_t>(std::min(groups, row)), static_cast<std::uint32_t>((groups + row - 1) / row), 1};
+}
+
+/// A thread for each.
+std::array<std::uint32_t, 3> groups_for(std::size_t items) {
+    return in_rows((items + shared::cloud_group - 1) / shared::cloud_group);
 }
 
 std::size_t leaves_of(const NeighbourTree& tree) { return std::size_t(1) << tree.levels(); }
@@ -44,7 +49,7 @@ std::vector<PassRow> box_passes(const NeighbourTree& tree, int normals) {
                           "cloud/join",
                           {},
                           {boxes},
-                          {std::uint32_t(1) << (level - per_group), 1, 1},
+                          in_rows(std::size_t(1) << (level - per_group)),
                           {{shared::spec_level, level}}});
     }
     return passes;
@@ -53,7 +58,7 @@ std::vector<PassRow> box_passes(const NeighbourTree& tree, int normals) {
 } // namespace
 
 std::size_t CloudGpu::most_points() const {
-    constexpr std::size_t bytes_per_point = 2 * sizeof(vec4) + sizeof(CloudSurface::Near) + 2 * sizeof(float) + 8;
+    constexpr std::size_t bytes_per_point = 96; // of either program, boxes included
     const gpu::DeviceInfo& info = device_.info();
     return static_cast<std::size_t>(
         std::min(info.most_buffer_bytes / sizeof(CloudSurface::Near), info.memory_bytes / 2 / bytes_per_point));
@@ -73,8 +78,8 @@ CloudGpu::Neighbourhoods CloudGpu::neighbourhoods(const NeighbourTree& tree) {
     buffers.push_back({"rounds", count * sizeof(shared::CloudRound), BufferRow::Host::download});
     std::vector<PassRow> passes = box_passes(tree, points);
     passes.push_back({"nearest", "cloud/nearest", {points, boxes, begins}, {near, rounds}, groups_for(count), {}});
-    auto program = std::make_unique<gpu::Program>(device_, std::move(buffers), std::move(passes),
-                                                  sizeof(shared::CloudConstants));
+    auto program =
+        std::make_unique<gpu::Program>(device_, std::move(buffers), std::move(passes), sizeof(shared::CloudConstants));
     const auto to = program->host_as<vec4>(points);
     tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
         to[i] = {tree[i].x(), tree[i].y(), tree[i].z(), 0};
@@ -95,15 +100,14 @@ std::vector<float> CloudGpu::visibility(const CloudSurface& surface, const RayFa
     std::vector<BufferRow> buffers = tree_buffers(tree);
     buffers.push_back({"normals", count * sizeof(vec4), BufferRow::Host::upload});
     buffers.push_back({"fan", directions * sizeof(vec4), BufferRow::Host::upload});
-    buffers.push_back({"near", task.means > 0 ? count * sizeof(surface.near[0]) : sizeof(surface.near[0]),
-                       BufferRow::Host::upload});
+    buffers.push_back(
+        {"near", task.means > 0 ? count * sizeof(surface.near[0]) : sizeof(surface.near[0]), BufferRow::Host::upload});
     const int result = values + task.means % 2;
     for (int i = 0; i < (task.means > 0 ? 2 : 1); ++i)
         buffers.push_back({i == 0 ? "values" : "means", count * sizeof(float),
                            values + i == result ? BufferRow::Host::download : BufferRow::Host::none});
     std::vector<PassRow> passes = box_passes(tree, normals);
-    passes.push_back(
-        {"rays", "cloud/rays", {points, normals, boxes, begins, fan_at}, {values}, groups_for(count), {}});
+    passes.push_back({"rays", "cloud/rays", {points, normals, boxes, begins, fan_at}, {values}, groups_for(count), {}});
     for (int i = 0; i < task.means; ++i)
         passes.push_back({"mean",
                           "cloud/mean",
@@ -114,16 +118,20 @@ std::vector<float> CloudGpu::visibility(const CloudSurface& surface, const RayFa
     gpu::Program program(device_, std::move(buffers), std::move(passes), sizeof(shared::CloudConstants));
 
     const auto to_points = program.host_as<vec4>(points), to_normals = program.host_as<vec4>(normals);
-    const float farthest = tbb::parallel_reduce(
-        tbb::blocked_range<std::size_t>(0, count), 0.0F,
-        [&](const auto& range, float most) {
+    using Box = Eigen::AlignedBox3f;
+    const Box of_discs = tbb::parallel_reduce( // a stray far off has none: it must not make the rest coarse
+        tbb::blocked_range<std::size_t>(0, count), Box(),
+        [&](const auto& range, Box box) {
             for (std::size_t i = range.begin(); i < range.end(); ++i)
-                most = std::max(most, tree[i].cwiseAbs().maxCoeff());
-            return most;
+                if (!surface.normals[i].isZero() && surface.disc_radius[i] > 0)
+                    box.extend(tree[i]);
+            return box;
         },
-        [](float a, float b) { return std::max(a, b); });
+        [](const Box& a, const Box& b) { return a.merged(b); });
+    const Eigen::Vector3f middle = of_discs.isEmpty() ? Eigen::Vector3f(Eigen::Vector3f::Zero()) : of_discs.center();
+    const float farthest = of_discs.isEmpty() ? 0 : of_discs.sizes().maxCoeff() / 2;
     tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
-        const Eigen::Vector3f &at = tree[i], &n = surface.normals[i];
+        const Eigen::Vector3f at = tree[i] - middle, &n = surface.normals[i];
         to_points[i] = {at.x(), at.y(), at.z(), n.isZero() ? 0 : surface.disc_radius[i]};
         to_normals[i] = {n.x(), n.y(), n.z(), surface.roughness[i]};
     });

@@ -6,8 +6,11 @@
 #include "ao/gpu/program.h"
 #include "shaders/shared/cloud.h"
 
-#include <array>
+#include <memory>
 #include <optional>
+#include <span>
+#include <string>
+#include <vector>
 
 namespace scanshade {
 

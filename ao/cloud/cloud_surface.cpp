@@ -173,8 +173,7 @@ CloudSurface cloud_surface(std::span<const Vector3d> points, std::span<const Vec
                     near.size() == usual ? std::sqrt(near.back().distance2) : std::numeric_limits<float>::infinity();
                 for (std::size_t k = 0; k < CloudSurface::kept; ++k)
                     surface.near[i][k] = k < near.size() ? near[k].point : static_cast<std::uint32_t>(i);
-                sixth[i] =
-                    near.empty() ? 0 : std::sqrt(near[std::min<std::size_t>(5, near.size() - 1)].distance2);
+                sixth[i] = near.empty() ? 0 : std::sqrt(near[std::min<std::size_t>(5, near.size() - 1)].distance2);
                 settle(i, near.size(), plane_round(surface.tree, i, near));
             }
         });

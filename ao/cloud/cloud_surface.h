@@ -40,9 +40,9 @@ struct CloudSurface {
 
     Eigen::Vector3d middle = Eigen::Vector3d::Zero(); ///< of the box round the points, so that single precision serves
     NeighbourTree tree;
-    std::vector<Near> near; ///< places, nearest first; the point's own where there are fewer
-    std::vector<Eigen::Vector3f> normals;              ///< unit; zero where the neighbours make no plane
-    std::vector<float> disc_radius;                    ///< covers the gaps between neighbours; 0 for a lonely point
+    std::vector<Near> near;               ///< places, nearest first; the point's own where there are fewer
+    std::vector<Eigen::Vector3f> normals; ///< unit; zero where the neighbours make no plane
+    std::vector<float> disc_radius;       ///< covers the gaps between neighbours; 0 for a lonely point
     std::vector<float> roughness; ///< one sigma of the neighbours' distances from the plane, in the cloud's unit
     std::vector<float> flatness;  ///< 1 - 3 times the surface variation (Pauly, Gross and Kobbelt 2002): 1 = a plane
     float spacing = 0;            ///< median over the points of the side of a square that holds one of them
@@ -54,8 +54,8 @@ struct CloudSurface {
 
 /// Finds neighbours and planes of `points`, which must be finite. Where `normals` holds one per point they are taken,
 /// and those that have no length are filled in from the planes. Planes come from 16 neighbours, weighted by distance;
-/// where these lie on a line, as on a scanner's rings, from 64. `normals` of estimated planes have no side yet. Neighbours and planes are found by `gpu`,
-/// if given.
+/// where these lie on a line, as on a scanner's rings, from 64. `normals` of estimated planes have no side yet.
+/// Neighbours and planes are found by `gpu`, if given.
 [[nodiscard]] CloudSurface cloud_surface(std::span<const Eigen::Vector3d> points,
                                          std::span<const Eigen::Vector3d> normals, CloudGpu* gpu = nullptr);
 

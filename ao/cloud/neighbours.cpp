@@ -104,7 +104,7 @@ void NeighbourTree::find_round(std::size_t place, std::size_t wanted, Nearest& f
     stack[depth++] = {0, 0, points_.size(), levels_, 0};
     while (depth > 0) {
         Visit visit = stack[--depth];
-        if (visit.distance2 > found.reach2())
+        if (!found.may_hold(visit.distance2, visit.begin))
             continue;
         while (visit.levels > 0) { // down to the leaf on the nearer side; the other side waits
             const std::size_t middle = visit.begin + (visit.end - visit.begin) / 2;
@@ -112,14 +112,13 @@ void NeighbourTree::find_round(std::size_t place, std::size_t wanted, Nearest& f
             Visit right{2 * visit.node + 2, middle, visit.end, visit.levels - 1, 0};
             left.distance2 = boxes_[left.node].distance2(at);
             right.distance2 = boxes_[right.node].distance2(at);
-            const bool left_first =
-                left.distance2 != right.distance2 ? left.distance2 < right.distance2 : place < middle;
+            const bool left_first = left.distance2 <= right.distance2;
             const Visit& later = left_first ? right : left;
-            if (later.distance2 <= found.reach2())
+            if (found.may_hold(later.distance2, later.begin))
                 stack[depth++] = later;
             visit = left_first ? left : right;
         }
-        if (visit.distance2 > found.reach2())
+        if (!found.may_hold(visit.distance2, visit.begin))
             continue;
         for (std::size_t other = visit.begin; other < visit.end; ++other)
             if (other != place)

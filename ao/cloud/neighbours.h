@@ -21,8 +21,11 @@ class Nearest {
 
     void begin(std::size_t wanted, float reach2);
     void offer(float distance2, std::uint32_t point);
-    /// What lies farther cannot be among them.
-    [[nodiscard]] float reach2() const { return reach2_; }
+    /// Whether a point of `first` or a later number, no nearer than this, may be among them. Of equally near ones the
+    /// lower number counts, so that many points at one place do not have to be looked at each for each.
+    [[nodiscard]] bool may_hold(float distance2, std::size_t first) const {
+        return distance2 < reach2_ || (distance2 == reach2_ && (count_ < wanted_ || first < found_[count_ - 1].point));
+    }
     [[nodiscard]] std::span<const Neighbour> all() const { return {found_.data(), count_}; }
 
   private:

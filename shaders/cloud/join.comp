@@ -12,7 +12,7 @@ layout(binding = 32, scalar) uniform Constants { CloudConstants k; };
 void main() {
     uint width = gl_WorkGroupSize.x;
     for (int level = first_level; level > first_level - cloud_levels && level > 0; --level, width /= 2) {
-        uint place = gl_WorkGroupID.x * width + gl_LocalInvocationIndex;
+        uint place = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * width + gl_LocalInvocationIndex;
         if (gl_LocalInvocationIndex < width && place < (1u << level)) {
             uint node = (1u << level) + place;
             for (int i = 0; i < 3; ++i) {

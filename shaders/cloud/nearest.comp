@@ -1,5 +1,5 @@
-// The nearest neighbours of every point of a cloud, and the plane of least squares through them: near ones weigh most, so that edges
-// stay edges.
+// The nearest neighbours of every point of a cloud, and the plane of least squares through them: near ones weigh most,
+// so that edges stay edges.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -42,21 +42,29 @@ float distance_to(vec3 at, vec3 low, vec3 high) {
     return dot(outside, outside);
 }
 
+// Whether a node as far away may hold one of the nearest. Of equally near points the lower number counts, so that many at one place do
+// not have to be looked at each for each.
+bool may_hold(float distance, uint node) {
+    float reach = distances[cloud_neighbours - 1];
+    if (distance != reach) return distance < reach;
+    uint first_leaf = (node << (int(k.levels) - findMSB(node))) - (1u << k.levels);
+    return begins[first_leaf] < places[cloud_neighbours - 1];
+}
+
 void find_round(uint own, vec3 at) {
     [[unroll]] for (int i = 0; i < cloud_neighbours; ++i) {
         distances[i] = none;
         places[i] = 0xffffffffu;
     }
     uint node = 1, trail = 0, leaves = 1u << k.levels;
-    float from_here = 0.0; // squared distance of the node's box
     do {
         bool inside = true;
         while (inside && node < leaves) {
             vec4 a = boxes[3 * node], b = boxes[3 * node + 1], c = boxes[3 * node + 2];
             float left = distance_to(at, a.xyz, vec3(a.w, b.xy)), right = distance_to(at, vec3(b.zw, c.x), c.yzw);
-            float reach = distances[cloud_neighbours - 1];
-            inside = min(left, right) <= reach;
-            if (inside) descend(node, trail, right < left, max(left, right) <= reach);
+            bool to_left = may_hold(left, 2 * node), to_right = may_hold(right, 2 * node + 1);
+            inside = to_left || to_right;
+            if (inside) descend(node, trail, to_right && !(to_left && left <= right), to_left && to_right);
         }
         if (inside)
             for (uint i = begins[node - leaves], end = begins[node - leaves + 1]; i < end; ++i) {
