@@ -20,6 +20,14 @@ gpu::Device& device() {
     return opened;
 }
 
+class CloudGpuTest : public testing::Test {
+  protected:
+    void TearDown() override {
+        for (const std::string& message : device().validation_messages())
+            ADD_FAILURE() << message;
+    }
+};
+
 /// A generated room: its points, with the normals of its surfaces.
 const scene::SceneCloud& office() {
     static const scene::SceneCloud cloud = scene::scene_cloud(scene::World(scene::scene_named("office")), 30000);
@@ -46,7 +54,7 @@ void expect_alike(const PointSet& set, const CloudAoOptions& options, double rms
     EXPECT_LE(largest, worst);
 }
 
-TEST(CloudGpu, neighbours_and_planes_are_those_of_the_processor) {
+TEST_F(CloudGpuTest, neighbours_and_planes_are_those_of_the_processor) {
     for (const std::size_t count : {std::size_t(1), std::size_t(2), std::size_t(9), std::size_t(16), std::size_t(40),
                                     std::size_t(1000), office().points.size()}) {
         Points points(office().points.begin(), office().points.begin() + static_cast<std::ptrdiff_t>(count));
@@ -76,17 +84,17 @@ TEST(CloudGpu, neighbours_and_planes_are_those_of_the_processor) {
     }
 }
 
-TEST(CloudGpu, values_are_those_of_the_processor) {
+TEST_F(CloudGpuTest, values_are_those_of_the_processor) {
     expect_alike({office().points, office().normals}, {.radius = 0.5, .rays = 16}, 0.001, 0.06);
     expect_alike({office().points, office().normals}, {.rays = 4, .smooth = 5}, 0.001, 0.06);
     expect_alike({office().points, office().normals}, {.radius = 0.3, .rays = 33, .smooth = 0}, 0.002, 0.07);
 }
 
-TEST(CloudGpu, the_sky_is_that_of_the_processor) {
+TEST_F(CloudGpuTest, the_sky_is_that_of_the_processor) {
     expect_alike({office().points, office().normals}, {.rays = 16, .sky = true, .up = "0.2,0,1"}, 0.002, 0.06);
 }
 
-TEST(CloudGpu, small_clouds_and_holes_are_no_matter) {
+TEST_F(CloudGpuTest, small_clouds_and_holes_are_no_matter) {
     for (const std::size_t count : {std::size_t(0), std::size_t(1), std::size_t(3), std::size_t(11), std::size_t(60)}) {
         Points points(office().points.begin(), office().points.begin() + static_cast<std::ptrdiff_t>(count));
         if (count > 20)
@@ -95,14 +103,14 @@ TEST(CloudGpu, small_clouds_and_holes_are_no_matter) {
     }
 }
 
-TEST(CloudGpu, tiles_are_those_of_the_processor) {
+TEST_F(CloudGpuTest, tiles_are_those_of_the_processor) {
     const scene::SceneCloud cloud = scene::scene_cloud(scene::World(scene::scene_named("office")), 170000);
     const CloudAoOptions options{.radius = 0.2, .rays = 4, .smooth = 3, .memory_mib = 64};
     ASSERT_EQ(CloudAo(options).compute({cloud.points, cloud.normals}).tiles, 2);
     expect_alike({cloud.points, cloud.normals}, options, 0.002, 0.25);
 }
 
-TEST(CloudGpu, many_points_at_one_place_are_no_matter) {
+TEST_F(CloudGpuTest, many_points_at_one_place_are_no_matter) {
     constexpr std::size_t many = 100000; // each with each, they would take minutes
     Points points = office().points, normals = office().normals;
     points.insert(points.end(), many, Vector3d(0.1, 0.2, 0.3));
@@ -110,7 +118,7 @@ TEST(CloudGpu, many_points_at_one_place_are_no_matter) {
     expect_alike({points, normals}, {.radius = 0.5, .rays = 4}, 0.001, 0.25);
 }
 
-TEST(CloudGpu, same_input_same_bits) {
+TEST_F(CloudGpuTest, same_input_same_bits) {
     const PointSet set{office().points, office().normals};
     const CloudAo method({.radius = 0.2, .rays = 8}, &device());
     EXPECT_EQ(method.compute(set).visibility, method.compute(set).visibility);
