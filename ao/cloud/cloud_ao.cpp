@@ -3,6 +3,7 @@
 
 #include "ao/cloud/cloud_gpu.h"
 #include "ao/cloud/disc_rays.h"
+#include "ao/cloud/tiles.h"
 #include "ao/raycast/raycast.h"
 #include "projection/error.h"
 #include "projection/hash.h"
@@ -84,7 +85,7 @@ double extent_of(std::span<const Vector3d> points) {
     return extent.norm();
 }
 
-/// Visibility hardly changes over a tenth of the radius: e^(this distance^2) is a neighbour's weight in the mean.
+/// A neighbour's weight in the mean is e^(this distance^2): visibility hardly changes over a tenth of the radius.
 float mean_falloff(float radius) { return -1 / (2 * 0.01F * radius * radius); }
 
 /// The mean of a value and those beside it on the same surface: planes alike, near against the radius.
@@ -186,11 +187,11 @@ class CloudAo::Work {
     }
 
     CloudVisibility run() {
-        const double reach = result_.radius + 16 * result_.spacing;
-        if (options_.sky || valid_.size() <= at_once())
+        if (options_.sky)
             tile(valid_, valid_);
         else
-            divide(valid_, valid_, reach);
+            cut_into_tiles(cloud_.points, valid_, result_.radius + 16 * result_.spacing, at_once(),
+                           [&](const Places& core, const Places& round) { tile(core, round); });
         tell();
         if (gpu_)
             for (const auto& [pass, ms] : gpu_->timings())
@@ -254,80 +255,8 @@ class CloudAo::Work {
         result_.notes.push_back(fmt::format("{} rays a point, {} times the mean over neighbours.", rays, passes_));
     }
 
-    /// Halves the points of `core` until one half and all that lies within `reach` of it fit the memory.
-    void divide(const std::vector<std::uint32_t>& core, const std::vector<std::uint32_t>& round, double reach) {
-        constexpr std::size_t least = 10000;
-        if (round.size() <= at_once() || core.size() <= least) {
-            tile(core, round);
-            return;
-        }
-        const Eigen::AlignedBox3d all = box_of(core);
-        int axis = 0;
-        all.sizes().maxCoeff(&axis);
-        const double middle = middle_of(core, axis);
-        // In the order of the file: to go through its points in another takes several times as long.
-        std::vector<std::uint32_t> low, high;
-        for (const std::uint32_t i : core)
-            (cloud_.points[i][axis] < middle ? low : high).push_back(i);
-        if (low.empty()) { // most of them at the lowest coordinate
-            const auto beyond = std::stable_partition(
-                high.begin(), high.end(), [&](std::uint32_t i) { return cloud_.points[i][axis] <= middle; });
-            low.assign(high.begin(), beyond);
-            high.erase(high.begin(), beyond);
-        }
-        if (high.empty()) { // all of them at one place
-            tile(core, round);
-            return;
-        }
-        std::vector<std::uint32_t> near_low = within_reach(low, round, reach),
-                                   near_high = within_reach(high, round, reach);
-        constexpr double no_less = 0.9;
-        const double enough = no_less * static_cast<double>(round.size());
-        if (static_cast<double>(std::min(near_low.size(), near_high.size())) > enough) { // all within reach of all
-            tile(core, round);
-            return;
-        }
-        divide(low, near_low, reach);
-        low = near_low = {};
-        divide(high, near_high, reach);
-    }
-
-    /// Those of `round` in the box about `core` that is `reach` wider.
-    [[nodiscard]] std::vector<std::uint32_t> within_reach(const std::vector<std::uint32_t>& core,
-                                                          const std::vector<std::uint32_t>& round, double reach) const {
-        Eigen::AlignedBox3d box = box_of(core);
-        box.min().array() -= reach;
-        box.max().array() += reach;
-        std::vector<std::uint32_t> near;
-        std::copy_if(round.begin(), round.end(), std::back_inserter(near),
-                     [&](std::uint32_t i) { return box.contains(cloud_.points[i]); });
-        return near;
-    }
-
-    [[nodiscard]] Eigen::AlignedBox3d box_of(const std::vector<std::uint32_t>& points) const {
-        Eigen::AlignedBox3d box;
-        for (const std::uint32_t i : points)
-            box.extend(cloud_.points[i]);
-        return box;
-    }
-
-    /// The median coordinate of a part of the points; recording order must not choose them.
-    [[nodiscard]] double middle_of(const std::vector<std::uint32_t>& points, int axis) const {
-        const auto chosen = static_cast<std::uint64_t>(
-            std::min(1.0, static_cast<double>(enough_to_judge) / static_cast<double>(points.size())) * 0x1p32);
-        std::vector<double> along;
-        for (const std::uint32_t i : points)
-            if (hash(i) < chosen)
-                along.push_back(cloud_.points[i][axis]);
-        if (along.empty())
-            return cloud_.points[points.front()][axis];
-        const auto middle = along.begin() + static_cast<std::ptrdiff_t>(along.size() / 2);
-        std::nth_element(along.begin(), middle, along.end());
-        return *middle;
-    }
-
     /// Values for `core`, which lies within `round`; on the GPU, where it has the memory for it.
-    void tile(const std::vector<std::uint32_t>& core, const std::vector<std::uint32_t>& round) {
+    void tile(const Places& core, const Places& round) {
         if (round.empty())
             return;
         if (gpu_ && round.size() <= gpu_->most_points()) {
@@ -344,7 +273,7 @@ class CloudAo::Work {
         tile(core, round, nullptr);
     }
 
-    void tile(const std::vector<std::uint32_t>& core, const std::vector<std::uint32_t>& round, CloudGpu* gpu) {
+    void tile(const Places& core, const Places& round, CloudGpu* gpu) {
         std::vector<char> wanted(core.size() == round.size() ? 0 : cloud_.points.size(), 0);
         if (!wanted.empty())
             for (const std::uint32_t i : core)
@@ -415,7 +344,7 @@ class CloudAo::Work {
     }
 
     /// Neighbours and planes of these points.
-    CloudSurface planes_of(const std::vector<std::uint32_t>& which, CloudGpu* gpu) {
+    CloudSurface planes_of(const Places& which, CloudGpu* gpu) {
         std::vector<Vector3d> some_points, some_normals;
         const auto pick = [&](std::span<const Vector3d> from, std::vector<Vector3d>& to) {
             if (which.size() == from.size())
@@ -487,7 +416,7 @@ class CloudAo::Work {
     std::optional<CloudGpu> gpu_;
     std::optional<RayFan> fan_;
     Outside outside_;
-    std::vector<std::uint32_t> valid_;
+    Places valid_;
     bool normals_refused_ = false, sides_opposed_ = false;
     int tiles_ = 0, gpu_tiles_ = 0, passes_ = 2;
 };

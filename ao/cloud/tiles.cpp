@@ -1,0 +1,106 @@
+// Tiles of a cloud: always in the order of the file, since to go through its points in another takes several times as
+// long.
+#include "ao/cloud/tiles.h"
+
+#include "projection/hash.h"
+
+#include <algorithm>
+#include <Eigen/Geometry>
+#include <iterator>
+#include <utility>
+
+namespace scanshade {
+namespace {
+
+using Eigen::Vector3d;
+
+class Cutter {
+  public:
+    Cutter(std::span<const Vector3d> points, double reach, std::size_t at_once,
+           const std::function<void(const Places&, const Places&)>& tile)
+        : points_(points), reach_(reach), at_once_(at_once), tile_(tile) {}
+
+    void cut(const Places& core, const Places& round) {
+        constexpr std::size_t least = 10000;
+        if (round.size() <= at_once_ || core.size() <= least)
+            return tile_(core, round);
+        auto [low, high] = halves(core);
+        if (high.empty()) // all of them at one place
+            return tile_(core, round);
+        Places near_low = within_reach(low, round), near_high = within_reach(high, round);
+        constexpr double hardly_fewer = 0.9;
+        if (static_cast<double>(std::min(near_low.size(), near_high.size())) >
+            hardly_fewer * static_cast<double>(round.size())) // all within reach of all
+            return tile_(core, round);
+        cut(low, near_low);
+        low = near_low = {};
+        cut(high, near_high);
+    }
+
+  private:
+    /// The second is empty where all points are at one place.
+    [[nodiscard]] std::pair<Places, Places> halves(const Places& core) const {
+        const Eigen::AlignedBox3d all = box_of(core);
+        int axis = 0;
+        all.sizes().maxCoeff(&axis);
+        const double middle = middle_of(core, axis);
+        Places low, high;
+        for (const std::uint32_t i : core)
+            (points_[i][axis] < middle ? low : high).push_back(i);
+        if (low.empty()) { // most of them at the lowest coordinate
+            const auto beyond = std::stable_partition(high.begin(), high.end(),
+                                                      [&](std::uint32_t i) { return points_[i][axis] <= middle; });
+            low.assign(high.begin(), beyond);
+            high.erase(high.begin(), beyond);
+        }
+        return {std::move(low), std::move(high)};
+    }
+
+    /// Those of `round` in the box about `core` that is wider by the reach.
+    [[nodiscard]] Places within_reach(const Places& core, const Places& round) const {
+        Eigen::AlignedBox3d box = box_of(core);
+        box.min().array() -= reach_;
+        box.max().array() += reach_;
+        Places near;
+        std::copy_if(round.begin(), round.end(), std::back_inserter(near),
+                     [&](std::uint32_t i) { return box.contains(points_[i]); });
+        return near;
+    }
+
+    [[nodiscard]] Eigen::AlignedBox3d box_of(const Places& places) const {
+        Eigen::AlignedBox3d box;
+        for (const std::uint32_t i : places)
+            box.extend(points_[i]);
+        return box;
+    }
+
+    /// The median coordinate of a part of the points; recording order must not choose them.
+    [[nodiscard]] double middle_of(const Places& places, int axis) const {
+        constexpr double enough = 60000;
+        const auto chosen =
+            static_cast<std::uint64_t>(std::min(1.0, enough / static_cast<double>(places.size())) * 0x1p32);
+        std::vector<double> along;
+        for (const std::uint32_t i : places)
+            if (hash(i) < chosen)
+                along.push_back(points_[i][axis]);
+        if (along.empty())
+            return points_[places.front()][axis];
+        const auto middle = along.begin() + static_cast<std::ptrdiff_t>(along.size() / 2);
+        std::nth_element(along.begin(), middle, along.end());
+        return *middle;
+    }
+
+    std::span<const Vector3d> points_;
+    double reach_;
+    std::size_t at_once_;
+    const std::function<void(const Places&, const Places&)>& tile_;
+};
+
+} // namespace
+
+void cut_into_tiles(std::span<const Vector3d> points, const Places& core, double reach, std::size_t at_once,
+                    const std::function<void(const Places&, const Places&)>& tile) {
+    Cutter(points, reach, at_once, tile).cut(core, core);
+}
+
+} // namespace scanshade
