@@ -13,6 +13,7 @@
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
+#include <functional>
 #include <gtest/gtest.h>
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
@@ -801,6 +802,40 @@ TEST(images, our_pngs_come_back_bit_by_bit) {
         }
     EXPECT_THROW((void)encoded_png(cv::Mat1f(4, 4, 0.5F)), Error);
     EXPECT_THROW((void)encoded_png(cv::Mat()), Error);
+}
+
+/// Calls `work` from ever deeper in the stack.
+void at_depths(int depths, const std::function<void()>& work) {
+    if (depths == 0)
+        return;
+    volatile char further[1 << 16];
+    further[0] = '\0';
+    work();
+    at_depths(depths - 1, work);
+    further[1] = '\0'; // not a tail call: the frame stays
+}
+
+/// ISA-L's faster levels hash an address: one packing in some thousands of the same pixels is another.
+TEST(images, the_same_pixels_are_the_same_bytes_wherever_the_stack_lies) {
+    cv::theRNG().state = 4;
+    std::vector<cv::Mat> images(500);
+    for (cv::Mat& image : images) { // rows that begin alike, so that the first bytes are found again
+        cv::Mat1b row(1, 24), noise(12, 24);
+        cv::randu(row, 0, 256);
+        cv::randu(noise, 0, 256);
+        cv::repeat(row, 12, 1, image);
+        noise.copyTo(image, noise > 230);
+    }
+    std::vector<std::string> first;
+    std::size_t different = 0;
+    at_depths(80, [&] {
+        for (std::size_t i = 0; i < images.size(); ++i)
+            if (std::string bytes = encoded_png(images[i]); i == first.size())
+                first.push_back(std::move(bytes));
+            else
+                different += bytes != first[i];
+    });
+    EXPECT_EQ(different, 0U);
 }
 
 /// Grey PNGs that another library wrote, with each of the five filters, in one chunk or many, as it reads them itself;
