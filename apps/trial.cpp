@@ -100,6 +100,8 @@ DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& fram
                 const Frame frame = capture.load(frames[places[i]], false);
                 if (!frame.cloud || frame.cloud->organised())
                     images[i] = project(frame);
+            } catch (const Outage&) { // a sigma of fewer frames would shape all results
+                throw;
             } catch (const std::exception&) { // whoever processes the frame says what is wrong with it
             }
         });

@@ -139,10 +139,19 @@ void check_depth_size(const Frame& frame, const fs::path& depth) {
                                 text(expected), frame.camera.origin));
 }
 
-void load_colour(const fs::path& file, Frame& frame) {
+/// A share that went while frames were read is no fault of theirs.
+void check_still_there(const Capture& capture) {
+    if (std::error_code trouble; !fs::exists(capture.path, trouble))
+        throw Outage(capture.path.string() + ": not there any more");
+}
+
+void load_colour(const Capture& capture, const fs::path& file, Frame& frame) {
     try {
         frame.colour = read_colour(file);
+    } catch (const Outage&) {
+        throw;
     } catch (const std::exception& failure) {
+        check_still_there(capture);
         frame.warnings.push_back(fmt::format("{}; processed without colour.", failure.what()));
         return;
     }
@@ -179,7 +188,7 @@ void load_depth(const Capture& capture, const CaptureEntry& entry, Frame& frame,
     correct(frame.depth_m, capture.depth_correction);
     frame.colour_camera = capture.colour_camera;
     if (with_colour && !entry.colour.empty())
-        load_colour(entry.colour, frame);
+        load_colour(capture, entry.colour, frame);
 }
 
 void load_cloud(const Capture& capture, const CaptureEntry& entry, Frame& frame) {
@@ -264,7 +273,12 @@ Frame Capture::load(std::size_t index, bool with_colour) const {
     frame.warnings = entry.warnings;
     frame.world_from_camera = entry.world_from_camera;
     frame.registration = registration;
-    entry.cloud.empty() ? load_depth(*this, entry, frame, with_colour) : load_cloud(*this, entry, frame);
+    try {
+        entry.cloud.empty() ? load_depth(*this, entry, frame, with_colour) : load_cloud(*this, entry, frame);
+    } catch (const std::exception&) {
+        check_still_there(*this);
+        throw;
+    }
     return frame;
 }
 

@@ -51,9 +51,9 @@ struct Capture {
     std::vector<CaptureEntry> entries; ///< in recording order
     std::vector<std::string> warnings; ///< about the capture as a whole
 
-    /// Decodes frame `index`; safe to call from several threads. Throws Error naming file and place; a damaged colour
-    /// image is a warning, not a failure. Without colour, whose decoding takes as long as the depth's, it is not looked
-    /// at.
+    /// Decodes frame `index`; safe to call from several threads. Throws Error naming file and place, Outage where the
+    /// capture cannot be reached any more; a damaged colour image is a warning, not a failure. Without colour, whose
+    /// decoding takes as long as the depth's, it is not looked at.
     [[nodiscard]] Frame load(std::size_t index, bool with_colour = true) const;
 };
 

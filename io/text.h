@@ -11,7 +11,7 @@
 namespace scanshade {
 
 /// The whole file, or its first `limit` bytes. Throws Error naming the file when it is missing, a folder, or
-/// unreadable, or larger than the machine's memory.
+/// unreadable, or larger than the machine's memory; Outage where that is the machine's or the network's trouble.
 [[nodiscard]] std::string read_bytes(const std::filesystem::path& file, std::size_t limit = SIZE_MAX);
 /// The whole file. Throws Error, too, where it is larger than `most` bytes, before it is read: "too large for `what`".
 [[nodiscard]] std::string read_at_most(std::uintmax_t most, const std::filesystem::path& file, std::string_view what);

@@ -17,6 +17,7 @@
 #include <gtest/gtest.h>
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
+#include <sys/resource.h>
 #include <zlib.h>
 
 namespace scanshade {
@@ -918,6 +919,39 @@ TEST(captures, colour_of_another_size_is_left_out_and_depth_stays) {
     EXPECT_TRUE(frame.colour.empty());
     EXPECT_FALSE(frame.depth_m.empty());
     EXPECT_TRUE(warned(frame.warnings, "32x24"));
+}
+
+/// With no file to be opened until it goes.
+class NoFiles {
+  public:
+    NoFiles() {
+        ::getrlimit(RLIMIT_NOFILE, &before_);
+        const rlimit none{0, before_.rlim_max};
+        ::setrlimit(RLIMIT_NOFILE, &none);
+    }
+    ~NoFiles() { ::setrlimit(RLIMIT_NOFILE, &before_); }
+    NoFiles(const NoFiles&) = delete;
+    NoFiles& operator=(const NoFiles&) = delete;
+
+  private:
+    rlimit before_ = {};
+};
+
+TEST(captures, what_ails_the_machine_or_the_share_is_no_fault_of_a_frame) {
+    const TemporaryFolder folder;
+    const std::filesystem::path share = folder / "share";
+    write_picture(share / "color/1.png", picture(wall().size()));
+    write_depth_png(share / "depth/1.png", wall(), 1000);
+    const Capture capture = open_capture(share);
+    {
+        const NoFiles none;
+        EXPECT_THROW((void)capture.load(0), Outage);
+    }
+    EXPECT_FALSE(capture.load(0).colour.empty());
+    std::filesystem::rename(share, folder / "elsewhere");
+    EXPECT_THROW((void)capture.load(0), Outage);
+    std::filesystem::create_directories(share);
+    EXPECT_TRUE(says(refusal([&] { (void)capture.load(0); }), "no such file")) << "the share is there, the file is not";
 }
 
 TEST(captures, nothing_to_do_says_what_was_looked_for) {

@@ -212,6 +212,28 @@ TEST_F(ResumeTest, a_job_killed_at_random_and_run_again_leaves_the_bytes_of_a_pl
     });
 }
 
+TEST_F(ResumeTest, a_share_that_goes_amid_a_run_is_no_fault_of_its_frames) {
+    record(200);
+    ASSERT_EQ(run(all_files).exit_code, 0);
+    const auto expected = results_in(out());
+    fs::remove_all(out());
+    const pid_t child = start(fmt::format("run {} -o {} {}", capture().string(), out().string(), all_files));
+    for (int tries = 0; tries < 60000 && (!fs::exists(out()) || done_frames() < 20); ++tries)
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    fs::rename(capture(), folder / "elsewhere");
+    EXPECT_EQ(wait_for(child), unfinished);
+    const auto records = read_journal(journal_file(out(), "")).records;
+    EXPECT_GE(records.size(), 20u);
+    for (const auto& [name, record] : records)
+        EXPECT_TRUE(record.row.fault == Fault::none || record.row.fault == Fault::outage) << record.row.why;
+    EXPECT_LT(results_in(out()).size(), expected.size());
+
+    fs::rename(folder / "elsewhere", capture());
+    ASSERT_EQ(run(std::string("--resume ") + all_files).exit_code, 0);
+    EXPECT_EQ(differences(results_in(out()), expected), std::vector<std::string>());
+    EXPECT_TRUE(strays_in(out()).empty());
+}
+
 // ---------------------------------------------------------------------------------------------------- what is redone
 
 TEST_F(ResumeTest, a_second_run_does_nothing_and_what_has_changed_is_done_again) {
