@@ -809,7 +809,7 @@ TEST(images, our_pngs_come_back_bit_by_bit) {
 void at_depths(int depths, const std::function<void()>& work) {
     if (depths == 0)
         return;
-    volatile char further[1 << 16];
+    [[maybe_unused]] volatile char further[1 << 16];
     further[0] = '\0';
     work();
     at_depths(depths - 1, work);

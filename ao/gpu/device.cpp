@@ -157,7 +157,6 @@ void open_device(Device::State& state) {
     state.device = vk::raii::Device(state.physical, info);
     for (std::uint32_t i = 0; i < priorities.size(); ++i)
         state.lanes.emplace_back(state.device.getQueue(state.queue_family, i));
-    state.pipelines = state.device.createPipelineCache({});
     state.memory = state.physical.getMemoryProperties();
     state.nanoseconds_per_tick = state.physical.getProperties().limits.timestampPeriod;
     state.has_timestamps = family.timestampValidBits > 0;

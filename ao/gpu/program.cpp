@@ -1,7 +1,6 @@
 #include "ao/gpu/program.h"
 
 #include "ao/gpu/bound_buffer.h"
-#include "ao/gpu/shader_table.h"
 #include "ao/gpu/vulkan.h"
 #include "projection/error.h"
 
@@ -178,12 +177,7 @@ struct Program::State {
     vk::raii::Sampler sampler = nullptr;
     std::vector<BoundBuffer> staging; // per row; empty where the host reaches the buffer itself
     BoundBuffer constants;
-    struct Pipeline {
-        vk::raii::DescriptorSetLayout set = nullptr;
-        vk::raii::PipelineLayout layout = nullptr;
-        vk::raii::Pipeline pipeline = nullptr;
-    };
-    std::vector<Pipeline> pipelines;
+    std::vector<const Pipeline*> pipelines; // per pass; null where it fills buffers
     Stamps stamps = Stamps::passes;
     std::vector<std::string> intervals; // what lies between one time stamp and the next
     vk::raii::QueryPool queries = nullptr;
@@ -248,38 +242,18 @@ struct Program::State {
                                                               : vk::DescriptorType::eStorageTexelBuffer;
     }
 
-    Pipeline make_pipeline(const PassRow& pass) {
-        Pipeline made;
+    /// Null where the pass fills buffers.
+    const Pipeline* pipeline_of(const PassRow& pass) {
         if (pass.shader.empty())
-            return made;
-        std::vector<vk::DescriptorSetLayoutBinding> bindings;
-        const auto add = [&](std::uint32_t binding, vk::DescriptorType type, std::uint32_t count = 1) {
-            bindings.emplace_back(binding, type, count, vk::ShaderStageFlagBits::eCompute);
-        };
+            return nullptr;
+        Pipelines::Key key{std::string(pass.shader), {}, pass.constants};
         for (std::size_t i = 0; i < pass.reads.size(); ++i)
-            add(static_cast<std::uint32_t>(i), type_of(pass.reads[i], false));
+            key.bindings.push_back({static_cast<std::uint32_t>(i), type_of(pass.reads[i], false)});
         for (std::size_t i = 0; i < pass.writes.size(); ++i)
-            add(first_write_binding + static_cast<std::uint32_t>(i), type_of(pass.writes[i], true),
-                is_image(pass.writes[i]) ? rows[pass.writes[i]].image.mips : 1);
-        add(constants_binding, vk::DescriptorType::eUniformBuffer);
-        made.set =
-            gpu.device.createDescriptorSetLayout({vk::DescriptorSetLayoutCreateFlagBits::ePushDescriptorKHR, bindings});
-        made.layout = gpu.device.createPipelineLayout(vk::PipelineLayoutCreateInfo({}, *made.set));
-
-        std::vector<vk::SpecializationMapEntry> entries;
-        std::vector<std::int32_t> values;
-        for (const auto& [id, value] : pass.constants) {
-            entries.emplace_back(static_cast<std::uint32_t>(id), static_cast<std::uint32_t>(values.size() * 4), 4);
-            values.push_back(value);
-        }
-        const vk::SpecializationInfo specialization(static_cast<std::uint32_t>(entries.size()), entries.data(),
-                                                    values.size() * 4, values.data());
-        const auto words = shader_words(pass.shader);
-        const vk::raii::ShaderModule module_ = gpu.device.createShaderModule({{}, words.size_bytes(), words.data()});
-        const vk::PipelineShaderStageCreateInfo stage({}, vk::ShaderStageFlagBits::eCompute, *module_, "main",
-                                                      &specialization);
-        made.pipeline = gpu.device.createComputePipeline(gpu.pipelines, {{}, stage, *made.layout});
-        return made;
+            key.bindings.push_back({first_write_binding + static_cast<std::uint32_t>(i), type_of(pass.writes[i], true),
+                                    is_image(pass.writes[i]) ? rows[pass.writes[i]].image.mips : 1});
+        key.bindings.push_back({constants_binding, vk::DescriptorType::eUniformBuffer});
+        return &gpu.pipelines.of(gpu.device, key);
     }
 
     void push_descriptors(const PassRow& pass, const Pipeline& pipeline) {
@@ -382,8 +356,8 @@ struct Program::State {
                 for (int w : pass.writes)
                     commands.fillBuffer(*buffers[w].buffer, 0, VK_WHOLE_SIZE, 0);
             } else {
-                commands.bindPipeline(vk::PipelineBindPoint::eCompute, *pipelines[i].pipeline);
-                push_descriptors(pass, pipelines[i]);
+                commands.bindPipeline(vk::PipelineBindPoint::eCompute, *pipelines[i]->pipeline);
+                push_descriptors(pass, *pipelines[i]);
                 commands.dispatch(pass.groups[0], pass.groups[1], pass.groups[2]);
             }
             if (stamps == Stamps::passes)
@@ -502,7 +476,7 @@ Program::Program(Device& device, std::vector<BufferRow> buffers, std::vector<Pas
     state_->stamps = stamps;
     state_->make_buffers(constants_bytes);
     for (const PassRow& pass : state_->passes)
-        state_->pipelines.push_back(during("pass " + pass.name, [&] { return state_->make_pipeline(pass); }));
+        state_->pipelines.push_back(during("pass " + pass.name, [&] { return state_->pipeline_of(pass); }));
     state_->record();
     state_->fill_buffers();
 }

@@ -1,4 +1,4 @@
-// Rows of passes -> pipelines -> one command buffer; milliseconds per pass. Passes are plain data: they can be printed,
+// Rows of passes -> one command buffer; milliseconds per pass. Passes are plain data: they can be printed,
 // timed by name and checked without a GPU.
 #pragma once
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "ao/gpu/device.h"
+#include "ao/gpu/pipeline.h"
 
 #include <atomic>
 #include <deque>
@@ -32,7 +33,7 @@ struct Device::State {
     std::uint32_t queue_family = 0;
     std::deque<Lane> lanes; ///< programs take them in turns: what one waits for does not hold up the others
     std::atomic<std::size_t> programs = 0;
-    vk::raii::PipelineCache pipelines = nullptr; ///< programs made alike compile once
+    Pipelines pipelines;
     vk::PhysicalDeviceMemoryProperties memory;
     double nanoseconds_per_tick = 1;
     bool has_timestamps = false;
