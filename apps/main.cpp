@@ -47,7 +47,7 @@ void print_overview() {
     fmt::print("  scanshade {:<14} {}\n  scanshade {:<14} {}\n", "help",
                "this, or the flags of one command: help COMMAND", "--version", "the version");
     fmt::print("\nExit code: 0 all well, 1 misuse, 2 some frames' input is bad (the others are done), 3 nothing could be done,\n"
-               "           4 interrupted, device lost or disk full: try again, `run --resume` goes on, 5 internal error.\n");
+               "           4 interrupted, device lost, disk full or share gone: try again, `run --resume` goes on, 5 internal error.\n");
 }
 
 std::string flag_names(const Parameter& row) { return row.name == "out" ? "-o,--out" : "--" + row.name; }

@@ -127,6 +127,8 @@ class Tally {
         for (const FrameRow& row : rows)
             faults_.insert(row.fault);
     }
+    /// Of a whole capture.
+    void add(Fault fault) { faults_.insert(fault); }
     [[nodiscard]] int exit_code(int unopened) const {
         if (interrupted || faults_.contains(Fault::outage))
             return unfinished;
@@ -159,23 +161,34 @@ class Run final : public Command {
         if (!asked_.budget.any())
             (void)asked_.chosen_setup(); // refuses before anything is opened
         int unopened = 0;
-        std::vector<Job> jobs = plan(unopened);
+        Tally tally;
+        std::vector<Job> jobs = plan(unopened, tally);
         for (const Job& job : jobs)
             if (!asked_.overwrite && !asked_.resume)
                 refuse_to_overwrite(job);
         if (jobs.empty())
-            return nothing_done;
+            return worse(nothing_done, tally.exit_code(unopened));
 
         cv::setNumThreads(1); // frames are the parallelism; threads inside a frame would only compete with them
         end_gracefully_on_signals();
-        Tally tally;
         std::mutex counting;
         overlapped(jobs.size(), at_once(), [&](std::size_t i, Turn& turn) {
             if (interrupted)
                 return;
-            const std::vector<FrameRow> rows = process(std::move(jobs[i]), turn);
+            std::vector<FrameRow> rows;
+            std::optional<Fault> fault;
+            try {
+                rows = process(std::move(jobs[i]), turn);
+            } catch (const DeviceLost&) { // the other captures need it, too
+                throw;
+            } catch (const Outage& failure) {
+                say(fmt::format("failed: {}", failure.what()));
+                fault = Fault::outage;
+            }
             const std::lock_guard alone(counting);
             tally.add(rows);
+            if (fault)
+                tally.add(*fault);
         });
         return tally.exit_code(unopened);
     }
@@ -196,7 +209,7 @@ class Run final : public Command {
     }
 
     /// Opens what is to be processed. A capture that cannot be opened is told and counted; it stops no other.
-    std::vector<Job> plan(int& unopened) {
+    std::vector<Job> plan(int& unopened, Tally& tally) {
         std::vector<Job> jobs;
         std::set<std::string> taken;
         for (const std::string& path : asked_.paths) {
@@ -206,6 +219,9 @@ class Run final : public Command {
                 jobs.push_back(job_from(path, folder));
             } catch (const Misuse&) {
                 throw;
+            } catch (const Outage& failure) {
+                say(fmt::format("failed: {}", failure.what()));
+                tally.add(Fault::outage);
             } catch (const std::exception& failure) {
                 say(fmt::format("failed: {}", failure.what()));
                 ++unopened;

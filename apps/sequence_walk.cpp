@@ -55,6 +55,8 @@ Token Waiting::pass(Token arrived) {
         newest_ = arrived->row.index;
         if (arrived->row.why.empty() && !arrived->by_points)
             sequence_->add(newest_, arrived->depth, arrived->frame.world_from_camera);
+        if (arrived->row.fault == Fault::outage)
+            away_.emplace_back(newest_, arrived->row.why);
         if (arrived->wanted)
             queue_.push_back(std::move(arrived));
     } else {
@@ -65,7 +67,19 @@ Token Waiting::pass(Token arrived) {
     Token complete = std::move(queue_.front());
     queue_.pop_front();
     sequence_->forget_before(complete->row.index - std::min(complete->row.index, sequence_->reach()));
+    blame_if_alone(complete->row);
     return complete;
+}
+
+void Waiting::blame_if_alone(FrameRow& row) const {
+    const auto missed = std::ranges::find_if(away_, [&](const auto& frame) {
+        return frame.first + sequence_->reach() >= row.index && row.index + sequence_->reach() >= frame.first;
+    });
+    if (!row.why.empty() || missed == away_.end())
+        return;
+    row.status = FrameStatus::failed;
+    row.fault = Fault::outage;
+    row.why = "a frame that it is to be looked at together with: " + missed->second;
 }
 
 NeighbourhoodOptions sequence_options(NeighbourhoodOptions asked, const Capture& capture, double radius_m) {

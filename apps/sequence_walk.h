@@ -33,19 +33,24 @@ class Waiting {
   public:
     explicit Waiting(Neighbourhood* sequence) : sequence_(sequence) {}
 
-    /// Takes a frame (or none, when all have come) and gives the next one that is complete, or none.
+    /// Takes a frame (or none, when all have come) and gives the next one that is complete, or none. Where an outage
+    /// kept one of those around it away, it is complete only at another time, and its row says so.
     [[nodiscard]] Token pass(Token arrived);
     /// Those that an interrupted walk leaves behind.
     [[nodiscard]] const std::deque<Token>& rest() const { return queue_; }
 
   private:
     Neighbourhood* sequence_;
+    void blame_if_alone(FrameRow& row) const;
+
     std::size_t newest_ = 0;
     std::deque<Token> queue_;
+    std::vector<std::pair<std::size_t, std::string>> away_; ///< frames that an outage kept away, and why
 };
 
 /// What is asked, with the reach that the capture's poses ask for where none is given.
-[[nodiscard]] NeighbourhoodOptions sequence_options(NeighbourhoodOptions asked, const Capture& capture, double radius_m);
+[[nodiscard]] NeighbourhoodOptions sequence_options(NeighbourhoodOptions asked, const Capture& capture,
+                                                    double radius_m);
 
 /// A frame's visibility together with the frames around it; its row's notes say which these were, and which were left
 /// out and why.

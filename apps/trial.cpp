@@ -141,6 +141,8 @@ TrialCapture load_trial(const fs::path& path, const TrialRequest& request) {
         try {
             during(fmt::format("{}: frame {}", path.string(), capture.entries[among[place]].name),
                    [&] { trial.frames.push_back(load_frame(capture, among[place], truth)); });
+        } catch (const Outage&) {
+            throw;
         } catch (const std::exception&) {
             if (!request.leave_bad_out)
                 throw;

@@ -85,6 +85,8 @@ cv::Size depth_size(const std::vector<CaptureEntry>& entries) {
             break;
         try {
             return peek(entry.depth).size;
+        } catch (const Outage&) {
+            throw;
         } catch (const Error&) {
             continue; // loading this frame will say why
         }

@@ -45,13 +45,16 @@ bool natural_less(const std::string& a, const std::string& b) {
 
 std::vector<fs::path> files_in(const fs::path& folder) {
     std::vector<fs::path> files;
-    for (const auto& entry : fs::directory_iterator(folder)) {
-        const std::string name = entry.path().filename().string();
+    std::error_code trouble;
+    for (fs::directory_iterator entry(folder, trouble), end; !trouble && entry != end; entry.increment(trouble)) {
+        const std::string name = entry->path().filename().string();
         std::error_code ignored;
-        if (name.starts_with('.') || name == "Thumbs.db" || name == "desktop.ini" || !entry.is_regular_file(ignored))
+        if (name.starts_with('.') || name == "Thumbs.db" || name == "desktop.ini" || !entry->is_regular_file(ignored))
             continue;
-        files.push_back(entry.path());
+        files.push_back(entry->path());
     }
+    if (trouble)
+        fail_to_read(folder, trouble);
     std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
         return natural_less(a.filename().string(), b.filename().string());
     });
@@ -161,6 +164,8 @@ std::optional<CameraFile> camera_in(const fs::path& folder, std::vector<std::str
     for (auto other = others.begin(); !found && other != others.end(); ++other) {
         try {
             found = read_camera_file(*other);
+        } catch (const Outage&) {
+            throw;
         } catch (const Error&) {
             continue; // a name that promises nothing may hold anything
         }
@@ -172,6 +177,8 @@ DepthEncoding assumed_encoding(const fs::path& first_depth) {
     bool floats = false;
     try {
         floats = !first_depth.empty() && peek(first_depth).floats;
+    } catch (const Outage&) {
+        throw;
     } catch (const Error&) { // loading that frame will say what is wrong with it
     }
     if (floats)

@@ -260,6 +260,8 @@ bool may_be_depth(const fs::path& file) {
     try {
         const ImageFacts facts = peek(file);
         return facts.channels == 1 && (facts.bits == 16 || facts.floats);
+    } catch (const Outage&) {
+        throw;
     } catch (const Error&) {
         return true;
     }

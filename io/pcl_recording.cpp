@@ -90,6 +90,8 @@ std::optional<CameraFile> recorded_camera(const Shots& shots, std::vector<std::s
             else if (camera && !same(*camera, *first))
                 trouble.add(fmt::format("{} tells another camera than {}, whose is used for all frames.",
                                         camera->camera.origin, first->camera.origin));
+        } catch (const Outage&) {
+            throw;
         } catch (const Error& failure) {
             trouble.add(fmt::format("{}; not used.", failure.what()));
         }

@@ -22,23 +22,19 @@ std::uintmax_t memory_bytes() {
            static_cast<std::uintmax_t>(::sysconf(_SC_PAGE_SIZE));
 }
 
-/// What ails the machine or the network, and not the file.
-bool passes(const std::error_code& trouble) {
-    constexpr std::array of_the_moment = {EIO,          ESTALE,   ETIMEDOUT, ENOTCONN,  EHOSTDOWN,
-                                          EHOSTUNREACH, ENETDOWN, EMFILE,    ENFILE,    ENOMEM};
-    return std::ranges::count(of_the_moment, trouble.value()) > 0;
-}
-
-[[noreturn]] void fail(const std::filesystem::path& file, const std::error_code& trouble) {
-    const std::string what = file.string() + ": cannot be read: " + trouble.message();
-    if (passes(trouble))
-        throw Outage(what);
-    throw Error(what);
-}
-
 std::error_code last_error() { return {errno, std::generic_category()}; }
 
 } // namespace
+
+void fail_to_read(const std::filesystem::path& path, const std::error_code& trouble) {
+    // What ails the machine or the network, and not the file. (EIO is not among them: broken sectors stay broken.)
+    constexpr std::array of_the_moment = {ESTALE,   ETIMEDOUT, ENOTCONN, EHOSTDOWN, EHOSTUNREACH,
+                                          ENETDOWN, EMFILE,    ENFILE,   ENOMEM};
+    const std::string what = path.string() + ": cannot be read: " + trouble.message();
+    if (std::ranges::count(of_the_moment, trouble.value()) > 0)
+        throw Outage(what);
+    throw Error(what);
+}
 
 std::string read_bytes(const std::filesystem::path& file, std::size_t limit) {
     std::error_code trouble;
@@ -46,23 +42,23 @@ std::string read_bytes(const std::filesystem::path& file, std::size_t limit) {
     if (status.type() == std::filesystem::file_type::not_found)
         throw Error(file.string() + ": no such file");
     if (trouble)
-        fail(file, trouble);
+        fail_to_read(file, trouble);
     if (!std::filesystem::is_regular_file(status))
         throw Error(file.string() + ": not a regular file");
     const auto size = std::filesystem::file_size(file, trouble);
     if (trouble)
-        fail(file, trouble);
+        fail_to_read(file, trouble);
 
     if (std::min<std::uintmax_t>(size, limit) > memory_bytes())
         throw Error(fmt::format("{}: {} bytes, more than this machine's memory holds", file.string(), size));
 
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "rb"), &std::fclose);
     if (!stream)
-        fail(file, last_error());
+        fail_to_read(file, last_error());
     std::string bytes(std::min<std::uintmax_t>(size, limit), '\0');
     bytes.resize(std::fread(bytes.data(), 1, bytes.size(), stream.get()));
     if (std::ferror(stream.get()))
-        fail(file, last_error());
+        fail_to_read(file, last_error());
     return bytes;
 }
 

@@ -6,12 +6,15 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 namespace scanshade {
 
+/// Throws Error that `path` cannot be read, Outage where that is the machine's or the network's trouble of the moment.
+[[noreturn]] void fail_to_read(const std::filesystem::path& path, const std::error_code& trouble);
 /// The whole file, or its first `limit` bytes. Throws Error naming the file when it is missing, a folder, or
-/// unreadable, or larger than the machine's memory; Outage where that is the machine's or the network's trouble.
+/// unreadable, or larger than the machine's memory; Outage as fail_to_read().
 [[nodiscard]] std::string read_bytes(const std::filesystem::path& file, std::size_t limit = SIZE_MAX);
 /// The whole file. Throws Error, too, where it is larger than `most` bytes, before it is read: "too large for `what`".
 [[nodiscard]] std::string read_at_most(std::uintmax_t most, const std::filesystem::path& file, std::string_view what);

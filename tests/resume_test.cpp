@@ -334,6 +334,21 @@ TEST_F(ResumeTest, a_second_plain_run_is_turned_away) {
     EXPECT_NE(second.err.find("another run is at work"), std::string::npos) << second.err;
 }
 
+TEST_F(ResumeTest, a_capture_that_another_run_holds_does_not_keep_the_others_from_being_done) {
+    tests::write_capture(folder / "data/one", 2);
+    tests::write_capture(folder / "data/two", 2);
+    const std::string arguments =
+        fmt::format("run {} {} -o {}", (folder / "data/one").string(), (folder / "data/two").string(), out().string());
+    {
+        const Journal held(out() / "one", "");
+        EXPECT_EQ(run_program(arguments + " --resume").exit_code, unfinished);
+    }
+    EXPECT_FALSE(fs::exists(out() / "one/manifest.json"));
+    EXPECT_TRUE(fs::exists(out() / "two/manifest.json"));
+    EXPECT_EQ(run_program(arguments + " --resume").exit_code, 0);
+    EXPECT_TRUE(fs::exists(out() / "one/manifest.json"));
+}
+
 // ---------------------------------------------------------------------------------------------------- the device, the
 // disk, a crash
 

@@ -7,6 +7,7 @@
 #include "apps/generate.h"
 #include "apps/scene.h"
 #include "apps/sensor.h"
+#include "apps/sequence_walk.h"
 #include "io/cloud_file.h"
 #include "tests/support/small_capture.h"
 
@@ -337,6 +338,35 @@ TEST(Sequence, what_was_removed_is_gone_beyond_the_window) {
         }
     ASSERT_GT(uncovered, 1000);
     EXPECT_LT(ghost / uncovered, 0.02);
+}
+
+TEST(Sequence, what_an_outage_keeps_away_is_waited_for_by_its_neighbours) {
+    Surfel surfel(device(), {});
+    Neighbourhood sequence(device(), surfel, radius_m, {}, {}, only(0, 0, 1));
+    ASSERT_EQ(sequence.reach(), 1U);
+    Waiting waiting(&sequence);
+    std::vector<CaptureEntry> entries(5);
+    std::vector<FrameRow> rows(5);
+    const auto pass = [&](std::size_t i) { (void)waiting.pass(std::make_shared<Work>(Work{entries[i], rows[i]})); };
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        rows[i].index = i;
+        if (i == 1) {
+            rows[i].fault = Fault::outage;
+            rows[i].why = "the share is gone";
+        } else if (i == 4) { // a damaged file stays away for good
+            rows[i].fault = Fault::input;
+            rows[i].why = "cut off";
+        }
+        pass(i);
+    }
+    while (waiting.pass({}))
+        ;
+    for (const std::size_t i : {0, 1, 2}) {
+        EXPECT_EQ(rows[i].fault, Fault::outage) << i;
+        EXPECT_NE(rows[i].why.find("the share is gone"), std::string::npos) << rows[i].why;
+    }
+    EXPECT_EQ(rows[3].why, "");
+    EXPECT_EQ(rows[4].fault, Fault::input);
 }
 
 } // namespace
