@@ -16,7 +16,7 @@ enum ExitCode : int {
     misuse = 1,
     some_failed = 2,    ///< some frames' input is bad, and which; the others are done. Trying again will not help
     nothing_done = 3,   ///< nothing could be done
-    unfinished = 4,     ///< interrupted, a device lost, a disk full: the same again with --resume goes on
+    unfinished = 4,     ///< interrupted, a device lost, a disk full, a share gone: the same again with --resume goes on
     internal_error = 5, ///< the program's own mistake, or a frame that crashed it
 };
 

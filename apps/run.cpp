@@ -167,7 +167,7 @@ class Run final : public Command {
             if (!asked_.overwrite && !asked_.resume)
                 refuse_to_overwrite(job);
         if (jobs.empty())
-            return worse(nothing_done, tally.exit_code(unopened));
+            return tally.exit_code(unopened);
 
         cv::setNumThreads(1); // frames are the parallelism; threads inside a frame would only compete with them
         end_gracefully_on_signals();
@@ -176,7 +176,7 @@ class Run final : public Command {
             if (interrupted)
                 return;
             std::vector<FrameRow> rows;
-            std::optional<Fault> fault;
+            Fault fault = Fault::none;
             try {
                 rows = process(std::move(jobs[i]), turn);
             } catch (const DeviceLost&) { // the other captures need it, too
@@ -187,8 +187,7 @@ class Run final : public Command {
             }
             const std::lock_guard alone(counting);
             tally.add(rows);
-            if (fault)
-                tally.add(*fault);
+            tally.add(fault);
         });
         return tally.exit_code(unopened);
     }

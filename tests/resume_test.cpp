@@ -156,6 +156,9 @@ int kills() {
 /// Of twenty injections, how many to go on by: all of them only in tests/survival.
 int step() { return std::getenv("SCANSHADE_KILLS") ? 1 : 5; }
 
+/// Five files of each frame, that there is much to be caught at.
+constexpr const char* all_files = "--write ao,confidence,shaded,panel,cloud";
+
 class ResumeTest : public testing::Test {
   protected:
     void record(int frames) { tests::write_capture(folder / "data/capture", frames); }
@@ -168,15 +171,21 @@ class ResumeTest : public testing::Test {
     [[nodiscard]] Ran plan(const std::string& flags = "") const {
         return run_program(fmt::format("plan {} -o {} {}", (folder / "data").string(), job().string(), flags));
     }
+    /// A job of four blocks of one capture, three frames in flight; what a plain run, one frame after the other,
+    /// leaves.
+    [[nodiscard]] std::map<std::string, std::string> plan_four_blocks() {
+        record(200);
+        EXPECT_EQ(run(all_files).exit_code, 0);
+        EXPECT_EQ(plan(fmt::format("--block 50 --in-flight 3 {}", all_files)).exit_code, 0);
+        return results_in(out());
+    }
+    [[nodiscard]] fs::path job_results() const { return job() / "results/data/capture"; }
     [[nodiscard]] std::size_t done_frames() const { return count_in(out(), "{\"frame\":"); }
 
     TemporaryFolder folder;
 };
 
 // ---------------------------------------------------------------------------------------------------- killed
-
-/// Five files of each frame, that there is much to be caught at.
-constexpr const char* all_files = "--write ao,confidence,shaded,panel,cloud";
 
 TEST_F(ResumeTest, a_run_killed_at_random_and_resumed_leaves_the_bytes_of_an_uninterrupted_one) {
     record(200);
@@ -194,22 +203,26 @@ TEST_F(ResumeTest, a_run_killed_at_random_and_resumed_leaves_the_bytes_of_an_uni
 }
 
 TEST_F(ResumeTest, a_job_killed_at_random_and_run_again_leaves_the_bytes_of_a_plain_run) {
-    record(200);
-    ASSERT_EQ(run(all_files).exit_code, 0);
-    const auto expected = results_in(out());
-    ASSERT_EQ(plan(fmt::format("--block 50 --in-flight 3 {}", all_files)).exit_code,
-              0); // the plain run computed one frame after the other
-    const fs::path results = job() / "results/data/capture";
+    const auto expected = plan_four_blocks();
     kill_at_random("run " + job().string(), job(), kills(), [&] {
         // Tasks that a dying worker still held were left to it.
         for (int tries = 0; tries < 100 && run_program("status " + job().string()).exit_code != 0; ++tries) {
             std::this_thread::sleep_for(std::chrono::milliseconds(100));
             ASSERT_EQ(run_program("run " + job().string()).exit_code, 0);
         }
-        EXPECT_EQ(differences(results_in(results), expected), std::vector<std::string>());
+        EXPECT_EQ(differences(results_in(job_results()), expected), std::vector<std::string>());
         EXPECT_TRUE(strays_in(job()).empty()) << strays_in(job()).front();
         fs::remove_all(job() / "results");
     });
+}
+
+TEST_F(ResumeTest, every_run_of_a_job_leaves_the_bytes_of_a_plain_run) {
+    const auto expected = plan_four_blocks();
+    for (int look = 0; look < kills() / 2; ++look) {
+        ASSERT_EQ(run_program("run " + job().string()).exit_code, 0);
+        ASSERT_EQ(differences(results_in(job_results()), expected), std::vector<std::string>()) << look;
+        fs::remove_all(job() / "results");
+    }
 }
 
 TEST_F(ResumeTest, a_share_that_goes_amid_a_run_is_no_fault_of_its_frames) {
