@@ -1,8 +1,8 @@
 // `scanshade inspect`: what is in a capture, and what looks wrong, before anything is computed.
 #include "apps/command.h"
 #include "apps/json.h"
-#include "io/capture.h"
-#include "io/cloud_file.h"
+#include "io/captures/capture.h"
+#include "io/clouds/cloud_file.h"
 #include "projection/error.h"
 #include "projection/project.h"
 

@@ -201,4 +201,11 @@ RepeatedWarning::~RepeatedWarning() {
         warnings_.push_back(fmt::format("... and {} more like the last one.", seen_ - shown));
 }
 
+std::string lower_extension(const std::filesystem::path& file) {
+    std::string text = file.extension().string();
+    std::transform(text.begin(), text.end(), text.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return text;
+}
+
 } // namespace scanshade

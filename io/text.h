@@ -66,4 +66,7 @@ class RepeatedWarning {
     std::size_t seen_ = 0;
 };
 
+/// ".PNG" -> ".png"
+[[nodiscard]] std::string lower_extension(const std::filesystem::path& file);
+
 } // namespace scanshade

@@ -134,4 +134,9 @@ void check(const Parameter& row) {
         refuse(row, value_text(row));
 }
 
+const Parameter* row_named(const std::vector<Parameter>& rows, std::string_view name) {
+    const auto row = std::ranges::find(rows, name, &Parameter::name);
+    return row == rows.end() ? nullptr : &*row;
+}
+
 } // namespace scanshade

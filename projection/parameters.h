@@ -3,6 +3,7 @@
 
 #include <limits>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -29,5 +30,7 @@ void set(const Parameter& row, const std::string& text);
 [[nodiscard]] std::string range_text(const Parameter& row);
 /// Throws Misuse when the value is out of the row's range, not finite, or not among its choices.
 void check(const Parameter& row);
+/// The row of that name; null where there is none.
+[[nodiscard]] const Parameter* row_named(const std::vector<Parameter>& rows, std::string_view name);
 
 } // namespace scanshade

@@ -8,7 +8,7 @@
 #include "ao/compare.h"
 #include "ao/gpu/device.h"
 #include "ao/raycast/raycast.h"
-#include "apps/scene_cloud.h"
+#include "apps/scenes/scene_cloud.h"
 #include "projection/hash.h"
 
 #include <chrono>

@@ -1,6 +1,6 @@
 // Cameras refined from targets, clouds and sequences: what is recovered, how sure it is, and when nothing is changed.
-#include "io/cloud_file.h"
-#include "io/image_file.h"
+#include "io/clouds/cloud_file.h"
+#include "io/images/image_file.h"
 #include "projection/calibration/board_detection.h"
 #include "projection/calibration/boards.h"
 #include "projection/calibration/ladder.h"

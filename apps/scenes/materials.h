@@ -1,7 +1,7 @@
 // What the scenes' surfaces look like.
 #pragma once
 
-#include "apps/scene.h"
+#include "apps/scenes/scene.h"
 
 namespace scanshade::scene {
 

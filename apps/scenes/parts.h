@@ -1,7 +1,7 @@
 // The parts things are built of: bars, rods, wires, vessels, shells. World axes as in apps/scene.h, metres, radians.
 #pragma once
 
-#include "apps/scene.h"
+#include "apps/scenes/scene.h"
 #include "projection/hash.h"
 
 #include <initializer_list>

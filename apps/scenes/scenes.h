@@ -1,7 +1,7 @@
 // The scenes themselves, one to a file: what stands where. Rooms are made of things, things of parts.
 #pragma once
 
-#include "apps/scene.h"
+#include "apps/scenes/scene.h"
 
 namespace scanshade::scene {
 

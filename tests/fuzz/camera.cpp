@@ -1,5 +1,5 @@
 // Fuzz target: camera files of every format, written in every format that can say what they hold, and read again.
-#include "io/camera_file.h"
+#include "io/cameras/camera_file.h"
 #include "tests/fuzz/fuzz.h"
 
 #include <cmath>

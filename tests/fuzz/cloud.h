@@ -1,8 +1,8 @@
 // Any cloud: read, asked for all it may hold, written with a field more and read again.
 #pragma once
 
-#include "io/cloud_file.h"
-#include "io/cloud_records.h"
+#include "io/clouds/cloud_file.h"
+#include "io/clouds/cloud_records.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace scanshade::fuzz {

@@ -1,5 +1,5 @@
 // Fuzz target: what runs keep for themselves and people edit: journals, plans, settings. The first byte chooses.
-#include "apps/job.h"
+#include "apps/jobs/job.h"
 #include "apps/settings_file.h"
 #include "tests/fuzz/fuzz.h"
 

@@ -1,6 +1,6 @@
 // Fuzz target: the lists of a capture's folder. The first byte chooses the layout; its files follow, between lines of
 // "=====". Whatever a list says, nothing outside the folder may be opened.
-#include "io/capture.h"
+#include "io/captures/capture.h"
 #include "tests/fuzz/fuzz.h"
 
 #include <array>

@@ -1,7 +1,7 @@
 // Small sound files of every format, for the fuzz targets to start from: fuzz_seeds FOLDER writes FOLDER/TARGET/NAME.
-#include "io/camera_file.h"
-#include "io/cloud_file.h"
-#include "io/image_file.h"
+#include "io/cameras/camera_file.h"
+#include "io/clouds/cloud_file.h"
+#include "io/images/image_file.h"
 #include "tests/fuzz/fuzz.h"
 
 #include <array>

@@ -1,5 +1,5 @@
 // Fuzz target: poses; the first byte chooses the format.
-#include "io/trajectory.h"
+#include "io/captures/trajectory.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace {

@@ -1,7 +1,7 @@
 #include "tests/hard_cases/cases.h"
 
-#include "apps/scene.h"
-#include "apps/sensor.h"
+#include "apps/scenes/scene.h"
+#include "apps/scenes/sensor.h"
 #include "tests/support/scenes.h"
 
 #include <cmath>

@@ -10,9 +10,9 @@
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/gpu/device.h"
 #include "ao/method.h"
-#include "apps/configurations.h"
+#include "apps/method_settings.h"
 #include "apps/picture.h"
-#include "io/image_file.h"
+#include "io/images/image_file.h"
 #include "projection/error.h"
 
 #include <CLI/CLI.hpp>

@@ -3,9 +3,9 @@
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/gpu/transfer.h"
 #include "ao/screen/screen.h"
-#include "apps/error_classes.h"
-#include "apps/scene.h"
-#include "apps/sensor.h"
+#include "apps/measure/error_classes.h"
+#include "apps/scenes/scene.h"
+#include "apps/scenes/sensor.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 #include "tests/support/scenes.h"
 
-#include "apps/noise.h"
-#include "apps/scene.h"
+#include "apps/scenes/random_noise.h"
+#include "apps/scenes/scene.h"
 
 #include <cmath>
 #include <numbers>

@@ -1,7 +1,7 @@
 #include "tests/support/small_capture.h"
 
-#include "io/camera_file.h"
-#include "io/image_file.h"
+#include "io/cameras/camera_file.h"
+#include "io/images/image_file.h"
 
 #include <cstdlib>
 #include <fmt/format.h>

@@ -1,0 +1,151 @@
+// A job's files, and how its tasks are dealt to shards.
+#include "apps/jobs/job.h"
+
+#include "apps/json.h"
+#include "io/output_file.h"
+#include "io/text.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <fmt/format.h>
+#include <fstream>
+#include <numeric>
+#include <queue>
+
+namespace scanshade {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+json task_json(const Task& task) {
+    return {{"capture", task.capture.string()},
+            {"name", task.name},
+            {"first", task.first},
+            {"frames", task.frames},
+            {"of", task.of},
+            {"cost", task.cost}};
+}
+
+/// A name that stays inside results/, whatever a plan edited by hand says.
+std::string checked_name(const std::string& name) {
+    const fs::path path = fs::path(name).lexically_normal();
+    if (name.empty() || name.find('\0') != std::string::npos || path.is_absolute() || *path.begin() == "..")
+        throw Error("'" + name + "' is no name inside the job's folder");
+    return name;
+}
+
+Task task_from(const json& text) {
+    Task task{text.at("capture").get<std::string>(),
+              checked_name(text.at("name")),
+              count_at(text, "first"),
+              count_at(text, "frames"),
+              count_at(text, "of"),
+              text.at("cost").get<double>()};
+    if (task.frames == 0 || task.first > task.of || task.frames > task.of - task.first)
+        throw Error(fmt::format("frames {} + {} of {} cannot be", task.first, task.frames, task.of));
+    return task;
+}
+
+int variable(const char* name, int otherwise) {
+    const char* text = std::getenv(name);
+    if (!text)
+        return otherwise;
+    const auto value = whole_number(text);
+    if (!value || *value > 1'000'000'000)
+        throw Misuse(fmt::format("{}: '{}' given, expected a whole number", name, text));
+    return static_cast<int>(*value);
+}
+
+Shard checked(Shard shard, const std::string& origin) {
+    if (shard.of < 1 || shard.index < 1 || shard.index > shard.of)
+        throw Misuse(fmt::format("{}: shard {} of {} cannot be", origin, shard.index, shard.of));
+    return shard;
+}
+
+} // namespace
+
+std::string Task::block() const { return frames == of ? "" : fmt::format("{}-{}", first, first + frames); }
+
+bool is_job(const fs::path& folder) {
+    std::error_code ignored;
+    return fs::is_regular_file(folder / "plan.json", ignored) && fs::is_regular_file(folder / "tasks.jsonl", ignored);
+}
+
+void write_plan(const fs::path& job, const Plan& plan) {
+    write_atomically(job / "tasks.jsonl", [&](const fs::path& file) {
+        std::ofstream stream(file, std::ios::binary);
+        stream.exceptions(std::ios::failbit | std::ios::badbit);
+        for (const Task& task : plan.tasks)
+            stream << task_json(task).dump(-1, ' ', false, json::error_handler_t::replace) << '\n';
+        stream.flush();
+    });
+    json settings = json::object();
+    for (const auto& [name, value] : plan.settings)
+        settings[name] = value;
+    const double cost = std::accumulate(plan.tasks.begin(), plan.tasks.end(), 0.0,
+                                        [](double sum, const Task& task) { return sum + task.cost; });
+    const json head{{"program", "scanshade"}, {"version", SCANSHADE_VERSION},
+                    {"settings", settings},   {"tasks", plan.tasks.size()},
+                    {"cost", cost},           {"refused", plan.refused}};
+    write_atomically(job / "plan.json", text_of(head) + "\n");
+}
+
+Plan read_plan(const fs::path& job) {
+    Plan plan;
+    during((job / "plan.json").string(), [&] {
+        const json head = json::parse(read_at_most(1 << 28, job / "plan.json", "a plan"));
+        for (const auto& [name, value] : head.at("settings").items())
+            plan.settings.emplace_back(name, value.get<std::string>());
+        plan.refused = head.at("refused").get<std::vector<std::string>>();
+    });
+    std::ifstream stream(job / "tasks.jsonl");
+    int number = 0;
+    for (std::string line; std::getline(stream, line);)
+        during(at_line(job / "tasks.jsonl", ++number), [&] { plan.tasks.push_back(task_from(json::parse(line))); });
+    return plan;
+}
+
+fs::path results_of(const fs::path& job, const Task& task) { return job / "results" / task.name; }
+
+Shard shard_from(const std::string& text) {
+    if (!text.empty()) {
+        Shard shard;
+        int used = 0;
+        if (std::sscanf(text.c_str(), "%d/%d%n", &shard.index, &shard.of, &used) != 2 ||
+            used != static_cast<int>(text.size()))
+            throw Misuse("shard: '" + text + "' given, expected INDEX/COUNT from 1/COUNT to COUNT/COUNT");
+        return checked(shard, "--shard");
+    }
+    if (std::getenv("SLURM_ARRAY_TASK_ID")) {
+        const int first = variable("SLURM_ARRAY_TASK_MIN", 0), step = std::max(1, variable("SLURM_ARRAY_TASK_STEP", 1));
+        return checked({(variable("SLURM_ARRAY_TASK_ID", 0) - first) / step + 1, variable("SLURM_ARRAY_TASK_COUNT", 1)},
+                       "SLURM_ARRAY_TASK_ID");
+    }
+    if (std::getenv("JOB_COMPLETION_INDEX") && std::getenv("JOB_COMPLETIONS"))
+        return checked({variable("JOB_COMPLETION_INDEX", 0) + 1, variable("JOB_COMPLETIONS", 1)},
+                       "JOB_COMPLETION_INDEX");
+    return {};
+}
+
+std::vector<std::vector<std::size_t>> cut(const std::vector<Task>& tasks, int shards) {
+    std::vector<std::size_t> order(tasks.size());
+    std::iota(order.begin(), order.end(), 0);
+    std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) { return tasks[a].cost > tasks[b].cost; });
+    using Load = std::pair<double, std::size_t>;
+    std::priority_queue<Load, std::vector<Load>, std::greater<>> least;
+    std::vector<std::vector<std::size_t>> parts(static_cast<std::size_t>(shards));
+    for (std::size_t shard = 0; shard < parts.size(); ++shard)
+        least.emplace(0.0, shard);
+    for (const std::size_t task : order) {
+        const auto [load, shard] = least.top();
+        least.pop();
+        parts[shard].push_back(task);
+        least.emplace(load + tasks[task].cost, shard);
+    }
+    return parts;
+}
+
+} // namespace scanshade

@@ -1,0 +1,57 @@
+// A job: many captures cut into tasks, in a folder that every machine sees. plan.json says what was asked for,
+// tasks.jsonl lists the tasks, results/NAME holds a capture's results and the journals of its tasks.
+#pragma once
+
+#include "apps/walk/journal.h"
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace scanshade {
+
+/// A capture, or a block of its frames.
+struct Task {
+    std::filesystem::path capture;
+    std::string name;       ///< unique in the job: results/NAME
+    std::size_t first = 0;  ///< among the capture's frames that the plan takes
+    std::size_t frames = 0; ///< how many from there on
+    std::size_t of = 0;     ///< of all that the plan takes of the capture
+    double cost = 0;        ///< about megapixels or million points: what shards are balanced by
+
+    /// "" for a whole capture, else "0-500": the end is not included.
+    [[nodiscard]] std::string block() const;
+};
+
+/// What was asked for, and of which captures. Settings are those that differ from their defaults, as typed.
+struct Plan {
+    std::vector<std::pair<std::string, std::string>> settings;
+    std::vector<Task> tasks;
+    std::vector<std::string> refused; ///< captures that could not be opened, and why
+};
+
+/// Which of N equal parts of a job: 1 .. of.
+struct Shard {
+    int index = 1, of = 1;
+};
+
+[[nodiscard]] bool is_job(const std::filesystem::path& folder);
+/// Atomic; plan.json last.
+void write_plan(const std::filesystem::path& job, const Plan& plan);
+/// Throws Error naming file and line.
+[[nodiscard]] Plan read_plan(const std::filesystem::path& job);
+
+[[nodiscard]] std::filesystem::path results_of(const std::filesystem::path& job, const Task& task);
+
+/// "2/8"; empty = SLURM_ARRAY_TASK_ID, _MIN, _COUNT and _STEP, else JOB_COMPLETION_INDEX and JOB_COMPLETIONS, else
+/// all of it. Throws Misuse.
+[[nodiscard]] Shard shard_from(const std::string& text);
+
+/// The tasks of each shard, by index into `tasks`: the costliest first, each to the shard with the least to do. Equal
+/// plans are cut equally on every machine.
+[[nodiscard]] std::vector<std::vector<std::size_t>> cut(const std::vector<Task>& tasks, int shards);
+
+} // namespace scanshade

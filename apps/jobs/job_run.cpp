@@ -1,0 +1,120 @@
+// The order of a shard's tasks, and what is told between them.
+#include "apps/jobs/job_run.h"
+
+#include "apps/command.h"
+#include "apps/walk/overlap.h"
+#include "apps/walk/progress.h"
+#include "projection/error.h"
+
+#include <chrono>
+#include <fmt/format.h>
+#include <mutex>
+#include <ranges>
+
+namespace scanshade {
+namespace {
+
+/// How far the shard is; remaining time at the pace so far, tasks found done not counted.
+class Pace {
+  public:
+    Pace(const Plan& plan, const std::vector<std::size_t>& tasks) : tasks_(tasks.size()) {
+        for (const std::size_t task : tasks)
+            left_ += plan.tasks[task].cost;
+        whole_ = left_;
+    }
+    void done(const Task& task) {
+        using namespace std::chrono;
+        const std::lock_guard alone(mutex_);
+        const double seconds = duration<double>(steady_clock::now() - before_).count();
+        before_ = steady_clock::now();
+        constexpr double found_done_s = 0.02;
+        if (seconds > found_done_s) {
+            worked_s_ += seconds;
+            worked_ += task.cost;
+        }
+        left_ -= task.cost;
+        const std::string time_left =
+            worked_ > 0 ? fmt::format(", {} left", duration_text(left_ / worked_ * worked_s_)) : "";
+        say(fmt::format("task {} of {}, {:.0f} % of the work{}", ++count_, tasks_,
+                        whole_ > 0 ? 100 * (1 - left_ / whole_) : 100, time_left));
+    }
+
+  private:
+    std::mutex mutex_;
+    std::size_t tasks_, count_ = 0;
+    double whole_ = 0, left_ = 0, worked_ = 0, worked_s_ = 0;
+    std::chrono::steady_clock::time_point before_ = std::chrono::steady_clock::now();
+};
+
+/// Tasks with what became of them.
+class Attempts {
+  public:
+    explicit Attempts(const std::function<int(const Task&, Turn&)>& run_task) : run_task_(run_task) {}
+
+    /// Whether it was taken: no other run is at it.
+    bool attempt(const Task& task, Turn& turn) {
+        try {
+            add(run_task_(task, turn));
+        } catch (const Misuse&) {
+            throw;
+        } catch (const DeviceLost&) { // this process can do no other task either
+            throw;
+        } catch (const Busy& busy) {
+            say(fmt::format("left to another run: {}", busy.what()));
+            return false;
+        } catch (const Outage& failure) {
+            say(fmt::format("failed: {}", failure.what()));
+            add(unfinished);
+        } catch (const std::exception& failure) {
+            say(fmt::format("failed: {}", failure.what()));
+            add(nothing_done);
+        }
+        return true;
+    }
+    void add(int code) {
+        const std::lock_guard alone(mutex_);
+        code_ = worse(code_, code);
+    }
+    [[nodiscard]] int code() const { return code_; }
+
+  private:
+    const std::function<int(const Task&, Turn&)>& run_task_;
+    std::mutex mutex_;
+    int code_ = all_well;
+};
+
+} // namespace
+
+int work_through(const std::filesystem::path& job, const Plan& plan, const Shard& shard, const std::atomic<bool>& stop,
+                 std::size_t at_once, const std::function<int(const Task&, Turn&)>& run_task) {
+    const auto parts = cut(plan.tasks, shard.of);
+    const auto& own = parts[static_cast<std::size_t>(shard.index - 1)];
+    say(fmt::format("{}: shard {} of {}, {} of {} tasks", job.string(), shard.index, shard.of, own.size(),
+                    plan.tasks.size()));
+    Attempts attempts(run_task);
+    Pace pace(plan, own);
+    overlapped(own.size(), at_once, [&](std::size_t i, Turn& turn) {
+        if (stop)
+            return attempts.add(unfinished);
+        (void)attempts.attempt(plan.tasks[own[i]], turn);
+        pace.done(plan.tasks[own[i]]);
+    });
+    // Other shards begin with their costliest tasks, so what they may leave lies at their ends. Our own come first: what
+    // another run held may be free by now.
+    for (int next = 0; next < shard.of; ++next)
+        for (const std::size_t index :
+             parts[static_cast<std::size_t>((shard.index - 1 + next) % shard.of)] | std::views::reverse) {
+            if (stop)
+                return worse(attempts.code(), unfinished);
+            const Task& task = plan.tasks[index];
+            const std::filesystem::path journal = journal_file(results_of(job, task), task.block());
+            if (is_complete(journal) || in_use(journal))
+                continue;
+            Turn turn;
+            if (attempts.attempt(task, turn) && next > 0)
+                say(fmt::format("  taken over from shard {}: {}", (shard.index - 1 + next) % shard.of + 1, task.name));
+        }
+    return attempts.code();
+}
+
+} // namespace scanshade

@@ -1,0 +1,262 @@
+// `scanshade plan`: finds the captures of a dataset, whatever their layouts, and cuts them into tasks.
+#include "apps/command.h"
+#include "apps/method_settings.h"
+#include "apps/jobs/job.h"
+#include "apps/slice.h"
+#include "io/captures/capture.h"
+#include "io/captures/layouts.h"
+#include "io/text.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <array>
+#include <fmt/format.h>
+#include <map>
+#include <optional>
+#include <set>
+
+namespace scanshade {
+namespace {
+
+namespace fs = std::filesystem;
+
+// ---------------------------------------------------------------------------------------------------- finding captures
+
+/// Results are no captures, though they hold depth-like images and clouds.
+bool is_result(const fs::path& folder) {
+    return is_job(folder) || fs::exists(folder / "journal.jsonl") || fs::exists(folder / "frames.csv");
+}
+
+struct Found {
+    fs::path path;
+    std::string name; ///< where it lies in its dataset
+    std::optional<Capture> capture;
+    std::string refused; ///< why it cannot be opened
+};
+
+/// Opens the folder where it is a capture, told by its content; else looks into its folders. Folders that hold
+/// nothing are passed over, those that hold something broken are told.
+/// `walked` are the folders of folders seen so far: links may lead back to them.
+void find_in(const fs::path& folder, const std::string& name, const CaptureOptions& options, std::set<fs::path>& walked,
+             const std::function<void(Found)>& found) {
+    if (is_result(folder))
+        return;
+    constexpr std::string_view nothing = "no frames found in";
+    try {
+        found({folder, name, open_capture(folder, options), ""});
+        return;
+    } catch (const Misuse&) {
+        throw;
+    } catch (const std::exception& failure) {
+        if (!std::string_view(failure.what()).starts_with(nothing)) {
+            found({folder, name, std::nullopt, failure.what()});
+            return;
+        }
+    }
+    std::error_code unreadable;
+    if (!walked.insert(fs::canonical(folder, unreadable)).second)
+        return;
+    std::vector<fs::path> folders;
+    for (fs::directory_iterator entry(folder, unreadable), end; !unreadable && entry != end;
+         entry.increment(unreadable))
+        if (std::error_code ignored; entry->is_directory(ignored) && entry->path().filename().string()[0] != '.')
+            folders.push_back(entry->path());
+    if (unreadable)
+        found({folder, name, std::nullopt, folder.string() + ": cannot be listed: " + unreadable.message()});
+    std::ranges::sort(folders, natural_less, [](const fs::path& path) { return path.filename().string(); });
+    for (const fs::path& each : folders)
+        find_in(each, (fs::path(name) / each.filename()).string(), options, walked, found);
+}
+
+std::string own_name(const fs::path& path) {
+    const fs::path whole = fs::weakly_canonical(path);
+    const fs::path last = whole.has_filename() ? whole.filename() : whole.parent_path().filename();
+    return (fs::is_directory(path) ? last : last.stem()).string();
+}
+
+void find_captures(const fs::path& dataset, const CaptureOptions& options, const std::function<void(Found)>& found) {
+    const fs::path path = fs::canonical(dataset);
+    if (fs::is_directory(path)) {
+        std::set<fs::path> walked;
+        find_in(path, own_name(path), options, walked, found);
+        return;
+    }
+    try {
+        found({path, own_name(path), open_capture(path, options), ""});
+    } catch (const Misuse&) {
+        throw;
+    } catch (const std::exception& failure) {
+        found({path, own_name(path), std::nullopt, failure.what()});
+    }
+}
+
+// ---------------------------------------------------------------------------------------------------- cost
+
+/// What a frame costs whatever its size, in megapixels: opening, syncing and renaming its files.
+constexpr double fixed_cost = 0.05;
+
+double megapixels(const Capture& capture) {
+    if (capture.camera && !capture.camera->pinhole.size.empty())
+        return capture.camera->pinhole.size.area() / 1e6;
+    for (const CaptureEntry& entry : capture.entries)
+        if (entry.problem.empty() && !entry.depth.empty()) {
+            try {
+                return peek(entry.depth).size.area() / 1e6;
+            } catch (const Error&) {
+                return 0;
+            }
+        }
+    return 0;
+}
+
+/// Costs of a capture's frames: all alike where they are images, by bytes where they are clouds (about 32 a point).
+std::vector<double> costs_of(const Capture& capture, const std::vector<std::size_t>& frames) {
+    const double image = megapixels(capture);
+    std::vector<double> costs;
+    for (const std::size_t frame : frames) {
+        const CaptureEntry& entry = capture.entries[frame];
+        std::error_code missing;
+        const auto bytes = entry.cloud.empty() ? 0 : fs::file_size(entry.cloud, missing);
+        costs.push_back(fixed_cost + (entry.cloud.empty() ? image : missing ? 0 : static_cast<double>(bytes) / 32e6));
+    }
+    return costs;
+}
+
+// ---------------------------------------------------------------------------------------------------- the command
+
+/// Settings of `run` that are no part of a plan: where and how it runs, and budgets, which are chosen by the clock.
+constexpr std::array not_planned = {"out",  "overwrite", "resume", "retry",     "shard",
+                                    "dump", "device",    "log",    "max-error", "max-ms"};
+
+class PlanCommand final : public Command {
+  public:
+    Words words() override { return {"DATASET", "folders searched for captures, or captures", &datasets_, 1, 1 << 20}; }
+
+    std::vector<Stage> stages() override {
+        std::vector<Stage> all = {
+            {"job",
+             {{"out", "folder of the job, on a disk that every machine sees; its results go there", &out_},
+              {"block", "captures of more frames than this are cut into blocks of about so many", &block_, "", 1, 1e9},
+              {"overwrite", "replaces an earlier plan; results stay, and what the new plan leaves valid is kept",
+               &overwrite_}}}};
+        for (Stage& stage : run_->stages()) {
+            std::erase_if(stage.rows, [](const Parameter& row) { return std::ranges::count(not_planned, row.name); });
+            all.push_back(std::move(stage));
+        }
+        return all;
+    }
+
+    int run() override {
+        if (out_.empty())
+            throw Misuse("plan needs -o FOLDER for the job");
+        if (is_job(out_) && !overwrite_)
+            throw Misuse(out_ + " is a job already: --overwrite plans it anew and keeps its results");
+        Plan plan;
+        plan.settings = settings();
+        const CaptureOptions options{value("camera"), value("depth-scale"), std::stod(value("association-limit"))};
+        for (const std::string& dataset : datasets_)
+            find_captures(dataset, options, [&](Found found) { add(std::move(found), plan); });
+        for (const std::string& refused : plan.refused)
+            fmt::print(stderr, "refused: {}\n", refused);
+        if (plan.tasks.empty())
+            throw Error("no captures found");
+        write_plan(out_, plan);
+        tell(plan);
+        return plan.refused.empty() ? all_well : some_failed;
+    }
+
+  private:
+    std::string value(const std::string& name) {
+        for (const Stage& stage : run_->stages())
+            if (const Parameter* row = row_named(stage.rows, name))
+                return value_text(*row);
+        return "";
+    }
+
+    /// What differs from the defaults; a camera file by its whole path, since jobs run from anywhere.
+    std::vector<std::pair<std::string, std::string>> settings() {
+        std::vector<std::pair<std::string, std::string>> given;
+        for (const Stage& stage : run_->stages())
+            for (const Parameter& row : stage.rows) {
+                if (std::ranges::count(not_planned, row.name) || row.name == "settings")
+                    continue;
+                std::string text = value_text(row);
+                if (text == defaults_[row.name])
+                    continue;
+                if (std::error_code ignored; row.name == "camera" && fs::exists(text, ignored))
+                    text = fs::canonical(text).string();
+                given.emplace_back(row.name, text);
+            }
+        return given;
+    }
+
+    static std::map<std::string, std::string> values_of(Command& command) {
+        std::map<std::string, std::string> values;
+        for (const Stage& stage : command.stages())
+            for (const Parameter& row : stage.rows)
+                values[row.name] = value_text(row);
+        return values;
+    }
+
+    std::string unique(const std::string& name) {
+        std::string free = name;
+        for (int n = 2; !taken_.insert(free).second; ++n)
+            free = fmt::format("{}-{}", name, n);
+        return free;
+    }
+
+    void add(Found found, Plan& plan) {
+        if (found.capture && as_utf8(found.path.string()) != found.path.string())
+            found = {found.path, "", std::nullopt,
+                     as_utf8(found.path.string()) + ": the name is not UTF-8, as a plan's must be"};
+        if (!found.capture) {
+            plan.refused.push_back(found.refused);
+            return;
+        }
+        std::vector<std::size_t> frames;
+        try {
+            frames = slice(value("frames"), found.capture->entries.size());
+        } catch (const Misuse& failure) {
+            plan.refused.push_back(found.path.string() + ": " + failure.what());
+            return;
+        }
+        ++captures_[found.capture->kind];
+        frames_ += frames.size();
+        const std::string name = unique(found.name);
+        const std::vector<double> costs = costs_of(*found.capture, frames);
+        const std::size_t blocks = (frames.size() + block_ - 1) / static_cast<std::size_t>(block_);
+        for (std::size_t b = 0; b < blocks; ++b) { // blocks of one capture are equal up to a frame
+            Task task{found.path, name, b * frames.size() / blocks, 0, frames.size(), 0};
+            task.frames = (b + 1) * frames.size() / blocks - task.first;
+            for (std::size_t i = 0; i < task.frames; ++i)
+                task.cost += costs[task.first + i];
+            plan.tasks.push_back(std::move(task));
+        }
+    }
+
+    void tell(const Plan& plan) const {
+        for (const auto& [kind, count] : captures_)
+            fmt::print("{:>8}  {}\n", count, kind);
+        double cost = 0;
+        for (const Task& task : plan.tasks)
+            cost += task.cost;
+        fmt::print("{:>8}  frames in {} tasks, {:.0f} megapixels or million points -> {}\n", frames_, plan.tasks.size(),
+                   cost, out_);
+    }
+
+    std::vector<std::string> datasets_;
+    std::string out_;
+    int block_ = 500;
+    bool overwrite_ = false;
+    std::unique_ptr<Command> run_ = run_command();
+    std::map<std::string, std::string> defaults_ = values_of(*run_);
+    std::set<std::string> taken_;
+    std::map<std::string, std::size_t> captures_;
+    std::size_t frames_ = 0;
+};
+
+} // namespace
+
+std::unique_ptr<Command> plan_command() { return std::make_unique<PlanCommand>(); }
+
+} // namespace scanshade

@@ -1,0 +1,221 @@
+// `scanshade status`: how a job stands. `scanshade merge`: its reports in one.
+#include "apps/command.h"
+#include "apps/jobs/job.h"
+#include "apps/json.h"
+#include "apps/walk/report.h"
+#include "io/output_file.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <fstream>
+#include <map>
+
+namespace scanshade {
+namespace {
+
+namespace fs = std::filesystem;
+
+// ---------------------------------------------------------------------------------------------------- reading a job
+
+enum class Standing { waiting, running, begun, done };
+
+/// One task as its journal tells.
+struct Reading {
+    Standing standing = Standing::waiting;
+    std::vector<FrameRow> rows; ///< in recording order
+    std::string host, device, since;
+};
+
+Reading read_task(const fs::path& job, const Task& task) {
+    const fs::path file = journal_file(results_of(job, task), task.block());
+    Reading reading;
+    if (std::error_code ignored; !fs::exists(file, ignored))
+        return reading;
+    JournalFacts facts = read_journal(file);
+    for (auto& [name, record] : facts.records)
+        reading.rows.push_back(std::move(record.row));
+    std::ranges::sort(reading.rows, {}, &FrameRow::index);
+    reading.host = facts.host;
+    reading.device = facts.device;
+    reading.since = facts.started;
+    reading.standing = in_use(file)              ? Standing::running
+                       : !facts.complete.empty() ? Standing::done
+                       : !reading.rows.empty()   ? Standing::begun
+                                                 : Standing::waiting;
+    return reading;
+}
+
+/// What a failure says without the names of its frame: digits become '#', the folder is left out.
+std::string reason_of(const FrameRow& row, const Task& task) {
+    std::string text = row.why;
+    for (std::string folder = task.capture.string() + "/"; text.find(folder) != std::string::npos;)
+        text.erase(text.find(folder), folder.size());
+    if (const auto at = text.find(row.name); at != std::string::npos)
+        text.replace(at, row.name.size(), "FRAME");
+    std::string reason;
+    for (const char c : text)
+        if (const bool digit = c >= '0' && c <= '9'; !digit || reason.empty() || reason.back() != '#')
+            reason += digit ? '#' : c;
+    return fmt::format("{}: {}", name_of(row.fault), reason);
+}
+
+/// Sums over a job, task by task, so that any number of them fits in memory.
+struct Totals {
+    std::size_t tasks = 0, frames = 0, ok = 0, failed = 0;
+    std::map<Standing, std::size_t> standing;
+    double cost = 0, done_cost = 0;
+    StageTimes ms{};
+    struct Group {
+        std::size_t frames = 0;
+        std::string example;
+    };
+    std::map<std::string, Group> reasons;
+    std::map<std::string, std::size_t> frames_by_host;
+
+    void add(const Task& task, const Reading& reading) {
+        ++tasks;
+        ++standing[reading.standing];
+        frames += task.frames;
+        cost += task.cost;
+        done_cost += task.cost * static_cast<double>(std::min(reading.rows.size(), task.frames)) /
+                     static_cast<double>(task.frames);
+        for (const FrameRow& row : reading.rows)
+            add(task, row);
+        if (!reading.rows.empty())
+            frames_by_host[reading.host + ", " + reading.device] += reading.rows.size();
+    }
+
+  private:
+    void add(const Task& task, const FrameRow& row) {
+        ms = ms + row.ms;
+        if (row.status == FrameStatus::ok) {
+            ++ok;
+            return;
+        }
+        ++failed;
+        Group& group = reasons[reason_of(row, task)];
+        if (group.frames++ == 0)
+            group.example = task.name + " " + row.name;
+    }
+};
+
+int code_of(const Totals& totals) {
+    if (totals.ok + totals.failed < totals.frames)
+        return unfinished;
+    return totals.failed == 0 ? all_well : totals.ok == 0 ? nothing_done : some_failed;
+}
+
+std::vector<std::pair<std::string, Totals::Group>> most_frequent_first(const Totals& totals) {
+    std::vector<std::pair<std::string, Totals::Group>> groups(totals.reasons.begin(), totals.reasons.end());
+    std::ranges::stable_sort(groups, [](const auto& a, const auto& b) { return a.second.frames > b.second.frames; });
+    return groups;
+}
+
+void print(const Totals& totals, std::size_t refused) {
+    const auto standing = [&](Standing which) {
+        const auto found = totals.standing.find(which);
+        return found == totals.standing.end() ? 0 : found->second;
+    };
+    fmt::print("tasks   {} done, {} running, {} begun, {} waiting, of {}\n", standing(Standing::done),
+               standing(Standing::running), standing(Standing::begun), standing(Standing::waiting), totals.tasks);
+    fmt::print("frames  {} ok, {} failed, {} left, of {}\n", totals.ok, totals.failed,
+               totals.frames - std::min(totals.frames, totals.ok + totals.failed), totals.frames);
+    fmt::print("work    {:.1f} %\n", totals.cost > 0 ? 100 * totals.done_cost / totals.cost : 100);
+    if (refused > 0)
+        fmt::print("refused {} captures when it was planned\n", refused);
+    for (const auto& [host, frames] : totals.frames_by_host)
+        fmt::print("  {:>8} frames last by {}\n", frames, host);
+    for (const auto& [reason, group] : most_frequent_first(totals))
+        fmt::print("  {:>8} failed: {} (first: {})\n", group.frames, reason, group.example);
+}
+
+Plan plan_of(const std::vector<std::string>& words) {
+    if (!is_job(words.front()))
+        throw Misuse(words.front() + " is no job: `scanshade plan DATASET -o JOB` makes one");
+    return read_plan(words.front());
+}
+
+// ---------------------------------------------------------------------------------------------------- the commands
+
+class Status final : public Command {
+  public:
+    Words words() override { return {"JOB", "the job's folder", &job_, 1, 1}; }
+
+    int run() override {
+        const Plan plan = plan_of(job_);
+        Totals totals;
+        std::vector<std::string> running;
+        for (const Task& task : plan.tasks) {
+            const Reading reading = read_task(job_.front(), task);
+            totals.add(task, reading);
+            if (reading.standing == Standing::running)
+                running.push_back(fmt::format("  running {} {}: {} of {} frames, {} since {}", task.name, task.block(),
+                                              reading.rows.size(), task.frames, reading.host, reading.since));
+        }
+        print(totals, plan.refused.size());
+        fmt::print("{}{}", fmt::join(running, "\n"), running.empty() ? "" : "\n");
+        return code_of(totals);
+    }
+
+  private:
+    std::vector<std::string> job_;
+};
+
+class Merge final : public Command {
+  public:
+    Words words() override { return {"JOB", "the job's folder", &job_, 1, 1}; }
+
+    int run() override {
+        const fs::path job = job_.front();
+        const Plan plan = plan_of(job_);
+        Totals totals;
+        write_atomically(job / "frames.csv", [&](const fs::path& file) {
+            std::ofstream stream(file, std::ios::binary);
+            stream.exceptions(std::ios::failbit | std::ios::badbit);
+            stream << "capture," << csv_head();
+            for (const Task& task : plan.tasks) {
+                const Reading reading = read_task(job, task);
+                totals.add(task, reading);
+                for (const FrameRow& row : reading.rows)
+                    stream << csv_line(task.name, row);
+            }
+            stream.flush();
+        });
+        write_manifest(job, plan, totals);
+        print(totals, plan.refused.size());
+        return code_of(totals);
+    }
+
+  private:
+    static void write_manifest(const fs::path& job, const Plan& plan, const Totals& totals) {
+        json settings = json::object(), failures = json::array();
+        for (const auto& [name, value] : plan.settings)
+            settings[name] = value;
+        for (const auto& [reason, group] : most_frequent_first(totals))
+            failures.push_back({{"reason", reason}, {"frames", group.frames}, {"first", group.example}});
+        const json text{{"program", "scanshade"},
+                        {"version", SCANSHADE_VERSION},
+                        {"settings", settings},
+                        {"totals",
+                         {{"tasks", totals.tasks},
+                          {"frames", totals.frames},
+                          {"ok", totals.ok},
+                          {"failed", totals.failed},
+                          {"stage_ms", stage_json(totals.ms)}}},
+                        {"frames_by_host", totals.frames_by_host},
+                        {"failures", failures},
+                        {"refused", plan.refused}};
+        write_atomically(job / "manifest.json", text_of(text) + "\n");
+    }
+
+    std::vector<std::string> job_;
+};
+
+} // namespace
+
+std::unique_ptr<Command> status_command() { return std::make_unique<Status>(); }
+std::unique_ptr<Command> merge_command() { return std::make_unique<Merge>(); }
+
+} // namespace scanshade

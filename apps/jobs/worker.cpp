@@ -1,0 +1,171 @@
+// fork, wait, fork again.
+#include "apps/jobs/worker.h"
+
+#include "apps/command.h"
+#include "apps/walk/progress.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <exception>
+#include <fmt/format.h>
+#include <map>
+#include <new>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+namespace scanshade {
+namespace {
+
+using Count = std::atomic<std::uint64_t>;
+static_assert(Count::is_always_lock_free, "it lies in memory that processes share");
+
+/// A count per worker that parent and children see.
+class SharedCounts {
+  public:
+    explicit SharedCounts(int count) : bytes_(sizeof(Count) * static_cast<std::size_t>(count)) {
+        memory_ = ::mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+        if (memory_ == MAP_FAILED)
+            throw Outage(fmt::format("no shared memory: {}", std::strerror(errno)));
+        for (int i = 0; i < count; ++i)
+            new (&at(i)) Count(0);
+    }
+    ~SharedCounts() { ::munmap(memory_, bytes_); }
+    SharedCounts(const SharedCounts&) = delete;
+    SharedCounts& operator=(const SharedCounts&) = delete;
+    [[nodiscard]] Count& at(int i) const { return static_cast<Count*>(memory_)[i]; }
+
+  private:
+    std::size_t bytes_;
+    void* memory_;
+};
+
+/// Signals wait until they are asked for; children get back the mask that was.
+class Signals {
+  public:
+    Signals() {
+        sigset_t set;
+        sigemptyset(&set);
+        for (const int signal : {SIGINT, SIGTERM, SIGCHLD})
+            sigaddset(&set, signal);
+        sigprocmask(SIG_BLOCK, &set, &before_);
+        waited_for_ = set;
+    }
+    ~Signals() { restore(); }
+    Signals(const Signals&) = delete;
+    Signals& operator=(const Signals&) = delete;
+    void restore() const { sigprocmask(SIG_SETMASK, &before_, nullptr); }
+    [[nodiscard]] int wait() const {
+        int signal = 0;
+        sigwait(&waited_for_, &signal);
+        return signal;
+    }
+
+  private:
+    sigset_t before_ = {}, waited_for_ = {};
+};
+
+/// One worker through all of its processes.
+struct Post {
+    Shift shift;
+    std::uint64_t finished_before = 0;
+    int in_vain = 0; ///< processes in a row that finished no frame
+};
+
+constexpr int patience = 3;
+
+pid_t start(const Post& post, const Signals& signals, const std::function<int(const Shift&)>& work) {
+    std::fflush(nullptr); // or the child would print what lies in the buffers once more
+    const pid_t parent = ::getpid(), child = ::fork();
+    if (child < 0)
+        throw Outage(fmt::format("no worker process: {}", std::strerror(errno)));
+    if (child > 0)
+        return child;
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != parent)
+        ::_exit(unfinished);
+    signals.restore();
+    int code = internal_error;
+    try {
+        code = work(post.shift);
+    } catch (const Misuse& failure) {
+        fmt::print(stderr, "scanshade: {}\n", failure.what());
+        code = misuse;
+    } catch (const Outage& failure) {
+        fmt::print(stderr, "scanshade: {}\n", failure.what());
+        code = unfinished;
+    } catch (const std::exception& failure) {
+        fmt::print(stderr, "scanshade: {}\n", failure.what());
+    }
+    std::fflush(nullptr);
+    ::_exit(code); // the caller's objects are the caller's to destroy
+}
+
+/// Whether the worker deserves another process, and what is to be done differently in it.
+bool goes_on(Post& post, int status) {
+    const std::uint64_t finished = *post.shift.finished;
+    post.in_vain = finished > std::exchange(post.finished_before, finished) ? 0 : post.in_vain + 1;
+    const bool killed = WIFSIGNALED(status);
+    if ((!killed && WEXITSTATUS(status) != unfinished) || post.in_vain >= patience)
+        return false;
+    post.shift.carefully = killed;
+    return true;
+}
+
+} // namespace
+
+int worse(int a, int b) {
+    constexpr std::array mildest_first = {int(all_well),       int(nothing_done), int(some_failed),
+                                          int(internal_error), int(unfinished),   int(misuse)};
+    if (a != b && std::min(a, b) == all_well && std::max(a, b) == nothing_done)
+        return some_failed;
+    const auto rank = [&](int code) { return std::ranges::find(mildest_first, code) - mildest_first.begin(); };
+    return rank(a) > rank(b) ? a : b;
+}
+
+int supervise(int workers, const std::function<int(const Shift&)>& work) {
+    const SharedCounts counts(workers);
+    const Signals signals;
+    std::map<pid_t, Post> posts;
+    for (int worker = 0; worker < workers; ++worker) {
+        const Post post{{worker, false, &counts.at(worker)}};
+        posts.emplace(start(post, signals, work), post);
+    }
+    bool interrupted = false;
+    int code = -1;
+    while (!posts.empty()) {
+        const int signal = signals.wait();
+        if (signal != SIGCHLD) {
+            // A terminal, and Slurm, signal children as well. The other of the two signals tells them the same without
+            // counting as a second one, which would kill.
+            interrupted = true;
+            for (const auto& [child, post] : posts)
+                ::kill(child, signal == SIGINT ? SIGTERM : SIGINT);
+            continue;
+        }
+        int status = 0;
+        for (pid_t child; (child = ::waitpid(-1, &status, WNOHANG)) > 0;) {
+            auto found = posts.extract(child);
+            if (found.empty())
+                continue;
+            Post& post = found.mapped();
+            const bool killed = WIFSIGNALED(status);
+            if (killed)
+                say(fmt::format("worker {} was killed: {}", post.shift.worker + 1, strsignal(WTERMSIG(status))));
+            if (!interrupted && goes_on(post, status)) {
+                posts.emplace(start(post, signals, work), post);
+                continue;
+            }
+            const int its_code = !killed ? WEXITSTATUS(status) : interrupted ? unfinished : internal_error;
+            code = code < 0 ? its_code : worse(code, its_code);
+        }
+    }
+    return code;
+}
+
+} // namespace scanshade

@@ -1,0 +1,358 @@
+// `scanshade bench`: methods x settings on captures with a known answer, milliseconds against error, as one page.
+#include "ao/gpu/device.h"
+#include "apps/measure/bench_results.h"
+#include "apps/measure/configurations.h"
+#include "apps/command.h"
+#include "apps/command_line.h"
+#include "apps/measure/fused_reference.h"
+#include "apps/scenes/generate.h"
+#include "apps/scenes/scene.h"
+#include "apps/scenes/sensor.h"
+#include "io/output_file.h"
+#include "io/text.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <chrono>
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <map>
+#include <set>
+#include <sstream>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_for_each.h>
+
+namespace scanshade {
+namespace {
+
+namespace fs = std::filesystem;
+
+void say(const std::string& line) { fmt::print(stderr, "{}\n", line); }
+
+/// The comma-separated words, each one of `known`; all of them for "all".
+std::vector<std::string> chosen(const std::string& flag, const std::string& list,
+                                const std::vector<std::string>& known) {
+    if (list == "all")
+        return known;
+    std::vector<std::string> words;
+    std::istringstream stream(list);
+    for (std::string word; std::getline(stream, word, ',');) {
+        if (std::ranges::find(known, word) == known.end())
+            throw Misuse(fmt::format("{}: '{}' given, expected all or any of {}", flag, word, fmt::join(known, ",")));
+        words.push_back(word);
+    }
+    if (words.empty())
+        throw Misuse(fmt::format("{}: nothing given, expected all or any of {}", flag, fmt::join(known, ",")));
+    return words;
+}
+
+template <class Table>
+std::vector<std::string> names_of(const Table& table) {
+    std::vector<std::string> names;
+    for (const auto& row : table)
+        names.emplace_back(row.name);
+    return names;
+}
+
+std::string settings_text(const std::vector<Parameter>& rows) {
+    std::string text;
+    for (const Parameter& row : rows)
+        text += fmt::format("{}{}={}", text.empty() ? "" : " ", row.name, value_text(row));
+    return text;
+}
+
+// ---------------------------------------------------------------------------------------------------- one capture
+
+/// Trials are kept from capture to capture, by what they are made with.
+class Trials {
+  public:
+    explicit Trials(gpu::Device& device) : device_(device) {}
+
+    /// The configuration's, ready for the capture. Throws where it cannot be made.
+    Trial& of(const Configuration& configuration, const TrialCapture& capture) {
+        auto& trial = made_[{configuration.full_name(), capture.radius_m}];
+        if (!trial)
+            trial = std::make_unique<Trial>(device_, configuration, capture.noise, capture.radius_m);
+        trial->set_noise(capture.noise);
+        return *trial;
+    }
+
+  private:
+    gpu::Device& device_;
+    std::map<std::pair<std::string, double>, std::unique_ptr<Trial>> made_;
+};
+
+/// All configurations on one capture: errors once, since same input gives same bytes, then rounds of times.
+class CaptureBench {
+  public:
+    CaptureBench(Trials& trials, const TrialCapture& capture, const std::vector<Configuration>& all)
+        : capture_(capture) {
+        result_ = {capture.name,
+                   capture.path.string(),
+                   capture.reference,
+                   describe(capture.noise),
+                   capture.sensor,
+                   capture.radius_m,
+                   {},
+                   capture.frames.front().depth.z_m.size(),
+                   {},
+                   capture.frames.front().truth,
+                   {}};
+        for (const TrialFrame& frame : capture.frames) {
+            result_.frames.push_back(frame.name);
+            const Pinhole& camera = frame.frame.camera.pinhole;
+            classes_.push_back({by_edge_distance(frame.exact_z_m), by_grazing_angle(frame.exact_z_m, camera),
+                                by_range(frame.exact_z_m)});
+        }
+        for (const Configuration& configuration : all)
+            begin(trials, configuration);
+    }
+
+    BenchCapture run(int rounds) {
+        std::vector<std::vector<cv::Mat1f>> maps(trials_.size());
+        for (std::size_t i = 0; i < trials_.size(); ++i)
+            attempt(i, [&] {
+                for (const TrialFrame& frame : capture_.frames)
+                    maps[i].push_back(trials_[i]->compute(frame));
+            });
+        // Finding the best look of a map takes longer than the map.
+        tbb::parallel_for(std::size_t{0}, trials_.size(),
+                          [&](std::size_t i) { attempt(i, [&] { judge(i, maps[i]); }); });
+        for (int round = 0; round < rounds; ++round) {
+            say(fmt::format("  {}: round {} of {}", capture_.name, round + 1, rounds));
+            for (const TrialFrame& frame : capture_.frames)
+                for (std::size_t turn = 0; turn < trials_.size(); ++turn) {
+                    const std::size_t i = (turn + static_cast<std::size_t>(round)) % trials_.size();
+                    attempt(i, [&] { time(i, frame); });
+                }
+        }
+        tbb::parallel_for_each(result_.measured, [](Measured& measured) { measured.sum_up(); });
+        return std::move(result_);
+    }
+
+  private:
+    void begin(Trials& trials, const Configuration& configuration) {
+        const std::size_t i = trials_.size();
+        trials_.emplace_back();
+        result_.measured.emplace_back();
+        result_.measured.back().configuration = configuration;
+        result_.visibilities.emplace_back();
+        attempt(i, [&] {
+            trials_[i] = &trials.of(configuration, capture_);
+            result_.measured[i].settings = settings_text(trials_[i]->settings());
+        });
+    }
+
+    /// A configuration that fails is out of the race on this capture, and the report says why.
+    template <class Step>
+    void attempt(std::size_t i, Step&& step) {
+        Measured& measured = result_.measured[i];
+        if (!measured.why.empty())
+            return;
+        try {
+            step();
+        } catch (const std::exception& failure) {
+            measured.why = failure.what();
+            say(fmt::format("  {}: {} failed: {}", capture_.name, measured.configuration.full_name(), failure.what()));
+        }
+    }
+
+    void judge(std::size_t i, const std::vector<cv::Mat1f>& maps) {
+        Measured& measured = result_.measured[i];
+        for (std::size_t n = 0; n < capture_.frames.size(); ++n) {
+            const TrialFrame& frame = capture_.frames[n];
+            const cv::Mat1f& map = maps[n];
+            measured.images.push_back(compare(map, frame.truth));
+            measured.pairs.add(pair_sums(map, frame.truth));
+            for (std::size_t by = 0; by < error_by_count; ++by)
+                measured.errors[by].add(map, frame.truth, classes_[n][by]);
+            if (n == 0)
+                result_.visibilities[i] = map;
+        }
+        say(fmt::format("  {}: {:<34} RMSE {:.4f}", capture_.name, measured.configuration.full_name(),
+                        total(measured.images, {}).rms));
+    }
+
+    void time(std::size_t i, const TrialFrame& frame) {
+        (void)trials_[i]->compute(frame);
+        Measured& measured = result_.measured[i];
+        measured.device_ms.push_back(trials_[i]->device_ms());
+        measured.wall_ms.push_back(trials_[i]->wall_ms());
+        measured.ns_per_pixel.push_back(trials_[i]->device_ms() * 1e6 / static_cast<double>(frame.depth.z_m.total()));
+    }
+
+    const TrialCapture& capture_;
+    std::vector<std::array<PixelClasses, error_by_count>> classes_;
+    std::vector<Trial*> trials_; ///< null where none could be made
+    BenchCapture result_;
+};
+
+// ---------------------------------------------------------------------------------------------------- the command
+
+class Bench final : public Command {
+  public:
+    Words words() override {
+        return {"CAPTURE",
+                "captures with truth/ao, as generate makes them, or with poses: then rays against all frames fused",
+                &paths_, 0, 1 << 20};
+    }
+
+    std::vector<Stage> stages() override {
+        return {
+            {"captures",
+             {{"generated", "generate captures of the scenes first, in REPORT/captures", &generated_},
+              {"scenes", "which scenes: all, or names with commas", &scenes_},
+              {"sensor", "which sensors see them: all, or names with commas", &sensors_},
+              {"size", "their image size, width x height", &generate_.size, "pixels"},
+              {"first",
+               "their first frame's place on the scene's walk, in tenths of a second: another one, other views",
+               &generate_.first, "", 0, 100000},
+              {"step", "from one frame to the next, in tenths of a second", &generate_.step, "", 1, 100000},
+              {"truth-rays", "rays per pixel of their truth", &generate_.truth_rays, "", 1, 65536},
+              {"frames", "frames taken of each capture, spread evenly", &request_.frames, "", 1, 100000},
+              {"radius", "how far away a surface may occlude, where the capture's truth does not say",
+               &request_.radius_m, "m", 1e-4, 1e5},
+              {"depth-noise", "as run takes it: auto (measured), none, kinect, tof or FLOOR,PER_Z2",
+               &request_.depth_noise}}},
+            {"method",
+             {{"methods", "which methods: all, or names with commas", &methods_},
+              {"rounds", "how often each configuration is timed on each frame, in turns with all others", &rounds_, "",
+               1, 1000},
+              {"device", "index or part of the name of a Vulkan device; empty = the fastest kind", &device_}}},
+            {"output",
+             {{"out", "folder of the report: index.html, bench.csv, bench.json, a plot of each sensor class as .svg",
+               &out_},
+              {"front", "file for the measured front, as `run --max-error` has it; other sensors' parts of it stay",
+               &front_},
+              {"overwrite", "replace an earlier report", &overwrite_}}}};
+    }
+
+    int run() override {
+        check_settings();
+        std::vector<Configuration> all = configurations();
+        const std::vector<std::string> methods = chosen("methods", methods_, names_of(scanshade::methods()));
+        std::erase_if(all, [&](const auto& c) { return std::ranges::find(methods, c.method) == methods.end(); });
+
+        gpu::Device device(device_);
+        BenchReport report{command_line(),
+                           device.info().name,
+                           device.info().driver,
+                           SCANSHADE_VERSION,
+                           fmt::format("{:%Y-%m-%d}", fmt::gmtime(std::time(nullptr))),
+                           rounds_,
+                           {},
+                           {}};
+        Trials trials(device);
+        for (const fs::path& path : captures()) {
+            const TrialCapture capture = loaded(device, path);
+            say(fmt::format("{}: {} frames, {} depth ({}, {})", path.string(), capture.frames.size(),
+                            name_of(capture.sensor), describe(capture.noise), capture.noise_origin));
+            report.captures.push_back(CaptureBench(trials, capture, all).run(rounds_));
+        }
+        report.groups = grouped(report);
+        write(report);
+        fmt::print("{}", bench_table(report));
+        return exit_code(report);
+    }
+
+  private:
+    void check_settings() const {
+        if (out_.empty())
+            throw Misuse("bench needs -o FOLDER for its report");
+        if (paths_.empty() && !generated_)
+            throw Misuse("bench needs captures, or --generated");
+        if (request_.depth_noise != "auto")
+            (void)noise_from_text(request_.depth_noise);
+        if (fs::exists(fs::path(out_) / "index.html") && !overwrite_)
+            throw Misuse(out_ + "/index.html exists already: --overwrite replaces it, or choose another -o");
+    }
+
+    /// The capture with its truth, or with what its posed frames tell together.
+    TrialCapture loaded(gpu::Device& device, const fs::path& path) const {
+        TrialCapture capture = load_trial(path, request_);
+        if (!capture.reference.empty())
+            return capture;
+        FusedReference fused(device, path, capture, request_.capture);
+        say(fmt::format("{}: {}", path.string(), fused.description()));
+        capture.reference = fused.description();
+        for (TrialFrame& frame : capture.frames)
+            frame.truth = fused.visibility(frame);
+        return capture;
+    }
+
+    /// The captures named, and those generated: made anew unless one of the same making lies there.
+    std::vector<fs::path> captures() {
+        std::vector<fs::path> all(paths_.begin(), paths_.end());
+        if (!generated_)
+            return all;
+        const auto sensor_names = chosen("sensor", sensors_, names_of(sensors()));
+        for (const std::string& scene : chosen("scenes", scenes_, names_of(scene::scenes())))
+            for (const std::string& sensor : sensor_names)
+                all.push_back(generated(scene, sensor));
+        return all;
+    }
+
+    fs::path generated(const std::string& scene, const std::string& sensor) {
+        GenerateOptions options = generate_;
+        options.scene = scene;
+        options.sensor = sensor;
+        options.frames = request_.frames;
+        options.overwrite = overwrite_;
+        const fs::path folder = fs::path(out_) / "captures" / fmt::format("{}-{}", scene, sensor);
+        say(fmt::format("generating {}", folder.string()));
+        generate(options, folder);
+        return folder;
+    }
+
+    static std::string plot_name(SensorClass sensor) {
+        std::string name = fmt::format("{}.svg", name_of(sensor));
+        std::ranges::replace(name, ' ', '-');
+        return name;
+    }
+
+    void write(const BenchReport& report) const {
+        const fs::path folder = out_;
+        write_atomically(folder / "bench.csv", bench_csv(report));
+        write_atomically(folder / "bench.json", text_of(bench_json(report)) + "\n");
+        for (const BenchGroup& group : report.groups)
+            write_atomically(folder / plot_name(group.sensor), bench_plot(group));
+        if (!front_.empty())
+            write_front(front_of(report));
+        write_atomically(folder / "index.html", bench_page(report)); // last: it says that the rest is there
+        say(fmt::format("-> {}", (folder / "index.html").string()));
+    }
+
+    /// Sensor classes that this bench did not see keep what an earlier one wrote.
+    void write_front(Front front) const {
+        if (fs::exists(front_)) {
+            Front earlier = front_from(json::parse(read_bytes(front_), nullptr, false), front_);
+            earlier.replace_with(front);
+            front = earlier;
+        }
+        write_atomically(front_, text_of(to_json(front)) + "\n");
+    }
+
+    static int exit_code(const BenchReport& report) {
+        std::size_t good = 0, bad = 0;
+        for (const BenchCapture& capture : report.captures)
+            for (const Measured& m : capture.measured)
+                ++(m.why.empty() ? good : bad);
+        if (bad == 0)
+            return all_well;
+        return good == 0 ? nothing_done : some_failed;
+    }
+
+    std::vector<std::string> paths_;
+    GenerateOptions generate_{.step = 25, .truth_rays = 256}; // views that differ
+    TrialRequest request_;
+    std::string scenes_ = "all", sensors_ = "ideal", methods_ = "all", device_, out_, front_;
+    int rounds_ = 3;
+    bool generated_ = false, overwrite_ = false;
+};
+
+} // namespace
+
+std::unique_ptr<Command> bench_command() { return std::make_unique<Bench>(); }
+
+} // namespace scanshade

@@ -1,0 +1,320 @@
+// `scanshade calibrate-look`: a method's free settings fitted to truth on some captures, judged on others.
+#include "ao/gpu/device.h"
+#include "apps/command.h"
+#include "apps/command_line.h"
+#include "apps/json.h"
+#include "apps/measure/trial.h"
+#include "io/output_file.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <opencv2/core/optim.hpp>
+#include <optional>
+#include <sstream>
+
+namespace scanshade {
+namespace {
+
+namespace fs = std::filesystem;
+
+void say(const std::string& line) { fmt::print(stderr, "{}\n", line); }
+
+std::vector<std::string> split(const std::string& list) {
+    std::vector<std::string> words;
+    std::istringstream stream(list);
+    for (std::string word; std::getline(stream, word, ',');)
+        if (!word.empty())
+            words.push_back(word);
+    return words;
+}
+
+/// A setting that the search may change.
+struct Free {
+    std::string name;
+    double start = 0, step = 0, low = 0, high = 0;
+};
+
+Free free_setting(const std::vector<Parameter>& rows, const std::string& method, const std::string& name) {
+    const Parameter* row = row_named(rows, name);
+    if (!row)
+        throw Misuse(fmt::format("free: the method {} has no setting '{}'", method, name));
+    if (!std::holds_alternative<float*>(row->value) && !std::holds_alternative<double*>(row->value))
+        throw Misuse(fmt::format("free: {} is no real number; only those can be fitted", name));
+    const double start = std::stod(value_text(*row));
+    const double span = std::isfinite(row->high - row->low) ? row->high - row->low : 1;
+    return {name, start, start != 0 ? 0.25 * std::abs(start) : 0.05 * std::min(span, 1.0), row->low, row->high};
+}
+
+/// Settings by which a method applies a Look: the best ones follow from maps made without (1, 1), whatever else is
+/// searched.
+struct LookRows {
+    std::string_view strength, power;
+};
+/// cacao applies its own before the blur, where the best look of the blurred map is as good as the best to within the
+/// blur.
+constexpr std::array look_rows{LookRows{"strength", "power"}, LookRows{"shadow-multiplier", "shadow-power"}};
+
+/// A method's look rows, where both are to be fitted, and the bounds that they have.
+struct FreeLook {
+    LookRows rows;
+    Look least, most;
+};
+
+/// What the errors are with some settings: of each capture, and over all (root mean square over captures).
+struct Score {
+    std::vector<Difference> captures;
+    PairSums pairs;
+    double rms = 0;
+};
+
+Score score(gpu::Device& device, const std::vector<TrialCapture>& captures, const Configuration& configuration) {
+    Score all;
+    for (const TrialCapture& capture : captures) {
+        Trial trial(device, configuration, capture.noise, capture.radius_m);
+        PairSums pairs;
+        std::vector<Difference> images;
+        for (const TrialFrame& frame : capture.frames) {
+            const cv::Mat1f map = trial.compute(frame);
+            images.push_back(compare(map, frame.truth));
+            pairs.add(pair_sums(map, frame.truth));
+        }
+        all.captures.push_back(total(images, pairs));
+        all.pairs.add(pairs);
+        all.rms += all.captures.back().rms * all.captures.back().rms / static_cast<double>(captures.size());
+    }
+    all.rms = std::sqrt(all.rms);
+    return all;
+}
+
+/// Nelder and Mead's simplex (1965) over the free settings, in units of their first steps; beyond a limit the nearest
+/// allowed value counts, and the way back costs something, so that the simplex turns round.
+class Search final : public cv::MinProblemSolver::Function {
+  public:
+    Search(gpu::Device& device, const std::vector<TrialCapture>& captures, Configuration fixed, std::vector<Free> free,
+           std::optional<FreeLook> look)
+        : device_(device), captures_(captures), fixed_(std::move(fixed)), free_(std::move(free)), look_(look) {
+        if (look_)
+            for (const std::string_view row : {look_->rows.strength, look_->rows.power})
+                fixed_.settings.emplace_back(row, "1");
+    }
+
+    [[nodiscard]] int getDims() const override { return static_cast<int>(free_.size()); }
+
+    double calc(const double* place) const override {
+        Settings values;
+        double outside = 0;
+        for (std::size_t i = 0; i < free_.size(); ++i) {
+            const Free& free = free_[i];
+            const double wanted = free.start + place[i] * free.step, value = std::clamp(wanted, free.low, free.high);
+            outside += std::abs(wanted - value) / free.step;
+            values.emplace_back(free.name, fmt::format("{:.6g}", value));
+        }
+        return tried(values) * (1 + 0.01 * outside);
+    }
+
+    /// The best settings found.
+    [[nodiscard]] Settings run(int evaluations) {
+        if (free_.empty()) {
+            (void)tried({});
+            return best_;
+        }
+        const auto solver = cv::DownhillSolver::create();
+        solver->setFunction(cv::Ptr<Search>(this, [](Search*) {}));
+        solver->setInitStep(cv::Mat1d::ones(1, getDims()));
+        solver->setTermCriteria({cv::TermCriteria::MAX_ITER + cv::TermCriteria::EPS, evaluations, 1e-5});
+        cv::Mat1d place(1, getDims(), 0.0);
+        solver->minimize(place);
+        return best_;
+    }
+
+  private:
+    double tried(Settings values) const {
+        Configuration configuration = fixed_;
+        std::ranges::copy(values, std::back_inserter(configuration.settings));
+        Score now = score(device_, captures_, configuration);
+        if (look_) {
+            const Look look = now.pairs.best_look(look_->least, look_->most);
+            now.rms = now.pairs.rms(look);
+            values.emplace_back(look_->rows.strength, fmt::format("{:.4g}", look.strength));
+            values.emplace_back(look_->rows.power, fmt::format("{:.4g}", look.power));
+        }
+        std::string line;
+        for (const auto& [name, value] : values)
+            line += fmt::format(" {} {}", name, value);
+        say(fmt::format("  {:>4} RMSE {:.4f}{}", ++tried_, now.rms, line));
+        if (best_.empty() || now.rms < best_rms_) {
+            best_ = values;
+            best_rms_ = now.rms;
+        }
+        return now.rms;
+    }
+
+    gpu::Device& device_;
+    const std::vector<TrialCapture>& captures_;
+    Configuration fixed_;
+    std::vector<Free> free_;
+    std::optional<FreeLook> look_;
+    mutable int tried_ = 0; // the solver's interface is const, what it tells us is not
+    mutable Settings best_;
+    mutable double best_rms_ = 0;
+};
+
+// ---------------------------------------------------------------------------------------------------- the command
+
+class Calibrate final : public Command {
+  public:
+    Calibrate() {
+        for (const MethodRow& row : methods())
+            setups_.emplace_back(row.name, row.setup());
+    }
+
+    Words words() override {
+        return {"CAPTURE", "training captures with truth/ao, as generate makes them", &training_, 1, 1 << 20};
+    }
+
+    std::vector<Stage> stages() override {
+        std::vector<std::string> names;
+        for (const MethodRow& row : methods())
+            names.emplace_back(row.name);
+        std::vector<Stage> all{
+            {"captures",
+             {{"held-out", "captures to judge the result on, with commas: none of the training ones", &held_out_},
+              {"frames", "frames taken of each capture, spread evenly", &request_.frames, "", 1, 100000},
+              {"depth-noise", "as run takes it: auto (measured), none, kinect, tof or FLOOR,PER_Z2",
+               &request_.depth_noise}}},
+            {"method",
+             {{.name = "method", .help = "whose settings are fitted", .value = &method_, .choices = names},
+              {"free", "names of its settings to fit, with commas; the others stay as given", &free_},
+              {"evaluations", "how many steps the search may take", &evaluations_, "", 1, 100000},
+              {"device", "index or part of the name of a Vulkan device; empty = the fastest kind", &device_}}},
+            {"output",
+             {{"out", "JSON file of the fitted settings, as `run --settings` takes it", &out_},
+              {"overwrite", "replace an earlier file", &overwrite_}}}};
+        for (const auto& [name, setup] : setups_)
+            all.push_back(method_stage(name, *setup));
+        return all;
+    }
+
+    int run() override {
+        check_settings();
+        const Configuration start = as_given();
+        gpu::Device device(device_);
+        const std::vector<TrialCapture> training = load(training_), others = load(split(held_out_));
+        std::vector<Free> free;
+        const std::vector<Parameter> rows = setup().parameters();
+        for (const std::string& name : split(free_))
+            free.push_back(free_setting(rows, method_, name));
+        const std::optional<FreeLook> look = taken_out(free);
+        const Settings found = Search(device, training, start, free, look).run(evaluations_);
+        Configuration fitted = start;
+        std::ranges::copy(found, std::back_inserter(fitted.settings));
+        tell(device, start, fitted, found, training, others);
+        return all_well;
+    }
+
+  private:
+    void check_settings() const {
+        if (out_.empty())
+            throw Misuse("calibrate-look needs -o FILE for the settings");
+        if (split(free_).empty())
+            throw Misuse("calibrate-look needs --free NAMES: which settings to fit");
+        if (fs::exists(out_) && !overwrite_)
+            throw Misuse(out_ + " exists already: --overwrite replaces it, or choose another -o");
+        for (const std::string& path : split(held_out_))
+            for (const std::string& other : training_)
+                if (fs::weakly_canonical(path) == fs::weakly_canonical(other))
+                    throw Misuse(fmt::format("held-out: {} is a training capture", path));
+    }
+
+    /// The rows of a look, where both are free, leave the search.
+    static std::optional<FreeLook> taken_out(std::vector<Free>& free) {
+        for (const LookRows& rows : look_rows) {
+            const auto strength = std::ranges::find(free, rows.strength, &Free::name);
+            const auto power = std::ranges::find(free, rows.power, &Free::name);
+            if (strength == free.end() || power == free.end())
+                continue;
+            const FreeLook look{rows, {strength->low, power->low}, {strength->high, power->high}};
+            std::erase_if(free, [&](const Free& f) { return f.name == rows.strength || f.name == rows.power; });
+            return look;
+        }
+        return std::nullopt;
+    }
+
+    MethodSetup& setup() {
+        return *std::ranges::find(setups_, method_, [](const auto& s) { return s.first; })->second;
+    }
+
+    /// Every setting as the command line left it, but for the radius: each capture's truth has its own.
+    Configuration as_given() {
+        Configuration given{method_, "candidate", values_of(setup())};
+        std::erase_if(given.settings, [](const auto& setting) { return setting.first == "radius"; });
+        return given;
+    }
+
+    std::vector<TrialCapture> load(const std::vector<std::string>& paths) const {
+        std::vector<TrialCapture> captures;
+        for (const std::string& path : paths) {
+            captures.push_back(load_trial(path, request_));
+            if (captures.back().reference.empty())
+                throw Error(path + ": no truth/ao to fit to");
+            say(fmt::format("{}: {} frames, {} depth", path, captures.back().frames.size(),
+                            name_of(captures.back().sensor)));
+        }
+        return captures;
+    }
+
+    void tell(gpu::Device& device, const Configuration& before, const Configuration& after, const Settings& found,
+              const std::vector<TrialCapture>& training, const std::vector<TrialCapture>& others) const {
+        json report{{"made_by", fmt::format("scanshade {} calibrate-look", SCANSHADE_VERSION)},
+                    {"command_line", command_line()},
+                    {"settings", {{"method", {{"method", method_}}}}}};
+        json& settings = report["settings"]["method " + method_];
+        for (const auto& [name, value] : found) {
+            fmt::print("--{}.{} {}\n", method_, name, value);
+            settings[fmt::format("{}.{}", method_, name)] = std::stod(value);
+        }
+        fmt::print("{:<12}{:<24}{:>12}{:>12}{:>14}{:>14}\n", "", "capture", "RMSE before", "after", "calib. before",
+                   "after");
+        report["training"] =
+            judged("training", training, score(device, training, before), score(device, training, after));
+        report["held_out"] = judged("held out", others, score(device, others, before), score(device, others, after));
+        if (others.empty())
+            say("no --held-out captures: nothing says that this holds elsewhere");
+        write_atomically(out_, text_of(report) + "\n");
+    }
+
+    static json judged(const std::string& role, const std::vector<TrialCapture>& captures, const Score& before,
+                       const Score& after) {
+        json rows = json::array();
+        const auto line = [&](const std::string& name, double rms, double rms_after, double calibrated,
+                              double calibrated_after) {
+            fmt::print("{:<12}{:<24}{:>12.4f}{:>12.4f}{:>14.4f}{:>14.4f}\n", role, name, rms, rms_after, calibrated,
+                       calibrated_after);
+            rows.push_back({{"capture", name}, {"rms_before", rms}, {"rms_after", rms_after}});
+        };
+        for (std::size_t i = 0; i < captures.size(); ++i)
+            line(captures[i].name, before.captures[i].rms, after.captures[i].rms, before.captures[i].calibrated_rms,
+                 after.captures[i].calibrated_rms);
+        if (!captures.empty())
+            line("all", before.rms, after.rms, before.pairs.rms(before.pairs.best_look()),
+                 after.pairs.rms(after.pairs.best_look()));
+        return rows;
+    }
+
+    std::vector<std::string> training_;
+    TrialRequest request_;
+    std::string held_out_, method_ = "cacao", free_, device_, out_;
+    int evaluations_ = 60;
+    bool overwrite_ = false;
+    std::vector<std::pair<std::string, std::unique_ptr<MethodSetup>>> setups_;
+};
+
+} // namespace
+
+std::unique_ptr<Command> calibrate_command() { return std::make_unique<Calibrate>(); }
+
+} // namespace scanshade

@@ -1,0 +1,193 @@
+// `scanshade compare`: how far the maps of one run are from those of another, or from truth, as numbers and pictures.
+#include "ao/compare.h"
+#include "apps/csv.h"
+#include "apps/command.h"
+#include "apps/measure/error_classes.h"
+#include "apps/measure/error_figures.h"
+#include "apps/json.h"
+#include "apps/measure/map_set.h"
+#include "apps/picture.h"
+#include "io/clouds/cloud_file.h"
+#include "io/images/image_file.h"
+#include "io/output_file.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+
+namespace scanshade {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What became of one pair of maps.
+struct Row {
+    std::string name;
+    Difference difference;
+    std::string why; ///< empty unless it failed
+};
+
+void say(const std::string& line) { fmt::print(stderr, "{}\n", line); }
+
+/// A map, or what a cloud's points hold as ambient_occlusion, in a row.
+cv::Mat1f values_of(const fs::path& file) {
+    if (!is_cloud_file(file))
+        return read_ao(file);
+    std::vector<std::string> warnings;
+    const std::vector<float> values = recorded_field(read_cloud(file, warnings), "ambient_occlusion", file);
+    return cv::Mat1f(values, true).reshape(0, 1);
+}
+
+class Compare final : public Command {
+  public:
+    Words words() override {
+        return {"PATH",
+                "A and B: runs' outputs, folders of maps, maps, clouds with the field ambient_occlusion, or as B a "
+                "generated "
+                "capture, whose truth is taken",
+                &paths_, 1, 2};
+    }
+
+    std::vector<Stage> stages() override {
+        return {{"input",
+                 {{"truth", "A is compared with the truth of the generated capture that it was made from", &truth_}}},
+                {"output",
+                 {{"out", "folder for difference/NAME.png, compare.csv and compare.json", &out_},
+                  {"scale", "difference shown in full blue (A too dark) or red (too bright)", &scale_, "", 1e-3, 1},
+                  {"overwrite", "replace an earlier comparison", &overwrite_}}}};
+    }
+
+    int run() override {
+        if (paths_.size() == 1 && !truth_)
+            throw Misuse("compare needs two PATHs, or one and --truth");
+        if (!out_.empty() && fs::exists(fs::path(out_) / "compare.json") && !overwrite_)
+            throw Misuse(out_ + "/compare.json exists already: --overwrite replaces it, or choose another -o");
+        const MapSet a = find_maps(paths_[0]);
+        const MapSet b = other_than(a);
+        introduce(a, b);
+        PairSums pairs;
+        std::vector<Row> rows;
+        for (const MapPair& pair : paired(a, b))
+            rows.push_back(compared(pair, pairs, a.confidence));
+        return conclude(a, b, rows, pairs);
+    }
+
+  private:
+    MapSet other_than(const MapSet& a) const {
+        if (paths_.size() == 1)
+            return truth_of(a);
+        MapSet b = find_maps(paths_[1]);
+        if (truth_ && b.kind != "truth")
+            throw Misuse(fmt::format("--truth: {} is no generated capture with truth/ao", paths_[1]));
+        return b;
+    }
+
+    static void introduce(const MapSet& a, const MapSet& b) {
+        say(fmt::format("A {} ({}), {} maps", a.path.string(), a.kind, a.files.size()));
+        say(fmt::format("B {} ({}), {} maps", b.path.string(), b.kind, b.files.size()));
+        if (a.radius_m && b.radius_m && std::abs(*a.radius_m - *b.radius_m) > 1e-6 * *b.radius_m)
+            say(fmt::format("  warning: A was made with a radius of {:g} m, B with {:g} m: they show different things",
+                            *a.radius_m, *b.radius_m));
+    }
+
+    Row compared(const MapPair& pair, PairSums& pairs, const std::map<std::string, fs::path>& confidence) {
+        try {
+            const cv::Mat1f a = values_of(pair.a), b = values_of(pair.b);
+            Row row{pair.name, during(pair.a.string() + " and " + pair.b.string(), [&] { return compare(a, b); }), {}};
+            pairs.add(pair_sums(a, b));
+            if (const auto believed = confidence.find(pair.name); believed != confidence.end() && a.rows > 1)
+                by_confidence_.add(a, b, of_one_size(read_ao(believed->second), a, believed->second));
+            if (!out_.empty() && a.rows > 1)
+                write_difference(pair.name, a, b);
+            return row;
+        } catch (const std::exception& failure) {
+            say(fmt::format("failed: {}", failure.what()));
+            return {pair.name, {}, failure.what()};
+        }
+    }
+
+    static PixelClasses of_one_size(const cv::Mat1f& confidence, const cv::Mat1f& map, const fs::path& file) {
+        if (confidence.size() != map.size())
+            throw Error(fmt::format("{}: {}x{} expected, as its map, found {}x{}", file.string(), map.cols, map.rows,
+                                    confidence.cols, confidence.rows));
+        return by_confidence(confidence);
+    }
+
+    void write_difference(const std::string& name, const cv::Mat1f& a, const cv::Mat1f& b) const {
+        cv::Mat1f apart;
+        cv::subtract(a, b, apart);
+        write_picture(fs::path(out_) / "difference" / (name + ".png"), difference_picture(apart, scale_));
+    }
+
+    int conclude(const MapSet& a, const MapSet& b, const std::vector<Row>& rows, const PairSums& pairs) const {
+        std::vector<Difference> good;
+        for (const Row& row : rows)
+            if (row.why.empty())
+                good.push_back(row.difference);
+        const Difference all = total(good, pairs);
+        print_table(rows, all);
+        print_confidence();
+        const std::size_t alone = a.files.size() + b.files.size() - 2 * rows.size();
+        if (alone > 0)
+            say(fmt::format("{} maps have no partner of their name", alone));
+        if (!out_.empty())
+            write_reports(a, b, rows, all);
+        if (good.size() == rows.size())
+            return all_well;
+        return good.empty() ? nothing_done : some_failed;
+    }
+
+    static void print_table(const std::vector<Row>& rows, const Difference& all) {
+        fmt::print("{:<24}{}\n", "image", figure_heads());
+        for (const Row& row : rows)
+            fmt::print("{:<24}{}\n", row.name, row.why.empty() ? figure_cells(row.difference) : "  failed");
+        fmt::print("{:<24}{}\n", "all (rms over images)", figure_cells(all));
+    }
+
+    /// Whether what A believes less is farther off, too.
+    void print_confidence() const {
+        if (by_confidence_.names().empty())
+            return;
+        fmt::print("\n{:<24}{:>10}{:>9}\n", "A's confidence", "pixels", "RMSE");
+        for (std::size_t i = 0; i < by_confidence_.names().size(); ++i)
+            fmt::print("{:<24}{:>10.0f}{:>9.4f}\n", by_confidence_.names()[i], by_confidence_.pixels(i),
+                       by_confidence_.rms(i));
+    }
+
+    json confidence_json() const {
+        json classes = json::array();
+        for (std::size_t i = 0; i < by_confidence_.names().size(); ++i)
+            if (by_confidence_.pixels(i) > 0)
+                classes.push_back({{"confidence", by_confidence_.names()[i]},
+                                   {"pixels", by_confidence_.pixels(i)},
+                                   {"rms", by_confidence_.rms(i)}});
+        return classes;
+    }
+
+    void write_reports(const MapSet& a, const MapSet& b, const std::vector<Row>& rows, const Difference& all) const {
+        std::string csv = "image," + figure_csv_heads() + ",why\n";
+        json images = json::array();
+        for (const Row& row : rows) {
+            csv += csv_field(row.name) + "," + figure_csv(row.difference) + "," + csv_field(row.why) + "\n";
+            images.push_back(row.why.empty() ? json{{"image", row.name}, {"difference", to_json(row.difference)}}
+                                             : json{{"image", row.name}, {"why", row.why}});
+        }
+        const json text{{"a", a.path.string()}, {"b", b.path.string()},  {"b_is", b.kind},
+                        {"scale", scale_},      {"total", to_json(all)}, {"by_confidence", confidence_json()},
+                        {"images", images}};
+        write_atomically(fs::path(out_) / "compare.csv", csv);
+        write_atomically(fs::path(out_) / "compare.json", text_of(text) + "\n"); // last: it says that the rest is there
+    }
+
+    std::vector<std::string> paths_;
+    std::string out_;
+    ErrorByClass by_confidence_;
+    double scale_ = 0.5;
+    bool truth_ = false, overwrite_ = false;
+};
+
+} // namespace
+
+std::unique_ptr<Command> compare_command() { return std::make_unique<Compare>(); }
+
+} // namespace scanshade

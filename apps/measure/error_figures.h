@@ -1,0 +1,22 @@
+// The figures of a Difference as people and programs read them: one list of columns for tables, CSV and JSON.
+#pragma once
+
+#include "ao/compare.h"
+#include "apps/json.h"
+
+#include <string>
+
+namespace scanshade {
+
+/// The columns' heads and one row's cells, aligned with each other.
+[[nodiscard]] std::string figure_heads();
+[[nodiscard]] std::string figure_cells(const Difference& difference);
+
+/// "pixels,only_a,only_b,mae,rms,..." and one row; what is unknown is an empty field.
+[[nodiscard]] std::string figure_csv_heads();
+[[nodiscard]] std::string figure_csv(const Difference& difference);
+
+/// Every figure by name; what is unknown is null.
+[[nodiscard]] json to_json(const Difference& difference);
+
+} // namespace scanshade

@@ -1,0 +1,164 @@
+#include "apps/measure/trial.h"
+
+#include "ao/gpu/device.h"
+#include "apps/measure/map_set.h"
+#include "io/images/image_file.h"
+#include "projection/attach.h"
+#include "projection/error.h"
+#include "projection/project.h"
+
+#include <algorithm>
+#include <chrono>
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+namespace scanshade {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// The folder's own name, whatever slashes and dots it was written with.
+std::string last_name(const fs::path& path) {
+    const fs::path whole = fs::weakly_canonical(path);
+    return (whole.has_filename() ? whole : whole.parent_path()).stem().string();
+}
+
+/// The class that a simulated sensor stands for.
+std::optional<SensorClass> class_of_simulated(std::string_view sensor) {
+    if (sensor == "ideal")
+        return SensorClass::clean;
+    if (sensor == "kinect")
+        return SensorClass::structured_light;
+    if (sensor == "tof")
+        return SensorClass::time_of_flight;
+    return std::nullopt;
+}
+
+/// Where a generated capture keeps what is exact.
+struct Truth {
+    std::optional<MapSet> ao;
+    fs::path depth;
+};
+
+Truth truth_beside(const fs::path& capture) {
+    if (!fs::is_directory(capture / "truth/ao"))
+        return {};
+    return {find_maps(capture), capture / "truth/depth"};
+}
+
+TrialFrame load_frame(const Capture& capture, std::size_t index, const Truth& truth) {
+    const CaptureEntry& entry = capture.entries[index];
+    if (!entry.problem.empty())
+        throw Error(entry.problem);
+    TrialFrame ready{entry.name, capture.load(index), {}, {}, {}};
+    ready.frame.camera = camera_of(ready.frame);
+    ready.depth = project(ready.frame);
+    ready.exact_z_m = ready.frame.depth_m.empty() ? ready.depth.z_m : ready.frame.depth_m;
+    if (truth.ao) {
+        const auto file = truth.ao->files.find(entry.name);
+        if (file == truth.ao->files.end())
+            throw Error(fmt::format("{} has no map of this frame", (truth.ao->path / "truth/ao").string()));
+        ready.truth = read_ao(file->second);
+        if (const fs::path depth = truth.depth / (entry.name + ".tiff"); fs::exists(depth))
+            ready.exact_z_m = depth_in_metres(read_stored_depth(depth), depth_encoding("m", "truth"));
+        if (ready.truth.size() != ready.exact_z_m.size())
+            throw Error(fmt::format("{}: {}x{} expected, as its depth, found {}x{}", file->second.string(),
+                                    ready.exact_z_m.cols, ready.exact_z_m.rows, ready.truth.cols, ready.truth.rows));
+    }
+    return ready;
+}
+
+} // namespace
+
+std::string_view name_of(SensorClass sensor) {
+    switch (sensor) {
+    case SensorClass::clean:
+        return "clean";
+    case SensorClass::structured_light:
+        return "structured light";
+    case SensorClass::time_of_flight:
+        return "time of flight";
+    }
+    return "";
+}
+
+SensorClass class_of(const DepthNoise& noise) {
+    if (noise.at(2) < 0.001)
+        return SensorClass::clean;
+    return noise.at(4) > 7 * noise.at(1) ? SensorClass::structured_light : SensorClass::time_of_flight;
+}
+
+TrialCapture load_trial(const fs::path& path, const TrialRequest& request) {
+    const Capture capture = open_capture(path, request.capture);
+    const Truth truth = truth_beside(path);
+    TrialCapture trial{last_name(path), path, {}, {}, request.radius_m, {}, {}, {}};
+    std::vector<std::size_t> among = request.among;
+    for (std::size_t i = 0; request.among.empty() && i < capture.entries.size(); ++i)
+        among.push_back(i);
+    trial.noise = noise_of(capture, among, request.depth_noise);
+    trial.noise_origin = request.depth_noise == "auto" ? "measured" : "--depth-noise";
+    trial.sensor = class_of(trial.noise);
+    trial.preparation = request.preparation;
+    if (truth.ao) {
+        trial.sensor = class_of_simulated(truth.ao->sensor).value_or(trial.sensor);
+        trial.radius_m = truth.ao->radius_m.value_or(request.radius_m);
+        trial.reference = "ray-traced truth of the generated scene";
+    }
+    for (const std::size_t place : spread(static_cast<std::size_t>(request.frames), among.size()))
+        try {
+            during(fmt::format("{}: frame {}", path.string(), capture.entries[among[place]].name),
+                   [&] { trial.frames.push_back(load_frame(capture, among[place], truth)); });
+        } catch (const Outage&) {
+            throw;
+        } catch (const std::exception&) {
+            if (!request.leave_bad_out)
+                throw;
+        }
+    if (trial.frames.empty())
+        throw Error(fmt::format("{}: none of the frames tried could be loaded", path.string()));
+    return trial;
+}
+
+namespace {
+
+/// The capture's radius first, so that a configuration may say otherwise.
+std::unique_ptr<MethodSetup> set_up(const Configuration& configuration, double radius_m) {
+    std::unique_ptr<MethodSetup> setup = method_named(configuration.method).setup();
+    const std::vector<Parameter> rows = setup->parameters();
+    if (const Parameter* radius = row_named(rows, "radius"))
+        set(*radius, fmt::format("{}", radius_m));
+    apply(configuration, *setup);
+    return setup;
+}
+
+FitPlaneOptions widened_for(const std::string& method, FitPlaneOptions preparation) {
+    preparation.smoothing *= method_named(method).smoothing;
+    return preparation;
+}
+
+} // namespace
+
+Trial::Trial(gpu::Device& device, Configuration configuration, const DepthNoise& noise, double radius_m,
+             FitPlaneOptions preparation)
+    : configuration_(std::move(configuration)), setup_(set_up(configuration_, radius_m)), plain_(setup_->make(device)),
+      method_(device, *plain_, widened_for(configuration_.method, preparation)), noise_(noise) {}
+
+cv::Mat1f Trial::compute(const TrialFrame& frame) {
+    const auto start = std::chrono::steady_clock::now();
+    const AoMap ao = method_.compute({.depth = frame.depth, .noise = noise_});
+    wall_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    device_ms_ = scanshade::device_ms(method_.timings());
+    return attach(frame.frame, frame.depth, ao).visibility;
+}
+
+double device_ms(const Timings& timings) {
+    double sum = 0;
+    for (const auto& [name, ms] : timings)
+        if (name.find("upload") == std::string::npos && name.find("download") == std::string::npos)
+            sum += ms;
+    return sum;
+}
+
+} // namespace scanshade

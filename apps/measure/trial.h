@@ -1,0 +1,91 @@
+// A configuration tried on captures whose right answer is known: the ground that bench, calibrate-look and error
+// budgets stand on.
+#pragma once
+
+#include "ao/compare.h"
+#include "ao/fit_plane/fit_plane.h"
+#include "apps/method_settings.h"
+#include "apps/walk/measured_noise.h"
+#include "io/captures/capture.h"
+
+#include <array>
+#include <filesystem>
+#include <optional>
+
+namespace scanshade {
+
+/// How depth was measured, as far as its noise tells; errors differ more between these than between methods.
+enum class SensorClass { clean, structured_light, time_of_flight };
+[[nodiscard]] std::string_view name_of(SensorClass sensor);
+/// Clean where sigma at 2 m is below 1 mm. The noise of structured light grows with the square of the distance (here:
+/// more than sevenfold from 1 to 4 m; Kinects 8 to 13), that of time of flight has a floor (simulated: 5).
+[[nodiscard]] SensorClass class_of(const DepthNoise& noise);
+
+/// A frame ready for the methods, and what should come out.
+struct TrialFrame {
+    std::string name;
+    Frame frame;
+    DepthImage depth;
+    cv::Mat1f truth;     ///< on the recorded pixels, NaN = no surface; empty where nothing is known
+    cv::Mat1f exact_z_m; ///< true depth of a generated capture, else the recorded one; 0 = hole
+};
+
+struct TrialCapture {
+    std::string name;
+    std::filesystem::path path;
+    DepthNoise noise;
+    std::string noise_origin;
+    double radius_m = 0.5;
+    SensorClass sensor = SensorClass::clean; ///< a generated capture's own, else class_of(noise)
+    std::string reference;                   ///< what `truth` is, or empty
+    std::vector<TrialFrame> frames;
+    FitPlaneOptions preparation = {}; ///< as requested
+};
+
+struct TrialRequest {
+    int frames = 4;        ///< spread evenly over the capture
+    double radius_m = 0.5; ///< where the capture's truth does not say
+    std::string depth_noise = "auto";
+    CaptureOptions capture;
+    std::vector<std::size_t> among;   ///< indices of the frames that may be taken; empty = all
+    bool leave_bad_out = false;       ///< frames that cannot be loaded are left out instead of being an Error
+    FitPlaneOptions preparation = {}; ///< of noisy depth; its smoothing goes over each method's own
+};
+
+/// Loads the frames with the truth that lies beside a generated capture. Throws Error naming the frame that fails, and
+/// where none is left.
+[[nodiscard]] TrialCapture load_trial(const std::filesystem::path& path, const TrialRequest& request);
+
+/// One configuration on one device, as `run` would use it on depth of some noise.
+class Trial {
+  public:
+    /// `radius_m` goes into the method's radius, before the configuration's own settings; the preparation's smoothing
+    /// is multiplied by the method's.
+    Trial(gpu::Device& device, Configuration configuration, const DepthNoise& noise, double radius_m,
+          FitPlaneOptions preparation = {});
+
+    /// From now on depth has that noise, or none. Pipelines stay: making them is most of a trial's time.
+    void set_noise(const DepthNoise& noise) { noise_ = noise; }
+    /// Visibility on the recorded pixels.
+    [[nodiscard]] cv::Mat1f compute(const TrialFrame& frame);
+
+    [[nodiscard]] const Configuration& configuration() const { return configuration_; }
+    /// Of the last compute(): the device's own time stamps without transfers; and all of it, by the host's clock.
+    [[nodiscard]] double device_ms() const { return device_ms_; }
+    [[nodiscard]] double wall_ms() const { return wall_ms_; }
+    /// Every setting as used.
+    [[nodiscard]] std::vector<Parameter> settings() const { return setup_->parameters(); }
+
+  private:
+    Configuration configuration_;
+    std::unique_ptr<MethodSetup> setup_;
+    std::unique_ptr<Method> plain_;
+    OnFittedDepth method_;
+    DepthNoise noise_;
+    double device_ms_ = 0, wall_ms_ = 0;
+};
+
+/// Milliseconds of the passes, transfers and the host's copying left out.
+[[nodiscard]] double device_ms(const Timings& timings);
+
+} // namespace scanshade

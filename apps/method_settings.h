@@ -1,0 +1,34 @@
+// A method with its settings as plain data, and the flags that set them.
+#pragma once
+
+#include "ao/method.h"
+#include "apps/command.h"
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace scanshade {
+
+/// Names and values of settings, as the method's rows take them: {"quality", "high"}.
+using Settings = std::vector<std::pair<std::string, std::string>>;
+
+struct Configuration {
+    std::string method;
+    std::string name; ///< tells it apart from the method's others: "high", "high downsampled"
+    Settings settings;
+
+    [[nodiscard]] std::string full_name() const { return method + " " + name; }
+};
+
+/// Puts the settings into the rows of `setup`. Throws Misuse naming the configuration for a row that is not there or
+/// refuses its value.
+void apply(const Configuration& configuration, MethodSetup& setup);
+
+/// Every row's present value: applying it later brings the settings back.
+[[nodiscard]] Settings values_of(MethodSetup& setup);
+
+/// The method's rows as the command line shows them: "radius" of cacao is --cacao.radius.
+[[nodiscard]] Stage method_stage(std::string_view name, MethodSetup& setup);
+
+} // namespace scanshade

@@ -1,0 +1,84 @@
+// What `scanshade run` tells people about a capture, before and after.
+#include "apps/run/messages.h"
+
+#include "apps/walk/progress.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+namespace scanshade {
+namespace {
+
+/// The first ten by name, the rest by number.
+std::string names_of_failed(const std::vector<FrameRow>& rows) {
+    std::vector<std::string> names;
+    for (const FrameRow& row : rows)
+        if (row.status == FrameStatus::failed)
+            names.push_back(row.name);
+    constexpr std::size_t most = 10;
+    const std::string more = names.size() > most ? fmt::format(" and {} more", names.size() - most) : "";
+    names.resize(std::min(names.size(), most));
+    return fmt::format("{}{}", fmt::join(names, ", "), more);
+}
+
+} // namespace
+
+std::string shading_sentence(const Capture& capture, Registration registration) {
+    const bool clouds = std::ranges::all_of(capture.entries, [](const auto& entry) { return !entry.cloud.empty(); });
+    const bool colour = std::ranges::any_of(capture.entries, [](const auto& entry) { return !entry.colour.empty(); });
+    if (clouds)
+        return "shaded pictures show the points' own colours, or grey clay where they have none.";
+    if (!colour)
+        return "shaded pictures show grey clay made from depth: the capture has no colour images.";
+    if (registration == Registration::yes)
+        return "shaded pictures show the colour images.";
+    if (capture.colour_camera)
+        return "shaded pictures show the colour images, carried over from the camera that took them (" +
+               describe(capture.colour_camera->camera) + "); what it did not see is grey clay.";
+    const std::string why = registration == Registration::no ? "do not lie on" : "are not known to lie on";
+    return fmt::format(
+        "shaded pictures show grey clay made from depth, because the colour images {} the depth pixels{}; "
+        "--registered yes shades the colour images anyway.",
+        why, capture.registration_reason.empty() ? "" : " (" + capture.registration_reason + ")");
+}
+
+std::string noise_sentence(const DepthNoise& noise, const RunSettings& settings) {
+    const std::string origin = settings.depth_noise == "auto" ? "measured" : "--depth-noise";
+    if (!noise.any())
+        return fmt::format("{} to mind ({}); depth is used as recorded", describe(noise), origin);
+    return fmt::format("{} ({}); flying pixels are {}; {}", describe(noise), origin,
+                       settings.flying_pixels == "drop" ? "dropped" : "kept",
+                       settings.depth_smoothing > 0 ? "depth and normals come from plane fits"
+                                                    : "depth is used as recorded");
+}
+
+void introduce(const RunReport& report, std::size_t frames) {
+    const Capture& capture = report.capture;
+    say(fmt::format("{}: {}, {} of {} frames", capture.path.string(), capture.kind, frames, capture.entries.size()));
+    if (!capture.depth.origin.empty())
+        say(fmt::format("  depth: {} ({})", capture.depth.name, capture.depth.origin));
+    if (capture.camera)
+        say(fmt::format("  camera: {} ({})", describe(*capture.camera), capture.camera->origin));
+    if (capture.depth_correction.any())
+        say(fmt::format("  depth correction: {} ({})", describe(capture.depth_correction), capture.camera->origin));
+    say("  depth noise: " + report.depth_noise);
+    for (const std::string& warning : capture.warnings)
+        say("  warning: " + warning);
+    for (const std::string& sentence : report.budget)
+        say("  " + sentence);
+    say("  " + report.shading);
+}
+
+void conclude(const RunReport& report, const std::filesystem::path& table) {
+    const std::size_t ok = count(report.frames, FrameStatus::ok);
+    const std::string before = ok > report.done_now ? fmt::format(", {} of them before", ok - report.done_now) : "";
+    say(fmt::format("  {} of {} frames{} in {:.1f} s ({}) -> {}", ok, report.frames.size(), before,
+                    report.took_ms / 1000, describe(rates_of(report)), table.parent_path().string()));
+    if (count(report.frames, FrameStatus::failed) > 0)
+        say(fmt::format("  failed: {} ({} says why)", names_of_failed(report.frames), table.string()));
+    if (const std::size_t skipped = count(report.frames, FrameStatus::skipped); skipped > 0)
+        say(fmt::format("  not finished: {} frames are left; --resume goes on with them", skipped));
+}
+
+} // namespace scanshade

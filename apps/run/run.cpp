@@ -1,0 +1,450 @@
+// `scanshade run`: ambient occlusion for every frame of one or more captures.
+#include "apps/walk/batch.h"
+#include "apps/jobs/job_run.h"
+#include "apps/walk/overlap.h"
+#include "apps/walk/progress.h"
+#include "apps/walk/resume.h"
+#include "apps/run/settings.h"
+#include "apps/run/messages.h"
+#include "apps/walk/sequence_order.h"
+#include "apps/slice.h"
+#include "apps/measure/trial.h"
+#include "apps/run/workers.h"
+#include "io/output_file.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <mutex>
+#include <opencv2/core/utility.hpp>
+#include <semaphore>
+#include <set>
+#include <utility>
+
+namespace scanshade {
+namespace {
+
+namespace fs = std::filesystem;
+
+// ---------------------------------------------------------------------------------------------------- interruption
+
+std::atomic<bool> interrupted = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may touch nothing else");
+
+/// The first Ctrl-C ends the run after the frames in flight; the second one kills it, as always.
+void end_gracefully_on_signals() {
+    struct sigaction action = {};
+    action.sa_handler = [](int) { interrupted = true; };
+    action.sa_flags = static_cast<int>(SA_RESETHAND) | SA_RESTART;
+    sigaction(SIGINT, &action, nullptr);
+    sigaction(SIGTERM, &action, nullptr);
+}
+
+// ---------------------------------------------------------------------------------------------------- jobs
+
+/// One capture, the frames to take of it, and where its results go.
+struct Job {
+    Capture capture;
+    BatchOptions batch;
+    std::vector<std::size_t> of = {}; ///< all that is taken of the capture, of which batch.frames may be a block
+    std::string block = {};           ///< "" = all, else as Task::block() says
+};
+
+/// "office" of captures/office/ and captures/office.pcd; "office-2" when another capture has that name.
+std::string folder_name(const fs::path& path, std::set<std::string>& taken) {
+    const fs::path whole = fs::weakly_canonical(path);
+    const fs::path last = whole.has_filename() ? whole.filename() : whole.parent_path().filename();
+    const std::string stem = fs::is_directory(path) ? last.string() : last.stem().string();
+    std::string name = stem.empty() ? "capture" : stem;
+    for (int n = 2; !taken.insert(name).second; ++n)
+        name = fmt::format("{}-{}", stem, n);
+    return name;
+}
+
+/// Nothing is begun when something would be lost: an earlier result is replaced only with --overwrite.
+void refuse_to_overwrite(const Job& job) {
+    const Outputs& outputs = job.batch.outputs;
+    const auto refuse = [](const std::vector<fs::path>& files) {
+        const auto there = std::ranges::find_if(files, [](const fs::path& file) { return fs::exists(file); });
+        if (there != files.end())
+            throw Misuse(there->string() +
+                         " exists already: --resume goes on with an earlier run, --overwrite replaces its "
+                         "results, or choose another -o");
+    };
+    refuse({outputs.folder / "manifest.json", outputs.folder / "frames.csv", journal_file(outputs.folder, "")});
+    for (const std::size_t index : job.batch.frames)
+        refuse(files_of(job.capture.entries[index], outputs));
+}
+
+/// Clears what a killed run left, and the report of an earlier one: a manifest says that what lies beside it is
+/// complete. The journal is held.
+void prepare_folder(const Job& job, const std::vector<fs::path>& reports) {
+    const fs::path& folder = job.batch.outputs.folder;
+    std::set<std::string, std::less<>> stems;
+    for (const std::size_t index : job.batch.frames)
+        stems.insert(job.capture.entries[index].name);
+    for (const fs::path& report : reports) {
+        stems.insert(report.stem().string());
+        fs::remove(folder / report);
+    }
+    for (const char* part : {"", "ao", "confidence", "shaded", "panel", "clouds"})
+        remove_leftovers(folder / part, [&](std::string_view stem) { return stems.contains(stem); });
+}
+
+/// "frames.csv", or "frames.0-500.csv" of a block.
+std::string report_name(const std::string& stem, const std::string& block, const char* extension) {
+    return block.empty() ? stem + extension : stem + "." + block + extension;
+}
+
+/// A capture's frames together, on a device and with a method that are lent for the whole of it.
+struct Together {
+    Together(Workers& workers, const Job& job, const RunSettings& asked)
+        : loan(workers.crew()), crew(*loan), worker(workers.who_is(*loan)),
+          sequence(*worker.device, *worker.plain, job.batch.radius_m, job.batch.noise, asked.fit(),
+                   asked.sequence == "on" ? sequence_options(asked.sequences, job.capture, job.batch.radius_m)
+                                          : alone()) {
+        if (workers.crew().size() > workers.devices())
+            say("  frames of a sequence are computed one at a time, in their order");
+        if (sequence.reach() > 0)
+            say(fmt::format("  frames within {} of each other are looked at together", sequence.reach()));
+    }
+    Crew::Loan loan;
+    Crew crew; ///< of the one
+    const Workers::Worker& worker;
+    Neighbourhood sequence;
+};
+
+/// What became of the frames, for the exit code.
+class Tally {
+  public:
+    void add(const std::vector<FrameRow>& rows) {
+        all_ += rows.size();
+        ok_ += count(rows, FrameStatus::ok);
+        for (const FrameRow& row : rows)
+            faults_.insert(row.fault);
+    }
+    /// Of a whole capture.
+    void add(Fault fault) { faults_.insert(fault); }
+    [[nodiscard]] int exit_code(int unopened) const {
+        if (interrupted || faults_.contains(Fault::outage))
+            return unfinished;
+        if (faults_.contains(Fault::internal) || faults_.contains(Fault::crash))
+            return internal_error;
+        if (ok_ == all_ && unopened == 0)
+            return all_well;
+        return ok_ == 0 ? nothing_done : some_failed;
+    }
+
+  private:
+    std::size_t all_ = 0, ok_ = 0;
+    std::set<Fault> faults_;
+};
+
+// ---------------------------------------------------------------------------------------------------- the command
+
+class Run final : public Command {
+  public:
+    Words words() override { return {"PATH", "captures: folders, depth images or clouds", &asked_.paths, 1, 1 << 20}; }
+
+    std::vector<Stage> stages() override { return asked_.stages(); }
+
+    int run() override {
+        if (asked_.log == "json")
+            log_as_json();
+        if (std::ranges::any_of(asked_.paths, is_job))
+            return run_planned();
+        asked_.check();
+        if (!asked_.budget.any())
+            (void)asked_.chosen_setup(); // refuses before anything is opened
+        int unopened = 0;
+        Tally tally;
+        std::vector<Job> jobs = plan(unopened, tally);
+        for (const Job& job : jobs)
+            if (!asked_.overwrite && !asked_.resume)
+                refuse_to_overwrite(job);
+        if (jobs.empty())
+            return tally.exit_code(unopened);
+
+        cv::setNumThreads(1); // frames are the parallelism; threads inside a frame would only compete with them
+        end_gracefully_on_signals();
+        std::mutex counting;
+        overlapped(jobs.size(), at_once(), [&](std::size_t i, Turn& turn) {
+            if (interrupted)
+                return;
+            std::vector<FrameRow> rows;
+            Fault fault = Fault::none;
+            try {
+                rows = process(std::move(jobs[i]), turn);
+            } catch (const DeviceLost&) { // the other captures need it, too
+                throw;
+            } catch (const Outage& failure) {
+                say(fmt::format("failed: {}", failure.what()));
+                fault = Fault::outage;
+            }
+            const std::lock_guard alone(counting);
+            tally.add(rows);
+            tally.add(fault);
+        });
+        return tally.exit_code(unopened);
+    }
+
+  private:
+    Job job_from(const fs::path& path, const fs::path& folder) const {
+        Job job{open_capture(path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s, asked_.poses}), {}};
+        refuse_absent_view(job.capture);
+        job.batch.frames = job.of = slice(asked_.frames, job.capture.entries.size());
+        job.batch.outputs = asked_.outputs();
+        job.batch.outputs.folder = folder;
+        if (!asked_.dump.empty())
+            job.batch.dump = fs::path(asked_.dump) / folder.lexically_relative(asked_.out);
+        job.batch.registration = asked_.registration();
+        job.batch.range = asked_.range();
+        job.batch.stop = &interrupted;
+        return job;
+    }
+
+    /// Opens what is to be processed. A capture that cannot be opened is told and counted; it stops no other.
+    std::vector<Job> plan(int& unopened, Tally& tally) {
+        std::vector<Job> jobs;
+        std::set<std::string> taken;
+        for (const std::string& path : asked_.paths) {
+            const fs::path folder =
+                asked_.paths.size() == 1 ? fs::path(asked_.out) : asked_.out / fs::path(folder_name(path, taken));
+            try {
+                jobs.push_back(job_from(path, folder));
+            } catch (const Misuse&) {
+                throw;
+            } catch (const Outage& failure) {
+                say(fmt::format("failed: {}", failure.what()));
+                tally.add(Fault::outage);
+            } catch (const std::exception& failure) {
+                say(fmt::format("failed: {}", failure.what()));
+                ++unopened;
+            }
+        }
+        return jobs;
+    }
+
+    void refuse_absent_view(const Capture& capture) const {
+        if (asked_.outputs().colour_view && !capture.colour_camera)
+            throw Error(capture.path.string() +
+                        ": --view colour needs to know the colour camera beside the depth camera; refine finds it");
+    }
+
+    RunReport report_on(const Job& job, Workers& workers) {
+        const auto& said = job.batch.registration;
+        const Registration registration = said.value_or(job.capture.registration);
+        RunReport report{.started = std::chrono::system_clock::now(),
+                         .device = workers.device().info(),
+                         .method = asked_.method,
+                         .settings = asked_.stages_in_use(),
+                         .capture = job.capture,
+                         .registration = registration,
+                         .registration_reason = said ? "--registered" : job.capture.registration_reason,
+                         .depth_noise = noise_sentence(job.batch.noise, asked_),
+                         .budget = {},
+                         .shading = shading_sentence(job.capture, registration),
+                         .frames = {}};
+        report.devices = workers.devices();
+        return report;
+    }
+
+    /// Picks method and settings for the capture, from where the command line left them. Says what it did.
+    std::vector<std::string> keep_to_budget(const Job& job, gpu::Device& device) {
+        const TrialRequest request{
+            .depth_noise = asked_.depth_noise,
+            .capture = {asked_.camera, asked_.depth_scale, asked_.association_limit_s},
+            .among = job.of,
+            .leave_bad_out = true,
+            .preparation = {.drop_flying = asked_.flying_pixels == "drop", .smoothing = asked_.depth_smoothing}};
+        const TrialCapture trial = load_trial(job.capture.path, request);
+        const double radius_m = asked_.radius.empty() ? request.radius_m : std::stod(asked_.radius);
+        const Choice choice = choose(device, shipped_front(), trial, radius_m, asked_.budget);
+        if (!before_budget_.settings.empty())
+            apply(before_budget_, asked_.chosen_setup());
+        asked_.method = choice.configuration.method;
+        MethodSetup& setup = asked_.chosen_setup();
+        before_budget_ = {asked_.method, "as given", values_of(setup)};
+        apply(choice.configuration, setup);
+        return choice.sentences;
+    }
+
+    /// A job made by `plan`: in worker processes, task by task.
+    int run_planned() {
+        if (asked_.paths.size() != 1 || !asked_.out.empty() || asked_.overwrite)
+            throw Misuse("run JOB goes on with that job, in its own folder: neither other captures, nor -o, nor "
+                         "--overwrite");
+        const fs::path job = asked_.paths.front();
+        const Plan plan = read_plan(job);
+        const Shard shard = shard_from(asked_.shard);
+        for (const Stage& stage : stages())
+            for (const auto& [name, value] : plan.settings)
+                if (const Parameter* row = row_named(stage.rows, name))
+                    set(*row, value);
+        asked_.out = (job / "results").string();
+        asked_.resume = true;
+        asked_.check();
+        (void)asked_.chosen_setup();
+        return supervise(1, [&](const Shift& shift) {
+            cv::setNumThreads(1);
+            end_gracefully_on_signals();
+            return work_through(job, plan, shard, interrupted, shift.carefully ? 1 : at_once(),
+                                [&](const Task& task, Turn& turn) {
+                                    Tally tally;
+                                    tally.add(process(job_of(job, task), turn, shift));
+                                    return tally.exit_code(0);
+                                });
+        });
+    }
+
+    Job job_of(const fs::path& folder, const Task& task) {
+        // The plan opened it: whatever is in the way now may be gone the next time.
+        if (std::error_code ignored; !fs::exists(task.capture, ignored))
+            throw Outage(task.capture.string() + ": not there any more");
+        Job job = job_from(task.capture, results_of(folder, task));
+        if (job.of.size() != task.of)
+            throw Error(fmt::format("{}: planned with {} frames, has {} now: plan anew", task.capture.string(), task.of,
+                                    job.of.size()));
+        job.block = task.block();
+        job.batch.frames = {job.of.begin() + static_cast<std::ptrdiff_t>(task.first),
+                            job.of.begin() + static_cast<std::ptrdiff_t>(task.first + task.frames)};
+        return job;
+    }
+
+    /// Captures: those whose frames enter the walk, and around them two that are made ready and two whose last frames
+    /// leave it: on a GPU 40 frames take as little time as opening their capture does. One fills sixteen cores. A
+    /// budget measures, which nothing may disturb, and picks other settings for each.
+    [[nodiscard]] std::size_t at_once() {
+        if (asked_.budget.any())
+            return 1;
+        std::size_t entering = std::max(1U, std::thread::hardware_concurrency() / 16);
+        if (asked_.sequence == "on") // keeps one device busy
+            entering = asked_.device == "all" ? workers().devices() : 1;
+        entrance_.release(static_cast<std::ptrdiff_t>(entering - 1));
+        return entering + 4;
+    }
+
+    /// Opened when the first frame needs them: where all is done already, never.
+    Workers& workers() {
+        if (!workers_)
+            workers_ = std::make_unique<Workers>(asked_.device, asked_.in_flight);
+        return *workers_;
+    }
+
+    /// The right to send frames into the walk.
+    class Entrance {
+      public:
+        explicit Entrance(std::counting_semaphore<>& free) : free_(free) { free_.acquire(); }
+        ~Entrance() { leave(); }
+        Entrance(const Entrance&) = delete;
+        Entrance& operator=(const Entrance&) = delete;
+        void leave() {
+            if (!left_.exchange(true))
+                free_.release();
+        }
+
+      private:
+        std::counting_semaphore<>& free_;
+        std::atomic<bool> left_ = false;
+    };
+
+    std::vector<FrameRow> process(Job job, Turn& turn, const Shift& shift = {}) {
+        const fs::path& folder = job.batch.outputs.folder;
+        turn.is_of(job.capture.path.string());
+        Journal journal(folder, job.block);
+        if (asked_.overwrite)
+            journal.clear();
+        const fs::path table = report_name("frames", job.block, ".csv"),
+                       manifest = report_name("manifest", job.block, ".json");
+        std::unique_lock alone(alone_);
+        const std::string task = task_key(asked_.stages_in_use(), job.capture, job.of, asked_.sequence == "on");
+        alone.unlock();
+        if (auto rows = rows_if_complete(journal, task, job.capture, job.batch.frames, asked_.retry);
+            rows && fs::exists(folder / manifest)) {
+            say(fmt::format("{}: done already, {} frames -> {}", job.capture.path.string(), rows->size(),
+                            folder.string()));
+            return *std::move(rows);
+        }
+        job.batch.noise = noise_of(job.capture, job.of, asked_.depth_noise);
+
+        alone.lock();
+        Workers& workers = this->workers();
+        const std::vector<std::string> budget =
+            asked_.budget.any() ? keep_to_budget(job, workers.device()) : std::vector<std::string>{};
+        workers.make(asked_.method, asked_.chosen_setup(), asked_.fit());
+        job.batch.point_method = dynamic_cast<PointMethod*>(workers.any().plain.get());
+        job.batch.radius_m = asked_.radius_m();
+        gpu::Device& device = workers.device();
+        const CloudAo of_clouds = asked_.cloud_ao(gpu::is_cpu(device.info()) ? nullptr : &device);
+        job.batch.cloud_ao = &of_clouds;
+        job.batch.cloud_walk = asked_.cloud_walk();
+        RunReport report = report_on(job, workers);
+        report.budget = budget;
+        const std::string settings = settings_key(report, job.batch.outputs, job.batch.noise);
+        alone.unlock();
+
+        std::optional<RecordingCloud> cloud;
+        if (!asked_.recording_cloud.empty())
+            job.batch.cloud = &cloud.emplace(asked_.cloud_resolution_m);
+        say(fmt::format("{} on {}", asked_.method, workers.description()));
+        introduce(report, job.batch.frames.size());
+        prepare_folder(job, {table, manifest});
+        Entrance entrance(entrance_);
+        job.batch.all_begun = [&] { entrance.leave(); };
+        std::optional<Together> together;
+        if (asked_.sequence == "on" || cloud)
+            job.batch.sequence = &together.emplace(workers, job, asked_).sequence;
+        report.at_once = together ? 1 : workers.crew().size();
+        const Recording recording{.journal = journal,
+                                  .settings = settings,
+                                  .task = task,
+                                  .device = workers.device().info().name,
+                                  .retry = asked_.retry,
+                                  .carefully = shift.carefully,
+                                  .finished = shift.finished};
+        Progress progress(job.batch.frames.size());
+        const auto start = std::chrono::steady_clock::now();
+        report.frames = run_recorded(job.capture, together ? together->crew : workers.crew(), job.batch, recording,
+                                     [&](const FrameRow& row) {
+                                         progress.add(row);
+                                         report.done_now += row.status == FrameStatus::ok;
+                                         report.ms_now = report.ms_now + row.ms;
+                                     });
+        report.took_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+        progress.end();
+        alone.lock(); // the report names settings
+        write_frames_csv(folder / table, report.frames);
+        write_manifest(folder / manifest, report, [&](const FrameRow& row) { return journal.whole(row); });
+        alone.unlock();
+        conclude(report, folder / table);
+        if (cloud && !interrupted)
+            write_recording(*cloud);
+        return std::move(report.frames);
+    }
+
+    void write_recording(const RecordingCloud& cloud) const {
+        if (cloud.points() == 0) {
+            say("  no frame had a pose: " + asked_.recording_cloud + " is not written");
+            return;
+        }
+        cloud.write(asked_.recording_cloud);
+        say(fmt::format("  {} points, merged within {:.4f} m -> {}", cloud.points(), cloud.resolution_m(),
+                        asked_.recording_cloud));
+    }
+
+    RunSettings asked_;
+    std::mutex alone_; ///< held while settings and devices are used by a capture, but not while frames are computed
+    std::counting_semaphore<> entrance_{1};
+    std::unique_ptr<Workers> workers_;
+    Configuration before_budget_; ///< of the method that a budget picked for the capture before this one
+};
+
+} // namespace
+
+std::unique_ptr<Command> run_command() { return std::make_unique<Run>(); }
+
+} // namespace scanshade

@@ -1,0 +1,174 @@
+#include "apps/scenes/sensor.h"
+
+#include "apps/scenes/random_noise.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fmt/format.h>
+#include <numbers>
+#include <tbb/parallel_for.h>
+
+namespace scanshade {
+namespace {
+
+/// What each stream of noise is for.
+enum Purpose : std::uint32_t { axial, sideways, downward, grazing, fraying, flying, mixing };
+
+Noise noise_of(const Sight& sight, Purpose purpose) { return {sight.seed, sight.frame, purpose}; }
+
+/// Depth of the surface at the nearest pixel inside the image.
+float depth_at(const Sight& sight, int u, int v) {
+    const cv::Mat1f& z_m = sight.exact.z_m;
+    return z_m(std::clamp(v, 0, z_m.rows - 1), std::clamp(u, 0, z_m.cols - 1));
+}
+
+/// A step of more than 4 % between two pixels is the outline of something, not a slope.
+bool is_edge(double z_m, double other_m) { return std::abs(z_m - other_m) > 0.04 * std::min(z_m, other_m); }
+
+bool beside_edge(const Sight& sight, int u, int v) {
+    const double z = depth_at(sight, u, v);
+    return is_edge(z, depth_at(sight, u - 1, v)) || is_edge(z, depth_at(sight, u + 1, v)) ||
+           is_edge(z, depth_at(sight, u, v - 1)) || is_edge(z, depth_at(sight, u, v + 1));
+}
+
+Eigen::Vector3d point_at(const Sight& sight, int u, int v, double z_m) {
+    return z_m * sight.camera.direction(u, v).homogeneous();
+}
+
+/// Cosine between the surface normal and the direction to the sensor.
+double facing(const Sight& sight, int u, int v) {
+    const cv::Vec3f& n = sight.exact.normals(v, u);
+    const Eigen::Vector3d to_sensor = -point_at(sight, u, v, 1).normalized();
+    return to_sensor.dot(Eigen::Vector3d(n[0], n[1], n[2]));
+}
+
+/// Chance of no measurement on a grazing surface: none up to 77 degrees, certain at 87.
+double grazing_loss(double cosine) {
+    const double certain = 0.052, none = 0.225;
+    return std::clamp((none - cosine) / (none - certain), 0.0, 1.0);
+}
+
+/// White noise under a 5x5 tent, sigma 1: devices measure in windows, so neighbouring pixels err alike.
+cv::Mat1f window_noise(const Sight& sight, Purpose purpose) {
+    constexpr std::array<double, 5> tent{1 / 9.0, 2 / 9.0, 3 / 9.0, 2 / 9.0, 1 / 9.0};
+    constexpr double left_over =
+        19 / 81.0; // the tent's sum of squares: sigma after one axis is its root, after both this
+    const cv::Size size = sight.exact.z_m.size();
+    const Noise noise = noise_of(sight, purpose);
+    cv::Mat1f white(size.height + 4, size.width + 4), rows(size.height + 4, size.width), smooth(size);
+    tbb::parallel_for(0, white.rows, [&](int v) {
+        for (int u = 0; u < white.cols; ++u)
+            white(v, u) = static_cast<float>(noise.gaussian(u, v));
+        for (int u = 0; u < rows.cols; ++u) {
+            double sum = 0;
+            for (int i = 0; i < 5; ++i)
+                sum += tent[i] * white(v, u + i);
+            rows(v, u) = static_cast<float>(sum / left_over);
+        }
+    });
+    tbb::parallel_for(0, smooth.rows, [&](int v) {
+        for (int u = 0; u < smooth.cols; ++u) {
+            double sum = 0;
+            for (int i = 0; i < 5; ++i)
+                sum += tent[i] * rows(v + i, u);
+            smooth(v, u) = static_cast<float>(sum);
+        }
+    });
+    return smooth;
+}
+
+/// Normal noise, sigma 1, as evenly spread in (0, 1): what is lost is lost in patches, not as single grains.
+double evenly(double gaussian) { return 0.5 * std::erfc(-gaussian / std::numbers::sqrt2); }
+
+template <class Measure>
+cv::Mat1f per_pixel(const Sight& sight, Measure&& measure) {
+    cv::Mat1f recorded(sight.exact.z_m.size(), 0.0F);
+    tbb::parallel_for(0, recorded.rows, [&](int v) {
+        for (int u = 0; u < recorded.cols; ++u)
+            if (sight.exact.z_m(v, u) > 0)
+                recorded(v, u) = static_cast<float>(measure(u, v, static_cast<double>(sight.exact.z_m(v, u))));
+    });
+    return recorded;
+}
+
+// ---------------------------------------------------------------------------------------------------- structured light
+
+/// The projector stands beside the camera: what the camera sees but the projector does not reach has no dots.
+bool in_shadow(const Sight& sight, int u, int v, double z_m) {
+    const Eigen::Vector3d projector(0.075, 0, 0);
+    const cv::Vec3f& n = sight.exact.normals(v, u);
+    const Eigen::Vector3d lifted = point_at(sight, u, v, z_m) + 1e-4 * Eigen::Vector3d(n[0], n[1], n[2]);
+    return sight.world.surface().blocked(sight.world_from_camera * lifted, sight.world_from_camera * projector);
+}
+
+double to_disparity_step(double z_m) {
+    constexpr double steps_metres = 1 / kinect_step_per_m; // z = steps_metres / whole number
+    return steps_metres / std::max(1.0, std::round(steps_metres / z_m));
+}
+
+cv::Mat1f record_kinect(const Sight& sight) {
+    constexpr double near_m = 0.4, far_m = 8.0, jitter_px = 0.7;
+    constexpr int blind_columns = 8; // the matching window hangs over the image's right border
+    const cv::Mat1f noise = window_noise(sight, axial), patches = window_noise(sight, grazing);
+    const Noise du = noise_of(sight, sideways), dv = noise_of(sight, downward), frayed = noise_of(sight, fraying);
+    return per_pixel(sight, [&](int u, int v, double z) -> double {
+        if (u >= sight.camera.pinhole.size.width - blind_columns)
+            return 0;
+        const bool edge = beside_edge(sight, u, v);
+        const bool lost = evenly(patches(v, u)) < grazing_loss(facing(sight, u, v));
+        if (lost || (edge && frayed.uniform(u, v) < 0.3) || in_shadow(sight, u, v, z))
+            return 0;
+        if (edge) // outlines waver by a pixel
+            z = depth_at(sight, u + static_cast<int>(std::lround(jitter_px * du.gaussian(u, v))),
+                         v + static_cast<int>(std::lround(jitter_px * dv.gaussian(u, v))));
+        const double measured = to_disparity_step(z + kinect_sigma_m(z) * noise(v, u));
+        return measured >= near_m && measured <= far_m ? measured : 0;
+    });
+}
+
+// ---------------------------------------------------------------------------------------------------- time of flight
+
+cv::Mat1f record_tof(const Sight& sight) {
+    constexpr double near_m = 0.25, far_m = 5.5, flying_share = 0.6;
+    const cv::Mat1f patches = window_noise(sight, grazing);
+    const Noise noise = noise_of(sight, axial), mix = noise_of(sight, mixing), flies = noise_of(sight, flying);
+    return per_pixel(sight, [&](int u, int v, double z) -> double {
+        const double cosine = std::max(facing(sight, u, v), 0.05);
+        if (evenly(patches(v, u)) < grazing_loss(cosine))
+            return 0;
+        if (beside_edge(sight, u, v) && flies.uniform(u, v) < flying_share) { // light of two surfaces in one pixel
+            const auto [low, high] = std::minmax({depth_at(sight, u - 1, v), depth_at(sight, u + 1, v),
+                                                  depth_at(sight, u, v - 1), depth_at(sight, u, v + 1)});
+            z = std::lerp(static_cast<double>(low), static_cast<double>(high), mix.uniform(u, v));
+        }
+        const double measured = z + tof_sigma_m(z) / std::sqrt(cosine) * noise.gaussian(u, v);
+        return measured >= near_m && measured <= far_m ? measured : 0;
+    });
+}
+
+cv::Mat1f record_ideal(const Sight& sight) { return sight.exact.z_m.clone(); }
+
+} // namespace
+
+const std::vector<Sensor>& sensors() {
+    static const std::vector<Sensor> table{
+        {"ideal", "exact depth of every pixel", record_ideal},
+        {"kinect", "structured light: disparity steps, noise, shadows, frayed outlines, 0.4 .. 8 m", record_kinect},
+        {"tof", "time of flight: noise, flying pixels at outlines, 0.25 .. 5.5 m", record_tof},
+    };
+    return table;
+}
+
+const Sensor& sensor_named(std::string_view name) {
+    std::string names;
+    for (const Sensor& sensor : sensors()) {
+        if (sensor.name == name)
+            return sensor;
+        names += fmt::format("{}{}", names.empty() ? "" : ", ", sensor.name);
+    }
+    throw Misuse(fmt::format("no sensor '{}', there are: {}", name, names));
+}
+
+} // namespace scanshade

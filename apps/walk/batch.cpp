@@ -1,0 +1,323 @@
+// The walk for many frames: load, project, compute, attach, write, with a bounded number of frames in memory.
+#include "apps/walk/batch.h"
+
+#include "apps/walk/point_clouds.h"
+#include "apps/walk/frame_files.h"
+#include "apps/walk/sequence_order.h"
+#include "io/clouds/cloud_file.h"
+#include "projection/attach.h"
+#include "projection/confidence.h"
+#include "projection/error.h"
+#include "projection/project.h"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <fmt/format.h>
+#include <mutex>
+#include <optional>
+#include <tbb/global_control.h>
+#include <tbb/info.h>
+#include <tbb/parallel_pipeline.h>
+#include <tbb/task_arena.h>
+
+namespace scanshade {
+namespace {
+
+void blame(FrameRow& row, FrameStatus status, Fault fault, const std::exception& failure) {
+    row.status = status;
+    row.fault = fault;
+    row.why = failure.what();
+}
+
+/// Takes one step with a frame and its time; the only place where a frame's failure is caught.
+template <class Step>
+void take(Work& work, double StageTimes::*stage, Step&& step) {
+    if (!work.row.why.empty())
+        return;
+    const auto start = std::chrono::steady_clock::now();
+    try {
+        step();
+    } catch (const DeviceLost& failure) { // no fault of the frame: another device may do it
+        blame(work.row, FrameStatus::skipped, Fault::outage, failure);
+    } catch (const Outage& failure) {
+        blame(work.row, FrameStatus::failed, Fault::outage, failure);
+    } catch (const Error& failure) {
+        blame(work.row, FrameStatus::failed, Fault::input, failure);
+    } catch (const std::exception& failure) { // while loading, a library's word on the file
+        const bool loading = stage == &StageTimes::load || stage == &StageTimes::project;
+        blame(work.row, FrameStatus::failed, loading ? Fault::input : Fault::internal, failure);
+    }
+    work.row.ms.*stage = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Whether anything that is written shows the colour images.
+bool shows_colour(const BatchOptions& options) {
+    const Outputs& outputs = options.outputs;
+    return outputs.shaded || outputs.panel || outputs.depth_cloud || outputs.colour_view || options.cloud;
+}
+
+Frame load(const Capture& capture, std::size_t index, const BatchOptions& options) {
+    if (const std::string& problem = capture.entries[index].problem; !problem.empty())
+        throw Error(problem);
+    Frame frame = capture.load(index, shows_colour(options));
+    if (options.registration)
+        frame.registration = *options.registration;
+    return frame;
+}
+
+double share(std::ptrdiff_t part, std::size_t whole) {
+    return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+/// Pixels or points that hold a depth / all of them.
+double valid_share(const Frame& frame) {
+    if (!frame.cloud)
+        return share(cv::countNonZero(frame.depth_m > 0), frame.depth_m.total());
+    const auto& points = frame.cloud->points;
+    return share(std::count_if(points.begin(), points.end(), [](const auto& p) { return p.allFinite(); }),
+                 points.size());
+}
+
+void describe_frame(Work& work) {
+    const Frame& frame = work.frame;
+    FrameRow& row = work.row;
+    row.size = frame.cloud ? frame.cloud->grid : frame.depth_m.size();
+    row.valid_share = valid_share(frame);
+    row.warnings = frame.warnings;
+    if (frame.registration == Registration::yes && !frame.cloud && !frame.colour.empty() &&
+        frame.colour.size() != frame.depth_m.size())
+        row.warnings.push_back(fmt::format("colour is {}x{}, depth {}x{}: shaded shows clay.", frame.colour.cols,
+                                           frame.colour.rows, frame.depth_m.cols, frame.depth_m.rows));
+}
+
+/// A camera that sees none of the points is a mistake to be told, not an empty result. (No depth at all is a result.)
+void refuse_blind_view(const Work& work) {
+    if (work.row.valid_share > 0 && cv::countNonZero(work.depth.z_m) == 0)
+        throw Error(fmt::format("nothing recorded lies in view of the camera ({}; {})", describe(work.frame.camera),
+                                work.frame.camera.origin));
+}
+
+/// Every point's value from the points themselves, or from the faces where the file has some.
+Attached attach_points(const Frame& frame, PointMethod& method) {
+    const Cloud& cloud = *frame.cloud;
+    const auto normals = recorded_normals(cloud);
+    const auto triangles = triangles_of(cloud);
+    return attached_points(cloud, method.compute({cloud.points, normals, triangles}));
+}
+
+/// Values from the points themselves: no view.
+void compute_points(Work& work, const BatchOptions& options) {
+    if (options.point_method) {
+        work.attached = attach_points(work.frame, *options.point_method);
+        if (!options.dump.empty())
+            write_intermediates(options.dump / work.entry.name, options.point_method->intermediates());
+        return;
+    }
+    work.of_points = cloud_visibility(work.frame, *options.cloud_ao);
+    std::ranges::copy(work.of_points.notes, std::back_inserter(work.row.notes));
+    work.confidence.per_point = work.of_points.confidence;
+    work.row.passes = work.of_points.timings;
+    work.attached = attached_points(*work.frame.cloud, work.of_points.visibility);
+}
+
+bool wants_confidence(const Work& work, const BatchOptions& options) {
+    const Outputs& outputs = options.outputs;
+    return options.cloud || outputs.confidence || (work.frame.cloud ? outputs.cloud : outputs.depth_cloud);
+}
+
+void attach_and_write(Work& work, const BatchOptions& options) {
+    Outputs outputs = options.outputs;
+    const bool by_points = work.by_points;
+    if (by_points)
+        outputs.ao = outputs.confidence = outputs.shaded = outputs.panel = false;
+    Scene scene;
+    cv::Mat3b shaded;
+    take(work, &StageTimes::attach, [&] {
+        if (!by_points)
+            work.attached = attach(work.frame, work.depth, work.ao);
+        if (!by_points && wants_confidence(work, options)) {
+            work.confidence_in_view = confidence_of(work.depth, work.ao.visibility, options.radius_m, options.noise);
+            work.confidence = attach(work.frame, work.depth, {work.confidence_in_view});
+        }
+        work.row.coverage = work.attached.coverage;
+        work.row.mean_visibility = work.attached.mean_visibility;
+        if (!by_points)
+            scene = scene_of(work, outputs.colour_view);
+        if (outputs.shaded || outputs.panel)
+            shaded = shaded_picture(scene, outputs.shade_strength);
+    });
+    take(work, &StageTimes::write, [&] {
+        write_all(work, scene, shaded, outputs);
+        if (by_points && options.outputs.shaded && !work.of_points.visibility.empty())
+            write_sides(work, options.outputs);
+    });
+    if (!work.row.why.empty())
+        remove_files(work, outputs);
+    else
+        work.row.status = FrameStatus::ok;
+}
+
+std::vector<FrameRow> planned_rows(const Capture& capture, const std::vector<std::size_t>& frames) {
+    std::vector<FrameRow> rows;
+    rows.reserve(frames.size());
+    for (const std::size_t index : frames)
+        rows.push_back(skipped_row(capture, index));
+    return rows;
+}
+
+/// The walk as one pipeline; the frames' rows are filled in on the way.
+class Pipeline {
+  public:
+    Pipeline(const Capture& capture, Crew& crew, const BatchOptions& options,
+             const std::function<void(const FrameRow&)>& on_frame)
+        : capture_(capture), crew_(crew), at_once_(options.sequence ? 1 : static_cast<int>(crew.size())),
+          options_(options), on_frame_(on_frame), rows_(planned_rows(capture, options.frames)),
+          walk_(capture, rows_, options.sequence ? options.sequence->reach() : 0), waiting_(options.sequence) {}
+
+    [[nodiscard]] std::vector<FrameRow> run() {
+        using tbb::filter_mode;
+        using Flow = tbb::flow_control;
+        const auto computing = at_once_ > 1 ? filter_mode::parallel : filter_mode::serial_in_order;
+        const auto filters =
+            tbb::make_filter<void, Token>(filter_mode::serial_in_order, [&](Flow& flow) { return begin(flow); }) &
+            tbb::make_filter<Token, Token>(filter_mode::parallel, [&](Token work) { return prepared(work); }) &
+            tbb::make_filter<Token, Token>(computing, [&](Token work) { return computed(work); }) &
+            tbb::make_filter<Token, Token>(filter_mode::parallel, [&](Token work) { return finished(work); }) &
+            tbb::make_filter<Token, void>(filter_mode::serial_in_order, [&](const Token& work) { report(work); });
+        // Who waits for a device leaves its core to others.
+        const int threads = cores() + (at_once_ > 1 ? at_once_ : 0);
+        const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism,
+                                          static_cast<std::size_t>(threads));
+        tbb::task_arena(threads).execute([&] { tbb::parallel_pipeline(frames_in_memory(), filters); });
+        for (const Token& unfinished : waiting_.rest()) // interrupted before what lies around them was there
+            unfinished->row = skipped_row(capture_, unfinished->row.index);
+        if (failure_)
+            std::rethrow_exception(failure_);
+        return std::move(rows_);
+    }
+
+  private:
+    [[nodiscard]] static int cores() { return tbb::info::default_concurrency(); }
+    [[nodiscard]] std::size_t frames_in_memory() const {
+        return static_cast<std::size_t>(options_.frames_in_memory > 0 ? options_.frames_in_memory
+                                                                      : cores() + 2 * at_once_);
+    }
+
+    Token begin(tbb::flow_control& flow) {
+        if (walk_.goes_on() && !(options_.stop && *options_.stop) && !given_up_)
+            return walk_.next();
+        flow.stop();
+        if (options_.all_begun)
+            options_.all_begun();
+        return {};
+    }
+
+    /// Loaded and projected.
+    Token prepared(Token work) const {
+        if (!work)
+            return work;
+        take(*work, &StageTimes::load, [&] {
+            work->frame = load(capture_, work->row.index, options_);
+            describe_frame(*work);
+        });
+        if (work->row.status != FrameStatus::failed && work->frame.cloud)
+            work->by_points = options_.point_method || takes_points(work->frame, options_, work->row.notes);
+        if (work->by_points) {
+            work->row.ms.project = 0;
+            return work;
+        }
+        take(*work, &StageTimes::project, [&] {
+            work->frame.camera = work->row.camera = camera_of(work->frame);
+            work->depth = project(work->frame, options_.range);
+            refuse_blind_view(*work);
+        });
+        return work;
+    }
+
+    Token computed(Token arrived) {
+        Token work = waiting_.pass(std::move(arrived));
+        if (!work || !work->row.why.empty())
+            return work;
+        if (work->by_points) { // one at a time takes all cores and much memory; nor may it begin another while it waits
+            const std::lock_guard alone(crew_.alone());
+            std::optional<Crew::Loan> rays;
+            if (options_.point_method)
+                rays.emplace(crew_);
+            tbb::this_task_arena::isolate(
+                [&] { take(*work, &StageTimes::compute, [&] { compute_points(*work, options_); }); });
+        } else {
+            const Crew::Loan method = crew_.lend();
+            take(*work, &StageTimes::compute, [&] { compute_view(*work, *method); });
+        }
+        if (work->row.status == FrameStatus::skipped && work->row.fault == Fault::outage)
+            given_up_ = true;
+        return work;
+    }
+
+    void compute_view(Work& work, Method& method) const {
+        if (options_.sequence) {
+            compute_in_sequence(work, capture_, *options_.sequence);
+        } else {
+            work.ao = method.compute({.depth = work.depth, .noise = options_.noise});
+            work.row.passes = method.timings();
+        }
+        if (options_.dump.empty())
+            return;
+        std::vector<Intermediate> all = method.intermediates();
+        if (options_.sequence)
+            std::ranges::move(options_.sequence->intermediates(), std::back_inserter(all));
+        write_intermediates(options_.dump / work.entry.name, all);
+    }
+
+    Token finished(Token work) const {
+        if (work)
+            attach_and_write(*work, options_);
+        return work;
+    }
+
+    /// The images end here. Where telling fails, the frames under way come to their ends first: TBB never frees those
+    /// of a pipeline that an exception leaves.
+    void report(const Token& work) {
+        if (!work || failure_)
+            return;
+        try {
+            tell(*work);
+        } catch (...) {
+            failure_ = std::current_exception();
+            given_up_ = true;
+        }
+    }
+
+    void tell(Work& work) {
+        if (options_.cloud && work.row.status == FrameStatus::ok)
+            add_to(*options_.cloud, work);
+        outages_ = work.row.fault == Fault::outage ? outages_ + 1 : 0;
+        given_up_ = given_up_ || outages_ >= 4;
+        if (on_frame_)
+            on_frame_(work.row);
+        if (options_.short_rows)
+            shorten(work.row);
+    }
+
+    const Capture& capture_;
+    Crew& crew_;
+    int at_once_;
+    const BatchOptions& options_;
+    const std::function<void(const FrameRow&)>& on_frame_;
+    std::vector<FrameRow> rows_;
+    Walk walk_;
+    Waiting waiting_;
+    std::atomic<bool> given_up_ = false;
+    std::exception_ptr failure_; ///< the first while reporting
+    int outages_ = 0;            ///< in a row: a full disk does not empty itself, and whoever goes on wastes the rest
+};
+
+} // namespace
+
+std::vector<FrameRow> run_batch(const Capture& capture, Crew& crew, const BatchOptions& options,
+                                const std::function<void(const FrameRow&)>& on_frame) {
+    return Pipeline(capture, crew, options, on_frame).run();
+}
+
+} // namespace scanshade

@@ -1,0 +1,262 @@
+// The last step of the walk: what a frame's values look like, and its files.
+#include "apps/walk/frame_files.h"
+
+#include "apps/walk/point_clouds.h"
+#include "apps/picture.h"
+#include "io/clouds/cloud_file.h"
+#include "io/images/npy_file.h"
+#include "io/output_file.h"
+#include "projection/colour_view.h"
+#include "projection/undistort.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+namespace scanshade {
+namespace {
+
+/// Whether colour is carried over from a camera of its own.
+bool colour_from_beside(const Frame& frame) {
+    return frame.registration != Registration::yes && frame.colour_camera && !frame.colour.empty();
+}
+
+/// Colour warped into the depth view, or everything else into the colour view.
+Scene scene_beside(const Work& work, bool colour_view) {
+    const Frame& frame = work.frame;
+    const SurfaceInColour surface = surface_in_colour(frame.depth_m, frame.camera, *frame.colour_camera);
+    if (colour_view) {
+        const cv::Mat1f& confidence = work.confidence.visibility;
+        return {surface.z_m,  on_colour_pixels(work.attached.visibility, surface),
+                frame.colour, frame.colour_camera->camera.pinhole,
+                {},           confidence.empty() ? cv::Mat1f() : on_colour_pixels(confidence, surface)};
+    }
+    const auto [colour, known] =
+        colour_on_depth(frame.colour, frame.depth_m, frame.camera, *frame.colour_camera, surface);
+    return {frame.depth_m, work.attached.visibility, colour, frame.camera.pinhole, known};
+}
+
+cv::Mat3b colour_in_view(const Cloud& cloud, const DepthImage& depth) {
+    if (cloud.colours.empty())
+        return {};
+    cv::Mat3b colour(depth.z_m.size(), cv::Vec3b(64, 40, 28));
+    std::transform(depth.source.begin(), depth.source.end(), colour.begin(), colour.begin(),
+                   [&](int point, const cv::Vec3b& none) { return point < 0 ? none : cloud.colours[point]; });
+    return colour;
+}
+
+/// Values of an organised cloud's points as an image; shares their memory.
+template <class Pixel>
+cv::Mat_<Pixel> on_grid(const std::vector<Pixel>& values, cv::Size grid) {
+    return cv::Mat_<Pixel>(grid.height, grid.width, const_cast<Pixel*>(values.data()));
+}
+
+cv::Mat1f depth_on_grid(const Cloud& cloud) {
+    cv::Mat1f z_m(cloud.grid);
+    std::transform(cloud.points.begin(), cloud.points.end(), z_m.begin(),
+                   [](const Eigen::Vector3d& p) { return p.allFinite() ? static_cast<float>(p.z()) : 0.0f; });
+    return z_m;
+}
+cv::Mat3b panel_picture(const Frame& frame, const Scene& scene, const cv::Mat3b& shaded) {
+    const bool fits = !scene.colour.empty();
+    const std::string colour = fits                   ? "colour"
+                               : frame.colour.empty() ? "no colour"
+                                                      : "colour (not known to fit the depth)";
+    return panel({{colour, fits ? scene.colour : frame.colour},
+                  {"depth", depth_picture(scene.z_m)},
+                  {"ambient occlusion", visibility_picture(scene.visibility)},
+                  {fits ? "colour x AO" : "clay x AO", shaded}});
+}
+
+std::vector<cv::Vec3b> shaded_colours(const std::vector<cv::Vec3b>& colours, const std::vector<float>& visibility,
+                                      double strength) {
+    const cv::Size row(static_cast<int>(colours.size()), 1);
+    if (row.empty())
+        return {};
+    const cv::Mat3b shaded = shade(on_grid(colours, row), on_grid(visibility, row), strength);
+    return {shaded.begin(), shaded.end()};
+}
+
+/// What each undistorted pixel shows of an image; the lens bends where to look. Zero where it saw nothing.
+template <class Pixel>
+cv::Mat_<Pixel> undistorted_image(const cv::Mat_<Pixel>& image, const Camera& camera) {
+    if (image.empty() || !camera.distortion.any())
+        return image;
+    const auto maps = Undistortion::of(camera);
+    cv::Mat_<Pixel> straight(image.size());
+    std::transform(maps->recorded_pixel().begin(), maps->recorded_pixel().end(), straight.begin(),
+                   [&](int pixel) { return pixel < 0 ? Pixel() : image(pixel / image.cols, pixel % image.cols); });
+    return straight;
+}
+
+/// In clouds, where nothing is known of a point it has no confidence.
+float known_or_none(float confidence) { return std::isnan(confidence) ? 0.0F : confidence; }
+
+/// The depth frame's surface as points in camera space, coloured where the colour fits. Points that the colour camera
+/// did not see are black, and colour_known says 0.
+void write_depth_cloud(const std::filesystem::path& file, const Work& work, const Scene& shown,
+                       const Outputs& outputs) {
+    const auto& [camera, z_m, source] = work.depth;
+    const bool beside = colour_from_beside(work.frame);
+    const Scene scene = beside && outputs.colour_view ? scene_beside(work, false) : shown;
+    const cv::Mat3b colour = undistorted_image(scene.colour, work.frame.camera);
+    const cv::Mat1b colour_known = undistorted_image(scene.colour_known, work.frame.camera);
+    std::vector<Eigen::Vector3d> points;
+    std::vector<cv::Vec3b> colours;
+    std::vector<float> visibility, confidence, known;
+    for (int v = 0; v < z_m.rows; ++v) {
+        for (int u = 0; u < z_m.cols; ++u) {
+            const double z = z_m(v, u);
+            if (z <= 0)
+                continue;
+            points.emplace_back((u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z);
+            visibility.push_back(work.ao.visibility(v, u));
+            confidence.push_back(known_or_none(work.confidence_in_view(v, u)));
+            if (!colour.empty())
+                colours.push_back(colour(v, u));
+            if (!colour_known.empty())
+                known.push_back(colour_known(v, u) > 0 ? 1.0F : 0.0F);
+        }
+    }
+    if (outputs.colour_cloud)
+        colours = shaded_colours(colours, visibility, outputs.shade_strength);
+    std::vector<AddedField> added = {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}};
+    if (beside)
+        added.push_back({"colour_known", known});
+    write_new_ply(file, points, colours, added, {"camera space: x right, y down, z forward, metres"});
+}
+
+void write_recorded_cloud(const std::filesystem::path& file, const Work& work, const Outputs& outputs) {
+    const Cloud& cloud = *work.frame.cloud;
+    std::vector<cv::Vec3b> colours;
+    if (outputs.colour_cloud)
+        colours = shaded_colours(cloud.colours, work.attached.per_point, outputs.shade_strength);
+    std::vector<AddedField> fields{{"ambient_occlusion", work.attached.per_point}};
+    std::vector<float> confidence = work.confidence.per_point;
+    std::ranges::transform(confidence, confidence.begin(), known_or_none);
+    if (!confidence.empty())
+        fields.push_back({"ao_confidence", confidence});
+    write_cloud(file, cloud, fields, colours);
+}
+
+std::filesystem::path ao_file(const std::string& name, const Outputs& outputs) {
+    return std::filesystem::path("ao") / (name + extension(outputs.format));
+}
+std::filesystem::path confidence_file(const std::string& name, const Outputs& outputs) {
+    return std::filesystem::path("confidence") / (name + extension(outputs.format));
+}
+std::filesystem::path picture_file(const char* kind, const std::string& name) {
+    return std::filesystem::path(kind) / (name + ".png");
+}
+std::filesystem::path cloud_file(const std::string& name, const std::string& extension) {
+    return std::filesystem::path("clouds") / (name + extension);
+}
+
+} // namespace
+
+Scene scene_of(const Work& work, bool colour_view) {
+    const Frame& frame = work.frame;
+    const cv::Mat1f& visibility = work.attached.visibility;
+    if (!frame.cloud) {
+        if (colour_from_beside(frame))
+            return scene_beside(work, colour_view);
+        const bool fits = frame.registration == Registration::yes && frame.colour.size() == frame.depth_m.size();
+        return {frame.depth_m, visibility, fits ? frame.colour : cv::Mat3b(), frame.camera.pinhole};
+    }
+    const Cloud& cloud = *frame.cloud;
+    if (!cloud.organised())
+        return {work.depth.z_m, visibility, colour_in_view(cloud, work.depth), work.depth.camera};
+    const cv::Mat3b colour = cloud.colours.empty() ? cv::Mat3b() : on_grid(cloud.colours, cloud.grid);
+    return {depth_on_grid(cloud), visibility, colour, frame.camera.pinhole};
+}
+
+/// Clay has no pixel colours to keep where there is no surface, so both kinds go through the same multiplication.
+/// What the colour camera did not see is clay, too.
+cv::Mat3b shaded_picture(const Scene& scene, double strength) {
+    cv::Mat3b base = scene.colour;
+    if (base.empty() || !scene.colour_known.empty())
+        base = clay(scene.z_m, scene.camera);
+    if (!scene.colour_known.empty())
+        scene.colour.copyTo(base, scene.colour_known);
+    return shade(base, scene.visibility, strength);
+}
+
+void write_all(Work& work, const Scene& scene, const cv::Mat3b& shaded, const Outputs& outputs) {
+    const std::string& name = work.entry.name;
+    const auto wrote = [&](const std::filesystem::path& file, const auto& write) {
+        write(outputs.folder / file);
+        work.row.files.push_back(file);
+    };
+    if (outputs.ao)
+        wrote(ao_file(name, outputs), [&](const auto& file) { write_ao(file, scene.visibility, outputs.format); });
+    if (outputs.confidence)
+        wrote(confidence_file(name, outputs), [&](const auto& file) {
+            const bool floats = outputs.format == AoFormat::tiff || outputs.format == AoFormat::exr;
+            write_ao(file, scene.confidence.empty() ? work.confidence.visibility : scene.confidence,
+                     floats ? outputs.format : AoFormat::png8);
+        });
+    if (outputs.shaded)
+        wrote(picture_file("shaded", name), [&](const auto& file) { write_picture(file, shaded); });
+    if (outputs.panel)
+        wrote(picture_file("panel", name),
+              [&](const auto& file) { write_picture(file, panel_picture(work.frame, scene, shaded)); });
+    if (work.frame.cloud && outputs.cloud)
+        wrote(cloud_file(name, extension(*work.frame.cloud->records)),
+              [&](const auto& file) { write_recorded_cloud(file, work, outputs); });
+    if (!work.frame.cloud && outputs.depth_cloud)
+        wrote(cloud_file(name, ".ply"), [&](const auto& file) { write_depth_cloud(file, work, scene, outputs); });
+}
+
+void write_sides(Work& work, const Outputs& outputs) {
+    const std::filesystem::path file = picture_file("shaded", work.entry.name);
+    write_picture(outputs.folder / file, two_sides(*work.frame.cloud, work.of_points, outputs.shade_strength));
+    work.row.files.push_back(file);
+}
+
+void remove_files(Work& work, const Outputs& outputs) {
+    work.row.files.clear();
+    for (const auto& file : files_of(work.entry, outputs)) {
+        std::error_code gone_already;
+        std::filesystem::remove(file, gone_already);
+    }
+}
+
+void write_intermediates(const std::filesystem::path& folder, const std::vector<Intermediate>& all) {
+    std::string index = "name,type,shape,meaning\n";
+    for (const Intermediate& each : all) {
+        write_npy(folder / (each.name + ".npy"), each.type, each.shape, each.data);
+        index += fmt::format("{},{},{},\"{}\"\n", each.name, each.type, fmt::join(each.shape, "x"), each.meaning);
+    }
+    write_atomically(folder / "index.csv", index);
+}
+
+void add_to(RecordingCloud& cloud, const Work& work) {
+    if (!work.frame.world_from_camera || work.looked_at.z_m.empty())
+        return;
+    const Scene scene = scene_of(work, false);
+    cloud.add({work.looked_at, work.ao.visibility, work.confidence_in_view,
+               undistorted_image(scene.colour, work.frame.camera),
+               undistorted_image(scene.colour_known, work.frame.camera), *work.frame.world_from_camera});
+}
+
+std::vector<std::filesystem::path> files_of(const CaptureEntry& entry, const Outputs& outputs) {
+    std::vector<std::filesystem::path> files;
+    const auto add = [&](const std::filesystem::path& file) { files.push_back(outputs.folder / file); };
+    if (outputs.ao)
+        add(ao_file(entry.name, outputs));
+    if (outputs.confidence)
+        add(confidence_file(entry.name, outputs));
+    if (outputs.shaded)
+        add(picture_file("shaded", entry.name));
+    if (outputs.panel)
+        add(picture_file("panel", entry.name));
+    if (entry.cloud.empty() ? outputs.depth_cloud : outputs.cloud)
+        add(cloud_file(entry.name, ".ply"));
+    if (!entry.cloud.empty() && outputs.cloud)
+        for (const char* other : {".pcd", ".las", ".xyz", ".pts", ".ptx"})
+            add(cloud_file(entry.name, other));
+    return files;
+}
+
+} // namespace scanshade

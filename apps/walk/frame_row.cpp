@@ -1,0 +1,62 @@
+// What became of one frame: a row of frames.csv, a line of the journal.
+#include "apps/walk/frame_row.h"
+
+#include <cmath>
+#include <limits>
+
+namespace scanshade {
+
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+std::string_view name_of(FrameStatus status) {
+    switch (status) {
+    case FrameStatus::ok:
+        return "ok";
+    case FrameStatus::failed:
+        return "failed";
+    case FrameStatus::skipped:
+        return "skipped";
+    }
+    return "";
+}
+
+StageTimes operator+(const StageTimes& a, const StageTimes& b) {
+    const auto sum = [](double x, double y) { return (std::isnan(x) ? 0 : x) + (std::isnan(y) ? 0 : y); };
+    return {sum(a.load, b.load), sum(a.project, b.project), sum(a.compute, b.compute), sum(a.attach, b.attach),
+            sum(a.write, b.write)};
+}
+
+std::string_view name_of(Fault fault) {
+    switch (fault) {
+    case Fault::none:
+        return "none";
+    case Fault::input:
+        return "input";
+    case Fault::outage:
+        return "outage";
+    case Fault::internal:
+        return "internal";
+    case Fault::crash:
+        return "crash";
+    }
+    return "";
+}
+
+void shorten(FrameRow& row) {
+    row.camera = {};
+    row.passes = {}; // not clear(): that would keep the memory
+    row.notes = {};
+    row.files = {};
+}
+
+FrameRow skipped_row(const Capture& capture, std::size_t index) {
+    FrameRow row;
+    row.index = index;
+    row.name = capture.entries.at(index).name;
+    row.why = "interrupted";
+    row.valid_share = row.coverage = row.mean_visibility = unknown;
+    row.ms = {unknown, unknown, unknown, unknown, unknown};
+    return row;
+}
+
+} // namespace scanshade

@@ -1,0 +1,56 @@
+// What became of one frame: a row of frames.csv, a line of the journal.
+#pragma once
+
+#include "ao/method.h"
+#include "io/captures/capture.h"
+#include "projection/camera.h"
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace scanshade {
+
+enum class FrameStatus { ok, failed, skipped };
+[[nodiscard]] std::string_view name_of(FrameStatus status);
+
+/// Milliseconds that one frame spent in each stage of the walk.
+struct StageTimes {
+    double load = 0, project = 0, compute = 0, attach = 0, write = 0;
+};
+/// Sums; a time that is not known (NaN) counts as none.
+[[nodiscard]] StageTimes operator+(const StageTimes& a, const StageTimes& b);
+
+/// Who is to blame for a frame that has no result. Only an outage is worth another try.
+enum class Fault { none, input, outage, internal, crash };
+[[nodiscard]] std::string_view name_of(Fault fault);
+
+/// NaN and empty where the frame did not come that far.
+struct FrameRow {
+    std::size_t index = 0; ///< in capture.entries
+    std::string name;
+    FrameStatus status = FrameStatus::skipped;
+    std::string why; ///< of a failed or skipped frame
+    Fault fault = Fault::none;
+    cv::Size size;
+    double valid_share = 0; ///< pixels or points with a depth / all of them
+    double coverage = 0;    ///< pixels or points with a visibility / those with a depth
+    double mean_visibility = 0;
+    Camera camera; ///< as used
+    StageTimes ms;
+    Timings passes; ///< the method's own account of `ms.compute`
+    std::vector<std::string> warnings;
+    std::vector<std::string> notes;           ///< what was chosen for this frame, and why
+    std::vector<std::filesystem::path> files; ///< written, relative to Outputs::folder
+};
+
+/// Lets go of what the journal keeps and only the manifest tells: camera, passes, notes and files. Of thousands of
+/// frames it would be what a run needs most memory for.
+void shorten(FrameRow& row);
+
+/// The row of a frame that was not begun.
+[[nodiscard]] FrameRow skipped_row(const Capture& capture, std::size_t index);
+
+} // namespace scanshade

@@ -1,0 +1,423 @@
+// Lines of JSON, one write and one sync each; the last line on a frame counts.
+#include "apps/walk/journal.h"
+
+#include "apps/json.h"
+#include "io/content_hash.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <ctime>
+#include <fcntl.h>
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <sys/file.h>
+#include <unistd.h>
+
+namespace scanshade {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// ---------------------------------------------------------------------------------------------------- rows as JSON
+
+constexpr std::array stages = {std::pair("load", &StageTimes::load), std::pair("project", &StageTimes::project),
+                               std::pair("compute", &StageTimes::compute), std::pair("attach", &StageTimes::attach),
+                               std::pair("write", &StageTimes::write)};
+
+double number_or_nan(const json& value) {
+    return value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN();
+}
+
+json row_json(
+    const FrameRow& row) { // nlohmann writes NaN as null and every other double so that it reads back the same
+    json text{{"index", row.index},
+              {"name", row.name},
+              {"status", name_of(row.status)},
+              {"why", row.why},
+              {"fault", name_of(row.fault)},
+              {"size", {row.size.width, row.size.height}},
+              {"valid", row.valid_share},
+              {"coverage", row.coverage},
+              {"visibility", row.mean_visibility},
+              {"camera", to_json(row.camera)},
+              {"warnings", row.warnings}};
+    for (const auto& [name, stage] : stages)
+        text["ms"][name] = row.ms.*stage;
+    text["passes"] = json::array();
+    for (const auto& [pass, ms] : row.passes)
+        text["passes"].push_back({pass, ms});
+    text["files"] = json::array();
+    for (const fs::path& file : row.files)
+        text["files"].push_back(file.generic_string());
+    if (!row.notes.empty())
+        text["notes"] = row.notes;
+    return text;
+}
+
+Camera camera_from(const json& text) {
+    Camera camera;
+    camera.pinhole = {text.at("fx"), text.at("fy"), text.at("cx"), text.at("cy"),
+                      cv::Size(text.at("width").get<int>(), text.at("height").get<int>())};
+    Distortion& d = camera.distortion;
+    if (text.contains("fisheye")) {
+        const auto k = text["fisheye"].get<std::array<double, 4>>();
+        d.model = LensModel::kannala_brandt;
+        std::tie(d.k1, d.k2, d.k3, d.k4) = std::tie(k[0], k[1], k[2], k[3]);
+    } else if (text.contains("distortion")) {
+        const auto k = text["distortion"].get<std::array<double, 5>>();
+        std::tie(d.k1, d.k2, d.p1, d.p2, d.k3) = std::tie(k[0], k[1], k[2], k[3], k[4]);
+    }
+    camera.origin = text.at("origin");
+    return camera;
+}
+
+template <class Enum>
+Enum named(const std::string& name, std::initializer_list<Enum> all) {
+    for (const Enum each : all)
+        if (name_of(each) == name)
+            return each;
+    throw Error("'" + name + "' is unknown");
+}
+
+FrameRow row_from(const json& text) {
+    FrameRow row;
+    row.index = count_at(text, "index");
+    row.name = text.at("name");
+    row.status = named(text.at("status"), {FrameStatus::ok, FrameStatus::failed, FrameStatus::skipped});
+    row.why = text.at("why");
+    row.fault = named(text.at("fault"), {Fault::none, Fault::input, Fault::outage, Fault::internal, Fault::crash});
+    row.size = {text.at("size").at(0).get<int>(), text.at("size").at(1).get<int>()};
+    row.valid_share = number_or_nan(text.at("valid"));
+    row.coverage = number_or_nan(text.at("coverage"));
+    row.mean_visibility = number_or_nan(text.at("visibility"));
+    row.camera = camera_from(text.at("camera"));
+    row.warnings = text.at("warnings").get<std::vector<std::string>>();
+    for (const auto& [name, stage] : stages)
+        row.ms.*stage = number_or_nan(text.at("ms").at(name));
+    for (const json& pass : text.at("passes"))
+        row.passes.emplace_back(pass.at(0).get<std::string>(), number_or_nan(pass.at(1)));
+    for (const json& file : text.at("files"))
+        row.files.emplace_back(file.get<std::string>());
+    if (text.contains("notes"))
+        row.notes = text["notes"].get<std::vector<std::string>>();
+    return row;
+}
+
+Record record_from(const json& line) {
+    Record record{row_from(line.at("frame")), line.at("settings"), line.at("stamp"), line.at("input"),
+                  line.at("sizes").get<std::vector<std::uintmax_t>>()};
+    if (record.sizes.size() != record.row.files.size())
+        throw Error("not a size for each file");
+    return record;
+}
+
+/// What a line tells of: its first key.
+std::string kind_of(const json& line) { return line.empty() ? "" : line.begin().key(); }
+
+void take_line(const json& line, JournalFacts& facts) {
+    const std::string kind = kind_of(line);
+    if (kind == "frame") {
+        Record record = record_from(line);
+        if (facts.begun == record.row.name)
+            facts.begun.clear();
+        facts.complete.clear();
+        facts.records.insert_or_assign(record.row.name, std::move(record));
+    } else if (kind == "process") {
+        facts.host = line["process"].at("host");
+        facts.device = line["process"].at("device");
+        facts.started = line["process"].at("started");
+        facts.begun.clear();
+    } else if (kind == "again") {
+        for (const std::string& name : line["again"].get<std::vector<std::string>>())
+            facts.records.erase(name);
+        facts.complete.clear();
+    } else if (kind == "begun") {
+        facts.begun = line["begun"];
+    } else if (kind == "complete") {
+        facts.complete = line["complete"];
+    }
+}
+
+/// Calls take(line, where it begins) for every line that is JSON and that it makes sense of.
+void for_each_line(const fs::path& file, const std::function<void(const json&, std::int64_t)>& take) {
+    std::ifstream stream(file, std::ios::binary);
+    std::int64_t at = 0;
+    for (std::string line; std::getline(stream, line); at += static_cast<std::int64_t>(line.size()) + 1) {
+        const json text = json::parse(line, nullptr, false);
+        if (!text.is_object())
+            continue;
+        try {
+            take(text, at);
+        } catch (const std::exception&) { // another version's line: its frame is done again
+            continue;
+        }
+    }
+}
+
+// ---------------------------------------------------------------------------------------------------- inputs
+
+std::vector<fs::path> inputs_of(const CaptureEntry& entry) {
+    std::vector<fs::path> files;
+    for (const std::string* file : {&entry.colour, &entry.depth, &entry.cloud})
+        if (!file->empty())
+            files.emplace_back(*file);
+    return files;
+}
+
+/// What the listing says of a frame that its results depend on: where colour lies depends on how the camera moved.
+std::string listed(const CaptureEntry& entry) {
+    const Eigen::Vector3d &turn = entry.motion.turn_per_s, &shift = entry.motion.shift_per_s;
+    const double between_s = entry.stamp_s && entry.colour_stamp_s ? *entry.colour_stamp_s - *entry.stamp_s : 0;
+    return fmt::format("{}|{}|{}|{}|", entry.problem, between_s, fmt::join(turn, " "), fmt::join(shift, " "));
+}
+
+std::string stamps_of(const CaptureEntry& entry) {
+    std::string all = listed(entry);
+    for (const fs::path& file : inputs_of(entry))
+        all += fmt::format("{}|", stamp_of(file));
+    return all;
+}
+
+/// A file that cannot be read is its own content: the frame fails, and fails again until it can.
+std::string hashes_of(const CaptureEntry& entry) {
+    std::string all = listed(entry);
+    for (const fs::path& file : inputs_of(entry)) {
+        try {
+            all += hash_of_file(file) + "|";
+        } catch (const Error&) {
+            all += "unreadable|";
+        }
+    }
+    return all;
+}
+
+std::string host_name() {
+    std::array<char, 256> name = {};
+    ::gethostname(name.data(), name.size() - 1);
+    return name.data();
+}
+
+[[noreturn]] void fail(const fs::path& file, const std::string& what) {
+    throw Outage(fmt::format("{}: {}: {}", file.string(), what, std::strerror(errno)));
+}
+
+/// File systems without locks (a Lustre mounted without flock) leave every run alone with its folder.
+bool no_locks_here(int error) { return error == ENOSYS || error == EOPNOTSUPP || error == ENOLCK; }
+
+bool is_journal(const fs::path& file) {
+    const std::string name = file.filename().string();
+    return name.starts_with("journal") && name.ends_with(".jsonl");
+}
+
+std::vector<fs::path> journals_in(const fs::path& folder) {
+    std::vector<fs::path> files;
+    for (const auto& entry : fs::directory_iterator(folder))
+        if (is_journal(entry.path()))
+            files.push_back(entry.path());
+    std::ranges::sort(files);
+    return files;
+}
+
+} // namespace
+
+fs::path journal_file(const fs::path& folder, const std::string& block) {
+    return folder / (block.empty() ? "journal.jsonl" : "journal." + block + ".jsonl");
+}
+
+JournalFacts read_journal(const fs::path& file) {
+    JournalFacts facts;
+    for_each_line(file, [&](const json& line, std::int64_t) { take_line(line, facts); });
+    return facts;
+}
+
+bool in_use(const fs::path& file) {
+    const int handle = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+    if (handle < 0)
+        return false;
+    const bool held = ::flock(handle, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+    ::close(handle);
+    return held;
+}
+
+bool is_complete(const fs::path& file) {
+    constexpr std::streamoff enough = 128;
+    std::ifstream stream(file, std::ios::binary | std::ios::ate);
+    if (!stream)
+        return false;
+    stream.seekg(-std::min<std::streamoff>(enough, stream.tellg()), std::ios::end);
+    const std::string end{std::istreambuf_iterator<char>(stream), {}};
+    const auto last = end.rfind('\n', end.size() < 2 ? 0 : end.size() - 2);
+    return end.ends_with("}\n") && end.substr(last == std::string::npos ? 0 : last + 1).starts_with("{\"complete\":");
+}
+
+std::string key_of(const std::vector<std::string>& parts) {
+    std::string all = SCANSHADE_VERSION;
+    for (const std::string& part : parts)
+        all += fmt::format("\n{}:{}", part.size(), part);
+    return hash_of(all);
+}
+
+Journal::Journal(fs::path folder, const std::string& block)
+    : folder_(std::move(folder)), file_(journal_file(folder_, block)) {
+    std::error_code trouble;
+    fs::create_directories(folder_, trouble);
+    handle_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+    if (handle_ < 0)
+        fail(file_, "cannot be opened");
+    if (::flock(handle_, LOCK_EX | LOCK_NB) != 0 && !no_locks_here(errno)) {
+        const int error = errno;
+        ::close(handle_);
+        errno = error;
+        if (error == EWOULDBLOCK)
+            throw Busy(file_.string() + ": another run is at work here");
+        fail(file_, "cannot be locked");
+    }
+    journals_ = journals_in(folder_);
+    std::erase(journals_, file_);
+    journals_.push_back(file_); // its lines outweigh the others'
+    for (std::size_t journal = 0; journal < journals_.size(); ++journal)
+        take_places(journal);
+}
+
+void Journal::take_places(std::size_t journal) {
+    facts_ = {};
+    for_each_line(journals_[journal], [&](const json& line, std::int64_t at) {
+        take_line(line, facts_);
+        for (const auto& [name, record] : facts_.records)
+            places_.insert_or_assign(name, Place{journal, at});
+        facts_.records.clear();
+        if (kind_of(line) == "again")
+            for (const json& name : line["again"])
+                places_.erase(name.get<std::string>());
+    });
+}
+
+std::optional<Record> Journal::record_of(const std::string& frame) const {
+    const auto place = places_.find(frame);
+    if (place == places_.end())
+        return std::nullopt;
+    std::ifstream stream(journals_[place->second.journal], std::ios::binary);
+    stream.seekg(place->second.at);
+    std::string line;
+    std::getline(stream, line);
+    try {
+        return record_from(json::parse(line));
+    } catch (const std::exception&) { // another block's journal, cleared meanwhile
+        return std::nullopt;
+    }
+}
+
+Journal::~Journal() { ::close(handle_); }
+
+void Journal::clear() {
+    for (const fs::path& other : journals_in(folder_))
+        if (other != file_ && file_ == journal_file(folder_, ""))
+            fs::remove(other);
+    if (::ftruncate(handle_, 0) != 0)
+        fail(file_, "cannot be cleared");
+    facts_ = {};
+    places_.clear();
+}
+
+bool Journal::files_are_there(const Record& record) const {
+    for (std::size_t i = 0; i < record.row.files.size(); ++i) {
+        std::error_code missing;
+        if (fs::file_size(folder_ / record.row.files[i], missing) != record.sizes.at(i) || missing)
+            return false;
+    }
+    return true;
+}
+
+std::optional<FrameRow> Journal::done(const CaptureEntry& entry, const std::optional<std::string>& settings,
+                                      bool retry) const {
+    std::optional<Record> record = record_of(entry.name);
+    if (!record)
+        return std::nullopt;
+    const bool again = record->row.fault == Fault::outage || (retry && record->row.status == FrameStatus::failed);
+    if (again || record->settings != settings.value_or(record->settings) || !files_are_there(*record))
+        return std::nullopt;
+    if (record->stamp != stamps_of(entry) && record->input != hashes_of(entry))
+        return std::nullopt;
+    return std::move(record->row);
+}
+
+FrameRow Journal::whole(const FrameRow& row) const {
+    std::optional<Record> record = record_of(row.name);
+    if (!record)
+        return row;
+    record->row.index = row.index; // in this listing of the capture
+    return std::move(record->row);
+}
+
+std::int64_t Journal::append(const std::string& line, Sync sync) {
+    // A torn line, which only a full disk or a power cut leaves, ends here.
+    const off_t end = ::lseek(handle_, 0, SEEK_END);
+    char last = '\n';
+    if (end > 0 && ::pread(handle_, &last, 1, end - 1) != 1)
+        fail(file_, "cannot be read");
+    const std::string whole = (last == '\n' ? "" : "\n") + line + "\n";
+    if (::write(handle_, whole.data(), whole.size()) != static_cast<ssize_t>(whole.size()))
+        fail(file_, "cannot be written");
+    const auto now = std::chrono::steady_clock::now();
+    if (sync == Sync::now || now - synced_ >= std::chrono::seconds(1)) {
+        if (::fdatasync(handle_) != 0)
+            fail(file_, "cannot be written");
+        synced_ = now;
+    }
+    return end + (last == '\n' ? 0 : 1);
+}
+
+void Journal::add(const FrameRow& row, const CaptureEntry& entry, const std::string& settings,
+                  const std::string& device) {
+    if (row.status == FrameStatus::skipped)
+        return;
+    if (!std::exchange(introduced_, true)) {
+        const auto now = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+        const json process{{"host", host_name()},
+                           {"pid", ::getpid()},
+                           {"device", device},
+                           {"started", now},
+                           {"version", SCANSHADE_VERSION}};
+        append(json{{"process", process}}.dump(-1, ' ', false, json::error_handler_t::replace));
+    }
+    Record record{row, settings, stamps_of(entry), hashes_of(entry), {}};
+    for (const fs::path& file : row.files)
+        record.sizes.push_back(fs::file_size(folder_ / file));
+    const json line{{"frame", row_json(row)},
+                    {"settings", record.settings},
+                    {"stamp", record.stamp},
+                    {"input", record.input},
+                    {"sizes", record.sizes}};
+    const std::int64_t at = append(line.dump(-1, ' ', false, json::error_handler_t::replace), Sync::soon);
+    places_.insert_or_assign(row.name, Place{journals_.size() - 1, at});
+    facts_.complete.clear();
+}
+
+void Journal::forget(const Capture& capture, const std::vector<std::size_t>& frames) {
+    std::vector<std::string> known;
+    for (const std::size_t index : frames)
+        if (places_.erase(capture.entries[index].name) > 0)
+            known.push_back(capture.entries[index].name);
+    if (!known.empty())
+        append(json{{"again", known}}.dump(-1, ' ', false, json::error_handler_t::replace));
+}
+
+void Journal::begin_alone(const std::string& frame) { append(json{{"begun", frame}}.dump()); }
+
+void Journal::complete(const std::string& key) {
+    if (facts_.complete == key)
+        return;
+    append(json{{"complete", key}}.dump());
+    facts_.complete = key;
+}
+
+} // namespace scanshade

@@ -1,0 +1,167 @@
+// How far a run has come: a bar with rate and remaining time on a terminal, one line per frame elsewhere. On stderr.
+#include "apps/walk/progress.h"
+
+#include "apps/json.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <deque>
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <mutex>
+#include <unistd.h>
+#include <utility>
+
+namespace scanshade {
+namespace {
+
+const char* const clear_line = "\r\033[K";
+
+bool as_json = false; // set once, before there are threads
+
+} // namespace
+
+struct Turn::Held {
+    std::string capture, text;
+    bool ended = false;
+};
+
+namespace {
+
+std::mutex speaking;
+std::deque<std::shared_ptr<Turn::Held>> turns; // of which the first speaks
+thread_local std::shared_ptr<Turn::Held> own_turn;
+
+/// Whether what belongs to a turn, or to none, may be told at once. `speaking` is held.
+bool speaks(const std::shared_ptr<Turn::Held>& turn) { return !turn || turns.front() == turn; }
+
+/// The text, ended by its line breaks; or later.
+void tell(const std::shared_ptr<Turn::Held>& turn, const std::string& text) {
+    const std::lock_guard alone(speaking);
+    if (!speaks(turn)) {
+        turn->text += text;
+        return;
+    }
+    std::fputs(text.c_str(), stderr);
+    std::fflush(stderr);
+}
+
+/// `latest` draws over itself: held back, it is forgotten.
+void tell_for_now(const std::shared_ptr<Turn::Held>& turn, const std::string& latest) {
+    const std::lock_guard alone(speaking);
+    if (!speaks(turn))
+        return;
+    std::fputs(latest.c_str(), stderr);
+    std::fflush(stderr);
+}
+
+void log(const std::shared_ptr<Turn::Held>& turn, json object) {
+    const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+    json line{{"time", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(now))}};
+    if (turn && !turn->capture.empty())
+        line["capture"] = turn->capture;
+    line.update(object);
+    const std::lock_guard alone(speaking);
+    fmt::print(stderr, "{}\n", line.dump(-1, ' ', false, json::error_handler_t::replace));
+}
+
+std::string line_of(const FrameRow& row) {
+    if (row.status != FrameStatus::ok)
+        return fmt::format("{}: {}: {}", row.name, name_of(row.status), row.why);
+    const StageTimes& ms = row.ms;
+    const std::string visibility =
+        std::isnan(row.mean_visibility) ? "no visibility" : fmt::format("visibility {:.3f}", row.mean_visibility);
+    std::string line =
+        fmt::format("{}: ok, valid {:.1f} %, coverage {:.1f} %, {}, {:.0f} ms", row.name, 100 * row.valid_share,
+                    100 * row.coverage, visibility, ms.load + ms.project + ms.compute + ms.attach + ms.write);
+    for (const std::string& warning : row.warnings)
+        line += "; warning: " + warning;
+    for (const std::string& note : row.notes)
+        line += "\n    " + note;
+    return line;
+}
+
+} // namespace
+
+void log_as_json() { as_json = true; }
+
+void say(const std::string& line) {
+    if (as_json)
+        log(own_turn, {{"message", line}});
+    else
+        tell(own_turn, line + "\n");
+}
+
+Turn::Turn() : held_(std::make_shared<Held>()) {
+    const std::lock_guard alone(speaking);
+    turns.push_back(held_);
+    own_turn = held_;
+}
+
+Turn::~Turn() {
+    const std::lock_guard alone(speaking);
+    own_turn = nullptr;
+    held_->ended = true;
+    while (!turns.empty() && turns.front()->ended) {
+        turns.pop_front();
+        if (!turns.empty())
+            std::fputs(std::exchange(turns.front()->text, "").c_str(), stderr);
+    }
+    std::fflush(stderr);
+}
+
+void Turn::is_of(const std::string& capture) { held_->capture = capture; }
+
+std::string duration_text(double seconds) {
+    const auto whole = static_cast<long>(std::lround(std::max(seconds, 0.0)));
+    const long h = whole / 3600, m = whole / 60 % 60, s = whole % 60;
+    return h > 0 ? fmt::format("{}:{:02}:{:02}", h, m, s) : fmt::format("{}:{:02}", m, s);
+}
+
+Progress::Progress(std::size_t total) : total_(total), on_terminal_(!as_json && isatty(STDERR_FILENO) == 1), turn_(own_turn) {}
+
+void Progress::add(const FrameRow& row) {
+    ++done_;
+    if (as_json) {
+        const StageTimes& ms = row.ms;
+        const double sum_ms = ms.load + ms.project + ms.compute + ms.attach + ms.write;
+        log(turn_, {{"frame", row.name},
+             {"status", name_of(row.status)},
+             {"fault", name_of(row.fault)},
+             {"why", row.why},
+             {"warnings", row.warnings},
+             {"ms", sum_ms},
+             {"done", done_},
+             {"of", total_},
+             {"left_s", seconds_left()}});
+        return;
+    }
+    const bool remarkable = row.status != FrameStatus::ok || !row.warnings.empty() || !row.notes.empty();
+    if (!on_terminal_ || remarkable)
+        tell(turn_, fmt::format("{}  {}\n", on_terminal_ ? clear_line : "", line_of(row)));
+    if (on_terminal_)
+        tell_for_now(turn_, bar());
+}
+
+double Progress::seconds_left() const {
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    return seconds / static_cast<double>(done_) * static_cast<double>(total_ - done_);
+}
+
+std::string Progress::bar() const {
+    constexpr std::size_t width = 30;
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    const double rate = static_cast<double>(done_) / seconds;
+    const std::string left = duration_text(seconds_left());
+    const std::size_t filled = width * done_ / total_;
+    return fmt::format("{}  [{:#<{}}{:.<{}}] {}/{}  {:.1f} frames/s  {} left", clear_line, "", filled, "",
+                       width - filled, done_, total_, rate, left);
+}
+
+void Progress::end() {
+    if (on_terminal_ && done_ > 0)
+        tell_for_now(turn_, "\n");
+}
+
+} // namespace scanshade

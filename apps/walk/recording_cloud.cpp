@@ -1,0 +1,90 @@
+#include "apps/walk/recording_cloud.h"
+
+#include "io/clouds/cloud_file.h"
+#include "projection/error.h"
+#include "projection/hash.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace scanshade {
+namespace {
+
+using Eigen::Vector3d;
+
+double median_depth_m(const cv::Mat1f& z_m) {
+    std::vector<float> known;
+    std::copy_if(z_m.begin(), z_m.end(), std::back_inserter(known), [](float z) { return z > 0; });
+    if (known.empty())
+        return 0;
+    const auto middle = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
+    std::nth_element(known.begin(), middle, known.end());
+    return *middle;
+}
+
+} // namespace
+
+std::size_t RecordingCloud::KeyHash::operator()(const Key& key) const {
+    const auto part = [&](std::size_t i) { return static_cast<std::uint32_t>(key[i]); };
+    return hash(hash(part(0), part(1)), part(2));
+}
+
+void RecordingCloud::add(const CloudFrame& frame) {
+    const auto& [depth, visibility, confidence, colour, colour_known, pose] = frame;
+    if (resolution_m_ <= 0)
+        resolution_m_ = 1.5 * median_depth_m(depth.z_m) / depth.camera.fx;
+    if (resolution_m_ <= 0)
+        return; // nothing seen yet
+    const Pinhole& camera = depth.camera;
+    for (int v = 0; v < depth.z_m.rows; ++v)
+        for (int u = 0; u < depth.z_m.cols; ++u) {
+            const double z = depth.z_m(v, u);
+            if (!(z > 0) || std::isnan(visibility(v, u)))
+                continue;
+            const Vector3d point = pose * Vector3d((u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z);
+            const Vector3d place = (point / resolution_m_).array().floor();
+            if (!(place.cwiseAbs().maxCoeff() < 2e9))
+                throw Error(fmt::format("a point {:.3g} m from the origin, in cubes of {:.3g} m: farther than can be counted", point.norm(), resolution_m_));
+            const auto whole = [&](Eigen::Index axis) { return static_cast<std::int32_t>(place[axis]); };
+            const auto [known, is_new] = index_.try_emplace(Key{whole(0), whole(1), whole(2)}, cells_.size());
+            if (is_new)
+                cells_.emplace_back();
+            Cell& cell = cells_[known->second];
+            const float sure = std::isnan(confidence(v, u)) ? 0.0F : confidence(v, u);
+            const auto weight = static_cast<float>((0.05 + sure) / (z * z));
+            cell.weight += weight;
+            cell.point += static_cast<double>(weight) * point;
+            cell.visibility += weight * visibility(v, u);
+            cell.confidence = std::max(cell.confidence, sure);
+            cell.views += cell.last_frame != frames_;
+            cell.last_frame = frames_;
+            if (colour.empty() || (!colour_known.empty() && colour_known(v, u) == 0))
+                continue;
+            cell.colour_weight += weight;
+            const cv::Vec3b bgr = colour(v, u);
+            cell.colour += weight * Eigen::Vector3f(bgr[0], bgr[1], bgr[2]);
+        }
+    ++frames_;
+}
+
+void RecordingCloud::write(const std::filesystem::path& file) const {
+    std::vector<Vector3d> points;
+    std::vector<cv::Vec3b> colours;
+    std::vector<float> visibility, confidence, views;
+    const bool coloured = std::ranges::any_of(cells_, [](const Cell& cell) { return cell.colour_weight > 0; });
+    for (const Cell& cell : cells_) {
+        points.push_back(cell.point / cell.weight);
+        visibility.push_back(cell.visibility / static_cast<float>(cell.weight));
+        confidence.push_back(cell.confidence);
+        views.push_back(static_cast<float>(cell.views));
+        if (!coloured)
+            continue;
+        const Eigen::Vector3f bgr = cell.colour_weight > 0 ? Eigen::Vector3f(cell.colour / cell.colour_weight) : Eigen::Vector3f(128, 128, 128);
+        colours.emplace_back(cv::saturate_cast<uchar>(bgr[0]), cv::saturate_cast<uchar>(bgr[1]), cv::saturate_cast<uchar>(bgr[2]));
+    }
+    write_new_ply(file, points, colours, {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}, {"ao_views", views}},
+                  {fmt::format("one cloud of {} frames, merged within {:.6f} m", frames_, resolution_m_)});
+}
+
+} // namespace scanshade

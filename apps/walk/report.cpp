@@ -1,0 +1,250 @@
+// What a run leaves beside its pictures: frames.csv, a row per frame, and manifest.json, enough to run it again.
+#include "apps/walk/report.h"
+
+#include "apps/command_line.h"
+#include "apps/csv.h"
+#include "apps/json.h"
+#include "io/output_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <fstream>
+#include <limits>
+#include <tbb/info.h>
+#include <type_traits>
+#include <utility>
+
+namespace scanshade {
+namespace {
+
+std::string number(double value, int digits) { return std::isnan(value) ? "" : fmt::format("{:.{}f}", value, digits); }
+
+/// JSON knows no NaN: what is not known is null.
+json known(double value, int digits = 4) {
+    const double scale = std::pow(10.0, digits);
+    return std::isfinite(value) ? json(std::round(value * scale) / scale) : json();
+}
+
+json value_json(const Parameter& row) {
+    return std::visit(
+        [&](const auto* value) -> json {
+            if constexpr (std::is_same_v<decltype(value), const float*>)
+                return json::parse(value_text(row)); // the number as typed: 0.1, not 0.10000000149011612
+            else
+                return *value;
+        },
+        row.value);
+}
+
+json settings_json(const std::vector<Stage>& stages) {
+    json settings = json::object();
+    for (const Stage& stage : stages)
+        for (const Parameter& row : stage.rows)
+            settings[stage.title][row.name] = value_json(row);
+    return settings;
+}
+
+json capture_json(const RunReport& report) {
+    const Capture& capture = report.capture;
+    std::vector<std::string> warnings = capture.warnings;
+    json text{{"path", capture.path.string()}, {"kind", capture.kind}, {"frames", capture.entries.size()}};
+    text["camera"] = capture.camera ? to_json(*capture.camera) : json();
+    text["depth"] = {{"encoding", capture.depth.name},
+                     {"units_per_metre", capture.depth.units_per_metre},
+                     {"origin", capture.depth.origin}};
+    if (const DepthCorrection& c = capture.depth_correction; c.any())
+        text["depth"]["correction"] = {{"scale", c.scale}, {"offset_m", c.offset_m}, {"curve_per_m", c.curve_per_m}};
+    if (capture.colour_camera)
+        text["colour_camera"] = to_json(*capture.colour_camera);
+    text["registration"] = {{"registered", name_of(report.registration)}, {"reason", report.registration_reason}};
+    text["warnings"] = warnings;
+    return text;
+}
+
+json passes_json(const Timings& passes) {
+    json text = json::array(); // a list: a pass may run twice under one name
+    for (const auto& [pass, ms] : passes)
+        text.push_back({{"pass", pass}, {"ms", known(ms)}});
+    return text;
+}
+
+json frame_json(const FrameRow& row, bool with_camera) {
+    json text{{"index", row.index}, {"name", row.name}, {"status", name_of(row.status)}};
+    if (!row.why.empty())
+        text["why"] = row.why;
+    if (!row.size.empty())
+        text["size"] = {row.size.width, row.size.height};
+    if (with_camera && !row.size.empty())
+        text["camera"] = to_json(row.camera);
+    text["valid_share"] = known(row.valid_share);
+    text["coverage"] = known(row.coverage);
+    text["mean_visibility"] = known(row.mean_visibility);
+    text["ms"] = stage_json(row.ms);
+    text["passes"] = passes_json(row.passes);
+    text["warnings"] = row.warnings;
+    if (!row.notes.empty())
+        text["notes"] = row.notes;
+    text["files"] = json::array();
+    for (const auto& file : row.files)
+        text["files"].push_back(file.generic_string());
+    return text;
+}
+
+/// With `blanks` before every line but the first.
+std::string indented(const std::string& text, const std::string& blanks) {
+    std::string result;
+    for (const char c : text)
+        c == '\n' ? result += '\n' + blanks : result += c;
+    return result;
+}
+
+/// The largest the process has been, in MiB, as the kernel counts it; NaN where /proc does not tell.
+double peak_memory_mib() {
+    std::ifstream status("/proc/self/status");
+    for (std::string word; status >> word;)
+        if (double kib = 0; word == "VmHWM:" && status >> kib)
+            return kib / 1024;
+    return std::nan("");
+}
+
+json totals_json(const RunReport& report) {
+    StageTimes sum;
+    for (const FrameRow& row : report.frames)
+        sum = sum + row.ms;
+    const std::size_t ok = count(report.frames, FrameStatus::ok);
+    const Rates rates = rates_of(report);
+    return {{"frames", report.frames.size()},
+            {"ok", ok},
+            {"failed", count(report.frames, FrameStatus::failed)},
+            {"skipped", count(report.frames, FrameStatus::skipped)},
+            {"took_ms", known(report.took_ms, 3)},
+            {"done_now", report.done_now},
+            {"frames_per_second", known(rates.pipeline, 2)},
+            {"stage_frames_per_second", stage_json(rates.stage)},
+            {"slowest_stage", rates.slowest},
+            {"share_of_slowest_stage", known(rates.share_of_slowest)},
+            {"device_busy_share", known(rates.device_busy)},
+            {"stage_ms", stage_json(sum)},
+            {"peak_memory_mib", known(peak_memory_mib(), 1)}};
+}
+
+std::string utc(std::chrono::system_clock::time_point time) {
+    return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::chrono::system_clock::to_time_t(time)));
+}
+
+} // namespace
+
+std::string csv_head() {
+    return "index,name,status,why,width,height,valid_share,coverage,mean_visibility,"
+           "load_ms,project_ms,compute_ms,attach_ms,write_ms,warnings\n";
+}
+
+std::string csv_line(const FrameRow& row) {
+    const auto ms = [](double value) { return number(value, 2); };
+    const bool loaded = !row.size.empty();
+    return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.index, csv_field(row.name),
+                       name_of(row.status), csv_field(row.why), loaded ? std::to_string(row.size.width) : "",
+                       loaded ? std::to_string(row.size.height) : "", number(row.valid_share, 4),
+                       number(row.coverage, 4), number(row.mean_visibility, 4), ms(row.ms.load), ms(row.ms.project),
+                       ms(row.ms.compute), ms(row.ms.attach), ms(row.ms.write),
+                       csv_field(fmt::format("{}", fmt::join(row.warnings, "; "))));
+}
+
+std::string csv_line(const std::string& capture, const FrameRow& row) {
+    return csv_field(capture) + "," + csv_line(row);
+}
+
+json stage_json(const StageTimes& ms) {
+    return {{"load", known(ms.load, 3)},
+            {"project", known(ms.project, 3)},
+            {"compute", known(ms.compute, 3)},
+            {"attach", known(ms.attach, 3)},
+            {"write", known(ms.write, 3)}};
+}
+
+Rates rates_of(const RunReport& report) {
+    const auto done = static_cast<double>(report.done_now);
+    const int cores = tbb::info::default_concurrency();
+    Rates rates;
+    rates.pipeline = report.took_ms > 0 ? done * 1000 / report.took_ms : 0;
+    const double could_ms = report.took_ms * static_cast<double>(report.at_once);
+    rates.device_busy = could_ms > 0 ? report.ms_now.compute / could_ms : 0;
+    double least = std::numeric_limits<double>::infinity();
+    const auto stage = [&](const char* name, double StageTimes::*ms, int at_once) {
+        const double rate =
+            report.ms_now.*ms > 0 && done > 0 ? done * 1000 * at_once / report.ms_now.*ms : std::nan("");
+        rates.stage.*ms = rate;
+        if (rate < least) {
+            least = rate;
+            rates.slowest = name;
+            rates.share_of_slowest = rates.pipeline / rate;
+        }
+    };
+    stage("load", &StageTimes::load, cores);
+    stage("project", &StageTimes::project, cores);
+    stage("compute", &StageTimes::compute, static_cast<int>(report.at_once));
+    stage("attach", &StageTimes::attach, cores);
+    stage("write", &StageTimes::write, cores);
+    return rates;
+}
+
+std::string describe(const Rates& rates) {
+    const std::string share =
+        rates.slowest.empty() ? "" : fmt::format(", {:.0f} % of {} alone", 100 * rates.share_of_slowest, rates.slowest);
+    return fmt::format("{:.1f} frames/s{}", rates.pipeline, share);
+}
+
+std::size_t count(const std::vector<FrameRow>& rows, FrameStatus status) {
+    return static_cast<std::size_t>(
+        std::count_if(rows.begin(), rows.end(), [&](const FrameRow& row) { return row.status == status; }));
+}
+
+void write_frames_csv(const std::filesystem::path& file, const std::vector<FrameRow>& frames) {
+    std::string text = csv_head();
+    for (const FrameRow& row : frames)
+        text += csv_line(row);
+    write_atomically(file, text);
+}
+
+void write_manifest(const std::filesystem::path& file, const RunReport& report,
+                    const std::function<FrameRow(const FrameRow&)>& whole) {
+    json text{{"program", "scanshade"},
+              {"version", SCANSHADE_VERSION},
+              {"command_line", command_line()},
+              {"started", utc(report.started)},
+              {"device",
+               {{"name", report.device.name},
+                {"kind", report.device.kind},
+                {"driver", report.device.driver},
+                {"api", report.device.api},
+                {"count", report.devices},
+                {"frames_at_once", report.at_once}}},
+              {"method", report.method},
+              {"settings", settings_json(report.settings)},
+              {"capture", capture_json(report)},
+              {"depth_noise", report.depth_noise},
+              {"budget", report.budget},
+              {"shading", report.shading},
+              {"totals", totals_json(report)}};
+    const std::string all = text_of(text), head = all.substr(0, all.rfind("\n}"));
+    write_atomically(file, [&](const std::filesystem::path& target) {
+        std::ofstream stream(target, std::ios::binary);
+        stream.exceptions(std::ios::failbit | std::ios::badbit);
+        stream
+            << head
+            << ",\n  \"frames\": ["; // one by one: thousands as one value would be what the run needs most memory for
+        const char* between = "";
+        for (const FrameRow& row : report.frames) {
+            stream << std::exchange(between, ",") << "\n    "
+                   << indented(text_of(frame_json(whole(row), !report.capture.camera)), "    ");
+        }
+        stream << (report.frames.empty() ? "]" : "\n  ]") << "\n}\n";
+        stream.flush();
+    });
+}
+
+} // namespace scanshade

@@ -1,0 +1,218 @@
+// Which frames are left, and a line in the journal for each one done.
+#include "apps/walk/resume.h"
+
+#include "apps/json.h"
+#include "io/content_hash.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <array>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <limits>
+#include <map>
+
+namespace scanshade {
+namespace {
+
+/// Rows that do not shape results: where and how it runs, what is told as used beside them, what outputs say.
+constexpr std::array aside = {"frames",         "camera",
+                              "depth-scale",    "association-limit",
+                              "registered",     "depth-noise",
+                              "method",         "radius",
+                              "quality",        "max-error",
+                              "max-ms",         "settings",
+                              "device",         "out",
+                              "write",          "format",
+                              "overwrite",      "dump",
+                              "resume",         "retry",
+                              "shard",          "log",
+                              "shade-strength", "colour-cloud",
+                              "cloud",          "cloud-resolution",
+                              "poses",          "in-flight"};
+
+/// Rows that shape nothing when they are typed differently.
+constexpr std::array elsewhere = {"out", "overwrite", "dump", "resume", "retry", "shard", "log", "device", "in-flight"};
+
+std::string row_text(const Parameter& row) { return row.name + "=" + value_text(row); }
+
+/// What is written, each kind with the settings that shape it.
+std::string outputs_text(const Outputs& outputs) {
+    std::string text;
+    if (outputs.ao)
+        text += fmt::format("ao {};", static_cast<int>(outputs.format));
+    if (outputs.confidence)
+        text += fmt::format("confidence {};", static_cast<int>(outputs.format));
+    if (outputs.shaded)
+        text += "shaded;";
+    if (outputs.panel)
+        text += "panel;";
+    if (outputs.cloud)
+        text += outputs.colour_cloud ? "coloured cloud;" : "cloud;";
+    if (outputs.depth_cloud)
+        text += outputs.colour_cloud ? "coloured depth cloud;" : "depth cloud;";
+    if (outputs.shaded || outputs.panel || outputs.colour_cloud)
+        text += fmt::format("strength {};", outputs.shade_strength);
+    return text;
+}
+
+std::string camera_text(const Camera& camera) {
+    return to_json(camera).dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+std::string capture_text(const Capture& capture) {
+    const auto& [scale, offset_m, curve_per_m] = capture.depth_correction;
+    std::string text =
+        fmt::format("{} {} {} {} {}", capture.depth.name, capture.depth.units_per_metre, scale, offset_m, curve_per_m);
+    if (capture.camera)
+        text += camera_text(*capture.camera);
+    if (capture.colour_camera)
+        text += fmt::format("{} {}", camera_text(capture.colour_camera->camera),
+                            fmt::join(capture.colour_camera->colour_from_depth.matrix().reshaped(), " "));
+    return text;
+}
+
+std::string stamps(const CaptureEntry& entry) {
+    return fmt::format("{} {} {} {} {}", entry.name, entry.problem, entry.colour.empty() ? "" : stamp_of(entry.colour),
+                       entry.depth.empty() ? "" : stamp_of(entry.depth),
+                       entry.cloud.empty() ? "" : stamp_of(entry.cloud));
+}
+
+/// What a frame's result depends on beside its own files: the frames within reach, and where each of them stood.
+std::string around(const Capture& capture, std::size_t index, std::size_t reach) {
+    if (reach == 0)
+        return "";
+    std::string text;
+    for (std::size_t i = index - std::min(index, reach); i <= std::min(index + reach, capture.entries.size() - 1);
+         ++i) {
+        const auto& pose = capture.entries[i].world_from_camera;
+        text +=
+            stamps(capture.entries[i]) + (pose ? fmt::format("{}", fmt::join(pose->matrix().reshaped(), " ")) : "none");
+    }
+    return text;
+}
+
+FrameRow crash_row(const Capture& capture, std::size_t index) {
+    FrameRow row;
+    row.index = index;
+    row.name = capture.entries[index].name;
+    row.status = FrameStatus::failed;
+    row.fault = Fault::crash;
+    row.why = "the process died while this frame was computed alone";
+    row.valid_share = row.coverage = row.mean_visibility = std::numeric_limits<double>::quiet_NaN();
+    row.ms.load = row.ms.project = row.ms.compute = row.ms.attach = row.ms.write = row.valid_share;
+    return row;
+}
+
+/// Each frame by itself, so that a crash names its frame.
+std::vector<FrameRow> run_one_by_one(const Capture& capture, Crew& crew, BatchOptions options, Journal& journal,
+                                     const std::function<void(const FrameRow&)>& on_frame) {
+    const std::string killer = journal.facts().begun;
+    std::vector<FrameRow> rows;
+    for (const std::size_t index : std::exchange(options.frames, {})) {
+        if (capture.entries[index].name == killer) {
+            rows.push_back(crash_row(capture, index));
+            for (const auto& file : files_of(capture.entries[index], options.outputs)) {
+                std::error_code gone_already;
+                std::filesystem::remove(file, gone_already);
+            }
+            on_frame(rows.back());
+            continue;
+        }
+        if (!options.stop || !*options.stop)
+            journal.begin_alone(capture.entries[index].name);
+        options.frames = {index};
+        std::ranges::move(run_batch(capture, crew, options, on_frame), std::back_inserter(rows));
+        if (rows.back().status == FrameStatus::skipped && rows.back().fault == Fault::outage)
+            break;
+    }
+    return rows;
+}
+
+} // namespace
+
+std::string settings_key(const RunReport& report, const Outputs& outputs, const DepthNoise& noise) {
+    std::vector<std::string> parts = {report.method, capture_text(report.capture), outputs_text(outputs),
+                                      std::string(name_of(report.registration)),
+                                      fmt::format("{} {} {}", noise.floor_m, noise.per_z2, noise.grain_px)};
+    for (const Stage& stage : report.settings)
+        for (const Parameter& row : stage.rows)
+            if (!std::ranges::count(aside, row.name))
+                parts.push_back(row_text(row));
+    return key_of(parts);
+}
+
+std::string task_key(const std::vector<Stage>& settings, const Capture& capture, const std::vector<std::size_t>& frames,
+                     bool together) {
+    std::vector<std::string> parts = {capture_text(capture)};
+    if (together && !capture.entries.empty())
+        parts.push_back(around(capture, 0, capture.entries.size()));
+    for (const Stage& stage : settings)
+        for (const Parameter& row : stage.rows)
+            if (!std::ranges::count(elsewhere, row.name))
+                parts.push_back(row_text(row));
+    for (const std::size_t index : frames)
+        parts.push_back(stamps(capture.entries[index]));
+    return key_of(parts);
+}
+
+std::optional<std::vector<FrameRow>> rows_if_complete(const Journal& journal, const std::string& task,
+                                                      const Capture& capture, const std::vector<std::size_t>& frames,
+                                                      bool retry) {
+    if (journal.facts().complete != task)
+        return std::nullopt;
+    std::vector<FrameRow> rows;
+    for (const std::size_t index : frames) {
+        auto row = journal.done(capture.entries[index], std::nullopt, retry);
+        if (!row)
+            return std::nullopt;
+        shorten(*row);
+        rows.push_back(*std::move(row));
+    }
+    return rows;
+}
+
+std::vector<FrameRow> run_recorded(const Capture& capture, Crew& crew, const BatchOptions& options,
+                                   const Recording& recording, const std::function<void(const FrameRow&)>& on_frame) {
+    Journal& journal = recording.journal;
+    const auto settings_of = [&](std::size_t index) {
+        const std::string others = around(capture, index, options.sequence ? options.sequence->reach() : 0);
+        return others.empty() ? recording.settings : key_of({recording.settings, others});
+    };
+    std::map<std::size_t, FrameRow> rows; // by index
+    BatchOptions left = options;
+    left.frames.clear();
+    left.short_rows = true;
+    for (const std::size_t index : options.frames) {
+        if (auto row = journal.done(capture.entries[index], settings_of(index), recording.retry)) {
+            shorten(*row);
+            rows.emplace(index, *std::move(row)).first->second.index = index;
+        } else {
+            left.frames.push_back(index);
+        }
+    }
+    journal.forget(capture, left.frames);
+    const auto record = [&](const FrameRow& row) {
+        journal.add(row, capture.entries[row.index], settings_of(row.index), recording.device);
+        if (recording.finished && row.status != FrameStatus::skipped && row.fault != Fault::outage)
+            ++*recording.finished;
+        if (on_frame)
+            on_frame(row);
+    };
+    for (FrameRow& row : recording.carefully ? run_one_by_one(capture, crew, left, journal, record)
+                                             : run_batch(capture, crew, left, record))
+        rows.insert_or_assign(row.index, std::move(row));
+    std::vector<FrameRow> all;
+    all.reserve(options.frames.size());
+    bool finished = true;
+    for (const std::size_t index : options.frames) {
+        FrameRow row = rows.contains(index) ? std::move(rows.at(index)) : skipped_row(capture, index);
+        finished = finished && row.status != FrameStatus::skipped && row.fault != Fault::outage;
+        all.push_back(std::move(row));
+    }
+    if (finished)
+        journal.complete(recording.task);
+    return all;
+}
+
+} // namespace scanshade

@@ -1,0 +1,113 @@
+// Which frames enter the walk, and in which order they are computed, where each needs those around it.
+#include "apps/walk/sequence_order.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <limits>
+#include <map>
+
+namespace scanshade {
+namespace {
+
+std::string names_of(const Capture& capture, const std::vector<std::size_t>& places) {
+    std::vector<std::string> names;
+    for (const std::size_t place : places)
+        names.push_back(capture.entries[place].name);
+    return fmt::format("{}", fmt::join(names, ", "));
+}
+
+} // namespace
+
+Walk::Walk(const Capture& capture, std::vector<FrameRow>& rows, std::size_t reach)
+    : capture_(capture), empty_(reach > 0 ? rows.size() : 0) {
+    std::map<std::size_t, FrameRow*> around;
+    for (FrameRow& row : rows) {
+        const std::size_t first = row.index - std::min(row.index, reach);
+        for (std::size_t i = first; reach > 0 && i <= std::min(row.index + reach, capture.entries.size() - 1); ++i)
+            around.try_emplace(i, nullptr);
+        if (reach > 0)
+            around[row.index] = &row;
+        else
+            steps_.emplace_back(row.index, &row);
+    }
+    steps_.insert(steps_.end(), around.begin(), around.end());
+}
+
+Token Walk::next() {
+    if (next_ == steps_.size()) {
+        --empty_;
+        return {};
+    }
+    const auto [index, row] = steps_[next_++];
+    if (!row)
+        beside_.push_back(skipped_row(capture_, index));
+    auto work = std::make_shared<Work>(Work{capture_.entries[index], row ? *row : beside_.back()});
+    work->row.why.clear();
+    work->wanted = row != nullptr;
+    return work;
+}
+
+Token Waiting::pass(Token arrived) {
+    if (!sequence_)
+        return arrived;
+    if (arrived) {
+        newest_ = arrived->row.index;
+        if (arrived->row.why.empty() && !arrived->by_points)
+            sequence_->add(newest_, arrived->depth, arrived->frame.world_from_camera);
+        if (arrived->row.fault == Fault::outage)
+            away_.emplace_back(newest_, arrived->row.why);
+        if (arrived->wanted)
+            queue_.push_back(std::move(arrived));
+    } else {
+        newest_ = std::numeric_limits<std::size_t>::max();
+    }
+    if (queue_.empty() || newest_ - queue_.front()->row.index < sequence_->reach())
+        return {};
+    Token complete = std::move(queue_.front());
+    queue_.pop_front();
+    sequence_->forget_before(complete->row.index - std::min(complete->row.index, sequence_->reach()));
+    blame_if_alone(complete->row);
+    return complete;
+}
+
+void Waiting::blame_if_alone(FrameRow& row) const {
+    const auto missed = std::ranges::find_if(away_, [&](const auto& frame) {
+        return frame.first + sequence_->reach() >= row.index && row.index + sequence_->reach() >= frame.first;
+    });
+    if (!row.why.empty() || missed == away_.end())
+        return;
+    row.status = FrameStatus::failed;
+    row.fault = Fault::outage;
+    row.why = "a frame that it is to be looked at together with: " + missed->second;
+}
+
+NeighbourhoodOptions sequence_options(NeighbourhoodOptions asked, const Capture& capture, double radius_m) {
+    if (asked.reach > 0)
+        return asked;
+    std::vector<std::optional<Eigen::Isometry3d>> poses;
+    std::ranges::transform(capture.entries, std::back_inserter(poses), &CaptureEntry::world_from_camera);
+    asked.reach = reach_for(poses, radius_m);
+    return asked;
+}
+
+void compute_in_sequence(Work& work, const Capture& capture, Neighbourhood& sequence) {
+    NeighbourhoodResult result = sequence.compute(work.row.index);
+    work.ao = std::move(result.ao);
+    work.looked_at = std::move(result.depth);
+    work.row.passes = std::move(result.timings);
+    if (!result.fused.empty())
+        work.row.notes.push_back("depth is averaged with frames " + names_of(capture, result.fused) + ".");
+    if (!result.neighbours.empty())
+        work.row.notes.push_back("surfaces of frames " + names_of(capture, result.neighbours) + " occlude, too.");
+    if (!result.averaged.empty())
+        work.row.notes.push_back("visibility is averaged with frames " + names_of(capture, result.averaged) + ".");
+    for (const LeftOut& other : result.left_out)
+        work.row.notes.push_back(
+            fmt::format("frame {} is left out: {:.0f} % of its surfaces meet this one's, {:.0f} % contradict it, "
+                        "{:.1f} of the tolerable misfit.",
+                        capture.entries[other.place].name, 100 * other.agreement.overlap,
+                        100 * other.agreement.contradicted, other.agreement.misfit));
+}
+
+} // namespace scanshade

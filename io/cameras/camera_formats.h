@@ -1,0 +1,42 @@
+// The formats of camera files, one function each way: what read_camera_file() and write_camera_file() choose from.
+#pragma once
+
+#include "io/cameras/camera_file.h"
+#include "io/text.h"
+
+#include <array>
+#include <string>
+#include <vector>
+
+namespace scanshade {
+
+inline constexpr int widest_image = 1 << 16;
+
+[[noreturn]] void refuse_camera(const std::filesystem::path& file, const std::string& why);
+
+/// Focal lengths that a pinhole can have; `names` are the words the file uses for fx, fy, cx, cy.
+void check_numbers(const std::filesystem::path& file, const Pinhole& camera, const std::array<std::string, 4>& names);
+
+/// A 4x4 matrix as a rigid transform, its rotation made exact. Throws Error naming the key where it is none to 1e-3.
+[[nodiscard]] Eigen::Isometry3d rigid_from(const std::filesystem::path& file, const Eigen::Matrix4d& matrix,
+                                           const std::string& key);
+
+// Each throws Error naming file and place.
+[[nodiscard]] CameraFile camera_from_json(const std::filesystem::path& file, const std::string& text);
+[[nodiscard]] CameraFile camera_from_yaml(const std::filesystem::path& file, const std::string& text);
+[[nodiscard]] CameraFile camera_from_xml(const std::filesystem::path& file, const std::string& text);
+[[nodiscard]] CameraFile camera_from_info(const std::filesystem::path& file, const std::vector<TextLine>& lines);
+[[nodiscard]] CameraFile camera_from_matrix(const std::filesystem::path& file, const std::vector<TextLine>& lines);
+[[nodiscard]] CameraFile camera_from_colmap(const std::filesystem::path& file, const std::vector<TextLine>& lines);
+/// Whether a line reads "ID MODEL WIDTH HEIGHT numbers", as COLMAP's cameras.txt does.
+[[nodiscard]] bool is_colmap(const std::vector<TextLine>& lines);
+
+// What cannot be said in a format is refused, never dropped.
+[[nodiscard]] std::string camera_as_json(const CameraFile& camera, const std::string& details);
+[[nodiscard]] std::string camera_as_open3d(const Camera& camera);
+[[nodiscard]] std::string camera_as_opencv(const Camera& camera, const CameraQuality& quality);
+[[nodiscard]] std::string camera_as_ros(const Camera& camera);
+[[nodiscard]] std::string camera_as_kalibr(const CameraFile& camera);
+[[nodiscard]] std::string camera_as_colmap(const Camera& camera);
+
+} // namespace scanshade

@@ -1,0 +1,254 @@
+// Cameras as JSON: ours, and Open3D's.
+#include "io/cameras/camera_formats.h"
+#include "io/shallow_json.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace scanshade {
+
+namespace {
+
+using Json = nlohmann::json;
+namespace fs = std::filesystem;
+
+/// The key whose value holds byte `offset`: the last quoted word before it that a colon follows.
+std::string key_before(std::string_view text, std::size_t offset) {
+    const auto colon = text.substr(0, offset).rfind(':');
+    if (colon == std::string_view::npos)
+        return {};
+    const auto close = text.substr(0, colon).rfind('"');
+    if (close == std::string_view::npos || close == 0)
+        return {};
+    const auto open = text.substr(0, close).rfind('"');
+    return open == std::string_view::npos ? std::string() : std::string(text.substr(open + 1, close - open - 1));
+}
+
+/// NaN and Infinity are what Python's json writes and JSON does not know; the parser's own message would not say so.
+bool mentions_not_a_number(std::string_view rest) {
+    return rest.starts_with("NaN") || rest.starts_with("nan") || rest.starts_with("Inf") || rest.starts_with("inf") ||
+           rest.starts_with("-Inf") || rest.starts_with("-inf");
+}
+
+[[noreturn]] void explain_syntax(const fs::path& file, std::string_view text, const Json::parse_error& failure) {
+    const std::size_t offset = std::min(text.size(), failure.byte > 0 ? failure.byte - 1 : 0);
+    const auto line_start = offset == 0 ? std::string_view::npos : text.rfind('\n', offset - 1);
+    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(offset), '\n');
+    const auto column = line_start == std::string_view::npos ? offset + 1 : offset - line_start;
+    const std::string place = fmt::format("line {}, column {}", line, column);
+
+    const std::size_t word = text.find_last_of(" \t\r\n,[:", offset == 0 ? 0 : offset - 1);
+    const std::size_t word_start = word == std::string_view::npos ? 0 : word + 1;
+    if (mentions_not_a_number(text.substr(std::min(word_start, text.size()))))
+        refuse_camera(
+            file, fmt::format("{}: \"{}\" holds NaN or infinity, expected a number", place, key_before(text, offset)));
+    std::string reason = failure.what();
+    if (const auto colon = reason.find(": "); colon != std::string::npos)
+        reason = reason.substr(colon + 2);
+    refuse_camera(file, fmt::format("{}: not JSON: {}", place, reason));
+}
+
+Json parse(const fs::path& file, const std::string& text) {
+    try {
+        return shallow_json<Json>(text);
+    } catch (const Json::parse_error& failure) {
+        explain_syntax(file, text, failure);
+    } catch (const Error& failure) {
+        refuse_camera(file, failure.what());
+    } catch (const Json::exception& failure) { // numbers beyond double
+        refuse_camera(file, fmt::format("not usable JSON: {}", failure.what()));
+    }
+}
+
+const Json& member(const fs::path& file, const Json& object, const std::string& key) {
+    const auto found = object.find(key);
+    if (found == object.end())
+        refuse_camera(file, fmt::format("\"{}\" is missing", key));
+    return *found;
+}
+
+double number_of(const fs::path& file, const Json& value, const std::string& key) {
+    if (!value.is_number())
+        refuse_camera(file, fmt::format("\"{}\" is {}, expected a number", key, in_quotes(value.dump())));
+    const double found = value.get<double>();
+    if (!std::isfinite(found))
+        refuse_camera(file, fmt::format("\"{}\" is not finite, expected a number", key));
+    return found;
+}
+
+int size_of(const fs::path& file, const Json& object, const std::string& key) {
+    const double value = number_of(file, member(file, object, key), key);
+    if (value != std::floor(value) || value < 1 || value > widest_image)
+        refuse_camera(
+            file, fmt::format("\"{}\" is {}, expected a whole number of pixels, 1 .. {}", key, value, widest_image));
+    return static_cast<int>(value);
+}
+
+std::vector<double> numbers_of(const fs::path& file, const Json& object, const std::string& key, std::size_t count) {
+    const Json& list = member(file, object, key);
+    if (!list.is_array())
+        refuse_camera(file, fmt::format("\"{}\" is not a list of {} numbers", key, count));
+    if (list.size() != count)
+        refuse_camera(file, fmt::format("\"{}\" has {}, expected {}", key, counted(list.size(), "number"), count));
+    std::vector<double> values;
+    for (const Json& value : list)
+        values.push_back(number_of(file, value, key));
+    return values;
+}
+
+/// Open3D's matrix stores columns one after another: fx 0 0, 0 fy 0, cx cy 1.
+Pinhole from_columns(const fs::path& file, const std::vector<double>& m) {
+    if (m[6] == 0 && m[7] == 0 && (m[2] != 0 || m[5] != 0))
+        refuse_camera(
+            file, "\"intrinsic_matrix\" is stored row by row; Open3D's layout stores columns: fx 0 0 0 fy 0 cx cy 1");
+    if (m[2] != 0 || m[5] != 0 || m[8] != 1 || m[1] != 0)
+        refuse_camera(file,
+                      "\"intrinsic_matrix\" is not a camera matrix stored by columns: expected fx 0 0 0 fy 0 cx cy 1");
+    if (m[3] != 0)
+        refuse_camera(file, fmt::format("\"intrinsic_matrix\" has skew {}, a pinhole camera here has none", m[3]));
+    const Pinhole camera{m[0], m[4], m[6], m[7], {}};
+    check_numbers(
+        file, camera,
+        {"\"intrinsic_matrix\" fx", "\"intrinsic_matrix\" fy", "\"intrinsic_matrix\" cx", "\"intrinsic_matrix\" cy"});
+    return camera;
+}
+
+Pinhole from_keys(const fs::path& file, const Json& object) {
+    const auto value = [&](const std::string& key) { return number_of(file, member(file, object, key), key); };
+    const Pinhole camera{value("fx"), value("fy"), value("cx"), value("cy"), {}};
+    check_numbers(file, camera, {"\"fx\"", "\"fy\"", "\"cx\"", "\"cy\""});
+    return camera;
+}
+
+Camera one_camera(const fs::path& file, const Json& object) {
+    Camera camera;
+    camera.pinhole = object.contains("intrinsic_matrix")
+                         ? from_columns(file, numbers_of(file, object, "intrinsic_matrix", 9))
+                         : from_keys(file, object);
+    camera.pinhole.size = {size_of(file, object, "width"), size_of(file, object, "height")};
+    if (object.contains("distortion")) {
+        const auto d = numbers_of(file, object, "distortion", 5);
+        camera.distortion = {d[0], d[1], d[2], d[3], d[4]};
+    }
+    if (object.contains("fisheye")) {
+        if (object.contains("distortion"))
+            refuse_camera(file, "\"distortion\" and \"fisheye\" are both there, one lens expected");
+        const auto k = numbers_of(file, object, "fisheye", 4);
+        camera.distortion = {k[0], k[1], 0, 0, k[2], k[3], LensModel::kannala_brandt};
+    }
+    return camera;
+}
+
+DepthCorrection correction_of(const fs::path& file, const Json& object) {
+    if (!object.is_object())
+        refuse_camera(file, "\"depth_correction\" is not an object of scale, offset_m and curve_per_m");
+    const auto value = [&](const std::string& key, double otherwise) {
+        return object.contains(key) ? number_of(file, object[key], key) : otherwise;
+    };
+    const DepthCorrection correction{value("scale", 1), value("offset_m", 0), value("curve_per_m", 0)};
+    if (correction.scale <= 0)
+        refuse_camera(file, fmt::format("\"scale\" is {}, a positive number expected", correction.scale));
+    return correction;
+}
+
+/// The camera that stands beside the main one.
+ColourCamera beside(const fs::path& file, const Json& object) {
+    if (!object.is_object())
+        refuse_camera(file, "not an object that describes a camera");
+    const Json& rows = member(file, object, "colour_from_depth");
+    Eigen::Matrix4d matrix;
+    if (!rows.is_array() || rows.size() != 4)
+        refuse_camera(file, "\"colour_from_depth\" is not a list of 4 rows");
+    for (int row = 0; row < 4; ++row) {
+        const auto values = numbers_of(file, {{"colour_from_depth", rows[row]}}, "colour_from_depth", 4);
+        matrix.row(row) = Eigen::Vector4d::Map(values.data()).transpose();
+    }
+    ColourCamera colour{one_camera(file, object), {}};
+    colour.colour_from_depth = rigid_from(file, matrix, "colour_from_depth");
+    check(colour.camera);
+    return colour;
+}
+
+} // namespace
+
+CameraFile camera_from_json(const fs::path& file, const std::string& text) {
+    const Json object = parse(file, text);
+    if (!object.is_object())
+        refuse_camera(file, "expected a JSON object that describes a camera");
+    if (!object.contains("intrinsic_matrix") && !object.contains("fx"))
+        refuse_camera(file, "\"intrinsic_matrix\" (Open3D's layout) and \"fx\" (ours) are both missing");
+    CameraFile result;
+    result.camera = one_camera(file, object);
+    if (object.contains("depth_units_per_metre")) {
+        const double units = number_of(file, object["depth_units_per_metre"], "depth_units_per_metre");
+        if (units <= 0)
+            refuse_camera(file, fmt::format("\"depth_units_per_metre\" is {}, expected a positive number", units));
+        result.depth_units_per_metre = units;
+    }
+    if (object.contains("registered")) {
+        if (!object["registered"].is_boolean())
+            refuse_camera(file, "\"registered\" is not true or false");
+        result.registration = object["registered"].get<bool>() ? Registration::yes : Registration::no;
+    }
+    if (object.contains("depth_correction"))
+        result.depth_correction = correction_of(file, object["depth_correction"]);
+    if (object.contains("pose_time_offset_s"))
+        result.pose_time_offset_s = number_of(file, object["pose_time_offset_s"], "pose_time_offset_s");
+    if (object.contains("colour"))
+        result.colour = during("\"colour\"", [&] { return beside(file, object["colour"]); });
+    return result;
+}
+
+namespace {
+
+nlohmann::ordered_json as_object(const Camera& camera) {
+    const auto& [fx, fy, cx, cy, size] = camera.pinhole;
+    nlohmann::ordered_json object{
+        {"fx", fx}, {"fy", fy}, {"cx", cx}, {"cy", cy}, {"width", size.width}, {"height", size.height}};
+    const Distortion& d = camera.distortion;
+    if (d.model == LensModel::kannala_brandt)
+        object["fisheye"] = {d.k1, d.k2, d.k3, d.k4};
+    else if (d.any())
+        object["distortion"] = {d.k1, d.k2, d.p1, d.p2, d.k3};
+    return object;
+}
+
+} // namespace
+
+std::string camera_as_json(const CameraFile& camera, const std::string& details) {
+    nlohmann::ordered_json object = as_object(camera.camera);
+    if (camera.depth_units_per_metre)
+        object["depth_units_per_metre"] = *camera.depth_units_per_metre;
+    if (camera.registration != Registration::unknown)
+        object["registered"] = camera.registration == Registration::yes;
+    if (const DepthCorrection& c = camera.depth_correction; c.any())
+        object["depth_correction"] = {{"scale", c.scale}, {"offset_m", c.offset_m}, {"curve_per_m", c.curve_per_m}};
+    if (camera.pose_time_offset_s != 0)
+        object["pose_time_offset_s"] = camera.pose_time_offset_s;
+    if (camera.colour) {
+        object["colour"] = as_object(camera.colour->camera);
+        const Eigen::Matrix4d matrix = camera.colour->colour_from_depth.matrix();
+        for (int row = 0; row < 4; ++row)
+            object["colour"]["colour_from_depth"].push_back(
+                {matrix(row, 0), matrix(row, 1), matrix(row, 2), matrix(row, 3)});
+    }
+    if (!details.empty())
+        object["refinement"] = nlohmann::ordered_json::parse(details);
+    return object.dump(2) + "\n";
+}
+
+std::string camera_as_open3d(const Camera& camera) {
+    if (camera.distortion.any())
+        throw Error("Open3D's format has no lens distortion; write another format, or undistort first");
+    const auto& [fx, fy, cx, cy, size] = camera.pinhole;
+    const nlohmann::ordered_json object{
+        {"width", size.width},
+        {"height", size.height},
+        {"intrinsic_matrix", {fx, 0.0, 0.0, 0.0, fy, 0.0, cx, cy, 1.0}}}; // column by column
+    return object.dump(2) + "\n";
+}
+
+} // namespace scanshade

@@ -1,0 +1,264 @@
+// Cameras as YAML: OpenCV's own, ROS's camera_info, Kalibr's camchain. (OpenCV's parser comes to no end with some
+// damaged files; yaml-cpp reads all three.)
+#include "io/cameras/camera_formats.h"
+#include "projection/error.h"
+
+#include <cmath>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <yaml-cpp/yaml.h>
+
+namespace scanshade {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// --- reading ---
+
+YAML::Node parsed(const fs::path& file, const std::string& text) {
+    try {
+        return YAML::Load(text);
+    } catch (const YAML::Exception& failure) {
+        throw Error(fmt::format("{}: not YAML: {}", at_line(file, failure.mark.line + 1), failure.msg));
+    }
+}
+
+/// The key's plain value; "" where there is none.
+std::string word_of(const YAML::Node& parent, const std::string& key) {
+    const YAML::Node node = parent[key];
+    return node.IsDefined() && node.IsScalar() ? node.Scalar() : "";
+}
+
+double number_of(const YAML::Node& node) {
+    return node.IsScalar() ? number(node.Scalar()).value_or(std::nan("")) : std::nan("");
+}
+
+/// Numbers of a list, or of a matrix given as rows, cols, data.
+std::vector<double> numbers_of(const fs::path& file, const YAML::Node& parent, const std::string& key) {
+    const YAML::Node node = parent[key];
+    if (!node.IsDefined())
+        refuse_camera(file, fmt::format("\"{}\" is missing", key));
+    const YAML::Node list = node.IsMap() ? node["data"] : node;
+    if (!list.IsDefined() || !list.IsSequence())
+        refuse_camera(file, fmt::format("\"{}\" is not a list of numbers", key));
+    std::vector<double> values;
+    for (const YAML::Node& entry : list) {
+        values.push_back(number_of(entry));
+        if (!std::isfinite(values.back()))
+            refuse_camera(file, fmt::format("\"{}\": value {} is not a finite number", key, values.size()));
+    }
+    return values;
+}
+
+std::vector<double> numbers_of(const fs::path& file, const YAML::Node& parent, const std::string& key,
+                               std::size_t count) {
+    const auto values = numbers_of(file, parent, key);
+    if (values.size() != count)
+        refuse_camera(file, fmt::format("\"{}\" has {}, expected {}", key, counted(values.size(), "number"), count));
+    return values;
+}
+
+cv::Size checked_size(const fs::path& file, double width, double height) {
+    if (!(width >= 1 && width <= widest_image && height >= 1 && height <= widest_image))
+        refuse_camera(file, fmt::format("{}x{} is no image size", width, height));
+    return {static_cast<int>(width), static_cast<int>(height)};
+}
+
+Pinhole from_matrix(const fs::path& file, const std::vector<double>& m) {
+    if (m[3] != 0 || m[6] != 0 || m[7] != 0 || m[8] != 1)
+        refuse_camera(file,
+                      "\"camera_matrix\" is not a camera matrix stored by rows: expected fx 0 cx, 0 fy cy, 0 0 1");
+    if (m[1] != 0)
+        refuse_camera(file, fmt::format("\"camera_matrix\" has skew {}, a pinhole camera here has none", m[1]));
+    const Pinhole pinhole{m[0], m[4], m[2], m[5], {}};
+    check_numbers(file, pinhole,
+                  {"\"camera_matrix\" fx", "\"camera_matrix\" fy", "\"camera_matrix\" cx", "\"camera_matrix\" cy"});
+    return pinhole;
+}
+
+Distortion fisheye(const fs::path& file, const std::string& key, const std::vector<double>& k) {
+    if (k.size() != 4)
+        refuse_camera(file, fmt::format("\"{}\" has {}, expected 4 of a fisheye", key, counted(k.size(), "number")));
+    return {k[0], k[1], 0, 0, k[2], k[3], LensModel::kannala_brandt};
+}
+
+/// k1 k2 p1 p2 [k3 [k4 k5 k6 ...]]: what goes beyond k3 must be zero.
+Distortion polynomial(const fs::path& file, const std::string& key, std::vector<double> k) {
+    for (std::size_t i = 5; i < k.size(); ++i)
+        if (k[i] != 0)
+            refuse_camera(
+                file, fmt::format("\"{}\" number {} is {}: rational, thin-prism and tilted lenses are not supported",
+                                  key, i + 1, k[i]));
+    if (k.size() != 4 && k.size() != 5 && k.size() != 8 && k.size() != 12 && k.size() != 14 && !k.empty())
+        refuse_camera(file,
+                      fmt::format("\"{}\" has {}, expected 4 or 5 (k1 k2 p1 p2 k3)", key, counted(k.size(), "number")));
+    k.resize(5);
+    return {k[0], k[1], k[2], k[3], k[4]};
+}
+
+/// OpenCV's and ROS's: both say camera_matrix and distortion_coefficients.
+CameraFile from_matrices(const fs::path& file, const YAML::Node& root) {
+    CameraFile result;
+    result.camera.pinhole = from_matrix(file, numbers_of(file, root, "camera_matrix", 9));
+    const std::string width = word_of(root, "image_width"), height = word_of(root, "image_height");
+    if (!width.empty() || !height.empty())
+        result.camera.pinhole.size = checked_size(file, number(width).value_or(0), number(height).value_or(0));
+    const std::string key = "distortion_coefficients";
+    if (!root[key].IsDefined())
+        return result;
+    const std::string said = word_of(root, "distortion_model"), model = said.empty() ? "plumb_bob" : said;
+    const bool flagged = number(word_of(root, "fisheye_model")).value_or(0) != 0;
+    if (model != "plumb_bob" && model != "rational_polynomial" && model != "equidistant" && model != "fisheye")
+        refuse_camera(file,
+                      fmt::format("\"distortion_model\" is {}, expected plumb_bob or equidistant", in_quotes(model)));
+    const auto numbers = numbers_of(file, root, key);
+    const bool is_fisheye = flagged || model == "equidistant" || model == "fisheye";
+    result.camera.distortion = is_fisheye ? fisheye(file, key, numbers) : polynomial(file, key, numbers);
+    return result;
+}
+
+/// One camera of a camchain.
+Camera of_chain(const fs::path& file, const YAML::Node& node) {
+    if (!node.IsMap())
+        refuse_camera(file, "\"cam0\" or \"cam1\" is not a map of keys and values");
+    const std::string model = word_of(node, "camera_model");
+    if (model != "pinhole")
+        refuse_camera(file, fmt::format("\"camera_model\" is {}, expected pinhole", in_quotes(model)));
+    const auto k = numbers_of(file, node, "intrinsics", 4);
+    Camera camera{{k[0], k[1], k[2], k[3], {}}, {}, {}};
+    check_numbers(file, camera.pinhole,
+                  {"\"intrinsics\" fx", "\"intrinsics\" fy", "\"intrinsics\" cx", "\"intrinsics\" cy"});
+    const auto size = numbers_of(file, node, "resolution", 2);
+    camera.pinhole.size = checked_size(file, size[0], size[1]);
+    const std::string said = word_of(node, "distortion_model"), lens = said.empty() ? "none" : said;
+    if (lens == "equidistant")
+        camera.distortion = fisheye(file, "distortion_coeffs", numbers_of(file, node, "distortion_coeffs"));
+    else if (lens == "radtan")
+        camera.distortion = polynomial(file, "distortion_coeffs", numbers_of(file, node, "distortion_coeffs"));
+    else if (lens != "none")
+        refuse_camera(file,
+                      fmt::format("\"distortion_model\" is {}, expected radtan, equidistant or none", in_quotes(lens)));
+    return camera;
+}
+
+Eigen::Isometry3d place_in_chain(const fs::path& file, const YAML::Node& node) {
+    Eigen::Matrix4d matrix = Eigen::Matrix4d::Zero();
+    bool whole = node.IsSequence() && node.size() == 4;
+    for (std::size_t row = 0; row < 4 && whole; ++row) {
+        const YAML::Node values = node[row];
+        whole = values.IsSequence() && values.size() == 4;
+        for (std::size_t column = 0; column < 4 && whole; ++column)
+            matrix(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(column)) = number_of(values[column]);
+    }
+    if (!whole || !matrix.allFinite())
+        refuse_camera(file, "\"T_cn_cnm1\" is not 4 rows of 4 numbers");
+    return rigid_from(file, matrix, "T_cn_cnm1");
+}
+
+/// cam0 is the depth camera; a cam1 whose place is told is the colour camera.
+CameraFile from_camchain(const fs::path& file, const YAML::Node& root) {
+    CameraFile result;
+    result.camera = of_chain(file, root["cam0"]);
+    if (const YAML::Node beside = root["cam1"]; beside.IsDefined()) {
+        if (!beside.IsMap() || !beside["T_cn_cnm1"].IsDefined()) {
+            result.warnings.push_back(file.string() + ": more than one camera; cam0 is used.");
+        } else {
+            result.colour = ColourCamera{of_chain(file, beside), place_in_chain(file, beside["T_cn_cnm1"])};
+            result.warnings.push_back(file.string() +
+                                      ": cam0 is taken as the depth camera, cam1 as the colour camera.");
+        }
+    }
+    return result;
+}
+
+// --- writing ---
+
+std::vector<double> coefficients(const Distortion& d) {
+    if (d.model == LensModel::kannala_brandt)
+        return {d.k1, d.k2, d.k3, d.k4};
+    return {d.k1, d.k2, d.p1, d.p2, d.k3};
+}
+
+std::string list(const std::vector<double>& values) { return fmt::format("[{}]", fmt::join(values, ", ")); }
+
+std::string matrix(const char* name, const char* type, int rows, int columns, const std::vector<double>& values) {
+    return fmt::format("{}:{}\n  rows: {}\n  cols: {}\n{}  data: {}\n", name, *type ? " !!opencv-matrix" : "", rows,
+                       columns, type, list(values));
+}
+
+std::vector<double> camera_matrix(const Pinhole& p) { return {p.fx, 0, p.cx, 0, p.fy, p.cy, 0, 0, 1}; }
+
+} // namespace
+
+CameraFile camera_from_yaml(const fs::path& file, const std::string& text) {
+    const YAML::Node root = parsed(file, text);
+    if (!root.IsMap())
+        refuse_camera(file, "not a map of keys and values");
+    if (root["camera_matrix"].IsDefined())
+        return from_matrices(file, root);
+    if (root["cam0"].IsDefined())
+        return from_camchain(file, root);
+    refuse_camera(file, "\"camera_matrix\" (OpenCV, ROS) and \"cam0\" (Kalibr) are both missing");
+}
+
+std::string camera_as_opencv(const Camera& camera, const CameraQuality& quality) {
+    const Pinhole& p = camera.pinhole;
+    const char* type = "  dt: d\n";
+    const auto k = coefficients(camera.distortion);
+    std::string text = fmt::format("%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\n", p.size.width, p.size.height);
+    text += matrix("camera_matrix", type, 3, 3, camera_matrix(p));
+    if (camera.distortion.model == LensModel::kannala_brandt)
+        text += "fisheye_model: 1\n";
+    text += matrix("distortion_coefficients", type, static_cast<int>(k.size()), 1, k);
+    if (std::isfinite(quality.rms_px))
+        text += fmt::format("avg_reprojection_error: {}\n", quality.rms_px);
+    if (!quality.view_rms_px.empty())
+        text += matrix("per_view_reprojection_errors", type, static_cast<int>(quality.view_rms_px.size()), 1,
+                       quality.view_rms_px);
+    return text;
+}
+
+std::string camera_as_ros(const Camera& camera) {
+    const Pinhole& p = camera.pinhole;
+    const bool fisheye_lens = camera.distortion.model == LensModel::kannala_brandt;
+    const auto k = coefficients(camera.distortion);
+    return fmt::format("image_width: {}\nimage_height: {}\ncamera_name: camera\n", p.size.width, p.size.height) +
+           matrix("camera_matrix", "", 3, 3, camera_matrix(p)) +
+           fmt::format("distortion_model: {}\n", fisheye_lens ? "equidistant" : "plumb_bob") +
+           matrix("distortion_coefficients", "", 1, static_cast<int>(k.size()), k) +
+           matrix("rectification_matrix", "", 3, 3, {1, 0, 0, 0, 1, 0, 0, 0, 1}) +
+           matrix("projection_matrix", "", 3, 4, {p.fx, 0, p.cx, 0, 0, p.fy, p.cy, 0, 0, 0, 1, 0});
+}
+
+namespace {
+
+std::string in_chain(const char* name, const Camera& camera) {
+    const Pinhole& p = camera.pinhole;
+    const Distortion& d = camera.distortion;
+    const bool fisheye_lens = d.model == LensModel::kannala_brandt;
+    if (!fisheye_lens && d.k3 != 0)
+        throw Error(fmt::format("Kalibr's radtan lens has no k3, and this camera's is {}; write another format", d.k3));
+    auto k = coefficients(d);
+    k.resize(4);
+    return fmt::format(
+        "{}:\n  camera_model: pinhole\n  intrinsics: {}\n  distortion_model: {}\n  distortion_coeffs: {}\n"
+        "  resolution: [{}, {}]\n",
+        name, list({p.fx, p.fy, p.cx, p.cy}), fisheye_lens ? "equidistant" : "radtan", list(k), p.size.width,
+        p.size.height);
+}
+
+} // namespace
+
+std::string camera_as_kalibr(const CameraFile& camera) {
+    std::string text = in_chain("cam0", camera.camera);
+    if (!camera.colour)
+        return text;
+    text += in_chain("cam1", camera.colour->camera) + "  T_cn_cnm1:\n";
+    const Eigen::Matrix4d m = camera.colour->colour_from_depth.matrix();
+    for (int row = 0; row < 4; ++row)
+        text += fmt::format("  - {}\n", list({m(row, 0), m(row, 1), m(row, 2), m(row, 3)}));
+    return text;
+}
+
+} // namespace scanshade

@@ -1,0 +1,287 @@
+// open_capture: which layout, camera and depth encoding; load: one frame's files decoded and checked against each
+// other.
+#include "io/captures/capture.h"
+
+#include "io/clouds/cloud_file.h"
+#include "io/clouds/cloud_records.h"
+#include "io/captures/layouts.h"
+#include "io/captures/plausibility.h"
+#include "io/text.h"
+#include "io/captures/trajectory.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace scanshade {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// --- opening ---
+
+Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
+    if (auto listing = list_tum(folder, options))
+        return *std::move(listing);
+    if (auto listing = list_seven_scenes(folder))
+        return *std::move(listing);
+    if (auto listing = list_pcl_recording(folder))
+        return *std::move(listing);
+    if (auto listing = list_image_folders(folder))
+        return *std::move(listing);
+    if (auto listing = list_depth_images(folder))
+        return *std::move(listing);
+    if (auto listing = list_clouds(folder))
+        return *std::move(listing);
+    throw Error(fmt::format(
+        "no frames found in {}: looked for depth.txt (TUM), frame-NNNNNN.depth.png (7-Scenes), "
+        "TIME_depth.pclzf (PCL), a folder depth/ "
+        "(Redwood, RealSense), 16-bit or float depth images, and clouds (.pcd, .ply, .las, .xyz, .pts, .ptx, .bin)",
+        folder.string()));
+}
+
+bool is_cloud(const fs::path& file) {
+    const std::string start = read_bytes(file, 16);
+    for (const std::string_view beginning : {"ply\n", "ply\r", "# .PCD", "VERSION", "FIELDS", "LASF", "ASTM-E57"})
+        if (start.starts_with(beginning))
+            return true;
+    return image_format(start) == ImageFormat::unknown && has_cloud_extension(file);
+}
+
+Listing list_file(const fs::path& file) {
+    CaptureEntry entry;
+    entry.name = file.stem().string();
+    Listing listing;
+    listing.find_camera = [](cv::Size, std::vector<std::string>&) { return std::nullopt; };
+    if (is_cloud(file)) {
+        entry.cloud = file;
+        listing.capture.kind = "cloud";
+        listing.capture.depth = depth_encoding("m", "of clouds: metres by custom, or the unit that the file names");
+        listing.capture.registration_reason = "colours belong to the points";
+    } else {
+        const bool image = image_format(read_bytes(file, 16)) != ImageFormat::unknown;
+        if (!image && !has_depth_extension(file))
+            throw Error(file.string() + ": neither a folder, a depth image (PNG, PGM, TIFF, EXR, PFM, PCLZF) nor a "
+                                        "cloud (PCD, PLY, LAS, XYZ, PTS, PTX, KITTI's .bin)");
+        entry.depth = file;
+        listing.capture.kind = "depth image";
+        listing.capture.depth = assumed_encoding(file);
+        listing.capture.registration_reason = "there is no colour";
+        listing.find_camera = [file](cv::Size, std::vector<std::string>&) { return camera_beside_pclzf(file); };
+    }
+    listing.capture.entries.push_back(std::move(entry));
+    return listing;
+}
+
+/// The size of the first depth image that has a readable header; 0x0 where none of the first few has.
+cv::Size depth_size(const std::vector<CaptureEntry>& entries) {
+    int tries = 8;
+    for (const CaptureEntry& entry : entries) {
+        if (!entry.problem.empty() || entry.depth.empty())
+            continue;
+        if (tries-- == 0)
+            break;
+        try {
+            return peek(entry.depth).size;
+        } catch (const Outage&) {
+            throw;
+        } catch (const Error&) {
+            continue; // loading this frame will say why
+        }
+    }
+    return {};
+}
+
+void settle_camera(Listing& listing, const CaptureOptions& options) {
+    Capture& capture = listing.capture;
+    const bool depth_images = std::any_of(capture.entries.begin(), capture.entries.end(),
+                                          [](const CaptureEntry& entry) { return !entry.depth.empty(); });
+    const cv::Size size = depth_images ? depth_size(capture.entries) : cv::Size();
+    const auto found = options.camera.empty() ? listing.find_camera(size, capture.warnings)
+                                              : std::optional(camera_from_argument(options.camera));
+    if (!found) {
+        if (depth_images)
+            capture.warnings.push_back("no camera: the capture has none; give --camera FILE or --camera fx,fy,cx,cy.");
+        return;
+    }
+    capture.warnings.insert(capture.warnings.end(), found->warnings.begin(), found->warnings.end());
+    capture.camera = found->camera;
+    if (capture.camera->pinhole.size.empty())
+        capture.camera->pinhole.size = size;
+    if (!capture.camera->pinhole.size.empty())
+        check(*capture.camera);
+    if (found->depth_units_per_metre)
+        capture.depth = depth_encoding(fmt::format("{}", *found->depth_units_per_metre), found->camera.origin);
+    capture.depth_correction = found->depth_correction;
+    capture.pose_time_offset_s = found->pose_time_offset_s;
+    capture.colour_camera = found->colour;
+    if (found->colour && found->registration == Registration::unknown) {
+        capture.registration = Registration::no;
+        capture.registration_reason = "a camera of its own took the colour, according to " + found->camera.origin;
+    }
+    if (found->registration == Registration::unknown)
+        return;
+    capture.registration = found->registration;
+    capture.registration_reason =
+        (found->registration == Registration::yes ? "registered, according to " : "unregistered, according to ") +
+        found->camera.origin;
+}
+
+// --- loading ---
+
+std::string text(cv::Size size) { return fmt::format("{}x{}", size.width, size.height); }
+
+/// Camera, depth and colour must be of one size: nothing is scaled without being asked for.
+void check_depth_size(const Frame& frame, const fs::path& depth) {
+    const cv::Size expected = frame.camera.pinhole.size, found = frame.depth_m.size();
+    if (!expected.empty() && found != expected)
+        throw Error(fmt::format("{}: depth is {}, but its camera is for {} ({})", depth.string(), text(found),
+                                text(expected), frame.camera.origin));
+}
+
+/// A share that went while frames were read is no fault of theirs.
+void check_still_there(const Capture& capture) {
+    if (std::error_code trouble; !fs::exists(capture.path, trouble))
+        throw Outage(capture.path.string() + ": not there any more");
+}
+
+void load_colour(const Capture& capture, const fs::path& file, Frame& frame) {
+    try {
+        frame.colour = read_colour(file);
+    } catch (const Outage&) {
+        throw;
+    } catch (const std::exception& failure) {
+        check_still_there(capture);
+        frame.warnings.push_back(fmt::format("{}; processed without colour.", failure.what()));
+        return;
+    }
+    const cv::Size colour = frame.colour.size(),
+                   expected = frame.colour_camera ? frame.colour_camera->camera.pinhole.size : frame.depth_m.size();
+    if (colour == expected)
+        return;
+    frame.warnings.push_back(fmt::format("{}: colour is {}, {} is {}; processed without colour.", file.string(),
+                                         text(colour), frame.colour_camera ? "its camera" : "depth", text(expected)));
+    frame.colour = cv::Mat3b();
+}
+
+void correct(cv::Mat1f& depth_m, const DepthCorrection& correction) {
+    if (!correction.any())
+        return;
+    std::transform(depth_m.begin(), depth_m.end(), depth_m.begin(), [&](float z) {
+        return z > 0 ? std::max(0.0F, static_cast<float>(correction(z))) : z; // what is corrected away is a hole
+    });
+}
+
+void load_depth(const Capture& capture, const CaptureEntry& entry, Frame& frame, bool with_colour) {
+    const cv::Mat stored = read_stored_depth(entry.depth);
+    frame.depth_m = during(entry.depth, [&] { return depth_in_metres(stored, capture.depth); });
+    if (capture.camera) {
+        frame.camera = *capture.camera;
+        if (frame.camera.pinhole.size.empty())
+            frame.camera.pinhole.size = frame.depth_m.size();
+        check_depth_size(frame, entry.depth);
+    } else { // anything that needs the camera refuses this one, and says its origin
+        frame.camera.origin = "none is known; give --camera FILE or --camera fx,fy,cx,cy";
+    }
+    const auto doubts = doubts_about(frame.depth_m, stored, capture.depth);
+    frame.warnings.insert(frame.warnings.end(), doubts.begin(), doubts.end());
+    correct(frame.depth_m, capture.depth_correction);
+    frame.colour_camera = capture.colour_camera;
+    if (with_colour && !entry.colour.empty())
+        load_colour(capture, entry.colour, frame);
+}
+
+void load_cloud(const Capture& capture, const CaptureEntry& entry, Frame& frame) {
+    frame.cloud = read_cloud(entry.cloud, frame.warnings);
+    if (frame.cloud->records->viewpoint)
+        frame.world_from_camera = frame.cloud->records->viewpoint;
+    if (!capture.camera)
+        return;
+    frame.camera = *capture.camera;
+    Pinhole& pinhole = frame.camera.pinhole;
+    const cv::Size grid = frame.cloud->grid;
+    if (frame.cloud->organised()) {
+        if (pinhole.size.empty())
+            pinhole.size = grid;
+        if (pinhole.size != grid)
+            throw Error(fmt::format("{}: the cloud's grid is {}, but its camera is for {} ({})", entry.cloud,
+                                    text(grid), text(pinhole.size), frame.camera.origin));
+    } else if (pinhole.size.empty()) {
+        // Four numbers say nothing about the image; a principal point is usually its middle.
+        constexpr double widest = 1 << 14;
+        if (!(pinhole.cx >= 0 && pinhole.cy >= 0 && pinhole.cx < widest / 2 && pinhole.cy < widest / 2))
+            throw Error(fmt::format("{}: an image size is needed with this camera ({}); give a camera file",
+                                    entry.cloud, frame.camera.origin));
+        pinhole.size = {static_cast<int>(std::lround(2 * pinhole.cx + 1)),
+                        static_cast<int>(std::lround(2 * pinhole.cy + 1))};
+        frame.warnings.push_back(
+            fmt::format("the camera names no image size; {} is taken from its principal point.", text(pinhole.size)));
+    }
+    check(frame.camera);
+}
+
+} // namespace
+
+namespace {
+
+/// Poses of a file in place of the recording's own. Throws Error where no frame finds one.
+void take_poses(Capture& capture, const CaptureOptions& options) {
+    const std::vector<StampedPose> poses = read_tum_trajectory(options.poses, capture.warnings);
+    std::size_t found = 0;
+    for (std::size_t i = 0; i < capture.entries.size(); ++i) {
+        CaptureEntry& entry = capture.entries[i];
+        entry.world_from_camera = entry.stamp_s ? pose_at(poses, *entry.stamp_s, options.association_limit_s)
+                                                : pose_at(poses, static_cast<double>(i), 0.01);
+        found += entry.world_from_camera.has_value();
+    }
+    if (found == 0)
+        throw Error(fmt::format("{}: none of its {} poses belongs to a frame of {} (by {})", options.poses.string(),
+                                poses.size(), capture.path.string(),
+                                capture.entries.front().stamp_s ? "time" : "index"));
+    capture.warnings.push_back(
+        fmt::format("{} of {} frames have a pose in {}.", found, capture.entries.size(), options.poses.string()));
+}
+
+} // namespace
+
+Capture open_capture(const fs::path& path, const CaptureOptions& options) {
+    std::error_code ignored;
+    if (!fs::exists(path, ignored))
+        throw Error(path.string() + ": no such file or folder");
+    Listing listing = fs::is_directory(path, ignored) ? list_folder(path, options) : list_file(path);
+    Capture& capture = listing.capture;
+    capture.path = path;
+    settle_names(capture.entries);
+    settle_camera(listing, options);
+    if (listing.find_poses)
+        listing.find_poses(capture, capture.pose_time_offset_s);
+    if (!options.depth_scale.empty())
+        capture.depth = depth_encoding(options.depth_scale, "--depth-scale");
+    if (!options.poses.empty())
+        take_poses(capture, options);
+    return std::move(capture);
+}
+
+Frame Capture::load(std::size_t index, bool with_colour) const {
+    if (index >= entries.size())
+        throw Error(fmt::format("{}: frame {} of {}", path.string(), index, entries.size()));
+    const CaptureEntry& entry = entries[index];
+    if (!entry.problem.empty())
+        throw Error(entry.problem);
+    Frame frame;
+    frame.name = entry.name;
+    frame.warnings = entry.warnings;
+    frame.world_from_camera = entry.world_from_camera;
+    frame.registration = registration;
+    try {
+        entry.cloud.empty() ? load_depth(*this, entry, frame, with_colour) : load_cloud(*this, entry, frame);
+    } catch (const std::exception&) {
+        check_still_there(*this);
+        throw;
+    }
+    return frame;
+}
+
+} // namespace scanshade

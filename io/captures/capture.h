@@ -1,0 +1,64 @@
+// Open a recording, list its frames, load one: the first steps of the walk.
+#pragma once
+
+#include "io/cameras/camera_file.h"
+#include "io/images/image_file.h"
+#include "projection/frame.h"
+#include "projection/motion.h"
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace scanshade {
+
+/// What the user said about a capture that its files may not say.
+struct CaptureOptions {
+    std::string camera;                ///< file or "fx,fy,cx,cy"; empty = from the capture
+    std::string depth_scale;           ///< as depth_encoding() takes it; empty = from the layout
+    double association_limit_s = 0.02; ///< colour, depth and poses farther apart in time are not paired (TUM)
+    std::filesystem::path poses =
+        {}; ///< TUM's rows, by time or, where frames have none, by index; empty = the capture's own
+};
+
+/// One frame's listing: where its parts lie. Nothing is decoded yet.
+struct CaptureEntry {
+    std::string name; ///< unique in the capture
+    /// Paths; empty where there is none. Not as std::filesystem::path, which holds every component apart: of thousands
+    /// of frames that would be most of what a capture takes.
+    std::string colour, depth, cloud;
+    std::optional<Eigen::Isometry3d> world_from_camera;
+    std::optional<double> stamp_s;        ///< of the depth image
+    std::optional<double> colour_stamp_s; ///< of the colour image paired with it
+    Motion motion;                        ///< of the camera then, where its trajectory tells
+    std::string problem; ///< why this frame cannot be loaded (names file and line); empty = it may be tried
+    std::vector<std::string> warnings; ///< what was odd in the listing of this frame
+};
+
+/// A recording, listed. Opening is cheap; frames are decoded by load().
+struct Capture {
+    std::filesystem::path path;
+    std::string kind; ///< "TUM RGB-D", "7-Scenes", "PCL recording", "Redwood / Open3D", "colour and depth folders",
+                      ///< "depth image", "cloud"
+    std::optional<Camera> camera; ///< none: clouds recover theirs; depth images need --camera
+    DepthEncoding depth;
+    DepthCorrection depth_correction;          ///< from the camera's file; load() applies it
+    std::optional<ColourCamera> colour_camera; ///< where colour images were taken, if it is known and not the depth's
+    double pose_time_offset_s = 0;             ///< from the camera's file; already in the poses
+    Registration registration = Registration::unknown;
+    std::string registration_reason;
+    std::vector<CaptureEntry> entries; ///< in recording order
+    std::vector<std::string> warnings; ///< about the capture as a whole
+
+    /// Decodes frame `index`; safe to call from several threads. Throws Error naming file and place, Outage where the
+    /// capture cannot be reached any more; a damaged colour image is a warning, not a failure. Without colour, whose
+    /// decoding takes as long as the depth's, it is not looked at.
+    [[nodiscard]] Frame load(std::size_t index, bool with_colour = true) const;
+};
+
+/// Opens a folder (layout told by its content), a single depth image, or a cloud file.
+/// Throws Error "no frames found in ..." where there is nothing to do, naming what was looked for.
+[[nodiscard]] Capture open_capture(const std::filesystem::path& path, const CaptureOptions& options = {});
+
+} // namespace scanshade

@@ -1,0 +1,203 @@
+// A capture folder's files: their order and kinds, the camera among them, and fit names for frames.
+#include "io/captures/layouts.h"
+
+#include "io/text.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <cctype>
+#include <fmt/format.h>
+#include <map>
+#include <set>
+
+namespace scanshade {
+
+namespace fs = std::filesystem;
+
+bool natural_less(const std::string& a, const std::string& b) {
+    const auto digit = [](char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; };
+    std::size_t i = 0, j = 0;
+    while (i < a.size() && j < b.size()) {
+        if (!digit(a[i]) || !digit(b[j])) {
+            if (a[i] != b[j])
+                return a[i] < b[j];
+            ++i, ++j;
+            continue;
+        }
+        const auto run = [&](const std::string& text, std::size_t& at) { // digits without leading zeros
+            while (at < text.size() && text[at] == '0')
+                ++at;
+            const std::size_t start = at;
+            while (at < text.size() && digit(text[at]))
+                ++at;
+            return text.substr(start, at - start);
+        };
+        const std::string left = run(a, i), right = run(b, j);
+        if (left.size() != right.size())
+            return left.size() < right.size();
+        if (left != right)
+            return left < right;
+    }
+    if (a.size() - i != b.size() - j)
+        return a.size() - i < b.size() - j;
+    return a < b; // "01" and "1": any fixed order will do
+}
+
+std::vector<fs::path> files_in(const fs::path& folder) {
+    std::vector<fs::path> files;
+    std::error_code trouble;
+    for (fs::directory_iterator entry(folder, trouble), end; !trouble && entry != end; entry.increment(trouble)) {
+        const std::string name = entry->path().filename().string();
+        std::error_code ignored;
+        if (name.starts_with('.') || name == "Thumbs.db" || name == "desktop.ini" || !entry->is_regular_file(ignored))
+            continue;
+        files.push_back(entry->path());
+    }
+    if (trouble)
+        fail_to_read(folder, trouble);
+    std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
+        return natural_less(a.filename().string(), b.filename().string());
+    });
+    return files;
+}
+
+namespace {
+
+bool speaks_of(const fs::path& file, std::initializer_list<std::string_view> subjects) {
+    std::string name = file.filename().string();
+    std::transform(name.begin(), name.end(), name.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return std::any_of(subjects.begin(), subjects.end(),
+                       [&](std::string_view subject) { return name.find(subject) != std::string::npos; });
+}
+
+bool one_of(const std::string& text, std::initializer_list<std::string_view> choices) {
+    return std::find(choices.begin(), choices.end(), text) != choices.end();
+}
+
+} // namespace
+
+bool has_depth_extension(const fs::path& file) {
+    return one_of(lower_extension(file), {".png", ".pgm", ".tif", ".tiff", ".exr", ".pfm", ".pclzf"});
+}
+bool has_colour_extension(const fs::path& file) {
+    return one_of(lower_extension(file),
+                  {".png", ".jpg", ".jpeg", ".ppm", ".pgm", ".bmp", ".tif", ".tiff", ".webp", ".pclzf"});
+}
+
+namespace {
+
+bool stays_inside(const fs::path& relative) {
+    return !relative.empty() && relative.is_relative() && *relative.begin() != "..";
+}
+
+/// Whether a part of the name is a link: few are, and only those need to be followed to their ends.
+bool through_a_link(fs::path at, const fs::path& relative) {
+    return std::any_of(relative.begin(), relative.end(), [&](const fs::path& part) {
+        std::error_code ignored;
+        return fs::is_symlink(at /= part, ignored);
+    });
+}
+
+} // namespace
+
+std::string trouble_with(const fs::path& folder, const std::string& name) {
+    const fs::path relative = fs::path(name).lexically_normal();
+    if (!stays_inside(relative) || name.find('\0') != std::string::npos)
+        return fmt::format("{} leaves the capture's folder; not opened", in_quotes(name));
+    std::error_code missing;
+    if (!fs::is_regular_file(folder / relative, missing))
+        return fmt::format("{} does not exist", in_quotes(name));
+    if (!through_a_link(folder, relative))
+        return {};
+    const fs::path file = fs::canonical(folder / relative, missing);
+    if (!stays_inside(file.lexically_relative(fs::canonical(folder, missing))))
+        return fmt::format("{} is a link out of the capture's folder, to {}; not opened", in_quotes(name),
+                           in_quotes(file.string()));
+    return {};
+}
+
+ImageFacts peek(const fs::path& image) {
+    constexpr std::size_t header = 1 << 16;
+    const std::string start = read_bytes(image, header);
+    const ImageFormat format = image_format(start);
+    const bool whole = format == ImageFormat::tiff || format == ImageFormat::exr; // their sizes may lie at the end
+    return read_image_header(whole ? read_bytes(image) : start, image);
+}
+
+std::optional<CameraFile> camera_in(const fs::path& folder, std::vector<std::string>& warnings) {
+    std::vector<fs::path> candidates, others;
+    for (const fs::path& file : files_in(folder)) {
+        const std::string name = file.filename().string();
+        const bool json = lower_extension(file) == ".json", text = lower_extension(file) == ".txt";
+        // Text files named after cameras are often poses or calibrations of another kind; JSON files rarely are.
+        const bool promising =
+            (json && speaks_of(file, {"cam", "intrinsic"}) && !speaks_of(file, {"traj", "pose", "extrinsic"})) ||
+            (text && speaks_of(file, {"intrinsic"}));
+        if (name == "camera.json")
+            candidates.insert(candidates.begin(), file);
+        else if (promising)
+            candidates.push_back(file);
+        else if (json || name == "info.txt")
+            others.push_back(file);
+    }
+    std::optional<CameraFile> found;
+    for (const fs::path& file : candidates) {
+        if (found) {
+            warnings.push_back(
+                fmt::format("{} is used as the camera; {} is not.", found->camera.origin, file.filename().string()));
+            continue;
+        }
+        found = read_camera_file(file);
+    }
+    for (auto other = others.begin(); !found && other != others.end(); ++other) {
+        try {
+            found = read_camera_file(*other);
+        } catch (const Outage&) {
+            throw;
+        } catch (const Error&) {
+            continue; // a name that promises nothing may hold anything
+        }
+    }
+    return found;
+}
+
+DepthEncoding assumed_encoding(const fs::path& first_depth) {
+    bool floats = false;
+    try {
+        floats = !first_depth.empty() && peek(first_depth).floats;
+    } catch (const Outage&) {
+        throw;
+    } catch (const Error&) { // loading that frame will say what is wrong with it
+    }
+    if (floats)
+        return depth_encoding("m", "assumed: floats are metres");
+    return depth_encoding("mm", "assumed: 16-bit integers are millimetres");
+}
+
+namespace {
+
+std::string fit_for_a_file(const std::string& name) {
+    constexpr std::size_t longest = 160; // of the 255 bytes that file systems have
+    std::string fit = as_utf8(name.substr(0, longest));
+    std::replace_if(
+        fit.begin(), fit.end(), [](char c) { return c == '/' || c == '\\' || static_cast<unsigned char>(c) < ' '; },
+        '_');
+    if (fit.starts_with('.')) // temporary files and those of other programs begin so
+        fit[0] = '_';
+    return fit.empty() ? "frame" : fit;
+}
+
+} // namespace
+
+void settle_names(std::vector<CaptureEntry>& entries) {
+    std::set<std::string> taken;
+    std::map<std::string, int> next; // of names that are wanted again and again
+    for (CaptureEntry& entry : entries) {
+        const std::string wanted = fit_for_a_file(entry.name);
+        for (entry.name = wanted; !taken.insert(entry.name).second;)
+            entry.name = fmt::format("{}-{}", wanted, ++next.emplace(wanted, 1).first->second);
+    }
+}
+
+} // namespace scanshade

@@ -1,0 +1,66 @@
+// The ways in which captures lie on disk, one function per layout: what open_capture() tries, in its order.
+#pragma once
+
+#include "io/captures/capture.h"
+#include "io/clouds/cloud_records.h"
+#include "io/images/image_check.h"
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace scanshade {
+
+/// A capture as its layout lists it, before camera and depth encoding are settled.
+struct Listing {
+    Capture capture; ///< capture.depth is the layout's own encoding
+    /// The layout's camera for depth images of this size (0x0 where no image could be read); may add to the warnings.
+    /// Called only when the user named no camera.
+    std::function<std::optional<CameraFile>(cv::Size depth_size, std::vector<std::string>& warnings)> find_camera;
+    /// Gives entries their poses by time; none where the layout ties poses to frames itself. Called once the camera is
+    /// known, whose file may tell how far the clocks are apart.
+    std::function<void(Capture& capture, double pose_time_offset_s)> find_poses = {};
+};
+
+// Each returns nothing when the folder is not in its layout, and throws Error when it is but cannot be used.
+[[nodiscard]] std::optional<Listing> list_tum(const std::filesystem::path& folder, const CaptureOptions& options);
+[[nodiscard]] std::optional<Listing> list_seven_scenes(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_pcl_recording(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_image_folders(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_depth_images(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_clouds(const std::filesystem::path& folder);
+
+// --- what layouts share ---
+
+/// The folder's own files, hidden and foreign ones (._*, Thumbs.db) left out, in natural order: 2 before 10.
+[[nodiscard]] std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder);
+[[nodiscard]] bool natural_less(const std::string& a, const std::string& b);
+[[nodiscard]] bool has_depth_extension(const std::filesystem::path& file);
+[[nodiscard]] bool has_colour_extension(const std::filesystem::path& file);
+
+/// Why a file that a list names cannot be opened: outside the capture's folder, by its name or through a link, or
+/// missing. Empty = it is there.
+[[nodiscard]] std::string trouble_with(const std::filesystem::path& folder, const std::string& name);
+
+/// Size and type of an image from its first bytes; throws Error where they make no sense.
+[[nodiscard]] ImageFacts peek(const std::filesystem::path& image);
+
+/// The camera among a folder's files: camera.json, any JSON or text file whose name speaks of a camera or intrinsics,
+/// info.txt. A file that speaks of a camera and cannot be read is an Error; of several, the first is used and the
+/// others are named.
+[[nodiscard]] std::optional<CameraFile> camera_in(const std::filesystem::path& folder,
+                                                  std::vector<std::string>& warnings);
+
+/// The camera and depth unit in the XML file that PCL writes beside a depth image of its recordings (TIME.xml beside
+/// TIME_depth.pclzf); nothing where there is none.
+[[nodiscard]] std::optional<CameraFile> camera_beside_pclzf(const std::filesystem::path& depth);
+
+/// "assumed: 16-bit integers are millimetres", or metres where `first_depth` holds floats.
+[[nodiscard]] DepthEncoding assumed_encoding(const std::filesystem::path& first_depth);
+
+/// Makes the entries' names unique, and fit for file names: UTF-8 without slashes and control characters, short enough
+/// to have something added, not hidden.
+void settle_names(std::vector<CaptureEntry>& entries);
+
+} // namespace scanshade

@@ -1,0 +1,18 @@
+// Does a depth image look like one? Nothing in a file tells the encodings apart, so what was assumed is checked against
+// what sensors can see.
+#pragma once
+
+#include "io/images/image_file.h"
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+namespace scanshade {
+
+/// Sentences about what looks wrong in `depth_m` (decoded from `stored` with `encoding`): no valid depth, a range that
+/// no depth sensor has, noise in place of surfaces. Each says what other encodings would give.
+[[nodiscard]] std::vector<std::string> doubts_about(const cv::Mat1f& depth_m, const cv::Mat& stored,
+                                                    const DepthEncoding& encoding);
+
+} // namespace scanshade

@@ -1,0 +1,381 @@
+// Clouds in and out: the format told by content, points and colours taken from the records, fields added to them.
+#include "io/clouds/cloud_file.h"
+
+#include "io/clouds/cloud_records.h"
+#include "io/output_file.h"
+#include "io/text.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <fmt/format.h>
+#include <limits>
+
+namespace scanshade {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+using Format = CloudRecords::Format;
+using Encoding = CloudRecords::Encoding;
+
+constexpr double largest_coordinate = 1e30; // 3e38 and the like mark invalid points
+
+CloudRecords read_records(const fs::path& file, std::vector<std::string>& warnings) {
+    const std::string bytes = read_bytes(file);
+    if (bytes.empty())
+        throw Error(file.string() + ": empty file (0 bytes), expected a cloud");
+    if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r"))
+        return read_ply(bytes, file, warnings);
+    for (const std::string_view start : {"# .PCD", "VERSION", "FIELDS", "COLUMNS", "#"})
+        if (bytes.starts_with(start) && !is_text_cloud(file))
+            return read_pcd(bytes, file, warnings);
+    if (bytes.starts_with("LASF"))
+        return read_las(bytes, file, warnings);
+    if (bytes.starts_with("ASTM-E57"))
+        throw Error(file.string() + ": E57, which is not read; CloudCompare or `pdal translate IN.e57 OUT.las` makes LAS "
+                                    "or PLY of it");
+    const std::string extension = lower_extension(file);
+    if (extension == ".las" || extension == ".laz")
+        throw Error(fmt::format("{}: begins with {}, expected the signature LASF", file.string(), in_quotes(bytes.substr(0, 4))));
+    if (extension == ".bin")
+        return read_kitti(bytes, file);
+    if (is_text_cloud(file))
+        return read_text_cloud(bytes, file, warnings);
+    throw Error(file.string() + ": neither PCD, PLY nor LAS (expected \"# .PCD\", \"ply\" or \"LASF\" at its start)");
+}
+
+/// A coordinate of every point, its place looked up once where records are alike.
+void read_coordinate(const CloudRecords& records, std::size_t field, int axis, std::vector<Eigen::Vector3d>& points) {
+    const bool alike = records.stride != 0;
+    const std::size_t offset = records.fields[field].offset;
+    const Scalar type = records.fields[field].type;
+    const bool big_endian = records.encoding == Encoding::big_endian;
+    for (std::size_t i = 0; i < points.size(); ++i)
+        points[i][axis] = alike ? decoded(records.points.data() + i * records.stride + offset, type, big_endian)
+                                : value_at(records, records.record(i), field);
+}
+
+/// The same in the cloud's unit.
+void place_coordinate(const CloudRecords& records, const char* name, int axis, std::vector<Eigen::Vector3d>& points) {
+    read_coordinate(records, *records.field_named(name), axis, points);
+    const double scale = records.scale[static_cast<std::size_t>(axis)], shift = records.shift[static_cast<std::size_t>(axis)];
+    if (scale == 1 && shift == 0)
+        return;
+    for (Eigen::Vector3d& point : points)
+        point[axis] = point[axis] * scale + shift;
+}
+
+std::vector<Eigen::Vector3d> points_of(const CloudRecords& records, const fs::path& file,
+                                       std::vector<std::string>& warnings) {
+    std::vector<Eigen::Vector3d> points = records.placed;
+    if (points.empty()) {
+        points.resize(records.point_count);
+        place_coordinate(records, "x", 0, points);
+        place_coordinate(records, "y", 1, points);
+        place_coordinate(records, "z", 2, points);
+    }
+    std::size_t absurd = 0, valid = 0;
+    for (Eigen::Vector3d& point : points) {
+        const bool usable = (point.array().abs() <= largest_coordinate).all();
+        valid += usable;
+        absurd += !usable && !point.array().isNaN().any();
+        if (!usable)
+            point.setConstant(std::numeric_limits<double>::quiet_NaN());
+    }
+    if (absurd > 0)
+        warnings.push_back(fmt::format("{}: {} with infinite or absurd coordinates (beyond 1e30), treated as invalid.",
+                                       file.string(), counted(absurd, "point")));
+    if (points.empty())
+        warnings.push_back(file.string() + ": no points.");
+    else if (valid == 0)
+        warnings.push_back(fmt::format("{}: no valid points among {}.", file.string(), points.size()));
+    return points;
+}
+
+cv::Vec3b bgr_of(std::uint32_t bits) {
+    return {static_cast<uchar>(bits), static_cast<uchar>(bits >> 8), static_cast<uchar>(bits >> 16)};
+}
+
+/// LAS has 16 bits a channel; many writers put bytes in them all the same. What the values are divided by.
+unsigned las_colour_step(const CloudRecords& records, const std::array<std::size_t, 3>& bgr) {
+    for (std::size_t i = 0; i < records.point_count; ++i)
+        for (const std::size_t channel : bgr)
+            if (value_at(records, records.record(i), channel) > 255)
+                return 256;
+    return 1;
+}
+
+std::optional<std::array<std::size_t, 3>> las_colours(const CloudRecords& records) {
+    const auto blue = records.field_named("blue"), green = records.field_named("green"), red = records.field_named("red");
+    if (records.format != Format::las || !blue || !green || !red)
+        return std::nullopt;
+    return std::array{*blue, *green, *red};
+}
+
+std::vector<cv::Vec3b> colours_of(const CloudRecords& records) {
+    if (const auto bgr = las_colours(records)) {
+        const double step = las_colour_step(records, *bgr);
+        std::vector<cv::Vec3b> colours(records.point_count);
+        for (std::size_t i = 0; i < colours.size(); ++i)
+            for (std::size_t channel = 0; channel < 3; ++channel)
+                colours[i][static_cast<int>(channel)] =
+                    static_cast<uchar>(value_at(records, records.record(i), (*bgr)[channel]) / step);
+        return colours;
+    }
+    const ColourFields fields = colour_fields(records);
+    std::vector<cv::Vec3b> colours;
+    if (!fields.packed && !fields.bgr)
+        return colours;
+    colours.reserve(records.point_count);
+    for (std::size_t i = 0; i < records.point_count; ++i) {
+        const std::string_view record = records.record(i);
+        if (fields.packed) {
+            colours.push_back(bgr_of(packed_bits(records, record, *fields.packed)));
+            continue;
+        }
+        cv::Vec3b colour;
+        for (std::size_t channel = 0; channel < 3; ++channel)
+            colour[static_cast<int>(channel)] =
+                cv::saturate_cast<uchar>(value_at(records, record, (*fields.bgr)[channel]));
+        colours.push_back(colour);
+    }
+    return colours;
+}
+
+void check_added(const Cloud& cloud, const AddedField& field) {
+    const bool word = !field.name.empty() && field.name.find_first_of(" \t\r\n") == std::string::npos;
+    if (!word)
+        throw Error(fmt::format("added field {}: expected a name without blanks", in_quotes(field.name)));
+    if (field.values.size() != cloud.points.size())
+        throw Error(fmt::format("added field {}: {}, expected one for each of {}", field.name,
+                                counted(field.values.size(), "value"), counted(cloud.points.size(), "point")));
+}
+
+/// Splits what is to be added into fields the file already has and new ones.
+void sort_out(const CloudRecords& records, const std::vector<AddedField>& added,
+              std::vector<FieldReplacement>& replacements, std::vector<FieldAddition>& additions) {
+    for (const AddedField& field : added) {
+        const auto existing = records.field_named(field.name);
+        const bool list = std::ranges::any_of(
+            records.fields, [&](const CloudField& f) { return f.name == field.name && f.list_length; });
+        if (!existing && !list) {
+            additions.push_back({field.name, field.values});
+            continue;
+        }
+        if (list || records.fields[*existing].count != 1)
+            throw Error(
+                fmt::format("field {} is already there with several values per point; it is not replaced", field.name));
+        const CloudField& old = records.fields[*existing];
+        replacements.push_back(
+            {*existing, [&records, type = old.type, values = field.values](std::size_t point, std::string_view) {
+                 return encoded(records, type, static_cast<double>(values[point]));
+             }});
+    }
+}
+
+void replace_colours(const CloudRecords& records, std::span<const cv::Vec3b> colours,
+                     std::vector<FieldReplacement>& replacements) {
+    const ColourFields fields = colour_fields(records);
+    if (fields.packed) {
+        replacements.push_back(
+            {*fields.packed, [&records, colours, field = *fields.packed](std::size_t point, std::string_view record) {
+                 const cv::Vec3b& c = colours[point];
+                 const std::uint32_t alpha = packed_bits(records, record, field) & 0xff000000U;
+                 const auto bits = alpha | std::uint32_t(c[2]) << 16 | std::uint32_t(c[1]) << 8 | c[0];
+                 return encoded_bits(records, records.fields[field].type, bits);
+             }});
+    } else if (const auto wide = las_colours(records)) {
+        const double step = las_colour_step(records, *wide) == 256 ? 257 : 1; // 255 is 65535 then
+        for (int channel = 0; channel < 3; ++channel)
+            replacements.push_back({(*wide)[static_cast<std::size_t>(channel)],
+                                    [&records, colours, channel, step](std::size_t point, std::string_view) {
+                                        return encoded(records, Scalar::uint16, step * colours[point][channel]);
+                                    }});
+    } else if (fields.bgr) {
+        for (int channel = 0; channel < 3; ++channel)
+            replacements.push_back({(*fields.bgr)[static_cast<std::size_t>(channel)],
+                                    [&records, colours, channel](std::size_t point, std::string_view) {
+                                        return encoded(records, Scalar::uint8, colours[point][channel]);
+                                    }});
+    } else {
+        throw Error("the cloud has no colour field to replace (rgb, rgba, or red green blue as uchar)");
+    }
+}
+
+template <class Number>
+void append(std::string& bytes, Number value) {
+    const auto raw = std::bit_cast<std::array<char, sizeof(Number)>>(value);
+    bytes.append(raw.data(), raw.size());
+}
+
+} // namespace
+
+Cloud read_cloud(const fs::path& file, std::vector<std::string>& warnings) {
+    auto records = std::make_shared<CloudRecords>(read_records(file, warnings));
+    Cloud cloud;
+    cloud.grid = records->grid;
+    cloud.points = points_of(*records, file, warnings);
+    cloud.colours = colours_of(*records);
+    cloud.records = std::move(records);
+    return cloud;
+}
+
+std::vector<std::array<int, 3>> triangles_of(const Cloud& cloud) {
+    const bool ply = cloud.records && cloud.records->format == Format::ply;
+    return ply ? ply_triangles(*cloud.records) : std::vector<std::array<int, 3>>();
+}
+
+std::vector<Eigen::Vector3d> recorded_normals(const Cloud& cloud) {
+    if (!cloud.records)
+        return {};
+    std::vector<Eigen::Vector3d> normals(cloud.points.size());
+    for (const auto& names : {std::array{"nx", "ny", "nz"}, {"normal_x", "normal_y", "normal_z"}}) {
+        std::size_t found = 0;
+        for (int axis = 0; axis < 3; ++axis)
+            if (const auto field = cloud.records->field_named(names[static_cast<std::size_t>(axis)])) {
+                read_coordinate(*cloud.records, *field, axis, normals);
+                ++found;
+            }
+        if (found < 3)
+            continue;
+        std::size_t valid = 0, unit = 0;
+        for (std::size_t i = 0; i < normals.size(); ++i) {
+            valid += cloud.points[i].allFinite();
+            unit += cloud.points[i].allFinite() && std::abs(normals[i].norm() - 1) < 0.01;
+        }
+        return 10 * unit >= 9 * valid ? normals : std::vector<Eigen::Vector3d>();
+    }
+    return {};
+}
+
+bool is_cloud_file(const fs::path& file) { return has_cloud_extension(file); }
+
+std::vector<float> recorded_field(const Cloud& cloud, const std::string& name, const fs::path& file) {
+    const auto field = cloud.records ? cloud.records->field_named(name) : std::nullopt;
+    if (!field)
+        throw Error(fmt::format("{}: no field {}", file.string(), name));
+    std::vector<float> values(cloud.points.size());
+    for (std::size_t i = 0; i < values.size(); ++i)
+        values[i] = static_cast<float>(value_at(*cloud.records, cloud.records->record(i), *field));
+    return values;
+}
+
+void write_cloud(const fs::path& file, const Cloud& cloud, const std::vector<AddedField>& added,
+                 std::span<const cv::Vec3b> colours) {
+    if (!cloud.records)
+        throw Error(file.string() + ": this cloud was not read from a file");
+    const CloudRecords& records = *cloud.records;
+    std::string bytes = during(file.string(), [&] {
+        for (const AddedField& field : added)
+            check_added(cloud, field);
+        if (!colours.empty() && colours.size() != cloud.points.size())
+            throw Error(
+                fmt::format("{} for {}", counted(colours.size(), "colour"), counted(cloud.points.size(), "point")));
+        std::vector<FieldReplacement> replacements;
+        std::vector<FieldAddition> additions;
+        sort_out(records, added, replacements, additions);
+        if (!colours.empty())
+            replace_colours(records, colours, replacements);
+        std::sort(replacements.begin(), replacements.end(),
+                  [](const FieldReplacement& a, const FieldReplacement& b) { return a.field < b.field; });
+        const std::string points = edited_points(records, replacements, additions);
+        switch (records.format) {
+        case Format::pcd:
+            return pcd_bytes(records, points, additions);
+        case Format::las:
+            return las_bytes(records, points, additions);
+        case Format::text:
+            return text_bytes(records, points, additions);
+        case Format::ply:
+            break;
+        }
+        return ply_bytes(records, points, additions);
+    });
+    write_atomically(file, bytes);
+}
+
+void write_new_ply(const fs::path& file, const std::vector<Eigen::Vector3d>& points,
+                   const std::vector<cv::Vec3b>& colours, const std::vector<AddedField>& added,
+                   const std::vector<std::string>& comments) {
+    // Beyond 4096 m neighbouring floats are half a millimetre apart.
+    static constexpr double far_away_m = 4096;
+    const bool doubles = std::any_of(points.begin(), points.end(),
+                                     [](const Eigen::Vector3d& p) { return (p.array().abs() > far_away_m).any(); });
+    if (!colours.empty() && colours.size() != points.size())
+        throw Error(fmt::format("{}: {} for {}", file.string(), counted(colours.size(), "colour"),
+                                counted(points.size(), "point")));
+    for (const AddedField& field : added)
+        if (field.values.size() != points.size())
+            throw Error(fmt::format("{}: field {} has {} for {}", file.string(), field.name,
+                                    counted(field.values.size(), "value"), counted(points.size(), "point")));
+
+    std::string bytes = "ply\nformat binary_little_endian 1.0\n";
+    for (std::string comment : comments) {
+        std::replace_if(
+            comment.begin(), comment.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+        bytes += "comment " + comment + "\n";
+    }
+    bytes += fmt::format("element vertex {}\n", points.size());
+    for (const auto* axis : {"x", "y", "z"})
+        bytes += fmt::format("property {} {}\n", doubles ? "double" : "float", axis);
+    if (!colours.empty())
+        for (const auto* channel : {"red", "green", "blue"})
+            bytes += fmt::format("property uchar {}\n", channel);
+    for (const AddedField& field : added)
+        bytes += fmt::format("property float {}\n", field.name);
+    bytes += "end_header\n";
+
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        for (const double coordinate : points[i])
+            doubles ? append(bytes, coordinate) : append(bytes, static_cast<float>(coordinate));
+        if (!colours.empty())
+            for (const int channel : {2, 1, 0})
+                append(bytes, colours[i][channel]);
+        for (const AddedField& field : added)
+            append(bytes, field.values[i]);
+    }
+    write_atomically(file, bytes);
+}
+
+namespace {
+
+std::string encoding_name(const CloudRecords& records) {
+    switch (records.encoding) {
+    case Encoding::ascii:
+        return "ascii";
+    case Encoding::compressed:
+        return "binary_compressed";
+    case Encoding::big_endian:
+        return "binary_big_endian";
+    case Encoding::binary:
+        break;
+    }
+    return records.format == Format::ply ? "binary_little_endian" : "binary";
+}
+
+} // namespace
+
+std::string describe(const CloudRecords& records) {
+    std::string names, kind = extension(records).substr(1);
+    std::transform(kind.begin(), kind.end(), kind.begin(), [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+    for (const CloudField& field : records.fields)
+        names += " " + field.name;
+    const std::string grid =
+        records.grid.height > 1 ? fmt::format(", {}x{} organised", records.grid.width, records.grid.height) : "";
+    return fmt::format("{} {}, {}{}, fields{}{}", kind, encoding_name(records), counted(records.point_count, "point"), grid,
+                       names, records.unit.empty() ? "" : ", in " + records.unit);
+}
+
+std::string unit_of(const CloudRecords& records) { return records.unit; }
+
+std::string extension(const CloudRecords& records) {
+    if (!records.name_end.empty())
+        return records.name_end;
+    return records.format == Format::pcd ? ".pcd" : records.format == Format::las ? ".las" : ".ply";
+}
+
+} // namespace scanshade

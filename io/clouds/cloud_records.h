@@ -1,0 +1,151 @@
+// A cloud file as its own records: header text, fields, and the bytes or words of every point, kept to be written back.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <Eigen/Geometry>
+#include <filesystem>
+#include <functional>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace scanshade {
+
+enum class Scalar { int8, uint8, int16, uint16, int32, uint32, int64, uint64, float32, float64 };
+
+[[nodiscard]] std::size_t size_of(Scalar type);
+
+/// A PCD field or a PLY vertex property.
+struct CloudField {
+    std::string name;
+    Scalar type = Scalar::float32;
+    std::size_t count = 1;             ///< values per point, side by side (PCD's COUNT)
+    std::optional<Scalar> list_length; ///< PLY list: the type of the length that comes before `type` values
+    std::size_t offset = 0;            ///< in a record of fixed stride
+
+    [[nodiscard]] std::size_t bytes() const { return size_of(type) * count; }
+};
+
+/// The file, taken apart but not changed: header, before, points, after in this order are its bytes (a compressed PCD's
+/// points are unpacked and put point after point).
+struct CloudRecords {
+    enum class Format { pcd, ply, las, text };
+    enum class Encoding { ascii, binary, big_endian, compressed };
+
+    Format format = Format::pcd;
+    Encoding encoding = Encoding::binary;
+    std::string header; ///< up to and including the end of its last line
+    std::vector<CloudField> fields;
+    std::size_t point_count = 0;
+    cv::Size grid;
+    std::string before;     ///< PLY elements that come before the vertices
+    std::string points;     ///< the records, without the last one's line end
+    std::size_t stride = 0; ///< bytes per record; 0 where records differ in length (text, lists)
+    std::vector<std::size_t>
+        ends;          ///< where each record ends in `points` (text: behind its last word), when stride is 0
+    std::string after; ///< faces, other elements, left-over lines
+    std::array<double, 3> scale{1, 1, 1}, shift{0, 0, 0}; ///< coordinates are field values times scale plus shift
+    std::vector<Eigen::Vector3d> placed; ///< the points, where fields alone do not tell them
+    std::string unit;                    ///< of the coordinates, and who says so; empty: metres, as clouds have by custom
+    std::string name_end;                ///< of a file of this kind: ".xyz"; empty: the format's own
+    std::optional<Eigen::Isometry3d> viewpoint; ///< world_from_camera as the PCD says, where it says something
+
+    [[nodiscard]] bool text() const { return encoding == Encoding::ascii; }
+    /// Point `index`'s bytes; for text what lies between the last word before it and its own last word.
+    [[nodiscard]] std::string_view record(std::size_t index) const;
+    /// The first field of that name that is no list: lists may be empty, and have no value to read.
+    [[nodiscard]] std::optional<std::size_t> field_named(std::string_view name) const;
+};
+
+/// Where a field lies in a record: byte range of all its values (text: of its words).
+struct FieldPlace {
+    std::size_t offset = 0, length = 0;
+};
+[[nodiscard]] FieldPlace locate(const CloudRecords& records, std::string_view record, std::size_t field);
+
+/// The first value of `field` in `record`; NaN where text is no number.
+[[nodiscard]] double value_at(const CloudRecords& records, std::string_view record, std::size_t field);
+/// A value as the file's encoding writes it: bytes in its order, or a word.
+[[nodiscard]] std::string encoded(const CloudRecords& records, Scalar type, double value);
+/// A number of `type` at `from`, which must have that many bytes.
+[[nodiscard]] double decoded(const char* from, Scalar type, bool big_endian);
+
+/// Fields that hold colour: one 4-byte field of packed bits, or three bytes.
+struct ColourFields {
+    std::optional<std::size_t> packed; ///< 0xAARRGGBB, typed float or integer
+    std::optional<std::array<std::size_t, 3>> bgr;
+};
+[[nodiscard]] ColourFields colour_fields(const CloudRecords& records);
+/// The packed colour's bits. Floats are read as bits, never as numbers: many are NaN or denormal.
+[[nodiscard]] std::uint32_t packed_bits(const CloudRecords& records, std::string_view record, std::size_t field);
+[[nodiscard]] std::string encoded_bits(const CloudRecords& records, Scalar type, std::uint32_t bits);
+
+/// Puts new content in place of a field of every point.
+struct FieldReplacement {
+    std::size_t field = 0;
+    std::function<std::string(std::size_t point, std::string_view record)> content;
+};
+/// A field added behind the last one of every point.
+struct FieldAddition {
+    std::string name;
+    std::span<const float> values;
+};
+/// All records in file order with replacements (sorted by field) and additions made.
+[[nodiscard]] std::string edited_points(const CloudRecords& records, const std::vector<FieldReplacement>& replacements,
+                                        const std::vector<FieldAddition>& additions);
+
+/// Lines of an ASCII body that hold words; blank ones are passed over.
+class TextRecords {
+  public:
+    TextRecords(std::string_view body, int first_line) : body_(body), line_(first_line - 1) {}
+    /// Moves to the next line with words; false at the end.
+    bool next();
+    [[nodiscard]] const std::vector<std::string_view>& words() const { return words_; }
+    [[nodiscard]] int line() const { return line_; }
+    /// Behind the last word of this line, as an offset in the body.
+    [[nodiscard]] std::size_t end() const { return end_; }
+
+  private:
+    std::string_view body_;
+    std::size_t at_ = 0, end_ = 0;
+    int line_ = 0;
+    std::vector<std::string_view> words_;
+};
+
+// One reader and one writer per format; cloud_file.cpp chooses. `bytes` is the whole file.
+[[nodiscard]] CloudRecords read_pcd(std::string_view bytes, const std::filesystem::path& file,
+                                    std::vector<std::string>& warnings);
+[[nodiscard]] CloudRecords read_ply(std::string_view bytes, const std::filesystem::path& file,
+                                    std::vector<std::string>& warnings);
+/// LAS 1.0 to 1.4, uncompressed, every point format (ASPRS, "LAS Specification 1.4 - R15"); everything but the points is
+/// kept as it is. Fields are named after the specification; those of an extra bytes record keep their names.
+[[nodiscard]] CloudRecords read_las(std::string_view bytes, const std::filesystem::path& file,
+                                    std::vector<std::string>& warnings);
+/// One point a line: .xyz (a line of names may come first), .pts (the count comes first), .ptx (one scan: sizes,
+/// pose, then the grid; "0 0 0" = nothing seen).
+[[nodiscard]] CloudRecords read_text_cloud(std::string_view bytes, const std::filesystem::path& file,
+                                           std::vector<std::string>& warnings);
+/// KITTI's Velodyne sweeps: x y z reflectance as floats, no header. The records are those of a PLY.
+[[nodiscard]] CloudRecords read_kitti(std::string_view bytes, const std::filesystem::path& file);
+/// Faces as triangles, polygons fanned from their first corner; -1 for an index that names no vertex. Tristrips are not read.
+[[nodiscard]] std::vector<std::array<int, 3>> ply_triangles(const CloudRecords& records);
+/// The file again with `points` (from edited_points) and the header naming `additions`.
+[[nodiscard]] std::string pcd_bytes(const CloudRecords& records, const std::string& points,
+                                    const std::vector<FieldAddition>& additions);
+/// `additions` become extra bytes: floats behind each point, and a record that names them.
+[[nodiscard]] std::string las_bytes(const CloudRecords& records, const std::string& points,
+                                    const std::vector<FieldAddition>& additions);
+[[nodiscard]] std::string text_bytes(const CloudRecords& records, const std::string& points,
+                                     const std::vector<FieldAddition>& additions);
+[[nodiscard]] std::string ply_bytes(const CloudRecords& records, const std::string& points,
+                                    const std::vector<FieldAddition>& additions);
+
+[[nodiscard]] bool has_cloud_extension(const std::filesystem::path& file);
+/// .xyz, .pts, .ptx: lines of numbers, which nothing but the name tells apart.
+[[nodiscard]] bool is_text_cloud(const std::filesystem::path& file);
+
+} // namespace scanshade

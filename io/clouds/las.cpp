@@ -1,0 +1,387 @@
+// LAS (ASPRS, "LAS Specification 1.4 - R15"): header and records checked, points kept as they are, AO as extra bytes.
+#include "io/clouds/cloud_records.h"
+
+#include "io/text.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <fmt/format.h>
+#include <limits>
+#include <map>
+
+namespace scanshade {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// Places in the public header block.
+constexpr std::size_t at_minor = 25, at_header_size = 94, at_points = 96, at_vlr_count = 100, at_format = 104,
+                      at_length = 105, at_count = 107, at_scale = 131, at_shift = 155, at_box = 179, at_waveform = 227,
+                      at_evlrs = 235, at_evlr_count = 243, at_count_64 = 247;
+constexpr std::size_t least_header = 227, vlr_header = 54, descriptor_size = 192;
+constexpr std::uint64_t most_points = 0x7fffffff; // points are numbered with 32 bits
+
+template <class Number>
+Number read_at(std::string_view bytes, std::size_t at) {
+    std::array<char, sizeof(Number)> raw{};
+    std::memcpy(raw.data(), bytes.data() + at, raw.size());
+    return std::bit_cast<Number>(raw);
+}
+
+template <class Number>
+void put(std::string& bytes, std::size_t at, Number value) {
+    const auto raw = std::bit_cast<std::array<char, sizeof(Number)>>(value);
+    std::copy(raw.begin(), raw.end(), bytes.begin() + static_cast<std::ptrdiff_t>(at));
+}
+
+/// Text in a field of fixed width, padded with zeros.
+std::string_view fixed_text(std::string_view bytes, std::size_t at, std::size_t width) {
+    const std::string_view all = bytes.substr(at, width);
+    return all.substr(0, all.find('\0'));
+}
+
+// --- fields ---
+
+CloudField field(std::string name, Scalar type, std::size_t count = 1) {
+    return {std::move(name), type, count, std::nullopt, 0};
+}
+
+void add(std::vector<CloudField>& fields, std::initializer_list<CloudField> more) { fields.insert(fields.end(), more); }
+
+/// What a record of point format 0 .. 10 holds.
+std::vector<CloudField> fields_of_format(int format) {
+    std::vector<CloudField> fields{field("x", Scalar::int32), field("y", Scalar::int32), field("z", Scalar::int32),
+                                   field("intensity", Scalar::uint16)};
+    const bool colour = format == 2 || format == 3 || format == 5 || format == 7 || format == 8 || format == 10;
+    const bool waveform = format == 4 || format == 5 || format == 9 || format == 10;
+    if (format <= 5) {
+        add(fields, {field("return_flags", Scalar::uint8), field("classification", Scalar::uint8),
+                     field("scan_angle_rank", Scalar::int8), field("user_data", Scalar::uint8),
+                     field("point_source_id", Scalar::uint16)});
+        if (format != 0 && format != 2)
+            add(fields, {field("gps_time", Scalar::float64)});
+    } else {
+        add(fields, {field("return_numbers", Scalar::uint8), field("return_flags", Scalar::uint8),
+                     field("classification", Scalar::uint8), field("user_data", Scalar::uint8),
+                     field("scan_angle", Scalar::int16), field("point_source_id", Scalar::uint16),
+                     field("gps_time", Scalar::float64)});
+    }
+    if (colour)
+        add(fields, {field("red", Scalar::uint16), field("green", Scalar::uint16), field("blue", Scalar::uint16)});
+    if (format == 8 || format == 10)
+        add(fields, {field("nir", Scalar::uint16)});
+    if (waveform)
+        add(fields, {field("wave_packet", Scalar::uint8, 29)});
+    return fields;
+}
+
+std::size_t stride_of(const std::vector<CloudField>& fields) {
+    std::size_t stride = 0;
+    for (const CloudField& f : fields)
+        stride += f.bytes();
+    return stride;
+}
+
+/// One variable length record, by places in the file.
+struct Vlr {
+    std::string_view user, data;
+    std::uint16_t id = 0;
+    std::size_t begin = 0; ///< of its own header
+};
+
+std::vector<Vlr> vlrs_of(std::string_view header, std::size_t first, std::uint32_t count) {
+    std::vector<Vlr> all;
+    std::size_t at = first;
+    for (std::uint32_t i = 0; i < count && at + vlr_header <= header.size(); ++i) {
+        const std::size_t length = read_at<std::uint16_t>(header, at + 20);
+        if (at + vlr_header + length > header.size())
+            break;
+        all.push_back({fixed_text(header, at + 2, 16), header.substr(at + vlr_header, length),
+                       read_at<std::uint16_t>(header, at + 18), at});
+        at += vlr_header + length;
+    }
+    return all;
+}
+
+bool names_extra_bytes(const Vlr& vlr) { return vlr.user == "LASF_Spec" && vlr.id == 4; }
+
+/// Fields behind the format's own, as far as a record describes them; what is left is one field of bytes. Returns where
+/// in the header the last description that makes sense ends; 0 where there is no such record.
+std::size_t add_extra_fields(std::vector<CloudField>& fields, const std::vector<Vlr>& vlrs, std::size_t record_length) {
+    static constexpr std::array types{Scalar::uint8, Scalar::int8,   Scalar::uint16, Scalar::int16,   Scalar::uint32,
+                                      Scalar::int32, Scalar::uint64, Scalar::int64,  Scalar::float32, Scalar::float64};
+    std::size_t end = 0;
+    bool sense = true;
+    for (const Vlr& vlr : vlrs) {
+        if (!names_extra_bytes(vlr) || !sense)
+            continue;
+        end = vlr.begin + vlr_header;
+        for (std::size_t at = 0; at + descriptor_size <= vlr.data.size(); at += descriptor_size) {
+            const auto type = read_at<std::uint8_t>(vlr.data, at + 2),
+                       options = read_at<std::uint8_t>(vlr.data, at + 3);
+            const std::string name(fixed_text(vlr.data, at + 4, 32));
+            // 1 .. 10 are scalars, 11 .. 30 the same in twos and threes (withdrawn in 1.4 R14, but written), 0 raw
+            // bytes.
+            const std::size_t copies = type == 0 ? options : (type + 9U) / 10;
+            CloudField extra = field(name, type == 0 || type > 30 ? Scalar::uint8 : types[(type - 1U) % 10], copies);
+            sense = copies > 0 && type <= 30 && stride_of(fields) + extra.bytes() <= record_length;
+            if (!sense)
+                break;
+            fields.push_back(std::move(extra));
+            end = vlr.begin + vlr_header + at + descriptor_size;
+        }
+    }
+    if (const std::size_t known = stride_of(fields); known < record_length)
+        fields.push_back(field("undocumented", Scalar::uint8, record_length - known));
+    return end;
+}
+
+// --- units ---
+
+/// What the coordinates count, from GeoTIFF keys or well-known text; empty where the file does not say.
+std::string unit_of(const std::vector<Vlr>& vlrs) {
+    std::uint16_t linear = 0, model = 0;
+    std::string_view text;
+    for (const Vlr& vlr : vlrs) {
+        if (vlr.user != "LASF_Projection")
+            continue;
+        if (vlr.id == 2112)
+            text = vlr.data.substr(0, vlr.data.find('\0'));
+        if (vlr.id == 34735)
+            for (std::size_t at = 8; at + 8 <= vlr.data.size(); at += 8) {
+                const auto key = read_at<std::uint16_t>(vlr.data, at), value = read_at<std::uint16_t>(vlr.data, at + 6);
+                linear = key == 3076 ? value : linear;
+                model = key == 1024 ? value : model;
+            }
+    }
+    if (!text.empty()) {
+        if (text.starts_with("GEOGCS") || text.starts_with("GEOGCRS"))
+            return "degrees (well-known text)";
+        // The last unit named is that of the projected coordinates; those before it belong to angles.
+        const auto at = text.rfind("UNIT[\"");
+        if (at != std::string_view::npos)
+            return std::string(text.substr(at + 6, text.find('"', at + 6) - at - 6)) + " (well-known text)";
+    }
+    static const std::map<std::uint16_t, std::string> names{{9001, "metres"}, {9002, "feet"}, {9003, "US survey feet"}};
+    if (model == 2)
+        return "degrees (GeoTIFF keys)";
+    const auto name = names.find(linear);
+    return name == names.end() ? "" : name->second + " (GeoTIFF keys)";
+}
+
+// --- header ---
+
+[[noreturn]] void refuse(const fs::path& file, const std::string& why) { throw Error(file.string() + ": " + why); }
+
+void check_scales(CloudRecords& records, std::string_view bytes, const fs::path& file) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        records.scale[axis] = read_at<double>(bytes, at_scale + 8 * axis);
+        records.shift[axis] = read_at<double>(bytes, at_shift + 8 * axis);
+        if (!std::isfinite(records.scale[axis]) || records.scale[axis] == 0)
+            refuse(file, fmt::format("{} scale factor at byte {} is {}, expected a number other than 0", "xyz"[axis],
+                                     at_scale + 8 * axis, records.scale[axis]));
+        if (!std::isfinite(records.shift[axis]))
+            refuse(file, fmt::format("{} offset at byte {} is {}, expected a number", "xyz"[axis], at_shift + 8 * axis,
+                                     records.shift[axis]));
+    }
+}
+
+/// The box in the header is of no use to us, but a lie is worth a word.
+void doubt_box(const CloudRecords& records, std::string_view header, const fs::path& file,
+               std::vector<std::string>& warnings) {
+    for (std::size_t axis = 0; axis < 3 && records.point_count > 0; ++axis) {
+        double low = std::numeric_limits<double>::infinity(), high = -low;
+        for (std::size_t i = 0; i < records.point_count; ++i) {
+            const double raw = read_at<std::int32_t>(records.points, i * records.stride + 4 * axis);
+            low = std::min(low, raw), high = std::max(high, raw);
+        }
+        low = low * records.scale[axis] + records.shift[axis];
+        high = high * records.scale[axis] + records.shift[axis];
+        if (low > high)
+            std::swap(low, high);
+        const double said_high = read_at<double>(header, at_box + 16 * axis);
+        const double said_low = read_at<double>(header, at_box + 16 * axis + 8);
+        const double slack = std::max(2 * std::abs(records.scale[axis]), 1e-3 * (high - low));
+        if (std::abs(said_low - low) <= slack && std::abs(said_high - high) <= slack)
+            continue;
+        warnings.push_back(
+            fmt::format("{}: the header's box says {} is {} .. {}, the points lie in {} .. {}; the points "
+                        "are believed.",
+                        file.string(), "xyz"[axis], said_low, said_high, low, high));
+        return;
+    }
+}
+
+std::size_t point_count(std::string_view bytes, int minor) {
+    const auto legacy = read_at<std::uint32_t>(bytes, at_count);
+    if (minor < 4 || bytes.size() < at_count_64 + 8)
+        return legacy;
+    const auto count = read_at<std::uint64_t>(bytes, at_count_64);
+    return count != 0 ? count : legacy;
+}
+
+} // namespace
+
+CloudRecords read_las(std::string_view bytes, const fs::path& file, std::vector<std::string>& warnings) {
+    if (bytes.size() < least_header)
+        refuse(file, fmt::format("a LAS header of {} bytes expected, found {}", least_header, bytes.size()));
+    const int minor = read_at<std::uint8_t>(bytes, at_minor);
+    if (read_at<std::uint8_t>(bytes, at_minor - 1) != 1 || minor > 4)
+        refuse(file, fmt::format("LAS version {}.{}, expected 1.0 .. 1.4", read_at<std::uint8_t>(bytes, at_minor - 1),
+                                 minor));
+    const std::size_t header_size = read_at<std::uint16_t>(bytes, at_header_size);
+    const std::size_t needed = minor >= 4 ? 375 : minor == 3 ? 235 : least_header;
+    if (header_size < needed || header_size > bytes.size())
+        refuse(file, fmt::format("header size {} at byte {}, expected {} .. {}", header_size, at_header_size, needed,
+                                 bytes.size()));
+    const int format = read_at<std::uint8_t>(bytes, at_format);
+    if (format & 0xc0)
+        refuse(file,
+               "compressed (LAZ), which is not read; `laszip -i IN.laz -o OUT.las` or `pdal translate IN.laz OUT.las` "
+               "unpacks it");
+    if (format > 10)
+        refuse(file, fmt::format("point format {} at byte {}, expected 0 .. 10", format, at_format));
+    const std::size_t points_at = read_at<std::uint32_t>(bytes, at_points);
+    if (points_at < header_size || points_at > bytes.size())
+        refuse(file, fmt::format("points are said to begin at byte {}, but the file has {} bytes and a header of {}",
+                                 points_at, bytes.size(), header_size));
+    CloudRecords records;
+    records.format = CloudRecords::Format::las;
+    records.encoding = CloudRecords::Encoding::binary;
+    records.header = bytes.substr(0, points_at);
+    records.stride = read_at<std::uint16_t>(bytes, at_length);
+    records.fields = fields_of_format(format);
+    if (records.stride < stride_of(records.fields))
+        refuse(file, fmt::format("record length {} at byte {}, but point format {} needs {}", records.stride, at_length,
+                                 format, stride_of(records.fields)));
+    const std::size_t count = point_count(bytes, minor), room = (bytes.size() - points_at) / records.stride;
+    if (count > room)
+        refuse(file,
+               fmt::format("the header says {} points of {} bytes, the file holds {}", count, records.stride, room));
+    if (count > most_points)
+        refuse(file, fmt::format("{} points, at most {} are read", count, most_points));
+    check_scales(records, bytes, file);
+
+    const auto said_vlrs = read_at<std::uint32_t>(bytes, at_vlr_count);
+    const auto vlrs = vlrs_of(records.header, header_size, said_vlrs);
+    if (vlrs.size() != said_vlrs)
+        warnings.push_back(fmt::format("{}: the header says {} variable length records, {} are there; they are kept as "
+                                       "they are.",
+                                       file.string(), said_vlrs, vlrs.size()));
+    (void)add_extra_fields(records.fields, vlrs, records.stride);
+    std::size_t offset = 0;
+    for (CloudField& f : records.fields) {
+        f.offset = offset;
+        offset += f.bytes();
+    }
+    records.point_count = count;
+    records.grid = {static_cast<int>(count), 1};
+    records.points = bytes.substr(points_at, count * records.stride);
+    records.after = bytes.substr(points_at + count * records.stride);
+    const std::string unit = unit_of(vlrs);
+    records.unit = unit.empty() ? "an unknown unit (the file names none)" : unit;
+    if (unit.starts_with("degrees"))
+        warnings.push_back(fmt::format("{}: coordinates are in {}: neither distances nor angles between points mean "
+                                       "anything; project them first.",
+                                       file.string(), unit));
+    doubt_box(records, records.header, file, warnings);
+    return records;
+}
+
+namespace {
+
+/// A float, as an extra bytes record describes it.
+std::string descriptor(const std::string& name) {
+    constexpr char float32 = 9;
+    std::string bytes(descriptor_size, '\0');
+    bytes[2] = float32;
+    name.copy(bytes.data() + 4, 31);
+    std::string_view("scanshade").copy(bytes.data() + 160, 31);
+    return bytes;
+}
+
+/// Extra bytes that nothing describes must be stepped over before ours are.
+std::string descriptors_of_raw_bytes(std::size_t count) {
+    constexpr std::size_t most = 255; // the number is a byte
+    std::string all;
+    for (; count > 0; count -= std::min(count, most)) {
+        std::string bytes(descriptor_size, '\0');
+        bytes[3] = static_cast<char>(std::min(count, most));
+        std::string_view("undocumented").copy(bytes.data() + 4, 31);
+        all += bytes;
+    }
+    return all;
+}
+
+/// Adds the descriptors to the record that describes extra bytes, before what makes no sense in it, or makes a record
+/// behind the last one. Returns by how much the header grew.
+std::size_t describe_extra_bytes(std::string& header, const std::string& descriptors, std::size_t stride) {
+    const std::size_t first = read_at<std::uint16_t>(header, at_header_size);
+    const auto count = read_at<std::uint32_t>(header, at_vlr_count);
+    const std::string copy = header;
+    const auto vlrs = vlrs_of(copy, first, count);
+    auto fields = fields_of_format(read_at<std::uint8_t>(header, at_format));
+    const std::size_t place = add_extra_fields(fields, vlrs, stride);
+    for (const Vlr& vlr : vlrs) {
+        const std::size_t begin = vlr.begin + vlr_header;
+        if (place < begin || place > begin + vlr.data.size() || !names_extra_bytes(vlr))
+            continue;
+        const std::size_t length = vlr.data.size() + descriptors.size();
+        if (length > 0xffff)
+            throw Error("the LAS file describes more extra bytes than one record can hold");
+        header.insert(place, descriptors);
+        put(header, vlr.begin + 20, static_cast<std::uint16_t>(length));
+        return descriptors.size();
+    }
+    if (descriptors.size() > 0xffff)
+        throw Error("the LAS file has more extra bytes than one record can describe");
+    std::string record(vlr_header, '\0');
+    std::string_view("LASF_Spec").copy(record.data() + 2, 16);
+    put(record, 18, std::uint16_t(4));
+    put(record, 20, static_cast<std::uint16_t>(descriptors.size()));
+    std::string_view("Extra bytes").copy(record.data() + 22, 32);
+    record += descriptors;
+    const std::size_t end = vlrs.empty() ? first : vlrs.back().begin + vlr_header + vlrs.back().data.size();
+    header.insert(end, record);
+    put(header, at_vlr_count, static_cast<std::uint32_t>(vlrs.size() + 1));
+    return record.size();
+}
+
+} // namespace
+
+std::string las_bytes(const CloudRecords& records, const std::string& points,
+                      const std::vector<FieldAddition>& additions) {
+    if (additions.empty())
+        return records.header + points + records.after;
+    std::string descriptors;
+    const bool described = records.fields.back().name != "undocumented";
+    if (!described)
+        descriptors += descriptors_of_raw_bytes(records.fields.back().count);
+    for (const FieldAddition& addition : additions)
+        descriptors += descriptor(addition.name);
+    std::string header = records.header;
+    const std::size_t grown = describe_extra_bytes(header, descriptors, records.stride);
+    const std::size_t wider = additions.size() * sizeof(float) * records.point_count;
+    const std::size_t length = records.stride + additions.size() * sizeof(float);
+    if (length > 0xffff)
+        throw Error("a LAS point record cannot grow beyond 65535 bytes");
+    put(header, at_length, static_cast<std::uint16_t>(length));
+    put(header, at_points, static_cast<std::uint32_t>(records.header.size() + grown));
+    const int minor = read_at<std::uint8_t>(header, at_minor);
+    const auto shift = [&](std::size_t at) { // of what lies behind the points
+        if (const auto place = read_at<std::uint64_t>(header, at); place >= records.header.size())
+            put(header, at, place + grown + wider);
+    };
+    if (minor >= 3)
+        shift(at_waveform);
+    if (minor >= 4 && read_at<std::uint32_t>(header, at_evlr_count) > 0)
+        shift(at_evlrs);
+    return header + points + records.after;
+}
+
+} // namespace scanshade

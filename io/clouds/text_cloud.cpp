@@ -1,0 +1,262 @@
+// Clouds as lines of numbers (.xyz, .pts, .ptx) and as bare floats (KITTI): little is said, so little is assumed.
+#include "io/clouds/cloud_records.h"
+
+#include "io/text.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <limits>
+
+namespace scanshade {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// What the columns of a line are, where nothing names them; colours are bytes by custom.
+std::vector<std::string> usual_names(std::size_t columns) {
+    switch (columns) {
+    case 3:
+        return {"x", "y", "z"};
+    case 4:
+        return {"x", "y", "z", "intensity"};
+    case 6:
+        return {"x", "y", "z", "red", "green", "blue"};
+    case 7:
+        return {"x", "y", "z", "intensity", "red", "green", "blue"};
+    default:
+        break;
+    }
+    std::vector<std::string> names{"x", "y", "z"};
+    for (std::size_t i = 3; i < columns; ++i)
+        names.push_back(fmt::format("column_{}", i + 1));
+    return names;
+}
+
+/// PTX has an intensity and may have colours; what comes behind them is not PTX's own (our AO, for one).
+std::vector<std::string> ptx_names(std::size_t columns) {
+    std::vector<std::string> names{"x", "y", "z", "intensity"};
+    if (columns >= 7)
+        names.insert(names.end(), {"red", "green", "blue"});
+    while (names.size() < columns)
+        names.push_back(fmt::format("column_{}", names.size() + 1));
+    return names;
+}
+
+std::vector<CloudField> fields_named(const std::vector<std::string>& names) {
+    std::vector<CloudField> fields;
+    for (const std::string& name : names) {
+        const bool colour = name == "red" || name == "green" || name == "blue";
+        fields.push_back({name, colour ? Scalar::uint8 : Scalar::float64, 1, std::nullopt, 0});
+    }
+    return fields;
+}
+
+/// "//X Y Z R G B" as names of ours; none where a word is no name.
+std::vector<std::string> names_in(const std::vector<std::string_view>& words) {
+    std::vector<std::string> names;
+    for (std::string_view word : words) {
+        while (word.starts_with('/') || word.starts_with('#'))
+            word.remove_prefix(1);
+        if (word.empty())
+            continue;
+        std::string name(word);
+        std::transform(name.begin(), name.end(), name.begin(),
+                       [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+        name = name == "r" ? "red" : name == "g" ? "green" : name == "b" ? "blue" : name;
+        names.push_back(name);
+    }
+    return names;
+}
+
+bool all_numbers(const std::vector<std::string_view>& words) {
+    return std::all_of(words.begin(), words.end(), [](std::string_view word) { return number(word).has_value(); });
+}
+
+void check_point_count(std::uint64_t count, const fs::path& file) {
+    constexpr std::uint64_t most_points = 0x7fffffff; // points are numbered with 32 bits
+    if (count > most_points)
+        throw Error(fmt::format("{}: {} points, at most {} are read", file.string(), count, most_points));
+}
+
+/// The lines of `body` as records of equally many words.
+void read_lines(CloudRecords& records, std::string_view body, int first_line, const fs::path& file) {
+    TextRecords lines(body, first_line);
+    while (lines.next()) {
+        if (records.fields.empty())
+            records.fields = fields_named(usual_names(lines.words().size()));
+        if (lines.words().size() != records.fields.size())
+            throw Error(fmt::format("{}: {}, expected {} as in the first", at_line(file, lines.line()),
+                                    counted(lines.words().size(), "value"), records.fields.size()));
+        for (const auto word : lines.words())
+            if (!number(word))
+                throw Error(fmt::format("{}: {} is not a number", at_line(file, lines.line()), in_quotes(word)));
+        records.ends.push_back(lines.end());
+    }
+    records.point_count = records.ends.size();
+    check_point_count(records.point_count, file);
+    const std::size_t used = records.ends.empty() ? 0 : records.ends.back();
+    records.points = body.substr(0, used);
+    records.after = body.substr(used);
+    records.grid = {static_cast<int>(records.point_count), 1};
+}
+
+/// Cuts the first `count` lines off: they are the header.
+std::vector<std::vector<std::string_view>> header_lines(std::string_view bytes, std::size_t count, std::size_t& length,
+                                                        const fs::path& file) {
+    std::vector<std::vector<std::string_view>> lines;
+    length = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        if (length >= bytes.size())
+            throw Error(fmt::format("{}: ends at line {}, expected a header of {} lines", file.string(), i, count));
+        const std::size_t end = std::min(bytes.find('\n', length), bytes.size());
+        lines.push_back(words(bytes.substr(length, end - length)));
+        length = std::min(end + 1, bytes.size());
+    }
+    return lines;
+}
+
+std::vector<double> numbers_of(const std::vector<std::string_view>& words, std::size_t expected, int line,
+                               const fs::path& file) {
+    std::vector<double> values;
+    for (const auto word : words)
+        if (const auto value = number(word); value && std::isfinite(*value))
+            values.push_back(*value);
+    if (values.size() != expected || words.size() != expected)
+        throw Error(fmt::format("{}: expected {}", at_line(file, line), counted(expected, "finite number")));
+    return values;
+}
+
+/// Leica's PTX: columns, rows, the scanner's place and three axes, a 4x4 for row vectors; then the grid, column by
+/// column.
+CloudRecords read_ptx(std::string_view bytes, const fs::path& file) {
+    CloudRecords records;
+    std::size_t length = 0;
+    const auto lines = header_lines(bytes, 10, length, file);
+    std::array<std::uint64_t, 2> sizes{};
+    for (std::size_t i = 0; i < 2; ++i) {
+        const auto size = lines[i].size() == 1 ? whole_number(lines[i][0]) : std::nullopt;
+        if (!size || *size == 0 || *size > 1U << 20)
+            throw Error(fmt::format("{}: expected the number of {}", at_line(file, static_cast<int>(i) + 1),
+                                    i == 0 ? "columns" : "rows"));
+        sizes[i] = *size;
+    }
+    for (std::size_t i = 2; i < 6; ++i)
+        (void)numbers_of(lines[i], 3, static_cast<int>(i) + 1, file);
+    Eigen::Matrix4d world_from_scan;
+    for (int i = 0; i < 4; ++i) {
+        const auto row = numbers_of(lines[static_cast<std::size_t>(i) + 6], 4, i + 7, file);
+        for (int j = 0; j < 4; ++j)
+            world_from_scan(j, i) = row[static_cast<std::size_t>(j)];
+    }
+    records.format = CloudRecords::Format::text;
+    records.encoding = CloudRecords::Encoding::ascii;
+    records.name_end = ".ptx";
+    records.header = bytes.substr(0, length);
+    const std::uint64_t expected = sizes[0] * sizes[1];
+    TextRecords peek(bytes.substr(length), 11);
+    std::size_t columns = 0;
+    for (std::uint64_t i = 0; i <= expected && peek.next(); ++i) {
+        if (i == expected)
+            throw Error(
+                fmt::format("{}: a second scan begins; files of one scan are read", at_line(file, peek.line())));
+        if (i == 0)
+            columns = peek.words().size();
+    }
+    if (columns < 4)
+        throw Error(fmt::format("{}: {} a point, expected x y z intensity [red green blue]", at_line(file, 11),
+                                counted(columns, "value")));
+    records.fields = fields_named(ptx_names(columns));
+    read_lines(records, bytes.substr(length), 11, file);
+    if (records.point_count != expected)
+        throw Error(fmt::format("{}: {} columns of {} rows are {} points, the file holds {}", file.string(), sizes[0],
+                                sizes[1], expected, records.point_count));
+    records.grid = {static_cast<int>(sizes[1]), static_cast<int>(sizes[0])};
+    records.placed.resize(records.point_count);
+    for (std::size_t i = 0; i < records.point_count; ++i) {
+        const auto at = words(records.record(i));
+        const Eigen::Vector3d point(*number(at[0]), *number(at[1]), *number(at[2]));
+        records.placed[i] = point.isZero()
+                                ? Eigen::Vector3d(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()))
+                                : Eigen::Vector3d((world_from_scan * point.homogeneous()).head<3>());
+    }
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.translation() = world_from_scan.topRightCorner<3, 1>();
+    records.viewpoint = pose;
+    return records;
+}
+
+} // namespace
+
+CloudRecords read_text_cloud(std::string_view bytes, const fs::path& file, std::vector<std::string>& warnings) {
+    const std::string extension = lower_extension(file);
+    if (extension == ".ptx")
+        return read_ptx(bytes, file);
+    CloudRecords records;
+    records.format = CloudRecords::Format::text;
+    records.encoding = CloudRecords::Encoding::ascii;
+    records.name_end = extension;
+    std::size_t length = 0;
+    const auto first = header_lines(bytes, 1, length, file).front();
+    const bool counted_first = first.size() == 1 && whole_number(first[0]);
+    const std::uint64_t said = counted_first ? whole_number(first[0]).value_or(0) : 0;
+    const bool named = !first.empty() && !all_numbers(first);
+    if (named) {
+        const auto names = names_in(first);
+        for (const char* axis : {"x", "y", "z"})
+            if (std::count(names.begin(), names.end(), axis) != 1)
+                throw Error(fmt::format("{}: expected numbers, or names of columns with x, y and z among them",
+                                        at_line(file, 1)));
+        records.fields = fields_named(names);
+    }
+    if (!counted_first && !named)
+        length = 0;
+    records.header = bytes.substr(0, length);
+    read_lines(records, bytes.substr(length), length > 0 ? 2 : 1, file);
+    if (records.fields.size() < 3 && records.point_count > 0)
+        throw Error(fmt::format("{}: {} a line, expected x y z at least", file.string(),
+                                counted(records.fields.size(), "value")));
+    if (records.fields.empty())
+        records.fields = fields_named(usual_names(3));
+    if (counted_first && said != records.point_count)
+        warnings.push_back(
+            fmt::format("{}: says {} points, holds {}; all are read.", file.string(), said, records.point_count));
+    return records;
+}
+
+std::string text_bytes(const CloudRecords& records, const std::string& points,
+                       const std::vector<FieldAddition>& additions) {
+    std::string header = records.header;
+    const auto names = words(header);
+    if (!names.empty() && records.name_end != ".ptx" &&
+        !number(names[0])) // a line of names gets those of the new columns
+        for (const FieldAddition& addition : additions)
+            header.insert(header.find_last_not_of("\r\n") + 1, " " + addition.name);
+    return header + points + records.after;
+}
+
+CloudRecords read_kitti(std::string_view bytes, const fs::path& file) {
+    constexpr std::size_t stride = 16;
+    if (bytes.size() % stride != 0)
+        throw Error(fmt::format("{}: {} bytes are not whole points of {} (x y z reflectance as floats)", file.string(),
+                                bytes.size(), stride));
+    check_point_count(bytes.size() / stride, file);
+    CloudRecords records;
+    records.format = CloudRecords::Format::ply;
+    records.encoding = CloudRecords::Encoding::binary;
+    records.point_count = bytes.size() / stride;
+    records.header = fmt::format("ply\nformat binary_little_endian 1.0\ncomment KITTI sweep: x forward, y left, z up, "
+                                 "metres\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
+                                 "property float reflectance\nend_header\n",
+                                 records.point_count);
+    for (const auto* name : {"x", "y", "z", "reflectance"})
+        records.fields.push_back({name, Scalar::float32, 1, std::nullopt, 4 * records.fields.size()});
+    records.stride = stride;
+    records.points = bytes;
+    records.grid = {static_cast<int>(records.point_count), 1};
+    return records;
+}
+
+} // namespace scanshade

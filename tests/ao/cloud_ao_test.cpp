@@ -1,0 +1,351 @@
+// Clouds without a view: laws and closed forms that visibility from the points themselves must keep.
+#include "ao/cloud/cloud_ao.h"
+#include "apps/scenes/scene_cloud.h"
+#include "projection/error.h"
+#include "tests/support/files.h"
+
+#include <cmath>
+#include <gtest/gtest.h>
+#include <numbers>
+#include <numeric>
+
+namespace scanshade {
+namespace {
+
+using Eigen::Vector3d;
+using Points = std::vector<Vector3d>;
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+/// Random numbers that are the same on every machine.
+class Dice {
+  public:
+    double roll() {
+        return static_cast<double>((state_ = state_ * 6364136223846793005ULL + 1442695040888963407ULL) >> 11) * 0x1p-53;
+    }
+
+  private:
+    std::uint64_t state_ = 42;
+};
+
+/// A square of side 2 about the origin in the plane z = 0.
+Points square(std::size_t count) {
+    Dice dice;
+    Points points(count);
+    for (Vector3d& p : points)
+        p = {2 * dice.roll() - 1, 2 * dice.roll() - 1, 0};
+    return points;
+}
+
+/// Floor z = 0 and wall x = 0, each 2 wide; the scanner stands in the corner's opening.
+Points corner(std::size_t count) {
+    Dice dice;
+    Points points(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        const double along = 2 * dice.roll(), away = 2 * dice.roll();
+        points[i] = i % 2 ? Vector3d(away, along, 0) : Vector3d(0, along, away);
+    }
+    return points;
+}
+
+Points sphere(std::size_t count, const Vector3d& centre) {
+    Points points;
+    for (std::size_t i = 0; i < count; ++i) {
+        const double z = 1 - (2 * static_cast<double>(i) + 1) / static_cast<double>(count);
+        const double turn = static_cast<double>(i) * std::numbers::pi * (3 - std::sqrt(5.0)),
+                     across = std::sqrt(1 - z * z);
+        points.push_back(centre + Vector3d(across * std::cos(turn), across * std::sin(turn), z));
+    }
+    return points;
+}
+
+CloudVisibility visibility(const Points& points, CloudAoOptions options = {}, const Points& normals = {}) {
+    return CloudAo(std::move(options)).compute({points, normals});
+}
+
+double mean(const std::vector<float>& values) {
+    return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+/// Over the values that both have.
+double rms_between(const std::vector<float>& a, const std::vector<float>& b) {
+    double squares = 0;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
+        if (!std::isnan(a[i]) && !std::isnan(b[i])) {
+            squares += std::pow(static_cast<double>(a[i]) - static_cast<double>(b[i]), 2);
+            ++count;
+        }
+    return std::sqrt(squares / static_cast<double>(count));
+}
+
+bool any_note(const CloudVisibility& found, const std::string& words) {
+    return std::any_of(found.notes.begin(), found.notes.end(),
+                       [&](const std::string& note) { return note.find(words) != std::string::npos; });
+}
+
+TEST(CloudAo, a_plane_is_open_at_any_tilt) {
+    for (const double tilt : {0.0, 0.5, 1.2}) {
+        Points points = square(20000);
+        for (Vector3d& p : points)
+            p = Eigen::AngleAxisd(tilt, Vector3d(1, 2, 0).normalized()) * p;
+        const auto found = visibility(points, {.radius = 0.5});
+        for (const float v : found.visibility)
+            ASSERT_GE(v, 0.99F) << tilt;
+    }
+}
+
+/// Spec's closed form b: floor at distance c R from a long wall, V = 1 - (acos c - c sqrt(1 - c^2)) / pi.
+TEST(CloudAo, a_corner_is_as_dark_as_the_closed_form_says) {
+    const Points points = corner(80000);
+    const double radius = 0.4;
+    const auto found = visibility(points, {.radius = radius, .outside = "1,1,1"});
+    double squares = 0;
+    int count = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const Vector3d& p = points[i];
+        const double away = std::max(p.x(), p.z()), c = away / radius;
+        if (p.y() < radius || p.y() > 2 - radius || away > 2 - radius || c < 0.05)
+            continue; // what the cloud's own rims leave open
+        const double truth = c >= 1 ? 1 : 1 - (std::acos(c) - c * std::sqrt(1 - c * c)) / std::numbers::pi;
+        squares += std::pow(static_cast<double>(found.visibility[i]) - truth, 2);
+        ++count;
+    }
+    EXPECT_GT(count, 20000);
+    EXPECT_LT(std::sqrt(squares / count), 0.015);
+}
+
+TEST(CloudAo, distance_from_the_origin_changes_nothing) {
+    const Points here = corner(20000);
+    Points far = here;
+    const Vector3d shift(5e6, -5e6, 5e6);
+    for (Vector3d& p : far)
+        p += shift;
+    const auto near_values = visibility(here, {.radius = 0.4, .outside = "1,1,1"});
+    const auto far_values = visibility(far, {.radius = 0.4, .outside = "5000001,-4999999,5000001"});
+    EXPECT_LT(rms_between(near_values.visibility, far_values.visibility), 0.01);
+    EXPECT_NEAR(near_values.spacing, far_values.spacing, 1e-5);
+}
+
+TEST(CloudAo, scale_changes_nothing) {
+    const Points points = corner(20000);
+    Points large = points;
+    for (Vector3d& p : large)
+        p *= 1000;
+    const auto small_values = visibility(points, {.outside = "1,1,1"});
+    const auto large_values = visibility(large, {.outside = "1000,1000,1000"});
+    EXPECT_NEAR(large_values.radius / small_values.radius, 1000, 0.1);
+    EXPECT_LT(rms_between(small_values.visibility, large_values.visibility), 0.01);
+}
+
+/// Halving a cloud must not change what its points see: the first half of a scene's points are a scene's points.
+TEST(CloudAo, density_changes_hardly_anything) {
+    const scene::World world(scene::scene_named("office"));
+    const auto all = scene::scene_cloud(world, 200000);
+    const auto with = [&](std::size_t count) {
+        return visibility({all.points.begin(), all.points.begin() + static_cast<std::ptrdiff_t>(count)},
+                          {.radius = 0.5},
+                          {all.normals.begin(), all.normals.begin() + static_cast<std::ptrdiff_t>(count)});
+    };
+    const auto half = with(100000), whole = with(200000);
+    EXPECT_LT(rms_between(half.visibility, whole.visibility), 0.045);
+    const auto truth = scene::true_visibility(world, all, {.radius_m = 0.5, .rays = 512});
+    EXPECT_LT(rms_between(whole.visibility, truth), 0.035);
+}
+
+/// Boards and backs of furniture as thin as two gaps between points included.
+TEST(CloudAo, a_room_without_normals_is_seen_from_inside) {
+    const scene::World world(scene::scene_named("office"));
+    const auto cloud = scene::scene_cloud(world, 200000);
+    const auto found = visibility(cloud.points, {.radius = 0.5});
+    EXPECT_TRUE(any_note(found, "inward, as of a room")) << tests::joined(found.notes);
+    const auto truth = scene::true_visibility(world, cloud, {.radius_m = 0.5, .rays = 256}, 8);
+    EXPECT_LT(rms_between(found.visibility, truth), 0.1);
+    double away = 0;
+    for (std::size_t i = 0; i < found.normals.size(); ++i)
+        away += found.normals[i].cast<double>().dot(cloud.normals[i]) < 0;
+    EXPECT_LT(away / static_cast<double>(found.normals.size()), 0.02);
+}
+
+TEST(CloudAo, a_ball_without_normals_is_seen_from_outside) {
+    const auto found = visibility(sphere(20000, {10, 20, 30}), {.radius = 1.5});
+    EXPECT_TRUE(any_note(found, "outward")) << tests::joined(found.notes);
+    EXPECT_GT(mean(found.visibility), 0.99); // convex: nothing above any tangent plane
+    const auto inside = visibility(sphere(20000, {10, 20, 30}), {.radius = 1, .outside = "inward"});
+    EXPECT_NEAR(mean(inside.visibility), 0.75, 0.02); // 1 - R^2 / 4 r^2
+}
+
+TEST(CloudAo, terrain_is_seen_from_above_and_scans_from_their_scanner) {
+    Points hills = square(20000);
+    for (Vector3d& p : hills)
+        p = {p.x() * 500 + 512000, p.y() * 500 + 5403000, 40 * std::sin(6 * p.x()) * std::cos(5 * p.y())};
+    EXPECT_TRUE(any_note(visibility(hills), "up along z"));
+    const auto scan = visibility(sphere(5000, {0.9, 0, 0}));
+    EXPECT_TRUE(any_note(scan, "the origin of the coordinates")) << tests::joined(scan.notes);
+    EXPECT_LT(mean(visibility(sphere(5000, {0.9, 0, 0}), {.radius = 2.1}).visibility), 0.05); // closed all round
+}
+
+TEST(CloudAo, recorded_normals_are_taken_only_if_they_lie_on_the_planes) {
+    const Points points = square(5000);
+    const auto good = visibility(points, {}, Points(points.size(), Vector3d(0, 0, -1)));
+    EXPECT_TRUE(any_note(good, "normals: recorded."));
+    const auto bad = visibility(points, {}, Points(points.size(), Vector3d(1, 0, 0)));
+    EXPECT_TRUE(any_note(bad, "recorded normals are not used"));
+    EXPECT_GT(mean(bad.visibility), 0.99);
+    Points torn(points.size());
+    for (std::size_t i = 0; i < torn.size(); ++i)
+        torn[i] = {0, 0, i % 2 ? 1.0 : -1.0};
+    EXPECT_TRUE(any_note(visibility(points, {}, torn), "oppose each other"));
+}
+
+TEST(CloudAo, the_sky_is_seen_by_its_share) {
+    const auto flat = visibility(square(10000), {.sky = true});
+    for (const float v : flat.visibility)
+        ASSERT_GE(v, 0.99F);
+    Points wall = square(10000);
+    for (Vector3d& p : wall)
+        p = {p.x(), 0, p.y()};
+    EXPECT_NEAR(mean(visibility(wall, {.sky = true, .outside = "0,-9,0"}).visibility), 0.5, 0.01);
+    for (const float v : visibility(square(10000), {.sky = true, .outside = "0,0,-9"}).visibility)
+        ASSERT_EQ(v, 0.0F); // a ceiling
+    EXPECT_NEAR(mean(visibility(square(10000), {.sky = true, .up = "1,0,0", .outside = "0,0,9"}).visibility), 0.5,
+                0.01);
+}
+
+TEST(CloudAo, odd_clouds_are_results_not_failures) {
+    EXPECT_TRUE(visibility({}).visibility.empty());
+    for (const Points& points : {Points{{1, 2, 3}}, Points{{1, 2, 3}, {4, 5, 6}}, Points(50, {1, 2, 3}),
+                                 Points(20, {nan, nan, nan}), Points{{nan, nan, nan}, {1, 1, 1}, {2, 2, 2}}}) {
+        const auto found = visibility(points, {.outside = "outward"});
+        ASSERT_EQ(found.visibility.size(), points.size());
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            EXPECT_TRUE(std::isnan(found.visibility[i]));
+            EXPECT_EQ(found.confidence[i], 0.0F);
+        }
+    }
+    Points line(100, Vector3d::Zero());
+    for (std::size_t i = 0; i < line.size(); ++i)
+        line[i].x() = static_cast<double>(i) / 10;
+    for (const float v : visibility(line, {.outside = "outward"}).visibility)
+        EXPECT_TRUE(std::isnan(v)); // no plane, no side
+    for (const float c : visibility(line, {.outside = "5,0,9"}).confidence)
+        EXPECT_EQ(c, 0.0F);
+}
+
+TEST(CloudAo, holes_and_duplicates_leave_the_others_alone) {
+    const Points plain = corner(10000);
+    Points holed;
+    for (const Vector3d& p : plain) {
+        holed.push_back(p);
+        holed.push_back({nan, nan, nan});
+    }
+    const auto expected = visibility(plain, {.radius = 0.4, .outside = "1,1,1"});
+    const auto found = visibility(holed, {.radius = 0.4, .outside = "1,1,1"});
+    for (std::size_t i = 0; i < plain.size(); ++i) {
+        ASSERT_EQ(found.visibility[2 * i], expected.visibility[i]);
+        ASSERT_TRUE(std::isnan(found.visibility[2 * i + 1]));
+    }
+    Points twice = plain;
+    twice.insert(twice.end(), plain.begin(), plain.end());
+    const auto doubled = visibility(twice, {.radius = 0.4, .outside = "1,1,1"});
+    EXPECT_LT(rms_between(doubled.visibility, expected.visibility), 0.04);
+}
+
+TEST(CloudAo, tiles_change_hardly_anything) {
+    const Points points = corner(400000);
+    const auto whole = visibility(points, {.radius = 0.2, .outside = "1,1,1"});
+    const auto tiled = visibility(points, {.radius = 0.2, .outside = "1,1,1", .memory_mib = 64});
+    EXPECT_EQ(whole.tiles, 1);
+    EXPECT_GE(tiled.tiles, 2);
+    EXPECT_EQ(whole.radius, tiled.radius);
+    EXPECT_LT(rms_between(whole.visibility, tiled.visibility), 0.015);
+}
+
+TEST(CloudAo, a_wall_that_holds_most_points_is_divided_too) {
+    Points points = square(200000);
+    for (std::size_t i = 0; i < points.size(); ++i) // most at the lowest coordinate of the longest axis
+        points[i] =
+            i % 4 ? Vector3d(0, points[i].x(), points[i].y()) : Vector3d(3 + 3 * points[i].x(), points[i].y(), 0);
+    EXPECT_GT(visibility(points, {.radius = 0.1, .rays = 4, .outside = "10,0,10", .memory_mib = 64}).tiles, 1);
+}
+
+TEST(CloudAo, same_input_same_bits) {
+    const Points points = corner(30000);
+    const auto one = visibility(points), other = visibility(points);
+    EXPECT_EQ(one.visibility, other.visibility);
+    EXPECT_EQ(one.confidence, other.confidence);
+}
+
+TEST(CloudAo, confidence_is_high_on_planes_and_low_where_discs_span_the_radius) {
+    const Points points = square(10000);
+    EXPECT_GT(mean(visibility(points, {.radius = 0.5}).confidence), 0.99);
+    EXPECT_LT(mean(visibility(points, {.radius = 0.03}).confidence), 0.4);
+}
+
+TEST(CloudAo, the_default_radius_is_a_twentieth_of_the_extent_within_its_bounds) {
+    EXPECT_EQ(default_radius(10, 0.01), 0.5);
+    EXPECT_EQ(default_radius(10, 0.1), 1.0);
+    EXPECT_EQ(default_radius(10, 0.001), 0.2);
+    EXPECT_EQ(default_radius(0, 0), 0.0);
+}
+
+TEST(CloudAo, fewer_rays_do_where_points_are_dense) {
+    const Points points = corner(200000); // 6 mm apart
+    const auto few = visibility(points, {.radius = 0.8, .outside = "1,1,1"});
+    EXPECT_TRUE(any_note(few, "4 rays a point")) << tests::joined(few.notes);
+    const auto many = visibility(points, {.radius = 0.8, .rays = 64, .smooth = 1, .outside = "1,1,1"});
+    EXPECT_LT(rms_between(few.visibility, many.visibility), 0.02);
+}
+
+TEST(CloudAo, settings_that_cannot_be_are_refused) {
+    EXPECT_THROW(CloudAo({.rays = -1}), Misuse);
+    EXPECT_THROW(CloudAo({.up = "0,0,0"}), Misuse);
+    EXPECT_THROW(CloudAo({.up = "up"}), Misuse);
+    EXPECT_THROW(CloudAo({.outside = "1,2"}), Misuse);
+    EXPECT_THROW(CloudAo({.outside = "sideways"}), Misuse);
+}
+
+TEST(Neighbours, are_those_that_trying_all_points_finds) {
+    Dice dice;
+    std::vector<Eigen::Vector3f> points(700);
+    for (auto& p : points)
+        p = Eigen::Vector3f(static_cast<float>(dice.roll()), static_cast<float>(dice.roll() * dice.roll()),
+                            static_cast<float>(std::round(4 * dice.roll())));
+    points[10] = points[20] = points[30];
+    const NeighbourTree tree(points);
+    Nearest found;
+    for (std::size_t i = 0; i < tree.size(); ++i) {
+        std::vector<float> all;
+        for (std::size_t j = 0; j < tree.size(); ++j)
+            if (j != i)
+                all.push_back((tree[j] - tree[i]).squaredNorm());
+        std::sort(all.begin(), all.end());
+        tree.find_round(i, 20, found);
+        ASSERT_EQ(found.all().size(), 20u);
+        for (std::size_t k = 0; k < 20; ++k)
+            ASSERT_EQ(found.all()[k].distance2, all[k]) << i << " " << k;
+        ASSERT_EQ(tree[i], points[tree.index(i)]);
+    }
+}
+
+TEST(CloudAo, run_gives_a_plain_cloud_a_value_on_every_point) {
+    const tests::TemporaryFolder folder;
+    std::string text = "ply\nformat ascii 1.0\nelement vertex 2000\nproperty double x\nproperty double y\nproperty "
+                       "double z\nend_header\n";
+    const Points points = corner(2000);
+    for (const Vector3d& p : points)
+        text += std::to_string(p.x() + 1e6) + " " + std::to_string(p.y()) + " " + std::to_string(p.z()) + "\n";
+    tests::write_file(folder / "c.ply", text);
+    const tests::Ran ran =
+        tests::run_program("run " + (folder / "c.ply").string() + " -o " + (folder / "out").string());
+    ASSERT_EQ(ran.exit_code, 0) << ran.err;
+    const std::string written = tests::file_bytes(folder / "out/clouds/c.ply");
+    EXPECT_NE(written.find("property float ambient_occlusion\nproperty float ao_confidence\n"), std::string::npos);
+    EXPECT_EQ(written.find("nan"), std::string::npos);
+    EXPECT_TRUE(std::filesystem::exists(folder / "out/shaded/c.png"));
+    const std::string manifest = tests::file_bytes(folder / "out/manifest.json");
+    EXPECT_NE(manifest.find("radius"), std::string::npos);
+    EXPECT_NE(manifest.find("points stand"), std::string::npos);
+}
+
+} // namespace
+} // namespace scanshade

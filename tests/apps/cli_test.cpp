@@ -1,0 +1,365 @@
+// The program as a person or a script meets it: exit codes, files, reports, and what a killed run leaves.
+#include "io/cameras/camera_file.h"
+#include "io/clouds/cloud_file.h"
+#include "io/images/image_file.h"
+#include "tests/support/small_capture.h"
+
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <fstream>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <sys/wait.h>
+#include <thread>
+#include <unistd.h>
+
+namespace scanshade {
+namespace {
+
+using nlohmann::json;
+using tests::Ran;
+using tests::read_bytes;
+using tests::run_program;
+using tests::TemporaryFolder;
+namespace fs = std::filesystem;
+
+class CliTest : public testing::Test {
+  protected:
+    void SetUp() override { tests::write_capture(capture(), 4); }
+
+    [[nodiscard]] fs::path capture() const { return folder / "capture"; }
+    [[nodiscard]] fs::path out() const { return folder / "out"; }
+    [[nodiscard]] Ran run(const std::string& flags = "") const {
+        return run_program(fmt::format("run {} -o {} {}", capture().string(), out().string(), flags));
+    }
+    [[nodiscard]] json manifest() const { return json::parse(read_bytes(out() / "manifest.json")); }
+
+    TemporaryFolder folder;
+};
+
+std::size_t files_in(const fs::path& folder) {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
+}
+
+// ---------------------------------------------------------------------------------------------------- run
+
+TEST_F(CliTest, run_leaves_maps_pictures_and_reports) {
+    const Ran ran = run();
+    ASSERT_EQ(ran.exit_code, 0) << ran.err;
+    EXPECT_EQ(files_in(out() / "ao"), 4u);
+    EXPECT_EQ(files_in(out() / "shaded"), 4u);
+    EXPECT_FALSE(fs::exists(out() / "clouds"));
+    const cv::Mat1f visibility = read_ao(out() / "ao/000.png");
+    EXPECT_EQ(visibility.size(), cv::Size(64, 48));
+    EXPECT_TRUE(std::isnan(visibility(4, 4)));
+
+    const json text = manifest();
+    EXPECT_EQ(text["method"], "cacao");
+    EXPECT_FALSE(text["version"].get<std::string>().empty());
+    EXPECT_FALSE(text["device"]["name"].get<std::string>().empty());
+    EXPECT_NE(text["command_line"].get<std::string>().find("run"), std::string::npos);
+    EXPECT_EQ(text["capture"]["camera"]["fx"], 52.0);
+    EXPECT_NE(text["capture"]["camera"]["origin"].get<std::string>().find("camera.json"), std::string::npos);
+    EXPECT_EQ(text["capture"]["registration"]["registered"], "yes");
+    EXPECT_FALSE(text["settings"]["method cacao"].empty());
+    EXPECT_EQ(text["totals"]["ok"], 4);
+    EXPECT_GT(text["totals"]["peak_memory_mib"], 1);
+    ASSERT_EQ(text["frames"].size(), 4u);
+    for (const json& frame : text["frames"]) {
+        EXPECT_EQ(frame["status"], "ok");
+        EXPECT_GT(frame["mean_visibility"], 0.2);
+        EXPECT_GE(frame["ms"]["compute"], 0);
+        EXPECT_FALSE(frame["passes"].empty());
+        for (const json& file : frame["files"])
+            EXPECT_TRUE(fs::exists(out() / file.get<std::string>())) << file;
+    }
+    const std::string table = read_bytes(out() / "frames.csv");
+    EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 5); // header and four frames
+}
+
+TEST_F(CliTest, one_bad_frame_is_told_and_the_others_are_processed) {
+    fs::resize_file(capture() / "depth/002.png", 60);
+    const Ran ran = run();
+    EXPECT_EQ(ran.exit_code, 2);
+    EXPECT_NE(ran.err.find("002.png"), std::string::npos) << ran.err;
+    EXPECT_EQ(files_in(out() / "ao"), 3u);
+    const json text = manifest();
+    EXPECT_EQ(text["frames"][2]["status"], "failed");
+    EXPECT_NE(text["frames"][2]["why"].get<std::string>().find("002.png"), std::string::npos);
+    EXPECT_EQ(text["frames"][3]["status"], "ok");
+    EXPECT_NE(read_bytes(out() / "frames.csv").find("failed"), std::string::npos);
+}
+
+TEST_F(CliTest, frames_are_taken_like_a_slice) {
+    ASSERT_EQ(run("--frames 1::2").exit_code, 0);
+    EXPECT_TRUE(fs::exists(out() / "ao/001.png"));
+    EXPECT_TRUE(fs::exists(out() / "ao/003.png"));
+    EXPECT_EQ(files_in(out() / "ao"), 2u);
+    ASSERT_EQ(run("--frames=-1: --overwrite").exit_code, 0);
+    EXPECT_EQ(manifest()["frames"][0]["index"], 3);
+    EXPECT_EQ(run("--frames 7:9 --overwrite").exit_code, 1);
+    EXPECT_EQ(run("--frames a:b --overwrite").exit_code, 1);
+    EXPECT_EQ(run("--frames 3:0:-1 --overwrite").exit_code, 1);
+}
+
+TEST_F(CliTest, an_earlier_result_is_replaced_only_when_asked) {
+    ASSERT_EQ(run("--frames 0").exit_code, 0);
+    const auto before = fs::last_write_time(out() / "ao/000.png");
+    const Ran refused = run();
+    EXPECT_EQ(refused.exit_code, 1);
+    EXPECT_NE(refused.err.find("--overwrite"), std::string::npos) << refused.err;
+    EXPECT_EQ(fs::last_write_time(out() / "ao/000.png"), before);
+    EXPECT_FALSE(fs::exists(out() / "ao/001.png")) << "refused means that nothing is begun";
+    EXPECT_EQ(run("--overwrite").exit_code, 0);
+    EXPECT_EQ(files_in(out() / "ao"), 4u);
+}
+
+TEST_F(CliTest, same_input_same_bytes) {
+    ASSERT_EQ(run("--write ao,shaded,cloud,panel").exit_code, 0);
+    fs::rename(out(), folder / "first");
+    ASSERT_EQ(run("--write ao,shaded,cloud,panel").exit_code, 0);
+    std::size_t compared = 0;
+    for (const char* kind : {"ao", "shaded", "clouds", "panel"})
+        for (const auto& file : fs::directory_iterator(out() / kind)) {
+            EXPECT_EQ(read_bytes(file.path()), read_bytes(folder / "first" / kind / file.path().filename())) << file;
+            ++compared;
+        }
+    EXPECT_EQ(compared, 16u);
+}
+
+TEST_F(CliTest, radius_and_quality_reach_the_method) {
+    ASSERT_EQ(run("--radius 0.25 --quality low --frames 0").exit_code, 0);
+    const json settings = manifest()["settings"]["method cacao"];
+    EXPECT_EQ(settings["cacao.radius"], 0.25);
+    EXPECT_EQ(settings["cacao.quality"], "low");
+    EXPECT_EQ(run("--radius -1 --overwrite").exit_code, 1);
+    EXPECT_EQ(run("--quality splendid --overwrite").exit_code, 1);
+}
+
+TEST_F(CliTest, a_cloud_keeps_its_points_and_gains_a_field) {
+    const cv::Mat1f z_m = tests::corner_depth(0);
+    const Pinhole camera = tests::small_camera().pinhole;
+    std::string text = "# .PCD v0.7\nVERSION 0.7\nFIELDS label x y z\nSIZE 4 4 4 4\nTYPE U F F F\nCOUNT 1 1 1 1\n"
+                       "WIDTH 64\nHEIGHT 48\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 3072\nDATA ascii\n";
+    for (int v = 0; v < 48; ++v)
+        for (int u = 0; u < 64; ++u)
+            text += z_m(v, u) <= 0 ? std::string("7 nan nan nan\n")
+                                   : fmt::format("7 {} {} {}\n", (u - camera.cx) / camera.fx * z_m(v, u),
+                                                 (v - camera.cy) / camera.fy * z_m(v, u), z_m(v, u));
+    const fs::path file = folder / "corner.pcd";
+    std::ofstream(file) << text;
+    const Ran ran = run_program(fmt::format("run {} -o {}", file.string(), out().string()));
+    ASSERT_EQ(ran.exit_code, 0) << ran.err;
+    std::vector<std::string> warnings;
+    const Cloud cloud = read_cloud(out() / "clouds/corner.pcd", warnings);
+    EXPECT_EQ(cloud.grid, cv::Size(64, 48));
+    EXPECT_NE(describe(*cloud.records).find("ambient_occlusion"), std::string::npos) << describe(*cloud.records);
+    EXPECT_NE(describe(*cloud.records).find("label"), std::string::npos);
+    EXPECT_NE(manifest()["frames"][0]["camera"]["origin"].get<std::string>().find("recovered"), std::string::npos);
+}
+
+TEST_F(CliTest, a_colour_camera_beside_depth_is_warped_by_either_way_and_told) {
+    CameraFile file{tests::small_camera(), 1000, Registration::no, {}};
+    ColourCamera colour{tests::small_camera(), Eigen::Isometry3d::Identity()};
+    colour.camera.pinhole = scaled(colour.camera.pinhole, {96, 72});
+    colour.colour_from_depth.translation().x() = -0.1; // the rightmost of the wall is out of its sight
+    file.colour = colour;
+    file.depth_correction.offset_m = 0.05;
+    write_camera_file(capture() / "camera.json", file);
+    for (int i = 0; i < 4; ++i)
+        write_picture(capture() / fmt::format("color/{:03}.png", i), cv::Mat3b(72, 96, cv::Vec3b(40, 120, 200)));
+    ASSERT_EQ(run("--write ao,shaded,cloud --shade-strength 0").exit_code, 0);
+    EXPECT_EQ(read_ao(out() / "ao/000.png").size(), cv::Size(64, 48));
+    const cv::Mat3b shaded = read_colour(out() / "shaded/000.png");
+    EXPECT_EQ(shaded(24, 30), cv::Vec3b(40, 120, 200));
+    EXPECT_NE(shaded(24, 0), cv::Vec3b(40, 120, 200)); // clay
+    const json text = manifest();
+    EXPECT_EQ(text["capture"]["colour_camera"]["width"], 96);
+    EXPECT_EQ(text["capture"]["depth"]["correction"]["offset_m"], 0.05);
+    EXPECT_NE(text["shading"].get<std::string>().find("carried over"), std::string::npos);
+    const std::string cloud = read_bytes(out() / "clouds/000.ply");
+    EXPECT_NE(cloud.find("property float colour_known"), std::string::npos);
+
+    ASSERT_EQ(run("--overwrite --view colour --shade-strength 0").exit_code, 0);
+    const cv::Mat1f visibility = read_ao(out() / "ao/000.png");
+    EXPECT_EQ(visibility.size(), cv::Size(96, 72));
+    EXPECT_FALSE(std::isnan(visibility(36, 40)));
+    EXPECT_TRUE(std::isnan(visibility(36, 95))); // what depth did not see
+    EXPECT_EQ(read_colour(out() / "shaded/000.png").size(), cv::Size(96, 72));
+}
+
+TEST_F(CliTest, a_colour_view_without_a_colour_camera_is_refused) {
+    const Ran ran = run("--view colour");
+    EXPECT_EQ(ran.exit_code, 3);
+    EXPECT_NE(ran.err.find("refine finds it"), std::string::npos) << ran.err;
+}
+
+TEST_F(CliTest, several_captures_get_a_folder_each) {
+    tests::write_capture(folder / "more/capture", 1);
+    const Ran ran =
+        run_program(fmt::format("run {} {} {} -o {}", capture().string(), (folder / "more/capture").string(),
+                                (folder / "nowhere").string(), out().string()));
+    EXPECT_EQ(ran.exit_code, 2) << ran.err;
+    EXPECT_NE(ran.err.find("nowhere"), std::string::npos);
+    EXPECT_EQ(files_in(out() / "capture/ao"), 4u);
+    EXPECT_EQ(files_in(out() / "capture-2/ao"), 1u);
+}
+
+// ---------------------------------------------------------------------------------------------------- exit codes
+
+TEST_F(CliTest, misuse_is_told_with_exit_code_1) {
+    for (const char* words : {"", "fly", "run", "run x", "run x -o y --radius big", "run x -o y --unheard-of",
+                              "run x -o y --format jpg", "run x -o y --write ao,sound", "help fly"})
+        EXPECT_EQ(run_program(words).exit_code, 1) << words;
+    EXPECT_EQ(run("--camera 1,2,3").exit_code, 1);
+    EXPECT_EQ(run("--depth-scale furlongs").exit_code, 1);
+}
+
+TEST_F(CliTest, nothing_usable_is_exit_code_3) {
+    fs::create_directories(folder / "empty");
+    const Ran empty = run_program(fmt::format("run {} -o {}", (folder / "empty").string(), out().string()));
+    EXPECT_EQ(empty.exit_code, 3);
+    EXPECT_NE(empty.err.find("no frames found"), std::string::npos) << empty.err;
+    for (const auto& file : fs::directory_iterator(capture() / "depth"))
+        fs::resize_file(file.path(), 10);
+    EXPECT_EQ(run().exit_code, 3);
+    EXPECT_EQ(manifest()["totals"]["failed"], 4) << "the report says why even when nothing could be done";
+    EXPECT_EQ(run_program("inspect " + (folder / "empty").string()).exit_code, 3);
+    EXPECT_EQ(run_program("inspect " + capture().string()).exit_code, 3);
+}
+
+// ---------------------------------------------------------------------------------------------------- killed and
+// interrupted
+
+/// The program started without waiting; its messages go nowhere.
+pid_t start(const std::vector<std::string>& words) {
+    const pid_t child = fork();
+    if (child != 0)
+        return child;
+    const int nowhere = open("/dev/null", O_WRONLY);
+    dup2(nowhere, STDOUT_FILENO);
+    dup2(nowhere, STDERR_FILENO);
+    std::vector<char*> arguments = {const_cast<char*>(SCANSHADE_PROGRAM)};
+    for (const std::string& word : words)
+        arguments.push_back(const_cast<char*>(word.c_str()));
+    arguments.push_back(nullptr);
+    execv(SCANSHADE_PROGRAM, arguments.data());
+    _exit(127);
+}
+
+/// Waits until `file` is there; false after a minute.
+bool wait_for(const fs::path& file) {
+    for (int tries = 0; tries < 6000; ++tries, std::this_thread::sleep_for(std::chrono::milliseconds(10)))
+        if (fs::exists(file))
+            return true;
+    return false;
+}
+
+TEST_F(CliTest, a_killed_run_leaves_no_half_file) {
+    tests::write_capture(capture(), 200);
+    for (int kill_after_ms : {0, 15, 40}) {
+        const pid_t child = start({"run", capture().string(), "-o", out().string(), "--overwrite"});
+        ASSERT_TRUE(wait_for(out() / "shaded"));
+        std::this_thread::sleep_for(std::chrono::milliseconds(kill_after_ms));
+        kill(child, SIGKILL);
+        int status = 0;
+        waitpid(child, &status, 0);
+        ASSERT_TRUE(WIFSIGNALED(status)) << "200 frames were done before the kill: the test needs more";
+        EXPECT_FALSE(fs::exists(out() / "manifest.json")) << "a manifest says that the run came to its end";
+        for (const char* kind : {"ao", "shaded"})
+            for (const auto& file : fs::directory_iterator(out() / kind)) {
+                const bool final_name = file.path().filename().string()[0] != '.'; // others say that they are not done
+                EXPECT_TRUE(!final_name || !read_colour(file.path()).empty()) << file;
+            }
+        fs::remove_all(out());
+    }
+}
+
+TEST_F(CliTest, what_a_killed_run_left_is_cleared_by_the_next) {
+    tests::write_capture(capture(), 200);
+    const pid_t child = start({"run", capture().string(), "-o", out().string()});
+    ASSERT_TRUE(wait_for(out() / "shaded"));
+    kill(child, SIGKILL);
+    waitpid(child, nullptr, 0);
+    ASSERT_EQ(run("--overwrite --frames :3").exit_code, 0);
+    for (const char* kind : {"ao", "shaded"})
+        for (const auto& file : fs::directory_iterator(out() / kind))
+            EXPECT_NE(file.path().filename().string()[0], '.') << file;
+}
+
+TEST_F(CliTest, an_interrupted_run_records_what_is_done) {
+    tests::write_capture(capture(), 400);
+    const pid_t child = start({"run", capture().string(), "-o", out().string()});
+    ASSERT_TRUE(wait_for(out() / "ao/000.png"));
+    kill(child, SIGTERM);
+    int status = 0;
+    waitpid(child, &status, 0);
+    ASSERT_TRUE(WIFEXITED(status));
+    EXPECT_EQ(WEXITSTATUS(status), 4); // the same again, with --resume, goes on
+    const json totals = manifest()["totals"];
+    EXPECT_GE(totals["ok"], 1);
+    EXPECT_GE(totals["skipped"], 1);
+    EXPECT_EQ(totals["ok"].get<std::size_t>(), files_in(out() / "ao"));
+}
+
+// ---------------------------------------------------------------------------------------------------- the other
+// commands
+
+TEST_F(CliTest, inspect_says_what_is_there) {
+    const Ran ran = run_program("inspect " + capture().string());
+    EXPECT_EQ(ran.exit_code, 0) << ran.err;
+    for (const char* expected : {"64x48", "camera.json", "holes", "registered"})
+        EXPECT_NE(ran.out.find(expected), std::string::npos) << expected << " in\n" << ran.out;
+    const json facts = json::parse(run_program("inspect --json " + capture().string()).out);
+    EXPECT_EQ(facts["frames"], 4);
+    EXPECT_NEAR(facts["depth"]["holes"].get<double>(), 30.0 / (64 * 48), 1e-6);
+    double smallest_step_m = 1;
+    for (const json& band : facts["depth"]["steps"])
+        smallest_step_m = std::min(smallest_step_m, band["step_m"].get<double>());
+    EXPECT_GE(smallest_step_m, 0.00099); // stored in millimetres: no step is smaller, all are whole ones
+    EXPECT_NEAR(std::remainder(smallest_step_m, 0.001), 0, 1e-5);
+    EXPECT_EQ(facts["camera"]["fx"], 52.0);
+}
+
+TEST_F(CliTest, inspect_tells_of_a_frame_that_cannot_be_read) {
+    fs::resize_file(capture() / "depth/001.png", 60);
+    const Ran ran = run_program("inspect " + capture().string());
+    EXPECT_EQ(ran.exit_code, 2);
+    EXPECT_NE(ran.out.find("001.png"), std::string::npos) << ran.out;
+}
+
+TEST(CliHelpTest, help_shows_every_flag_with_default_and_range) {
+    const Ran ran = run_program("help run");
+    EXPECT_EQ(ran.exit_code, 0);
+    for (const char* expected :
+         {"--frames", "--cacao.radius", "default cacao", "png16 | png8 | tiff | exr", "-o,--out"})
+        EXPECT_NE(ran.out.find(expected), std::string::npos) << expected << " in\n" << ran.out;
+    EXPECT_EQ(run_program("run --help").out, ran.out);
+    EXPECT_EQ(run_program("help").exit_code, 0);
+    EXPECT_EQ(run_program("--version").out.substr(0, 10), "scanshade ");
+}
+
+TEST(CliHelpTest, methods_and_devices_are_listed) {
+    EXPECT_NE(run_program("methods").out.find("cacao"), std::string::npos);
+    const Ran devices = run_program("devices");
+    EXPECT_EQ(devices.exit_code, 0) << devices.err;
+    EXPECT_NE(devices.out.find("yes"), std::string::npos);
+}
+
+TEST_F(CliTest, generate_makes_a_capture_that_run_takes) {
+    const fs::path made = folder / "made";
+    const std::string generate =
+        fmt::format("generate office -o {} --frames 2 --size 64x48 --truth=false", made.string());
+    const Ran generated = run_program(generate);
+    ASSERT_EQ(generated.exit_code, 0) << generated.err;
+    const Ran ran = run_program(fmt::format("run {} -o {}", made.string(), out().string()));
+    EXPECT_EQ(ran.exit_code, 0) << ran.err;
+    EXPECT_EQ(run_program(generate).exit_code, 1) << "an earlier capture is replaced only when asked";
+    EXPECT_EQ(run_program("generate nowhere -o " + (folder / "x").string()).exit_code, 1);
+}
+
+} // namespace
+} // namespace scanshade

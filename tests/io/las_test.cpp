@@ -1,0 +1,304 @@
+// LAS and clouds as text: every version and point format read, and written back with two fields more and nothing less.
+#include "io/clouds/cloud_file.h"
+#include "io/clouds/cloud_records.h"
+#include "tests/support/files.h"
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+namespace scanshade {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace tests;
+
+template <class Number>
+void put(std::string& bytes, std::size_t at, Number value) {
+    std::memcpy(bytes.data() + at, &value, sizeof value);
+}
+template <class Number>
+Number get(const std::string& bytes, std::size_t at) {
+    Number value;
+    std::memcpy(&value, bytes.data() + at, sizeof value);
+    return value;
+}
+
+std::string vlr(const std::string& user, std::uint16_t id, const std::string& data) {
+    std::string bytes(54, '\0');
+    user.copy(bytes.data() + 2, 16);
+    put(bytes, 18, id);
+    put(bytes, 20, static_cast<std::uint16_t>(data.size()));
+    return bytes + data;
+}
+
+constexpr std::array<std::size_t, 11> base_length{20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67};
+
+/// Three points of raw coordinates 100, 200, 300 (+1, +2 each), scale 0.01, offset 1000; a record of our own; `extra`
+/// bytes nobody describes; in 1.4 a record behind the points.
+std::string las(int minor, int format, std::size_t extra = 0, const std::string& more_vlrs = "",
+                unsigned vlr_count = 1) {
+    const std::size_t header_size = minor >= 4 ? 375 : minor == 3 ? 235 : 227;
+    const std::string vlrs = vlr("ours", 7, "kept") + more_vlrs;
+    const std::size_t length = base_length[static_cast<std::size_t>(format)] + extra;
+    std::string bytes(header_size, '\0');
+    bytes.replace(0, 4, "LASF");
+    bytes[24] = 1;
+    bytes[25] = static_cast<char>(minor);
+    put(bytes, 94, static_cast<std::uint16_t>(header_size));
+    put(bytes, 96, static_cast<std::uint32_t>(header_size + vlrs.size()));
+    put(bytes, 100, vlr_count);
+    bytes[104] = static_cast<char>(format);
+    put(bytes, 105, static_cast<std::uint16_t>(length));
+    if (format < 6)
+        put(bytes, 107, std::uint32_t(3));
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        put(bytes, 131 + 8 * axis, 0.01);
+        put(bytes, 155 + 8 * axis, 1000.0);
+        const double low = 1000 + static_cast<double>(axis + 1);
+        put(bytes, 179 + 16 * axis, low + 0.02);
+        put(bytes, 187 + 16 * axis, low);
+    }
+    const std::size_t points_end = header_size + vlrs.size() + 3 * length;
+    if (minor >= 4) {
+        put(bytes, 235, static_cast<std::uint64_t>(points_end));
+        put(bytes, 243, std::uint32_t(1));
+        put(bytes, 247, std::uint64_t(3));
+    }
+    if (minor >= 3)
+        put(bytes, 227, static_cast<std::uint64_t>(points_end));
+    bytes += vlrs;
+    for (int i = 0; i < 3; ++i) {
+        std::string record(length, '\0');
+        for (std::size_t k = 0; k < length; ++k)
+            record[k] = static_cast<char>(17 * k + static_cast<std::size_t>(i));
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            put(record, 4 * axis, static_cast<std::int32_t>(100 * (axis + 1)) + i);
+        bytes += record;
+    }
+    return minor >= 4 ? bytes + std::string(60, 'E') : bytes;
+}
+
+Cloud read(const fs::path& file) {
+    std::vector<std::string> warnings;
+    Cloud cloud = read_cloud(file, warnings);
+    EXPECT_TRUE(warnings.empty()) << joined(warnings);
+    return cloud;
+}
+
+const std::array visibility{0.25F, 0.5F, std::numeric_limits<float>::quiet_NaN()}, confidence{1.0F, 0.75F, 0.0F};
+
+double value(const Cloud& cloud, std::size_t point, const std::string& field) {
+    const auto found = cloud.records->field_named(field);
+    EXPECT_TRUE(found) << field;
+    return found ? value_at(*cloud.records, cloud.records->record(point), *found) : 0;
+}
+
+TEST(Las, every_version_and_point_format_gains_fields_and_loses_nothing) {
+    const TemporaryFolder folder;
+    for (int minor = 0; minor <= 4; ++minor)
+        for (int format = 0; format <= (minor == 4 ? 10 : 5); ++format)
+            for (const std::size_t extra : {0u, 5u}) {
+                SCOPED_TRACE(fmt::format("1.{} format {} extra {}", minor, format, extra));
+                const std::string before = las(minor, format, extra);
+                const Cloud cloud = read(write_file(folder / "a.las", before));
+                ASSERT_EQ(cloud.points.size(), 3u);
+                EXPECT_NEAR((cloud.points[2] - Eigen::Vector3d(1001.02, 1002.02, 1003.02)).norm(), 0, 1e-9);
+                write_cloud(folder / "same.las", cloud, {});
+                EXPECT_EQ(file_bytes(folder / "same.las"), before);
+
+                write_cloud(folder / "b.las", cloud,
+                            {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}});
+                const std::string after = file_bytes(folder / "b.las");
+                const Cloud back = read(folder / "b.las");
+                EXPECT_EQ(value(back, 1, "ambient_occlusion"), 0.5);
+                EXPECT_TRUE(std::isnan(value(back, 2, "ambient_occlusion")));
+                EXPECT_EQ(value(back, 1, "ao_confidence"), 0.75);
+                for (std::size_t i = 0; i < 3; ++i) {
+                    EXPECT_EQ(back.points[i], cloud.points[i]);
+                    EXPECT_EQ(back.records->record(i).substr(0, cloud.records->stride), cloud.records->record(i));
+                }
+                EXPECT_NE(after.find("kept"), std::string::npos);
+                if (minor == 4) {
+                    EXPECT_EQ(after.substr(get<std::uint64_t>(after, 235)), std::string(60, 'E'));
+                }
+                if (minor >= 3) {
+                    EXPECT_EQ(get<std::uint64_t>(after, 227), after.size() - (minor == 4 ? 60 : 0));
+                }
+                // Everything else of the header is as it was.
+                std::string header = after.substr(0, 227);
+                for (const auto& [at, length] : {std::pair(96, 4), {100, 4}, {105, 2}})
+                    header.replace(static_cast<std::size_t>(at), static_cast<std::size_t>(length), before,
+                                   static_cast<std::size_t>(at), static_cast<std::size_t>(length));
+                EXPECT_EQ(header, before.substr(0, 227));
+
+                const std::array second{0.1F, 0.2F, 0.3F};
+                write_cloud(folder / "c.las", back, {{"ambient_occlusion", second}});
+                EXPECT_EQ(file_bytes(folder / "c.las").size(), after.size()); // replaced, not doubled
+                EXPECT_FLOAT_EQ(static_cast<float>(value(read(folder / "c.las"), 0, "ambient_occlusion")), 0.1F);
+            }
+}
+
+TEST(Las, described_extra_bytes_keep_their_names) {
+    const TemporaryFolder folder;
+    std::string descriptor(192, '\0');
+    descriptor[2] = 3; // unsigned short
+    std::string_view("pulse width").copy(descriptor.data() + 4, 32);
+    const Cloud cloud = read(write_file(folder / "a.las", las(2, 3, 2, vlr("LASF_Spec", 4, descriptor), 2)));
+    EXPECT_EQ(cloud.records->fields.back().name, "pulse width");
+    write_cloud(folder / "b.las", cloud, {{"ambient_occlusion", visibility}});
+    const Cloud back = read(folder / "b.las");
+    EXPECT_EQ(value(back, 1, "pulse width"), value(cloud, 1, "pulse width"));
+    EXPECT_EQ(value(back, 0, "ambient_occlusion"), 0.25);
+    EXPECT_EQ(get<std::uint32_t>(file_bytes(folder / "b.las"), 100), 2u); // one record describes both
+}
+
+TEST(Las, what_describes_nothing_does_not_hide_our_fields) {
+    // A description of no bytes, and one of more than a record holds: what comes behind them is not understood.
+    const TemporaryFolder folder;
+    std::string nothing(192, '\0'), sound(192, '\0'), too_long(192, '\0');
+    sound[2] = 9;
+    std::string("height").copy(sound.data() + 4, 6);
+    too_long[2] = 10;
+    for (const std::string& descriptions : {nothing, nothing + sound, sound + too_long, too_long})
+        for (const std::size_t extra : {4u, 300u}) {
+            SCOPED_TRACE(fmt::format("{} descriptions, {} bytes", descriptions.size() / 192, extra));
+            const Cloud cloud =
+                read(write_file(folder / "a.las", las(2, 0, extra, vlr("LASF_Spec", 4, descriptions), 2)));
+            EXPECT_EQ(cloud.records->field_named("height").has_value(), descriptions.starts_with(sound));
+            write_cloud(folder / "b.las", cloud, {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}});
+            const Cloud again = read(folder / "b.las");
+            for (std::size_t point = 0; point < 3; ++point) {
+                EXPECT_EQ(value(again, point, "ao_confidence"), confidence[point]);
+                EXPECT_EQ(again.records->record(point).substr(0, 20 + extra), cloud.records->record(point));
+            }
+            EXPECT_EQ(value(again, 1, "ambient_occlusion"), 0.5);
+        }
+}
+
+TEST(Las, units_are_told_not_guessed) {
+    const TemporaryFolder folder;
+    const auto unit = [&](const std::string& more) {
+        std::vector<std::string> warnings;
+        return unit_of(
+            *read_cloud(write_file(folder / "a.las", las(2, 1, 0, more, more.empty() ? 1 : 2)), warnings).records);
+    };
+    const auto keys = [](std::uint16_t key, std::uint16_t code) {
+        std::string data(16, '\0');
+        put(data, 8, key);
+        put(data, 14, code);
+        return vlr("LASF_Projection", 34735, data);
+    };
+    EXPECT_TRUE(says(unit(""), "unknown"));
+    EXPECT_TRUE(says(unit(keys(3076, 9003)), "US survey feet"));
+    EXPECT_TRUE(says(unit(keys(3076, 9001)), "metres"));
+    EXPECT_TRUE(says(unit(keys(1024, 2)), "degrees"));
+    EXPECT_TRUE(
+        says(unit(vlr("LASF_Projection", 2112, "PROJCS[\"x\",GEOGCS[UNIT[\"degree\",0.01]],UNIT[\"foot\",0.3048]]")),
+             "foot"));
+}
+
+TEST(Las, colours_of_eight_and_sixteen_bits_are_told_apart) {
+    const TemporaryFolder folder;
+    std::string bytes = las(2, 2);
+    const std::size_t points = get<std::uint32_t>(bytes, 96);
+    for (std::size_t i = 0; i < 3; ++i)
+        for (std::size_t channel = 0; channel < 3; ++channel)
+            put(bytes, points + 26 * i + 20 + 2 * channel, static_cast<std::uint16_t>(10 * (channel + 1)));
+    EXPECT_EQ(read(write_file(folder / "a.las", bytes)).colours[0], cv::Vec3b(30, 20, 10));
+    for (std::size_t channel = 0; channel < 3; ++channel)
+        put(bytes, points + 20 + 2 * channel, static_cast<std::uint16_t>(0x4000 * (channel + 1)));
+    const Cloud wide = read(write_file(folder / "b.las", bytes));
+    EXPECT_EQ(wide.colours[0], cv::Vec3b(0xc0, 0x80, 0x40));
+    const std::array colours{cv::Vec3b(255, 0, 1), cv::Vec3b(), cv::Vec3b()};
+    write_cloud(folder / "c.las", wide, {}, colours);
+    EXPECT_EQ(read(folder / "c.las").colours[0], colours[0]);
+}
+
+TEST(Las, what_is_packed_or_another_format_is_refused_with_help) {
+    const TemporaryFolder folder;
+    std::string packed = las(2, 3);
+    packed[104] = static_cast<char>(0x83);
+    const auto refused = [&](const std::string& name, const std::string& bytes) {
+        std::vector<std::string> warnings;
+        return refusal([&] { (void)read_cloud(write_file(folder / name, bytes), warnings); });
+    };
+    EXPECT_TRUE(says(refused("a.laz", packed), "laszip -i"));
+    EXPECT_TRUE(says(refused("a.e57", "ASTM-E57" + std::string(100, '\0')), "E57, which is not read"));
+    std::string five = las(2, 3);
+    five[25] = 5;
+    EXPECT_TRUE(says(refused("a.las", five), "LAS version 1.5"));
+    for (std::size_t length = 0; length < las(4, 7).size() - 60; ++length)
+        EXPECT_NE(refused("a.las", las(4, 7).substr(0, length)), "") << length;
+}
+
+TEST(TextClouds, keep_every_word_and_get_two_more) {
+    const TemporaryFolder folder;
+    const auto with_ao = [&](const std::string& name, const std::string& text) {
+        const Cloud cloud = read(write_file(folder / name, text));
+        EXPECT_EQ(cloud.points[1], Eigen::Vector3d(4, 5, 6)) << name;
+        const std::array values{0.25F, 0.5F};
+        write_cloud(folder / ("out-" + name), cloud, {{"ambient_occlusion", values}});
+        return file_bytes(folder / ("out-" + name));
+    };
+    EXPECT_EQ(with_ao("a.xyz", "1.00 2 3\n4 5 6e0\n"), "1.00 2 3 0.25\n4 5 6e0 0.5\n");
+    EXPECT_EQ(with_ao("b.xyz", "//X Y Z R G B\n1 2 3 9 8 7\n4 5 6 9 8 7"),
+              "//X Y Z R G B ambient_occlusion\n1 2 3 9 8 7 0.25\n4 5 6 9 8 7 0.5");
+    EXPECT_EQ(with_ao("c.pts", "2\r\n1 2 3 -5 1 2 3\r\n4 5 6 7 1 2 3\r\n"),
+              "2\r\n1 2 3 -5 1 2 3 0.25\r\n4 5 6 7 1 2 3 0.5\r\n");
+    EXPECT_EQ(read(folder / "c.pts").colours[0], cv::Vec3b(3, 2, 1));
+    std::vector<std::string> warnings;
+    EXPECT_TRUE(says(refusal([&] { (void)read_cloud(write_file(folder / "d.xyz", "1 2 3\n1 2\n"), warnings); }),
+                     "line 2: 2 values, expected 3"));
+    EXPECT_TRUE(
+        says(refusal([&] { (void)read_cloud(write_file(folder / "e.xyz", "1 2 3\n1 2 x\n"), warnings); }), "line 2"));
+    (void)read_cloud(write_file(folder / "f.pts", "5\n1 2 3\n"), warnings);
+    EXPECT_TRUE(warned(warnings, "says 5 points, holds 1"));
+}
+
+TEST(TextClouds, ptx_is_a_grid_placed_by_its_matrix) {
+    const TemporaryFolder folder;
+    const std::string head = "2\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n0 1 0 0\n-1 0 0 0\n0 0 1 0\n10 20 30 1\n";
+    const std::string body = "1 0 0 0.5\n0 0 0 0.5\n0 1 0 0.5\n0 0 1 0.5\n";
+    const Cloud cloud = read(write_file(folder / "a.ptx", head + body));
+    EXPECT_EQ(cloud.grid, cv::Size(2, 2));
+    EXPECT_EQ(cloud.points[0], Eigen::Vector3d(10, 21, 30)); // row vector times matrix: x turns to y
+    EXPECT_TRUE(cloud.points[1].array().isNaN().all());
+    EXPECT_EQ(cloud.records->viewpoint->translation(), Eigen::Vector3d(10, 20, 30));
+    const std::array values{0.5F, 0.5F, 0.5F, 0.25F};
+    write_cloud(folder / "b.ptx", cloud, {{"ambient_occlusion", values}});
+    EXPECT_EQ(file_bytes(folder / "b.ptx"), head + "1 0 0 0.5 0.5\n0 0 0 0.5 0.5\n0 1 0 0.5 0.5\n0 0 1 0.5 0.25\n");
+    const std::vector<float> twice{1, 2, 3, 4};
+    write_cloud(folder / "b.ptx", cloud, {{"ambient_occlusion", values}, {"ao_confidence", twice}});
+    const Cloud again = read(folder / "b.ptx");
+    EXPECT_EQ(again.points[0], cloud.points[0]);
+    EXPECT_TRUE(again.colours.empty()) << "six columns, but no colours";
+    std::vector<std::string> warnings;
+    EXPECT_TRUE(
+        says(refusal([&] { (void)read_cloud(write_file(folder / "c.ptx", head + body + head + body), warnings); }),
+             "a second scan"));
+    EXPECT_TRUE(says(refusal([&] { (void)read_cloud(write_file(folder / "d.ptx", head + "1 0 0 1\n"), warnings); }),
+                     "4 points, the file holds 1"));
+}
+
+TEST(Kitti, sweeps_become_ply) {
+    const TemporaryFolder folder;
+    const std::array<float, 8> floats{1, 2, 3, 0.5F, 4, 5, 6, 0.25F};
+    const std::string bytes(reinterpret_cast<const char*>(floats.data()), sizeof floats);
+    const Cloud cloud = read(write_file(folder / "a.bin", bytes));
+    EXPECT_EQ(cloud.points[1], Eigen::Vector3d(4, 5, 6));
+    EXPECT_EQ(extension(*cloud.records), ".ply");
+    const std::array values{0.5F, 0.25F};
+    write_cloud(folder / "a.ply", cloud, {{"ambient_occlusion", values}});
+    const Cloud back = read(folder / "a.ply");
+    EXPECT_EQ(value(back, 1, "reflectance"), 0.25);
+    EXPECT_EQ(value(back, 1, "ambient_occlusion"), 0.25);
+    std::vector<std::string> warnings;
+    EXPECT_TRUE(
+        says(refusal([&] { (void)read_cloud(write_file(folder / "b.bin", bytes + "x"), warnings); }), "33 bytes"));
+}
+
+} // namespace
+} // namespace scanshade
