@@ -19,7 +19,7 @@ namespace scanshade {
 namespace gpu {
 class Device;
 class DeviceBytes;
-}
+} // namespace gpu
 
 /// Depth and normals as shaders/lib/surfel.glsl packs them, two 32-bit words a pixel, on the device; depth 0 = hole.
 struct PackedSurfaces {
@@ -118,8 +118,8 @@ struct MethodRow {
     std::string_view summary; ///< one line
     std::string_view source;  ///< paper or documentation it follows
     std::unique_ptr<MethodSetup> (*setup)();
-    /// How much wider the windows of plane fits are for it than the noise itself asks for: methods that do not widen their
-    /// tolerances by View::noise want it gone.
+    /// How much wider the windows of plane fits are for it than the noise itself asks for: methods that do not widen
+    /// their tolerances by View::noise want it gone.
     double smoothing = 1;
 };
 

@@ -20,7 +20,8 @@ const std::array commands = {
                plan_command},
     CommandRow{"status", "how a planned job stands: tasks, frames, who is at work, failures by reason", status_command},
     CommandRow{"merge", "a planned job's reports in one", merge_command},
-    CommandRow{"refine", "the camera, from pictures of a board, organised clouds or a recording, and how sure", refine_command},
+    CommandRow{"refine", "the camera, from pictures of a board, organised clouds or a recording, and how sure",
+               refine_command},
     CommandRow{"compare", "two results, or a result and truth, as numbers and difference pictures", compare_command},
     CommandRow{"bench", "methods and settings against truth: milliseconds, errors, the front, as one page",
                bench_command},
@@ -46,8 +47,10 @@ void print_overview() {
         fmt::print("  scanshade {:<14} {}\n", row.name, row.summary);
     fmt::print("  scanshade {:<14} {}\n  scanshade {:<14} {}\n", "help",
                "this, or the flags of one command: help COMMAND", "--version", "the version");
-    fmt::print("\nExit code: 0 all well, 1 misuse, 2 some frames' input is bad (the others are done), 3 nothing could be done,\n"
-               "           4 interrupted, device lost, disk full or share gone: try again, `run --resume` goes on, 5 internal error.\n");
+    fmt::print("\nExit code: 0 all well, 1 misuse, 2 some frames' input is bad (the others are done), 3 nothing could "
+               "be done,\n"
+               "           4 interrupted, device lost, disk full or share gone: try again, `run --resume` goes on, 5 "
+               "internal error.\n");
 }
 
 std::string flag_names(const Parameter& row) { return row.name == "out" ? "-o,--out" : "--" + row.name; }
@@ -148,8 +151,8 @@ int execute(const std::vector<std::string>& arguments) {
 
 int main(int count, char** words) {
     using namespace scanshade;
-    // Images come and go by the megabyte: what one frame gives back the next one takes. By default each would ask the system for
-    // fresh pages, which costs more than most of what is done with them.
+    // Images come and go by the megabyte: what one frame gives back the next one takes. By default each would ask the
+    // system for fresh pages, which costs more than most of what is done with them.
     mallopt(M_MMAP_THRESHOLD, 32 << 20);
     mallopt(M_TRIM_THRESHOLD, 1 << 30);
     const std::vector<std::string> arguments(words + std::min(count, 1), words + count);

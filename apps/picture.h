@@ -20,12 +20,13 @@ namespace scanshade {
 /// `camera` is the pinhole of `z_m`, same size; lens distortion may be ignored, it only bends the light a little.
 [[nodiscard]] cv::Mat3b clay(const cv::Mat1f& z_m, const Pinhole& camera);
 
-/// Signed differences: -full_scale is blue, 0 white, +full_scale red, what lies beyond is cut there; NaN gets the dim blue.
-/// Straight lines in CIELAB between ends of equal lightness and chroma: equal differences look equally far apart
+/// Signed differences: -full_scale is blue, 0 white, +full_scale red, what lies beyond is cut there; NaN gets the dim
+/// blue. Straight lines in CIELAB between ends of equal lightness and chroma: equal differences look equally far apart
 /// (after Moreland, "Diverging Color Maps for Scientific Visualization", 2009).
 [[nodiscard]] cv::Mat3b difference_picture(const cv::Mat1f& difference, double full_scale);
 
-/// Cosine between each pixel's surface normal and the way back to the camera, after a smoothing along the surface; 0 in holes.
+/// Cosine between each pixel's surface normal and the way back to the camera, after a smoothing along the surface; 0 in
+/// holes.
 [[nodiscard]] cv::Mat1f facing_camera(const cv::Mat1f& z_m, const Pinhole& camera);
 
 /// One picture of a panel, and what is written above it.

@@ -19,23 +19,28 @@ std::array<cv::Point2f, places> seeds() {
     std::array<cv::Point2f, places> all;
     for (int i = 0; i < places; ++i) {
         const double r = std::sqrt((i + 0.5) / places), turn = i * std::numbers::pi * (3 - std::sqrt(5.0));
-        all[static_cast<std::size_t>(i)] = {static_cast<float>(r * std::cos(turn)), static_cast<float>(r * std::sin(turn))};
+        all[static_cast<std::size_t>(i)] = {static_cast<float>(r * std::cos(turn)),
+                                            static_cast<float>(r * std::sin(turn))};
     }
     return all;
 }
 
 } // namespace
 
-cv::Mat1f confidence_of(const DepthImage& depth, const cv::Mat1f& visibility, double radius_m, const DepthNoise& noise) {
+cv::Mat1f confidence_of(const DepthImage& depth, const cv::Mat1f& visibility, double radius_m,
+                        const DepthNoise& noise) {
     const cv::Mat1f& z_m = depth.z_m;
     if (visibility.size() != z_m.size())
-        throw Error(fmt::format("visibility is {}x{}, its depth image {}x{}", visibility.cols, visibility.rows, z_m.cols, z_m.rows));
+        throw Error(fmt::format("visibility is {}x{}, its depth image {}x{}", visibility.cols, visibility.rows,
+                                z_m.cols, z_m.rows));
     static const std::array<cv::Point2f, places> disc = seeds();
-    const auto radius = static_cast<float>(radius_m), fx = static_cast<float>(depth.camera.fx), fy = static_cast<float>(depth.camera.fy);
+    const auto radius = static_cast<float>(radius_m), fx = static_cast<float>(depth.camera.fx),
+               fy = static_cast<float>(depth.camera.fy);
     const float f = std::sqrt(fx * fy);
     cv::Mat1f seen_z(z_m.size()); // in front of no ball where nothing was seen
-    std::transform(z_m.begin(), z_m.end(), visibility.begin(), seen_z.begin(),
-                   [](float z, float value) { return std::isnan(value) ? -std::numeric_limits<float>::infinity() : z; });
+    std::transform(z_m.begin(), z_m.end(), visibility.begin(), seen_z.begin(), [](float z, float value) {
+        return std::isnan(value) ? -std::numeric_limits<float>::infinity() : z;
+    });
     cv::Mat1f confidence(z_m.size(), std::numeric_limits<float>::quiet_NaN());
     for (int v = 0; v < z_m.rows; ++v)
         for (int u = 0; u < z_m.cols; ++u) {
@@ -45,8 +50,8 @@ cv::Mat1f confidence_of(const DepthImage& depth, const cv::Mat1f& visibility, do
             int seen = 0;
             for (const cv::Point2f& seed : disc) {
                 const int x = u + cvRound(seed.x * across), y = v + cvRound(seed.y * down);
-                seen += static_cast<unsigned>(x) < static_cast<unsigned>(z_m.cols) && static_cast<unsigned>(y) < static_cast<unsigned>(z_m.rows) &&
-                        seen_z(y, x) > z - radius;
+                seen += static_cast<unsigned>(x) < static_cast<unsigned>(z_m.cols) &&
+                        static_cast<unsigned>(y) < static_cast<unsigned>(z_m.rows) && seen_z(y, x) > z - radius;
             }
             const float resolved = std::clamp(0.5F * (radius * f / z) - 0.5F, 0.0F, 1.0F);
             const auto told = static_cast<float>(std::max(0.0, 1 - 3 * noise.at(z) / radius_m));

@@ -17,9 +17,9 @@
 namespace scanshade {
 namespace {
 
-constexpr int lag_px = 4;      // longer than the sensor's own smoothing, shorter than most surfaces
-constexpr int step_px = 3;     // every third pixel of every third row is plenty
-constexpr int bands = 24;      // equal steps of log z over 0.2 .. 50 m
+constexpr int lag_px = 4;  // longer than the sensor's own smoothing, shorter than most surfaces
+constexpr int step_px = 3; // every third pixel of every third row is plenty
+constexpr int bands = 24;  // equal steps of log z over 0.2 .. 50 m
 constexpr double nearest_m = 0.2, farthest_m = 50;
 constexpr std::size_t enough = 400; // samples for a band to speak
 
@@ -30,14 +30,13 @@ struct Band {
     double z_sum = 0;
 };
 
-int band_of(double z) {
-    return static_cast<int>(bands * std::log(z / nearest_m) / std::log(farthest_m / nearest_m));
-}
+int band_of(double z) { return static_cast<int>(bands * std::log(z / nearest_m) / std::log(farthest_m / nearest_m)); }
 
 /// Second difference of 1/z along (dx, dy), as metres of depth at z; negative where something is unknown.
 float second_difference(const cv::Mat1f& z, int x, int y, int dx, int dy) {
     const float c = z(y, x), a = z(y - dy, x - dx), b = z(y + dy, x + dx);
-    if (!(a > 0 && b > 0)) return -1;
+    if (!(a > 0 && b > 0))
+        return -1;
     return std::abs(1 / a + 1 / b - 2 / c) * c * c;
 }
 
@@ -45,12 +44,15 @@ void collect(const cv::Mat1f& z, std::array<Band, bands>& all) {
     for (int y = lag_px; y < z.rows - lag_px; y += step_px)
         for (int x = lag_px; x < z.cols - lag_px; x += step_px) {
             const float c = z(y, x);
-            if (!(c > nearest_m && c < farthest_m)) continue;
+            if (!(c > nearest_m && c < farthest_m))
+                continue;
             Band& band = all[static_cast<std::size_t>(std::min(band_of(c), bands - 1))];
             band.depths_m.push_back(c);
             for (const auto& [dx, dy] : {std::pair{1, 0}, std::pair{0, 1}}) {
-                const float d = second_difference(z, x, y, lag_px * dx, lag_px * dy), adjacent = second_difference(z, x, y, dx, dy);
-                if (d < 0 || adjacent < 0) continue;
+                const float d = second_difference(z, x, y, lag_px * dx, lag_px * dy),
+                            adjacent = second_difference(z, x, y, dx, dy);
+                if (d < 0 || adjacent < 0)
+                    continue;
                 band.spread_m.push_back(d);
                 band.adjacent_m.push_back(adjacent);
                 band.z_sum += c;
@@ -62,8 +64,8 @@ struct Measured {
     double z, sigma, adjacent, weight; // deviations by distant and by adjacent pixels
 };
 
-/// Sigma from the mean of the smallest `share` of the differences, were they Gaussian; `mean_of_share` is that mean for sigma 1.
-/// A second difference of three independent values has sqrt(6) times the deviation of one.
+/// Sigma from the mean of the smallest `share` of the differences, were they Gaussian; `mean_of_share` is that mean for
+/// sigma 1. A second difference of three independent values has sqrt(6) times the deviation of one.
 double sigma_of(std::vector<float>& spread_m, double share, double mean_of_share) {
     const double count = share * static_cast<double>(spread_m.size());
     const auto at = spread_m.begin() + static_cast<std::ptrdiff_t>(count);
@@ -79,9 +81,11 @@ void keep_distinct(std::vector<float>& values) {
 
 /// The usual distance between neighbouring values that occur: the sensor's step where it has one.
 double step_of(const std::vector<float>& depths_m) {
-    if (depths_m.size() < 2) return 0;
+    if (depths_m.size() < 2)
+        return 0;
     std::vector<float> gaps(depths_m.size() - 1);
-    for (std::size_t i = 0; i < gaps.size(); ++i) gaps[i] = depths_m[i + 1] - depths_m[i];
+    for (std::size_t i = 0; i < gaps.size(); ++i)
+        gaps[i] = depths_m[i + 1] - depths_m[i];
     const auto middle = gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2);
     std::nth_element(gaps.begin(), middle, gaps.end());
     return *middle;
@@ -91,17 +95,18 @@ struct Spread {
     double distant, adjacent;
 };
 
-/// The lower 80 % of |N(0, 1)| have the mean 0.5586, the lower 40 % 0.2563. Among clutter more than a fifth of the differences
-/// straddle an edge, so the smaller share decides; but not where the values come in steps: there many differences are exactly
-/// zero, and the steps are the noise.
+/// The lower 80 % of |N(0, 1)| have the mean 0.5586, the lower 40 % 0.2563. Among clutter more than a fifth of the
+/// differences straddle an edge, so the smaller share decides; but not where the values come in steps: there many
+/// differences are exactly zero, and the steps are the noise.
 Spread spread_of(Band& band) {
     const double most = sigma_of(band.spread_m, 0.8, 0.5586), few = sigma_of(band.spread_m, 0.4, 0.2563);
-    if (few >= most || step_of(band.depths_m) >= 0.5 * most) return {most, sigma_of(band.adjacent_m, 0.8, 0.5586)};
+    if (few >= most || step_of(band.depths_m) >= 0.5 * most)
+        return {most, sigma_of(band.adjacent_m, 0.8, 0.5586)};
     return {few, sigma_of(band.adjacent_m, 0.4, 0.2563)};
 }
 
-/// Variance of a second difference over `lag` pixels, in variances of one value, where values d pixels apart correlate by
-/// exp(-d^2 / 2 s^2).
+/// Variance of a second difference over `lag` pixels, in variances of one value, where values d pixels apart correlate
+/// by exp(-d^2 / 2 s^2).
 double second_difference_variance(double lag, double s) {
     const auto correlation = [s](double d) { return std::exp(-d * d / (2 * s * s)); };
     return 6 - 8 * correlation(lag) + 2 * correlation(2 * lag);
@@ -112,7 +117,8 @@ double grain_of(double ratio) {
     double low = 0.3, high = 3; // of s
     for (int i = 0; i < 30; ++i) {
         const double s = (low + high) / 2;
-        const bool too_smooth = second_difference_variance(1, s) < ratio * ratio * second_difference_variance(lag_px, s);
+        const bool too_smooth =
+            second_difference_variance(1, s) < ratio * ratio * second_difference_variance(lag_px, s);
         (too_smooth ? high : low) = s;
     }
     return std::max(1.0, std::sqrt(2 * std::numbers::pi) * low);
@@ -126,20 +132,24 @@ Step step_by(const std::vector<float>& values_m, int power) {
     std::vector<double> gaps;
     for (std::size_t i = 1; i < values_m.size(); ++i)
         gaps.push_back((static_cast<double>(values_m[i]) - values_m[i - 1]) / std::pow(values_m[i], power));
-    if (gaps.size() < 50) return {}; // a disparity sensor has some hundred values in all
+    if (gaps.size() < 50)
+        return {}; // a disparity sensor has some hundred values in all
     const auto low = gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 10);
     std::nth_element(gaps.begin(), low, gaps.end());
     double sum = 0, count = 0;
     for (const double gap : gaps)
-        if (gap > 0.75 * *low && gap < 1.35 * *low) sum += gap, ++count;
+        if (gap > 0.75 * *low && gap < 1.35 * *low)
+            sum += gap, ++count;
     return {sum / count, count / static_cast<double>(gaps.size())};
 }
 
 void tell_steps(DepthNoise& noise, const std::vector<float>& values_m) {
     const Step even = step_by(values_m, 0), growing = step_by(values_m, 2);
     constexpr double told = 0.25; // of unquantised values a fiftieth lie so
-    if (std::max(even.share, growing.share) < told) return;
-    (even.share >= growing.share ? noise.step_m : noise.step_per_z2) = (even.share >= growing.share ? even : growing).size;
+    if (std::max(even.share, growing.share) < told)
+        return;
+    (even.share >= growing.share ? noise.step_m : noise.step_per_z2) =
+        (even.share >= growing.share ? even : growing).size;
 }
 
 /// floor + per_z2 z^2 through the bands by least squares of relative error, both terms at least zero.
@@ -157,8 +167,10 @@ DepthNoise law_through(const std::vector<Measured>& points) {
     } else {
         noise.floor_m = t0 / s00; // one distance: it cannot be told how noise grows
     }
-    if (noise.per_z2 < 0) noise = {t0 / s00, 0};
-    if (noise.floor_m < 0) noise = {0, t1 / s11};
+    if (noise.per_z2 < 0)
+        noise = {t0 / s00, 0};
+    if (noise.floor_m < 0)
+        noise = {0, t1 / s11};
     return noise;
 }
 
@@ -166,13 +178,15 @@ DepthNoise law_through(const std::vector<Measured>& points) {
 
 DepthNoise measure_noise(std::span<const DepthImage> images) {
     std::array<Band, bands> all;
-    for (const DepthImage& image : images) collect(image.z_m, all);
+    for (const DepthImage& image : images)
+        collect(image.z_m, all);
     std::array<std::optional<Measured>, bands> measured;
     tbb::this_task_arena::isolate([&] {
         tbb::parallel_for(std::size_t(0), all.size(), [&](std::size_t i) {
             Band& band = all[i];
             keep_distinct(band.depths_m);
-            if (band.spread_m.size() < enough) return;
+            if (band.spread_m.size() < enough)
+                return;
             const double count = static_cast<double>(band.spread_m.size());
             const Spread spread = spread_of(band);
             measured[i] = {band.z_sum / count, std::max(spread.distant, 1e-6), spread.adjacent, count};
@@ -182,32 +196,41 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
     std::vector<float> values_m; // in order, as bands are
     for (std::size_t i = 0; i < all.size(); ++i) {
         values_m.insert(values_m.end(), all[i].depths_m.begin(), all[i].depths_m.end());
-        if (measured[i]) points.push_back(*measured[i]);
+        if (measured[i])
+            points.push_back(*measured[i]);
     }
     DepthNoise steps;
     tell_steps(steps, values_m);
-    if (points.empty()) return steps;
+    if (points.empty())
+        return steps;
     DepthNoise noise = law_through(points);
     noise.step_m = steps.step_m, noise.step_per_z2 = steps.step_per_z2;
     double ratios = 0, weights = 0;
-    for (const Measured& p : points) ratios += p.weight * p.adjacent / p.sigma, weights += p.weight;
+    for (const Measured& p : points)
+        ratios += p.weight * p.adjacent / p.sigma, weights += p.weight;
     noise.grain_px = grain_of(ratios / weights);
-    const bool clean = std::all_of(points.begin(), points.end(), [&](const Measured& p) { return noise.at(p.z) < std::max(1e-4 * p.z, 1.2e-4); });
+    const bool clean = std::all_of(points.begin(), points.end(),
+                                   [&](const Measured& p) { return noise.at(p.z) < std::max(1e-4 * p.z, 1.2e-4); });
     return clean ? steps : noise;
 }
 
 DepthNoise noise_from_text(const std::string& text) {
-    if (text == "none") return {};
-    if (text == "kinect") return {0.0015, 0.0018, 3};
-    if (text == "tof") return {0.0015, 0};
+    if (text == "none")
+        return {};
+    if (text == "kinect")
+        return {0.0015, 0.0018, 3};
+    if (text == "tof")
+        return {0.0015, 0};
     DepthNoise noise;
     int used = 0;
     const bool law = std::sscanf(text.c_str(), "%lf,%lf%n", &noise.floor_m, &noise.per_z2, &used) == 2;
     if (law && used < static_cast<int>(text.size())) { // with a grain
         int more = 0;
-        if (std::sscanf(text.c_str() + used, ",%lf%n", &noise.grain_px, &more) == 1) used += more;
+        if (std::sscanf(text.c_str() + used, ",%lf%n", &noise.grain_px, &more) == 1)
+            used += more;
     }
-    if (!law || used != static_cast<int>(text.size()) || !(noise.floor_m >= 0 && noise.floor_m < 1 && noise.per_z2 >= 0 && noise.per_z2 < 1) ||
+    if (!law || used != static_cast<int>(text.size()) ||
+        !(noise.floor_m >= 0 && noise.floor_m < 1 && noise.per_z2 >= 0 && noise.per_z2 < 1) ||
         !(noise.grain_px >= 1 && noise.grain_px <= 16))
         throw Misuse("depth noise '" + text +
                      "': auto, none, kinect, tof or FLOOR,PER_Z2[,GRAIN] (metres, 0 .. 1; pixels, 1 .. 16) expected");
@@ -216,9 +239,12 @@ DepthNoise noise_from_text(const std::string& text) {
 
 std::string describe(const DepthNoise& noise) {
     std::string text = "none";
-    if (noise.any()) text = fmt::format("sigma {:.5f} + {:.5f} z^2 m, grain {:.1f} px", noise.floor_m, noise.per_z2, noise.grain_px);
-    if (noise.step_m > 0) text += fmt::format(", steps of {:.2g} m", noise.step_m);
-    if (noise.step_per_z2 > 0) text += fmt::format(", steps of {:.2g} z^2 m", noise.step_per_z2);
+    if (noise.any())
+        text = fmt::format("sigma {:.5f} + {:.5f} z^2 m, grain {:.1f} px", noise.floor_m, noise.per_z2, noise.grain_px);
+    if (noise.step_m > 0)
+        text += fmt::format(", steps of {:.2g} m", noise.step_m);
+    if (noise.step_per_z2 > 0)
+        text += fmt::format(", steps of {:.2g} z^2 m", noise.step_per_z2);
     return text;
 }
 

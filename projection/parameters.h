@@ -13,9 +13,9 @@ namespace scanshade {
 struct Parameter {
     using Target = std::variant<bool*, int*, float*, double*, std::string*>;
 
-    std::string name;  ///< "radius"
-    std::string help;  ///< one line, without default and range (they are printed from the row)
-    Target value;      ///< holds the default until set
+    std::string name;   ///< "radius"
+    std::string help;   ///< one line, without default and range (they are printed from the row)
+    Target value;       ///< holds the default until set
     std::string unit{}; ///< "m", "rad", "" ...
     double low = -std::numeric_limits<double>::infinity(); ///< inclusive
     double high = std::numeric_limits<double>::infinity(); ///< inclusive

@@ -47,8 +47,8 @@ struct CloudVisibility {
 /// Deterministic: the result depends neither on the number of threads nor on their timing.
 class CloudAo {
   public:
-    /// On `device`, or where there is none on the processor (faster there than as Vulkan's device). Throws Misuse naming
-    /// a setting out of its range.
+    /// On `device`, or where there is none on the processor (faster there than as Vulkan's device). Throws Misuse
+    /// naming a setting out of its range.
     explicit CloudAo(CloudAoOptions options, gpu::Device* device = nullptr);
 
     /// `scanner`: where the file says that the cloud was seen from. Where there are faces, rays are cast from the

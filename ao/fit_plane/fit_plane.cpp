@@ -14,9 +14,10 @@ namespace {
 // The order of buffers; all but the first two only where planes are fitted, the last three only where frames are fused.
 enum Buffers : int { recorded, kept, averages, depth_out, normals_out, others_in, fused, relief };
 
-/// Of the window's radius, squared, in units of grain^2 sigma fx / z (pixels). Below it noise tilts normals, above it a plane no
-/// longer is what surfaces are. Without grain this leaves the least error in AO on simulated sensors. With grain the least error
-/// lies somewhat lower, but a real Kinect errs alike over more pixels than the grain tells, and its walls would stay mottled.
+/// Of the window's radius, squared, in units of grain^2 sigma fx / z (pixels). Below it noise tilts normals, above it a
+/// plane no longer is what surfaces are. Without grain this leaves the least error in AO on simulated sensors. With
+/// grain the least error lies somewhat lower, but a real Kinect errs alike over more pixels than the grain tells, and
+/// its walls would stay mottled.
 constexpr double window_scale = 1.8;
 
 std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bool planes, bool fuse) {
@@ -54,7 +55,8 @@ FitPlane::FitPlane(gpu::Device& device, const DepthNoise& noise, const FitPlaneO
 }
 
 void FitPlane::set_noise(const DepthNoise& noise) {
-    if (!noise.any()) throw Error("a plane fit needs a noise above zero");
+    if (!noise.any())
+        throw Error("a plane fit needs a noise above zero");
     noise_ = noise;
 }
 
@@ -64,8 +66,10 @@ void FitPlane::prepare(const DepthImage& depth, std::span<const OtherDepth> othe
     if (others.size() > shared::most_neighbours)
         throw Error(fmt::format("{} other frames, {} are the most", others.size(), shared::most_neighbours));
     for (const OtherDepth& other : others) // before any is taken: a run that fails must leave nothing to the next
-        if (other.camera.size != size) throw Error("another frame of another image size");
-    if (!program_ || size != size_ || fuse != fused_) program_ = program_for(device_, size, planes(), fuse);
+        if (other.camera.size != size)
+            throw Error("another frame of another image size");
+    if (!program_ || size != size_ || fuse != fused_)
+        program_ = program_for(device_, size, planes(), fuse);
     size_ = size;
     fused_ = fuse;
     const shared::Pinhole camera = depth.camera.on_gpu();
@@ -91,7 +95,8 @@ void FitPlane::prepare(const DepthImage& depth, std::span<const OtherDepth> othe
 
 PreparedSurfaces FitPlane::compute_on_device(const DepthImage& depth) {
     prepare(depth, {});
-    const std::shared_ptr<gpu::DeviceBytes> z_m = pool_.get(depth.z_m.total() * 4), normals = pool_.get(depth.z_m.total() * 12);
+    const std::shared_ptr<gpu::DeviceBytes> z_m = pool_.get(depth.z_m.total() * 4),
+                                            normals = pool_.get(depth.z_m.total() * 12);
     program_->give(depth_out, z_m);
     program_->give(normals_out, normals);
     program_->run(std::as_bytes(std::span(&constants_, 1)), gpu::Program::Results::on_device);
@@ -109,7 +114,8 @@ FittedDepth FitPlane::compute(const DepthImage& depth, std::span<const OtherDept
     if (!planes()) {
         fitted.depth.z_m.create(size);
         const auto inverse = program_->host_as<float>(kept);
-        std::transform(z.begin(), z.end(), inverse.begin(), fitted.depth.z_m.begin(), [](float z_m, float w) { return w > 0 ? z_m : 0; });
+        std::transform(z.begin(), z.end(), inverse.begin(), fitted.depth.z_m.begin(),
+                       [](float z_m, float w) { return w > 0 ? z_m : 0; });
         return fitted;
     }
     fitted.normals.normals.create(size);
@@ -124,8 +130,10 @@ AoMap OnFittedDepth::compute(const View& view) {
     if (!view.noise.any()) {
         ao = method_.compute(view);
     } else {
-        if (fit_) fit_->set_noise(view.noise);
-        else fit_.emplace(device_, view.noise, options_);
+        if (fit_)
+            fit_->set_noise(view.noise);
+        else
+            fit_.emplace(device_, view.noise, options_);
         ao = on_fitted(view);
         timings_ = fit_->timings();
     }
@@ -140,7 +148,8 @@ AoMap OnFittedDepth::on_fitted(const View& view) {
     }
     const FittedDepth fitted = fit_->compute(view.depth);
     const bool planes = !fitted.normals.normals.empty();
-    return method_.compute({fitted.depth, view.normals || !planes ? view.normals : &fitted.normals, view.noise, planes});
+    return method_.compute(
+        {fitted.depth, view.normals || !planes ? view.normals : &fitted.normals, view.noise, planes});
 }
 
 } // namespace scanshade

@@ -35,7 +35,8 @@ vk::DebugUtilsMessengerCreateInfoEXT messenger_info(Messages* messages) {
     return {{}, Severity::eError | Severity::eWarning, Type::eValidation | Type::ePerformance, keep_message, messages};
 }
 
-/// The instance, with validation and synchronization validation where SCANSHADE_VALIDATE asks and the layer is installed.
+/// The instance, with validation and synchronization validation where SCANSHADE_VALIDATE asks and the layer is
+/// installed.
 void make_instance(Device::State& state) {
     const vk::ApplicationInfo application("scanshade", 1, "scanshade", 1, VK_API_VERSION_1_3);
     vk::InstanceCreateInfo info({}, &application);
@@ -57,34 +58,45 @@ void make_instance(Device::State& state) {
 
 std::string kind_name(vk::PhysicalDeviceType type) {
     switch (type) {
-    case vk::PhysicalDeviceType::eDiscreteGpu: return "discrete GPU";
-    case vk::PhysicalDeviceType::eIntegratedGpu: return "integrated GPU";
-    case vk::PhysicalDeviceType::eVirtualGpu: return "virtual GPU";
-    case vk::PhysicalDeviceType::eCpu: return "CPU";
-    default: return "other";
+    case vk::PhysicalDeviceType::eDiscreteGpu:
+        return "discrete GPU";
+    case vk::PhysicalDeviceType::eIntegratedGpu:
+        return "integrated GPU";
+    case vk::PhysicalDeviceType::eVirtualGpu:
+        return "virtual GPU";
+    case vk::PhysicalDeviceType::eCpu:
+        return "CPU";
+    default:
+        return "other";
     }
 }
 
 int compute_family(const vk::raii::PhysicalDevice& physical) {
     const auto families = physical.getQueueFamilyProperties();
     for (std::size_t i = 0; i < families.size(); ++i)
-        if (families[i].queueFlags & vk::QueueFlagBits::eCompute) return static_cast<int>(i);
+        if (families[i].queueFlags & vk::QueueFlagBits::eCompute)
+            return static_cast<int>(i);
     return -1;
 }
 
 /// What the shaders and the pass runner cannot do without.
 std::string what_is_missing(const vk::raii::PhysicalDevice& physical) {
-    if (physical.getProperties().apiVersion < VK_API_VERSION_1_3) return "Vulkan 1.3";
-    if (compute_family(physical) < 0) return "a compute queue";
+    if (physical.getProperties().apiVersion < VK_API_VERSION_1_3)
+        return "Vulkan 1.3";
+    if (compute_family(physical) < 0)
+        return "a compute queue";
     const auto extensions = physical.enumerateDeviceExtensionProperties();
     if (std::none_of(extensions.begin(), extensions.end(),
                      [](const auto& e) { return std::strcmp(e.extensionName, push_descriptors) == 0; }))
         return push_descriptors;
-    const auto features =
-        physical.getFeatures2<vk::PhysicalDeviceFeatures2, vk::PhysicalDeviceVulkan12Features, vk::PhysicalDeviceVulkan13Features>();
-    if (!features.get<vk::PhysicalDeviceVulkan12Features>().scalarBlockLayout) return "scalarBlockLayout";
-    if (!features.get<vk::PhysicalDeviceVulkan13Features>().synchronization2) return "synchronization2";
-    if (!features.get<vk::PhysicalDeviceVulkan13Features>().maintenance4) return "maintenance4";
+    const auto features = physical.getFeatures2<vk::PhysicalDeviceFeatures2, vk::PhysicalDeviceVulkan12Features,
+                                                vk::PhysicalDeviceVulkan13Features>();
+    if (!features.get<vk::PhysicalDeviceVulkan12Features>().scalarBlockLayout)
+        return "scalarBlockLayout";
+    if (!features.get<vk::PhysicalDeviceVulkan13Features>().synchronization2)
+        return "synchronization2";
+    if (!features.get<vk::PhysicalDeviceVulkan13Features>().maintenance4)
+        return "maintenance4";
     return {};
 }
 
@@ -109,13 +121,16 @@ DeviceInfo info_of(const vk::raii::PhysicalDevice& physical, int index) {
 }
 
 std::string lower(std::string text) {
-    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    std::transform(text.begin(), text.end(), text.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     return text;
 }
 
 int rank(const DeviceInfo& info) {
-    if (info.kind == "discrete GPU") return 0;
-    if (info.kind == "integrated GPU") return 1;
+    if (info.kind == "discrete GPU")
+        return 0;
+    if (info.kind == "integrated GPU")
+        return 1;
     return info.kind == "virtual GPU" ? 2 : 3;
 }
 
@@ -125,15 +140,19 @@ const DeviceInfo* chosen(const std::vector<DeviceInfo>& all, const std::string& 
     const auto [end, code] = std::from_chars(choice.data(), choice.data() + choice.size(), index);
     const bool by_index = code == std::errc() && end == choice.data() + choice.size();
     for (const DeviceInfo& info : all) {
-        if (by_index ? info.index != index : lower(info.name).find(lower(choice)) == std::string::npos) continue;
-        if (!info.unusable.empty()) continue;
-        if (!best || rank(info) < rank(*best)) best = &info;
+        if (by_index ? info.index != index : lower(info.name).find(lower(choice)) == std::string::npos)
+            continue;
+        if (!info.unusable.empty())
+            continue;
+        if (!best || rank(info) < rank(*best))
+            best = &info;
     }
     return best;
 }
 
 std::string listing(const std::vector<DeviceInfo>& all) {
-    if (all.empty()) return "no Vulkan driver is installed (Debian: mesa-vulkan-drivers brings a software one)";
+    if (all.empty())
+        return "no Vulkan driver is installed (Debian: mesa-vulkan-drivers brings a software one)";
     std::string text = "there are:";
     for (const DeviceInfo& info : all)
         text += fmt::format(" {} {} ({}){};", info.index, info.name, info.kind,
@@ -166,7 +185,8 @@ void open_device(Device::State& state) {
 
 int Device::State::memory_type(std::uint32_t allowed, vk::MemoryPropertyFlags wanted) const {
     for (std::uint32_t i = 0; i < memory.memoryTypeCount; ++i)
-        if ((allowed >> i & 1u) && (memory.memoryTypes[i].propertyFlags & wanted) == wanted) return static_cast<int>(i);
+        if ((allowed >> i & 1u) && (memory.memoryTypes[i].propertyFlags & wanted) == wanted)
+            return static_cast<int>(i);
     return -1;
 }
 
@@ -186,7 +206,8 @@ Device::Device(const std::string& choice) : state_(std::make_unique<State>()) {
         make_instance(*state_);
         const auto physicals = state_->instance.enumeratePhysicalDevices();
         std::vector<DeviceInfo> all;
-        for (const auto& physical : physicals) all.push_back(info_of(physical, static_cast<int>(all.size())));
+        for (const auto& physical : physicals)
+            all.push_back(info_of(physical, static_cast<int>(all.size())));
         const DeviceInfo* best = chosen(all, choice);
         if (!best)
             throw Error(choice.empty() ? "no usable device; " + listing(all)
@@ -206,7 +227,8 @@ std::vector<std::unique_ptr<Device>> open_devices(const std::string& choice) {
     if (choice != "all" || is_cpu(first))
         return opened;
     for (const DeviceInfo& info : list_devices())
-        if (info.unusable.empty() && info.index != first.index && info.name == first.name && info.driver == first.driver)
+        if (info.unusable.empty() && info.index != first.index && info.name == first.name &&
+            info.driver == first.driver)
             opened.push_back(std::make_unique<Device>(std::to_string(info.index)));
     return opened;
 }

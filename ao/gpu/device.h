@@ -10,29 +10,30 @@ namespace scanshade::gpu {
 
 /// What `scanshade devices` prints of one Vulkan device.
 struct DeviceInfo {
-    int index = 0;          ///< in the order the Vulkan loader lists them
-    std::string name;       ///< "llvmpipe (LLVM 15.0.6, 256 bits)"
-    std::string kind;       ///< "discrete GPU", "integrated GPU", "virtual GPU", "CPU", "other"
-    std::string driver;     ///< driver name and version text
-    std::string api;        ///< "1.3.230"
-    int most_threads = 0;   ///< of a work group
+    int index = 0;                       ///< in the order the Vulkan loader lists them
+    std::string name;                    ///< "llvmpipe (LLVM 15.0.6, 256 bits)"
+    std::string kind;                    ///< "discrete GPU", "integrated GPU", "virtual GPU", "CPU", "other"
+    std::string driver;                  ///< driver name and version text
+    std::string api;                     ///< "1.3.230"
+    int most_threads = 0;                ///< of a work group
     std::uint64_t most_buffer_bytes = 0; ///< that a shader may reach of a buffer
     std::uint64_t memory_bytes = 0;      ///< of its largest heap of its own
-    std::string unusable;   ///< what it lacks; empty = usable
+    std::string unusable;                ///< what it lacks; empty = usable
 };
 
 /// Whether "the device" is the processor's own cores.
 [[nodiscard]] inline bool is_cpu(const DeviceInfo& info) { return info.kind == "CPU"; }
 
-/// Every device the loader knows, usable or not. Empty without a driver; throws Error only when there is no Vulkan loader.
+/// Every device the loader knows, usable or not. Empty without a driver; throws Error only when there is no Vulkan
+/// loader.
 [[nodiscard]] std::vector<DeviceInfo> list_devices();
 
-/// One opened device. Owns the Vulkan objects; programs made from it must not outlive it. Threads may make and run programs of
-/// their own on it side by side.
+/// One opened device. Owns the Vulkan objects; programs made from it must not outlive it. Threads may make and run
+/// programs of their own on it side by side.
 class Device {
   public:
-    /// `choice`: empty = discrete GPU, else integrated, else any usable (lavapipe); an index; or part of a name, case-insensitive.
-    /// Throws Error listing the devices there are when nothing fits.
+    /// `choice`: empty = discrete GPU, else integrated, else any usable (lavapipe); an index; or part of a name,
+    /// case-insensitive. Throws Error listing the devices there are when nothing fits.
     explicit Device(const std::string& choice = {});
     ~Device();
     Device(const Device&) = delete;
@@ -51,8 +52,8 @@ class Device {
     std::unique_ptr<State> state_;
 };
 
-/// The device that `choice` names, as Device takes it. "all": the fastest GPU and every other of the same name and driver, so
-/// that it makes no difference which of them computes a frame; a software device only where there is no GPU.
+/// The device that `choice` names, as Device takes it. "all": the fastest GPU and every other of the same name and
+/// driver, so that it makes no difference which of them computes a frame; a software device only where there is no GPU.
 [[nodiscard]] std::vector<std::unique_ptr<Device>> open_devices(const std::string& choice);
 
 } // namespace scanshade::gpu

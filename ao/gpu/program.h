@@ -17,50 +17,51 @@
 
 namespace scanshade::gpu {
 
-/// A buffer (or image) of the program, zero to begin with. Host buffers can be reached by Program::host() before (upload) or after
-/// (download) a run; Program::take() fills the others that are no pass's result.
+/// A buffer (or image) of the program, zero to begin with. Host buffers can be reached by Program::host() before
+/// (upload) or after (download) a run; Program::take() fills the others that are no pass's result.
 struct BufferRow {
     enum class Host { none, upload, download, taken }; // what is uploaded may be taken, too
     std::string_view name;
     std::size_t bytes = 0;
     Host host = Host::none;
-    /// Bound as a storage texel buffer (imageBuffer, uimageBuffer) instead of a storage buffer: on lavapipe a load is then
-    /// one gather in place, without a branch per lane (storage buffer) or a call (sampled texel buffer).
+    /// Bound as a storage texel buffer (imageBuffer, uimageBuffer) instead of a storage buffer: on lavapipe a load is
+    /// then one gather in place, without a branch per lane (storage buffer) or a call (sampled texel buffer).
     enum class Texels { none, r32f, rg32f, rgba32f, r32ui, rg32ui };
     Texels texels = Texels::none;
     std::vector<float> initial = {}; ///< what it holds from the start instead of zeros; 64 KiB at most
-    /// Instead of a buffer, an array of layers of 32-bit floats with mips; `bytes` is image_bytes(image). Passes that read it see
-    /// a sampler2DArray (nearest texel, 0 outside), passes that write it an image2DArray[mips]. GPUs keep images in tiles and
-    /// find a texel in hardware; lavapipe does all of that step by step.
+    /// Instead of a buffer, an array of layers of 32-bit floats with mips; `bytes` is image_bytes(image). Passes that
+    /// read it see a sampler2DArray (nearest texel, 0 outside), passes that write it an image2DArray[mips]. GPUs keep
+    /// images in tiles and find a texel in hardware; lavapipe does all of that step by step.
     struct Image {
         std::uint32_t width = 0, height = 0, layers = 0, mips = 0;
     };
     Image image = {};
 };
 
-/// Bytes of all mips of all layers, mip by mip, layer by layer, row by row: what Program::read_back() of an image returns.
+/// Bytes of all mips of all layers, mip by mip, layer by layer, row by row: what Program::read_back() of an image
+/// returns.
 [[nodiscard]] std::size_t image_bytes(const BufferRow::Image& image);
 
 /// One dispatch. `reads` bind from 0, `writes` (read-write included) from 16, the constants at 32.
 struct PassRow {
-    std::string name;              ///< for people: timings carry it
-    std::string_view shader;       ///< "cacao/blur"; empty = fill the written buffers with zero
+    std::string name;               ///< for people: timings carry it
+    std::string_view shader;        ///< "cacao/blur"; empty = fill the written buffers with zero
     std::vector<int> reads, writes; ///< indices of BufferRow
     std::array<std::uint32_t, 3> groups{1, 1, 1};
     std::vector<std::pair<int, int>> constants; ///< specialization: id, value
 };
 
-/// What is wrong with the table, as sentences: unknown indices, reads before any write, empty dispatches, an output never
-/// written. Empty = sound. Needs no GPU.
+/// What is wrong with the table, as sentences: unknown indices, reads before any write, empty dispatches, an output
+/// never written. Empty = sound. Needs no GPU.
 [[nodiscard]] std::vector<std::string> problems(std::span<const BufferRow> buffers, std::span<const PassRow> passes);
 
 /// A table of passes made runnable on one device. One memory barrier goes before each pass that touches what an earlier
 /// pass wrote (or overwrites what it read) and only there.
 class Program {
   public:
-    /// `constants_bytes` is the size of the uniform block every pass sees. Throws Error listing problems() or naming the
-    /// shader whose pipeline could not be made.
-    /// Stamps::total times all passes together, as "passes": stamping each costs a GPU some microseconds.
+    /// `constants_bytes` is the size of the uniform block every pass sees. Throws Error listing problems() or naming
+    /// the shader whose pipeline could not be made. Stamps::total times all passes together, as "passes": stamping each
+    /// costs a GPU some microseconds.
     enum class Stamps { passes, total };
     Program(Device& device, std::vector<BufferRow> buffers, std::vector<PassRow> passes, std::size_t constants_bytes,
             Stamps stamps = Stamps::passes);
@@ -76,13 +77,14 @@ class Program {
         return {reinterpret_cast<T*>(bytes.data()), bytes.size() / sizeof(T)};
     }
 
-    /// Copies on the device, as part of the next run and of no other: `from` into a `taken` buffer from byte `offset` on, or into an
-    /// upload buffer instead of what the host has written there, before the passes; a buffer's first bytes into `to`, after them.
+    /// Copies on the device, as part of the next run and of no other: `from` into a `taken` buffer from byte `offset`
+    /// on, or into an upload buffer instead of what the host has written there, before the passes; a buffer's first
+    /// bytes into `to`, after them.
     void take(int buffer, std::size_t offset, std::shared_ptr<const DeviceBytes> from);
     void give(int buffer, std::shared_ptr<DeviceBytes> to);
 
-    /// Uploads, runs all passes, downloads, unless the results are wanted on the device alone; returns when all is done. Throws Error
-    /// on device loss.
+    /// Uploads, runs all passes, downloads, unless the results are wanted on the device alone; returns when all is
+    /// done. Throws Error on device loss.
     enum class Results { on_host, on_device };
     void run(std::span<const std::byte> constants, Results results = Results::on_host);
 

@@ -23,7 +23,8 @@ const Row table[] = {
 
 std::span<const std::uint32_t> shader_words(std::string_view name) {
     for (const Row& row : table)
-        if (row.name == name) return row.words;
+        if (row.name == name)
+            return row.words;
     throw Error("no shader is called " + std::string(name));
 }
 

@@ -22,7 +22,9 @@ void upload_depth(const cv::Mat1f& z_m, cv::Mat1f to) {
 
 shared::NeighbourPlace place_of(const Pinhole& camera, const Eigen::Isometry3d& here_from_there) {
     const auto single = [](double x) { return static_cast<float>(x); };
-    const auto row = [&](const Eigen::Vector3d& v) { return shared::vec3(single(v.x()), single(v.y()), single(v.z())); };
+    const auto row = [&](const Eigen::Vector3d& v) {
+        return shared::vec3(single(v.x()), single(v.y()), single(v.z()));
+    };
     const Eigen::Matrix3d turn = here_from_there.linear();
     return {row(turn.row(0)),
             row(turn.row(1)),

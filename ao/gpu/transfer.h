@@ -12,10 +12,12 @@ namespace scanshade::gpu {
 
 /// Rows of `image` side by side; `to` holds as many bytes.
 void upload(const cv::Mat& image, std::span<std::byte> to);
-/// Depth in metres; what is none (not finite, not positive, beyond what single precision can tell) becomes a hole here, once,
-/// so that shaders only ask z > 0.
+/// Depth in metres; what is none (not finite, not positive, beyond what single precision can tell) becomes a hole here,
+/// once, so that shaders only ask z > 0.
 void upload_depth(const cv::Mat1f& z_m, cv::Mat1f to);
-inline void upload_depth(const cv::Mat1f& z_m, std::span<float> to) { upload_depth(z_m, cv::Mat1f(z_m.rows, z_m.cols, to.data())); }
+inline void upload_depth(const cv::Mat1f& z_m, std::span<float> to) {
+    upload_depth(z_m, cv::Mat1f(z_m.rows, z_m.cols, to.data()));
+}
 /// A program's buffer as an image, without a copy.
 template <class Pixel>
 [[nodiscard]] cv::Mat_<Pixel> image_on(std::span<std::byte> buffer, cv::Size size) {

@@ -70,8 +70,7 @@ Hbao::Hbao(gpu::Device& device, const HbaoOptions& options)
     : ScreenMethod(device, resolved(options).screen), options_(resolved(options)) {}
 
 void Hbao::add_passes(ScreenTables& tables) const {
-    tables.add_pass("generate", "hbao/generate", {screen_depth, screen_surfaces, screen_noise},
-                    {screen_raw});
+    tables.add_pass("generate", "hbao/generate", {screen_depth, screen_surfaces, screen_noise}, {screen_raw});
 }
 
 std::vector<std::byte> Hbao::constants(const shared::ScreenConstants& screen) const {

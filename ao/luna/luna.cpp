@@ -100,8 +100,7 @@ void Luna::add_passes(ScreenTables& tables) const {
     const int table = tables.add_buffer(
         {"vectors", vectors.size() * 4, gpu::BufferRow::Host::none, gpu::BufferRow::Texels::rgba32f, vectors});
     tables.add_pass(
-        "generate", "luna/generate", {screen_depth, screen_surfaces, screen_noise, table},
-        {screen_raw},
+        "generate", "luna/generate", {screen_depth, screen_surfaces, screen_noise, table}, {screen_raw},
         {{shared::spec_published, options_.profile == "published"}, {shared::spec_renormalise, options_.renormalise}});
     tables.add_blurs(options_.blurs, {0.16397F, 0.15136F, 0.11906F, 0.07981F, 0.04559F, 0.02219F}); // sigma 2.5 pixels
 }

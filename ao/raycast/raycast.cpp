@@ -88,7 +88,14 @@ Face face_of(std::span<const Vector3d> vertices, const std::array<int, 3>& trian
 std::vector<Parameter> RaycastOptions::parameters() {
     return {
         {"radius", "occluders farther away do not count", &radius_m, "m", 1e-6, 1e6, {}},
-        {"rays", "per value; the error falls as rays^-3/4, and powers of two spread best; --dump writes each value's standard error", &rays, "", 1, 65536, {}},
+        {"rays",
+         "per value; the error falls as rays^-3/4, and powers of two spread best; --dump writes each value's standard "
+         "error",
+         &rays,
+         "",
+         1,
+         65536,
+         {}},
         {"falloff",
          "how much an occluder counts with its distance: all, 1 - t^2 / R^2, or (R - t) / (0.615 R)",
          &falloff,

@@ -29,7 +29,8 @@ SurfelOptions resolved(SurfelOptions options) {
     return options;
 }
 
-/// Where depth is clean, wide holes are the sky; noisy sensors have shadows beside whatever stands in front of something.
+/// Where depth is clean, wide holes are the sky; noisy sensors have shadows beside whatever stands in front of
+/// something.
 constexpr int widest_fill_px = 40, narrowest_fill_px = 4;
 
 int divided_up(int n, int by) { return (n + by - 1) / by; }
@@ -55,7 +56,8 @@ std::pair<int, int> add_layers(ScreenTables& tables) {
         tables.passes.back().groups[2] = static_cast<std::uint32_t>(tables.neighbours);
     }
     tables.add_pass("widen", "surfel/widen", {screen_depth, behind}, {screen_surfaces});
-    tables.add_pass_over(halved(tables.window.size()), "carve", "surfel/carve", {screen_neighbours, screen_surfaces}, {limits});
+    tables.add_pass_over(halved(tables.window.size()), "carve", "surfel/carve", {screen_neighbours, screen_surfaces},
+                         {limits});
     return {behind, limits};
 }
 

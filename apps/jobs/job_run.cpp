@@ -99,8 +99,8 @@ int work_through(const std::filesystem::path& job, const Plan& plan, const Shard
         (void)attempts.attempt(plan.tasks[own[i]], turn);
         pace.done(plan.tasks[own[i]]);
     });
-    // Other shards begin with their costliest tasks, so what they may leave lies at their ends. Our own come first: what
-    // another run held may be free by now.
+    // Other shards begin with their costliest tasks, so what they may leave lies at their ends. Our own come first:
+    // what another run held may be free by now.
     for (int next = 0; next < shard.of; ++next)
         for (const std::size_t index :
              parts[static_cast<std::size_t>((shard.index - 1 + next) % shard.of)] | std::views::reverse) {

@@ -1,7 +1,7 @@
 // `scanshade plan`: finds the captures of a dataset, whatever their layouts, and cuts them into tasks.
 #include "apps/command.h"
-#include "apps/method_settings.h"
 #include "apps/jobs/job.h"
+#include "apps/method_settings.h"
 #include "apps/slice.h"
 #include "io/captures/capture.h"
 #include "io/captures/layouts.h"

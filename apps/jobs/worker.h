@@ -9,9 +9,10 @@ namespace scanshade {
 
 /// What a worker process knows of its start.
 struct Shift {
-    int worker = 0;                                 ///< 0 .. workers - 1
-    bool carefully = false;                         ///< the process before this one was killed by a signal
-    std::atomic<std::uint64_t>* finished = nullptr; ///< to be counted up with each frame settled: progress earns new processes
+    int worker = 0;         ///< 0 .. workers - 1
+    bool carefully = false; ///< the process before this one was killed by a signal
+    std::atomic<std::uint64_t>* finished =
+        nullptr; ///< to be counted up with each frame settled: progress earns new processes
 };
 
 /// Runs work(shift) in `workers` child processes at once; the caller has no threads yet. A child that a signal killed

@@ -1,9 +1,9 @@
 // `scanshade bench`: methods x settings on captures with a known answer, milliseconds against error, as one page.
 #include "ao/gpu/device.h"
-#include "apps/measure/bench_results.h"
-#include "apps/measure/configurations.h"
 #include "apps/command.h"
 #include "apps/command_line.h"
+#include "apps/measure/bench_results.h"
+#include "apps/measure/configurations.h"
 #include "apps/measure/fused_reference.h"
 #include "apps/scenes/generate.h"
 #include "apps/scenes/scene.h"

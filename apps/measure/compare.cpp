@@ -1,10 +1,10 @@
 // `scanshade compare`: how far the maps of one run are from those of another, or from truth, as numbers and pictures.
 #include "ao/compare.h"
-#include "apps/csv.h"
 #include "apps/command.h"
+#include "apps/csv.h"
+#include "apps/json.h"
 #include "apps/measure/error_classes.h"
 #include "apps/measure/error_figures.h"
-#include "apps/json.h"
 #include "apps/measure/map_set.h"
 #include "apps/picture.h"
 #include "io/clouds/cloud_file.h"

@@ -1,8 +1,8 @@
 // What `scanshade run` tells people about a capture, before and after.
 #pragma once
 
-#include "apps/walk/report.h"
 #include "apps/run/settings.h"
+#include "apps/walk/report.h"
 
 #include <filesystem>
 #include <string>

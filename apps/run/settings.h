@@ -4,9 +4,9 @@
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/method.h"
 #include "ao/sequence/neighbourhood.h"
-#include "apps/walk/batch.h"
-#include "apps/measure/budget.h"
 #include "apps/command.h"
+#include "apps/measure/budget.h"
+#include "apps/walk/batch.h"
 
 #include <memory>
 #include <optional>

@@ -26,8 +26,8 @@ class Workers {
     /// Makes the crew anew where method or settings are others than before: shaders are compiled once for all captures.
     /// Nothing of it may be lent then.
     void make(const std::string& method, MethodSetup& setup, const FitPlaneOptions& fit);
-    /// Methods as made, on depth as recorded or, where View::noise says so, as fitted. Those that keep all cores busy by
-    /// themselves are one.
+    /// Methods as made, on depth as recorded or, where View::noise says so, as fitted. Those that keep all cores busy
+    /// by themselves are one.
     [[nodiscard]] Crew& crew() { return *crew_; }
 
     /// What one of the crew is made of.

@@ -1,8 +1,8 @@
 // The walk for many frames: load, project, compute, attach, write, with a bounded number of frames in memory.
 #include "apps/walk/batch.h"
 
-#include "apps/walk/point_clouds.h"
 #include "apps/walk/frame_files.h"
+#include "apps/walk/point_clouds.h"
 #include "apps/walk/sequence_order.h"
 #include "io/clouds/cloud_file.h"
 #include "projection/attach.h"

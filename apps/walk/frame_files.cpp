@@ -1,8 +1,8 @@
 // The last step of the walk: what a frame's values look like, and its files.
 #include "apps/walk/frame_files.h"
 
-#include "apps/walk/point_clouds.h"
 #include "apps/picture.h"
+#include "apps/walk/point_clouds.h"
 #include "io/clouds/cloud_file.h"
 #include "io/images/npy_file.h"
 #include "io/output_file.h"

@@ -119,7 +119,8 @@ std::string duration_text(double seconds) {
     return h > 0 ? fmt::format("{}:{:02}:{:02}", h, m, s) : fmt::format("{}:{:02}", m, s);
 }
 
-Progress::Progress(std::size_t total) : total_(total), on_terminal_(!as_json && isatty(STDERR_FILENO) == 1), turn_(own_turn) {}
+Progress::Progress(std::size_t total)
+    : total_(total), on_terminal_(!as_json && isatty(STDERR_FILENO) == 1), turn_(own_turn) {}
 
 void Progress::add(const FrameRow& row) {
     ++done_;
@@ -127,14 +128,14 @@ void Progress::add(const FrameRow& row) {
         const StageTimes& ms = row.ms;
         const double sum_ms = ms.load + ms.project + ms.compute + ms.attach + ms.write;
         log(turn_, {{"frame", row.name},
-             {"status", name_of(row.status)},
-             {"fault", name_of(row.fault)},
-             {"why", row.why},
-             {"warnings", row.warnings},
-             {"ms", sum_ms},
-             {"done", done_},
-             {"of", total_},
-             {"left_s", seconds_left()}});
+                    {"status", name_of(row.status)},
+                    {"fault", name_of(row.fault)},
+                    {"why", row.why},
+                    {"warnings", row.warnings},
+                    {"ms", sum_ms},
+                    {"done", done_},
+                    {"of", total_},
+                    {"left_s", seconds_left()}});
         return;
     }
     const bool remarkable = row.status != FrameStatus::ok || !row.warnings.empty() || !row.notes.empty();

@@ -45,7 +45,9 @@ void RecordingCloud::add(const CloudFrame& frame) {
             const Vector3d point = pose * Vector3d((u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z);
             const Vector3d place = (point / resolution_m_).array().floor();
             if (!(place.cwiseAbs().maxCoeff() < 2e9))
-                throw Error(fmt::format("a point {:.3g} m from the origin, in cubes of {:.3g} m: farther than can be counted", point.norm(), resolution_m_));
+                throw Error(
+                    fmt::format("a point {:.3g} m from the origin, in cubes of {:.3g} m: farther than can be counted",
+                                point.norm(), resolution_m_));
             const auto whole = [&](Eigen::Index axis) { return static_cast<std::int32_t>(place[axis]); };
             const auto [known, is_new] = index_.try_emplace(Key{whole(0), whole(1), whole(2)}, cells_.size());
             if (is_new)
@@ -80,10 +82,13 @@ void RecordingCloud::write(const std::filesystem::path& file) const {
         views.push_back(static_cast<float>(cell.views));
         if (!coloured)
             continue;
-        const Eigen::Vector3f bgr = cell.colour_weight > 0 ? Eigen::Vector3f(cell.colour / cell.colour_weight) : Eigen::Vector3f(128, 128, 128);
-        colours.emplace_back(cv::saturate_cast<uchar>(bgr[0]), cv::saturate_cast<uchar>(bgr[1]), cv::saturate_cast<uchar>(bgr[2]));
+        const Eigen::Vector3f bgr =
+            cell.colour_weight > 0 ? Eigen::Vector3f(cell.colour / cell.colour_weight) : Eigen::Vector3f(128, 128, 128);
+        colours.emplace_back(cv::saturate_cast<uchar>(bgr[0]), cv::saturate_cast<uchar>(bgr[1]),
+                             cv::saturate_cast<uchar>(bgr[2]));
     }
-    write_new_ply(file, points, colours, {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}, {"ao_views", views}},
+    write_new_ply(file, points, colours,
+                  {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}, {"ao_views", views}},
                   {fmt::format("one cloud of {} frames, merged within {:.6f} m", frames_, resolution_m_)});
 }
 

@@ -3,16 +3,17 @@
 
 #include "projection/maps.h"
 
-#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
+#include <Eigen/Geometry>
 #include <filesystem>
 #include <unordered_map>
 #include <vector>
 
 namespace scanshade {
 
-/// What one frame adds. All images have the depth's size; `colour` may be empty, `colour_known` too where it is known everywhere.
+/// What one frame adds. All images have the depth's size; `colour` may be empty, `colour_known` too where it is known
+/// everywhere.
 struct CloudFrame {
     const DepthImage& depth;
     const cv::Mat1f& visibility;
@@ -22,10 +23,12 @@ struct CloudFrame {
     Eigen::Isometry3d world_from_camera;
 };
 
-/// Its memory grows with the surface recorded, not with the number of frames. Frames must come in the same order every time.
+/// Its memory grows with the surface recorded, not with the number of frames. Frames must come in the same order every
+/// time.
 class RecordingCloud {
   public:
-    /// Points are merged within cubes of this side; 0 = one and a half times what a pixel covers at the first frame's median depth.
+    /// Points are merged within cubes of this side; 0 = one and a half times what a pixel covers at the first frame's
+    /// median depth.
     explicit RecordingCloud(double resolution_m) : resolution_m_(resolution_m) {}
 
     /// Nearer and more confident views of a place count more. Pixels without visibility add nothing.

@@ -2,10 +2,10 @@
 #pragma once
 
 #include "ao/gpu/device.h"
-#include "apps/walk/frame_row.h"
-#include "io/captures/capture.h"
 #include "apps/command.h"
 #include "apps/json.h"
+#include "apps/walk/frame_row.h"
+#include "io/captures/capture.h"
 
 #include <chrono>
 #include <filesystem>

@@ -14,7 +14,7 @@ struct Work {
     FrameRow& row;
     Frame frame = {};
     DepthImage depth = {};
-    DepthImage looked_at = {};                ///< of a sequence: what the methods saw in place of `depth`
+    DepthImage looked_at = {}; ///< of a sequence: what the methods saw in place of `depth`
     AoMap ao = {};
     cv::Mat1f confidence_in_view = {}; ///< of `ao`, pixel by pixel
     Attached attached = {}, confidence = {};

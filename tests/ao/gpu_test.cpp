@@ -17,7 +17,9 @@ using Texels = BufferRow::Texels;
 constexpr int count = 1000;
 
 BufferRow words(std::string_view name, Host host = Host::none) { return {name, count * 4, host, Texels::r32ui}; }
-PassRow add_one(int from, int to, int step = 1) { return {"add", "test/add_one", {from}, {to}, {(count + 63) / 64, 1, 1}, {{0, step}}}; }
+PassRow add_one(int from, int to, int step = 1) {
+    return {"add", "test/add_one", {from}, {to}, {(count + 63) / 64, 1, 1}, {{0, step}}};
+}
 
 TEST(gpu, devices_are_listed_with_what_they_lack) {
     const auto devices = gpu::list_devices();
@@ -49,10 +51,12 @@ TEST(gpu, a_chain_of_passes_sees_each_others_results) {
         const std::int32_t n = count;
         program.run(std::as_bytes(std::span(&n, 1)));
         const auto out = program.host_as<std::uint32_t>(3);
-        for (std::size_t i = 0; i < count; ++i) ASSERT_EQ(out[i], in[i] + 1111) << i; // four mirrorings: back in place
+        for (std::size_t i = 0; i < count; ++i)
+            ASSERT_EQ(out[i], in[i] + 1111) << i; // four mirrorings: back in place
     }
     EXPECT_EQ(program.timings().size(), 6U) << "upload, four passes, download";
-    for (const std::string& message : device.validation_messages()) ADD_FAILURE() << message;
+    for (const std::string& message : device.validation_messages())
+        ADD_FAILURE() << message;
 }
 
 TEST(gpu, two_programs_may_share_a_device) {
@@ -96,7 +100,8 @@ TEST(gpu, validation_rings_when_a_program_is_wrong) {
     // More work groups than any device allows, recorded but never run: the layer must say so, or it is not watching.
     setenv("SCANSHADE_VALIDATE", "1", 1);
     gpu::Device device;
-    if (!device.validating()) GTEST_SKIP() << "the validation layer is not installed";
+    if (!device.validating())
+        GTEST_SKIP() << "the validation layer is not installed";
     PassRow vast = add_one(0, 1);
     vast.groups = {1, 1U << 31, 1};
     const gpu::Program program(device, {words("in", Host::upload), words("out", Host::download)}, {vast}, 4);

@@ -1,12 +1,12 @@
-// Frames of a recording together: what other views add, what averaging takes away, and that nothing is ever worse than a frame
-// by itself.
+// Frames of a recording together: what other views add, what averaging takes away, and that nothing is ever worse than
+// a frame by itself.
 #include "ao/gpu/device.h"
 #include "ao/sequence/neighbourhood.h"
 #include "ao/surfel/surfel.h"
-#include "apps/walk/batch.h"
 #include "apps/scenes/generate.h"
 #include "apps/scenes/scene.h"
 #include "apps/scenes/sensor.h"
+#include "apps/walk/batch.h"
 #include "apps/walk/sequence_order.h"
 #include "io/clouds/cloud_file.h"
 #include "tests/support/small_capture.h"
@@ -92,8 +92,8 @@ NeighbourhoodOptions only(int fuse, int layers, int average, int reach = 12) {
 
 const DepthNoise kinect{0.0015, 0.0018, 3};
 
-NeighbourhoodResult together(const std::vector<Recorded>& frames, const NeighbourhoodOptions& options, std::size_t place, const DepthNoise& noise = {},
-                        const char* level = "high") {
+NeighbourhoodResult together(const std::vector<Recorded>& frames, const NeighbourhoodOptions& options,
+                             std::size_t place, const DepthNoise& noise = {}, const char* level = "high") {
     Surfel surfel(device(), quality(level));
     Neighbourhood sequence(device(), surfel, radius_m, noise, {}, options);
     for (std::size_t i = 0; i < frames.size(); ++i)
@@ -147,7 +147,8 @@ TEST(Sequence, noisy_depth_is_averaged_before_its_planes_are_fitted) {
 
 TEST(Sequence, a_frame_whose_pose_is_wrong_is_left_out) {
     auto frames = walk("office", "ideal", 5.5, 0.3, 3);
-    const cv::Mat1f by_itself = together({frames[0], frames[1]}, only(0, 2, 2, 1), 1).ao.visibility; // without the last one
+    const cv::Mat1f by_itself =
+        together({frames[0], frames[1]}, only(0, 2, 2, 1), 1).ao.visibility; // without the last one
     frames[2].pose = frames[2].pose * Eigen::Translation3d(0.4, 0, 0) * Eigen::AngleAxisd(0.2, Vector3d::UnitY());
     const NeighbourhoodResult result = together(frames, only(0, 2, 2, 1), 1);
     ASSERT_EQ(result.left_out.size(), 1U);
@@ -206,13 +207,15 @@ TEST(Sequence, averaging_a_static_camera_leaves_the_mean_of_all_patterns) {
     EXPECT_LT(noise_of_15, 1.3 * noise_of_one / std::sqrt(15.0));
 
     const cv::Mat1f truth = truth_of("office", frames[0]);
-    const double of_64 = rms(together(frames, alone(), 15, {}, "highest").ao.visibility, truth), averaged = rms(result.ao.visibility, truth);
+    const double of_64 = rms(together(frames, alone(), 15, {}, "highest").ao.visibility, truth),
+                 averaged = rms(result.ao.visibility, truth);
     std::printf("error: 30 frames of 8 reads %.4f, one of 64 %.4f\n", averaged, of_64);
     EXPECT_LT(averaged, of_64 + 0.007);
 }
 
 /// Mean over points of the deviation in time of what frames say of them; seen in every frame, told by exact depth.
-double flicker(const std::vector<Recorded>& frames, const std::vector<cv::Mat1f>& visibility, std::size_t first, std::size_t last) {
+double flicker(const std::vector<Recorded>& frames, const std::vector<cv::Mat1f>& visibility, std::size_t first,
+               std::size_t last) {
     const std::size_t middle = (first + last) / 2;
     const Pinhole camera = small_camera();
     double sum = 0;
@@ -220,13 +223,16 @@ double flicker(const std::vector<Recorded>& frames, const std::vector<cv::Mat1f>
     for (int v = 4; v < 240; v += 4)
         for (int u = 4; u < 320; u += 4) {
             const double z = frames[middle].exact_m(v, u);
-            const Vector3d point = frames[middle].pose * Vector3d((u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z);
+            const Vector3d point =
+                frames[middle].pose * Vector3d((u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z);
             double m = 0, m2 = 0;
             bool always = z > 0;
             for (std::size_t i = first; always && i <= last; ++i) {
                 const Vector3d there = frames[i].pose.inverse() * point;
-                const int x = cvRound(camera.fx * there.x() / there.z() + camera.cx), y = cvRound(camera.fy * there.y() / there.z() + camera.cy);
-                always = x >= 0 && y >= 0 && x < 320 && y < 240 && std::abs(frames[i].exact_m(y, x) - there.z()) < 0.01 * z && !std::isnan(visibility[i](y, x));
+                const int x = cvRound(camera.fx * there.x() / there.z() + camera.cx),
+                          y = cvRound(camera.fy * there.y() / there.z() + camera.cy);
+                always = x >= 0 && y >= 0 && x < 320 && y < 240 &&
+                         std::abs(frames[i].exact_m(y, x) - there.z()) < 0.01 * z && !std::isnan(visibility[i](y, x));
                 if (!always)
                     break;
                 m += visibility[i](y, x);
@@ -259,8 +265,8 @@ TEST(Sequence, static_points_flicker_a_third_as_much) {
 }
 
 /// Runs some frames of a recording as `run --sequence on --cloud` does.
-std::vector<FrameRow> run_together(const Capture& capture, const std::vector<std::size_t>& frames, const std::filesystem::path& out,
-                                   RecordingCloud* cloud = nullptr) {
+std::vector<FrameRow> run_together(const Capture& capture, const std::vector<std::size_t>& frames,
+                                   const std::filesystem::path& out, RecordingCloud* cloud = nullptr) {
     Surfel surfel(device(), quality("low"));
     Neighbourhood sequence(device(), surfel, radius_m, kinect, {}, only(2, 2, 2, 2));
     BatchOptions options;
@@ -325,7 +331,8 @@ TEST(Sequence, what_was_removed_is_gone_beyond_the_window) {
         never.push_back(record(empty));
     }
     const NeighbourhoodOptions options = only(0, 0, 8);
-    const cv::Mat1f later = together(frames, options, 12).ao.visibility, clean = together(never, options, 12).ao.visibility;
+    const cv::Mat1f later = together(frames, options, 12).ao.visibility,
+                    clean = together(never, options, 12).ao.visibility;
     EXPECT_TRUE(same_bytes(later, clean));
     // Where the box stood, the frame after has only its own side of time: no ghost of the box itself.
     const cv::Mat1f after = together(frames, options, 8).ao.visibility, own = together(never, alone(), 8).ao.visibility;

@@ -37,7 +37,8 @@ class MeasureTest : public testing::Test {
                 fmt::format("generate office -o {} --sensor ideal --frames 2 --size 64x48 --truth-rays 16", capture()))
                 .exit_code,
             0);
-        ASSERT_EQ(run_program(fmt::format("run {} -o {} --write ao,confidence --depth-noise none", capture(), made())).exit_code,
+        ASSERT_EQ(run_program(fmt::format("run {} -o {} --write ao,confidence --depth-noise none", capture(), made()))
+                      .exit_code,
                   0);
     }
     static void TearDownTestSuite() { shared_folder().reset(); }
@@ -222,8 +223,8 @@ TEST(BudgetTest, what_cannot_be_kept_is_told_with_what_could) {
 }
 
 TEST_F(MeasureTest, a_budget_picks_says_and_verifies) {
-    const Ran ran =
-        run_program(fmt::format("run {} -o {} --write ao,confidence --depth-noise none --max-ms 100000", capture(), out()));
+    const Ran ran = run_program(
+        fmt::format("run {} -o {} --write ao,confidence --depth-noise none --max-ms 100000", capture(), out()));
     ASSERT_EQ(ran.exit_code, 0) << ran.err;
     EXPECT_TRUE(says(ran.err, "picked"));
     EXPECT_TRUE(says(ran.err, "to truth"));

@@ -1,8 +1,8 @@
 // Fuzz target: depth, colour and AO images of every format, and a picture's EXIF.
+#include "io/captures/layouts.h"
 #include "io/images/exif.h"
 #include "io/images/image_check.h"
 #include "io/images/image_file.h"
-#include "io/captures/layouts.h"
 #include "tests/fuzz/fuzz.h"
 
 #include <zlib.h>

@@ -49,13 +49,18 @@ Body rod(Vector3d base, Vector3d axis, double radius, double height) {
     return {Cylinder{std::move(base), radius, height, axis.normalized()}, {}};
 }
 
-std::vector<Body> corner_of_walls(double z_m = 2) { return {plane({0, 0, z_m}, {1, 0, -1}), plane({0, 0, z_m}, {-1, 0, -1})}; }
+std::vector<Body> corner_of_walls(double z_m = 2) {
+    return {plane({0, 0, z_m}, {1, 0, -1}), plane({0, 0, z_m}, {-1, 0, -1})};
+}
 
-std::vector<Body> ball_on_floor() { return {plane({0, 1, 0}, {0, -1, 0}), plane({0, 0, 4}, {0, 0, -1}), ball({0.1, 0.7, 2.2}, 0.3)}; }
+std::vector<Body> ball_on_floor() {
+    return {plane({0, 1, 0}, {0, -1, 0}), plane({0, 0, 4}, {0, 0, -1}), ball({0.1, 0.7, 2.2}, 0.3)};
+}
 
 std::vector<Body> stairs() {
     std::vector<Body> steps{plane({0, 0, 6}, {0, 0, -1})};
-    for (int i = 0; i < 8; ++i) steps.push_back(box({0, 1.0 - 0.17 * i + 1, 1.6 + 0.28 * i + 2}, {3, 1, 2}));
+    for (int i = 0; i < 8; ++i)
+        steps.push_back(box({0, 1.0 - 0.17 * i + 1, 1.6 + 0.28 * i + 2}, {3, 1, 2}));
     return steps;
 }
 
@@ -92,7 +97,8 @@ DepthImage structured_light(const DepthImage& clean, unsigned seed) {
     cv::Mat1f white(clean.z_m.size()), grained;
     std::mt19937 random(seed);
     std::normal_distribution<float> normal;
-    for (float& value : white) value = normal(random);
+    for (float& value : white)
+        value = normal(random);
     constexpr double deviation = 0.9; // of the window, pixels: what makes a grain of 3.2
     cv::GaussianBlur(white, grained, {9, 9}, deviation);
     grained *= 2 * deviation * std::sqrt(std::numbers::pi);
@@ -101,7 +107,8 @@ DepthImage structured_light(const DepthImage& clean, unsigned seed) {
         for (int u = 0; u < white.cols; ++u)
             if (float& z = noisy.z_m(v, u); z > 0) {
                 const double measured = z + kinect_sigma_m(z) * static_cast<double>(grained(v, u));
-                z = static_cast<float>(1 / (std::max(1.0, std::round(1 / (measured * kinect_step_per_m))) * kinect_step_per_m));
+                z = static_cast<float>(
+                    1 / (std::max(1.0, std::round(1 / (measured * kinect_step_per_m))) * kinect_step_per_m));
             }
     return noisy;
 }
@@ -128,7 +135,8 @@ DepthImage punched(const DepthImage& depth, Keep&& keep) {
     DepthImage holed{depth.camera, depth.z_m.clone(), {}};
     for (int v = 0; v < holed.z_m.rows; ++v)
         for (int u = 0; u < holed.z_m.cols; ++u)
-            if (!keep(u, v)) holed.z_m(v, u) = 0;
+            if (!keep(u, v))
+                holed.z_m(v, u) = 0;
     return holed;
 }
 
@@ -144,12 +152,16 @@ DepthImage random_holes(const DepthImage& depth, double share) {
 std::vector<Case> planes(bool noisy) {
     std::vector<Case> all;
     const Pinhole camera = tests::test_camera();
-    const std::vector<double> tilts = noisy ? std::vector<double>{0, 45, 60, 70} : std::vector<double>{0, 45, 70, 80, 85, 89};
-    const std::vector<double> depths = noisy ? std::vector<double>{0.5, 1, 2, 3, 4} : std::vector<double>{0.3, 1, 5, 20, 50, 200};
+    const std::vector<double> tilts =
+        noisy ? std::vector<double>{0, 45, 60, 70} : std::vector<double>{0, 45, 70, 80, 85, 89};
+    const std::vector<double> depths =
+        noisy ? std::vector<double>{0.5, 1, 2, 3, 4} : std::vector<double>{0.3, 1, 5, 20, 50, 200};
     for (const double tilt : tilts)
         for (const double z_m : depths) {
-            if (0.5 * camera.fx / z_m < 2) continue;
-            Case one = open_everywhere(fmt::format("{} degrees, {} m", tilt, z_m), tests::tilted_plane(camera, tilt, z_m));
+            if (0.5 * camera.fx / z_m < 2)
+                continue;
+            Case one =
+                open_everywhere(fmt::format("{} degrees, {} m", tilt, z_m), tests::tilted_plane(camera, tilt, z_m));
             if (noisy) {
                 one.depth.z_m.setTo(0, one.depth.z_m > 8); // no structured light reaches farther
                 one.expected.setTo(unknown, one.depth.z_m == 0);
@@ -163,16 +175,18 @@ std::vector<Case> planes(bool noisy) {
 std::vector<Case> shapes() {
     const Pinhole camera = tests::test_camera({320, 240});
     return {traced("corner", camera, corner_of_walls()), traced("ball on a floor", camera, ball_on_floor()),
-            traced("saddle", camera, saddle()),          traced("stairs", camera, stairs()),
+            traced("saddle", camera, saddle()), traced("stairs", camera, stairs()),
             traced("crevice", camera, crevice())};
 }
 
 std::vector<Case> thin_things() {
     const Pinhole camera = tests::test_camera({320, 240});
     const double pixel_m = 2 / camera.fx;
-    return {traced("pole of one pixel", camera, {plane({0, 0, 2.2}, {0, 0, -1}), rod({0, -3, 2}, {0, 1, 0}, 0.5 * pixel_m, 6)}),
-            traced("wires", camera, {plane({0, 0, 2.5}, {0, 0, -1}), rod({-3, 0.1, 2}, {1, 0.2, 0}, 0.6 * pixel_m, 8),
-                                     rod({-3, -0.4, 1.7}, {1, -0.05, 0.1}, 0.6 * pixel_m, 8)}),
+    return {traced("pole of one pixel", camera,
+                   {plane({0, 0, 2.2}, {0, 0, -1}), rod({0, -3, 2}, {0, 1, 0}, 0.5 * pixel_m, 6)}),
+            traced("wires", camera,
+                   {plane({0, 0, 2.5}, {0, 0, -1}), rod({-3, 0.1, 2}, {1, 0.2, 0}, 0.6 * pixel_m, 8),
+                    rod({-3, -0.4, 1.7}, {1, -0.05, 0.1}, 0.6 * pixel_m, 8)}),
             traced("grate", camera, grate())};
 }
 
@@ -186,7 +200,8 @@ std::vector<Case> steps_in_depth() {
 
 std::vector<Case> noisy_shapes() {
     std::vector<Case> all = shapes();
-    for (Case& one : all) one = recorded(std::move(one));
+    for (Case& one : all)
+        one = recorded(std::move(one));
     return all;
 }
 
@@ -195,7 +210,8 @@ std::vector<Case> cameras() {
     shifted.cx = -60;
     narrow.fy *= 2;
     const Pinhole tele{20.0 * 160, 20.0 * 160, 79.5, 59.5, {160, 120}};
-    return {traced("principal point outside", shifted, {plane({1.2, 0, 2.4}, {1, 0, -1}), plane({1.2, 0, 2.4}, {-1, 0, -1})}),
+    return {traced("principal point outside", shifted,
+                   {plane({1.2, 0, 2.4}, {1, 0, -1}), plane({1.2, 0, 2.4}, {-1, 0, -1})}),
             traced("fy = 2 fx", narrow, corner_of_walls()), traced("telephoto, fx = 20 W", tele, corner_of_walls(40)),
             traced("150 degrees", lens(150, {320, 240}), corner_of_walls(1))};
 }
@@ -204,18 +220,21 @@ std::vector<Case> radii() {
     std::vector<Case> all;
     for (const double radius_m : {0.001, 0.02, 0.1, 2.0, 100.0})
         all.push_back(traced(fmt::format("{} m", radius_m), tests::test_camera({160, 120}), ball_on_floor(), radius_m));
-    all.front().expected.setTo(1.0F, all.front().depth.z_m > 0); // rays cannot start closer than coordinates of a kilometre round
-    all.back().expected.release();                               // most of what is within 100 m lies outside the image
+    all.front().expected.setTo(1.0F, all.front().depth.z_m >
+                                         0); // rays cannot start closer than coordinates of a kilometre round
+    all.back().expected.release();           // most of what is within 100 m lies outside the image
     return all;
 }
 
 std::vector<Case> sizes() {
     std::vector<Case> all;
-    for (const cv::Size size : {cv::Size{1, 1}, {1, 7}, {7, 1}, {3, 2}, {17, 1}, {641, 479}, {2000, 3}, {3, 2000}, {3840, 2160}}) {
+    for (const cv::Size size :
+         {cv::Size{1, 1}, {1, 7}, {7, 1}, {3, 2}, {17, 1}, {641, 479}, {2000, 3}, {3, 2000}, {3840, 2160}}) {
         const double f = 0.8 * std::max(size.width, size.height);
         const Pinhole camera{f, f, 0.5 * size.width, 0.5 * size.height, size};
         Case one = open_everywhere(fmt::format("{}x{}", size.width, size.height), tests::tilted_plane(camera, 30));
-        if (std::min(size.width, size.height) < 2) one.expected.release(); // a line has no normal: any answer, or none
+        if (std::min(size.width, size.height) < 2)
+            one.expected.release(); // a line has no normal: any answer, or none
         all.push_back(std::move(one));
     }
     return all;
@@ -227,7 +246,8 @@ std::vector<Case> no_depth() {
     std::vector<Case> all;
     for (const float value : {unknown, infinite, -infinite, -1.0F, 1e-40F, 0.0F}) {
         DepthImage sprinkled{ball.camera, ball.z_m.clone(), {}};
-        for (int i = 0; i < 120; ++i) sprinkled.z_m(i, i * 37 % 160) = value;
+        for (int i = 0; i < 120; ++i)
+            sprinkled.z_m(i, i * 37 % 160) = value;
         all.push_back({fmt::format("{}", value), sprinkled, {}, 0.5});
     }
     DepthImage sentinel{ball.camera, ball.z_m.clone(), {}};
@@ -244,7 +264,8 @@ std::vector<Case> no_depth() {
 /// The same scene with and without holes.
 std::vector<std::pair<Case, Case>> holes() {
     std::vector<std::pair<Case, Case>> all;
-    for (const auto& [name, bodies] : {std::pair{"corner", corner_of_walls()}, {"ball", ball_on_floor()}, {"stairs", stairs()}}) {
+    for (const auto& [name, bodies] :
+         {std::pair{"corner", corner_of_walls()}, {"ball", ball_on_floor()}, {"stairs", stairs()}}) {
         const Case whole = traced(name, tests::test_camera({320, 240}), bodies);
         const auto add = [&](const std::string& kind, DepthImage holed) {
             all.emplace_back(whole, Case{fmt::format("{}, {}", name, kind), std::move(holed), {}, 0.5});
@@ -257,7 +278,8 @@ std::vector<std::pair<Case, Case>> holes() {
 
 std::vector<std::pair<Case, Case>> worse_holes() {
     std::vector<std::pair<Case, Case>> all;
-    for (const auto& [name, bodies] : {std::pair{"corner", corner_of_walls()}, {"ball", ball_on_floor()}, {"stairs", stairs()}}) {
+    for (const auto& [name, bodies] :
+         {std::pair{"corner", corner_of_walls()}, {"ball", ball_on_floor()}, {"stairs", stairs()}}) {
         const Case whole = traced(name, tests::test_camera({320, 240}), bodies);
         const auto add = [&](const std::string& kind, DepthImage holed) {
             all.emplace_back(whole, Case{fmt::format("{}, {}", name, kind), std::move(holed), {}, 0.5});
@@ -275,23 +297,27 @@ std::vector<std::pair<Case, Case>> units() {
     std::vector<std::pair<Case, Case>> all;
     const DepthImage metres = tests::ball_on_floor(tests::test_camera({320, 240}));
     for (const double scale : {0.01, 0.1, 10.0, 100.0})
-        all.emplace_back(Case{"metres", metres, {}, 0.5},
-                         Case{fmt::format("times {}", scale), {metres.camera, cv::Mat1f(metres.z_m * scale), {}}, {}, 0.5 * scale});
+        all.emplace_back(
+            Case{"metres", metres, {}, 0.5},
+            Case{fmt::format("times {}", scale), {metres.camera, cv::Mat1f(metres.z_m * scale), {}}, {}, 0.5 * scale});
     return all;
 }
 
-/// The same corner from 0.2 to 200 m away, radius to match, through a normal, a long and a wide lens: what single precision
-/// takes away between the sensor's file and visibility. A fifth of a step of 8 bits is the bound.
+/// The same corner from 0.2 to 200 m away, radius to match, through a normal, a long and a wide lens: what single
+/// precision takes away between the sensor's file and visibility. A fifth of a step of 8 bits is the bound.
 std::vector<std::pair<Case, Case>> precision() {
     std::vector<std::pair<Case, Case>> all;
     const Pinhole tele{20.0 * 160, 20.0 * 160, 79.5, 59.5, {160, 120}};
-    for (const auto& [name, camera, z_m] : {std::tuple{"normal lens", tests::test_camera({160, 120}), 2.0}, {"fx = 20 W", tele, 40.0}, {"150 degrees", lens(150), 1.0}}) {
+    for (const auto& [name, camera, z_m] : {std::tuple{"normal lens", tests::test_camera({160, 120}), 2.0},
+                                            {"fx = 20 W", tele, 40.0},
+                                            {"150 degrees", lens(150), 1.0}}) {
         const Scene scene{"corner", "", corner_of_walls(z_m)};
         const cv::Mat1f z = render_geometry(World(scene), camera, Eigen::Isometry3d::Identity()).z_m;
         for (const double away_m : {0.2, 2.0, 20.0, 200.0}) {
             const double scale = away_m / z_m;
-            all.emplace_back(Case{name, {camera, z, {}}, {}, 0.5},
-                             Case{fmt::format("{}, {} m", name, away_m), {camera, cv::Mat1f(z * scale), {}}, {}, 0.5 * scale});
+            all.emplace_back(
+                Case{name, {camera, z, {}}, {}, 0.5},
+                Case{fmt::format("{}, {} m", name, away_m), {camera, cv::Mat1f(z * scale), {}}, {}, 0.5 * scale});
         }
     }
     return all;
@@ -313,7 +339,8 @@ std::vector<std::pair<Case, Case>> flying_pixels() {
         for (int v = 1; v + 1 < z.rows; ++v)
             for (int u = 1; u + 1 < z.cols; ++u) {
                 const auto [low, high] = std::minmax({z(v, u - 1), z(v, u + 1), z(v - 1, u), z(v + 1, u)});
-                if (high - low > 0.05F && even(random) < 0.6F) flown.depth.z_m(v, u) = low + (high - low) * even(random);
+                if (high - low > 0.05F && even(random) < 0.6F)
+                    flown.depth.z_m(v, u) = low + (high - low) * even(random);
             }
         all.emplace_back(std::move(quiet), std::move(flown));
     }
@@ -324,8 +351,14 @@ std::vector<std::pair<Case, Case>> flying_pixels() {
 
 const std::vector<Family>& families() {
     static const std::vector<Family> all{
-        {"planes", "0 .. 89 degrees, 0.3 .. 200 m, radius of two pixels and more", {.least = 0.9, .mean = 0.98}, [] { return planes(false); }},
-        {"planes, structured light", "0 .. 70 degrees, 0.5 .. 4 m, noise and disparity steps", {.mean = 0.95}, [] { return planes(true); }},
+        {"planes",
+         "0 .. 89 degrees, 0.3 .. 200 m, radius of two pixels and more",
+         {.least = 0.9, .mean = 0.98},
+         [] { return planes(false); }},
+        {"planes, structured light",
+         "0 .. 70 degrees, 0.5 .. 4 m, noise and disparity steps",
+         {.mean = 0.95},
+         [] { return planes(true); }},
         {"shapes", "corner, ball, saddle, stairs, crevice", {}, shapes},
         {"shapes, structured light", "the same with noise and disparity steps", {}, noisy_shapes},
         {"thin things", "a pole and wires of one pixel, a grate", {}, thin_things},
@@ -336,7 +369,11 @@ const std::vector<Family>& families() {
         {"cameras", "principal point outside, oblong pixels, telephoto, 150 degrees", {}, cameras},
         {"radii", "1 mm .. 100 m", {}, radii},
         {"units", "scene and radius times 0.01 .. 100", {.rmse = 1.0 / 255}, {}, units},
-        {"precision", "0.2 .. 200 m, fx = 20 W and 150 degrees, against another distance", {.rmse = 0.2 / 255}, {}, precision},
+        {"precision",
+         "0.2 .. 200 m, fx = 20 W and 150 degrees, against another distance",
+         {.rmse = 0.2 / 255},
+         {},
+         precision},
         {"sizes", "1x1 .. 3840x2160, lines", {.least = 0.9, .mean = 0.98}, sizes},
         {"no depth", "NaN, infinities, negative, denormal, sentinels, nothing", {}, no_depth},
     };

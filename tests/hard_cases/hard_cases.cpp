@@ -1,9 +1,9 @@
 // hard_cases: every method over what recorded depth has that rendered depth has not.
 //   hard_cases [--methods cacao,surfel] [--only TEXT] [--cases] [--write FOLDER] [--device NAME]
 //   hard_cases --normals     how true normals and edges are, of each simulated sensor
-// Prints a table per method: difference to the expected answer, worst pixel, pixels that are NaN without reason or outside
-// 0 .. 1, cases whose second run gave other bytes. --write draws each case: depth, what was expected, what came out, their
-// difference. Exit 0 all gates kept, 1 some missed.
+// Prints a table per method: difference to the expected answer, worst pixel, pixels that are NaN without reason or
+// outside 0 .. 1, cases whose second run gave other bytes. --write draws each case: depth, what was expected, what came
+// out, their difference. Exit 0 all gates kept, 1 some missed.
 #include "tests/hard_cases/cases.h"
 #include "tests/hard_cases/normals.h"
 
@@ -34,7 +34,8 @@ struct Score {
     [[nodiscard]] double rmse() const { return pixels > 0 ? std::sqrt(squares / static_cast<double>(pixels)) : 0; }
     [[nodiscard]] double mean() const { return values > 0 ? sum / static_cast<double>(values) : 1; }
     void add(const Score& other) {
-        squares += other.squares, worst = std::max(worst, other.worst), sum += other.sum, least = std::min(least, other.least);
+        squares += other.squares, worst = std::max(worst, other.worst), sum += other.sum,
+                                  least = std::min(least, other.least);
         pixels += other.pixels, values += other.values, wrong += other.wrong;
     }
 };
@@ -77,9 +78,11 @@ Score judge(const Case& one, const cv::Mat1f& found, const cv::Mat1f& again, con
             // Without a neighbour there is no normal, and a flying pixel is nobody's: then NaN is an answer.
             const bool may_be_unknown = !surface || line || one.noise.any();
             score.wrong += std::isnan(value) ? !may_be_unknown : !surface || value < 0 || value > 1;
-            if (std::isnan(value)) continue;
+            if (std::isnan(value))
+                continue;
             score.sum += value, score.least = std::min<double>(score.least, value), ++score.values;
-            if (expected.empty() || std::isnan(expected(v, u))) continue;
+            if (expected.empty() || std::isnan(expected(v, u)))
+                continue;
             const double error = static_cast<double>(value) - expected(v, u);
             score.squares += error * error, score.worst = std::max(score.worst, std::abs(error)), ++score.pixels;
         }
@@ -89,11 +92,16 @@ Score judge(const Case& one, const cv::Mat1f& found, const cv::Mat1f& again, con
 /// What the gate says of a case, or nothing.
 std::string missed(const Gate& gate, const Score& score, bool expects) {
     std::string why;
-    if (gate.rmse && score.rmse() > *gate.rmse) why += fmt::format(" rmse {:.4f} > {:.4f}", score.rmse(), *gate.rmse);
-    if (expects && gate.mean && score.mean() < *gate.mean) why += fmt::format(" mean {:.3f} < {}", score.mean(), *gate.mean);
-    if (expects && gate.least && score.least < *gate.least) why += fmt::format(" least {:.3f} < {}", score.least, *gate.least);
-    if (score.wrong > 0) why += fmt::format(" {} pixels NaN or out of range", score.wrong);
-    if (score.differs) why += " another answer the second time";
+    if (gate.rmse && score.rmse() > *gate.rmse)
+        why += fmt::format(" rmse {:.4f} > {:.4f}", score.rmse(), *gate.rmse);
+    if (expects && gate.mean && score.mean() < *gate.mean)
+        why += fmt::format(" mean {:.3f} < {}", score.mean(), *gate.mean);
+    if (expects && gate.least && score.least < *gate.least)
+        why += fmt::format(" least {:.3f} < {}", score.least, *gate.least);
+    if (score.wrong > 0)
+        why += fmt::format(" {} pixels NaN or out of range", score.wrong);
+    if (score.differs)
+        why += " another answer the second time";
     return why;
 }
 
@@ -101,7 +109,8 @@ void draw(const std::filesystem::path& file, const Case& one, const cv::Mat1f& e
     std::vector<Tile> tiles{{"depth", depth_picture(one.depth.z_m)}, {"found", visibility_picture(found)}};
     if (!expected.empty()) {
         tiles.push_back({"expected", visibility_picture(expected)});
-        tiles.push_back({"found - expected, blue -0.3 .. red +0.3", difference_picture(cv::Mat1f(found - expected), 0.3)});
+        tiles.push_back(
+            {"found - expected, blue -0.3 .. red +0.3", difference_picture(cv::Mat1f(found - expected), 0.3)});
     }
     write_picture(file, panel(tiles));
 }
@@ -129,36 +138,43 @@ int main(int argc, char** argv) {
         }
         for (const std::string& name : names) {
             Subject subject(device, method_named(name));
-            fmt::print("\n{} on {}\n\n| family | cases | RMSE | worst pixel | mean | least | NaN or out of range | runs differ | gates |\n"
+            fmt::print("\n{} on {}\n\n| family | cases | RMSE | worst pixel | mean | least | NaN or out of range | "
+                       "runs differ | gates |\n"
                        "|---|---|---|---|---|---|---|---|---|\n",
                        name, device.info().name);
             for (const Family& family : families()) {
-                if (family.name.find(only) == std::string::npos) continue;
+                if (family.name.find(only) == std::string::npos)
+                    continue;
                 Score all;
                 int cases = 0, differ = 0, failed = 0;
                 const auto count = [&](const Case& one, const cv::Mat1f& expected) {
                     const cv::Mat1f found = subject.visibility(one);
                     const Score score = judge(one, found, subject.visibility(one), expected);
                     if (!folder.empty())
-                        draw(std::filesystem::path(folder) / fmt::format("{}, {}, {}.png", name, family.name, one.name), one, expected, found);
+                        draw(std::filesystem::path(folder) / fmt::format("{}, {}, {}.png", name, family.name, one.name),
+                             one, expected, found);
                     const std::string why = missed(family.gate, score, !expected.empty());
                     if (each)
-                        fmt::print("  {}: {}: rmse {:.4f} worst {:.3f} mean {:.3f} least {:.3f}{}\n", family.name, one.name, score.rmse(),
-                                   score.worst, score.mean(), score.least, why);
+                        fmt::print("  {}: {}: rmse {:.4f} worst {:.3f} mean {:.3f} least {:.3f}{}\n", family.name,
+                                   one.name, score.rmse(), score.worst, score.mean(), score.least, why);
                     if (!why.empty())
                         misses += fmt::format("{}: {}: {}:{}\n", name, family.name, one.name, why);
                     all.add(score), ++cases, differ += score.differs, failed += !why.empty();
                 };
                 if (family.cases)
-                    for (const Case& one : family.cases()) count(one, one.expected);
+                    for (const Case& one : family.cases())
+                        count(one, one.expected);
                 else
-                    for (const auto& [whole, one] : family.pairs()) count(one, subject.visibility(whole));
-                fmt::print("| {} | {} | {:.4f} | {:.3f} | {:.3f} | {:.3f} | {} | {} | {} |\n", family.name, cases, all.rmse(), all.worst, all.mean(),
-                           all.least, all.wrong, differ, failed == 0 ? "kept" : fmt::format("{} missed", failed));
+                    for (const auto& [whole, one] : family.pairs())
+                        count(one, subject.visibility(whole));
+                fmt::print("| {} | {} | {:.4f} | {:.3f} | {:.3f} | {:.3f} | {} | {} | {} |\n", family.name, cases,
+                           all.rmse(), all.worst, all.mean(), all.least, all.wrong, differ,
+                           failed == 0 ? "kept" : fmt::format("{} missed", failed));
                 std::fflush(stdout);
             }
         }
-        for (const std::string& message : device.validation_messages()) misses += message + "\n";
+        for (const std::string& message : device.validation_messages())
+            misses += message + "\n";
         fmt::print("\n{}", misses.empty() ? "every gate kept\n" : "missed:\n" + misses);
         return misses.empty() ? 0 : 1;
     } catch (const std::exception& failure) {

@@ -39,7 +39,9 @@ std::vector<Sighted> views_of(const scene::Scene& scene, const Sensor& sensor) {
 FittedDepth from_depth(gpu::Device& device, const DepthImage& depth) {
     using Host = gpu::BufferRow::Host;
     const std::size_t pixels = depth.z_m.total();
-    ScreenTables tables{{{}, depth.z_m.size()}, depth.z_m.size(), 0,
+    ScreenTables tables{{{}, depth.z_m.size()},
+                        depth.z_m.size(),
+                        0,
                         {{"depth", pixels * 4, Host::upload, gpu::BufferRow::Texels::r32f},
                          {"surfaces", pixels * 16, Host::download, gpu::BufferRow::Texels::rgba32f}},
                         {}};
@@ -50,7 +52,8 @@ FittedDepth from_depth(gpu::Device& device, const DepthImage& depth) {
     program.run(bytes_of(constants));
     FittedDepth found{depth, {cv::Mat3f(depth.z_m.size())}};
     const auto surfaces = program.host_as<cv::Vec4f>(1);
-    std::transform(surfaces.begin(), surfaces.end(), found.normals.normals.begin(), [](const cv::Vec4f& s) { return cv::Vec3f(s[0], s[1], s[2]); });
+    std::transform(surfaces.begin(), surfaces.end(), found.normals.normals.begin(),
+                   [](const cv::Vec4f& s) { return cv::Vec3f(s[0], s[1], s[2]); });
     return found;
 }
 
@@ -58,7 +61,8 @@ FittedDepth from_depth(gpu::Device& device, const DepthImage& depth) {
 bool jumps(const cv::Mat1f& z, int v, int u) {
     const float most = std::max(0.1F, 0.05F * z(v, u));
     for (const auto& [y, x] : {std::pair{v, u - 1}, {v, u + 1}, {v - 1, u}, {v + 1, u}})
-        if (y >= 0 && x >= 0 && y < z.rows && x < z.cols && std::abs(z(y, x) - z(v, u)) > most) return true;
+        if (y >= 0 && x >= 0 && y < z.rows && x < z.cols && std::abs(z(y, x) - z(v, u)) > most)
+            return true;
     return false;
 }
 
@@ -74,22 +78,27 @@ void add(Figures& figures, const Sighted& view, const FittedDepth& found) {
     cv::erode(found.depth.z_m > 0, surrounded, cv::Mat(), {-1, -1}, 2);
     for (int v = 0; v < z.rows; ++v)
         for (int u = 0; u < z.cols; ++u) {
-            if (!(view.recorded.z_m(v, u) > 0 && z(v, u) > 0)) continue;
+            if (!(view.recorded.z_m(v, u) > 0 && z(v, u) > 0))
+                continue;
             ++figures.depths;
             const cv::Vec3f normal = found.normals.normals(v, u);
             if (cv::norm(normal) > 0.5) {
-                const double degrees = std::acos(std::clamp(normal.dot(view.exact.normals(v, u)), -1.0F, 1.0F)) * 180 / std::numbers::pi;
+                const double degrees =
+                    std::acos(std::clamp(normal.dot(view.exact.normals(v, u)), -1.0F, 1.0F)) * 180 / std::numbers::pi;
                 figures.degrees.push_back(degrees);
-                if (z(v, u) >= 1 && z(v, u) <= 3) figures.near_degrees.push_back(degrees);
+                if (z(v, u) >= 1 && z(v, u) <= 3)
+                    figures.near_degrees.push_back(degrees);
             }
-            if (true_edge(v, u) != 0 || !jumps(z, v, u) || !surrounded(v, u)) continue;
+            if (true_edge(v, u) != 0 || !jumps(z, v, u) || !surrounded(v, u))
+                continue;
             ++figures.edges;
             figures.kept += found_edge(v, u) <= 1; // a distance of 0, or of 1 and diagonally
         }
 }
 
 double share_of(std::vector<double>& values, double share) {
-    if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+    if (values.empty())
+        return std::numeric_limits<double>::quiet_NaN();
     const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
     std::nth_element(values.begin(), at, values.end());
     return *at;
@@ -98,27 +107,37 @@ double share_of(std::vector<double>& values, double share) {
 } // namespace
 
 std::string print_normals(gpu::Device& device) {
-    fmt::print("\n| sensor | pixels with a normal, % | median, degrees | 95 % | median at 1 .. 3 m | 95 % | edges within 1 px, % |\n"
+    fmt::print("\n| sensor | pixels with a normal, % | median, degrees | 95 % | median at 1 .. 3 m | 95 % | edges "
+               "within 1 px, % |\n"
                "|---|---|---|---|---|---|---|\n");
     std::string misses;
     const double cacao = method_named("cacao").smoothing;
-    for (const auto& [name, smoothing] : {std::pair{"ideal", 1.0}, {"kinect", 1.0}, {"kinect", cacao}, {"tof", 1.0}, {"tof", cacao}}) {
+    for (const auto& [name, smoothing] :
+         {std::pair{"ideal", 1.0}, {"kinect", 1.0}, {"kinect", cacao}, {"tof", 1.0}, {"tof", cacao}}) {
         const Sensor& sensor = sensor_named(name);
         Figures figures;
         for (const scene::Scene& scene : scene::scenes()) {
             const std::vector<Sighted> views = views_of(scene, sensor);
             std::vector<DepthImage> images;
-            for (const Sighted& view : views) images.push_back(view.recorded);
+            for (const Sighted& view : views)
+                images.push_back(view.recorded);
             const DepthNoise noise = measure_noise(images);
             std::optional<FitPlane> fit;
-            if (noise.any()) fit.emplace(device, noise, FitPlaneOptions{.smoothing = smoothing});
-            for (const Sighted& view : views) add(figures, view, fit ? fit->compute(view.recorded) : from_depth(device, view.recorded));
+            if (noise.any())
+                fit.emplace(device, noise, FitPlaneOptions{.smoothing = smoothing});
+            for (const Sighted& view : views)
+                add(figures, view, fit ? fit->compute(view.recorded) : from_depth(device, view.recorded));
         }
-        const double median = share_of(figures.near_degrees, 0.5), aim = name == std::string("ideal") ? 1 : smoothing == cacao ? 5 : 180;
-        fmt::print("| {}{} | {:.1f} | {:.2f} | {:.1f} | {:.2f} | {:.1f} | {:.1f} |\n", name, smoothing == 1 ? "" : ", CACAO's windows",
+        const double median = share_of(figures.near_degrees, 0.5), aim = name == std::string("ideal") ? 1
+                                                                         : smoothing == cacao         ? 5
+                                                                                                      : 180;
+        fmt::print("| {}{} | {:.1f} | {:.2f} | {:.1f} | {:.2f} | {:.1f} | {:.1f} |\n", name,
+                   smoothing == 1 ? "" : ", CACAO's windows",
                    100 * static_cast<double>(figures.degrees.size()) / figures.depths, share_of(figures.degrees, 0.5),
-                   share_of(figures.degrees, 0.95), median, share_of(figures.near_degrees, 0.95), 100 * figures.kept / figures.edges);
-        if (!(median <= aim)) misses += fmt::format("normals, {}: median {:.2f} > {} degrees\n", name, median, aim);
+                   share_of(figures.degrees, 0.95), median, share_of(figures.near_degrees, 0.95),
+                   100 * figures.kept / figures.edges);
+        if (!(median <= aim))
+            misses += fmt::format("normals, {}: median {:.2f} > {} degrees\n", name, median, aim);
     }
     return misses;
 }

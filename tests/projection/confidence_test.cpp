@@ -38,7 +38,8 @@ TEST(Confidence, FallsWithTheShareOfHolesAndIsNoneInThem) {
     const double share = cv::countNonZero(holed.z_m > 0) / static_cast<double>(holed.z_m.total());
     EXPECT_NEAR(cv::mean(c(middle), holed.z_m(middle) > 0)[0], share, 0.03);
     for (int y = 0; y < c.rows; ++y)
-        for (int x = 0; x < c.cols; ++x) ASSERT_EQ(std::isnan(c(y, x)), holed.z_m(y, x) == 0);
+        for (int x = 0; x < c.cols; ++x)
+            ASSERT_EQ(std::isnan(c(y, x)), holed.z_m(y, x) == 0);
 }
 
 TEST(Confidence, IsHalfBesideWhatHidesHalfOfTheBall) {

@@ -1,4 +1,5 @@
-// Noise measured from depth, and the plane fit that it steers: what is gained on noisy depth, and what must not be lost.
+// Noise measured from depth, and the plane fit that it steers: what is gained on noisy depth, and what must not be
+// lost.
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/gpu/device.h"
 #include "projection/error.h"
@@ -26,9 +27,11 @@ DepthImage noisy(const DepthImage& clean, const DepthNoise& noise, double step_p
     std::mt19937 random(seed);
     std::normal_distribution<double> normal;
     for (float& z : image.z_m) {
-        if (z <= 0) continue;
+        if (z <= 0)
+            continue;
         double value = z + noise.at(z) * normal(random);
-        if (step_per_z2 > 0) value = 1 / (std::round(1 / (value * step_per_z2)) * step_per_z2);
+        if (step_per_z2 > 0)
+            value = 1 / (std::round(1 / (value * step_per_z2)) * step_per_z2);
         z = static_cast<float>(value);
     }
     return image;
@@ -45,7 +48,8 @@ std::vector<double> normal_errors(const cv::Mat3f& normals, const cv::Vec3d& tru
     for (int y = 8; y < normals.rows - 8; ++y)
         for (int x = 8; x < normals.cols - 8; ++x) {
             const cv::Vec3d n = normals(y, x);
-            if (cv::norm(n) > 0) errors.push_back(degrees * std::acos(std::clamp(n.dot(truth), -1.0, 1.0)));
+            if (cv::norm(n) > 0)
+                errors.push_back(degrees * std::acos(std::clamp(n.dot(truth), -1.0, 1.0)));
         }
     std::sort(errors.begin(), errors.end());
     return errors;
@@ -53,7 +57,8 @@ std::vector<double> normal_errors(const cv::Mat3f& normals, const cv::Vec3d& tru
 
 TEST(noise, clean_depth_has_none) {
     // Second differences of 1/z vanish on planes; what a scene's edges and curves add is the far tail.
-    const std::vector<DepthImage> images{tilted_plane(test_camera({320, 240}), 40), ball_on_floor(test_camera({320, 240}))};
+    const std::vector<DepthImage> images{tilted_plane(test_camera({320, 240}), 40),
+                                         ball_on_floor(test_camera({320, 240}))};
     EXPECT_FALSE(measure_noise(images).any()) << describe(measure_noise(images));
 }
 
@@ -77,9 +82,11 @@ TEST(noise, a_known_law_is_measured) {
     const Pinhole camera = test_camera({320, 240});
     const DepthNoise kinect{0.001, 0.0018};
     std::vector<DepthImage> images;
-    for (const double z : {1.0, 2.0, 3.0, 4.0}) images.push_back(noisy(tilted_plane(camera, 35, z), kinect));
+    for (const double z : {1.0, 2.0, 3.0, 4.0})
+        images.push_back(noisy(tilted_plane(camera, 35, z), kinect));
     const DepthNoise measured = measure_noise(images);
-    for (const double z : {1.0, 2.0, 3.0, 4.0}) EXPECT_NEAR(measured.at(z), kinect.at(z), 0.2 * kinect.at(z)) << z << " m";
+    for (const double z : {1.0, 2.0, 3.0, 4.0})
+        EXPECT_NEAR(measured.at(z), kinect.at(z), 0.2 * kinect.at(z)) << z << " m";
 }
 
 TEST(noise, disparity_steps_count_as_noise) {
@@ -91,7 +98,8 @@ TEST(noise, disparity_steps_count_as_noise) {
 }
 
 TEST(noise, grain_is_that_of_the_sensors_window) {
-    // White noise under a Gaussian window of deviation d correlates by exp(-x^2 / 4 d^2), whose integral is 2 d sqrt(pi).
+    // White noise under a Gaussian window of deviation d correlates by exp(-x^2 / 4 d^2), whose integral is 2 d
+    // sqrt(pi).
     const Pinhole camera = test_camera({320, 240});
     const DepthImage clean = tilted_plane(camera, 35, 2);
     const DepthImage white = noisy(clean, {0.01, 0});
@@ -115,7 +123,8 @@ TEST(noise, steps_are_told_and_nothing_is_taken_for_one) {
     EXPECT_EQ(disparity.step_m, 0);
     for (const double step_m : {0.001, 0.0002}) {
         DepthImage stored{camera, unquantised.z_m.clone(), {}};
-        for (float& z : stored.z_m) z = static_cast<float>(std::round(z / step_m) * step_m);
+        for (float& z : stored.z_m)
+            z = static_cast<float>(std::round(z / step_m) * step_m);
         const DepthNoise even = measure_noise(std::vector{stored});
         EXPECT_NEAR(even.step_m, step_m, 0.05 * step_m);
         EXPECT_EQ(even.step_per_z2, 0);
@@ -156,7 +165,8 @@ TEST(fit_plane, clean_planes_stay_where_they_are) {
     const auto errors = normal_errors(fitted.normals.normals, {std::sin(tilt), 0, -std::cos(tilt)});
     EXPECT_LT(errors.back(), 1);
     for (int y = 0; y < plane.z_m.rows; ++y)
-        for (int x = 0; x < plane.z_m.cols; ++x) ASSERT_NEAR(fitted.depth.z_m(y, x), plane.z_m(y, x), 1e-3 * plane.z_m(y, x)) << x << ", " << y;
+        for (int x = 0; x < plane.z_m.cols; ++x)
+            ASSERT_NEAR(fitted.depth.z_m(y, x), plane.z_m(y, x), 1e-3 * plane.z_m(y, x)) << x << ", " << y;
 }
 
 TEST(fit_plane, edges_stay_within_a_pixel) {
@@ -168,7 +178,8 @@ TEST(fit_plane, edges_stay_within_a_pixel) {
     FitPlane fit(device(), kinect);
     const cv::Mat1f z = fit.compute(noisy(step, kinect)).depth.z_m;
     for (int y = 0; y < z.rows; ++y)
-        for (int x = 0; x < z.cols; ++x) ASSERT_NEAR(z(y, x), x < 160 ? 2.0 : 2.3, 0.06) << x << ", " << y;
+        for (int x = 0; x < z.cols; ++x)
+            ASSERT_NEAR(z(y, x), x < 160 ? 2.0 : 2.3, 0.06) << x << ", " << y;
 }
 
 TEST(fit_plane, depth_gains_from_the_fit) {
@@ -177,7 +188,8 @@ TEST(fit_plane, depth_gains_from_the_fit) {
     const DepthNoise kinect{0.0012, 0.0018};
     const DepthImage recorded = noisy(plane, kinect);
     FitPlane fit(device(), kinect);
-    const double before = cv::norm(recorded.z_m, plane.z_m), after = cv::norm(fit.compute(recorded).depth.z_m, plane.z_m);
+    const double before = cv::norm(recorded.z_m, plane.z_m),
+                 after = cv::norm(fit.compute(recorded).depth.z_m, plane.z_m);
     EXPECT_LT(after, 0.5 * before);
 }
 
@@ -202,7 +214,8 @@ DepthImage two_panes(bool with_flying) {
     std::uniform_real_distribution<float> between(1.05F, 1.35F);
     for (int y = 0; with_flying && y < image.z_m.rows; ++y)
         for (int x : {159, 160})
-            if (random() % 5 < 3) image.z_m(y, x) = between(random);
+            if (random() % 5 < 3)
+                image.z_m(y, x) = between(random);
     return image;
 }
 
@@ -230,10 +243,12 @@ TEST(fit_plane, a_wire_is_no_flying_pixel) {
     DepthImage wires{camera, cv::Mat1f(camera.size, 2.0F), {}};
     wires.z_m.col(20).rowRange(0, 200) = 1.5F;
     wires.z_m.row(230) = 1.4F;
-    for (int i = 0; i < 180; ++i) wires.z_m(10 + i, 60 + i) = 1.6F;
+    for (int i = 0; i < 180; ++i)
+        wires.z_m(10 + i, 60 + i) = 1.6F;
     FitPlane fit(device(), {0.001, 0.0005});
     const cv::Mat1f kept = fit.compute(wires).depth.z_m;
-    EXPECT_EQ(cv::countNonZero(kept), kept.total() - 6); // the last pixel at either end of a wire has one neighbour only
+    EXPECT_EQ(cv::countNonZero(kept),
+              kept.total() - 6); // the last pixel at either end of a wire has one neighbour only
 }
 
 TEST(fit_plane, without_smoothing_depth_is_as_recorded) {
@@ -245,7 +260,8 @@ TEST(fit_plane, without_smoothing_depth_is_as_recorded) {
         for (int x = 0; x < flown.z_m.cols; ++x)
             ASSERT_TRUE(fitted.depth.z_m(y, x) == 0 || fitted.depth.z_m(y, x) == flown.z_m(y, x));
     EXPECT_LT(cv::countNonZero(fitted.depth.z_m), flown.z_m.total());
-    for (const std::string& message : device().validation_messages()) ADD_FAILURE() << message;
+    for (const std::string& message : device().validation_messages())
+        ADD_FAILURE() << message;
 }
 
 TEST(fit_plane, what_stays_on_the_device_is_what_the_host_would_have_sent) {
@@ -262,7 +278,10 @@ TEST(fit_plane, what_stays_on_the_device_is_what_the_host_would_have_sent) {
         const cv::Mat1f stayed = on_device.compute({.depth = depth, .noise = kinect}).visibility;
         EXPECT_EQ(std::memcmp(by_host.data, stayed.data, by_host.total() * 4), 0) << name;
         // And what the host sends next is not what stayed there.
-        EXPECT_EQ(std::memcmp(method->compute({fitted.depth, &fitted.normals, kinect, true}).visibility.data, by_host.data, by_host.total() * 4), 0) << name;
+        EXPECT_EQ(std::memcmp(method->compute({fitted.depth, &fitted.normals, kinect, true}).visibility.data,
+                              by_host.data, by_host.total() * 4),
+                  0)
+            << name;
     }
 }
 
