@@ -8,6 +8,7 @@
 #include <array>
 #include <Eigen/Geometry>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -93,12 +94,24 @@ struct PointSet {
     std::span<const std::array<int, 3>> triangles = {};
 };
 
-/// What a method is besides, if it needs no view: it looks from the points themselves.
+/// Values of points, and what was chosen on the way.
+struct PointVisibility {
+    std::vector<float> visibility; ///< per point; NaN where it is not finite or its neighbours make no surface
+    std::vector<float> confidence; ///< 0 .. 1: how flat the surface is round the point, times how many discs span the
+                                   ///< radius; empty where the method has none
+    std::vector<Eigen::Vector3f> normals; ///< as used; zero where there is none; empty for meshes
+    double radius = 0, spacing = 0;       ///< as used, in the cloud's unit; spacing 0 = not measured
+    int tiles = 1;
+    std::vector<std::string> notes; ///< sentences: what was chosen and why
+    Timings timings;
+};
+
+/// Computes points without a view: it looks from the points themselves. Not thread-safe: one cloud at a time.
 class PointMethod {
   public:
     virtual ~PointMethod() = default;
-    /// Visibility of each point; NaN where a point has no surface round it.
-    virtual std::vector<float> compute(const PointSet& points) = 0;
+    /// `scanner`: where the file says that the cloud was seen from.
+    virtual PointVisibility compute(const PointSet& points, const std::optional<Eigen::Vector3d>& scanner = {}) = 0;
     /// What the last compute() found besides, for study.
     [[nodiscard]] virtual std::vector<Intermediate> intermediates() { return {}; }
 };
@@ -111,6 +124,8 @@ class MethodSetup {
     virtual std::vector<Parameter> parameters() = 0;
     /// Takes the settings as they are now; throws Error naming the setting that is out of range.
     virtual std::unique_ptr<Method> make(gpu::Device& device) const = 0;
+    /// The same for points; null where the method needs a view.
+    [[nodiscard]] virtual std::unique_ptr<PointMethod> make_for_points() const { return nullptr; }
 };
 
 struct MethodRow {

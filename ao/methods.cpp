@@ -10,6 +10,8 @@
 #include "ao/surfel/surfel.h"
 #include "projection/error.h"
 
+#include <type_traits>
+
 namespace scanshade {
 namespace {
 
@@ -20,6 +22,12 @@ class SetupOf final : public MethodSetup {
     std::vector<Parameter> parameters() override { return options_.parameters(); }
     std::unique_ptr<Method> make(gpu::Device& device) const override {
         return std::make_unique<Made>(device, options_);
+    }
+    std::unique_ptr<PointMethod> make_for_points() const override {
+        if constexpr (std::is_base_of_v<PointMethod, Made>)
+            return std::make_unique<Made>(options_);
+        else
+            return nullptr;
     }
     static std::unique_ptr<MethodSetup> start() { return std::make_unique<SetupOf>(); }
 

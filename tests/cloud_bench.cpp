@@ -187,5 +187,6 @@ int main(int argc, char** argv) {
             judge.row(fmt::format("256 views of {0}x{0}", raster),
                       [&] { return sky_by_views(cloud, spacing, 256, raster); });
     if (with_raycast)
-        judge.row("raycast, 64 rays", [&] { return Raycast({.radius_m = radius, .rays = 64}).compute(set); });
+        judge.row("raycast, 64 rays",
+                  [&] { return Raycast({.radius_m = radius, .rays = 64}).compute(set).visibility; });
 }

@@ -186,7 +186,7 @@ class CloudAo::Work {
         watch_.lap("survey");
     }
 
-    CloudVisibility run() {
+    PointVisibility run() {
         if (options_.sky)
             tile(valid_, valid_);
         else
@@ -411,7 +411,7 @@ class CloudAo::Work {
     const CloudAoOptions& options_;
     Vector3d up_;
     const PointSet& cloud_;
-    CloudVisibility result_;
+    PointVisibility result_;
     Watch watch_;
     std::optional<CloudGpu> gpu_;
     std::optional<RayFan> fan_;
@@ -421,15 +421,15 @@ class CloudAo::Work {
     int tiles_ = 0, gpu_tiles_ = 0, passes_ = 2;
 };
 
-CloudVisibility CloudAo::compute(const PointSet& cloud, const std::optional<Vector3d>& scanner) const {
+PointVisibility CloudAo::compute(const PointSet& cloud, const std::optional<Vector3d>& scanner) {
     if (!cloud.triangles.empty() && !options_.sky)
         return of_mesh(cloud);
     return Work(options_, device_, up_, viewpoint_, cloud, scanner).run();
 }
 
 /// Vertices see exactly what the faces hide; no mean over neighbours is needed, but more rays.
-CloudVisibility CloudAo::of_mesh(const PointSet& mesh) const {
-    CloudVisibility result;
+PointVisibility CloudAo::of_mesh(const PointSet& mesh) const {
+    PointVisibility result;
     std::vector<float> sides;
     for (const auto& [a, b, c] : mesh.triangles)
         if (std::min({a, b, c}) >= 0)
@@ -445,7 +445,7 @@ CloudVisibility CloudAo::of_mesh(const PointSet& mesh) const {
         std::clamp(options_.radius > 0 ? options_.radius : default_radius(extent, result.spacing), 1e-6, 1e6);
     const int rays = options_.rays > 0 ? options_.rays : 64;
     Raycast raycast({.radius_m = result.radius, .rays = rays, .mesh = "vertices", .seed = options_.seed});
-    result.visibility = raycast.compute(mesh);
+    result.visibility = raycast.compute(mesh).visibility;
     result.timings = raycast.timings();
     result.confidence.assign(result.visibility.size(), 0.0F);
     for (std::size_t i = 0; i < result.visibility.size(); ++i)

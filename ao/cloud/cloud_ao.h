@@ -28,37 +28,23 @@ struct CloudAoOptions {
     [[nodiscard]] std::vector<Parameter> parameters();
 };
 
-/// What came out, and what was chosen on the way.
-struct CloudVisibility {
-    std::vector<float> visibility; ///< per point; NaN where it is not finite or its neighbours make no surface
-    std::vector<float>
-        confidence; ///< 0 .. 1: how flat the surface is round the point, times how many discs span the radius
-    std::vector<Eigen::Vector3f> normals; ///< as used; zero where there is none; empty for meshes
-    double radius = 0, spacing = 0;       ///< as used; in the cloud's unit
-    int tiles = 1;
-    std::vector<std::string> notes; ///< sentences: what was chosen and why
-    Timings timings;
-};
-
 /// A twentieth of the cloud's extent (of the box that holds all but one in a hundred points, each way), but at least 10
 /// and at most 200 spacings: fewer would see single points, more would cost without end.
 [[nodiscard]] double default_radius(double extent, double spacing);
 
 /// Deterministic: the result depends neither on the number of threads nor on their timing.
-class CloudAo {
+class CloudAo final : public PointMethod {
   public:
     /// On `device`, or where there is none on the processor (faster there than as Vulkan's device). Throws Misuse
     /// naming a setting out of its range.
     explicit CloudAo(CloudAoOptions options, gpu::Device* device = nullptr);
 
-    /// `scanner`: where the file says that the cloud was seen from. Where there are faces, rays are cast from the
-    /// vertices against them in place of discs.
-    [[nodiscard]] CloudVisibility compute(const PointSet& cloud,
-                                          const std::optional<Eigen::Vector3d>& scanner = {}) const;
+    /// Where there are faces, rays are cast from the vertices against them in place of discs.
+    PointVisibility compute(const PointSet& cloud, const std::optional<Eigen::Vector3d>& scanner = {}) override;
 
   private:
     class Work;
-    [[nodiscard]] CloudVisibility of_mesh(const PointSet& mesh) const;
+    [[nodiscard]] PointVisibility of_mesh(const PointSet& mesh) const;
 
     CloudAoOptions options_;
     gpu::Device* device_;

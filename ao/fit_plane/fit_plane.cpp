@@ -124,32 +124,4 @@ FittedDepth FitPlane::compute(const DepthImage& depth, std::span<const OtherDept
     return fitted;
 }
 
-AoMap OnFittedDepth::compute(const View& view) {
-    timings_.clear();
-    AoMap ao;
-    if (!view.noise.any()) {
-        ao = method_.compute(view);
-    } else {
-        if (fit_)
-            fit_->set_noise(view.noise);
-        else
-            fit_.emplace(device_, view.noise, options_);
-        ao = on_fitted(view);
-        timings_ = fit_->timings();
-    }
-    timings_.insert(timings_.end(), method_.timings().begin(), method_.timings().end());
-    return ao;
-}
-
-AoMap OnFittedDepth::on_fitted(const View& view) {
-    if (fit_->planes() && !view.normals && method_.takes_prepared()) {
-        const PreparedSurfaces prepared = fit_->compute_on_device(view.depth);
-        return method_.compute({.depth = view.depth, .noise = view.noise, .smoothed = true, .prepared = &prepared});
-    }
-    const FittedDepth fitted = fit_->compute(view.depth);
-    const bool planes = !fitted.normals.normals.empty();
-    return method_.compute(
-        {fitted.depth, view.normals || !planes ? view.normals : &fitted.normals, view.noise, planes});
-}
-
 } // namespace scanshade

@@ -68,26 +68,4 @@ class FitPlane {
     Timings timings_;
 };
 
-/// A method that looks at fitted depth and normals in place of the recorded ones, where View::noise says that depth has
-/// noise; else at these.
-class OnFittedDepth final : public Method {
-  public:
-    /// Keeps references to device and method.
-    OnFittedDepth(gpu::Device& device, Method& method, const FitPlaneOptions& options)
-        : device_(device), method_(method), options_(options) {}
-
-    AoMap compute(const View& view) override;
-    [[nodiscard]] const Timings& timings() const override { return timings_; }
-    [[nodiscard]] std::vector<Intermediate> intermediates() override { return method_.intermediates(); }
-
-  private:
-    [[nodiscard]] AoMap on_fitted(const View& view);
-
-    gpu::Device& device_;
-    Method& method_;
-    FitPlaneOptions options_;
-    std::optional<FitPlane> fit_; ///< made when noise first asks for it; its pipelines stay for other noise
-    Timings timings_;
-};
-
 } // namespace scanshade

@@ -176,9 +176,13 @@ std::vector<Intermediate> Raycast::intermediates() {
          "one standard error of each visibility; NaN where there is none"}};
 }
 
-std::vector<float> Raycast::compute(const PointSet& points) {
+PointVisibility Raycast::compute(const PointSet& points, const std::optional<Vector3d>&) {
     size_ = {};
-    return points.triangles.empty() ? of_cloud(points) : of_mesh(points);
+    PointVisibility found;
+    found.visibility = points.triangles.empty() ? of_cloud(points) : of_mesh(points);
+    found.radius = options_.radius_m;
+    found.timings = timings_;
+    return found;
 }
 
 std::vector<float> Raycast::of_cloud(const PointSet& points) {

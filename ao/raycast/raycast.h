@@ -32,7 +32,7 @@ class Raycast final : public Method, public PointMethod {
     /// Clouds as discs (discs_of()); meshes as they are. Per vertex of a mesh either the mean over its triangles of the
     /// visibility at their centroids about their face normals (Luna 2016, chapter 21), or rays from the vertex about
     /// the mean of their normals. NaN for points that are not finite and vertices without a triangle.
-    std::vector<float> compute(const PointSet& points) override;
+    PointVisibility compute(const PointSet& points, const std::optional<Eigen::Vector3d>& scanner = {}) override;
 
     [[nodiscard]] const Timings& timings() const override { return timings_; }
     /// One standard error of each value of the last compute(), in its order (row by row); NaN where there is no value.

@@ -90,15 +90,31 @@ SensorClass class_of(const DepthNoise& noise) {
     return noise.at(4) > 7 * noise.at(1) ? SensorClass::structured_light : SensorClass::time_of_flight;
 }
 
+namespace {
+
+std::vector<std::size_t> indices_in(const Capture& capture, const TrialRequest& request) {
+    std::vector<std::size_t> indices = request.among;
+    for (std::size_t i = 0; request.among.empty() && i < capture.entries.size(); ++i)
+        indices.push_back(i);
+    return indices;
+}
+
+} // namespace
+
 TrialCapture load_trial(const fs::path& path, const TrialRequest& request) {
     const Capture capture = open_capture(path, request.capture);
+    const bool measured = request.depth_noise == "auto";
+    const DepthNoise noise =
+        measured ? noise_of(capture, indices_in(capture, request)) : noise_from_text(request.depth_noise);
+    return load_trial(capture, noise, measured ? "measured" : "--depth-noise", request);
+}
+
+TrialCapture load_trial(const Capture& capture, const DepthNoise& noise, const std::string& noise_origin,
+                        const TrialRequest& request) {
+    const fs::path& path = capture.path;
     const Truth truth = truth_beside(path);
-    TrialCapture trial{last_name(path), path, {}, {}, request.radius_m, {}, {}, {}};
-    std::vector<std::size_t> among = request.among;
-    for (std::size_t i = 0; request.among.empty() && i < capture.entries.size(); ++i)
-        among.push_back(i);
-    trial.noise = noise_of(capture, among, request.depth_noise);
-    trial.noise_origin = request.depth_noise == "auto" ? "measured" : "--depth-noise";
+    const std::vector<std::size_t> among = indices_in(capture, request);
+    TrialCapture trial{last_name(path), path, noise, noise_origin, request.radius_m, {}, {}, {}};
     trial.sensor = class_of(trial.noise);
     trial.preparation = request.preparation;
     if (truth.ao) {
@@ -133,21 +149,16 @@ std::unique_ptr<MethodSetup> set_up(const Configuration& configuration, double r
     return setup;
 }
 
-FitPlaneOptions widened_for(const std::string& method, FitPlaneOptions preparation) {
-    preparation.smoothing *= method_named(method).smoothing;
-    return preparation;
-}
-
 } // namespace
 
 Trial::Trial(gpu::Device& device, Configuration configuration, const DepthNoise& noise, double radius_m,
              FitPlaneOptions preparation)
-    : configuration_(std::move(configuration)), setup_(set_up(configuration_, radius_m)), plain_(setup_->make(device)),
-      method_(device, *plain_, widened_for(configuration_.method, preparation)), noise_(noise) {}
+    : configuration_(std::move(configuration)), setup_(set_up(configuration_, radius_m)),
+      method_(device, method_named(configuration_.method), *setup_, preparation), noise_(noise) {}
 
 cv::Mat1f Trial::compute(const TrialFrame& frame) {
     const auto start = std::chrono::steady_clock::now();
-    const AoMap ao = method_.compute({.depth = frame.depth, .noise = noise_});
+    const AoMap ao = method_.compute(frame.depth, noise_);
     wall_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     device_ms_ = scanshade::device_ms(method_.timings());
     return attach(frame.frame, frame.depth, ao).visibility;

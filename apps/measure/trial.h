@@ -3,7 +3,7 @@
 #pragma once
 
 #include "ao/compare.h"
-#include "ao/fit_plane/fit_plane.h"
+#include "ao/frame.h"
 #include "apps/method_settings.h"
 #include "apps/walk/measured_noise.h"
 #include "io/captures/capture.h"
@@ -55,6 +55,9 @@ struct TrialRequest {
 /// Loads the frames with the truth that lies beside a generated capture. Throws Error naming the frame that fails, and
 /// where none is left.
 [[nodiscard]] TrialCapture load_trial(const std::filesystem::path& path, const TrialRequest& request);
+/// The same of a capture that is open already, with its noise and who says so.
+[[nodiscard]] TrialCapture load_trial(const Capture& capture, const DepthNoise& noise, const std::string& noise_origin,
+                                      const TrialRequest& request);
 
 /// One configuration on one device, as `run` would use it on depth of some noise.
 class Trial {
@@ -79,8 +82,7 @@ class Trial {
   private:
     Configuration configuration_;
     std::unique_ptr<MethodSetup> setup_;
-    std::unique_ptr<Method> plain_;
-    OnFittedDepth method_;
+    FrameAo method_;
     DepthNoise noise_;
     double device_ms_ = 0, wall_ms_ = 0;
 };

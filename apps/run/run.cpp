@@ -1,5 +1,6 @@
 // `scanshade run`: ambient occlusion for every frame of one or more captures.
 #include "apps/jobs/job_run.h"
+#include "apps/measure/front.h"
 #include "apps/measure/trial.h"
 #include "apps/run/messages.h"
 #include "apps/run/settings.h"
@@ -52,6 +53,9 @@ struct Job {
     BatchOptions batch;
     std::vector<std::size_t> of = {}; ///< all that is taken of the capture, of which batch.frames may be a block
     std::string block = {};           ///< "" = all, else as Task::block() says
+    LoadedFrames loaded = {};         ///< decoded for the noise; the walk takes them
+
+    [[nodiscard]] const fs::path& folder() const { return batch.outputs.folder; }
 };
 
 /// "office" of captures/office/ and captures/office.pcd; "office-2" when another capture has that name.
@@ -80,41 +84,46 @@ void refuse_to_overwrite(const Job& job) {
         refuse(files_of(job.capture.entries[index], outputs));
 }
 
+/// "frames.csv" and "manifest.json", or "frames.0-500.csv" of a block.
+struct ReportFiles {
+    ReportFiles(const fs::path& folder, const std::string& block)
+        : table(folder / named("frames", block, ".csv")), manifest(folder / named("manifest", block, ".json")) {}
+    fs::path table, manifest;
+
+  private:
+    static std::string named(const std::string& stem, const std::string& block, const char* extension) {
+        return block.empty() ? stem + extension : stem + "." + block + extension;
+    }
+};
+
 /// Clears what a killed run left, and the report of an earlier one: a manifest says that what lies beside it is
 /// complete. The journal is held.
-void prepare_folder(const Job& job, const std::vector<fs::path>& reports) {
-    const fs::path& folder = job.batch.outputs.folder;
+void prepare_folder(const Job& job, const ReportFiles& reports) {
     std::set<std::string, std::less<>> stems;
     for (const std::size_t index : job.batch.frames)
         stems.insert(job.capture.entries[index].name);
-    for (const fs::path& report : reports) {
+    for (const fs::path& report : {reports.table, reports.manifest}) {
         stems.insert(report.stem().string());
-        fs::remove(folder / report);
+        fs::remove(report);
     }
     for (const char* part : {"", "ao", "confidence", "shaded", "panel", "clouds"})
-        remove_leftovers(folder / part, [&](std::string_view stem) { return stems.contains(stem); });
+        remove_leftovers(job.folder() / part, [&](std::string_view stem) { return stems.contains(stem); });
 }
 
-/// "frames.csv", or "frames.0-500.csv" of a block.
-std::string report_name(const std::string& stem, const std::string& block, const char* extension) {
-    return block.empty() ? stem + extension : stem + "." + block + extension;
-}
-
-/// A capture's frames together, on a device and with a method that are lent for the whole of it.
+/// A capture's frames together, by a method that is leased for the whole of it.
 struct Together {
     Together(Workers& workers, const Job& job, const RunSettings& asked)
-        : loan(workers.crew()), crew(*loan), worker(workers.who_is(*loan)),
-          sequence(*worker.device, *worker.plain, job.batch.radius_m, job.batch.noise, asked.fit(),
-                   asked.sequence == "on" ? sequence_options(asked.sequences, job.capture, job.batch.radius_m)
-                                          : alone()) {
-        if (workers.crew().size() > workers.devices())
+        : lease(workers.pool()), pool(*lease),
+          sequence(lease->sequence(
+              job.batch.radius_m, job.batch.noise,
+              asked.sequence == "on" ? sequence_options(asked.sequences, job.capture, job.batch.radius_m) : alone())) {
+        if (workers.pool().size() > workers.devices())
             say("  frames of a sequence are computed one at a time, in their order");
         if (sequence.reach() > 0)
             say(fmt::format("  frames within {} of each other are looked at together", sequence.reach()));
     }
-    Crew::Loan loan;
-    Crew crew; ///< of the one
-    const Workers::Worker& worker;
+    MethodPool::Lease lease;
+    MethodPool pool; ///< of the one
     Neighbourhood sequence;
 };
 
@@ -235,7 +244,7 @@ class Run final : public Command {
                         ": --view colour needs to know the colour camera beside the depth camera; refine finds it");
     }
 
-    RunReport report_on(const Job& job, Workers& workers) {
+    RunReport begun_report(const Job& job, Workers& workers) {
         const auto& said = job.batch.registration;
         const Registration registration = said.value_or(job.capture.registration);
         RunReport report{.started = std::chrono::system_clock::now(),
@@ -255,13 +264,11 @@ class Run final : public Command {
 
     /// Picks method and settings for the capture, from where the command line left them. Says what it did.
     std::vector<std::string> keep_to_budget(const Job& job, gpu::Device& device) {
-        const TrialRequest request{
-            .depth_noise = asked_.depth_noise,
-            .capture = {asked_.camera, asked_.depth_scale, asked_.association_limit_s},
-            .among = job.of,
-            .leave_bad_out = true,
-            .preparation = {.drop_flying = asked_.flying_pixels == "drop", .smoothing = asked_.depth_smoothing}};
-        const TrialCapture trial = load_trial(job.capture.path, request);
+        TrialRequest request;
+        request.among = job.of;
+        request.leave_bad_out = true;
+        request.preparation = asked_.preparation();
+        const TrialCapture trial = load_trial(job.capture, job.batch.noise, noise_origin(), request);
         const double radius_m = asked_.radius.empty() ? request.radius_m : std::stod(asked_.radius);
         const Choice choice = choose(device, shipped_front(), trial, radius_m, asked_.budget);
         if (!before_budget_.settings.empty())
@@ -271,6 +278,10 @@ class Run final : public Command {
         before_budget_ = {asked_.method, "as given", values_of(setup)};
         apply(choice.configuration, setup);
         return choice.sentences;
+    }
+
+    [[nodiscard]] std::string noise_origin() const {
+        return asked_.depth_noise == "auto" ? "measured" : "--depth-noise";
     }
 
     /// A job made by `plan`: in worker processes, task by task.
@@ -352,78 +363,121 @@ class Run final : public Command {
         std::atomic<bool> left_ = false;
     };
 
+    /// One capture, from its journal to its report.
     std::vector<FrameRow> process(Job job, Turn& turn, const Shift& shift = {}) {
-        const fs::path& folder = job.batch.outputs.folder;
         turn.is_of(job.capture.path.string());
-        Journal journal(folder, job.block);
+        Journal journal(job.folder(), job.block);
         if (asked_.overwrite)
             journal.clear();
-        const fs::path table = report_name("frames", job.block, ".csv"),
-                       manifest = report_name("manifest", job.block, ".json");
-        std::unique_lock alone(alone_);
-        const std::string task = task_key(asked_.stages_in_use(), job.capture, job.of, asked_.sequence == "on");
-        alone.unlock();
-        if (auto rows = rows_if_complete(journal, task, job.capture, job.batch.frames, asked_.retry);
-            rows && fs::exists(folder / manifest)) {
-            say(fmt::format("{}: done already, {} frames -> {}", job.capture.path.string(), rows->size(),
-                            folder.string()));
+        const ReportFiles files(job.folder(), job.block);
+        const std::string task = task_of(job);
+        if (auto rows = rows_if_done(job, journal, task, files))
             return *std::move(rows);
-        }
-        job.batch.noise = noise_of(job.capture, job.of, asked_.depth_noise);
+        measure_noise_of(job);
 
-        alone.lock();
-        Workers& workers = this->workers();
-        const std::vector<std::string> budget =
-            asked_.budget.any() ? keep_to_budget(job, workers.device()) : std::vector<std::string>{};
-        workers.make(asked_.method, asked_.chosen_setup(), asked_.fit());
-        job.batch.point_method = dynamic_cast<PointMethod*>(workers.any().plain.get());
-        job.batch.radius_m = asked_.radius_m();
-        gpu::Device& device = workers.device();
-        const CloudAo of_clouds = asked_.cloud_ao(gpu::is_cpu(device.info()) ? nullptr : &device);
-        job.batch.cloud_ao = &of_clouds;
-        job.batch.cloud_walk = asked_.cloud_walk();
-        RunReport report = report_on(job, workers);
-        report.budget = budget;
-        const std::string settings = settings_key(report, job.batch.outputs, job.batch.noise);
-        alone.unlock();
-
+        Prepared ready = prepare(job);
         std::optional<RecordingCloud> cloud;
         if (!asked_.recording_cloud.empty())
             job.batch.cloud = &cloud.emplace(asked_.cloud_resolution_m);
-        say(fmt::format("{} on {}", asked_.method, workers.description()));
-        introduce(report, job.batch.frames.size());
-        prepare_folder(job, {table, manifest});
-        Entrance entrance(entrance_);
-        job.batch.all_begun = [&] { entrance.leave(); };
-        std::optional<Together> together;
-        if (asked_.sequence == "on" || cloud)
-            job.batch.sequence = &together.emplace(workers, job, asked_).sequence;
-        report.at_once = together ? 1 : workers.crew().size();
+        say(fmt::format("{} on {}", asked_.method, workers().description()));
+        introduce(ready.report, job.batch.frames.size());
+        prepare_folder(job, files);
         const Recording recording{.journal = journal,
-                                  .settings = settings,
+                                  .settings = ready.settings,
                                   .task = task,
-                                  .device = workers.device().info().name,
+                                  .device = ready.report.device.name,
                                   .retry = asked_.retry,
                                   .carefully = shift.carefully,
                                   .finished = shift.finished};
-        Progress progress(job.batch.frames.size());
-        const auto start = std::chrono::steady_clock::now();
-        report.frames = run_recorded(job.capture, together ? together->crew : workers.crew(), job.batch, recording,
-                                     [&](const FrameRow& row) {
-                                         progress.add(row);
-                                         report.done_now += row.status == FrameStatus::ok;
-                                         report.ms_now = report.ms_now + row.ms;
-                                     });
-        report.took_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-        progress.end();
-        alone.lock(); // the report names settings
-        write_frames_csv(folder / table, report.frames);
-        write_manifest(folder / manifest, report, [&](const FrameRow& row) { return journal.whole(row); });
-        alone.unlock();
-        conclude(report, folder / table);
+        walk(job, ready.report, recording);
+        report_on(ready.report, journal, files);
         if (cloud && !interrupted)
             write_recording(*cloud);
-        return std::move(report.frames);
+        return std::move(ready.report.frames);
+    }
+
+    [[nodiscard]] std::string task_of(const Job& job) {
+        const std::lock_guard alone(alone_);
+        return task_key(asked_.stages_in_use(), job.capture, job.of, asked_.sequence == "on");
+    }
+
+    /// The rows of a capture that an earlier run has finished.
+    [[nodiscard]] std::optional<std::vector<FrameRow>> rows_if_done(const Job& job, const Journal& journal,
+                                                                    const std::string& task, const ReportFiles& files) {
+        auto rows = rows_if_complete(journal, task, job.capture, job.batch.frames, asked_.retry);
+        if (!rows || !fs::exists(files.manifest))
+            return std::nullopt;
+        say(fmt::format("{}: done already, {} frames -> {}", job.capture.path.string(), rows->size(),
+                        job.folder().string()));
+        return rows;
+    }
+
+    /// Of all that is taken of the capture, so that blocks of it agree. The block's own frames stay in memory.
+    void measure_noise_of(Job& job) const {
+        if (asked_.depth_noise != "auto") {
+            job.batch.noise = noise_from_text(asked_.depth_noise);
+            return;
+        }
+        const bool colour = shows_colour(job.batch.outputs, !asked_.recording_cloud.empty());
+        job.batch.noise = noise_of(job.capture, job.of, &job.loaded, colour);
+        const std::set<std::size_t> wanted(job.batch.frames.begin(), job.batch.frames.end());
+        std::erase_if(job.loaded, [&](const auto& each) { return !wanted.contains(each.first); });
+        job.batch.loaded = &job.loaded;
+    }
+
+    /// What a capture is computed with, and all there is to report before it is.
+    struct Prepared {
+        RunReport report;
+        std::string settings; ///< settings_key()
+        std::unique_ptr<PointMethod> points;
+    };
+
+    /// Makes the methods, or finds them made for the capture before.
+    [[nodiscard]] Prepared prepare(Job& job) {
+        const std::lock_guard alone(alone_);
+        Workers& workers = this->workers();
+        gpu::Device& device = workers.device();
+        const std::vector<std::string> budget =
+            asked_.budget.any() ? keep_to_budget(job, device) : std::vector<std::string>{};
+        MethodSetup& setup = asked_.chosen_setup();
+        workers.make(asked_.method, setup, asked_.preparation());
+        job.batch.radius_m = asked_.radius_m();
+        auto points = point_method(setup, asked_.cloud_ao(), gpu::is_cpu(device.info()) ? nullptr : &device);
+        job.batch.points = points.get();
+        job.batch.cloud_walk = setup.make_for_points() ? CloudWalk::points : asked_.cloud_walk();
+        RunReport report = begun_report(job, workers);
+        report.budget = budget;
+        std::string settings = settings_key(report, job.batch.outputs, job.batch.noise);
+        return {std::move(report), std::move(settings), std::move(points)};
+    }
+
+    /// The frames that the journal does not have.
+    void walk(Job& job, RunReport& report, const Recording& recording) {
+        Entrance entrance(entrance_);
+        job.batch.all_begun = [&] { entrance.leave(); };
+        std::optional<Together> together;
+        if (asked_.sequence == "on" || job.batch.cloud)
+            job.batch.sequence = &together.emplace(workers(), job, asked_).sequence;
+        MethodPool& pool = together ? together->pool : workers().pool();
+        report.at_once = pool.size();
+        Progress progress(job.batch.frames.size());
+        const auto start = std::chrono::steady_clock::now();
+        report.frames = run_recorded(job.capture, pool, job.batch, recording, [&](const FrameRow& row) {
+            progress.add(row);
+            report.done_now += row.status == FrameStatus::ok;
+            report.ms_now = report.ms_now + row.ms;
+        });
+        report.took_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+        progress.end();
+    }
+
+    void report_on(const RunReport& report, const Journal& journal, const ReportFiles& files) {
+        {
+            const std::lock_guard alone(alone_); // the report names settings
+            write_frames_csv(files.table, report.frames);
+            write_manifest(files.manifest, report, [&](const FrameRow& row) { return journal.whole(row); });
+        }
+        conclude(report, files.table);
     }
 
     void write_recording(const RecordingCloud& cloud) const {

@@ -1,6 +1,7 @@
 // Everything that `scanshade run` can be told, and what that means to the walk.
 #include "apps/run/settings.h"
 
+#include "ao/cloud/cloud_ao.h"
 #include "apps/method_settings.h"
 #include "apps/settings_file.h"
 #include "projection/error.h"
@@ -197,7 +198,7 @@ void RunSettings::check() const {
         throw Misuse("a budget (--max-error, --max-ms) picks the quality: leave --quality out");
     if (!depth_scale.empty())
         (void)depth_encoding(depth_scale, "--depth-scale");
-    (void)cloud_ao();
+    (void)CloudAo(cloud_ao());
 }
 
 Outputs RunSettings::outputs() const {
@@ -240,15 +241,15 @@ CloudWalk RunSettings::cloud_walk() const {
     return clouds == "view" ? CloudWalk::view : CloudWalk::automatic;
 }
 
-FitPlaneOptions RunSettings::fit() const {
-    return {.drop_flying = flying_pixels == "drop", .smoothing = depth_smoothing * method_named(method).smoothing};
+FitPlaneOptions RunSettings::preparation() const {
+    return {.drop_flying = flying_pixels == "drop", .smoothing = depth_smoothing};
 }
 
-CloudAo RunSettings::cloud_ao(gpu::Device* on) const {
+CloudAoOptions RunSettings::cloud_ao() const {
     CloudAoOptions options = clouds_by_points;
     if (options.radius == 0 && !radius.empty())
         set({"radius", "", &options.radius}, radius);
-    return CloudAo(options, on);
+    return options;
 }
 
 MethodSetup& RunSettings::setup_of(std::string_view name) {

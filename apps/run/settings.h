@@ -49,9 +49,9 @@ class RunSettings {
     [[nodiscard]] ProjectOptions range() const;
     [[nodiscard]] std::optional<Registration> registration() const;
     [[nodiscard]] CloudWalk cloud_walk() const;
-    [[nodiscard]] FitPlaneOptions fit() const;
+    [[nodiscard]] FitPlaneOptions preparation() const; ///< of noisy depth
     /// As given; --radius holds for clouds, too, and --cloud.radius before it.
-    [[nodiscard]] CloudAo cloud_ao(gpu::Device* on = nullptr) const;
+    [[nodiscard]] CloudAoOptions cloud_ao() const;
     /// The chosen method's settings, --radius and --quality put in their rows.
     [[nodiscard]] MethodSetup& chosen_setup();
     [[nodiscard]] double radius_m(); ///< the chosen method's

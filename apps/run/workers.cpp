@@ -11,31 +11,24 @@ Workers::Workers(const std::string& choice, int in_flight) : devices_(gpu::open_
     in_flight_ = in_flight > 0 ? static_cast<std::size_t>(in_flight) : gpu::is_cpu(device().info()) ? 1 : of_a_gpu;
 }
 
-void Workers::make(const std::string& method, MethodSetup& setup, const FitPlaneOptions& fit) {
+void Workers::make(const std::string& method, MethodSetup& setup, const FitPlaneOptions& preparation) {
     const Configuration wanted{method, "", values_of(setup)};
-    if (crew_ && wanted.method == configuration_.method && wanted.settings == configuration_.settings && fit == fit_)
+    if (pool_ && wanted.method == configuration_.method && wanted.settings == configuration_.settings &&
+        preparation == preparation_)
         return;
-    crew_.reset();
+    pool_.reset();
     made_.clear();
-    const auto add = [&](gpu::Device& device) {
-        Worker worker{&device, setup.make(device), nullptr};
-        worker.method = std::make_unique<OnFittedDepth>(device, *worker.plain, fit);
-        made_.push_back(std::move(worker));
-    };
-    add(device());
-    const bool rays = dynamic_cast<PointMethod*>(any().plain.get()) != nullptr; // keep all cores busy already
-    for (std::size_t i = 1; !rays && i < in_flight_ * devices_.size(); ++i)
-        add(*devices_[i % devices_.size()]);
-    std::vector<Method*> methods;
-    for (const Worker& worker : made_)
-        methods.push_back(worker.method.get());
-    crew_ = std::make_unique<Crew>(methods);
+    const bool keeps_cores_busy = setup.make_for_points() != nullptr;
+    const std::size_t count = keeps_cores_busy ? 1 : in_flight_ * devices_.size();
+    std::vector<FrameAo*> methods;
+    for (std::size_t i = 0; i < count; ++i) {
+        gpu::Device& device = *devices_[i % devices_.size()];
+        methods.push_back(
+            made_.emplace_back(std::make_unique<FrameAo>(device, method_named(method), setup, preparation)).get());
+    }
+    pool_ = std::make_unique<MethodPool>(methods);
     configuration_ = wanted;
-    fit_ = fit;
-}
-
-const Workers::Worker& Workers::who_is(const Method& lent) const {
-    return *std::ranges::find(made_, &lent, [](const Worker& worker) -> const Method* { return worker.method.get(); });
+    preparation_ = preparation;
 }
 
 std::string Workers::description() const {

@@ -1,9 +1,8 @@
 // The devices of a run, and what computes frames on them: as many methods, made alike, as frames are computed at once.
 #pragma once
 
-#include "ao/fit_plane/fit_plane.h"
+#include "ao/frame.h"
 #include "ao/gpu/device.h"
-#include "ao/method.h"
 #include "apps/method_settings.h"
 #include "apps/walk/method_pool.h"
 
@@ -23,21 +22,10 @@ class Workers {
 
     /// The one that everything runs on that takes one frame after the other.
     [[nodiscard]] gpu::Device& device() { return *devices_.front(); }
-    /// Makes the crew anew where method or settings are others than before: shaders are compiled once for all captures.
-    /// Nothing of it may be lent then.
-    void make(const std::string& method, MethodSetup& setup, const FitPlaneOptions& fit);
-    /// Methods as made, on depth as recorded or, where View::noise says so, as fitted. Those that keep all cores busy
-    /// by themselves are one.
-    [[nodiscard]] Crew& crew() { return *crew_; }
-
-    /// What one of the crew is made of.
-    struct Worker {
-        gpu::Device* device;
-        std::unique_ptr<Method> plain;
-        std::unique_ptr<OnFittedDepth> method; ///< what the crew lends
-    };
-    [[nodiscard]] const Worker& who_is(const Method& lent) const;
-    [[nodiscard]] const Worker& any() const { return made_.front(); }
+    /// Makes the methods anew where method or settings are others than before: shaders are compiled once for all
+    /// captures. None may be leased then. Of a method that keeps all cores busy by itself there is one.
+    void make(const std::string& method, MethodSetup& setup, const FitPlaneOptions& preparation);
+    [[nodiscard]] MethodPool& pool() { return *pool_; }
 
     /// "NVIDIA H100 (NVIDIA 550.54)", "2 x NVIDIA ..., 6 frames at once"
     [[nodiscard]] std::string description() const;
@@ -47,9 +35,9 @@ class Workers {
     std::vector<std::unique_ptr<gpu::Device>> devices_; ///< outlive what is made on them
     std::size_t in_flight_;
     Configuration configuration_; ///< what made_ was made from, and
-    FitPlaneOptions fit_;
-    std::vector<Worker> made_;
-    std::unique_ptr<Crew> crew_;
+    FitPlaneOptions preparation_;
+    std::vector<std::unique_ptr<FrameAo>> made_;
+    std::unique_ptr<MethodPool> pool_;
 };
 
 } // namespace scanshade

@@ -51,19 +51,10 @@ void take(Work& work, double StageTimes::*stage, Step&& step) {
     work.row.ms.*stage = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// Whether anything that is written shows the colour images.
-bool shows_colour(const BatchOptions& options) {
-    const Outputs& outputs = options.outputs;
-    return outputs.shaded || outputs.panel || outputs.depth_cloud || outputs.colour_view || options.cloud;
-}
-
 Frame load(const Capture& capture, std::size_t index, const BatchOptions& options) {
     if (const std::string& problem = capture.entries[index].problem; !problem.empty())
         throw Error(problem);
-    Frame frame = capture.load(index, shows_colour(options));
-    if (options.registration)
-        frame.registration = *options.registration;
-    return frame;
+    return capture.load(index, shows_colour(options.outputs, options.cloud != nullptr));
 }
 
 double share(std::ptrdiff_t part, std::size_t whole) {
@@ -98,27 +89,16 @@ void refuse_blind_view(const Work& work) {
                                 work.frame.camera.origin));
 }
 
-/// Every point's value from the points themselves, or from the faces where the file has some.
-Attached attach_points(const Frame& frame, PointMethod& method) {
-    const Cloud& cloud = *frame.cloud;
-    const auto normals = recorded_normals(cloud);
-    const auto triangles = triangles_of(cloud);
-    return attached_points(cloud, method.compute({cloud.points, normals, triangles}));
-}
-
 /// Values from the points themselves: no view.
 void compute_points(Work& work, const BatchOptions& options) {
-    if (options.point_method) {
-        work.attached = attach_points(work.frame, *options.point_method);
-        if (!options.dump.empty())
-            write_intermediates(options.dump / work.entry.name, options.point_method->intermediates());
-        return;
-    }
-    work.of_points = cloud_visibility(work.frame, *options.cloud_ao);
+    work.of_points = visibility_of_points(work.frame, *options.points);
     std::ranges::copy(work.of_points.notes, std::back_inserter(work.row.notes));
     work.confidence.per_point = work.of_points.confidence;
     work.row.passes = work.of_points.timings;
     work.attached = attached_points(*work.frame.cloud, work.of_points.visibility);
+    const std::vector<Intermediate> intermediates = options.points->intermediates();
+    if (!options.dump.empty() && !intermediates.empty())
+        write_intermediates(options.dump / work.entry.name, intermediates);
 }
 
 bool wants_confidence(const Work& work, const BatchOptions& options) {
@@ -149,7 +129,7 @@ void attach_and_write(Work& work, const BatchOptions& options) {
     });
     take(work, &StageTimes::write, [&] {
         write_all(work, scene, shaded, outputs);
-        if (by_points && options.outputs.shaded && !work.of_points.visibility.empty())
+        if (by_points && options.outputs.shaded && work.of_points.spacing > 0)
             write_sides(work, options.outputs);
     });
     if (!work.row.why.empty())
@@ -169,9 +149,9 @@ std::vector<FrameRow> planned_rows(const Capture& capture, const std::vector<std
 /// The walk as one pipeline; the frames' rows are filled in on the way.
 class Pipeline {
   public:
-    Pipeline(const Capture& capture, Crew& crew, const BatchOptions& options,
+    Pipeline(const Capture& capture, MethodPool& pool, const BatchOptions& options,
              const std::function<void(const FrameRow&)>& on_frame)
-        : capture_(capture), crew_(crew), at_once_(options.sequence ? 1 : static_cast<int>(crew.size())),
+        : capture_(capture), pool_(pool), at_once_(options.sequence ? 1 : static_cast<int>(pool.size())),
           options_(options), on_frame_(on_frame), rows_(planned_rows(capture, options.frames)),
           walk_(capture, rows_, options.sequence ? options.sequence->reach() : 0), waiting_(options.sequence) {}
 
@@ -206,11 +186,21 @@ class Pipeline {
 
     Token begin(tbb::flow_control& flow) {
         if (walk_.goes_on() && !(options_.stop && *options_.stop) && !given_up_)
-            return walk_.next();
+            return with_frame_if_loaded(walk_.next());
         flow.stop();
         if (options_.all_begun)
             options_.all_begun();
         return {};
+    }
+
+    [[nodiscard]] Token with_frame_if_loaded(Token work) const {
+        const auto known =
+            work && options_.loaded ? options_.loaded->extract(work->row.index) : LoadedFrames::node_type();
+        if (!known.empty()) {
+            work->frame = std::move(known.mapped().frame);
+            work->loaded_in_ms = known.mapped().took_ms;
+        }
+        return work;
     }
 
     /// Loaded and projected.
@@ -218,11 +208,15 @@ class Pipeline {
         if (!work)
             return work;
         take(*work, &StageTimes::load, [&] {
-            work->frame = load(capture_, work->row.index, options_);
+            if (work->loaded_in_ms == 0)
+                work->frame = load(capture_, work->row.index, options_);
+            if (options_.registration)
+                work->frame.registration = *options_.registration;
             describe_frame(*work);
         });
+        work->row.ms.load += work->loaded_in_ms;
         if (work->row.status != FrameStatus::failed && work->frame.cloud)
-            work->by_points = options_.point_method || takes_points(work->frame, options_, work->row.notes);
+            work->by_points = takes_points(work->frame, options_, work->row.notes);
         if (work->by_points) {
             work->row.ms.project = 0;
             return work;
@@ -240,14 +234,11 @@ class Pipeline {
         if (!work || !work->row.why.empty())
             return work;
         if (work->by_points) { // one at a time takes all cores and much memory; nor may it begin another while it waits
-            const std::lock_guard alone(crew_.alone());
-            std::optional<Crew::Loan> rays;
-            if (options_.point_method)
-                rays.emplace(crew_);
+            const std::lock_guard alone(pool_.alone());
             tbb::this_task_arena::isolate(
                 [&] { take(*work, &StageTimes::compute, [&] { compute_points(*work, options_); }); });
         } else {
-            const Crew::Loan method = crew_.lend();
+            const MethodPool::Lease method = pool_.lease();
             take(*work, &StageTimes::compute, [&] { compute_view(*work, *method); });
         }
         if (work->row.status == FrameStatus::skipped && work->row.fault == Fault::outage)
@@ -255,11 +246,11 @@ class Pipeline {
         return work;
     }
 
-    void compute_view(Work& work, Method& method) const {
+    void compute_view(Work& work, FrameAo& method) const {
         if (options_.sequence) {
             compute_in_sequence(work, capture_, *options_.sequence);
         } else {
-            work.ao = method.compute({.depth = work.depth, .noise = options_.noise});
+            work.ao = method.compute(work.depth, options_.noise);
             work.row.passes = method.timings();
         }
         if (options_.dump.empty())
@@ -301,7 +292,7 @@ class Pipeline {
     }
 
     const Capture& capture_;
-    Crew& crew_;
+    MethodPool& pool_;
     int at_once_;
     const BatchOptions& options_;
     const std::function<void(const FrameRow&)>& on_frame_;
@@ -315,9 +306,9 @@ class Pipeline {
 
 } // namespace
 
-std::vector<FrameRow> run_batch(const Capture& capture, Crew& crew, const BatchOptions& options,
+std::vector<FrameRow> run_batch(const Capture& capture, MethodPool& pool, const BatchOptions& options,
                                 const std::function<void(const FrameRow&)>& on_frame) {
-    return Pipeline(capture, crew, options, on_frame).run();
+    return Pipeline(capture, pool, options, on_frame).run();
 }
 
 } // namespace scanshade

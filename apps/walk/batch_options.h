@@ -1,9 +1,9 @@
 // What the walk is told: which frames, what is written of them, and with what they are computed.
 #pragma once
 
-#include "ao/cloud/cloud_ao.h"
 #include "ao/method.h"
 #include "ao/sequence/neighbourhood.h"
+#include "apps/walk/measured_noise.h"
 #include "apps/walk/recording_cloud.h"
 #include "io/captures/capture.h"
 #include "io/images/image_file.h"
@@ -36,6 +36,11 @@ struct Outputs {
 /// The files that `outputs` makes of a frame; of a cloud both possible names, since only its content tells the format.
 [[nodiscard]] std::vector<std::filesystem::path> files_of(const CaptureEntry& entry, const Outputs& outputs);
 
+/// Whether anything that is written shows the colour images.
+[[nodiscard]] inline bool shows_colour(const Outputs& outputs, bool recording_cloud) {
+    return outputs.shaded || outputs.panel || outputs.depth_cloud || outputs.colour_view || recording_cloud;
+}
+
 /// How clouds are taken: rays from each of their points, one camera's view, or points unless one camera saw them all.
 enum class CloudWalk { automatic, points, view };
 
@@ -46,13 +51,12 @@ struct BatchOptions {
     double radius_m = 0;                      ///< the method's, and
     DepthNoise noise;                         ///< the depth's: what confidence depends on
     std::optional<Registration> registration; ///< what the user said; otherwise what the capture says
-    PointMethod* point_method = nullptr; ///< what clouds and meshes are computed with, where that needs no view: then
-                                         ///< the cloud is all that is written of them
-    const CloudAo* cloud_ao = nullptr;   ///< what other clouds are computed with, where `cloud_walk` says so
+    PointMethod* points = nullptr; ///< what clouds and meshes are computed with where `cloud_walk` asks for points
     CloudWalk cloud_walk = CloudWalk::automatic;
     RecordingCloud* cloud = nullptr;   ///< what frames with a pose are added to
     Neighbourhood* sequence = nullptr; ///< what frames are computed with instead of the method, together with those
                                        ///< around them; these are loaded whether or not `frames` has them
+    LoadedFrames* loaded = nullptr;    ///< frames that are in memory already; the walk takes them from there
     std::filesystem::path dump;        ///< folder for the method's intermediates, frame by frame; empty = none
     bool short_rows = false;           ///< rows come back shortened, once on_frame has seen them
     int frames_in_memory = 0;          ///< 0 = cores, and two for each method

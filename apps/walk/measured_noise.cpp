@@ -4,32 +4,41 @@
 #include "projection/project.h"
 
 #include <algorithm>
+#include <chrono>
+#include <optional>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 namespace scanshade {
 
-DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& frames) {
+DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& frames, LoadedFrames* kept,
+                    bool with_colour) {
     constexpr std::size_t most = 5;
-    const std::vector<std::size_t> places = spread(most, frames.size());
-    std::vector<DepthImage> images(places.size());
+    const std::vector<std::size_t> chosen = spread(most, frames.size());
+    std::vector<DepthImage> images(chosen.size());
+    std::vector<std::optional<LoadedFrame>> loaded(chosen.size());
     tbb::this_task_arena::isolate([&] {
-        tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t i) {
+        tbb::parallel_for(std::size_t(0), chosen.size(), [&](std::size_t i) {
             try {
-                const Frame frame = capture.load(frames[places[i]], false);
-                if (!frame.cloud || frame.cloud->organised())
+                const auto start = std::chrono::steady_clock::now();
+                Frame frame = capture.load(frames[chosen[i]], with_colour);
+                const double ms =
+                    std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+                const bool image = !frame.cloud || frame.cloud->organised();
+                if (image)
                     images[i] = project(frame);
+                if (kept && (image || frames.size() == 1))
+                    loaded[i] = {std::move(frame), ms};
             } catch (const Outage&) { // a sigma of fewer frames would shape all results
                 throw;
             } catch (const std::exception&) { // whoever processes the frame says what is wrong with it
             }
         });
     });
+    for (std::size_t i = 0; i < chosen.size(); ++i)
+        if (loaded[i])
+            kept->emplace(frames[chosen[i]], *std::move(loaded[i]));
     return measure_noise(images);
-}
-
-DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& frames, const std::string& text) {
-    return text == "auto" ? noise_of(capture, frames) : noise_from_text(text);
 }
 
 std::vector<std::size_t> spread(std::size_t count, std::size_t total) {

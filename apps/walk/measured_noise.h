@@ -4,17 +4,25 @@
 #include "io/captures/capture.h"
 #include "projection/noise.h"
 
+#include <cstddef>
+#include <map>
 #include <string>
 #include <vector>
 
 namespace scanshade {
 
+/// Frames that were decoded before the walk began, so that it need not decode them again.
+struct LoadedFrame {
+    Frame frame;
+    double took_ms = 0;
+};
+using LoadedFrames = std::map<std::size_t, LoadedFrame>; ///< by index in the capture
+
 /// sigma(z) of a capture, measured on up to five of the frames. No noise for clouds without a grid, which no sensor's
-/// image backs. Frames that cannot be loaded are left out.
-[[nodiscard]] DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& frames);
-/// `text` is "auto" (measured) or as noise_from_text() takes it.
+/// image backs. Frames that cannot be loaded are left out. `kept`, where given, receives the frames (with their colour
+/// if `with_colour`), but of several clouds without a grid none: they may be large.
 [[nodiscard]] DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& frames,
-                                  const std::string& text);
+                                  LoadedFrames* kept = nullptr, bool with_colour = false);
 
 /// `count` of `total` indices, spread evenly from the first on.
 [[nodiscard]] std::vector<std::size_t> spread(std::size_t count, std::size_t total);

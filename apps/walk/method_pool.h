@@ -1,7 +1,7 @@
-// Methods made alike, lent to one frame, or one sequence, at a time each.
+// Methods made alike: each is leased to one frame, or to one sequence, at a time.
 #pragma once
 
-#include "ao/method.h"
+#include "ao/frame.h"
 
 #include <mutex>
 #include <span>
@@ -9,32 +9,32 @@
 
 namespace scanshade {
 
-/// Any number of walks may share one. Outlives its loans; the methods outlive it.
-class Crew {
+/// Any number of walks may share one. Outlives its leases; the methods outlive it.
+class MethodPool {
   public:
-    explicit Crew(std::span<Method* const> methods) : size_(methods.size()) {
-        for (Method* method : methods)
+    explicit MethodPool(std::span<FrameAo* const> methods) : size_(methods.size()) {
+        for (FrameAo* method : methods)
             free_.push(method);
     }
-    explicit Crew(Method& method) : size_(1) { free_.push(&method); }
+    explicit MethodPool(FrameAo& method) : size_(1) { free_.push(&method); }
 
-    /// A method, until the loan ends.
-    class Loan {
+    /// A method, until the lease ends.
+    class Lease {
       public:
-        explicit Loan(Crew& crew) : crew_(crew) { crew_.free_.pop(method_); }
-        ~Loan() { crew_.free_.push(method_); }
-        Loan(const Loan&) = delete;
-        Loan& operator=(const Loan&) = delete;
-        [[nodiscard]] Method& operator*() const { return *method_; }
-        [[nodiscard]] Method* operator->() const { return method_; }
+        explicit Lease(MethodPool& pool) : pool_(pool) { pool_.free_.pop(method_); }
+        ~Lease() { pool_.free_.push(method_); }
+        Lease(const Lease&) = delete;
+        Lease& operator=(const Lease&) = delete;
+        [[nodiscard]] FrameAo& operator*() const { return *method_; }
+        [[nodiscard]] FrameAo* operator->() const { return method_; }
 
       private:
-        Crew& crew_;
-        Method* method_ = nullptr;
+        MethodPool& pool_;
+        FrameAo* method_ = nullptr;
     };
 
     /// Waits until one is free.
-    [[nodiscard]] Loan lend() { return Loan(*this); }
+    [[nodiscard]] Lease lease() { return Lease(*this); }
     /// How many frames may be computed at once.
     [[nodiscard]] std::size_t size() const { return size_; }
     /// Held by what takes all cores and much memory by itself.
@@ -43,7 +43,7 @@ class Crew {
   private:
     std::size_t size_;
     std::mutex alone_;
-    tbb::concurrent_bounded_queue<Method*> free_;
+    tbb::concurrent_bounded_queue<FrameAo*> free_;
 };
 
 } // namespace scanshade

@@ -18,7 +18,7 @@ namespace scanshade {
 using Eigen::Vector3d;
 
 bool takes_points(const Frame& frame, const BatchOptions& options, std::vector<std::string>& notes) {
-    if (!options.cloud_ao || options.cloud_walk == CloudWalk::view)
+    if (!options.points || options.cloud_walk == CloudWalk::view)
         return false;
     if (options.cloud_walk == CloudWalk::points)
         return true;
@@ -37,14 +37,14 @@ bool takes_points(const Frame& frame, const BatchOptions& options, std::vector<s
     }
 }
 
-CloudVisibility cloud_visibility(const Frame& frame, const CloudAo& method) {
+PointVisibility visibility_of_points(const Frame& frame, PointMethod& method) {
     const Cloud& cloud = *frame.cloud;
     const auto normals = recorded_normals(cloud);
     const auto triangles = triangles_of(cloud);
     std::optional<Vector3d> scanner;
     if (frame.world_from_camera)
         scanner = frame.world_from_camera->translation();
-    CloudVisibility found = method.compute({cloud.points, normals, triangles}, scanner);
+    PointVisibility found = method.compute({cloud.points, normals, triangles}, scanner);
     if (const std::string unit = cloud.records ? unit_of(*cloud.records) : ""; !unit.empty())
         found.notes.insert(found.notes.begin(), fmt::format("coordinates are in {}.", unit));
     return found;
@@ -105,7 +105,7 @@ struct SideView {
     }
 };
 
-SideView side_view(const Cloud& cloud, const CloudVisibility& found, const Eigen::AlignedBox3d& box,
+SideView side_view(const Cloud& cloud, const PointVisibility& found, const Eigen::AlignedBox3d& box,
                    const Vector3d& forward) {
     const Vector3d right = Vector3d(forward.y(), -forward.x(), 0).normalized(), down = forward.cross(right);
     const double scale = 0.96 * side_px / std::max(box.diagonal().norm(), 1e-12);
@@ -130,7 +130,7 @@ SideView side_view(const Cloud& cloud, const CloudVisibility& found, const Eigen
 
 } // namespace
 
-cv::Mat3b two_sides(const Cloud& cloud, const CloudVisibility& found, double strength) {
+cv::Mat3b two_sides(const Cloud& cloud, const PointVisibility& found, double strength) {
     cv::Mat3b picture(2 * side_px, 2 * side_px, SideView::nothing_there);
     const Eigen::AlignedBox3d box = framed_box(cloud);
     if (box.isEmpty())

@@ -1,7 +1,7 @@
 // Clouds that no single camera sees: which those are, their values, and how they look from two sides.
 #pragma once
 
-#include "ao/cloud/cloud_ao.h"
+#include "ao/method.h"
 #include "apps/walk/batch_options.h"
 #include "projection/attach.h"
 #include "projection/frame.h"
@@ -16,7 +16,7 @@ namespace scanshade {
 [[nodiscard]] bool takes_points(const Frame& frame, const BatchOptions& options, std::vector<std::string>& notes);
 
 /// The cloud with its own normals, faces and viewpoint, as `method` sees it.
-[[nodiscard]] CloudVisibility cloud_visibility(const Frame& frame, const CloudAo& method);
+[[nodiscard]] PointVisibility visibility_of_points(const Frame& frame, PointMethod& method);
 
 /// Values of points, with how many of the valid ones have one.
 [[nodiscard]] Attached attached_points(const Cloud& cloud, std::vector<float> visibility);
@@ -24,6 +24,6 @@ namespace scanshade {
 /// The cloud's points from two opposite sides, obliquely from above (z up): colours, or light grey, times visibility;
 /// below them visibility alone. Points are as large as they stand apart; those without a value are a dim blue; those
 /// that face away are left out, so that one looks into rooms.
-[[nodiscard]] cv::Mat3b two_sides(const Cloud& cloud, const CloudVisibility& found, double strength);
+[[nodiscard]] cv::Mat3b two_sides(const Cloud& cloud, const PointVisibility& found, double strength);
 
 } // namespace scanshade

@@ -105,7 +105,7 @@ FrameRow crash_row(const Capture& capture, std::size_t index) {
 }
 
 /// Each frame by itself, so that a crash names its frame.
-std::vector<FrameRow> run_one_by_one(const Capture& capture, Crew& crew, BatchOptions options, Journal& journal,
+std::vector<FrameRow> run_one_by_one(const Capture& capture, MethodPool& pool, BatchOptions options, Journal& journal,
                                      const std::function<void(const FrameRow&)>& on_frame) {
     const std::string killer = journal.facts().begun;
     std::vector<FrameRow> rows;
@@ -122,7 +122,7 @@ std::vector<FrameRow> run_one_by_one(const Capture& capture, Crew& crew, BatchOp
         if (!options.stop || !*options.stop)
             journal.begin_alone(capture.entries[index].name);
         options.frames = {index};
-        std::ranges::move(run_batch(capture, crew, options, on_frame), std::back_inserter(rows));
+        std::ranges::move(run_batch(capture, pool, options, on_frame), std::back_inserter(rows));
         if (rows.back().status == FrameStatus::skipped && rows.back().fault == Fault::outage)
             break;
     }
@@ -172,7 +172,7 @@ std::optional<std::vector<FrameRow>> rows_if_complete(const Journal& journal, co
     return rows;
 }
 
-std::vector<FrameRow> run_recorded(const Capture& capture, Crew& crew, const BatchOptions& options,
+std::vector<FrameRow> run_recorded(const Capture& capture, MethodPool& pool, const BatchOptions& options,
                                    const Recording& recording, const std::function<void(const FrameRow&)>& on_frame) {
     Journal& journal = recording.journal;
     const auto settings_of = [&](std::size_t index) {
@@ -199,8 +199,8 @@ std::vector<FrameRow> run_recorded(const Capture& capture, Crew& crew, const Bat
         if (on_frame)
             on_frame(row);
     };
-    for (FrameRow& row : recording.carefully ? run_one_by_one(capture, crew, left, journal, record)
-                                             : run_batch(capture, crew, left, record))
+    for (FrameRow& row : recording.carefully ? run_one_by_one(capture, pool, left, journal, record)
+                                             : run_batch(capture, pool, left, record))
         rows.insert_or_assign(row.index, std::move(row));
     std::vector<FrameRow> all;
     all.reserve(options.frames.size());

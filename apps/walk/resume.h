@@ -42,7 +42,7 @@ struct Recording {
 /// run_batch() over the frames that the journal does not have; rows of all come back shortened, in the order of
 /// options.frames; Journal::whole() has the rest.
 /// `on_frame` is told of those that were run.
-[[nodiscard]] std::vector<FrameRow> run_recorded(const Capture& capture, Crew& crew, const BatchOptions& options,
+[[nodiscard]] std::vector<FrameRow> run_recorded(const Capture& capture, MethodPool& pool, const BatchOptions& options,
                                                  const Recording& recording,
                                                  const std::function<void(const FrameRow&)>& on_frame = {});
 

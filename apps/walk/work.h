@@ -13,6 +13,7 @@ struct Work {
     const CaptureEntry& entry;
     FrameRow& row;
     Frame frame = {};
+    double loaded_in_ms = 0; ///< above 0: `frame` was in memory before the walk
     DepthImage depth = {};
     DepthImage looked_at = {}; ///< of a sequence: what the methods saw in place of `depth`
     AoMap ao = {};
@@ -20,7 +21,7 @@ struct Work {
     Attached attached = {}, confidence = {};
     bool wanted = true;             ///< false: loaded for the frames around it
     bool by_points = false;         ///< no view: values come from the points themselves
-    CloudVisibility of_points = {}; ///< what they are, where a CloudAo found them
+    PointVisibility of_points = {}; ///< what they are
 };
 
 using Token = std::shared_ptr<Work>;

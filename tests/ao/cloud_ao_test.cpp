@@ -58,7 +58,7 @@ Points sphere(std::size_t count, const Vector3d& centre) {
     return points;
 }
 
-CloudVisibility visibility(const Points& points, CloudAoOptions options = {}, const Points& normals = {}) {
+PointVisibility visibility(const Points& points, CloudAoOptions options = {}, const Points& normals = {}) {
     return CloudAo(std::move(options)).compute({points, normals});
 }
 
@@ -78,7 +78,7 @@ double rms_between(const std::vector<float>& a, const std::vector<float>& b) {
     return std::sqrt(squares / static_cast<double>(count));
 }
 
-bool any_note(const CloudVisibility& found, const std::string& words) {
+bool any_note(const PointVisibility& found, const std::string& words) {
     return std::any_of(found.notes.begin(), found.notes.end(),
                        [&](const std::string& note) { return note.find(words) != std::string::npos; });
 }

@@ -36,7 +36,7 @@ const scene::SceneCloud& office() {
 
 /// Both ways; values must be known for the same points.
 void expect_alike(const PointSet& set, const CloudAoOptions& options, double rms, double worst) {
-    const CloudVisibility here = CloudAo(options).compute(set), there = CloudAo(options, &device()).compute(set);
+    const PointVisibility here = CloudAo(options).compute(set), there = CloudAo(options, &device()).compute(set);
     ASSERT_EQ(here.visibility.size(), there.visibility.size());
     double squares = 0, largest = 0;
     for (std::size_t i = 0; i < here.visibility.size(); ++i) {
@@ -120,7 +120,7 @@ TEST_F(CloudGpuTest, many_points_at_one_place_are_no_matter) {
 
 TEST_F(CloudGpuTest, same_input_same_bits) {
     const PointSet set{office().points, office().normals};
-    const CloudAo method({.radius = 0.2, .rays = 8}, &device());
+    CloudAo method({.radius = 0.2, .rays = 8}, &device());
     EXPECT_EQ(method.compute(set).visibility, method.compute(set).visibility);
 }
 

@@ -396,7 +396,7 @@ TEST(Clouds, discs_reproduce_a_corner) {
     const Vector3d shift(-0.3, 0, -1.5); // the sensor, at the origin, looks down on it
     const auto points = corner_cloud(shift);
     Raycast raycast({.radius_m = 0.3, .rays = 512});
-    const auto values = raycast.compute({points});
+    const auto values = raycast.compute({points}).visibility;
     double squares = 0;
     int count = 0;
     for (std::size_t i = 0; i < points.size(); i += 2) {
@@ -414,7 +414,7 @@ TEST(Clouds, discs_reproduce_a_corner) {
 
 TEST(Clouds, every_point_gets_a_value_wherever_the_cloud_lies) {
     auto points = corner_cloud({-0.3, 0, -1.5});
-    const auto here = Raycast({.radius_m = 0.3, .rays = 64}).compute({points});
+    const auto here = Raycast({.radius_m = 0.3, .rays = 64}).compute({points}).visibility;
     std::vector<Vector3d> normals;
     for (const Disc& disc : discs_of(points))
         normals.push_back(disc.normal);
@@ -422,7 +422,7 @@ TEST(Clouds, every_point_gets_a_value_wherever_the_cloud_lies) {
         point += Vector3d(4.5e5, 5.2e6, 120);
     points.push_back(Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
     normals.emplace_back(0, 0, 1);
-    const auto there = Raycast({.radius_m = 0.3, .rays = 64}).compute({points, normals});
+    const auto there = Raycast({.radius_m = 0.3, .rays = 64}).compute({points, normals}).visibility;
     double difference = 0;
     for (std::size_t i = 0; i < here.size(); ++i) {
         ASSERT_FALSE(std::isnan(here[i]));
@@ -439,14 +439,14 @@ TEST(Clouds, a_ball_is_open_and_a_point_alone_too) {
         points.emplace_back(0.3 * r * std::cos(turn), 0.3 * r * std::sin(turn), 0.3 * z);
     }
     std::vector<Vector3d> normals = points;
-    for (const float v : Raycast({.rays = 256}).compute({points, normals}))
+    for (const float v : Raycast({.rays = 256}).compute({points, normals}).visibility)
         EXPECT_GT(v, 0.99F);
     for (const int count : {1, 2, 3}) {
         const std::vector<Vector3d> few(points.begin(), points.begin() + count);
-        for (const float v : Raycast({.rays = 16}).compute({few}))
+        for (const float v : Raycast({.rays = 16}).compute({few}).visibility)
             EXPECT_GE(v, 0.0F) << count;
     }
-    EXPECT_TRUE(Raycast({.rays = 16}).compute(PointSet{}).empty());
+    EXPECT_TRUE(Raycast({.rays = 16}).compute(PointSet{}).visibility.empty());
 }
 
 // ---------------------------------------------------------------------------------------------------- meshes
@@ -470,10 +470,12 @@ TEST(Meshes, a_cube_is_open_at_every_vertex_and_a_box_closed_from_inside) {
     for (auto& triangle : inside.triangles)
         std::swap(triangle[1], triangle[2]);
     for (const char* from : {"triangles", "vertices"}) {
-        for (const float v : Raycast({.rays = 256, .mesh = from}).compute({outside.vertices, {}, outside.triangles}))
+        for (const float v :
+             Raycast({.rays = 256, .mesh = from}).compute({outside.vertices, {}, outside.triangles}).visibility)
             EXPECT_EQ(v, 1) << from;
         const auto closed = Raycast({.radius_m = endless, .rays = 256, .mesh = "triangles"})
-                                .compute({inside.vertices, {}, inside.triangles});
+                                .compute({inside.vertices, {}, inside.triangles})
+                                .visibility;
         for (const float v : closed)
             EXPECT_EQ(v, 0);
     }
@@ -483,7 +485,7 @@ TEST(Meshes, vertices_without_a_triangle_have_no_value) {
     Mesh mesh = cube();
     mesh.vertices.emplace_back(3, 3, 3);
     for (const char* from : {"triangles", "vertices"}) {
-        const auto values = Raycast({.rays = 16, .mesh = from}).compute({mesh.vertices, {}, mesh.triangles});
+        const auto values = Raycast({.rays = 16, .mesh = from}).compute({mesh.vertices, {}, mesh.triangles}).visibility;
         EXPECT_EQ(values.size(), 9U);
         EXPECT_TRUE(std::isnan(values.back())) << from;
     }

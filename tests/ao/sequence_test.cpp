@@ -276,8 +276,9 @@ std::vector<FrameRow> run_together(const Capture& capture, const std::vector<std
     options.noise = kinect;
     options.sequence = &sequence;
     options.cloud = cloud;
-    Crew crew(surfel);
-    return run_batch(capture, crew, options);
+    FrameAo door(surfel);
+    MethodPool pool(door);
+    return run_batch(capture, pool, options);
 }
 
 TEST(Sequence, a_block_of_frames_writes_the_same_bytes_and_a_bad_frame_fails_alone) {

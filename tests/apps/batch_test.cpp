@@ -26,8 +26,9 @@ constexpr float half_open = 0.5f;
 
 std::vector<FrameRow> run_batch(const Capture& capture, Method& method, const BatchOptions& options,
                                 const std::function<void(const FrameRow&)>& on_frame = {}) {
-    Crew crew(method);
-    return scanshade::run_batch(capture, crew, options, on_frame);
+    FrameAo door(method);
+    MethodPool pool(door);
+    return scanshade::run_batch(capture, pool, options, on_frame);
 }
 
 /// Every surface is half open. `before` may throw or interrupt; it gets the number of the call, from 0.
@@ -178,11 +179,12 @@ TEST_F(BatchTest, several_methods_take_a_frame_each_and_rows_keep_their_order) {
             --at_once;
             --own;
         });
-    Crew crew(std::array<Method*, 3>{&three[0], &three[1], &three[2]});
+    FrameAo first(three[0]), second(three[1]), third(three[2]);
+    MethodPool pool(std::array<FrameAo*, 3>{&first, &second, &third});
     std::vector<std::size_t> told;
     BatchOptions options = all_frames(recorded, folder / "out");
     options.outputs.shaded = options.outputs.confidence = false;
-    const auto rows = run_batch(recorded, crew, options, [&](const FrameRow& row) { told.push_back(row.index); });
+    const auto rows = run_batch(recorded, pool, options, [&](const FrameRow& row) { told.push_back(row.index); });
     EXPECT_EQ(count(rows, FrameStatus::ok), 24u);
     EXPECT_EQ(told, options.frames);
     EXPECT_GT(most, 1) << "one waits for its device while another begins";
@@ -194,10 +196,11 @@ TEST_F(BatchTest, one_lost_device_of_three_ends_the_run) {
         if (call == 1)
             throw DeviceLost("the device is lost");
     });
-    Crew crew(std::array<Method*, 3>{&sound, &lost, &as_sound});
+    FrameAo first(sound), second(lost), third(as_sound);
+    MethodPool pool(std::array<FrameAo*, 3>{&first, &second, &third});
     BatchOptions options = all_frames(recorded, folder / "out");
     options.frames_in_memory = 4;
-    const auto rows = run_batch(recorded, crew, options);
+    const auto rows = run_batch(recorded, pool, options);
     ASSERT_EQ(rows.size(), 24u);
     EXPECT_EQ(std::ranges::count(rows, Fault::outage, &FrameRow::fault), 1);
     EXPECT_GT(count(rows, FrameStatus::skipped), 1u) << "those after it are not begun";

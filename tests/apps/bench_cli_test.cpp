@@ -3,6 +3,7 @@
 #include "ao/gpu/device.h"
 #include "apps/measure/bench_results.h"
 #include "apps/measure/budget.h"
+#include "apps/measure/configurations.h"
 #include "apps/measure/fused_reference.h"
 #include "apps/page.h"
 #include "io/images/image_file.h"

@@ -393,8 +393,9 @@ int work(const fs::path& path, const fs::path& out, const Shift& shift,
     std::iota(options.frames.begin(), options.frames.end(), 0);
     options.outputs.folder = out;
     const Recording recording{journal, "settings", "task", "test", false, shift.carefully, shift.finished};
-    Crew crew(method);
-    const auto rows = run_recorded(capture, crew, options, recording);
+    FrameAo door(method);
+    MethodPool pool(door);
+    const auto rows = run_recorded(capture, pool, options, recording);
     const auto any = [&](Fault fault) { return std::ranges::count(rows, fault, &FrameRow::fault) > 0; };
     return any(Fault::outage) ? unfinished : any(Fault::crash) ? internal_error : all_well;
 }

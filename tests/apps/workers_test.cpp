@@ -29,7 +29,7 @@ class WorkersTest : public testing::TestWithParam<const char*> {
         Workers workers("", in_flight);
         const auto setup = method_named(GetParam()).setup();
         workers.make(GetParam(), *setup, {});
-        EXPECT_EQ(workers.crew().size(), static_cast<std::size_t>(in_flight));
+        EXPECT_EQ(workers.pool().size(), static_cast<std::size_t>(in_flight));
         const Capture capture = open_capture(folder / "capture");
         BatchOptions options;
         options.frames.resize(capture.entries.size());
@@ -38,7 +38,7 @@ class WorkersTest : public testing::TestWithParam<const char*> {
         options.outputs.format = AoFormat::tiff; // every bit of every float
         options.radius_m = 0.5;
         options.noise = noise;
-        auto rows = run_batch(capture, workers.crew(), options);
+        auto rows = run_batch(capture, workers.pool(), options);
         for (const std::string& message : workers.device().validation_messages())
             ADD_FAILURE() << message;
         return rows;
@@ -86,7 +86,7 @@ TEST(DevicesTest, a_processor_computes_one_frame_at_a_time_unless_asked) {
     const auto setup = method_named("cacao").setup();
     workers.make("cacao", *setup, {});
     const std::size_t each = gpu::is_cpu(workers.device().info()) ? 1 : 3;
-    EXPECT_EQ(workers.crew().size(), each * workers.devices());
+    EXPECT_EQ(workers.pool().size(), each * workers.devices());
     EXPECT_NE(workers.description().find(workers.device().info().name), std::string::npos);
 }
 

@@ -7,7 +7,7 @@
 #include "tests/hard_cases/cases.h"
 #include "tests/hard_cases/normals.h"
 
-#include "ao/fit_plane/fit_plane.h"
+#include "ao/frame.h"
 #include "ao/gpu/device.h"
 #include "ao/method.h"
 #include "apps/method_settings.h"
@@ -51,19 +51,16 @@ class Subject {
             const auto setup = row_.setup();
             const std::vector<Parameter> rows = setup->parameters();
             set(*row_named(rows, "radius"), fmt::format("{}", one.radius_m));
-            on_fitted_.reset();
-            method_ = setup->make(device_);
-            on_fitted_.emplace(device_, *method_, FitPlaneOptions{.smoothing = row_.smoothing});
+            method_ = std::make_unique<FrameAo>(device_, row_, *setup);
             radius_m_ = one.radius_m;
         }
-        return on_fitted_->compute({.depth = one.depth, .noise = one.noise}).visibility;
+        return method_->compute(one.depth, one.noise).visibility;
     }
 
   private:
     gpu::Device& device_;
     const MethodRow& row_;
-    std::unique_ptr<Method> method_;
-    std::optional<OnFittedDepth> on_fitted_;
+    std::unique_ptr<FrameAo> method_;
     double radius_m_ = 0;
 };
 

@@ -1,6 +1,7 @@
 // Noise measured from depth, and the plane fit that it steers: what is gained on noisy depth, and what must not be
 // lost.
 #include "ao/fit_plane/fit_plane.h"
+#include "ao/frame.h"
 #include "ao/gpu/device.h"
 #include "projection/error.h"
 #include "tests/support/says.h"
@@ -273,9 +274,9 @@ TEST(fit_plane, what_stays_on_the_device_is_what_the_host_would_have_sent) {
         FitPlane fit(device(), kinect);
         const FittedDepth fitted = fit.compute(depth);
         const cv::Mat1f by_host = method->compute({fitted.depth, &fitted.normals, kinect, true}).visibility;
-        OnFittedDepth on_device(device(), *method, {});
+        FrameAo on_device(device(), *method, {});
         ASSERT_TRUE(method->takes_prepared()) << name;
-        const cv::Mat1f stayed = on_device.compute({.depth = depth, .noise = kinect}).visibility;
+        const cv::Mat1f stayed = on_device.compute(depth, kinect).visibility;
         EXPECT_EQ(std::memcmp(by_host.data, stayed.data, by_host.total() * 4), 0) << name;
         // And what the host sends next is not what stayed there.
         EXPECT_EQ(std::memcmp(method->compute({fitted.depth, &fitted.normals, kinect, true}).visibility.data,

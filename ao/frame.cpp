@@ -1,0 +1,57 @@
+#include "ao/frame.h"
+
+#include <cassert>
+
+namespace scanshade {
+namespace {
+
+FitPlaneOptions widened_for(const MethodRow& row, FitPlaneOptions preparation) {
+    preparation.smoothing *= row.smoothing;
+    return preparation;
+}
+
+} // namespace
+
+FrameAo::FrameAo(gpu::Device& device, const MethodRow& row, const MethodSetup& setup, FitPlaneOptions preparation)
+    : device_(&device), owned_(setup.make(device)), method_(*owned_), preparation_(widened_for(row, preparation)) {}
+
+AoMap FrameAo::compute(const DepthImage& depth, const DepthNoise& noise) {
+    timings_.clear();
+    AoMap ao;
+    if (noise.any() && device_) {
+        ao = compute_prepared(depth, noise);
+        timings_ = fit_->timings();
+    } else {
+        ao = method_.compute({.depth = depth, .noise = noise});
+    }
+    timings_.insert(timings_.end(), method_.timings().begin(), method_.timings().end());
+    return ao;
+}
+
+AoMap FrameAo::compute_prepared(const DepthImage& depth, const DepthNoise& noise) {
+    if (fit_)
+        fit_->set_noise(noise);
+    else
+        fit_.emplace(*device_, noise, preparation_);
+    if (fit_->planes() && method_.takes_prepared()) {
+        const PreparedSurfaces prepared = fit_->compute_on_device(depth);
+        return method_.compute({.depth = depth, .noise = noise, .smoothed = true, .prepared = &prepared});
+    }
+    const FittedDepth fitted = fit_->compute(depth);
+    const bool planes = !fitted.normals.normals.empty();
+    return method_.compute({fitted.depth, planes ? &fitted.normals : nullptr, noise, planes});
+}
+
+Neighbourhood FrameAo::sequence(double radius_m, const DepthNoise& noise, const NeighbourhoodOptions& options) {
+    assert(device_);
+    return {*device_, method_, radius_m, noise, preparation_, options};
+}
+
+std::unique_ptr<PointMethod> point_method(const MethodSetup& setup, const CloudAoOptions& options,
+                                          gpu::Device* device) {
+    if (std::unique_ptr<PointMethod> own = setup.make_for_points())
+        return own;
+    return std::make_unique<CloudAo>(options, device);
+}
+
+} // namespace scanshade

@@ -1,0 +1,57 @@
+// The one door to ambient occlusion: a depth image or points, with settings, become visibility. Preparation of noisy
+// depth, frames of a recording and the method are wired here once; the walk, `bench` and budgets all come in this way.
+#pragma once
+
+#include "ao/cloud/cloud_ao.h"
+#include "ao/fit_plane/fit_plane.h"
+#include "ao/method.h"
+#include "ao/sequence/neighbourhood.h"
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+namespace scanshade {
+
+/// One method on one device, with the preparation of depth that it asks for. Not thread-safe: one frame at a time.
+class FrameAo {
+  public:
+    /// Keeps a reference to the device. `preparation.smoothing` is multiplied by the method's own. Throws Misuse naming
+    /// a setting out of its range.
+    FrameAo(gpu::Device& device, const MethodRow& row, const MethodSetup& setup, FitPlaneOptions preparation = {});
+    /// A method made elsewhere, which must outlive this one. It sees depth as recorded, whatever its noise.
+    explicit FrameAo(Method& method) : method_(method) {}
+    /// The same with preparation, just as said.
+    FrameAo(gpu::Device& device, Method& method, const FitPlaneOptions& preparation)
+        : device_(&device), method_(method), preparation_(preparation) {}
+    FrameAo(const FrameAo&) = delete;
+    FrameAo& operator=(const FrameAo&) = delete;
+
+    /// Visibility of each pixel of `depth`; NaN exactly where there is no surface. Depth with noise is prepared first.
+    [[nodiscard]] AoMap compute(const DepthImage& depth, const DepthNoise& noise);
+    /// For the frames of one recording, each computed together with those around it. Must not outlive this one.
+    [[nodiscard]] Neighbourhood sequence(double radius_m, const DepthNoise& noise,
+                                         const NeighbourhoodOptions& options = alone());
+
+    /// Where the time of the last compute() went, in order of execution.
+    [[nodiscard]] const Timings& timings() const { return timings_; }
+    /// What lay between the method's passes in the last compute().
+    [[nodiscard]] std::vector<Intermediate> intermediates() { return method_.intermediates(); }
+
+  private:
+    [[nodiscard]] AoMap compute_prepared(const DepthImage& depth, const DepthNoise& noise);
+
+    gpu::Device* device_ = nullptr; ///< none: depth is never prepared
+    std::unique_ptr<Method> owned_;
+    Method& method_;
+    FitPlaneOptions preparation_;
+    std::optional<FitPlane> fit_; ///< made when noise first asks for it; its pipelines stay for other noise
+    Timings timings_;
+};
+
+/// How points are computed: by the method itself where it needs no view, else by rays from every point. `device` = null
+/// casts them on the processor.
+[[nodiscard]] std::unique_ptr<PointMethod> point_method(const MethodSetup& setup, const CloudAoOptions& options,
+                                                        gpu::Device* device);
+
+} // namespace scanshade
