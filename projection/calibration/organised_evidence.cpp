@@ -1,7 +1,7 @@
 // Organised clouds as evidence: a sample of points per tile.
 #include "projection/calibration/organised_evidence.h"
 
-#include "projection/calibration/organised.h"
+#include "projection/fit_pinhole.h"
 #include "projection/calibration/solve.h"
 #include "projection/error.h"
 

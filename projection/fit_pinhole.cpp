@@ -1,4 +1,4 @@
-#include "projection/calibration/organised.h"
+#include "projection/fit_pinhole.h"
 
 #include "projection/error.h"
 
