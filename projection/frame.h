@@ -12,8 +12,8 @@
 
 namespace scanshade {
 
-/// A cloud file's own bytes, fields and text, which only io understands (io/cloud_file.h); kept so that everything
-/// not touched is written back bit for bit.
+/// A cloud file's own bytes, fields and text, which only io understands (io/clouds/cloud_file.h); kept so that
+/// everything not touched is written back bit for bit.
 struct CloudRecords;
 
 /// Points in camera space (x right, y down, z forward), in file order, metres.

@@ -93,7 +93,7 @@ void Front::replace_with(const Front& other) {
 }
 
 const Front& shipped_front() {
-    static const Front front = front_from(json::parse(shipped_front_text), "apps/front.json");
+    static const Front front = front_from(json::parse(shipped_front_text), "apps/measure/front.json");
     return front;
 }
 

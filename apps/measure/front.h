@@ -38,7 +38,7 @@ struct Front {
 /// Throws Error naming `origin` and what was expected there.
 [[nodiscard]] Front front_from(const json& text, const std::string& origin);
 
-/// The one this program was built with (apps/front.json, made by `bench --front`).
+/// The one this program was built with (apps/measure/front.json, made by `bench --front`).
 [[nodiscard]] const Front& shipped_front();
 
 } // namespace scanshade

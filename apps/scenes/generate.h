@@ -12,8 +12,8 @@ namespace scanshade {
 
 /// What is generated. The rows of parameters() point into this object: keep it where it is while they are used.
 struct GenerateOptions {
-    std::string scene = "office";  ///< a name of scenes() (apps/scene.h)
-    std::string sensor = "kinect"; ///< a name of sensors() (apps/sensor.h)
+    std::string scene = "office";  ///< a name of scenes() (apps/scenes/scene.h)
+    std::string sensor = "kinect"; ///< a name of sensors() (apps/scenes/sensor.h)
     int frames = 8;
     int first = 0, step = 1;            ///< frames first, first + step, ... of the scene's walk, ten per second
     std::string size = "640x480";       ///< width x height in pixels; the field of view stays that of a Kinect

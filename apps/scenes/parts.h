@@ -1,4 +1,5 @@
-// The parts things are built of: bars, rods, wires, vessels, shells. World axes as in apps/scene.h, metres, radians.
+// The parts things are built of: bars, rods, wires, vessels, shells. World axes as in apps/scenes/scene.h, metres,
+// radians.
 #pragma once
 
 #include "apps/scenes/scene.h"

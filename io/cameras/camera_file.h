@@ -40,8 +40,8 @@ struct CameraFile {
 /// matrices.
 [[nodiscard]] CameraFile read_camera_file(const std::filesystem::path& file);
 
-/// `text` is a file's path, the name of a known camera (io/known_cameras.h), or "fx,fy,cx,cy". Throws Misuse when it is
-/// none of these.
+/// `text` is a file's path, the name of a known camera (io/cameras/known_cameras.h), or "fx,fy,cx,cy". Throws Misuse
+/// when it is none of these.
 [[nodiscard]] CameraFile camera_from_argument(const std::string& text);
 
 enum class CameraFormat { scanshade, open3d, opencv, ros, kalibr, colmap };

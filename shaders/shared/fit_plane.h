@@ -1,4 +1,4 @@
-// What host and shader share of the plane fit (shaders/fit_plane.comp).
+// What host and shader share of the plane fit (shaders/fit_plane/fit.comp).
 #ifndef SCANSHADE_SHARED_FIT_PLANE_H
 #define SCANSHADE_SHARED_FIT_PLANE_H
 #include "neighbour.h"

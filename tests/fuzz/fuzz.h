@@ -1,5 +1,5 @@
 // What the fuzz targets share: an input as a file, and what a reader may do with it. Each target is an entry point that
-// libFuzzer drives (tests/fuzz/run); whatever is found becomes a row of tests/broken_inputs_test.cpp.
+// libFuzzer drives (tests/fuzz/run); whatever is found becomes a row of tests/io/broken_inputs_test.cpp.
 #pragma once
 
 #include "projection/error.h"
