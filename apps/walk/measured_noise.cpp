@@ -21,7 +21,7 @@ DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& fram
                     images[i] = project(frame);
             } catch (const Outage&) { // a sigma of fewer frames would shape all results
                 throw;
-            } catch (const std::exception&) { // whoever processes the frame says what is wrong with it
+            } catch (const Error&) { // whoever processes the frame says what is wrong with it
             }
         });
     });
