@@ -8,7 +8,7 @@
 #include "ao/method.h"
 #include "ao/raycast/raycast.h"
 #include "ao/surfel/surfel.h"
-#include "projection/error.h"
+#include "projection/named.h"
 
 #include <type_traits>
 
@@ -61,14 +61,6 @@ const std::vector<MethodRow>& methods() {
     return table;
 }
 
-const MethodRow& method_named(std::string_view name) {
-    std::string known;
-    for (const MethodRow& row : methods()) {
-        if (row.name == name)
-            return row;
-        known += (known.empty() ? "" : ", ") + std::string(row.name);
-    }
-    throw Misuse("no method '" + std::string(name) + "'; there are: " + known);
-}
+const MethodRow& method_named(std::string_view name) { return one_named(methods(), name, "method"); }
 
 } // namespace scanshade

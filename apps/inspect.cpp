@@ -143,7 +143,7 @@ void measure_samples(Findings& findings) {
     for (const std::size_t place : spread(loadable.size())) {
         try {
             add_frame(findings.capture.load(loadable[place]), findings.samples);
-        } catch (const std::exception& failure) {
+        } catch (const Error& failure) {
             findings.problems.push_back({findings.capture.entries[loadable[place]].name, failure.what()});
         }
     }
@@ -311,7 +311,7 @@ class Inspect final : public Command {
                 as_json_ ? all.push_back(to_json(found)) : print(found);
             } catch (const Misuse&) {
                 throw;
-            } catch (const std::exception& failure) {
+            } catch (const Error& failure) {
                 fmt::print(stderr, "scanshade: {}\n", failure.what());
                 ++problems;
             }

@@ -1,8 +1,6 @@
 // Values that both the manifest and `inspect --json` tell.
 #include "apps/json.h"
 
-#include "projection/error.h"
-
 namespace scanshade {
 
 json to_json(const Camera& camera) {

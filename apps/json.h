@@ -2,6 +2,7 @@
 #pragma once
 
 #include "projection/camera.h"
+#include "projection/error.h"
 #include "projection/frame.h"
 
 #include <nlohmann/json.hpp>
@@ -22,6 +23,18 @@ using json = nlohmann::ordered_json;
 
 /// A member that counts something. Throws Error naming the key where it is no whole number.
 [[nodiscard]] std::size_t count_at(const json& object, const std::string& key);
+
+/// during() for code that reads JSON from outside: members that are missing or of another type become Error.
+template <class Action>
+decltype(auto) reading_json(const std::string& what, Action&& action) {
+    return during(what, [&]() -> decltype(auto) {
+        try {
+            return std::forward<Action>(action)();
+        } catch (const json::exception& failure) {
+            throw Error(failure.what());
+        }
+    });
+}
 
 /// The text as people read it; bytes that are not UTF-8 (file names may hold any) become U+FFFD.
 [[nodiscard]] std::string text_of(const json& value);

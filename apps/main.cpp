@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <malloc.h>
@@ -166,6 +167,9 @@ int main(int count, char** words) {
         fmt::print(stderr, "scanshade: {}\n", failure.what());
         return unfinished;
     } catch (const Error& failure) {
+        fmt::print(stderr, "scanshade: {}\n", failure.what());
+        return nothing_done;
+    } catch (const std::filesystem::filesystem_error& failure) { // a path of the command line leads nowhere
         fmt::print(stderr, "scanshade: {}\n", failure.what());
         return nothing_done;
     } catch (const std::exception& failure) {

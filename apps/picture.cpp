@@ -1,6 +1,8 @@
 // Depth and visibility made visible: colours for depth, clay for shape, and the side-by-side panel.
 #include "apps/picture.h"
 
+#include "projection/statistics.h"
+
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
@@ -17,11 +19,7 @@ std::pair<float, float> usual_range(const cv::Mat1f& z_m) {
     std::copy_if(z_m.begin(), z_m.end(), std::back_inserter(seen), [](float z) { return z > 0; });
     if (seen.empty())
         return {0.0f, 0.0f};
-    const auto at_share = [&](std::size_t percent) {
-        const auto place = seen.begin() + static_cast<std::ptrdiff_t>((seen.size() - 1) * percent / 100);
-        std::nth_element(seen.begin(), place, seen.end());
-        return *place;
-    };
+    const auto at_share = [&](std::size_t percent) { return ranked(seen, (seen.size() - 1) * percent / 100); };
     const float near = at_share(1);
     return {near, at_share(99)};
 }

@@ -20,7 +20,9 @@ std::string typed(const std::string& name, const json& value) {
 json parsed(std::istream& stream) {
     try {
         return shallow_json<json>(stream);
-    } catch (const std::exception& failure) {
+    } catch (const Error& failure) {
+        throw Misuse(fmt::format("settings: {}", failure.what()));
+    } catch (const json::exception& failure) {
         throw Misuse(fmt::format("settings: {}", failure.what()));
     }
 }

@@ -67,16 +67,22 @@ std::optional<std::string_view> target_of(std::string_view name) {
 void write_atomically(const fs::path& target, const std::function<void(const fs::path&)>& write) {
     const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
     const fs::path temporary = temporary_name(target);
+    const auto clean_up = [&] {
+        std::error_code ignored;
+        fs::remove(temporary, ignored);
+    };
     try {
         fs::create_directories(folder);
         write(temporary);
         sync(temporary, O_RDONLY);
         fs::rename(temporary, target);
         sync(folder, O_RDONLY | O_DIRECTORY);
-    } catch (const std::exception& failure) {
-        std::error_code ignored;
-        fs::remove(temporary, ignored);
+    } catch (const std::system_error& failure) { // the file system's answer; streams throw it, too
+        clean_up();
         throw Outage(target.string() + ": not written: " + failure.what());
+    } catch (...) {
+        clean_up();
+        throw;
     }
 }
 

@@ -14,6 +14,7 @@
 #include "shaders/shared/camera.h"
 
 #include <cmath>
+#include <Eigen/Core>
 #include <opencv2/core.hpp>
 #include <string>
 
@@ -23,6 +24,13 @@ namespace scanshade {
 struct Pinhole {
     double fx = 0, fy = 0, cx = 0, cy = 0;
     cv::Size size;
+
+    /// The ray through pixel (u, v), z = 1.
+    [[nodiscard]] Eigen::Vector3d ray(double u, double v) const {
+        return {shared::ray_coordinate(u, fx, cx), shared::ray_coordinate(v, fy, cy), 1};
+    }
+    /// The point in camera space that pixel (u, v) sees at depth z_m.
+    [[nodiscard]] Eigen::Vector3d point(double u, double v, double z_m) const { return ray(u, v) * z_m; }
 
     /// The same camera in the GPU's single precision.
     [[nodiscard]] shared::Pinhole on_gpu() const {

@@ -26,8 +26,10 @@ cv::Mat2f directions_of(const Camera& camera) {
     const Pinhole& p = camera.pinhole;
     cv::Mat2f directions(p.size);
     for (int v = 0; v < directions.rows; ++v)
-        for (int u = 0; u < directions.cols; ++u)
-            directions(v, u) = {static_cast<float>((u - p.cx) / p.fx), static_cast<float>((v - p.cy) / p.fy)};
+        for (int u = 0; u < directions.cols; ++u) {
+            const Eigen::Vector3d ray = p.ray(u, v);
+            directions(v, u) = {static_cast<float>(ray.x()), static_cast<float>(ray.y())};
+        }
     return directions;
 }
 

@@ -1,4 +1,4 @@
-// How a failure says what was being done, to what: errors gain context on their way out.
+// How a failure says what was being done, to what: errors gain context on their way out and keep their types.
 #pragma once
 
 #include <exception>
@@ -32,19 +32,27 @@ class DeviceLost : public Outage {
     using Outage::Outage;
 };
 
-/// Runs `action`; a failure inside leaves as `what: <its message>`. Misuse, Outage and DeviceLost stay what they are.
+/// An exception that is not ours left during(): a mistake of the program, not of its input. The exception is nested
+/// inside. Code that calls a library turns what the library throws about bad input into Error on the spot.
+class InternalError : public std::logic_error {
+  public:
+    using std::logic_error::logic_error;
+};
+
+/// Runs `action`; a failure inside leaves as `what: <its message>`. Errors keep their types; any other exception
+/// becomes an InternalError.
 template <class Action>
 decltype(auto) during(const std::string& what, Action&& action) {
     try {
         return std::forward<Action>(action)();
-    } catch (const Misuse& failure) {
-        throw Misuse(what + ": " + failure.what());
-    } catch (const DeviceLost& failure) {
-        throw DeviceLost(what + ": " + failure.what());
-    } catch (const Outage& failure) {
-        throw Outage(what + ": " + failure.what());
+    } catch (Error& failure) { // whatever its type: only the message changes
+        static_cast<std::runtime_error&>(failure) = std::runtime_error(what + ": " + failure.what());
+        throw;
+    } catch (InternalError& failure) {
+        static_cast<std::logic_error&>(failure) = std::logic_error(what + ": " + failure.what());
+        throw;
     } catch (const std::exception& failure) {
-        throw Error(what + ": " + failure.what());
+        std::throw_with_nested(InternalError(what + ": " + failure.what()));
     }
 }
 

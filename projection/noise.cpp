@@ -1,6 +1,7 @@
 #include "projection/noise.h"
 
 #include "projection/error.h"
+#include "projection/statistics.h"
 
 #include <algorithm>
 #include <array>
@@ -86,9 +87,7 @@ double step_of(const std::vector<float>& depths_m) {
     std::vector<float> gaps(depths_m.size() - 1);
     for (std::size_t i = 0; i < gaps.size(); ++i)
         gaps[i] = depths_m[i + 1] - depths_m[i];
-    const auto middle = gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2);
-    std::nth_element(gaps.begin(), middle, gaps.end());
-    return *middle;
+    return median(std::move(gaps));
 }
 
 struct Spread {
@@ -134,11 +133,10 @@ Step step_by(const std::vector<float>& values_m, int power) {
         gaps.push_back((static_cast<double>(values_m[i]) - values_m[i - 1]) / std::pow(values_m[i], power));
     if (gaps.size() < 50)
         return {}; // a disparity sensor has some hundred values in all
-    const auto low = gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 10);
-    std::nth_element(gaps.begin(), low, gaps.end());
+    const double low = ranked(gaps, gaps.size() / 10);
     double sum = 0, count = 0;
     for (const double gap : gaps)
-        if (gap > 0.75 * *low && gap < 1.35 * *low)
+        if (gap > 0.75 * low && gap < 1.35 * low)
             sum += gap, ++count;
     return {sum / count, count / static_cast<double>(gaps.size())};
 }

@@ -95,9 +95,7 @@ std::optional<Eigen::Vector2d> undistorted_within(const Distortion& distortion, 
     return std::nullopt;
 }
 
-Eigen::Vector2d normalised(const Pinhole& camera, double u, double v) {
-    return {(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy};
-}
+Eigen::Vector2d normalised(const Pinhole& camera, double u, double v) { return camera.ray(u, v).head<2>(); }
 
 /// The pixel at normalised coordinates, if it is in the image.
 std::optional<cv::Point> pixel_at(const Pinhole& camera, const Eigen::Vector2d& point) {

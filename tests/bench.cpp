@@ -11,6 +11,7 @@
 #include "ao/gpu/device.h"
 #include "ao/gpu/program.h"
 #include "projection/error.h"
+#include "projection/statistics.h"
 
 #include <algorithm>
 #include <array>
@@ -49,11 +50,6 @@ DepthImage room(cv::Size size) {
             image.z_m(v, u) = static_cast<float>(z);
         }
     return image;
-}
-
-double median(std::vector<double> values) {
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-    return values[values.size() / 2];
 }
 
 double least(const std::vector<double>& values) { return *std::min_element(values.begin(), values.end()); }

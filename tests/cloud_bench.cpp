@@ -10,8 +10,8 @@
 #include "ao/raycast/raycast.h"
 #include "apps/scenes/scene_cloud.h"
 #include "projection/hash.h"
+#include "projection/stopwatch.h"
 
-#include <chrono>
 #include <CLI/CLI.hpp>
 #include <ctime>
 #include <fmt/format.h>
@@ -39,10 +39,10 @@ struct Judge {
 
     template <class Compute>
     void row(const std::string& name, Compute&& compute) const {
-        const auto start = std::chrono::steady_clock::now();
+        const Stopwatch stopwatch;
         const std::clock_t cpu = std::clock();
         const std::vector<float> values = compute();
-        const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        const double wall_s = stopwatch.seconds();
         const double cpu_s = static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC;
         cv::Mat1f ours(1, static_cast<int>(values.size())), exact(ours.size());
         std::copy(values.begin(), values.end(), ours.begin());

@@ -485,8 +485,7 @@ TEST(Clouds, DistortionLeftInACloudsGridIsFound) {
     Cloud cloud{small.pinhole.size, {}, {}, {}};
     for (int v = 0; v < 120; ++v)
         for (int u = 0; u < 160; ++u) {
-            const auto straight = undistorted(small.distortion, {(u - small.pinhole.cx) / small.pinhole.fx,
-                                                                 (v - small.pinhole.cy) / small.pinhole.fy});
+            const auto straight = undistorted(small.distortion, small.pinhole.ray(u, v).head<2>());
             const double z = 2 + 0.3 * std::sin(u * 0.1);
             cloud.points.push_back(straight ? Eigen::Vector3d(z * straight->x(), z * straight->y(), z)
                                             : Eigen::Vector3d::Constant(NAN));

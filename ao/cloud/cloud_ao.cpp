@@ -7,12 +7,13 @@
 #include "ao/raycast/raycast.h"
 #include "projection/error.h"
 #include "projection/hash.h"
+#include "projection/statistics.h"
+#include "projection/stopwatch.h"
 
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <charconv>
-#include <chrono>
 #include <cmath>
 #include <Eigen/Geometry>
 #include <fmt/format.h>
@@ -45,16 +46,11 @@ std::optional<Vector3d> triple(const std::string& text) {
 class Watch {
   public:
     explicit Watch(Timings& timings) : timings_(timings) {}
-    void lap(const std::string& name) {
-        const auto now = std::chrono::steady_clock::now();
-        const double ms = std::chrono::duration<double, std::milli>(now - last_).count();
-        add(timings_, name, ms);
-        last_ = now;
-    }
+    void lap(const std::string& name) { add(timings_, name, stopwatch_.lap_ms()); }
 
   private:
     Timings& timings_;
-    std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+    Stopwatch stopwatch_;
 };
 
 /// About `wanted` of the points, chosen by a hash: recording order would take whole lines of a scan or none of them.
@@ -266,7 +262,7 @@ class CloudAo::Work {
                 return;
             } catch (const Outage&) { // what concerns more than this cloud
                 throw;
-            } catch (const std::exception& failure) { // no memory, most likely: other programs' counts, too
+            } catch (const Error& failure) { // no memory, most likely: other programs' counts, too
                 result_.notes.push_back(fmt::format("{}: {}", gpu_->device_name(), failure.what()));
             }
         }
@@ -435,11 +431,8 @@ PointVisibility CloudAo::of_mesh(const PointSet& mesh) const {
         if (std::min({a, b, c}) >= 0)
             sides.push_back(static_cast<float>(
                 (mesh.points[static_cast<std::size_t>(a)] - mesh.points[static_cast<std::size_t>(b)]).norm()));
-    if (!sides.empty()) {
-        const auto middle = sides.begin() + static_cast<std::ptrdiff_t>(sides.size() / 2);
-        std::nth_element(sides.begin(), middle, sides.end());
-        result.spacing = static_cast<double>(*middle);
-    }
+    if (!sides.empty())
+        result.spacing = static_cast<double>(median(std::move(sides)));
     const double extent = extent_of(sampled(mesh.points, 60000));
     result.radius =
         std::clamp(options_.radius > 0 ? options_.radius : default_radius(extent, result.spacing), 1e-6, 1e6);

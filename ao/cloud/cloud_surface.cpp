@@ -2,6 +2,7 @@
 #include "ao/cloud/cloud_surface.h"
 
 #include "ao/cloud/cloud_gpu.h"
+#include "projection/statistics.h"
 
 #include <algorithm>
 #include <cmath>
@@ -55,14 +56,6 @@ Plane plane_round(const NeighbourTree& tree, std::size_t place, std::span<const 
 /// Whether points lie on a line rather than in a plane.
 bool on_a_line(const Plane& plane) { return !(plane.variance_narrow > 0.01F * plane.variance_wide); }
 
-float median(std::vector<float> values) {
-    if (values.empty())
-        return 0;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
-
 /// Discs as wide as their neighbours' gaps, yet a point that strayed from a surface must not get a shield of its own:
 /// at most twice what its neighbours have, at least half of it.
 void limit_discs(CloudSurface& surface) {
@@ -71,8 +64,7 @@ void limit_discs(CloudSurface& surface) {
         std::array<float, CloudSurface::kept> round;
         std::transform(surface.near[i].begin(), surface.near[i].end(), round.begin(),
                        [&](std::uint32_t other) { return surface.disc_radius[other]; });
-        std::nth_element(round.begin(), round.begin() + round.size() / 2, round.end());
-        const float usual_radius = round[round.size() / 2];
+        const float usual_radius = median(round);
         limited[i] = usual_radius > 0 ? std::clamp(surface.disc_radius[i], usual_radius / 2, 2 * usual_radius)
                                       : surface.disc_radius[i];
     });
@@ -179,10 +171,10 @@ CloudSurface cloud_surface(std::span<const Vector3d> points, std::span<const Vec
         });
     }
     constexpr float sixth_on_grid = 1.414F;
-    surface.spacing = median(std::move(sixth)) / sixth_on_grid;
+    surface.spacing = median(std::move(sixth), 0) / sixth_on_grid;
     limit_discs(surface);
     if (!normals.empty()) {
-        surface.agreement = static_cast<double>(median(std::move(cosines)));
+        surface.agreement = static_cast<double>(median(std::move(cosines), 0));
         compare_sides(surface, normals);
     }
     return surface;

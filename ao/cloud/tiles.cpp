@@ -3,6 +3,7 @@
 #include "ao/cloud/tiles.h"
 
 #include "projection/hash.h"
+#include "projection/statistics.h"
 
 #include <algorithm>
 #include <Eigen/Geometry>
@@ -85,9 +86,7 @@ class Cutter {
                 along.push_back(points_[i][axis]);
         if (along.empty())
             return points_[places.front()][axis];
-        const auto middle = along.begin() + static_cast<std::ptrdiff_t>(along.size() / 2);
-        std::nth_element(along.begin(), middle, along.end());
-        return *middle;
+        return median(std::move(along));
     }
 
     std::span<const Vector3d> points_;

@@ -72,13 +72,9 @@ void FitPlane::prepare(const DepthImage& depth, std::span<const OtherDepth> othe
         program_ = program_for(device_, size, planes(), fuse);
     size_ = size;
     fused_ = fuse;
-    const shared::Pinhole camera = depth.camera.on_gpu();
     const double window = window_scale * noise_.grain_px * noise_.grain_px * options_.smoothing * options_.smoothing;
     constants_ = {{size.width, size.height},
-                  camera.fx,
-                  camera.fy,
-                  camera.cx,
-                  camera.cy,
+                  depth.camera.on_gpu(),
                   static_cast<float>(noise_.floor_m),
                   static_cast<float>(noise_.per_z2),
                   static_cast<float>(window),

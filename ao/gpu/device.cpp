@@ -191,7 +191,7 @@ int Device::State::memory_type(std::uint32_t allowed, vk::MemoryPropertyFlags wa
 }
 
 std::vector<DeviceInfo> list_devices() {
-    return during("Vulkan", [] {
+    return asking_vulkan("Vulkan", [] {
         Device::State state;
         make_instance(state);
         std::vector<DeviceInfo> all;
@@ -202,7 +202,7 @@ std::vector<DeviceInfo> list_devices() {
 }
 
 Device::Device(const std::string& choice) : state_(std::make_unique<State>()) {
-    during("Vulkan", [&] {
+    asking_vulkan("Vulkan", [&] {
         make_instance(*state_);
         const auto physicals = state_->instance.enumeratePhysicalDevices();
         std::vector<DeviceInfo> all;

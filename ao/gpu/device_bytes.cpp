@@ -9,7 +9,7 @@ namespace scanshade::gpu {
 
 DeviceBytes::DeviceBytes(Device& device, std::size_t bytes) {
     using Usage = vk::BufferUsageFlagBits;
-    state_ = during(fmt::format("{} bytes on the device", bytes), [&] {
+    state_ = asking_vulkan(fmt::format("{} bytes on the device", bytes), [&] {
         return std::make_unique<State>(BoundBuffer(device.state(), bytes, Usage::eTransferSrc | Usage::eTransferDst,
                                                    {vk::MemoryPropertyFlagBits::eDeviceLocal}));
     });

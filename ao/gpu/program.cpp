@@ -206,15 +206,15 @@ struct Program::State {
         for (std::size_t i = 0; i < rows.size(); ++i) {
             const BufferRow& row = rows[i];
             if (row.image.width > 0) {
-                images[i] = during(fmt::format("image {} of {} bytes", row.name, row.bytes),
-                                   [&] { return BoundImage(gpu, row.image); });
+                images[i] = asking_vulkan(fmt::format("image {} of {} bytes", row.name, row.bytes),
+                                          [&] { return BoundImage(gpu, row.image); });
                 buffers.emplace_back();
                 continue;
             }
             auto usage = Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst;
             if (row.texels != BufferRow::Texels::none)
                 usage |= Usage::eStorageTexelBuffer;
-            buffers.push_back(during(fmt::format("buffer {} of {} bytes", row.name, row.bytes), [&] {
+            buffers.push_back(asking_vulkan(fmt::format("buffer {} of {} bytes", row.name, row.bytes), [&] {
                 return BoundBuffer(gpu, row.bytes, usage, {shared_memory, Memory::eDeviceLocal});
             }));
             if (row.texels != BufferRow::Texels::none) {
@@ -453,16 +453,12 @@ struct Program::State {
             if (each)
                 infos.emplace_back(each);
         constexpr std::uint64_t patience_ns = 120'000'000'000;
-        try {
-            {
-                const std::lock_guard alone(lane.submitting);
-                lane.queue.submit2(vk::SubmitInfo2({}, {}, infos), *fence);
-            }
-            if (gpu.device.waitForFences(*fence, VK_TRUE, patience_ns) != vk::Result::eSuccess)
-                throw DeviceLost(fmt::format("{} did not finish within 120 s", gpu.info.name));
-        } catch (const vk::DeviceLostError& failure) {
-            throw DeviceLost(fmt::format("{}: {}", gpu.info.name, failure.what()));
+        {
+            const std::lock_guard alone(lane.submitting);
+            lane.queue.submit2(vk::SubmitInfo2({}, {}, infos), *fence);
         }
+        if (gpu.device.waitForFences(*fence, VK_TRUE, patience_ns) != vk::Result::eSuccess)
+            throw DeviceLost("did not finish within 120 s");
         gpu.device.resetFences(*fence);
     }
 };
@@ -472,13 +468,15 @@ Program::Program(Device& device, std::vector<BufferRow> buffers, std::vector<Pas
     const auto wrong = problems(buffers, passes);
     if (!wrong.empty())
         throw Error(fmt::format("pass table: {}", fmt::join(wrong, "; ")));
-    state_ = std::make_unique<State>(device.state(), std::move(buffers), std::move(passes));
-    state_->stamps = stamps;
-    state_->make_buffers(constants_bytes);
-    for (const PassRow& pass : state_->passes)
-        state_->pipelines.push_back(during("pass " + pass.name, [&] { return state_->pipeline_of(pass); }));
-    state_->record();
-    state_->fill_buffers();
+    asking_vulkan([&] {
+        state_ = std::make_unique<State>(device.state(), std::move(buffers), std::move(passes));
+        state_->stamps = stamps;
+        state_->make_buffers(constants_bytes);
+        for (const PassRow& pass : state_->passes)
+            state_->pipelines.push_back(asking_vulkan("pass " + pass.name, [&] { return state_->pipeline_of(pass); }));
+        state_->record();
+        state_->fill_buffers();
+    });
 }
 
 Program::~Program() = default;
@@ -511,7 +509,7 @@ void Program::give(int buffer, std::shared_ptr<DeviceBytes> to) {
 void Program::run(std::span<const std::byte> constants, Results results) {
     State& s = *state_;
     std::copy_n(constants.data(), std::min(constants.size(), s.constants.bytes), s.constants.mapped);
-    during(s.gpu.info.name, [&] { s.submit(s.all_commands(results)); });
+    asking_vulkan(s.gpu.info.name, [&] { s.submit(s.all_commands(results)); });
     s.taken.clear();
     s.given.clear();
     timings_.clear();

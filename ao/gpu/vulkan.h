@@ -3,6 +3,7 @@
 
 #include "ao/gpu/device.h"
 #include "ao/gpu/pipeline.h"
+#include "projection/error.h"
 
 #include <atomic>
 #include <deque>
@@ -10,6 +11,25 @@
 #include <vulkan/vulkan_raii.hpp>
 
 namespace scanshade::gpu {
+
+/// Runs what calls Vulkan. Its error codes tell of the machine (no driver, no memory, a lost device), never of a
+/// mistake of ours: they become DeviceLost and Error.
+template <class Action>
+decltype(auto) asking_vulkan(Action&& action) {
+    try {
+        return std::forward<Action>(action)();
+    } catch (const vk::DeviceLostError& failure) {
+        throw DeviceLost(failure.what());
+    } catch (const vk::SystemError& failure) {
+        throw Error(failure.what());
+    }
+}
+
+/// The same, with context.
+template <class Action>
+decltype(auto) asking_vulkan(const std::string& what, Action&& action) {
+    return during(what, [&]() -> decltype(auto) { return asking_vulkan(std::forward<Action>(action)); });
+}
 
 struct Messages {
     std::mutex mutex;

@@ -53,7 +53,7 @@ class Weaver {
         mesh_.vertices.reserve(depth.z_m.total());
         for (int v = 0; v < depth.z_m.rows; ++v)
             for (int u = 0; u < depth.z_m.cols; ++u)
-                mesh_.vertices.push_back(point_at(depth.camera, u, v, static_cast<double>(depth.z_m(v, u))));
+                mesh_.vertices.push_back(depth.camera.point(u, v, static_cast<double>(depth.z_m(v, u))));
     }
 
     void add_block(int u, int v) {
@@ -103,7 +103,7 @@ class Weaver {
         for (int v = 0; v < depth_.z_m.rows; ++v)
             for (int u = 0; u < depth_.z_m.cols; ++u)
                 mesh_.vertices.push_back(
-                    point_at(depth_.camera, u, v, static_cast<double>(depth_.z_m(v, u)) + thickness_m_));
+                    depth_.camera.point(u, v, static_cast<double>(depth_.z_m(v, u)) + thickness_m_));
         const std::size_t front = mesh_.triangles.size() - curtains_.size();
         for (std::size_t i = 0; i < front; ++i) {
             const auto [a, b, c] = mesh_.triangles[i];
@@ -118,7 +118,7 @@ class Weaver {
         const double z = static_cast<double>(depth_.z_m(p)), end = nearest_m + thickness_m_;
         if (z <= end)
             return index(p);
-        mesh_.vertices.push_back(point_at(depth_.camera, p.x, p.y, end));
+        mesh_.vertices.push_back(depth_.camera.point(p.x, p.y, end));
         return static_cast<int>(mesh_.vertices.size()) - 1;
     }
 
@@ -155,7 +155,7 @@ class Tangents {
     }
 
     [[nodiscard]] Vector3d point(cv::Point p) const {
-        return point_at(depth_.camera, p.x, p.y, static_cast<double>(depth_.z_m(p)));
+        return depth_.camera.point(p.x, p.y, static_cast<double>(depth_.z_m(p)));
     }
 
   private:

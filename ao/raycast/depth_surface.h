@@ -19,9 +19,4 @@ namespace scanshade {
 /// faces it: every pixel with depth has a normal.
 [[nodiscard]] NormalImage normals_of(const DepthImage& depth);
 
-/// The point a pixel sees.
-[[nodiscard]] inline Eigen::Vector3d point_at(const Pinhole& camera, double u, double v, double z_m) {
-    return {(u - camera.cx) / camera.fx * z_m, (v - camera.cy) / camera.fy * z_m, z_m};
-}
-
 } // namespace scanshade

@@ -2,6 +2,7 @@
 #include "ao/raycast/point_surface.h"
 
 #include "ao/raycast/embree.h"
+#include "projection/statistics.h"
 
 #include <algorithm>
 #include <cmath>
@@ -123,11 +124,10 @@ void clamp_radii(std::vector<Disc>& discs) {
             radii.push_back(disc.radius_m);
     if (radii.empty())
         return;
-    const auto middle = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
-    std::nth_element(radii.begin(), middle, radii.end());
+    const double usual = median(std::move(radii));
     for (Disc& disc : discs)
         if (disc.centre.allFinite())
-            disc.radius_m = std::clamp(disc.radius_m, 0.5 * *middle, 3 * *middle);
+            disc.radius_m = std::clamp(disc.radius_m, 0.5 * usual, 3 * usual);
 }
 
 } // namespace

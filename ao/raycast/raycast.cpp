@@ -4,9 +4,9 @@
 #include "ao/raycast/depth_surface.h"
 #include "ao/raycast/point_surface.h"
 #include "projection/hash.h"
+#include "projection/stopwatch.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <Eigen/Geometry>
 #include <limits>
@@ -32,15 +32,11 @@ RaycastOptions checked(RaycastOptions options) {
 class Watch {
   public:
     explicit Watch(Timings& timings) : timings_(timings) { timings_.clear(); }
-    void lap(std::string name) {
-        const auto now = std::chrono::steady_clock::now();
-        timings_.emplace_back(std::move(name), std::chrono::duration<double, std::milli>(now - last_).count());
-        last_ = now;
-    }
+    void lap(std::string name) { timings_.emplace_back(std::move(name), stopwatch_.lap_ms()); }
 
   private:
     Timings& timings_;
-    std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+    Stopwatch stopwatch_;
 };
 
 Vector3d vector_of(const cv::Vec3f& v) { return Eigen::Vector3f(v[0], v[1], v[2]).cast<double>(); }
@@ -155,7 +151,7 @@ AoMap Raycast::compute(const View& view) {
         const double z = static_cast<double>(z_m(v, u));
         if (!(z > 0))
             return std::nullopt;
-        const Vector3d point = point_at(camera, u, v, z), normal = vector_of(normals(v, u)).normalized();
+        const Vector3d point = camera.point(u, v, z), normal = vector_of(normals(v, u)).normalized();
         const auto key = hash(static_cast<std::uint32_t>(u), static_cast<std::uint32_t>(v));
         return RayStart{point, normal, key, view.noise.at(z) * std::abs(normal.dot(point)) / z};
     });

@@ -2,9 +2,9 @@
 
 #include "ao/gpu/transfer.h"
 #include "ao/screen/noise.h"
+#include "projection/stopwatch.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <fmt/format.h>
 
@@ -70,7 +70,8 @@ int ScreenTables::add_buffer(gpu::BufferRow row) {
 }
 
 void ScreenTables::add_pass_over(cv::Size over, std::string name, std::string_view shader, std::vector<int> reads,
-                                 std::vector<int> writes, std::vector<std::pair<int, int>> constants, int pixels_a_side) {
+                                 std::vector<int> writes, std::vector<std::pair<int, int>> constants,
+                                 int pixels_a_side) {
     const int tile = shared::screen_tile * pixels_a_side;
     const auto groups = [&](int n) { return static_cast<std::uint32_t>((n + tile - 1) / tile); };
     passes.push_back({std::move(name),
@@ -136,14 +137,20 @@ ScreenTables ScreenMethod::tables(const Shape& shape) const {
     const cv::Size size(width, height);
     const int guard = neighbours > 0 ? guard_px(size) : 0;
     const cv::Size image(size.width + 2 * guard, size.height + 2 * guard);
-    ScreenTables all{{{guard, guard}, size}, image, neighbours, shared_buffers(static_cast<std::size_t>(image.area()), supplied, options_.seed), {}, noisy};
+    ScreenTables all{{{guard, guard}, size},
+                     image,
+                     neighbours,
+                     shared_buffers(static_cast<std::size_t>(image.area()), supplied, options_.seed),
+                     {},
+                     noisy};
     if (neighbours > 0) {
         const auto each = static_cast<std::size_t>(neighbours);
-        all.add_buffer({"neighbours", each * static_cast<std::size_t>(size.area()) * 8, gpu::BufferRow::Host::taken, gpu::BufferRow::Texels::rg32ui});
+        all.add_buffer({"neighbours", each * static_cast<std::size_t>(size.area()) * 8, gpu::BufferRow::Host::taken,
+                        gpu::BufferRow::Texels::rg32ui});
     }
     // Without normals of the view, depth fills their slot; nothing reads it.
-    all.add_pass_over(size, "normals", "normals", {screen_depth, supplied ? screen_given : screen_depth}, {screen_surfaces},
-                      {{shared::spec_supplied, supplied}});
+    all.add_pass_over(size, "normals", "normals", {screen_depth, supplied ? screen_given : screen_depth},
+                      {screen_surfaces}, {{shared::spec_supplied, supplied}});
     add_passes(all);
     add_denoise(all);
     return all;
@@ -182,7 +189,7 @@ AoMap ScreenMethod::compute(const View& view) {
     });
     const auto block = constants(screen);
     gpu::Program& program = program_for({size.width, size.height, supplied, most, noisy}, block.size());
-    const auto start = std::chrono::steady_clock::now();
+    Stopwatch stopwatch;
     const cv::Rect window({guard, guard}, size);
     const cv::Size image(screen.size.x, screen.size.y);
     if (view.prepared) {
@@ -195,15 +202,14 @@ AoMap ScreenMethod::compute(const View& view) {
         view.normals->normals.copyTo(gpu::image_on<cv::Vec3f>(program.host(screen_given), image)(window));
     for (std::size_t i = 0; const Neighbour& other : neighbours)
         program.take(screen_neighbours, i++ * other.surfaces->words->size(), other.surfaces->words);
-    const auto uploaded = std::chrono::steady_clock::now();
+    const double upload_ms = stopwatch.lap_ms();
     program.run(block);
-    const auto ran = std::chrono::steady_clock::now();
+    (void)stopwatch.lap_ms(); // the program times its own passes
     AoMap ao{gpu::image_on<float>(program.host(screen_visibility), image)(window).clone()};
-    const auto done = std::chrono::steady_clock::now();
-    const auto ms = [](auto from, auto to) { return std::chrono::duration<double, std::milli>(to - from).count(); };
-    timings_.assign({{"host upload", ms(start, uploaded)}});
+    const double download_ms = stopwatch.ms();
+    timings_.assign({{"host upload", upload_ms}});
     timings_.insert(timings_.end(), program.timings().begin(), program.timings().end());
-    timings_.emplace_back("host download", ms(ran, done));
+    timings_.emplace_back("host download", download_ms);
     return ao;
 }
 

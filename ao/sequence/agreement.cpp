@@ -1,5 +1,7 @@
 #include "ao/sequence/agreement.h"
 
+#include "projection/statistics.h"
+
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Eigenvalues>
@@ -55,7 +57,7 @@ Facets::Facet facet_at(const DepthImage& depth, int u, int v, const DepthNoise& 
                           w - plane.x() * (u - camera.cx) - plane.y() * (v - camera.cy));
     if (!(w > 0) || std::abs(plane.z()) > 4 * sigma + 1e-3 * here)
         return {Vector3d::Zero(), Vector3d::Zero()};
-    return {{(u - camera.cx) / camera.fx * fitted, (v - camera.cy) / camera.fy * fitted, fitted}, -normal.normalized()};
+    return {camera.point(u, v, fitted), -normal.normalized()};
 }
 
 /// A point of the one frame, and the plane of the other that it meets or misses by a gate.
@@ -91,13 +93,6 @@ std::vector<Encounter> encounters(const Pair& pair, const Isometry3d& here_from_
                        hides && !(alike && std::abs(distance) < gate)});
     }
     return all;
-}
-
-/// What the share of them stays below.
-double quantile(std::vector<double>& values, double share) {
-    const auto rank = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), rank, values.end());
-    return *rank;
 }
 
 /// Distances of the planes that meet, in what is tolerable or in metres.

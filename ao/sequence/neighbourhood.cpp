@@ -1,7 +1,9 @@
 #include "ao/sequence/neighbourhood.h"
 
+#include "projection/statistics.h"
+#include "projection/stopwatch.h"
+
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <tbb/parallel_for_each.h>
 #include <tbb/task_arena.h>
@@ -16,10 +18,6 @@ using Eigen::Isometry3d;
 constexpr double aligned_already = 0.05;
 /// Of what an alignment leaves open, how much counts as misfit: most of it slides surfaces along themselves.
 constexpr double slides = 0.25;
-
-double ms_since(std::chrono::steady_clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-}
 
 } // namespace
 
@@ -69,8 +67,7 @@ int reach_for(std::span<const std::optional<Isometry3d>> world_from_camera, doub
                 moved.push_back((after->translation() - before->translation()).norm());
         if (moved.empty())
             break;
-        std::ranges::nth_element(moved, moved.begin() + static_cast<std::ptrdiff_t>(moved.size() / 2));
-        if (moved[moved.size() / 2] >= radius_m)
+        if (median(std::move(moved)) >= radius_m)
             return step;
     }
     return most;
@@ -96,9 +93,9 @@ const DepthImage& Neighbourhood::kept(Slot& slot) {
 const Facets& Neighbourhood::facets(Slot& slot) {
     if (!slot.facets) {
         const DepthImage& depth = fit_ ? kept(slot) : slot.depth;
-        const auto start = std::chrono::steady_clock::now();
+        const Stopwatch stopwatch;
         tbb::this_task_arena::isolate([&] { slot.facets = facets_of(depth, noise_); });
-        timings_.emplace_back("facets", ms_since(start));
+        timings_.emplace_back("facets", stopwatch.ms());
     }
     return *slot.facets;
 }
@@ -172,12 +169,12 @@ void Neighbourhood::meet(std::size_t place, std::span<const std::size_t> others)
     }
     if (tasks.empty())
         return;
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch stopwatch;
     tbb::this_task_arena::isolate([&] { // no other frame is begun while this one waits
         tbb::parallel_for_each(tasks,
                                [&](const Task& task) { *task.meeting = meeting_of(*task.earlier, *task.later); });
     });
-    timings_.emplace_back("align", ms_since(start));
+    timings_.emplace_back("align", stopwatch.ms());
 }
 
 std::optional<Neighbourhood::Fitting> Neighbourhood::fitting(std::size_t here, std::size_t there) {

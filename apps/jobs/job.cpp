@@ -95,7 +95,7 @@ void write_plan(const fs::path& job, const Plan& plan) {
 
 Plan read_plan(const fs::path& job) {
     Plan plan;
-    during((job / "plan.json").string(), [&] {
+    reading_json((job / "plan.json").string(), [&] {
         const json head = json::parse(read_at_most(1 << 28, job / "plan.json", "a plan"));
         for (const auto& [name, value] : head.at("settings").items())
             plan.settings.emplace_back(name, value.get<std::string>());
@@ -104,7 +104,8 @@ Plan read_plan(const fs::path& job) {
     std::ifstream stream(job / "tasks.jsonl");
     int number = 0;
     for (std::string line; std::getline(stream, line);)
-        during(at_line(job / "tasks.jsonl", ++number), [&] { plan.tasks.push_back(task_from(json::parse(line))); });
+        reading_json(at_line(job / "tasks.jsonl", ++number),
+                     [&] { plan.tasks.push_back(task_from(json::parse(line))); });
     return plan;
 }
 

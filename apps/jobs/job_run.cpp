@@ -5,8 +5,8 @@
 #include "apps/walk/overlap.h"
 #include "apps/walk/progress.h"
 #include "projection/error.h"
+#include "projection/stopwatch.h"
 
-#include <chrono>
 #include <fmt/format.h>
 #include <mutex>
 #include <ranges>
@@ -23,10 +23,8 @@ class Pace {
         whole_ = left_;
     }
     void done(const Task& task) {
-        using namespace std::chrono;
         const std::lock_guard alone(mutex_);
-        const double seconds = duration<double>(steady_clock::now() - before_).count();
-        before_ = steady_clock::now();
+        const double seconds = stopwatch_.lap_ms() / 1000;
         constexpr double found_done_s = 0.02;
         if (seconds > found_done_s) {
             worked_s_ += seconds;
@@ -43,7 +41,7 @@ class Pace {
     std::mutex mutex_;
     std::size_t tasks_, count_ = 0;
     double whole_ = 0, left_ = 0, worked_ = 0, worked_s_ = 0;
-    std::chrono::steady_clock::time_point before_ = std::chrono::steady_clock::now();
+    Stopwatch stopwatch_; ///< since the last task was done
 };
 
 /// Tasks with what became of them.
@@ -65,9 +63,12 @@ class Attempts {
         } catch (const Outage& failure) {
             say(fmt::format("failed: {}", failure.what()));
             add(unfinished);
-        } catch (const std::exception& failure) {
+        } catch (const Error& failure) {
             say(fmt::format("failed: {}", failure.what()));
             add(nothing_done);
+        } catch (const std::exception& failure) {
+            say(fmt::format("failed: internal error: {}", failure.what()));
+            add(internal_error);
         }
         return true;
     }

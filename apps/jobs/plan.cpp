@@ -41,17 +41,15 @@ void find_in(const fs::path& folder, const std::string& name, const CaptureOptio
              const std::function<void(Found)>& found) {
     if (is_result(folder))
         return;
-    constexpr std::string_view nothing = "no frames found in";
     try {
         found({folder, name, open_capture(folder, options), ""});
         return;
     } catch (const Misuse&) {
         throw;
-    } catch (const std::exception& failure) {
-        if (!std::string_view(failure.what()).starts_with(nothing)) {
-            found({folder, name, std::nullopt, failure.what()});
-            return;
-        }
+    } catch (const NoFrames&) { // its folders may be captures
+    } catch (const Error& failure) {
+        found({folder, name, std::nullopt, failure.what()});
+        return;
     }
     std::error_code unreadable;
     if (!walked.insert(fs::canonical(folder, unreadable)).second)
@@ -75,7 +73,10 @@ std::string own_name(const fs::path& path) {
 }
 
 void find_captures(const fs::path& dataset, const CaptureOptions& options, const std::function<void(Found)>& found) {
-    const fs::path path = fs::canonical(dataset);
+    std::error_code trouble;
+    const fs::path path = fs::canonical(dataset, trouble);
+    if (trouble)
+        fail_to_read(dataset, trouble);
     if (fs::is_directory(path)) {
         std::set<fs::path> walked;
         find_in(path, own_name(path), options, walked, found);
@@ -85,7 +86,7 @@ void find_captures(const fs::path& dataset, const CaptureOptions& options, const
         found({path, own_name(path), open_capture(path, options), ""});
     } catch (const Misuse&) {
         throw;
-    } catch (const std::exception& failure) {
+    } catch (const Error& failure) {
         found({path, own_name(path), std::nullopt, failure.what()});
     }
 }

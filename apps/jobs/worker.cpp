@@ -99,8 +99,11 @@ pid_t start(const Post& post, const Signals& signals, const std::function<int(co
     } catch (const Outage& failure) {
         fmt::print(stderr, "scanshade: {}\n", failure.what());
         code = unfinished;
-    } catch (const std::exception& failure) {
+    } catch (const Error& failure) {
         fmt::print(stderr, "scanshade: {}\n", failure.what());
+        code = nothing_done;
+    } catch (const std::exception& failure) {
+        fmt::print(stderr, "scanshade: internal error: {}\n", failure.what());
     }
     std::fflush(nullptr);
     ::_exit(code); // the caller's objects are the caller's to destroy

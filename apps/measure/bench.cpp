@@ -152,7 +152,7 @@ class CaptureBench {
             return;
         try {
             step();
-        } catch (const std::exception& failure) {
+        } catch (const Error& failure) {
             measured.why = failure.what();
             say(fmt::format("  {}: {} failed: {}", capture_.name, measured.configuration.full_name(), failure.what()));
         }

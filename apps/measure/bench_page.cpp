@@ -2,6 +2,7 @@
 #include "apps/measure/bench_results.h"
 #include "apps/page.h"
 #include "apps/picture.h"
+#include "projection/statistics.h"
 
 #include <algorithm>
 #include <cmath>

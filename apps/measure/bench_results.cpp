@@ -2,6 +2,7 @@
 #include "apps/csv.h"
 
 #include "apps/measure/error_figures.h"
+#include "projection/statistics.h"
 
 #include <algorithm>
 #include <cmath>
@@ -87,14 +88,6 @@ void Measured::add(const Measured& other) {
         errors[by].add(other.errors[by]);
     if (why.empty())
         why = other.why;
-}
-
-double median(std::vector<double> values) {
-    if (values.empty())
-        return std::numeric_limits<double>::quiet_NaN();
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
 }
 
 double least(const std::vector<double>& values) {

@@ -63,7 +63,6 @@ struct BenchReport {
 [[nodiscard]] std::vector<BenchGroup> grouped(const BenchReport& report);
 
 /// NaN without values.
-[[nodiscard]] double median(std::vector<double> values);
 [[nodiscard]] double least(const std::vector<double>& values);
 
 /// Median device time and total error, as fronts price it.

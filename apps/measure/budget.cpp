@@ -2,6 +2,7 @@
 
 #include "apps/measure/bench_results.h"
 #include "projection/error.h"
+#include "projection/statistics.h"
 
 #include <algorithm>
 #include <cmath>

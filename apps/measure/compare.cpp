@@ -100,7 +100,7 @@ class Compare final : public Command {
             if (!out_.empty() && a.rows > 1)
                 write_difference(pair.name, a, b);
             return row;
-        } catch (const std::exception& failure) {
+        } catch (const Error& failure) {
             say(fmt::format("failed: {}", failure.what()));
             return {pair.name, {}, failure.what()};
         }

@@ -66,7 +66,7 @@ json to_json(const Front& front) {
 }
 
 Front front_from(const json& text, const std::string& origin) {
-    return during(origin, [&] {
+    return reading_json(origin, [&] {
         Front front{text.at("device"), {}, {}};
         for (const SensorClass sensor : sensor_classes)
             if (const auto own = text.find(name_of(sensor)); own != text.end()) {

@@ -45,7 +45,7 @@ void each_surface_pixel(const DepthImage& depth, const cv::Mat3f& normals, int r
         const double z = depth.z_m(row, u);
         const Vector3d normal = vector(normals(row, u));
         if (z > 0 && normal.squaredNorm() > 0.5)
-            use(u, point_at(depth.camera, u, row, z), normal);
+            use(u, depth.camera.point(u, row, z), normal);
     }
 }
 
@@ -144,7 +144,7 @@ cv::Mat1f FusedReference::visibility(const TrialFrame& frame) const {
                 const double z = frame.depth.z_m(row, u);
                 if (z <= 0)
                     continue;
-                auto from = start(pose.translation(), pose * point_at(frame.depth.camera, u, row, z), noise_.at(z));
+                auto from = start(pose.translation(), pose * frame.depth.camera.point(u, row, z), noise_.at(z));
                 if (!from)
                     continue;
                 from->key = hash(static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(u));

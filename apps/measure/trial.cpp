@@ -6,9 +6,9 @@
 #include "projection/attach.h"
 #include "projection/error.h"
 #include "projection/project.h"
+#include "projection/stopwatch.h"
 
 #include <algorithm>
-#include <chrono>
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
@@ -128,7 +128,7 @@ TrialCapture load_trial(const Capture& capture, const DepthNoise& noise, const s
                    [&] { trial.frames.push_back(load_frame(capture, among[place], truth)); });
         } catch (const Outage&) {
             throw;
-        } catch (const std::exception&) {
+        } catch (const Error&) {
             if (!request.leave_bad_out)
                 throw;
         }
@@ -157,9 +157,9 @@ Trial::Trial(gpu::Device& device, Configuration configuration, const DepthNoise&
       method_(device, method_named(configuration_.method), *setup_, preparation), noise_(noise) {}
 
 cv::Mat1f Trial::compute(const TrialFrame& frame) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch stopwatch;
     const AoMap ao = method_.compute(frame.depth, noise_);
-    wall_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    wall_ms_ = stopwatch.ms();
     device_ms_ = scanshade::device_ms(method_.timings());
     return attach(frame.frame, frame.depth, ao).visibility;
 }

@@ -86,7 +86,7 @@ Material material_of(const Capture& capture, const std::vector<std::size_t>& wan
             material.frames.push_back(frame_of(capture, index, recording, with_colour));
             material.stamps_s.push_back(entry.stamp_s.value_or(static_cast<double>(index)));
             material.stamped = material.stamped && entry.stamp_s;
-        } catch (const std::exception& failure) {
+        } catch (const Error& failure) {
             material.notes.push_back(fmt::format("{}; not used.", failure.what()));
             first_trouble = first_trouble.empty() ? "\n  " + material.notes.back() : first_trouble;
         }
@@ -111,7 +111,7 @@ std::vector<SequenceFrame> frames_between(const Capture& capture, const std::vec
     for (const std::size_t place : spread(between.size(), enough))
         try {
             frames.push_back(frame_of(capture, wanted[between[place]], recording, true));
-        } catch (const std::exception&) { // as good as one that is not there
+        } catch (const Error&) { // as good as one that is not there
         }
     return frames;
 }

@@ -5,8 +5,8 @@
 #include "io/cameras/camera_file.h"
 #include "io/output_file.h"
 #include "projection/error.h"
+#include "projection/stopwatch.h"
 
-#include <chrono>
 #include <cmath>
 #include <fmt/format.h>
 #include <numeric>
@@ -111,9 +111,9 @@ class Refine final : public Command {
         const auto format = out_.empty() ? CameraFormat::scanshade : camera_format(out_, format_);
         refuse_to_overwrite();
         settle_options();
-        const auto start = std::chrono::steady_clock::now();
+        const Stopwatch stopwatch;
         const RecordingResult found = board_.empty() ? from_capture(path) : camera_alone(from_boards(path));
-        const double took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        const double took_s = stopwatch.seconds();
         fmt::print("{}", summary_of(found.refinement, took_s));
         write(found, format, took_s);
         return all_well;

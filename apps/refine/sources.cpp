@@ -2,9 +2,9 @@
 #include "apps/refine/sources.h"
 
 #include "io/cameras/camera_file.h"
+#include "io/captures/layouts.h"
 #include "io/images/exif.h"
 #include "io/images/image_file.h"
-#include "io/captures/layouts.h"
 #include "projection/calibration/organised_evidence.h"
 #include "projection/error.h"
 
@@ -44,7 +44,7 @@ std::vector<Picture> pictures_in(const fs::path& folder, std::vector<std::string
         try {
             all.push_back({file.filename().string(), read_colour(file)});
             ++sizes[{all.back().pixels.cols, all.back().pixels.rows}];
-        } catch (const std::exception& failure) {
+        } catch (const Error& failure) {
             notes.push_back(fmt::format("{}; not used.", failure.what()));
         }
     }
@@ -154,7 +154,7 @@ Refinement refine_from_clouds(const Capture& capture, const std::vector<std::siz
             const Frame frame = capture.load(index);
             evidence.add(frame.name, *frame.cloud);
             ++used;
-        } catch (const std::exception& failure) {
+        } catch (const Error& failure) {
             notes.push_back(fmt::format("{}; not used.", failure.what()));
         }
     }

@@ -13,6 +13,7 @@
 #include "apps/walk/sequence_order.h"
 #include "io/output_file.h"
 #include "projection/error.h"
+#include "projection/stopwatch.h"
 
 #include <algorithm>
 #include <atomic>
@@ -230,9 +231,12 @@ class Run final : public Command {
             } catch (const Outage& failure) {
                 say(fmt::format("failed: {}", failure.what()));
                 tally.add(Fault::outage);
-            } catch (const std::exception& failure) {
+            } catch (const Error& failure) {
                 say(fmt::format("failed: {}", failure.what()));
                 ++unopened;
+            } catch (const std::exception& failure) {
+                say(fmt::format("failed: internal error: {}", failure.what()));
+                tally.add(Fault::internal);
             }
         }
         return jobs;
@@ -461,13 +465,13 @@ class Run final : public Command {
         MethodPool& pool = together ? together->pool : workers().pool();
         report.at_once = pool.size();
         Progress progress(job.batch.frames.size());
-        const auto start = std::chrono::steady_clock::now();
+        const Stopwatch stopwatch;
         report.frames = run_recorded(job.capture, pool, job.batch, recording, [&](const FrameRow& row) {
             progress.add(row);
             report.done_now += row.status == FrameStatus::ok;
             report.ms_now = report.ms_now + row.ms;
         });
-        report.took_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+        report.took_ms = stopwatch.ms();
         progress.end();
     }
 

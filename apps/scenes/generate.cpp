@@ -10,6 +10,7 @@
 #include "io/images/image_file.h"
 #include "io/output_file.h"
 #include "projection/error.h"
+#include "projection/statistics.h"
 
 #include <algorithm>
 #include <charconv>
@@ -166,9 +167,7 @@ TruthError summary_of(const cv::Mat1f& standard_error) {
     double squares = 0;
     for (const float error : errors)
         squares += static_cast<double>(error) * error;
-    const auto rank = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() * 99 / 100);
-    std::nth_element(errors.begin(), rank, errors.end());
-    return {std::sqrt(squares / static_cast<double>(errors.size())), *rank};
+    return {std::sqrt(squares / static_cast<double>(errors.size())), ranked(errors, errors.size() * 99 / 100)};
 }
 
 double truth_radius_m(const GenerateOptions& options, const scene::Scene& scene) {

@@ -386,7 +386,7 @@ Hit World::cast(const Ray& ray) const {
 }
 
 Eigen::Vector2d Optics::direction(double u, double v) const {
-    const Eigen::Vector2d bent((u - pinhole.cx) / pinhole.fx, (v - pinhole.cy) / pinhole.fy);
+    const Eigen::Vector2d bent = pinhole.ray(u, v).head<2>();
     const auto straight = lens.any() ? undistorted(lens, bent) : std::optional(bent);
     if (!straight)
         throw Misuse(fmt::format("pixel {:.0f}, {:.0f} sees nothing through a lens with k1 {}", u, v, lens.k1));

@@ -1,9 +1,7 @@
 // The table of scenes.
 #include "apps/scenes/scenes.h"
 
-#include "projection/error.h"
-
-#include <fmt/format.h>
+#include "projection/named.h"
 
 namespace scanshade::scene {
 
@@ -12,14 +10,6 @@ const std::vector<Scene>& scenes() {
     return table;
 }
 
-const Scene& scene_named(std::string_view name) {
-    std::string names;
-    for (const Scene& scene : scenes()) {
-        if (scene.name == name)
-            return scene;
-        names += fmt::format("{}{}", names.empty() ? "" : ", ", scene.name);
-    }
-    throw Misuse(fmt::format("no scene '{}', there are: {}", name, names));
-}
+const Scene& scene_named(std::string_view name) { return one_named(scenes(), name, "scene"); }
 
 } // namespace scanshade::scene

@@ -1,12 +1,11 @@
 #include "apps/scenes/sensor.h"
 
 #include "apps/scenes/random_noise.h"
-#include "projection/error.h"
+#include "projection/named.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fmt/format.h>
 #include <numbers>
 #include <tbb/parallel_for.h>
 
@@ -161,14 +160,6 @@ const std::vector<Sensor>& sensors() {
     return table;
 }
 
-const Sensor& sensor_named(std::string_view name) {
-    std::string names;
-    for (const Sensor& sensor : sensors()) {
-        if (sensor.name == name)
-            return sensor;
-        names += fmt::format("{}{}", names.empty() ? "" : ", ", sensor.name);
-    }
-    throw Misuse(fmt::format("no sensor '{}', there are: {}", name, names));
-}
+const Sensor& sensor_named(std::string_view name) { return one_named(sensors(), name, "sensor"); }
 
 } // namespace scanshade

@@ -9,9 +9,9 @@
 #include "projection/confidence.h"
 #include "projection/error.h"
 #include "projection/project.h"
+#include "projection/stopwatch.h"
 
 #include <algorithm>
-#include <chrono>
 #include <exception>
 #include <fmt/format.h>
 #include <mutex>
@@ -35,7 +35,7 @@ template <class Step>
 void take(Work& work, double StageTimes::*stage, Step&& step) {
     if (!work.row.why.empty())
         return;
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch stopwatch;
     try {
         step();
     } catch (const DeviceLost& failure) { // no fault of the frame: another device may do it
@@ -44,11 +44,10 @@ void take(Work& work, double StageTimes::*stage, Step&& step) {
         blame(work.row, FrameStatus::failed, Fault::outage, failure);
     } catch (const Error& failure) {
         blame(work.row, FrameStatus::failed, Fault::input, failure);
-    } catch (const std::exception& failure) { // while loading, a library's word on the file
-        const bool loading = stage == &StageTimes::load || stage == &StageTimes::project;
-        blame(work.row, FrameStatus::failed, loading ? Fault::input : Fault::internal, failure);
+    } catch (const std::exception& failure) {
+        blame(work.row, FrameStatus::failed, Fault::internal, failure);
     }
-    work.row.ms.*stage = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    work.row.ms.*stage = stopwatch.ms();
 }
 
 Frame load(const Capture& capture, std::size_t index, const BatchOptions& options) {

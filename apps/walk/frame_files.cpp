@@ -110,7 +110,7 @@ void write_depth_cloud(const std::filesystem::path& file, const Work& work, cons
             const double z = z_m(v, u);
             if (z <= 0)
                 continue;
-            points.emplace_back((u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z);
+            points.push_back(camera.point(u, v, z));
             visibility.push_back(work.ao.visibility(v, u));
             confidence.push_back(known_or_none(work.confidence_in_view(v, u)));
             if (!colour.empty())

@@ -2,9 +2,9 @@
 
 #include "projection/error.h"
 #include "projection/project.h"
+#include "projection/stopwatch.h"
 
 #include <algorithm>
-#include <chrono>
 #include <optional>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
@@ -20,10 +20,9 @@ DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& fram
     tbb::this_task_arena::isolate([&] {
         tbb::parallel_for(std::size_t(0), chosen.size(), [&](std::size_t i) {
             try {
-                const auto start = std::chrono::steady_clock::now();
+                const Stopwatch stopwatch;
                 Frame frame = capture.load(frames[chosen[i]], with_colour);
-                const double ms =
-                    std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+                const double ms = stopwatch.ms();
                 const bool image = !frame.cloud || frame.cloud->organised();
                 if (image)
                     images[i] = project(frame);
@@ -31,7 +30,7 @@ DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& fram
                     loaded[i] = {std::move(frame), ms};
             } catch (const Outage&) { // a sigma of fewer frames would shape all results
                 throw;
-            } catch (const std::exception&) { // whoever processes the frame says what is wrong with it
+            } catch (const Error&) { // whoever processes the frame says what is wrong with it
             }
         });
     });

@@ -146,14 +146,12 @@ void Progress::add(const FrameRow& row) {
 }
 
 double Progress::seconds_left() const {
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-    return seconds / static_cast<double>(done_) * static_cast<double>(total_ - done_);
+    return stopwatch_.seconds() / static_cast<double>(done_) * static_cast<double>(total_ - done_);
 }
 
 std::string Progress::bar() const {
     constexpr std::size_t width = 30;
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-    const double rate = static_cast<double>(done_) / seconds;
+    const double rate = static_cast<double>(done_) / stopwatch_.seconds();
     const std::string left = duration_text(seconds_left());
     const std::size_t filled = width * done_ / total_;
     return fmt::format("{}  [{:#<{}}{:.<{}}] {}/{}  {:.1f} frames/s  {} left", clear_line, "", filled, "",

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "apps/walk/frame_row.h"
+#include "projection/stopwatch.h"
 
-#include <chrono>
 #include <memory>
 #include <string>
 
@@ -50,7 +50,7 @@ class Progress {
     std::size_t total_, done_ = 0;
     bool on_terminal_;
     std::shared_ptr<Turn::Held> turn_; ///< of the thread that made it
-    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+    Stopwatch stopwatch_;
 };
 
 } // namespace scanshade

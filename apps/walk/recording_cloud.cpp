@@ -3,6 +3,7 @@
 #include "io/clouds/cloud_file.h"
 #include "projection/error.h"
 #include "projection/hash.h"
+#include "projection/statistics.h"
 
 #include <algorithm>
 #include <cmath>
@@ -16,11 +17,7 @@ using Eigen::Vector3d;
 double median_depth_m(const cv::Mat1f& z_m) {
     std::vector<float> known;
     std::copy_if(z_m.begin(), z_m.end(), std::back_inserter(known), [](float z) { return z > 0; });
-    if (known.empty())
-        return 0;
-    const auto middle = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
-    std::nth_element(known.begin(), middle, known.end());
-    return *middle;
+    return median(std::move(known), 0);
 }
 
 } // namespace
@@ -42,7 +39,7 @@ void RecordingCloud::add(const CloudFrame& frame) {
             const double z = depth.z_m(v, u);
             if (!(z > 0) || std::isnan(visibility(v, u)))
                 continue;
-            const Vector3d point = pose * Vector3d((u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z);
+            const Vector3d point = pose * camera.point(u, v, z);
             const Vector3d place = (point / resolution_m_).array().floor();
             if (!(place.cwiseAbs().maxCoeff() < 2e9))
                 throw Error(

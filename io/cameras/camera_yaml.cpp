@@ -195,10 +195,14 @@ CameraFile camera_from_yaml(const fs::path& file, const std::string& text) {
     const YAML::Node root = parsed(file, text);
     if (!root.IsMap())
         refuse_camera(file, "not a map of keys and values");
-    if (root["camera_matrix"].IsDefined())
-        return from_matrices(file, root);
-    if (root["cam0"].IsDefined())
-        return from_camchain(file, root);
+    try {
+        if (root["camera_matrix"].IsDefined())
+            return from_matrices(file, root);
+        if (root["cam0"].IsDefined())
+            return from_camchain(file, root);
+    } catch (const YAML::Exception& failure) { // a node of another kind than its use
+        refuse_camera(file, failure.msg);
+    }
     refuse_camera(file, "\"camera_matrix\" (OpenCV, ROS) and \"cam0\" (Kalibr) are both missing");
 }
 

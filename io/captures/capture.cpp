@@ -2,12 +2,12 @@
 // other.
 #include "io/captures/capture.h"
 
-#include "io/clouds/cloud_file.h"
-#include "io/clouds/cloud_records.h"
 #include "io/captures/layouts.h"
 #include "io/captures/plausibility.h"
-#include "io/text.h"
 #include "io/captures/trajectory.h"
+#include "io/clouds/cloud_file.h"
+#include "io/clouds/cloud_records.h"
+#include "io/text.h"
 #include "projection/error.h"
 
 #include <algorithm>
@@ -35,7 +35,7 @@ Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
         return *std::move(listing);
     if (auto listing = list_clouds(folder))
         return *std::move(listing);
-    throw Error(fmt::format(
+    throw NoFrames(fmt::format(
         "no frames found in {}: looked for depth.txt (TUM), frame-NNNNNN.depth.png (7-Scenes), "
         "TIME_depth.pclzf (PCL), a folder depth/ "
         "(Redwood, RealSense), 16-bit or float depth images, and clouds (.pcd, .ply, .las, .xyz, .pts, .ptx, .bin)",
@@ -152,7 +152,7 @@ void load_colour(const Capture& capture, const fs::path& file, Frame& frame) {
         frame.colour = read_colour(file);
     } catch (const Outage&) {
         throw;
-    } catch (const std::exception& failure) {
+    } catch (const Error& failure) {
         check_still_there(capture);
         frame.warnings.push_back(fmt::format("{}; processed without colour.", failure.what()));
         return;

@@ -3,6 +3,7 @@
 
 #include "io/cameras/camera_file.h"
 #include "io/images/image_file.h"
+#include "projection/error.h"
 #include "projection/frame.h"
 #include "projection/motion.h"
 
@@ -34,6 +35,12 @@ struct CaptureEntry {
     Motion motion;                        ///< of the camera then, where its trajectory tells
     std::string problem; ///< why this frame cannot be loaded (names file and line); empty = it may be tried
     std::vector<std::string> warnings; ///< what was odd in the listing of this frame
+};
+
+/// A folder holds nothing of a known layout. Its own folders may.
+class NoFrames : public Error {
+  public:
+    using Error::Error;
 };
 
 /// A recording, listed. Opening is cheap; frames are decoded by load().

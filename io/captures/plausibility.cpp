@@ -1,6 +1,8 @@
 // Range and smoothness of a depth image, from a sample of its pixels.
 #include "io/captures/plausibility.h"
 
+#include "projection/statistics.h"
+
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -39,9 +41,7 @@ Statistics statistics_of(const cv::Mat1f& depth_m) {
     result.valid = sample.size();
     if (sample.empty())
         return result;
-    const auto middle = sample.begin() + static_cast<std::ptrdiff_t>(sample.size() / 2);
-    std::nth_element(sample.begin(), middle, sample.end());
-    result.median_m = *middle;
+    result.median_m = median(std::move(sample));
     if (neighbours > 100)
         result.jumps = static_cast<double>(jumps) / static_cast<double>(neighbours);
     return result;

@@ -1,8 +1,8 @@
 // The TUM RGB-D layout (Sturm et al., IROS 2012): depth.txt, rgb.txt and groundtruth.txt, paired by nearest time.
 #include "io/captures/layouts.h"
 
-#include "io/text.h"
 #include "io/captures/trajectory.h"
+#include "io/text.h"
 #include "projection/error.h"
 
 #include <algorithm>
@@ -224,7 +224,9 @@ std::optional<int> freiburg_number(const fs::path& folder) {
             if (const auto found = freiburg_in(line.text); found && line.text.starts_with('#'))
                 return found;
     }
-    return freiburg_in(fs::absolute(folder).string());
+    std::error_code ignored; // without a working directory the name as given must do
+    const fs::path whole = fs::absolute(folder, ignored);
+    return freiburg_in((ignored ? folder : whole).string());
 }
 
 CameraFile published_camera(int freiburg, std::vector<std::string>& warnings) {

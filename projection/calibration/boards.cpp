@@ -57,7 +57,11 @@ void guess_pose(const Model& model, const BoardView& view, double* pose) {
         cv::undistortPoints(seen, straight, matrix,
                             cv::Vec<double, 5>(model[k1], model[k2], model[p1], model[p2], model[k3]));
     cv::Vec3d turn, shift;
-    cv::solvePnP(points, straight, cv::Matx33d::eye(), cv::noArray(), turn, shift, false, cv::SOLVEPNP_ITERATIVE);
+    try {
+        cv::solvePnP(points, straight, cv::Matx33d::eye(), cv::noArray(), turn, shift, false, cv::SOLVEPNP_ITERATIVE);
+    } catch (const cv::Exception& failure) { // corners that determine no pose
+        throw Error(failure.err);
+    }
     std::copy_n(turn.val, 3, pose);
     std::copy_n(shift.val, 3, pose + 3);
 }

@@ -23,7 +23,7 @@ void main() {
     float wc = hole ? 1.0 : w, zc = 1.0 / wc;
     Plane plane;
     // A slope up to 45 degrees is still the pixel's own surface.
-    float narrow = 1.0 / (3.0 * sigma_of(zc) * relief_at(here) * wc * wc + 0.7 * 2.8 * wc / k.fx);
+    float narrow = 1.0 / (3.0 * sigma_of(zc) * relief_at(here) * wc * wc + 0.7 * 2.8 * wc / k.camera.fx);
     bool good = solve(square5(p, wc, 1.0, level, narrow), plane); // not good: the plane is level, the pixel stays as it is
     imageStore(averages, here, vec4(hole ? 0.0 : wc + plane.c));
 }

@@ -31,14 +31,14 @@ void main() {
 
     Plane first, plane;
     // A slope up to 45 degrees is still the pixel's own surface in the first round.
-    bool good = solve(square5(p, wc, max(radius * 0.5, 1.0), level, 1.0 / (3.0 * sigma + 0.7 * radius * wc / k.fx)), first);
+    bool good = solve(square5(p, wc, max(radius * 0.5, 1.0), level, 1.0 / (3.0 * sigma + 0.7 * radius * wc / k.camera.fx)), first);
     float narrow = 1.0 / (3.0 * sigma * relief_here);
     good = solve(square7(p, wc, max(radius * (1.0 / 3.0), 1.0), first, narrow), plane) && good;
 
     // Plane w = W + a u + b v  =>  n ~ (fx a, fy b, w at the principal point), turned to the camera.
     float w_here = wc + plane.c;
-    float w_principal = w_here - plane.a * (float(p.x) - k.cx) - plane.b * (float(p.y) - k.cy);
-    vec3 n = -vec3(k.fx * plane.a, k.fy * plane.b, w_principal);
+    float w_principal = w_here - plane.a * (float(p.x) - k.camera.cx) - plane.b * (float(p.y) - k.camera.cy);
+    vec3 n = -vec3(k.camera.fx * plane.a, k.camera.fy * plane.b, w_principal);
     n *= inversesqrt(max(dot(n, n), 1e-30));
     bool near = abs(plane.c) < 3.0 * sigma; // within the tolerance of what lies there
     good = good && near && w_here > 1e-6 && !hole; // a kilometre of kilometres

@@ -21,7 +21,7 @@ void main() {
     if (any(greaterThanEqual(p, k.size))) return;
     float z = depth_at(p);
     // A slope up to 76 degrees is one surface.
-    float tolerance = 3.0 * (k.noise_floor + k.noise_per_z2 * z * z) + 4.0 * z / k.fx;
+    float tolerance = 3.0 * (k.noise_floor + k.noise_per_z2 * z * z) + 4.0 * z / k.camera.fx;
     int known = 0, friends = 0;
     bool nearer = false, farther = false;
     for (int i = 0; i < 8; ++i) {

@@ -22,7 +22,7 @@ void main() {
     float w = imageLoad(kept, here).x;
     bool hole = !(w > 0.0);
     float z = hole ? 1.0 : 1.0 / w;
-    vec3 ray = vec3((float(p.x) - k.cx) / k.fx, (float(p.y) - k.cy) / k.fy, 1.0);
+    vec3 ray = ray_through(k.camera, vec2(p));
     float narrow = 1.0 / (3.5 * (k.noise_floor + k.noise_per_z2 * z * z));
     float weights = 1.0, sum = 0.0; // of weights and of differences of z
     int i = 0;

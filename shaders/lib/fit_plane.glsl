@@ -90,4 +90,4 @@ float relief_at(int index) { return is_fused == 0 ? 1.0 : imageLoad(relief, inde
 
 float sigma_of(float z) { return k.noise_floor + k.noise_per_z2 * z * z; }
 
-float window_of(float z, float sigma) { return clamp(sqrt(k.window * sigma * k.fx / z), 1.5, k.largest_radius); }
+float window_of(float z, float sigma) { return clamp(sqrt(k.window * sigma * k.camera.fx / z), 1.5, k.largest_radius); }

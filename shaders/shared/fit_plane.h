@@ -6,7 +6,7 @@ SHARED_BEGIN
 
 struct FitPlaneConstants {
     ivec2 size;                       // of the image
-    float fx, fy, cx, cy;             // pinhole, pixels
+    Pinhole camera;
     float noise_floor, noise_per_z2;  // sigma(z) = floor + per_z2 z^2, metres
     float window;                     // its radius is sqrt(window sigma fx / z), pixels
     float largest_radius;             // but at most this

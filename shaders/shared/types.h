@@ -1,9 +1,10 @@
-// What GLSL's vector types are to C++, and the words that let one text serve both. Empty for GLSL.
+// What GLSL's vector types are to C++, and the words that let one text serve both. GLSL has no templates: Number is float.
 #ifdef __cplusplus
 #pragma once
 #define SHARED_BEGIN namespace scanshade::shared {
 #define SHARED_END }
 #define SHARED_FN constexpr
+#define SHARED_FN_OF(number) template <class number> constexpr
 #include <cstdint>
 namespace scanshade::shared {
 using uint = std::uint32_t;
@@ -32,4 +33,6 @@ struct ivec2 {
 #define SHARED_BEGIN
 #define SHARED_END
 #define SHARED_FN
+#define SHARED_FN_OF(number)
+#define Number float
 #endif

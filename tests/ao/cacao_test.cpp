@@ -848,8 +848,8 @@ TEST_F(cacao_formulas, normals_are_those_of_the_four_quadrants) {
             return depth.z_m(std::clamp(y, 0, usual.height - 1), std::clamp(x, 0, usual.width - 1));
         };
         const auto place = [&](int x, int y, double z) {
-            return cv::Vec3f(static_cast<float>((x - camera.cx) / camera.fx * z),
-                             static_cast<float>(-(y - camera.cy) / camera.fy * z), static_cast<float>(z));
+            const Eigen::Vector3f point = camera.point(x, y, z).cast<float>();
+            return cv::Vec3f(point.x(), -point.y(), point.z());
         };
         Agreement agreement;
         for (int y = 0; y < usual.height; ++y)

@@ -82,7 +82,7 @@ DepthImage seen(const Pinhole& camera, const Surface& surface) {
     DepthImage depth{camera, cv::Mat1f(camera.size), {}};
     for (int v = 0; v < camera.size.height; ++v)
         for (int u = 0; u < camera.size.width; ++u)
-            depth.z_m(v, u) = static_cast<float>(surface((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy));
+            depth.z_m(v, u) = static_cast<float>(surface(camera.ray(u, v).x(), camera.ray(u, v).y()));
     return depth;
 }
 
@@ -469,9 +469,8 @@ TEST_F(Classics, convex_things_are_open) {
     NormalImage normals{cv::Mat3f(ball.z_m.size(), cv::Vec3f())};
     for (int v = 0; v < ball.z_m.rows; ++v)
         for (int u = 0; u < ball.z_m.cols; ++u) {
-            const double z = ball.z_m(v, u);
-            normals.normals(v, u) =
-                cv::Vec3d((u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z - 2) * 4;
+            const Eigen::Vector3d point = camera.point(u, v, ball.z_m(v, u));
+            normals.normals(v, u) = cv::Vec3d(point.x(), point.y(), point.z() - 2) * 4;
         }
     for (const std::string& method : classics) {
         EXPECT_GE(lowest(ao_of(method, ball, {}, {}, &normals).visibility), 0.99) << method;

@@ -369,7 +369,7 @@ TEST(DepthSurface, a_corner_follows_the_closed_form) {
     int count = 0;
     for (int row = 80; row < 160; row += 4)
         for (int u = 20; u < 300; ++u) {
-            const Vector3d point = point_at(camera, u, row, static_cast<double>(depth.z_m(row, u)));
+            const Vector3d point = camera.point(u, row, static_cast<double>(depth.z_m(row, u)));
             const double c = std::hypot(point.x(), point.z() - 2) / 0.5;
             if (c < 0.02)
                 continue;

@@ -223,8 +223,7 @@ double flicker(const std::vector<Recorded>& frames, const std::vector<cv::Mat1f>
     for (int v = 4; v < 240; v += 4)
         for (int u = 4; u < 320; u += 4) {
             const double z = frames[middle].exact_m(v, u);
-            const Vector3d point =
-                frames[middle].pose * Vector3d((u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z);
+            const Vector3d point = frames[middle].pose * camera.point(u, v, z);
             double m = 0, m2 = 0;
             bool always = z > 0;
             for (std::size_t i = first; always && i <= last; ++i) {

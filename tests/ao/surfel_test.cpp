@@ -45,7 +45,7 @@ CornerError corner_error(const SurfelOptions& options) {
     CornerError error;
     for (int v = 140; v < 340; ++v)
         for (int u = 0; u < 640; ++u) {
-            const double z = depth.z_m(v, u), x = (u - camera.cx) / camera.fx * z;
+            const double z = depth.z_m(v, u), x = camera.point(u, v, z).x();
             const double along = std::hypot(x, z - 2); // from the edge, along the own wall: the distance to the other
             if (along > 0.6)
                 continue;

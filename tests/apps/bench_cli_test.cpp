@@ -368,7 +368,7 @@ cv::Mat1f leaning_plane(const Pinhole& camera, double degrees) {
     cv::Mat1f z_m(camera.size);
     for (int v = 0; v < z_m.rows; ++v)
         for (int u = 0; u < z_m.cols; ++u)
-            z_m(v, u) = static_cast<float>(2 / (1 - slope * (u - camera.cx) / camera.fx));
+            z_m(v, u) = static_cast<float>(2 / (1 - slope * camera.ray(u, v).x()));
     return z_m;
 }
 

@@ -146,9 +146,9 @@ TEST_F(CliTest, a_cloud_keeps_its_points_and_gains_a_field) {
                        "WIDTH 64\nHEIGHT 48\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 3072\nDATA ascii\n";
     for (int v = 0; v < 48; ++v)
         for (int u = 0; u < 64; ++u)
-            text += z_m(v, u) <= 0 ? std::string("7 nan nan nan\n")
-                                   : fmt::format("7 {} {} {}\n", (u - camera.cx) / camera.fx * z_m(v, u),
-                                                 (v - camera.cy) / camera.fy * z_m(v, u), z_m(v, u));
+            text += z_m(v, u) <= 0 ? "7 nan nan nan\n"
+                                   : fmt::format("7 {} {} {}\n", camera.point(u, v, z_m(v, u)).x(),
+                                                 camera.point(u, v, z_m(v, u)).y(), z_m(v, u));
     const fs::path file = folder / "corner.pcd";
     std::ofstream(file) << text;
     const Ran ran = run_program(fmt::format("run {} -o {}", file.string(), out().string()));

@@ -136,7 +136,7 @@ TEST(Truth, TheTreeAndTheFormulasAgree) {
         int count = 0;
         for (int v = 2; v < 60; v += 10)
             for (int u = 3; u < 80; u += 10, ++count) {
-                const Eigen::Vector3d sight((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1);
+                const Eigen::Vector3d sight = camera.ray(u, v);
                 const scene::Ray ray{pose.translation(), pose.linear() * sight};
                 const scene::Hit hit = scene::cast(scene.bodies, ray);
                 const Eigen::Vector3d point = ray.origin + hit.t * ray.direction + 1e-6 * hit.normal;

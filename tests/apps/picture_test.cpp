@@ -16,7 +16,7 @@ cv::Mat1f plane(double degrees) {
     const double slope = std::tan(degrees * M_PI / 180);
     for (int v = 0; v < z_m.rows; ++v)
         for (int u = 0; u < z_m.cols; ++u)
-            z_m(v, u) = static_cast<float>(2 / (1 - slope * (u - camera.cx) / camera.fx));
+            z_m(v, u) = static_cast<float>(2 / (1 - slope * camera.ray(u, v).x()));
     return z_m;
 }
 

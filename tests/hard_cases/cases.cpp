@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <fmt/format.h>
+#include <functional>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <random>
@@ -261,36 +262,36 @@ std::vector<Case> no_depth() {
     return all;
 }
 
-/// The same scene with and without holes.
-std::vector<std::pair<Case, Case>> holes() {
+/// Three scenes, each beside copies of it with holes. `punch` hands every copy of a depth image to its second argument,
+/// with the kind of its holes.
+using AddHoled = std::function<void(const std::string& kind, DepthImage holed)>;
+std::vector<std::pair<Case, Case>> beside_holed(const std::function<void(const DepthImage&, const AddHoled&)>& punch) {
     std::vector<std::pair<Case, Case>> all;
     for (const auto& [name, bodies] :
          {std::pair{"corner", corner_of_walls()}, {"ball", ball_on_floor()}, {"stairs", stairs()}}) {
         const Case whole = traced(name, tests::test_camera({320, 240}), bodies);
-        const auto add = [&](const std::string& kind, DepthImage holed) {
-            all.emplace_back(whole, Case{fmt::format("{}, {}", name, kind), std::move(holed), {}, 0.5});
-        };
-        for (const double share : {0.05, 0.3})
-            add(fmt::format("{:.0f} % random", 100 * share), random_holes(whole.depth, share));
+        punch(whole.depth, [&, scene = name](const std::string& kind, DepthImage holed) {
+            all.emplace_back(whole, Case{fmt::format("{}, {}", scene, kind), std::move(holed), {}, 0.5});
+        });
     }
     return all;
 }
 
+std::vector<std::pair<Case, Case>> holes() {
+    return beside_holed([](const DepthImage& depth, const AddHoled& add) {
+        for (const double share : {0.05, 0.3})
+            add(fmt::format("{:.0f} % random", 100 * share), random_holes(depth, share));
+    });
+}
+
 std::vector<std::pair<Case, Case>> worse_holes() {
-    std::vector<std::pair<Case, Case>> all;
-    for (const auto& [name, bodies] :
-         {std::pair{"corner", corner_of_walls()}, {"ball", ball_on_floor()}, {"stairs", stairs()}}) {
-        const Case whole = traced(name, tests::test_camera({320, 240}), bodies);
-        const auto add = [&](const std::string& kind, DepthImage holed) {
-            all.emplace_back(whole, Case{fmt::format("{}, {}", name, kind), std::move(holed), {}, 0.5});
-        };
-        add("60 % random", random_holes(whole.depth, 0.6));
-        add("30 % in blocks", tests::with_holes(whole.depth, 0.3));
-        add("checkerboard", punched(whole.depth, [](int u, int v) { return (u + v) % 2 == 0; }));
-        add("every third column", punched(whole.depth, [](int u, int) { return u % 3 != 0; }));
-        add("every fourth row", punched(whole.depth, [](int, int v) { return v % 4 != 0; }));
-    }
-    return all;
+    return beside_holed([](const DepthImage& depth, const AddHoled& add) {
+        add("60 % random", random_holes(depth, 0.6));
+        add("30 % in blocks", tests::with_holes(depth, 0.3));
+        add("checkerboard", punched(depth, [](int u, int v) { return (u + v) % 2 == 0; }));
+        add("every third column", punched(depth, [](int u, int) { return u % 3 != 0; }));
+        add("every fourth row", punched(depth, [](int, int v) { return v % 4 != 0; }));
+    });
 }
 
 std::vector<std::pair<Case, Case>> units() {

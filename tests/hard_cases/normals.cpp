@@ -1,4 +1,5 @@
 #include "tests/hard_cases/normals.h"
+#include "projection/statistics.h"
 
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/gpu/transfer.h"
@@ -96,14 +97,6 @@ void add(Figures& figures, const Sighted& view, const FittedDepth& found) {
         }
 }
 
-double share_of(std::vector<double>& values, double share) {
-    if (values.empty())
-        return std::numeric_limits<double>::quiet_NaN();
-    const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), at, values.end());
-    return *at;
-}
-
 } // namespace
 
 std::string print_normals(gpu::Device& device) {
@@ -128,13 +121,13 @@ std::string print_normals(gpu::Device& device) {
             for (const Sighted& view : views)
                 add(figures, view, fit ? fit->compute(view.recorded) : from_depth(device, view.recorded));
         }
-        const double median = share_of(figures.near_degrees, 0.5), aim = name == std::string("ideal") ? 1
+        const double median = quantile(figures.near_degrees, 0.5), aim = name == std::string("ideal") ? 1
                                                                          : smoothing == cacao         ? 5
                                                                                                       : 180;
         fmt::print("| {}{} | {:.1f} | {:.2f} | {:.1f} | {:.2f} | {:.1f} | {:.1f} |\n", name,
                    smoothing == 1 ? "" : ", CACAO's windows",
-                   100 * static_cast<double>(figures.degrees.size()) / figures.depths, share_of(figures.degrees, 0.5),
-                   share_of(figures.degrees, 0.95), median, share_of(figures.near_degrees, 0.95),
+                   100 * static_cast<double>(figures.degrees.size()) / figures.depths, quantile(figures.degrees, 0.5),
+                   quantile(figures.degrees, 0.95), median, quantile(figures.near_degrees, 0.95),
                    100 * figures.kept / figures.edges);
         if (!(median <= aim))
             misses += fmt::format("normals, {}: median {:.2f} > {} degrees\n", name, median, aim);

@@ -112,7 +112,7 @@ Frame cloud_frame(const Pinhole& camera, std::vector<cv::Point3d> pixels_and_dep
     frame.camera = {camera, {}, "--camera"};
     frame.cloud = Cloud{{static_cast<int>(pixels_and_depths.size()), 1}, {}, {}, {}};
     for (const auto& p : pixels_and_depths)
-        frame.cloud->points.emplace_back((p.x - camera.cx) / camera.fx * p.z, (p.y - camera.cy) / camera.fy * p.z, p.z);
+        frame.cloud->points.push_back(camera.point(p.x, p.y, p.z));
     return frame;
 }
 
@@ -147,8 +147,7 @@ TEST(AttachToCloud, AnOrganisedCloudGetsOneValuePerPointAndItsGridBack) {
     for (int v = 0; v < sensed.z_m.rows; ++v)
         for (int u = 0; u < sensed.z_m.cols; ++u) {
             const double z = sensed.z_m(v, u) > 0 ? sensed.z_m(v, u) : NAN;
-            frame.cloud->points.emplace_back((u - sensed.camera.cx) / sensed.camera.fx * z,
-                                             (v - sensed.camera.cy) / sensed.camera.fy * z, z);
+            frame.cloud->points.push_back(sensed.camera.point(u, v, z));
         }
     const DepthImage depth = project(frame);
     const AoMap ao = numbered(depth);

@@ -58,18 +58,29 @@ TEST(Camera, DistortionFollowsOpenCvsFormula) {
     EXPECT_NEAR(bent.y(), 0.25 * radial + 0.002 * (0.3125 + 0.125) + 2 * 0.003 * 0.125, 1e-15);
 }
 
+TEST(Camera, RaysAndPointsAreTheTextbookFormulaToTheBit) {
+    const Pinhole camera{523.7, 519.3, 311.9, 241.3, {640, 480}};
+    for (const double u : {-0.5, 0.0, 17.0, 311.9, 639.5})
+        for (const double v : {-0.5, 0.0, 241.0, 479.5}) {
+            const double x = (u - camera.cx) / camera.fx, y = (v - camera.cy) / camera.fy;
+            EXPECT_EQ(camera.ray(u, v), Eigen::Vector3d(x, y, 1));
+            EXPECT_EQ(camera.point(u, v, 1.7), Eigen::Vector3d(x * 1.7, y * 1.7, 1.7));
+        }
+}
+
 TEST(Camera, UndistortingReversesDistortingAllOverTheImage) {
     for (const Distortion& lens : lenses) {
         const Camera camera = camera_with(lens);
-        const auto& [fx, fy, cx, cy, size] = camera.pinhole;
-        for (int v = 0; v < size.height; v += 8)
-            for (int u = 0; u < size.width; u += 8) {
-                const Eigen::Vector2d bent((u - cx) / fx, (v - cy) / fy);
+        const Pinhole& pinhole = camera.pinhole;
+        for (int v = 0; v < pinhole.size.height; v += 8)
+            for (int u = 0; u < pinhole.size.width; u += 8) {
+                const Eigen::Vector2d bent = pinhole.ray(u, v).head<2>();
                 const auto straight = undistorted(lens, bent);
                 if (!straight)
                     continue; // beyond the lens's fold, see below
                 const Eigen::Vector2d miss = distorted(lens, *straight) - bent;
-                EXPECT_LT(std::hypot(miss.x() * fx, miss.y() * fy), 1e-6) << "at pixel " << u << ", " << v;
+                EXPECT_LT(std::hypot(miss.x() * pinhole.fx, miss.y() * pinhole.fy), 1e-6)
+                    << "at pixel " << u << ", " << v;
             }
         EXPECT_TRUE(undistorted(lens, {0.3, 0.2})) << "the middle of the image must be reachable";
     }
@@ -140,9 +151,9 @@ TEST(Camera, ThreadsShareOneCamerasMaps) {
 TEST(Camera, ResizingKeepsTheFieldOfView) {
     const Pinhole full = camera_with({}).pinhole, half = scaled(full, {320, 240});
     // The image covers [-0.5, width - 0.5]: its borders keep their directions.
-    EXPECT_DOUBLE_EQ((-0.5 - full.cx) / full.fx, (-0.5 - half.cx) / half.fx);
-    EXPECT_DOUBLE_EQ((639.5 - full.cx) / full.fx, (319.5 - half.cx) / half.fx);
-    EXPECT_DOUBLE_EQ((479.5 - full.cy) / full.fy, (239.5 - half.cy) / half.fy);
+    EXPECT_DOUBLE_EQ(full.ray(-0.5, 0).x(), half.ray(-0.5, 0).x());
+    EXPECT_DOUBLE_EQ(full.ray(639.5, 0).x(), half.ray(319.5, 0).x());
+    EXPECT_DOUBLE_EQ(full.ray(0, 479.5).y(), half.ray(0, 239.5).y());
     const Pinhole again = scaled(half, {640, 480});
     EXPECT_DOUBLE_EQ(again.fx, full.fx);
     EXPECT_DOUBLE_EQ(again.cy, full.cy);
@@ -185,8 +196,7 @@ Cloud cloud_of(const DepthImage& depth, bool single_precision = true) {
     for (int v = 0; v < depth.z_m.rows; ++v)
         for (int u = 0; u < depth.z_m.cols; ++u) {
             const double z = depth.z_m(v, u) > 0 ? depth.z_m(v, u) : NAN;
-            const Eigen::Vector3d point((u - depth.camera.cx) / depth.camera.fx * z,
-                                        (v - depth.camera.cy) / depth.camera.fy * z, z);
+            const Eigen::Vector3d point = depth.camera.point(u, v, z);
             cloud.points.push_back(single_precision ? point.cast<float>().cast<double>().eval() : point);
         }
     return cloud;

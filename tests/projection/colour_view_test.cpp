@@ -3,6 +3,7 @@
 #include "projection/colour_view.h"
 #include "projection/error.h"
 #include "projection/project.h"
+#include "projection/statistics.h"
 #include "projection/undistort.h"
 #include "tests/support/says.h"
 #include "tests/support/scenes.h"
@@ -42,21 +43,12 @@ const Views& views() {
     return all;
 }
 
-Eigen::Vector3d point_of(const Pinhole& p, int u, int v, double z) {
-    return {(u - p.cx) / p.fx * z, (v - p.cy) / p.fy * z, z};
-}
-
 /// Whether something stands between the colour camera and a point of the depth camera's space.
 bool hidden(const Eigen::Vector3d& in_depth) {
     const Eigen::Vector3d eye = views().world_from_colour.translation(), target = views().world_from_depth * in_depth;
     const scene::Hit hit = views().world.cast({eye, target - eye});
     constexpr double of_the_way = 0.98; // nearer than that it is another surface
     return hit.t < of_the_way;
-}
-
-double median_of(std::vector<double> values) {
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-    return values[values.size() / 2];
 }
 
 TEST(ColourOnDepth, HasTheColourThatTheDepthCameraWouldHaveSeen) {
@@ -68,7 +60,7 @@ TEST(ColourOnDepth, HasTheColourThatTheDepthCameraWouldHaveSeen) {
     for (int v = 0; v < known.rows; ++v)
         for (int u = 0; u < known.cols; ++u) {
             const Eigen::Vector3d p =
-                colour_camera.colour_from_depth * point_of(depth_camera.pinhole, u, v, all.depth.z_m(v, u));
+                colour_camera.colour_from_depth * depth_camera.pinhole.point(u, v, all.depth.z_m(v, u));
             const Pinhole& c = colour_camera.camera.pinhole;
             const double x = c.fx * p.x() / p.z() + c.cx, y = c.fy * p.y() / p.z() + c.cy;
             if (all.depth.z_m(v, u) > 0 && x > 0 && y > 0 && x < c.size.width - 1 && y < c.size.height - 1) {
@@ -81,10 +73,10 @@ TEST(ColourOnDepth, HasTheColourThatTheDepthCameraWouldHaveSeen) {
             unwarped.push_back(cv::norm(cv::Vec3d(all.colour(v, u)) - cv::Vec3d(wanted(v, u))));
         }
     std::printf("colour known for %.1f %% of what lies in view; median miss %.1f of 255, without the warp %.1f\n",
-                100 * found / inside, median_of(warped), median_of(unwarped));
+                100 * found / inside, median(warped), median(unwarped));
     EXPECT_GT(found / inside, 0.9); // an outline and its shadow are the price of never being wrong
-    EXPECT_LT(median_of(warped), 3);
-    EXPECT_LT(median_of(warped), 0.2 * median_of(unwarped));
+    EXPECT_LT(median(warped), 3);
+    EXPECT_LT(median(warped), 0.2 * median(unwarped));
 }
 
 TEST(ColourOnDepth, WhatIsHiddenFromTheColourCameraGetsNoColour) {
@@ -96,7 +88,7 @@ TEST(ColourOnDepth, WhatIsHiddenFromTheColourCameraGetsNoColour) {
             const double z = all.depth.z_m(v, u);
             if (z <= 0)
                 continue;
-            const bool is_hidden = hidden(point_of(depth_camera.pinhole, u, v, z));
+            const bool is_hidden = hidden(depth_camera.pinhole.point(u, v, z));
             hidden_pixels += is_hidden;
             coloured += known(v, u) > 0;
             wrong += is_hidden && known(v, u);
@@ -120,7 +112,7 @@ TEST(SurfaceInColour, LiesWhereTheColourCameraSeesIt) {
             misses.push_back(std::abs(z - truth));
             in_front += z < truth - 0.02 * truth; // nothing is there
         }
-    EXPECT_LT(median_of(misses), 1e-3);
+    EXPECT_LT(median(misses), 1e-3);
     EXPECT_LT(in_front, 0.002 * seen);
     EXPECT_GT(seen, 0.7 * static_cast<double>(all.surface.z_m.total())); // of another angle, and 60 mm aside
 }
@@ -132,7 +124,7 @@ TEST(SurfaceInColour, ValuesOfDepthPixelsComeToThePixelsThatShowThem) {
     for (int v = 0; v < height.rows; ++v)
         for (int u = 0; u < height.cols; ++u)
             if (const double z = all.depth.z_m(v, u); z > 0)
-                height(v, u) = static_cast<float>((all.world_from_depth * point_of(depth_camera.pinhole, u, v, z)).z());
+                height(v, u) = static_cast<float>((all.world_from_depth * depth_camera.pinhole.point(u, v, z)).z());
     const cv::Mat1f carried = on_colour_pixels(height, all.surface);
     std::vector<double> misses;
     for (int v = 0; v < carried.rows; ++v)
@@ -140,10 +132,10 @@ TEST(SurfaceInColour, ValuesOfDepthPixelsComeToThePixelsThatShowThem) {
             EXPECT_EQ(std::isnan(carried(v, u)), all.surface.z_m(v, u) == 0); // holes stay unknown
             if (std::isnan(carried(v, u)))
                 continue;
-            const Eigen::Vector3d point = point_of(colour_camera.camera.pinhole, u, v, all.beside.z_m(v, u));
+            const Eigen::Vector3d point = colour_camera.camera.pinhole.point(u, v, all.beside.z_m(v, u));
             misses.push_back(std::abs((all.world_from_colour * point).z() - carried(v, u)));
         }
-    EXPECT_LT(median_of(misses), 2e-3); // a pixel is 8 mm wide there
+    EXPECT_LT(median(misses), 2e-3); // a pixel is 8 mm wide there
 }
 
 TEST(SurfaceInColour, BothLensesBend) {
@@ -160,7 +152,7 @@ TEST(SurfaceInColour, BothLensesBend) {
     const Camera other{depth_camera.pinhole, {0.1, 0, 0, 0, 0}, "other"};
     const SurfaceInColour through = surface_in_colour(wall, bent, {other, Eigen::Isometry3d::Identity()});
     const Pinhole& p = depth_camera.pinhole;
-    const auto straight = undistorted(other.distortion, {(60 - p.cx) / p.fx, (200 - p.cy) / p.fy});
+    const auto straight = undistorted(other.distortion, p.ray(60, 200).head<2>());
     ASSERT_TRUE(straight);
     const Eigen::Vector2d at = distorted(bent.distortion, *straight);
     EXPECT_NEAR(through.seen_at(200, 60)[0], p.fx * at.x() + p.cx, 0.02);

@@ -22,10 +22,6 @@ Frame frame_of(const DepthImage& depth) {
     return frame;
 }
 
-Eigen::Vector3d point_of(const Pinhole& camera, double u, double v, double z) {
-    return {(u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z};
-}
-
 Frame cloud_frame(std::vector<Eigen::Vector3d> points, cv::Size grid = {}) {
     Frame frame;
     if (grid.empty())
@@ -39,7 +35,7 @@ Frame organised_frame(const DepthImage& depth) {
     for (int v = 0; v < depth.z_m.rows; ++v)
         for (int u = 0; u < depth.z_m.cols; ++u) {
             const double z = depth.z_m(v, u);
-            points.push_back(z > 0 ? point_of(depth.camera, u, v, z) : Eigen::Vector3d::Constant(NAN));
+            points.push_back(z > 0 ? depth.camera.point(u, v, z) : Eigen::Vector3d::Constant(NAN));
         }
     return cloud_frame(std::move(points), depth.z_m.size());
 }
@@ -86,7 +82,7 @@ TEST(ProjectDepth, UndistortedDepthIsThatOfTheStraightCamera) {
     frame.depth_m = cv::Mat1f(pinhole.size, 0.0F);
     for (int v = 0; v < pinhole.size.height; ++v)
         for (int u = 0; u < pinhole.size.width; ++u)
-            if (const auto p = undistorted(lens, {(u - pinhole.cx) / pinhole.fx, (v - pinhole.cy) / pinhole.fy}))
+            if (const auto p = undistorted(lens, pinhole.ray(u, v).head<2>()))
                 frame.depth_m(v, u) = static_cast<float>(depth_along(*p));
 
     const DepthImage depth = project(frame);
@@ -95,7 +91,7 @@ TEST(ProjectDepth, UndistortedDepthIsThatOfTheStraightCamera) {
         for (int u = 0; u < pinhole.size.width; ++u)
             if (const float z = depth.z_m(v, u); z > 0) {
                 ++seen;
-                const double exact = depth_along({(u - pinhole.cx) / pinhole.fx, (v - pinhole.cy) / pinhole.fy});
+                const double exact = depth_along(pinhole.ray(u, v).head<2>());
                 EXPECT_NEAR(z, exact, exact * 1.0 / pinhole.fx) << "nearest pixel: at most the slope over 0.7 px off";
                 exactly +=
                     std::abs(z - exact) < 1e-5 * exact; // between pixels 1/z is linear, the lens hardly bends it there
@@ -169,13 +165,13 @@ TEST(ProjectCloud, ACloudOfHolesIsAResult) {
 
 TEST(ProjectCloud, TheNearestPointWinsThenTheFirst) {
     const Pinhole camera = test_camera();
-    Frame frame = cloud_frame({point_of(camera, 20, 30, 3),
-                               point_of(camera, 20.2, 30.1, 2),
-                               point_of(camera, 19.8, 30, 2),
-                               point_of(camera, 50, 60, 1.5),
+    Frame frame = cloud_frame({camera.point(20, 30, 3),
+                               camera.point(20.2, 30.1, 2),
+                               camera.point(19.8, 30, 2),
+                               camera.point(50, 60, 1.5),
                                {0, 0, -1},
                                {NAN, NAN, NAN},
-                               point_of(camera, 500, 30, 2)});
+                               camera.point(500, 30, 2)});
     frame.camera = {camera, {}, "--camera"};
     const DepthImage depth = project(frame);
     EXPECT_EQ(depth.source(30, 20), 1) << "nearest, and of two equal ones the first";
@@ -191,7 +187,7 @@ void strew_wall(std::vector<Eigen::Vector3d>& points, const Pinhole& camera, cv:
     std::mt19937 random(static_cast<unsigned>(points.size()) + 1);
     std::uniform_real_distribution<double> u(pixels.x, pixels.x + pixels.width), v(pixels.y, pixels.y + pixels.height);
     for (int i = 0; i < static_cast<int>(pixels.area() * per_pixel); ++i)
-        points.push_back(point_of(camera, u(random), v(random), z));
+        points.push_back(camera.point(u(random), v(random), z));
 }
 
 TEST(ProjectCloud, WhatLiesBehindDoesNotShineThroughGaps) {

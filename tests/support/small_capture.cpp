@@ -33,7 +33,7 @@ cv::Mat1f corner_depth(int index) {
     cv::Mat1f z_m(camera.size);
     for (int v = 0; v < z_m.rows; ++v)
         for (int u = 0; u < z_m.cols; ++u) // walls z = 2 - |x - edge z|: 45 degrees to the view on either side
-            z_m(v, u) = static_cast<float>(2 / (1 + std::abs((u - camera.cx) / camera.fx - edge)));
+            z_m(v, u) = static_cast<float>(2 / (1 + std::abs(camera.ray(u, v).x() - edge)));
     z_m(cv::Rect(2, 2, 6, 5)) = 0;
     return z_m;
 }
