@@ -1,7 +1,7 @@
 // Frame -> DepthImage: undistort a recorded image once, or splat a cloud's points with a depth test.
 #pragma once
 
-#include "projection/calibration/organised.h"
+#include "projection/fit_pinhole.h"
 #include "projection/frame.h"
 #include "projection/maps.h"
 

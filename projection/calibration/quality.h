@@ -1,7 +1,7 @@
 // How good a calibration is, in terms that matter: where it was seen, how sure pixels are, what changed in millimetres.
 #pragma once
 
-#include "projection/calibration/evidence.h"
+#include "projection/calibration/problem.h"
 
 namespace scanshade::calibration {
 

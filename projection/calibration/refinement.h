@@ -2,7 +2,7 @@
 // data.
 #pragma once
 
-#include "projection/calibration/ladder.h"
+#include "projection/calibration/model_selection.h"
 #include "projection/calibration/quality.h"
 
 #include <optional>

@@ -1,7 +1,7 @@
 // What the sources of evidence share of Ceres: frozen numbers, settings, and the covariance of the model's numbers.
 #pragma once
 
-#include "projection/calibration/evidence.h"
+#include "projection/calibration/problem.h"
 
 #include <ceres/ceres.h>
 #include <map>

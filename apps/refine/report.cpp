@@ -1,0 +1,273 @@
+// The findings of `refine` as JSON, as a table, and as a page.
+#include "apps/refine/report.h"
+
+#include "apps/page.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace scanshade {
+using namespace calibration;
+namespace {
+
+/// One number of the camera, before and after, with its sigma; NaN where it was frozen.
+struct NumberRow {
+    std::string name;
+    double before, after, sigma;
+};
+
+std::vector<NumberRow> numbers_of(const Refinement& r) {
+    const Fit& fit = r.climb.fit;
+    const Model& before = r.climb.start.model;
+    const auto sigma = [&](Unknown unknown) {
+        return r.climb.free[unknown] && fit.covariance.size() > 0 ? fit.sigma(unknown) : std::nan("");
+    };
+    const bool fy_free = fit.covariance.size() > 0 && (r.climb.free[f] || r.climb.free[aspect]);
+    std::vector<NumberRow> rows = {
+        {"fx", before[f], fit.model[f], sigma(f)},
+        {"fy", before[f] * before[aspect], fit.model[f] * fit.model[aspect], fy_free ? sigma_fy(fit) : std::nan("")}};
+    for (int i = cx; i < unknown_count; ++i) {
+        const auto unknown = static_cast<Unknown>(i);
+        if (i < k1 || r.climb.free[i] || before[unknown] != (i == depth_scale ? 1 : 0))
+            rows.push_back({std::string(name_of(unknown)), before[unknown], fit.model[unknown], sigma(unknown)});
+    }
+    return rows;
+}
+
+json finite(double value) { return std::isfinite(value) ? json(value) : json(); }
+
+json covariance_json(const Climb& climb) {
+    json names = json::array(), rows = json::array();
+    if (climb.fit.covariance.size() == 0)
+        return json();
+    for (int i = 0; i < unknown_count; ++i) {
+        if (!climb.free[i])
+            continue;
+        names.push_back(name_of(static_cast<Unknown>(i)));
+        json row = json::array();
+        for (int j = 0; j < unknown_count; ++j)
+            if (climb.free[j])
+                row.push_back(climb.fit.covariance(i, j));
+        rows.push_back(row);
+    }
+    return {{"of", names}, {"matrix", rows}};
+}
+
+template <class Number>
+json grid_json(const cv::Mat_<Number>& grid) {
+    json rows = json::array();
+    for (int row = 0; row < grid.rows; ++row) {
+        json cells = json::array();
+        for (int column = 0; column < grid.cols; ++column)
+            cells.push_back(finite(grid(row, column)));
+        rows.push_back(cells);
+    }
+    return rows;
+}
+
+json errors_json(const Climb& climb) {
+    return {{"train", finite(climb.train_px)},
+            {"train_before", finite(climb.train_before_px)},
+            {"held_out", finite(climb.held_out_px)},
+            {"held_out_before", finite(climb.held_out_before_px)}};
+}
+
+double largest(const cv::Mat1d& grid) {
+    double most = 0;
+    for (const double value : grid)
+        most = std::isfinite(value) ? std::max(most, value) : most;
+    return most;
+}
+
+} // namespace
+
+std::string status_of(const Refinement& r) { return r.changed() ? "refined" : "unchanged"; }
+
+json details_of(const Refinement& r, double took_s) {
+    json text{{"status", status_of(r)}, {"source", r.source}, {"took_s", took_s}, {"error_unit", r.unit}};
+    text["before"] = to_json(r.before);
+    for (const NumberRow& row : numbers_of(r))
+        text["numbers"][row.name] = {{"before", row.before}, {"after", row.after}, {"sigma", finite(row.sigma)}};
+    text["covariance"] = covariance_json(r.climb);
+    text["rms_px"] = errors_json(r.climb);
+    if (r.full)
+        text["rms_px_full_model"] = errors_json(*r.full);
+    for (const Step& step : r.climb.steps)
+        text["ladder"].push_back({{"rung", step.name}, {"climbed", step.climbed}, {"why", step.why}});
+    for (const ViewRow& view : r.views)
+        text["views"].push_back({{"name", view.name},
+                                 {"rms_px", finite(view.score.rms())},
+                                 {"points", view.score.points},
+                                 {"outlying", view.outlying},
+                                 {"used", view.used},
+                                 {"weight", view.weight}});
+    text["coverage"] = {{"share_of_cells", r.coverage.share}, {"counts", grid_json(r.coverage.counts)}};
+    text["pixel_sigma_px"] = grid_json(r.pixel_sigma);
+    for (const Effect& effect : r.effects)
+        text["effect"].push_back(
+            {{"depth_m", effect.depth_m}, {"rms_mm", effect.rms_mm}, {"worst_mm", effect.worst_mm}});
+    text["notes"] = r.notes;
+    return text;
+}
+
+std::string summary_of(const Refinement& r, double took_s) {
+    std::string text = fmt::format("{}: {} ({:.1f} s)\n\n", status_of(r), r.source, took_s);
+    text += fmt::format("  {:<14} {:>12} {:>12} {:>10}\n", "", "before", "after", "sigma");
+    for (const NumberRow& row : numbers_of(r))
+        text += fmt::format("  {:<14} {:>12.6g} {:>12.6g} {:>10}\n", row.name, row.before, row.after,
+                            std::isnan(row.sigma) ? "kept" : fmt::format("{:.2g}", row.sigma));
+    text += fmt::format("\n  {:<14} {:>12} {:>12}\n", fmt::format("error, {} rms", r.unit), "before", "after");
+    text += fmt::format("  {:<14} {:>12.4g} {:>12.4g}\n", "fitted", r.climb.train_before_px, r.climb.train_px);
+    text += fmt::format("  {:<14} {:>12.4g} {:>12.4g}\n", "held out", r.climb.held_out_before_px, r.climb.held_out_px);
+    if (r.full)
+        text += fmt::format("  full model: fitted {:.4g}, held out {:.4g}\n", r.full->train_px, r.full->held_out_px);
+    text += "\n";
+    for (const Step& step : r.climb.steps)
+        text += fmt::format("  {:<14} {} {}\n", step.name, step.climbed ? "freed:" : "kept: ", step.why);
+    text += fmt::format(
+        "\n  {:.0f} % of the image's cells hold observations; the pixel's sigma is {:.2g} px on average, {:.2g} "
+        "at most\n",
+        100 * r.coverage.share, mean_pixel_sigma(r.climb.fit), largest(r.pixel_sigma));
+    for (const Effect& effect : r.effects)
+        text += fmt::format("  at {:.2f} m points move by {:.2f} mm rms, {:.2f} mm at most\n", effect.depth_m,
+                            effect.rms_mm, effect.worst_mm);
+    for (const std::string& note : r.notes)
+        text += "  note: " + note + "\n";
+    return text;
+}
+
+// ---------------------------------------------------------------------------------------------------- the page
+
+namespace {
+
+std::string number(double value, int digits = 4) {
+    return std::isfinite(value) ? fmt::format("{:.{}g}", value, digits) : "";
+}
+
+/// White to blue, 0 to 1.
+std::string shade_of(double share) {
+    const int other = static_cast<int>(std::lround(255 - 175 * std::clamp(share, 0.0, 1.0)));
+    return fmt::format("rgb({},{},255)", other, other);
+}
+
+/// Values of a grid as tinted cells with their numbers.
+template <class Number>
+std::string heat_map(const cv::Mat_<Number>& grid, const char* caption, const char* format) {
+    constexpr int cell = 56;
+    double most = 1e-12;
+    for (const Number value : grid)
+        most = std::isfinite(static_cast<double>(value)) ? std::max(most, static_cast<double>(value)) : most;
+    std::string svg = fmt::format("<figure><svg viewBox='0 0 {} {}' width='480'>", grid.cols * cell, grid.rows * cell);
+    for (int row = 0; row < grid.rows; ++row)
+        for (int column = 0; column < grid.cols; ++column) {
+            const double value = grid(row, column);
+            svg += fmt::format("<rect x='{}' y='{}' width='{}' height='{}' fill='{}'/>", column * cell, row * cell,
+                               cell, cell, std::isfinite(value) ? shade_of(value / most) : "#ddd");
+            if (std::isfinite(value))
+                svg += fmt::format("<text x='{}' y='{}'>{}</text>", column * cell + cell / 2, row * cell + cell / 2 + 5,
+                                   fmt::format(fmt::runtime(format), value));
+        }
+    return svg + fmt::format("</svg><figcaption>{}</figcaption></figure>\n", caption);
+}
+
+/// Residuals as arrows from where something was seen, exaggerated so that the usual one is a fiftieth of the width.
+std::string arrows(const Refinement& r) {
+    const cv::Size size = r.before.pinhole.size;
+    const double exaggeration = std::max(1.0, std::floor(size.width / 50.0 / std::max(r.climb.train_px, 1e-9)));
+    constexpr std::size_t most = 4000;
+    const std::size_t step = std::max<std::size_t>(1, r.residuals.size() / most);
+    std::string svg =
+        fmt::format("<figure><svg viewBox='0 0 {} {}' width='640' class='framed'>", size.width, size.height);
+    for (std::size_t i = 0; i < r.residuals.size(); i += step) {
+        const auto& [at, miss] = r.residuals[i];
+        svg += fmt::format("<path d='M{:.1f} {:.1f}l{:.1f} {:.1f}'/>", at.x, at.y, miss.x() * exaggeration,
+                           miss.y() * exaggeration);
+    }
+    return svg +
+           fmt::format("</svg><figcaption>Residuals (predicted - seen) over the image, {:.0f} times as long as they are"
+                       "</figcaption></figure>\n",
+                       exaggeration);
+}
+
+/// The residuals themselves as a cloud of points: round and centred where nothing is left to model.
+std::string scatter(const Refinement& r) {
+    const double reach = std::max(4 * r.climb.train_px, 1e-9), scale = 150 / reach;
+    constexpr std::size_t most = 4000;
+    const std::size_t step = std::max<std::size_t>(1, r.residuals.size() / most);
+    std::string svg =
+        "<figure><svg viewBox='-160 -160 320 320' width='320' class='framed'><path class='axis' d='M-150 0h300M0 "
+        "-150v300'/>";
+    for (std::size_t i = 0; i < r.residuals.size(); i += step)
+        svg += fmt::format("<circle cx='{:.1f}' cy='{:.1f}' r='1.5'/>",
+                           std::clamp(r.residuals[i].second.x() * scale, -155.0, 155.0),
+                           std::clamp(r.residuals[i].second.y() * scale, -155.0, 155.0));
+    return svg + fmt::format("</svg><figcaption>Residuals, axes +-{:.2g} px</figcaption></figure>\n", reach);
+}
+
+std::string view_bars(const Refinement& r) {
+    constexpr int line = 18;
+    double most = 1e-12;
+    for (const ViewRow& view : r.views)
+        most = std::max(most, view.score.rms());
+    std::string svg = fmt::format("<svg viewBox='0 0 640 {}' width='640' class='bars'>", line * r.views.size() + 4);
+    for (std::size_t i = 0; i < r.views.size(); ++i) {
+        const ViewRow& view = r.views[i];
+        const double width = 380 * view.score.rms() / most;
+        svg += fmt::format(
+            "<text class='name' x='160' y='{0}'>{1}</text><rect x='166' y='{2}' width='{3:.1f}' height='12' "
+            "class='{4}'/><text class='value' x='{5:.1f}' y='{0}'>{6:.3g} {8}{7}</text>",
+            line * i + 14, page::escaped(view.name), line * i + 4, width, view.outlying ? "bad" : "good", 172 + width,
+            view.score.rms(), view.used ? "" : ", dropped", r.unit);
+    }
+    return svg + "</svg>\n";
+}
+
+/// For the plots of this page alone.
+constexpr const char* style =
+    "<style>figure{display:inline-block;margin:.5em 1em .5em 0}figcaption{color:#555;font-size:13px}figure "
+    "text{font:15px "
+    "sans-serif;text-anchor:middle}.bars text{font:12px sans-serif}.bars .name{text-anchor:end}figure path{stroke:#c33;"
+    "stroke-width:1.2}figure .axis{stroke:#bbb}figure circle{fill:#36a;fill-opacity:.4}.framed{border:1px solid "
+    "#999}.good{"
+    "fill:#58a}.bad{fill:#c33}</style>\n";
+
+} // namespace
+
+std::string page_of(const Refinement& r, double took_s) {
+    std::vector<std::vector<std::string>> numbers, steps, moves;
+    std::vector<bool> freed;
+    for (const NumberRow& row : numbers_of(r))
+        numbers.push_back({row.name, number(row.before, 8), number(row.after, 8),
+                           std::isnan(row.sigma) ? "kept" : number(row.sigma, 2)});
+    for (const Step& step : r.climb.steps) {
+        steps.push_back({step.name, step.climbed ? "freed" : "kept", step.why});
+        freed.push_back(step.climbed);
+    }
+    for (const Effect& effect : r.effects)
+        moves.push_back({number(effect.depth_m, 3), number(effect.rms_mm, 3), number(effect.worst_mm, 3)});
+    std::vector<std::vector<std::string>> errors = {
+        {"before", number(r.climb.train_before_px), number(r.climb.held_out_before_px)},
+        {"after", number(r.climb.train_px), number(r.climb.held_out_px)}};
+    if (r.full)
+        errors.push_back({"full model, for comparison", number(r.full->train_px), number(r.full->held_out_px)});
+
+    std::string found = style + page::paragraph(fmt::format("From {}; {:.1f} s.", r.source, took_s));
+    for (const std::string& note : r.notes)
+        found += page::paragraph(note);
+    std::vector<page::Section> sections = {
+        {"Found", found},
+        {"Numbers", page::table({"", "before", "after", "sigma"}, numbers)},
+        {fmt::format("Error, {} rms", r.unit), page::table({"", "fitted views", "held-out views"}, errors)},
+        {"Ladder", page::table({"rung", "", "why"}, steps, freed)},
+        {"Residuals", r.residuals.empty() ? page::paragraph("of depth, not of pixels") : arrows(r) + scatter(r)},
+        {"Views", view_bars(r)},
+        {"Image", heat_map(r.coverage.counts, "Observations", "{:.0f}") +
+                      heat_map(r.pixel_sigma, "Sigma of a pixel, px", "{:.2g}")}};
+    if (!moves.empty())
+        sections.insert(sections.begin() + 4, {"Effect: how far surface points move",
+                                               page::table({"depth, m", "rms, mm", "most, mm"}, moves)});
+    return page::document("Camera: " + status_of(r), sections);
+}
+
+} // namespace scanshade

@@ -1,0 +1,179 @@
+// Pictures and clouds made into evidence, with notes on what was left out; where a camera starts from.
+#include "apps/refine/sources.h"
+
+#include "io/camera_file.h"
+#include "io/exif.h"
+#include "io/image_file.h"
+#include "io/layouts.h"
+#include "projection/calibration/boards/organised_clouds.h"
+#include "projection/error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <map>
+#include <opencv2/imgproc.hpp>
+
+namespace scanshade {
+namespace fs = std::filesystem;
+using namespace calibration;
+namespace {
+
+Camera with_lens(Camera camera, LensModel lens) {
+    if (lens == LensModel::kannala_brandt && camera.distortion.model != lens)
+        camera.distortion = {.model = lens};
+    return camera;
+}
+
+Pinhole centred(double focal_length, cv::Size size) {
+    return {focal_length, focal_length, (size.width - 1) / 2.0, (size.height - 1) / 2.0, size};
+}
+
+struct Picture {
+    std::string name;
+    cv::Mat3b pixels;
+};
+
+/// The readable pictures of a folder; of others, and of those not of the commonest size, a note.
+std::vector<Picture> pictures_in(const fs::path& folder, std::vector<std::string>& notes) {
+    std::vector<Picture> all;
+    std::map<std::pair<int, int>, int> sizes;
+    for (const fs::path& file : files_in(folder)) {
+        if (!has_colour_extension(file))
+            continue;
+        try {
+            all.push_back({file.filename().string(), read_colour(file)});
+            ++sizes[{all.back().pixels.cols, all.back().pixels.rows}];
+        } catch (const std::exception& failure) {
+            notes.push_back(fmt::format("{}; not used.", failure.what()));
+        }
+    }
+    if (all.empty())
+        throw Error(folder.string() + ": no pictures (PNG, JPEG ...) of a board that can be read");
+    const auto commonest = std::max_element(sizes.begin(), sizes.end(), [](const auto& a, const auto& b) {
+                               return a.second < b.second;
+                           })->first;
+    std::erase_if(all, [&](const Picture& picture) {
+        if (std::pair(picture.pixels.cols, picture.pixels.rows) == commonest)
+            return false;
+        notes.push_back(fmt::format("{}: {}x{} among pictures of {}x{}: sizes are not mixed; not used.",
+                                    (folder / picture.name).string(), picture.pixels.cols, picture.pixels.rows,
+                                    commonest.first, commonest.second));
+        return true;
+    });
+    return all;
+}
+
+/// From the boards' homographies, or where they do not tell, from the pictures' EXIF.
+Camera first_guess(const std::vector<BoardView>& views, const fs::path& picture, LensModel lens, cv::Size size) {
+    try {
+        return with_lens(guess_from_boards(views, size), lens);
+    } catch (const Error&) {
+        if (!exif_focal_length_px(picture, size))
+            throw;
+        return guessed_camera(picture, lens, size);
+    }
+}
+
+std::string text_of(const Target& target) {
+    const char* kinds[] = {"chessboard of {}x{} corners", "ChArUco board of {}x{} squares", "grid of {}x{} circles",
+                           "asymmetric grid of {}x{} circles"};
+    return fmt::format(fmt::runtime(std::string(kinds[static_cast<int>(target.kind)]) + ", {:g} mm"),
+                       target.count.width, target.count.height, 1000 * target.square_m);
+}
+
+} // namespace
+
+std::optional<Camera> given_camera(const std::string& text, double fov_degrees, LensModel lens, cv::Size size) {
+    if (!text.empty()) {
+        Camera camera = camera_from_argument(text).camera;
+        if (camera.pinhole.size.empty())
+            camera.pinhole.size = size;
+        if (camera.pinhole.size != size)
+            throw Error(fmt::format("the images are {}x{}, but the camera ({}) is for {}x{}", size.width, size.height,
+                                    camera.origin, camera.pinhole.size.width, camera.pinhole.size.height));
+        check(camera);
+        return with_lens(camera, lens);
+    }
+    if (fov_degrees > 0) {
+        const double f = size.width / 2.0 / std::tan(fov_degrees * CV_PI / 360);
+        return with_lens({centred(f, size), {}, fmt::format("--fov {} degrees", fov_degrees)}, lens);
+    }
+    return std::nullopt;
+}
+
+Camera guessed_camera(const fs::path& picture, LensModel lens, cv::Size size) {
+    if (const auto f = picture.empty() ? std::nullopt : exif_focal_length_px(picture, size))
+        return with_lens({centred(*f, size), {}, fmt::format("EXIF of {}", picture.filename().string())}, lens);
+    const double usual = 0.82 * size.width; // a Kinect's colour camera
+    return with_lens({centred(usual, size), {}, "guessed: a usual lens, principal point in the middle"}, lens);
+}
+
+Refinement refine_from_boards(const fs::path& folder, const Target& target, const FirstCamera& first,
+                              RefineOptions options) {
+    if (!fs::is_directory(folder))
+        throw Error(folder.string() + ": not a folder of pictures");
+    std::vector<std::string> notes;
+    const std::vector<Picture> pictures = pictures_in(folder, notes);
+    const cv::Size size = pictures.front().pixels.size();
+    std::vector<BoardView> views;
+    for (const Picture& picture : pictures)
+        if (auto view = find_board(picture.pixels, target, picture.name))
+            views.push_back(*std::move(view));
+        else
+            notes.push_back(fmt::format("no board found in {}; not used.", (folder / picture.name).string()));
+    if (views.empty())
+        throw Error(
+            fmt::format("{}: no {} found in any of {} pictures", folder.string(), text_of(target), pictures.size()));
+    const auto given = given_camera(first.camera, first.fov_degrees, first.lens, size);
+    options.ladder.guessed = !given;
+    const Camera before = given ? *given : first_guess(views, folder / views.front().name, first.lens, size);
+    Boards boards(views);
+    const std::string cannot = degeneracy(views, boards.start(model_of(before)));
+    Refinement result;
+    try {
+        result = refine(boards, before, camera_rungs(before.distortion.model), options, cannot);
+    } catch (const Error& failure) { // what was left out is often why
+        std::string all = folder.string() + ": " + failure.what();
+        for (const std::string& note : notes)
+            all += "\n  " + note;
+        throw Error(all);
+    }
+    result.source = fmt::format("{}, in {} of {} pictures", text_of(target), views.size(), pictures.size());
+    result.notes.insert(result.notes.begin(), notes.begin(), notes.end());
+    return result;
+}
+
+Refinement refine_from_clouds(const Capture& capture, const std::vector<std::size_t>& frames, const FirstCamera& first,
+                              RefineOptions options) {
+    Organised evidence;
+    std::vector<std::string> notes;
+    std::size_t used = 0;
+    for (const std::size_t index : frames) {
+        try {
+            const Frame frame = capture.load(index);
+            evidence.add(frame.name, *frame.cloud);
+            ++used;
+        } catch (const std::exception& failure) {
+            notes.push_back(fmt::format("{}; not used.", failure.what()));
+        }
+    }
+    if (used == 0)
+        throw Error(
+            fmt::format("{}: no organised cloud that tells its camera: {}", capture.path.string(), notes.front()));
+    const cv::Size size = evidence.size();
+    const auto given = given_camera(first.camera, first.fov_degrees, first.lens, size);
+    options.ladder.guessed = !given;
+    const Camera before = given ? *given : guessed_camera({}, first.lens, size);
+    Refinement result = refine(evidence, before, camera_rungs(before.distortion.model), options, "");
+    result.source = fmt::format("pixels and points of {} organised cloud{}", used, used == 1 ? "" : "s");
+    if (!result.after.distortion.any())
+        result.notes.push_back(
+            fmt::format("the points lie on a pinhole's rays to {:.1g} px: no lens distortion is left in "
+                        "them (rectified, or never there).",
+                        result.climb.train_px));
+    result.notes.insert(result.notes.begin(), notes.begin(), notes.end());
+    return result;
+}
+
+} // namespace scanshade
