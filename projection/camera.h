@@ -14,6 +14,7 @@
 #include "shaders/shared/camera.h"
 
 #include <cmath>
+#include <Eigen/Core>
 #include <opencv2/core.hpp>
 #include <string>
 
@@ -23,6 +24,20 @@ namespace scanshade {
 struct Pinhole {
     double fx = 0, fy = 0, cx = 0, cy = 0;
     cv::Size size;
+
+    /// x and y at z = 1 of the ray through a pixel.
+    [[nodiscard]] Eigen::Vector2d ray(double u, double v) const {
+        return {shared::ray_axis(fx, cx, u), shared::ray_axis(fy, cy, v)};
+    }
+    /// The point in camera space that a pixel sees at depth z (along +z, not along the ray).
+    [[nodiscard]] Eigen::Vector3d point(double u, double v, double z) const {
+        const Eigen::Vector2d slope = ray(u, v);
+        return {slope.x() * z, slope.y() * z, z};
+    }
+    /// The pixel of a point in camera space, z > 0.
+    [[nodiscard]] Eigen::Vector2d pixel(const Eigen::Vector3d& point) const {
+        return {shared::project_axis(fx, cx, point.x(), point.z()), shared::project_axis(fy, cy, point.y(), point.z())};
+    }
 
     /// The same camera in the GPU's single precision.
     [[nodiscard]] shared::Pinhole on_gpu() const {

@@ -1,5 +1,6 @@
-// `scanshade refine`: the camera made right from whatever shows it, and how sure that is.
+// `scanshade refine`: refines a camera from pictures of a board, organised clouds or a recording, with its uncertainty.
 #include "apps/command.h"
+#include "apps/refine/recording.h"
 #include "apps/refine/report.h"
 #include "apps/refine/sources.h"
 #include "io/camera_file.h"
@@ -23,7 +24,7 @@ cv::Size parsed_count(const std::string& text) {
     if (std::sscanf(text.c_str(), "%dx%d%c", &width, &height, &rest) != 2 || width < 3 || height < 3 || width > 200 ||
         height > 200)
         throw Misuse(fmt::format(
-            "board: '{}' given, expected columns x rows of the target's points such as 9x6, each 3 .. 200", text));
+            "board: '{}' given, expected columns x rows of the target's points, such as 9x6, each 3 .. 200", text));
     return {width, height};
 }
 
@@ -39,70 +40,67 @@ class Refine final : public Command {
              {{"board", "inner corners of a chessboard, squares of a ChArUco board, circles of a grid: columns x rows",
                &board_},
               {.name = "target",
-               .help = "what is on the pictures",
+               .help = "the target in the pictures",
                .value = &target_,
                .choices = {"chessboard", "charuco", "circles", "asymmetric-circles"}},
-              {"square", "from corner to corner, or circle to circle", &square_m_, "m", 1e-6, 100},
+              {"square", "distance between corners, or between circles", &square_m_, "m", 1e-6, 100},
               {"marker", "side of a ChArUco marker; 0 = three quarters of a square", &marker_m_, "m", 0, 100},
               {.name = "dictionary",
                .help = "of the ChArUco markers",
                .value = &dictionary_,
                .choices = dictionary_names()}}},
             {"recording",
-             {{.name = "evidence",
-               .help =
-                   "tracks of points in the colour images, or depth alone: surfaces that are planes must come out as "
-                   "planes; auto = tracks where there is colour",
-               .value = &recording_.evidence,
+             {{.name = "observations",
+               .help = "tracks of points in colour images, or planes in depth images; auto = tracks where there is "
+                       "colour",
+               .value = &recording_.observations,
                .choices = {"auto", "tracks", "depth"}},
               {.name = "registered",
                .help =
-                   "whether colour pixels lie on depth pixels; where not, the colour camera and its place are refined",
+                   "whether colour and depth pixels coincide; if not, the colour camera and its extrinsics are refined",
                .value = &recording_.registered,
                .choices = {"auto", "yes", "no"}},
               {.name = "poses",
-               .help = "keep recorded poses as the truth, refine them too, or ignore them and follow the camera; auto "
-                       "keeps "
-                       "them where refined ones would explain hardly more",
+               .help = "keep recorded poses as exact, refine them too, or ignore and estimate them; auto keeps them "
+                       "unless refined poses fit clearly better",
                .value = &recording_.poses,
                .choices = {"auto", "keep", "refine", "ignore"}},
-              {"frames", "at most so many frames, evenly spread", &recording_.frames, "", 3, 1000},
+              {"frames", "most frames to use, evenly spaced", &recording_.frames, "", 3, 1000},
               {"depth-scale", "mm, tum, sun, nyu, m, or units per metre; replaces the capture's own", &depth_scale_}}},
             {"camera",
              {{"camera",
-               "where to start: a camera file, fx,fy,cx,cy, or the name of a known one; otherwise the capture's own, "
-               "the "
-               "pictures' EXIF, or a guess",
+               "first camera: a file, fx,fy,cx,cy, or the name of a known one; default: the capture's own, EXIF, or a "
+               "guess",
                &first_.camera},
-              {"colour-camera", "the same for the camera beside the depth camera, where colour is not registered",
+              {"colour-camera", "first camera of the secondary colour camera, where colour is not registered",
                &first_.colour_camera},
-              {"fov", "where to start: angle of view across the image; 0 = not known", &first_.fov_degrees, "degrees",
-               0, 175},
+              {"fov", "first camera: horizontal field of view; 0 = not known", &first_.fov_degrees, "degrees", 0, 175},
               {.name = "lens",
-               .help = "the kind of lens: brown (most) or fisheye (wide ones)",
+               .help = "lens model: brown (most lenses) or fisheye (wide lenses)",
                .value = &lens_,
                .choices = {"brown", "fisheye"}}}},
             {"model",
              {{.name = "model",
-               .help = "ladder = only what held-out views support, full = everything",
+               .help = "selected = only parameters that held-out views support, full = all",
                .value = &model_,
-               .choices = {"ladder", "full"}},
+               .choices = {"selected", "full"}},
               {.name = "outliers",
                .help = "views with more than 3 times the median error",
                .value = &outliers_,
                .choices = {"keep", "downweight", "drop"}},
-              {"folds", "how often views are held out in turn", &options_.ladder.folds, "", 2, 100},
-              {"sigmas", "how far a new number must be from where it was", &options_.ladder.least_sigmas, "", 0, 100}}},
+              {"folds", "number of folds of held-out views", &options_.selection.folds, "", 2, 100},
+              {"sigmas", "least difference between a new number and its start, in sigmas",
+               &options_.selection.least_sigmas, "", 0, 100}}},
             {"output",
              {{"out",
-               "the camera's file; its extension tells the format: .json ours, .yml OpenCV, .yaml ROS, .txt COLMAP",
+               "the camera's file; its extension sets the format: .json ours, .yml OpenCV, .yaml ROS, .txt COLMAP",
                &out_},
               {.name = "format",
                .help = "the format, whatever the extension",
                .value = &format_,
                .choices = format_choices()},
-              {"trajectory", "the refined poses of a recording, as TUM's rows", &trajectory_},
-              {"report", "a page with tables and plots", &report_},
+              {"trajectory", "file for the refined poses of a recording, in TUM's format", &trajectory_},
+              {"report", "HTML page with tables and plots", &report_},
               {"overwrite", "replace earlier results", &overwrite_}}}};
     }
 
@@ -110,7 +108,7 @@ class Refine final : public Command {
         const fs::path path = paths_.front();
         const auto format = out_.empty() ? CameraFormat::scanshade : camera_format(out_, format_);
         refuse_to_overwrite();
-        settle_options();
+        apply_flags();
         const auto start = std::chrono::steady_clock::now();
         const RecordingResult found = board_.empty() ? from_capture(path) : camera_alone(from_boards(path));
         const double took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -132,9 +130,9 @@ class Refine final : public Command {
                 throw Misuse(file + " exists already: --overwrite replaces it, or choose another name");
     }
 
-    void settle_options() {
+    void apply_flags() {
         first_.lens = lens_ == "fisheye" ? LensModel::kannala_brandt : LensModel::brown_conrady;
-        options_.model = model_ == "full" ? ModelChoice::full : ModelChoice::ladder;
+        options_.model = model_ == "full" ? ModelChoice::full : ModelChoice::selected;
         options_.outliers = outliers_ == "drop"         ? Outliers::drop
                             : outliers_ == "downweight" ? Outliers::downweight
                                                         : Outliers::keep;
@@ -164,7 +162,7 @@ class Refine final : public Command {
         return refine_from_recording(std::move(capture), frames, first_, recording_, options_);
     }
 
-    /// TUM's rows: time tx ty tz qx qy qz qw.
+    /// TUM's format: rows of time tx ty tz qx qy qz qw.
     static std::string trajectory_of(const RecordingResult& result) {
         std::string rows = "# refined poses, camera to world\n# timestamp tx ty tz qx qy qz qw\n";
         for (std::size_t i = 0; i < result.poses.size(); ++i) {
@@ -180,7 +178,7 @@ class Refine final : public Command {
         const Refinement& result = found.refinement;
         CameraQuality quality{.rms_px = std::nan(""), .view_rms_px = {}, .details = {}};
         if (result.unit == "px") {
-            quality.rms_px = result.climb.train_px;
+            quality.rms_px = result.selection.train_px;
             for (const ViewRow& view : result.views)
                 quality.view_rms_px.push_back(view.score.rms());
         }
@@ -197,7 +195,7 @@ class Refine final : public Command {
     }
 
     std::vector<std::string> paths_;
-    std::string board_, target_ = "chessboard", dictionary_ = "4x4_50", lens_ = "brown", model_ = "ladder",
+    std::string board_, target_ = "chessboard", dictionary_ = "4x4_50", lens_ = "brown", model_ = "selected",
                         outliers_ = "keep";
     std::string out_, format_, report_, trajectory_, depth_scale_;
     double square_m_ = 0.025, marker_m_ = 0;

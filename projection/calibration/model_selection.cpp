@@ -1,4 +1,4 @@
-// The ladder: which rung is tried, what speaks against it, what is taken back.
+// The order in which groups are tried, the tests they must pass, and what is fixed again.
 #include "projection/calibration/model_selection.h"
 
 #include "projection/calibration/quality.h"
@@ -28,7 +28,7 @@ double bic(const Fit& fit) {
     return n * std::log(fit.rss / n + tiny) + fit.unknowns * std::log(n);
 }
 
-/// How many sigmas the new numbers are from the old ones: of a pair, the sigmas of a single number as unlikely as that.
+/// How many sigmas the new numbers are from the old ones. A pair counts as a single number that is as unlikely.
 double sigmas_from(const Fit& fit, const Model& neutral, const std::vector<Unknown>& unknowns) {
     const auto count = static_cast<Eigen::Index>(unknowns.size());
     Eigen::VectorXd move(count);
@@ -49,7 +49,7 @@ double sigmas_from(const Fit& fit, const Model& neutral, const std::vector<Unkno
     return std::sqrt(z2);
 }
 
-/// Of the correlation matrix, so that units do not matter: 1 where nothing hangs together.
+/// Of the correlation matrix, so that units do not matter: 1 where nothing correlates.
 double condition(const Fit& fit, const Free& free) {
     std::vector<int> open;
     for (int i = 0; i < unknown_count; ++i)
@@ -71,22 +71,22 @@ double condition(const Fit& fit, const Free& free) {
 std::vector<Views> folds_of(const Views& used, int wanted) {
     const auto count = static_cast<int>(std::count(used.begin(), used.end(), true));
     std::vector<Views> folds(std::clamp(wanted, 2, std::max(2, count)), Views(used.size(), false));
-    std::size_t place = 0;
+    std::size_t index = 0;
     for (std::size_t i = 0; i < used.size(); ++i)
         if (used[i])
-            folds[place++ % folds.size()][i] = true;
+            folds[index++ % folds.size()][i] = true;
     return folds;
 }
 
 /// Each view's score under a camera fitted without it.
-std::vector<ViewScore> held_out(const Evidence& evidence, const Fit& from, const Free& free, const Views& used,
+std::vector<ViewScore> held_out(const Problem& problem, const Fit& from, const Free& free, const Views& used,
                                 int wanted_folds) {
     std::vector<ViewScore> all(used.size());
     for (const Views& fold : folds_of(used, wanted_folds)) {
         Views rest = used;
         for (std::size_t i = 0; i < rest.size(); ++i)
             rest[i] = rest[i] && !fold[i];
-        const std::vector<ViewScore> scores = evidence.score(evidence.fit(from, free, rest, false), fold);
+        const std::vector<ViewScore> scores = problem.score(problem.fit(from, free, rest, false), fold);
         for (std::size_t i = 0; i < all.size(); ++i)
             if (fold[i])
                 all[i] = scores[i];
@@ -94,8 +94,8 @@ std::vector<ViewScore> held_out(const Evidence& evidence, const Fit& from, const
     return all;
 }
 
-/// How much smaller the views' errors have become: mean logarithm of the ratio, and its standard error. Views pair off,
-/// and a view with ten times the error of the others has one vote, not ninety-nine.
+/// How much smaller the views' errors have become: mean logarithm of the ratio, and its standard error. Logarithms give
+/// each view one vote, even one with ten times the error of the others.
 struct Gain {
     double mean = 0, standard_error = 0;
     [[nodiscard]] bool clear() const { return mean > standard_error; }
@@ -118,7 +118,7 @@ Gain gain_of(const std::vector<ViewScore>& before, const std::vector<ViewScore>&
 }
 
 std::string inflated(const Fit& before, const Fit& after, const Free& was_free, double most) {
-    // k1 and k2 trade with each other, and their sigmas must grow together; what counts of them is the pixel's sigma.
+    // k1 and k2 compensate each other, so their sigmas grow together. The pixel's sigma covers both.
     for (const Unknown unknown : {f, aspect, cx, cy})
         if (was_free[unknown] && after.sigma(unknown) > most * before.sigma(unknown))
             return fmt::format("the sigma of {} grows {:.1f} times", name_of(unknown),
@@ -129,192 +129,197 @@ std::string inflated(const Fit& before, const Fit& after, const Free& was_free, 
     return {};
 }
 
-/// The ladder while it is being climbed.
-class Ladder {
+/// The state of one selection.
+class ModelSelection {
   public:
-    Ladder(const Evidence& evidence, const Fit& start, const std::vector<Rung>& rungs, const Views& used,
-           const LadderOptions& options)
-        : evidence_(evidence), rungs_(rungs), used_(used), options_(options) {
-        climb_.start = start;
-        climb_.fit = evidence.fit(start, {}, used, true);
-        climb_.steps.resize(rungs.size());
-        for (std::size_t i = 0; i < rungs.size(); ++i)
-            climb_.steps[i].name = rungs[i].name;
-        held_out_ = held_out(evidence, climb_.fit, {}, used, options.folds);
-        climb_.held_out_before_px = total_rms(held_out_);
-        climb_.train_before_px = train_rms(climb_.fit);
+    ModelSelection(const Problem& problem, const Fit& start, const std::vector<ParameterGroup>& groups,
+                   const Views& used, const SelectionOptions& options)
+        : problem_(problem), groups_(groups), used_(used), options_(options) {
+        selection_.start = start;
+        selection_.fit = problem.fit(start, {}, used, true);
+        selection_.steps.resize(groups.size());
+        for (std::size_t i = 0; i < groups.size(); ++i)
+            selection_.steps[i].name = groups[i].name;
+        held_out_ = held_out(problem, selection_.fit, {}, used, options.folds);
+        selection_.held_out_before_px = total_rms(held_out_);
+        selection_.train_before_px = train_rms(selection_.fit);
     }
 
-    Climb by_evidence() {
-        for (bool higher = true; higher;) { // what failed beside a cruder model may stand beside a better one
-            higher = false;
+    Selection supported() {
+        for (bool any_freed = true; any_freed;) { // a better model may support what a cruder one rejected
+            any_freed = false;
             std::vector<std::size_t> together;
-            for (std::size_t i = 0; i < rungs_.size(); ++i) {
-                if (climb_.steps[i].climbed)
+            for (std::size_t i = 0; i < groups_.size(); ++i) {
+                if (selection_.steps[i].freed)
                     continue;
-                // A strong barrel folds when k1 has to do alone what k1 and k2 do together: then they are freed as one.
+                // A strong barrel folds when k1 has to do alone what k1 and k2 do together: both are then freed at
+                // once.
                 together.push_back(i);
-                const Outcome outcome = try_rungs(together);
-                higher = higher || outcome == Outcome::climbed;
+                const Outcome outcome = try_groups(together);
+                any_freed = any_freed || outcome == Outcome::freed;
                 if (outcome != Outcome::folds)
                     together.clear();
             }
         }
-        for (std::size_t i = rungs_.size(); i-- > 0;)
-            take_back_if_unsupported(i);
+        for (std::size_t i = groups_.size(); i-- > 0;)
+            fix_if_unsupported(i);
         return finished();
     }
 
-    Climb all() {
-        for (std::size_t i = 0; i < rungs_.size(); ++i) {
-            climb_.steps[i] = {std::string(rungs_[i].name), true, "asked for"};
-            for (const Unknown unknown : rungs_[i].unknowns)
-                climb_.free[unknown] = true;
+    Selection all() {
+        for (std::size_t i = 0; i < groups_.size(); ++i) {
+            selection_.steps[i] = {std::string(groups_[i].name), true, "asked for"};
+            for (const Unknown unknown : groups_[i].unknowns)
+                selection_.free[unknown] = true;
         }
-        climb_.fit = evidence_.fit(climb_.fit, climb_.free, used_, true);
-        held_out_ = held_out(evidence_, climb_.fit, climb_.free, used_, options_.folds);
+        selection_.fit = problem_.fit(selection_.fit, selection_.free, used_, true);
+        held_out_ = held_out(problem_, selection_.fit, selection_.free, used_, options_.folds);
         return finished();
     }
 
   private:
-    [[nodiscard]] double train_rms(const Fit& fit) const { return total_rms(evidence_.score(fit, used_)); }
+    [[nodiscard]] double train_rms(const Fit& fit) const { return total_rms(problem_.score(fit, used_)); }
 
-    Climb finished() {
-        climb_.held_out_px = total_rms(held_out_);
-        climb_.train_px = train_rms(climb_.fit);
-        return climb_;
+    Selection finished() {
+        selection_.held_out_px = total_rms(held_out_);
+        selection_.train_px = train_rms(selection_.fit);
+        return selection_;
     }
 
     /// A guess is not information: the first focal length needs to be determined, not to differ from the guess.
-    [[nodiscard]] bool must(const Rung& rung) const { return options_.guessed && rung.unknowns.front() == f; }
-
-    enum class Outcome { climbed, refused, folds };
-
-    void say(const std::vector<std::size_t>& indices, bool climbed, const std::string& why) {
-        for (const std::size_t index : indices)
-            climb_.steps[index] = {std::string(rungs_[index].name), climbed, why};
+    [[nodiscard]] bool must_free(const ParameterGroup& group) const {
+        return options_.guessed && group.unknowns.front() == f;
     }
 
-    /// Frees the rungs' numbers as one, if they stand the tests.
-    Outcome try_rungs(const std::vector<std::size_t>& indices) {
-        Rung rung = rungs_[indices.front()];
+    enum class Outcome { freed, rejected, folds };
+
+    void record(const std::vector<std::size_t>& indices, bool freed, const std::string& why) {
+        for (const std::size_t index : indices)
+            selection_.steps[index] = {std::string(groups_[index].name), freed, why};
+    }
+
+    /// Frees the groups' numbers at once, if they pass the tests.
+    Outcome try_groups(const std::vector<std::size_t>& indices) {
+        ParameterGroup group = groups_[indices.front()];
         for (std::size_t i = 1; i < indices.size(); ++i)
-            rung.unknowns.insert(rung.unknowns.end(), rungs_[indices[i]].unknowns.begin(),
-                                 rungs_[indices[i]].unknowns.end());
-        if (const double rms = train_rms(climb_.fit); rms < options_.enough_px && !must(rung)) {
-            say(indices, false, fmt::format("not needed: the error is {:.1g} {} without it", rms, evidence_.unit()));
-            return Outcome::refused;
+            group.unknowns.insert(group.unknowns.end(), groups_[indices[i]].unknowns.begin(),
+                                  groups_[indices[i]].unknowns.end());
+        if (const double rms = train_rms(selection_.fit); rms < options_.enough_px && !must_free(group)) {
+            record(indices, false, fmt::format("not needed: the error is {:.1g} {} without it", rms, problem_.unit()));
+            return Outcome::rejected;
         }
-        Free free = climb_.free;
-        for (const Unknown unknown : rung.unknowns)
+        Free free = selection_.free;
+        for (const Unknown unknown : group.unknowns)
             free[unknown] = true;
-        const Fit fit = evidence_.fit(climb_.fit, free, used_, true);
-        if (const std::string why = objection(rung, fit, free); !why.empty()) {
-            say(indices, false, why);
-            return Outcome::refused;
+        const Fit fit = problem_.fit(selection_.fit, free, used_, true);
+        if (const std::string why = objection(group, fit, free); !why.empty()) {
+            record(indices, false, why);
+            return Outcome::rejected;
         }
         if (!monotone(fit.model)) {
-            say(indices, false, "not usable: the lens would fold back on itself within the image");
+            record(indices, false, "not usable: the lens would fold back on itself within the image");
             return Outcome::folds;
         }
-        const auto scores = held_out(evidence_, fit, free, used_, options_.folds);
+        const auto scores = held_out(problem_, fit, free, used_, options_.folds);
         const Gain gain = gain_of(held_out_, scores);
-        if (!gain.clear() && !must(rung)) {
-            say(indices, false,
-                fmt::format("not supported: held-out error falls by {:.2f} % +- {:.2f} %", gain.percent(),
-                            100 * gain.standard_error));
-            return Outcome::refused;
+        if (!gain.clear() && !must_free(group)) {
+            record(indices, false,
+                   fmt::format("not supported: held-out error falls by {:.2f} % +- {:.2f} %", gain.percent(),
+                               100 * gain.standard_error));
+            return Outcome::rejected;
         }
-        say(indices, true,
-            fmt::format("{:.1f} sigma, held-out error falls by {:.2f} % +- {:.2f} %{}",
-                        sigmas_from(fit, climb_.start.model, rung.unknowns), gain.percent(), 100 * gain.standard_error,
-                        indices.size() > 1 ? " (together)" : ""));
-        climb_.fit = fit;
-        climb_.free = free;
+        record(indices, true,
+               fmt::format("{:.1f} sigma, held-out error falls by {:.2f} % +- {:.2f} %{}",
+                           sigmas_from(fit, selection_.start.model, group.unknowns), gain.percent(),
+                           100 * gain.standard_error, indices.size() > 1 ? " (together)" : ""));
+        selection_.fit = fit;
+        selection_.free = free;
         held_out_ = scores;
-        return Outcome::climbed;
+        return Outcome::freed;
     }
 
-    /// Why the rung cannot be climbed, held-out views aside; empty where nothing speaks against it.
-    [[nodiscard]] std::string objection(const Rung& rung, const Fit& fit, const Free& free) const {
+    /// Why the group cannot be freed, apart from held-out views; empty where all tests pass.
+    [[nodiscard]] std::string objection(const ParameterGroup& group, const Fit& fit, const Free& free) const {
         if (fit.covariance.size() == 0)
             return "not determined: the normal matrix is singular";
         if (!fit.converged)
             return "not determined: the fit does not converge";
-        if (must(rung))
+        if (must_free(group))
             return fit.sigma(f) > 0.05 * fit.model[f]
                        ? fmt::format("not determined: f is {:.1f} +- {:.1f} px", fit.model[f], fit.sigma(f))
                        : "";
-        if (const double sigmas = sigmas_from(fit, climb_.start.model, rung.unknowns); sigmas < options_.least_sigmas)
+        if (const double sigmas = sigmas_from(fit, selection_.start.model, group.unknowns);
+            sigmas < options_.least_sigmas)
             return fmt::format("not supported: {:.1f} sigma", sigmas);
-        if (const std::string why = stood_in_for(rung, fit, free); !why.empty())
+        if (const std::string why = confused_with_rival(group, fit, free); !why.empty())
             return why;
-        if (bic(fit) >= bic(climb_.fit))
+        if (bic(fit) >= bic(selection_.fit))
             return "not supported: BIC does not fall";
         if (const double found = condition(fit, free); found > options_.worst_condition)
             return fmt::format("not determined: condition number {:.1e}", found);
-        if (const std::string trouble = inflated(climb_.fit, fit, climb_.free, options_.most_inflation);
+        if (const std::string trouble = inflated(selection_.fit, fit, selection_.free, options_.most_inflation);
             !trouble.empty())
             return "not supported: " + trouble;
         return {};
     }
 
-    /// Gauge check: with the rival free as well, what the rung alone seemed to show may be gone.
-    [[nodiscard]] std::string stood_in_for(const Rung& rung, const Fit& fit, Free free) const {
-        if (!rung.rival || free[*rung.rival])
+    /// Gauge check: the group may be significant only because its rival is fixed.
+    [[nodiscard]] std::string confused_with_rival(const ParameterGroup& group, const Fit& fit, Free free) const {
+        if (!group.rival || free[*group.rival])
             return {};
-        free[*rung.rival] = true;
-        const Fit beside = evidence_.fit(fit, free, used_, true);
+        free[*group.rival] = true;
+        const Fit both = problem_.fit(fit, free, used_, true);
         const double sigmas =
-            beside.covariance.size() == 0 ? 0 : sigmas_from(beside, climb_.start.model, rung.unknowns);
+            both.covariance.size() == 0 ? 0 : sigmas_from(both, selection_.start.model, group.unknowns);
         if (sigmas >= options_.least_sigmas)
             return {};
         const auto called = [](Unknown unknown) { return unknown == f ? "focal length" : name_of(unknown); };
         return fmt::format("{} and {} cannot be told apart here: {:.1f} sigma alone, {:.1f} with both free",
-                           called(rung.unknowns.front()), called(*rung.rival),
-                           sigmas_from(fit, climb_.start.model, rung.unknowns), sigmas);
+                           called(group.unknowns.front()), called(*group.rival),
+                           sigmas_from(fit, selection_.start.model, group.unknowns), sigmas);
     }
 
-    /// A number freed early may have stood in for one that came later.
-    void take_back_if_unsupported(std::size_t index) {
-        const Rung& rung = rungs_[index];
-        Step& step = climb_.steps[index];
-        if (!step.climbed || must(rung))
+    /// A number freed early may have explained what belongs to a later one.
+    void fix_if_unsupported(std::size_t index) {
+        const ParameterGroup& group = groups_[index];
+        Step& step = selection_.steps[index];
+        if (!step.freed || must_free(group))
             return;
-        const double sigmas = sigmas_from(climb_.fit, climb_.start.model, rung.unknowns);
+        const double sigmas = sigmas_from(selection_.fit, selection_.start.model, group.unknowns);
         if (sigmas >= options_.least_sigmas)
             return;
-        for (const Unknown unknown : rung.unknowns) {
-            climb_.free[unknown] = false;
-            climb_.fit.model[unknown] = climb_.start.model[unknown];
+        for (const Unknown unknown : group.unknowns) {
+            selection_.free[unknown] = false;
+            selection_.fit.model[unknown] = selection_.start.model[unknown];
         }
-        step = {std::string(rung.name), false, fmt::format("not supported beside the others: {:.1f} sigma", sigmas)};
-        climb_.fit = evidence_.fit(climb_.fit, climb_.free, used_, true);
-        held_out_ = held_out(evidence_, climb_.fit, climb_.free, used_, options_.folds);
+        step = {std::string(group.name), false,
+                fmt::format("not supported together with the others: {:.1f} sigma", sigmas)};
+        selection_.fit = problem_.fit(selection_.fit, selection_.free, used_, true);
+        held_out_ = held_out(problem_, selection_.fit, selection_.free, used_, options_.folds);
     }
 
-    const Evidence& evidence_;
-    const std::vector<Rung>& rungs_;
+    const Problem& problem_;
+    const std::vector<ParameterGroup>& groups_;
     const Views& used_;
-    const LadderOptions& options_;
-    Climb climb_;
+    const SelectionOptions& options_;
+    Selection selection_;
     std::vector<ViewScore> held_out_;
 };
 
 } // namespace
 
-bool Climb::unchanged() const {
+bool Selection::unchanged() const {
     return std::none_of(free.begin(), free.end(), [](bool open) { return open; });
 }
 
-Climb climb(const Evidence& evidence, const Fit& start, const std::vector<Rung>& rungs, const Views& used,
-            const LadderOptions& options) {
-    return Ladder(evidence, start, rungs, used, options).by_evidence();
+Selection select_model(const Problem& problem, const Fit& start, const std::vector<ParameterGroup>& groups,
+                       const Views& used, const SelectionOptions& options) {
+    return ModelSelection(problem, start, groups, used, options).supported();
 }
 
-Climb climb_all(const Evidence& evidence, const Fit& start, const std::vector<Rung>& rungs, const Views& used,
-                const LadderOptions& options) {
-    return Ladder(evidence, start, rungs, used, options).all();
+Selection full_model(const Problem& problem, const Fit& start, const std::vector<ParameterGroup>& groups,
+                     const Views& used, const SelectionOptions& options) {
+    return ModelSelection(problem, start, groups, used, options).all();
 }
 
 } // namespace scanshade::calibration

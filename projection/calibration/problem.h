@@ -1,4 +1,4 @@
-// A source of evidence about a camera, as the ladder sees it: views that a model can be fitted to, and tested on.
+// A calibration problem as model selection sees it: views that a model can be fitted to, and tested on.
 #pragma once
 
 #include "projection/calibration/model.h"
@@ -16,10 +16,10 @@ using Views = std::vector<bool>; ///< which views take part
 /// A model fitted to some views.
 struct Fit {
     Model model;
-    std::vector<double> nuisance = {}; ///< the evidence's own unknowns (poses, landmarks): where the next fit starts
+    std::vector<double> nuisance = {}; ///< the problem's own unknowns (poses, points): where the next fit starts
     double rss = 0;                    ///< sum of squared residuals of the views used, in units of `unit()`
-    int residuals = 0, unknowns = 0;   ///< how many of each; unknowns count the evidence's own, too
-    /// Of the model's numbers; rows and columns of frozen ones are 0. Scaled by the residual variance.
+    int residuals = 0, unknowns = 0;   ///< how many of each; the problem's own unknowns count, too
+    /// Covariance of the model's numbers, scaled by the residual variance; rows and columns of fixed numbers are 0.
     /// Empty when it was not asked for, or when the views do not determine the free numbers.
     Eigen::MatrixXd covariance = {};
     bool converged = false;
@@ -36,27 +36,28 @@ struct ViewScore {
     [[nodiscard]] double rms() const { return points > 0 ? std::sqrt(squared / points) : 0; }
 };
 
-class Evidence {
+/// Observations of a camera and what they say of a model.
+class Problem {
   public:
-    virtual ~Evidence() = default;
+    virtual ~Problem() = default;
 
     [[nodiscard]] virtual std::size_t views() const = 0;
     [[nodiscard]] virtual std::string view_name(std::size_t view) const = 0;
-    /// What residuals are counted in.
+    /// The unit of residuals.
     [[nodiscard]] virtual std::string_view unit() const { return "px"; }
-    /// How much each view counts from now on, as the factor on its residuals; 1 until set.
-    virtual void weigh(const std::vector<double>& weights) = 0;
-    /// Nothing free yet: the evidence's own unknowns fitted to the model as it is.
+    /// Sets each view's weight, the factor on its residuals; 1 until set.
+    virtual void set_weights(const std::vector<double>& weights) = 0;
+    /// Fits the problem's own unknowns to the model as it is.
     [[nodiscard]] virtual Fit start(const Model& model) const = 0;
     /// Least squares over the views used, warm-started.
     [[nodiscard]] virtual Fit fit(const Fit& from, const Free& free, const Views& used, bool covariance) const = 0;
-    /// Each marked view's residuals under the model; the view's own unknowns are fitted, the model's are not.
+    /// Each wanted view's residuals under the model; the view's own unknowns are fitted, the model's are not.
     [[nodiscard]] virtual std::vector<ViewScore> score(const Fit& fit, const Views& wanted) const = 0;
-    /// Where in the image a view saw something, and by how much the model misses it there (predicted - seen), pixels;
-    /// no residuals where they are not of pixels.
+    /// The pixels that a view has observed.
     [[nodiscard]] virtual std::vector<cv::Point2d> pixels_of(std::size_t view) const = 0;
+    /// Predicted less observed pixel for each of them; empty where residuals are not of pixels.
     [[nodiscard]] virtual std::vector<Eigen::Vector2d> residuals(const Fit& fit, std::size_t view) const = 0;
-    /// Depths of what was seen, metres, for the effect in millimetres.
+    /// Depths of what was observed, metres, for the effect in millimetres.
     [[nodiscard]] virtual std::vector<double> depths_m(const Fit& fit) const = 0;
 };
 

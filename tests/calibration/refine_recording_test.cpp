@@ -1,13 +1,14 @@
-// Cameras refined from recordings: tracks, planes, clocks and a colour camera beside the depth camera.
+// Cameras refined from recordings: tracks, planes, time offsets and a secondary colour camera.
 #include "apps/generate.h"
-#include "apps/refine/sources.h"
+#include "apps/refine/recording.h"
 #include "apps/scene.h"
 #include "apps/sensor.h"
 #include "io/camera_file.h"
 #include "projection/calibration/recording/agreement.h"
-#include "projection/calibration/recording/plane_adjustment.h"
-#include "projection/calibration/recording/sequence.h"
+#include "projection/calibration/recording/planes.h"
 #include "projection/calibration/recording/residuals.h"
+#include "projection/calibration/recording/sequence.h"
+#include "projection/calibration/refinement.h"
 #include "projection/error.h"
 #include "tests/support/files.h"
 
@@ -44,7 +45,7 @@ const fs::path& office_folder() {
     return path;
 }
 
-/// The same in smaller steps, as a camera is followed.
+/// The same in smaller steps, for estimated poses.
 const fs::path& slow_office_folder() {
     static const tests::TemporaryFolder folder;
     static const fs::path path = generated(folder / "slow", 12, 1);
@@ -64,25 +65,26 @@ Capture office(const std::string& camera = "") {
 const char* five_percent_off = "551,551,319.5,239.5";
 
 TEST(Recordings, AWrongFocalLengthIsFoundAndTheRightOneKept) {
-    for (const char* evidence : {"tracks", "depth"}) {
+    for (const char* observations : {"tracks", "depth"}) {
         const Capture wrong = office(five_percent_off);
-        const Refinement r = refined(wrong, {.evidence = evidence}).refinement;
-        std::printf("%s: fx %.2f +- %.2f\n", r.source.c_str(), r.after.pinhole.fx, r.climb.fit.sigma(f));
-        ASSERT_TRUE(r.climb.free[f]) << evidence;
-        EXPECT_NEAR(r.after.pinhole.fx, 525, 3 * r.climb.fit.sigma(f) + 0.5) << evidence;
-        EXPECT_NEAR(r.after.pinhole.fx, 525, 8) << evidence;
-        EXPECT_LT(r.climb.held_out_px, r.climb.held_out_before_px) << evidence;
-        const Refinement right = refined(office(), {.evidence = evidence}).refinement;
-        EXPECT_FALSE(right.changed()) << evidence << ": " << right.climb.fit.model[f];
+        const Refinement r = refined(wrong, {.observations = observations}).refinement;
+        std::printf("%s: fx %.2f +- %.2f\n", r.source.c_str(), r.after.pinhole.fx, r.selection.fit.sigma(f));
+        ASSERT_TRUE(r.selection.free[f]) << observations;
+        EXPECT_NEAR(r.after.pinhole.fx, 525, 3 * r.selection.fit.sigma(f) + 0.5) << observations;
+        EXPECT_NEAR(r.after.pinhole.fx, 525, 8) << observations;
+        EXPECT_LT(r.selection.held_out_px, r.selection.held_out_before_px) << observations;
+        const Refinement right = refined(office(), {.observations = observations}).refinement;
+        EXPECT_FALSE(right.changed()) << observations << ": " << right.selection.fit.model[f];
     }
 }
 
-TEST(Recordings, WithoutPosesTheCameraIsFollowed) {
+TEST(Recordings, MissingPosesAreEstimated) {
     const Capture capture = open_capture(slow_office_folder());
     const RecordingResult result = refined(capture, {.poses = "ignore"});
     EXPECT_FALSE(result.refinement.changed());
     ASSERT_EQ(result.poses.size(), capture.entries.size());
-    const Eigen::Isometry3d start = *capture.entries[0].world_from_camera; // the followed world is the first camera's
+    const Eigen::Isometry3d start =
+        *capture.entries[0].world_from_camera; // estimated poses are relative to the first camera
     for (std::size_t i = 0; i < result.poses.size(); ++i) {
         const Eigen::Isometry3d truth = start.inverse() * *capture.entries[i].world_from_camera;
         const Eigen::Isometry3d found = result.poses[0].second.inverse() * result.poses[i].second;
@@ -91,7 +93,7 @@ TEST(Recordings, WithoutPosesTheCameraIsFollowed) {
     }
 }
 
-TEST(Recordings, ACaptureWithoutCameraStartsFromWhatIsTold) {
+TEST(Recordings, ACaptureWithoutCameraStartsFromTheFlags) {
     const tests::TemporaryFolder folder;
     fs::copy(slow_office_folder(), folder / "bare", fs::copy_options::recursive);
     const std::string camera = tests::file_bytes(slow_office_folder() / "camera.json");
@@ -113,7 +115,7 @@ TEST(Recordings, ACaptureWithoutCameraStartsFromWhatIsTold) {
     }
 }
 
-// ---------------------------------------------------------------------------------------------------- clocks
+// ---------------------------------------------------------------------------------------------------- time offsets
 
 /// The office with its poses stamped `late_s` after their time.
 Capture office_with_late_poses(const tests::TemporaryFolder& folder, double late_s) {
@@ -129,22 +131,22 @@ Capture office_with_late_poses(const tests::TemporaryFolder& folder, double late
     return open_capture(folder / "late");
 }
 
-TEST(Recordings, ClocksApartAreFoundAndTheNextRunGoesByThem) {
+TEST(Recordings, ATimeOffsetIsFoundAndTheNextRunAppliesIt) {
     const tests::TemporaryFolder folder;
     const double late_s = 0.015;
     const Capture late = office_with_late_poses(folder, late_s);
     const RecordingResult result = refined(late);
-    const Fit& fit = result.refinement.climb.fit;
+    const Fit& fit = result.refinement.selection.fit;
     std::printf("poses %.1f ms late: found %.2f +- %.2f ms\n", 1000 * late_s, 1000 * fit.model[time_offset],
                 1000 * fit.sigma(time_offset));
-    ASSERT_TRUE(result.refinement.climb.free[time_offset]);
+    ASSERT_TRUE(result.refinement.selection.free[time_offset]);
     EXPECT_NEAR(result.file.pose_time_offset_s, late_s, 3 * fit.sigma(time_offset));
     EXPECT_NEAR(result.file.pose_time_offset_s, late_s, 0.003);
-    EXPECT_LT(result.refinement.climb.held_out_px, result.refinement.climb.held_out_before_px);
+    EXPECT_LT(result.refinement.selection.held_out_px, result.refinement.selection.held_out_before_px);
     CameraFile file = read_camera_file(folder / "late/camera.json");
     file.pose_time_offset_s = result.file.pose_time_offset_s;
     write_camera_file(folder / "late/camera.json", file);
-    EXPECT_FALSE(refined(open_capture(folder / "late")).refinement.climb.free[time_offset]);
+    EXPECT_FALSE(refined(open_capture(folder / "late")).refinement.selection.free[time_offset]);
 }
 
 // ---------------------------------------------------------------------------------------------------- depth alone
@@ -190,11 +192,11 @@ const std::vector<Eigen::Vector4d> room = {
 
 Refinement refined(Planes& planes, const Camera& first) {
     RefineOptions options;
-    options.ladder.least_sigmas = 5;
+    options.selection.least_sigmas = 5;
     Refinement best;
-    for (const std::vector<Rung>& ladder : planes.ladders()) {
-        Refinement r = refine(planes, first, ladder, options, planes.degeneracy());
-        if (best.unit.empty() || r.climb.held_out_px < best.climb.held_out_px)
+    for (const std::vector<ParameterGroup>& groups : planes.group_orders()) {
+        Refinement r = refine(planes, first, groups, options, planes.degeneracy());
+        if (best.unit.empty() || r.selection.held_out_px < best.selection.held_out_px)
             best = std::move(r);
     }
     return best;
@@ -202,8 +204,8 @@ Refinement refined(Planes& planes, const Camera& first) {
 
 std::string steps_of(const Refinement& r) {
     std::string all;
-    for (const Step& step : r.climb.steps)
-        all += "\n  " + step.name + (step.climbed ? " freed: " : " kept: ") + step.why;
+    for (const Step& step : r.selection.steps)
+        all += "\n  " + step.name + (step.freed ? " freed: " : " kept: ") + step.why;
     for (const std::string& note : r.notes)
         all += "\n  " + note;
     return all;
@@ -215,32 +217,33 @@ TEST(Planes, RecoverFocalLengthAndLensTogether) {
     first.pinhole.fx = first.pinhole.fy = 275;
     Planes planes(frames_of_walls(truth, room, looks_around()), model_of(first));
     const Refinement r = refined(planes, first);
-    const Fit& fit = r.climb.fit;
+    const Fit& fit = r.selection.fit;
     std::printf("f %.2f +- %.2f, k1 %.4f +- %.4f\n", fit.model[f], fit.sigma(f), fit.model[k1], fit.sigma(k1));
-    ASSERT_TRUE(r.climb.free[f] && r.climb.free[k1]);
+    ASSERT_TRUE(r.selection.free[f] && r.selection.free[k1]);
     EXPECT_NEAR(fit.model[f], 262.5, 1);
     EXPECT_NEAR(fit.model[k1], -0.12, 0.01);
 }
 
-TEST(Planes, AScaleIsNotTakenForAFocalLengthInABareRoom) {
-    // A camera that moves only sideways sees a room that is s times deeper as one whose focal length is s times longer:
-    // x z / f and y z / f stay what they are, and no wall tells how it ought to slant. One turn of the camera does.
+TEST(Planes, AScaleIsNotMistakenForAFocalLengthInABareRoom) {
+    // A camera that moves only sideways cannot distinguish a room s times deeper from a focal length s times longer:
+    // x z / f and y z / f stay the same, and the slant of no wall is known. A rotation of the camera resolves that.
     const Camera tiny{{131.25, 131.25, 79.5, 59.5, {160, 120}}, {}, "tiny"};
-    const auto refined_moving = [&](double turn, const Camera& first, float depths) {
+    const auto refined_moving = [&](double angle, const Camera& first, float depths) {
         std::vector<Eigen::Isometry3d> poses(5, Eigen::Isometry3d::Identity());
         for (int i = 0; i < 5; ++i) {
             poses[i].translation() = Eigen::Vector3d(0.15 * (i - 2), 0.1 * (i % 3), 0);
-            poses[i].linear() = Eigen::AngleAxisd(turn * (i - 2), Eigen::Vector3d(0.6, 0.8, 0)).toRotationMatrix();
+            poses[i].linear() = Eigen::AngleAxisd(angle * (i - 2), Eigen::Vector3d(0.6, 0.8, 0)).toRotationMatrix();
         }
         std::vector<PlaneFrame> frames = frames_of_walls(tiny, room, poses);
         for (PlaneFrame& frame : frames)
             frame.depth_m *= depths;
         Planes planes(std::move(frames), model_of(first));
-        std::vector<Rung> rungs = planes.ladders().front();
-        std::erase_if(rungs, [](const Rung& rung) { return rung.name != "f" && rung.name != "depth scale"; });
+        std::vector<ParameterGroup> groups = planes.group_orders().front();
+        std::erase_if(groups,
+                      [](const ParameterGroup& group) { return group.name != "f" && group.name != "depth scale"; });
         RefineOptions options;
-        options.ladder.least_sigmas = 5;
-        return refine(planes, first, rungs, options, planes.degeneracy());
+        options.selection.least_sigmas = 5;
+        return refine(planes, first, groups, options, planes.degeneracy());
     };
     Camera wrong = tiny;
     wrong.pinhole.fx = wrong.pinhole.fy = 1.05 * 131.25;
@@ -248,19 +251,19 @@ TEST(Planes, AScaleIsNotTakenForAFocalLengthInABareRoom) {
     EXPECT_FALSE(sideways.changed()) << steps_of(sideways);
     EXPECT_TRUE(says(steps_of(sideways), "focal length and depth scale cannot be told apart here"))
         << steps_of(sideways);
-    EXPECT_FALSE(turning.climb.free[depth_scale]) << steps_of(turning);
-    EXPECT_NEAR(turning.climb.fit.model[f], 131.25, 0.5) << steps_of(turning);
+    EXPECT_FALSE(turning.selection.free[depth_scale]) << steps_of(turning);
+    EXPECT_NEAR(turning.selection.fit.model[f], 131.25, 0.5) << steps_of(turning);
 }
 
-TEST(Planes, WithoutPosesOnlyTheLensAndDepthsOffsetAreAsked) {
+TEST(Planes, WithoutPosesOnlyLensAndDepthOffsetAreFree) {
     const Camera truth{small.pinhole, {-0.12, 0, 0, 0, 0}, "truth"};
     Planes planes(frames_of_walls(truth, room, looks_around(), false), model_of(small));
     EXPECT_FALSE(planes.linked());
     const Refinement r = refined(planes, small);
-    EXPECT_TRUE(r.climb.free[k1]);
-    EXPECT_FALSE(r.climb.free[f] || r.climb.free[depth_scale]);
-    EXPECT_NEAR(r.climb.fit.model[k1], -0.12, 0.02);
-    // A focal length that is wrong by 5 % leaves every plane a plane: nothing is to be found, and nothing is changed.
+    EXPECT_TRUE(r.selection.free[k1]);
+    EXPECT_FALSE(r.selection.free[f] || r.selection.free[depth_scale]);
+    EXPECT_NEAR(r.selection.fit.model[k1], -0.12, 0.02);
+    // With a focal length 5 % wrong every plane stays a plane: nothing can be found, and nothing changes.
     Camera wrong = small;
     wrong.pinhole.fx = wrong.pinhole.fy = 275;
     Planes plain(frames_of_walls(small, room, looks_around(), false), model_of(wrong));
@@ -279,11 +282,11 @@ TEST(Planes, DegenerateScenesAreNamedAndChangeNothing) {
     EXPECT_TRUE(says(said_of({room[0]}, looks_around()), "1 plane in the depth images"));
     EXPECT_TRUE(says(said_of(room, std::vector(4, looks_around()[0])), "the camera hardly moves"));
     // Steps of a stair seen from before it: many planes, one direction.
-    std::vector<Eigen::Isometry3d> aside;
+    std::vector<Eigen::Isometry3d> poses;
     for (int i = 0; i < 5; ++i)
-        aside.emplace_back(Eigen::Translation3d(0.05 * i, 0, 0));
+        poses.emplace_back(Eigen::Translation3d(0.05 * i, 0, 0));
     std::vector<PlaneFrame> stairs;
-    for (const Eigen::Isometry3d& pose : aside) {
+    for (const Eigen::Isometry3d& pose : poses) {
         cv::Mat1f depth(small.pinhole.size);
         for (int row = 0; row < depth.rows; ++row)
             depth.row(row).setTo(3.0F - 0.3F * static_cast<float>(row / 48));
@@ -299,12 +302,11 @@ TEST(Planes, DegenerateScenesAreNamedAndChangeNothing) {
         says(tests::refusal([&] { (void)Planes(rough, model_of(small)); }), "nothing in the depth images is plane"));
 }
 
-// ---------------------------------------------------------------------------------------------------- colour beside
-// depth
+// ---------------------------------------------------------------------------------------------------- secondary camera
 
-/// Office frames whose colour comes from a camera 40 mm aside, turned by a degree, of another focal length.
-std::vector<SequenceFrame> frames_beside(const Camera& depth_camera, const ColourCamera& colour, double start_s = 0,
-                                         int seed = 1, int count = 10) {
+/// Office frames whose colour comes from a second camera: 40 mm away, rotated by a degree, of another focal length.
+std::vector<SequenceFrame> frames_of_secondary(const Camera& depth_camera, const ColourCamera& colour,
+                                               double start_s = 0, int seed = 1, int count = 10) {
     static const scene::World world(scene::scene_named("office"));
     std::vector<SequenceFrame> frames;
     for (int i = 0; i < count; ++i) {
@@ -320,7 +322,7 @@ std::vector<SequenceFrame> frames_beside(const Camera& depth_camera, const Colou
     return frames;
 }
 
-/// Where a model puts what the depth camera sees, against where the truth does: pixels, root mean square.
+/// Distance between the projections of recorded depth by a model and by the truth: pixels, root mean square.
 double warp_error_px(const Camera& depth_camera, const cv::Mat1f& depth_m, const Model& model,
                      const ColourCamera& truth) {
     double squares = 0, count = 0;
@@ -330,7 +332,7 @@ double warp_error_px(const Camera& depth_camera, const cv::Mat1f& depth_m, const
                 continue;
             const Eigen::Vector3d in_depth = depth_m(v, u) * ray_of(depth_camera, Eigen::Vector2d(u, v));
             const Eigen::Vector3d wanted = truth.colour_from_depth * in_depth,
-                                  found = from_six(model.values.data() + turn_x) * in_depth;
+                                  found = pose_from_parameters(model.values.data() + rotation_x) * in_depth;
             const Model right = model_of(truth.camera);
             Eigen::Vector2d a, b;
             pixel_of(right.lens, right.values.data(), wanted.data(), a.data());
@@ -341,64 +343,65 @@ double warp_error_px(const Camera& depth_camera, const cv::Mat1f& depth_m, const
     return std::sqrt(squares / count);
 }
 
-TEST(ColourBeside, AgreementIsToldFromChance) {
+TEST(SecondaryCamera, AgreementIsAboveChance) {
     const Camera depth_camera{{585, 585, 320, 240, {640, 480}}, {}, "depth"};
     ColourCamera truth{{{530, 530, 319.5, 239.5, {640, 480}}, {}, "truth"}, Eigen::Isometry3d::Identity()};
     truth.colour_from_depth.translation() = Eigen::Vector3d(-0.04, 0.003, -0.002);
-    const std::vector<SequenceFrame> frames = frames_beside(depth_camera, truth, 0, 1, 3);
+    const std::vector<SequenceFrame> frames = frames_of_secondary(depth_camera, truth, 0, 1, 3);
     Model right = model_of(truth.camera);
-    to_six(truth.colour_from_depth, right.values.data() + turn_x);
+    to_pose_parameters(truth.colour_from_depth, right.values.data() + rotation_x);
     const auto sigmas = [&](double off_px) {
         Model off = right;
-        off[cx] += off_px; // both ways: along a straight edge nothing is seen of a shift
+        off[cx] += off_px; // both axes: a translation along a straight edge is invisible
         off[cy] += off_px;
         return outline_agreement(frames, depth_camera, off, expected_gap_px).sigmas();
     };
-    std::printf("sigmas beyond chance: %.1f, 15 px aside %.1f and %.1f\n", sigmas(0), sigmas(15), sigmas(-15));
+    std::printf("sigmas above chance: %.1f, 15 px off %.1f and %.1f\n", sigmas(0), sigmas(15), sigmas(-15));
     EXPECT_GT(sigmas(0), 5);
     EXPECT_LT(sigmas(15), 3);
     EXPECT_LT(sigmas(-15), 3);
 }
 
-TEST(ColourBeside, ColourComesToLieOnDepth) {
+TEST(SecondaryCamera, ColourIsRegisteredWithDepth) {
     const Camera depth_camera{{585, 585, 320, 240, {640, 480}}, {}, "depth"};
     ColourCamera truth{{{530, 530, 319.5, 239.5, {640, 480}}, {}, "truth"}, Eigen::Isometry3d::Identity()};
     truth.colour_from_depth.linear() = Eigen::AngleAxisd(0.02, Eigen::Vector3d(2, -1, 2) / 3).toRotationMatrix();
     truth.colour_from_depth.translation() = Eigen::Vector3d(-0.04, 0.003, -0.002);
     const Camera guess{{505, 505, 319.5, 239.5, {640, 480}}, {}, "guess"};
-    const std::vector<SequenceFrame> frames = frames_beside(depth_camera, truth);
+    const std::vector<SequenceFrame> frames = frames_of_secondary(depth_camera, truth);
     std::vector<double> off_px;
     for (const bool outlines : {false, true}) {
         SequenceOptions how;
         how.registered = how.refine_poses = false;
         how.outlines = outlines;
         Sequence sequence(frames, depth_camera, model_of(guess), how);
-        std::vector<Rung> rungs = camera_rungs(LensModel::brown_conrady);
-        rungs.insert(rungs.begin(), place_rung());
+        std::vector<ParameterGroup> groups = camera_groups(LensModel::brown_conrady);
+        groups.insert(groups.begin(), extrinsics_group());
         RefineOptions options;
-        options.ladder.guessed = true;
-        options.ladder.folds = 3;
-        options.ladder.least_sigmas = 5;
+        options.selection.guessed = true;
+        options.selection.folds = 3;
+        options.selection.least_sigmas = 5;
         const Refinement r =
-            refine(sequence, guess, rungs, options, sequence.degeneracy(sequence.start(model_of(guess))));
-        const Fit& fit = r.climb.fit;
+            refine(sequence, guess, groups, options, sequence.degeneracy(sequence.start(model_of(guess))));
+        const Fit& fit = r.selection.fit;
         const auto error_px = [&](const Model& model) {
             return warp_error_px(depth_camera, frames[3].depth_m, model, truth);
         };
-        std::printf("%s outlines: %zu points, %zu of outlines; f %.1f +- %.1f (530), shift %.1f %.1f %.1f +- %.1f mm "
-                    "(-40 3 -2), off "
-                    "%.2f px, %.2f before; held out %.2f -> %.2f\n",
-                    outlines ? "with" : "without", sequence.points(), sequence.outline_points(), fit.model[f],
-                    fit.sigma(f), 1000 * fit.model[shift_x], 1000 * fit.model[shift_y], 1000 * fit.model[shift_z],
-                    1000 * fit.sigma(shift_x), error_px(fit.model), error_px(model_of(guess)),
-                    r.climb.held_out_before_px, r.climb.held_out_px);
-        ASSERT_TRUE(r.climb.free[f] && r.climb.free[turn_x]);
+        std::printf(
+            "%s outlines: %zu points, %zu of outlines; f %.1f +- %.1f (530), translation %.1f %.1f %.1f +- %.1f mm "
+            "(-40 3 -2), off "
+            "%.2f px, %.2f before; held out %.2f -> %.2f\n",
+            outlines ? "with" : "without", sequence.points(), sequence.outline_points(), fit.model[f], fit.sigma(f),
+            1000 * fit.model[translation_x], 1000 * fit.model[translation_y], 1000 * fit.model[translation_z],
+            1000 * fit.sigma(translation_x), error_px(fit.model), error_px(model_of(guess)),
+            r.selection.held_out_before_px, r.selection.held_out_px);
+        ASSERT_TRUE(r.selection.free[f] && r.selection.free[rotation_x]);
         EXPECT_NEAR(fit.model[f], 530, 8) << steps_of(r);
-        EXPECT_LT(r.climb.held_out_px, 0.5 * r.climb.held_out_before_px);
+        EXPECT_LT(r.selection.held_out_px, 0.5 * r.selection.held_out_before_px);
         off_px.push_back(error_px(fit.model));
     }
     EXPECT_LT(off_px[1], 0.2 * warp_error_px(depth_camera, frames[3].depth_m, model_of(guess), truth));
-    EXPECT_LT(off_px[1], 0.5 * off_px[0]); // points alone hardly tell a shift from a turn
+    EXPECT_LT(off_px[1], 0.5 * off_px[0]); // points alone hardly distinguish a translation from a rotation
 }
 
 /// Errors in sigmas of one number over several trials.
@@ -417,9 +420,9 @@ struct Trials {
     }
 };
 
-/// Places of the walk, noise and the colour camera are other ones in each trial: 2 of them in a test. SCANSHADE_TRIALS
-/// says how many to measure instead, SCANSHADE_FIRST_TRIAL from which on.
-TEST(ColourBeside, SigmasAreHonest) {
+/// Each trial has its own part of the walk, noise and colour camera. A test runs 2 of them; SCANSHADE_TRIALS and
+/// SCANSHADE_FIRST_TRIAL choose others.
+TEST(SecondaryCamera, SigmasAreHonest) {
     const auto number_from = [](const char* name, int otherwise) {
         const char* text = std::getenv(name);
         return text ? std::atoi(text) : otherwise;
@@ -427,7 +430,8 @@ TEST(ColourBeside, SigmasAreHonest) {
     const int trials = number_from("SCANSHADE_TRIALS", 2), first_trial = number_from("SCANSHADE_FIRST_TRIAL", 2);
     const Camera depth_camera{{585, 585, 320, 240, {640, 480}}, {}, "depth"};
     const Camera guess{{525, 525, 319.5, 239.5, {640, 480}}, {}, "guess"};
-    const std::vector<Unknown> numbers = {f, turn_x, turn_y, turn_z, shift_x, shift_y, shift_z};
+    const std::vector<Unknown> numbers = {
+        f, rotation_x, rotation_y, rotation_z, translation_x, translation_y, translation_z};
     std::map<Unknown, Trials> by_number;
     Trials all;
     for (int trial = first_trial; trial < first_trial + trials; ++trial) {
@@ -440,13 +444,13 @@ TEST(ColourBeside, SigmasAreHonest) {
         truth.colour_from_depth.linear() = Eigen::AngleAxisd(0.02, three(1).normalized()).toRotationMatrix();
         truth.colour_from_depth.translation() = Eigen::Vector3d(-0.04, 0, 0) + three(0.005);
         Model right = model_of(truth.camera);
-        to_six(truth.colour_from_depth, right.values.data() + turn_x);
+        to_pose_parameters(truth.colour_from_depth, right.values.data() + rotation_x);
         constexpr double walk_s = 16, golden = 0.618;
         const double start_s = walk_s * std::fmod(golden * trial, 1.0);
         SequenceOptions how;
         how.registered = how.refine_poses = false;
         try {
-            const Sequence sequence(frames_beside(depth_camera, truth, start_s, trial + 1), depth_camera,
+            const Sequence sequence(frames_of_secondary(depth_camera, truth, start_s, trial + 1), depth_camera,
                                     model_of(guess), how);
             Free free{};
             for (const Unknown number : numbers)
@@ -459,7 +463,7 @@ TEST(ColourBeside, SigmasAreHonest) {
                 by_number[number].sigmas_off.push_back(off / fit.sigma(number));
                 all.sigmas_off.push_back(off / fit.sigma(number));
                 std::printf("%s %.4f +- %.4f%s", std::string(name_of(number)).c_str(), off, fit.sigma(number),
-                            number == shift_z ? "\n" : ", ");
+                            number == translation_z ? "\n" : ", ");
             }
         } catch (const Error& failure) { // a wall without texture
             std::printf("trial %d: %s\n", trial, failure.what());
@@ -470,7 +474,7 @@ TEST(ColourBeside, SigmasAreHonest) {
                     100 * of_number.within_two(), of_number.rms());
     ASSERT_GE(all.sigmas_off.size(), numbers.size() * static_cast<std::size_t>(trials) / 2);
     std::printf("all: within 2 sigma %.1f %%, rms %.2f sigma\n", 100 * all.within_two(), all.rms());
-    EXPECT_GE(all.within_two(), trials < 20 ? 0.75 : 0.93); // a few fall together
+    EXPECT_GE(all.within_two(), trials < 20 ? 0.75 : 0.93); // few trials are correlated
     EXPECT_LT(all.rms(), 3);
     EXPECT_GT(all.rms(), 1.0 / 3);
 }
@@ -507,27 +511,28 @@ void expect_right_derivatives(const Residual& residual, std::vector<std::vector<
 
 TEST(Derivatives, OfEveryResidualOfRecordingsAgreeWithNumericOnes) {
     const Motion motion{{0.3, -0.2, 0.1}, {0.2, 0.1, -0.3}};
-    const std::vector<double> depth = {1.02, -0.01, 0.003}, place = {0.02, -0.03, 0.01, 0.03, 0.002, -0.004},
+    const std::vector<double> depth = {1.02, -0.01, 0.003}, extrinsics = {0.02, -0.03, 0.01, 0.03, 0.002, -0.004},
                               clock = {0.01}, pose = {0.3, -0.2, 0.1, 0.2, -0.1, 0.3}, point = {0.3, -0.2, 1.9};
     for (const LensModel lens : {LensModel::brown_conrady, LensModel::kannala_brandt}) {
         const std::vector<double> camera = {530, 0.99, 322, 238, -0.1, 0.03, 0.002, -0.001, 0.01, -0.01};
-        expect_right_derivatives<SightingResidual, 2, camera_unknowns, 1, 6, 3>({lens, {300, 200}, motion, 0.004, 1.5},
-                                                                                {camera, clock, pose, point});
-        expect_right_derivatives<PlacedSightingResidual, 2, camera_unknowns, place_unknowns, 1, 6, 3>(
-            {lens, {300, 200}, motion, 0.004, 1.5}, {camera, place, clock, pose, point});
-        expect_right_derivatives<PosedSightingResidual, 2, camera_unknowns, place_unknowns, 1, 3>(
-            {lens, {300, 200}, motion, 0.004, 1.5, from_six(pose.data())}, {camera, place, clock, point});
-        // Steps of numeric differences bring the lens's Newton iteration to its own tolerance of 1e-10.
-        expect_right_derivatives<OutlineResidual, 1, camera_unknowns, place_unknowns, 1, 1>(
+        expect_right_derivatives<ObservationResidual, 2, camera_unknowns, 1, 6, 3>(
+            {lens, {300, 200}, motion, 0.004, 1.5}, {camera, clock, pose, point});
+        expect_right_derivatives<SecondaryObservationResidual, 2, camera_unknowns, extrinsic_unknowns, 1, 6, 3>(
+            {lens, {300, 200}, motion, 0.004, 1.5}, {camera, extrinsics, clock, pose, point});
+        expect_right_derivatives<FixedPoseObservationResidual, 2, camera_unknowns, extrinsic_unknowns, 1, 3>(
+            {lens, {300, 200}, motion, 0.004, 1.5, pose_from_parameters(pose.data())},
+            {camera, extrinsics, clock, point});
+        // Numeric differences see the lens's Newton iteration only to its tolerance of 1e-10.
+        expect_right_derivatives<OutlineResidual, 1, camera_unknowns, extrinsic_unknowns, 1, 1>(
             {lens, {0.3, -0.2, 1.9}, {0.003, -0.001, 0}, {400, 180}, {0.6, 0.8}, motion, 0.004, 1.5},
-            {camera, place, clock, {0.7}});
+            {camera, extrinsics, clock, {0.7}});
         expect_right_derivatives<PlaneResidual, 1, camera_unknowns, depth_unknowns, 6, 3>(
             {lens, {420, 130}, 1.8, {0.2, -0.1, 0.3}, 10}, {camera, depth, pose, {0.2, 0.1, 0.5}});
     }
     expect_right_derivatives<DepthResidual, 1, depth_unknowns, 1, 6, 3>({1.8, motion, 100},
                                                                         {depth, clock, pose, point});
     expect_right_derivatives<SurfaceResidual, 1, 6, 3>({{0.1, 0.2, 2}, {0, 0.6, -0.8}, 100}, {pose, point});
-    expect_right_derivatives<PoseResidual, 6, 6>(
+    expect_right_derivatives<PosePriorResidual, 6, 6>(
         {Eigen::Quaterniond(0.9, 0.1, -0.3, 0.2).normalized(), {1, 2, 3}, 10, 20}, {pose});
 }
 

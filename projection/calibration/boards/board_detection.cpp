@@ -1,4 +1,4 @@
-// OpenCV's detectors of each target, made to give points and pixels.
+// Calls OpenCV's detector of each target and returns points and pixels.
 #include "projection/calibration/boards/board_detection.h"
 
 #include "projection/error.h"
@@ -28,7 +28,7 @@ int dictionary_named(const std::string& name) {
         if (known == name)
             return index;
     throw Misuse(
-        fmt::format("'{}' is no marker dictionary, expected one of {}", name, fmt::join(dictionary_names(), ", ")));
+        fmt::format("'{}' is not a marker dictionary, expected one of {}", name, fmt::join(dictionary_names(), ", ")));
 }
 
 void check(const Target& target) {
@@ -56,7 +56,7 @@ BoardView view_of(const std::vector<cv::Point2f>& pixels, const Target& target, 
 
 /// The refinement's window must not reach a neighbouring corner: just under half the least distance between two.
 int window_half(const std::vector<cv::Point2f>& corners, cv::Size count) {
-    constexpr int largest = 11; // OpenCV's samples', enough for a blurred edge
+    constexpr int largest = 11; // as in OpenCV's samples, enough for a blurred edge
     double least = 2.0 * largest + 2;
     for (int i = 0; i < static_cast<int>(corners.size()); ++i) {
         if ((i + 1) % count.width != 0)

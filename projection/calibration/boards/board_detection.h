@@ -14,17 +14,17 @@ namespace scanshade::calibration {
 struct Target {
     enum class Kind { chessboard, charuco, circles, asymmetric_circles } kind = Kind::chessboard;
     cv::Size count{9, 6};
-    double square_m =
-        0.025;           ///< between neighbouring corners or circles (of one row of an asymmetric grid: half of that)
-    double marker_m = 0; ///< side of a ChArUco marker; 0 = three quarters of a square
+    /// Between neighbouring corners or circles; in an asymmetric grid, half the distance between circles of one row.
+    double square_m = 0.025;
+    double marker_m = 0;               ///< side of a ChArUco marker; 0 = three quarters of a square
     std::string dictionary = "4x4_50"; ///< of the ChArUco markers
 };
 
 /// The names that Target::dictionary takes: 4x4_50 ... 7x7_1000.
 [[nodiscard]] std::vector<std::string> dictionary_names();
 
-/// The board in a picture, named `name`; none where it is not there (or too little of a ChArUco board).
-/// Throws Error where the target itself cannot be (fewer than 3x3 points, an unknown dictionary).
+/// The board in a picture, named `name`; none where the picture shows no board, or too little of a ChArUco board.
+/// Throws Error where the target is impossible (fewer than 3x3 points, an unknown dictionary).
 [[nodiscard]] std::optional<BoardView> find_board(const cv::Mat3b& picture, const Target& target,
                                                   const std::string& name);
 

@@ -1,4 +1,4 @@
-// Boards as evidence: the adjustment, first guesses, and views that tell nothing.
+// The bundle adjustment of boards, first guesses, and degenerate views.
 #include "projection/calibration/boards/boards.h"
 
 #include "projection/calibration/solve.h"
@@ -10,24 +10,22 @@
 namespace scanshade::calibration {
 namespace {
 
-constexpr int pose_unknowns = 6;
-
 struct CornerResidual {
     LensModel lens;
     Eigen::Vector3d point_m;
-    Eigen::Vector2d seen;
+    Eigen::Vector2d observed;
     double weight;
 
     template <class Number>
     bool operator()(const Number* camera, const Number* pose, Number* residual) const {
         const Number on_board[3] = {Number(point_m.x()), Number(point_m.y()), Number(point_m.z())};
         Number point[3];
-        moved(pose, on_board, point);
+        transform_point(pose, on_board, point);
         if (point[2] < Number(1e-6))
-            return false; // behind the camera: the solver takes a shorter step
+            return false; // behind the camera: the solver then takes a shorter step
         pixel_of(lens, camera, point, residual);
         for (int i = 0; i < 2; ++i)
-            residual[i] = Number(weight) * (residual[i] - Number(seen[i]));
+            residual[i] = Number(weight) * (residual[i] - Number(observed[i]));
         return true;
     }
 };
@@ -39,27 +37,29 @@ void add_view(ceres::Problem& problem, Model& model, const BoardView& view, doub
                                  nullptr, model.values.data(), pose);
 }
 
-/// The board's pose from its homography, with directions freed of the lens so that any lens will do.
+/// The board's pose from its homography, on undistorted directions so that any lens will do.
 void guess_pose(const Model& model, const BoardView& view, double* pose) {
     const Camera camera = calibration::camera_of(model);
     std::vector<cv::Point3d> points;
-    std::vector<cv::Point2d> straight, seen;
+    std::vector<cv::Point2d> undistorted_pixels, observed;
     for (std::size_t i = 0; i < view.pixels.size(); ++i) {
         const auto& [x, y, z] = std::tie(view.points_m[i].x(), view.points_m[i].y(), view.points_m[i].z());
         points.emplace_back(x, y, z);
-        seen.emplace_back(view.pixels[i].x(), view.pixels[i].y());
+        observed.emplace_back(view.pixels[i].x(), view.pixels[i].y());
     }
     const auto& [fx, fy, px, py, size] = camera.pinhole;
     const cv::Matx33d matrix(fx, 0, px, 0, fy, py, 0, 0, 1);
     if (model.lens == LensModel::kannala_brandt)
-        cv::fisheye::undistortPoints(seen, straight, matrix, cv::Vec4d(model[k1], model[k2], model[k3], model[k4]));
+        cv::fisheye::undistortPoints(observed, undistorted_pixels, matrix,
+                                     cv::Vec4d(model[k1], model[k2], model[k3], model[k4]));
     else
-        cv::undistortPoints(seen, straight, matrix,
+        cv::undistortPoints(observed, undistorted_pixels, matrix,
                             cv::Vec<double, 5>(model[k1], model[k2], model[p1], model[p2], model[k3]));
-    cv::Vec3d turn, shift;
-    cv::solvePnP(points, straight, cv::Matx33d::eye(), cv::noArray(), turn, shift, false, cv::SOLVEPNP_ITERATIVE);
-    std::copy_n(turn.val, 3, pose);
-    std::copy_n(shift.val, 3, pose + 3);
+    cv::Vec3d rotation, translation;
+    cv::solvePnP(points, undistorted_pixels, cv::Matx33d::eye(), cv::noArray(), rotation, translation, false,
+                 cv::SOLVEPNP_ITERATIVE);
+    std::copy_n(rotation.val, 3, pose);
+    std::copy_n(translation.val, 3, pose + 3);
 }
 
 std::vector<Eigen::Vector2d> residuals_of(const Model& model, const BoardView& view, const double* pose) {
@@ -91,7 +91,7 @@ Fit Boards::fit(const Fit& from, const Free& free, const Views& used, bool covar
     for (std::size_t i = 0; i < views_.size(); ++i)
         if (used[i])
             add_view(problem, fit.model, views_[i], weights_[i], &fit.nuisance[i * pose_unknowns]);
-    freeze(problem, fit.model, free);
+    fix(problem, fit.model, free);
     solve(problem, fit, false);
     if (covariance) {
         std::vector<double*> poses;
@@ -111,7 +111,7 @@ std::vector<ViewScore> Boards::score(const Fit& from, const Views& wanted) const
         double* pose = &fit.nuisance[i * pose_unknowns];
         ceres::Problem problem;
         add_view(problem, fit.model, views_[i], 1, pose);
-        freeze(problem, fit.model, {});
+        fix(problem, fit.model, {});
         solve(problem, fit, false);
         for (const Eigen::Vector2d& residual : residuals_of(fit.model, views_[i], pose))
             scores[i].squared += residual.squaredNorm();
@@ -132,7 +132,7 @@ std::vector<double> Boards::depths_m(const Fit& fit) const {
     for (std::size_t i = 0; i < views_.size(); ++i)
         for (const Eigen::Vector3d& on_board : views_[i].points_m) {
             Eigen::Vector3d point;
-            moved(&fit.nuisance[i * pose_unknowns], on_board.data(), point.data());
+            transform_point(&fit.nuisance[i * pose_unknowns], on_board.data(), point.data());
             depths.push_back(point.z());
         }
     return depths;
@@ -154,7 +154,7 @@ Camera guess_from_boards(const std::vector<BoardView>& views, cv::Size size) {
         }
     }
     const cv::Matx33d matrix = cv::initCameraMatrix2D(points, pixels, size, 1.0);
-    // Views without perspective say nothing; a usual lens is then a better start than none.
+    // Views without perspective determine no focal length; a usual lens is then a better start than none.
     const double usual = 0.9 * size.width, found = matrix(0, 0);
     const double guess = std::isfinite(found) && found > 0.2 * usual && found < 10 * usual ? found : usual;
     return {{guess, guess, (size.width - 1) / 2.0, (size.height - 1) / 2.0, size}, {}, "guessed from the board"};
@@ -162,7 +162,7 @@ Camera guess_from_boards(const std::vector<BoardView>& views, cv::Size size) {
 
 namespace {
 
-/// Whether two images show the board at the same place: the corners' distances, root mean square.
+/// How far the board has moved between two images: the corners' distances, root mean square.
 double distance_px(const BoardView& a, const BoardView& b) {
     if (a.pixels.size() != b.pixels.size())
         return std::numeric_limits<double>::infinity();
@@ -173,7 +173,7 @@ double distance_px(const BoardView& a, const BoardView& b) {
 }
 
 int distinct(const std::vector<BoardView>& views) {
-    constexpr double same_px = 2; // a shaky tripod is no second view
+    constexpr double same_px = 2; // a shaking tripod gives no second view
     std::vector<const BoardView*> different;
     for (const BoardView& view : views)
         if (std::none_of(different.begin(), different.end(),

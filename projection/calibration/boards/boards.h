@@ -1,23 +1,23 @@
-// Calibration targets as evidence: bundle adjustment of a camera and one pose per view of a flat board.
+// Calibration boards as a problem: bundle adjustment of a camera and one pose per view of a flat board.
 #pragma once
 
 #include "projection/calibration/problem.h"
 
 namespace scanshade::calibration {
 
-/// A board as one image shows it: pixel i shows point i of the board, metres, z = 0.
+/// A board in one image: pixel i shows point i of the board, metres, z = 0.
 struct BoardView {
     std::string name;
     std::vector<Eigen::Vector3d> points_m;
     std::vector<Eigen::Vector2d> pixels;
 };
 
-class Boards final : public Evidence {
+class Boards final : public Problem {
   public:
     /// Throws Error naming the view that has fewer than 6 points.
     explicit Boards(std::vector<BoardView> views);
 
-    void weigh(const std::vector<double>& weights) override { weights_ = weights; }
+    void set_weights(const std::vector<double>& weights) override { weights_ = weights; }
     [[nodiscard]] std::size_t views() const override { return views_.size(); }
     [[nodiscard]] std::string view_name(std::size_t view) const override { return views_[view].name; }
     [[nodiscard]] Fit start(const Model& model) const override;
@@ -33,7 +33,7 @@ class Boards final : public Evidence {
 };
 
 /// A first guess from the views' homographies (Zhang 2000 with the principal point in the middle and square pixels).
-/// Throws Error where they do not tell.
+/// Views without perspective give a usual lens instead.
 [[nodiscard]] Camera guess_from_boards(const std::vector<BoardView>& views, cv::Size size);
 
 /// Why these views cannot determine a camera: too few different ones, or all of one tilt. Empty = they may.

@@ -1,9 +1,9 @@
-// Organised clouds as evidence: a sample of points per tile.
+// Samples points per tile of an organised cloud, and fits a camera to them.
 #include "projection/calibration/boards/organised_clouds.h"
 
-#include "projection/fit_pinhole.h"
 #include "projection/calibration/solve.h"
 #include "projection/error.h"
+#include "projection/fit_pinhole.h"
 
 #include <fmt/format.h>
 
@@ -27,10 +27,10 @@ struct PointResidual {
 
 } // namespace
 
-void Organised::add(const std::string& name, const Cloud& cloud) {
+void OrganisedClouds::add(const std::string& name, const Cloud& cloud) {
     constexpr int stride = 8, tiles_across = 4;
     constexpr std::size_t least_points = 20;
-    (void)during(name, [&] { return fit_pinhole(cloud); }); // refuses what no camera explains
+    (void)during(name, [&] { return fit_pinhole(cloud); }); // throws where no camera explains the points
     if (size_.empty())
         size_ = cloud.grid;
     if (cloud.grid != size_)
@@ -51,11 +51,11 @@ void Organised::add(const std::string& name, const Cloud& cloud) {
         }
 }
 
-Fit Organised::start(const Model& model) const {
+Fit OrganisedClouds::start(const Model& model) const {
     return fit({.model = model, .nuisance = {}, .covariance = {}}, {}, Views(tiles_.size(), true), false);
 }
 
-Fit Organised::fit(const Fit& from, const Free& free, const Views& used, bool covariance) const {
+Fit OrganisedClouds::fit(const Fit& from, const Free& free, const Views& used, bool covariance) const {
     Fit fit = from;
     ceres::Problem problem;
     for (std::size_t i = 0; i < tiles_.size(); ++i)
@@ -64,14 +64,14 @@ Fit Organised::fit(const Fit& from, const Free& free, const Views& used, bool co
                 problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PointResidual, 2, camera_unknowns>(
                                              new PointResidual{fit.model.lens, point.in_camera, point.pixel}),
                                          nullptr, fit.model.values.data());
-    freeze(problem, fit.model, free);
+    fix(problem, fit.model, free);
     solve(problem, fit, false);
     if (covariance)
         add_covariance(problem, fit, free, {}, {});
     return fit;
 }
 
-std::vector<ViewScore> Organised::score(const Fit& fit, const Views& wanted) const {
+std::vector<ViewScore> OrganisedClouds::score(const Fit& fit, const Views& wanted) const {
     std::vector<ViewScore> scores(tiles_.size());
     for (std::size_t i = 0; i < tiles_.size(); ++i) {
         if (!wanted[i])
@@ -83,7 +83,7 @@ std::vector<ViewScore> Organised::score(const Fit& fit, const Views& wanted) con
     return scores;
 }
 
-std::vector<Eigen::Vector2d> Organised::residuals(const Fit& fit, std::size_t view) const {
+std::vector<Eigen::Vector2d> OrganisedClouds::residuals(const Fit& fit, std::size_t view) const {
     std::vector<Eigen::Vector2d> all;
     for (const Point& point : tiles_[view].points) {
         Eigen::Vector2d residual;
@@ -93,14 +93,14 @@ std::vector<Eigen::Vector2d> Organised::residuals(const Fit& fit, std::size_t vi
     return all;
 }
 
-std::vector<cv::Point2d> Organised::pixels_of(std::size_t view) const {
+std::vector<cv::Point2d> OrganisedClouds::pixels_of(std::size_t view) const {
     std::vector<cv::Point2d> all;
     for (const Point& point : tiles_[view].points)
         all.emplace_back(point.pixel.x(), point.pixel.y());
     return all;
 }
 
-std::vector<double> Organised::depths_m(const Fit&) const {
+std::vector<double> OrganisedClouds::depths_m(const Fit&) const {
     std::vector<double> depths;
     for (const Tile& tile : tiles_)
         for (const Point& point : tile.points)

@@ -1,4 +1,4 @@
-// Organised clouds as evidence: every point says which pixel saw it, exactly.
+// Organised clouds as a problem: every point knows exactly which pixel saw it.
 #pragma once
 
 #include "projection/calibration/problem.h"
@@ -6,18 +6,17 @@
 
 namespace scanshade::calibration {
 
-/// Each cloud's grid is cut into 4x4 tiles, which are its views: what is fitted to some tiles is tested on the others.
-class Organised final : public Evidence {
+/// Each cloud's grid is cut into 4x4 tiles. The tiles are the views: a fit to some tiles is tested on the others.
+class OrganisedClouds final : public Problem {
   public:
-    /// Adds a sample of the cloud's points, one of 8x8 pixels. Throws Error for a cloud without grid, of another size
-    /// than the ones before, or whose points do not lie on a pinhole's rays at all (more than 2 px off, see
-    /// fit_pinhole).
+    /// Adds a sample of the cloud's points, one of 8x8 pixels. Throws Error for a cloud without grid or of another size
+    /// than the ones before. Throws it too where the points are more than 2 px off a pinhole's rays, see fit_pinhole.
     void add(const std::string& name, const Cloud& cloud);
 
     [[nodiscard]] cv::Size size() const { return size_; }
     [[nodiscard]] std::size_t views() const override { return tiles_.size(); }
     [[nodiscard]] std::string view_name(std::size_t view) const override { return tiles_[view].name; }
-    void weigh(const std::vector<double>&) override {} // points of one cloud are of one make
+    void set_weights(const std::vector<double>&) override {} // points of one cloud are equally good
     [[nodiscard]] Fit start(const Model& model) const override;
     [[nodiscard]] Fit fit(const Fit& from, const Free& free, const Views& used, bool covariance) const override;
     [[nodiscard]] std::vector<ViewScore> score(const Fit& fit, const Views& wanted) const override;

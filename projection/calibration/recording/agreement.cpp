@@ -1,4 +1,4 @@
-// Depth edges counted on colour edges, and on the same edges shifted aside.
+// Counts depth edges on colour edges, and on the same edges translated.
 #include "projection/calibration/recording/agreement.h"
 
 #include "projection/calibration/recording/residuals.h"
@@ -8,20 +8,21 @@
 namespace scanshade::calibration {
 namespace {
 
-constexpr int shifts = 24;
+constexpr int translations = 24;
 
 /// Evenly in all directions (steps of the golden angle), at growing distance.
-Eigen::Vector2d shift_px(int index) {
+Eigen::Vector2d translation_px(int index) {
     constexpr double golden_angle = 2.399963, nearest_px = 16, farthest_px = 48;
-    const double length = nearest_px + (farthest_px - nearest_px) * index / (shifts - 1);
+    const double length = nearest_px + (farthest_px - nearest_px) * index / (translations - 1);
     return length * Eigen::Vector2d(std::cos(golden_angle * index), std::sin(golden_angle * index));
 }
 
-/// Where the camera sees outlines when the colour image is taken.
-std::vector<OutlinePoint> outline_then(const SequenceFrame& frame, const Camera& depth_camera, const Model& colour) {
+/// The outlines in depth camera space at the time of the colour image.
+std::vector<OutlinePoint> outline_at_colour_time(const SequenceFrame& frame, const Camera& depth_camera,
+                                                 const Model& colour) {
     std::vector<OutlinePoint> outline = outline_of(frame.depth_m, depth_camera);
     for (OutlinePoint& point : outline)
-        seen_later(frame.motion, colour[time_offset] + frame.colour_later_s, point.in_depth.data());
+        moved_by_camera_motion(frame.motion, colour[time_offset] + frame.colour_later_s, point.in_depth.data());
     return outline;
 }
 
@@ -32,20 +33,20 @@ OutlineAgreement outline_agreement(const std::vector<SequenceFrame>& frames, con
     constexpr double reach_px = 2;
     OutlineAgreement all;
     double hits = 0;
-    std::array<double, shifts> by_chance{};
+    std::array<double, translations> by_chance{};
     for (const SequenceFrame& frame : frames) {
-        const std::vector<OutlinePoint> outline = outline_then(frame, depth_camera, colour);
+        const std::vector<OutlinePoint> outline = outline_at_colour_time(frame, depth_camera, colour);
         const ColourEdges edges = colour_edges_of(frame.grey);
         const auto hit = [&](const Model& model) {
             return static_cast<double>(paired(outline, gap_px, edges, model, reach_px).size());
         };
         all.points += outline.size();
         hits += hit(colour);
-        for (int i = 0; i < shifts; ++i) {
-            Model aside = colour;
-            aside[cx] += shift_px(i).x();
-            aside[cy] += shift_px(i).y();
-            by_chance[i] += hit(aside);
+        for (int i = 0; i < translations; ++i) {
+            Model translated = colour;
+            translated[cx] += translation_px(i).x();
+            translated[cy] += translation_px(i).y();
+            by_chance[i] += hit(translated);
         }
     }
     if (all.points == 0)
@@ -54,10 +55,10 @@ OutlineAgreement outline_agreement(const std::vector<SequenceFrame>& frames, con
     all.share = hits / count;
     double squares = 0;
     for (const double found : by_chance)
-        all.by_chance += found / count / shifts;
+        all.by_chance += found / count / translations;
     for (const double found : by_chance)
         squares += std::pow(found / count - all.by_chance, 2);
-    all.chance_sigma = std::sqrt(squares / (shifts - 1));
+    all.chance_sigma = std::sqrt(squares / (translations - 1));
     return all;
 }
 

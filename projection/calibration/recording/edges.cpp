@@ -1,8 +1,9 @@
-// Depth edges, colour edges, and which belongs to which.
+// Finds depth edges and colour edges, and pairs them.
 #include "projection/calibration/recording/edges.h"
 
 #include "projection/calibration/recording/geometry.h"
 #include "projection/calibration/solve.h"
+#include "projection/statistics.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,10 +13,10 @@
 namespace scanshade::calibration {
 namespace {
 
-/// The pixel at which the colour camera sees a point of the depth camera's space; none behind it or outside the image.
-std::optional<Eigen::Vector2d> seen_at(const Model& colour, const Eigen::Vector3d& in_depth) {
+/// Projects a point of the depth camera's space into the colour image; none behind the camera or outside the image.
+std::optional<Eigen::Vector2d> colour_pixel(const Model& colour, const Eigen::Vector3d& in_depth) {
     Eigen::Vector3d in_colour;
-    moved(colour.values.data() + turn_x, in_depth.data(), in_colour.data());
+    transform_point(colour.values.data() + rotation_x, in_depth.data(), in_colour.data());
     if (in_colour.z() <= 0.05)
         return std::nullopt;
     Eigen::Vector2d pixel;
@@ -25,7 +26,7 @@ std::optional<Eigen::Vector2d> seen_at(const Model& colour, const Eigen::Vector3
     return inside ? std::optional(pixel) : std::nullopt;
 }
 
-/// The nearest edge pixel along a line through a place, both ways.
+/// The nearest edge pixel along a line through a pixel, in both directions.
 std::optional<cv::Point> edge_along(const ColourEdges& edges, const Eigen::Vector2d& from,
                                     const Eigen::Vector2d& direction, double reach_px) {
     constexpr double step_px = 0.5, same_direction = 0.85; // cosine of 32 degrees
@@ -42,7 +43,7 @@ std::optional<cv::Point> edge_along(const ColourEdges& edges, const Eigen::Vecto
     return std::nullopt;
 }
 
-/// Where the surface of a pixel ends right beside it with something farther behind: the direction it ends in.
+/// The direction in which a pixel's surface ends, with another surface farther behind; none where it does not.
 std::optional<Eigen::Vector2d> outward_at(const cv::Mat1f& depth_m, int u, int v) {
     constexpr double farther = 1.08, flat = 1.02;
     constexpr int longest_shadow = 30; // of a Kinect's projector, pixels
@@ -57,15 +58,15 @@ std::optional<Eigen::Vector2d> outward_at(const cv::Mat1f& depth_m, int u, int v
     if (outward.norm() < 3)
         return std::nullopt;
     outward.normalize();
-    const auto beside = [&](double steps) {
+    const auto depth_along = [&](double steps) {
         const cv::Point at(u + static_cast<int>(std::lround(steps * outward.x())),
                            v + static_cast<int>(std::lround(steps * outward.y())));
         return cv::Rect({}, depth_m.size()).contains(at) ? depth_m(at) : 0.0F;
     };
-    if (beside(-3) > flat * near || beside(-3) < near / flat)
-        return std::nullopt; // no surface that goes on evenly
+    if (depth_along(-3) > flat * near || depth_along(-3) < near / flat)
+        return std::nullopt; // no smooth surface
     for (double steps = 1.5; steps < longest_shadow; ++steps)
-        if (const float behind = beside(steps); behind > 0)
+        if (const float behind = depth_along(steps); behind > 0)
             return behind > farther * near ? std::optional(outward) : std::nullopt;
     return std::nullopt;
 }
@@ -76,7 +77,7 @@ OutlinePoint outline_point(const Camera& camera, const Eigen::Vector2d& pixel, d
     return {here, outward, z_m * ray_of(camera, pixel + outward) - here};
 }
 
-/// The steepest place near an edge pixel, along the way across it: the peak of a parabola through three values.
+/// The steepest position near an edge pixel, across the edge: the peak of a parabola through three values.
 Eigen::Vector2d steepest(const ColourEdges& edges, const cv::Point& pixel) {
     const cv::Vec2f across = edges.across(pixel);
     const auto at = [&](float away) {
@@ -128,7 +129,7 @@ std::vector<OutlinePair> paired(const std::vector<OutlinePoint>& outline, double
                                 const Model& colour, double reach_px) {
     std::vector<OutlinePair> pairs;
     for (const OutlinePoint& point : outline) {
-        const auto pixel = seen_at(colour, point.edge(gap_px));
+        const auto pixel = colour_pixel(colour, point.edge(gap_px));
         if (!pixel)
             continue;
         if (const auto edge = edge_along(edges, *pixel, point.outward, reach_px)) {
@@ -141,11 +142,11 @@ std::vector<OutlinePair> paired(const std::vector<OutlinePoint>& outline, double
 
 namespace {
 
-/// Outline points of all frames, each with its image; and how many of them come to lie on edges.
+/// Counts how many outline points of all frames lie on edges.
 class OutlineCount {
   public:
     OutlineCount(const std::vector<std::vector<OutlinePoint>>& outlines, const std::vector<ColourEdges>& edges) {
-        std::vector<Seen> all;
+        std::vector<FramePoint> all;
         for (std::size_t i = 0; i < outlines.size(); ++i)
             for (const OutlinePoint& point : outlines[i])
                 all.push_back({point.edge(expected_gap_px), point.outward, &edges[i]});
@@ -156,74 +157,74 @@ class OutlineCount {
             points_.push_back(all[i]);
             depths.push_back(all[i].in_depth.z());
         }
-        usual_depth_m_ = median_of(depths);
+        median_depth_m_ = median(depths);
     }
-    [[nodiscard]] double usual_depth_m() const { return usual_depth_m_; }
-    /// An edge at a point's place counts 1, one `reach_px` away 0.
+    [[nodiscard]] double median_depth_m() const { return median_depth_m_; }
+    /// A point on an edge counts 1, a point `reach_px` away from one 0.
     [[nodiscard]] double operator()(const Model& colour, double reach_px) const {
         double sum = 0;
-        for (const Seen& point : points_)
-            if (const auto pixel = seen_at(colour, point.in_depth))
+        for (const FramePoint& point : points_)
+            if (const auto pixel = colour_pixel(colour, point.in_depth))
                 if (const auto edge = edge_along(*point.edges, *pixel, point.outward, reach_px))
                     sum += std::max(0.0, 1 - (Eigen::Vector2d(edge->x, edge->y) - *pixel).norm() / reach_px);
         return sum;
     }
 
   private:
-    struct Seen {
+    struct FramePoint {
         Eigen::Vector3d in_depth;
         Eigen::Vector2d outward;
         const ColourEdges* edges;
     };
-    std::vector<Seen> points_;
-    double usual_depth_m_ = 1;
+    std::vector<FramePoint> points_;
+    double median_depth_m_ = 1;
 };
 
-/// How a camera is moved aside: metres, and pixels by which things at the usual depth move.
-using Aside = Eigen::Vector4d;
+/// A step of the search: x and y of the translation, metres, then the movement of points at the median depth, pixels.
+using Offset = Eigen::Vector4d;
 
-Model moved_aside(const Model& tracked, const Model& first, double usual_depth_m, const Aside& by) {
-    Eigen::Isometry3d place = from_six(tracked.values.data() + turn_x);
-    const Eigen::Vector3d there =
-        from_six(first.values.data() + turn_x).translation() + Eigen::Vector3d(by[0], by[1], 0);
-    const Eigen::Vector3d by_m = there - place.translation();
-    const Eigen::Vector2d turn = by.tail<2>() / tracked[f] - by_m.head<2>() / usual_depth_m;
-    place.linear() = Eigen::AngleAxisd(turn.x(), Eigen::Vector3d::UnitY()) *
-                     Eigen::AngleAxisd(-turn.y(), Eigen::Vector3d::UnitX()) * place.linear();
-    place.translation() = there;
+Model offset_extrinsics(const Model& tracked, const Model& first, double median_depth_m, const Offset& by) {
+    Eigen::Isometry3d extrinsics = pose_from_parameters(tracked.values.data() + rotation_x);
+    const Eigen::Vector3d translation =
+        pose_from_parameters(first.values.data() + rotation_x).translation() + Eigen::Vector3d(by[0], by[1], 0);
+    const Eigen::Vector3d by_m = translation - extrinsics.translation();
+    const Eigen::Vector2d rotation = by.tail<2>() / tracked[f] - by_m.head<2>() / median_depth_m;
+    extrinsics.linear() = Eigen::AngleAxisd(rotation.x(), Eigen::Vector3d::UnitY()) *
+                          Eigen::AngleAxisd(-rotation.y(), Eigen::Vector3d::UnitX()) * extrinsics.linear();
+    extrinsics.translation() = translation;
     Model model = tracked;
-    to_six(place, model.values.data() + turn_x);
+    to_pose_parameters(extrinsics, model.values.data() + rotation_x);
     return model;
 }
 
 } // namespace
 
-Model placed_by_outlines(const std::vector<std::vector<OutlinePoint>>& outlines, const std::vector<ColourEdges>& edges,
-                         const Model& tracked, const Model& first) {
+Model extrinsics_from_outlines(const std::vector<std::vector<OutlinePoint>>& outlines,
+                               const std::vector<ColourEdges>& edges, const Model& tracked, const Model& first) {
     const OutlineCount count(outlines, edges);
     struct Best {
-        Aside aside = Aside::Zero();
+        Offset offset = Offset::Zero();
         double count = -1;
     } best;
-    const auto look_around = [&](const Aside& centre, const Aside& step, const Eigen::Vector4i& steps,
-                                 double reach_px) {
+    const auto search_around = [&](const Offset& centre, const Offset& step, const Eigen::Vector4i& steps,
+                                   double reach_px) {
         std::vector<Best> all;
-        Eigen::Vector4i at;
-        for (at[0] = -steps[0]; at[0] <= steps[0]; ++at[0])
-            for (at[1] = -steps[1]; at[1] <= steps[1]; ++at[1])
-                for (at[2] = -steps[2]; at[2] <= steps[2]; ++at[2])
-                    for (at[3] = -steps[3]; at[3] <= steps[3]; ++at[3])
-                        all.push_back({centre + at.cast<double>().cwiseProduct(step)});
+        Eigen::Vector4i index;
+        for (index[0] = -steps[0]; index[0] <= steps[0]; ++index[0])
+            for (index[1] = -steps[1]; index[1] <= steps[1]; ++index[1])
+                for (index[2] = -steps[2]; index[2] <= steps[2]; ++index[2])
+                    for (index[3] = -steps[3]; index[3] <= steps[3]; ++index[3])
+                        all.push_back({centre + index.cast<double>().cwiseProduct(step)});
         tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
-            all[i].count = count(moved_aside(tracked, first, count.usual_depth_m(), all[i].aside), reach_px);
+            all[i].count = count(offset_extrinsics(tracked, first, count.median_depth_m(), all[i].offset), reach_px);
         });
         best =
             *std::max_element(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.count < b.count; });
     };
-    look_around(Aside::Zero(), {0.02, 0.02, 6, 6}, {4, 1, 4, 4}, 10);
-    look_around(best.aside, {0.01, 0.01, 3, 3}, {1, 1, 1, 1}, 6);
-    look_around(best.aside, {0.005, 0.005, 1.5, 1.5}, {1, 1, 1, 1}, 4);
-    return moved_aside(tracked, first, count.usual_depth_m(), best.aside);
+    search_around(Offset::Zero(), {0.02, 0.02, 6, 6}, {4, 1, 4, 4}, 10);
+    search_around(best.offset, {0.01, 0.01, 3, 3}, {1, 1, 1, 1}, 6);
+    search_around(best.offset, {0.005, 0.005, 1.5, 1.5}, {1, 1, 1, 1}, 4);
+    return offset_extrinsics(tracked, first, count.median_depth_m(), best.offset);
 }
 
 } // namespace scanshade::calibration

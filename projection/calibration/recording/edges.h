@@ -1,4 +1,4 @@
-// Outlines: where depth breaks off, colour usually does, too. What ties a colour camera to the depth camera beside it.
+// Outlines: depth edges usually are colour edges, too. They tie a secondary colour camera to the depth camera.
 #pragma once
 
 #include "projection/calibration/model.h"
@@ -10,21 +10,22 @@
 
 namespace scanshade::calibration {
 
-/// The last point of a surface before a depth edge. The edge itself lies a little farther out: half a pixel, and what
-/// the sensor frays off.
+/// The last point of a surface before a depth edge. The edge itself lies farther out: half a pixel, and what the sensor
+/// loses at edges.
 struct OutlinePoint {
     Eigen::Vector3d in_depth;      ///< depth camera space, metres
     Eigen::Vector2d outward;       ///< unit, in the image, from near to far
-    Eigen::Vector3d one_px_beyond; ///< that way on the same surface: metres per pixel of the depth image
+    Eigen::Vector3d one_px_beyond; ///< in that direction on the same surface: metres per pixel of the depth image
 
     [[nodiscard]] Eigen::Vector3d edge(double gap_px) const { return in_depth + gap_px * one_px_beyond; }
 };
-/// Of every other pixel whose surface goes on evenly to one side and ends on the other, with something at least 8 %
-/// farther behind (and maybe a structured-light sensor's shadow between); at most `most`, evenly chosen.
+/// Every other pixel is tested. Its surface must continue smoothly on one side and end on the other, with another
+/// surface at least 8 % farther behind; a structured-light sensor's shadow may lie between. At most `most` points,
+/// evenly chosen.
 [[nodiscard]] std::vector<OutlinePoint> outline_of(const cv::Mat1f& depth_m, const Camera& camera,
                                                    std::size_t most = 400);
 
-/// Where a colour image changes: 255 on edges (Canny 1986), the direction of steepest change, unit, and how steep.
+/// Edges of a colour image: 255 on edges (Canny 1986), the unit direction of the gradient, and its length.
 struct ColourEdges {
     cv::Mat1b edges;
     cv::Mat2f across;
@@ -35,18 +36,19 @@ struct ColourEdges {
 /// A point of an outline, and the colour edge that it should lie on.
 struct OutlinePair {
     OutlinePoint point;
-    Eigen::Vector2d on_edge, across; ///< pixels, to fractions of one; unit
+    Eigen::Vector2d on_edge, across; ///< subpixel position; unit normal of the edge
 };
-/// For each outline point whose edge the model puts into the colour image, the nearest colour edge of much the same
-/// direction within `reach_px` along the outline's normal; points without one are left out.
+/// Projects each outline point's edge into the colour image, and finds the nearest colour edge of a similar direction
+/// within `reach_px` along the outline's normal. Points without one are left out.
 [[nodiscard]] std::vector<OutlinePair> paired(const std::vector<OutlinePoint>& outline, double gap_px,
                                               const ColourEdges& edges, const Model& colour, double reach_px);
 
-/// The place of a colour camera whose tracks are explained by `tracked`, so far as outlines tell it: tracks hardly tell
-/// a shift from a turn, and the nearest edge is often another one, so that places all around `first` are looked at, the
-/// camera each time turned so that things at the usual depth stay where `tracked` has them, or up to a few pixels
-/// aside.
-[[nodiscard]] Model placed_by_outlines(const std::vector<std::vector<OutlinePoint>>& outlines,
-                                       const std::vector<ColourEdges>& edges, const Model& tracked, const Model& first);
+/// The extrinsics of a colour camera that explain both its tracks (as `tracked` does) and most outlines. Tracks hardly
+/// distinguish a translation from a rotation, and the nearest edge is often a wrong one. So a grid of translations
+/// around `first` is searched. Each is compensated by a rotation: points at the median depth stay within a few pixels
+/// of where `tracked` projects them.
+[[nodiscard]] Model extrinsics_from_outlines(const std::vector<std::vector<OutlinePoint>>& outlines,
+                                             const std::vector<ColourEdges>& edges, const Model& tracked,
+                                             const Model& first);
 
 } // namespace scanshade::calibration

@@ -1,4 +1,4 @@
-// Poses, rays and pieces of surface of a recording's frames.
+// Converts poses and pixels, and fits planes to recorded depth.
 #include "projection/calibration/recording/geometry.h"
 
 #include "projection/undistort.h"
@@ -6,23 +6,23 @@
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Eigenvalues>
-#include <limits>
+#include <vector>
 
 namespace scanshade::calibration {
 
-void to_six(const Eigen::Isometry3d& transform, double* six) {
-    const Eigen::AngleAxisd turn(transform.linear());
-    const Eigen::Vector3d axis_times_angle = turn.angle() * turn.axis();
-    std::copy_n(axis_times_angle.data(), 3, six);
-    std::copy_n(transform.translation().data(), 3, six + 3);
+void to_pose_parameters(const Eigen::Isometry3d& transform, double* pose) {
+    const Eigen::AngleAxisd rotation(transform.linear());
+    const Eigen::Vector3d axis_times_angle = rotation.angle() * rotation.axis();
+    std::copy_n(axis_times_angle.data(), 3, pose);
+    std::copy_n(transform.translation().data(), 3, pose + 3);
 }
 
-Eigen::Isometry3d from_six(const double* six) {
-    const Eigen::Map<const Eigen::Vector3d> turn(six), shift(six + 3);
+Eigen::Isometry3d pose_from_parameters(const double* pose) {
+    const Eigen::Map<const Eigen::Vector3d> rotation(pose), translation(pose + 3);
     Eigen::Isometry3d transform = Eigen::Isometry3d::Identity();
-    if (turn.norm() > 0)
-        transform.linear() = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
-    transform.translation() = shift;
+    if (rotation.norm() > 0)
+        transform.linear() = Eigen::AngleAxisd(rotation.norm(), rotation.normalized()).toRotationMatrix();
+    transform.translation() = translation;
     return transform;
 }
 
@@ -42,14 +42,13 @@ double depth_at(const cv::Mat1f& depth_m, const Eigen::Vector2d& pixel) {
     return low > 0 && high - low < same_surface * low ? sum / 9 : 0;
 }
 
-Eigen::Vector2d straight_of(const Camera& camera, const Eigen::Vector2d& pixel) {
-    const Pinhole& p = camera.pinhole;
-    const Eigen::Vector2d bent((pixel.x() - p.cx) / p.fx, (pixel.y() - p.cy) / p.fy);
-    return undistorted(camera.distortion, bent).value_or(bent);
+Eigen::Vector2d undistorted_direction(const Camera& camera, const Eigen::Vector2d& pixel) {
+    const Eigen::Vector2d distorted = camera.pinhole.ray(pixel.x(), pixel.y());
+    return undistorted(camera.distortion, distorted).value_or(distorted);
 }
 
 Eigen::Vector3d ray_of(const Camera& camera, const Eigen::Vector2d& pixel) {
-    return straight_of(camera, pixel).homogeneous();
+    return undistorted_direction(camera, pixel).homogeneous();
 }
 
 std::optional<SurfacePiece> surface_at(const cv::Mat1f& depth_m, const Pinhole& camera, const Eigen::Vector3d& point) {
@@ -57,8 +56,8 @@ std::optional<SurfacePiece> surface_at(const cv::Mat1f& depth_m, const Pinhole& 
     constexpr double same_surface_m = 0.03;
     if (point.z() <= 0.1)
         return std::nullopt;
-    const int u = static_cast<int>(std::lround(camera.fx * point.x() / point.z() + camera.cx));
-    const int v = static_cast<int>(std::lround(camera.fy * point.y() / point.z() + camera.cy));
+    const Eigen::Vector2d pixel = camera.pixel(point);
+    const int u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
     if (u < reach || v < reach || u + reach >= depth_m.cols || v + reach >= depth_m.rows)
         return std::nullopt;
     const double middle = depth_m(v, u);
@@ -68,7 +67,7 @@ std::optional<SurfacePiece> surface_at(const cv::Mat1f& depth_m, const Pinhole& 
             const double z = depth_m(v + dv, u + du);
             if (!(z > 0) || std::abs(z - middle) > same_surface_m * middle)
                 return std::nullopt;
-            points.emplace_back((u + du - camera.cx) / camera.fx * z, (v + dv - camera.cy) / camera.fy * z, z);
+            points.push_back(camera.point(u + du, v + dv, z));
         }
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();
     for (const auto& p : points)
@@ -77,14 +76,6 @@ std::optional<SurfacePiece> surface_at(const cv::Mat1f& depth_m, const Pinhole& 
     for (const auto& p : points)
         moments += (p - centre) * (p - centre).transpose();
     return SurfacePiece{centre, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(moments).eigenvectors().col(0)};
-}
-
-double median_of(std::vector<double> values) {
-    if (values.empty())
-        return std::nan("");
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
 }
 
 } // namespace scanshade::calibration

@@ -1,4 +1,4 @@
-// Lifting one frame's depth into another.
+// Transforms one frame's depth into another, and compares both.
 #include "projection/calibration/recording/overlap.h"
 
 #include "projection/calibration/recording/geometry.h"
@@ -11,10 +11,10 @@ namespace scanshade::calibration {
 namespace {
 
 /// Distances of one frame's surface from another's, on every eighth pixel, millimetres.
-void add_misses(const cv::Mat1f& depth_a, const cv::Mat1f& depth_b, const Eigen::Isometry3d& b_from_a,
-                const Model& model, std::vector<double>& misses) {
+void add_distances(const cv::Mat1f& depth_a, const cv::Mat1f& depth_b, const Eigen::Isometry3d& b_from_a,
+                   const Model& model, std::vector<double>& distances_mm) {
     constexpr int stride = 8;
-    constexpr double most = 0.05; // of the depth: farther off is another surface, or a camera far off
+    constexpr double most = 0.05; // of the depth: larger distances are to other surfaces, or a camera far off
     const Camera camera = camera_of(model);
     for (int v = stride; v < depth_a.rows - stride; v += stride)
         for (int u = stride; u < depth_a.cols - stride; u += stride) {
@@ -28,25 +28,22 @@ void add_misses(const cv::Mat1f& depth_a, const cv::Mat1f& depth_b, const Eigen:
             pixel_of(model.lens, model.values.data(), point.data(), pixel.data());
             const double z = depth_at(depth_b, pixel);
             if (z > 0)
-                misses.push_back(1000 * std::min(std::abs(corrected_m(model, z) - point.z()), most * z));
+                distances_mm.push_back(1000 * std::min(std::abs(corrected_m(model, z) - point.z()), most * z));
         }
 }
 
 } // namespace
 
-double corrected_m(const Model& model, double z_m) {
-    return model[depth_scale] * z_m + model[depth_offset] + model[depth_curve] * z_m * z_m;
-}
-
 double overlap_mm(const std::vector<cv::Mat1f>& depths_m, const Model& model,
                   const std::vector<Eigen::Isometry3d>& poses) {
-    std::vector<double> misses;
+    std::vector<double> distances_mm;
     for (std::size_t a = 0; a < depths_m.size(); ++a)
         for (const std::size_t b : {a + 1, a + 4, a + 10})
             if (b < depths_m.size())
-                add_misses(depths_m[a], depths_m[b], poses[b].inverse() * poses[a], model, misses);
-    return misses.empty() ? std::nan("")
-                          : std::accumulate(misses.begin(), misses.end(), 0.0) / static_cast<double>(misses.size());
+                add_distances(depths_m[a], depths_m[b], poses[b].inverse() * poses[a], model, distances_mm);
+    return distances_mm.empty() ? std::nan("")
+                                : std::accumulate(distances_mm.begin(), distances_mm.end(), 0.0) /
+                                      static_cast<double>(distances_mm.size());
 }
 
 } // namespace scanshade::calibration

@@ -1,7 +1,10 @@
-// A recording as the ladder sees it: fits, scores, and what the frames say of themselves.
+// Fits and scores of a recorded sequence, and what its frames cannot determine.
 #include "projection/calibration/recording/sequence.h"
 
+#include "projection/calibration/recording/geometry.h"
 #include "projection/calibration/recording/sequence_adjustment.h"
+#include "projection/calibration/recording/sequence_setup.h"
+#include "projection/statistics.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,10 +14,10 @@
 namespace scanshade::calibration {
 namespace {
 
-/// The cube of the world that a point lies in, as a number: what lies in one is on the same surfaces, and seen by the
+/// The number of the cube of the world that a point lies in. Points of one cube are on the same surfaces, and in the
 /// same frames.
 int neighbourhood_of(const Eigen::Vector3d& in_world, double side_m) {
-    constexpr unsigned cubes = 1024; // along each axis before numbers come again
+    constexpr unsigned cubes = 1024; // along each axis before numbers repeat
     unsigned number = 0;
     for (int axis = 0; axis < 3; ++axis)
         number = number * cubes + (static_cast<unsigned>(std::lround(in_world[axis] / side_m)) & (cubes - 1));
@@ -23,92 +26,100 @@ int neighbourhood_of(const Eigen::Vector3d& in_world, double side_m) {
 
 } // namespace
 
-Fit Sequence::start(const Model& model) const { return fit(initial(model), {}, Views(frames_.size(), true), false); }
+Sequence::Sequence(std::vector<SequenceFrame> frames, const Camera& depth_camera, const Model& first,
+                   const SequenceOptions& options)
+    : observations_(observe_sequence(std::move(frames), depth_camera, first, options)) {}
+
+Fit Sequence::start(const Model& model) const {
+    return fit(initial_fit(observations_, model), {}, Views(observations_.frames.size(), true), false);
+}
 
 Fit Sequence::fit(const Fit& from, const Free& free, const Views& used, bool covariance) const {
     Fit fit = from;
     fit.used = used;
-    SequenceProblem adjustment(*this, fit);
-    for (std::size_t i = 0; i < tracks_.size(); ++i) {
-        const auto sightings = std::count_if(tracks_[i].sightings.begin(), tracks_[i].sightings.end(),
-                                             [&](const Sighting& s) { return used[s.frame]; });
-        if (sightings < 2)
+    SequenceAdjustment adjustment(observations_, fit);
+    for (std::size_t i = 0; i < observations_.points.size(); ++i) {
+        const auto count =
+            std::count_if(observations_.points[i].observations.begin(), observations_.points[i].observations.end(),
+                          [&](const PointObservation& s) { return used[s.frame]; });
+        if (count < 2)
             continue;
-        for (const Sighting& s : tracks_[i].sightings)
+        for (const PointObservation& s : observations_.points[i].observations)
             if (used[s.frame])
                 adjustment.add(i, s);
     }
-    for (std::size_t i = 0; i < frames_.size(); ++i)
+    for (std::size_t i = 0; i < observations_.frames.size(); ++i)
         if (used[i])
             adjustment.add_outlines(static_cast<int>(i));
-    adjustment.hold_gap();
-    adjustment.hold_poses(used);
-    freeze(adjustment.problem, fit.model, free);
+    adjustment.add_gap_prior();
+    adjustment.add_pose_priors(used);
+    fix(adjustment.problem, fit.model, free);
     solve(adjustment.problem, fit, true);
     if (covariance)
         add_covariance(adjustment, fit, free);
     return fit;
 }
 
-void Sequence::add_covariance(SequenceProblem& adjustment, Fit& fit, const Free& free) const {
-    constexpr double share_of_depth = 0.6; // a piece of furniture: what is seen of it errs together
-    const double side_m = share_of_depth * median_of(depths_m(fit));
+void Sequence::add_covariance(SequenceAdjustment& adjustment, Fit& fit, const Free& free) const {
+    constexpr double share_of_depth = 0.6; // about a piece of furniture, whose errors are correlated
+    const double side_m = share_of_depth * median(depths_m(fit));
     std::vector<double*> kept = {adjustment.gap()};
     Clusters clusters{.many = true};
-    for (std::size_t i = 0; i < frames_.size(); ++i)
+    for (std::size_t i = 0; i < observations_.frames.size(); ++i)
         kept.push_back(adjustment.pose(static_cast<int>(i)));
-    for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    for (std::size_t i = 0; i < observations_.points.size(); ++i) {
         const Eigen::Map<const Eigen::Vector3d> point(adjustment.point(i));
         clusters.points.push_back({adjustment.point(i), neighbourhood_of(point, side_m)});
     }
     for (const auto& [block, in_world] : adjustment.outlines)
-        clusters.pointless[block] = neighbourhood_of(in_world, side_m);
+        clusters.residuals[block] = neighbourhood_of(in_world, side_m);
     calibration::add_covariance(adjustment.problem, fit, free, kept, clusters);
-    // Surfaces and edges were chosen by a fit and hold it there, which no residual shows (Censi 2007 of scans laid onto
-    // each other): errors were 1.9 of the sigmas that residuals alone tell, as the test of honest sigmas measures.
+    // A fit has chosen the surfaces and edges, and they hold it there. Residuals do not show that (Censi 2007 on scan
+    // matching): true errors were 1.9 times the sigmas of residuals alone, as the test SigmasAreHonest measures.
     constexpr double by_choice = 2;
-    if (!options_.registered)
+    if (!observations_.options.registered)
         fit.covariance *= by_choice * by_choice;
 }
 
 std::vector<ViewScore> Sequence::score(const Fit& from, const Views& wanted) const {
     Fit fit = from;
-    std::vector<bool> known(tracks_.size());
-    for (std::size_t i = 0; i < tracks_.size(); ++i)
-        known[i] = std::count_if(tracks_[i].sightings.begin(), tracks_[i].sightings.end(),
-                                 [&](const Sighting& s) { return fit.used[s.frame]; }) >= 2;
-    std::vector<ViewScore> scores(frames_.size());
-    for (std::size_t frame = 0; frame < frames_.size(); ++frame) {
+    std::vector<bool> known(observations_.points.size());
+    for (std::size_t i = 0; i < observations_.points.size(); ++i)
+        known[i] =
+            std::count_if(observations_.points[i].observations.begin(), observations_.points[i].observations.end(),
+                          [&](const PointObservation& s) { return fit.used[s.frame]; }) >= 2;
+    std::vector<ViewScore> scores(observations_.frames.size());
+    for (std::size_t frame = 0; frame < observations_.frames.size(); ++frame) {
         if (!wanted[frame])
             continue;
-        SequenceProblem adjustment(*this, fit);
-        for (std::size_t i = 0; i < tracks_.size(); ++i)
-            for (const Sighting& s : tracks_[i].sightings)
+        SequenceAdjustment adjustment(observations_, fit);
+        for (std::size_t i = 0; i < observations_.points.size(); ++i)
+            for (const PointObservation& s : observations_.points[i].observations)
                 if (s.frame == static_cast<int>(frame) && known[i]) {
                     adjustment.add(i, s);
                     adjustment.problem.SetParameterBlockConstant(adjustment.point(i));
                 }
-        if (adjustment.sightings.size() < 6)
+        if (adjustment.pixels.size() < 6)
             continue;
         adjustment.add_outlines(static_cast<int>(frame));
         if (adjustment.problem.HasParameterBlock(adjustment.gap()))
             adjustment.problem.SetParameterBlockConstant(adjustment.gap());
-        freeze(adjustment.problem, fit.model, {});
-        if (options_.refine_poses)
-            adjustment.hold_near_recorded(static_cast<int>(frame));
+        fix(adjustment.problem, fit.model, {});
+        if (observations_.options.refine_poses)
+            adjustment.add_pose_prior(static_cast<int>(frame));
         else if (adjustment.problem.HasParameterBlock(adjustment.pose(static_cast<int>(frame))))
             adjustment.problem.SetParameterBlockConstant(adjustment.pose(static_cast<int>(frame)));
-        Fit alone = fit; // the pose is fitted in place; rss is this view's
+        Fit alone = fit; // the pose is fitted inside `fit`; rss is this view's
         solve(adjustment.problem, alone, false);
-        scores[frame] = {alone.rss, static_cast<int>(adjustment.sightings.size())};
+        scores[frame] = {alone.rss, static_cast<int>(adjustment.pixels.size())};
     }
     return scores;
 }
 
 std::vector<cv::Point2d> Sequence::pixels_of(std::size_t view) const {
     std::vector<cv::Point2d> all;
-    for (const Point& point : tracks_)
-        for (const Sighting& s : point.sightings)
+    for (const ScenePoint& point : observations_.points)
+        for (const PointObservation& s : point.observations)
             if (s.frame == static_cast<int>(view))
                 all.emplace_back(s.pixel.x(), s.pixel.y());
     return all;
@@ -117,10 +128,10 @@ std::vector<cv::Point2d> Sequence::pixels_of(std::size_t view) const {
 std::vector<Eigen::Vector2d> Sequence::residuals(const Fit& from, std::size_t view) const {
     Fit fit = from;
     std::vector<Eigen::Vector2d> all;
-    for (std::size_t i = 0; i < tracks_.size(); ++i)
-        for (const Sighting& s : tracks_[i].sightings)
+    for (std::size_t i = 0; i < observations_.points.size(); ++i)
+        for (const PointObservation& s : observations_.points[i].observations)
             if (s.frame == static_cast<int>(view)) {
-                SequenceProblem single(*this, fit);
+                SequenceAdjustment single(observations_, fit);
                 single.add(i, s);
                 std::vector<double> r;
                 single.problem.Evaluate({}, nullptr, &r, nullptr, nullptr);
@@ -131,70 +142,64 @@ std::vector<Eigen::Vector2d> Sequence::residuals(const Fit& from, std::size_t vi
 
 std::vector<double> Sequence::depths_m(const Fit& fit) const {
     std::vector<double> depths;
-    for (std::size_t i = 0; i < tracks_.size(); ++i)
-        for (const Sighting& s : tracks_[i].sightings) {
-            const Eigen::Map<const Eigen::Vector3d> point(
-                &fit.nuisance[frames_.size() * pose_unknowns + i * point_unknowns]);
-            depths.push_back((from_six(&fit.nuisance[s.frame * pose_unknowns]) * point).z());
+    for (std::size_t i = 0; i < observations_.points.size(); ++i)
+        for (const PointObservation& s : observations_.points[i].observations) {
+            const Eigen::Map<const Eigen::Vector3d> point(&fit.nuisance[point_offset(observations_, i)]);
+            depths.push_back((pose_from_parameters(&fit.nuisance[s.frame * pose_unknowns]) * point).z());
         }
     return depths;
 }
 
 std::vector<Eigen::Isometry3d> Sequence::poses(const Fit& fit) const {
     std::vector<Eigen::Isometry3d> all;
-    for (std::size_t i = 0; i < frames_.size(); ++i)
-        all.push_back(from_six(&fit.nuisance[i * pose_unknowns]).inverse());
+    for (std::size_t i = 0; i < observations_.frames.size(); ++i)
+        all.push_back(pose_from_parameters(&fit.nuisance[i * pose_unknowns]).inverse());
     return all;
 }
 
 std::size_t Sequence::outline_points() const {
     std::size_t sum = 0;
-    for (const auto& pairs : pairs_)
+    for (const auto& pairs : observations_.pairs)
         sum += pairs.size();
     return sum;
 }
 
-bool Sequence::tells_time() const {
-    return !options_.refine_poses &&
-           std::any_of(frames_.begin(), frames_.end(), [](const SequenceFrame& frame) { return frame.motion.any(); });
-}
-
-std::size_t Sequence::sightings() const {
+std::size_t Sequence::observations() const {
     std::size_t sum = 0;
-    for (const Point& point : tracks_)
-        sum += point.sightings.size();
+    for (const ScenePoint& point : observations_.points)
+        sum += point.observations.size();
     return sum;
 }
 
 std::string Sequence::degeneracy(const Fit& fit) const {
-    constexpr double least_turn_degrees = 2, least_shift = 0.02; // of the median depth
+    constexpr double least_rotation_degrees = 2, least_translation = 0.02; // of the median depth
     const std::vector<Eigen::Isometry3d> all = poses(fit);
-    const double depth_m = median_of(depths_m(fit));
+    const double depth_m = median(depths_m(fit));
     Eigen::Vector3d low = Eigen::Vector3d::Constant(1e9), high = -low;
-    double turn = 0;
+    double rotation_degrees = 0;
     for (const Eigen::Isometry3d& pose : all) {
         const Eigen::Isometry3d here = all.front().inverse() * pose;
         low = low.cwiseMin(here.translation());
         high = high.cwiseMax(here.translation());
-        turn = std::max(turn, Eigen::AngleAxisd(here.linear()).angle() * 180 / CV_PI);
+        rotation_degrees = std::max(rotation_degrees, Eigen::AngleAxisd(here.linear()).angle() * 180 / CV_PI);
     }
     const Eigen::Vector3d reach = high - low;
-    if (frames_.size() < 3)
-        return fmt::format("{} frames, at least 3 expected", frames_.size());
-    if (reach.norm() < least_shift * depth_m && turn < least_turn_degrees)
+    if (observations_.frames.size() < 3)
+        return fmt::format("{} frames, at least 3 expected", observations_.frames.size());
+    if (reach.norm() < least_translation * depth_m && rotation_degrees < least_rotation_degrees)
         return fmt::format("the camera hardly moves: {:.0f} mm and {:.1f} degrees before a scene {:.1f} m away",
-                           1000 * reach.norm(), turn, depth_m);
-    if (turn < least_turn_degrees && reach.head<2>().norm() < 0.2 * reach.z())
+                           1000 * reach.norm(), rotation_degrees, depth_m);
+    if (rotation_degrees < least_rotation_degrees && reach.head<2>().norm() < 0.2 * reach.z())
         return fmt::format(
             "the camera moves straight forward ({:.0f} mm along its axis, {:.0f} mm across, {:.1f} degrees): "
             "focal length and distance cannot be told apart",
-            1000 * reach.z(), 1000 * reach.head<2>().norm(), turn);
+            1000 * reach.z(), 1000 * reach.head<2>().norm(), rotation_degrees);
     return {};
 }
 
 std::vector<cv::Mat1f> Sequence::depth_images() const {
     std::vector<cv::Mat1f> images;
-    for (const SequenceFrame& frame : frames_)
+    for (const SequenceFrame& frame : observations_.frames)
         images.push_back(frame.depth_m);
     return images;
 }

@@ -1,7 +1,10 @@
-// A recording made ready for adjustment: tracks lifted, poses found where none were recorded, outliers left out.
-#include "projection/calibration/recording/sequence.h"
+// Lifts tracks, estimates missing poses, pairs outlines with colour edges, and removes outliers.
+#include "projection/calibration/recording/sequence_setup.h"
+
 #include "projection/calibration/recording/sequence_adjustment.h"
+#include "projection/calibration/recording/tracks.h"
 #include "projection/error.h"
+#include "projection/statistics.h"
 
 #include <algorithm>
 #include <Eigen/Dense>
@@ -9,226 +12,93 @@
 #include <opencv2/calib3d.hpp>
 
 namespace scanshade::calibration {
-
 namespace {
-constexpr double unusable = -1; // a sighting's depth that does not fit
+
+constexpr double unusable = -1; // an observation's depth that is an outlier
+
+/// Sizes of an observation's residuals, in the residuals' unit.
+struct ErrorSize {
+    double pixels = 0, depth = 0;
+};
+
+/// Worth keeping: observed often enough, with a depth somewhere.
+bool useful(const ScenePoint& point, const SequenceOptions& options) {
+    const bool lifted =
+        std::any_of(point.observations.begin(), point.observations.end(), [](const auto& s) { return s.depth_m > 0; });
+    return point.observations.size() >= 3 && (lifted || !options.registered);
 }
 
-Sequence::Sequence(std::vector<SequenceFrame> frames, const Camera& depth_camera, const Model& first,
-                   const SequenceOptions& options)
-    : frames_(std::move(frames)), depth_camera_(depth_camera), options_(options), weights_(frames_.size(), 1.0) {
-    std::vector<cv::Mat1b> images;
-    for (const SequenceFrame& frame : frames_)
-        images.push_back(frame.grey);
-    for (const Track& track : find_tracks(images)) {
-        Point point;
-        for (const Track::Sighting& seen : track.sightings) {
-            const Eigen::Vector2d pixel(seen.pixel.x, seen.pixel.y);
-            point.sightings.push_back(
-                {seen.frame, pixel, options_.registered ? depth_at(frames_[seen.frame].depth_m, pixel) : 0});
-        }
-        if (useful(point))
-            tracks_.push_back(std::move(point));
-    }
-    constexpr std::size_t least = 40;
-    if (tracks_.size() < least)
-        throw Error(
-            fmt::format("{} points are seen in 3 or more of {} images, at least {} expected: too little texture, or "
-                        "frames too far apart",
-                        tracks_.size(), frames_.size(), least));
-    follow_camera(first);
-    if (options_.registered || !options_.outlines) {
-        prune(first, first);
-    } else {
-        const Model near = place_by_outlines(first);
-        prune(near, first);
-        pair_ever_nearer(near, first);
-    }
-    if (tracks_.size() < least)
-        throw Error(
-            fmt::format("{} points fit together, at least {} expected: the poses, the depth unit or the camera are far "
-                        "off",
-                        tracks_.size(), least));
+Eigen::Map<const Eigen::Vector3d> point_in_world(const SequenceObservations& all, const Fit& fit, std::size_t point) {
+    return Eigen::Map<const Eigen::Vector3d>(&fit.nuisance[point_offset(all, point)]);
 }
 
-/// From where the most outlines find an edge: of all places that tracks allow, since the nearest edge is often another
-/// one.
-Model Sequence::place_by_outlines(const Model& first) {
-    for (const SequenceFrame& frame : frames_) {
-        outlines_.push_back(outline_of(frame.depth_m, depth_camera_));
-        edges_.push_back(colour_edges_of(frame.grey));
-    }
-    leave_out_absurd(initial(first));
-    const Model near = placed_by_outlines(outlines_, edges_, robust_fit(initial(first), first).model, first);
-    constexpr double reach_px = 8; // a step of the search, and what tracks have wrong
-    pair_outlines(initial(near), reach_px);
-    return near;
-}
+// ---------------------------------------------------------------------------------------------------- poses
 
-/// As the nearest point of a surface is found, in turns with the place: points slide along their surfaces, edges along
-/// theirs, so that it takes a few rounds.
-void Sequence::pair_ever_nearer(const Model& near, const Model& first) {
-    constexpr int rounds = 10;
-    constexpr double nearest_px = 2;
-    Fit fit = robust_fit(initial(near), first);
-    for (int round = 0; round < rounds; ++round) {
-        pair_outlines(fit, std::max(nearest_px, 5.0 - round));
-        fit = robust_fit(fit, first);
-        leave_out_far_outlines(fit);
-    }
-}
-
-void Sequence::pair_outlines(const Fit& fit, double reach_px) {
-    pairs_.assign(frames_.size(), {});
-    for (std::size_t i = 0; i < frames_.size(); ++i)
-        pairs_[i] = paired(outlines_[i], gap_px(fit), edges_[i], fit.model, reach_px);
-}
-
-/// Scales the outlines' sigma to what is seen, and leaves out what is farther off than three of them.
-void Sequence::leave_out_far_outlines(const Fit& from) {
-    constexpr double most_sigmas = 3;
-    Fit fit = from;
-    std::vector<std::vector<double>> misses(frames_.size());
-    std::vector<double> all;
-    for (std::size_t i = 0; i < frames_.size(); ++i) {
-        SequenceProblem alone(*this, fit);
-        alone.add_outlines(static_cast<int>(i));
-        alone.problem.Evaluate({}, nullptr, &misses[i], nullptr, nullptr);
-        for (double& miss : misses[i]) {
-            miss = std::abs(miss) * outline_sigma_px_ / (options_.pixel_sigma_px * SequenceProblem::outline_share);
-            all.push_back(miss);
-        }
-    }
-    if (all.empty())
-        return;
-    outline_sigma_px_ = std::max(0.3, median_of(all) / 0.674); // of a Gaussian; an edge has its pixel's width
-    for (std::size_t i = 0; i < frames_.size(); ++i) {
-        std::vector<OutlinePair> kept;
-        for (std::size_t pair = 0; pair < pairs_[i].size(); ++pair)
-            if (misses[i][pair] <= most_sigmas * outline_sigma_px_)
-                kept.push_back(pairs_[i][pair]);
-        pairs_[i] = std::move(kept);
-    }
-}
-
-/// Poses that were not recorded: each frame by what it sees of points lifted in frames before.
-void Sequence::follow_camera(const Model& first) {
-    const bool all =
-        std::all_of(frames_.begin(), frames_.end(), [](const auto& frame) { return frame.world_from_camera; });
-    start_poses_.assign(frames_.size(), Eigen::Isometry3d::Identity());
-    if (all) {
-        for (std::size_t i = 0; i < frames_.size(); ++i)
-            start_poses_[i] = *frames_[i].world_from_camera;
-        return;
-    }
-    if (!options_.registered)
-        throw Error("the frames have no poses, and colour and depth are not registered: one of both is needed");
-    const Camera camera = camera_of(first);
-    std::vector<std::optional<Eigen::Vector3d>> world(tracks_.size());
-    for (int frame = 0; frame < static_cast<int>(frames_.size()); ++frame) {
-        if (frame > 0)
-            start_poses_[frame] = placed_by_points(frame, camera, world);
-        for (std::size_t i = 0; i < tracks_.size(); ++i)
-            for (const Sighting& s : tracks_[i].sightings)
-                if (s.frame == frame && s.depth_m > 0 && !world[i])
-                    world[i] = start_poses_[frame] * (s.depth_m * ray_of(camera, s.pixel));
-    }
-}
-
-/// The pose from which a frame sees the points that are known already (EPnP in RANSAC, then least squares).
-Eigen::Isometry3d Sequence::placed_by_points(int frame, const Camera& camera,
-                                             const std::vector<std::optional<Eigen::Vector3d>>& world) const {
+/// The pose from which a frame sees the points that are already known (EPnP in RANSAC, then least squares).
+Eigen::Isometry3d absolute_pose(const SequenceObservations& all, int frame, const Camera& camera,
+                                const std::vector<std::optional<Eigen::Vector3d>>& world) {
     std::vector<cv::Point3d> points;
-    std::vector<cv::Point2d> straight;
-    for (std::size_t i = 0; i < tracks_.size(); ++i)
-        for (const Sighting& s : tracks_[i].sightings)
+    std::vector<cv::Point2d> rays;
+    for (std::size_t i = 0; i < all.points.size(); ++i)
+        for (const PointObservation& s : all.points[i].observations)
             if (s.frame == frame && world[i]) {
                 points.emplace_back(world[i]->x(), world[i]->y(), world[i]->z());
-                const Eigen::Vector2d direction = straight_of(camera, s.pixel);
-                straight.emplace_back(direction.x(), direction.y());
+                const Eigen::Vector2d direction = undistorted_direction(camera, s.pixel);
+                rays.emplace_back(direction.x(), direction.y());
             }
-    cv::Vec3d turn, shift;
-    std::vector<int> good;
+    cv::Vec3d rotation, translation;
+    std::vector<int> inliers;
     constexpr std::size_t least = 12;
     const auto reach = static_cast<float>(4 / camera.pinhole.fx);
     if (points.size() < least ||
-        !cv::solvePnPRansac(points, straight, cv::Matx33d::eye(), cv::noArray(), turn, shift, false, 300, reach, 0.999,
-                            good, cv::SOLVEPNP_EPNP) ||
-        good.size() < least)
-        throw Error(
-            fmt::format("{}: its place cannot be found: {} of its points are known from the frames before, {} fit; "
-                        "at least {} expected",
-                        frames_[frame].name, points.size(), good.size(), least));
-    cv::solvePnPRefineLM(points, straight, cv::Matx33d::eye(), cv::noArray(), turn, shift);
-    const double six[pose_unknowns] = {turn[0], turn[1], turn[2], shift[0], shift[1], shift[2]};
-    return from_six(six).inverse();
+        !cv::solvePnPRansac(points, rays, cv::Matx33d::eye(), cv::noArray(), rotation, translation, false, 300, reach,
+                            0.999, inliers, cv::SOLVEPNP_EPNP) ||
+        inliers.size() < least)
+        throw Error(fmt::format("{}: its pose cannot be found: it shows {} points of earlier frames, {} of them fit; "
+                                "at least {} expected",
+                                all.frames[frame].name, points.size(), inliers.size(), least));
+    cv::solvePnPRefineLM(points, rays, cv::Matx33d::eye(), cv::noArray(), rotation, translation);
+    const double pose[pose_unknowns] = {rotation[0],    rotation[1],    rotation[2],
+                                        translation[0], translation[1], translation[2]};
+    return pose_from_parameters(pose).inverse();
 }
 
-Fit Sequence::initial(const Model& model) const {
-    Fit fit{.model = model, .used = Views(frames_.size(), true)};
-    fit.nuisance.resize(frames_.size() * pose_unknowns + tracks_.size() * point_unknowns + 1);
-    fit.nuisance.back() = expected_gap_px;
-    for (std::size_t i = 0; i < frames_.size(); ++i)
-        to_six(start_poses_[i].inverse(), &fit.nuisance[i * pose_unknowns]);
-    const Camera camera = calibration::camera_of(model);
-    const Eigen::Isometry3d depth_from_colour = from_six(model.values.data() + turn_x).inverse();
-    for (std::size_t i = 0; i < tracks_.size(); ++i) {
-        Eigen::Vector3d lifted = Eigen::Vector3d::Zero(), sides = Eigen::Vector3d::Zero();
-        Eigen::Matrix3d across = Eigen::Matrix3d::Zero();
-        int count = 0;
-        for (const Sighting& s : tracks_[i].sightings) {
-            const Eigen::Isometry3d world_from_colour = start_poses_[s.frame] * depth_from_colour;
-            const Eigen::Vector3d ray = ray_of(camera, s.pixel);
-            if (s.depth_m > 0) {
-                lifted += start_poses_[s.frame] * (ray * s.depth_m);
-                ++count;
-            }
-            const Eigen::Vector3d direction = (world_from_colour.linear() * ray).normalized();
-            const Eigen::Matrix3d side = Eigen::Matrix3d::Identity() - direction * direction.transpose();
-            across += side;
-            sides += side * world_from_colour.translation();
-        }
-        const Eigen::Vector3d meeting = across.ldlt().solve(sides); // nearest to all rays
-        Eigen::Map<Eigen::Vector3d>(&fit.nuisance[frames_.size() * pose_unknowns + i * point_unknowns]) =
-            count > 0 ? Eigen::Vector3d(lifted / count) : meeting;
+/// Where poses were not recorded: each frame's pose from the points that earlier frames have lifted.
+void estimate_missing_poses(SequenceObservations& all, const Model& first) {
+    const bool recorded =
+        std::all_of(all.frames.begin(), all.frames.end(), [](const auto& frame) { return frame.world_from_camera; });
+    all.start_poses.assign(all.frames.size(), Eigen::Isometry3d::Identity());
+    if (recorded) {
+        for (std::size_t i = 0; i < all.frames.size(); ++i)
+            all.start_poses[i] = *all.frames[i].world_from_camera;
+        return;
     }
-    return fit;
-}
-
-bool Sequence::useful(const Point& point) const {
-    const bool lifted =
-        std::any_of(point.sightings.begin(), point.sightings.end(), [](const auto& s) { return s.depth_m > 0; });
-    return point.sightings.size() >= 3 && (lifted || !options_.registered);
-}
-
-/// Points must lie before each camera that sees them, and not absurdly far.
-void Sequence::leave_out_absurd(const Fit& fit) {
-    std::vector<Point> kept;
-    for (std::size_t i = 0; i < tracks_.size(); ++i) {
-        const Eigen::Map<const Eigen::Vector3d> point(
-            &fit.nuisance[frames_.size() * pose_unknowns + i * point_unknowns]);
-        const bool sound =
-            std::all_of(tracks_[i].sightings.begin(), tracks_[i].sightings.end(), [&](const Sighting& s) {
-                const double z = (from_six(&fit.nuisance[s.frame * pose_unknowns]) * point).z();
-                return z > 0.1 && z < 30;
-            });
-        if (sound)
-            kept.push_back(std::move(tracks_[i]));
+    if (!all.options.registered)
+        throw Error("the frames have no poses, and colour and depth are not registered: one of both is needed");
+    const Camera camera = camera_of(first);
+    std::vector<std::optional<Eigen::Vector3d>> world(all.points.size());
+    for (int frame = 0; frame < static_cast<int>(all.frames.size()); ++frame) {
+        if (frame > 0)
+            all.start_poses[frame] = absolute_pose(all, frame, camera, world);
+        for (std::size_t i = 0; i < all.points.size(); ++i)
+            for (const PointObservation& s : all.points[i].observations)
+                if (s.frame == frame && s.depth_m > 0 && !world[i])
+                    world[i] = all.start_poses[frame] * (s.depth_m * ray_of(camera, s.pixel));
     }
-    tracks_ = std::move(kept);
 }
 
-/// Of unregistered frames: the piece of surface nearest to where each point is, along the depth camera's ray.
-void Sequence::find_surfaces(const Fit& fit) {
-    constexpr double same_surface = 0.05; // of the depth: farther off it is another one, and says nothing of this point
-    for (std::size_t i = 0; i < tracks_.size(); ++i) {
-        const Eigen::Map<const Eigen::Vector3d> point(
-            &fit.nuisance[frames_.size() * pose_unknowns + i * point_unknowns]);
-        for (Sighting& s : tracks_[i].sightings) {
-            const Eigen::Vector3d in_depth = from_six(&fit.nuisance[s.frame * pose_unknowns]) * point;
+// ---------------------------------------------------------------------------------------------------- robust fits
+
+/// Of unregistered frames: the piece of surface nearest to each point, along the depth camera's ray.
+void find_surfaces(SequenceObservations& all, const Fit& fit) {
+    constexpr double same_surface = 0.05; // of the depth: a surface farther off is not this point's
+    for (std::size_t i = 0; i < all.points.size(); ++i) {
+        const auto point = point_in_world(all, fit, i);
+        for (PointObservation& s : all.points[i].observations) {
+            const Eigen::Vector3d in_depth = pose_from_parameters(&fit.nuisance[s.frame * pose_unknowns]) * point;
             s.surface = {};
             if (s.depth_m != unusable)
-                s.surface = surface_at(frames_[s.frame].depth_m, depth_camera_.pinhole, in_depth);
+                s.surface = surface_at(all.frames[s.frame].depth_m, all.depth_camera.pinhole, in_depth);
             if (s.surface &&
                 std::abs(s.surface->normal.dot(in_depth - s.surface->centre)) > same_surface * in_depth.z())
                 s.surface = {};
@@ -236,92 +106,246 @@ void Sequence::find_surfaces(const Fit& fit) {
     }
 }
 
-/// With the usual suspects free: a wrong camera must not cost the image's corners.
-Fit Sequence::robust_fit(const Fit& from, const Model& first) {
+/// Frees the most likely errors: a wrong camera must not cost the corners of the image.
+Fit robust_fit(SequenceObservations& all, const Fit& from, const Model& first) {
     constexpr double robust_px = 1;
     Fit fit = from;
-    if (!options_.registered)
-        find_surfaces(fit);
-    SequenceProblem adjustment(*this, fit);
-    for (std::size_t i = 0; i < tracks_.size(); ++i)
-        for (const Sighting& s : tracks_[i].sightings)
+    if (!all.options.registered)
+        find_surfaces(all, fit);
+    SequenceAdjustment adjustment(all, fit);
+    for (std::size_t i = 0; i < all.points.size(); ++i)
+        for (const PointObservation& s : all.points[i].observations)
             adjustment.add(i, s, new ceres::CauchyLoss(robust_px));
-    for (std::size_t i = 0; i < frames_.size(); ++i)
+    for (std::size_t i = 0; i < all.frames.size(); ++i)
         adjustment.add_outlines(static_cast<int>(i), true);
-    adjustment.hold_gap();
-    adjustment.hold_place(first);
+    adjustment.add_gap_prior();
+    adjustment.add_extrinsics_prior(first);
     Free free{};
     free[f] = free[k1] = true;
-    free[cx] = free[cy] = options_.registered; // beside a turn of the camera the principal point is hardly seen
-    for (int i = turn_x; i < time_offset; ++i)
-        free[i] = !options_.registered;
-    free[time_offset] = tells_time();
-    free[depth_scale] = free[depth_offset] = options_.registered && !options_.refine_poses;
-    adjustment.hold_poses(fit.used);
-    freeze(adjustment.problem, fit.model, free);
+    free[cx] = free[cy] = all.options.registered; // a rotation of the camera compensates the principal point
+    for (int i = rotation_x; i < time_offset; ++i)
+        free[i] = !all.options.registered;
+    free[time_offset] = all.determines_time();
+    free[depth_scale] = free[depth_offset] = all.options.registered && !all.options.refine_poses;
+    adjustment.add_pose_priors(fit.used);
+    fix(adjustment.problem, fit.model, free);
     solve(adjustment.problem, fit, true);
     return fit;
 }
 
-std::vector<std::vector<Sequence::Miss>> Sequence::misses_of(const Fit& from) const {
+/// Removes points that are not in front of each of their cameras, or absurdly far.
+void remove_implausible_points(SequenceObservations& all, const Fit& fit) {
+    std::vector<ScenePoint> kept;
+    for (std::size_t i = 0; i < all.points.size(); ++i) {
+        const auto point = point_in_world(all, fit, i);
+        const std::vector<PointObservation>& observations = all.points[i].observations;
+        const bool plausible = std::all_of(observations.begin(), observations.end(), [&](const PointObservation& s) {
+            const double z = (pose_from_parameters(&fit.nuisance[s.frame * pose_unknowns]) * point).z();
+            return z > 0.1 && z < 30;
+        });
+        if (plausible)
+            kept.push_back(std::move(all.points[i]));
+    }
+    all.points = std::move(kept);
+}
+
+// ---------------------------------------------------------------------------------------------------- outlines
+
+void pair_outlines(SequenceObservations& all, const Fit& fit, double reach_px) {
+    all.pairs.assign(all.frames.size(), {});
+    for (std::size_t i = 0; i < all.frames.size(); ++i)
+        all.pairs[i] = paired(all.outlines[i], fit.nuisance.back(), all.edges[i], fit.model, reach_px);
+}
+
+/// Scales the outlines' sigma to their errors, and removes pairs beyond three of them.
+void remove_outlying_pairs(SequenceObservations& all, const Fit& from) {
+    constexpr double most_sigmas = 3;
     Fit fit = from;
-    std::vector<std::vector<Miss>> all(tracks_.size());
-    for (std::size_t i = 0; i < tracks_.size(); ++i)
-        for (const Sighting& s : tracks_[i].sightings) {
-            SequenceProblem single(*this, fit);
+    std::vector<std::vector<double>> errors(all.frames.size());
+    std::vector<double> sizes;
+    for (std::size_t i = 0; i < all.frames.size(); ++i) {
+        SequenceAdjustment alone(all, fit);
+        alone.add_outlines(static_cast<int>(i));
+        alone.problem.Evaluate({}, nullptr, &errors[i], nullptr, nullptr);
+        for (double& error : errors[i]) {
+            error = std::abs(error) * all.outline_sigma_px /
+                    (all.options.pixel_sigma_px * SequenceAdjustment::outline_share);
+            sizes.push_back(error);
+        }
+    }
+    if (sizes.empty())
+        return;
+    constexpr double edge_width_px = 0.3; // the sigma of a perfect edge
+    all.outline_sigma_px = std::max(edge_width_px, median(sizes) / median_of_gaussian);
+    for (std::size_t i = 0; i < all.frames.size(); ++i) {
+        std::vector<OutlinePair> kept;
+        for (std::size_t pair = 0; pair < all.pairs[i].size(); ++pair)
+            if (errors[i][pair] <= most_sigmas * all.outline_sigma_px)
+                kept.push_back(all.pairs[i][pair]);
+        all.pairs[i] = std::move(kept);
+    }
+}
+
+/// Starts from the extrinsics at which most outlines meet an edge. All extrinsics that tracks allow are searched,
+/// because the nearest edge is often the wrong one.
+Model start_from_outlines(SequenceObservations& all, const Model& first) {
+    for (const SequenceFrame& frame : all.frames) {
+        all.outlines.push_back(outline_of(frame.depth_m, all.depth_camera));
+        all.edges.push_back(colour_edges_of(frame.grey));
+    }
+    remove_implausible_points(all, initial_fit(all, first));
+    const Model near =
+        extrinsics_from_outlines(all.outlines, all.edges, robust_fit(all, initial_fit(all, first), first).model, first);
+    constexpr double reach_px = 8; // a step of the search plus the error of tracks
+    pair_outlines(all, initial_fit(all, near), reach_px);
+    return near;
+}
+
+/// Alternates between pairing and fitting, as ICP does. Points slide along their surfaces and edges along theirs, so
+/// that convergence takes several rounds.
+void pair_and_fit_outlines(SequenceObservations& all, const Model& near, const Model& first) {
+    constexpr int rounds = 10;
+    constexpr double nearest_px = 2;
+    Fit fit = robust_fit(all, initial_fit(all, near), first);
+    for (int round = 0; round < rounds; ++round) {
+        pair_outlines(all, fit, std::max(nearest_px, 5.0 - round));
+        fit = robust_fit(all, fit, first);
+        remove_outlying_pairs(all, fit);
+    }
+}
+
+// ---------------------------------------------------------------------------------------------------- outliers
+
+std::vector<std::vector<ErrorSize>> errors_of(const SequenceObservations& all, const Fit& from) {
+    Fit fit = from;
+    std::vector<std::vector<ErrorSize>> errors(all.points.size());
+    for (std::size_t i = 0; i < all.points.size(); ++i)
+        for (const PointObservation& s : all.points[i].observations) {
+            SequenceAdjustment single(all, fit);
             single.add(i, s);
             std::vector<double> r;
             single.problem.Evaluate({}, nullptr, &r, nullptr, nullptr);
-            all[i].push_back({std::hypot(r[0], r[1]), r.size() > 2 ? std::abs(r[2]) : std::nan("")});
+            errors[i].push_back({std::hypot(r[0], r[1]), r.size() > 2 ? std::abs(r[2]) : std::nan("")});
         }
+    return errors;
+}
+
+void remove_outliers(SequenceObservations& all, const std::vector<std::vector<ErrorSize>>& errors,
+                     const ErrorSize& most) {
+    std::vector<ScenePoint> kept;
+    for (std::size_t i = 0; i < all.points.size(); ++i) {
+        ScenePoint point;
+        for (std::size_t s = 0; s < all.points[i].observations.size(); ++s) {
+            if (errors[i][s].pixels > most.pixels)
+                continue;
+            point.observations.push_back(all.points[i].observations[s]);
+            if (errors[i][s].depth > most.depth) {
+                point.observations.back().depth_m = unusable;
+                point.observations.back().surface = {};
+            }
+        }
+        if (useful(point, all.options))
+            kept.push_back(std::move(point));
+    }
+    all.points = std::move(kept);
+}
+
+/// Removes outliers of a robust fit, and scales the depths' sigma to that of the pixels by the residuals of each.
+void prune(SequenceObservations& all, Model near, const Model& first) {
+    constexpr double most_sigmas = 4;
+    for (int round = 0; round < 3 && !all.points.empty(); ++round) {
+        remove_implausible_points(all, initial_fit(all, near));
+        const Fit fit = robust_fit(all, initial_fit(all, near), first);
+        if (!all.options.registered) // so that each point finds the surface that it lies on
+            near = fit.model;
+        const std::vector<std::vector<ErrorSize>> errors = errors_of(all, fit);
+        std::vector<double> pixels, depths;
+        for (const auto& of_point : errors)
+            for (const ErrorSize& error : of_point) {
+                pixels.push_back(error.pixels);
+                if (!std::isnan(error.depth))
+                    depths.push_back(error.depth);
+            }
+        constexpr double median_of_gaussian_2d = 1.177; // of the distance, in sigmas
+        const double pixel_sigma = median(pixels) / median_of_gaussian_2d,
+                     depth_sigma = median(depths) / median_of_gaussian;
+        remove_outliers(all, errors, {most_sigmas * pixel_sigma, most_sigmas * depth_sigma});
+        if (depth_sigma > 0)
+            all.depth_weight *= pixel_sigma / depth_sigma;
+        if (all.options.refine_poses)
+            for (std::size_t i = 0; i < all.frames.size(); ++i)
+                all.start_poses[i] = pose_from_parameters(&fit.nuisance[i * pose_unknowns]).inverse();
+    }
+}
+
+} // namespace
+
+SequenceObservations observe_sequence(std::vector<SequenceFrame> frames, const Camera& depth_camera, const Model& first,
+                                      const SequenceOptions& options) {
+    SequenceObservations all{.frames = std::move(frames), .depth_camera = depth_camera, .options = options};
+    all.weights.assign(all.frames.size(), 1.0);
+    std::vector<cv::Mat1b> images;
+    for (const SequenceFrame& frame : all.frames)
+        images.push_back(frame.grey);
+    for (const Track& track : find_tracks(images)) {
+        ScenePoint point;
+        for (const Track::Observation& s : track.observations) {
+            const Eigen::Vector2d pixel(s.pixel.x, s.pixel.y);
+            point.observations.push_back(
+                {s.frame, pixel, options.registered ? depth_at(all.frames[s.frame].depth_m, pixel) : 0});
+        }
+        if (useful(point, options))
+            all.points.push_back(std::move(point));
+    }
+    constexpr std::size_t least = 40;
+    if (all.points.size() < least)
+        throw Error(fmt::format("{} points are seen in 3 or more of {} images, at least {} expected: too little "
+                                "texture, or frames too far apart",
+                                all.points.size(), all.frames.size(), least));
+    estimate_missing_poses(all, first);
+    if (options.registered || !options.outlines) {
+        prune(all, first, first);
+    } else {
+        const Model near = start_from_outlines(all, first);
+        prune(all, near, first);
+        pair_and_fit_outlines(all, near, first);
+    }
+    if (all.points.size() < least)
+        throw Error(fmt::format("{} points fit together, at least {} expected: the poses, the depth unit or the camera "
+                                "are far off",
+                                all.points.size(), least));
     return all;
 }
 
-void Sequence::leave_out_beyond(const std::vector<std::vector<Miss>>& misses, const Miss& most) {
-    std::vector<Point> kept;
-    for (std::size_t i = 0; i < tracks_.size(); ++i) {
-        Point point;
-        for (std::size_t s = 0; s < tracks_[i].sightings.size(); ++s) {
-            if (misses[i][s].pixels > most.pixels)
-                continue;
-            point.sightings.push_back(tracks_[i].sightings[s]);
-            if (misses[i][s].depth > most.depth) {
-                point.sightings.back().depth_m = unusable;
-                point.sightings.back().surface = {};
+Fit initial_fit(const SequenceObservations& sequence, const Model& model) {
+    Fit fit{.model = model, .used = Views(sequence.frames.size(), true)};
+    fit.nuisance.resize(point_offset(sequence, sequence.points.size()) + 1);
+    fit.nuisance.back() = expected_gap_px;
+    for (std::size_t i = 0; i < sequence.frames.size(); ++i)
+        to_pose_parameters(sequence.start_poses[i].inverse(), &fit.nuisance[i * pose_unknowns]);
+    const Camera camera = camera_of(model);
+    const Eigen::Isometry3d depth_from_colour = pose_from_parameters(model.values.data() + rotation_x).inverse();
+    for (std::size_t i = 0; i < sequence.points.size(); ++i) {
+        Eigen::Vector3d lifted = Eigen::Vector3d::Zero(), centres = Eigen::Vector3d::Zero();
+        Eigen::Matrix3d across = Eigen::Matrix3d::Zero();
+        int count = 0;
+        for (const PointObservation& s : sequence.points[i].observations) {
+            const Eigen::Isometry3d world_from_colour = sequence.start_poses[s.frame] * depth_from_colour;
+            const Eigen::Vector3d ray = ray_of(camera, s.pixel);
+            if (s.depth_m > 0) {
+                lifted += sequence.start_poses[s.frame] * (ray * s.depth_m);
+                ++count;
             }
+            const Eigen::Vector3d direction = (world_from_colour.linear() * ray).normalized();
+            const Eigen::Matrix3d across_ray = Eigen::Matrix3d::Identity() - direction * direction.transpose();
+            across += across_ray;
+            centres += across_ray * world_from_colour.translation();
         }
-        if (useful(point))
-            kept.push_back(std::move(point));
+        const Eigen::Vector3d nearest_to_rays = across.ldlt().solve(centres);
+        Eigen::Map<Eigen::Vector3d>(&fit.nuisance[point_offset(sequence, i)]) =
+            count > 0 ? Eigen::Vector3d(lifted / count) : nearest_to_rays;
     }
-    tracks_ = std::move(kept);
-}
-
-/// Leaves out what does not fit, judged by a robust fit, and scales the depths' sigma to the pixels', by the residuals
-/// of each.
-void Sequence::prune(Model near, const Model& first) {
-    constexpr double most_sigmas = 4;
-    for (int round = 0; round < 3 && !tracks_.empty(); ++round) {
-        leave_out_absurd(initial(near));
-        const Fit fit = robust_fit(initial(near), first);
-        if (!options_.registered) // so that each point is looked for on the surface that it lies on
-            near = fit.model;
-        const std::vector<std::vector<Miss>> misses = misses_of(fit);
-        std::vector<double> pixels, depths;
-        for (const auto& of_track : misses)
-            for (const Miss& miss : of_track) {
-                pixels.push_back(miss.pixels);
-                if (!std::isnan(miss.depth))
-                    depths.push_back(miss.depth);
-            }
-        // Of a two-dimensional Gaussian the median distance is 1.18 sigma, of a one-dimensional one 0.674.
-        const double pixel_sigma = median_of(pixels) / 1.177, depth_sigma = median_of(depths) / 0.674;
-        leave_out_beyond(misses, {most_sigmas * pixel_sigma, most_sigmas * depth_sigma});
-        if (depth_sigma > 0)
-            depth_weight_ *= pixel_sigma / depth_sigma;
-        if (options_.refine_poses)
-            for (std::size_t i = 0; i < frames_.size(); ++i)
-                start_poses_[i] = from_six(&fit.nuisance[i * pose_unknowns]).inverse();
-    }
+    return fit;
 }
 
 } // namespace scanshade::calibration

@@ -1,4 +1,4 @@
-// Features, their matches, and chains of matches.
+// Detects features, matches them, and chains the matches.
 #include "projection/calibration/recording/tracks.h"
 
 #include <algorithm>
@@ -27,7 +27,7 @@ std::vector<Features> features_of(const std::vector<cv::Mat1b>& images) {
     return all;
 }
 
-/// Pairs of features that are each other's best, clearly better than the second best, and on one fundamental matrix.
+/// Mutual best matches that are clearly better than the second best, and that agree with one fundamental matrix.
 std::vector<std::pair<int, int>> matches_of(const Features& a, const Features& b) {
     constexpr float ratio = 0.8F;     // Lowe 2004, section 7.1
     constexpr double epipolar_px = 2; // generous: lens distortion bends epipolar lines
@@ -74,22 +74,22 @@ class Chains {
     std::vector<int> parent_;
 };
 
-/// The longest tracks of each part of the image, in turns, so that no textured corner outweighs the rest.
+/// The longest tracks of each part of the image, in turn, so that no textured corner dominates.
 std::vector<Track> spread(std::vector<Track> tracks, cv::Size size, std::size_t most) {
     constexpr int cells = 8;
     std::stable_sort(tracks.begin(), tracks.end(),
-                     [](const Track& a, const Track& b) { return a.sightings.size() > b.sightings.size(); });
+                     [](const Track& a, const Track& b) { return a.observations.size() > b.observations.size(); });
     std::map<std::pair<int, int>, std::vector<std::size_t>> by_cell;
     for (std::size_t i = 0; i < tracks.size(); ++i) {
-        const cv::Point2d pixel = tracks[i].sightings.front().pixel;
+        const cv::Point2d pixel = tracks[i].observations.front().pixel;
         by_cell[{static_cast<int>(pixel.x * cells / size.width), static_cast<int>(pixel.y * cells / size.height)}]
             .push_back(i);
     }
     std::vector<Track> chosen;
-    for (std::size_t turn = 0; turn < tracks.size() && chosen.size() < most; ++turn)
+    for (std::size_t rank = 0; rank < tracks.size() && chosen.size() < most; ++rank)
         for (const auto& [cell, indices] : by_cell)
-            if (turn < indices.size() && chosen.size() < most)
-                chosen.push_back(tracks[indices[turn]]);
+            if (rank < indices.size() && chosen.size() < most)
+                chosen.push_back(tracks[indices[rank]]);
     return chosen;
 }
 
@@ -121,14 +121,14 @@ std::vector<Track> find_tracks(const std::vector<cv::Mat1b>& images, int shortes
     std::map<int, Track> by_root;
     for (int frame = 0; frame < count; ++frame)
         for (int i = first[frame]; i < first[frame + 1]; ++i)
-            by_root[chains.root(i)].sightings.push_back({frame, features[frame].points[i - first[frame]].pt});
+            by_root[chains.root(i)].observations.push_back({frame, features[frame].points[i - first[frame]].pt});
     std::vector<Track> tracks;
     for (auto& [root, track] : by_root) {
         std::set<int> frames;
-        for (const Track::Sighting& sighting : track.sightings)
-            frames.insert(sighting.frame);
-        // Twice in one image means that something was mistaken for something else.
-        if (frames.size() == track.sightings.size() && static_cast<int>(frames.size()) >= shortest)
+        for (const Track::Observation& observation : track.observations)
+            frames.insert(observation.frame);
+        // A track with two features in one image contains a wrong match.
+        if (frames.size() == track.observations.size() && static_cast<int>(frames.size()) >= shortest)
             tracks.push_back(std::move(track));
     }
     return spread(std::move(tracks), images.front().size(), most);
