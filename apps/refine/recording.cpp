@@ -257,7 +257,7 @@ RecordingResult refine_tracks(const Capture& capture, const RecordingData& data,
                            .file = {.camera = *capture.camera, .depth_units_per_metre = {}, .warnings = {}}};
     Sequence sequence = sequence_of(data.frames, *capture.camera, first, how, recording.poses);
     if (sequence.determines_time())
-        rungs.insert(rungs.begin() + (how.registered ? 0 : 1), {"time offset", {time_offset}});
+        groups.insert(groups.begin() + (how.registered ? 0 : 1), {"time offset", {time_offset}});
     if (how.registered && !how.refine_poses)
         for (const ParameterGroup& group : depth_groups())
             groups.push_back(group);
