@@ -27,10 +27,14 @@ struct Pinhole {
 
     /// The ray through pixel (u, v), z = 1.
     [[nodiscard]] Eigen::Vector3d ray(double u, double v) const {
-        return {shared::ray_coordinate(u, fx, cx), shared::ray_coordinate(v, fy, cy), 1};
+        return {shared::ray_axis(fx, cx, u), shared::ray_axis(fy, cy, v), 1};
     }
     /// The point in camera space that pixel (u, v) sees at depth z_m.
     [[nodiscard]] Eigen::Vector3d point(double u, double v, double z_m) const { return ray(u, v) * z_m; }
+    /// The pixel of a point in camera space, z > 0.
+    [[nodiscard]] Eigen::Vector2d pixel(const Eigen::Vector3d& point) const {
+        return {shared::project_axis(fx, cx, point.x(), point.z()), shared::project_axis(fy, cy, point.y(), point.z())};
+    }
 
     /// The same camera in the GPU's single precision.
     [[nodiscard]] shared::Pinhole on_gpu() const {

@@ -1,4 +1,4 @@
-// What the recorded data themselves say about their camera: the pinhole behind an organised cloud.
+// The pinhole camera of an organised cloud, from the cloud's own points.
 #pragma once
 
 #include "projection/frame.h"
@@ -12,8 +12,8 @@ struct PinholeFit {
     int points = 0;    ///< points used: those beyond 3 sigma of a first fit are left out of the second
 };
 
-/// Throws Error where the points cannot tell: an unorganised cloud, fewer than 3 valid points, all in one row or
-/// column, focal lengths that are not positive, or a residual above 2 px (then the grid is not a pinhole image).
+/// Throws Error where the points do not determine it: an unorganised cloud, fewer than 3 valid points, all in one row
+/// or column, focal lengths that are not positive, or a residual above 2 px (then the grid is not a pinhole image).
 [[nodiscard]] PinholeFit fit_pinhole(const Cloud& cloud);
 
 } // namespace scanshade

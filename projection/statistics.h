@@ -32,4 +32,7 @@ template <class Values>
     return ranked(values, static_cast<std::size_t>(share * static_cast<double>(values.size() - 1)));
 }
 
+/// Sigma of a Gaussian from the median of its absolute values.
+inline constexpr double median_of_gaussian = 0.674;
+
 } // namespace scanshade

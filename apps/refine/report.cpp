@@ -1,4 +1,4 @@
-// The findings of `refine` as JSON, as a table, and as a page.
+// Writes the results of `refine` as JSON, as a table, and as a page.
 #include "apps/refine/report.h"
 
 #include "apps/page.h"
@@ -11,25 +11,25 @@ namespace scanshade {
 using namespace calibration;
 namespace {
 
-/// One number of the camera, before and after, with its sigma; NaN where it was frozen.
+/// One number of the camera, before and after, with its sigma; NaN where it was fixed.
 struct NumberRow {
     std::string name;
     double before, after, sigma;
 };
 
 std::vector<NumberRow> numbers_of(const Refinement& r) {
-    const Fit& fit = r.climb.fit;
-    const Model& before = r.climb.start.model;
+    const Fit& fit = r.selection.fit;
+    const Model& before = r.selection.start.model;
     const auto sigma = [&](Unknown unknown) {
-        return r.climb.free[unknown] && fit.covariance.size() > 0 ? fit.sigma(unknown) : std::nan("");
+        return r.selection.free[unknown] && fit.covariance.size() > 0 ? fit.sigma(unknown) : std::nan("");
     };
-    const bool fy_free = fit.covariance.size() > 0 && (r.climb.free[f] || r.climb.free[aspect]);
+    const bool fy_free = fit.covariance.size() > 0 && (r.selection.free[f] || r.selection.free[aspect]);
     std::vector<NumberRow> rows = {
         {"fx", before[f], fit.model[f], sigma(f)},
         {"fy", before[f] * before[aspect], fit.model[f] * fit.model[aspect], fy_free ? sigma_fy(fit) : std::nan("")}};
     for (int i = cx; i < unknown_count; ++i) {
         const auto unknown = static_cast<Unknown>(i);
-        if (i < k1 || r.climb.free[i] || before[unknown] != (i == depth_scale ? 1 : 0))
+        if (i < k1 || r.selection.free[i] || before[unknown] != (i == depth_scale ? 1 : 0))
             rows.push_back({std::string(name_of(unknown)), before[unknown], fit.model[unknown], sigma(unknown)});
     }
     return rows;
@@ -37,18 +37,18 @@ std::vector<NumberRow> numbers_of(const Refinement& r) {
 
 json finite(double value) { return std::isfinite(value) ? json(value) : json(); }
 
-json covariance_json(const Climb& climb) {
+json covariance_json(const Selection& selection) {
     json names = json::array(), rows = json::array();
-    if (climb.fit.covariance.size() == 0)
+    if (selection.fit.covariance.size() == 0)
         return json();
     for (int i = 0; i < unknown_count; ++i) {
-        if (!climb.free[i])
+        if (!selection.free[i])
             continue;
         names.push_back(name_of(static_cast<Unknown>(i)));
         json row = json::array();
         for (int j = 0; j < unknown_count; ++j)
-            if (climb.free[j])
-                row.push_back(climb.fit.covariance(i, j));
+            if (selection.free[j])
+                row.push_back(selection.fit.covariance(i, j));
         rows.push_back(row);
     }
     return {{"of", names}, {"matrix", rows}};
@@ -66,11 +66,11 @@ json grid_json(const cv::Mat_<Number>& grid) {
     return rows;
 }
 
-json errors_json(const Climb& climb) {
-    return {{"train", finite(climb.train_px)},
-            {"train_before", finite(climb.train_before_px)},
-            {"held_out", finite(climb.held_out_px)},
-            {"held_out_before", finite(climb.held_out_before_px)}};
+json errors_json(const Selection& selection) {
+    return {{"train", finite(selection.train_px)},
+            {"train_before", finite(selection.train_before_px)},
+            {"held_out", finite(selection.held_out_px)},
+            {"held_out_before", finite(selection.held_out_before_px)}};
 }
 
 double largest(const cv::Mat1d& grid) {
@@ -89,12 +89,12 @@ json details_of(const Refinement& r, double took_s) {
     text["before"] = to_json(r.before);
     for (const NumberRow& row : numbers_of(r))
         text["numbers"][row.name] = {{"before", row.before}, {"after", row.after}, {"sigma", finite(row.sigma)}};
-    text["covariance"] = covariance_json(r.climb);
-    text["rms_px"] = errors_json(r.climb);
+    text["covariance"] = covariance_json(r.selection);
+    text["rms_px"] = errors_json(r.selection);
     if (r.full)
         text["rms_px_full_model"] = errors_json(*r.full);
-    for (const Step& step : r.climb.steps)
-        text["ladder"].push_back({{"rung", step.name}, {"climbed", step.climbed}, {"why", step.why}});
+    for (const Step& step : r.selection.steps)
+        text["model_selection"].push_back({{"parameters", step.name}, {"freed", step.freed}, {"why", step.why}});
     for (const ViewRow& view : r.views)
         text["views"].push_back({{"name", view.name},
                                  {"rms_px", finite(view.score.rms())},
@@ -118,17 +118,18 @@ std::string summary_of(const Refinement& r, double took_s) {
         text += fmt::format("  {:<14} {:>12.6g} {:>12.6g} {:>10}\n", row.name, row.before, row.after,
                             std::isnan(row.sigma) ? "kept" : fmt::format("{:.2g}", row.sigma));
     text += fmt::format("\n  {:<14} {:>12} {:>12}\n", fmt::format("error, {} rms", r.unit), "before", "after");
-    text += fmt::format("  {:<14} {:>12.4g} {:>12.4g}\n", "fitted", r.climb.train_before_px, r.climb.train_px);
-    text += fmt::format("  {:<14} {:>12.4g} {:>12.4g}\n", "held out", r.climb.held_out_before_px, r.climb.held_out_px);
+    text += fmt::format("  {:<14} {:>12.4g} {:>12.4g}\n", "fitted", r.selection.train_before_px, r.selection.train_px);
+    text += fmt::format("  {:<14} {:>12.4g} {:>12.4g}\n", "held out", r.selection.held_out_before_px,
+                        r.selection.held_out_px);
     if (r.full)
         text += fmt::format("  full model: fitted {:.4g}, held out {:.4g}\n", r.full->train_px, r.full->held_out_px);
     text += "\n";
-    for (const Step& step : r.climb.steps)
-        text += fmt::format("  {:<14} {} {}\n", step.name, step.climbed ? "freed:" : "kept: ", step.why);
+    for (const Step& step : r.selection.steps)
+        text += fmt::format("  {:<14} {} {}\n", step.name, step.freed ? "freed:" : "kept: ", step.why);
     text += fmt::format(
         "\n  {:.0f} % of the image's cells hold observations; the pixel's sigma is {:.2g} px on average, {:.2g} "
         "at most\n",
-        100 * r.coverage.share, mean_pixel_sigma(r.climb.fit), largest(r.pixel_sigma));
+        100 * r.coverage.share, mean_pixel_sigma(r.selection.fit), largest(r.pixel_sigma));
     for (const Effect& effect : r.effects)
         text += fmt::format("  at {:.2f} m points move by {:.2f} mm rms, {:.2f} mm at most\n", effect.depth_m,
                             effect.rms_mm, effect.worst_mm);
@@ -171,28 +172,28 @@ std::string heat_map(const cv::Mat_<Number>& grid, const char* caption, const ch
     return svg + fmt::format("</svg><figcaption>{}</figcaption></figure>\n", caption);
 }
 
-/// Residuals as arrows from where something was seen, exaggerated so that the usual one is a fiftieth of the width.
+/// Residuals as arrows from the observed pixels. They are exaggerated: a typical one is a fiftieth of the width.
 std::string arrows(const Refinement& r) {
     const cv::Size size = r.before.pinhole.size;
-    const double exaggeration = std::max(1.0, std::floor(size.width / 50.0 / std::max(r.climb.train_px, 1e-9)));
+    const double exaggeration = std::max(1.0, std::floor(size.width / 50.0 / std::max(r.selection.train_px, 1e-9)));
     constexpr std::size_t most = 4000;
     const std::size_t step = std::max<std::size_t>(1, r.residuals.size() / most);
     std::string svg =
         fmt::format("<figure><svg viewBox='0 0 {} {}' width='640' class='framed'>", size.width, size.height);
     for (std::size_t i = 0; i < r.residuals.size(); i += step) {
-        const auto& [at, miss] = r.residuals[i];
-        svg += fmt::format("<path d='M{:.1f} {:.1f}l{:.1f} {:.1f}'/>", at.x, at.y, miss.x() * exaggeration,
-                           miss.y() * exaggeration);
+        const auto& [at, error] = r.residuals[i];
+        svg += fmt::format("<path d='M{:.1f} {:.1f}l{:.1f} {:.1f}'/>", at.x, at.y, error.x() * exaggeration,
+                           error.y() * exaggeration);
     }
     return svg +
-           fmt::format("</svg><figcaption>Residuals (predicted - seen) over the image, {:.0f} times as long as they are"
+           fmt::format("</svg><figcaption>Residuals (predicted - observed) over the image, {:.0f} times their length"
                        "</figcaption></figure>\n",
                        exaggeration);
 }
 
-/// The residuals themselves as a cloud of points: round and centred where nothing is left to model.
+/// The residuals as a scatter plot: round and centred where nothing is left to model.
 std::string scatter(const Refinement& r) {
-    const double reach = std::max(4 * r.climb.train_px, 1e-9), scale = 150 / reach;
+    const double reach = std::max(4 * r.selection.train_px, 1e-9), scale = 150 / reach;
     constexpr std::size_t most = 4000;
     const std::size_t step = std::max<std::size_t>(1, r.residuals.size() / most);
     std::string svg =
@@ -240,15 +241,15 @@ std::string page_of(const Refinement& r, double took_s) {
     for (const NumberRow& row : numbers_of(r))
         numbers.push_back({row.name, number(row.before, 8), number(row.after, 8),
                            std::isnan(row.sigma) ? "kept" : number(row.sigma, 2)});
-    for (const Step& step : r.climb.steps) {
-        steps.push_back({step.name, step.climbed ? "freed" : "kept", step.why});
-        freed.push_back(step.climbed);
+    for (const Step& step : r.selection.steps) {
+        steps.push_back({step.name, step.freed ? "freed" : "kept", step.why});
+        freed.push_back(step.freed);
     }
     for (const Effect& effect : r.effects)
         moves.push_back({number(effect.depth_m, 3), number(effect.rms_mm, 3), number(effect.worst_mm, 3)});
     std::vector<std::vector<std::string>> errors = {
-        {"before", number(r.climb.train_before_px), number(r.climb.held_out_before_px)},
-        {"after", number(r.climb.train_px), number(r.climb.held_out_px)}};
+        {"before", number(r.selection.train_before_px), number(r.selection.held_out_before_px)},
+        {"after", number(r.selection.train_px), number(r.selection.held_out_px)}};
     if (r.full)
         errors.push_back({"full model, for comparison", number(r.full->train_px), number(r.full->held_out_px)});
 
@@ -259,7 +260,7 @@ std::string page_of(const Refinement& r, double took_s) {
         {"Found", found},
         {"Numbers", page::table({"", "before", "after", "sigma"}, numbers)},
         {fmt::format("Error, {} rms", r.unit), page::table({"", "fitted views", "held-out views"}, errors)},
-        {"Ladder", page::table({"rung", "", "why"}, steps, freed)},
+        {"Model selection", page::table({"parameters", "", "why"}, steps, freed)},
         {"Residuals", r.residuals.empty() ? page::paragraph("of depth, not of pixels") : arrows(r) + scatter(r)},
         {"Views", view_bars(r)},
         {"Image", heat_map(r.coverage.counts, "Observations", "{:.0f}") +

@@ -1,4 +1,4 @@
-// What `refine` tells: a table on the terminal, details for the camera's file, and a page with plots.
+// The results of `refine`: a table on the terminal, details for the camera's file, and a page with plots.
 #pragma once
 
 #include "apps/json.h"
@@ -8,14 +8,14 @@
 
 namespace scanshade {
 
-/// Everything but the camera itself, for our JSON: status, numbers with sigmas, covariance, ladder, errors, views,
-/// coverage, the pixel's sigma over the image, effects.
+/// Everything but the camera itself, for our JSON: status, numbers with sigmas, covariance, model selection, errors,
+/// views, coverage, the pixel's sigma over the image, effects.
 [[nodiscard]] json details_of(const calibration::Refinement& refinement, double took_s);
 
 /// The same as a person reads it on a terminal.
 [[nodiscard]] std::string summary_of(const calibration::Refinement& refinement, double took_s);
 
-/// A page of its own: tables and inline SVG (residuals over the image, views, coverage, the pixel's sigma).
+/// A whole page: tables and inline SVG (residuals over the image, views, coverage, the pixel's sigma).
 [[nodiscard]] std::string page_of(const calibration::Refinement& refinement, double took_s);
 
 /// "refined" or "unchanged"

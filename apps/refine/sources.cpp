@@ -1,11 +1,11 @@
-// Pictures and clouds made into evidence, with notes on what was left out; where a camera starts from.
+// Refines from pictures and clouds, with notes about what was left out; and finds first cameras.
 #include "apps/refine/sources.h"
 
 #include "io/cameras/camera_file.h"
-#include "io/captures/layouts.h"
 #include "io/images/exif.h"
 #include "io/images/image_file.h"
-#include "projection/calibration/organised_evidence.h"
+#include "io/captures/layouts.h"
+#include "projection/calibration/boards/organised_clouds.h"
 #include "projection/error.h"
 
 #include <algorithm>
@@ -34,7 +34,7 @@ struct Picture {
     cv::Mat3b pixels;
 };
 
-/// The readable pictures of a folder; of others, and of those not of the commonest size, a note.
+/// The readable pictures of a folder, all of the most common size. Each other picture gets a note.
 std::vector<Picture> pictures_in(const fs::path& folder, std::vector<std::string>& notes) {
     std::vector<Picture> all;
     std::map<std::pair<int, int>, int> sizes;
@@ -44,27 +44,27 @@ std::vector<Picture> pictures_in(const fs::path& folder, std::vector<std::string
         try {
             all.push_back({file.filename().string(), read_colour(file)});
             ++sizes[{all.back().pixels.cols, all.back().pixels.rows}];
-        } catch (const Error& failure) {
+        } catch (const std::exception& failure) {
             notes.push_back(fmt::format("{}; not used.", failure.what()));
         }
     }
     if (all.empty())
         throw Error(folder.string() + ": no pictures (PNG, JPEG ...) of a board that can be read");
-    const auto commonest = std::max_element(sizes.begin(), sizes.end(), [](const auto& a, const auto& b) {
-                               return a.second < b.second;
-                           })->first;
+    const auto most_common = std::max_element(sizes.begin(), sizes.end(), [](const auto& a, const auto& b) {
+                                 return a.second < b.second;
+                             })->first;
     std::erase_if(all, [&](const Picture& picture) {
-        if (std::pair(picture.pixels.cols, picture.pixels.rows) == commonest)
+        if (std::pair(picture.pixels.cols, picture.pixels.rows) == most_common)
             return false;
-        notes.push_back(fmt::format("{}: {}x{} among pictures of {}x{}: sizes are not mixed; not used.",
+        notes.push_back(fmt::format("{}: {}x{} among pictures of {}x{}: all must have one size; not used.",
                                     (folder / picture.name).string(), picture.pixels.cols, picture.pixels.rows,
-                                    commonest.first, commonest.second));
+                                    most_common.first, most_common.second));
         return true;
     });
     return all;
 }
 
-/// From the boards' homographies, or where they do not tell, from the pictures' EXIF.
+/// From the boards' homographies, or where those fail, from the pictures' EXIF.
 Camera first_guess(const std::vector<BoardView>& views, const fs::path& picture, LensModel lens, cv::Size size) {
     try {
         return with_lens(guess_from_boards(views, size), lens);
@@ -126,14 +126,14 @@ Refinement refine_from_boards(const fs::path& folder, const Target& target, cons
         throw Error(
             fmt::format("{}: no {} found in any of {} pictures", folder.string(), text_of(target), pictures.size()));
     const auto given = given_camera(first.camera, first.fov_degrees, first.lens, size);
-    options.ladder.guessed = !given;
+    options.selection.guessed = !given;
     const Camera before = given ? *given : first_guess(views, folder / views.front().name, first.lens, size);
     Boards boards(views);
-    const std::string cannot = degeneracy(views, boards.start(model_of(before)));
+    const std::string why_not = degeneracy(views, boards.start(model_of(before)));
     Refinement result;
     try {
-        result = refine(boards, before, camera_rungs(before.distortion.model), options, cannot);
-    } catch (const Error& failure) { // what was left out is often why
+        result = refine(boards, before, camera_groups(before.distortion.model), options, why_not);
+    } catch (const Error& failure) { // the pictures left out are often the reason
         std::string all = folder.string() + ": " + failure.what();
         for (const std::string& note : notes)
             all += "\n  " + note;
@@ -146,32 +146,32 @@ Refinement refine_from_boards(const fs::path& folder, const Target& target, cons
 
 Refinement refine_from_clouds(const Capture& capture, const std::vector<std::size_t>& frames, const FirstCamera& first,
                               RefineOptions options) {
-    Organised evidence;
+    OrganisedClouds problem;
     std::vector<std::string> notes;
     std::size_t used = 0;
     for (const std::size_t index : frames) {
         try {
             const Frame frame = capture.load(index);
-            evidence.add(frame.name, *frame.cloud);
+            problem.add(frame.name, *frame.cloud);
             ++used;
-        } catch (const Error& failure) {
+        } catch (const std::exception& failure) {
             notes.push_back(fmt::format("{}; not used.", failure.what()));
         }
     }
     if (used == 0)
         throw Error(
-            fmt::format("{}: no organised cloud that tells its camera: {}", capture.path.string(), notes.front()));
-    const cv::Size size = evidence.size();
+            fmt::format("{}: no organised cloud determines its camera: {}", capture.path.string(), notes.front()));
+    const cv::Size size = problem.size();
     const auto given = given_camera(first.camera, first.fov_degrees, first.lens, size);
-    options.ladder.guessed = !given;
+    options.selection.guessed = !given;
     const Camera before = given ? *given : guessed_camera({}, first.lens, size);
-    Refinement result = refine(evidence, before, camera_rungs(before.distortion.model), options, "");
+    Refinement result = refine(problem, before, camera_groups(before.distortion.model), options, "");
     result.source = fmt::format("pixels and points of {} organised cloud{}", used, used == 1 ? "" : "s");
     if (!result.after.distortion.any())
         result.notes.push_back(
             fmt::format("the points lie on a pinhole's rays to {:.1g} px: no lens distortion is left in "
                         "them (rectified, or never there).",
-                        result.climb.train_px));
+                        result.selection.train_px));
     result.notes.insert(result.notes.begin(), notes.begin(), notes.end());
     return result;
 }

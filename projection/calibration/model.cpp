@@ -1,13 +1,29 @@
-// Cameras to numbers and back; the rungs.
+// Cameras to numbers and back; the parameter groups.
 #include "projection/calibration/model.h"
 
 namespace scanshade::calibration {
 
 std::string_view name_of(Unknown unknown) {
-    constexpr std::array<std::string_view, unknown_count> names = {
-        "f",      "fy/fx",  "cx",      "cy",          "k1",           "k2",          "p1",
-        "p2",     "k3",     "k4",      "depth scale", "depth offset", "depth curve", "turn x",
-        "turn y", "turn z", "shift x", "shift y",     "shift z",      "time offset"};
+    constexpr std::array<std::string_view, unknown_count> names = {"f",
+                                                                   "fy/fx",
+                                                                   "cx",
+                                                                   "cy",
+                                                                   "k1",
+                                                                   "k2",
+                                                                   "p1",
+                                                                   "p2",
+                                                                   "k3",
+                                                                   "k4",
+                                                                   "depth scale",
+                                                                   "depth offset",
+                                                                   "depth curve",
+                                                                   "rotation x",
+                                                                   "rotation y",
+                                                                   "rotation z",
+                                                                   "translation x",
+                                                                   "translation y",
+                                                                   "translation z",
+                                                                   "time offset"};
     return names[unknown];
 }
 
@@ -34,18 +50,29 @@ Camera camera_of(const Model& m, std::string origin) {
             std::move(origin)};
 }
 
-std::vector<Rung> camera_rungs(LensModel lens) {
-    std::vector<Rung> rungs = {{"f", {f}}, {"fx, fy", {aspect}}, {"cx, cy", {cx, cy}}, {"k1", {k1}}, {"k2", {k2}}};
-    if (lens == LensModel::kannala_brandt)
-        rungs.insert(rungs.end(), {{"k3", {k3}}, {"k4", {k4}}});
-    else
-        rungs.insert(rungs.end(), {{"p1, p2", {p1, p2}}, {"k3", {k3}}});
-    return rungs;
+DepthCorrection depth_correction_of(const Model& model) {
+    return {model[depth_scale], model[depth_offset], model[depth_curve]};
 }
 
-Rung place_rung() { return {"place", {turn_x, turn_y, turn_z, shift_x, shift_y, shift_z}}; }
+double corrected_m(const Model& model, double z_m) {
+    return model[depth_scale] * z_m + model[depth_offset] + model[depth_curve] * z_m * z_m;
+}
 
-std::vector<Rung> depth_rungs() {
+std::vector<ParameterGroup> camera_groups(LensModel lens) {
+    std::vector<ParameterGroup> groups = {
+        {"f", {f}}, {"fx, fy", {aspect}}, {"cx, cy", {cx, cy}}, {"k1", {k1}}, {"k2", {k2}}};
+    if (lens == LensModel::kannala_brandt)
+        groups.insert(groups.end(), {{"k3", {k3}}, {"k4", {k4}}});
+    else
+        groups.insert(groups.end(), {{"p1, p2", {p1, p2}}, {"k3", {k3}}});
+    return groups;
+}
+
+ParameterGroup extrinsics_group() {
+    return {"extrinsics", {rotation_x, rotation_y, rotation_z, translation_x, translation_y, translation_z}};
+}
+
+std::vector<ParameterGroup> depth_groups() {
     return {{"depth offset", {depth_offset}}, {"depth scale", {depth_scale}, f}, {"depth curve", {depth_curve}}};
 }
 

@@ -1,4 +1,4 @@
-// What a calibration may change, as one row of named numbers, and how a camera with those numbers sees a point.
+// What a calibration may change, as one row of named numbers, and how a camera with those numbers projects a point.
 #pragma once
 
 #include "projection/camera.h"
@@ -25,21 +25,23 @@ enum Unknown : int {
     depth_scale,
     depth_offset,
     depth_curve, // true depth = scale z + offset + curve z^2, metres
-    turn_x,
-    turn_y,
-    turn_z,
-    shift_x,
-    shift_y,
-    shift_z,     // colour_from_depth: axis times angle, metres
-    time_offset, // the images' clock against the poses', seconds: an image stamped t was taken at pose time t + offset
+    rotation_x,
+    rotation_y,
+    rotation_z,
+    translation_x,
+    translation_y,
+    translation_z, // the extrinsics colour_from_depth: axis times angle, metres
+    time_offset,   // seconds from the clock of the images to that of the poses: image time t is pose time t + offset
     unknown_count
 };
-inline constexpr int camera_unknowns = depth_scale, depth_unknowns = turn_x - depth_scale;
-inline constexpr int place_unknowns = time_offset - turn_x;
+inline constexpr int camera_unknowns = depth_scale, depth_unknowns = rotation_x - depth_scale;
+inline constexpr int extrinsic_unknowns = time_offset - rotation_x;
+/// What problems hold besides the model: a pose is axis times angle, then translation.
+inline constexpr int pose_unknowns = 6, point_unknowns = 3;
 
 [[nodiscard]] std::string_view name_of(Unknown unknown);
 
-/// A camera (and its depth) as the solver sees it.
+/// A camera, its depth correction and its extrinsics as the solver sees them.
 struct Model {
     LensModel lens = LensModel::brown_conrady;
     cv::Size size;
@@ -51,25 +53,28 @@ struct Model {
 
 [[nodiscard]] Model model_of(const Camera& camera);
 [[nodiscard]] Camera camera_of(const Model& model, std::string origin = {});
+[[nodiscard]] DepthCorrection depth_correction_of(const Model& model);
+/// A recorded depth after the model's correction.
+[[nodiscard]] double corrected_m(const Model& model, double z_m);
 
 /// Which of the numbers a fit may change.
 using Free = std::array<bool, unknown_count>;
 
-/// One step of the ladder: the numbers that are freed together.
-struct Rung {
+/// One step of model selection: the numbers that are freed together.
+struct ParameterGroup {
     std::string_view name;
     std::vector<Unknown> unknowns;
-    /// A number that may stand in for these: they must be seen while it is free, too.
+    /// A number that the data may confuse with these: they must be significant while it is free, too.
     std::optional<Unknown> rival = {};
 };
 /// f, fx fy, cx cy, k1, k2, p1 p2, k3; for a fisheye f, fx fy, cx cy, k1, k2, k3, k4.
-[[nodiscard]] std::vector<Rung> camera_rungs(LensModel lens);
-/// Where the colour camera is beside the depth camera.
-[[nodiscard]] Rung place_rung();
+[[nodiscard]] std::vector<ParameterGroup> camera_groups(LensModel lens);
+/// The pose of the colour camera relative to the depth camera.
+[[nodiscard]] ParameterGroup extrinsics_group();
 /// Depth offset, scale, curve.
-[[nodiscard]] std::vector<Rung> depth_rungs();
+[[nodiscard]] std::vector<ParameterGroup> depth_groups();
 
-/// The pixel at which the camera sees a point in camera space, z > 0. `camera` holds the first camera_unknowns numbers.
+/// Projects a point in camera space, z > 0, to its pixel. `camera` holds the first camera_unknowns numbers.
 template <class Number>
 void pixel_of(LensModel lens, const Number* camera, const Number* point, Number* pixel) {
     const Number x = point[0] / point[2], y = point[1] / point[2];

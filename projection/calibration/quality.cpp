@@ -23,22 +23,21 @@ void for_each_cell(cv::Size image, cv::Size cells, Visit&& visit) {
 }
 
 std::optional<Eigen::Vector2d> direction(const Camera& camera, double u, double v) {
-    const Pinhole& p = camera.pinhole;
-    return undistorted(camera.distortion, {(u - p.cx) / p.fx, (v - p.cy) / p.fy});
+    return undistorted(camera.distortion, camera.pinhole.ray(u, v).head<2>());
 }
 
-/// Derivatives of the pixel by the camera's numbers, and by a small turn of the camera.
+/// Derivatives of the pixel by the camera's numbers, and by a small rotation of the camera.
 using PixelJacobian = Eigen::Matrix<double, 2, camera_unknowns + 3>;
-PixelJacobian pixel_jacobian(const Model& model, const Eigen::Vector2d& straight) {
+PixelJacobian pixel_jacobian(const Model& model, const Eigen::Vector2d& undistorted_ray) {
     using Jet = ceres::Jet<double, camera_unknowns + 3>;
-    Jet camera[camera_unknowns], turn[3], pixel[2], turned[3];
+    Jet camera[camera_unknowns], rotation[3], pixel[2], rotated[3];
     for (int i = 0; i < camera_unknowns; ++i)
         camera[i] = Jet(model.values[i], i);
     for (int i = 0; i < 3; ++i)
-        turn[i] = Jet(0.0, camera_unknowns + i);
-    const Jet point[3] = {Jet(straight.x()), Jet(straight.y()), Jet(1.0)};
-    ceres::AngleAxisRotatePoint(turn, point, turned);
-    pixel_of(model.lens, camera, turned, pixel);
+        rotation[i] = Jet(0.0, camera_unknowns + i);
+    const Jet point[3] = {Jet(undistorted_ray.x()), Jet(undistorted_ray.y()), Jet(1.0)};
+    ceres::AngleAxisRotatePoint(rotation, point, rotated);
+    pixel_of(model.lens, camera, rotated, pixel);
     PixelJacobian jacobian;
     jacobian << pixel[0].v.transpose(), pixel[1].v.transpose();
     return jacobian;
@@ -63,31 +62,31 @@ cv::Mat1d pixel_sigmas(const Fit& fit, cv::Size cells) {
     if (fit.covariance.size() == 0)
         return sigmas;
     const Camera camera = camera_of(fit.model);
-    std::vector<cv::Point> places;
-    Eigen::MatrixXd by_camera(2 * cells.area(), camera_unknowns), by_turn(2 * cells.area(), 3);
+    std::vector<cv::Point> used;
+    Eigen::MatrixXd by_camera(2 * cells.area(), camera_unknowns), by_rotation(2 * cells.area(), 3);
     for_each_cell(fit.model.size, cells, [&](int row, int column, double u, double v) {
-        const auto straight = direction(camera, u, v);
-        if (!straight) {
+        const auto ray = direction(camera, u, v);
+        if (!ray) {
             sigmas(row, column) = std::numeric_limits<double>::quiet_NaN();
             return;
         }
-        const PixelJacobian jacobian = pixel_jacobian(fit.model, *straight);
-        const auto place = 2 * static_cast<Eigen::Index>(places.size());
-        by_camera.middleRows<2>(place) = jacobian.leftCols<camera_unknowns>();
-        by_turn.middleRows<2>(place) = jacobian.rightCols<3>();
-        places.emplace_back(column, row);
+        const PixelJacobian jacobian = pixel_jacobian(fit.model, *ray);
+        const auto index = 2 * static_cast<Eigen::Index>(used.size());
+        by_camera.middleRows<2>(index) = jacobian.leftCols<camera_unknowns>();
+        by_rotation.middleRows<2>(index) = jacobian.rightCols<3>();
+        used.emplace_back(column, row);
     });
-    const auto rows = 2 * static_cast<Eigen::Index>(places.size());
+    const auto rows = 2 * static_cast<Eigen::Index>(used.size());
     by_camera.conservativeResize(rows, Eigen::NoChange);
-    by_turn.conservativeResize(rows, Eigen::NoChange);
+    by_rotation.conservativeResize(rows, Eigen::NoChange);
     if (rows < 6)
         return sigmas;
-    // What is left of each change once the camera is turned to make up for it as well as it can.
-    by_camera -= by_turn * by_turn.colPivHouseholderQr().solve(by_camera);
+    // What remains of each change after the rotation of the camera that best compensates it.
+    by_camera -= by_rotation * by_rotation.colPivHouseholderQr().solve(by_camera);
     const Eigen::MatrixXd spread = by_camera * fit.covariance.topLeftCorner(camera_unknowns, camera_unknowns);
-    for (std::size_t i = 0; i < places.size(); ++i) {
+    for (std::size_t i = 0; i < used.size(); ++i) {
         const auto row = 2 * static_cast<Eigen::Index>(i);
-        sigmas(places[i]) =
+        sigmas(used[i]) =
             std::sqrt(std::max(0.0, (spread.middleRows<2>(row) * by_camera.middleRows<2>(row).transpose()).trace()));
     }
     return sigmas;
@@ -126,14 +125,14 @@ Effect effect_at(const Camera& before, const Camera& after, double depth_m) {
     Effect effect{depth_m, 0, 0};
     if (old_points.size() < 3)
         return effect;
-    Eigen::Matrix3d moments = Eigen::Matrix3d::Zero(); // the best turn between two bundles of rays (Kabsch 1976)
+    Eigen::Matrix3d moments = Eigen::Matrix3d::Zero(); // the best rotation between two bundles of rays (Kabsch 1976)
     for (std::size_t i = 0; i < old_points.size(); ++i)
         moments += new_points[i] * old_points[i].transpose();
     const Eigen::JacobiSVD<Eigen::Matrix3d> svd(moments, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    const Eigen::Matrix3d turn = svd.matrixU() * svd.matrixV().transpose();
+    const Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
     double squares = 0;
     for (std::size_t i = 0; i < old_points.size(); ++i) {
-        const double moved_mm = 1000 * (new_points[i] - turn * old_points[i]).norm();
+        const double moved_mm = 1000 * (new_points[i] - rotation * old_points[i]).norm();
         effect.worst_mm = std::max(effect.worst_mm, moved_mm);
         squares += moved_mm * moved_mm;
     }

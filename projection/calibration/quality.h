@@ -1,7 +1,7 @@
-// How good a calibration is, in terms that matter: where it was seen, how sure pixels are, what changed in millimetres.
+// How good a calibration is: coverage of the image, uncertainty of pixels, and the change in millimetres.
 #pragma once
 
-#include "projection/calibration/evidence.h"
+#include "projection/calibration/problem.h"
 
 namespace scanshade::calibration {
 
@@ -12,18 +12,18 @@ struct Coverage {
 };
 [[nodiscard]] Coverage coverage_of(const std::vector<cv::Point2d>& pixels, cv::Size size);
 
-/// One standard deviation of the pixel at which a direction is seen, over a grid of the image (pixels, both axes
-/// together): the covariance of the model carried through the projection, less what a turn of the whole camera makes up
-/// for, since that changes no shape (after mrcal's projection uncertainty). 0 where nothing was free, NaN beyond the
-/// lens.
+/// One standard deviation of the pixel that a direction projects to, over a grid of the image (pixels, both axes
+/// together). The model's covariance is propagated through the projection. What a rotation of the whole camera
+/// compensates is left out, since it changes no shape (after mrcal's projection uncertainty). 0 where nothing was free,
+/// NaN beyond the lens.
 [[nodiscard]] cv::Mat1d pixel_sigmas(const Fit& fit, cv::Size cells = {9, 7});
 [[nodiscard]] double mean_pixel_sigma(const Fit& fit);
 
-/// Whether the lens maps ever wider angles to ever larger radii, out to the image's corners.
+/// Whether the lens maps wider angles to larger radii, out to the image's corners.
 [[nodiscard]] bool monotone(const Model& model);
 
-/// By how much the surface point behind a pixel moves from one camera to the other, at a depth, less a turn of the
-/// whole.
+/// How far the surface point behind a pixel moves from one camera to the other, at a depth. The best common rotation is
+/// left out.
 struct Effect {
     double depth_m = 0, rms_mm = 0, worst_mm = 0;
 };
@@ -31,7 +31,7 @@ struct Effect {
 /// At the 10th, 50th and 90th percentile of the depths; empty where there are none.
 [[nodiscard]] std::vector<Effect> effects(const Camera& before, const Camera& after, std::vector<double> depths_m);
 
-/// Sigma of fy, which the model holds as f times aspect.
+/// Sigma of fy, which the model stores as f times aspect.
 [[nodiscard]] double sigma_fy(const Fit& fit);
 
 } // namespace scanshade::calibration

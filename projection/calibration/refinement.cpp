@@ -1,7 +1,8 @@
-// One refinement from evidence to findings: climb, outlying views, coverage, effect.
+// One refinement from observations to findings: model selection, outlying views, coverage, effect.
 #include "projection/calibration/refinement.h"
 
 #include "projection/error.h"
+#include "projection/statistics.h"
 
 #include <algorithm>
 #include <fmt/format.h>
@@ -12,35 +13,27 @@ namespace {
 
 constexpr double outlying_ratio = 3;
 
-double median(std::vector<double> values) {
-    if (values.empty())
-        return 0;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
-
-std::vector<ViewRow> rows_of(const Evidence& evidence, const Fit& fit) {
-    const std::vector<ViewScore> scores = evidence.score(fit, Views(evidence.views(), true));
+std::vector<ViewRow> rows_of(const Problem& problem, const Fit& fit) {
+    const std::vector<ViewScore> scores = problem.score(fit, Views(problem.views(), true));
     std::vector<ViewRow> rows;
     std::vector<double> errors;
     for (std::size_t i = 0; i < scores.size(); ++i) {
-        rows.push_back({evidence.view_name(i), scores[i]});
+        rows.push_back({problem.view_name(i), scores[i]});
         if (scores[i].points > 0)
             errors.push_back(scores[i].rms());
     }
-    const double usual = median(errors);
+    const double typical = median(errors);
     for (ViewRow& row : rows) {
-        row.outlying = row.score.rms() > outlying_ratio * usual;
-        row.weight = row.outlying ? usual / row.score.rms() : 1;
+        row.outlying = row.score.rms() > outlying_ratio * typical;
+        row.weight = row.outlying ? typical / row.score.rms() : 1;
     }
     return rows;
 }
 
-Climb climbed(const Evidence& evidence, const Fit& start, const std::vector<Rung>& rungs, const Views& used,
-              const RefineOptions& options) {
-    return options.model == ModelChoice::full ? climb_all(evidence, start, rungs, used, options.ladder)
-                                              : climb(evidence, start, rungs, used, options.ladder);
+Selection selected(const Problem& problem, const Fit& start, const std::vector<ParameterGroup>& groups,
+                   const Views& used, const RefineOptions& options) {
+    return options.model == ModelChoice::full ? full_model(problem, start, groups, used, options.selection)
+                                              : select_model(problem, start, groups, used, options.selection);
 }
 
 std::string names_of_outlying(const std::vector<ViewRow>& rows, const std::string& unit) {
@@ -56,33 +49,33 @@ std::string names_of_outlying(const std::vector<ViewRow>& rows, const std::strin
 
 } // namespace
 
-Refinement refine(Evidence& evidence, const Camera& before, const std::vector<Rung>& rungs,
-                  const RefineOptions& options, const std::string& cannot) {
-    return refine(evidence, model_of(before), before, rungs, options, cannot);
+Refinement refine(Problem& problem, const Camera& before, const std::vector<ParameterGroup>& groups,
+                  const RefineOptions& options, const std::string& degeneracy) {
+    return refine(problem, model_of(before), before, groups, options, degeneracy);
 }
 
-Refinement refine(Evidence& evidence, const Model& first, const Camera& before, const std::vector<Rung>& rungs,
-                  const RefineOptions& options, const std::string& cannot) {
-    if (!cannot.empty() && options.ladder.guessed)
-        throw Error("no camera can be found: " + cannot);
+Refinement refine(Problem& problem, const Model& first, const Camera& before, const std::vector<ParameterGroup>& groups,
+                  const RefineOptions& options, const std::string& degeneracy) {
+    if (!degeneracy.empty() && options.selection.guessed)
+        throw Error("no camera can be found: " + degeneracy);
     Refinement result;
     result.before = before;
-    result.unit = evidence.unit();
-    Views used(evidence.views(), true);
-    const Fit start = evidence.start(first);
-    if (!cannot.empty()) {
-        result.notes.push_back("nothing is determined: " + cannot + ".");
-        result.climb = climb(evidence, start, {}, used, options.ladder);
-        result.views = rows_of(evidence, result.climb.fit);
+    result.unit = problem.unit();
+    Views used(problem.views(), true);
+    const Fit start = problem.start(first);
+    if (!degeneracy.empty()) {
+        result.notes.push_back("nothing is determined: " + degeneracy + ".");
+        result.selection = select_model(problem, start, {}, used, options.selection);
+        result.views = rows_of(problem, result.selection.fit);
     } else {
-        result.climb = climbed(evidence, start, rungs, used, options);
-        result.views = rows_of(evidence, result.climb.fit);
+        result.selection = selected(problem, start, groups, used, options);
+        result.views = rows_of(problem, result.selection.fit);
         const auto outlying =
             std::count_if(result.views.begin(), result.views.end(), [](const auto& v) { return v.outlying; });
         if (outlying > 0) {
             const char* done = options.outliers == Outliers::keep   ? "kept; --outliers downweight or drop"
                                : options.outliers == Outliers::drop ? "dropped"
-                                                                    : "weighed down to the median's error";
+                                                                    : "downweighted to the median error";
             result.notes.push_back(fmt::format("outlying views, more than {:.0f} times the median error: {}; {}.",
                                                outlying_ratio, names_of_outlying(result.views, result.unit), done));
         }
@@ -92,10 +85,10 @@ Refinement refine(Evidence& evidence, const Model& first, const Camera& before, 
                 used[i] = !(result.views[i].outlying && options.outliers == Outliers::drop);
                 weights[i] = options.outliers == Outliers::downweight ? result.views[i].weight : 1;
             }
-            evidence.weigh(weights);
+            problem.set_weights(weights);
             const std::vector<ViewRow> all = result.views;
-            result.climb = climbed(evidence, start, rungs, used, options);
-            result.views = rows_of(evidence, result.climb.fit);
+            result.selection = selected(problem, start, groups, used, options);
+            result.views = rows_of(problem, result.selection.fit);
             for (std::size_t i = 0; i < all.size(); ++i) {
                 result.views[i].outlying = all[i].outlying;
                 result.views[i].weight = weights[i];
@@ -103,29 +96,30 @@ Refinement refine(Evidence& evidence, const Model& first, const Camera& before, 
             }
         }
         if (options.model != ModelChoice::full)
-            result.full = climb_all(evidence, result.climb.fit, rungs, used, options.ladder);
+            result.full = full_model(problem, result.selection.fit, groups, used, options.selection);
     }
-    if (options.ladder.guessed && !result.climb.free[f])
-        throw Error("no camera can be found: " + result.climb.steps.front().why);
-    result.after = result.changed() ? camera_of(result.climb.fit.model, "refined") : before;
-    std::vector<cv::Point2d> seen;
-    for (std::size_t i = 0; i < evidence.views(); ++i) {
+    if (options.selection.guessed && !result.selection.free[f])
+        throw Error("no camera can be found: " + result.selection.steps.front().why);
+    result.after = result.changed() ? camera_of(result.selection.fit.model, "refined") : before;
+    std::vector<cv::Point2d> observed;
+    for (std::size_t i = 0; i < problem.views(); ++i) {
         if (!used[i])
             continue;
-        const std::vector<cv::Point2d> pixels = evidence.pixels_of(i);
-        const std::vector<Eigen::Vector2d> residuals = evidence.residuals(result.climb.fit, i);
+        const std::vector<cv::Point2d> pixels = problem.pixels_of(i);
+        const std::vector<Eigen::Vector2d> residuals = problem.residuals(result.selection.fit, i);
         for (std::size_t point = 0; point < pixels.size(); ++point) {
-            seen.push_back(pixels[point]);
+            observed.push_back(pixels[point]);
             if (point < residuals.size())
                 result.residuals.emplace_back(pixels[point], residuals[point]);
         }
     }
-    result.coverage = coverage_of(seen, before.pinhole.size);
-    result.pixel_sigma = pixel_sigmas(result.climb.fit);
-    const auto& free = result.climb.free;
-    const bool of_camera = std::any_of(free.begin(), free.begin() + camera_unknowns, [](bool open) { return open; });
-    if (of_camera && !options.ladder.guessed) // a change from a guess says nothing
-        result.effects = effects(before, result.after, evidence.depths_m(result.climb.fit));
+    result.coverage = coverage_of(observed, before.pinhole.size);
+    result.pixel_sigma = pixel_sigmas(result.selection.fit);
+    const auto& free = result.selection.free;
+    const bool camera_changed =
+        std::any_of(free.begin(), free.begin() + camera_unknowns, [](bool open) { return open; });
+    if (camera_changed && !options.selection.guessed) // a change from a guess says nothing
+        result.effects = effects(before, result.after, problem.depths_m(result.selection.fit));
     return result;
 }
 

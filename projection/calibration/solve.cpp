@@ -1,4 +1,4 @@
-// Ceres, as all evidence uses it: settings, frozen numbers, covariance.
+// Ceres, as all problems use it: settings, fixed numbers, covariance.
 #include "projection/calibration/solve.h"
 
 #include "projection/error.h"
@@ -14,7 +14,7 @@ struct Block {
     int first, size;
 };
 constexpr Block blocks[] = {
-    {0, camera_unknowns}, {depth_scale, depth_unknowns}, {turn_x, place_unknowns}, {time_offset, 1}};
+    {0, camera_unknowns}, {depth_scale, depth_unknowns}, {rotation_x, extrinsic_unknowns}, {time_offset, 1}};
 
 std::vector<int> free_in(const Block& block, const Free& free) {
     std::vector<int> indices;
@@ -30,7 +30,7 @@ bool in_use(const ceres::Problem& problem, const Model& model, const Block& bloc
 
 } // namespace
 
-void freeze(ceres::Problem& problem, Model& model, const Free& free) {
+void fix(ceres::Problem& problem, Model& model, const Free& free) {
     for (const Block& block : blocks) {
         if (!in_use(problem, model, block))
             continue;
@@ -41,21 +41,21 @@ void freeze(ceres::Problem& problem, Model& model, const Free& free) {
             continue;
         }
         problem.SetParameterBlockVariable(values);
-        std::vector<int> frozen;
+        std::vector<int> fixed;
         for (int i = 0; i < block.size; ++i)
             if (!free[block.first + i])
-                frozen.push_back(i);
-        if (!frozen.empty())
-            problem.SetManifold(values, new ceres::SubsetManifold(block.size, frozen));
+                fixed.push_back(i);
+        if (!fixed.empty())
+            problem.SetManifold(values, new ceres::SubsetManifold(block.size, fixed));
     }
 }
 
 void solve(ceres::Problem& problem, Fit& fit, bool many_unknowns) {
-    FLAGS_minloglevel = google::GLOG_ERROR; // a step that fails is taken again, shorter: nothing to warn of
+    FLAGS_minloglevel = google::GLOG_ERROR; // Ceres repeats a failed step, shorter: no reason to warn
     ceres::Solver::Options options;
-    options.linear_solver_type = ceres::DENSE_SCHUR; // poses and model are few, points are eliminated
+    options.linear_solver_type = ceres::DENSE_SCHUR; // poses and model are few, and points are eliminated
     options.max_num_iterations = many_unknowns ? 40 : 100;
-    options.function_tolerance = many_unknowns ? 1e-6 : 1e-10; // of the sum, thousands of sigmas squared
+    options.function_tolerance = many_unknowns ? 1e-6 : 1e-10; // of a sum of thousands of squared sigmas
     options.gradient_tolerance = 1e-12;
     options.parameter_tolerance = 1e-10;
     options.logging_type = ceres::SILENT;
@@ -76,15 +76,15 @@ void solve(ceres::Problem& problem, Fit& fit, bool many_unknowns) {
 
 namespace {
 
-constexpr int by_itself = -1;
+constexpr int no_cluster = -1;
 
-/// The normal equations with the points eliminated, cluster by cluster. Rows come as a sparse Jacobian whose columns
-/// hold the first `kept` numbers, then three per point.
+/// The normal equations of each cluster, with its points eliminated. The columns of the sparse Jacobian are the `kept`
+/// numbers, then three per point.
 class Reduced {
   public:
     Reduced(const ceres::CRSMatrix& jacobian, const std::vector<double>& residuals, Eigen::Index kept,
             const std::vector<int>& of_points, const std::vector<int>& of_rows)
-        : kept_(kept), by_themselves_(part()), spread_(by_themselves_.normal) {
+        : kept_(kept), unclustered_(part()), spread_(unclustered_.normal) {
         points_.resize(static_cast<std::size_t>((jacobian.num_cols - kept) / 3));
         for (int row = 0; row < jacobian.num_rows; ++row)
             add_row(jacobian, row, residuals[row], of_points, of_rows[row]);
@@ -93,38 +93,38 @@ class Reduced {
             if (point.mixed.size() == 0)
                 continue;
             const Eigen::LDLT<Eigen::Matrix3d> own = point.own.ldlt();
-            Part& around = cluster(of_points[i]);
-            around.normal -= point.mixed.transpose() * own.solve(point.mixed);
-            around.pull -= point.mixed.transpose() * own.solve(point.own_pull);
+            Part& cluster_part = cluster(of_points[i]);
+            cluster_part.normal -= point.mixed.transpose() * own.solve(point.mixed);
+            cluster_part.gradient -= point.mixed.transpose() * own.solve(point.own_gradient);
         }
-        normal_ = by_themselves_.normal;
+        normal_ = unclustered_.normal;
         for (const auto& [number, part] : clusters_)
             normal_ += part.normal;
     }
     [[nodiscard]] const Eigen::MatrixXd& normal() const { return normal_; }
-    /// Of the kept numbers, from how each cluster pulls at them.
+    /// Of the kept numbers, from each cluster's gradient.
     [[nodiscard]] Eigen::MatrixXd covariance(const Eigen::MatrixXd& inverse, bool many) const {
         const auto count = static_cast<double>(clusters_.size());
-        Eigen::MatrixXd moves = Eigen::MatrixXd::Zero(kept_, kept_);
+        Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(kept_, kept_);
         for (const auto& [number, part] : clusters_) {
-            const Eigen::VectorXd move =
-                many ? Eigen::VectorXd((normal_ - part.normal).ldlt().solve(part.pull)) : inverse * part.pull;
-            moves += move * move.transpose();
+            const Eigen::VectorXd step =
+                many ? Eigen::VectorXd((normal_ - part.normal).ldlt().solve(part.gradient)) : inverse * part.gradient;
+            sum += step * step.transpose();
         }
         if (count > 1)
-            moves *= many ? (count - 1) / count : count / (count - 1);
-        return moves + inverse * spread_ * inverse;
+            sum *= many ? (count - 1) / count : count / (count - 1);
+        return sum + inverse * spread_ * inverse;
     }
 
   private:
     struct Part {
         Eigen::MatrixXd normal;
-        Eigen::VectorXd pull;
+        Eigen::VectorXd gradient;
     };
     struct Point {
         Eigen::Matrix3d own = Eigen::Matrix3d::Zero();
         Eigen::MatrixXd mixed;
-        Eigen::Vector3d own_pull = Eigen::Vector3d::Zero();
+        Eigen::Vector3d own_gradient = Eigen::Vector3d::Zero();
     };
 
     [[nodiscard]] Part part() const { return {Eigen::MatrixXd::Zero(kept_, kept_), Eigen::VectorXd::Zero(kept_)}; }
@@ -143,18 +143,19 @@ class Reduced {
         Point* point = about ? &points_[*about] : nullptr;
         if (point && point->mixed.size() == 0)
             point->mixed = Eigen::MatrixXd::Zero(3, kept_);
-        const bool alone = !point && of_row == by_itself;
-        Part& around = alone ? by_themselves_ : cluster(point ? of_points[*about] : of_row);
-        Eigen::VectorXd pull = alone ? Eigen::VectorXd::Zero(kept_) : Eigen::VectorXd();
+        const bool alone = !point && of_row == no_cluster;
+        Part& cluster_part = alone ? unclustered_ : cluster(point ? of_points[*about] : of_row);
+        Eigen::VectorXd gradient = alone ? Eigen::VectorXd::Zero(kept_) : Eigen::VectorXd();
         for (int a = begin; a < end; ++a) {
             const Eigen::Index at = jacobian.cols[a];
             const double value = jacobian.values[a];
-            (at < kept_ ? (alone ? pull : around.pull)(at) : point->own_pull((at - kept_) % 3)) += value * residual;
+            (at < kept_ ? (alone ? gradient : cluster_part.gradient)(at) : point->own_gradient((at - kept_) % 3)) +=
+                value * residual;
             for (int b = begin; b < end; ++b)
-                add(around.normal, point, at, jacobian.cols[b], value * jacobian.values[b]);
+                add(cluster_part.normal, point, at, jacobian.cols[b], value * jacobian.values[b]);
         }
         if (alone)
-            spread_ += pull * pull.transpose();
+            spread_ += gradient * gradient.transpose();
     }
     void add(Eigen::MatrixXd& normal, Point* point, Eigen::Index a, Eigen::Index b, double value) const {
         if (a < kept_ && b < kept_)
@@ -166,7 +167,7 @@ class Reduced {
     }
 
     Eigen::Index kept_;
-    Part by_themselves_; ///< rows that hang together with no others
+    Part unclustered_; ///< rows whose errors are independent
     Eigen::MatrixXd normal_, spread_;
     std::vector<Point> points_;
     std::map<int, Part> clusters_;
@@ -180,12 +181,12 @@ std::vector<int> clusters_of_rows(const ceres::Problem& problem,
     for (const ceres::ResidualBlockId block : residual_blocks) {
         const auto found = clusters.find(block);
         const int rows = problem.GetCostFunctionForResidualBlock(block)->num_residuals();
-        of_rows.insert(of_rows.end(), rows, found == clusters.end() ? by_itself : found->second);
+        of_rows.insert(of_rows.end(), rows, found == clusters.end() ? no_cluster : found->second);
     }
     return of_rows;
 }
 
-/// The inverse of a symmetric matrix scaled to a unit diagonal first; empty where it has none worth the name.
+/// The inverse of a symmetric matrix, scaled to a unit diagonal first; empty where double precision tells none.
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& normal) {
     constexpr double smallest = 1e-13; // of the eigenvalues: what is left of double precision after squaring
     const Eigen::VectorXd scale = normal.diagonal().cwiseSqrt().cwiseInverse();
@@ -209,16 +210,16 @@ void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const s
         return;
     ceres::Problem::EvaluateOptions options;
     options.apply_loss_function = false;
-    std::vector<int> places; // of the kept columns in the model; -1 for the poses'
+    std::vector<int> indices; // of the kept columns in the model
     for (const Block& block : blocks) {
         double* values = fit.model.values.data() + block.first;
         if (!in_use(problem, fit.model, block) || problem.IsParameterBlockConstant(values))
             continue;
         options.parameter_blocks.push_back(values);
         for (const int index : free_in(block, free))
-            places.push_back(block.first + index);
+            indices.push_back(block.first + index);
     }
-    const auto count = static_cast<Eigen::Index>(places.size());
+    const auto count = static_cast<Eigen::Index>(indices.size());
     auto kept = count;
     for (double* block : kept_blocks)
         if (problem.HasParameterBlock(block) && !problem.IsParameterBlockConstant(block)) {
@@ -239,7 +240,7 @@ void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const s
     std::vector<double> residuals;
     problem.Evaluate(options, nullptr, &residuals, nullptr, &jacobian);
     const Reduced reduced(jacobian, residuals, kept, of_points,
-                          clusters_of_rows(problem, options.residual_blocks, clusters.pointless));
+                          clusters_of_rows(problem, options.residual_blocks, clusters.residuals));
     Eigen::MatrixXd all = inverse(reduced.normal());
     if (all.size() == 0 || !all.allFinite()) {
         fit.covariance.resize(0, 0);
@@ -248,7 +249,7 @@ void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const s
     all = clusters.points.empty() ? Eigen::MatrixXd(all * (fit.rss / spare)) : reduced.covariance(all, clusters.many);
     for (Eigen::Index a = 0; a < count; ++a)
         for (Eigen::Index b = 0; b < count; ++b)
-            fit.covariance(places[a], places[b]) = all(a, b);
+            fit.covariance(indices[a], indices[b]) = all(a, b);
 }
 
 } // namespace scanshade::calibration

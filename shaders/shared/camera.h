@@ -9,19 +9,22 @@ struct Pinhole {
     float fx, fy, cx, cy;
 };
 
+// One axis of the two formulas below: the pixel of a coordinate at depth z, and x / z (or y / z) of the ray through a
+// pixel. The host computes them in double precision, too.
+SHARED_NUMBER_FN project_axis(Number focal, Number centre, Number coordinate, Number z) {
+    return focal * coordinate / z + centre;
+}
+SHARED_NUMBER_FN ray_axis(Number focal, Number centre, Number pixel) { return (pixel - centre) / focal; }
+
 // Pixel (u, v) of a point in camera space, in front of the camera (point.z > 0).
 SHARED_FN vec2 project(Pinhole camera, vec3 point) {
-    return vec2(camera.fx * point.x / point.z + camera.cx, camera.fy * point.y / point.z + camera.cy);
-}
-
-// One coordinate of the ray through a pixel: x / z from u, fx, cx, or y / z from v, fy, cy.
-SHARED_FN_OF(Number) Number ray_coordinate(Number pixel, Number focal_length, Number centre) {
-    return (pixel - centre) / focal_length;
+    return vec2(project_axis(camera.fx, camera.cx, point.x, point.z),
+                project_axis(camera.fy, camera.cy, point.y, point.z));
 }
 
 // The ray through a pixel, z = 1.
 SHARED_FN vec3 ray_through(Pinhole camera, vec2 pixel) {
-    return vec3(ray_coordinate(pixel.x, camera.fx, camera.cx), ray_coordinate(pixel.y, camera.fy, camera.cy), 1);
+    return vec3(ray_axis(camera.fx, camera.cx, pixel.x), ray_axis(camera.fy, camera.cy, pixel.y), 1);
 }
 
 // Point in camera space that pixel (u, v) sees at depth z (along +z, not along the ray).

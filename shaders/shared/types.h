@@ -4,7 +4,7 @@
 #define SHARED_BEGIN namespace scanshade::shared {
 #define SHARED_END }
 #define SHARED_FN constexpr
-#define SHARED_FN_OF(number) template <class number> constexpr
+#define SHARED_NUMBER_FN template <class Number> constexpr Number // a function in the precision of its caller
 #include <cstdint>
 namespace scanshade::shared {
 using uint = std::uint32_t;
@@ -33,6 +33,6 @@ struct ivec2 {
 #define SHARED_BEGIN
 #define SHARED_END
 #define SHARED_FN
-#define SHARED_FN_OF(number)
+#define SHARED_NUMBER_FN float
 #define Number float
 #endif
