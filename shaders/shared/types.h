@@ -4,7 +4,9 @@
 #define SHARED_BEGIN namespace scanshade::shared {
 #define SHARED_END }
 #define SHARED_FN constexpr
-#define SHARED_NUMBER_FN template <class Number> constexpr Number // a function in the precision of its caller
+#define SHARED_NUMBER_FN                                                                                               \
+    template <class Number>                                                                                            \
+    constexpr Number // a function in the precision of its caller
 #include <cstdint>
 namespace scanshade::shared {
 using uint = std::uint32_t;

@@ -1,4 +1,4 @@
-// Organised clouds as a problem: every point knows exactly which pixel saw it.
+// Organised clouds as a problem: every point has an exact pixel.
 #pragma once
 
 #include "projection/calibration/problem.h"
