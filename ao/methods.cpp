@@ -1,6 +1,6 @@
 // The table of methods.
-#include "ao/bitmask/bitmask.h"
 #include "ao/cacao/cacao.h"
+#include "ao/gtao/bitmask.h"
 #include "ao/gtao/gtao.h"
 #include "ao/hbao/hbao.h"
 #include "ao/hemisphere/hemisphere.h"
@@ -18,7 +18,9 @@ template <class Options, class Made>
 class SetupOf final : public MethodSetup {
   public:
     std::vector<Parameter> parameters() override { return options_.parameters(); }
-    std::unique_ptr<Method> make(gpu::Device& device) const override { return std::make_unique<Made>(device, options_); }
+    std::unique_ptr<Method> make(gpu::Device& device) const override {
+        return std::make_unique<Made>(device, options_);
+    }
     static std::unique_ptr<MethodSetup> start() { return std::make_unique<SetupOf>(); }
 
   private:
@@ -32,17 +34,20 @@ const std::vector<MethodRow>& methods() {
         {"cacao", "tap pairs on de-interleaved depth, edge-aware blur; five qualities, native or half resolution",
          "FidelityFX CACAO 1.3 (AMD's public documentation)", SetupOf<CacaoOptions, Cacao>::start, 1.6},
         {"luna", "fourteen vectors around the point, occluded by what stands in front of it",
-         "Luna, Introduction to 3D Game Programming with DirectX 12 (2016), ch. 21", SetupOf<LunaOptions, Luna>::start, 1.6},
-        {"hemisphere", "points in the half ball above the surface, tested against what is seen", "tutorials on SSAO with a hemisphere kernel",
-         SetupOf<HemisphereOptions, Hemisphere>::start, 1.6},
-        {"hbao", "horizons above the tangent plane, attenuated by distance", "Bavoil, Sainz, Dimitrov 2008", SetupOf<HbaoOptions, Hbao>::start},
+         "Luna, Introduction to 3D Game Programming with DirectX 12 (2016), ch. 21", SetupOf<LunaOptions, Luna>::start,
+         1.6},
+        {"hemisphere", "points in the half ball above the surface, tested against what is seen",
+         "tutorials on SSAO with a hemisphere kernel", SetupOf<HemisphereOptions, Hemisphere>::start, 1.6},
+        {"hbao", "horizons above the tangent plane, attenuated by distance", "Bavoil, Sainz, Dimitrov 2008",
+         SetupOf<HbaoOptions, Hbao>::start},
         {"gtao", "open arc between two horizons, slice by slice", "Jimenez et al. 2016; XeGTAO (Strugar, McCalla 2021)",
          SetupOf<GtaoOptions, Gtao>::start},
-        {"bitmask", "gtao's slices with 32 sectors, so that what is seen has a thickness", "Therrien, Levesque, Gilet 2023",
-         SetupOf<BitmaskOptions, Bitmask>::start},
+        {"bitmask", "gtao's slices with 32 sectors, so that what is seen has a thickness",
+         "Therrien, Levesque, Gilet 2023", SetupOf<BitmaskOptions, Bitmask>::start},
         {"surfel", "bitmask over pixels that have a direction and a thickness: the most accurate",
          "own, after Therrien et al. 2023 and Jimenez et al. 2016", SetupOf<SurfelOptions, Surfel>::start},
-        {"raycast", "rays against the depth surface, the cloud's discs or the mesh itself; on the CPU, with standard errors",
+        {"raycast",
+         "rays against the depth surface, the cloud's discs or the mesh itself; on the CPU, with standard errors",
          "cosine-weighted ambient occlusion by its definition; Embree 3", SetupOf<RaycastOptions, Raycast>::start},
     };
     return table;
@@ -51,7 +56,8 @@ const std::vector<MethodRow>& methods() {
 const MethodRow& method_named(std::string_view name) {
     std::string known;
     for (const MethodRow& row : methods()) {
-        if (row.name == name) return row;
+        if (row.name == name)
+            return row;
         known += (known.empty() ? "" : ", ") + std::string(row.name);
     }
     throw Misuse("no method '" + std::string(name) + "'; there are: " + known);

@@ -1,4 +1,4 @@
-#include "ao/bitmask/bitmask.h"
+#include "ao/gtao/bitmask.h"
 
 namespace scanshade {
 

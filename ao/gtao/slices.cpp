@@ -1,4 +1,4 @@
-#include "ao/screen/slices.h"
+#include "ao/gtao/slices.h"
 
 #include <array>
 #include <cmath>
@@ -57,8 +57,8 @@ shared::GtaoConstants slice_constants(const SliceOptions& options, const shared:
 
 void add_slice_pass(ScreenTables& tables, const SliceOptions& options, std::vector<std::pair<int, int>> constants) {
     constants.emplace_back(shared::spec_square, options.distribution == 2);
-    tables.add_pass("generate", "gtao/generate", {screen_depth, screen_surfaces, screen_noise},
-                    {screen_raw}, std::move(constants));
+    tables.add_pass("generate", "gtao/generate", {screen_depth, screen_surfaces, screen_noise}, {screen_raw},
+                    std::move(constants));
 }
 
 } // namespace scanshade

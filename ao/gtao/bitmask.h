@@ -6,7 +6,7 @@
 // published way).
 #pragma once
 
-#include "ao/screen/slices.h"
+#include "ao/gtao/slices.h"
 
 namespace scanshade {
 
