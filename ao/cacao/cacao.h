@@ -1,8 +1,9 @@
 // CACAO: AMD's Combined Adaptive Compute Ambient Occlusion 1.3, after its public documentation, for recorded depth.
 //
-// Two profiles run the same kernels. `reference` reproduces AMD's output, quirks included, so that anyone can check us
-// against the original. `scan`, the default, is the same algorithm for metric sensor depth; its departures are named in
-// the README and each has a test that fails without it.
+// Two profiles, each with its own shaders and table of passes. `reference` (reference.cpp, shaders/cacao/reference)
+// reproduces AMD's output, quirks included, so that anyone can check us against the original. `scan` (scan.cpp,
+// shaders/cacao/scan), the default, is the same algorithm for metric sensor depth; its departures are named in the
+// README and each has a test that fails without it.
 #pragma once
 
 #include "ao/gpu/program.h"

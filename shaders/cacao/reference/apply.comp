@@ -33,6 +33,7 @@ void main() {
     if (any(greaterThanEqual(t, k.slice))) return;
     ivec2 p = 2 * t;
     const ivec2 x = ivec2(1, 0), y = ivec2(0, 1);
-    store_visibility(p, vec2(result(p), result(p + x)));
-    store_visibility(p + y, vec2(result(p + y), result(p + x + y)));
+    vec4 v = vec4(result(p), result(p + x), result(p + y), result(p + x + y));
+    store_visibility(p, v.xy);
+    store_visibility(p + y, v.zw);
 }

@@ -68,6 +68,7 @@ void main() {
     ivec2 p = 2 * h, g = h + 2;
     if (any(greaterThanEqual(p, k.image))) return;
     const ivec2 x = ivec2(1, 0), y = ivec2(0, 1);
-    store_visibility(p, vec2(result(p, g, vec2(0.0)), result(p + x, g, vec2(0.5, 0.0))));
-    store_visibility(p + y, vec2(result(p + y, g, vec2(0.0, 0.5)), result(p + x + y, g, vec2(0.5))));
+    vec4 v = vec4(result(p, g, vec2(0.0)), result(p + x, g, vec2(0.5, 0.0)), result(p + y, g, vec2(0.0, 0.5)), result(p + x + y, g, vec2(0.5)));
+    store_visibility(p, v.xy); // both after all reads, which the four share
+    store_visibility(p + y, v.zw);
 }

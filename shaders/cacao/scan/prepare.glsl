@@ -111,7 +111,7 @@ vec3 normal_of(ivec2 p, bool holes, vec4 c, vec4 left, vec4 right, vec4 top, vec
 
 // --- The pass.
 
-// `seen` is the recorded depth, c the filled one: without a normal it would only brighten.
+// `seen` is the recorded depth, c the filled one. A filled depth without a normal is left out: it would only brighten.
 void put(int slice, ivec2 t, float seen, float c, vec3 n) {
     if (two_slices != 0 && slice != 0 && slice != 3) return;
     c = is_normal(n) ? c : seen;

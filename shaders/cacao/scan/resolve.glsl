@@ -1,5 +1,5 @@
 // CACAO `scan`, resolve (section 8.8, A-smart): one AO value per pixel of the AO grid out of the four slices, whatever the quality.
-// AMD's weights, centred on the pixel (AMD's lie half a pixel off); the includer has texel_or_hole().
+// The weights are AMD's, but centred on the pixel: AMD's samples lie half a pixel off. The includer has texel_or_hole().
 
 // A slice's texel, or a hole where there is none.
 Texel texel_or_hole(int slice, ivec2 t);
