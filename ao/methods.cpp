@@ -1,6 +1,6 @@
 // The table of methods.
-#include "ao/bitmask/bitmask.h"
 #include "ao/cacao/cacao.h"
+#include "ao/gtao/bitmask.h"
 #include "ao/gtao/gtao.h"
 #include "ao/hbao/hbao.h"
 #include "ao/hemisphere/hemisphere.h"

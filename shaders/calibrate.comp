@@ -2,7 +2,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
-#include "lib/cacao_pattern.glsl"
+#include "cacao/pattern.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0, r32f) readonly uniform imageBuffer from;

@@ -1,8 +1,9 @@
 // CACAO: AMD's Combined Adaptive Compute Ambient Occlusion 1.3, after its public documentation, for recorded depth.
 //
-// Two profiles run the same kernels. `reference` reproduces AMD's output, quirks included, so that anyone can check us
-// against the original. `scan`, the default, is the same algorithm for metric sensor depth; its departures are named in
-// the README and each has a test that fails without it.
+// Two profiles, each with its own shaders and table of passes. `reference` (reference.cpp, shaders/cacao/reference)
+// reproduces AMD's output, quirks included, so that anyone can check us against the original. `scan` (scan.cpp,
+// shaders/cacao/scan), the default, is the same algorithm for metric sensor depth; its departures are named in the
+// README and each has a test that fails without it.
 #pragma once
 
 #include "ao/gpu/program.h"
@@ -24,7 +25,8 @@ struct CacaoOptions {
     std::string quality = "high";
     bool downsampled = false;
     float radius = 0.5F;
-    std::string look = "auto"; ///< how obscurance becomes visibility; auto: calibrated in `scan`, documented in `reference`
+    std::string look =
+        "auto"; ///< how obscurance becomes visibility; auto: calibrated in `scan`, documented in `reference`
     float shadow_multiplier = 1.0F;
     float shadow_power = 1.5F;
     float shadow_clamp = 0.98F;
@@ -42,7 +44,8 @@ struct CacaoOptions {
     float normals_mul = 1.0F;
     float normals_add = 0.0F;
     std::string storage = "auto";
-    std::optional<float> outside_depth; ///< reference only: what loads outside the image read; default: device depth 0, linearised
+    std::optional<float>
+        outside_depth; ///< reference only: what loads outside the image read; default: device depth 0, linearised
 
     [[nodiscard]] std::vector<Parameter> parameters();
     /// Throws Misuse for a name that is no quality.
@@ -58,8 +61,21 @@ struct CacaoOptions {
 
 /// The buffers of CACAO by name; the rows of CacaoTables::buffers are in this order.
 enum CacaoBuffer : int {
-    cacao_depth_in, cacao_normals_in, cacao_depths, cacao_normals, cacao_ping, cacao_pong, cacao_importance,
-    cacao_importance_pong, cacao_counter, cacao_blur_a, cacao_blur_b, cacao_staged, cacao_pattern, cacao_out, cacao_buffer_count
+    cacao_depth_in,
+    cacao_normals_in,
+    cacao_depths,
+    cacao_normals,
+    cacao_ping,
+    cacao_pong,
+    cacao_importance,
+    cacao_importance_pong,
+    cacao_counter,
+    cacao_blur_a,
+    cacao_blur_b,
+    cacao_staged,
+    cacao_pattern,
+    cacao_out,
+    cacao_buffer_count
 };
 
 /// Everything one configuration runs, as plain data.
@@ -68,13 +84,13 @@ struct CacaoTables {
     std::vector<gpu::PassRow> passes;
     int blurred = cacao_ping; ///< which buffer holds AO after the blur
 };
-/// How the passes keep what they hand on: in buffers, or depth in images and the last blur steps and the resolve in one pass.
-/// The same kernels and, but for rounding, the same maps; CPUs are faster with the first, GPUs with the second.
+/// How the passes keep what they hand on: in buffers, or depth in images and the last blur steps and the resolve in one
+/// pass. The same kernels and, but for rounding, the same maps; CPUs are faster with the first, GPUs with the second.
 enum class CacaoStorage { buffers, images };
 [[nodiscard]] CacaoStorage cacao_storage(const CacaoOptions& options, const gpu::Device& device);
 
-[[nodiscard]] CacaoTables cacao_tables(const CacaoOptions& options, const shared::CacaoConstants& constants, bool normals_supplied,
-                                       CacaoStorage storage = CacaoStorage::buffers);
+[[nodiscard]] CacaoTables cacao_tables(const CacaoOptions& options, const shared::CacaoConstants& constants,
+                                       bool normals_supplied, CacaoStorage storage = CacaoStorage::buffers);
 
 class Cacao final : public Method {
   public:
@@ -85,8 +101,8 @@ class Cacao final : public Method {
     [[nodiscard]] bool takes_prepared() const override { return true; }
     [[nodiscard]] const Timings& timings() const override { return timings_; }
 
-    /// Buffers between the passes of the last compute(): depth slices by mip, normals, base pass, importance, AO before and
-    /// after the blur, load counter. Empty before the first compute().
+    /// Buffers between the passes of the last compute(): depth slices by mip, normals, base pass, importance, AO before
+    /// and after the blur, load counter. Empty before the first compute().
     [[nodiscard]] std::vector<Intermediate> intermediates() override;
 
   private:

@@ -6,7 +6,7 @@
 // thickness.
 #pragma once
 
-#include "ao/screen/slices.h"
+#include "ao/gtao/slices.h"
 
 namespace scanshade {
 

@@ -1,17 +1,16 @@
-// CACAO HIGHEST: smooths the importance map; the second pass also sums every ninth texel into the load counter.
+// CACAO HIGHEST (section 8.6, IA and IB), both profiles: smooths the importance map; the second pass also sums every ninth texel into
+// the load counter.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
-#include "lib/cacao.glsl"
+#include "cacao/cacao.glsl"
+#include "cacao/importance_smoothing.glsl"
 
 layout(local_size_x = cacao_row) in;
 layout(constant_id = spec_last) const int second = 0;
 layout(binding = 0, r32ui) readonly uniform uimageBuffer from;
-layout(binding = 1, r32ui) readonly uniform uimageBuffer base_result;
 layout(binding = 16, r32ui) uniform writeonly uimageBuffer to;
 layout(binding = 17, r32ui) uniform uimageBuffer load_counter;
-
-#include "lib/cacao_importance.glsl"
 
 uint read(int x, int y) {
     ivec2 t = clamp(ivec2(x, y), ivec2(0), k.importance - 1);

@@ -10,7 +10,7 @@ layout(binding = 1, std430) readonly buffer Normals { vec4 normals[]; };
 layout(binding = 16, std430) writeonly buffer Boxes { float boxes[]; };  // of a node's two children, 6 numbers each
 layout(binding = 17, std430) writeonly buffer Begins { uint begins[]; }; // first point of each leaf, and the end
 layout(binding = 32, scalar) uniform Constants { CloudConstants k; };
-#include "lib/tree.glsl"
+#include "cloud/tree.glsl"
 
 void main() {
     uint leaf = own_number(), leaves = 1u << k.levels;

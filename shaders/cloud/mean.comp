@@ -11,7 +11,7 @@ layout(binding = 2, std430) readonly buffer Near { uint near[]; };
 layout(binding = 3, std430) readonly buffer Values { float values[]; };
 layout(binding = 16, std430) writeonly buffer Means { float means[]; };
 layout(binding = 32, scalar) uniform Constants { CloudConstants k; };
-#include "lib/tree.glsl"
+#include "cloud/tree.glsl"
 
 void main() {
     uint own = own_number();

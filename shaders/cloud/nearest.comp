@@ -13,7 +13,7 @@ layout(binding = 2, std430) readonly buffer Begins { uint begins[]; };
 layout(binding = 16, std430) writeonly buffer Near { uint near[]; };
 layout(binding = 17, scalar) writeonly buffer Rounds { CloudRound rounds[]; };
 layout(binding = 32, scalar) uniform Constants { CloudConstants k; };
-#include "lib/tree.glsl"
+#include "cloud/tree.glsl"
 
 const float none = 3e38;
 float distances[cloud_neighbours]; // squared, ascending

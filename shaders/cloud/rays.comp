@@ -12,7 +12,7 @@ layout(binding = 3, std430) readonly buffer Begins { uint begins[]; };
 layout(binding = 4, std430) readonly buffer Fan { vec4 fan[]; };         // directions about z, run after run
 layout(binding = 16, std430) writeonly buffer Values { float values[]; };
 layout(binding = 32, scalar) uniform Constants { CloudConstants k; };
-#include "lib/tree.glsl"
+#include "cloud/tree.glsl"
 
 const float missed = 3.4e38;
 

@@ -12,7 +12,7 @@ layout(binding = 1, r32f) readonly uniform imageBuffer relief;
 layout(binding = 16, r32f) uniform writeonly imageBuffer averages;
 layout(binding = 32, scalar) uniform Constants { FitPlaneConstants k; };
 
-#include "lib/fit_plane.glsl"
+#include "fit_plane/fit_plane.glsl"
 
 void main() {
     ivec2 p = ivec2(gl_GlobalInvocationID.xy);

@@ -17,7 +17,7 @@ layout(binding = 16, r32f) uniform writeonly imageBuffer depth_out;
 layout(binding = 17, r32f) uniform writeonly imageBuffer normals_out;
 layout(binding = 32, scalar) uniform Constants { FitPlaneConstants k; };
 
-#include "lib/fit_plane.glsl"
+#include "fit_plane/fit_plane.glsl"
 
 void main() {
     ivec2 p = ivec2(gl_GlobalInvocationID.xy);

@@ -12,15 +12,6 @@ ivec4 nearest(vec4 x) {
     precise vec4 shifted = x + magic;
     return floatBitsToInt(shifted) - magic_bits;
 }
-#ifdef FOR_GPU // a GPU: one instruction each as they stand
-float positive(float x) { return max(x, 0.0); }
-float at_most_one(float x) { return min(x, 1.0); }
-float at_least(float x, float low) { return max(x, low); }
-const float quick_scale = 1.0;
-float quick_inversesqrt(float x) { return inversesqrt(x); }
-vec4 positive(vec4 x) { return max(x, 0.0); }
-vec4 quick_inversesqrt(vec4 x) { return inversesqrt(x); }
-#else
 float positive(float x) { return intBitsToFloat(max(floatBitsToInt(x), 0)); }               // max(x, 0)
 float at_most_one(float x) { return intBitsToFloat(min(floatBitsToInt(x), 0x3f800000)); }   // min(x, 1), x >= 0
 float at_least(float x, float low) { return intBitsToFloat(max(floatBitsToInt(x), floatBitsToInt(low))); } // low > 0
@@ -37,4 +28,3 @@ vec4 quick_inversesqrt(vec4 x) {
     vec4 y = intBitsToFloat(0x5f1ffff9 - (floatBitsToInt(x) >> 1));
     return y * (2.38924456 - x * y * y);
 }
-#endif

@@ -39,34 +39,35 @@ struct CacaoConstants {
     int depth_pitch;                // texels from one slice, with its mips, to the next
     int depth_mips;                 // T: 4/3 of mip 0 with its padding
     int depth_end;                  // mip m of a slice starts at depth_end - (T >> 2m); a rim of holes, always 0, lies round each
-    uint all_ones;                  // 0xffffffff, unknown to the compiler (see lib/cacao.glsl, whole())
+    uint all_ones;                  // 0xffffffff, unknown to the compiler (see cacao/cacao.glsl, whole())
     float spatial[10];              // upsampler: 1D spatial weight of tap -2 .. 2 for even, then odd pixels
 };
 
 // Rows of the buffer `pattern`: the taps but the last, which only HIGHEST reads, then 5 rotations for each of 4 slices.
 const int cacao_taps = 31;
 
-// Threads of a work group: a row of texels where passes work on buffers, so that CPUs run along their caches' lines; a square where
+// Texels of a work group: a row of them where passes work on buffers, so that CPUs run along their caches' lines; a rectangle where
 // they share memory on GPUs.
 const int cacao_row = 64;
 const int cacao_tile = 16;
-const int cacao_wide = 32, cacao_high = 32; // finish: with a rim that is lent to neighbours only
+const int cacao_mip_tile = 8;                           // prepare: one texel of mip 3
+const int cacao_taps_wide = 20, cacao_taps_high = 8;    // generate: whole blocks of the 5x4 that have all rotations
+const int cacao_wide = 32, cacao_high = 32;             // finish: with a rim that is lent to neighbours only
 
 // Specialization constants, the same numbers in every CACAO shader.
-const int spec_scan = 0;        // 1: profile `scan`, 0: profile `reference`
-const int spec_spacing = 1;     // image pixels per AO grid pixel: 1 native, 2 downsampled
-const int spec_kernel = 2;      // q: 0 LOWEST and LOW, 1 MEDIUM, 2 HIGH, 3 HIGHEST
-const int spec_base = 3;        // 1: base pass of HIGHEST
-const int spec_two_slices = 4;  // 1: LOWEST, only slices 0 and 3
-const int spec_normals = 5;     // 1: normals supplied, 0: derived from depth
+const int spec_spacing = 1;      // image pixels per AO grid pixel: 1 native, 2 downsampled
+const int spec_kernel = 2;       // q: 0 LOWEST and LOW, 1 MEDIUM, 2 HIGH, 3 HIGHEST
+const int spec_base = 3;         // 1: base pass of HIGHEST
+const int spec_two_slices = 4;   // 1: LOWEST, only slices 0 and 3
+const int spec_normals = 5;      // 1: normals supplied, 0: derived from depth
 const int spec_device_depth = 6; // 1: input is device depth (normal-Z or reverse-Z), 0: metric linear z
-const int spec_mips = 7;        // 1: depth mips are built and read
-const int spec_first = 8;       // blur: 1 for the first step
-const int spec_last = 9;        // blur: 1 for the last step
-const int spec_halo = 10;       // blur: texels of mirrored halo kept round each slice (reference)
-const int spec_resolve = 11;    // apply and stage: 0 smart, 1 plain, 2 half
-const int spec_power = 12;      // 1: output raised to 2.2 (reference, where AMD's shaders do)
-const int spec_steps = 13;      // finish: blur steps
+const int spec_mips = 7;         // 1: depth mips are built and read
+const int spec_first = 8;        // reference, blur: 1 for the first step
+const int spec_last = 9;         // reference, blur: 1 for the last step; importance blur: 1 for the second
+const int spec_halo = 10;        // reference, blur: texels of mirrored halo kept round each slice
+const int spec_resolve = 11;     // reference, apply and upsample: 0 smart, 1 plain, 2 half
+const int spec_power = 12;       // reference: 1 = output raised to 2.2, where AMD's shaders do
+const int spec_steps = 13;       // finish: blur steps
 
 // Resolve kinds, values of spec_resolve.
 const int resolve_smart = 0;

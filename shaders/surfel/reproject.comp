@@ -21,7 +21,7 @@ layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 #include "lib/depth.glsl"
 #include "lib/surfel.glsl"
-#include "lib/layer.glsl"
+#include "surfel/layer.glsl"
 
 // Of the block's pixels the nearest, 0 where one is a hole.
 float nearest_of(ivec2 block) {

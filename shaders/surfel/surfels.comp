@@ -7,7 +7,7 @@
 #include "lib/screen.glsl"
 #include "lib/cheap.glsl"
 #include "lib/surfel.glsl"
-#include "lib/layer.glsl"
+#include "surfel/layer.glsl"
 
 layout(constant_id = spec_layers) const int layers = 1;
 

@@ -15,7 +15,7 @@ layout(binding = 16, rgba32f) uniform imageBuffer surfaces; // where there is de
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 #include "lib/depth.glsl"
-#include "lib/layer.glsl"
+#include "surfel/layer.glsl"
 
 void main() {
     SurfelConstants s = constants;

@@ -168,9 +168,9 @@ Seen run(const CacaoOptions& o, const DepthImage& depth, const Given& given = {}
         }
     }
     std::erase_if(tables.passes, [](const gpu::PassRow& row) {
-        return std::set<std::string_view>{"", "cacao/mips", "cacao/generate", "cacao/importance",
-                                          "cacao/importance_blur"}
-                   .count(row.shader) > 0;
+        return std::set<std::string_view>{
+                   "mips", "clear counter", "base", "importance", "importance blur a", "importance blur b", "generate"}
+                   .count(row.name) > 0;
     });
     tables.buffers[cacao_ping].host = gpu::BufferRow::Host::upload;
     return run_tables(o, k, tables, depth, given.normals, words);

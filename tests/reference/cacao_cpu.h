@@ -3,7 +3,7 @@
 #pragma once
 
 #include "ao/cacao/cacao.h"
-#include "shaders/lib/cacao_pattern.glsl"
+#include "shaders/cacao/pattern.glsl"
 #include "shaders/shared/cacao.h"
 
 #include <algorithm>

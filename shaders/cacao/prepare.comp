@@ -1,5 +1,0 @@
-// CACAO preparation, depth into a buffer.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
-#include "cacao/prepare.glsl"

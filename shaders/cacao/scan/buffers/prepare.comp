@@ -1,0 +1,16 @@
+// CACAO `scan`, prepare: depth into a buffer.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "cacao/scan/prepare.glsl"
+
+layout(local_size_x = cacao_row) in;
+layout(binding = 16, r32f) uniform writeonly imageBuffer depths;
+
+void store_depth(int slice, ivec2 t, float z) { imageStore(depths, depth_index(slice, 0, t), vec4(whole(z))); }
+
+void main() {
+    k = constants;
+    ivec2 t = ivec2(gl_GlobalInvocationID.xy);
+    if (all(lessThan(t, k.slice))) prepared(t);
+}
