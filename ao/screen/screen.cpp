@@ -55,11 +55,6 @@ std::vector<Parameter> ScreenOptions::parameters() {
         {"strength", "share of the occlusion that is shown, before the power", &strength, "", 0, 2},
         {"power", "exponent of the visibility shown", &power, "", 0.25, 8},
         {"denoise", "mean over the 5x5 pixels around that lie on the same plane", &denoise},
-        {"tangent-sine",
-         "samples lower above the surface than this do not occlude: pixels lie beside the line that is marched",
-         &tangent_sine, "sine", 0, 0.5},
-        {"tangent-sigmas", "nor do samples that rise less than so many deviations of the depth's noise",
-         &tangent_sigmas, "sigma", 0, 20},
         {"seed", "another number, another noise pattern", &seed, "", 0, 1e6},
     };
 }
@@ -70,7 +65,8 @@ int ScreenTables::add_buffer(gpu::BufferRow row) {
 }
 
 void ScreenTables::add_pass_over(cv::Size over, std::string name, std::string_view shader, std::vector<int> reads,
-                                 std::vector<int> writes, std::vector<std::pair<int, int>> constants, int pixels_a_side) {
+                                 std::vector<int> writes, std::vector<std::pair<int, int>> constants,
+                                 int pixels_a_side) {
     const int tile = shared::screen_tile * pixels_a_side;
     const auto groups = [&](int n) { return static_cast<std::uint32_t>((n + tile - 1) / tile); };
     passes.push_back({std::move(name),
@@ -136,14 +132,20 @@ ScreenTables ScreenMethod::tables(const Shape& shape) const {
     const cv::Size size(width, height);
     const int guard = neighbours > 0 ? guard_px(size) : 0;
     const cv::Size image(size.width + 2 * guard, size.height + 2 * guard);
-    ScreenTables all{{{guard, guard}, size}, image, neighbours, shared_buffers(static_cast<std::size_t>(image.area()), supplied, options_.seed), {}, noisy};
+    ScreenTables all{{{guard, guard}, size},
+                     image,
+                     neighbours,
+                     shared_buffers(static_cast<std::size_t>(image.area()), supplied, options_.seed),
+                     {},
+                     noisy};
     if (neighbours > 0) {
         const auto each = static_cast<std::size_t>(neighbours);
-        all.add_buffer({"neighbours", each * static_cast<std::size_t>(size.area()) * 8, gpu::BufferRow::Host::taken, gpu::BufferRow::Texels::rg32ui});
+        all.add_buffer({"neighbours", each * static_cast<std::size_t>(size.area()) * 8, gpu::BufferRow::Host::taken,
+                        gpu::BufferRow::Texels::rg32ui});
     }
     // Without normals of the view, depth fills their slot; nothing reads it.
-    all.add_pass_over(size, "normals", "normals", {screen_depth, supplied ? screen_given : screen_depth}, {screen_surfaces},
-                      {{shared::spec_supplied, supplied}});
+    all.add_pass_over(size, "normals", "normals", {screen_depth, supplied ? screen_given : screen_depth},
+                      {screen_surfaces}, {{shared::spec_supplied, supplied}});
     add_passes(all);
     add_denoise(all);
     return all;
