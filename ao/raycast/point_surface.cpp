@@ -4,7 +4,6 @@
 #include "ao/raycast/embree.h"
 
 #include <algorithm>
-#include <cmath>
 #include <Eigen/Eigenvalues>
 #include <tbb/parallel_for.h>
 

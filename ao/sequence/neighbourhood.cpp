@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <tbb/parallel_for_each.h>
 #include <tbb/task_arena.h>
 

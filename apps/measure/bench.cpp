@@ -15,12 +15,10 @@
 #include "projection/error.h"
 
 #include <algorithm>
-#include <chrono>
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <map>
-#include <set>
 #include <sstream>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_for_each.h>
