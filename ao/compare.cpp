@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 #include <limits>
 #include <opencv2/imgproc.hpp>
-#include <optional>
 
 namespace scanshade {
 namespace {

@@ -6,7 +6,6 @@
 #include "ao/raycast/ray_surface.h"
 
 #include <optional>
-#include <vector>
 
 namespace scanshade {
 

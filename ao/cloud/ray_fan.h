@@ -1,7 +1,6 @@
 // Directions: round the sphere, and cosine-weighted for many neighbouring points, each with a few of one long sequence.
 #pragma once
 
-#include <cstdint>
 #include <Eigen/Core>
 #include <vector>
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Geometry>
-#include <functional>
 #include <limits>
 #include <numeric>
 #include <tbb/parallel_for.h>

@@ -32,7 +32,6 @@ HbaoOptions resolved(HbaoOptions options) {
         return options;
     options.bias_degrees = 30;
     options.attenuated = true;
-    options.contrast = 1.25F;
     return options;
 }
 
@@ -62,7 +61,6 @@ std::vector<Parameter> HbaoOptions::parameters() {
                       {"attenuated",
                        "samples count less with the square of their distance, instead of all alike up to the radius",
                        &attenuated},
-                      {"contrast", "the occlusion is multiplied by this", &contrast, "", 0, 5},
                   });
 }
 
@@ -79,7 +77,7 @@ std::vector<std::byte> Hbao::constants(const shared::ScreenConstants& screen) co
     return bytes_of(shared::HbaoConstants{screen, count.directions, count.steps, static_cast<float>(std::cos(turn)),
                                           static_cast<float>(std::sin(turn)), static_cast<float>(std::cos(bias)),
                                           static_cast<float>(std::sin(bias)), options_.attenuated ? 1.0F : 0.0F,
-                                          options_.contrast});
+                                          options_.profile == "published" ? 1.25F : 1.0F});
 }
 
 } // namespace scanshade

@@ -15,7 +15,6 @@ struct HbaoOptions {
     std::string profile = "metric";
     float bias_degrees = 0;
     bool attenuated = false;
-    float contrast = 1;
 
     [[nodiscard]] std::vector<Parameter> parameters();
 };

@@ -32,19 +32,21 @@ struct Count {
 constexpr std::array counts{Count{"lowest", 1, 8}, Count{"low", 1, 14}, Count{"medium", 2, 14}, Count{"high", 4, 14},
                             Count{"highest", 16, 14}};
 
+/// What stands less than `epsilon` in front of the surface does not occlude; occlusion ends between the other two.
+struct Falloff {
+    float epsilon, fade_from, fade_to;
+};
+constexpr Falloff published_m{0.05F, 0.2F, 1};
+Falloff falloff_of(float radius_m) { return {0.02F * radius_m, 0.4F * radius_m, radius_m}; }
+
 /// The companion code's power and blur belong to its look.
 LunaOptions resolved(LunaOptions options) {
     options = checked(std::move(options));
-    if (options.fade_to <= options.fade_from)
-        throw Misuse("fade-to must lie beyond fade-from");
     if (options.profile == "metric")
         return options;
     options.screen.power *= 6;
     options.screen.denoise = false;
     options.blurs = 4;
-    options.epsilon = 0.05F; // in metres, as the next two
-    options.fade_from = 0.2F;
-    options.fade_to = 1;
     return options;
 }
 
@@ -81,9 +83,6 @@ std::vector<Parameter> LunaOptions::parameters() {
              {},
              {},
              {"lowest", "low", "medium", "high", "highest"}},
-            {"epsilon", "what stands less than this in front of the surface does not occlude", &epsilon, "radii", 0, 1},
-            {"fade-from", "what stands farther in front occludes less", &fade_from, "radii", 0, 10},
-            {"fade-to", "and beyond this not at all", &fade_to, "radii", 1e-3, 10},
             {"renormalise",
              "samples that met nothing known count as those that did, where at least half did; else as open",
              &renormalise},
@@ -107,9 +106,8 @@ void Luna::add_passes(ScreenTables& tables) const {
 
 std::vector<std::byte> Luna::constants(const shared::ScreenConstants& screen) const {
     const Count& count = level_of(counts, options_.quality);
-    const float unit = options_.profile == "published" ? 1 : screen.radius;
-    return bytes_of(shared::LunaConstants{screen, count.sets, count.count, options_.epsilon * unit,
-                                          options_.fade_from * unit, options_.fade_to * unit});
+    const Falloff how = options_.profile == "published" ? published_m : falloff_of(screen.radius);
+    return bytes_of(shared::LunaConstants{screen, count.sets, count.count, how.epsilon, how.fade_from, how.fade_to});
 }
 
 } // namespace scanshade

@@ -11,9 +11,7 @@ namespace scanshade {
 struct LunaOptions {
     ScreenOptions screen;
     std::string profile = "metric";
-    std::string quality = "low";         ///< lowest 8 vectors, low the published 14, medium 28, high 56, highest 224
-    float epsilon = 0.02F;               ///< radii in front of the surface up to which nothing occludes
-    float fade_from = 0.4F, fade_to = 1; ///< radii in front over which occlusion ends
+    std::string quality = "low"; ///< lowest 8 vectors, low the published 14, medium 28, high 56, highest 224
     bool renormalise = false;
     int blurs = 0; ///< iterations of the published blur, before denoise
 

@@ -5,7 +5,6 @@
 #include "projection/statistics.h"
 
 #include <algorithm>
-#include <cmath>
 #include <Eigen/Eigenvalues>
 #include <tbb/parallel_for.h>
 

@@ -55,11 +55,6 @@ std::vector<Parameter> ScreenOptions::parameters() {
         {"strength", "share of the occlusion that is shown, before the power", &strength, "", 0, 2},
         {"power", "exponent of the visibility shown", &power, "", 0.25, 8},
         {"denoise", "mean over the 5x5 pixels around that lie on the same plane", &denoise},
-        {"tangent-sine",
-         "samples lower above the surface than this do not occlude: pixels lie beside the line that is marched",
-         &tangent_sine, "sine", 0, 0.5},
-        {"tangent-sigmas", "nor do samples that rise less than so many deviations of the depth's noise",
-         &tangent_sigmas, "sigma", 0, 20},
         {"seed", "another number, another noise pattern", &seed, "", 0, 1e6},
     };
 }

@@ -20,9 +20,10 @@ struct ScreenOptions {
     float radius = 0.5F;
     float strength = 1, power = 1;
     bool denoise = true;
-    float tangent_sine = 0.02F;   ///< beta_t of the rule that keeps a surface from occluding itself
-    float tangent_sigmas = 4.24F; ///< kappa of that rule, 3 sqrt 2: a difference of two depths, three deviations
     int seed = 0;
+    // A surface must not occlude itself. The method, not a person, says how that is kept from happening:
+    float tangent_sine = 0.02F;   ///< beta_t: samples lower above the tangent plane than this do not count (sine)
+    float tangent_sigmas = 4.24F; ///< kappa, 3 sqrt 2: nor does a difference of two depths below three deviations
 
     [[nodiscard]] std::vector<Parameter> parameters();
 };
@@ -36,7 +37,8 @@ enum ScreenBuffer : int {
     screen_raw,        ///< r32f: visibility before denoise, finite everywhere
     screen_visibility, ///< r32f: the result, NaN in holes
     screen_own,
-    screen_neighbours = screen_own ///< only where there are any: rg32ui, their surfaces (lib/surfel.glsl) one after the other
+    screen_neighbours =
+        screen_own ///< only where there are any: rg32ui, their surfaces (lib/surfel.glsl) one after the other
 };
 
 /// Everything one configuration runs, as plain data.
@@ -53,19 +55,21 @@ struct ScreenTables {
     /// Appends a pass of one thread per `pixels_a_side` squared pixels of the image.
     void add_pass(std::string name, std::string_view shader, std::vector<int> reads, std::vector<int> writes,
                   std::vector<std::pair<int, int>> constants = {}, int pixels_a_side = 1) {
-        add_pass_over(size, std::move(name), shader, std::move(reads), std::move(writes), std::move(constants), pixels_a_side);
+        add_pass_over(size, std::move(name), shader, std::move(reads), std::move(writes), std::move(constants),
+                      pixels_a_side);
     }
     /// The same of an image of size `over`.
-    void add_pass_over(cv::Size over, std::string name, std::string_view shader, std::vector<int> reads, std::vector<int> writes,
-                       std::vector<std::pair<int, int>> constants = {}, int pixels_a_side = 1);
+    void add_pass_over(cv::Size over, std::string name, std::string_view shader, std::vector<int> reads,
+                       std::vector<int> writes, std::vector<std::pair<int, int>> constants = {}, int pixels_a_side = 1);
     /// Appends so many iterations of a separable blur of screen_raw over the pixels of the same surface; `weights` are
     /// those of offsets 0, 1, 2 ... to either side.
     void add_blurs(int iterations, const std::vector<float>& weights);
     [[nodiscard]] std::size_t pixels() const { return static_cast<std::size_t>(size.area()); }
 };
 
-/// A method of which the room itself is only the part from depth and normals to raw visibility. Where it looks at neighbours
-/// and there are any, the image has a guard band of guard_px() on every side, and add_passes() finds buffers for them.
+/// A method of which the room itself is only the part from depth and normals to raw visibility. Where it looks at
+/// neighbours and there are any, the image has a guard band of guard_px() on every side, and add_passes() finds buffers
+/// for them.
 class ScreenMethod : public Method {
   public:
     AoMap compute(const View& view) final;
@@ -81,8 +85,10 @@ class ScreenMethod : public Method {
     virtual void add_denoise(ScreenTables& tables) const;
     /// The room's constant block. It begins with `screen`.
     [[nodiscard]] virtual std::vector<std::byte> constants(const shared::ScreenConstants& screen) const = 0;
+
   private:
-    using Shape = std::tuple<int, int, bool, int, bool>; // width, height, whether normals are supplied, most neighbours, noisy
+    using Shape =
+        std::tuple<int, int, bool, int, bool>; // width, height, whether normals are supplied, most neighbours, noisy
     [[nodiscard]] ScreenTables tables(const Shape& shape) const;
     gpu::Program& program_for(const Shape& shape, std::size_t constants_bytes);
 

@@ -50,8 +50,6 @@ AoMap Gather::compute(const Seen& own, std::span<const Seen> others, const Gathe
                                       static_cast<int>(others.size()),
                                       0.002F,
                                       0.005F,
-                                      how.clamp,
-                                      {},
                                       {}};
     const std::size_t pixels = static_cast<std::size_t>(size.area());
     program_->take(own_surfaces, 0, own.surfaces->words);
@@ -59,7 +57,6 @@ AoMap Gather::compute(const Seen& own, std::span<const Seen> others, const Gathe
     for (std::size_t i = 0; i < others.size(); ++i) {
         const Seen& other = others[i];
         constants.places[i] = gpu::place_of(other.surfaces->camera, other.here_from_there);
-        constants.shares[i] = other.share;
         program_->take(surfaces, i * pixels * 8, other.surfaces->words);
         program_->take(visibilities, i * pixels * 4, other.visibility);
     }

@@ -16,13 +16,11 @@ struct Seen {
     const PackedSurfaces* surfaces;
     std::shared_ptr<const gpu::DeviceBytes> visibility;
     Eigen::Isometry3d here_from_there = Eigen::Isometry3d::Identity();
-    float share = 1; ///< in the mean
 };
 
 struct GatherOptions {
     double radius_m; ///< of the visibility
     DepthNoise noise;
-    float clamp = 1; ///< others' visibility counts as no farther from the frame's own than this
 };
 
 /// Not thread-safe: one frame at a time.

@@ -4,7 +4,6 @@
 #include "projection/stopwatch.h"
 
 #include <algorithm>
-#include <cmath>
 #include <tbb/parallel_for_each.h>
 #include <tbb/task_arena.h>
 
@@ -27,16 +26,7 @@ std::vector<Parameter> NeighbourhoodOptions::parameters() {
             {"reach",
              "how many frames away those may be; 0 = so many as the camera takes to move by the radius, 4 to 30",
              &reach, "frames", 0, 1000},
-            {"average", "frames around each whose visibility is averaged with its own; 0 = none", &average, "", 0, 64},
-            {"blend",
-             "mean of frames before and after; exponential: of frames before, each a 29/30 of the next younger one",
-             &blend,
-             "",
-             {},
-             {},
-             {"mean", "exponential"}},
-            {"clamp", "visibility of other frames counts as no farther from the frame's own than this; 1 = as it is",
-             &clamp, "", 0, 1}};
+            {"average", "frames around each whose visibility is averaged with its own; 0 = none", &average, "", 0, 64}};
 }
 
 Neighbourhood::Neighbourhood(gpu::Device& device, Method& method, double radius_m, const DepthNoise& noise,
@@ -220,14 +210,13 @@ std::vector<Neighbourhood::Fitting> Neighbourhood::spread_views(std::size_t plac
     return chosen;
 }
 
-/// The nearest ones on either side, or before it.
-std::vector<Neighbourhood::Fitting> Neighbourhood::adjacent_views(std::size_t place, int count, bool only_before) {
+/// The nearest ones on either side.
+std::vector<Neighbourhood::Fitting> Neighbourhood::adjacent_views(std::size_t place, int count) {
     std::vector<Fitting> chosen;
     std::vector<std::size_t> candidates;
-    for (int step = 1; step <= (only_before ? count : (count + 1) / 2); ++step) {
+    for (int step = 1; step <= (count + 1) / 2; ++step) {
         candidates.push_back(place - static_cast<std::size_t>(step));
-        if (!only_before)
-            candidates.push_back(place + static_cast<std::size_t>(step));
+        candidates.push_back(place + static_cast<std::size_t>(step));
     }
     meet(place, candidates);
     for (const std::size_t other : candidates)
@@ -273,16 +262,13 @@ NeighbourhoodResult Neighbourhood::compute(std::size_t place) {
     NeighbourhoodResult result;
     result.ao = visibility(place);
     std::vector<Seen> others;
-    const bool exponential = options_.blend == "exponential";
-    for (const Fitting& other : adjacent_views(place, options_.average, exponential)) {
-        const double share = exponential ? std::pow(29.0 / 30, static_cast<double>(place - other.place)) : 1;
+    for (const Fitting& other : adjacent_views(place, options_.average)) {
         others.push_back(seen(other.place));
         others.back().here_from_there = other.here_from_there;
-        others.back().share = static_cast<float>(share);
         result.averaged.push_back(other.place);
     }
     if (!others.empty()) {
-        result.ao = gather_.compute(seen(place), others, {radius_m_, noise_, options_.clamp});
+        result.ao = gather_.compute(seen(place), others, {radius_m_, noise_});
         account("average", gather_.timings());
     }
     averaged_ = !others.empty();

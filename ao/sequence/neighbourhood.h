@@ -18,18 +18,15 @@ namespace scanshade {
 
 /// A recording's frames can be fused, seen through each other, and averaged; 0 = not so.
 struct NeighbourhoodOptions {
-    int fuse = 8;               ///< frames around each that noisy depth is averaged with
-    int layers = 6;             ///< other views whose surfaces occlude what a frame shows; of use to surfel
-    int reach = 0;              ///< how many frames away these may be; 0 = as reach_for() has it, which the caller asks
-    int average = 12;           ///< frames around each whose visibility is averaged with its own
-    std::string blend = "mean"; ///< of these; "exponential": of those before, each older one 29/30 of the next
-    float clamp = 1;            ///< other frames' visibility counts as no farther from the frame's own than this
+    int fuse = 8;     ///< frames around each that noisy depth is averaged with
+    int layers = 6;   ///< other views whose surfaces occlude what a frame shows; of use to surfel
+    int reach = 0;    ///< how many frames away these may be; 0 = as reach_for() has it, which the caller asks
+    int average = 12; ///< frames around each whose visibility is averaged with its own
 
     [[nodiscard]] std::vector<Parameter> parameters();
     /// How many frames before and behind it a frame's result may depend on.
     [[nodiscard]] std::size_t farthest() const {
-        return static_cast<std::size_t>((layers > 0 ? reach : 0) + (fuse + 1) / 2 +
-                                        (blend == "mean" ? (average + 1) / 2 : average));
+        return static_cast<std::size_t>((layers > 0 ? reach : 0) + (fuse + 1) / 2 + (average + 1) / 2);
     }
 };
 
@@ -113,7 +110,7 @@ class Neighbourhood {
     [[nodiscard]] Meeting meeting_of(const Slot& earlier, const Slot& later) const;
     [[nodiscard]] std::optional<Fitting> fitting(std::size_t here, std::size_t there);
     [[nodiscard]] std::vector<Fitting> spread_views(std::size_t place);
-    [[nodiscard]] std::vector<Fitting> adjacent_views(std::size_t place, int count, bool only_before = false);
+    [[nodiscard]] std::vector<Fitting> adjacent_views(std::size_t place, int count);
     void account(std::string_view step, const Timings& timings);
 
     Method& method_;

@@ -35,7 +35,10 @@ constexpr int widest_fill_px = 40, narrowest_fill_px = 4;
 
 int divided_up(int n, int by) { return (n + by - 1) / by; }
 
-/// Half the thickness of all surfaces where they are alike, in radii: what reads the least error.
+/// Half the thickness of a surface, in radii, at least and at most: what reads the least error. Where the ends of a
+/// surface are out of sight, it is as thick as can be.
+constexpr float thinnest = 0.01F, thickest = 0.6F;
+/// That of all surfaces where they are alike.
 constexpr float alike = 0.25F;
 
 /// Half the thickness of what other views saw behind this one's surfaces, in radii.
@@ -133,13 +136,7 @@ std::vector<Parameter> SurfelOptions::parameters() {
           "a CPU, low 0.101, 0.27, high 0.085, 0.41",
           &downsampled},
          {"slices", "of the hemisphere; 0 = the quality's", &slices, "", 0, 64},
-         {"steps", "reads on either side of a slice; 0 = the quality's", &steps, "", 0, 256},
-         {"thinnest", "half the thickness of a surface at least", &thinnest, "radii", 0, 10},
-         {"thickest", "half the thickness of a surface at most; what is wider than twice this in the image is as thick",
-          &thickest, "radii", 1e-3, 10},
-         {"hidden",
-          "half the thickness of a surface whose ends lie behind others or outside the image; thickest is the limit",
-          &hidden, "radii", 0, 10}});
+         {"steps", "reads on either side of a slice; 0 = the quality's", &steps, "", 0, 256}});
 }
 
 Surfel::Surfel(gpu::Device& device, const SurfelOptions& options)
@@ -183,17 +180,16 @@ std::vector<std::byte> Surfel::constants(const shared::ScreenConstants& screen) 
         {words.width, words.height},
         {plane.width, plane.height},
         {samples.width, samples.height},
-        options_.thinnest * r,
-        options_.thickest * r,
-        std::max(options_.thinnest, std::min(alike, options_.thickest)) * r,
-        std::min(options_.hidden, options_.thickest) * r,
+        thinnest * r,
+        thickest * r,
+        alike * r,
         options_.slices * options_.steps <= 4 ? 1.3F : 1.0F, // between few samples gaps would open
         0.05F * r,
         0.3F * r,
         noisy ? widest_fill_px : narrowest_fill_px,
         0.5F * r,
         0.03F * r,
-        static_cast<int>(std::lround(255 * hidden_layer / options_.thickest))});
+        static_cast<int>(std::lround(255 * hidden_layer / thickest))});
 }
 
 } // namespace scanshade

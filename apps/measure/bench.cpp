@@ -1,7 +1,9 @@
-// `scanshade bench`: methods x settings on captures with a known answer, milliseconds against error, as one page.
+// `scanshade bench`: methods x settings on captures with a known answer, milliseconds against error, as one page. Flags
+// ask for other measurements instead, each a part (bench_part.h) with a file of its own.
 #include "ao/gpu/device.h"
 #include "apps/command.h"
 #include "apps/command_line.h"
+#include "apps/measure/bench_part.h"
 #include "apps/measure/bench_results.h"
 #include "apps/measure/configurations.h"
 #include "apps/measure/fused_reference.h"
@@ -13,12 +15,10 @@
 #include "projection/error.h"
 
 #include <algorithm>
-#include <chrono>
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <map>
-#include <set>
 #include <sstream>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_for_each.h>
@@ -199,7 +199,7 @@ class Bench final : public Command {
     }
 
     std::vector<Stage> stages() override {
-        return {
+        std::vector<Stage> all{
             {"captures",
              {{"generated", "generate captures of the scenes first, in REPORT/captures", &generated_},
               {"scenes", "which scenes: all, or names with commas", &scenes_},
@@ -226,9 +226,23 @@ class Bench final : public Command {
               {"front", "file for the measured front, as `run --max-error` has it; other sensors' parts of it stay",
                &front_},
               {"overwrite", "replace an earlier report", &overwrite_}}}};
+        for (const auto& part : parts_)
+            all.push_back(part->stage());
+        return all;
     }
 
     int run() override {
+        const auto asked = [](const auto& part) { return part->asked(); };
+        const auto count = std::ranges::count_if(parts_, asked);
+        if (count == 0)
+            return report_on_captures();
+        if (count > 1 || !paths_.empty() || generated_)
+            throw Misuse("bench measures captures or one part at a time; `scanshade help bench` lists the parts");
+        return (*std::ranges::find_if(parts_, asked))->run(device_);
+    }
+
+  private:
+    int report_on_captures() {
         check_settings();
         std::vector<Configuration> all = configurations();
         const std::vector<std::string> methods = chosen("methods", methods_, names_of(scanshade::methods()));
@@ -256,7 +270,6 @@ class Bench final : public Command {
         return exit_code(report);
     }
 
-  private:
     void check_settings() const {
         if (out_.empty())
             throw Misuse("bench needs -o FOLDER for its report");
@@ -349,6 +362,9 @@ class Bench final : public Command {
     std::string scenes_ = "all", sensors_ = "ideal", methods_ = "all", device_, out_, front_;
     int rounds_ = 3;
     bool generated_ = false, overwrite_ = false;
+    /// Each is measured instead of captures, where its flag asks for it.
+    std::array<std::unique_ptr<BenchPart>, 5> parts_{cacao_times(), cacao_maps(), cloud_errors(), hard_cases_kept(),
+                                                     normals_kept()};
 };
 
 } // namespace

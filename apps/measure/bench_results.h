@@ -5,7 +5,6 @@
 #include "apps/measure/front.h"
 #include "apps/measure/trial.h"
 
-#include <filesystem>
 #include <string>
 #include <vector>
 

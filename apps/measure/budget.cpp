@@ -129,7 +129,6 @@ Choice choose(gpu::Device& device, const Front& front, const TrialCapture& captu
     const bool truth_fits = !capture.reference.empty() && std::abs(capture.radius_m - radius_m) < 1e-6 * radius_m;
     const auto reference = std::ranges::min_element(points, {}, &Priced::rms)->configuration;
     const std::vector<cv::Mat1f> right = truth_fits ? truths(capture) : trials.of(reference).maps;
-    choice.against_truth = truth_fits;
 
     while (true) {
         std::vector<double> ms;

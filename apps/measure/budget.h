@@ -27,7 +27,6 @@ struct Choice {
     double expected_ms = 0, expected_rms = 0;
     double measured_ms = 0;
     double measured_rms = 0; ///< to truth, or to the most accurate configuration of the front
-    bool against_truth = false;
     std::vector<std::string> sentences; ///< what was done and found, for people
 };
 

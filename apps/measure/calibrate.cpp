@@ -3,6 +3,7 @@
 #include "apps/command.h"
 #include "apps/command_line.h"
 #include "apps/json.h"
+#include "apps/lists.h"
 #include "apps/measure/trial.h"
 #include "io/output_file.h"
 #include "projection/error.h"
@@ -14,7 +15,6 @@
 #include <fmt/ranges.h>
 #include <opencv2/core/optim.hpp>
 #include <optional>
-#include <sstream>
 
 namespace scanshade {
 namespace {
@@ -22,15 +22,6 @@ namespace {
 namespace fs = std::filesystem;
 
 void say(const std::string& line) { fmt::print(stderr, "{}\n", line); }
-
-std::vector<std::string> split(const std::string& list) {
-    std::vector<std::string> words;
-    std::istringstream stream(list);
-    for (std::string word; std::getline(stream, word, ',');)
-        if (!word.empty())
-            words.push_back(word);
-    return words;
-}
 
 /// A setting that the search may change.
 struct Free {
@@ -203,10 +194,10 @@ class Calibrate final : public Command {
         check_settings();
         const Configuration start = as_given();
         gpu::Device device(device_);
-        const std::vector<TrialCapture> training = load(training_), others = load(split(held_out_));
+        const std::vector<TrialCapture> training = load(training_), others = load(comma_separated(held_out_));
         std::vector<Free> free;
         const std::vector<Parameter> rows = setup().parameters();
-        for (const std::string& name : split(free_))
+        for (const std::string& name : comma_separated(free_))
             free.push_back(free_setting(rows, method_, name));
         const std::optional<FreeLook> look = taken_out(free);
         const Settings found = Search(device, training, start, free, look).run(evaluations_);
@@ -220,11 +211,11 @@ class Calibrate final : public Command {
     void check_settings() const {
         if (out_.empty())
             throw Misuse("calibrate-look needs -o FILE for the settings");
-        if (split(free_).empty())
+        if (comma_separated(free_).empty())
             throw Misuse("calibrate-look needs --free NAMES: which settings to fit");
         if (fs::exists(out_) && !overwrite_)
             throw Misuse(out_ + " exists already: --overwrite replaces it, or choose another -o");
-        for (const std::string& path : split(held_out_))
+        for (const std::string& path : comma_separated(held_out_))
             for (const std::string& other : training_)
                 if (fs::weakly_canonical(path) == fs::weakly_canonical(other))
                     throw Misuse(fmt::format("held-out: {} is a training capture", path));

@@ -12,7 +12,6 @@
 #include "io/output_file.h"
 #include "projection/error.h"
 
-#include <algorithm>
 #include <fmt/format.h>
 
 namespace scanshade {

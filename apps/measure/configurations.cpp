@@ -3,7 +3,6 @@
 #include "projection/error.h"
 
 #include <algorithm>
-#include <fmt/format.h>
 
 namespace scanshade {
 namespace {

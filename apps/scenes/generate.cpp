@@ -46,20 +46,6 @@ std::string stamp(Microseconds time) {
     return fmt::format("{}.{:06}", absolute / 1000000, absolute % 1000000);
 }
 
-cv::Size parsed_size(const std::string& text) {
-    constexpr int largest = 8192;
-    cv::Size size;
-    const char* end = text.data() + text.size();
-    const auto [cross, bad_width] = std::from_chars(text.data(), end, size.width);
-    if (bad_width == std::errc() && cross != end && *cross == 'x') {
-        const auto [stop, bad_height] = std::from_chars(cross + 1, end, size.height);
-        if (bad_height == std::errc() && stop == end && std::min(size.width, size.height) >= 1 &&
-            std::max(size.width, size.height) <= largest)
-            return size;
-    }
-    throw Misuse(fmt::format("size: '{}' given, expected width x height such as 640x480, each 1 .. {}", text, largest));
-}
-
 /// A Kinect's 525 px at 640x480, the same field of view at other sizes.
 Pinhole camera_of_size(cv::Size size) {
     const double f = 525.0 * std::max(size.width / 640.0, size.height / 480.0);
@@ -286,6 +272,20 @@ void write_scene_cloud(const GenerateOptions& options, const scene::World& world
 }
 
 } // namespace
+
+cv::Size parsed_size(const std::string& text) {
+    constexpr int largest = 8192;
+    cv::Size size;
+    const char* end = text.data() + text.size();
+    const auto [cross, bad_width] = std::from_chars(text.data(), end, size.width);
+    if (bad_width == std::errc() && cross != end && *cross == 'x') {
+        const auto [stop, bad_height] = std::from_chars(cross + 1, end, size.height);
+        if (bad_height == std::errc() && stop == end && std::min(size.width, size.height) >= 1 &&
+            std::max(size.width, size.height) <= largest)
+            return size;
+    }
+    throw Misuse(fmt::format("size: '{}' given, expected width x height such as 640x480, each 1 .. {}", text, largest));
+}
 
 std::vector<Parameter> GenerateOptions::parameters() {
     return {

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,9 @@ struct GenerateOptions {
     /// Every setting but the scene, which the command line takes as a word of its own.
     [[nodiscard]] std::vector<Parameter> parameters();
 };
+
+/// From width x height such as "640x480", each 1 .. 8192. Throws Misuse.
+[[nodiscard]] cv::Size parsed_size(const std::string& text);
 
 /// Called after each frame that is on disk, from the calling thread.
 using GenerateProgress = std::function<void(int done, int total)>;

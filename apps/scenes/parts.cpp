@@ -1,7 +1,6 @@
 // The parts things are built of, as the solids rays can hit.
 #include "apps/scenes/parts.h"
 
-#include <algorithm>
 #include <cmath>
 
 namespace scanshade::scene {

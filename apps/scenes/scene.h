@@ -7,7 +7,6 @@
 #include <Eigen/Geometry>
 #include <limits>
 #include <opencv2/core.hpp>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>

@@ -6,7 +6,6 @@
 #include "apps/scenes/parts.h"
 #include "apps/scenes/things.h"
 
-#include <cmath>
 
 namespace scanshade::scene {
 

@@ -5,8 +5,6 @@
 #include "io/text.h"
 #include "projection/error.h"
 
-#include <algorithm>
-#include <cctype>
 #include <chrono>
 #include <fmt/format.h>
 #include <map>

@@ -53,10 +53,10 @@ void main() {
         float apart = dot(turned, met - there) * narrow;
         float then = imageLoad(visibilities, index).x;
         float closer = at_most_one(z * z / (there.z * there.z));
-        float weight = positive(1.0 - apart * apart) * worth(there, turned, at) * closer * constants.shares[i];
+        float weight = positive(1.0 - apart * apart) * worth(there, turned, at) * closer;
         bool same = sees && met.z > 0.0 && dot(turned, normal) > 0.7 && then >= 0.0;
         weight = same ? weight : 0.0;
-        then = same ? clamp(then, v - constants.clamp_to, v + constants.clamp_to) : 0.0;
+        then = same ? then : 0.0;
         weights += weight;
         sum += weight * then;
         squares += weight * then * then;

@@ -15,7 +15,6 @@ struct SurfelConstants {
     ivec2 samples;             // pixels that slices are marched from: all, or every other one of every other row
     float thinnest, thickest;  // half a surfel's thickness at least and at most, metres
     float alike;               // half a surfel's thickness where all are alike, metres
-    float hidden;              // half the thickness of what ends out of sight, metres; at most the thickest
     float lengthen;            // factor on the half lengths of surfels: few samples leave gaps
     float jut;                 // metres by which what hides a surface's continuation stands in front of it
     float longest;             // of what is added to a half length there, metres

@@ -64,7 +64,7 @@ void main() {
     int along = run_length(p.y, s.words.x * k.size.y + (p.y >> 5) * k.size.x + p.x);
     float width = min(float(across) / k.camera.fx, float(along) / k.camera.fy) * abs(z);
     bool ends_in_sight = across < open || along < open;
-    float thickness = ends_in_sight ? clamp(0.5 * width, s.thinnest, s.thickest) : s.hidden;
+    float thickness = ends_in_sight ? clamp(0.5 * width, s.thinnest, s.thickest) : s.thickest;
 
     if (layers == 1) {
         imageStore(surfels, surfel_index(p, s.plane), uvec4(surfel(z, surface.xyz, thickness / s.thickest), 0u, 0u));

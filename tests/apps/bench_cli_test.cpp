@@ -341,6 +341,37 @@ TEST_F(MeasureTest, without_truth_all_posed_frames_together_are_the_reference) {
     EXPECT_TRUE(says(lost.err, "0 frames with poses"));
 }
 
+TEST_F(MeasureTest, bench_parts_print_what_they_measure) {
+    const auto printed = [&](const std::string& flags) {
+        const Ran ran = run_program("bench " + flags);
+        EXPECT_EQ(ran.exit_code, 0) << flags << "\n" << ran.err;
+        return ran.out;
+    };
+    EXPECT_TRUE(says(printed("--hard-cases --hard-cases.only units --hard-cases.methods gtao"), "every gate kept"));
+    EXPECT_TRUE(says(printed("--cacao --cacao.sizes 64x48,48x64 --cacao.repeat 1 --cacao.passes"), "48x64"));
+    EXPECT_TRUE(says(printed("--clouds --clouds.points 3000 --clouds.rays 2,4"), "4 rays a point"));
+    const fs::path maps = folder / "maps";
+    (void)printed(fmt::format("--write-maps {}", maps.string()));
+    EXPECT_TRUE(says(printed(fmt::format("--compare-maps {}", maps.string())), "highest_downsampled"));
+}
+
+/// Maps of another device that are too far off are told in the exit code.
+TEST_F(MeasureTest, bench_tells_maps_that_are_far_apart) {
+    const fs::path maps = folder / "maps";
+    ASSERT_EQ(run_program(fmt::format("bench --write-maps {}", maps.string())).exit_code, 0);
+    fs::copy_file(maps / "lowest_native.f32", maps / "high_downsampled.f32", fs::copy_options::overwrite_existing);
+    const Ran ran = run_program(fmt::format("bench --compare-maps {}", maps.string()));
+    EXPECT_EQ(ran.exit_code, 2);
+    EXPECT_TRUE(says(ran.out, "MISSED"));
+}
+
+TEST_F(MeasureTest, bench_measures_one_part_at_a_time) {
+    EXPECT_EQ(run_program("bench --normals --hard-cases").exit_code, 1);
+    EXPECT_EQ(run_program(fmt::format("bench {} --normals", capture())).exit_code, 1);
+    EXPECT_EQ(run_program("bench --clouds --clouds.rays 8,some").exit_code, 1);
+    EXPECT_EQ(run_program("bench --cacao --cacao.sizes 640").exit_code, 1);
+}
+
 TEST_F(MeasureTest, bench_needs_truth_and_something_to_do) {
     EXPECT_EQ(run_program(fmt::format("bench -o {}", out())).exit_code, 1);
     EXPECT_EQ(run_program(fmt::format("bench {}", capture())).exit_code, 1);

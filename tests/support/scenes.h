@@ -1,22 +1,12 @@
-// Depth images of shapes whose answers are known, for any test that needs something to look at.
+// What tests look at: the program's shapes, in the tests' own namespace.
 #pragma once
 
-#include "projection/maps.h"
+#include "apps/scenes/shapes.h"
 
 namespace scanshade::tests {
 
-/// 65 degrees wide, off-centre principal point: nothing may hang on the image's middle.
-[[nodiscard]] Pinhole test_camera(cv::Size size = {160, 120});
+using namespace shapes;
 
-/// A plane through (0, 0, z_m), turned about the vertical axis: 0 faces the camera. Pixels that see none of it within
-/// 100 m are holes.
-[[nodiscard]] DepthImage tilted_plane(const Pinhole& camera, double tilt_degrees, double z_m = 2);
-/// Two walls that meet at a right angle in a vertical edge z_m away, each 45 degrees to the view.
-[[nodiscard]] DepthImage wall_corner(const Pinhole& camera, double z_m = 2);
-/// A ball of 0.3 m lying on a floor 1 m below the camera, with a wall behind.
-[[nodiscard]] DepthImage ball_on_floor(const Pinhole& camera);
-
-/// The same with a share of its pixels punched out, in blocks of 1 to 4 pixels; the same `seed` punches the same holes.
-[[nodiscard]] DepthImage with_holes(const DepthImage& depth, double share, int seed = 1);
+[[nodiscard]] inline Pinhole test_camera(cv::Size size = {160, 120}) { return off_centre_camera(size); }
 
 } // namespace scanshade::tests

@@ -1,8 +1,8 @@
-#include "tests/hard_cases/normals.h"
-#include "projection/statistics.h"
+#include "apps/measure/normal_errors.h"
 
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/gpu/transfer.h"
+#include "projection/statistics.h"
 #include "ao/screen/screen.h"
 #include "apps/measure/error_classes.h"
 #include "apps/scenes/scene.h"
@@ -10,11 +10,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
-namespace scanshade::hard_cases {
+namespace scanshade {
 namespace {
 
 const Pinhole camera{525, 525, 319.5, 239.5, {640, 480}};
@@ -99,40 +98,37 @@ void add(Figures& figures, const Sighted& view, const FittedDepth& found) {
 
 } // namespace
 
-std::string print_normals(gpu::Device& device) {
-    fmt::print("\n| sensor | pixels with a normal, % | median, degrees | 95 % | median at 1 .. 3 m | 95 % | edges "
-               "within 1 px, % |\n"
-               "|---|---|---|---|---|---|---|\n");
-    std::string misses;
+const std::vector<NormalCase>& normal_cases() {
+    constexpr double no_aim = 180;
     const double cacao = method_named("cacao").smoothing;
-    for (const auto& [name, smoothing] :
-         {std::pair{"ideal", 1.0}, {"kinect", 1.0}, {"kinect", cacao}, {"tof", 1.0}, {"tof", cacao}}) {
-        const Sensor& sensor = sensor_named(name);
-        Figures figures;
-        for (const scene::Scene& scene : scene::scenes()) {
-            const std::vector<Sighted> views = views_of(scene, sensor);
-            std::vector<DepthImage> images;
-            for (const Sighted& view : views)
-                images.push_back(view.recorded);
-            const DepthNoise noise = measure_noise(images);
-            std::optional<FitPlane> fit;
-            if (noise.any())
-                fit.emplace(device, noise, FitPlaneOptions{.smoothing = smoothing});
-            for (const Sighted& view : views)
-                add(figures, view, fit ? fit->compute(view.recorded) : from_depth(device, view.recorded));
-        }
-        const double median = quantile(figures.near_degrees, 0.5), aim = name == std::string("ideal") ? 1
-                                                                         : smoothing == cacao         ? 5
-                                                                                                      : 180;
-        fmt::print("| {}{} | {:.1f} | {:.2f} | {:.1f} | {:.2f} | {:.1f} | {:.1f} |\n", name,
-                   smoothing == 1 ? "" : ", CACAO's windows",
-                   100 * static_cast<double>(figures.degrees.size()) / figures.depths, quantile(figures.degrees, 0.5),
-                   quantile(figures.degrees, 0.95), median, quantile(figures.near_degrees, 0.95),
-                   100 * figures.kept / figures.edges);
-        if (!(median <= aim))
-            misses += fmt::format("normals, {}: median {:.2f} > {} degrees\n", name, median, aim);
-    }
-    return misses;
+    static const std::vector<NormalCase> cases{{"ideal", "ideal", 1, 1},
+                                               {"kinect", "kinect", 1, no_aim},
+                                               {"kinect, CACAO's windows", "kinect", cacao, 5},
+                                               {"tof", "tof", 1, no_aim},
+                                               {"tof, CACAO's windows", "tof", cacao, 5}};
+    return cases;
 }
 
-} // namespace scanshade::hard_cases
+NormalErrors normal_errors(gpu::Device& device, const NormalCase& which) {
+    const Sensor& sensor = sensor_named(which.sensor);
+    Figures figures;
+    for (const scene::Scene& scene : scene::scenes()) {
+        const std::vector<Sighted> views = views_of(scene, sensor);
+        std::vector<DepthImage> images;
+        for (const Sighted& view : views)
+            images.push_back(view.recorded);
+        const DepthNoise noise = measure_noise(images);
+        std::optional<FitPlane> fit;
+        if (noise.any())
+            fit.emplace(device, noise, FitPlaneOptions{.smoothing = which.smoothing});
+        for (const Sighted& view : views)
+            add(figures, view, fit ? fit->compute(view.recorded) : from_depth(device, view.recorded));
+    }
+    const auto angles = [](std::vector<double>& degrees) {
+        return NormalErrors::Angles{quantile(degrees, 0.5), quantile(degrees, 0.95)};
+    };
+    return {static_cast<double>(figures.degrees.size()) / figures.depths, angles(figures.degrees),
+            angles(figures.near_degrees), figures.kept / figures.edges};
+}
+
+} // namespace scanshade

@@ -1,8 +1,8 @@
-#include "tests/hard_cases/cases.h"
+#include "apps/measure/hard_cases/cases.h"
 
 #include "apps/scenes/scene.h"
 #include "apps/scenes/sensor.h"
-#include "tests/support/scenes.h"
+#include "apps/scenes/shapes.h"
 
 #include <cmath>
 #include <fmt/format.h>
@@ -119,7 +119,7 @@ const DepthNoise& structured_light_noise() {
     static const DepthNoise noise = [] {
         std::vector<DepthImage> images;
         for (const double z_m : {0.8, 1.5, 2.5, 3.5})
-            images.push_back(structured_light(tests::tilted_plane(tests::test_camera({320, 240}), 40, z_m), 5));
+            images.push_back(structured_light(shapes::tilted_plane(shapes::off_centre_camera({320, 240}), 40, z_m), 5));
         return measure_noise(images);
     }();
     return noise;
@@ -152,7 +152,7 @@ DepthImage random_holes(const DepthImage& depth, double share) {
 /// Planes whose radius shows as two pixels or more.
 std::vector<Case> planes(bool noisy) {
     std::vector<Case> all;
-    const Pinhole camera = tests::test_camera();
+    const Pinhole camera = shapes::off_centre_camera();
     const std::vector<double> tilts =
         noisy ? std::vector<double>{0, 45, 60, 70} : std::vector<double>{0, 45, 70, 80, 85, 89};
     const std::vector<double> depths =
@@ -162,7 +162,7 @@ std::vector<Case> planes(bool noisy) {
             if (0.5 * camera.fx / z_m < 2)
                 continue;
             Case one =
-                open_everywhere(fmt::format("{} degrees, {} m", tilt, z_m), tests::tilted_plane(camera, tilt, z_m));
+                open_everywhere(fmt::format("{} degrees, {} m", tilt, z_m), shapes::tilted_plane(camera, tilt, z_m));
             if (noisy) {
                 one.depth.z_m.setTo(0, one.depth.z_m > 8); // no structured light reaches farther
                 one.expected.setTo(unknown, one.depth.z_m == 0);
@@ -174,14 +174,14 @@ std::vector<Case> planes(bool noisy) {
 }
 
 std::vector<Case> shapes() {
-    const Pinhole camera = tests::test_camera({320, 240});
+    const Pinhole camera = shapes::off_centre_camera({320, 240});
     return {traced("corner", camera, corner_of_walls()), traced("ball on a floor", camera, ball_on_floor()),
             traced("saddle", camera, saddle()), traced("stairs", camera, stairs()),
             traced("crevice", camera, crevice())};
 }
 
 std::vector<Case> thin_things() {
-    const Pinhole camera = tests::test_camera({320, 240});
+    const Pinhole camera = shapes::off_centre_camera({320, 240});
     const double pixel_m = 2 / camera.fx;
     return {traced("pole of one pixel", camera,
                    {plane({0, 0, 2.2}, {0, 0, -1}), rod({0, -3, 2}, {0, 1, 0}, 0.5 * pixel_m, 6)}),
@@ -194,7 +194,7 @@ std::vector<Case> thin_things() {
 std::vector<Case> steps_in_depth() {
     std::vector<Case> all;
     for (const double jump_m : {0.01, 0.1, 0.3, 1.0, 10.0, 100.0})
-        all.push_back(traced(fmt::format("{} m", jump_m), tests::test_camera({320, 240}),
+        all.push_back(traced(fmt::format("{} m", jump_m), shapes::off_centre_camera({320, 240}),
                              {plane({0, 0, 1.5 + jump_m}, {0, 0, -1}), box({-2, 0, 2}, {2, 4, 0.5})}));
     return all;
 }
@@ -207,7 +207,7 @@ std::vector<Case> noisy_shapes() {
 }
 
 std::vector<Case> cameras() {
-    Pinhole shifted = tests::test_camera({320, 240}), narrow = lens(65, {320, 240});
+    Pinhole shifted = shapes::off_centre_camera({320, 240}), narrow = lens(65, {320, 240});
     shifted.cx = -60;
     narrow.fy *= 2;
     const Pinhole tele{20.0 * 160, 20.0 * 160, 79.5, 59.5, {160, 120}};
@@ -220,7 +220,8 @@ std::vector<Case> cameras() {
 std::vector<Case> radii() {
     std::vector<Case> all;
     for (const double radius_m : {0.001, 0.02, 0.1, 2.0, 100.0})
-        all.push_back(traced(fmt::format("{} m", radius_m), tests::test_camera({160, 120}), ball_on_floor(), radius_m));
+        all.push_back(
+            traced(fmt::format("{} m", radius_m), shapes::off_centre_camera({160, 120}), ball_on_floor(), radius_m));
     all.front().expected.setTo(1.0F, all.front().depth.z_m >
                                          0); // rays cannot start closer than coordinates of a kilometre round
     all.back().expected.release();           // most of what is within 100 m lies outside the image
@@ -233,7 +234,7 @@ std::vector<Case> sizes() {
          {cv::Size{1, 1}, {1, 7}, {7, 1}, {3, 2}, {17, 1}, {641, 479}, {2000, 3}, {3, 2000}, {3840, 2160}}) {
         const double f = 0.8 * std::max(size.width, size.height);
         const Pinhole camera{f, f, 0.5 * size.width, 0.5 * size.height, size};
-        Case one = open_everywhere(fmt::format("{}x{}", size.width, size.height), tests::tilted_plane(camera, 30));
+        Case one = open_everywhere(fmt::format("{}x{}", size.width, size.height), shapes::tilted_plane(camera, 30));
         if (std::min(size.width, size.height) < 2)
             one.expected.release(); // a line has no normal: any answer, or none
         all.push_back(std::move(one));
@@ -242,7 +243,7 @@ std::vector<Case> sizes() {
 }
 
 std::vector<Case> no_depth() {
-    const DepthImage ball = tests::ball_on_floor(tests::test_camera());
+    const DepthImage ball = shapes::ball_on_floor(shapes::off_centre_camera());
     const float infinite = std::numeric_limits<float>::infinity();
     std::vector<Case> all;
     for (const float value : {unknown, infinite, -infinite, -1.0F, 1e-40F, 0.0F}) {
@@ -269,7 +270,7 @@ std::vector<std::pair<Case, Case>> beside_holed(const std::function<void(const D
     std::vector<std::pair<Case, Case>> all;
     for (const auto& [name, bodies] :
          {std::pair{"corner", corner_of_walls()}, {"ball", ball_on_floor()}, {"stairs", stairs()}}) {
-        const Case whole = traced(name, tests::test_camera({320, 240}), bodies);
+        const Case whole = traced(name, shapes::off_centre_camera({320, 240}), bodies);
         punch(whole.depth, [&, scene = name](const std::string& kind, DepthImage holed) {
             all.emplace_back(whole, Case{fmt::format("{}, {}", scene, kind), std::move(holed), {}, 0.5});
         });
@@ -287,7 +288,7 @@ std::vector<std::pair<Case, Case>> holes() {
 std::vector<std::pair<Case, Case>> worse_holes() {
     return beside_holed([](const DepthImage& depth, const AddHoled& add) {
         add("60 % random", random_holes(depth, 0.6));
-        add("30 % in blocks", tests::with_holes(depth, 0.3));
+        add("30 % in blocks", shapes::with_holes(depth, 0.3));
         add("checkerboard", punched(depth, [](int u, int v) { return (u + v) % 2 == 0; }));
         add("every third column", punched(depth, [](int u, int) { return u % 3 != 0; }));
         add("every fourth row", punched(depth, [](int, int v) { return v % 4 != 0; }));
@@ -296,7 +297,7 @@ std::vector<std::pair<Case, Case>> worse_holes() {
 
 std::vector<std::pair<Case, Case>> units() {
     std::vector<std::pair<Case, Case>> all;
-    const DepthImage metres = tests::ball_on_floor(tests::test_camera({320, 240}));
+    const DepthImage metres = shapes::ball_on_floor(shapes::off_centre_camera({320, 240}));
     for (const double scale : {0.01, 0.1, 10.0, 100.0})
         all.emplace_back(
             Case{"metres", metres, {}, 0.5},
@@ -309,7 +310,7 @@ std::vector<std::pair<Case, Case>> units() {
 std::vector<std::pair<Case, Case>> precision() {
     std::vector<std::pair<Case, Case>> all;
     const Pinhole tele{20.0 * 160, 20.0 * 160, 79.5, 59.5, {160, 120}};
-    for (const auto& [name, camera, z_m] : {std::tuple{"normal lens", tests::test_camera({160, 120}), 2.0},
+    for (const auto& [name, camera, z_m] : {std::tuple{"normal lens", shapes::off_centre_camera({160, 120}), 2.0},
                                             {"fx = 20 W", tele, 40.0},
                                             {"150 degrees", lens(150), 1.0}}) {
         const Scene scene{"corner", "", corner_of_walls(z_m)};
@@ -329,7 +330,7 @@ std::vector<std::pair<Case, Case>> flying_pixels() {
     std::vector<std::pair<Case, Case>> all;
     const DepthNoise tof{0.001, 0.0006};
     for (const double gap_m : {0.1, 0.3, 1.0}) {
-        const Case clean = traced(fmt::format("{} m", gap_m), tests::test_camera({320, 240}),
+        const Case clean = traced(fmt::format("{} m", gap_m), shapes::off_centre_camera({320, 240}),
                                   {plane({0, 0, 1.5 + gap_m}, {0, 0, -1}), box({0, 0, 1.6}, {0.4, 0.3, 0.1})});
         Case flown = clean, quiet = clean;
         flown.noise = quiet.noise = tof;

@@ -1,18 +1,17 @@
-// cloud_bench: visibility of a scene's points, from the points alone, against rays on the scene itself: error, time,
-// memory.
-//   cloud_bench [--scene office] [--points 1000000] [--rays 8,16,32] [--no-normals] [--raycast] [--device NAME]
-//   [--smooth 2] cloud_bench --sky [--scene outdoor] [--raster 512,1024,2048]     the sky's share, also by depth images
-//   from 256 sides
-// All rows are of one run, each judged at the same points (about 50000); seconds are the wall's and the processor's.
+// `bench --clouds`: visibility of a scene's points, from the points alone, against rays on the scene itself: error,
+// time, memory. With --clouds.sky it is the share of the sky, also by depth images from 256 directions.
+//
+// All rows are of one run, each compared at the same points (about 50000). Seconds are the wall's and the processor's.
 #include "ao/cloud/cloud_ao.h"
 #include "ao/compare.h"
 #include "ao/gpu/device.h"
 #include "ao/raycast/raycast.h"
+#include "apps/lists.h"
+#include "apps/measure/bench_part.h"
 #include "apps/scenes/scene_cloud.h"
 #include "projection/hash.h"
 #include "projection/stopwatch.h"
 
-#include <CLI/CLI.hpp>
 #include <ctime>
 #include <fmt/format.h>
 #include <fstream>
@@ -20,10 +19,10 @@
 #include <tbb/combinable.h>
 #include <tbb/parallel_for.h>
 
-using namespace scanshade;
-using Eigen::Vector3d, Eigen::Vector3f;
-
+namespace scanshade {
 namespace {
+
+using Eigen::Vector3d, Eigen::Vector3f;
 
 /// The largest the process has been, in MiB.
 double peak_memory_mib() {
@@ -135,58 +134,71 @@ double share_turned_away(const std::vector<Vector3f>& found, const std::vector<V
     return away / std::max(all, 1.0);
 }
 
+class CloudErrors final : public BenchPart {
+  public:
+    Stage stage() override {
+        return {"clouds against rays on their scene",
+                {{"clouds", "errors, seconds and memory of a scene's points", &asked_},
+                 {"clouds.scene", "which scene; empty = office, or outdoor for the sky", &scene_},
+                 {"clouds.points", "how many points", &points_, "", 1, 1e9},
+                 {"clouds.rays", "per point, with commas", &rays_},
+                 {"clouds.smooth", "means over neighbours; -1 = by the spacing", &smooth_, "", -1, 16},
+                 {"clouds.normals", "whether the points come with theirs", &normals_},
+                 {"clouds.gpu", "on the Vulkan device instead of the processor", &gpu_},
+                 {"clouds.raycast", "the method raycast with 64 rays, too", &raycast_},
+                 {"clouds.sky", "the share of the sky instead, also by depth images", &sky_},
+                 {"clouds.raster", "sizes of these images, pixels a side, with commas", &rasters_}}};
+    }
+    [[nodiscard]] bool asked() const override { return asked_; }
+
+    int run(const std::string& choice) override {
+        const std::vector<int> rays = whole_numbers("clouds.rays", rays_, 1),
+                               rasters = whole_numbers("clouds.raster", rasters_, 1);
+        const scene::World world(scene::scene_named(!scene_.empty() ? scene_ : sky_ ? "outdoor" : "office"));
+        const auto points = static_cast<std::size_t>(points_);
+        const auto cloud = scene::scene_cloud(world, points);
+        const std::size_t step = std::max<std::size_t>(1, points / 50000);
+        const double radius = world.scene().ao_radius_m;
+        const Judge judge{sky_ ? true_sky(world, cloud, step)
+                               : scene::true_visibility(world, cloud, {radius, 1024, 1, false}, step)};
+        const PointSet set{cloud.points, normals_ ? cloud.normals : std::span<const Vector3d>()};
+        fmt::print("{}: {} points, radius {} m; judged at every {}. point\n", world.scene().name, points,
+                   sky_ ? 0 : radius, step);
+        double spacing = 0, turned_away = 0;
+        std::unique_ptr<gpu::Device> device;
+        if (gpu_)
+            device = std::make_unique<gpu::Device>(choice);
+        for (const int count : rays)
+            judge.row(fmt::format("{} rays a point", count), [&] {
+                const auto found =
+                    CloudAo({.radius = radius, .rays = count, .smooth = smooth_, .sky = sky_}, device.get())
+                        .compute(set);
+                for (const auto& [stage, ms] : found.timings)
+                    fmt::print("{} {:.0f} ms; ", stage, ms);
+                fmt::print("\n");
+                spacing = found.spacing;
+                turned_away = share_turned_away(found.normals, cloud.normals);
+                return found.visibility;
+            });
+        if (!normals_)
+            fmt::print("{:.2f} % of the points face the wrong side\n", 100 * turned_away);
+        if (sky_)
+            for (const int raster : rasters)
+                judge.row(fmt::format("256 views of {0}x{0}", raster),
+                          [&] { return sky_by_views(cloud, spacing, 256, raster); });
+        if (raycast_)
+            judge.row("raycast, 64 rays", [&] { return Raycast({.radius_m = radius, .rays = 64}).compute(set).visibility; });
+        return all_well;
+    }
+
+  private:
+    std::string scene_, rays_ = "8,16,32", rasters_ = "512,1024,2048";
+    int points_ = 1000000, smooth_ = -1;
+    bool asked_ = false, normals_ = true, gpu_ = false, raycast_ = false, sky_ = false;
+};
+
 } // namespace
 
-int main(int argc, char** argv) {
-    std::string scene;
-    std::size_t points = 1000000;
-    std::vector<int> rays{8, 16, 32}, rasters{512, 1024, 2048};
-    bool no_normals = false, with_raycast = false, sky = false;
-    std::string device_name;
-    int smooth = -1;
-    CLI::App parser("visibility of points against rays on the scene they were taken from");
-    parser.add_option("--scene", scene, "office, or outdoor with --sky");
-    parser.add_option("--points", points);
-    parser.add_option("--rays", rays, "per point")->delimiter(',');
-    parser.add_option("--smooth", smooth, "means over neighbours; -1 = by the spacing");
-    parser.add_option("--raster", rasters, "of depth images, pixels a side")->delimiter(',');
-    CLI::Option* on_device = parser.add_option("--device", device_name, "a Vulkan device; without it the processor");
-    parser.add_flag("--no-normals", no_normals, "the points alone");
-    parser.add_flag("--raycast", with_raycast, "also the method raycast, 64 rays");
-    parser.add_flag("--sky", sky, "the share of the sky");
-    CLI11_PARSE(parser, argc, argv);
+std::unique_ptr<BenchPart> cloud_errors() { return std::make_unique<CloudErrors>(); }
 
-    const scene::World world(scene::scene_named(scene.empty() ? sky ? "outdoor" : "office" : scene));
-    const auto cloud = scene::scene_cloud(world, points);
-    const std::size_t step = std::max<std::size_t>(1, points / 50000);
-    const double radius = world.scene().ao_radius_m;
-    const Judge judge{sky ? true_sky(world, cloud, step)
-                          : scene::true_visibility(world, cloud, {radius, 1024, 1, false}, step)};
-    const PointSet set{cloud.points, no_normals ? std::span<const Vector3d>() : cloud.normals};
-    fmt::print("{}: {} points, radius {} m; judged at every {}. point\n", world.scene().name, points, sky ? 0 : radius,
-               step);
-    double spacing = 0, sides = 0;
-    std::unique_ptr<gpu::Device> device;
-    if (on_device->count() > 0)
-        device = std::make_unique<gpu::Device>(device_name);
-    for (const int count : rays)
-        judge.row(fmt::format("{} rays a point", count), [&] {
-            const auto found =
-                CloudAo({.radius = radius, .rays = count, .smooth = smooth, .sky = sky}, device.get()).compute(set);
-            for (const auto& [stage, ms] : found.timings)
-                fmt::print("{} {:.0f} ms; ", stage, ms);
-            fmt::print("\n");
-            spacing = found.spacing;
-            sides = share_turned_away(found.normals, cloud.normals);
-            return found.visibility;
-        });
-    if (no_normals)
-        fmt::print("{:.2f} % of the points face the wrong side\n", 100 * sides);
-    if (sky)
-        for (const int raster : rasters)
-            judge.row(fmt::format("256 views of {0}x{0}", raster),
-                      [&] { return sky_by_views(cloud, spacing, 256, raster); });
-    if (with_raycast)
-        judge.row("raycast, 64 rays",
-                  [&] { return Raycast({.radius_m = radius, .rays = 64}).compute(set).visibility; });
-}
+} // namespace scanshade

@@ -1,4 +1,4 @@
-#include "tests/support/scenes.h"
+#include "apps/scenes/shapes.h"
 
 #include "apps/scenes/random_noise.h"
 #include "apps/scenes/scene.h"
@@ -6,14 +6,14 @@
 #include <cmath>
 #include <numbers>
 
-namespace scanshade::tests {
+namespace scanshade::shapes {
 namespace {
 
 constexpr float farthest_m = 100;
 
 /// Bodies given in camera space.
 DepthImage seen(const Pinhole& camera, std::vector<scene::Body> bodies) {
-    const scene::Scene scene{"test", "", std::move(bodies), {}, {}};
+    const scene::Scene scene{"shape", "", std::move(bodies), {}, {}};
     cv::Mat1f z_m = render_geometry(scene::World(scene), camera, Eigen::Isometry3d::Identity()).z_m;
     z_m.setTo(0, z_m > farthest_m);
     return {camera, z_m, {}};
@@ -21,7 +21,7 @@ DepthImage seen(const Pinhole& camera, std::vector<scene::Body> bodies) {
 
 } // namespace
 
-Pinhole test_camera(cv::Size size) {
+Pinhole off_centre_camera(cv::Size size) {
     const double f = size.width / (2 * std::tan(32.5 * std::numbers::pi / 180));
     return {f, 1.02 * f, 0.47 * size.width, 0.54 * size.height, size};
 }
@@ -58,4 +58,4 @@ DepthImage with_holes(const DepthImage& depth, double share, int seed) {
     return holed;
 }
 
-} // namespace scanshade::tests
+} // namespace scanshade::shapes
