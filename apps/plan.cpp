@@ -4,6 +4,7 @@
 #include "apps/job.h"
 #include "apps/slice.h"
 #include "io/capture.h"
+#include "io/images/format.h"
 #include "io/layouts.h"
 #include "io/text.h"
 #include "projection/error.h"

@@ -4,6 +4,7 @@
 #include "io/camera_file.h"
 #include "io/exif.h"
 #include "io/image_file.h"
+#include "io/images/format.h"
 #include "io/layouts.h"
 #include "projection/calibration/organised_evidence.h"
 #include "projection/error.h"

@@ -4,6 +4,7 @@
 
 #include "io/cloud_file.h"
 #include "io/cloud_records.h"
+#include "io/images/format.h"
 #include "io/layouts.h"
 #include "io/plausibility.h"
 #include "io/text.h"
@@ -47,7 +48,7 @@ bool is_cloud(const fs::path& file) {
     for (const std::string_view beginning : {"ply\n", "ply\r", "# .PCD", "VERSION", "FIELDS", "LASF", "ASTM-E57"})
         if (start.starts_with(beginning))
             return true;
-    return image_format(start) == ImageFormat::unknown && has_cloud_extension(file);
+    return !image_format(start) && has_cloud_extension(file);
 }
 
 Listing list_file(const fs::path& file) {
@@ -61,10 +62,11 @@ Listing list_file(const fs::path& file) {
         listing.capture.depth = depth_encoding("m", "of clouds: metres by custom, or the unit that the file names");
         listing.capture.registration_reason = "colours belong to the points";
     } else {
-        const bool image = image_format(read_bytes(file, 16)) != ImageFormat::unknown;
+        const bool image = image_format(read_bytes(file, 16)) != nullptr;
         if (!image && !has_depth_extension(file))
-            throw Error(file.string() + ": neither a folder, a depth image (PNG, PGM, TIFF, EXR, PFM, PCLZF) nor a "
-                                        "cloud (PCD, PLY, LAS, XYZ, PTS, PTX, KITTI's .bin)");
+            throw Error(fmt::format("{}: neither a folder, a depth image ({}) nor a cloud (PCD, PLY, LAS, XYZ, PTS, PTX, "
+                                    "KITTI's .bin)",
+                                    file.string(), listed(depth_format_names(), "or")));
         entry.depth = file;
         listing.capture.kind = "depth image";
         listing.capture.depth = assumed_encoding(file);

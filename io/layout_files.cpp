@@ -1,6 +1,7 @@
 // A capture folder's files: their order and kinds, the camera among them, and fit names for frames.
 #include "io/layouts.h"
 
+#include "io/images/format.h"
 #include "io/text.h"
 #include "projection/error.h"
 
@@ -61,13 +62,6 @@ std::vector<fs::path> files_in(const fs::path& folder) {
     return files;
 }
 
-std::string lower_extension(const fs::path& file) {
-    std::string text = file.extension().string();
-    std::transform(text.begin(), text.end(), text.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    return text;
-}
-
 namespace {
 
 bool speaks_of(const fs::path& file, std::initializer_list<std::string_view> subjects) {
@@ -84,13 +78,6 @@ bool one_of(const std::string& text, std::initializer_list<std::string_view> cho
 
 } // namespace
 
-bool has_depth_extension(const fs::path& file) {
-    return one_of(lower_extension(file), {".png", ".pgm", ".tif", ".tiff", ".exr", ".pfm", ".pclzf"});
-}
-bool has_colour_extension(const fs::path& file) {
-    return one_of(lower_extension(file),
-                  {".png", ".jpg", ".jpeg", ".ppm", ".pgm", ".bmp", ".tif", ".tiff", ".webp", ".pclzf"});
-}
 bool is_text_cloud(const fs::path& file) { return one_of(lower_extension(file), {".xyz", ".pts", ".ptx"}); }
 bool has_cloud_extension(const fs::path& file) {
     return is_text_cloud(file) || one_of(lower_extension(file), {".pcd", ".ply", ".las", ".laz", ".e57", ".bin"});
@@ -126,14 +113,6 @@ std::string trouble_with(const fs::path& folder, const std::string& name) {
         return fmt::format("{} is a link out of the capture's folder, to {}; not opened", in_quotes(name),
                            in_quotes(file.string()));
     return {};
-}
-
-ImageFacts peek(const fs::path& image) {
-    constexpr std::size_t header = 1 << 16;
-    const std::string start = read_bytes(image, header);
-    const ImageFormat format = image_format(start);
-    const bool whole = format == ImageFormat::tiff || format == ImageFormat::exr; // their sizes may lie at the end
-    return read_image_header(whole ? read_bytes(image) : start, image);
 }
 
 std::optional<CameraFile> camera_in(const fs::path& folder, std::vector<std::string>& warnings) {

@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <map>
-#include <pcl/io/lzf.h>
+#include <liblzf/lzf.h>
 
 namespace scanshade {
 
@@ -299,7 +299,7 @@ void read_compressed(CloudRecords& records, std::string_view body, std::size_t b
         throw Error(fmt::format("{}: {} compressed bytes at byte {} cannot unpack to {}", file.string(), packed,
                                 body_at + 8, unpacked));
     std::string columns(unpacked, '\0');
-    if (unpacked > 0 && pcl::lzfDecompress(body.data() + 8, packed, columns.data(), unpacked) != unpacked)
+    if (unpacked > 0 && lzf_decompress(body.data() + 8, packed, columns.data(), unpacked) != unpacked)
         throw Error(fmt::format("{}: compressed body at byte {} is damaged (LZF)", file.string(), body_at + 8));
     records.points = rows_from_columns(columns, records.fields, records.stride, records.point_count);
     keep_trailing(records, body.substr(8 + packed), file, warnings);
@@ -322,7 +322,7 @@ std::string compressed(const std::string& columns) {
         throw Error("too many points for a compressed PCD");
     std::string packed(columns.size() + columns.size() / 16 + 64, '\0');
     const auto length = columns.size() < 8 ? 0
-                                           : pcl::lzfCompress(columns.data(), static_cast<unsigned>(columns.size()),
+                                           : lzf_compress(columns.data(), static_cast<unsigned>(columns.size()),
                                                               packed.data(), static_cast<unsigned>(packed.size()));
     packed = length > 0 ? packed.substr(0, length) : literal_runs(columns);
     const std::array<std::uint32_t, 2> sizes{static_cast<std::uint32_t>(packed.size()),

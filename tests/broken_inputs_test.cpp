@@ -27,6 +27,9 @@ using tests::TemporaryFolder;
 using tests::warned;
 using tests::write_file;
 
+/// OpenCV writes EXR only where this is set when it first looks.
+[[maybe_unused]] const bool exr_allowed = ::setenv("OPENCV_IO_ENABLE_OPENEXR", "1", 1) == 0;
+
 // --- images made here ---
 
 class BrokenImages : public ::testing::Test {
