@@ -177,7 +177,9 @@ std::string base64(std::string_view bytes) {
     constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     std::string coded;
     for (std::size_t i = 0; i < bytes.size(); i += 3) {
-        const auto byte = [&](std::size_t k) { return i + k < bytes.size() ? unsigned{static_cast<unsigned char>(bytes[i + k])} : 0U; };
+        const auto byte = [&](std::size_t k) {
+            return i + k < bytes.size() ? unsigned{static_cast<unsigned char>(bytes[i + k])} : 0U;
+        };
         const unsigned group = byte(0) << 16 | byte(1) << 8 | byte(2);
         for (std::size_t k = 0; k < 4; ++k)
             coded += i + k <= bytes.size() ? digits[group >> (18 - 6 * k) & 63] : '=';

@@ -72,16 +72,7 @@ bool speaks_of(const fs::path& file, std::initializer_list<std::string_view> sub
                        [&](std::string_view subject) { return name.find(subject) != std::string::npos; });
 }
 
-bool one_of(const std::string& text, std::initializer_list<std::string_view> choices) {
-    return std::find(choices.begin(), choices.end(), text) != choices.end();
-}
-
 } // namespace
-
-bool is_text_cloud(const fs::path& file) { return one_of(lower_extension(file), {".xyz", ".pts", ".ptx"}); }
-bool has_cloud_extension(const fs::path& file) {
-    return is_text_cloud(file) || one_of(lower_extension(file), {".pcd", ".ply", ".las", ".laz", ".e57", ".bin"});
-}
 
 namespace {
 

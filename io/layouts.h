@@ -34,9 +34,6 @@ struct Listing {
 /// The folder's own files, hidden and foreign ones (._*, Thumbs.db) left out, in natural order: 2 before 10.
 [[nodiscard]] std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder);
 [[nodiscard]] bool natural_less(const std::string& a, const std::string& b);
-[[nodiscard]] bool has_cloud_extension(const std::filesystem::path& file);
-/// .xyz, .pts, .ptx: lines of numbers, which nothing but the name tells apart.
-[[nodiscard]] bool is_text_cloud(const std::filesystem::path& file);
 
 /// Why a file that a list names cannot be opened: outside the capture's folder, by its name or through a link, or
 /// missing. Empty = it is there.

@@ -78,9 +78,7 @@ cv::Mat1b unpacked(const Bitmap& bitmap, cv::Size size, const Path& file) {
             refuse(file, "BMP is damaged: a run leaves the image");
         indices(y, x++) = static_cast<uchar>(value);
     };
-    const auto half = [&](unsigned byte, unsigned i) {
-        return bits == 8 ? byte : i % 2 == 0 ? byte >> 4 : byte & 15;
-    };
+    const auto half = [&](unsigned byte, unsigned i) { return bits == 8 ? byte : i % 2 == 0 ? byte >> 4 : byte & 15; };
     for (std::size_t at = 0;;) {
         const auto next = [&] {
             if (at >= bitmap.pixels.size())
@@ -130,7 +128,8 @@ cv::Mat3b colour_bmp(std::string_view bytes, const ImageFacts& facts, const Path
     const Bitmap bitmap = taken_apart(bytes, file);
     const unsigned bits = bitmap.bits;
     const bool known = bits == 1 || bits == 4 || bits == 8 || bits == 16 || bits == 24 || bits == 32;
-    const bool packed = (bits == 8 && bitmap.compression == runs_of_8) || (bits == 4 && bitmap.compression == runs_of_4);
+    const bool packed =
+        (bits == 8 && bitmap.compression == runs_of_8) || (bits == 4 && bitmap.compression == runs_of_4);
     const bool fields = (bits == 16 || bits == 32) && bitmap.compression == bit_fields;
     if (!known || (bitmap.compression != plain && !packed && !fields))
         refuse(file, fmt::format("BMP of {} bits and compression {}, which is not read", bits,
@@ -148,7 +147,8 @@ cv::Mat3b colour_bmp(std::string_view bytes, const ImageFacts& facts, const Path
     cv::Mat3b image(facts.size);
     for (int y = 0; y < image.rows; ++y) { // the bottom row comes first
         cv::Vec3b* to = image[bitmap.top_first ? y : image.rows - 1 - y];
-        const std::string_view row = packed ? "" : bitmap.pixels.substr(static_cast<std::size_t>(y) * row_bytes, row_bytes);
+        const std::string_view row =
+            packed ? "" : bitmap.pixels.substr(static_cast<std::size_t>(y) * row_bytes, row_bytes);
         for (int x = 0; x < image.cols; ++x) {
             const auto i = static_cast<std::size_t>(x);
             if (packed)

@@ -29,8 +29,8 @@ class Source : public Imf::IStream {
     bool read(char to[], int count) override {
         const auto length = static_cast<std::size_t>(std::max(count, 0));
         if (at_ > bytes_.size() || length > bytes_.size() - at_)
-            throw std::runtime_error(fmt::format("ends early: {} bytes, something is said to lie at byte {}",
-                                                 bytes_.size(), at_ + length));
+            throw std::runtime_error(
+                fmt::format("ends early: {} bytes, something is said to lie at byte {}", bytes_.size(), at_ + length));
         std::memcpy(to, bytes_.data() + at_, length);
         at_ += length;
         return at_ < bytes_.size();
@@ -72,8 +72,8 @@ auto checked(const Path& file, const Steps& steps) {
     }
 }
 
-/// How many bytes of floats one coded byte can become: twice what the code can make of it, since halves are read as floats; none where
-/// nothing is known of the compression.
+/// How many bytes of floats one coded byte can become: twice what the code can make of it, since halves are read as
+/// floats; none where nothing is known of the compression.
 std::optional<std::uint64_t> expansion(Imf::Compression compression) {
     switch (compression) {
     case Imf::NO_COMPRESSION:
@@ -144,8 +144,8 @@ std::string encoded_exr(const cv::Mat& image) {
     {
         Imf::OutputFile output(sink, header);
         Imf::FrameBuffer buffer;
-        buffer.insert(channel, Imf::Slice::Make(Imf::FLOAT, image.data, header.dataWindow(), sizeof(float),
-                                                image.step[0]));
+        buffer.insert(channel,
+                      Imf::Slice::Make(Imf::FLOAT, image.data, header.dataWindow(), sizeof(float), image.step[0]));
         output.setFrameBuffer(buffer);
         output.writePixels(image.rows);
     } // writes the table of lines

@@ -130,7 +130,8 @@ std::vector<std::string_view> names_of_those(bool (*wanted)(const ImageFormat&))
 std::span<const ImageFormat> image_formats() { return formats; }
 
 const ImageFormat* image_format(std::string_view bytes) {
-    const auto found = std::ranges::find_if(formats, [&](const ImageFormat& format) { return format.signature(bytes); });
+    const auto found =
+        std::ranges::find_if(formats, [&](const ImageFormat& format) { return format.signature(bytes); });
     return found == std::end(formats) ? nullptr : found;
 }
 

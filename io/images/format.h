@@ -15,16 +15,17 @@
 namespace scanshade {
 
 struct ImageFormat {
-    std::string_view name;                       ///< "PNG"
-    bool (*signature)(std::string_view start);   ///< whether a file that begins so is of this format
-    std::array<std::string_view, 2> extensions;  ///< lower case, with the dot; empty: none
-    std::size_t header_bytes;                    ///< so many of the first bytes hold the header
-    std::string_view no_depth = {};              ///< why the format cannot hold depth, where its header does not tell
+    std::string_view name;                      ///< "PNG"
+    bool (*signature)(std::string_view start);  ///< whether a file that begins so is of this format
+    std::array<std::string_view, 2> extensions; ///< lower case, with the dot; empty: none
+    std::size_t header_bytes;                   ///< so many of the first bytes hold the header
+    std::string_view no_depth = {};             ///< why the format cannot hold depth, where its header does not tell
 
     // Each throws Error, which names `file` and what is wrong, for anything that is damaged or cut short.
     ImageFacts (*header)(std::string_view bytes, const std::filesystem::path& file);
     /// One channel of 8- or 16-bit integers or floats, as stored. None: the format holds no such image.
-    cv::Mat (*read_stored)(std::string_view bytes, const ImageFacts& facts, const std::filesystem::path& file) = nullptr;
+    cv::Mat (*read_stored)(std::string_view bytes, const ImageFacts& facts,
+                           const std::filesystem::path& file) = nullptr;
     /// 8-bit BGR, from grey and 16 bits, too. None: the format holds floats.
     cv::Mat3b (*read_colour)(std::string_view bytes, const ImageFacts& facts,
                              const std::filesystem::path& file) = nullptr;

@@ -127,9 +127,7 @@ cv::Mat3b from_cmyk(const cv::Mat& cmyk) {
 
 } // namespace
 
-ImageFacts jpeg_header(std::string_view bytes, const Path& file) {
-    return facts_of(Decoder(bytes, file).info(), file);
-}
+ImageFacts jpeg_header(std::string_view bytes, const Path& file) { return facts_of(Decoder(bytes, file).info(), file); }
 
 cv::Mat3b colour_jpeg(std::string_view bytes, const ImageFacts& facts, const Path& file) {
     Decoder decoder(bytes, file);

@@ -37,9 +37,9 @@ std::uint64_t next_number(std::string_view bytes, std::size_t& at, const Path& f
 
 struct Header {
     ImageFacts facts;
-    char kind = 0;            ///< the digit of P1 to P7, f or F
-    unsigned maxval = 1;      ///< integers only
-    bool big_endian = false;  ///< PFM
+    char kind = 0;           ///< the digit of P1 to P7, f or F
+    unsigned maxval = 1;     ///< integers only
+    bool big_endian = false; ///< PFM
     std::size_t samples_at = 0;
 
     [[nodiscard]] bool text() const { return kind >= '1' && kind <= '3'; }
@@ -108,7 +108,8 @@ Header header_of(std::string_view bytes, const Path& file) {
 /// The samples, of which there must be exactly as many as the header says.
 std::string_view samples_of(std::string_view bytes, const Header& header, const Path& file) {
     const ImageFacts& facts = header.facts;
-    const auto width = static_cast<std::uint64_t>(facts.size.width), height = static_cast<std::uint64_t>(facts.size.height);
+    const auto width = static_cast<std::uint64_t>(facts.size.width),
+               height = static_cast<std::uint64_t>(facts.size.height);
     const std::uint64_t row =
         header.one_bit() ? (width + 7) / 8 : width * static_cast<unsigned>(facts.channels * facts.bits / 8);
     const std::string_view samples = bytes.substr(std::min(bytes.size(), header.samples_at));
@@ -161,7 +162,7 @@ cv::Mat unpacked_text(std::string_view bytes, const Header& header, const Path& 
         const auto value = whole_number(word);
         if (!value || *value > header.maxval)
             refuse(file, fmt::format("sample {} is {}, expected 0 .. {}", i + 1, in_quotes(word), header.maxval));
-        const auto grey = static_cast<uchar>(*value * 255 / header.maxval);
+        const auto grey = static_cast<uchar>(header.maxval > 255 ? *value >> 8 : *value * 255 / header.maxval);
         image.data[i] = header.one_bit() ? 255 - grey : grey;
     }
     return image;
@@ -197,15 +198,17 @@ cv::Mat3b colour_netpbm(std::string_view bytes, const ImageFacts& facts, const P
                                        : unpacked_bytes(samples_of(bytes, header, file), facts);
     if (image.depth() == CV_16U) { // the upper byte of each
         cv::Mat upper(image.size(), CV_MAKETYPE(CV_8U, image.channels()));
-        std::transform(image.ptr<ushort>(), image.ptr<ushort>() + image.total() * static_cast<std::size_t>(image.channels()),
-                       upper.data, [](ushort value) { return static_cast<uchar>(value >> 8); });
+        std::transform(image.ptr<ushort>(),
+                       image.ptr<ushort>() + image.total() * static_cast<std::size_t>(image.channels()), upper.data,
+                       [](ushort value) { return static_cast<uchar>(value >> 8); });
         image = upper;
     }
     if (image.channels() == 2) // grey and how opaque it is
         cv::extractChannel(image, image, 0);
-    cv::cvtColor(image, image, image.channels() == 1   ? cv::COLOR_GRAY2BGR
-                               : image.channels() == 3 ? cv::COLOR_RGB2BGR
-                                                       : cv::COLOR_RGBA2BGR);
+    cv::cvtColor(image, image,
+                 image.channels() == 1   ? cv::COLOR_GRAY2BGR
+                 : image.channels() == 3 ? cv::COLOR_RGB2BGR
+                                         : cv::COLOR_RGBA2BGR);
     return image;
 }
 

@@ -61,7 +61,7 @@ toff_t size_of_memory(thandle_t handle) { return memory_of(handle).size(); }
 int map_memory(thandle_t handle, void** base, toff_t* size) {
     Memory& memory = memory_of(handle);
     if (memory.bytes.empty())
-        return 0; // is being written
+        return 0;                                   // is being written
     *base = const_cast<char*>(memory.bytes.data()); // is only read
     *size = memory.bytes.size();
     return 1;
