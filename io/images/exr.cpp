@@ -80,8 +80,12 @@ std::optional<std::uint64_t> expansion(Imf::Compression compression) {
         return 2;
     case Imf::RLE_COMPRESSION:
         return 2 * 64;
+    case Imf::B44_COMPRESSION:
+    case Imf::B44A_COMPRESSION:
+        return 2 * 11;
     case Imf::ZIPS_COMPRESSION:
     case Imf::ZIP_COMPRESSION:
+    case Imf::PXR24_COMPRESSION:
         return 2 * 1032;
     default:
         return std::nullopt;
