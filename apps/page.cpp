@@ -1,12 +1,11 @@
 #include "apps/page.h"
 
-#include "projection/error.h"
+#include "io/images/png_output.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 namespace scanshade::page {
@@ -174,11 +173,13 @@ std::string everything(const Plot& plot) {
 
 constexpr int figure_width = 340; ///< px, as the style has it: a page of fifty pictures stays below some megabytes
 
-std::string base64(const std::vector<uchar>& bytes) {
+std::string base64(std::string_view bytes) {
     constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     std::string coded;
     for (std::size_t i = 0; i < bytes.size(); i += 3) {
-        const auto byte = [&](std::size_t k) { return i + k < bytes.size() ? unsigned{bytes[i + k]} : 0U; };
+        const auto byte = [&](std::size_t k) {
+            return i + k < bytes.size() ? unsigned{static_cast<unsigned char>(bytes[i + k])} : 0U;
+        };
         const unsigned group = byte(0) << 16 | byte(1) << 8 | byte(2);
         for (std::size_t k = 0; k < 4; ++k)
             coded += i + k <= bytes.size() ? digits[group >> (18 - 6 * k) & 63] : '=';
@@ -275,11 +276,8 @@ std::string figure(const cv::Mat3b& picture, std::string_view caption) {
     if (picture.cols > figure_width)
         cv::resize(picture, shown, {figure_width, std::max(1, picture.rows * figure_width / picture.cols)}, 0, 0,
                    cv::INTER_AREA);
-    std::vector<uchar> bytes;
-    if (!cv::imencode(".png", shown, bytes))
-        throw Error(fmt::format("picture '{}' cannot be encoded", caption));
     return fmt::format("<figure><img alt=\"\" src=\"data:image/png;base64,{}\"><figcaption>{}</figcaption></figure>\n",
-                       base64(bytes), escaped(caption));
+                       base64(encoded_png(shown)), escaped(caption));
 }
 
 std::string paragraph(std::string_view text) { return fmt::format("<p>{}</p>\n", escaped(text)); }

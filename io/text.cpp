@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cerrno>
 #include <charconv>
 #include <cstdio>
@@ -183,6 +184,20 @@ std::string at_line(const std::filesystem::path& file, int line) {
     return fmt::format("{} line {}", file.string(), line);
 }
 
+std::string lower_extension(const std::filesystem::path& file) {
+    std::string text = file.extension().string();
+    std::transform(text.begin(), text.end(), text.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return text;
+}
+
+std::string listed(const std::vector<std::string_view>& names, std::string_view before_last) {
+    std::string text;
+    for (std::size_t i = 0; i < names.size(); ++i)
+        text += (i == 0 ? "" : i + 1 < names.size() ? ", " : fmt::format(" {} ", before_last)) + std::string(names[i]);
+    return text;
+}
+
 std::string counted(std::size_t count, std::string_view noun) {
     return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
 }
@@ -199,13 +214,6 @@ void RepeatedWarning::add(std::string sentence) {
 RepeatedWarning::~RepeatedWarning() {
     if (seen_ > shown)
         warnings_.push_back(fmt::format("... and {} more like the last one.", seen_ - shown));
-}
-
-std::string lower_extension(const std::filesystem::path& file) {
-    std::string text = file.extension().string();
-    std::transform(text.begin(), text.end(), text.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    return text;
 }
 
 } // namespace scanshade

@@ -49,6 +49,12 @@ struct TextLine {
 /// "path line 12": how every message names a place in a text file.
 [[nodiscard]] std::string at_line(const std::filesystem::path& file, int line);
 
+/// ".PNG" -> ".png"
+[[nodiscard]] std::string lower_extension(const std::filesystem::path& file);
+
+/// "a, b or c", with the word before the last.
+[[nodiscard]] std::string listed(const std::vector<std::string_view>& names, std::string_view before_last);
+
 /// "1 point", "7 points"
 [[nodiscard]] std::string counted(std::size_t count, std::string_view noun);
 
@@ -66,7 +72,5 @@ class RepeatedWarning {
     std::size_t seen_ = 0;
 };
 
-/// ".PNG" -> ".png"
-[[nodiscard]] std::string lower_extension(const std::filesystem::path& file);
 
 } // namespace scanshade

@@ -4,6 +4,7 @@
 #include "apps/method_settings.h"
 #include "apps/slice.h"
 #include "io/captures/capture.h"
+#include "io/images/format.h"
 #include "io/captures/layouts.h"
 #include "io/text.h"
 #include "projection/error.h"

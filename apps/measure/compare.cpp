@@ -8,6 +8,7 @@
 #include "apps/measure/map_set.h"
 #include "apps/picture.h"
 #include "io/clouds/cloud_file.h"
+#include "io/clouds/format.h"
 #include "io/images/image_file.h"
 #include "io/output_file.h"
 #include "projection/error.h"
@@ -30,7 +31,7 @@ void say(const std::string& line) { fmt::print(stderr, "{}\n", line); }
 
 /// A map, or what a cloud's points hold as ambient_occlusion, in a row.
 cv::Mat1f values_of(const fs::path& file) {
-    if (!is_cloud_file(file))
+    if (!has_cloud_extension(file))
         return read_ao(file);
     std::vector<std::string> warnings;
     const std::vector<float> values = recorded_field(read_cloud(file, warnings), "ambient_occlusion", file);

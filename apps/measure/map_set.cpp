@@ -1,6 +1,7 @@
 #include "apps/measure/map_set.h"
 
 #include "apps/json.h"
+#include "io/images/image_file.h"
 #include "io/text.h"
 #include "projection/error.h"
 
@@ -14,9 +15,7 @@ namespace fs = std::filesystem;
 namespace {
 
 bool is_map(const fs::path& file) {
-    constexpr std::array<std::string_view, 4> kinds{".png", ".tiff", ".tif", ".exr"};
-    return fs::is_regular_file(file) && !file.filename().string().starts_with('.') &&
-           std::ranges::find(kinds, file.extension().string()) != kinds.end();
+    return fs::is_regular_file(file) && !file.filename().string().starts_with('.') && has_ao_extension(file);
 }
 
 std::map<std::string, fs::path> maps_in(const fs::path& folder) {

@@ -2,9 +2,10 @@
 #include "apps/refine/sources.h"
 
 #include "io/cameras/camera_file.h"
-#include "io/images/exif.h"
-#include "io/images/image_file.h"
 #include "io/captures/layouts.h"
+#include "io/images/exif.h"
+#include "io/images/format.h"
+#include "io/images/image_file.h"
 #include "projection/calibration/boards/organised_clouds.h"
 #include "projection/error.h"
 

@@ -4,6 +4,7 @@
 #include "apps/picture.h"
 #include "apps/walk/point_clouds.h"
 #include "io/clouds/cloud_file.h"
+#include "io/clouds/format.h"
 #include "io/images/npy_file.h"
 #include "io/output_file.h"
 #include "projection/colour_view.h"
@@ -251,11 +252,11 @@ std::vector<std::filesystem::path> files_of(const CaptureEntry& entry, const Out
         add(picture_file("shaded", entry.name));
     if (outputs.panel)
         add(picture_file("panel", entry.name));
-    if (entry.cloud.empty() ? outputs.depth_cloud : outputs.cloud)
+    if (entry.cloud.empty() && outputs.depth_cloud)
         add(cloud_file(entry.name, ".ply"));
     if (!entry.cloud.empty() && outputs.cloud)
-        for (const char* other : {".pcd", ".las", ".xyz", ".pts", ".ptx"})
-            add(cloud_file(entry.name, other));
+        for (const std::string_view extension : written_cloud_extensions())
+            add(cloud_file(entry.name, std::string(extension)));
     return files;
 }
 

@@ -2,11 +2,12 @@
 // other.
 #include "io/captures/capture.h"
 
-#include "io/captures/layouts.h"
-#include "io/captures/plausibility.h"
-#include "io/captures/trajectory.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
+#include "io/clouds/format.h"
+#include "io/images/format.h"
+#include "io/captures/layouts.h"
+#include "io/captures/plausibility.h"
 #include "io/text.h"
 #include "projection/error.h"
 
@@ -35,19 +36,10 @@ Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
         return *std::move(listing);
     if (auto listing = list_clouds(folder))
         return *std::move(listing);
-    throw NoFrames(fmt::format(
-        "no frames found in {}: looked for depth.txt (TUM), frame-NNNNNN.depth.png (7-Scenes), "
-        "TIME_depth.pclzf (PCL), a folder depth/ "
-        "(Redwood, RealSense), 16-bit or float depth images, and clouds (.pcd, .ply, .las, .xyz, .pts, .ptx, .bin)",
-        folder.string()));
-}
-
-bool is_cloud(const fs::path& file) {
-    const std::string start = read_bytes(file, 16);
-    for (const std::string_view beginning : {"ply\n", "ply\r", "# .PCD", "VERSION", "FIELDS", "LASF", "ASTM-E57"})
-        if (start.starts_with(beginning))
-            return true;
-    return image_format(start) == ImageFormat::unknown && has_cloud_extension(file);
+    throw NoFrames(fmt::format("no frames found in {}: looked for depth.txt (TUM), frame-NNNNNN.depth.png (7-Scenes), "
+                            "TIME_depth.pclzf (PCL), a folder depth/ "
+                            "(Redwood, RealSense), 16-bit or float depth images, and clouds ({})",
+                            folder.string(), listed(cloud_format_names(), "or")));
 }
 
 Listing list_file(const fs::path& file) {
@@ -55,16 +47,17 @@ Listing list_file(const fs::path& file) {
     entry.name = file.stem().string();
     Listing listing;
     listing.find_camera = [](cv::Size, std::vector<std::string>&) { return std::nullopt; };
-    if (is_cloud(file)) {
+    constexpr std::size_t enough_for_signatures = 1 << 12;
+    const std::string start = read_bytes(file, enough_for_signatures);
+    if (is_cloud(start, file)) {
         entry.cloud = file;
         listing.capture.kind = "cloud";
         listing.capture.depth = depth_encoding("m", "of clouds: metres by custom, or the unit that the file names");
         listing.capture.registration_reason = "colours belong to the points";
     } else {
-        const bool image = image_format(read_bytes(file, 16)) != ImageFormat::unknown;
-        if (!image && !has_depth_extension(file))
-            throw Error(file.string() + ": neither a folder, a depth image (PNG, PGM, TIFF, EXR, PFM, PCLZF) nor a "
-                                        "cloud (PCD, PLY, LAS, XYZ, PTS, PTX, KITTI's .bin)");
+        if (!image_format(start) && !has_depth_extension(file))
+            throw Error(fmt::format("{}: neither a folder, a depth image ({}) nor a cloud ({})", file.string(),
+                                    listed(depth_format_names(), "or"), listed(cloud_format_names(), "or")));
         entry.depth = file;
         listing.capture.kind = "depth image";
         listing.capture.depth = assumed_encoding(file);

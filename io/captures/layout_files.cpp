@@ -1,6 +1,7 @@
 // A capture folder's files: their order and kinds, the camera among them, and fit names for frames.
 #include "io/captures/layouts.h"
 
+#include "io/images/format.h"
 #include "io/text.h"
 #include "projection/error.h"
 
@@ -71,19 +72,7 @@ bool speaks_of(const fs::path& file, std::initializer_list<std::string_view> sub
                        [&](std::string_view subject) { return name.find(subject) != std::string::npos; });
 }
 
-bool one_of(const std::string& text, std::initializer_list<std::string_view> choices) {
-    return std::find(choices.begin(), choices.end(), text) != choices.end();
-}
-
 } // namespace
-
-bool has_depth_extension(const fs::path& file) {
-    return one_of(lower_extension(file), {".png", ".pgm", ".tif", ".tiff", ".exr", ".pfm", ".pclzf"});
-}
-bool has_colour_extension(const fs::path& file) {
-    return one_of(lower_extension(file),
-                  {".png", ".jpg", ".jpeg", ".ppm", ".pgm", ".bmp", ".tif", ".tiff", ".webp", ".pclzf"});
-}
 
 namespace {
 
@@ -115,14 +104,6 @@ std::string trouble_with(const fs::path& folder, const std::string& name) {
         return fmt::format("{} is a link out of the capture's folder, to {}; not opened", in_quotes(name),
                            in_quotes(file.string()));
     return {};
-}
-
-ImageFacts peek(const fs::path& image) {
-    constexpr std::size_t header = 1 << 16;
-    const std::string start = read_bytes(image, header);
-    const ImageFormat format = image_format(start);
-    const bool whole = format == ImageFormat::tiff || format == ImageFormat::exr; // their sizes may lie at the end
-    return read_image_header(whole ? read_bytes(image) : start, image);
 }
 
 std::optional<CameraFile> camera_in(const fs::path& folder, std::vector<std::string>& warnings) {

@@ -1,6 +1,8 @@
 // Layouts of folders other than TUM's: 7-Scenes, colour and depth folders, depth images alone, clouds.
 #include "io/captures/layouts.h"
 
+#include "io/clouds/format.h"
+#include "io/images/format.h"
 #include "io/text.h"
 #include "io/captures/trajectory.h"
 #include "projection/error.h"

@@ -2,8 +2,6 @@
 #pragma once
 
 #include "io/captures/capture.h"
-#include "io/clouds/cloud_records.h"
-#include "io/images/image_check.h"
 
 #include <functional>
 #include <optional>
@@ -36,15 +34,10 @@ struct Listing {
 /// The folder's own files, hidden and foreign ones (._*, Thumbs.db) left out, in natural order: 2 before 10.
 [[nodiscard]] std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder);
 [[nodiscard]] bool natural_less(const std::string& a, const std::string& b);
-[[nodiscard]] bool has_depth_extension(const std::filesystem::path& file);
-[[nodiscard]] bool has_colour_extension(const std::filesystem::path& file);
 
 /// Why a file that a list names cannot be opened: outside the capture's folder, by its name or through a link, or
 /// missing. Empty = it is there.
 [[nodiscard]] std::string trouble_with(const std::filesystem::path& folder, const std::string& name);
-
-/// Size and type of an image from its first bytes; throws Error where they make no sense.
-[[nodiscard]] ImageFacts peek(const std::filesystem::path& image);
 
 /// The camera among a folder's files: camera.json, any JSON or text file whose name speaks of a camera or intrinsics,
 /// info.txt. A file that speaks of a camera and cannot be read is an Error; of several, the first is used and the

@@ -2,6 +2,7 @@
 // write them and its ImageGrabber reads them.
 #include "io/captures/layouts.h"
 
+#include "io/images/format.h"
 #include "io/text.h"
 #include "projection/error.h"
 

@@ -2,6 +2,7 @@
 #include "io/clouds/cloud_file.h"
 
 #include "io/clouds/cloud_records.h"
+#include "io/clouds/format.h"
 #include "io/output_file.h"
 #include "io/text.h"
 #include "projection/error.h"
@@ -19,7 +20,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-using Format = CloudRecords::Format;
 using Encoding = CloudRecords::Encoding;
 
 constexpr double largest_coordinate = 1e30; // 3e38 and the like mark invalid points
@@ -28,24 +28,15 @@ CloudRecords read_records(const fs::path& file, std::vector<std::string>& warnin
     const std::string bytes = read_bytes(file);
     if (bytes.empty())
         throw Error(file.string() + ": empty file (0 bytes), expected a cloud");
-    if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r"))
-        return read_ply(bytes, file, warnings);
-    for (const std::string_view start : {"# .PCD", "VERSION", "FIELDS", "COLUMNS", "#"})
-        if (bytes.starts_with(start) && !is_text_cloud(file))
-            return read_pcd(bytes, file, warnings);
-    if (bytes.starts_with("LASF"))
-        return read_las(bytes, file, warnings);
-    if (bytes.starts_with("ASTM-E57"))
-        throw Error(file.string() + ": E57, which is not read; CloudCompare or `pdal translate IN.e57 OUT.las` makes LAS "
-                                    "or PLY of it");
-    const std::string extension = lower_extension(file);
-    if (extension == ".las" || extension == ".laz")
-        throw Error(fmt::format("{}: begins with {}, expected the signature LASF", file.string(), in_quotes(bytes.substr(0, 4))));
-    if (extension == ".bin")
-        return read_kitti(bytes, file);
-    if (is_text_cloud(file))
-        return read_text_cloud(bytes, file, warnings);
-    throw Error(file.string() + ": neither PCD, PLY nor LAS (expected \"# .PCD\", \"ply\" or \"LASF\" at its start)");
+    const CloudFormat* format = cloud_format(bytes, file);
+    if (!format)
+        throw Error(fmt::format("{}: begins with {}: neither {}", file.string(), in_quotes(bytes.substr(0, 4)),
+                                listed(cloud_format_names(), "nor")));
+    if (!format->read)
+        throw Error(fmt::format("{}: {}", file.string(), format->refusal));
+    CloudRecords records = format->read(bytes, file, warnings);
+    records.format = format;
+    return records;
 }
 
 /// A coordinate of every point, its place looked up once where records are alike.
@@ -62,7 +53,8 @@ void read_coordinate(const CloudRecords& records, std::size_t field, int axis, s
 /// The same in the cloud's unit.
 void place_coordinate(const CloudRecords& records, const char* name, int axis, std::vector<Eigen::Vector3d>& points) {
     read_coordinate(records, *records.field_named(name), axis, points);
-    const double scale = records.scale[static_cast<std::size_t>(axis)], shift = records.shift[static_cast<std::size_t>(axis)];
+    const double scale = records.scale[static_cast<std::size_t>(axis)],
+                 shift = records.shift[static_cast<std::size_t>(axis)];
     if (scale == 1 && shift == 0)
         return;
     for (Eigen::Vector3d& point : points)
@@ -110,8 +102,9 @@ unsigned las_colour_step(const CloudRecords& records, const std::array<std::size
 }
 
 std::optional<std::array<std::size_t, 3>> las_colours(const CloudRecords& records) {
-    const auto blue = records.field_named("blue"), green = records.field_named("green"), red = records.field_named("red");
-    if (records.format != Format::las || !blue || !green || !red)
+    const auto blue = records.field_named("blue"), green = records.field_named("green"),
+               red = records.field_named("red");
+    if (!records.format->wide_colours || !blue || !green || !red)
         return std::nullopt;
     return std::array{*blue, *green, *red};
 }
@@ -225,8 +218,8 @@ Cloud read_cloud(const fs::path& file, std::vector<std::string>& warnings) {
 }
 
 std::vector<std::array<int, 3>> triangles_of(const Cloud& cloud) {
-    const bool ply = cloud.records && cloud.records->format == Format::ply;
-    return ply ? ply_triangles(*cloud.records) : std::vector<std::array<int, 3>>();
+    const bool mesh = cloud.records && cloud.records->format->triangles;
+    return mesh ? cloud.records->format->triangles(*cloud.records) : std::vector<std::array<int, 3>>();
 }
 
 std::vector<Eigen::Vector3d> recorded_normals(const Cloud& cloud) {
@@ -251,8 +244,6 @@ std::vector<Eigen::Vector3d> recorded_normals(const Cloud& cloud) {
     }
     return {};
 }
-
-bool is_cloud_file(const fs::path& file) { return has_cloud_extension(file); }
 
 std::vector<float> recorded_field(const Cloud& cloud, const std::string& name, const fs::path& file) {
     const auto field = cloud.records ? cloud.records->field_named(name) : std::nullopt;
@@ -283,17 +274,7 @@ void write_cloud(const fs::path& file, const Cloud& cloud, const std::vector<Add
         std::sort(replacements.begin(), replacements.end(),
                   [](const FieldReplacement& a, const FieldReplacement& b) { return a.field < b.field; });
         const std::string points = edited_points(records, replacements, additions);
-        switch (records.format) {
-        case Format::pcd:
-            return pcd_bytes(records, points, additions);
-        case Format::las:
-            return las_bytes(records, points, additions);
-        case Format::text:
-            return text_bytes(records, points, additions);
-        case Format::ply:
-            break;
-        }
-        return ply_bytes(records, points, additions);
+        return records.format->written(records, points, additions);
     });
     write_atomically(file, bytes);
 }
@@ -354,28 +335,25 @@ std::string encoding_name(const CloudRecords& records) {
     case Encoding::binary:
         break;
     }
-    return records.format == Format::ply ? "binary_little_endian" : "binary";
+    return std::string(records.format->binary_encoding);
 }
 
 } // namespace
 
 std::string describe(const CloudRecords& records) {
     std::string names, kind = extension(records).substr(1);
-    std::transform(kind.begin(), kind.end(), kind.begin(), [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+    std::transform(kind.begin(), kind.end(), kind.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
     for (const CloudField& field : records.fields)
         names += " " + field.name;
     const std::string grid =
         records.grid.height > 1 ? fmt::format(", {}x{} organised", records.grid.width, records.grid.height) : "";
-    return fmt::format("{} {}, {}{}, fields{}{}", kind, encoding_name(records), counted(records.point_count, "point"), grid,
-                       names, records.unit.empty() ? "" : ", in " + records.unit);
+    return fmt::format("{} {}, {}{}, fields{}{}", kind, encoding_name(records), counted(records.point_count, "point"),
+                       grid, names, records.unit.empty() ? "" : ", in " + records.unit);
 }
 
 std::string unit_of(const CloudRecords& records) { return records.unit; }
 
-std::string extension(const CloudRecords& records) {
-    if (!records.name_end.empty())
-        return records.name_end;
-    return records.format == Format::pcd ? ".pcd" : records.format == Format::las ? ".las" : ".ply";
-}
+std::string extension(const CloudRecords& records) { return std::string(written_extension(*records.format)); }
 
 } // namespace scanshade

@@ -1,4 +1,5 @@
-// Clouds (PLY, PCD, LAS, lines of text, KITTI): points out, every other field, face and comment kept as the file's own bytes and written back.
+// Clouds (PLY, PCD, LAS, lines of text, KITTI): points out, every other field, face and comment kept as the file's own
+// bytes and written back.
 #pragma once
 
 #include "projection/frame.h"
@@ -18,15 +19,13 @@ namespace scanshade {
 /// receives what was odd but readable.
 [[nodiscard]] Cloud read_cloud(const std::filesystem::path& file, std::vector<std::string>& warnings);
 
-/// Indices of points, three per triangle, of a mesh (a PLY with faces; polygons are fanned, -1 names no vertex); empty for
-/// clouds.
+/// Indices of points, three per triangle, of a mesh (a PLY with faces; polygons are fanned, -1 names no vertex); empty
+/// for clouds.
 [[nodiscard]] std::vector<std::array<int, 3>> triangles_of(const Cloud& cloud);
-/// The file's own normals (nx ny nz, or normal_x ...), one per point; empty where there are none, or fewer than nine in ten
-/// points with coordinates have one of unit length.
+/// The file's own normals (nx ny nz, or normal_x ...), one per point; empty where there are none, or fewer than nine in
+/// ten points with coordinates have one of unit length.
 [[nodiscard]] std::vector<Eigen::Vector3d> recorded_normals(const Cloud& cloud);
 
-/// Whether the name is that of a cloud in one of these formats.
-[[nodiscard]] bool is_cloud_file(const std::filesystem::path& file);
 /// One value per point; throws Error naming `file` where the cloud has no such field.
 [[nodiscard]] std::vector<float> recorded_field(const Cloud& cloud, const std::string& name,
                                                 const std::filesystem::path& file);

@@ -271,14 +271,4 @@ bool TextRecords::next() {
     return false;
 }
 
-bool is_text_cloud(const std::filesystem::path& file) {
-    const std::string extension = lower_extension(file);
-    return extension == ".xyz" || extension == ".pts" || extension == ".ptx";
-}
-
-bool has_cloud_extension(const std::filesystem::path& file) {
-    constexpr std::array others{".pcd", ".ply", ".las", ".laz", ".e57", ".bin"};
-    return is_text_cloud(file) || std::ranges::find(others, lower_extension(file)) != others.end();
-}
-
 } // namespace scanshade

@@ -19,6 +19,8 @@ enum class Scalar { int8, uint8, int16, uint16, int32, uint32, int64, uint64, fl
 
 [[nodiscard]] std::size_t size_of(Scalar type);
 
+struct CloudFormat;
+
 /// A PCD field or a PLY vertex property.
 struct CloudField {
     std::string name;
@@ -33,10 +35,9 @@ struct CloudField {
 /// The file, taken apart but not changed: header, before, points, after in this order are its bytes (a compressed PCD's
 /// points are unpacked and put point after point).
 struct CloudRecords {
-    enum class Format { pcd, ply, las, text };
     enum class Encoding { ascii, binary, big_endian, compressed };
 
-    Format format = Format::pcd;
+    const CloudFormat* format = nullptr; ///< that it was read in
     Encoding encoding = Encoding::binary;
     std::string header; ///< up to and including the end of its last line
     std::vector<CloudField> fields;
@@ -44,14 +45,14 @@ struct CloudRecords {
     cv::Size grid;
     std::string before;     ///< PLY elements that come before the vertices
     std::string points;     ///< the records, without the last one's line end
+    std::string packed;     ///< compressed PCD: the sizes and the block as the file has them
     std::size_t stride = 0; ///< bytes per record; 0 where records differ in length (text, lists)
     std::vector<std::size_t>
         ends;          ///< where each record ends in `points` (text: behind its last word), when stride is 0
     std::string after; ///< faces, other elements, left-over lines
     std::array<double, 3> scale{1, 1, 1}, shift{0, 0, 0}; ///< coordinates are field values times scale plus shift
-    std::vector<Eigen::Vector3d> placed; ///< the points, where fields alone do not tell them
-    std::string unit;                    ///< of the coordinates, and who says so; empty: metres, as clouds have by custom
-    std::string name_end;                ///< of a file of this kind: ".xyz"; empty: the format's own
+    std::vector<Eigen::Vector3d> placed;                  ///< the points, where fields alone do not tell them
+    std::string unit; ///< of the coordinates, and who says so; empty: metres, as clouds have by custom
     std::optional<Eigen::Isometry3d> viewpoint; ///< world_from_camera as the PCD says, where it says something
 
     [[nodiscard]] bool text() const { return encoding == Encoding::ascii; }
@@ -116,22 +117,26 @@ class TextRecords {
     std::vector<std::string_view> words_;
 };
 
-// One reader and one writer per format; cloud_file.cpp chooses. `bytes` is the whole file.
+// One reader and one writer per format; io/clouds/format.cpp lists them. `bytes` is the whole file.
 [[nodiscard]] CloudRecords read_pcd(std::string_view bytes, const std::filesystem::path& file,
                                     std::vector<std::string>& warnings);
 [[nodiscard]] CloudRecords read_ply(std::string_view bytes, const std::filesystem::path& file,
                                     std::vector<std::string>& warnings);
-/// LAS 1.0 to 1.4, uncompressed, every point format (ASPRS, "LAS Specification 1.4 - R15"); everything but the points is
-/// kept as it is. Fields are named after the specification; those of an extra bytes record keep their names.
+/// LAS 1.0 to 1.4, uncompressed, every point format (ASPRS, "LAS Specification 1.4 - R15"); everything but the points
+/// is kept as it is. Fields are named after the specification; those of an extra bytes record keep their names.
 [[nodiscard]] CloudRecords read_las(std::string_view bytes, const std::filesystem::path& file,
                                     std::vector<std::string>& warnings);
-/// One point a line: .xyz (a line of names may come first), .pts (the count comes first), .ptx (one scan: sizes,
-/// pose, then the grid; "0 0 0" = nothing seen).
-[[nodiscard]] CloudRecords read_text_cloud(std::string_view bytes, const std::filesystem::path& file,
-                                           std::vector<std::string>& warnings);
+/// One point a line: .xyz (a line of names may come first) and .pts (the count comes first).
+[[nodiscard]] CloudRecords read_xyz(std::string_view bytes, const std::filesystem::path& file,
+                                    std::vector<std::string>& warnings);
+/// One point a line, .ptx: one scan, sizes, pose, then the grid; "0 0 0" = nothing seen.
+[[nodiscard]] CloudRecords read_ptx(std::string_view bytes, const std::filesystem::path& file,
+                                    std::vector<std::string>& warnings);
 /// KITTI's Velodyne sweeps: x y z reflectance as floats, no header. The records are those of a PLY.
-[[nodiscard]] CloudRecords read_kitti(std::string_view bytes, const std::filesystem::path& file);
-/// Faces as triangles, polygons fanned from their first corner; -1 for an index that names no vertex. Tristrips are not read.
+[[nodiscard]] CloudRecords read_kitti(std::string_view bytes, const std::filesystem::path& file,
+                                      std::vector<std::string>& warnings);
+/// Faces as triangles, polygons fanned from their first corner; -1 for an index that names no vertex. Tristrips are not
+/// read.
 [[nodiscard]] std::vector<std::array<int, 3>> ply_triangles(const CloudRecords& records);
 /// The file again with `points` (from edited_points) and the header naming `additions`.
 [[nodiscard]] std::string pcd_bytes(const CloudRecords& records, const std::string& points,
@@ -143,9 +148,5 @@ class TextRecords {
                                      const std::vector<FieldAddition>& additions);
 [[nodiscard]] std::string ply_bytes(const CloudRecords& records, const std::string& points,
                                     const std::vector<FieldAddition>& additions);
-
-[[nodiscard]] bool has_cloud_extension(const std::filesystem::path& file);
-/// .xyz, .pts, .ptx: lines of numbers, which nothing but the name tells apart.
-[[nodiscard]] bool is_text_cloud(const std::filesystem::path& file);
 
 } // namespace scanshade

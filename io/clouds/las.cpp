@@ -251,7 +251,6 @@ CloudRecords read_las(std::string_view bytes, const fs::path& file, std::vector<
         refuse(file, fmt::format("points are said to begin at byte {}, but the file has {} bytes and a header of {}",
                                  points_at, bytes.size(), header_size));
     CloudRecords records;
-    records.format = CloudRecords::Format::las;
     records.encoding = CloudRecords::Encoding::binary;
     records.header = bytes.substr(0, points_at);
     records.stride = read_at<std::uint16_t>(bytes, at_length);

@@ -10,8 +10,8 @@
 #include <cstring>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <liblzf/lzf.h>
 #include <map>
-#include <pcl/io/lzf.h>
 
 namespace scanshade {
 
@@ -299,8 +299,9 @@ void read_compressed(CloudRecords& records, std::string_view body, std::size_t b
         throw Error(fmt::format("{}: {} compressed bytes at byte {} cannot unpack to {}", file.string(), packed,
                                 body_at + 8, unpacked));
     std::string columns(unpacked, '\0');
-    if (unpacked > 0 && pcl::lzfDecompress(body.data() + 8, packed, columns.data(), unpacked) != unpacked)
+    if (unpacked > 0 && lzf_decompress(body.data() + 8, packed, columns.data(), unpacked) != unpacked)
         throw Error(fmt::format("{}: compressed body at byte {} is damaged (LZF)", file.string(), body_at + 8));
+    records.packed = body.substr(0, 8 + packed);
     records.points = rows_from_columns(columns, records.fields, records.stride, records.point_count);
     keep_trailing(records, body.substr(8 + packed), file, warnings);
 }
@@ -322,8 +323,8 @@ std::string compressed(const std::string& columns) {
         throw Error("too many points for a compressed PCD");
     std::string packed(columns.size() + columns.size() / 16 + 64, '\0');
     const auto length = columns.size() < 8 ? 0
-                                           : pcl::lzfCompress(columns.data(), static_cast<unsigned>(columns.size()),
-                                                              packed.data(), static_cast<unsigned>(packed.size()));
+                                           : lzf_compress(columns.data(), static_cast<unsigned>(columns.size()),
+                                                          packed.data(), static_cast<unsigned>(packed.size()));
     packed = length > 0 ? packed.substr(0, length) : literal_runs(columns);
     const std::array<std::uint32_t, 2> sizes{static_cast<std::uint32_t>(packed.size()),
                                              static_cast<std::uint32_t>(columns.size())};
@@ -361,7 +362,6 @@ std::string header_with(const std::string& header, const std::vector<FieldAdditi
 CloudRecords read_pcd(std::string_view bytes, const fs::path& file, std::vector<std::string>& warnings) {
     const Header header = split_header(bytes, file);
     CloudRecords records;
-    records.format = CloudRecords::Format::pcd;
     records.header = bytes.substr(0, header.length);
     std::size_t stride = 0;
     records.fields = fields_of(header, file, stride);
@@ -395,6 +395,8 @@ std::string pcd_bytes(const CloudRecords& records, const std::string& points,
     std::string result = header_with(records.header, additions);
     if (records.encoding != Encoding::compressed)
         return result + points + records.after;
+    if (!records.packed.empty() && additions.empty() && points == records.points) // else LZF might pack them otherwise
+        return result + records.packed + records.after;
 
     std::vector<CloudField> fields = records.fields;
     for (const FieldAddition& addition : additions)

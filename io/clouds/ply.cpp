@@ -255,7 +255,6 @@ std::optional<std::size_t> index_list(const Element& element) {
 class FaceIndices {
   public:
     FaceIndices(const Element& faces, const Header& header) : list_(*index_list(faces)) {
-        view_.format = CloudRecords::Format::ply;
         view_.encoding = header.encoding;
         view_.fields = faces.properties;
     }
@@ -384,7 +383,6 @@ CloudRecords read_ply(std::string_view bytes, const fs::path& file, std::vector<
     const Header header = parse_header(bytes, file);
     const Element& vertex = vertex_element(header, file);
     CloudRecords records;
-    records.format = CloudRecords::Format::ply;
     records.encoding = header.encoding;
     records.header = bytes.substr(0, header.length);
     records.fields = vertex.properties;

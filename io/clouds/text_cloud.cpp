@@ -129,9 +129,11 @@ std::vector<double> numbers_of(const std::vector<std::string_view>& words, std::
     return values;
 }
 
+} // namespace
+
 /// Leica's PTX: columns, rows, the scanner's place and three axes, a 4x4 for row vectors; then the grid, column by
 /// column.
-CloudRecords read_ptx(std::string_view bytes, const fs::path& file) {
+CloudRecords read_ptx(std::string_view bytes, const fs::path& file, std::vector<std::string>&) {
     CloudRecords records;
     std::size_t length = 0;
     const auto lines = header_lines(bytes, 10, length, file);
@@ -151,9 +153,7 @@ CloudRecords read_ptx(std::string_view bytes, const fs::path& file) {
         for (int j = 0; j < 4; ++j)
             world_from_scan(j, i) = row[static_cast<std::size_t>(j)];
     }
-    records.format = CloudRecords::Format::text;
     records.encoding = CloudRecords::Encoding::ascii;
-    records.name_end = ".ptx";
     records.header = bytes.substr(0, length);
     const std::uint64_t expected = sizes[0] * sizes[1];
     TextRecords peek(bytes.substr(length), 11);
@@ -188,16 +188,9 @@ CloudRecords read_ptx(std::string_view bytes, const fs::path& file) {
     return records;
 }
 
-} // namespace
-
-CloudRecords read_text_cloud(std::string_view bytes, const fs::path& file, std::vector<std::string>& warnings) {
-    const std::string extension = lower_extension(file);
-    if (extension == ".ptx")
-        return read_ptx(bytes, file);
+CloudRecords read_xyz(std::string_view bytes, const fs::path& file, std::vector<std::string>& warnings) {
     CloudRecords records;
-    records.format = CloudRecords::Format::text;
     records.encoding = CloudRecords::Encoding::ascii;
-    records.name_end = extension;
     std::size_t length = 0;
     const auto first = header_lines(bytes, 1, length, file).front();
     const bool counted_first = first.size() == 1 && whole_number(first[0]);
@@ -230,21 +223,19 @@ std::string text_bytes(const CloudRecords& records, const std::string& points,
                        const std::vector<FieldAddition>& additions) {
     std::string header = records.header;
     const auto names = words(header);
-    if (!names.empty() && records.name_end != ".ptx" &&
-        !number(names[0])) // a line of names gets those of the new columns
+    if (!names.empty() && !number(names[0])) // a line of names gets those of the new columns
         for (const FieldAddition& addition : additions)
             header.insert(header.find_last_not_of("\r\n") + 1, " " + addition.name);
     return header + points + records.after;
 }
 
-CloudRecords read_kitti(std::string_view bytes, const fs::path& file) {
+CloudRecords read_kitti(std::string_view bytes, const fs::path& file, std::vector<std::string>&) {
     constexpr std::size_t stride = 16;
     if (bytes.size() % stride != 0)
         throw Error(fmt::format("{}: {} bytes are not whole points of {} (x y z reflectance as floats)", file.string(),
                                 bytes.size(), stride));
     check_point_count(bytes.size() / stride, file);
     CloudRecords records;
-    records.format = CloudRecords::Format::ply;
     records.encoding = CloudRecords::Encoding::binary;
     records.point_count = bytes.size() / stride;
     records.header = fmt::format("ply\nformat binary_little_endian 1.0\ncomment KITTI sweep: x forward, y left, z up, "

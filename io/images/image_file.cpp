@@ -1,25 +1,17 @@
-// Depth and colour images from disk: container checked first, decoded by OpenCV (PGM, PFM, PCLZF and grey PNG here),
-// then metres.
+// Depth, colour and AO images from disk: decoded by the reader of their format, then metres or visibility.
 #include "io/images/image_file.h"
 
-#include "io/images/image_check.h"
-#include "io/images/pclzf.h"
-#include "io/images/png_input.h"
+#include "io/images/format.h"
 #include "io/text.h"
 #include "projection/error.h"
 
-#include <bit>
 #include <cmath>
-#include <cstring>
 #include <fmt/format.h>
 #include <limits>
-#include <opencv2/imgcodecs.hpp>
 
 namespace scanshade {
 
 namespace fs = std::filesystem;
-
-static_assert(std::endian::native == std::endian::little, "byte orders below are written for little-endian machines");
 
 namespace {
 
@@ -31,62 +23,25 @@ std::string read_image_bytes(const fs::path& file) {
     return bytes;
 }
 
-cv::Mat decode(const std::string& bytes, const fs::path& file, int flags) {
-    cv::Mat image;
-    try {
-        const cv::Mat view(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
-        image = cv::imdecode(view, flags);
-    } catch (const cv::Exception& failure) {
-        throw Error(fmt::format("{}: cannot be decoded: {}", file.string(), failure.err));
-    }
-    if (image.empty())
-        throw Error(fmt::format("{}: cannot be decoded: damaged or not an image", file.string()));
-    return image;
-}
-
-cv::Mat decode_grey(const std::string& bytes, const ImageFacts& facts, const fs::path& file) {
-    cv::Mat image = facts.format == ImageFormat::png ? decoded_grey_png(bytes) : cv::Mat();
-    return image.empty() ? decode(bytes, file, cv::IMREAD_UNCHANGED) : image;
-}
-
 void check_is_depth(const ImageFacts& facts, const fs::path& file) {
     const auto refuse = [&](const std::string& found) {
         throw Error(fmt::format("{}: 16-bit or float depth expected, one channel; found {}", file.string(), found));
     };
-    const auto format = facts.format;
-    const std::string name(format_name(format));
-    if (format == ImageFormat::unknown)
-        refuse("neither PNG, PGM, TIFF, EXR, PFM nor PCLZF");
-    if (format == ImageFormat::jpeg)
-        refuse("JPEG, which is 8-bit and lossy and cannot hold depth");
-    if (format == ImageFormat::other_netpbm)
-        refuse("a Netpbm kind other than binary grey (P5)");
+    if (!facts.format)
+        refuse("neither " + listed(depth_format_names(), "nor"));
+    if (!facts.format->no_depth.empty())
+        refuse(std::string(facts.format->no_depth));
     if (facts.channels != 1)
-        refuse(fmt::format("{} with {} channels", name, facts.channels));
+        refuse(fmt::format("{} with {} channels", facts.format->name, facts.channels));
     if (facts.bits != 16 && !(facts.floats && facts.bits == 32))
-        refuse(fmt::format("{}-bit {}", facts.bits, name));
+        refuse(fmt::format("{}-bit {}", facts.bits, facts.format->name));
 }
 
-cv::Mat1w unpack_pgm(std::string_view bytes, const ImageFacts& facts) {
-    cv::Mat1w image(facts.size);
-    const auto* from = reinterpret_cast<const unsigned char*>(bytes.data()) + facts.pixels_at;
-    for (auto& value : image) {
-        value = static_cast<ushort>(from[0] << 8 | from[1]); // Netpbm: most significant byte first
-        from += 2;
-    }
-    return image;
-}
-
-cv::Mat1f unpack_pfm(std::string_view bytes, const ImageFacts& facts) {
-    cv::Mat1f image(facts.size);
-    const std::size_t row_bytes = static_cast<std::size_t>(facts.size.width) * sizeof(float);
-    for (int y = 0; y < facts.size.height; ++y) { // PFM starts with the bottom row
-        const auto file_row = static_cast<std::size_t>(facts.size.height - 1 - y);
-        std::memcpy(image[y], bytes.data() + facts.pixels_at + file_row * row_bytes, row_bytes);
-    }
-    if (facts.big_endian)
-        for (auto& value : image)
-            value = std::bit_cast<float>(__builtin_bswap32(std::bit_cast<std::uint32_t>(value)));
+cv::Mat read_as_stored(const std::string& bytes, const ImageFacts& facts, const fs::path& file) {
+    const cv::Mat image = facts.format->read_stored(bytes, facts, file);
+    const int depth = facts.floats ? CV_32F : facts.bits == 16 ? CV_16U : CV_8U;
+    if (image.size() != facts.size || image.type() != CV_MAKETYPE(depth, 1))
+        throw Error(fmt::format("{}: decoded to something else than its header says", file.string()));
     return image;
 }
 
@@ -127,18 +82,9 @@ DepthEncoding depth_encoding(const std::string& text, const std::string& origin)
 cv::Mat read_stored_depth(const fs::path& file) {
     const std::string bytes = read_image_bytes(file);
     // The header speaks first: what cannot be depth is refused for that, whatever else is wrong with it.
-    check_is_depth(read_image_header(bytes, file), file);
-    const ImageFacts facts = check_image(bytes, file);
-    if (facts.format == ImageFormat::pgm)
-        return unpack_pgm(bytes, facts);
-    if (facts.format == ImageFormat::pfm)
-        return unpack_pfm(bytes, facts);
-    if (facts.format == ImageFormat::pclzf)
-        return decoded_pclzf(bytes, facts, file);
-    const cv::Mat image = decode_grey(bytes, facts, file);
-    if (image.size() != facts.size || (image.type() != CV_16UC1 && image.type() != CV_32FC1))
-        throw Error(fmt::format("{}: decoded to something else than its header says", file.string()));
-    return image;
+    const ImageFacts facts = read_image_header(bytes, file);
+    check_is_depth(facts, file);
+    return read_as_stored(bytes, facts, file);
 }
 
 cv::Mat1f depth_in_metres(const cv::Mat& stored, const DepthEncoding& encoding) {
@@ -188,38 +134,27 @@ cv::Mat1f depth_in_metres(const cv::Mat& stored, const DepthEncoding& encoding) 
 
 cv::Mat3b read_colour(const fs::path& file) {
     const std::string bytes = read_image_bytes(file);
-    const ImageFacts facts = check_image(bytes, file);
-    if (facts.format == ImageFormat::unknown)
-        throw Error(file.string() + ": neither PNG, JPEG, TIFF, EXR, BMP, WebP, PCLZF nor Netpbm");
-    if (facts.format == ImageFormat::pclzf && facts.channels != 3)
-        throw Error(file.string() + ": PCLZF depth, expected a colour image");
-    if (facts.format == ImageFormat::pclzf)
-        return decoded_pclzf(bytes, facts, file);
-    // The orientation tag of a photo would turn the colour away from its depth.
-    const cv::Mat image = decode(bytes, file, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
-    if (image.type() != CV_8UC3)
-        throw Error(file.string() + ": floats, expected a colour image of 8 or 16 bits");
-    return image;
+    const ImageFacts facts = read_image_header(bytes, file);
+    if (!facts.format)
+        throw Error(fmt::format("{}: neither {}", file.string(), listed(colour_format_names(), "nor")));
+    if (!facts.format->read_colour)
+        throw Error(fmt::format("{}: {} of floats, expected a colour image of 8 or 16 bits", file.string(),
+                                facts.format->name));
+    return facts.format->read_colour(bytes, facts, file);
 }
 
 cv::Mat1f read_ao(const fs::path& file) {
     const std::string bytes = read_image_bytes(file);
-    const ImageFacts facts = check_image(bytes, file);
-    const bool png = facts.format == ImageFormat::png && facts.channels == 1 && (facts.bits == 8 || facts.bits == 16);
-    const bool floats = facts.floats && facts.channels == 1 && facts.format != ImageFormat::pfm;
-    if (!png && !floats)
+    const ImageFacts facts = read_image_header(bytes, file);
+    if (!is_ao_map(facts))
         throw Error(
             fmt::format("{}: not an AO map: expected 8- or 16-bit grey PNG, or float TIFF or EXR; found {}-bit {} "
                         "with {} channels",
-                        file.string(), facts.bits, format_name(facts.format), facts.channels));
-    const cv::Mat image = decode_grey(bytes, facts, file);
-    if (image.type() == CV_16UC1)
+                        file.string(), facts.bits, name_of(facts.format), facts.channels));
+    const cv::Mat image = read_as_stored(bytes, facts, file);
+    if (image.depth() == CV_16U)
         return from_integers<ushort>(image);
-    if (image.type() == CV_8UC1)
-        return from_integers<uchar>(image);
-    if (image.type() == CV_32FC1)
-        return image;
-    throw Error(file.string() + ": AO map cannot be decoded");
+    return image.depth() == CV_8U ? from_integers<uchar>(image) : cv::Mat1f(image);
 }
 
 } // namespace scanshade

@@ -1,6 +1,8 @@
 // Colour, depth and AO images on disk; the only place that knows their formats and stored units.
 #pragma once
 
+#include "io/images/image_check.h"
+
 #include <filesystem>
 #include <opencv2/core.hpp>
 #include <string>
@@ -42,6 +44,9 @@ enum class AoFormat { png16, png8, tiff, exr };
 [[nodiscard]] AoFormat ao_format(const std::string& name);
 /// ".png", ".tiff" or ".exr".
 [[nodiscard]] std::string extension(AoFormat format);
+/// Whether an image with these facts is in one of those formats, and the name that of a file in one of them.
+[[nodiscard]] bool is_ao_map(const ImageFacts& facts);
+[[nodiscard]] bool has_ao_extension(const std::filesystem::path& file);
 
 /// Writes visibility. Integers: 0 = no surface, 1 .. max = visibility 0 .. 1 (so 1 + round(v (max - 1))); floats keep
 /// NaN. Atomic; fast compression.
@@ -49,7 +54,7 @@ void write_ao(const std::filesystem::path& file, const cv::Mat1f& visibility, Ao
 /// The reverse of write_ao (format told by signature and bit depth): NaN = no surface.
 [[nodiscard]] cv::Mat1f read_ao(const std::filesystem::path& file);
 
-/// 8-bit BGR picture as PNG with fast compression, or JPEG by extension. Atomic.
+/// 8-bit BGR picture in the format that the extension names, if that is one that is written. Atomic.
 void write_picture(const std::filesystem::path& file, const cv::Mat3b& picture);
 /// 16-bit integer depth as PNG (value = round(metres * units_per_metre), 0 = hole). Atomic.
 void write_depth_png(const std::filesystem::path& file, const cv::Mat1f& depth_m, double units_per_metre);

@@ -1,9 +1,8 @@
 // AO maps, pictures and depth to disk: encoded in memory, or beside the target, then renamed.
 #include "io/images/image_file.h"
 
-#include "io/images/image_check.h"
+#include "io/images/format.h"
 #include "io/output_file.h"
-#include "io/images/png_output.h"
 #include "io/text.h"
 #include "projection/error.h"
 
@@ -11,7 +10,6 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <limits>
-#include <opencv2/imgcodecs.hpp>
 
 namespace scanshade {
 
@@ -19,27 +17,23 @@ namespace fs = std::filesystem;
 
 namespace {
 
-const std::vector<int> plain_tiff{cv::IMWRITE_TIFF_COMPRESSION, 1};
-// ZIP, the default, takes ten times as long for a tenth of the size.
-const std::vector<int> fast_exr{cv::IMWRITE_EXR_TYPE, cv::IMWRITE_EXR_TYPE_FLOAT, //
-                                cv::IMWRITE_EXR_COMPRESSION, cv::IMWRITE_EXR_COMPRESSION_RLE};
+struct AoRow {
+    std::string_view name; ///< of --format
+    AoFormat format;
+    int depth; ///< OpenCV's, of the samples
+    std::string_view extension;
 
-void write_encoded(const fs::path& file, const cv::Mat& image, const std::string& extension,
-                   const std::vector<int>& settings) {
-    std::vector<uchar> bytes;
-    bool done = false;
-    try {
-        done = cv::imencode(extension, image, bytes, settings);
-    } catch (const cv::Exception& failure) {
-        throw Error(fmt::format("{}: cannot be encoded: {}", file.string(), failure.err));
-    }
-    if (!done)
-        throw Error(fmt::format("{}: cannot be encoded as {}", file.string(), extension));
-    write_atomically(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-}
+    [[nodiscard]] const ImageFormat& image() const { return *image_format_by_extension(extension); }
+};
+constexpr AoRow ao_rows[] = {{"png16", AoFormat::png16, CV_16U, ".png"},
+                             {"png8", AoFormat::png8, CV_8U, ".png"},
+                             {"tiff", AoFormat::tiff, CV_32F, ".tiff"},
+                             {"exr", AoFormat::exr, CV_32F, ".exr"}};
 
-void write_png(const fs::path& file, const cv::Mat& image) {
-    write_atomically(file, during(file.string(), [&] { return encoded_png(image); }));
+const AoRow& row_of(AoFormat format) { return *std::ranges::find(ao_rows, format, &AoRow::format); }
+
+void write_image(const fs::path& file, const cv::Mat& image, const ImageFormat& format) {
+    write_atomically(file, during(file.string(), [&] { return format.written(image); }));
 }
 
 /// 0 = no surface, 1 .. largest = visibility 0 .. 1. Plain rows, so that the compiler makes vectors of them.
@@ -61,45 +55,47 @@ cv::Mat_<Integer> as_integers(const cv::Mat1f& visibility) {
 } // namespace
 
 AoFormat ao_format(const std::string& name) {
-    if (name == "png16")
-        return AoFormat::png16;
-    if (name == "png8")
-        return AoFormat::png8;
-    if (name == "tiff")
-        return AoFormat::tiff;
-    if (name == "exr")
-        return AoFormat::exr;
-    throw Misuse(fmt::format("--format {}: expected png16, png8, tiff or exr", in_quotes(name)));
+    const auto row = std::ranges::find(ao_rows, name, &AoRow::name);
+    if (row != std::end(ao_rows))
+        return row->format;
+    std::vector<std::string_view> names;
+    for (const AoRow& each : ao_rows)
+        names.push_back(each.name);
+    throw Misuse(fmt::format("--format {}: expected {}", in_quotes(name), listed(names, "or")));
 }
 
-std::string extension(AoFormat format) {
-    if (format == AoFormat::tiff)
-        return ".tiff";
-    return format == AoFormat::exr ? ".exr" : ".png";
+std::string extension(AoFormat format) { return std::string(row_of(format).extension); }
+
+bool is_ao_map(const ImageFacts& facts) {
+    return facts.channels == 1 && std::ranges::any_of(ao_rows, [&](const AoRow& row) {
+               return &row.image() == facts.format && CV_ELEM_SIZE1(row.depth) * 8 == facts.bits &&
+                      (row.depth == CV_32F) == facts.floats;
+           });
+}
+
+bool has_ao_extension(const fs::path& file) {
+    const ImageFormat* format = image_format_by_extension(lower_extension(file));
+    return format && std::ranges::any_of(ao_rows, [&](const AoRow& row) { return &row.image() == format; });
 }
 
 void write_ao(const fs::path& file, const cv::Mat1f& visibility, AoFormat format) {
-    switch (format) {
-    case AoFormat::png16:
-        return write_png(file, as_integers<ushort>(visibility));
-    case AoFormat::png8:
-        return write_png(file, as_integers<uchar>(visibility));
-    case AoFormat::tiff:
-        return write_encoded(file, visibility, ".tiff", plain_tiff);
-    case AoFormat::exr:
-        return write_encoded(file, visibility, ".exr", fast_exr);
-    }
+    const AoRow& row = row_of(format);
+    const cv::Mat image = row.depth == CV_16U  ? cv::Mat(as_integers<ushort>(visibility))
+                          : row.depth == CV_8U ? cv::Mat(as_integers<uchar>(visibility))
+                                               : cv::Mat(visibility);
+    write_image(file, image, row.image());
 }
 
 void write_picture(const fs::path& file, const cv::Mat3b& picture) {
-    std::string kind = file.extension().string();
-    std::transform(kind.begin(), kind.end(), kind.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    if (kind == ".jpg" || kind == ".jpeg")
-        return write_encoded(file, picture, ".jpg", {cv::IMWRITE_JPEG_QUALITY, 95});
-    if (kind != ".png")
-        throw Error(file.string() + ": pictures are written as .png, .jpg or .jpeg");
-    write_png(file, picture);
+    const ImageFormat* format = image_format_by_extension(lower_extension(file));
+    if (!format || !format->written || !format->read_colour) {
+        std::vector<std::string_view> names;
+        for (const ImageFormat& each : image_formats())
+            if (each.written && each.read_colour)
+                names.push_back(each.name);
+        throw Error(fmt::format("{}: pictures are written as {}", file.string(), listed(names, "or")));
+    }
+    write_image(file, picture, *format);
 }
 
 void write_depth_png(const fs::path& file, const cv::Mat1f& depth_m, double units_per_metre) {
@@ -109,9 +105,11 @@ void write_depth_png(const fs::path& file, const cv::Mat1f& depth_m, double unit
         const double value = std::round(metres * units_per_metre);
         return value >= 1 && value < 65535 ? static_cast<ushort>(value) : ushort(0);
     });
-    write_png(file, image);
+    write_image(file, image, *image_format_by_extension(".png"));
 }
 
-void write_float_tiff(const fs::path& file, const cv::Mat& image) { write_encoded(file, image, ".tiff", plain_tiff); }
+void write_float_tiff(const fs::path& file, const cv::Mat& image) {
+    write_image(file, image, *image_format_by_extension(".tiff"));
+}
 
 } // namespace scanshade

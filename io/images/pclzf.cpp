@@ -1,20 +1,20 @@
 // PCL's compressed images: a header of 37 bytes, then one block of LZF whose samples are sorted by kind, as PCL's
 // writers (pcl/io/lzf_image_io.h) leave them.
-#include "io/images/pclzf.h"
+#include "io/images/readers.h"
 
 #include "io/text.h"
 
 #include <algorithm>
 #include <array>
 #include <fmt/format.h>
+#include <liblzf/lzf.h>
 #include <opencv2/imgproc.hpp>
-#include <pcl/io/lzf.h>
 
-namespace scanshade {
+namespace scanshade::images {
 
 namespace {
 
-namespace fs = std::filesystem;
+using image_check::little_endian_32;
 using image_check::refuse;
 
 constexpr std::size_t header_bytes = 37; ///< "PCLZF", width, height, 16 characters of type, packed and unpacked size
@@ -58,7 +58,7 @@ constexpr Kind kinds[] = {{"depth16", CV_16UC1, nullptr},
                           {"yuv422", CV_8UC2, &from_yuv422},
                           {"bayer8", CV_8UC1, &from_bayer}};
 
-const Kind& kind_of(std::string_view bytes, const fs::path& file) {
+const Kind& kind_of(std::string_view bytes, const Path& file) {
     const std::string_view name = trimmed(bytes.substr(13, 16)); // padded with blanks
     const auto kind = std::ranges::find(kinds, name, &Kind::name);
     if (kind == std::end(kinds))
@@ -66,22 +66,35 @@ const Kind& kind_of(std::string_view bytes, const fs::path& file) {
     return *kind;
 }
 
-std::uint32_t little_endian_32(std::string_view bytes, std::size_t at) {
-    return __builtin_bswap32(image_check::big_endian_32(bytes, at));
+void check_block(std::string_view bytes, const ImageFacts& facts, const Kind& kind, const Path& file) {
+    const std::uint32_t packed = little_endian_32(bytes, 29);
+    if (const std::size_t found = bytes.size() - header_bytes; packed != found)
+        refuse(file, fmt::format("{} bytes of packed data expected, found {}", packed, found));
+    constexpr std::uint64_t longest_copy = 264, its_code = 3; // bytes
+    image_check::check_expansion(packed, longest_copy / its_code, facts, CV_MAT_CN(kind.stored_type), file);
+}
+
+cv::Mat unpacked(std::string_view bytes, const ImageFacts& facts, const Kind& kind, const Path& file) {
+    check_block(bytes, facts, kind, file);
+    cv::Mat stored(facts.size, kind.stored_type);
+    const std::string_view block = bytes.substr(header_bytes);
+    const auto size = static_cast<unsigned>(stored.total() * stored.elemSize());
+    if (block.empty() || // of which liblzf would read a byte all the same
+        lzf_decompress(block.data(), static_cast<unsigned>(block.size()), stored.data, size) != size)
+        refuse(file, fmt::format("damaged: its packed data do not become {} bytes", size));
+    return stored;
 }
 
 } // namespace
 
-ImageFacts image_check::pclzf_header(std::string_view bytes, const fs::path& file) {
+ImageFacts pclzf_header(std::string_view bytes, const Path& file) {
     if (bytes.size() < header_bytes)
         refuse(file, fmt::format("PCLZF ends early: {} bytes, expected a header of {}", bytes.size(), header_bytes));
     const Kind& kind = kind_of(bytes, file);
     ImageFacts facts;
-    facts.format = ImageFormat::pclzf;
-    facts.size = checked_size(little_endian_32(bytes, 5), little_endian_32(bytes, 9), file);
+    facts.size = image_check::checked_size(little_endian_32(bytes, 5), little_endian_32(bytes, 9), file);
     facts.bits = CV_ELEM_SIZE1(kind.stored_type) * 8;
     facts.channels = kind.to_bgr ? 3 : 1;
-    facts.pixels_at = header_bytes;
     const std::uint64_t expected = std::uint64_t(facts.size.area()) * CV_ELEM_SIZE(kind.stored_type);
     if (const std::uint32_t unpacked = little_endian_32(bytes, 33); unpacked != expected)
         refuse(file, fmt::format("{}x{} pixels of {} are {} bytes, but the header says that {} are packed",
@@ -89,23 +102,15 @@ ImageFacts image_check::pclzf_header(std::string_view bytes, const fs::path& fil
     return facts;
 }
 
-void image_check::check_pclzf_block(std::string_view bytes, const fs::path& file, const ImageFacts& facts) {
-    const std::uint32_t packed = little_endian_32(bytes, 29);
-    if (const std::size_t found = bytes.size() - header_bytes; packed != found)
-        refuse(file, fmt::format("{} bytes of packed data expected, found {}", packed, found));
-    constexpr std::uint64_t longest_copy = 264, its_code = 3; // bytes
-    check_expansion(packed, longest_copy / its_code, facts, CV_MAT_CN(kind_of(bytes, file).stored_type), file);
+cv::Mat stored_pclzf(std::string_view bytes, const ImageFacts& facts, const Path& file) {
+    return unpacked(bytes, facts, kind_of(bytes, file), file);
 }
 
-cv::Mat decoded_pclzf(std::string_view bytes, const ImageFacts& facts, const fs::path& file) {
+cv::Mat3b colour_pclzf(std::string_view bytes, const ImageFacts& facts, const Path& file) {
     const Kind& kind = kind_of(bytes, file);
-    cv::Mat stored(facts.size, kind.stored_type);
-    const std::string_view block = bytes.substr(header_bytes);
-    const auto unpacked = static_cast<unsigned>(stored.total() * stored.elemSize());
-    if (block.empty() || // of which PCL would read a byte all the same
-        pcl::lzfDecompress(block.data(), static_cast<unsigned>(block.size()), stored.data, unpacked) != unpacked)
-        refuse(file, fmt::format("damaged: its packed data do not become {} bytes", unpacked));
-    return kind.to_bgr ? kind.to_bgr(stored) : stored;
+    if (!kind.to_bgr)
+        refuse(file, "PCLZF depth, expected a colour image");
+    return kind.to_bgr(unpacked(bytes, facts, kind, file));
 }
 
-} // namespace scanshade
+} // namespace scanshade::images

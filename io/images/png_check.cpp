@@ -1,14 +1,16 @@
-// PNG's container (W3C PNG, section 5): header, chunk lengths, checksums and end. libpng through OpenCV passes over
-// some damage in silence and leaves the rest of the image zero, which would read as holes. That the pixels are all
-// there once every chunk is sound, libpng does check.
-#include "io/images/image_check.h"
+// PNG's container (W3C PNG, section 5): header, chunk lengths, checksums and end, for both ways in which its pixels are
+// read. That the pixels are all there once every chunk is sound, ISA-L and libpng do check.
+#include "io/images/readers.h"
 
 #include <fmt/format.h>
 #include <zlib.h>
 
-namespace scanshade::image_check {
+namespace scanshade::images {
 
 namespace {
+
+using image_check::big_endian_32;
+using image_check::refuse;
 
 constexpr std::size_t signature_length = 8;
 constexpr std::size_t chunk_overhead = 12; // length, type, checksum
@@ -32,15 +34,14 @@ int channels_of(int colour_type) {
 
 } // namespace
 
-ImageFacts png_header(std::string_view bytes, const std::filesystem::path& file) {
+ImageFacts png_header(std::string_view bytes, const Path& file) {
     constexpr std::size_t header_end = signature_length + chunk_overhead + 13;
     if (bytes.size() < header_end)
         refuse(file, fmt::format("PNG ends early: {} bytes, the header alone takes {}", bytes.size(), header_end));
     if (big_endian_32(bytes, 8) != 13 || bytes.substr(12, 4) != "IHDR")
         refuse(file, "PNG does not start with its header IHDR");
     ImageFacts facts;
-    facts.format = ImageFormat::png;
-    facts.size = checked_size(big_endian_32(bytes, 16), big_endian_32(bytes, 20), file);
+    facts.size = image_check::checked_size(big_endian_32(bytes, 16), big_endian_32(bytes, 20), file);
     facts.bits = static_cast<unsigned char>(bytes[24]);
     facts.channels = channels_of(static_cast<unsigned char>(bytes[25]));
     const bool legal_bits =
@@ -51,7 +52,7 @@ ImageFacts png_header(std::string_view bytes, const std::filesystem::path& file)
     return facts;
 }
 
-void check_png_chunks(std::string_view bytes, const std::filesystem::path& file, const ImageFacts& facts) {
+void check_png_chunks(std::string_view bytes, const ImageFacts& facts, const Path& file) {
     std::uint64_t packed = 0;
     for (std::size_t at = signature_length;;) {
         if (bytes.size() - at < chunk_overhead)
@@ -73,7 +74,7 @@ void check_png_chunks(std::string_view bytes, const std::filesystem::path& file,
     }
     constexpr std::uint64_t deflate_most = 1032; // a match of 258 bytes takes two bits
     constexpr char palette = 3;
-    check_expansion(packed, deflate_most, facts, bytes[25] == palette ? 1 : facts.channels, file);
+    image_check::check_expansion(packed, deflate_most, facts, bytes[25] == palette ? 1 : facts.channels, file);
 }
 
-} // namespace scanshade::image_check
+} // namespace scanshade::images

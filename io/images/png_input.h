@@ -6,7 +6,7 @@
 
 namespace scanshade {
 
-/// The image in a file that check_image() has passed, as 8 or 16 bits, of the plainest kind: grey without palette,
+/// The image in a file that check_png_chunks() has passed, as 8 or 16 bits, of the plainest kind: grey without palette,
 /// transparency or interlacing (W3C PNG, second edition). Empty for any other, and where anything about the packed
 /// pixels is odd: libpng says what.
 [[nodiscard]] cv::Mat decoded_grey_png(std::string_view bytes);

@@ -5,6 +5,7 @@
 #include "tests/fuzz/fuzz.h"
 
 #include <array>
+#include <cstdlib>
 #include <cstring>
 #include <opencv2/imgcodecs.hpp>
 
@@ -14,6 +15,9 @@ namespace fs = std::filesystem;
 using namespace scanshade;
 
 fs::path root;
+
+/// OpenCV writes EXR only where this is set when it first looks.
+[[maybe_unused]] const bool exr_allowed = ::setenv("OPENCV_IO_ENABLE_OPENEXR", "1", 1) == 0;
 
 void seed(const std::string& target, const std::string& name, const std::string& bytes) {
     fs::create_directories(root / target);

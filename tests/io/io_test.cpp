@@ -4,6 +4,7 @@
 #include "io/images/exif.h"
 #include "io/images/image_check.h"
 #include "io/images/image_file.h"
+#include "io/images/format.h"
 #include "io/output_file.h"
 #include "io/images/png_input.h"
 #include "io/images/png_output.h"
@@ -217,6 +218,77 @@ TEST(colour_images, png_pictures_are_exact_and_jpeg_is_close) {
     write_picture(folder / "p.JPG", picture());
     EXPECT_LE(worst_difference(read_colour(folder / "p.JPG"), picture()), 12);
     EXPECT_THROW(write_picture(folder / "p.gif", picture()), Error);
+}
+
+/// Of every format that OpenCV writes, too, and in each of its depths.
+TEST(colour_images, are_read_as_opencv_reads_them) {
+    const TemporaryFolder folder;
+    cv::theRNG().state = 8;
+    for (const char* kind : {".png", ".jpg", ".tiff", ".bmp", ".webp", ".ppm", ".pgm"})
+        for (const int type : {CV_8UC1, CV_8UC3, CV_8UC4, CV_16UC1, CV_16UC3}) {
+            const std::string name(kind);
+            const bool grey = CV_MAT_CN(type) == 1, alpha = CV_MAT_CN(type) == 4, deep = CV_MAT_DEPTH(type) == CV_16U;
+            const bool only_grey = name == ".pgm", only_colour = name == ".webp" || name == ".ppm";
+            const bool deep_too = name == ".png" || name == ".tiff" || name == ".ppm" || only_grey;
+            const bool alpha_too = name == ".png" || name == ".tiff" || name == ".webp" || name == ".bmp";
+            if ((grey ? only_colour : only_grey) || (deep && !deep_too) || (alpha && !alpha_too))
+                continue;
+            SCOPED_TRACE(name + " of type " + std::to_string(type));
+            cv::Mat image(19, 23, type);
+            cv::randu(image, cv::Scalar::all(0), cv::Scalar::all(deep ? 65536 : 256));
+            const fs::path file = folder / ("image" + name);
+            ASSERT_TRUE(cv::imwrite(file.string(), image));
+            const cv::Mat theirs = cv::imread(file.string(), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
+            EXPECT_EQ(cv::norm(read_colour(file), theirs, cv::NORM_INF), 0);
+        }
+}
+
+TEST(colour_images, netpbm_and_bmp_of_rare_kinds_are_read) {
+    const TemporaryFolder folder;
+    const auto read = [&](const std::string& bytes) { return read_colour(write_file(folder / "image", bytes)); };
+    const cv::Vec3b black(0, 0, 0), white(255, 255, 255);
+    EXPECT_EQ(read("P1\n# a comment\n3 1\n1 0\n1\n")(0, 1), white); // bits: 1 is black
+    EXPECT_EQ(read("P1 3 1\n101")(0, 2), black);
+    EXPECT_EQ(read("P4 3 1\n\xA0")(0, 1), white);
+    EXPECT_EQ(read("P2 2 1 100\n50 100\n")(0, 0), cv::Vec3b(127, 127, 127));
+    EXPECT_EQ(read("P3 1 1 255\n1 2 3\n")(0, 0), cv::Vec3b(3, 2, 1));
+    EXPECT_EQ(read("P7\nWIDTH 1\nHEIGHT 1\nDEPTH 4\nMAXVAL 255\nTUPLTYPE RGB_ALPHA\nENDHDR\n\1\2\3\4")(0, 0),
+              cv::Vec3b(3, 2, 1));
+    for (const char* broken :
+         {"P1 3 1\n10", "P4 9 1\n\xA0", "P2 2 1 100\n50\n", "P3 1 1 255\n1 2 256\n", "P7\nWIDTH 1\n"})
+        EXPECT_NE(refusal([&] { (void)read(broken); }), "") << broken;
+
+    // 3x2 pixels of a palette of 2, in runs: the bottom row is 1 0 0, the top one ends after its first pixel.
+    const auto bmp = [](const std::string& runs) {
+        const std::string zeros(3, '\0');
+        return "BM" + std::string(8, '\0') + '\x3e' + zeros + '\x28' + zeros + '\3' + zeros + '\2' + zeros +
+               std::string("\1\0\x8\0\1", 5) + std::string(15, '\0') + '\2' + std::string(7, '\0') +
+               std::string("\x9\x9\x9\0\1\2\3\0", 8) + runs;
+    };
+    const cv::Mat3b image = read(bmp(std::string("\1\1\2\0\0\0\1\1\0\1", 10)));
+    EXPECT_EQ(image(1, 0), cv::Vec3b(1, 2, 3));
+    EXPECT_EQ(image(1, 2), cv::Vec3b(9, 9, 9));
+    EXPECT_EQ(image(0, 0), cv::Vec3b(1, 2, 3));
+    EXPECT_TRUE(says(refusal([&] { (void)read(bmp("\4\1")); }), "a run leaves the image"));
+    EXPECT_TRUE(says(refusal([&] { (void)read(bmp("\1\1")); }), "runs have no end"));
+}
+
+/// Names and signatures come from one table: a file is of the format that its extension says.
+TEST(image_formats, what_is_written_under_an_extension_is_told_by_its_signature) {
+    const TemporaryFolder folder;
+    for (const ImageFormat& format : image_formats())
+        for (const std::string_view extension : format.extensions) {
+            if (!format.written || extension.empty())
+                continue;
+            EXPECT_EQ(image_format_by_extension(extension), &format);
+            const bool colour = format.read_colour != nullptr;
+            const std::string bytes =
+                format.written(colour ? cv::Mat(cv::Mat3b(3, 4, {1, 2, 3})) : cv::Mat(cv::Mat1f(3, 4, 2.5F)));
+            EXPECT_EQ(image_format(bytes), &format) << extension;
+            EXPECT_EQ(read_image_header(bytes, "image").size, cv::Size(4, 3)) << extension;
+        }
+    EXPECT_EQ(image_format("GIF89a"), nullptr);
+    EXPECT_EQ(image_format_by_extension(""), nullptr);
 }
 
 // --- atomic output ---
@@ -887,7 +959,7 @@ TEST(images, grey_pngs_are_read_as_libpng_reads_them) {
             for (const std::size_t piece : {std::size_t(7), std::size_t(1) << 20}) {
                 const std::string file = png(size, bits, filtered, piece, false);
                 const cv::Mat ours = decoded_grey_png(file), theirs = libpng(file);
-                ASSERT_EQ(check_image(file, "image").bits, bits);
+                ASSERT_EQ(read_image_header(file, "image").bits, bits);
                 ASSERT_EQ(ours.type(), theirs.type());
                 ASSERT_EQ(ours.size(), size);
                 EXPECT_EQ(cv::norm(ours, theirs, cv::NORM_INF), 0) << size << " of " << bits << " bits";

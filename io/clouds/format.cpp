@@ -1,0 +1,101 @@
+// The table of cloud formats, and the questions that it answers.
+#include "io/clouds/format.h"
+
+#include "io/images/format.h"
+#include "io/text.h"
+
+#include <algorithm>
+
+namespace scanshade {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_ply(std::string_view start) { return start.starts_with("ply\n") || start.starts_with("ply\r"); }
+bool is_las(std::string_view start) { return start.starts_with("LASF"); }
+bool is_e57(std::string_view start) { return start.starts_with("ASTM-E57"); }
+
+/// PCD's own comment, or the first line of its header behind others.
+bool is_pcd(std::string_view start) {
+    if (start.starts_with("# .PCD"))
+        return true;
+    while (start.starts_with('#'))
+        start.remove_prefix(std::min(start.find('\n'), start.size() - 1) + 1);
+    return start.starts_with("VERSION") || start.starts_with("FIELDS") || start.starts_with("COLUMNS");
+}
+
+// Names come before PCD's signature: lists of points may begin with comments and names of columns, too.
+constexpr CloudFormat formats[] = {
+    {.name = "PLY",
+     .signature = &is_ply,
+     .extensions = {".ply"},
+     .read = &read_ply,
+     .written = &ply_bytes,
+     .triangles = &ply_triangles,
+     .binary_encoding = "binary_little_endian"},
+    {.name = "LAS",
+     .signature = &is_las,
+     .extensions = {".las", ".laz"},
+     .read = &read_las,
+     .written = &las_bytes,
+     .wide_colours = true},
+    {.name = "E57",
+     .signature = &is_e57,
+     .extensions = {".e57"},
+     .refusal = "E57, which is not read; CloudCompare or `pdal translate IN.e57 OUT.las` makes LAS or PLY of it"},
+    {.name = "XYZ", .extensions = {".xyz"}, .read = &read_xyz, .written = &text_bytes},
+    {.name = "PTS", .extensions = {".pts"}, .read = &read_xyz, .written = &text_bytes},
+    {.name = "PTX", .extensions = {".ptx"}, .read = &read_ptx, .written = &text_bytes},
+    {.name = "KITTI's .bin",
+     .extensions = {".bin"},
+     .written_extension = ".ply", // with a header
+     .read = &read_kitti,
+     .written = &ply_bytes,
+     .binary_encoding = "binary_little_endian"},
+    {.name = "PCD", .signature = &is_pcd, .extensions = {".pcd"}, .read = &read_pcd, .written = &pcd_bytes},
+};
+
+bool named_so(const CloudFormat& format, const fs::path& file) {
+    const std::string extension = lower_extension(file);
+    return !extension.empty() && std::ranges::find(format.extensions, extension) != format.extensions.end();
+}
+
+} // namespace
+
+const CloudFormat* cloud_format(std::string_view bytes, const fs::path& file) {
+    const auto found = std::ranges::find_if(formats, [&](const CloudFormat& format) {
+        return format.signature ? format.signature(bytes) : named_so(format, file);
+    });
+    return found == std::end(formats) ? nullptr : found;
+}
+
+bool has_cloud_extension(const fs::path& file) {
+    return std::ranges::any_of(formats, [&](const CloudFormat& format) { return named_so(format, file); });
+}
+
+bool is_cloud(std::string_view start, const fs::path& file) {
+    return !image_format(start) && (cloud_format(start, file) || has_cloud_extension(file));
+}
+
+std::vector<std::string_view> cloud_format_names() {
+    std::vector<std::string_view> names;
+    for (const CloudFormat& format : formats)
+        if (format.read)
+            names.push_back(format.name);
+    return names;
+}
+
+std::string_view written_extension(const CloudFormat& format) {
+    return format.written_extension.empty() ? format.extensions[0] : format.written_extension;
+}
+
+std::vector<std::string_view> written_cloud_extensions() {
+    std::vector<std::string_view> extensions;
+    for (const CloudFormat& format : formats)
+        if (format.written && std::ranges::find(extensions, written_extension(format)) == extensions.end())
+            extensions.push_back(written_extension(format));
+    return extensions;
+}
+
+} // namespace scanshade

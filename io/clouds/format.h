@@ -1,0 +1,47 @@
+// The table of cloud formats. Whoever asks whether a file is a cloud, what it is called, or how it is read or written
+// asks here. A new format is a row in format.cpp and a file beside it.
+#pragma once
+
+#include "io/clouds/cloud_records.h"
+
+#include <array>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace scanshade {
+
+struct CloudFormat {
+    std::string_view name; ///< "PLY"
+    /// Whether a file that begins so is of this format. None: nothing but its name tells.
+    bool (*signature)(std::string_view start) = nullptr;
+    std::array<std::string_view, 2> extensions; ///< lower case, with the dot
+    std::string_view written_extension = {};    ///< of what `written` makes, where it is not the first of them
+    std::string_view refusal = {};              ///< why it is not read, and what helps
+
+    CloudRecords (*read)(std::string_view bytes, const std::filesystem::path& file,
+                         std::vector<std::string>& warnings) = nullptr;
+    /// The file again with `points` (from edited_points) and a header that names `additions`.
+    std::string (*written)(const CloudRecords& records, const std::string& points,
+                           const std::vector<FieldAddition>& additions) = nullptr;
+    std::vector<std::array<int, 3>> (*triangles)(const CloudRecords& records) = nullptr; ///< none: no meshes
+    std::string_view binary_encoding = "binary"; ///< what the format calls little-endian numbers
+    bool wide_colours = false;                   ///< red, green and blue may have 16 bits
+};
+
+/// The format, by how the file begins, or by its name where only that tells; none where it is unknown.
+[[nodiscard]] const CloudFormat* cloud_format(std::string_view bytes, const std::filesystem::path& file);
+/// Whether the name is that of a cloud.
+[[nodiscard]] bool has_cloud_extension(const std::filesystem::path& file);
+/// Whether a file that begins so is a cloud, or a damaged one by its name.
+[[nodiscard]] bool is_cloud(std::string_view start, const std::filesystem::path& file);
+/// The formats that are read.
+[[nodiscard]] std::vector<std::string_view> cloud_format_names();
+/// Of the file that write_cloud() makes of a cloud in this format.
+[[nodiscard]] std::string_view written_extension(const CloudFormat& format);
+/// Those of all formats.
+[[nodiscard]] std::vector<std::string_view> written_cloud_extensions();
+
+} // namespace scanshade

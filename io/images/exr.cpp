@@ -1,0 +1,159 @@
+// EXR with OpenEXR, from memory and to memory: one channel of any name, halves and integers as floats.
+#include "io/images/readers.h"
+
+#include "projection/error.h"
+
+#include <algorithm>
+#include <cstring>
+#include <exception>
+#include <fmt/format.h>
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfInputFile.h>
+#include <ImfIO.h>
+#include <ImfOutputFile.h>
+#include <ImfVersion.h>
+#include <optional>
+#include <stdexcept>
+
+namespace scanshade::images {
+
+namespace {
+
+using image_check::refuse;
+
+class Source : public Imf::IStream {
+  public:
+    Source(std::string_view bytes, const Path& file) : Imf::IStream(file.c_str()), bytes_(bytes) {}
+    bool read(char to[], int count) override {
+        const auto length = static_cast<std::size_t>(std::max(count, 0));
+        if (at_ > bytes_.size() || length > bytes_.size() - at_)
+            throw std::runtime_error(
+                fmt::format("ends early: {} bytes, something is said to lie at byte {}", bytes_.size(), at_ + length));
+        std::memcpy(to, bytes_.data() + at_, length);
+        at_ += length;
+        return at_ < bytes_.size();
+    }
+    std::uint64_t tellg() override { return at_; }
+    void seekg(std::uint64_t at) override { at_ = at; }
+
+  private:
+    std::string_view bytes_;
+    std::uint64_t at_ = 0;
+};
+
+class Sink : public Imf::OStream {
+  public:
+    Sink() : Imf::OStream("") {}
+    void write(const char from[], int count) override {
+        bytes.resize(std::max(bytes.size(), at_ + static_cast<std::size_t>(count)));
+        std::memcpy(bytes.data() + at_, from, static_cast<std::size_t>(count));
+        at_ += static_cast<std::size_t>(count);
+    }
+    std::uint64_t tellp() override { return at_; }
+    void seekp(std::uint64_t at) override { at_ = at; }
+
+    std::string bytes;
+
+  private:
+    std::uint64_t at_ = 0;
+};
+
+/// Calls `steps`, OpenEXR's errors becoming ours.
+template <class Steps>
+auto checked(const Path& file, const Steps& steps) {
+    try {
+        return steps();
+    } catch (const std::bad_alloc&) {
+        throw;
+    } catch (const std::exception& failure) {
+        refuse(file, fmt::format("EXR is damaged or cut short: {}", failure.what()));
+    }
+}
+
+/// How many bytes of floats one coded byte can become: twice what the code can make of it, since halves are read as
+/// floats; none where nothing is known of the compression.
+std::optional<std::uint64_t> expansion(Imf::Compression compression) {
+    switch (compression) {
+    case Imf::NO_COMPRESSION:
+        return 2;
+    case Imf::RLE_COMPRESSION:
+        return 2 * 64;
+    case Imf::B44_COMPRESSION:
+    case Imf::B44A_COMPRESSION:
+        return 2 * 11;
+    case Imf::ZIPS_COMPRESSION:
+    case Imf::ZIP_COMPRESSION:
+    case Imf::PXR24_COMPRESSION:
+        return 2 * 1032;
+    default:
+        return std::nullopt;
+    }
+}
+
+} // namespace
+
+/// The header is looked at on its own, for opening the file allocates what the header says.
+ImageFacts exr_header(std::string_view bytes, const Path& file) {
+    constexpr std::size_t magic_and_version = 8;
+    if (bytes.size() < magic_and_version)
+        refuse(file, fmt::format("EXR ends early: {} bytes", bytes.size()));
+    Imf::Header header;
+    checked(file, [&] {
+        Source source(bytes, file);
+        source.seekg(magic_and_version);
+        int version = static_cast<int>(image_check::little_endian_32(bytes, 4));
+        header.readFrom(source, version);
+        header.sanityCheck(Imf::isTiled(version));
+    });
+    const Imath::Box2i& window = header.dataWindow();
+    const auto side = [](int first, int last) {
+        return static_cast<std::uint64_t>(std::max(std::int64_t(last) - first + 1, std::int64_t(0)));
+    };
+    ImageFacts facts;
+    facts.size = image_check::checked_size(side(window.min.x, window.max.x), side(window.min.y, window.max.y), file);
+    facts.bits = 32;
+    for (auto channel = header.channels().begin(); channel != header.channels().end(); ++channel)
+        ++facts.channels;
+    facts.floats = true;
+    if (const auto most = expansion(header.compression()))
+        image_check::check_expansion(bytes.size(), *most, facts, facts.channels, file);
+    return facts;
+}
+
+cv::Mat stored_exr(std::string_view bytes, const ImageFacts& facts, const Path& file) {
+    cv::Mat1f image(facts.size);
+    checked(file, [&] {
+        Source source(bytes, file);
+        Imf::InputFile input(source);
+        const Imath::Box2i& window = input.header().dataWindow();
+        Imf::FrameBuffer buffer;
+        buffer.insert(input.header().channels().begin().name(),
+                      Imf::Slice::Make(Imf::FLOAT, image.data, window, sizeof(float), image.step[0]));
+        input.setFrameBuffer(buffer);
+        input.readPixels(window.min.y, window.max.y);
+    });
+    return image;
+}
+
+std::string encoded_exr(const cv::Mat& image) {
+    if (image.type() != CV_32FC1)
+        throw Error(fmt::format("an EXR is made of floats of one channel here, not of OpenCV's type {}", image.type()));
+    const char* const channel = "Y"; // luminance, which viewers show as grey
+    Imf::Header header(image.cols, image.rows);
+    header.compression() = Imf::RLE_COMPRESSION; // ZIP takes ten times as long for a tenth of the size
+    header.channels().insert(channel, Imf::Channel(Imf::FLOAT));
+    Sink sink;
+    {
+        Imf::OutputFile output(sink, header);
+        Imf::FrameBuffer buffer;
+        buffer.insert(channel,
+                      Imf::Slice::Make(Imf::FLOAT, image.data, header.dataWindow(), sizeof(float), image.step[0]));
+        output.setFrameBuffer(buffer);
+        output.writePixels(image.rows);
+    } // writes the table of lines
+    return std::move(sink.bytes);
+}
+
+} // namespace scanshade::images
