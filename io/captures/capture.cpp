@@ -8,6 +8,7 @@
 #include "io/images/format.h"
 #include "io/captures/layouts.h"
 #include "io/captures/plausibility.h"
+#include "io/captures/trajectory.h"
 #include "io/text.h"
 #include "projection/error.h"
 
