@@ -26,18 +26,18 @@ constexpr std::array<std::array<int, 3>, 14> directions{{{1, 1, 1},
                                                          {0, 0, 1}}};
 
 struct Count {
-    const char* quality;
+    Quality quality;
     int sets, count;
 };
-constexpr std::array counts{Count{"lowest", 1, 8}, Count{"low", 1, 14}, Count{"medium", 2, 14}, Count{"high", 4, 14},
-                            Count{"highest", 16, 14}};
+constexpr std::array counts{Count{Quality::lowest, 1, 8}, Count{Quality::low, 1, 14}, Count{Quality::medium, 2, 14},
+                            Count{Quality::high, 4, 14}, Count{Quality::highest, 16, 14}};
 
 /// The companion code's power and blur belong to its look.
 LunaOptions resolved(LunaOptions options) {
     options = checked(std::move(options));
     if (options.fade_to <= options.fade_from)
         throw Misuse("fade-to must lie beyond fade-from");
-    if (options.profile == "metric")
+    if (options.profile == Profile::metric)
         return options;
     options.screen.power *= 6;
     options.screen.denoise = false;
@@ -66,28 +66,40 @@ std::vector<Parameter> LunaOptions::parameters() {
     return joined(
         screen.parameters(),
         {
-            {"profile",
-             "metric: the radius is respected; published: the companion code's constants (in metres), power 6 and four "
-             "blurs",
-             &profile,
-             "",
-             {},
-             {},
-             {"metric", "published"}},
-            {"quality",
-             "vectors: lowest 8, low the published 14, medium 28, high 56, highest 224",
-             &quality,
-             "",
-             {},
-             {},
-             {"lowest", "low", "medium", "high", "highest"}},
-            {"epsilon", "what stands less than this in front of the surface does not occlude", &epsilon, "radii", 0, 1},
-            {"fade-from", "what stands farther in front occludes less", &fade_from, "radii", 0, 10},
-            {"fade-to", "and beyond this not at all", &fade_to, "radii", 1e-3, 10},
-            {"renormalise",
-             "samples that met nothing known count as those that did, where at least half did; else as open",
-             &renormalise},
-            {"blurs", "iterations of the published 11-tap blur, before denoise", &blurs, "", 0, 16},
+            {.name = "profile",
+             .help = "metric respects the radius; published takes the companion code's constants in metres, power 6 "
+                     "and four blurs",
+             .value = OneOf(&profile, profile_words)},
+            {.name = "quality",
+             .help = "number of vectors: lowest 8, low 14 as published, medium 28, high 56, highest 224",
+             .value = OneOf(&quality, quality_words)},
+            {.name = "epsilon",
+             .help = "what stands less than this in front of the surface does not occlude",
+             .value = &epsilon,
+             .unit = "radii",
+             .low = 0,
+             .high = 1},
+            {.name = "fade-from",
+             .help = "what stands farther in front than this occludes less",
+             .value = &fade_from,
+             .unit = "radii",
+             .low = 0,
+             .high = 10},
+            {.name = "fade-to",
+             .help = "what stands farther in front than this does not occlude",
+             .value = &fade_to,
+             .unit = "radii",
+             .low = 1e-3,
+             .high = 10},
+            {.name = "renormalise",
+             .help = "samples that met nothing known are left out where at least half met something; otherwise they "
+                     "count as open",
+             .value = &renormalise},
+            {.name = "blurs",
+             .help = "iterations of the published 11-tap blur, before denoise",
+             .value = &blurs,
+             .low = 0,
+             .high = 16},
         });
 }
 
@@ -99,15 +111,15 @@ void Luna::add_passes(ScreenTables& tables) const {
     const auto vectors = luna_vectors(count.sets, count.count);
     const int table = tables.add_buffer(
         {"vectors", vectors.size() * 4, gpu::BufferRow::Host::none, gpu::BufferRow::Texels::rgba32f, vectors});
-    tables.add_pass(
-        "generate", "luna/generate", {screen_depth, screen_surfaces, screen_noise, table}, {screen_raw},
-        {{shared::spec_published, options_.profile == "published"}, {shared::spec_renormalise, options_.renormalise}});
+    tables.add_pass("generate", "luna/generate", {screen_depth, screen_surfaces, screen_noise, table}, {screen_raw},
+                    {{shared::spec_published, options_.profile == Profile::published},
+                     {shared::spec_renormalise, options_.renormalise}});
     tables.add_blurs(options_.blurs, {0.16397F, 0.15136F, 0.11906F, 0.07981F, 0.04559F, 0.02219F}); // sigma 2.5 pixels
 }
 
 std::vector<std::byte> Luna::constants(const shared::ScreenConstants& screen) const {
     const Count& count = level_of(counts, options_.quality);
-    const float unit = options_.profile == "published" ? 1 : screen.radius;
+    const float unit = options_.profile == Profile::published ? 1 : screen.radius;
     return bytes_of(shared::LunaConstants{screen, count.sets, count.count, options_.epsilon * unit,
                                           options_.fade_from * unit, options_.fade_to * unit});
 }

@@ -10,8 +10,8 @@ namespace scanshade {
 
 struct LunaOptions {
     ScreenOptions screen;
-    std::string profile = "metric";
-    std::string quality = "low";         ///< lowest 8 vectors, low the published 14, medium 28, high 56, highest 224
+    Profile profile = Profile::metric;
+    Quality quality = Quality::low;      ///< lowest 8 vectors, low the published 14, medium 28, high 56, highest 224
     float epsilon = 0.02F;               ///< radii in front of the surface up to which nothing occludes
     float fade_from = 0.4F, fade_to = 1; ///< radii in front over which occlusion ends
     bool renormalise = false;

@@ -22,12 +22,12 @@ namespace scanshade {
 /// What a person sets. Reads per pixel = 2 x slices x steps.
 struct SurfelOptions {
     ScreenOptions screen{.tangent_sine = 0.01F, .tangent_sigmas = 0};
-    std::string quality = "high"; ///< low 8 reads, medium 16, high 32, highest 64; lowest 8, and no look at widths
-    bool downsampled = false;     ///< a quarter of the pixels are sampled
-    int slices = 0, steps = 0;    ///< above 0: instead of the quality's
-    float thinnest = 0.01F;       ///< half a surfel's thickness at least, share of the radius
-    float thickest = 0.6F;        ///< and at most
-    float hidden = 0.6F;          ///< that of a surface whose ends are out of sight
+    Quality quality = Quality::high; ///< low 8 reads, medium 16, high 32, highest 64; lowest 8, and no look at widths
+    bool downsampled = false;        ///< a quarter of the pixels are sampled
+    int slices = 0, steps = 0;       ///< above 0: instead of the quality's
+    float thinnest = 0.01F;          ///< half a surfel's thickness at least, share of the radius
+    float thickest = 0.6F;           ///< and at most
+    float hidden = 0.6F;             ///< that of a surface whose ends are out of sight
 
     [[nodiscard]] std::vector<Parameter> parameters();
 };

@@ -63,10 +63,10 @@ class Attempts {
             say(fmt::format("left to another run: {}", busy.what()));
             return false;
         } catch (const Outage& failure) {
-            say(fmt::format("failed: {}", failure.what()));
+            warn(fmt::format("failed: {}", failure.what()));
             add(unfinished);
         } catch (const std::exception& failure) {
-            say(fmt::format("failed: {}", failure.what()));
+            warn(fmt::format("failed: {}", failure.what()));
             add(nothing_done);
         }
         return true;

@@ -2,6 +2,7 @@
 #include "apps/jobs/job_run.h"
 #include "apps/measure/trial.h"
 #include "apps/run/messages.h"
+#include "apps/run/outlook.h"
 #include "apps/run/settings.h"
 #include "apps/run/workers.h"
 #include "apps/slice.h"
@@ -105,8 +106,8 @@ struct Together {
     Together(Workers& workers, const Job& job, const RunSettings& asked)
         : loan(workers.crew()), crew(*loan), worker(workers.who_is(*loan)),
           sequence(*worker.device, *worker.plain, job.batch.radius_m, job.batch.noise, asked.fit(),
-                   asked.sequence == "on" ? sequence_options(asked.sequences, job.capture, job.batch.radius_m)
-                                          : alone()) {
+                   asked.in_sequence(job.capture) ? sequence_options(asked.sequences, job.capture, job.batch.radius_m)
+                                                  : alone()) {
         if (workers.crew().size() > workers.devices())
             say("  frames of a sequence are computed one at a time, in their order");
         if (sequence.reach() > 0)
@@ -151,15 +152,16 @@ class Run final : public Command {
     Words words() override { return {"PATH", "captures: folders, depth images or clouds", &asked_.paths, 1, 1 << 20}; }
 
     std::vector<Stage> stages() override { return asked_.stages(); }
+    void take_preset() override { asked_.take_preset(); }
 
     int run() override {
-        if (asked_.log == "json")
+        if (asked_.log_json)
             log_as_json();
+        if (asked_.quiet)
+            be_quiet();
         if (std::ranges::any_of(asked_.paths, is_job))
             return run_planned();
-        asked_.check();
-        if (!asked_.budget.any())
-            (void)asked_.chosen_setup(); // refuses before anything is opened
+        asked_.resolve(); // refuses before anything is opened
         int unopened = 0;
         Tally tally;
         std::vector<Job> jobs = plan(unopened, tally);
@@ -182,13 +184,15 @@ class Run final : public Command {
             } catch (const DeviceLost&) { // the other captures need it, too
                 throw;
             } catch (const Outage& failure) {
-                say(fmt::format("failed: {}", failure.what()));
+                warn(fmt::format("failed: {}", failure.what()));
                 fault = Fault::outage;
             }
             const std::lock_guard alone(counting);
             tally.add(rows);
             tally.add(fault);
         });
+        for (const std::string& sentence : outlook_)
+            say(sentence);
         return tally.exit_code(unopened);
     }
 
@@ -219,10 +223,10 @@ class Run final : public Command {
             } catch (const Misuse&) {
                 throw;
             } catch (const Outage& failure) {
-                say(fmt::format("failed: {}", failure.what()));
+                warn(fmt::format("failed: {}", failure.what()));
                 tally.add(Fault::outage);
             } catch (const std::exception& failure) {
-                say(fmt::format("failed: {}", failure.what()));
+                warn(fmt::format("failed: {}", failure.what()));
                 ++unopened;
             }
         }
@@ -260,16 +264,11 @@ class Run final : public Command {
             .capture = {asked_.camera, asked_.depth_scale, asked_.association_limit_s},
             .among = job.of,
             .leave_bad_out = true,
-            .preparation = {.drop_flying = asked_.flying_pixels == "drop", .smoothing = asked_.depth_smoothing}};
+            .preparation = {.drop_flying = asked_.drop_flying, .smoothing = asked_.depth_smoothing}};
         const TrialCapture trial = load_trial(job.capture.path, request);
-        const double radius_m = asked_.radius.empty() ? request.radius_m : std::stod(asked_.radius);
+        const double radius_m = asked_.radius.value_or(request.radius_m);
         const Choice choice = choose(device, shipped_front(), trial, radius_m, asked_.budget);
-        if (!before_budget_.settings.empty())
-            apply(before_budget_, asked_.chosen_setup());
-        asked_.method = choice.configuration.method;
-        MethodSetup& setup = asked_.chosen_setup();
-        before_budget_ = {asked_.method, "as given", values_of(setup)};
-        apply(choice.configuration, setup);
+        asked_.choose(choice.configuration);
         return choice.sentences;
     }
 
@@ -287,8 +286,7 @@ class Run final : public Command {
                     set(*row, value);
         asked_.out = (job / "results").string();
         asked_.resume = true;
-        asked_.check();
-        (void)asked_.chosen_setup();
+        asked_.resolve();
         return supervise(1, [&](const Shift& shift) {
             cv::setNumThreads(1);
             end_gracefully_on_signals();
@@ -322,7 +320,7 @@ class Run final : public Command {
         if (asked_.budget.any())
             return 1;
         std::size_t entering = std::max(1U, std::thread::hardware_concurrency() / 16);
-        if (asked_.sequence == "on") // keeps one device busy
+        if (asked_.sequence != SequenceUse::off) // keeps one device busy
             entering = asked_.device == "all" ? workers().devices() : 1;
         entrance_.release(static_cast<std::ptrdiff_t>(entering - 1));
         return entering + 4;
@@ -361,7 +359,7 @@ class Run final : public Command {
         const fs::path table = report_name("frames", job.block, ".csv"),
                        manifest = report_name("manifest", job.block, ".json");
         std::unique_lock alone(alone_);
-        const std::string task = task_key(asked_.stages_in_use(), job.capture, job.of, asked_.sequence == "on");
+        const std::string task = task_key(asked_.stages_in_use(), job.capture, job.of, asked_.in_sequence(job.capture));
         alone.unlock();
         if (auto rows = rows_if_complete(journal, task, job.capture, job.batch.frames, asked_.retry);
             rows && fs::exists(folder / manifest)) {
@@ -381,7 +379,7 @@ class Run final : public Command {
         gpu::Device& device = workers.device();
         const CloudAo of_clouds = asked_.cloud_ao(gpu::is_cpu(device.info()) ? nullptr : &device);
         job.batch.cloud_ao = &of_clouds;
-        job.batch.cloud_walk = asked_.cloud_walk();
+        job.batch.cloud_walk = asked_.clouds;
         RunReport report = report_on(job, workers);
         report.budget = budget;
         const std::string settings = settings_key(report, job.batch.outputs, job.batch.noise);
@@ -396,7 +394,7 @@ class Run final : public Command {
         Entrance entrance(entrance_);
         job.batch.all_begun = [&] { entrance.leave(); };
         std::optional<Together> together;
-        if (asked_.sequence == "on" || cloud)
+        if (asked_.in_sequence(job.capture) || cloud)
             job.batch.sequence = &together.emplace(workers, job, asked_).sequence;
         report.at_once = together ? 1 : workers.crew().size();
         const Recording recording{.journal = journal,
@@ -419,6 +417,10 @@ class Run final : public Command {
         alone.lock(); // the report names settings
         write_frames_csv(folder / table, report.frames);
         write_manifest(folder / manifest, report, [&](const FrameRow& row) { return journal.whole(row); });
+        if (count(report.frames, FrameStatus::ok) > 0)
+            for (const std::string& sentence : outlook(asked_, job.batch.noise, job.capture, shipped_front()))
+                if (!std::ranges::count(outlook_, sentence))
+                    outlook_.push_back(sentence);
         alone.unlock();
         conclude(report, folder / table);
         if (cloud && !interrupted)
@@ -440,7 +442,7 @@ class Run final : public Command {
     std::mutex alone_; ///< held while settings and devices are used by a capture, but not while frames are computed
     std::counting_semaphore<> entrance_{1};
     std::unique_ptr<Workers> workers_;
-    Configuration before_budget_; ///< of the method that a budget picked for the capture before this one
+    std::vector<std::string> outlook_; ///< of all captures, each sentence once
 };
 
 } // namespace
