@@ -146,10 +146,11 @@ void print_help(const CommandRow& row, const std::string& topic) {
     }
     for (const Stage& stage : shown)
         print_stage(stage);
-    if (topic.empty() && !topics.empty())
-        fmt::print(
-            "\nEvery flag: scanshade help {0} all\nOne method's, or those of one topic: scanshade help {0} {1}\n",
-            row.name, fmt::join(topics, "|"));
+    if (topic.empty() && !topics.empty()) {
+        fmt::print("\nmore:\n");
+        print_entry("every flag", 10, fmt::format("scanshade help {} all", row.name));
+        print_entry("one topic", 10, fmt::format("scanshade help {} TOPIC: {}", row.name, fmt::join(topics, ", ")));
+    }
 }
 
 // ---------------------------------------------------------------------------------------------------- flags

@@ -61,9 +61,9 @@ std::vector<std::string> outlook(const RunSettings& settings, const DepthNoise& 
         return {};
     const bool together = settings.in_sequence(capture);
     const auto gain = front.sequences.find(sensor);
-    std::vector<std::string> sentences{
-        fmt::format("expected error{}: RMSE {:.3f} to truth, as measured on generated scenes with {} depth",
-                    together ? " of each frame by itself" : "", used->rms, name_of(sensor))};
+    std::vector<std::string> sentences{fmt::format(
+        "expected error{}: RMSE {:.3f} to truth, as measured with {} on generated scenes with {} depth",
+        together ? " of each frame by itself" : "", used->rms, used->configuration.full_name(), name_of(sensor))};
     if (together && gain != front.sequences.end())
         sentences.back() += fmt::format("; on such recordings {}", gain_text(gain->second));
     const bool could_be_together = !together && gain != front.sequences.end() && has_poses(capture);
