@@ -171,14 +171,24 @@ void add_flag(CLI::App& parser, const Parameter& row, Given& given) {
         parser.add_option_function<std::string>(names, take);
 }
 
+std::vector<std::string> flags_of(const std::vector<Parameter>& rows) {
+    std::vector<std::string> flags;
+    for (const Parameter& row : rows)
+        flags.push_back(flag_of(row));
+    return flags;
+}
+
 /// The first word that the parser did not know, if it looks like a flag: with the flag that was meant.
 void refuse_unknown_flag(const std::vector<std::string>& unknown, const std::vector<Parameter>& rows) {
-    std::vector<std::string> known;
-    for (const Parameter& row : rows)
-        known.push_back(flag_of(row));
     for (const std::string& word : unknown)
         if (const std::string flag = word.substr(0, word.find('=')); flag.starts_with('-'))
-            throw Misuse(fmt::format("{}: no such flag{}", flag, suggestion(flag, known)));
+            throw Misuse(fmt::format("{}: no such flag{}", flag, suggestion(flag, flags_of(rows))));
+}
+
+/// CLI11's message about a settings file ends with the setting that it did not know.
+[[noreturn]] void refuse_unknown_setting(const std::string& message, const std::vector<Parameter>& rows) {
+    const std::string flag = "--" + message.substr(message.rfind(' ') + 1);
+    throw Misuse(fmt::format("settings: {}: no such flag{}", flag, suggestion(flag, flags_of(rows))));
 }
 
 /// Fills the command's words and rows, a preset first; throws Misuse for what is unknown, missing or out of range.
@@ -201,6 +211,8 @@ void parse(Command& command, std::vector<std::string> arguments) {
     std::ranges::reverse(arguments); // as CLI11 takes a vector
     try {
         parser.parse(arguments);
+    } catch (const CLI::ConfigError& error) {
+        refuse_unknown_setting(error.what(), rows);
     } catch (const CLI::ParseError& error) {
         refuse_unknown_flag(parser.remaining(), rows);
         throw Misuse(error.what());

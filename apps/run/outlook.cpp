@@ -40,7 +40,7 @@ std::optional<Preset> better_preset(const Front& front, SensorClass sensor, cons
 std::string gain_text(const SequenceGain& gain) {
     const std::string time =
         gain.times_as_long > 0 ? fmt::format(", in {:.1f} times the time", gain.times_as_long) : "";
-    return fmt::format("looking at frames together took {} from RMSE {:.3f} to {:.3f}{}",
+    return fmt::format("on generated recordings, looking at frames together took {} from RMSE {:.3f} to {:.3f}{}",
                        gain.configuration.full_name(), gain.alone_rms, gain.together_rms, time);
 }
 
@@ -62,21 +62,22 @@ std::vector<std::string> outlook(const RunSettings& settings, const DepthNoise& 
     const bool together = settings.in_sequence(capture);
     const auto gain = front.sequences.find(sensor);
     std::vector<std::string> sentences{fmt::format(
-        "expected error{}: RMSE {:.3f} to truth, as measured with {} on generated scenes with {} depth",
+        "expected error{}: RMSE {:.3f} to truth, measured with {} on generated scenes with {} depth",
         together ? " of each frame by itself" : "", used->rms, used->configuration.full_name(), name_of(sensor))};
-    if (together && gain != front.sequences.end())
-        sentences.back() += fmt::format("; on such recordings {}", gain_text(gain->second));
-    const bool could_be_together = !together && gain != front.sequences.end() && has_poses(capture);
-    if (const auto better = better_preset(front, sensor, *used)) {
+    if (gain != front.sequences.end() && together)
+        sentences.push_back(gain_text(gain->second));
+    const auto better = better_preset(front, sensor, *used);
+    if (better) {
         const Priced* point = measured_with(front, sensor, *better);
-        sentences.push_back(fmt::format("--preset {}: RMSE {:.3f}, in {:.1f} times the time of this method's passes",
+        sentences.push_back(fmt::format("--preset {}: RMSE {:.3f}, in {:.1f} times the time of the method's passes",
                                         word_for(*better, preset_words), point->rms,
                                         point->ns_per_pixel / used->ns_per_pixel));
-        if (*better == Preset::best && could_be_together)
-            sentences.back() += fmt::format("; besides, {}", gain_text(gain->second));
-    } else if (could_be_together) {
-        sentences.push_back(fmt::format("--preset best: {}", gain_text(gain->second)));
     }
+    // `best` looks at frames together, too.
+    if (gain != front.sequences.end() && !together && has_poses(capture) &&
+        better.value_or(Preset::best) == Preset::best)
+        sentences.push_back(fmt::format("{}: {}", settings.preset == Preset::best ? "--sequence on" : "--preset best",
+                                        gain_text(gain->second)));
     return sentences;
 }
 

@@ -150,11 +150,12 @@ void Progress::add(const FrameRow& row) {
                     {"left_s", seconds_left()}});
         return;
     }
-    if (quiet)
+    if (quiet) {
         tell(turn_, fmt::format("{}: {}\n", turn_ ? turn_->capture : "", line_of(row)));
-    else if (on_terminal_ ? bad || !row.notes.empty() : bad || is_due())
-        tell(turn_,
-             fmt::format("{}  {}\n", on_terminal_ ? clear_line : fmt::format("  {}/{}", done_, total_), line_of(row)));
+    } else if (on_terminal_ ? bad || !row.notes.empty() : bad || is_due()) {
+        const std::string place = bad ? "" : fmt::format("  {}/{}", done_, total_);
+        tell(turn_, fmt::format("{}  {}\n", on_terminal_ ? clear_line : place, line_of(row)));
+    }
     if (on_terminal_)
         tell_for_now(turn_, bar());
 }

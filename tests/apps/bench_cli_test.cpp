@@ -498,6 +498,10 @@ TEST_F(MeasureTest, a_file_that_holds_no_settings_is_refused) {
                       .exit_code,
                   1)
             << file;
+    std::ofstream(folder / "mistyped.json") << R"({"settings": {"method cacao": {"cacao.raduis": 0.3}}})";
+    const Ran mistyped =
+        run_program(fmt::format("run {} -o {} --settings {}", capture(), out(), (folder / "mistyped.json").string()));
+    EXPECT_TRUE(says(mistyped.err, "--cacao.raduis: no such flag; did you mean --cacao.radius?")) << mistyped.err;
 }
 
 } // namespace
