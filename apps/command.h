@@ -24,7 +24,11 @@ enum ExitCode : int {
 struct Stage {
     std::string title; ///< "input", "output", "method cacao"
     std::vector<Parameter> rows;
+    std::string topic{}; ///< shown by `help COMMAND TOPIC` only; empty = by the command's own help
 };
+
+/// The flag of a preset, in commands that have one: defaults of other flags.
+inline constexpr std::string_view preset_flag = "preset";
 
 /// What stands on the command line without a flag: PATH...
 struct Words {
@@ -40,6 +44,8 @@ class Command {
     virtual ~Command() = default;
     virtual Words words() { return {}; }
     virtual std::vector<Stage> stages() { return {}; }
+    /// Called once the row preset_flag is set, before any other is: changes defaults.
+    virtual void take_preset() {}
     /// Does the work; returns an ExitCode. Throws Misuse for settings that cannot be, Error when nothing can be done.
     virtual int run() = 0;
 };

@@ -292,12 +292,19 @@ class Inspect final : public Command {
 
     std::vector<Stage> stages() override {
         return {{"input",
-                 {{"camera", "a camera file, or fx,fy,cx,cy; replaces the capture's own", &options_.camera},
-                  {"depth-scale", "mm, tum, sun, nyu, m, or units per metre; replaces the capture's own",
-                   &options_.depth_scale},
-                  {"association-limit", "colour, depth and poses farther apart in time are not paired",
-                   &options_.association_limit_s, "s", 0, 1e6}}},
-                {"output", {{"json", "the same as JSON", &as_json_}}}};
+                 {{.name = "camera",
+                   .help = "a camera file, or fx,fy,cx,cy; replaces the capture's own",
+                   .value = &options_.camera},
+                  {.name = "depth-scale",
+                   .help = "mm, tum, sun, nyu, m, or units per metre; replaces the capture's own",
+                   .value = &options_.depth_scale},
+                  {.name = "association-limit",
+                   .help = "colour, depth and poses that are farther apart in time are not paired",
+                   .value = &options_.association_limit_s,
+                   .unit = "s",
+                   .low = 0,
+                   .high = 1e6}}},
+                {"output", {{.name = "json", .help = "prints the same as JSON", .value = &as_json_}}}};
     }
 
     int run() override {

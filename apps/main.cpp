@@ -2,6 +2,7 @@
 #include "apps/command.h"
 #include "apps/settings_file.h"
 #include "projection/error.h"
+#include "projection/nearest_word.h"
 
 #include <algorithm>
 #include <array>
@@ -10,35 +11,53 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <malloc.h>
+#include <sstream>
 
 namespace scanshade {
 namespace {
 
 const std::array commands = {
-    CommandRow{"inspect", "what is in a capture: frames, sizes, depth range, holes, camera, poses", inspect_command},
-    CommandRow{"run", "ambient occlusion for every frame: maps, shaded pictures, clouds, a report", run_command},
+    CommandRow{"inspect", "tells what is in a capture: frames, sizes, depth range, holes, camera, poses",
+               inspect_command},
+    CommandRow{"run", "computes ambient occlusion for every frame: maps, shaded pictures, clouds, a report",
+               run_command},
     CommandRow{"plan", "finds a dataset's captures and cuts them into tasks, for run on any number of machines",
                plan_command},
-    CommandRow{"status", "how a planned job stands: tasks, frames, who is at work, failures by reason", status_command},
-    CommandRow{"merge", "a planned job's reports in one", merge_command},
-    CommandRow{"refine", "the camera, from pictures of a board, organised clouds or a recording, and how sure",
+    CommandRow{"status", "tells how far a planned job is: tasks, frames, processes at work, failures by reason",
+               status_command},
+    CommandRow{"merge", "joins a planned job's reports into one", merge_command},
+    CommandRow{"refine",
+               "finds the camera and its uncertainty from pictures of a board, organised clouds or a recording",
                refine_command},
-    CommandRow{"compare", "two results, or a result and truth, as numbers and difference pictures", compare_command},
-    CommandRow{"bench", "methods and settings against truth: milliseconds, errors, the front, as one page",
+    CommandRow{"compare", "compares two results, or a result and truth: numbers and difference pictures",
+               compare_command},
+    CommandRow{"bench", "measures methods and settings against truth: time, error and the Pareto front, as a page",
                bench_command},
-    CommandRow{"calibrate-look", "fits a method's free settings to truth, judges them on other captures",
+    CommandRow{"calibrate-look", "fits a method's free settings to truth, and judges them on other captures",
                calibrate_command},
-    CommandRow{"generate", "a capture of a synthetic scene with exact truth", generate_command},
-    CommandRow{"methods", "the ambient-occlusion methods there are", methods_command},
-    CommandRow{"devices", "the Vulkan devices there are", devices_command},
+    CommandRow{"generate", "generates a capture of a synthetic scene with exact truth", generate_command},
+    CommandRow{"methods", "lists the ambient-occlusion methods", methods_command},
+    CommandRow{"devices", "lists the Vulkan devices", devices_command},
 };
 
 const CommandRow& command_named(const std::string& name) {
     const auto row = std::ranges::find(commands, name, &CommandRow::name);
-    if (row == commands.end())
-        throw Misuse("'" + name + "' is no command; `scanshade help` lists them");
-    return *row;
+    if (row != commands.end())
+        return *row;
+    std::vector<std::string> known;
+    for (const CommandRow& each : commands)
+        known.emplace_back(each.name);
+    throw Misuse(fmt::format("{}: no such command{}", name, suggestion(name, known)));
 }
+
+std::string flag_of(const Parameter& row) { return "--" + row.name; }
+
+/// With the letter of the few that have one.
+std::string flag_names(const Parameter& row) {
+    return row.name == "out" ? "-o,--out" : row.name == "quiet" ? "-q,--quiet" : flag_of(row);
+}
+
+bool is_switch(const Parameter& row) { return std::holds_alternative<bool*>(row.value); }
 
 // ---------------------------------------------------------------------------------------------------- help
 
@@ -48,56 +67,132 @@ void print_overview() {
         fmt::print("  scanshade {:<14} {}\n", row.name, row.summary);
     fmt::print("  scanshade {:<14} {}\n  scanshade {:<14} {}\n", "help",
                "this, or the flags of one command: help COMMAND", "--version", "the version");
-    fmt::print("\nExit code: 0 all well, 1 misuse, 2 some frames' input is bad (the others are done), 3 nothing could "
-               "be done,\n"
-               "           4 interrupted, device lost, disk full or share gone: try again, `run --resume` goes on, 5 "
-               "internal error.\n");
+    fmt::print(
+        "\nExit code: 0 all well; 1 misuse; 2 some frames' input is bad, the others are done; 3 nothing could be "
+        "done;\n"
+        "           4 interrupted, device lost, disk full or share gone: `run --resume` goes on; 5 internal "
+        "error.\n");
 }
-
-std::string flag_names(const Parameter& row) { return row.name == "out" ? "-o,--out" : "--" + row.name; }
-
-bool is_switch(const Parameter& row) { return std::holds_alternative<bool*>(row.value); }
 
 /// "[default 0.5; m, 0 .. 100]"
 std::string limits(const Parameter& row) {
     const std::string value = value_text(row), range = range_text(row);
     const std::string otherwise = value.empty() ? "" : "default " + value;
     const std::string allowed = is_switch(row) ? "" : range;
-    return fmt::format("{}{}{}", otherwise, otherwise.empty() || allowed.empty() ? "" : "; ", allowed);
+    if (otherwise.empty() && allowed.empty())
+        return "";
+    return fmt::format(" [{}{}{}]", otherwise, otherwise.empty() || allowed.empty() ? "" : "; ", allowed);
 }
 
-void print_help(const CommandRow& row) {
+/// A name, and beside it a text in lines of at most 110 columns.
+void print_entry(const std::string& name, std::size_t name_width, const std::string& text) {
+    const std::size_t width = 110 - name_width - 4;
+    fmt::print("  {:<{}}  ", name, name_width);
+    std::istringstream words(text);
+    std::size_t used = 0;
+    for (std::string word; words >> word; used += word.size()) {
+        if (used > 0 && used + 1 + word.size() > width) {
+            fmt::print("\n  {:<{}}  ", "", name_width);
+            used = 0;
+        }
+        fmt::print("{}{}", used > 0 ? " " : "", word);
+        used += used > 0 ? 1 : 0;
+    }
+    fmt::print("\n");
+}
+
+void print_stage(const Stage& stage) {
+    if (stage.rows.empty())
+        return;
+    std::size_t longest = 0;
+    for (const Parameter& row : stage.rows)
+        longest = std::max(longest, flag_names(row).size());
+    fmt::print("\n{}:\n", stage.title);
+    for (const Parameter& row : stage.rows)
+        print_entry(flag_names(row), longest, row.help + limits(row));
+}
+
+/// What `help COMMAND` shows of a command that has more: its common flags, or all without a topic where it marks none.
+std::vector<Stage> first_page(std::vector<Stage> stages) {
+    std::erase_if(stages, [](const Stage& stage) { return !stage.topic.empty(); });
+    const bool marked =
+        std::ranges::any_of(stages, [](const Stage& s) { return std::ranges::any_of(s.rows, &Parameter::common); });
+    for (Stage& stage : stages)
+        if (marked)
+            std::erase_if(stage.rows, [](const Parameter& row) { return !row.common; });
+    return stages;
+}
+
+/// `topic`: empty, "all", or that of a stage.
+void print_help(const CommandRow& row, const std::string& topic) {
     const std::unique_ptr<Command> command = row.make();
+    const std::vector<Stage> all = command->stages();
+    std::vector<std::string> topics;
+    for (const Stage& stage : all)
+        if (!stage.topic.empty())
+            topics.push_back(stage.topic);
+    std::vector<Stage> shown = topic == "all" ? all : first_page(all);
+    if (!topic.empty() && topic != "all") {
+        shown = all;
+        std::erase_if(shown, [&](const Stage& stage) { return stage.topic != topic; });
+        if (shown.empty())
+            throw Misuse(fmt::format("help {}: no topic '{}'{}", row.name, topic, suggestion(topic, topics)));
+    }
     const Words words = command->words();
     fmt::print("scanshade {}{}{} [flags]\n  {}\n", row.name, words.values ? " " + words.name : "",
                words.at_most > 1 ? "..." : "", row.summary);
-    if (words.values)
-        fmt::print("\n  {:<28} {}\n", words.name, words.help);
-    for (const Stage& stage : command->stages()) {
-        fmt::print("\n{}:\n", stage.title);
-        for (const Parameter& parameter : stage.rows) {
-            fmt::print("  {:<28} {}\n", flag_names(parameter), parameter.help);
-            if (const std::string about = limits(parameter); !about.empty())
-                fmt::print("  {:<28} [{}]\n", "", about);
-        }
+    if (words.values && (topic.empty() || topic == "all")) {
+        fmt::print("\n");
+        print_entry(words.name, words.name.size(), words.help);
+    }
+    for (const Stage& stage : shown)
+        print_stage(stage);
+    if (topic.empty() && !topics.empty()) {
+        fmt::print("\nmore:\n");
+        print_entry("every flag", 10, fmt::format("scanshade help {} all", row.name));
+        print_entry("one topic", 10, fmt::format("scanshade help {} TOPIC: {}", row.name, fmt::join(topics, ", ")));
     }
 }
 
 // ---------------------------------------------------------------------------------------------------- flags
 
+/// What stands on the command line and in the settings file, as it is read.
+using Given = std::vector<std::pair<Parameter, std::string>>;
+
 /// A switch is given as --name or --name=false; everything else takes a value. --settings FILE gives others theirs,
 /// unless they stand on the command line themselves.
-void add_flag(CLI::App& parser, const Parameter& row) {
+void add_flag(CLI::App& parser, const Parameter& row, Given& given) {
     const std::string names = flag_names(row);
+    const auto take = [&given, row](const std::string& text) { given.emplace_back(row, text); };
     if (row.name == settings_flag)
-        parser.set_config(names)->each([row](const std::string& text) { set(row, text); });
+        parser.set_config(names)->each(take);
     else if (is_switch(row))
-        parser.add_flag_function(names, [row](std::int64_t given) { set(row, given > 0 ? "true" : "false"); });
+        parser.add_flag_function(names, [take](std::int64_t count) { take(count > 0 ? "true" : "false"); });
     else
-        parser.add_option_function<std::string>(names, [row](const std::string& text) { set(row, text); });
+        parser.add_option_function<std::string>(names, take);
 }
 
-/// Fills the command's words and rows; throws Misuse for what is unknown, missing or out of range.
+std::vector<std::string> flags_of(const std::vector<Parameter>& rows) {
+    std::vector<std::string> flags;
+    for (const Parameter& row : rows)
+        flags.push_back(flag_of(row));
+    return flags;
+}
+
+/// The first word that the parser did not know, if it looks like a flag: with the flag that was meant.
+void refuse_unknown_flag(const std::vector<std::string>& unknown, const std::vector<Parameter>& rows) {
+    for (const std::string& word : unknown)
+        if (const std::string flag = word.substr(0, word.find('=')); flag.starts_with('-'))
+            throw Misuse(fmt::format("{}: no such flag{}", flag, suggestion(flag, flags_of(rows))));
+}
+
+/// CLI11's message about a settings file ends with the setting that it did not know.
+[[noreturn]] void refuse_unknown_setting(const std::string& message, const std::vector<Parameter>& rows) {
+    const std::string flag = "--" + message.substr(message.rfind(' ') + 1);
+    throw Misuse(fmt::format("settings: {}: no such flag{}", flag, suggestion(flag, flags_of(rows))));
+}
+
+/// Fills the command's words and rows, a preset first; throws Misuse for what is unknown, missing or out of range.
 void parse(Command& command, std::vector<std::string> arguments) {
     CLI::App parser;
     parser.set_help_flag();
@@ -108,15 +203,29 @@ void parse(Command& command, std::vector<std::string> arguments) {
         parser.add_option(words.name, *words.values)
             ->expected(words.at_least, words.at_most)
             ->required(words.at_least > 0);
+    Given given;
+    std::vector<Parameter> rows;
     for (const Stage& stage : command.stages())
-        for (const Parameter& row : stage.rows)
-            add_flag(parser, row);
+        rows.insert(rows.end(), stage.rows.begin(), stage.rows.end());
+    for (const Parameter& row : rows)
+        add_flag(parser, row, given);
     std::ranges::reverse(arguments); // as CLI11 takes a vector
     try {
         parser.parse(arguments);
+    } catch (const CLI::ConfigError& error) {
+        refuse_unknown_setting(error.what(), rows);
     } catch (const CLI::ParseError& error) {
+        refuse_unknown_flag(parser.remaining(), rows);
         throw Misuse(error.what());
     }
+    const auto rest =
+        std::ranges::stable_partition(given, [](const auto& each) { return each.first.name == preset_flag; });
+    for (const auto& [row, text] : std::ranges::subrange(given.begin(), rest.begin()))
+        set(row, text);
+    if (rest.begin() != given.begin())
+        command.take_preset();
+    for (const auto& [row, text] : rest)
+        set(row, text);
 }
 
 bool asks_for_help(const std::string& word) { return word == "help" || word == "--help" || word == "-h"; }
@@ -132,13 +241,16 @@ int execute(const std::vector<std::string>& arguments) {
         return all_well;
     }
     if (asks_for_help(name)) {
-        arguments.size() > 1 ? print_help(command_named(arguments[1])) : print_overview();
+        if (arguments.size() > 1)
+            print_help(command_named(arguments[1]), arguments.size() > 2 ? arguments[2] : "");
+        else
+            print_overview();
         return all_well;
     }
     const CommandRow& row = command_named(name);
     const std::vector<std::string> rest(arguments.begin() + 1, arguments.end());
     if (std::ranges::any_of(rest, [](const auto& word) { return word == "--help" || word == "-h"; })) {
-        print_help(row);
+        print_help(row, "");
         return all_well;
     }
     const std::unique_ptr<Command> command = row.make();

@@ -24,7 +24,7 @@ Settings values_of(MethodSetup& setup) {
 }
 
 Stage method_stage(std::string_view name, MethodSetup& setup) {
-    Stage stage{fmt::format("method {}", name), setup.parameters()};
+    Stage stage{fmt::format("method {}", name), setup.parameters(), std::string(name)};
     for (Parameter& row : stage.rows)
         row.name = fmt::format("{}.{}", name, row.name);
     return stage;

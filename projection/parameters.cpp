@@ -1,6 +1,7 @@
 #include "projection/parameters.h"
 
 #include "projection/error.h"
+#include "projection/nearest_word.h"
 
 #include <algorithm>
 #include <array>
@@ -32,7 +33,8 @@ std::string number_text(Number number) {
 
 [[noreturn]] void refuse(const Parameter& row, const std::string& text) {
     const std::string range = range_text(row);
-    throw Misuse(fmt::format("{}: '{}' given, expected {}", row.name, text, range.empty() ? "some text" : range));
+    throw Misuse(fmt::format("{}: '{}' given, expected {}{}", row.name, text, range.empty() ? "some text" : range,
+                             suggestion(text, choices_of(row))));
 }
 
 template <class Number>
@@ -61,9 +63,14 @@ std::string parsed<std::string>(const Parameter&, const std::string& text) {
     return text;
 }
 
+template <>
+std::optional<double> parsed<std::optional<double>>(const Parameter& row, const std::string& text) {
+    return text.empty() ? std::nullopt : std::optional(parsed<double>(row, text));
+}
+
 std::string choices_text(const Parameter& row) {
     std::string text;
-    for (const std::string& choice : row.choices)
+    for (const std::string& choice : choices_of(row))
         text += (text.empty() ? "" : " | ") + choice;
     return text;
 }
@@ -77,37 +84,90 @@ std::string limits_text(const Parameter& row) {
     return below ? fmt::format("{} or less", number_text(row.high)) : std::string();
 }
 
+/// Puts the value in its place; a refused one leaves the setting as it was.
+template <class Value>
+void put(const Parameter& row, Value* target, Value value) {
+    std::swap(*target, value);
+    try {
+        check(row);
+    } catch (...) {
+        std::swap(*target, value);
+        throw;
+    }
+}
+
 } // namespace
 
+std::vector<std::string> OneOf::words() const {
+    std::vector<std::string> all;
+    for (std::size_t i = 0; i < count_; ++i)
+        if (const std::string_view word = word_(words_, i); !word.empty())
+            all.emplace_back(word);
+    return all;
+}
+
+std::optional<std::string_view> OneOf::word() const {
+    for (std::size_t i = 0; i < count_; ++i)
+        if (holds_(variable_, words_, i))
+            return word_(words_, i);
+    return std::nullopt;
+}
+
+bool OneOf::set(std::string_view word) const {
+    for (std::size_t i = 0; i < count_; ++i)
+        if (word_(words_, i) == word) {
+            assign_(variable_, words_, i);
+            return true;
+        }
+    return false;
+}
+
 void set(const Parameter& row, const std::string& text) {
-    std::visit(
-        [&](auto* target) {
-            using Value = std::remove_pointer_t<decltype(target)>;
-            Value value = parsed<Value>(row, text);
-            std::swap(*target, value);
-            try {
-                check(row);
-            } catch (...) {
-                std::swap(*target, value); // a refused text leaves the setting as it was
-                throw;
-            }
-        },
-        row.value);
+    std::visit(Overloaded{
+                   [&](const OneOf& choice) {
+                       if (!choice.set(text))
+                           refuse(row, text);
+                   },
+                   [&]<class Value>(Value* target) { put(row, target, parsed<Value>(row, text)); },
+               },
+               row.value);
+}
+
+void set(const Parameter& row, double number) {
+    if (float* const* const target = std::get_if<float*>(&row.value))
+        put(row, *target, static_cast<float>(number));
+    else
+        put(row, std::get<double*>(row.value), number);
 }
 
 std::string value_text(const Parameter& row) {
     return std::visit(Overloaded{
                           [](const bool* value) { return std::string(*value ? "true" : "false"); },
                           [](const std::string* value) { return *value; },
+                          [](const std::optional<double>* value) { return *value ? number_text(**value) : ""; },
+                          [](const OneOf& choice) { return std::string(choice.word().value_or("")); },
                           [](const auto* value) { return number_text(*value); },
                       },
                       row.value);
 }
 
+double number_of(const Parameter& row) {
+    if (float* const* const target = std::get_if<float*>(&row.value))
+        return parsed<double>(row, number_text(**target));
+    if (int* const* const target = std::get_if<int*>(&row.value))
+        return **target;
+    return *std::get<double*>(row.value);
+}
+
+std::vector<std::string> choices_of(const Parameter& row) {
+    const OneOf* const choice = std::get_if<OneOf>(&row.value);
+    return choice ? choice->words() : row.choices;
+}
+
 std::string range_text(const Parameter& row) {
     if (std::holds_alternative<bool*>(row.value))
         return "true | false";
-    if (std::holds_alternative<std::string*>(row.value))
+    if (std::holds_alternative<std::string*>(row.value) || std::holds_alternative<OneOf>(row.value))
         return choices_text(row);
     const std::string limits = limits_text(row);
     if (!row.unit.empty())
@@ -118,18 +178,16 @@ std::string range_text(const Parameter& row) {
 }
 
 void check(const Parameter& row) {
-    const bool good = std::visit(Overloaded{
-                                     [](const bool*) { return true; },
-                                     [&](const std::string* value) {
-                                         return row.choices.empty() || std::find(row.choices.begin(), row.choices.end(),
-                                                                                 *value) != row.choices.end();
-                                     },
-                                     [&](const auto* value) {
-                                         const double number = *value;
-                                         return std::isfinite(number) && number >= row.low && number <= row.high;
-                                     },
-                                 },
-                                 row.value);
+    const auto within = [&](double number) { return std::isfinite(number) && number >= row.low && number <= row.high; };
+    const bool good = std::visit(
+        Overloaded{
+            [](const bool*) { return true; },
+            [&](const std::string* value) { return row.choices.empty() || std::ranges::count(row.choices, *value); },
+            [](const OneOf& choice) { return choice.word().has_value(); },
+            [&](const std::optional<double>* value) { return !*value || within(**value); },
+            [&](const auto* value) { return within(*value); },
+        },
+        row.value);
     if (!good)
         refuse(row, value_text(row));
 }

@@ -1,7 +1,10 @@
 // One row per setting: the same rows parse the flags, print the help, check the ranges and fill the manifest.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -9,23 +12,79 @@
 
 namespace scanshade {
 
+/// A value of an enum, and the word that people type for it.
+template <class Enum>
+struct Named {
+    std::string_view name;
+    Enum value;
+};
+template <class Enum>
+Named(const char*, Enum) -> Named<Enum>;
+
+/// The word for a value; empty where the table has none.
+template <class Enum, std::size_t count>
+[[nodiscard]] constexpr std::string_view word_for(Enum value, const std::array<Named<Enum>, count>& words) {
+    for (const Named<Enum>& word : words)
+        if (word.value == value)
+            return word.name;
+    return {};
+}
+
+/// A variable of an enum, bound together with a table of the words for its values. The table must outlive it.
+class OneOf {
+  public:
+    template <class Enum, std::size_t count>
+    OneOf(Enum* variable, const std::array<Named<Enum>, count>& words)
+        : variable_(variable), words_(words.data()), count_(count),
+          word_([](const void* table, std::size_t i) { return static_cast<const Named<Enum>*>(table)[i].name; }),
+          holds_([](const void* held, const void* table, std::size_t i) {
+              return *static_cast<const Enum*>(held) == static_cast<const Named<Enum>*>(table)[i].value;
+          }),
+          assign_([](void* held, const void* table, std::size_t i) {
+              *static_cast<Enum*>(held) = static_cast<const Named<Enum>*>(table)[i].value;
+          }) {}
+
+    /// Without an empty one, which stands for "not given".
+    [[nodiscard]] std::vector<std::string> words() const;
+    /// The word for the present value; none where the table has none.
+    [[nodiscard]] std::optional<std::string_view> word() const;
+    /// Sets the variable; false, and nothing done, for a word that is not in the table.
+    [[nodiscard]] bool set(std::string_view word) const;
+
+  private:
+    void* variable_;
+    const void* words_;
+    std::size_t count_;
+    std::string_view (*word_)(const void* table, std::size_t i);
+    bool (*holds_)(const void* held, const void* table, std::size_t i);
+    void (*assign_)(void* held, const void* table, std::size_t i);
+};
+
 /// A setting bound to the variable that holds it.
 struct Parameter {
-    using Target = std::variant<bool*, int*, float*, double*, std::string*>;
+    using Target = std::variant<bool*, int*, float*, double*, std::optional<double>*, std::string*, OneOf>;
 
     std::string name;   ///< "radius"
-    std::string help;   ///< one line, without default and range (they are printed from the row)
+    std::string help{}; ///< one line, without default and range (they are printed from the row)
     Target value;       ///< holds the default until set
     std::string unit{}; ///< "m", "rad", "" ...
     double low = -std::numeric_limits<double>::infinity(); ///< inclusive
     double high = std::numeric_limits<double>::infinity(); ///< inclusive
     std::vector<std::string> choices{};                    ///< for strings: the only values allowed; empty = any
+    bool common = false;                                   ///< shown on the first page of a command's help
 };
 
 /// Sets the row's variable from text. Throws Misuse naming the row, the text, and what was expected.
 void set(const Parameter& row, const std::string& text);
-/// The row's present value as text: numbers shortest round trip, booleans "true"/"false".
+/// Sets a row of a real number. Throws Misuse where it is out of range.
+void set(const Parameter& row, double number);
+/// The row's present value as text: numbers shortest round trip, booleans "true"/"false", nothing for what was not
+/// given.
 [[nodiscard]] std::string value_text(const Parameter& row);
+/// The present value of a row of numbers, as it would be typed: 0.1 of a float that holds 0.10000000149.
+[[nodiscard]] double number_of(const Parameter& row);
+/// The words that may be given; empty where the row takes anything else.
+[[nodiscard]] std::vector<std::string> choices_of(const Parameter& row);
 /// "m, 0 .. 100000" or "lowest | low | ..." : what may be given.
 [[nodiscard]] std::string range_text(const Parameter& row);
 /// Throws Misuse when the value is out of the row's range, not finite, or not among its choices.

@@ -110,6 +110,9 @@ std::vector<float> smoothed(const CloudSurface& surface, const std::vector<float
     return means;
 }
 
+constexpr std::array normals_words{Named{"auto", CloudNormals::automatic}, Named{"recorded", CloudNormals::recorded},
+                                   Named{"estimated", CloudNormals::estimated}};
+
 /// Discs that span the radius: 0 for one, 1 for four or more.
 float resolution(float radius, float disc) { return disc > 0 ? std::clamp((radius / disc - 1) / 3, 0.0F, 1.0F) : 0.0F; }
 
@@ -117,29 +120,41 @@ float resolution(float radius, float disc) { return disc > 0 ? std::clamp((radiu
 
 std::vector<Parameter> CloudAoOptions::parameters() {
     return {
-        {"radius",
-         "how far away a surface may still occlude, in the cloud's unit; 0 = from the cloud's extent and spacing",
-         &radius, "", 0, 1e9},
-        {"rays", "per point; 0 = 64 on a GPU, else 16, fewer where the radius spans many spacings", &rays, "", 0,
-         16384},
-        {"smooth",
-         "how often a value becomes the mean of those beside it on the same surface; -1 = twice, or more where the "
-         "radius "
-         "spans many spacings",
-         &smooth, "", -1, 16},
-        {"sky", "how much of the sky a point sees, at any distance, in place of what is open within the radius", &sky},
-        {"up", "where the sky is, x,y,z", &up},
-        {"outside", "where estimated normals point: auto, up, outward, inward, or to the scanner's place x,y,z",
-         &outside},
-        {"normals",
-         "which to take; auto = recorded ones where they lie on the planes of the points",
-         &normals,
-         "",
-         0,
-         0,
-         {"auto", "recorded", "estimated"}},
-        {"memory", "of the points in work at once; larger clouds are taken in tiles", &memory_mib, "MiB", 64, 1 << 20},
-        {"seed", "of the rays' scrambling", &seed, "", 0, 2147483647},
+        {.name = "radius",
+         .help = "surfaces farther away than this do not occlude, in the cloud's unit; 0 = from the cloud's extent and "
+                 "spacing",
+         .value = &radius,
+         .low = 0,
+         .high = 1e9},
+        {.name = "rays",
+         .help = "rays per point; 0 = 64 on a GPU, else 16, or fewer where the radius spans many spacings",
+         .value = &rays,
+         .low = 0,
+         .high = 16384},
+        {.name = "smooth",
+         .help = "how often a value becomes the mean of its neighbours on the same surface; -1 = twice, or more where "
+                 "the radius spans many spacings",
+         .value = &smooth,
+         .low = -1,
+         .high = 16},
+        {.name = "sky",
+         .help = "computes the share of the sky that a point sees at any distance, instead of what is open within the "
+                 "radius",
+         .value = &sky},
+        {.name = "up", .help = "the direction of the sky, x,y,z", .value = &up},
+        {.name = "outside",
+         .help = "where estimated normals point: auto, up, outward, inward, or to the scanner at x,y,z",
+         .value = &outside},
+        {.name = "normals",
+         .help = "which normals are taken; auto = recorded ones where they lie on the planes of the points",
+         .value = OneOf(&normals, normals_words)},
+        {.name = "memory",
+         .help = "memory for the points in work; larger clouds are taken in tiles",
+         .value = &memory_mib,
+         .unit = "MiB",
+         .low = 64,
+         .high = 1 << 20},
+        {.name = "seed", .help = "scrambles the rays", .value = &seed, .low = 0, .high = 2147483647},
     };
 }
 
@@ -355,7 +370,7 @@ class CloudAo::Work {
             normals = pick(cloud_.normals, some_normals);
         CloudSurface surface = cloud_surface(points, normals, gpu);
         constexpr double same_planes = 0.8, too_many_opposed = 0.05;
-        if (!normals.empty() && options_.normals == "auto" && surface.agreement < same_planes) {
+        if (!normals.empty() && options_.normals == CloudNormals::automatic && surface.agreement < same_planes) {
             normals_refused_ = true;
             result_.notes.push_back(fmt::format(
                 "recorded normals are not used: the median angle between them and the planes of the points is "
@@ -365,13 +380,14 @@ class CloudAo::Work {
             surface = cloud_surface(points, {}, gpu);
         }
         watch_.lap("planes");
-        sides_opposed_ |= !normals.empty() && options_.normals == "auto" && surface.discord > too_many_opposed;
+        sides_opposed_ |=
+            !normals.empty() && options_.normals == CloudNormals::automatic && surface.discord > too_many_opposed;
         return surface;
     }
 
     /// Whether recorded normals are taken.
     [[nodiscard]] bool recorded() const {
-        return !cloud_.normals.empty() && options_.normals != "estimated" && !normals_refused_;
+        return !cloud_.normals.empty() && options_.normals != CloudNormals::estimated && !normals_refused_;
     }
     [[nodiscard]] bool sides_unknown() const { return !recorded() || sides_opposed_; }
 
@@ -437,7 +453,7 @@ PointVisibility CloudAo::of_mesh(const PointSet& mesh) const {
     result.radius =
         std::clamp(options_.radius > 0 ? options_.radius : default_radius(extent, result.spacing), 1e-6, 1e6);
     const int rays = options_.rays > 0 ? options_.rays : 64;
-    Raycast raycast({.radius_m = result.radius, .rays = rays, .mesh = "vertices", .seed = options_.seed});
+    Raycast raycast({.radius_m = result.radius, .rays = rays, .mesh = MeshRays::vertices, .seed = options_.seed});
     result.visibility = raycast.compute(mesh).visibility;
     result.timings = raycast.timings();
     result.confidence.assign(result.visibility.size(), 0.0F);

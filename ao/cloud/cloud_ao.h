@@ -11,6 +11,9 @@
 
 namespace scanshade {
 
+/// Which normals of a cloud are taken; automatic: the recorded ones where they lie on the planes of the points.
+enum class CloudNormals { automatic, recorded, estimated };
+
 /// What a person sets.
 struct CloudAoOptions {
     double radius = 0; ///< in the cloud's unit; 0 = from the cloud: see default_radius()
@@ -21,8 +24,8 @@ struct CloudAoOptions {
     bool sky = false; ///< how much of the sky a point sees, however far what hides it
     std::string up = "0,0,1";
     std::string outside = "auto"; ///< "auto", "up", "outward", "inward", or the scanner's place x,y,z
-    std::string normals = "auto"; ///< "auto" | "recorded" | "estimated"
-    int memory_mib = 4096;        ///< of the points in work; larger clouds are taken in tiles
+    CloudNormals normals = CloudNormals::automatic;
+    int memory_mib = 4096; ///< of the points in work; larger clouds are taken in tiles
     int seed = 1;
 
     [[nodiscard]] std::vector<Parameter> parameters();

@@ -1,22 +1,34 @@
 #include "ao/gtao/bitmask.h"
 
 namespace scanshade {
+namespace {
+
+constexpr std::array sector_words{Named{"cosine", Sectors::cosine}, Named{"angle", Sectors::angle}};
+
+} // namespace
 
 std::vector<Parameter> BitmaskOptions::parameters() {
     return joined(
         joined(screen.parameters(), slices.parameters()),
         {
-            {"thickness", "how thick what is seen is taken to be", &thickness, "radii", 1e-4, 1e6},
-            {"thickness-per-z", "and how much thicker per metre of depth", &thickness_per_z, "m/m", 0, 10},
-            {"sectors",
-             "cosine: of equal cosine-weighted measure; angle: of equal angle, as published",
-             &sectors,
-             "",
-             {},
-             {},
-             {"cosine", "angle"}},
-            {"unbounded", "samples beyond the radius count, too, as published: only the image's march ends there",
-             &unbounded},
+            {.name = "thickness",
+             .help = "how thick what is seen is taken to be",
+             .value = &thickness,
+             .unit = "radii",
+             .low = 1e-4,
+             .high = 1e6},
+            {.name = "thickness-per-z",
+             .help = "how much thicker it is per metre of depth",
+             .value = &thickness_per_z,
+             .unit = "m/m",
+             .low = 0,
+             .high = 10},
+            {.name = "sectors",
+             .help = "cosine: sectors of equal cosine-weighted measure; angle: of equal angle, as published",
+             .value = OneOf(&sectors, sector_words)},
+            {.name = "unbounded",
+             .help = "samples beyond the radius count, too, as published; the march in the image still ends there",
+             .value = &unbounded},
         });
 }
 
@@ -29,7 +41,7 @@ void Bitmask::add_passes(ScreenTables& tables) const {
     add_slice_pass(tables, options_.slices,
                    {{shared::spec_bitmask, 1},
                     {shared::spec_falloff, falloff},
-                    {shared::spec_uniform, options_.sectors == "angle"}});
+                    {shared::spec_uniform, options_.sectors == Sectors::angle}});
 }
 
 std::vector<std::byte> Bitmask::constants(const shared::ScreenConstants& screen) const {

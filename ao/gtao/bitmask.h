@@ -10,12 +10,15 @@
 
 namespace scanshade {
 
+/// What all 32 sectors have equal shares of: cosine-weighted measure, or angle.
+enum class Sectors { cosine, angle };
+
 struct BitmaskOptions {
     ScreenOptions screen;
     SliceOptions slices;
     float thickness = 0.3F;    ///< of what is seen, in radii
     float thickness_per_z = 0; ///< metres more per metre of depth
-    std::string sectors = "cosine";
+    Sectors sectors = Sectors::cosine;
     bool unbounded = false;
 
     [[nodiscard]] std::vector<Parameter> parameters();

@@ -8,19 +8,30 @@ constexpr float linear_share = 0.615F; // of the radius over which XeGTAO's weig
 /// XeGTAO: radius, falloff and power were fitted together, so a profile sets them together.
 GtaoOptions resolved(GtaoOptions options) {
     options = checked(std::move(options));
-    if (options.profile == "metric")
+    if (options.profile == GtaoProfile::metric)
         return options;
     options.screen.radius *= 1.457F;
     options.screen.power *= 2.2F;
-    options.falloff = "linear";
+    options.falloff = GtaoFalloff::linear;
     return options;
 }
 
-int kind_of(const std::string& falloff) {
-    if (falloff == "linear")
+/// The specialization constant of a falloff.
+int kind_of(GtaoFalloff falloff) {
+    switch (falloff) {
+    case GtaoFalloff::linear:
         return shared::falloff_linear;
-    return falloff == "quadratic" ? shared::falloff_quadratic : shared::falloff_hard;
+    case GtaoFalloff::quadratic:
+        return shared::falloff_quadratic;
+    case GtaoFalloff::hard:
+        break;
+    }
+    return shared::falloff_hard;
 }
+
+constexpr std::array gtao_profile_words{Named{"metric", GtaoProfile::metric}, Named{"xegtao", GtaoProfile::xegtao}};
+constexpr std::array gtao_falloff_words{Named{"hard", GtaoFalloff::hard}, Named{"linear", GtaoFalloff::linear},
+                                        Named{"quadratic", GtaoFalloff::quadratic}};
 
 } // namespace
 
@@ -28,21 +39,15 @@ std::vector<Parameter> GtaoOptions::parameters() {
     return joined(
         joined(screen.parameters(), slices.parameters()),
         {
-            {"profile",
-             "metric: visibility within the radius; xegtao: 1.457 times the radius, linear falloff, power 2.2",
-             &profile,
-             "",
-             {},
-             {},
-             {"metric", "xegtao"}},
-            {"falloff",
-             "how a sample's weight falls with distance: not before the radius, over its last 0.615, or with the "
-             "square",
-             &falloff,
-             "",
-             {},
-             {},
-             {"hard", "linear", "quadratic"}},
+            {.name = "profile",
+             .help = "metric estimates visibility within the radius; xegtao takes 1.457 times the radius, linear "
+                     "falloff and power 2.2",
+             .value = OneOf(&profile, gtao_profile_words)},
+            {.name = "falloff",
+             .help =
+                 "how the weight of a sample falls with distance: hard, at the radius; linear, over its last 0.615; "
+                 "or quadratic",
+             .value = OneOf(&falloff, gtao_falloff_words)},
         });
 }
 

@@ -10,11 +10,15 @@
 
 namespace scanshade {
 
+enum class GtaoProfile { metric, xegtao };
+/// How the weight of a sample falls with its distance.
+enum class GtaoFalloff { hard, linear, quadratic };
+
 struct GtaoOptions {
     ScreenOptions screen;
     SliceOptions slices;
-    std::string profile = "metric";
-    std::string falloff = "hard";
+    GtaoProfile profile = GtaoProfile::metric;
+    GtaoFalloff falloff = GtaoFalloff::hard;
 
     [[nodiscard]] std::vector<Parameter> parameters();
 };

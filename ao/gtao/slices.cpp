@@ -8,11 +8,11 @@ namespace scanshade {
 namespace {
 
 struct Count {
-    const char* quality;
+    Quality quality;
     int slices, steps;
 };
-constexpr std::array counts{Count{"lowest", 1, 4}, Count{"low", 2, 4}, Count{"medium", 2, 8}, Count{"high", 4, 8},
-                            Count{"highest", 16, 16}};
+constexpr std::array counts{Count{Quality::lowest, 1, 4}, Count{Quality::low, 2, 4}, Count{Quality::medium, 2, 8},
+                            Count{Quality::high, 4, 8}, Count{Quality::highest, 16, 16}};
 
 /// The quality's, but for what was given.
 Count count_of(const SliceOptions& options) {
@@ -28,17 +28,24 @@ Count count_of(const SliceOptions& options) {
 
 std::vector<Parameter> SliceOptions::parameters() {
     return {
-        {"quality",
-         "slices x steps to either side: lowest 1x4, low 2x4, medium 2x8, high 4x8, highest 16x16",
-         &quality,
-         "",
-         {},
-         {},
-         {"lowest", "low", "medium", "high", "highest"}},
-        {"slices", "slices through the eye's ray; 0 = as the quality says", &slices, "", 0, 64},
-        {"steps", "steps to either side of a slice; 0 = as the quality says", &steps, "", 0, 256},
-        {"distribution", "exponent of the steps' distances; above 1, they are denser close by", &distribution, "", 0.5,
-         4},
+        {.name = "quality",
+         .help = "slices x steps to either side: lowest 1x4, low 2x4, medium 2x8, high 4x8, highest 16x16",
+         .value = OneOf(&quality, quality_words)},
+        {.name = "slices",
+         .help = "slices through the eye's ray; 0 = as the quality says",
+         .value = &slices,
+         .low = 0,
+         .high = 64},
+        {.name = "steps",
+         .help = "steps to either side of a slice; 0 = as the quality says",
+         .value = &steps,
+         .low = 0,
+         .high = 256},
+        {.name = "distribution",
+         .help = "exponent of the distances of steps; above 1, they are denser close by",
+         .value = &distribution,
+         .low = 0.5,
+         .high = 4},
     };
 }
 

@@ -11,14 +11,14 @@ namespace scanshade {
 
 /// Slices through the eye's ray, and steps to either side of each: 2 x slices x steps reads a pixel.
 struct SliceOptions {
-    std::string quality = "medium"; ///< lowest 8 reads, low 16, medium 32, high 64, highest 512
-    int slices = 0, steps = 0;      ///< above 0: instead of the quality's
-    float distribution = 2;         ///< exponent of the steps' distances: above 1, they are denser close by
+    Quality quality = Quality::medium; ///< lowest 8 reads, low 16, medium 32, high 64, highest 512
+    int slices = 0, steps = 0;         ///< above 0: instead of the quality's
+    float distribution = 2;            ///< exponent of the steps' distances: above 1, they are denser close by
 
     [[nodiscard]] std::vector<Parameter> parameters();
 };
 
-/// The block of one view, without falloff and thickness. Throws Misuse for a name that is no quality.
+/// The block of one view, without falloff and thickness.
 [[nodiscard]] shared::GtaoConstants slice_constants(const SliceOptions& options, const shared::ScreenConstants& screen);
 
 /// Appends the one pass of gtao and bitmask; `constants` are specializations (shared/gtao.h).

@@ -10,11 +10,11 @@ namespace scanshade {
 namespace {
 
 struct Count {
-    const char* quality;
+    Quality quality;
     int directions, steps;
 };
-constexpr std::array counts{Count{"lowest", 4, 2}, Count{"low", 4, 4}, Count{"medium", 8, 4}, Count{"high", 8, 8},
-                            Count{"highest", 32, 16}};
+constexpr std::array counts{Count{Quality::lowest, 4, 2}, Count{Quality::low, 4, 4}, Count{Quality::medium, 8, 4},
+                            Count{Quality::high, 8, 8}, Count{Quality::highest, 32, 16}};
 
 /// The quality's, but for what was given.
 Count count_of(const HbaoOptions& options) {
@@ -28,7 +28,7 @@ Count count_of(const HbaoOptions& options) {
 
 HbaoOptions resolved(HbaoOptions options) {
     options = checked(std::move(options));
-    if (options.profile == "metric")
+    if (options.profile == Profile::metric)
         return options;
     options.bias_degrees = 30;
     options.attenuated = true;
@@ -40,27 +40,33 @@ HbaoOptions resolved(HbaoOptions options) {
 std::vector<Parameter> HbaoOptions::parameters() {
     return joined(screen.parameters(),
                   {
-                      {"profile",
-                       "metric: all within the radius count alike; published: bias 30, attenuated, contrast 1.25",
-                       &profile,
-                       "",
-                       {},
-                       {},
-                       {"metric", "published"}},
-                      {"quality",
-                       "directions x steps: lowest 4x2, low 4x4, medium 8x4, high 8x8, highest 32x16",
-                       &quality,
-                       "",
-                       {},
-                       {},
-                       {"lowest", "low", "medium", "high", "highest"}},
-                      {"directions", "directions in the image; 0 = as the quality says", &directions, "", 0, 128},
-                      {"steps", "steps along each; 0 = as the quality says", &steps, "", 0, 256},
-                      {"bias", "horizons lower above the tangent plane than this do not occlude", &bias_degrees,
-                       "degrees", 0, 89},
-                      {"attenuated",
-                       "samples count less with the square of their distance, instead of all alike up to the radius",
-                       &attenuated},
+                      {.name = "profile",
+                       .help = "metric counts all within the radius alike; published takes bias 30, attenuated, "
+                               "contrast 1.25",
+                       .value = OneOf(&profile, profile_words)},
+                      {.name = "quality",
+                       .help = "directions x steps: lowest 4x2, low 4x4, medium 8x4, high 8x8, highest 32x16",
+                       .value = OneOf(&quality, quality_words)},
+                      {.name = "directions",
+                       .help = "directions in the image; 0 = as the quality says",
+                       .value = &directions,
+                       .low = 0,
+                       .high = 128},
+                      {.name = "steps",
+                       .help = "steps along each direction; 0 = as the quality says",
+                       .value = &steps,
+                       .low = 0,
+                       .high = 256},
+                      {.name = "bias",
+                       .help = "horizons lower above the tangent plane than this do not occlude",
+                       .value = &bias_degrees,
+                       .unit = "degrees",
+                       .low = 0,
+                       .high = 89},
+                      {.name = "attenuated",
+                       .help = "samples count less with the square of their distance; otherwise all within the radius "
+                               "count alike",
+                       .value = &attenuated},
                   });
 }
 

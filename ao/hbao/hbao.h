@@ -10,9 +10,9 @@ namespace scanshade {
 
 struct HbaoOptions {
     ScreenOptions screen;
-    std::string quality = "medium"; ///< lowest 8 reads, low 16, medium 32, high 64, highest 512
-    int directions = 0, steps = 0;  ///< above 0: instead of the quality's
-    std::string profile = "metric";
+    Quality quality = Quality::medium; ///< lowest 8 reads, low 16, medium 32, high 64, highest 512
+    int directions = 0, steps = 0;     ///< above 0: instead of the quality's
+    Profile profile = Profile::metric;
     float bias_degrees = 0;
     bool attenuated = false;
 

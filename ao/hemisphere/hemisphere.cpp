@@ -14,11 +14,11 @@ constexpr double shortest = 0.01; // of the radius
 constexpr double lowest = 0.05;   // height above the tangent plane: points lower only meet the surface itself
 
 struct Count {
-    const char* quality;
+    Quality quality;
     int points;
 };
-constexpr std::array counts{Count{"lowest", 8}, Count{"low", 16}, Count{"medium", 32}, Count{"high", 64},
-                            Count{"highest", 256}};
+constexpr std::array counts{Count{Quality::lowest, 8}, Count{Quality::low, 16}, Count{Quality::medium, 32},
+                            Count{Quality::high, 64}, Count{Quality::highest, 256}};
 
 int points_of(const HemisphereOptions& options) {
     return options.points > 0 ? options.points : level_of(counts, options.quality).points;
@@ -60,26 +60,27 @@ std::vector<float> published_kernel(int points) {
 std::vector<Parameter> HemisphereOptions::parameters() {
     return joined(screen.parameters(),
                   {
-                      {"profile",
-                       "metric: open planes and a normalised mean; published: the tutorial's test against the "
-                       "surface's own depth",
-                       &profile,
-                       "",
-                       {},
-                       {},
-                       {"metric", "published"}},
-                      {"quality",
-                       "points: lowest 8, low 16, medium 32, high 64, highest 256",
-                       &quality,
-                       "",
-                       {},
-                       {},
-                       {"lowest", "low", "medium", "high", "highest"}},
-                      {"points", "points of the kernel; 0 = as the quality says", &points, "", 0, 1024},
-                      {"renormalise",
-                       "samples that met nothing known count as those that did, where at least half did; else as open",
-                       &renormalise},
-                      {"blurs", "iterations of the published 7-tap blur, before denoise", &blurs, "", 0, 16},
+                      {.name = "profile",
+                       .help = "metric has open planes and a normalised mean; published tests against the surface's "
+                               "own depth, as the tutorial does",
+                       .value = OneOf(&profile, profile_words)},
+                      {.name = "quality",
+                       .help = "number of points: lowest 8, low 16, medium 32, high 64, highest 256",
+                       .value = OneOf(&quality, quality_words)},
+                      {.name = "points",
+                       .help = "points of the kernel; 0 = as the quality says",
+                       .value = &points,
+                       .low = 0,
+                       .high = 1024},
+                      {.name = "renormalise",
+                       .help = "samples that met nothing known are left out where at least half met something; "
+                               "otherwise they count as open",
+                       .value = &renormalise},
+                      {.name = "blurs",
+                       .help = "iterations of the published 7-tap blur, before denoise",
+                       .value = &blurs,
+                       .low = 0,
+                       .high = 16},
                   });
 }
 
@@ -87,7 +88,7 @@ Hemisphere::Hemisphere(gpu::Device& device, const HemisphereOptions& options)
     : ScreenMethod(device, checked(options).screen), options_(options) {}
 
 void Hemisphere::add_passes(ScreenTables& tables) const {
-    const bool published = options_.profile == "published";
+    const bool published = options_.profile == Profile::published;
     const int points = points_of(options_);
     const auto kernel = published ? published_kernel(points) : hemisphere_kernel(points);
     const int table = tables.add_buffer(

@@ -10,9 +10,9 @@ namespace scanshade {
 
 struct HemisphereOptions {
     ScreenOptions screen;
-    std::string profile = "metric";
-    std::string quality = "medium"; ///< lowest 8 points, low 16, medium 32, high 64, highest 256
-    int points = 0;                 ///< above 0: instead of the quality's
+    Profile profile = Profile::metric;
+    Quality quality = Quality::medium; ///< lowest 8 points, low 16, medium 32, high 64, highest 256
+    int points = 0;                    ///< above 0: instead of the quality's
     bool renormalise = false;
     int blurs = 0; ///< iterations of the published blur, before denoise
 

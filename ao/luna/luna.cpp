@@ -26,11 +26,11 @@ constexpr std::array<std::array<int, 3>, 14> directions{{{1, 1, 1},
                                                          {0, 0, 1}}};
 
 struct Count {
-    const char* quality;
+    Quality quality;
     int sets, count;
 };
-constexpr std::array counts{Count{"lowest", 1, 8}, Count{"low", 1, 14}, Count{"medium", 2, 14}, Count{"high", 4, 14},
-                            Count{"highest", 16, 14}};
+constexpr std::array counts{Count{Quality::lowest, 1, 8}, Count{Quality::low, 1, 14}, Count{Quality::medium, 2, 14},
+                            Count{Quality::high, 4, 14}, Count{Quality::highest, 16, 14}};
 
 /// What stands less than `epsilon` in front of the surface does not occlude; occlusion ends between the other two.
 struct Falloff {
@@ -42,7 +42,7 @@ Falloff falloff_of(float radius_m) { return {0.02F * radius_m, 0.4F * radius_m, 
 /// The companion code's power and blur belong to its look.
 LunaOptions resolved(LunaOptions options) {
     options = checked(std::move(options));
-    if (options.profile == "metric")
+    if (options.profile == Profile::metric)
         return options;
     options.screen.power *= 6;
     options.screen.denoise = false;
@@ -68,25 +68,22 @@ std::vector<Parameter> LunaOptions::parameters() {
     return joined(
         screen.parameters(),
         {
-            {"profile",
-             "metric: the radius is respected; published: the companion code's constants (in metres), power 6 and four "
-             "blurs",
-             &profile,
-             "",
-             {},
-             {},
-             {"metric", "published"}},
-            {"quality",
-             "vectors: lowest 8, low the published 14, medium 28, high 56, highest 224",
-             &quality,
-             "",
-             {},
-             {},
-             {"lowest", "low", "medium", "high", "highest"}},
-            {"renormalise",
-             "samples that met nothing known count as those that did, where at least half did; else as open",
-             &renormalise},
-            {"blurs", "iterations of the published 11-tap blur, before denoise", &blurs, "", 0, 16},
+            {.name = "profile",
+             .help = "metric respects the radius; published takes the companion code's constants in metres, power 6 "
+                     "and four blurs",
+             .value = OneOf(&profile, profile_words)},
+            {.name = "quality",
+             .help = "number of vectors: lowest 8, low 14 as published, medium 28, high 56, highest 224",
+             .value = OneOf(&quality, quality_words)},
+            {.name = "renormalise",
+             .help = "samples that met nothing known are left out where at least half met something; otherwise they "
+                     "count as open",
+             .value = &renormalise},
+            {.name = "blurs",
+             .help = "iterations of the published 11-tap blur, before denoise",
+             .value = &blurs,
+             .low = 0,
+             .high = 16},
         });
 }
 
@@ -98,15 +95,15 @@ void Luna::add_passes(ScreenTables& tables) const {
     const auto vectors = luna_vectors(count.sets, count.count);
     const int table = tables.add_buffer(
         {"vectors", vectors.size() * 4, gpu::BufferRow::Host::none, gpu::BufferRow::Texels::rgba32f, vectors});
-    tables.add_pass(
-        "generate", "luna/generate", {screen_depth, screen_surfaces, screen_noise, table}, {screen_raw},
-        {{shared::spec_published, options_.profile == "published"}, {shared::spec_renormalise, options_.renormalise}});
+    tables.add_pass("generate", "luna/generate", {screen_depth, screen_surfaces, screen_noise, table}, {screen_raw},
+                    {{shared::spec_published, options_.profile == Profile::published},
+                     {shared::spec_renormalise, options_.renormalise}});
     tables.add_blurs(options_.blurs, {0.16397F, 0.15136F, 0.11906F, 0.07981F, 0.04559F, 0.02219F}); // sigma 2.5 pixels
 }
 
 std::vector<std::byte> Luna::constants(const shared::ScreenConstants& screen) const {
     const Count& count = level_of(counts, options_.quality);
-    const Falloff how = options_.profile == "published" ? published_m : falloff_of(screen.radius);
+    const Falloff how = options_.profile == Profile::published ? published_m : falloff_of(screen.radius);
     return bytes_of(shared::LunaConstants{screen, count.sets, count.count, how.epsilon, how.fade_from, how.fade_to});
 }
 

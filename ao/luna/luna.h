@@ -10,8 +10,8 @@ namespace scanshade {
 
 struct LunaOptions {
     ScreenOptions screen;
-    std::string profile = "metric";
-    std::string quality = "low"; ///< lowest 8 vectors, low the published 14, medium 28, high 56, highest 224
+    Profile profile = Profile::metric;
+    Quality quality = Quality::low; ///< lowest 8 vectors, low the published 14, medium 28, high 56, highest 224
     bool renormalise = false;
     int blurs = 0; ///< iterations of the published blur, before denoise
 

@@ -104,10 +104,10 @@ void aim(RayBundle& bundle, std::span<const CosineDirections::Direction> eight, 
 } // namespace
 
 Falloff falloff_named(std::string_view name) {
-    const auto found = std::find(falloff_names.begin(), falloff_names.end(), name);
-    if (found == falloff_names.end())
+    Falloff falloff{};
+    if (!OneOf(&falloff, falloff_words).set(name))
         throw Misuse(fmt::format("no falloff '{}', there are: hard, quad, lin", name));
-    return static_cast<Falloff>(found - falloff_names.begin());
+    return falloff;
 }
 
 CosineDirections::CosineDirections(int rays, int seed) : rays_(rays), sets_(std::clamp(65536 / rays, 1, 256)) {

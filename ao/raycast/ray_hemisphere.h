@@ -2,6 +2,7 @@
 #pragma once
 
 #include "ao/raycast/ray_surface.h"
+#include "projection/parameters.h"
 
 #include <cstdint>
 #include <string>
@@ -13,7 +14,8 @@ namespace scanshade {
 /// How much a surface at distance t occludes: hard 1 up to the radius R; quad 1 - t^2 / R^2; lin (R - t) / (0.615 R),
 /// at most 1 (XeGTAO's range).
 enum class Falloff { hard, quad, lin };
-inline constexpr std::array<std::string_view, 3> falloff_names{"hard", "quad", "lin"};
+inline constexpr std::array falloff_words{Named{"hard", Falloff::hard}, Named{"quad", Falloff::quad},
+                                          Named{"lin", Falloff::lin}};
 /// Throws Misuse listing the names.
 [[nodiscard]] Falloff falloff_named(std::string_view name);
 

@@ -22,6 +22,8 @@ namespace {
 using Eigen::Vector3d;
 constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
 
+constexpr std::array mesh_words{Named{"triangles", MeshRays::triangles}, Named{"vertices", MeshRays::vertices}};
+
 RaycastOptions checked(RaycastOptions options) {
     for (const Parameter& row : options.parameters())
         check(row);
@@ -83,49 +85,43 @@ Face face_of(std::span<const Vector3d> vertices, const std::array<int, 3>& trian
 
 std::vector<Parameter> RaycastOptions::parameters() {
     return {
-        {"radius", "occluders farther away do not count", &radius_m, "m", 1e-6, 1e6, {}},
-        {"rays",
-         "per value; the error falls as rays^-3/4, and powers of two spread best; --dump writes each value's standard "
-         "error",
-         &rays,
-         "",
-         1,
-         65536,
-         {}},
-        {"falloff",
-         "how much an occluder counts with its distance: all, 1 - t^2 / R^2, or (R - t) / (0.615 R)",
-         &falloff,
-         "",
-         0,
-         0,
-         {falloff_names.begin(), falloff_names.end()}},
-        {"thickness",
-         "of depth images: how far surfaces reach behind their outlines; 0 = not at all, 1000 = up to what lies behind",
-         &thickness_m,
-         "m",
-         0,
-         1e6,
-         {}},
-        {"mesh",
-         "of meshes: rays from triangles, averaged to their vertices, or from vertices",
-         &mesh,
-         "",
-         0,
-         0,
-         {"triangles", "vertices"}},
-        {"seed", "of the rays' scrambling", &seed, "", 0, 2147483647, {}},
+        {.name = "radius",
+         .help = "surfaces farther away than this do not occlude",
+         .value = &radius_m,
+         .unit = "m",
+         .low = 1e-6,
+         .high = 1e6},
+        {.name = "rays",
+         .help = "rays per value; powers of two spread best, and the error falls as rays^-3/4. --dump writes each "
+                 "value's standard error",
+         .value = &rays,
+         .low = 1,
+         .high = 65536},
+        {.name = "falloff",
+         .help = "how much an occluder at distance t counts: hard 1, quad 1 - t^2 / R^2, lin (R - t) / (0.615 R)",
+         .value = OneOf(&falloff, falloff_words)},
+        {.name = "thickness",
+         .help = "of depth images: how far surfaces reach behind their outlines; 0 = not at all, 1000 = up to what "
+                 "lies behind",
+         .value = &thickness_m,
+         .unit = "m",
+         .low = 0,
+         .high = 1e6},
+        {.name = "mesh",
+         .help = "of meshes: rays from triangles, averaged to their vertices, or from vertices",
+         .value = OneOf(&mesh, mesh_words)},
+        {.name = "seed", .help = "scrambles the rays", .value = &seed, .low = 0, .high = 2147483647},
     };
 }
 
 Raycast::Raycast(RaycastOptions options)
-    : options_(checked(std::move(options))), falloff_(falloff_named(options_.falloff)),
-      directions_(options_.rays, options_.seed) {}
+    : options_(checked(std::move(options))), directions_(options_.rays, options_.seed) {}
 
 /// Values of start_of(i) for i below count; where it returns none, NaN.
 template <class StartOf>
 std::vector<float> Raycast::cast(const RaySurface& surface, std::size_t count, StartOf&& start_of) {
-    const RayHemisphere hemisphere(surface, directions_, options_.radius_m, falloff_ != Falloff::hard);
-    const auto kind = static_cast<std::size_t>(falloff_);
+    const RayHemisphere hemisphere(surface, directions_, options_.radius_m, options_.falloff != Falloff::hard);
+    const auto kind = static_cast<std::size_t>(options_.falloff);
     std::vector<float> values(count, nothing);
     standard_error_.assign(count, nothing);
     tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
@@ -215,7 +211,7 @@ std::vector<float> Raycast::of_mesh(const PointSet& points) {
                 vertex_normals[static_cast<std::size_t>(corner)] += face.area * face.normal;
             }
     }
-    if (options_.mesh == "vertices") {
+    if (options_.mesh == MeshRays::vertices) {
         auto values = cast(surface, points.points.size(), [&](std::size_t i) -> std::optional<RayStart> {
             const double length = vertex_normals[i].norm();
             if (!(length > 0))

@@ -7,13 +7,16 @@
 
 namespace scanshade {
 
+/// Where the rays of a mesh start.
+enum class MeshRays { triangles, vertices };
+
 /// What a person sets.
 struct RaycastOptions {
     double radius_m = 0.5;
-    int rays = 256;               ///< per pixel, point, vertex or triangle
-    std::string falloff = "hard"; ///< a name of falloff_names
-    double thickness_m = 0;       ///< of depth images: how far surfaces reach behind their outlines; see surface_of()
-    std::string mesh = "triangles";
+    int rays = 256; ///< per pixel, point, vertex or triangle
+    Falloff falloff = Falloff::hard;
+    double thickness_m = 0; ///< of depth images: how far surfaces reach behind their outlines; see surface_of()
+    MeshRays mesh = MeshRays::triangles;
     int seed = 1;
 
     [[nodiscard]] std::vector<Parameter> parameters();
@@ -47,7 +50,6 @@ class Raycast final : public Method, public PointMethod {
     std::vector<float> cast(const RaySurface& surface, std::size_t count, StartOf&& start_of);
 
     RaycastOptions options_;
-    Falloff falloff_;
     CosineDirections directions_;
     Timings timings_;
     std::vector<float> standard_error_;

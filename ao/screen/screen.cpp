@@ -51,11 +51,22 @@ std::span<const Neighbour> checked_neighbours(const View& view) {
 
 std::vector<Parameter> ScreenOptions::parameters() {
     return {
-        {"radius", "surfaces farther than this do not occlude", &radius, "m", 1e-6, 1e6},
-        {"strength", "share of the occlusion that is shown, before the power", &strength, "", 0, 2},
-        {"power", "exponent of the visibility shown", &power, "", 0.25, 8},
-        {"denoise", "mean over the 5x5 pixels around that lie on the same plane", &denoise},
-        {"seed", "another number, another noise pattern", &seed, "", 0, 1e6},
+        {.name = "radius",
+         .help = "surfaces farther away than this do not occlude",
+         .value = &radius,
+         .unit = "m",
+         .low = 1e-6,
+         .high = 1e6},
+        {.name = "strength",
+         .help = "the share of the occlusion that is shown, before the power",
+         .value = &strength,
+         .low = 0,
+         .high = 2},
+        {.name = "power", .help = "exponent of the visibility", .value = &power, .low = 0.25, .high = 8},
+        {.name = "denoise",
+         .help = "takes the mean over those of the 5x5 pixels around that lie on the same plane",
+         .value = &denoise},
+        {.name = "seed", .help = "another number gives another noise pattern", .value = &seed, .low = 0, .high = 1e6},
     };
 }
 

@@ -4,6 +4,7 @@
 
 #include "ao/gpu/program.h"
 #include "ao/method.h"
+#include "ao/quality.h"
 #include "projection/error.h"
 #include "shaders/shared/screen.h"
 
@@ -14,6 +15,10 @@
 #include <vector>
 
 namespace scanshade {
+
+/// Whether a room measures visibility within the radius, or keeps the constants of what it follows.
+enum class Profile { metric, published };
+inline constexpr std::array profile_words{Named{"metric", Profile::metric}, Named{"published", Profile::published}};
 
 /// The settings all these rooms have. A room keeps one in its own Options and appends its rows.
 struct ScreenOptions {
@@ -98,13 +103,13 @@ class ScreenMethod : public Method {
     Timings timings_;
 };
 
-/// The row of that quality; the choices of the parameter row are those of the table.
-template <class Levels>
-[[nodiscard]] const auto& level_of(const Levels& levels, const std::string& quality) {
+/// The row of that quality. The table has a row for every one.
+template <class Levels, class Quality>
+[[nodiscard]] const auto& level_of(const Levels& levels, const Quality& quality) {
     for (const auto& level : levels)
         if (quality == level.quality)
             return level;
-    throw Misuse("no quality '" + quality + "'");
+    throw Misuse("no such quality");
 }
 
 /// The rows all rooms have, then a room's own.

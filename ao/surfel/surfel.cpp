@@ -11,12 +11,12 @@ namespace scanshade {
 namespace {
 
 struct Level {
-    const char* quality;
+    Quality quality;
     int slices, steps;
     bool alike = false; ///< all surfaces are taken to be equally thick, and clean depth's narrow holes stay
 };
-constexpr std::array levels{Level{"lowest", 1, 4, true}, Level{"low", 1, 4}, Level{"medium", 1, 8}, Level{"high", 2, 8},
-                            Level{"highest", 2, 16}};
+constexpr std::array levels{Level{Quality::lowest, 1, 4, true}, Level{Quality::low, 1, 4}, Level{Quality::medium, 1, 8},
+                            Level{Quality::high, 2, 8}, Level{Quality::highest, 2, 16}};
 
 /// Slices and steps of the quality, where none are given.
 SurfelOptions resolved(SurfelOptions options) {
@@ -121,22 +121,25 @@ int add_surfels(ScreenTables& tables, int layers) {
 std::vector<Parameter> SurfelOptions::parameters() {
     return joined(
         screen.parameters(),
-        {{"quality",
-          "reads a pixel: lowest 8, of surfaces taken to be all equally thick (RMSE 0.103, 0.37 of high's time on a "
-          "CPU), "
-          "low 8 (0.095, 0.5), medium 16 (0.085, 0.65), high 32 (0.081), highest 64 (0.080, 1.6)",
-          &quality,
-          "",
-          {},
-          {},
-          {"lowest", "low", "medium", "high", "highest"}},
-         {"downsampled",
-          "march from every other pixel of every other row, and fill in the rest: lowest RMSE 0.109, 0.18 of high's "
-          "time on "
-          "a CPU, low 0.101, 0.27, high 0.085, 0.41",
-          &downsampled},
-         {"slices", "of the hemisphere; 0 = the quality's", &slices, "", 0, 64},
-         {"steps", "reads on either side of a slice; 0 = the quality's", &steps, "", 0, 256}});
+        {{.name = "quality",
+          .help =
+              "reads per pixel: lowest 8, low 8, medium 16, high 32, highest 64. RMSE 0.103, 0.095, 0.085, 0.081, "
+              "0.080; time on a CPU 0.37, 0.5, 0.65, 1, 1.6 of high's. lowest takes all surfaces to be equally thick",
+          .value = OneOf(&quality, quality_words)},
+         {.name = "downsampled",
+          .help = "samples every other pixel of every other row and fills in the rest: lowest RMSE 0.109, low 0.101, "
+                  "high 0.085; time on a CPU 0.18, 0.27, 0.41 of high's",
+          .value = &downsampled},
+         {.name = "slices",
+          .help = "slices of the hemisphere; 0 = as the quality says",
+          .value = &slices,
+          .low = 0,
+          .high = 64},
+         {.name = "steps",
+          .help = "reads on either side of a slice; 0 = as the quality says",
+          .value = &steps,
+          .low = 0,
+          .high = 256}});
 }
 
 Surfel::Surfel(gpu::Device& device, const SurfelOptions& options)

@@ -22,9 +22,9 @@ namespace scanshade {
 /// What a person sets. Reads per pixel = 2 x slices x steps.
 struct SurfelOptions {
     ScreenOptions screen{.tangent_sine = 0.01F, .tangent_sigmas = 0};
-    std::string quality = "high"; ///< low 8 reads, medium 16, high 32, highest 64; lowest 8, and no look at widths
-    bool downsampled = false;     ///< a quarter of the pixels are sampled
-    int slices = 0, steps = 0;    ///< above 0: instead of the quality's
+    Quality quality = Quality::high; ///< low 8 reads, medium 16, high 32, highest 64; lowest 8, and no look at widths
+    bool downsampled = false;        ///< a quarter of the pixels are sampled
+    int slices = 0, steps = 0;       ///< above 0: instead of the quality's
 
     [[nodiscard]] std::vector<Parameter> parameters();
 };

@@ -61,13 +61,13 @@ class Attempts {
             say(fmt::format("left to another run: {}", busy.what()));
             return false;
         } catch (const Outage& failure) {
-            say(fmt::format("failed: {}", failure.what()));
+            warn(fmt::format("failed: {}", failure.what()));
             add(unfinished);
         } catch (const Error& failure) {
-            say(fmt::format("failed: {}", failure.what()));
+            warn(fmt::format("failed: {}", failure.what()));
             add(nothing_done);
         } catch (const std::exception& failure) {
-            say(fmt::format("failed: internal error: {}", failure.what()));
+            warn(fmt::format("failed: internal error: {}", failure.what()));
             add(internal_error);
         }
         return true;

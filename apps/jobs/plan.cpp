@@ -4,8 +4,8 @@
 #include "apps/method_settings.h"
 #include "apps/slice.h"
 #include "io/captures/capture.h"
-#include "io/images/format.h"
 #include "io/captures/layouts.h"
+#include "io/images/format.h"
 #include "io/text.h"
 #include "projection/error.h"
 
@@ -127,26 +127,37 @@ std::vector<double> costs_of(const Capture& capture, const std::vector<std::size
 // ---------------------------------------------------------------------------------------------------- the command
 
 /// Settings of `run` that are no part of a plan: where and how it runs, and budgets, which are chosen by the clock.
-constexpr std::array not_planned = {"out",  "overwrite", "resume", "retry",     "shard",
-                                    "dump", "device",    "log",    "max-error", "max-ms"};
+constexpr std::array not_planned = {"out",    "overwrite", "resume",    "retry",  "shard", "dump",
+                                    "device", "log",       "max-error", "max-ms", "quiet"};
 
 class PlanCommand final : public Command {
   public:
     Words words() override { return {"DATASET", "folders searched for captures, or captures", &datasets_, 1, 1 << 20}; }
 
     std::vector<Stage> stages() override {
-        std::vector<Stage> all = {
-            {"job",
-             {{"out", "folder of the job, on a disk that every machine sees; its results go there", &out_},
-              {"block", "captures of more frames than this are cut into blocks of about so many", &block_, "", 1, 1e9},
-              {"overwrite", "replaces an earlier plan; results stay, and what the new plan leaves valid is kept",
-               &overwrite_}}}};
+        std::vector<Stage> all = {{"job",
+                                   {{.name = "out",
+                                     .help = "folder of the job and of its results, on a disk that every machine sees",
+                                     .value = &out_,
+                                     .common = true},
+                                    {.name = "block",
+                                     .help = "captures of more frames than this are cut into blocks of about this many",
+                                     .value = &block_,
+                                     .low = 1,
+                                     .high = 1e9,
+                                     .common = true},
+                                    {.name = "overwrite",
+                                     .help = "replaces an earlier plan; results that stay valid are kept",
+                                     .value = &overwrite_,
+                                     .common = true}}}};
         for (Stage& stage : run_->stages()) {
             std::erase_if(stage.rows, [](const Parameter& row) { return std::ranges::count(not_planned, row.name); });
             all.push_back(std::move(stage));
         }
         return all;
     }
+
+    void take_preset() override { run_->take_preset(); }
 
     int run() override {
         if (out_.empty())
@@ -155,7 +166,7 @@ class PlanCommand final : public Command {
             throw Misuse(out_ + " is a job already: --overwrite plans it anew and keeps its results");
         Plan plan;
         plan.settings = settings();
-        const CaptureOptions options{value("camera"), value("depth-scale"), std::stod(value("association-limit"))};
+        const CaptureOptions options{value("camera"), value("depth-scale"), number_of(row_of("association-limit"))};
         for (const std::string& dataset : datasets_)
             find_captures(dataset, options, [&](Found found) { add(std::move(found), plan); });
         for (const std::string& refused : plan.refused)
@@ -168,12 +179,13 @@ class PlanCommand final : public Command {
     }
 
   private:
-    std::string value(const std::string& name) {
+    Parameter row_of(std::string_view name) {
         for (const Stage& stage : run_->stages())
             if (const Parameter* row = row_named(stage.rows, name))
-                return value_text(*row);
-        return "";
+                return *row;
+        throw std::logic_error(fmt::format("run has no row {}", name));
     }
+    std::string value(std::string_view name) { return value_text(row_of(name)); }
 
     /// What differs from the defaults; a camera file by its whole path, since jobs run from anywhere.
     std::vector<std::pair<std::string, std::string>> settings() {

@@ -74,6 +74,11 @@ struct Totals {
     std::map<std::string, Group> reasons;
     std::map<std::string, std::size_t> frames_by_host;
 
+    [[nodiscard]] std::size_t in(Standing which) const {
+        const auto found = standing.find(which);
+        return found == standing.end() ? 0 : found->second;
+    }
+
     void add(const Task& task, const Reading& reading) {
         ++tasks;
         ++standing[reading.standing];
@@ -113,27 +118,32 @@ std::vector<std::pair<std::string, Totals::Group>> most_frequent_first(const Tot
     return groups;
 }
 
+std::size_t left_of(const Totals& totals) { return totals.frames - std::min(totals.frames, totals.ok + totals.failed); }
+double work_done(const Totals& totals) { return totals.cost > 0 ? totals.done_cost / totals.cost : 1; }
+
+json failures_json(const Totals& totals) {
+    json failures = json::array();
+    for (const auto& [reason, group] : most_frequent_first(totals))
+        failures.push_back({{"reason", reason}, {"frames", group.frames}, {"first", group.example}});
+    return failures;
+}
+
 void print(const Totals& totals, std::size_t refused) {
-    const auto standing = [&](Standing which) {
-        const auto found = totals.standing.find(which);
-        return found == totals.standing.end() ? 0 : found->second;
-    };
-    fmt::print("tasks   {} done, {} running, {} begun, {} waiting, of {}\n", standing(Standing::done),
-               standing(Standing::running), standing(Standing::begun), standing(Standing::waiting), totals.tasks);
-    fmt::print("frames  {} ok, {} failed, {} left, of {}\n", totals.ok, totals.failed,
-               totals.frames - std::min(totals.frames, totals.ok + totals.failed), totals.frames);
-    fmt::print("work    {:.1f} %\n", totals.cost > 0 ? 100 * totals.done_cost / totals.cost : 100);
+    fmt::print("tasks   {} done, {} running, {} begun, {} waiting, of {}\n", totals.in(Standing::done),
+               totals.in(Standing::running), totals.in(Standing::begun), totals.in(Standing::waiting), totals.tasks);
+    fmt::print("frames  {} ok, {} failed, {} left, of {}\n", totals.ok, totals.failed, left_of(totals), totals.frames);
+    fmt::print("work    {:.1f} %\n", 100 * work_done(totals));
     if (refused > 0)
-        fmt::print("refused {} captures when it was planned\n", refused);
+        fmt::print("refused {} captures, when the job was planned\n", refused);
     for (const auto& [host, frames] : totals.frames_by_host)
-        fmt::print("  {:>8} frames last by {}\n", frames, host);
+        fmt::print("  {:>8} frames by {}\n", frames, host);
     for (const auto& [reason, group] : most_frequent_first(totals))
         fmt::print("  {:>8} failed: {} (first: {})\n", group.frames, reason, group.example);
 }
 
 Plan plan_of(const std::vector<std::string>& words) {
     if (!is_job(words.front()))
-        throw Misuse(words.front() + " is no job: `scanshade plan DATASET -o JOB` makes one");
+        throw Misuse(words.front() + " is not a job: `scanshade plan DATASET -o JOB` makes one");
     return read_plan(words.front());
 }
 
@@ -143,24 +153,68 @@ class Status final : public Command {
   public:
     Words words() override { return {"JOB", "the job's folder", &job_, 1, 1}; }
 
+    std::vector<Stage> stages() override {
+        return {{"output", {{.name = "json", .help = "prints JSON instead of lines", .value = &as_json_}}}};
+    }
+
     int run() override {
         const Plan plan = plan_of(job_);
         Totals totals;
-        std::vector<std::string> running;
+        std::vector<Running> running;
         for (const Task& task : plan.tasks) {
             const Reading reading = read_task(job_.front(), task);
             totals.add(task, reading);
             if (reading.standing == Standing::running)
-                running.push_back(fmt::format("  running {} {}: {} of {} frames, {} since {}", task.name, task.block(),
-                                              reading.rows.size(), task.frames, reading.host, reading.since));
+                running.push_back({&task, reading.rows.size(), reading.host, reading.since});
         }
-        print(totals, plan.refused.size());
-        fmt::print("{}{}", fmt::join(running, "\n"), running.empty() ? "" : "\n");
+        if (as_json_)
+            fmt::print("{}\n", text_of(status_json(totals, running, plan)));
+        else
+            print_all(totals, running, plan);
         return code_of(totals);
     }
 
   private:
+    /// A task that a process works at now.
+    struct Running {
+        const Task* task;
+        std::size_t frames; ///< done
+        std::string host, since;
+    };
+
+    static void print_all(const Totals& totals, const std::vector<Running>& running, const Plan& plan) {
+        print(totals, plan.refused.size());
+        for (const Running& each : running)
+            fmt::print("  running {} {}: {} of {} frames, {} since {}\n", each.task->name, each.task->block(),
+                       each.frames, each.task->frames, each.host, each.since);
+    }
+
+    static json status_json(const Totals& totals, const std::vector<Running>& running, const Plan& plan) {
+        json tasks = json::array();
+        for (const Running& each : running)
+            tasks.push_back({{"task", each.task->name},
+                             {"block", each.task->block()},
+                             {"frames", each.frames},
+                             {"of", each.task->frames},
+                             {"host", each.host},
+                             {"since", each.since}});
+        return {{"tasks",
+                 {{"done", totals.in(Standing::done)},
+                  {"running", totals.in(Standing::running)},
+                  {"begun", totals.in(Standing::begun)},
+                  {"waiting", totals.in(Standing::waiting)},
+                  {"of", totals.tasks}}},
+                {"frames",
+                 {{"ok", totals.ok}, {"failed", totals.failed}, {"left", left_of(totals)}, {"of", totals.frames}}},
+                {"work_done", work_done(totals)},
+                {"frames_by_host", totals.frames_by_host},
+                {"failures", failures_json(totals)},
+                {"running", tasks},
+                {"refused", plan.refused}};
+    }
+
     std::vector<std::string> job_;
+    bool as_json_ = false;
 };
 
 class Merge final : public Command {
@@ -190,11 +244,9 @@ class Merge final : public Command {
 
   private:
     static void write_manifest(const fs::path& job, const Plan& plan, const Totals& totals) {
-        json settings = json::object(), failures = json::array();
+        json settings = json::object();
         for (const auto& [name, value] : plan.settings)
             settings[name] = value;
-        for (const auto& [reason, group] : most_frequent_first(totals))
-            failures.push_back({{"reason", reason}, {"frames", group.frames}, {"first", group.example}});
         const json text{{"program", "scanshade"},
                         {"version", SCANSHADE_VERSION},
                         {"settings", settings},
@@ -205,7 +257,7 @@ class Merge final : public Command {
                           {"failed", totals.failed},
                           {"stage_ms", stage_json(totals.ms)}}},
                         {"frames_by_host", totals.frames_by_host},
-                        {"failures", failures},
+                        {"failures", failures_json(totals)},
                         {"refused", plan.refused}};
         write_atomically(job / "manifest.json", text_of(text) + "\n");
     }

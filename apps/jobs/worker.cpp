@@ -159,7 +159,7 @@ int supervise(int workers, const std::function<int(const Shift&)>& work) {
             Post& post = found.mapped();
             const bool killed = WIFSIGNALED(status);
             if (killed)
-                say(fmt::format("worker {} was killed: {}", post.shift.worker + 1, strsignal(WTERMSIG(status))));
+                warn(fmt::format("worker {} was killed: {}", post.shift.worker + 1, strsignal(WTERMSIG(status))));
             if (!interrupted && goes_on(post, status)) {
                 posts.emplace(start(post, signals, work), post);
                 continue;

@@ -192,13 +192,15 @@ json bench_json(const BenchReport& report) {
 }
 
 Front front_of(const BenchReport& report) {
-    Front front{report.device, {}, {}};
+    Front front{report.device, {}, {}, {}, {}};
     for (const BenchGroup& group : report.groups) {
         front.made_by[group.sensor] = made_by(report, group);
         std::vector<Priced>& points = front.points[group.sensor];
         for (std::size_t i = 0; i < group.measured.size(); ++i)
-            if (group.front[i])
-                points.push_back(priced(group.measured[i]));
+            if (const Priced point = priced(group.measured[i]); group.front[i])
+                points.push_back(point);
+            else if (std::isfinite(point.rms) && std::isfinite(point.ns_per_pixel))
+                front.others[group.sensor].push_back(point);
         std::ranges::stable_sort(points, {}, &Priced::ns_per_pixel);
     }
     return front;

@@ -35,7 +35,7 @@ Free free_setting(const std::vector<Parameter>& rows, const std::string& method,
         throw Misuse(fmt::format("free: the method {} has no setting '{}'", method, name));
     if (!std::holds_alternative<float*>(row->value) && !std::holds_alternative<double*>(row->value))
         throw Misuse(fmt::format("free: {} is no real number; only those can be fitted", name));
-    const double start = std::stod(value_text(*row));
+    const double start = number_of(*row);
     const double span = std::isfinite(row->high - row->low) ? row->high - row->low : 1;
     return {name, start, start != 0 ? 0.25 * std::abs(start) : 0.05 * std::min(span, 1.0), row->low, row->high};
 }
@@ -173,18 +173,33 @@ class Calibrate final : public Command {
             names.emplace_back(row.name);
         std::vector<Stage> all{
             {"captures",
-             {{"held-out", "captures to judge the result on, with commas: none of the training ones", &held_out_},
-              {"frames", "frames taken of each capture, spread evenly", &request_.frames, "", 1, 100000},
-              {"depth-noise", "as run takes it: auto (measured), none, kinect, tof or FLOOR,PER_Z2",
-               &request_.depth_noise}}},
+             {{.name = "held-out",
+               .help = "captures to judge the result on, with commas: none of the training ones",
+               .value = &held_out_},
+              {.name = "frames",
+               .help = "frames taken of each capture, spread evenly",
+               .value = &request_.frames,
+               .low = 1,
+               .high = 100000},
+              {.name = "depth-noise",
+               .help = "as run takes it: auto (measured), none, kinect, tof or FLOOR,PER_Z2",
+               .value = &request_.depth_noise}}},
             {"method",
-             {{.name = "method", .help = "whose settings are fitted", .value = &method_, .choices = names},
-              {"free", "names of its settings to fit, with commas; the others stay as given", &free_},
-              {"evaluations", "how many steps the search may take", &evaluations_, "", 1, 100000},
-              {"device", "index or part of the name of a Vulkan device; empty = the fastest kind", &device_}}},
+             {{.name = "method", .help = "the method whose settings are fitted", .value = &method_, .choices = names},
+              {.name = "free",
+               .help = "names of its settings to fit, with commas; the others stay as given",
+               .value = &free_},
+              {.name = "evaluations",
+               .help = "how many steps the search may take",
+               .value = &evaluations_,
+               .low = 1,
+               .high = 100000},
+              {.name = "device",
+               .help = "index of a Vulkan device, or a part of its name; empty = the fastest kind",
+               .value = &device_}}},
             {"output",
-             {{"out", "JSON file of the fitted settings, as `run --settings` takes it", &out_},
-              {"overwrite", "replace an earlier file", &overwrite_}}}};
+             {{.name = "out", .help = "JSON file of the fitted settings, as `run --settings` takes it", .value = &out_},
+              {.name = "overwrite", .help = "replaces an earlier file", .value = &overwrite_}}}};
         for (const auto& [name, setup] : setups_)
             all.push_back(method_stage(name, *setup));
         return all;

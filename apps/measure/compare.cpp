@@ -42,19 +42,26 @@ class Compare final : public Command {
   public:
     Words words() override {
         return {"PATH",
-                "A and B: runs' outputs, folders of maps, maps, clouds with the field ambient_occlusion, or as B a "
-                "generated "
-                "capture, whose truth is taken",
+                "A and B: results of runs, folders of maps, maps, or clouds with the field ambient_occlusion. B may be "
+                "a generated capture: its truth is taken",
                 &paths_, 1, 2};
     }
 
     std::vector<Stage> stages() override {
-        return {{"input",
-                 {{"truth", "A is compared with the truth of the generated capture that it was made from", &truth_}}},
-                {"output",
-                 {{"out", "folder for difference/NAME.png, compare.csv and compare.json", &out_},
-                  {"scale", "difference shown in full blue (A too dark) or red (too bright)", &scale_, "", 1e-3, 1},
-                  {"overwrite", "replace an earlier comparison", &overwrite_}}}};
+        return {
+            {"input",
+             {{.name = "truth",
+               .help = "compares A with the truth of the generated capture that A was made from",
+               .value = &truth_}}},
+            {"output",
+             {{.name = "out", .help = "folder for difference/NAME.png, compare.csv and compare.json", .value = &out_},
+              {.name = "scale",
+               .help = "the difference that is shown in full blue (A too dark) or full red (A too bright)",
+               .value = &scale_,
+               .low = 1e-3,
+               .high = 1},
+              {.name = "json", .help = "prints JSON instead of tables", .value = &as_json_},
+              {.name = "overwrite", .help = "replaces an earlier comparison", .value = &overwrite_}}}};
     }
 
     int run() override {
@@ -125,11 +132,15 @@ class Compare final : public Command {
             if (row.why.empty())
                 good.push_back(row.difference);
         const Difference all = total(good, pairs);
-        print_table(rows, all);
-        print_confidence();
+        if (as_json_) {
+            fmt::print("{}\n", text_of(report_json(a, b, rows, all)));
+        } else {
+            print_table(rows, all);
+            print_confidence();
+        }
         const std::size_t alone = a.files.size() + b.files.size() - 2 * rows.size();
         if (alone > 0)
-            say(fmt::format("{} maps have no partner of their name", alone));
+            say(fmt::format("{} maps are in one of the two only", alone));
         if (!out_.empty())
             write_reports(a, b, rows, all);
         if (good.size() == rows.size())
@@ -164,26 +175,30 @@ class Compare final : public Command {
         return classes;
     }
 
-    void write_reports(const MapSet& a, const MapSet& b, const std::vector<Row>& rows, const Difference& all) const {
-        std::string csv = "image," + figure_csv_heads() + ",why\n";
+    json report_json(const MapSet& a, const MapSet& b, const std::vector<Row>& rows, const Difference& all) const {
         json images = json::array();
-        for (const Row& row : rows) {
-            csv += csv_field(row.name) + "," + figure_csv(row.difference) + "," + csv_field(row.why) + "\n";
+        for (const Row& row : rows)
             images.push_back(row.why.empty() ? json{{"image", row.name}, {"difference", to_json(row.difference)}}
                                              : json{{"image", row.name}, {"why", row.why}});
-        }
-        const json text{{"a", a.path.string()}, {"b", b.path.string()},  {"b_is", b.kind},
-                        {"scale", scale_},      {"total", to_json(all)}, {"by_confidence", confidence_json()},
-                        {"images", images}};
+        return {{"a", a.path.string()}, {"b", b.path.string()},  {"b_is", b.kind},
+                {"scale", scale_},      {"total", to_json(all)}, {"by_confidence", confidence_json()},
+                {"images", images}};
+    }
+
+    void write_reports(const MapSet& a, const MapSet& b, const std::vector<Row>& rows, const Difference& all) const {
+        std::string csv = "image," + figure_csv_heads() + ",why\n";
+        for (const Row& row : rows)
+            csv += csv_field(row.name) + "," + figure_csv(row.difference) + "," + csv_field(row.why) + "\n";
         write_atomically(fs::path(out_) / "compare.csv", csv);
-        write_atomically(fs::path(out_) / "compare.json", text_of(text) + "\n"); // last: it says that the rest is there
+        write_atomically(fs::path(out_) / "compare.json",
+                         text_of(report_json(a, b, rows, all)) + "\n"); // last: it says that the rest is there
     }
 
     std::vector<std::string> paths_;
     std::string out_;
     ErrorByClass by_confidence_;
     double scale_ = 0.5;
-    bool truth_ = false, overwrite_ = false;
+    bool truth_ = false, overwrite_ = false, as_json_ = false;
 };
 
 } // namespace

@@ -32,7 +32,7 @@ std::vector<Configuration> levels(const MethodRow& method) {
     if (!quality)
         return {{name, "as it comes", {}}};
     std::vector<Configuration> all;
-    for (const std::string& level : quality->choices)
+    for (const std::string& level : choices_of(*quality))
         all.push_back({name, level, {{"quality", level}}});
     return all;
 }

@@ -19,25 +19,51 @@ bool beats(const Priced& a, const Priced& b) {
 bool equal(const Priced& a, const Priced& b) { return a.ns_per_pixel == b.ns_per_pixel && a.rms == b.rms; }
 bool finite(const Priced& point) { return std::isfinite(point.ns_per_pixel) && std::isfinite(point.rms); }
 
-json point_json(const Priced& point) {
+json to_json(const Configuration& configuration) {
     json settings = json::object();
-    for (const auto& [name, value] : point.configuration.settings)
+    for (const auto& [name, value] : configuration.settings)
         settings[name] = value;
-    return {{"method", point.configuration.method},
-            {"name", point.configuration.name},
-            {"settings", settings},
-            {"ns_per_pixel", point.ns_per_pixel},
-            {"rms", point.rms}};
+    return {{"method", configuration.method}, {"name", configuration.name}, {"settings", settings}};
+}
+
+Configuration configuration_from(const json& text) {
+    Configuration configuration{text.at("method"), text.at("name"), {}};
+    for (const auto& [name, value] : text.at("settings").items())
+        configuration.settings.emplace_back(name, value.get<std::string>());
+    return configuration;
+}
+
+json to_json(const std::vector<Priced>& points) {
+    json list = json::array();
+    for (const Priced& point : points) {
+        json& row = list.emplace_back(to_json(point.configuration));
+        row["ns_per_pixel"] = point.ns_per_pixel;
+        row["rms"] = point.rms;
+    }
+    return list;
 }
 
 Priced point_from(const json& text) {
-    Priced point{{text.at("method"), text.at("name"), {}}, text.at("ns_per_pixel"), text.at("rms")};
-    for (const auto& [name, value] : text.at("settings").items())
-        point.configuration.settings.emplace_back(name, value.get<std::string>());
+    Priced point{configuration_from(text), text.at("ns_per_pixel"), text.at("rms")};
     if (!(point.ns_per_pixel > 0 && point.rms >= 0))
         throw Error(fmt::format("{}: a time above zero and an error of zero or more expected",
                                 point.configuration.full_name()));
     return point;
+}
+
+json to_json(const SequenceGain& gain) {
+    json text{{"made_by", gain.made_by}};
+    text.update(to_json(gain.configuration));
+    text["alone_rms"] = gain.alone_rms;
+    text["together_rms"] = gain.together_rms;
+    if (gain.times_as_long > 0)
+        text["times_as_long"] = gain.times_as_long;
+    return text;
+}
+
+SequenceGain gain_from(const json& text) {
+    return {text.at("made_by"), configuration_from(text), text.at("alone_rms"), text.at("together_rms"),
+            text.value("times_as_long", 0.0)};
 }
 
 } // namespace
@@ -58,21 +84,28 @@ json to_json(const Front& front) {
     for (const auto& [sensor, points] : front.points) {
         const auto made_by = front.made_by.find(sensor);
         json& own = text[std::string(name_of(sensor))];
-        own = {{"made_by", made_by == front.made_by.end() ? "" : made_by->second}, {"points", json::array()}};
-        for (const Priced& point : points)
-            own["points"].push_back(point_json(point));
+        own = {{"made_by", made_by == front.made_by.end() ? "" : made_by->second}, {"points", to_json(points)}};
+        if (const auto others = front.others.find(sensor); others != front.others.end())
+            own["others"] = to_json(others->second);
+        if (const auto gain = front.sequences.find(sensor); gain != front.sequences.end())
+            own["sequence"] = to_json(gain->second);
     }
     return text;
 }
 
 Front front_from(const json& text, const std::string& origin) {
     return reading_json(origin, [&] {
-        Front front{text.at("device"), {}, {}};
+        Front front{text.at("device"), {}, {}, {}, {}};
         for (const SensorClass sensor : sensor_classes)
             if (const auto own = text.find(name_of(sensor)); own != text.end()) {
                 front.made_by[sensor] = own->at("made_by");
                 for (const json& point : own->at("points"))
                     front.points[sensor].push_back(point_from(point));
+                if (own->contains("others"))
+                    for (const json& point : own->at("others"))
+                        front.others[sensor].push_back(point_from(point));
+                if (own->contains("sequence"))
+                    front.sequences[sensor] = gain_from(own->at("sequence"));
             }
         if (front.points.empty())
             throw Error("no points of any sensor class (clean, structured light, time of flight)");
@@ -89,6 +122,9 @@ void Front::replace_with(const Front& other) {
     for (const auto& [sensor, own] : other.points) {
         points[sensor] = own;
         made_by[sensor] = other.made_by.at(sensor);
+        others.erase(sensor);
+        if (const auto theirs = other.others.find(sensor); theirs != other.others.end())
+            others[sensor] = theirs->second;
     }
 }
 

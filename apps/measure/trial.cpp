@@ -144,7 +144,7 @@ std::unique_ptr<MethodSetup> set_up(const Configuration& configuration, double r
     std::unique_ptr<MethodSetup> setup = method_named(configuration.method).setup();
     const std::vector<Parameter> rows = setup->parameters();
     if (const Parameter* radius = row_named(rows, "radius"))
-        set(*radius, fmt::format("{}", radius_m));
+        set(*radius, radius_m);
     apply(configuration, *setup);
     return setup;
 }

@@ -47,10 +47,9 @@ std::string noise_sentence(const DepthNoise& noise, const RunSettings& settings)
     const std::string origin = settings.depth_noise == "auto" ? "measured" : "--depth-noise";
     if (!noise.any())
         return fmt::format("{} to mind ({}); depth is used as recorded", describe(noise), origin);
-    return fmt::format("{} ({}); flying pixels are {}; {}", describe(noise), origin,
-                       settings.flying_pixels == "drop" ? "dropped" : "kept",
-                       settings.depth_smoothing > 0 ? "depth and normals come from plane fits"
-                                                    : "depth is used as recorded");
+    return fmt::format(
+        "{} ({}); flying pixels are {}; {}", describe(noise), origin, settings.drop_flying ? "dropped" : "kept",
+        settings.depth_smoothing > 0 ? "depth and normals come from plane fits" : "depth is used as recorded");
 }
 
 void introduce(const RunReport& report, std::size_t frames) {
@@ -64,7 +63,7 @@ void introduce(const RunReport& report, std::size_t frames) {
         say(fmt::format("  depth correction: {} ({})", describe(capture.depth_correction), capture.camera->origin));
     say("  depth noise: " + report.depth_noise);
     for (const std::string& warning : capture.warnings)
-        say("  warning: " + warning);
+        warn(fmt::format("  warning: {}: {}", capture.path.string(), warning));
     for (const std::string& sentence : report.budget)
         say("  " + sentence);
     say("  " + report.shading);
@@ -72,13 +71,15 @@ void introduce(const RunReport& report, std::size_t frames) {
 
 void conclude(const RunReport& report, const std::filesystem::path& table) {
     const std::size_t ok = count(report.frames, FrameStatus::ok);
-    const std::string before = ok > report.done_now ? fmt::format(", {} of them before", ok - report.done_now) : "";
+    const std::string before =
+        ok > report.done_now ? fmt::format(", {} of them in an earlier run", ok - report.done_now) : "";
     say(fmt::format("  {} of {} frames{} in {:.1f} s ({}) -> {}", ok, report.frames.size(), before,
                     report.took_ms / 1000, describe(rates_of(report)), table.parent_path().string()));
     if (count(report.frames, FrameStatus::failed) > 0)
-        say(fmt::format("  failed: {} ({} says why)", names_of_failed(report.frames), table.string()));
+        warn(fmt::format("  failed: {} ({} says why)", names_of_failed(report.frames), table.string()));
     if (const std::size_t skipped = count(report.frames, FrameStatus::skipped); skipped > 0)
-        say(fmt::format("  not finished: {} frames are left; --resume goes on with them", skipped));
+        warn(fmt::format("  not finished: {} frames of {} are left; --resume goes on with them", skipped,
+                         report.capture.path.string()));
 }
 
 } // namespace scanshade

@@ -3,6 +3,7 @@
 #include "apps/measure/front.h"
 #include "apps/measure/trial.h"
 #include "apps/run/messages.h"
+#include "apps/run/outlook.h"
 #include "apps/run/settings.h"
 #include "apps/run/workers.h"
 #include "apps/slice.h"
@@ -115,9 +116,10 @@ void prepare_folder(const Job& job, const ReportFiles& reports) {
 struct Together {
     Together(Workers& workers, const Job& job, const RunSettings& asked)
         : lease(workers.pool()), pool(*lease),
-          sequence(lease->sequence(
-              job.batch.radius_m, job.batch.noise,
-              asked.sequence == "on" ? sequence_options(asked.sequences, job.capture, job.batch.radius_m) : alone())) {
+          sequence(lease->sequence(job.batch.radius_m, job.batch.noise,
+                                   asked.in_sequence(job.capture)
+                                       ? sequence_options(asked.sequences, job.capture, job.batch.radius_m)
+                                       : alone())) {
         if (workers.pool().size() > workers.devices())
             say("  frames of a sequence are computed one at a time, in their order");
         if (sequence.reach() > 0)
@@ -161,15 +163,16 @@ class Run final : public Command {
     Words words() override { return {"PATH", "captures: folders, depth images or clouds", &asked_.paths, 1, 1 << 20}; }
 
     std::vector<Stage> stages() override { return asked_.stages(); }
+    void take_preset() override { asked_.take_preset(); }
 
     int run() override {
-        if (asked_.log == "json")
+        if (asked_.log_json)
             log_as_json();
+        if (asked_.quiet)
+            be_quiet();
         if (std::ranges::any_of(asked_.paths, is_job))
             return run_planned();
-        asked_.check();
-        if (!asked_.budget.any())
-            (void)asked_.chosen_setup(); // refuses before anything is opened
+        asked_.resolve(); // refuses before anything is opened
         int unopened = 0;
         Tally tally;
         std::vector<Job> jobs = plan(unopened, tally);
@@ -192,13 +195,15 @@ class Run final : public Command {
             } catch (const DeviceLost&) { // the other captures need it, too
                 throw;
             } catch (const Outage& failure) {
-                say(fmt::format("failed: {}", failure.what()));
+                warn(fmt::format("failed: {}", failure.what()));
                 fault = Fault::outage;
             }
             const std::lock_guard alone(counting);
             tally.add(rows);
             tally.add(fault);
         });
+        for (const std::string& sentence : outlook_)
+            say(sentence);
         return tally.exit_code(unopened);
     }
 
@@ -229,13 +234,13 @@ class Run final : public Command {
             } catch (const Misuse&) {
                 throw;
             } catch (const Outage& failure) {
-                say(fmt::format("failed: {}", failure.what()));
+                warn(fmt::format("failed: {}", failure.what()));
                 tally.add(Fault::outage);
             } catch (const Error& failure) {
-                say(fmt::format("failed: {}", failure.what()));
+                warn(fmt::format("failed: {}", failure.what()));
                 ++unopened;
             } catch (const std::exception& failure) {
-                say(fmt::format("failed: internal error: {}", failure.what()));
+                warn(fmt::format("failed: internal error: {}", failure.what()));
                 tally.add(Fault::internal);
             }
         }
@@ -273,14 +278,9 @@ class Run final : public Command {
         request.leave_bad_out = true;
         request.preparation = asked_.preparation();
         const TrialCapture trial = load_trial(job.capture, job.batch.noise, noise_origin(), request);
-        const double radius_m = asked_.radius.empty() ? request.radius_m : std::stod(asked_.radius);
+        const double radius_m = asked_.radius.value_or(request.radius_m);
         const Choice choice = choose(device, shipped_front(), trial, radius_m, asked_.budget);
-        if (!before_budget_.settings.empty())
-            apply(before_budget_, asked_.chosen_setup());
-        asked_.method = choice.configuration.method;
-        MethodSetup& setup = asked_.chosen_setup();
-        before_budget_ = {asked_.method, "as given", values_of(setup)};
-        apply(choice.configuration, setup);
+        asked_.choose(choice.configuration);
         return choice.sentences;
     }
 
@@ -302,8 +302,7 @@ class Run final : public Command {
                     set(*row, value);
         asked_.out = (job / "results").string();
         asked_.resume = true;
-        asked_.check();
-        (void)asked_.chosen_setup();
+        asked_.resolve();
         return supervise(1, [&](const Shift& shift) {
             cv::setNumThreads(1);
             end_gracefully_on_signals();
@@ -337,7 +336,7 @@ class Run final : public Command {
         if (asked_.budget.any())
             return 1;
         std::size_t entering = std::max(1U, std::thread::hardware_concurrency() / 16);
-        if (asked_.sequence == "on") // keeps one device busy
+        if (asked_.sequence != SequenceUse::off) // keeps one device busy
             entering = asked_.device == "all" ? workers().devices() : 1;
         entrance_.release(static_cast<std::ptrdiff_t>(entering - 1));
         return entering + 4;
@@ -394,7 +393,7 @@ class Run final : public Command {
                                   .carefully = shift.carefully,
                                   .finished = shift.finished};
         walk(job, ready.report, recording);
-        report_on(ready.report, journal, files);
+        report_on(job, ready.report, journal, files);
         if (cloud && !interrupted)
             write_recording(*cloud);
         return std::move(ready.report.frames);
@@ -402,7 +401,7 @@ class Run final : public Command {
 
     [[nodiscard]] std::string task_of(const Job& job) {
         const std::lock_guard alone(alone_);
-        return task_key(asked_.stages_in_use(), job.capture, job.of, asked_.sequence == "on");
+        return task_key(asked_.stages_in_use(), job.capture, job.of, asked_.in_sequence(job.capture));
     }
 
     /// The rows of a capture that an earlier run has finished.
@@ -448,7 +447,7 @@ class Run final : public Command {
         job.batch.radius_m = asked_.radius_m();
         auto points = point_method(setup, asked_.cloud_ao(), gpu::is_cpu(device.info()) ? nullptr : &device);
         job.batch.points = points.get();
-        job.batch.cloud_walk = setup.make_for_points() ? CloudWalk::points : asked_.cloud_walk();
+        job.batch.cloud_walk = setup.make_for_points() ? CloudWalk::points : asked_.clouds;
         RunReport report = begun_report(job, workers);
         report.budget = budget;
         std::string settings = settings_key(report, job.batch.outputs, job.batch.noise);
@@ -460,7 +459,7 @@ class Run final : public Command {
         Entrance entrance(entrance_);
         job.batch.all_begun = [&] { entrance.leave(); };
         std::optional<Together> together;
-        if (asked_.sequence == "on" || job.batch.cloud)
+        if (asked_.in_sequence(job.capture) || job.batch.cloud)
             job.batch.sequence = &together.emplace(workers(), job, asked_).sequence;
         MethodPool& pool = together ? together->pool : workers().pool();
         report.at_once = pool.size();
@@ -475,11 +474,15 @@ class Run final : public Command {
         progress.end();
     }
 
-    void report_on(const RunReport& report, const Journal& journal, const ReportFiles& files) {
+    void report_on(const Job& job, const RunReport& report, const Journal& journal, const ReportFiles& files) {
         {
             const std::lock_guard alone(alone_); // the report names settings
             write_frames_csv(files.table, report.frames);
             write_manifest(files.manifest, report, [&](const FrameRow& row) { return journal.whole(row); });
+            if (count(report.frames, FrameStatus::ok) > 0)
+                for (const std::string& sentence : outlook(asked_, job.batch.noise, job.capture, shipped_front()))
+                    if (!std::ranges::count(outlook_, sentence))
+                        outlook_.push_back(sentence);
         }
         conclude(report, files.table);
     }
@@ -498,7 +501,7 @@ class Run final : public Command {
     std::mutex alone_; ///< held while settings and devices are used by a capture, but not while frames are computed
     std::counting_semaphore<> entrance_{1};
     std::unique_ptr<Workers> workers_;
-    Configuration before_budget_; ///< of the method that a budget picked for the capture before this one
+    std::vector<std::string> outlook_; ///< of all captures, each sentence once
 };
 
 } // namespace

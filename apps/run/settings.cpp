@@ -5,32 +5,86 @@
 #include "apps/method_settings.h"
 #include "apps/settings_file.h"
 #include "projection/error.h"
+#include "projection/nearest_word.h"
 
 #include <algorithm>
 #include <cstdio>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <map>
 #include <set>
 #include <sstream>
 
 namespace scanshade {
 namespace {
 
+constexpr std::array registered_words{Named{"auto", Registration::unknown}, Named{"yes", Registration::yes},
+                                      Named{"no", Registration::no}};
+constexpr std::array flying_words{Named{"drop", true}, Named{"keep", false}};
+constexpr std::array cloud_words{Named{"auto", CloudWalk::automatic}, Named{"points", CloudWalk::points},
+                                 Named{"view", CloudWalk::view}};
+constexpr std::array sequence_words{Named{"off", SequenceUse::off}, Named{"on", SequenceUse::on},
+                                    Named{"auto", SequenceUse::automatic}};
+constexpr std::array format_words{Named{"png16", AoFormat::png16}, Named{"png8", AoFormat::png8},
+                                  Named{"tiff", AoFormat::tiff}, Named{"exr", AoFormat::exr}};
+constexpr std::array view_words{Named{"depth", false}, Named{"colour", true}};
+constexpr std::array log_words{Named{"text", false}, Named{"json", true}};
+
+/// quality_words, and none for a quality that was not given.
+using MaybeQuality = std::optional<Quality>;
+constexpr auto maybe_quality_words = [] {
+    std::array<Named<MaybeQuality>, quality_words.size() + 1> words{Named<MaybeQuality>{"", std::nullopt}};
+    for (std::size_t i = 0; i < quality_words.size(); ++i)
+        words[i + 1] = {quality_words[i].name, quality_words[i].value};
+    return words;
+}();
+
 std::set<std::string> words_of(const std::string& list) {
+    const std::vector<std::string> known{"ao", "confidence", "shaded", "cloud", "panel"};
     std::set<std::string> words;
     std::istringstream stream(list);
     for (std::string word; std::getline(stream, word, ',');) {
-        if (word != "ao" && word != "confidence" && word != "shaded" && word != "cloud" && word != "panel")
-            throw Misuse("write: '" + word + "' given, expected any of ao,confidence,shaded,cloud,panel");
+        if (!std::ranges::count(known, word))
+            throw Misuse(fmt::format("write: '{}' given, expected any of {}{}", word, fmt::join(known, ","),
+                                     suggestion(word, known)));
         words.insert(word);
     }
     return words;
 }
 
+Outputs outputs_from(const RunSettings& asked) {
+    Outputs wanted;
+    wanted.format = asked.format;
+    wanted.shade_strength = asked.shade_strength;
+    wanted.colour_cloud = asked.colour_cloud;
+    wanted.colour_view = asked.colour_view;
+    if (asked.write != "auto") {
+        const std::set<std::string> words = words_of(asked.write);
+        wanted.ao = words.contains("ao");
+        wanted.confidence = words.contains("confidence");
+        wanted.shaded = words.contains("shaded");
+        wanted.panel = words.contains("panel");
+        wanted.cloud = wanted.depth_cloud = words.contains("cloud");
+    }
+    return wanted;
+}
+
+ProjectOptions range_from(const std::string& text) {
+    ProjectOptions limits;
+    int used = 0;
+    if (text.empty())
+        return limits;
+    if (std::sscanf(text.c_str(), "%lf,%lf%n", &limits.near_m, &limits.far_m, &used) != 2 ||
+        used != static_cast<int>(text.size()) || !(limits.near_m >= 0 && limits.far_m > limits.near_m))
+        throw Misuse("depth-range: '" + text + "' given, expected NEAR,FAR in metres, such as 0.4,5");
+    return limits;
+}
+
 /// --cloud.rays and so on.
-Stage prefixed(std::string title, const std::string& prefix, std::vector<Parameter> rows) {
+Stage prefixed(std::string title, const std::string& prefix, std::vector<Parameter> rows, std::string topic) {
     for (Parameter& row : rows)
         row.name = prefix + row.name;
-    return {std::move(title), std::move(rows)};
+    return {std::move(title), std::move(rows), std::move(topic)};
 }
 
 std::vector<std::string> method_names() {
@@ -38,6 +92,28 @@ std::vector<std::string> method_names() {
     for (const MethodRow& row : methods())
         names.emplace_back(row.name);
     return names;
+}
+
+/// "0.5", or where methods differ "low (luna), high (cacao, surfel)": what a setting is where it is not given.
+std::string defaults_of(std::string_view setting) {
+    std::vector<std::string> values;
+    std::map<std::string, std::vector<std::string_view>> methods_by_value;
+    for (const MethodRow& method : methods()) {
+        const auto setup = method.setup();
+        const std::vector<Parameter> rows = setup->parameters();
+        if (const Parameter* row = row_named(rows, setting)) {
+            const std::string value = value_text(*row);
+            if (!methods_by_value.contains(value))
+                values.push_back(value);
+            methods_by_value[value].push_back(method.name);
+        }
+    }
+    if (values.size() == 1)
+        return values.front();
+    std::string text;
+    for (const std::string& value : values)
+        text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", value, fmt::join(methods_by_value[value], ", "));
+    return text;
 }
 
 } // namespace
@@ -66,210 +142,246 @@ std::vector<Stage> RunSettings::stages_in_use() {
 
 std::vector<Stage> RunSettings::common_stages() {
     RunSettings& s = *this;
-    const auto [radii, qualities] = method_defaults();
     return {
         {"input",
-         {{"frames", "which frames, by index: first:end:step, end not included; negative counts from the end",
-           &s.frames},
-          {"camera", "a camera file, or fx,fy,cx,cy; replaces the capture's own", &s.camera},
-          {"poses", "a trajectory in TUM's rows, as refine --trajectory writes it; replaces the capture's own poses",
-           &s.poses},
-          {"depth-scale", "mm, tum, sun, nyu, m, or units per metre; replaces the capture's own", &s.depth_scale},
+         {{.name = "frames",
+           .help = "which frames, by index: first:end:step without the end; negative numbers count from the end",
+           .value = &s.frames,
+           .common = true},
+          {.name = "camera",
+           .help = "a camera file, or fx,fy,cx,cy; replaces the capture's own",
+           .value = &s.camera,
+           .common = true},
+          {.name = "poses",
+           .help = "a trajectory in TUM's format, as refine --trajectory writes it; replaces the capture's own poses",
+           .value = &s.poses},
+          {.name = "depth-scale",
+           .help = "mm, tum, sun, nyu, m, or units per metre; replaces the capture's own",
+           .value = &s.depth_scale,
+           .common = true},
           {.name = "registered",
-           .help = "whether colour pixels lie on depth pixels",
-           .value = &s.registered,
-           .choices = {"auto", "yes", "no"}},
-          {"association-limit", "colour, depth and poses farther apart in time are not paired", &s.association_limit_s,
-           "s", 0, 1e6}}},
+           .help = "whether colour pixels lie on depth pixels; auto = as the capture says",
+           .value = OneOf(&s.registered, registered_words)},
+          {.name = "association-limit",
+           .help = "colour, depth and poses that are farther apart in time are not paired",
+           .value = &s.association_limit_s,
+           .unit = "s",
+           .low = 0,
+           .high = 1e6}}},
         {"depth preparation",
-         {{"depth-range", "NEAR,FAR in metres: depth outside is taken as not recorded; empty = all of it",
-           &s.depth_range},
-          {"depth-noise",
-           "sigma of one depth value, FLOOR,PER_Z2[,GRAIN] for FLOOR + PER_Z2 z^2 metres that err alike over GRAIN "
-           "pixels, or auto (measured), none, kinect, tof; what follows is done only where there is any",
-           &s.depth_noise},
+         {{.name = "depth-range",
+           .help = "NEAR,FAR in metres; depth outside counts as a hole. Empty = all depth counts",
+           .value = &s.depth_range,
+           .common = true},
+          {.name = "depth-noise",
+           .help = "noise of the depth: auto (measured), none, kinect, tof, or FLOOR,PER_Z2[,GRAIN]. Its sigma is "
+                   "FLOOR + PER_Z2 z^2 metres, its correlation length GRAIN pixels. The next two act only on noisy "
+                   "depth",
+           .value = &s.depth_noise},
           {.name = "flying-pixels",
-           .help = "where a sensor saw two surfaces at once: drop leaves them unknown",
-           .value = &s.flying_pixels,
-           .choices = {"drop", "keep"}},
-          {"depth-smoothing",
-           "radius of the plane fits that depth and normals come from, in those that the noise and the method ask "
-           "for; 0 = depth as recorded",
-           &s.depth_smoothing, "", 0, 10}}},
+           .help = "pixels where the sensor mixed two surfaces: drop makes them holes",
+           .value = OneOf(&s.drop_flying, flying_words)},
+          {.name = "depth-smoothing",
+           .help = "scales the windows of the plane fits that give depth and normals; 0 = depth as recorded",
+           .value = &s.depth_smoothing,
+           .low = 0,
+           .high = 10}}},
         {"method",
-         {{.name = "method",
-           .help = "which method computes the visibility",
+         {{.name = std::string(preset_flag),
+           .help = "defaults for other flags: fast = cacao; balanced = surfel, downsampled; best = surfel, frames of a "
+                   "recording together, 64 rays per point of a cloud",
+           .value = OneOf(&s.preset, preset_words),
+           .common = true},
+          {.name = "method",
+           .help = "the method that computes the visibility",
            .value = &s.method,
-           .choices = method_names()},
+           .choices = method_names(),
+           .common = true},
           {.name = "clouds",
-           .help = "clouds by rays from every point, or as one camera's view; auto = points, unless a grid or --camera "
-                   "tells the camera",
-           .value = &s.clouds,
-           .choices = {"auto", "points", "view"}},
+           .help = "points: rays from every point of a cloud; view: the cloud as one camera sees it; auto = points, "
+                   "unless the cloud has a grid or --camera is given",
+           .value = OneOf(&s.clouds, cloud_words)},
           {.name = "sequence",
+           .help = "on: frames of a recording with poses are looked at together; auto: where there are poses",
+           .value = OneOf(&s.sequence, sequence_words),
+           .common = true},
+          {.name = "radius",
+           .help = "surfaces farther away than this do not occlude; otherwise " + defaults_of("radius"),
+           .value = &s.radius,
+           .unit = "m",
+           .low = 0,
+           .common = true},
+          {.name = "quality",
+           .help = "the method's quality level; otherwise " + defaults_of("quality"),
+           .value = OneOf(&s.quality, maybe_quality_words),
+           .common = true},
+          {.name = "max-error",
+           .help = "picks method and quality: the cheapest within this RMSE to truth; 0 = no limit",
+           .value = &s.budget.max_error,
+           .low = 0,
+           .high = 1,
+           .common = true},
+          {.name = "max-ms",
+           .help = "picks method and quality: the most accurate within this device time per frame; 0 = no limit",
+           .value = &s.budget.max_ms,
+           .unit = "ms",
+           .low = 0,
+           .high = 1e6,
+           .common = true},
+          {.name = std::string(settings_flag),
+           .help = "a file of settings: from calibrate-look, or an earlier run's manifest.json. Flags given here win",
+           .value = &s.settings,
+           .common = true},
+          {.name = "device",
            .help =
-               "on: frames of a recording with poses are looked at together with those around them (sequences, below)",
-           .value = &s.sequence,
-           .choices = {"off", "on"}},
-          {"radius", "how far away a surface may still occlude, in metres" + radii, &s.radius},
-          {"quality", "the method's quality level" + qualities, &s.quality},
-          {"max-error",
-           "picks method and quality: the cheapest within this RMSE to truth; 0 = no limit",
-           &s.budget.max_error,
-           "",
-           0,
-           1,
-           {}},
-          {"max-ms",
-           "picks method and quality: the most accurate within these device milliseconds per frame; 0 = no limit",
-           &s.budget.max_ms,
-           "ms",
-           0,
-           1e6,
-           {}},
-          {std::string(settings_flag),
-           "file of settings, from calibrate-look or an earlier run's manifest.json; flags given "
-           "here win",
-           &s.settings},
-          {"device",
-           "index or part of the name of a Vulkan device; empty = the fastest kind; all = every GPU like the fastest",
-           &s.device},
-          {"in-flight", "frames computed at once on each device; 0 = 3 on a GPU, 1 on a processor", &s.in_flight, "", 0,
-           64}}},
+               "index of a Vulkan device, or a part of its name; empty = the fastest kind; all = every GPU like the "
+               "fastest",
+           .value = &s.device,
+           .common = true},
+          {.name = "in-flight",
+           .help = "frames computed at once on each device; 0 = 3 on a GPU, 1 on a processor",
+           .value = &s.in_flight,
+           .low = 0,
+           .high = 64}}},
         {"output",
-         {{"out", "folder of the results; several captures get a folder each in it", &s.out},
-          {"write", "any of ao,confidence,shaded,cloud,panel; auto = ao,confidence,shaded, and cloud for clouds",
-           &s.write},
-          {.name = "format", .help = "of the ao maps", .value = &s.format, .choices = {"png16", "png8", "tiff", "exr"}},
+         {{.name = "out",
+           .help = "folder of the results; several captures get a folder each in it",
+           .value = &s.out,
+           .common = true},
+          {.name = "write",
+           .help = "any of ao,confidence,shaded,cloud,panel; auto = ao,confidence,shaded, and cloud for clouds",
+           .value = &s.write,
+           .common = true},
+          {.name = "format",
+           .help = "file format of the ao maps",
+           .value = OneOf(&s.format, format_words),
+           .common = true},
           {.name = "view",
-           .help = "whose pixels maps and pictures have, where a colour camera stands beside the depth camera",
-           .value = &s.view,
-           .choices = {"depth", "colour"}},
-          {"shade-strength", "0 leaves the colour, 1 multiplies it by visibility", &s.shade_strength, "", 0, 1},
-          {"cloud", "a PLY file: one cloud of all frames with poses, points of the same place merged",
-           &s.recording_cloud},
-          {"cloud-resolution", "within cubes of this side; 0 = one and a half times what a pixel covers",
-           &s.cloud_resolution_m, "m", 0, 100},
-          {"colour-cloud", "replace the clouds' colour by colour times visibility", &s.colour_cloud},
-          {"overwrite", "replace the results of an earlier run", &s.overwrite},
-          {"resume", "go on with an earlier run: what is done, from the same input and settings, stays", &s.resume},
-          {"retry", "with --resume: frames that failed are tried again, too", &s.retry},
+           .help = "whose pixels maps and pictures have, if there is a colour camera beside the depth camera",
+           .value = OneOf(&s.colour_view, view_words)},
+          {.name = "shade-strength",
+           .help = "0 leaves the colour, 1 multiplies it by visibility",
+           .value = &s.shade_strength,
+           .low = 0,
+           .high = 1},
+          {.name = "cloud",
+           .help = "a PLY file: one cloud of all frames with poses, points of the same place merged",
+           .value = &s.recording_cloud,
+           .common = true},
+          {.name = "cloud-resolution",
+           .help = "points of that cloud are merged within cubes of this side; 0 = one and a half times what a pixel "
+                   "covers",
+           .value = &s.cloud_resolution_m,
+           .unit = "m",
+           .low = 0,
+           .high = 100},
+          {.name = "colour-cloud",
+           .help = "replaces the clouds' colour by colour times visibility",
+           .value = &s.colour_cloud},
+          {.name = "overwrite",
+           .help = "replaces the results of an earlier run",
+           .value = &s.overwrite,
+           .common = true},
+          {.name = "resume",
+           .help = "goes on with an earlier run; frames done from the same input and settings stay",
+           .value = &s.resume,
+           .common = true},
+          {.name = "retry", .help = "with --resume: tries failed frames again, too", .value = &s.retry},
+          {.name = "quiet", .help = "tells only warnings and failures", .value = &s.quiet, .common = true},
           {.name = "log",
            .help = "what stderr gets: prose, or a JSON object per line",
-           .value = &s.log,
-           .choices = {"text", "json"}},
-          {"shard", "of a job, the I-th of N parts: I/N; empty = as Slurm or Kubernetes number this one, else all",
-           &s.shard},
-          {"dump", "folder for what lies between the method's passes, as .npy files with an index.csv per frame",
-           &s.dump}}}};
+           .value = OneOf(&s.log_json, log_words)},
+          {.name = "shard",
+           .help = "of a job, the I-th of N parts: I/N; empty = as Slurm or Kubernetes number this task, else all",
+           .value = &s.shard},
+          {.name = "dump",
+           .help = "folder for the data between the method's passes: .npy files with an index.csv per frame",
+           .value = &s.dump}}}};
 }
 
 Stage RunSettings::cloud_stage() {
-    return prefixed("clouds, from every point", "cloud.", clouds_by_points.parameters());
+    return prefixed("clouds, from every point", "cloud.", clouds_by_points.parameters(), "clouds");
 }
 
 Stage RunSettings::sequence_stage() {
     return prefixed("sequences: with --sequence on, frames together with those around them", "sequence.",
-                    sequences.parameters());
+                    sequences.parameters(), "sequence");
 }
 
-std::pair<std::string, std::string> RunSettings::method_defaults() {
-    std::string radii, qualities;
-    for (const auto& [name, setup] : setups_) {
-        const std::vector<Parameter> rows = setup->parameters();
-        if (const Parameter* row = row_named(rows, "radius"))
-            radii += fmt::format("; {}: {} by default", name, value_text(*row));
-        if (const Parameter* row = row_named(rows, "quality"))
-            qualities += fmt::format("; {}: {}, {} by default", name, range_text(*row), value_text(*row));
+void RunSettings::take_preset() {
+    const Configuration& of_preset = configuration_of(preset);
+    method = of_preset.method;
+    apply(of_preset, chosen_setup());
+    if (preset == Preset::best) {
+        sequence = SequenceUse::automatic;
+        clouds_by_points.rays = 64; // RMSE 0.016 of a million points, 0.018 with the 16 that a processor casts
     }
-    return {radii, qualities};
 }
 
-void RunSettings::check() const {
+void RunSettings::resolve() {
     if (out.empty())
         throw Misuse("run needs -o FOLDER for its results");
-    (void)outputs();
+    outputs_ = outputs_from(*this);
+    range_ = range_from(depth_range);
     if (depth_noise != "auto")
         (void)noise_from_text(depth_noise);
-    (void)range();
     if (!recording_cloud.empty() && (resume || paths.size() > 1))
         throw Misuse("cloud: is made of all frames of one capture in one run, without --resume");
-    if (budget.any() && !quality.empty())
-        throw Misuse("a budget (--max-error, --max-ms) picks the quality: leave --quality out");
+    if (budget.any() && (quality || preset != Preset::fast))
+        throw Misuse("a budget (--max-error, --max-ms) picks method and quality: leave --quality and --preset out");
     if (!depth_scale.empty())
         (void)depth_encoding(depth_scale, "--depth-scale");
-    (void)CloudAo(cloud_ao());
+    cloud_options_ = clouds_by_points;
+    if (cloud_options_.radius == 0 && radius)
+        cloud_options_.radius = *radius;
+    (void)CloudAo(cloud_options_);
+    put_common_settings();
 }
 
-Outputs RunSettings::outputs() const {
-    Outputs wanted;
-    wanted.format = ao_format(format);
-    wanted.shade_strength = shade_strength;
-    wanted.colour_cloud = colour_cloud;
-    wanted.colour_view = view == "colour";
-    if (write != "auto") {
-        const std::set<std::string> words = words_of(write);
-        wanted.ao = words.contains("ao");
-        wanted.confidence = words.contains("confidence");
-        wanted.shaded = words.contains("shaded");
-        wanted.panel = words.contains("panel");
-        wanted.cloud = wanted.depth_cloud = words.contains("cloud");
-    }
-    return wanted;
+void RunSettings::put_common_settings() {
+    const std::vector<Parameter> rows = chosen_setup().parameters();
+    const auto row = [&](const char* name) -> const Parameter& {
+        if (const Parameter* found = row_named(rows, name))
+            return *found;
+        throw Misuse(fmt::format("{}: the method {} has no such setting", name, method));
+    };
+    if (radius)
+        set(row("radius"), *radius);
+    if (quality)
+        set(row("quality"), std::string(word_for(*quality, quality_words)));
 }
 
-ProjectOptions RunSettings::range() const {
-    ProjectOptions limits;
-    int used = 0;
-    if (depth_range.empty())
-        return limits;
-    if (std::sscanf(depth_range.c_str(), "%lf,%lf%n", &limits.near_m, &limits.far_m, &used) != 2 ||
-        used != static_cast<int>(depth_range.size()) || !(limits.near_m >= 0 && limits.far_m > limits.near_m))
-        throw Misuse("depth-range: '" + depth_range + "' given, expected NEAR,FAR in metres, such as 0.4,5");
-    return limits;
+void RunSettings::choose(const Configuration& picked) {
+    if (before_choice_)
+        apply(*before_choice_, chosen_setup());
+    method = picked.method;
+    put_common_settings();
+    before_choice_ = {method, "as given", values_of(chosen_setup())};
+    apply(picked, chosen_setup());
 }
 
 std::optional<Registration> RunSettings::registration() const {
-    if (registered == "auto")
-        return std::nullopt;
-    return registered == "yes" ? Registration::yes : Registration::no;
+    return registered == Registration::unknown ? std::nullopt : std::optional(registered);
 }
 
-CloudWalk RunSettings::cloud_walk() const {
-    if (clouds == "points")
-        return CloudWalk::points;
-    return clouds == "view" ? CloudWalk::view : CloudWalk::automatic;
-}
+FitPlaneOptions RunSettings::preparation() const { return {.drop_flying = drop_flying, .smoothing = depth_smoothing}; }
 
-FitPlaneOptions RunSettings::preparation() const {
-    return {.drop_flying = flying_pixels == "drop", .smoothing = depth_smoothing};
-}
-
-CloudAoOptions RunSettings::cloud_ao() const {
-    CloudAoOptions options = clouds_by_points;
-    if (options.radius == 0 && !radius.empty())
-        set({"radius", "", &options.radius}, radius);
-    return options;
-}
-
-MethodSetup& RunSettings::setup_of(std::string_view name) {
+MethodSetup& RunSettings::setup_of(std::string_view name) const {
     return *std::ranges::find(setups_, name, [](const auto& each) { return each.first; })->second;
 }
 
-MethodSetup& RunSettings::chosen_setup() {
-    MethodSetup& setup = setup_of(method);
-    const std::vector<Parameter> rows = setup.parameters();
-    for (const auto& [name, text] : {std::pair("radius", radius), std::pair("quality", quality)}) {
-        if (text.empty())
-            continue;
-        const Parameter* row = row_named(rows, name);
-        if (!row)
-            throw Misuse(fmt::format("{}: the method {} has no such setting", name, method));
-        set(*row, text);
-    }
-    return setup;
+double RunSettings::radius_m() const {
+    const std::vector<Parameter> rows = chosen_setup().parameters();
+    return number_of(*row_named(rows, "radius"));
 }
 
-double RunSettings::radius_m() { return std::stod(value_text(*row_named(chosen_setup().parameters(), "radius"))); }
+bool RunSettings::in_sequence(const Capture& capture) const {
+    return sequence == SequenceUse::on || (sequence == SequenceUse::automatic && has_poses(capture));
+}
+
+bool has_poses(const Capture& capture) {
+    const auto posed = [](const CaptureEntry& entry) { return entry.world_from_camera && entry.cloud.empty(); };
+    return std::ranges::count_if(capture.entries, posed) > 1;
+}
 
 } // namespace scanshade

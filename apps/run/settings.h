@@ -3,9 +3,11 @@
 
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/method.h"
+#include "ao/quality.h"
 #include "ao/sequence/neighbourhood.h"
 #include "apps/command.h"
 #include "apps/measure/budget.h"
+#include "apps/run/presets.h"
 #include "apps/walk/batch.h"
 
 #include <memory>
@@ -16,25 +18,38 @@
 
 namespace scanshade {
 
-/// What was typed, or its default; the rows of stages() are bound to it.
+/// Whether frames of a recording are looked at together; automatic: where at least two frames have a pose.
+enum class SequenceUse { off, on, automatic };
+
+/// What was typed, or its default; the rows of stages() are bound to it. Filled by the parser, then resolve()d once.
 class RunSettings {
   public:
     RunSettings();
 
     std::vector<std::string> paths;
-    std::string frames, camera, poses, depth_scale, registered = "auto";
-    std::string depth_noise = "auto", depth_range, flying_pixels = "drop";
+    std::string frames, camera, poses, depth_scale;
+    Registration registered = Registration::unknown; ///< unknown: as the capture says
+    std::string depth_noise = "auto", depth_range;
+    bool drop_flying = true;
     double depth_smoothing = 1;
     double association_limit_s = 0.02;
-    std::string sequence = "off", method = "cacao", radius, quality, device, settings, clouds = "auto";
+    Preset preset = Preset::fast;
+    SequenceUse sequence = SequenceUse::off;
+    std::string method = "cacao", device, settings;
+    std::optional<double> radius;
+    std::optional<Quality> quality;
+    CloudWalk clouds = CloudWalk::automatic;
     int in_flight = 0;
     Budget budget;
-    std::string out, write = "auto", format = "png16", view = "depth", dump;
+    std::string out, write = "auto", dump;
+    AoFormat format = AoFormat::png16;
+    bool colour_view = false;
     double shade_strength = 1;
     std::string recording_cloud;
     double cloud_resolution_m = 0;
     bool colour_cloud = false, overwrite = false, resume = false, retry = false;
-    std::string shard, log = "text";
+    std::string shard;
+    bool quiet = false, log_json = false;
     CloudAoOptions clouds_by_points;
     NeighbourhoodOptions sequences;
 
@@ -42,29 +57,41 @@ class RunSettings {
     [[nodiscard]] std::vector<Stage> stages();
     /// Without those of methods that were not chosen: what a report holds, and results depend on.
     [[nodiscard]] std::vector<Stage> stages_in_use();
-    /// Throws Misuse where settings do not go together.
-    void check() const;
 
-    [[nodiscard]] Outputs outputs() const; ///< without a folder
-    [[nodiscard]] ProjectOptions range() const;
+    /// Before anything else is set: changes defaults to those of `preset`.
+    void take_preset();
+    /// Once everything is set: puts --radius and --quality into the chosen method's settings, and takes lists apart.
+    /// Throws Misuse where settings do not go together.
+    void resolve();
+    /// Takes method and settings of a budget's choice in place of those of its last choice.
+    void choose(const Configuration& picked);
+
+    // What resolve() made of it.
+    [[nodiscard]] const Outputs& outputs() const { return outputs_; } ///< without a folder
+    [[nodiscard]] const ProjectOptions& range() const { return range_; }
     [[nodiscard]] std::optional<Registration> registration() const;
-    [[nodiscard]] CloudWalk cloud_walk() const;
     [[nodiscard]] FitPlaneOptions preparation() const; ///< of noisy depth
-    /// As given; --radius holds for clouds, too, and --cloud.radius before it.
-    [[nodiscard]] CloudAoOptions cloud_ao() const;
-    /// The chosen method's settings, --radius and --quality put in their rows.
-    [[nodiscard]] MethodSetup& chosen_setup();
-    [[nodiscard]] double radius_m(); ///< the chosen method's
+    /// --radius holds for clouds, too, and --cloud.radius before it.
+    [[nodiscard]] const CloudAoOptions& cloud_ao() const { return cloud_options_; }
+    [[nodiscard]] MethodSetup& chosen_setup() const { return setup_of(method); }
+    [[nodiscard]] double radius_m() const; ///< the chosen method's
+    [[nodiscard]] bool in_sequence(const Capture& capture) const;
 
   private:
     [[nodiscard]] std::vector<Stage> common_stages();
     [[nodiscard]] Stage cloud_stage();    ///< --cloud.rays and so on
     [[nodiscard]] Stage sequence_stage(); ///< --sequence.layers and so on
-    /// What --radius and --quality are when not given, as their help says it.
-    [[nodiscard]] std::pair<std::string, std::string> method_defaults();
-    [[nodiscard]] MethodSetup& setup_of(std::string_view name);
+    [[nodiscard]] MethodSetup& setup_of(std::string_view name) const;
+    void put_common_settings();
 
     std::vector<std::pair<std::string, std::unique_ptr<MethodSetup>>> setups_;
+    Outputs outputs_;
+    ProjectOptions range_;
+    CloudAoOptions cloud_options_;               ///< --radius holds for clouds, too, and --cloud.radius before it
+    std::optional<Configuration> before_choice_; ///< the method of a budget's last choice, as it was before
 };
+
+/// Whether at least two depth frames have a pose: only then is there anything to look at together.
+[[nodiscard]] bool has_poses(const Capture& capture);
 
 } // namespace scanshade

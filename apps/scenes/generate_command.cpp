@@ -14,7 +14,8 @@ class Generate final : public Command {
 
     std::vector<Stage> stages() override {
         std::vector<Parameter> rows = options_.parameters();
-        rows.insert(rows.begin(), {"out", "folder of the capture", &out_});
+        rows.insert(rows.begin(), {.name = "out", .help = "folder of the capture", .value = &out_});
+        rows.push_back({.name = "quiet", .help = "tells only failures", .value = &quiet_});
         return {{"capture", rows}};
     }
 
@@ -22,7 +23,12 @@ class Generate final : public Command {
         if (out_.empty())
             throw Misuse("generate needs -o FOLDER for the capture");
         options_.scene = scene_.front();
-        generate(options_, out_, [](int done, int total) { fmt::print(stderr, "  frame {} of {}\n", done, total); });
+        generate(options_, out_, [&](int done, int total) {
+            if (!quiet_)
+                fmt::print(stderr, "  frame {} of {}\n", done, total);
+        });
+        if (quiet_)
+            return all_well;
         if (options_.cloud > 0) {
             fmt::print(stderr, "{}: a cloud of {} points -> {}\n", options_.scene, options_.cloud, out_);
             return all_well;
@@ -34,6 +40,7 @@ class Generate final : public Command {
   private:
     std::vector<std::string> scene_;
     std::string out_;
+    bool quiet_ = false;
     GenerateOptions options_;
 };
 

@@ -422,7 +422,7 @@ Truth true_visibility(const World& world, const Optics& camera, const Eigen::Iso
                       const TruthOptions& options) {
     const CosineDirections directions(options.rays, options.seed);
     const RayHemisphere hemisphere(world.surface(), directions, options.radius_m, options.all_falloffs);
-    const std::size_t kinds = options.all_falloffs ? falloff_names.size() : 1;
+    const std::size_t kinds = options.all_falloffs ? falloff_words.size() : 1;
     Truth truth;
     for (std::size_t kind = 0; kind < kinds; ++kind)
         truth.visibility[kind] = cv::Mat1f(camera.pinhole.size, std::numeric_limits<float>::quiet_NaN());

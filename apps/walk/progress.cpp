@@ -1,4 +1,3 @@
-// How far a run has come: a bar with rate and remaining time on a terminal, one line per frame elsewhere. On stderr.
 #include "apps/walk/progress.h"
 
 #include "apps/json.h"
@@ -18,7 +17,10 @@ namespace {
 
 const char* const clear_line = "\r\033[K";
 
-bool as_json = false; // set once, before there are threads
+/// How often frames that are well are told of where there is no terminal.
+constexpr double between_lines_s = 5;
+
+bool as_json = false, quiet = false; // set once, before there are threads
 
 } // namespace
 
@@ -86,7 +88,14 @@ std::string line_of(const FrameRow& row) {
 
 void log_as_json() { as_json = true; }
 
+void be_quiet() { quiet = true; }
+
 void say(const std::string& line) {
+    if (!quiet)
+        warn(line);
+}
+
+void warn(const std::string& line) {
     if (as_json)
         log(own_turn, {{"message", line}});
     else
@@ -120,10 +129,13 @@ std::string duration_text(double seconds) {
 }
 
 Progress::Progress(std::size_t total)
-    : total_(total), on_terminal_(!as_json && isatty(STDERR_FILENO) == 1), turn_(own_turn) {}
+    : total_(total), on_terminal_(!as_json && !quiet && isatty(STDERR_FILENO) == 1), turn_(own_turn) {}
 
 void Progress::add(const FrameRow& row) {
     ++done_;
+    const bool bad = row.status != FrameStatus::ok || !row.warnings.empty();
+    if (quiet && !bad)
+        return;
     if (as_json) {
         const StageTimes& ms = row.ms;
         const double sum_ms = ms.load + ms.project + ms.compute + ms.attach + ms.write;
@@ -138,11 +150,21 @@ void Progress::add(const FrameRow& row) {
                     {"left_s", seconds_left()}});
         return;
     }
-    const bool remarkable = row.status != FrameStatus::ok || !row.warnings.empty() || !row.notes.empty();
-    if (!on_terminal_ || remarkable)
-        tell(turn_, fmt::format("{}  {}\n", on_terminal_ ? clear_line : "", line_of(row)));
+    if (quiet) {
+        tell(turn_, fmt::format("{}: {}\n", turn_ ? turn_->capture : "", line_of(row)));
+    } else if (on_terminal_ ? bad || !row.notes.empty() : bad || is_due()) {
+        const std::string place = bad ? "" : fmt::format("  {}/{}", done_, total_);
+        tell(turn_, fmt::format("{}  {}\n", on_terminal_ ? clear_line : place, line_of(row)));
+    }
     if (on_terminal_)
         tell_for_now(turn_, bar());
+}
+
+bool Progress::is_due() {
+    if (last_told_ && last_told_->seconds() < between_lines_s)
+        return false;
+    last_told_.emplace();
+    return true;
 }
 
 double Progress::seconds_left() const {

@@ -31,11 +31,13 @@ json known(double value, int digits = 4) {
 
 json value_json(const Parameter& row) {
     return std::visit(
-        [&](const auto* value) -> json {
-            if constexpr (std::is_same_v<decltype(value), const float*>)
+        [&]<class Target>(const Target& target) -> json {
+            if constexpr (std::is_same_v<Target, float*>)
                 return json::parse(value_text(row)); // the number as typed: 0.1, not 0.10000000149011612
+            else if constexpr (std::is_same_v<Target, OneOf> || std::is_same_v<Target, std::optional<double>*>)
+                return value_text(row);
             else
-                return *value;
+                return *target;
         },
         row.value);
 }

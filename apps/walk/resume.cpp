@@ -29,10 +29,12 @@ constexpr std::array aside = {"frames",         "camera",
                               "shard",          "log",
                               "shade-strength", "colour-cloud",
                               "cloud",          "cloud-resolution",
-                              "poses",          "in-flight"};
+                              "poses",          "in-flight",
+                              "preset",         "quiet"};
 
 /// Rows that shape nothing when they are typed differently.
-constexpr std::array elsewhere = {"out", "overwrite", "dump", "resume", "retry", "shard", "log", "device", "in-flight"};
+constexpr std::array elsewhere = {"out", "overwrite", "dump",      "resume", "retry", "shard",
+                                  "log", "device",    "in-flight", "preset", "quiet"};
 
 std::string row_text(const Parameter& row) { return row.name + "=" + value_text(row); }
 

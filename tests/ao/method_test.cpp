@@ -38,7 +38,7 @@ std::vector<Case> cases() {
         const auto setup = method.setup();
         auto rows = setup->parameters();
         const Parameter* quality = row_named(rows, "quality");
-        for (const std::string& name : quality ? quality->choices : std::vector<std::string>{""}) {
+        for (const std::string& name : quality ? choices_of(*quality) : std::vector<std::string>{""}) {
             all.push_back({std::string(method.name), name, false});
             if (row_named(rows, "downsampled"))
                 all.push_back({std::string(method.name), name, true});

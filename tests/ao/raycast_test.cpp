@@ -469,11 +469,11 @@ TEST(Meshes, a_cube_is_open_at_every_vertex_and_a_box_closed_from_inside) {
     Mesh inside = cube();
     for (auto& triangle : inside.triangles)
         std::swap(triangle[1], triangle[2]);
-    for (const char* from : {"triangles", "vertices"}) {
+    for (const MeshRays from : {MeshRays::triangles, MeshRays::vertices}) {
         for (const float v :
              Raycast({.rays = 256, .mesh = from}).compute({outside.vertices, {}, outside.triangles}).visibility)
-            EXPECT_EQ(v, 1) << from;
-        const auto closed = Raycast({.radius_m = endless, .rays = 256, .mesh = "triangles"})
+            EXPECT_EQ(v, 1) << static_cast<int>(from);
+        const auto closed = Raycast({.radius_m = endless, .rays = 256, .mesh = MeshRays::triangles})
                                 .compute({inside.vertices, {}, inside.triangles})
                                 .visibility;
         for (const float v : closed)
@@ -484,10 +484,10 @@ TEST(Meshes, a_cube_is_open_at_every_vertex_and_a_box_closed_from_inside) {
 TEST(Meshes, vertices_without_a_triangle_have_no_value) {
     Mesh mesh = cube();
     mesh.vertices.emplace_back(3, 3, 3);
-    for (const char* from : {"triangles", "vertices"}) {
+    for (const MeshRays from : {MeshRays::triangles, MeshRays::vertices}) {
         const auto values = Raycast({.rays = 16, .mesh = from}).compute({mesh.vertices, {}, mesh.triangles}).visibility;
         EXPECT_EQ(values.size(), 9U);
-        EXPECT_TRUE(std::isnan(values.back())) << from;
+        EXPECT_TRUE(std::isnan(values.back())) << static_cast<int>(from);
     }
 }
 
@@ -544,8 +544,9 @@ TEST(Meshes, the_file_comes_back_with_one_property_more) {
 TEST(Settings, that_cannot_be_are_refused) {
     EXPECT_THROW(Raycast(RaycastOptions{.radius_m = 0}), Misuse);
     EXPECT_THROW(Raycast(RaycastOptions{.rays = 0}), Misuse);
-    EXPECT_THROW(Raycast(RaycastOptions{.falloff = "soft"}), Misuse);
-    EXPECT_THROW(Raycast(RaycastOptions{.mesh = "edges"}), Misuse);
+    RaycastOptions options;
+    for (const auto& [name, word] : {std::pair("falloff", "soft"), std::pair("mesh", "edges")})
+        EXPECT_THROW(set(*row_named(options.parameters(), name), word), Misuse) << name;
 }
 
 } // namespace

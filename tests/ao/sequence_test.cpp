@@ -75,9 +75,9 @@ bool same_bytes(const cv::Mat1f& a, const cv::Mat1f& b) {
     return a.size() == b.size() && std::memcmp(a.data, b.data, a.total() * 4) == 0;
 }
 
-SurfelOptions quality(const char* name) {
+SurfelOptions with(Quality quality) {
     SurfelOptions options;
-    options.quality = name;
+    options.quality = quality;
     return options;
 }
 
@@ -103,7 +103,7 @@ NeighbourhoodResult together(const std::vector<Recorded>& frames, const Neighbou
 
 TEST(Sequence, a_frame_without_pose_is_what_it_is_by_itself) {
     const auto frames = walk("clutter", "ideal", 3, 0.2, 3);
-    Surfel surfel(device(), quality("high"));
+    Surfel surfel(device(), with(Quality::high));
     Neighbourhood sequence(device(), surfel, radius_m, {}, {}, {});
     for (std::size_t i = 0; i < 3; ++i)
         sequence.add(i, frames[i].depth, i == 1 ? std::nullopt : std::optional(frames[i].pose));
@@ -176,7 +176,7 @@ TEST(Sequence, poses_off_by_a_centimetre_and_half_a_degree_cost_little) {
 
 TEST(Sequence, averaging_a_static_camera_leaves_the_mean_of_all_patterns) {
     const std::vector<Recorded> frames(31, walk("office", "ideal", 5.5, 0.1, 1)[0]);
-    Surfel surfel(device(), quality("low"));
+    Surfel surfel(device(), with(Quality::low));
     cv::Mat1d sum(240, 320, 0.0);
     std::vector<cv::Mat1f> each;
     for (int i = 0; i < 31; ++i) {
@@ -249,7 +249,7 @@ double flicker(const std::vector<Recorded>& frames, const std::vector<cv::Mat1f>
 TEST(Sequence, static_points_flicker_a_third_as_much) {
     const auto frames = walk("office", "kinect", 5.5, 1.0 / 30, 25);
     const auto all = [&](const NeighbourhoodOptions& options) {
-        Surfel surfel(device(), quality("high"));
+        Surfel surfel(device(), with(Quality::high));
         Neighbourhood sequence(device(), surfel, radius_m, kinect, {}, options);
         for (std::size_t i = 0; i < frames.size(); ++i)
             sequence.add(i, frames[i].depth, frames[i].pose);
@@ -266,7 +266,7 @@ TEST(Sequence, static_points_flicker_a_third_as_much) {
 /// Runs some frames of a recording as `run --sequence on --cloud` does.
 std::vector<FrameRow> run_together(const Capture& capture, const std::vector<std::size_t>& frames,
                                    const std::filesystem::path& out, RecordingCloud* cloud = nullptr) {
-    Surfel surfel(device(), quality("low"));
+    Surfel surfel(device(), with(Quality::low));
     Neighbourhood sequence(device(), surfel, radius_m, kinect, {}, only(2, 2, 2, 2));
     BatchOptions options;
     options.frames = frames;

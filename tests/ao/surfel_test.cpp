@@ -60,7 +60,7 @@ CornerError corner_error(const SurfelOptions& options) {
 
 TEST(Surfel, a_right_angled_corner_is_as_dark_as_the_closed_form) {
     const CornerError many = corner_error(reads(2, 8)), few = corner_error(reads(1, 4));
-    const CornerError alike = corner_error({.quality = "lowest"});
+    const CornerError alike = corner_error({.quality = Quality::lowest});
     EXPECT_LT(many.rms, 0.01);
     EXPECT_LT(few.rms, 0.01);
     EXPECT_LT(alike.rms, 0.01); // nothing in a corner has ends, so its thickness does not show
@@ -70,7 +70,7 @@ TEST(Surfel, a_right_angled_corner_is_as_dark_as_the_closed_form) {
 }
 
 TEST(Surfel, a_plane_is_open_at_any_tilt_and_distance) {
-    for (const char* quality : {"lowest", "high"})
+    for (const Quality quality : {Quality::lowest, Quality::high})
         for (const double tilt : {0.0, 45.0, 60.0, 80.0, 85.0})
             for (const double z : {0.3, 2.0, 20.0}) {
                 const DepthImage depth = tilted_plane(test_camera({320, 240}), tilt, z);
@@ -79,7 +79,8 @@ TEST(Surfel, a_plane_is_open_at_any_tilt_and_distance) {
                 for (int i = 0; i < 320 * 240; ++i)
                     if (depth.z_m(i) > 0)
                         lowest = std::min<double>(lowest, ao.visibility(i));
-                EXPECT_GE(lowest, 0.995) << quality << ": " << tilt << " degrees at " << z << " m";
+                EXPECT_GE(lowest, 0.995) << word_for(quality, quality_words) << ": " << tilt << " degrees at " << z
+                                         << " m";
             }
 }
 

@@ -6,6 +6,7 @@
 #include "apps/measure/configurations.h"
 #include "apps/measure/fused_reference.h"
 #include "apps/page.h"
+#include "apps/run/presets.h"
 #include "io/images/image_file.h"
 #include "tests/support/says.h"
 #include "tests/support/small_capture.h"
@@ -111,6 +112,12 @@ TEST_F(MeasureTest, maps_of_another_radius_are_told) {
     EXPECT_TRUE(says(run_program(fmt::format("compare {} --truth", out())).err, "radius of 0.2 m, B with 0.5 m"));
 }
 
+TEST_F(MeasureTest, a_comparison_is_printed_as_json_when_asked) {
+    const Ran ran = run_program(fmt::format("compare {} --truth --json -o {}", made(), out()));
+    ASSERT_EQ(ran.exit_code, 0) << ran.err;
+    EXPECT_EQ(json::parse(ran.out), read(folder / "out/compare.json")) << "and nothing else stands there";
+}
+
 TEST_F(MeasureTest, a_damaged_map_is_told_and_the_others_are_compared) {
     fs::copy(made(), out(), fs::copy_options::recursive);
     const fs::path first = fs::directory_iterator(folder / "out/ao")->path();
@@ -155,9 +162,11 @@ TEST(FrontTest, holds_what_nothing_beats) {
 }
 
 TEST(FrontTest, survives_its_file_and_says_what_is_wrong_with_another) {
-    Front front{"some device", {{SensorClass::clean, "bench"}}, {}};
+    Front front{"some device", {{SensorClass::clean, "bench"}}, {}, {}, {}};
     front.points[SensorClass::clean] = {{{"cacao", "low", {{"quality", "low"}}}, 30, 0.12},
                                         {{"cacao", "high", {{"quality", "high"}}}, 60, 0.1}};
+    front.others[SensorClass::clean] = {{{"cacao", "lowest", {{"quality", "lowest"}}}, 40, 0.2}};
+    front.sequences[SensorClass::clean] = {"measured", {"surfel", "high", {{"quality", "high"}}}, 0.2, 0.1, 2};
     const Front again = front_from(to_json(front), "front.json");
     EXPECT_EQ(to_json(again), to_json(front));
     json bad = to_json(front);
@@ -167,8 +176,8 @@ TEST(FrontTest, survives_its_file_and_says_what_is_wrong_with_another) {
 }
 
 TEST(FrontTest, parts_of_two_devices_do_not_go_together) {
-    Front one{"a", {{SensorClass::clean, ""}}, {{SensorClass::clean, {point("x", 1, 0.1)}}}};
-    const Front other{"b", {{SensorClass::clean, ""}}, {{SensorClass::clean, {point("y", 1, 0.1)}}}};
+    Front one{"a", {{SensorClass::clean, ""}}, {{SensorClass::clean, {point("x", 1, 0.1)}}}, {}, {}};
+    const Front other{"b", {{SensorClass::clean, ""}}, {{SensorClass::clean, {point("y", 1, 0.1)}}}, {}, {}};
     EXPECT_TRUE(says(refusal([&] { one.replace_with(other); }), "two devices"));
 }
 
@@ -179,6 +188,23 @@ TEST(FrontTest, the_shipped_one_is_a_front_of_configurations_that_are_there) {
             EXPECT_TRUE(front[i]) << points[i].configuration.full_name();
             const auto setup = method_named(points[i].configuration.method).setup();
             EXPECT_NO_THROW(apply(points[i].configuration, *setup));
+        }
+    }
+}
+
+TEST(FrontTest, the_shipped_one_knows_the_error_of_every_preset) {
+    const Front& front = shipped_front();
+    for (const auto& [sensor, points] : front.points) {
+        double last = 1;
+        for (const auto& [name, preset] : preset_words) {
+            const std::string wanted = configuration_of(preset).full_name();
+            const auto is_it = [&](const Priced& point) { return point.configuration.full_name() == wanted; };
+            const std::vector<Priced>& others = front.others.at(sensor);
+            const auto on = std::ranges::find_if(points, is_it), off = std::ranges::find_if(others, is_it);
+            ASSERT_TRUE(on != points.end() || off != others.end()) << wanted;
+            const double rms = on != points.end() ? on->rms : off->rms;
+            EXPECT_LT(rms, 1.01 * last) << name << ", " << name_of(sensor) << ": no worse than the preset before it";
+            last = rms;
         }
     }
 }
@@ -503,6 +529,10 @@ TEST_F(MeasureTest, a_file_that_holds_no_settings_is_refused) {
                       .exit_code,
                   1)
             << file;
+    std::ofstream(folder / "mistyped.json") << R"({"settings": {"method cacao": {"cacao.raduis": 0.3}}})";
+    const Ran mistyped =
+        run_program(fmt::format("run {} -o {} --settings {}", capture(), out(), (folder / "mistyped.json").string()));
+    EXPECT_TRUE(says(mistyped.err, "--cacao.raduis: no such flag; did you mean --cacao.radius?")) << mistyped.err;
 }
 
 } // namespace

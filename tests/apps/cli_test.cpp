@@ -139,6 +139,100 @@ TEST_F(CliTest, radius_and_quality_reach_the_method) {
     EXPECT_EQ(run("--quality splendid --overwrite").exit_code, 1);
 }
 
+/// The settings that a run used, in rows of every stage.
+json rows_of(const json& manifest) {
+    json rows = json::object();
+    for (const auto& [stage, own] : manifest["settings"].items())
+        rows.update(own);
+    return rows;
+}
+
+TEST_F(CliTest, a_preset_changes_defaults_and_flags_win) {
+    ASSERT_EQ(run("--frames 0").exit_code, 0);
+    const json plain = rows_of(manifest());
+    EXPECT_EQ(plain["preset"], "fast");
+    ASSERT_EQ(run("--frames 0 --overwrite --preset fast").exit_code, 0);
+    EXPECT_EQ(rows_of(manifest()), [&] {
+        json same = plain;
+        same["overwrite"] = true;
+        return same;
+    }()) << "the default is the first preset";
+
+    ASSERT_EQ(run("--frames 0 --overwrite --preset balanced").exit_code, 0);
+    const json balanced = rows_of(manifest());
+    EXPECT_EQ(balanced["method"], "surfel");
+    EXPECT_EQ(balanced["surfel.quality"], "high");
+    EXPECT_EQ(balanced["surfel.downsampled"], true);
+    EXPECT_EQ(balanced["sequence"], "off");
+
+    ASSERT_EQ(run("--quality low --frames 0 --overwrite --preset best").exit_code, 0);
+    const json best = rows_of(manifest());
+    EXPECT_EQ(best["preset"], "best");
+    EXPECT_EQ(best["method"], "surfel");
+    EXPECT_EQ(best["surfel.quality"], "low") << "flags win, wherever they stand";
+    EXPECT_EQ(best["sequence"], "auto");
+    EXPECT_EQ(best["cloud.rays"], 64);
+
+    ASSERT_EQ(run("--frames 0 --overwrite --preset best --method gtao --sequence off").exit_code, 0);
+    const json other = rows_of(manifest());
+    EXPECT_EQ(other["method"], "gtao");
+    EXPECT_EQ(other["gtao.quality"], "medium") << "what the preset says of surfel is not gtao's";
+    EXPECT_EQ(other["sequence"], "off");
+
+    const fs::path file = folder / "settings.json";
+    std::ofstream(file) << R"({"settings": {"method surfel": {"surfel.quality": "medium"}}})";
+    ASSERT_EQ(run(fmt::format("--frames 0 --overwrite --preset best --settings {}", file.string())).exit_code, 0);
+    EXPECT_EQ(rows_of(manifest())["surfel.quality"], "medium") << "a settings file wins, too";
+    EXPECT_EQ(run("--frames 0 --overwrite --preset best --max-error 0.2").exit_code, 1);
+}
+
+TEST_F(CliTest, frames_are_looked_at_together_only_where_there_are_poses) {
+    ASSERT_EQ(run("--preset best --surfel.quality lowest").exit_code, 0);
+    EXPECT_EQ(manifest()["totals"]["ok"], 4) << "no poses: each frame by itself";
+    const fs::path recording = folder / "recording";
+    ASSERT_EQ(
+        run_program(fmt::format("generate office -o {} --frames 3 --size 64x48 --truth=false", recording.string()))
+            .exit_code,
+        0);
+    const Ran together = run_program(
+        fmt::format("run {} -o {} --preset best --surfel.quality lowest", recording.string(), (folder / "b").string()));
+    ASSERT_EQ(together.exit_code, 0);
+    EXPECT_NE(together.err.find("looked at together"), std::string::npos) << together.err;
+}
+
+TEST_F(CliTest, a_quiet_run_tells_only_what_went_wrong) {
+    const Ran silent = run("-q");
+    EXPECT_EQ(silent.exit_code, 0);
+    EXPECT_EQ(silent.err, "");
+    EXPECT_EQ(silent.out, "");
+    fs::resize_file(capture() / "depth/002.png", 60);
+    const Ran failed = run("--overwrite --quiet");
+    EXPECT_EQ(failed.exit_code, 2);
+    EXPECT_NE(failed.err.find("002.png"), std::string::npos) << failed.err;
+    EXPECT_EQ(failed.err.find("ok,"), std::string::npos) << failed.err;
+    EXPECT_LE(std::count(failed.err.begin(), failed.err.end(), '\n'), 2) << failed.err;
+}
+
+TEST_F(CliTest, off_a_terminal_frames_that_are_well_are_told_of_now_and_then) {
+    tests::write_capture(capture(), 40);
+    fs::resize_file(capture() / "depth/030.png", 60);
+    const Ran ran = run("--write ao");
+    std::size_t told = 0;
+    for (std::size_t at = 0; (at = ran.err.find(": ok,", at)) != std::string::npos; ++at)
+        ++told;
+    EXPECT_GE(told, 1u) << ran.err;
+    EXPECT_LT(told, 20u) << ran.err;
+    EXPECT_NE(ran.err.find("030: failed"), std::string::npos) << ran.err;
+}
+
+TEST_F(CliTest, a_run_ends_with_measured_errors_and_with_none_where_nothing_was_measured) {
+    const Ran ran = run();
+    EXPECT_NE(ran.err.find("expected error: RMSE 0."), std::string::npos) << ran.err;
+    EXPECT_NE(ran.err.find("--preset balanced: RMSE 0."), std::string::npos) << ran.err;
+    const Ran other = run("--overwrite --radius 0.3");
+    EXPECT_EQ(other.err.find("expected error"), std::string::npos) << "nothing was measured at this radius";
+}
+
 TEST_F(CliTest, a_cloud_keeps_its_points_and_gains_a_field) {
     const cv::Mat1f z_m = tests::corner_depth(0);
     const Pinhole camera = tests::small_camera().pinhole;
@@ -331,15 +425,65 @@ TEST_F(CliTest, inspect_tells_of_a_frame_that_cannot_be_read) {
     EXPECT_NE(ran.out.find("001.png"), std::string::npos) << ran.out;
 }
 
-TEST(CliHelpTest, help_shows_every_flag_with_default_and_range) {
-    const Ran ran = run_program("help run");
+std::size_t lines_in(const std::string& text) {
+    return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+TEST(CliHelpTest, help_all_shows_every_flag_with_default_and_range) {
+    const Ran ran = run_program("help run all");
     EXPECT_EQ(ran.exit_code, 0);
-    for (const char* expected :
-         {"--frames", "--cacao.radius", "default cacao", "png16 | png8 | tiff | exr", "-o,--out"})
+    for (const char* expected : {"--frames", "--cacao.radius", "default cacao", "png16 | png8 | tiff | exr", "-o,--out",
+                                 "--cloud.rays", "--sequence.layers", "--dump"})
         EXPECT_NE(ran.out.find(expected), std::string::npos) << expected << " in\n" << ran.out;
-    EXPECT_EQ(run_program("run --help").out, ran.out);
+}
+
+TEST(CliHelpTest, the_first_page_of_every_command_fits_a_screen) {
+    for (const char* command : {"inspect", "run", "plan", "status", "merge", "compare", "bench", "calibrate-look",
+                                "generate", "methods", "devices"}) {
+        const Ran ran = run_program(fmt::format("help {}", command));
+        EXPECT_EQ(ran.exit_code, 0) << command;
+        EXPECT_LE(lines_in(ran.out), 60u) << ran.out;
+        std::istringstream lines(ran.out);
+        for (std::string line; std::getline(lines, line);)
+            EXPECT_LE(line.size(), 110u) << line;
+    }
+    const std::string page = run_program("help run").out;
+    for (const char* expected :
+         {"--preset", "--method", "--quality", "--radius", "-q,--quiet", "help run all", "surfel"})
+        EXPECT_NE(page.find(expected), std::string::npos) << expected << " in\n" << page;
+    EXPECT_EQ(page.find("--cacao."), std::string::npos);
+    EXPECT_EQ(run_program("run --help").out, page);
     EXPECT_EQ(run_program("help").exit_code, 0);
     EXPECT_EQ(run_program("--version").out.substr(0, 10), "scanshade ");
+}
+
+TEST(CliHelpTest, help_of_a_topic_shows_its_flags_alone) {
+    for (const auto& [topic, flag] : {std::pair("cacao", "--cacao.radius"), std::pair("surfel", "--surfel.hidden"),
+                                      std::pair("clouds", "--cloud.rays"), std::pair("sequence", "--sequence.fuse")}) {
+        const Ran ran = run_program(fmt::format("help run {}", topic));
+        EXPECT_EQ(ran.exit_code, 0);
+        EXPECT_NE(ran.out.find(flag), std::string::npos) << ran.out;
+        EXPECT_EQ(ran.out.find("--frames"), std::string::npos) << ran.out;
+    }
+    const Ran mistyped = run_program("help run surfle");
+    EXPECT_EQ(mistyped.exit_code, 1);
+    EXPECT_NE(mistyped.err.find("did you mean surfel?"), std::string::npos) << mistyped.err;
+}
+
+TEST(CliHelpTest, mistyped_words_are_told_the_nearest_one) {
+    for (const auto& [words, meant] :
+         {std::pair("run x -o y --quailty high", "--quailty: no such flag; did you mean --quality?"),
+          std::pair("run x -o y --cacao.raduis=1", "--cacao.raduis: no such flag; did you mean --cacao.radius?"),
+          std::pair("generate office --frame 3", "did you mean --frames?"),
+          std::pair("insepct x", "insepct: no such command; did you mean inspect?"),
+          std::pair("run x -o y --method surfle", "did you mean surfel?"),
+          std::pair("run x -o y --preset bets", "did you mean best?"),
+          std::pair("run x -o y --write ao,shadde", "did you mean shaded?")}) {
+        const Ran ran = run_program(words);
+        EXPECT_EQ(ran.exit_code, 1) << words;
+        EXPECT_NE(ran.err.find(meant), std::string::npos) << ran.err;
+    }
+    EXPECT_EQ(run_program("run x -o y --unheard-of").err.find("did you mean"), std::string::npos);
 }
 
 TEST(CliHelpTest, methods_and_devices_are_listed) {

@@ -514,6 +514,11 @@ TEST_F(ResumeTest, shards_together_do_everything_and_a_late_one_stands_in_for_a_
     ASSERT_EQ(plan("--write ao").exit_code, 0);
     ASSERT_EQ(run_program(fmt::format("run {} --shard 2/3", job().string())).exit_code, 0);
     EXPECT_EQ(run_program("status " + job().string()).exit_code, 0) << "shards 1 and 3 never ran";
+    const json status = json::parse(run_program("status --json " + job().string()).out);
+    EXPECT_EQ(status["tasks"]["done"], status["tasks"]["of"]);
+    EXPECT_EQ(status["frames"]["ok"], 3 + 4 + 5 + 6);
+    EXPECT_EQ(status["work_done"], 1);
+    EXPECT_TRUE(status["running"].empty() && status["failures"].empty());
     EXPECT_EQ(run_program(fmt::format("run {} --shard 4/3", job().string())).exit_code, 1);
     EXPECT_EQ(run_program("merge " + job().string()).exit_code, 0);
     const std::string table = read_bytes(job() / "frames.csv");
