@@ -93,8 +93,8 @@ NeighbourhoodOptions only(int fuse, int layers, int average, int reach = 12) {
 const DepthNoise kinect{0.0015, 0.0018, 3};
 
 NeighbourhoodResult together(const std::vector<Recorded>& frames, const NeighbourhoodOptions& options,
-                             std::size_t place, const DepthNoise& noise = {}, const char* level = "high") {
-    Surfel surfel(device(), quality(level));
+                             std::size_t place, const DepthNoise& noise = {}, Quality level = Quality::high) {
+    Surfel surfel(device(), with(level));
     Neighbourhood sequence(device(), surfel, radius_m, noise, {}, options);
     for (std::size_t i = 0; i < frames.size(); ++i)
         sequence.add(i, frames[i].depth, frames[i].pose);
@@ -207,7 +207,7 @@ TEST(Sequence, averaging_a_static_camera_leaves_the_mean_of_all_patterns) {
     EXPECT_LT(noise_of_15, 1.3 * noise_of_one / std::sqrt(15.0));
 
     const cv::Mat1f truth = truth_of("office", frames[0]);
-    const double of_64 = rms(together(frames, alone(), 15, {}, "highest").ao.visibility, truth),
+    const double of_64 = rms(together(frames, alone(), 15, {}, Quality::highest).ao.visibility, truth),
                  averaged = rms(result.ao.visibility, truth);
     std::printf("error: 30 frames of 8 reads %.4f, one of 64 %.4f\n", averaged, of_64);
     EXPECT_LT(averaged, of_64 + 0.007);
