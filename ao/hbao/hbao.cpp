@@ -83,7 +83,7 @@ std::vector<std::byte> Hbao::constants(const shared::ScreenConstants& screen) co
     return bytes_of(shared::HbaoConstants{screen, count.directions, count.steps, static_cast<float>(std::cos(turn)),
                                           static_cast<float>(std::sin(turn)), static_cast<float>(std::cos(bias)),
                                           static_cast<float>(std::sin(bias)), options_.attenuated ? 1.0F : 0.0F,
-                                          options_.profile == "published" ? 1.25F : 1.0F});
+                                          options_.profile == Profile::published ? 1.25F : 1.0F});
 }
 
 } // namespace scanshade
