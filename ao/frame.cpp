@@ -22,7 +22,7 @@ AoMap FrameAo::compute(const DepthImage& depth, const DepthNoise& noise) {
         ao = compute_prepared(depth, noise);
         timings_ = fit_->timings();
     } else {
-        ao = method_.compute({.depth = depth, .noise = noise});
+        ao = method_.compute({.surfaces = depth, .noise = noise});
     }
     timings_.insert(timings_.end(), method_.timings().begin(), method_.timings().end());
     return ao;
@@ -33,13 +33,9 @@ AoMap FrameAo::compute_prepared(const DepthImage& depth, const DepthNoise& noise
         fit_->set_noise(noise);
     else
         fit_.emplace(*device_, noise, preparation_);
-    if (fit_->planes() && method_.takes_prepared()) {
-        const PreparedSurfaces prepared = fit_->compute_on_device(depth);
-        return method_.compute({.depth = depth, .noise = noise, .smoothed = true, .prepared = &prepared});
-    }
-    const FittedDepth fitted = fit_->compute(depth);
-    const bool planes = !fitted.normals.normals.empty();
-    return method_.compute({fitted.depth, planes ? &fitted.normals : nullptr, noise, planes});
+    if (fit_->planes())
+        return method_.compute({.surfaces = fit_->compute_on_device(depth), .noise = noise, .smoothed = true});
+    return method_.compute({.surfaces = fit_->compute(depth).depth, .noise = noise});
 }
 
 Neighbourhood FrameAo::sequence(double radius_m, const DepthNoise& noise, const NeighbourhoodOptions& options) {

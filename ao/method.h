@@ -1,12 +1,14 @@
 // Depth in, visibility out: the one interface every AO method has, and the row type of the table of methods.
 #pragma once
 
+#include "projection/error.h"
 #include "projection/maps.h"
 #include "projection/noise.h"
 #include "projection/parameters.h"
 
 #include <array>
 #include <Eigen/Geometry>
+#include <fmt/format.h>
 #include <memory>
 #include <optional>
 #include <span>
@@ -35,21 +37,47 @@ struct Neighbour {
     double misfit_m = 0;               ///< by which the surfaces of both lie apart where they should not
 };
 
-/// Depth and normals that are on the device already.
-struct PreparedSurfaces {
-    std::shared_ptr<const gpu::DeviceBytes> z_m;     ///< a 32-bit float a pixel, metres, 0 = hole
-    std::shared_ptr<const gpu::DeviceBytes> normals; ///< three a pixel, (0, 0, 0) where there is none
+/// Depth and normals of one view, on the host or already on the device. Normals may be missing: methods then derive
+/// their own from depth.
+struct Surfaces {
+    /// On the host; shares the memory of both images.
+    Surfaces(const DepthImage& depth) : camera(depth.camera), z_m(depth.z_m) {}
+    Surfaces(const DepthImage& depth, const NormalImage& given)
+        : camera(depth.camera), z_m(depth.z_m), normals(given.normals) {}
+    /// On the device: one 32-bit float a pixel for depth, three for normals.
+    Surfaces(const Pinhole& pinhole, std::shared_ptr<const gpu::DeviceBytes> depth_there,
+             std::shared_ptr<const gpu::DeviceBytes> normals_there_)
+        : camera(pinhole), z_there(std::move(depth_there)), normals_there(std::move(normals_there_)) {}
+
+    Pinhole camera;
+    cv::Mat1f z_m;                                                  ///< metres, 0 = hole
+    cv::Mat3f normals;                                              ///< (0, 0, 0) where there is none
+    std::shared_ptr<const gpu::DeviceBytes> z_there, normals_there; ///< the same on the device
+
+    [[nodiscard]] bool on_device() const { return z_there != nullptr; }
+    [[nodiscard]] bool has_normals() const { return normals_there || !normals.empty(); }
 };
 
-/// What a method looks at. Normals are optional: without them the method derives its own from depth.
+/// Throws Error where the images on the host differ in size from the camera.
+inline void check_sizes(const Surfaces& surfaces) {
+    if (surfaces.on_device())
+        return;
+    const cv::Size depth = surfaces.z_m.size(), camera = surfaces.camera.size, normals = surfaces.normals.size();
+    if (depth.empty() || depth != camera)
+        throw Error(fmt::format("depth image of {}x{} with a camera of {}x{}", depth.width, depth.height, camera.width,
+                                camera.height));
+    if (!surfaces.normals.empty() && normals != depth)
+        throw Error(fmt::format("normals of {}x{} for a depth image of {}x{}", normals.width, normals.height,
+                                depth.width, depth.height));
+}
+
+/// What a method looks at.
 struct View {
-    const DepthImage& depth;
-    const NormalImage* normals = nullptr;
-    DepthNoise noise = {}; ///< sigma(z) of `depth` as recorded; none = clean. Methods may widen their tolerances by it
+    Surfaces surfaces;
+    DepthNoise noise = {}; ///< sigma(z) of depth as recorded; none = clean. Methods may widen their tolerances by it
     bool smoothed = false; ///< the noise is gone from within surfaces; at their edges it is not
     std::span<const Neighbour> neighbours = {}; ///< of the same image size; most methods have no use for them
-    const PreparedSurfaces* prepared = nullptr; ///< in place of depth.z_m and normals, for methods that take them
-    int instant = 0; ///< another number, another pattern of samples, so that frames of a recording can be averaged
+    int instant = 0; ///< another number gives another pattern of samples, so that frames of a recording can be averaged
 };
 
 /// Milliseconds per named pass or transfer, in execution order.
@@ -76,12 +104,10 @@ struct Intermediate {
 class Method {
   public:
     virtual ~Method() = default;
-    /// Visibility of each pixel: same size as view.depth.z_m; NaN exactly where there is no surface.
+    /// Visibility of each pixel, of the camera's image size; NaN exactly where there is no surface.
     virtual AoMap compute(const View& view) = 0;
     /// Whether View::neighbours make a difference.
     [[nodiscard]] virtual bool looks_at_neighbours() const { return false; }
-    /// Whether it reads View::prepared where there is one: then nothing goes by the host.
-    [[nodiscard]] virtual bool takes_prepared() const { return false; }
     /// Where the time of the last compute() went.
     [[nodiscard]] virtual const Timings& timings() const = 0;
     /// What lay between the passes of the last compute(), for study; most methods have nothing to show.

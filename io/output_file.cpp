@@ -72,14 +72,17 @@ void write_atomically(const fs::path& target, const std::function<void(const fs:
         fs::remove(temporary, ignored);
     };
     try {
-        fs::create_directories(folder);
-        write(temporary);
-        sync(temporary, O_RDONLY);
-        fs::rename(temporary, target);
-        sync(folder, O_RDONLY | O_DIRECTORY);
-    } catch (const std::system_error& failure) { // the file system's answer; streams throw it, too
-        clean_up();
-        throw Outage(target.string() + ": not written: " + failure.what());
+        during(target.string(), [&] {
+            try {
+                fs::create_directories(folder);
+                write(temporary);
+                sync(temporary, O_RDONLY);
+                fs::rename(temporary, target);
+                sync(folder, O_RDONLY | O_DIRECTORY);
+            } catch (const std::system_error& failure) { // the file system's answer; streams throw it, too
+                throw Outage(std::string("not written: ") + failure.what());
+            }
+        });
     } catch (...) {
         clean_up();
         throw;

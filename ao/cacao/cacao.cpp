@@ -19,8 +19,8 @@ Cacao::Cacao(gpu::Device& device, CacaoOptions options) : device_(device), optio
 }
 
 void Cacao::prepare(const View& view) {
-    const Pinhole& camera = view.depth.camera;
-    const bool supplied = view.normals || view.prepared;
+    const Pinhole& camera = view.surfaces.camera;
+    const bool supplied = view.surfaces.has_normals();
     if (program_ && supplied == normals_supplied_ && camera.size == camera_.size) {
         if (std::memcmp(&camera, &camera_, sizeof camera) == 0)
             return;
@@ -37,28 +37,25 @@ void Cacao::prepare(const View& view) {
 }
 
 AoMap Cacao::compute(const View& view) {
-    const cv::Mat1f& z = view.depth.z_m;
-    if (z.empty() || z.size() != view.depth.camera.size)
-        throw Error(fmt::format("depth image of {}x{} with a camera of {}x{}", z.cols, z.rows,
-                                view.depth.camera.size.width, view.depth.camera.size.height));
-    if (view.normals && view.normals->normals.size() != z.size())
-        throw Error("normals and depth differ in size");
+    const Surfaces& surfaces = view.surfaces;
+    check_sizes(surfaces);
     prepare(view);
     const auto start = std::chrono::steady_clock::now();
-    if (view.prepared) {
-        program_->take(cacao_depth_in, 0, view.prepared->z_m);
-        program_->take(cacao_normals_in, 0, view.prepared->normals);
-    } else if (options_.scan() && options_.depth_input == "metric") {
-        gpu::upload_depth(z, program_->host_as<float>(cacao_depth_in));
+    if (surfaces.on_device()) {
+        program_->take(cacao_depth_in, 0, surfaces.z_there);
+        program_->take(cacao_normals_in, 0, surfaces.normals_there);
     } else {
-        gpu::upload(z, program_->host(cacao_depth_in));
+        if (options_.scan() && options_.depth_input == "metric")
+            gpu::upload_depth(surfaces.z_m, program_->host_as<float>(cacao_depth_in));
+        else
+            gpu::upload(surfaces.z_m, program_->host(cacao_depth_in));
+        if (surfaces.has_normals())
+            gpu::upload(surfaces.normals, program_->host(cacao_normals_in));
     }
-    if (view.normals && !view.prepared)
-        gpu::upload(view.normals->normals, program_->host(cacao_normals_in));
     const auto uploaded = std::chrono::steady_clock::now();
     program_->run(std::as_bytes(std::span(&constants_, 1)));
     const auto ran = std::chrono::steady_clock::now();
-    AoMap ao{gpu::downloaded(program_->host_as<float>(cacao_out), z.size())};
+    AoMap ao{gpu::downloaded(program_->host_as<float>(cacao_out), surfaces.camera.size)};
     const auto done = std::chrono::steady_clock::now();
     const auto ms = [](auto from, auto to) { return std::chrono::duration<double, std::milli>(to - from).count(); };
     timings_.assign({{"host upload", ms(start, uploaded)}});

@@ -98,7 +98,6 @@ class Cacao final : public Method {
     Cacao(gpu::Device& device, CacaoOptions options);
 
     AoMap compute(const View& view) override;
-    [[nodiscard]] bool takes_prepared() const override { return true; }
     [[nodiscard]] const Timings& timings() const override { return timings_; }
 
     /// Buffers between the passes of the last compute(): depth slices by mip, normals, base pass, importance, AO before

@@ -89,7 +89,7 @@ void FitPlane::prepare(const DepthImage& depth, std::span<const OtherDepth> othe
     gpu::upload_depth(depth.z_m, program_->host_as<float>(recorded));
 }
 
-PreparedSurfaces FitPlane::compute_on_device(const DepthImage& depth) {
+Surfaces FitPlane::compute_on_device(const DepthImage& depth) {
     prepare(depth, {});
     const std::shared_ptr<gpu::DeviceBytes> z_m = pool_.get(depth.z_m.total() * 4),
                                             normals = pool_.get(depth.z_m.total() * 12);
@@ -97,7 +97,7 @@ PreparedSurfaces FitPlane::compute_on_device(const DepthImage& depth) {
     program_->give(normals_out, normals);
     program_->run(std::as_bytes(std::span(&constants_, 1)), gpu::Program::Results::on_device);
     timings_ = program_->timings();
-    return {z_m, normals};
+    return {depth.camera, z_m, normals};
 }
 
 FittedDepth FitPlane::compute(const DepthImage& depth, std::span<const OtherDepth> others) {

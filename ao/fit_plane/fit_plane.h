@@ -44,7 +44,7 @@ class FitPlane {
     /// what that leaves of sigma.
     [[nodiscard]] FittedDepth compute(const DepthImage& depth, std::span<const OtherDepth> others = {});
     /// The same of one frame, left on the device; planes() must hold.
-    [[nodiscard]] PreparedSurfaces compute_on_device(const DepthImage& depth);
+    [[nodiscard]] Surfaces compute_on_device(const DepthImage& depth);
     /// Whether depth and normals come from planes, and not depth alone, without flying pixels.
     [[nodiscard]] bool planes() const { return options_.smoothing > 0; }
     [[nodiscard]] const DepthNoise& noise() const { return noise_; }

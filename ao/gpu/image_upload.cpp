@@ -17,4 +17,11 @@ std::shared_ptr<const DeviceBytes> ImageUpload::operator()(const cv::Mat1f& imag
     return there;
 }
 
+std::vector<std::byte> read_back(Device& device, std::shared_ptr<const DeviceBytes> from) {
+    Program program(device, {{"bytes", from->size(), BufferRow::Host::taken}}, {}, 0);
+    program.take(0, 0, std::move(from));
+    program.run({});
+    return program.read_back(0);
+}
+
 } // namespace scanshade::gpu

@@ -21,4 +21,7 @@ class ImageUpload {
     std::unique_ptr<Program> program_; ///< one buffer and no pass
 };
 
+/// A copy on the host of what is on the device. Makes a program each time: for what is seldom done.
+[[nodiscard]] std::vector<std::byte> read_back(Device& device, std::shared_ptr<const DeviceBytes> from);
+
 } // namespace scanshade::gpu

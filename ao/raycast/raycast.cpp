@@ -1,6 +1,8 @@
 // Ray casting: geometry from what is given, then the same rays everywhere.
 #include "ao/raycast/raycast.h"
 
+#include "ao/gpu/image_upload.h"
+
 #include "ao/raycast/depth_surface.h"
 #include "ao/raycast/point_surface.h"
 #include "projection/hash.h"
@@ -43,11 +45,23 @@ class Watch {
 
 Vector3d vector_of(const cv::Vec3f& v) { return Eigen::Vector3f(v[0], v[1], v[2]).cast<double>(); }
 
+/// Depth and the given normals, brought to the host where they are on the device.
+std::pair<DepthImage, cv::Mat3f> on_host(const Surfaces& surfaces, gpu::Device* device) {
+    if (!surfaces.on_device())
+        return {{surfaces.camera, surfaces.z_m, {}}, surfaces.normals};
+    const cv::Size size = surfaces.camera.size;
+    const auto image = [&](const std::shared_ptr<const gpu::DeviceBytes>& there, int type) {
+        std::vector<std::byte> bytes = gpu::read_back(*device, there);
+        return cv::Mat(size, type, bytes.data()).clone();
+    };
+    return {{surfaces.camera, image(surfaces.z_there, CV_32FC1), {}}, image(surfaces.normals_there, CV_32FC3)};
+}
+
 /// The given normals; the depth's own where there is none.
-cv::Mat3f normals_for(const View& view) {
-    if (!view.normals)
-        return normals_of(view.depth).normals;
-    cv::Mat3f normals = view.normals->normals.clone();
+cv::Mat3f normals_for(const DepthImage& depth, const cv::Mat3f& given) {
+    if (given.empty())
+        return normals_of(depth).normals;
+    cv::Mat3f normals = given.clone();
     std::optional<NormalImage> own;
     for (int v = 0; v < normals.rows; ++v)
         for (int u = 0; u < normals.cols; ++u) {
@@ -55,7 +69,7 @@ cv::Mat3f normals_for(const View& view) {
             if (length > 0.5 && length < 2)
                 continue;
             if (!own)
-                own = normals_of(view.depth);
+                own = normals_of(depth);
             normals(v, u) = own->normals(v, u);
         }
     return normals;
@@ -136,10 +150,12 @@ std::vector<float> Raycast::cast(const RaySurface& surface, std::size_t count, S
 
 AoMap Raycast::compute(const View& view) {
     Watch watch(timings_);
-    const auto& [camera, z_m, source] = view.depth;
-    const cv::Mat3f normals = normals_for(view);
+    check_sizes(view.surfaces);
+    const auto [depth, given] = on_host(view.surfaces, device_);
+    const auto& [camera, z_m, source] = depth;
+    const cv::Mat3f normals = normals_for(depth, given);
     watch.lap("normals");
-    const RaySurface surface(surface_of(view.depth, view.noise, options_.thickness_m));
+    const RaySurface surface(surface_of(depth, view.noise, options_.thickness_m));
     watch.lap("tree");
     const auto width = static_cast<std::size_t>(z_m.cols);
     const auto values = cast(surface, z_m.total(), [&](std::size_t i) -> std::optional<RayStart> {

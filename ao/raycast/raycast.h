@@ -27,10 +27,11 @@ class Raycast final : public Method, public PointMethod {
   public:
     /// Throws Misuse naming a setting out of its range.
     explicit Raycast(RaycastOptions options);
-    /// For the table of methods; the device has no part in it.
-    Raycast(gpu::Device&, RaycastOptions options) : Raycast(std::move(options)) {}
+    /// For the table of methods; the device only gives up surfaces that lie on it.
+    Raycast(gpu::Device& device, RaycastOptions options) : Raycast(std::move(options)) { device_ = &device; }
 
-    /// The depth image as the surface, about view.normals or its own. Memory grows with the image: 100 bytes a pixel.
+    /// The depth image as the surface, about the given normals or its own. Memory grows with the image: 100 bytes a
+    /// pixel.
     AoMap compute(const View& view) override;
     /// Clouds as discs (discs_of()); meshes as they are. Per vertex of a mesh either the mean over its triangles of the
     /// visibility at their centroids about their face normals (Luna 2016, chapter 21), or rays from the vertex about
@@ -50,6 +51,7 @@ class Raycast final : public Method, public PointMethod {
     std::vector<float> cast(const RaySurface& surface, std::size_t count, StartOf&& start_of);
 
     RaycastOptions options_;
+    gpu::Device* device_ = nullptr;
     CosineDirections directions_;
     Timings timings_;
     std::vector<float> standard_error_;

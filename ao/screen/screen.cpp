@@ -11,16 +11,10 @@
 namespace scanshade {
 namespace {
 
-void refuse_odd_sizes(const View& view) {
-    const cv::Size depth = view.depth.z_m.size(), camera = view.depth.camera.size;
-    if (depth.empty() || depth != camera)
-        throw Error(fmt::format("depth image of {}x{} with a camera of {}x{}", depth.width, depth.height, camera.width,
-                                camera.height));
-    if (view.prepared && !view.neighbours.empty())
-        throw Error("surfaces prepared on the device have no room for a guard band");
-    if (view.normals && view.normals->normals.size() != depth)
-        throw Error(fmt::format("normals of {}x{} for a depth image of {}x{}", view.normals->normals.cols,
-                                view.normals->normals.rows, depth.width, depth.height));
+void check_view(const View& view) {
+    check_sizes(view.surfaces);
+    if (view.surfaces.on_device() && !view.neighbours.empty())
+        throw Error("surfaces on the device have no room for a guard band");
 }
 
 std::vector<gpu::BufferRow> shared_buffers(std::size_t pixels, bool supplied, int seed) {
@@ -42,7 +36,7 @@ std::span<const Neighbour> checked_neighbours(const View& view) {
     if (view.neighbours.size() > shared::most_neighbours)
         throw Error(fmt::format("{} neighbours, {} are the most", view.neighbours.size(), shared::most_neighbours));
     for (const Neighbour& neighbour : view.neighbours)
-        if (neighbour.surfaces->camera.size != view.depth.z_m.size())
+        if (neighbour.surfaces->camera.size != view.surfaces.camera.size)
             throw Error("a neighbour of another image size");
     return view.neighbours;
 }
@@ -110,7 +104,7 @@ std::vector<Parameter> joined(std::vector<Parameter> rows, const std::vector<Par
 int guard_px(cv::Size size) { return (std::max(size.width, size.height) / 5 + 3) / 4 * 4; }
 
 shared::ScreenConstants constants_from(const ScreenOptions& options, const View& view, int guard) {
-    Pinhole camera = view.depth.camera;
+    Pinhole camera = view.surfaces.camera;
     camera.cx += guard;
     camera.cy += guard;
     shared::ScreenConstants k{};
@@ -179,9 +173,10 @@ gpu::Program& ScreenMethod::program_for(const Shape& shape, std::size_t constant
 }
 
 AoMap ScreenMethod::compute(const View& view) {
-    refuse_odd_sizes(view);
-    const cv::Size size = view.depth.z_m.size();
-    const bool supplied = view.normals || view.prepared;
+    check_view(view);
+    const Surfaces& surfaces = view.surfaces;
+    const cv::Size size = surfaces.camera.size;
+    const bool supplied = surfaces.has_normals();
     const auto neighbours = looks_at_neighbours() ? checked_neighbours(view) : std::span<const Neighbour>{};
     const int most = neighbours.empty() ? 0 : (static_cast<int>(neighbours.size()) + 3) / 4 * 4;
     const int guard = most > 0 ? guard_px(size) : 0;
@@ -198,14 +193,14 @@ AoMap ScreenMethod::compute(const View& view) {
     Stopwatch stopwatch;
     const cv::Rect window({guard, guard}, size);
     const cv::Size image(screen.size.x, screen.size.y);
-    if (view.prepared) {
-        program.take(screen_depth, 0, view.prepared->z_m);
-        program.take(screen_given, 0, view.prepared->normals);
+    if (surfaces.on_device()) {
+        program.take(screen_depth, 0, surfaces.z_there);
+        program.take(screen_given, 0, surfaces.normals_there);
     } else {
-        gpu::upload_depth(view.depth.z_m, gpu::image_on<float>(program.host(screen_depth), image)(window));
+        gpu::upload_depth(surfaces.z_m, gpu::image_on<float>(program.host(screen_depth), image)(window));
+        if (supplied)
+            surfaces.normals.copyTo(gpu::image_on<cv::Vec3f>(program.host(screen_given), image)(window));
     }
-    if (view.normals && !view.prepared)
-        view.normals->normals.copyTo(gpu::image_on<cv::Vec3f>(program.host(screen_given), image)(window));
     for (std::size_t i = 0; const Neighbour& other : neighbours)
         program.take(screen_neighbours, i++ * other.surfaces->words->size(), other.surfaces->words);
     const double upload_ms = stopwatch.lap_ms();

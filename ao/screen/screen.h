@@ -78,7 +78,6 @@ struct ScreenTables {
 class ScreenMethod : public Method {
   public:
     AoMap compute(const View& view) final;
-    [[nodiscard]] bool takes_prepared() const final { return true; }
     [[nodiscard]] const Timings& timings() const final { return timings_; }
 
   protected:

@@ -46,7 +46,7 @@ AoMap Gather::compute(const Seen& own, std::span<const Seen> others, const Gathe
     const DepthImage camera_only{own.surfaces->camera, {}, {}};
     ScreenOptions options;
     options.radius = static_cast<float>(how.radius_m);
-    shared::GatherConstants constants{constants_from(options, {.depth = camera_only, .noise = how.noise}),
+    shared::GatherConstants constants{constants_from(options, {.surfaces = camera_only, .noise = how.noise}),
                                       static_cast<int>(others.size()),
                                       0.002F,
                                       0.005F,

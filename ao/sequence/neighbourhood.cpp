@@ -107,7 +107,7 @@ View Neighbourhood::view_of(std::size_t place) {
         account("prepare", fit_->timings());
     }
     const bool planes = !slot.fitted->normals.normals.empty();
-    return {slot.fitted->depth, planes ? &slot.fitted->normals : nullptr, noise_, planes};
+    return {{slot.fitted->depth, slot.fitted->normals}, noise_, planes};
 }
 
 /// A frame's normals are asked for twice: to pack them, and to look from them.
@@ -273,7 +273,7 @@ NeighbourhoodResult Neighbourhood::compute(std::size_t place) {
     }
     averaged_ = !others.empty();
     const Slot& slot = slots_.at(place);
-    result.depth = view_of(place).depth;
+    result.depth = fit_ ? slot.fitted->depth : slot.depth;
     result.fused = slot.fused;
     result.neighbours = slot.neighbours;
     result.left_out = slot.left_out;

@@ -26,21 +26,22 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
 } // namespace
 
 PackedSurfaces PackSurfaces::compute(const View& view) {
-    const cv::Size size = view.depth.z_m.size();
-    const bool supplied = view.normals != nullptr;
+    const Surfaces& surfaces = view.surfaces;
+    const cv::Size size = surfaces.camera.size;
+    const bool supplied = surfaces.has_normals();
     if (!program_ || size != size_ || supplied != supplied_)
         program_ = program_for(device_, size, supplied);
     size_ = size;
     supplied_ = supplied;
-    gpu::upload_depth(view.depth.z_m, program_->host_as<float>(depth_in));
+    gpu::upload_depth(surfaces.z_m, program_->host_as<float>(depth_in));
     if (supplied)
-        gpu::upload(view.normals->normals, program_->host(given));
+        gpu::upload(surfaces.normals, program_->host(given));
     const shared::ScreenConstants constants = constants_from({}, view);
-    const std::shared_ptr<gpu::DeviceBytes> packed = pool_.get(view.depth.z_m.total() * 8);
+    const std::shared_ptr<gpu::DeviceBytes> packed = pool_.get(surfaces.z_m.total() * 8);
     program_->give(words, packed);
     program_->run(std::as_bytes(std::span(&constants, 1)));
     timings_ = program_->timings();
-    return {view.depth.camera, packed};
+    return {surfaces.camera, packed};
 }
 
 } // namespace scanshade

@@ -13,7 +13,7 @@ class PackSurfaces {
   public:
     explicit PackSurfaces(gpu::Device& device) : device_(device), pool_(device) {}
 
-    /// Normals that are missing or zero are derived from the depth.
+    /// Of surfaces on the host. Normals that are missing or zero are derived from the depth.
     [[nodiscard]] PackedSurfaces compute(const View& view);
     /// Where the time of the last compute() went.
     [[nodiscard]] const Timings& timings() const { return timings_; }

@@ -54,7 +54,7 @@ Method& method_with(const std::string& method, const Settings& settings) {
 
 AoMap ao_of(const std::string& method, const DepthImage& depth, const Settings& settings = {}, DepthNoise noise = {},
             const NormalImage* normals = nullptr) {
-    return method_with(method, settings).compute({depth, normals, noise});
+    return method_with(method, settings).compute({normals ? Surfaces(depth, *normals) : Surfaces(depth), noise});
 }
 
 class Classics : public testing::Test {

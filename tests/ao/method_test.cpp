@@ -188,7 +188,7 @@ TEST_P(Laws, normals_of_the_surface_may_be_brought_along) {
     const auto s = static_cast<float>(std::sin(40 * CV_PI / 180)), c = static_cast<float>(std::cos(40 * CV_PI / 180));
     NormalImage normals{cv::Mat3f(depth.z_m.size(), cv::Vec3f(s, 0, -c))};
     normals.normals(cv::Rect(60, 40, 9, 9)) = cv::Vec3f();
-    EXPECT_GE(lowest_inside(make(0.5)->compute({depth, &normals}).visibility, 8), 0.98);
+    EXPECT_GE(lowest_inside(make(0.5)->compute({{depth, normals}}).visibility, 8), 0.98);
 }
 
 TEST_P(Laws, an_image_of_holes_is_a_result) {

@@ -38,8 +38,8 @@ class HalfOpen final : public Method {
 
     AoMap compute(const View& view) override {
         before_(calls_++);
-        AoMap ao{cv::Mat1f(view.depth.z_m.size(), half_open)};
-        ao.visibility.setTo(std::numeric_limits<float>::quiet_NaN(), view.depth.z_m <= 0);
+        AoMap ao{cv::Mat1f(view.surfaces.z_m.size(), half_open)};
+        ao.visibility.setTo(std::numeric_limits<float>::quiet_NaN(), view.surfaces.z_m <= 0);
         return ao;
     }
     const Timings& timings() const override { return timings_; }

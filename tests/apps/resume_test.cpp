@@ -371,8 +371,8 @@ class HalfOpen final : public Method {
     explicit HalfOpen(std::function<void(const View&)> before) : before_(std::move(before)) {}
     AoMap compute(const View& view) override {
         before_(view);
-        AoMap ao{cv::Mat1f(view.depth.z_m.size(), 0.5f)};
-        ao.visibility.setTo(std::numeric_limits<float>::quiet_NaN(), view.depth.z_m <= 0);
+        AoMap ao{cv::Mat1f(view.surfaces.z_m.size(), 0.5f)};
+        ao.visibility.setTo(std::numeric_limits<float>::quiet_NaN(), view.surfaces.z_m <= 0);
         return ao;
     }
     const Timings& timings() const override { return timings_; }
@@ -402,7 +402,7 @@ int work(const fs::path& path, const fs::path& out, const Shift& shift,
 
 /// The depth of write_capture()'s frame tells which it is: `index` and what is alike modulo 8.
 bool is_frame(const View& view, int index) {
-    return cv::norm(view.depth.z_m, tests::corner_depth(index), cv::NORM_INF) < 0.002;
+    return cv::norm(view.surfaces.z_m, tests::corner_depth(index), cv::NORM_INF) < 0.002;
 }
 
 TEST_F(ResumeTest, a_frame_that_crashes_the_process_is_marked_and_the_others_are_done) {
