@@ -254,8 +254,13 @@ class Bench final : public Command {
                .help = "file for the measured front, as `run --max-error` takes it; parts of other sensors stay",
                .value = &front_},
               {.name = "overwrite", .help = "replaces an earlier report", .value = &overwrite_}}}};
-        for (const auto& part : parts_)
+        for (Stage& stage : all)
+            for (Parameter& row : stage.rows)
+                row.common = true;
+        for (const auto& part : parts_) {
             all.push_back(part->stage());
+            all.back().rows.front().common = true; // what asks for the part
+        }
         return all;
     }
 

@@ -458,7 +458,7 @@ TEST(CliHelpTest, the_first_page_of_every_command_fits_a_screen) {
 }
 
 TEST(CliHelpTest, help_of_a_topic_shows_its_flags_alone) {
-    for (const auto& [topic, flag] : {std::pair("cacao", "--cacao.radius"), std::pair("surfel", "--surfel.hidden"),
+    for (const auto& [topic, flag] : {std::pair("cacao", "--cacao.radius"), std::pair("surfel", "--surfel.slices"),
                                       std::pair("clouds", "--cloud.rays"), std::pair("sequence", "--sequence.fuse")}) {
         const Ran ran = run_program(fmt::format("help run {}", topic));
         EXPECT_EQ(ran.exit_code, 0);
