@@ -1,5 +1,6 @@
-// CACAO's own tests: what profile `scan` corrects, each shown against `reference`, which must fail it; the shaders
-// against the formulas of AMD's documentation; every table of passes; kinds of depth; and a few golden maps.
+// CACAO's own tests. Profile `scan` must hold each of its corrections, and `reference` must fail on the same input. The
+// shaders must agree with the formulas of AMD's documentation. Tables of passes, kinds of depth and a few golden maps
+// follow.
 #include "ao/cacao/cacao.h"
 #include "ao/gpu/transfer.h"
 #include "io/images/image_file.h"
@@ -28,7 +29,7 @@ using shared::CacaoConstants;
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 const cv::Size usual(160, 120);
 
-/// One for all: opening costs more than a frame. It validates where the layer is installed.
+/// One device for all tests: opening it takes longer than a frame. It validates where the layer is installed.
 gpu::Device& device() {
     static const int asked = setenv("SCANSHADE_VALIDATE", "1", 1);
     static gpu::Device opened;
@@ -51,13 +52,13 @@ struct Seen {
     std::array<cv::Mat3f, 4> normals;              ///< y up, as stored
 };
 
-/// What a run is given besides depth.
+/// The inputs of a run besides depth.
 struct Given {
     cv::Mat3f normals{};
-    std::function<Slice(int slice, const Slice& made)> ao{}; ///< replaces what generation made
+    std::function<Slice(int slice, const Slice& made)> ao{}; ///< replaces the result of generate
 };
 
-/// The words of AO texels: the reference keeps AMD's 8 bits, scan 16.
+/// The word of an AO texel: the reference stores AMD's 8 bits, scan 16.
 std::uint32_t word_of(float ao, int edges, bool scan) {
     return static_cast<std::uint32_t>(std::nearbyint(ao * (scan ? 65535.0F : 255.0F))) |
            static_cast<std::uint32_t>(edges) << 16;
@@ -86,8 +87,8 @@ cv::Vec3f normal_of(std::uint32_t word, bool scan) {
     return n;
 }
 
-/// Programs by their tables: runs that differ in constants only share pipelines, and pipelines are what takes time
-/// here.
+/// Programs by their tables. Making pipelines takes most of the time here, so runs that differ only in constants share
+/// them.
 class Shared {
   public:
     gpu::Program program;
@@ -157,7 +158,7 @@ Seen run(const CacaoOptions& o, const DepthImage& depth, const Given& given = {}
     CacaoTables tables = cacao_tables(o, k, !given.normals.empty());
     if (!given.ao)
         return run_tables(o, k, tables, depth, given.normals, {});
-    // Everything but generation, which is replaced by an upload.
+    // All passes but generation, which an upload replaces.
     const Seen made = run_tables(o, k, tables, depth, given.normals, {});
     std::vector<std::uint32_t> words;
     for (int a = 0; a < 4; ++a) {
@@ -203,7 +204,7 @@ Both both(CacaoOptions o, const DepthImage& depth, const Given& given = {}) {
     return {std::move(scan), run(o, depth, given)};
 }
 
-/// The figures a test is about, one line in the log.
+/// Prints the figures that a test compares.
 void measured(std::string_view what, double scan, double reference) {
     fmt::print("             {}: scan {:.4f}, reference {:.4f}\n", what, scan, reference);
 }
@@ -228,7 +229,7 @@ DepthImage step(const Pinhole& camera, float left, float z) {
     return depth;
 }
 
-/// Of the values that are numbers, where `mask` allows.
+/// Of the values that are not NaN, where the mask is set.
 struct Figures {
     double low = 0, high = 0, average = 0;
 };
@@ -284,8 +285,8 @@ TEST_F(cacao_scan, visibility_comes_out_as_computed) {
 }
 
 TEST_F(cacao_scan, holes_do_not_occlude_and_have_no_visibility) {
-    // A plane is open, whatever of it is missing. A hole is depth 0, the place of the camera: nearer than the radius,
-    // the reference takes it for something right in front of the plane.
+    // A plane with holes is still open. A hole has depth 0, the position of the camera. If that is within the radius,
+    // the reference takes the hole for an occluder in front of the plane.
     DepthImage depth = with_holes(flat(camera_of(125), 0.3F), 0.1);
     CacaoOptions o = options();
     o.radius = 2;
@@ -301,9 +302,9 @@ TEST_F(cacao_scan, holes_do_not_occlude_and_have_no_visibility) {
 }
 
 TEST_F(cacao_scan, holes_are_not_open_space) {
-    // A corner stays as dark as it was when pixels are taken from it, at random or one whole slice of the four. Beyond
-    // the radius the reference counts a hole as a ray that met nothing, and a quarter of the darkness is lost. (Scan
-    // still loses 1 % where 40 % of the pixels are gone; the tolerance is that measurement, not a derivation.)
+    // A corner stays as dark when pixels are removed, at random or one whole slice of the four. Beyond the radius the
+    // reference counts a hole as a ray without a hit, and loses a quarter of the darkness. (Scan still loses 1 % where
+    // 40 % of the pixels are missing. The tolerance comes from that measurement, not from a derivation.)
     const Pinhole camera = camera_of(125);
     const DepthImage corner = wall_corner(camera);
     DepthImage sliced{camera, corner.z_m.clone(), {}};
@@ -333,8 +334,9 @@ TEST_F(cacao_scan, holes_are_not_open_space) {
 }
 
 TEST_F(cacao_scan, a_checkerboard_of_holes_changes_nothing) {
-    // Every other pixel is missing, so that none has a neighbour left, and two of the four slices are empty. On the
-    // line of 1/z to what lies beyond a hole of one pixel normals go on, and the hole itself serves as an occluder.
+    // Every other pixel is missing, so no pixel has a neighbour, and two of the four slices are empty. Scan
+    // interpolates 1/z across a hole of one pixel: normals use the pixel beyond it, and the filled hole serves as an
+    // occluder.
     const DepthImage corner = wall_corner(test_camera(usual));
     DepthImage board{corner.camera, corner.z_m.clone(), {}};
     for (int y = 0; y < usual.height; ++y)
@@ -357,8 +359,8 @@ TEST_F(cacao_scan, a_checkerboard_of_holes_changes_nothing) {
 }
 
 TEST_F(cacao_scan, a_hole_of_device_depth_is_a_hole) {
-    // 0 in the depth image is no surface (projection/maps.h), whatever the numbers mean otherwise: with reverse-Z it is
-    // what a cleared buffer holds, infinitely far.
+    // 0 in the depth image is no surface (projection/maps.h), in device depth, too. With reverse-Z a cleared buffer
+    // holds 0, which means infinitely far.
     for (const CacaoDepthInput kind : {CacaoDepthInput::normal_z, CacaoDepthInput::reverse_z})
         for (const Quality quality : {Quality::lowest, Quality::high})
             for (const bool downsampled : {false, true}) {
@@ -377,7 +379,7 @@ TEST_F(cacao_scan, a_hole_of_device_depth_is_a_hole) {
 }
 
 TEST_F(cacao_scan, a_hole_does_not_poison_the_mips) {
-    // The mean of what is known of a wall at 3 m is 3 m. The reference takes the nearest of each four, and a hole is
+    // The mean of the known depths of a wall at 3 m is 3 m. The reference takes the nearest of each four, and a hole is
     // nearest: one missing pixel empties 16x16 of them in mip 3.
     DepthImage depth = flat(camera_of(125), 3);
     depth.z_m(40, 40) = 0;
@@ -390,9 +392,9 @@ TEST_F(cacao_scan, a_hole_does_not_poison_the_mips) {
 }
 
 TEST_F(cacao_scan, mips_know_the_radius) {
-    // A scene and its radius eight times as large is the same picture: every length scales by a power of two, so not
-    // even rounding changes. AMD's mip weight forgot the radius and cuts at one unit: poles 15 cm before a wall are
-    // blended with it, poles 1.2 m before it are not.
+    // A scene and radius eight times as large give the same map. Every length scales by a power of two, so not even
+    // rounding changes. AMD's mip weight ignores the radius and cuts at one unit: it blends poles 15 cm before a wall
+    // with the wall, but not poles 1.2 m before it.
     DepthImage fence = flat(camera_of(125), 0.5F);
     for (int x = 0; x < usual.width; ++x)
         if (x % 12 < 3)
@@ -411,8 +413,8 @@ TEST_F(cacao_scan, mips_know_the_radius) {
 }
 
 TEST_F(cacao_scan, distance_alone_takes_nothing_away) {
-    // A hall 400 m away under a radius to match is the picture of a room 2 m away. AMD's AO fades out from 50 to 300 m
-    // unless told otherwise: depths of games, not of scans.
+    // A hall 400 m away, with the radius scaled alike, gives the same map as a room 2 m away. By default AMD's AO fades
+    // out from 50 to 300 m: depths of games, not of scans.
     const DepthImage near = wall_corner(test_camera(usual));
     const auto at = [&](float scale) {
         CacaoOptions o = options();
@@ -429,8 +431,8 @@ TEST_F(cacao_scan, distance_alone_takes_nothing_away) {
 }
 
 TEST_F(cacao_scan, what_lies_outside_the_image_is_unknown) {
-    // A plane that recedes out of the image is open up to its rim. The reference goes on from the rim with its last
-    // depth, straight sideways, which stands above the plane.
+    // A plane that recedes out of the image is open up to the rim. The reference repeats the depth of the rim outside
+    // the image, which is above the plane.
     const DepthImage depth = tilted_plane(camera_of(200), 60);
     const Both maps = both(options(), depth, {plane_normals(usual, 60), {}});
     const cv::Rect inside(60, 0, 40, 120);
@@ -441,9 +443,9 @@ TEST_F(cacao_scan, what_lies_outside_the_image_is_unknown) {
 }
 
 TEST_F(cacao_scan, taps_look_from_the_texel_they_read) {
-    // A tap of mip m reads the mean of 2^m texels across. Seen from that texel's centre it lies on the plane; seen from
-    // where the tap fell, as in the reference, a slope becomes a staircase. At full strength, and without a horizon
-    // angle to hide the steps.
+    // A tap of mip m reads the mean of 2^m texels across. At the centre of that texel, this depth is on the plane. At
+    // the position of the tap, as in the reference, a slope becomes a staircase. Full strength and a horizon angle of 0
+    // keep the steps visible.
     const cv::Size size(320, 240);
     const DepthImage depth = tilted_plane(camera_of(693, size), 60);
     const Given given{plane_normals(size, 60), {}};
@@ -476,7 +478,7 @@ TEST_F(cacao_scan, a_grazing_plane_is_one_surface) {
                 for (int x = 2; x + 2 < seen.k.slice.x; ++x) {
                     const cv::Mat1f& z = seen.depth[a][0];
                     if (lowest(z(cv::Rect(x - 2, y - 1, 5, 3))) == 0)
-                        continue; // the last before a hole has no slope to go by
+                        continue; // the last texel before a hole has no slope
                     ++texels;
                     whole += seen.raw[a].edges(y, x) == 0xff;
                     const double cosine = cv::normalize(seen.normals[a](y, x)).dot(truth);
@@ -495,7 +497,7 @@ TEST_F(cacao_scan, a_grazing_plane_is_one_surface) {
 }
 
 TEST_F(cacao_scan, nothing_leaks_across_a_cut_edge) {
-    // Left all open, right all closed, a metre apart in depth: no pass of the blur may mix them. AMD lets 1 - sharpness
+    // Left all open, right all closed, a metre apart in depth: no blur step may mix them. AMD lets 1 - sharpness
     // through every cut edge.
     const DepthImage depth = step(camera_of(125), 1, 3);
     const Given sides{{}, [](int, const Slice& made) {
@@ -522,7 +524,7 @@ TEST_F(cacao_scan, nothing_leaks_across_a_cut_edge) {
     EXPECT_GT(leak(maps.reference).second, 0.01);
 }
 
-/// Columns of the AO grid, put in place of what was generated; all edges open, or those found in depth.
+/// Replaces generated AO by columns of the AO grid. All edges are open, or those found in depth.
 Given columns(const std::function<float(int)>& value, bool found_edges = false) {
     return {{}, [=](int slice, const Slice& made) {
                 Slice s{cv::Mat1f(made.ao.size()), found_edges ? made.edges : cv::Mat1b(made.ao.size(), 255)};
@@ -571,8 +573,8 @@ TEST_F(cacao_scan, upsampled_ao_stays_where_it_was_computed) {
 }
 
 TEST_F(cacao_scan, the_upsampler_compares_with_the_depth_of_the_same_column) {
-    // A near open surface left, a far closed one right: their depths keep them apart. AMD reads the depth of odd
-    // columns one slice texel to the right, so the near rim is taken for the far wall.
+    // A near open surface is left, a far closed one right, and their depths keep them apart. AMD reads the depth of odd
+    // columns one slice texel to the right, so it takes the near rim for the far wall.
     const Both maps = both(upsampling(Quality::high), step(camera_of(125), 1, 3),
                            columns([](int g) { return g < 40 ? 1.0F : 0.0F; }, true));
     const cv::Rect left(6, 0, 74, 120), right(80, 0, 74, 120);
@@ -585,7 +587,8 @@ TEST_F(cacao_scan, the_upsampler_compares_with_the_depth_of_the_same_column) {
 }
 
 TEST_F(cacao_scan, the_last_odd_column_counts) {
-    // Its depth is one column too far right as well: outside, so AMD's last column weighs nothing.
+    // AMD reads the depth of the last column one column too far right, too. That is outside the image, so the column
+    // has no weight.
     const auto closed = [](int column) { return columns([=](int g) { return g == column ? 0.0F : 1.0F; }); };
     const DepthImage depth = flat(camera_of(125), 3);
     const Both last = both(upsampling(Quality::high), depth, closed(79)),
@@ -620,7 +623,7 @@ TEST_F(cacao_scan, pixels_are_where_they_are_at_odd_sizes) {
 
 TEST_F(cacao_scan, depth_is_precise_from_near_to_far) {
     // A plane is open at any tilt and distance. Through a telephoto lens a pixel is 2 cm wide at 65 m, where binary16
-    // counts in steps of 6 cm and AMD's bias covers 5: its slope is a staircase. 32 bits have no such steps.
+    // has steps of 6 cm and AMD's bias covers 5, so a slope becomes a staircase. 32 bits have no such steps.
     CacaoOptions o = options();
     o.fade_from = 1e4F;
     o.fade_to = 1e5F;
@@ -649,8 +652,8 @@ TEST_F(cacao_scan, depth_is_precise_from_near_to_far) {
 }
 
 TEST_F(cacao_scan, the_radius_is_metric_at_close_range) {
-    // What stands 0.3 m aside and 0.1 m higher shades a wall within a radius of 0.5 m, at half a metre from the camera
-    // as at five. The reference shrinks its radius, to less than 0.3 m here, where it would cover much of the screen.
+    // A step 0.3 m aside and 0.1 m higher shades a wall within a radius of 0.5 m, both at half a metre from the camera
+    // and at five. The reference shrinks its radius, to less than 0.3 m here, where it would cover much of the screen.
     // How dark is not compared: perspective shows the two cameras different parts of the step.
     const auto aside = [](const Seen& seen, double pixel_m) {
         return average(seen.visibility(cv::Rect(80 + static_cast<int>(0.3 / pixel_m), 40, 1, 40)));
@@ -682,7 +685,8 @@ TEST_F(cacao_scan, pixels_need_not_be_square) {
 }
 
 TEST_F(cacao_scan, lowest_reads_nothing_beyond_an_odd_image) {
-    // Of an odd image the last column has no partner in the other slice. AMD loads 0 for it, a wall at the camera.
+    // In an odd image, the last column has no partner in the other slice. AMD loads depth 0 for it, a wall at the
+    // camera.
     CacaoOptions o = options(Quality::lowest);
     o.radius = 2;
     const Both odd = both(o, flat(camera_of(40, {41, 31}), 0.3F));
@@ -695,8 +699,8 @@ TEST_F(cacao_scan, lowest_reads_nothing_beyond_an_odd_image) {
 }
 
 TEST_F(cacao_scan, normals_beside_holes_are_true_or_absent) {
-    // Half of a slope is missing. Where a quadrant is left its normal is the plane's, where none is the neighbours' may
-    // do, and else none is better than AMD's guess, which faces the camera.
+    // More than half of a slope is missing. A complete quadrant gives the normal of the plane. Without one, scan takes
+    // the neighbours' normals, or none. AMD guesses a normal that faces the camera.
     const double tilt = 60;
     const DepthImage depth = with_holes(tilted_plane(camera_of(200), tilt), 0.6);
     const Both maps = both(options(), depth);
@@ -726,7 +730,7 @@ TEST_F(cacao_scan, normals_beside_holes_are_true_or_absent) {
 constexpr float near_enough = 1e-6F;
 
 TEST_F(cacao_formulas, the_cpu_reference_has_the_documented_values) {
-    // The unit vectors of the specification: they vouch for the formulas that the tests below compare the shaders with.
+    // The specification's worked values check the formulas with which the tests below compare the shaders.
     const Around e = reference::edges(2, {2.1F, 1.95F, 2, 3});
     EXPECT_NEAR(e.left, 0.675, 2e-6);
     EXPECT_NEAR(e.right, 0.675, 2e-6);
@@ -795,7 +799,7 @@ struct Agreement {
 };
 
 TEST_F(cacao_formulas, edges_are_those_of_the_documentation) {
-    // Every packed edge byte of a scene, from the depth slices; two bits of it may fall on the other side of a tie.
+    // Every packed edge byte of a scene, from the depth slices. Ties may round the other way.
     const Both maps = both(options(Quality::medium), ball_on_floor(camera_of(125)));
     for (const Seen* seen : {&maps.scan, &maps.reference}) {
         const bool scan = seen == &maps.scan;
@@ -815,8 +819,8 @@ TEST_F(cacao_formulas, edges_are_those_of_the_documentation) {
 }
 
 TEST_F(cacao_formulas, mips_are_means_of_the_nearest_surface) {
-    // Mip 1 from the full-precision depth; AMD's weight is that of a radius of 1, whatever the radius, and its copies
-    // are binary16.
+    // Mip 1 from the full-precision depth. AMD's weight always assumes a radius of 1, and its stored copies are
+    // binary16.
     const DepthImage depth = ball_on_floor(camera_of(125));
     const Both maps = both(options(), depth);
     for (const Seen* seen : {&maps.scan, &maps.reference}) {
@@ -878,7 +882,7 @@ TEST_F(cacao_formulas, normals_are_those_of_the_four_quadrants) {
                     reference::normal_of(e, place(x, y, own), place(x - 1, y, z.left), place(x + 1, y, z.right),
                                          place(x, y - 1, z.top), place(x, y + 1, z.bottom));
                 if (scan && cv::norm(n) < 0.01)
-                    continue; // lent by a neighbour, or absent: a test of its own
+                    continue; // taken from a neighbour, or absent: another test
                 const cv::Vec3f ours = seen.normals[static_cast<std::size_t>(x % 2 + 2 * (y % 2))](y / 2, x / 2);
                 agreement.add(cv::norm(cv::normalize(n) - ours, cv::NORM_INF) <= 1.01 / (scan ? 511 : 127));
             }
@@ -888,8 +892,8 @@ TEST_F(cacao_formulas, normals_are_those_of_the_four_quadrants) {
 }
 
 TEST_F(cacao_formulas, one_blur_pass_is_the_documented_sum) {
-    // From the AO and edges that went in. The reference mirrors at the rim and rounds to 8 bits; scan has 16, and
-    // nothing passes a cut edge.
+    // From the AO and edges before the blur. The reference mirrors at the rim and rounds to 8 bits. Scan has 16 bits,
+    // and nothing passes a cut edge.
     CacaoOptions o = options();
     o.blur_passes = 1;
     const Both maps = both(o, ball_on_floor(camera_of(125)));
@@ -924,8 +928,8 @@ TEST_F(cacao_formulas, one_blur_pass_is_the_documented_sum) {
 }
 
 TEST_F(cacao_formulas, high_is_the_documented_kernel) {
-    // Every texel of every slice, from the depth mips and normals that went in: 12 tap pairs, detail shadows, edges,
-    // fade. A tap on a tie, or a mip on one, may go the other way.
+    // Every texel of every slice, from its depth mips and normals: 12 tap pairs, detail shadows, edges,
+    // fade. Ties of taps and mips may go the other way.
     const Seen seen = run(options(Quality::high, false, CacaoProfile::reference), ball_on_floor(camera_of(125)));
     Agreement agreement;
     for (int a = 0; a < 4; ++a) {
@@ -942,8 +946,8 @@ TEST_F(cacao_formulas, high_is_the_documented_kernel) {
 // --- C. tables and sizes
 
 TEST_F(cacao_passes, every_configuration_is_sound) {
-    // Twenty configurations, two profiles, zero to eight blur passes: all read only what was written, and the last pass
-    // writes the map.
+    // Twenty configurations, two profiles, zero to eight blur passes. Passes read only buffers already written, and the
+    // last one writes the map.
     for (const auto& [profile_word, profile] : cacao_profile_words)
         for (const auto& [quality_word, quality] : quality_words)
             for (const bool downsampled : {false, true})
@@ -996,8 +1000,8 @@ TEST_F(cacao_passes, odd_and_tiny_images_run_without_a_word_of_validation) {
 }
 
 TEST_F(cacao_passes, both_storages_make_the_same_map) {
-    // Buffers are what CPUs are fast with, images and fused passes what GPUs are fast with; one algorithm. Holes, odd
-    // sizes and every number of blur steps, in one pass or more.
+    // Buffers are faster on CPUs, images and fused passes on GPUs, and both run one algorithm. The runs cover holes,
+    // odd sizes, and zero to seven blur steps, fused or not.
     const DepthImage depth = with_holes(ball_on_floor(camera_of(125, {161, 119})), 0.05);
     const std::vector<std::pair<Quality, bool>> modes{
         {Quality::lowest, true}, {Quality::lowest, false}, {Quality::low, true},     {Quality::medium, false},
@@ -1052,8 +1056,8 @@ TEST_F(cacao_depth_input, device_depth_is_the_same_scene) {
 // --- E. goldens
 
 TEST_F(cacao_golden, maps_are_as_they_were) {
-    // Whatever changes a map must be seen: UPDATE_GOLDEN=1 rewrites them, and the change is reviewed with the code.
-    // Devices may differ in single decisions; a formula that changed differs everywhere.
+    // A change of a map must not go unnoticed. UPDATE_GOLDEN=1 rewrites the maps, and the change is reviewed with the
+    // code. Devices may differ in single pixels; a changed formula differs everywhere.
     namespace fs = std::filesystem;
     struct Case {
         Quality quality;
