@@ -45,7 +45,7 @@ AoMap Cacao::compute(const View& view) {
         program_->take(cacao_depth_in, 0, surfaces.z_there);
         program_->take(cacao_normals_in, 0, surfaces.normals_there);
     } else {
-        if (options_.scan() && options_.depth_input == "metric")
+        if (options_.scan() && options_.depth_input == CacaoDepthInput::metric)
             gpu::upload_depth(surfaces.z_m, program_->host_as<float>(cacao_depth_in));
         else
             gpu::upload(surfaces.z_m, program_->host(cacao_depth_in));

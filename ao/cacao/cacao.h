@@ -3,11 +3,12 @@
 // Two profiles, each with its own shaders and table of passes. `reference` (reference.cpp, shaders/cacao/reference)
 // reproduces AMD's output, quirks included, so that anyone can check us against the original. `scan` (scan.cpp,
 // shaders/cacao/scan), the default, is the same algorithm for metric sensor depth; its departures are named in the
-// README and each has a test that fails without it.
+// README, and each has a test that fails without it.
 #pragma once
 
 #include "ao/gpu/program.h"
 #include "ao/method.h"
+#include "ao/quality.h"
 #include "shaders/shared/cacao.h"
 
 #include <array>
@@ -16,17 +17,30 @@
 
 namespace scanshade {
 
-/// AMD's quality presets, cheapest first.
-enum class CacaoQuality { lowest, low, medium, high, highest };
+enum class CacaoProfile { scan, reference };
+inline constexpr std::array cacao_profile_words{Named{"scan", CacaoProfile::scan},
+                                                Named{"reference", CacaoProfile::reference}};
+
+/// How obscurance becomes visibility: as AMD documents it, or fitted to ray-traced truth.
+enum class CacaoToneCurve { calibrated, documented };
+
+/// What the depth image holds: metres, or device depth with the near plane at 0 (normal_z) or at 1 (reverse_z).
+enum class CacaoDepthInput { metric, normal_z, reverse_z };
+inline constexpr std::array cacao_depth_input_words{Named{"metric", CacaoDepthInput::metric},
+                                                    Named{"normal_z", CacaoDepthInput::normal_z},
+                                                    Named{"reverse_z", CacaoDepthInput::reverse_z}};
+
+/// Where the passes keep depth. `images` also joins the last blur steps and the resolve in one pass. Both use the same
+/// kernels, and their maps differ by rounding only. Buffers are faster on CPUs, images on GPUs.
+enum class CacaoStorage { buffers, images };
 
 /// What a person sets. Names and defaults follow AMD's documentation; `radius` and the depths are metres.
 struct CacaoOptions {
-    std::string profile = "scan";
-    std::string quality = "high";
+    CacaoProfile profile = CacaoProfile::scan;
+    Quality quality = Quality::high;
     bool downsampled = false;
     float radius = 0.5F;
-    std::string look =
-        "auto"; ///< how obscurance becomes visibility; auto: calibrated in `scan`, documented in `reference`
+    std::optional<CacaoToneCurve> tone_curve; ///< none: calibrated in `scan`, documented in `reference`
     float shadow_multiplier = 1.0F;
     float shadow_power = 1.5F;
     float shadow_clamp = 0.98F;
@@ -38,19 +52,17 @@ struct CacaoOptions {
     float detail_strength = 0.5F;
     float sigma_squared = 5.0F;
     float depth_sigma_squared = 0.01F;
-    std::string depth_input = "metric";
+    CacaoDepthInput depth_input = CacaoDepthInput::metric;
     float near_m = 0.1F;
     float far_m = 1000.0F;
     float normals_mul = 1.0F;
     float normals_add = 0.0F;
-    std::string storage = "auto";
-    std::optional<float>
-        outside_depth; ///< reference only: what loads outside the image read; default: device depth 0, linearised
+    std::optional<CacaoStorage> storage; ///< none: images on GPUs; buffers on CPUs and in `reference`
+    /// `reference` only: the depth read outside the image. Default: device depth 0, linearised.
+    std::optional<float> outside_depth;
 
     [[nodiscard]] std::vector<Parameter> parameters();
-    /// Throws Misuse for a name that is no quality.
-    [[nodiscard]] CacaoQuality level() const;
-    [[nodiscard]] bool scan() const { return profile == "scan"; }
+    [[nodiscard]] bool scan() const { return profile == CacaoProfile::scan; }
 };
 
 /// The constant block of one frame size and camera. Clamps as AMD's host code does.
@@ -78,15 +90,14 @@ enum CacaoBuffer : int {
     cacao_buffer_count
 };
 
-/// Everything one configuration runs, as plain data.
+/// The buffers and passes of one configuration.
 struct CacaoTables {
     std::vector<gpu::BufferRow> buffers;
     std::vector<gpu::PassRow> passes;
-    int blurred = cacao_ping; ///< which buffer holds AO after the blur
+    int blurred = cacao_ping; ///< the buffer that holds AO after the blur
 };
-/// How the passes keep what they hand on: in buffers, or depth in images and the last blur steps and the resolve in one
-/// pass. The same kernels and, but for rounding, the same maps; CPUs are faster with the first, GPUs with the second.
-enum class CacaoStorage { buffers, images };
+
+/// The storage that the options name, else the faster one for the device.
 [[nodiscard]] CacaoStorage cacao_storage(const CacaoOptions& options, const gpu::Device& device);
 
 [[nodiscard]] CacaoTables cacao_tables(const CacaoOptions& options, const shared::CacaoConstants& constants,
@@ -111,7 +122,7 @@ class Cacao final : public Method {
 
     gpu::Device& device_;
     CacaoOptions options_;
-    Pinhole camera_; // that constants_ and program_ were made for
+    Pinhole camera_; // constants_ and program_ were made for it
     bool normals_supplied_ = false;
     shared::CacaoConstants constants_{};
     CacaoTables tables_;

@@ -1,4 +1,4 @@
-// Options and camera -> the constant block the shaders read, and the sampling pattern.
+// Options and camera -> the constant block that the shaders read; and the rotations of the sampling pattern.
 #include "ao/cacao/cacao.h"
 #include "ao/cacao/plan.h"
 
@@ -18,7 +18,7 @@ int halved(int n) { return (n + 1) / 2; }
 /// Device depth d -> z = mu / (alpha - d), with z positive for both orders of near and far.
 vec2 depth_unpack(const CacaoOptions& options) {
     const float n = options.near_m, f = options.far_m;
-    const bool reverse = options.depth_input == "reverse_z";
+    const bool reverse = options.depth_input == CacaoDepthInput::reverse_z;
     const float p22 = reverse ? n / (n - f) : f / (f - n); // z' = p22 + p23 / z, left-handed
     const float p23 = reverse ? -f * n / (n - f) : -n * f / (f - n);
     const float mu = -p23;
@@ -34,9 +34,9 @@ void set_sizes(CacaoConstants& k, const CacaoOptions& options, cv::Size image) {
     k.grid = {halved(image.width) + 4, halved(image.height) + 4};
     k.slice_inv = {1.0F / static_cast<float>(k.slice.x), 1.0F / static_cast<float>(k.slice.y)};
     k.image_inv = {1.0F / static_cast<float>(image.width), 1.0F / static_cast<float>(image.height)};
-    // Mip starts by shifts alone: with a stride of 24s and rows of 8s, 4/3 of mip 0 is divisible by 64. Each mip ends
-    // with at least one column and row that nothing writes; they serve as the rim of its left and upper side, too, and
-    // the first slice has a row before it.
+    // Shifts alone find where a mip starts: strides are multiples of 24 and rows of 8, so 4/3 of mip 0 is divisible by
+    // 64. Each mip ends with at least one column and one row that nothing writes. They serve as the left and upper rim,
+    // too. The first slice has a row before it.
     k.depth_stride = 24 * groups_of(8 * groups_of(k.slice.x, 8) + 8, 24);
     const int padded = k.depth_stride * 8 * (groups_of(k.slice.y, 8) + 1), lead = k.depth_stride + 8;
     k.depth_mips = padded / 3 * 4;
@@ -66,22 +66,22 @@ shared::vec2 cacao_rotation(int a, int phase) {
 
 CacaoConstants constants_from(const CacaoOptions& options, const Pinhole& camera) {
     CacaoConstants k{};
-    const CacaoQuality level = options.level();
     set_sizes(k, options, camera.size);
     set_camera(k, camera);
     k.depth_unpack = depth_unpack(options);
     const float at_zero = k.depth_unpack.y == 0 ? 0.0F : k.depth_unpack.x / k.depth_unpack.y;
-    k.outside_depth = options.outside_depth.value_or(options.depth_input == "metric" ? 0.0F : at_zero);
+    k.outside_depth = options.outside_depth.value_or(options.depth_input == CacaoDepthInput::metric ? 0.0F : at_zero);
 
-    const float wide = level <= CacaoQuality::low ? 1.5F : 1.0F;
+    const float wide = options.quality <= Quality::low ? 1.5F : 1.0F;
     const float tan_half_height = static_cast<float>(camera.size.height) / (2.0F * static_cast<float>(camera.fy));
-    k.radius = std::clamp(options.radius, 0.0F, 100000.0F) * (level == CacaoQuality::lowest ? 0.8F : 1.0F);
+    k.radius = std::clamp(options.radius, 0.0F, 100000.0F) * (options.quality == Quality::lowest ? 0.8F : 1.0F);
     k.neg_rec_radius = -1.0F / k.radius;
     k.near_limit_rec = 1.0F / ((options.radius * 1.2F * wide) / tan_half_height);
     k.mip_weight =
         options.scan() ? -1.0F / (k.radius * k.radius) : k.neg_rec_radius * k.radius; // AMD's slip: always -1
-    // Fitted to ray-traced truth (calibrate-look): AMD's curve leaves corners far too dark.
-    const bool calibrated = options.look == "calibrated" || (options.look == "auto" && options.scan());
+    // The factors were fitted to ray-traced truth (calibrate-look): AMD's curve leaves corners far too dark.
+    const CacaoToneCurve own = options.scan() ? CacaoToneCurve::calibrated : CacaoToneCurve::documented;
+    const bool calibrated = options.tone_curve.value_or(own) == CacaoToneCurve::calibrated;
     k.shadow_strength = std::clamp(4.3F * options.shadow_multiplier * (calibrated ? 0.294F : 1.0F), 0.0F, 10.0F);
     k.shadow_power =
         std::clamp(options.shadow_power * (calibrated ? 5.0F / 1.5F : 1.0F), 0.0F, calibrated ? 100.0F : 10.0F);

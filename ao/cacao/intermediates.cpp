@@ -1,4 +1,4 @@
-// What lies between CACAO's passes, for who studies them.
+// The buffers between CACAO's passes, for people who study them.
 #include "ao/cacao/cacao.h"
 
 #include <algorithm>
@@ -55,7 +55,6 @@ std::vector<Intermediate> Cacao::intermediates() {
     std::vector<Intermediate> all;
     if (!program_)
         return all;
-    const CacaoQuality level = options_.level();
     const auto words = [&](int buffer, std::size_t count) {
         auto bytes = program_->read_back(buffer);
         bytes.resize(count * 4);
@@ -68,7 +67,7 @@ std::vector<Intermediate> Cacao::intermediates() {
         all.push_back({std::move(name), "u4", std::move(shape), words(buffer, count), std::move(meaning)});
     };
     const shared::CacaoConstants& k = constants_;
-    for (int m = 0; m < (level >= CacaoQuality::high ? 4 : 1); ++m)
+    for (int m = 0; m < (options_.quality >= Quality::high ? 4 : 1); ++m)
         all.push_back(depth_slices(m));
     const std::vector<int> slices{4, k.slice.y, k.slice.x};
     const bool scan = options_.scan();
@@ -79,13 +78,13 @@ std::vector<Intermediate> Cacao::intermediates() {
     add("normals", slices, cacao_normals,
         scan ? "x right, y up, z forward, each (n - 512) / 511 in 10 bits from bit 0"
              : "each n / 127 in 8 signed bits from bit 0");
-    if (level == CacaoQuality::highest) {
+    if (options_.quality == Quality::highest) {
         add("importance", {k.importance.y, k.importance.x}, cacao_importance, "255ths");
         add("load_counter", {1}, cacao_counter, "sum of every ninth importance");
         all.push_back(tap_pairs(all[all.size() - 2], all.back()));
     }
     add("ao", slices, cacao_ping, texel);
-    const bool fused = tables_.buffers[cacao_depths].image.width > 0; // then the last blur steps end in shared memory
+    const bool fused = tables_.buffers[cacao_depths].image.width > 0; // then blurred AO stays in shared memory
     if (options_.blur_passes > 0 && !fused)
         add("ao_blurred", slices, tables_.blurred, texel);
     return all;

@@ -26,8 +26,8 @@ std::vector<float> pattern() {
 
 CacaoPlan::CacaoPlan(const CacaoOptions& options_, const shared::CacaoConstants& constants, bool normals_supplied_)
     : options(options_), k(constants), normals_supplied(normals_supplied_),
-      two_slices(options.level() == CacaoQuality::lowest), mips(options.level() >= CacaoQuality::high),
-      highest(options.level() == CacaoQuality::highest), layers(two_slices ? 2 : 4) {
+      two_slices(options.quality == Quality::lowest), mips(options.quality >= Quality::high),
+      highest(options.quality == Quality::highest), layers(two_slices ? 2 : 4) {
     using Host = gpu::BufferRow::Host;
     constexpr auto floats = gpu::BufferRow::Texels::r32f, pairs = gpu::BufferRow::Texels::rg32f,
                    words = gpu::BufferRow::Texels::r32ui;
@@ -54,11 +54,10 @@ CacaoPlan::CacaoPlan(const CacaoOptions& options_, const shared::CacaoConstants&
 
 void CacaoPlan::add(std::string name, std::string_view shader, std::vector<int> reads, std::vector<int> writes,
                     const Area& area, const Constants& constants) {
-    const CacaoQuality level = options.level();
     Constants all{{shared::spec_spacing, options.downsampled ? 2 : 1},
-                  {shared::spec_kernel, level == CacaoQuality::lowest ? 0 : static_cast<int>(level) - 1},
+                  {shared::spec_kernel, two_slices ? 0 : static_cast<int>(options.quality) - 1},
                   {shared::spec_two_slices, two_slices},
-                  {shared::spec_device_depth, options.depth_input != "metric"}};
+                  {shared::spec_device_depth, options.depth_input != CacaoDepthInput::metric}};
     all.insert(all.end(), constants.begin(), constants.end());
     tables.passes.push_back(
         {std::move(name),
@@ -71,7 +70,7 @@ void CacaoPlan::add(std::string name, std::string_view shader, std::vector<int> 
 }
 
 void CacaoPlan::add_mips(std::string_view shader) {
-    const int threads = 4 * groups_of(k.slice.x, 8) * groups_of(k.slice.y, 8); // one for 8x8 texels of a slice
+    const int threads = 4 * groups_of(k.slice.x, 8) * groups_of(k.slice.y, 8); // one per 8x8 texels of a slice
     add("mips", shader, {cacao_depth_in}, {cacao_depths}, {{threads, 1}});
 }
 

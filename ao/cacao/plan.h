@@ -1,5 +1,4 @@
-// A configuration of CACAO while its table of passes is written: what the profiles' tables share. For the files of this
-// room alone.
+// What the tables of passes of both profiles share. Only the files of this folder include it.
 #pragma once
 
 #include "ao/cacao/cacao.h"
@@ -17,7 +16,7 @@ namespace scanshade {
 }
 
 struct CacaoPlan {
-    /// Lists the buffers in the order of CacaoBuffer; a profile changes what it keeps otherwise.
+    /// Lists the buffers in the order of CacaoBuffer. A profile then changes those it keeps in another form.
     CacaoPlan(const CacaoOptions& options, const shared::CacaoConstants& constants, bool normals_supplied);
 
     const CacaoOptions& options;
@@ -25,11 +24,11 @@ struct CacaoPlan {
     bool normals_supplied;
     bool two_slices; ///< LOWEST computes slices 0 and 3 only
     bool mips;       ///< HIGH and HIGHEST read coarser depth far from a texel
-    bool highest;    ///< a base pass and an importance map decide how many taps follow
-    int layers;      ///< slices computed
+    bool highest;    ///< HIGHEST decides the number of taps by a base pass and an importance map
+    int layers;      ///< number of slices computed
     CacaoTables tables;
 
-    /// The texels a pass runs over, and those of a work group, as its shader declares.
+    /// The texels that a pass covers, and those of one work group, as its shader declares them.
     struct Area {
         shared::ivec2 texels;
         int layers = 1;
@@ -39,20 +38,20 @@ struct CacaoPlan {
     void add(std::string name, std::string_view shader, std::vector<int> reads, std::vector<int> writes,
              const Area& area, const Constants& constants = {});
 
-    // Passes both profiles have in buffers.
+    // Passes that both profiles run on buffers.
     void add_mips(std::string_view shader);
     void add_clear_counter();
     void add_importance_blurs();
 
-    /// What prepare reads; with no normals given, the depth once more.
+    /// The buffers that prepare reads. Without supplied normals, depth fills their slot.
     [[nodiscard]] std::vector<int> given() const;
-    /// What generate reads. Slots that are not read are filled with a buffer that is read anyway.
+    /// The buffers that generate reads. A buffer that is read anyway fills the unused slots.
     [[nodiscard]] static std::vector<int> surfaces();
-    /// What HIGHEST's last taps read.
+    /// The buffers that generate reads at HIGHEST, after the base pass.
     [[nodiscard]] static std::vector<int> surfaces_and_importance();
 };
 
-// The profiles: what they run, from prepare to apply.
+// All passes of a profile, from prepare to apply.
 [[nodiscard]] CacaoTables reference_tables(CacaoPlan plan);
 [[nodiscard]] CacaoTables scan_tables(CacaoPlan plan, CacaoStorage storage);
 

@@ -6,16 +6,16 @@
 namespace scanshade {
 namespace {
 
-/// Smart, plain or half, by quality (section 9.2).
+/// Which resolve a quality uses: smart, plain or half (section 9.2).
 int resolve_of(const CacaoOptions& options) {
-    if (options.level() == CacaoQuality::lowest)
+    if (options.quality == Quality::lowest)
         return shared::resolve_half;
-    const CacaoQuality smart = options.downsampled ? CacaoQuality::high : CacaoQuality::medium;
-    return options.level() >= smart ? shared::resolve_smart : shared::resolve_plain;
+    const Quality smart = options.downsampled ? Quality::high : Quality::medium;
+    return options.quality >= smart ? shared::resolve_smart : shared::resolve_plain;
 }
 
-/// Steps within a slice that a mirrored halo widens, as many texels as there are steps. Returns where the last one
-/// leaves AO.
+/// Adds the blur steps. A mirrored halo, as many texels wide as there are steps, surrounds each slice. Returns the
+/// buffer that holds AO afterwards.
 int add_haloed_blurs(CacaoPlan& plan) {
     const shared::ivec2 slice = plan.k.slice;
     const int steps = plan.options.blur_passes;

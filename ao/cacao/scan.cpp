@@ -1,5 +1,5 @@
-// CACAO for the metric depth of sensors: the passes of profile `scan`, from prepare to apply, as CPUs and as GPUs are
-// fast at them. shaders/cacao/scan/scan.glsl says what each does.
+// CACAO for the metric depth of sensors: the passes of profile `scan`, in one form that is fast on CPUs and one that is
+// fast on GPUs. shaders/cacao/scan/scan.glsl explains each pass.
 #include "ao/cacao/plan.h"
 
 #include <algorithm>
@@ -10,7 +10,7 @@ namespace {
 
 using shared::ivec2;
 
-/// So many blur steps, each a pass, from ping on. Returns where the last one leaves AO.
+/// Adds blur steps, one pass each; the first reads ping. Returns the buffer that holds AO afterwards.
 int add_blurs(CacaoPlan& plan, int steps) {
     int from = cacao_ping, to = cacao_pong;
     for (int step = 1; step <= steps; ++step, std::swap(from, to))
@@ -49,10 +49,10 @@ CacaoTables in_buffers(CacaoPlan plan) {
     return std::move(plan.tables);
 }
 
-/// Depth in images, and passes fused through shared memory: prepare makes the mips, too, one importance pass smooths
-/// its map, and the last blur steps and the resolve are one.
+/// Depth is in images, and shared memory joins passes. Prepare also makes the mips, one pass makes and smooths the
+/// importance map, and `finish` does the last blur steps and the resolve.
 CacaoTables in_images(CacaoPlan plan) {
-    constexpr int most_fused = 4; // blur steps: each widens the rim that work groups compute twice
+    constexpr int most_fused = 4; // blur steps: each widens the rim that neighbouring work groups both compute
     constexpr ivec2 mip_tile{shared::cacao_mip_tile, shared::cacao_mip_tile};
     constexpr ivec2 taps_tile{shared::cacao_taps_wide, shared::cacao_taps_high};
     constexpr ivec2 tile{shared::cacao_tile, shared::cacao_tile};
@@ -90,10 +90,10 @@ CacaoTables in_images(CacaoPlan plan) {
 
 CacaoStorage cacao_storage(const CacaoOptions& options, const gpu::Device& device) {
     const gpu::DeviceInfo& info = device.info();
-    const bool finishes = info.most_threads >= shared::cacao_wide * shared::cacao_high; // as one work group
-    if (options.storage == "buffers" || !options.scan() || !finishes)
+    const bool finishes = info.most_threads >= shared::cacao_wide * shared::cacao_high; // a work group of `finish`
+    if (options.storage == CacaoStorage::buffers || !options.scan() || !finishes)
         return CacaoStorage::buffers;
-    return options.storage == "images" || !gpu::is_cpu(info) ? CacaoStorage::images : CacaoStorage::buffers;
+    return options.storage.value_or(gpu::is_cpu(info) ? CacaoStorage::buffers : CacaoStorage::images);
 }
 
 CacaoTables scan_tables(CacaoPlan plan, CacaoStorage storage) {

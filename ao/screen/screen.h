@@ -103,8 +103,8 @@ class ScreenMethod : public Method {
 };
 
 /// The row of that quality. The table has a row for every one.
-template <class Levels, class Quality>
-[[nodiscard]] const auto& level_of(const Levels& levels, const Quality& quality) {
+template <class Levels>
+[[nodiscard]] const auto& level_of(const Levels& levels, Quality quality) {
     for (const auto& level : levels)
         if (quality == level.quality)
             return level;

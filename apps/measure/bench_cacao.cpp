@@ -124,7 +124,8 @@ constexpr int warm_up = 3; // runs before those that count
 
 /// Fits ms = fixed + pixels (base + tap taps + blur passes) to native LOW, MEDIUM and HIGH with 0, 2 and 4 blur passes.
 void print_model(gpu::Device& device, const std::vector<cv::Size>& sizes, int repeat) {
-    const std::vector<std::pair<std::string, int>> taps_of{{"low", 6}, {"medium", 10}, {"high", 24}};
+    constexpr std::array<std::pair<Quality, int>, 3> taps_of{
+        {{Quality::low, 6}, {Quality::medium, 10}, {Quality::high, 24}}};
     cv::Mat1d terms, times;
     for (const cv::Size size : sizes) {
         const DepthImage depth = room(size);
@@ -160,7 +161,7 @@ class CacaoTimes final : public BenchPart {
                  {"cacao.repeat", "how often each is timed", &repeat_, "", 1, 100000},
                  {"cacao.passes", "each pass by itself, too, and the GB/s that it moves; a stamp costs microseconds",
                   &passes_},
-                 {"cacao.profile", "which profile", &options_.profile, "", {}, {}, {"scan", "reference"}},
+                 {"cacao.profile", "which profile", OneOf(&options_.profile, cacao_profile_words)},
                  {"cacao.model", "instead, fit milliseconds as a formula of pixels, taps and blur passes", &model_}}};
     }
     [[nodiscard]] bool asked() const override { return asked_; }
@@ -170,7 +171,8 @@ class CacaoTimes final : public BenchPart {
         for (const std::string& text : comma_separated(sizes_))
             sizes.push_back(parsed_size(text));
         gpu::Device device(choice);
-        fmt::print("{} ({}), profile {}\n", device.info().name, device.info().driver, options_.profile);
+        fmt::print("{} ({}), profile {}\n", device.info().name, device.info().driver,
+                   word_for(options_.profile, cacao_profile_words));
         if (model_)
             print_model(device, sizes, repeat_);
         else
@@ -187,7 +189,7 @@ class CacaoTimes final : public BenchPart {
         fmt::print("\n{}x{}\n{:<10} {:>11} {:>10} {:>10} {:>10} {:>10}\n", size.width, size.height, "quality",
                    "resolution", "median ms", "least ms", "x gather", "gather ms");
         for (const bool downsampled : {false, true})
-            for (const char* quality : {"lowest", "low", "medium", "high", "highest"}) {
+            for (const auto& [word, quality] : quality_words) {
                 options_.quality = quality;
                 options_.downsampled = downsampled;
                 const auto method = timed_cacao(device, options_, depth,
@@ -201,7 +203,7 @@ class CacaoTimes final : public BenchPart {
                     taps.push_back(b);
                     ratios.push_back(a / b);
                 }
-                fmt::print("{:<10} {:>11} {:>10.4f} {:>10.4f} {:>10.2f} {:>10.4f}\n", quality,
+                fmt::print("{:<10} {:>11} {:>10.4f} {:>10.4f} {:>10.2f} {:>10.4f}\n", word,
                            downsampled ? "downsampled" : "native", median(ms), least(ms), median(ratios), median(taps));
                 if (passes_)
                     method->print_passes();
@@ -223,13 +225,12 @@ void each_map(gpu::Device& device, Use use) {
     depth.z_m(cv::Rect(200, 150, 60, 7)) = 0;
     depth.z_m(cv::Rect(400, 0, 5, 300)) = 0;
     for (const bool downsampled : {false, true})
-        for (const char* quality : {"lowest", "low", "medium", "high", "highest"}) {
+        for (const auto& [word, quality] : quality_words) {
             CacaoOptions options;
             options.quality = quality;
             options.downsampled = downsampled;
             Cacao method(device, options);
-            use(fmt::format("{}_{}", quality, downsampled ? "downsampled" : "native"),
-                method.compute({depth}).visibility);
+            use(fmt::format("{}_{}", word, downsampled ? "downsampled" : "native"), method.compute({depth}).visibility);
         }
 }
 
@@ -283,7 +284,8 @@ class CacaoMaps final : public BenchPart {
 
     int run(const std::string& choice) override {
         gpu::Device device(choice);
-        fmt::print("{} ({}), profile {}\n", device.info().name, device.info().driver, CacaoOptions().profile);
+        fmt::print("{} ({}), profile {}\n", device.info().name, device.info().driver,
+                   word_for(CacaoOptions().profile, cacao_profile_words));
         if (!written_.empty())
             write_maps(device, written_);
         return compared_.empty() || compare_maps(device, compared_) ? all_well : some_failed;

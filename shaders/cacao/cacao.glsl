@@ -7,8 +7,8 @@
 
 layout(binding = 32, scalar) uniform Constants { CacaoConstants constants; };
 
-// Every main() starts with `k = constants`, before any branch: where lanes may be off, lavapipe loads each constant lane by
-// lane (some 35 instructions); what main() loads first is loaded once. What is not used costs nothing.
+// Every main() starts with `k = constants`, before any branch. Inside a branch, lavapipe loads each constant lane by lane (some
+// 35 instructions); at the start it loads each once. Unused constants cost nothing.
 CacaoConstants k;
 
 layout(constant_id = spec_spacing) const int spacing = 1;
@@ -34,14 +34,14 @@ uint pack_edges(vec4 edges) {
     return nearest_small(r.x) << 6 | nearest_small(r.y) << 4 | nearest_small(r.z) << 2 | nearest_small(r.w);
 }
 
-// --- Depth of device depth (section 6.2); the literal order keeps AMD's rounding (inverse of 0 is 0).
+// --- Metric depth from device depth (section 6.2). The order of operations keeps AMD's rounding (the inverse of 0 is 0).
 float linear_depth(float d) {
     float v = k.depth_unpack.y - d;
     float s = sign(v) * sign(v);
     return k.depth_unpack.x * (s / ((v + s) - 1.0));
 }
 
-// A value about to be stored, finished as a vector. lavapipe stores lane by lane, and LLVM would move the packing into
-// that loop, eight times over; a minimum with an unknown number cannot be moved.
+// Computes a value for all lanes before it is stored. lavapipe stores lane by lane, and LLVM would repeat the packing in each of
+// the eight rounds. A minimum with a number unknown to the compiler prevents that.
 uint whole(uint v) { return min(v, k.all_ones); }
 float whole(float v) { return min(v, uintBitsToFloat(k.all_ones >> 1 & 0x7f800000u)); }

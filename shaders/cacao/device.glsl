@@ -1,12 +1,12 @@
-// What differs between devices in CACAO's arithmetic, all of it: the same formulas, spelt as GPUs (FOR_GPU) and CPUs are fast at them.
-// How depth is kept differs as well: see scan/buffers and scan/images.
+// All of CACAO's arithmetic that differs between devices: the same formulas, in a form fast on GPUs (FOR_GPU) and one fast on CPUs.
+// The storage of depth differs, too: see scan/buffers and scan/images.
 //
 //   small, nearest_small    between floats and integers below 2^22
-//   share(x)                max(x, 0) of what is at most 1
-//   up_to_one(x)            min(x, 1) of what is positive
+//   share(x)                max(x, 0) where x is at most 1
+//   up_to_one(x)            min(x, 1) where x is positive
 //   if_depth(z, value)      the value, or 0 where z is a hole
 //   one_if_known(v)         1, or 0 where v is -1, a hole
-//   quick_inversesqrt(x)    1 / (quick_scale sqrt(x)); the scale is for the caller to fold into something constant
+//   quick_inversesqrt(x)    1 / (quick_scale sqrt(x)); the caller folds the scale into a constant
 //   halo_weight(x)          0.6 clamp(2 + dz / R, 0, 1) + 0.4 of x = halo_scale dz / R (section 8.4)
 #ifdef FOR_GPU
 
@@ -27,8 +27,8 @@ float quick_inversesqrt(float x) { return inversesqrt(x); }
 const float halo_scale = 1.0;
 float halo_weight(float scaled_dz) { return 0.6 * clamp(scaled_dz + 2.0, 0.0, 1.0) + 0.4; }
 
-const bool branches_pay = true; // around what few pixels need
-const bool pairs_in_twos = true; // two pairs of taps on their way at a time
+const bool branches_pay = true; // around work that few pixels need
+const bool pairs_in_twos = true; // two pairs of taps are in flight at a time
 
 #else
 #include "lib/cheap.glsl"

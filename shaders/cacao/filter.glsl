@@ -1,5 +1,5 @@
 // Bilinear reads of 8-bit maps in integers, so that no driver's filter decides the result (section 11.1, rule F):
-// coordinates in 1/256 texel, each interpolation rounded to 8 bits (what lavapipe's sampler does).
+// coordinates in 1/256 texel, and each interpolation is rounded to 8 bits, as lavapipe's sampler does.
 
 struct Footprint {
     ivec2 low, high; // clamped texels

@@ -1,4 +1,4 @@
-// CACAO HIGHEST (section 8.6, I0): how much a 4x4 block of the AO grid needs more taps. The includer has the buffer `base_result`,
+// CACAO HIGHEST (section 8.6, I0): how strongly a 4x4 block of the AO grid needs more taps. The includer has the buffer `base_result`,
 // ao_value() and is_hole().
 
 float base_visibility(float obscurance) { return pow(clamp(1.0 - k.shadow_strength * obscurance, 0.0, 1.0), k.shadow_power); }

@@ -1,8 +1,8 @@
-// Where visibility goes, two pixels beside each other at a time: one store where rows are even.
+// Stores visibility for two adjacent pixels: in one store where rows have an even length.
 layout(binding = 16, scalar) writeonly buffer Out { float visibility[]; };
 layout(binding = 16, scalar) writeonly buffer OutPairs { vec2 visibility_pairs[]; };
 
-// Pixels p, whose column is even, and the next, as far as they lie in the image.
+// Stores pixel p, whose column is even, and the next one, if they are in the image.
 void store_visibility(ivec2 p, vec2 v) {
     if (any(greaterThanEqual(p, k.image))) return;
     int here = p.y * k.image.x + p.x;

@@ -1,5 +1,6 @@
-// CACAO's own tests: what profile `scan` corrects, each shown against `reference`, which must fail it; the shaders
-// against the formulas of AMD's documentation; every table of passes; kinds of depth; and a few golden maps.
+// CACAO's own tests. Profile `scan` must hold each of its corrections, and `reference` must fail on the same input. The
+// shaders must agree with the formulas of AMD's documentation. Tables of passes, kinds of depth and a few golden maps
+// follow.
 #include "ao/cacao/cacao.h"
 #include "ao/gpu/transfer.h"
 #include "io/images/image_file.h"
@@ -28,7 +29,7 @@ using shared::CacaoConstants;
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 const cv::Size usual(160, 120);
 
-/// One for all: opening costs more than a frame. It validates where the layer is installed.
+/// One device for all tests: opening it takes longer than a frame. It validates where the layer is installed.
 gpu::Device& device() {
     static const int asked = setenv("SCANSHADE_VALIDATE", "1", 1);
     static gpu::Device opened;
@@ -51,13 +52,13 @@ struct Seen {
     std::array<cv::Mat3f, 4> normals;              ///< y up, as stored
 };
 
-/// What a run is given besides depth.
+/// The inputs of a run besides depth.
 struct Given {
     cv::Mat3f normals{};
-    std::function<Slice(int slice, const Slice& made)> ao{}; ///< replaces what generation made
+    std::function<Slice(int slice, const Slice& made)> ao{}; ///< replaces the result of generate
 };
 
-/// The words of AO texels: the reference keeps AMD's 8 bits, scan 16.
+/// The word of an AO texel: the reference stores AMD's 8 bits, scan 16.
 std::uint32_t word_of(float ao, int edges, bool scan) {
     return static_cast<std::uint32_t>(std::nearbyint(ao * (scan ? 65535.0F : 255.0F))) |
            static_cast<std::uint32_t>(edges) << 16;
@@ -86,8 +87,8 @@ cv::Vec3f normal_of(std::uint32_t word, bool scan) {
     return n;
 }
 
-/// Programs by their tables: runs that differ in constants only share pipelines, and pipelines are what takes time
-/// here.
+/// Programs by their tables. Making pipelines takes most of the time here, so runs that differ only in constants share
+/// them.
 class Shared {
   public:
     gpu::Program program;
@@ -157,7 +158,7 @@ Seen run(const CacaoOptions& o, const DepthImage& depth, const Given& given = {}
     CacaoTables tables = cacao_tables(o, k, !given.normals.empty());
     if (!given.ao)
         return run_tables(o, k, tables, depth, given.normals, {});
-    // Everything but generation, which is replaced by an upload.
+    // All passes but generation, which an upload replaces.
     const Seen made = run_tables(o, k, tables, depth, given.normals, {});
     std::vector<std::uint32_t> words;
     for (int a = 0; a < 4; ++a) {
@@ -176,28 +177,35 @@ Seen run(const CacaoOptions& o, const DepthImage& depth, const Given& given = {}
     return run_tables(o, k, tables, depth, given.normals, words);
 }
 
-CacaoOptions options(const std::string& profile, const std::string& quality = "high", bool downsampled = false) {
+/// With AMD's tone curve for both profiles: the calibrated one would hide half of each departure.
+CacaoOptions options(Quality quality = Quality::high, bool downsampled = false,
+                     CacaoProfile profile = CacaoProfile::scan) {
     CacaoOptions o;
     o.profile = profile;
     o.quality = quality;
     o.downsampled = downsampled;
-    o.look = "documented"; // the departures are compared on one curve; the calibrated one would hide half of each
+    o.tone_curve = CacaoToneCurve::documented;
     return o;
 }
+
+std::string_view name_of(Quality quality) { return word_for(quality, quality_words); }
+std::string_view name_of(CacaoProfile profile) { return word_for(profile, cacao_profile_words); }
+std::string_view name_of(CacaoDepthInput input) { return word_for(input, cacao_depth_input_words); }
+std::string_view name_of(CacaoStorage storage) { return storage == CacaoStorage::images ? "images" : "buffers"; }
 
 /// The same through both profiles.
 struct Both {
     Seen scan, reference;
 };
 Both both(CacaoOptions o, const DepthImage& depth, const Given& given = {}) {
-    o.profile = "scan";
+    o.profile = CacaoProfile::scan;
     Seen scan = run(o, depth, given);
-    o.profile = "reference";
+    o.profile = CacaoProfile::reference;
     return {std::move(scan), run(o, depth, given)};
 }
 
-/// The figures a test is about, one line in the log.
-void measured(const std::string& what, double scan, double reference) {
+/// Prints the figures that a test compares.
+void measured(std::string_view what, double scan, double reference) {
     fmt::print("             {}: scan {:.4f}, reference {:.4f}\n", what, scan, reference);
 }
 
@@ -221,7 +229,7 @@ DepthImage step(const Pinhole& camera, float left, float z) {
     return depth;
 }
 
-/// Of the values that are numbers, where `mask` allows.
+/// Of the values that are not NaN, where the mask is set.
 struct Figures {
     double low = 0, high = 0, average = 0;
 };
@@ -265,11 +273,11 @@ TEST_F(cacao_scan, visibility_comes_out_as_computed) {
     // All slices say 0.5, so the map must say 0.5. AMD raises it to 2.2 on the way out, but not in every quality.
     const Given half{{}, [](int, const Slice& made) { return Slice{cv::Mat1f(made.ao.size(), 0.5F), made.edges}; }};
     const double dark = std::pow(128.0 / 255, 2.2);
-    for (const auto& [quality, expected] : {std::pair<std::string, double>{"low", 128.0 / 255}, {"high", dark}}) {
-        CacaoOptions o = options("", quality);
+    for (const auto& [quality, expected] : {std::pair(Quality::low, 128.0 / 255), {Quality::high, dark}}) {
+        CacaoOptions o = options(quality);
         o.blur_passes = 0;
         const Both maps = both(o, flat(camera_of(125), 3), half);
-        measured(quality, average(maps.scan.visibility), average(maps.reference.visibility));
+        measured(name_of(quality), average(maps.scan.visibility), average(maps.reference.visibility));
         EXPECT_NEAR(lowest(maps.scan.visibility), 0.5, 1e-4);
         EXPECT_NEAR(highest(maps.scan.visibility), 0.5, 1e-4);
         EXPECT_NEAR(average(maps.reference.visibility), expected, 0.005);
@@ -277,10 +285,10 @@ TEST_F(cacao_scan, visibility_comes_out_as_computed) {
 }
 
 TEST_F(cacao_scan, holes_do_not_occlude_and_have_no_visibility) {
-    // A plane is open, whatever of it is missing. A hole is depth 0, the place of the camera: nearer than the radius,
-    // the reference takes it for something right in front of the plane.
+    // A plane with holes is still open. A hole has depth 0, the position of the camera. If that is within the radius,
+    // the reference takes the hole for an occluder in front of the plane.
     DepthImage depth = with_holes(flat(camera_of(125), 0.3F), 0.1);
-    CacaoOptions o = options("");
+    CacaoOptions o = options();
     o.radius = 2;
     const Both maps = both(o, depth);
     const cv::Mat surface = depth.z_m > 0;
@@ -294,9 +302,9 @@ TEST_F(cacao_scan, holes_do_not_occlude_and_have_no_visibility) {
 }
 
 TEST_F(cacao_scan, holes_are_not_open_space) {
-    // A corner stays as dark as it was when pixels are taken from it, at random or one whole slice of the four. Beyond
-    // the radius the reference counts a hole as a ray that met nothing, and a quarter of the darkness is lost. (Scan
-    // still loses 1 % where 40 % of the pixels are gone; the tolerance is that measurement, not a derivation.)
+    // A corner stays as dark when pixels are removed, at random or one whole slice of the four. Beyond the radius the
+    // reference counts a hole as a ray without a hit, and loses a quarter of the darkness. (Scan still loses 1 % where
+    // 40 % of the pixels are missing. The tolerance comes from that measurement, not from a derivation.)
     const Pinhole camera = camera_of(125);
     const DepthImage corner = wall_corner(camera);
     DepthImage sliced{camera, corner.z_m.clone(), {}};
@@ -307,7 +315,7 @@ TEST_F(cacao_scan, holes_are_not_open_space) {
     const float s = std::numbers::sqrt2_v<float> / 2;
     for (int x = 0; x < usual.width; ++x)
         normals.col(x) = cv::Vec3f(x < camera.cx ? s : -s, 0, -s);
-    CacaoOptions o = options(""); // weak and linear: a strong effect brightens where fewer taps make it noisier
+    CacaoOptions o = options(); // weak and linear: a strong effect brightens where fewer taps make it noisier
     o.shadow_multiplier = 0.5F;
     o.shadow_power = 1;
     const Both whole = both(o, corner, {normals, {}});
@@ -326,8 +334,9 @@ TEST_F(cacao_scan, holes_are_not_open_space) {
 }
 
 TEST_F(cacao_scan, a_checkerboard_of_holes_changes_nothing) {
-    // Every other pixel is missing, so that none has a neighbour left, and two of the four slices are empty. On the
-    // line of 1/z to what lies beyond a hole of one pixel normals go on, and the hole itself serves as an occluder.
+    // Every other pixel is missing, so no pixel has a neighbour, and two of the four slices are empty. Scan
+    // interpolates 1/z across a hole of one pixel: normals use the pixel beyond it, and the filled hole serves as an
+    // occluder.
     const DepthImage corner = wall_corner(test_camera(usual));
     DepthImage board{corner.camera, corner.z_m.clone(), {}};
     for (int y = 0; y < usual.height; ++y)
@@ -337,10 +346,10 @@ TEST_F(cacao_scan, a_checkerboard_of_holes_changes_nothing) {
     const auto changed = [&](const Seen& with, const Seen& without) {
         return std::sqrt(cv::norm(with.visibility, without.visibility, cv::NORM_L2SQR, left) / cv::countNonZero(left));
     };
-    for (const char* quality : {"lowest", "low", "high", "highest"}) {
-        const CacaoOptions o = options("", quality);
+    for (const Quality quality : {Quality::lowest, Quality::low, Quality::high, Quality::highest}) {
+        const CacaoOptions o = options(quality);
         const Both whole = both(o, corner), punched = both(o, board);
-        measured(fmt::format("{}, RMS change", quality), changed(punched.scan, whole.scan),
+        measured(fmt::format("{}, RMS change", name_of(quality)), changed(punched.scan, whole.scan),
                  changed(punched.reference, whole.reference));
         EXPECT_LT(changed(punched.scan, whole.scan), 0.005);
         EXPECT_GT(changed(punched.reference, whole.reference), 0.1);
@@ -350,30 +359,31 @@ TEST_F(cacao_scan, a_checkerboard_of_holes_changes_nothing) {
 }
 
 TEST_F(cacao_scan, a_hole_of_device_depth_is_a_hole) {
-    // 0 in the depth image is no surface (projection/maps.h), whatever the numbers mean otherwise: with reverse-Z it is
-    // what a cleared buffer holds, infinitely far.
-    for (const char* kind : {"normal_z", "reverse_z"})
-        for (const char* quality : {"lowest", "high"})
+    // 0 in the depth image is no surface (projection/maps.h), in device depth, too. With reverse-Z a cleared buffer
+    // holds 0, which means infinitely far.
+    for (const CacaoDepthInput kind : {CacaoDepthInput::normal_z, CacaoDepthInput::reverse_z})
+        for (const Quality quality : {Quality::lowest, Quality::high})
             for (const bool downsampled : {false, true}) {
-                CacaoOptions o = options("scan", quality, downsampled);
+                CacaoOptions o = options(quality, downsampled);
                 o.depth_input = kind;
                 o.radius = 2;
                 const float d =
-                    kind == std::string("normal_z") ? 0.66673334F : 0.33326666F; // 0.3 m between 0.1 and 1000 m
+                    kind == CacaoDepthInput::normal_z ? 0.66673334F : 0.33326666F; // 0.3 m between 0.1 and 1000 m
                 DepthImage depth = flat(camera_of(125), d);
                 depth.z_m(cv::Rect(60, 40, 20, 20)) = 0;
                 const cv::Mat1f v = run(o, depth).visibility;
-                EXPECT_TRUE(std::isnan(v(50, 70))) << kind << " " << quality << " " << downsampled << ": " << v(50, 70);
-                EXPECT_GE(lowest(v), 0.999) << kind << " " << quality << " " << downsampled;
+                const std::string run_name = fmt::format("{} {} {}", name_of(kind), name_of(quality), downsampled);
+                EXPECT_TRUE(std::isnan(v(50, 70))) << run_name << ": " << v(50, 70);
+                EXPECT_GE(lowest(v), 0.999) << run_name;
             }
 }
 
 TEST_F(cacao_scan, a_hole_does_not_poison_the_mips) {
-    // The mean of what is known of a wall at 3 m is 3 m. The reference takes the nearest of each four, and a hole is
+    // The mean of the known depths of a wall at 3 m is 3 m. The reference takes the nearest of each four, and a hole is
     // nearest: one missing pixel empties 16x16 of them in mip 3.
     DepthImage depth = flat(camera_of(125), 3);
     depth.z_m(40, 40) = 0;
-    const Both maps = both(options(""), depth);
+    const Both maps = both(options(), depth);
     for (std::size_t m = 1; m < 4; ++m) {
         EXPECT_EQ(lowest(maps.scan.depth[0][m]), 3) << "mip " << m;
         EXPECT_EQ(lowest(maps.reference.depth[0][m]), 0) << "mip " << m;
@@ -382,15 +392,15 @@ TEST_F(cacao_scan, a_hole_does_not_poison_the_mips) {
 }
 
 TEST_F(cacao_scan, mips_know_the_radius) {
-    // A scene and its radius eight times as large is the same picture: every length scales by a power of two, so not
-    // even rounding changes. AMD's mip weight forgot the radius and cuts at one unit: poles 15 cm before a wall are
-    // blended with it, poles 1.2 m before it are not.
+    // A scene and radius eight times as large give the same map. Every length scales by a power of two, so not even
+    // rounding changes. AMD's mip weight ignores the radius and cuts at one unit: it blends poles 15 cm before a wall
+    // with the wall, but not poles 1.2 m before it.
     DepthImage fence = flat(camera_of(125), 0.5F);
     for (int x = 0; x < usual.width; ++x)
         if (x % 12 < 3)
             fence.z_m.col(x) = 0.35F;
     const auto at = [&](float scale) {
-        CacaoOptions o = options("");
+        CacaoOptions o = options();
         o.radius = 0.8F * scale;
         return both(o, {fence.camera, cv::Mat1f(fence.z_m * scale), {}});
     };
@@ -403,11 +413,11 @@ TEST_F(cacao_scan, mips_know_the_radius) {
 }
 
 TEST_F(cacao_scan, distance_alone_takes_nothing_away) {
-    // A hall 400 m away under a radius to match is the picture of a room 2 m away. AMD's AO fades out from 50 to 300 m
-    // unless told otherwise: depths of games, not of scans.
+    // A hall 400 m away, with the radius scaled alike, gives the same map as a room 2 m away. By default AMD's AO fades
+    // out from 50 to 300 m: depths of games, not of scans.
     const DepthImage near = wall_corner(test_camera(usual));
     const auto at = [&](float scale) {
-        CacaoOptions o = options("");
+        CacaoOptions o = options();
         o.radius = 0.5F * scale;
         return both(o, {near.camera, cv::Mat1f(near.z_m * scale), {}});
     };
@@ -421,10 +431,10 @@ TEST_F(cacao_scan, distance_alone_takes_nothing_away) {
 }
 
 TEST_F(cacao_scan, what_lies_outside_the_image_is_unknown) {
-    // A plane that recedes out of the image is open up to its rim. The reference goes on from the rim with its last
-    // depth, straight sideways, which stands above the plane.
+    // A plane that recedes out of the image is open up to the rim. The reference repeats the depth of the rim outside
+    // the image, which is above the plane.
     const DepthImage depth = tilted_plane(camera_of(200), 60);
-    const Both maps = both(options(""), depth, {plane_normals(usual, 60), {}});
+    const Both maps = both(options(), depth, {plane_normals(usual, 60), {}});
     const cv::Rect inside(60, 0, 40, 120);
     measured("darkest at the rim", lowest(maps.scan.visibility), lowest(maps.reference.visibility));
     EXPECT_GE(lowest(maps.scan.visibility), 0.999);
@@ -433,21 +443,21 @@ TEST_F(cacao_scan, what_lies_outside_the_image_is_unknown) {
 }
 
 TEST_F(cacao_scan, taps_look_from_the_texel_they_read) {
-    // A tap of mip m reads the mean of 2^m texels across. Seen from that texel's centre it lies on the plane; seen from
-    // where the tap fell, as in the reference, a slope becomes a staircase. At full strength, and without a horizon
-    // angle to hide the steps.
+    // A tap of mip m reads the mean of 2^m texels across. At the centre of that texel, this depth is on the plane. At
+    // the position of the tap, as in the reference, a slope becomes a staircase. Full strength and a horizon angle of 0
+    // keep the steps visible.
     const cv::Size size(320, 240);
     const DepthImage depth = tilted_plane(camera_of(693, size), 60);
     const Given given{plane_normals(size, 60), {}};
-    CacaoOptions o = options("");
+    CacaoOptions o = options();
     o.radius = 1;
     o.horizon_angle = 0;
     o.shadow_multiplier = 2.3F;
     o.shadow_power = 5;
     const Both maps = both(o, depth, given);
     const cv::Rect inside(155, 0, 10, 240); // no tap of these leaves the image sideways
-    o.quality = "medium";
-    o.profile = "reference";
+    o.quality = Quality::medium;
+    o.profile = CacaoProfile::reference;
     measured("slope by mips", lowest(maps.scan.visibility(inside)), lowest(maps.reference.visibility(inside)));
     EXPECT_GE(lowest(maps.scan.visibility), 0.999);
     EXPECT_LT(lowest(maps.reference.visibility(inside)), 0.9);
@@ -458,7 +468,7 @@ TEST_F(cacao_scan, a_grazing_plane_is_one_surface) {
     // 1/z is linear across any plane, so a plane has no edges, however it is tilted; z is not.
     const double tilt = 80;
     const DepthImage depth = tilted_plane(camera_of(125), tilt);
-    const Both maps = both(options(""), depth);
+    const Both maps = both(options(), depth);
     const cv::Vec3f truth = plane_normals({1, 1}, tilt)(0, 0);
     const auto found = [&](const Seen& seen) {
         int whole = 0, texels = 0;
@@ -468,7 +478,7 @@ TEST_F(cacao_scan, a_grazing_plane_is_one_surface) {
                 for (int x = 2; x + 2 < seen.k.slice.x; ++x) {
                     const cv::Mat1f& z = seen.depth[a][0];
                     if (lowest(z(cv::Rect(x - 2, y - 1, 5, 3))) == 0)
-                        continue; // the last before a hole has no slope to go by
+                        continue; // the last texel before a hole has no slope
                     ++texels;
                     whole += seen.raw[a].edges(y, x) == 0xff;
                     const double cosine = cv::normalize(seen.normals[a](y, x)).dot(truth);
@@ -487,7 +497,7 @@ TEST_F(cacao_scan, a_grazing_plane_is_one_surface) {
 }
 
 TEST_F(cacao_scan, nothing_leaks_across_a_cut_edge) {
-    // Left all open, right all closed, a metre apart in depth: no pass of the blur may mix them. AMD lets 1 - sharpness
+    // Left all open, right all closed, a metre apart in depth: no blur step may mix them. AMD lets 1 - sharpness
     // through every cut edge.
     const DepthImage depth = step(camera_of(125), 1, 3);
     const Given sides{{}, [](int, const Slice& made) {
@@ -495,7 +505,7 @@ TEST_F(cacao_scan, nothing_leaks_across_a_cut_edge) {
                           s.ao.colRange(0, s.ao.cols / 2) = 1;
                           return s;
                       }};
-    CacaoOptions o = options("");
+    CacaoOptions o = options();
     o.blur_passes = 8;
     o.sharpness = 0.98F;
     const Both maps = both(o, depth, sides);
@@ -514,7 +524,7 @@ TEST_F(cacao_scan, nothing_leaks_across_a_cut_edge) {
     EXPECT_GT(leak(maps.reference).second, 0.01);
 }
 
-/// Columns of the AO grid, put in place of what was generated; all edges open, or those found in depth.
+/// Replaces generated AO by columns of the AO grid. All edges are open, or those found in depth.
 Given columns(const std::function<float(int)>& value, bool found_edges = false) {
     return {{}, [=](int slice, const Slice& made) {
                 Slice s{cv::Mat1f(made.ao.size()), found_edges ? made.edges : cv::Mat1b(made.ao.size(), 255)};
@@ -524,8 +534,8 @@ Given columns(const std::function<float(int)>& value, bool found_edges = false) 
             }};
 }
 
-CacaoOptions upsampling(const std::string& quality) {
-    CacaoOptions o = options("", quality, true);
+CacaoOptions upsampling(Quality quality) {
+    CacaoOptions o = options(quality, true);
     o.blur_passes = 0;
     return o;
 }
@@ -533,7 +543,7 @@ CacaoOptions upsampling(const std::string& quality) {
 TEST_F(cacao_scan, the_left_rim_knows_nothing_of_the_right) {
     // AMD's unsigned coordinates wrap: its halo left of the image shows AO of the right rim.
     const Both maps =
-        both(upsampling("high"), flat(camera_of(125), 3), columns([](int g) { return g < 70 ? 1.0F : 0.0F; }));
+        both(upsampling(Quality::high), flat(camera_of(125), 3), columns([](int g) { return g < 70 ? 1.0F : 0.0F; }));
     const cv::Rect left(0, 0, 4, 120);
     measured("left rim, open, with the right rim closed", lowest(maps.scan.visibility(left)),
              lowest(maps.reference.visibility(left)));
@@ -546,8 +556,8 @@ TEST_F(cacao_scan, upsampled_ao_stays_where_it_was_computed) {
     // texel borders, where the hardware chooses a side, and the map moves by half a grid pixel. (The window of five is
     // lopsided itself, by 0.02, at odd pixels.)
     for (const int column : {34, 35}) {
-        const Both maps =
-            both(upsampling("low"), flat(camera_of(125), 3), columns([&](int g) { return g == column ? 0.0F : 1.0F; }));
+        const Both maps = both(upsampling(Quality::low), flat(camera_of(125), 3),
+                               columns([&](int g) { return g == column ? 0.0F : 1.0F; }));
         const auto lopsided = [&](const Seen& seen) {
             double most = 0;
             for (int d = 1; d <= 4; ++d)
@@ -563,10 +573,10 @@ TEST_F(cacao_scan, upsampled_ao_stays_where_it_was_computed) {
 }
 
 TEST_F(cacao_scan, the_upsampler_compares_with_the_depth_of_the_same_column) {
-    // A near open surface left, a far closed one right: their depths keep them apart. AMD reads the depth of odd
-    // columns one slice texel to the right, so the near rim is taken for the far wall.
-    const Both maps =
-        both(upsampling("high"), step(camera_of(125), 1, 3), columns([](int g) { return g < 40 ? 1.0F : 0.0F; }, true));
+    // A near open surface is left, a far closed one right, and their depths keep them apart. AMD reads the depth of odd
+    // columns one slice texel to the right, so it takes the near rim for the far wall.
+    const Both maps = both(upsampling(Quality::high), step(camera_of(125), 1, 3),
+                           columns([](int g) { return g < 40 ? 1.0F : 0.0F; }, true));
     const cv::Rect left(6, 0, 74, 120), right(80, 0, 74, 120);
     measured("darkest left of the step", lowest(maps.scan.visibility(left)), lowest(maps.reference.visibility(left)));
     measured("brightest right of the step", highest(maps.scan.visibility(right)),
@@ -577,10 +587,12 @@ TEST_F(cacao_scan, the_upsampler_compares_with_the_depth_of_the_same_column) {
 }
 
 TEST_F(cacao_scan, the_last_odd_column_counts) {
-    // Its depth is one column too far right as well: outside, so AMD's last column weighs nothing.
+    // AMD reads the depth of the last column one column too far right, too. That is outside the image, so the column
+    // has no weight.
     const auto closed = [](int column) { return columns([=](int g) { return g == column ? 0.0F : 1.0F; }); };
     const DepthImage depth = flat(camera_of(125), 3);
-    const Both last = both(upsampling("high"), depth, closed(79)), inner = both(upsampling("high"), depth, closed(39));
+    const Both last = both(upsampling(Quality::high), depth, closed(79)),
+               inner = both(upsampling(Quality::high), depth, closed(39));
     const auto darkening = [](const Seen& seen, int x) { return 1 - average(seen.visibility.col(x)); };
     const double scan = darkening(last.scan, 158) / darkening(inner.scan, 78),
                  amd = darkening(last.reference, 158) / darkening(inner.reference, 78);
@@ -593,7 +605,7 @@ TEST_F(cacao_scan, pixels_are_where_they_are_at_odd_sizes) {
     // 33 pixels are 9 slice texels of four, 36 pixels: AMD's kernel squeezes its rays by 33/36, and a plane no longer
     // fits its own normals. At 36 pixels it does.
     const double tilt = 50;
-    CacaoOptions o = options("", "low", true);
+    CacaoOptions o = options(Quality::low, true);
     o.radius = 0.8F;
     o.horizon_angle = 0;
     const auto inner = [&](const Seen& seen) { return lowest(seen.visibility(cv::Rect(12, 12, 9, 9))); };
@@ -611,14 +623,14 @@ TEST_F(cacao_scan, pixels_are_where_they_are_at_odd_sizes) {
 
 TEST_F(cacao_scan, depth_is_precise_from_near_to_far) {
     // A plane is open at any tilt and distance. Through a telephoto lens a pixel is 2 cm wide at 65 m, where binary16
-    // counts in steps of 6 cm and AMD's bias covers 5: its slope is a staircase. 32 bits have no such steps.
-    CacaoOptions o = options("");
+    // has steps of 6 cm and AMD's bias covers 5, so a slope becomes a staircase. 32 bits have no such steps.
+    CacaoOptions o = options();
     o.fade_from = 1e4F;
     o.fade_to = 1e5F;
     for (const double tilt : {3.0, 45.0, 80.0})
         for (const double z : {0.3, 3.0, 65.0, 100.0}) {
             const DepthImage depth = tilted_plane(camera_of(3200), tilt, z);
-            o.profile = "scan";
+            o.profile = CacaoProfile::scan;
             const Seen seen = run(o, depth, {plane_normals(usual, tilt), {}});
             EXPECT_GE(lowest(seen.visibility), 0.999) << tilt << " degrees, " << z << " m";
         }
@@ -640,14 +652,14 @@ TEST_F(cacao_scan, depth_is_precise_from_near_to_far) {
 }
 
 TEST_F(cacao_scan, the_radius_is_metric_at_close_range) {
-    // What stands 0.3 m aside and 0.1 m higher shades a wall within a radius of 0.5 m, at half a metre from the camera
-    // as at five. The reference shrinks its radius, to less than 0.3 m here, where it would cover much of the screen.
+    // A step 0.3 m aside and 0.1 m higher shades a wall within a radius of 0.5 m, both at half a metre from the camera
+    // and at five. The reference shrinks its radius, to less than 0.3 m here, where it would cover much of the screen.
     // How dark is not compared: perspective shows the two cameras different parts of the step.
     const auto aside = [](const Seen& seen, double pixel_m) {
         return average(seen.visibility(cv::Rect(80 + static_cast<int>(0.3 / pixel_m), 40, 1, 40)));
     };
-    const Both close = both(options(""), step(camera_of(125), 0.4F, 0.5F)),
-               far = both(options(""), step(camera_of(500), 4.9F, 5));
+    const Both close = both(options(), step(camera_of(125), 0.4F, 0.5F)),
+               far = both(options(), step(camera_of(500), 4.9F, 5));
     measured("0.3 m from a step, camera at 0.5 m", aside(close.scan, 0.004), aside(close.reference, 0.004));
     measured("0.3 m from a step, camera at 5 m", aside(far.scan, 0.01), aside(far.reference, 0.01));
     EXPECT_LT(aside(close.scan, 0.004), 0.96);
@@ -660,8 +672,8 @@ TEST_F(cacao_scan, pixels_need_not_be_square) {
     // The same view, sampled twice as finely down as across, shows the same shadows. AMD's disc is as high as wide in
     // pixels.
     const cv::Size tall(160, 240);
-    const Both square = both(options(""), ball_on_floor(camera_of(125)));
-    const Both high = both(options(""), ball_on_floor({125, 250, 79.5, 119.5, tall}));
+    const Both square = both(options(), ball_on_floor(camera_of(125)));
+    const Both high = both(options(), ball_on_floor({125, 250, 79.5, 119.5, tall}));
     const auto apart = [](const Seen& a, const Seen& b) {
         cv::Mat1f halved;
         cv::resize(b.visibility, halved, a.visibility.size(), 0, 0, cv::INTER_AREA);
@@ -673,11 +685,12 @@ TEST_F(cacao_scan, pixels_need_not_be_square) {
 }
 
 TEST_F(cacao_scan, lowest_reads_nothing_beyond_an_odd_image) {
-    // Of an odd image the last column has no partner in the other slice. AMD loads 0 for it, a wall at the camera.
-    CacaoOptions o = options("", "lowest");
+    // In an odd image, the last column has no partner in the other slice. AMD loads depth 0 for it, a wall at the
+    // camera.
+    CacaoOptions o = options(Quality::lowest);
     o.radius = 2;
     const Both odd = both(o, flat(camera_of(40, {41, 31}), 0.3F));
-    o.profile = "reference";
+    o.profile = CacaoProfile::reference;
     const Seen even = run(o, flat(camera_of(40, {42, 32}), 0.3F));
     measured("darkest pixel of a plane of 41x31", lowest(odd.scan.visibility), lowest(odd.reference.visibility));
     EXPECT_GE(lowest(odd.scan.visibility), 0.999);
@@ -686,11 +699,11 @@ TEST_F(cacao_scan, lowest_reads_nothing_beyond_an_odd_image) {
 }
 
 TEST_F(cacao_scan, normals_beside_holes_are_true_or_absent) {
-    // Half of a slope is missing. Where a quadrant is left its normal is the plane's, where none is the neighbours' may
-    // do, and else none is better than AMD's guess, which faces the camera.
+    // More than half of a slope is missing. A complete quadrant gives the normal of the plane. Without one, scan takes
+    // the neighbours' normals, or none. AMD guesses a normal that faces the camera.
     const double tilt = 60;
     const DepthImage depth = with_holes(tilted_plane(camera_of(200), tilt), 0.6);
-    const Both maps = both(options(""), depth);
+    const Both maps = both(options(), depth);
     const cv::Vec3f truth = plane_normals({1, 1}, tilt)(0, 0);
     const auto found = [&](const Seen& seen) {
         int wrong = 0, none = 0, texels = 0;
@@ -717,7 +730,7 @@ TEST_F(cacao_scan, normals_beside_holes_are_true_or_absent) {
 constexpr float near_enough = 1e-6F;
 
 TEST_F(cacao_formulas, the_cpu_reference_has_the_documented_values) {
-    // The unit vectors of the specification: they vouch for the formulas that the tests below compare the shaders with.
+    // The specification's worked values check the formulas with which the tests below compare the shaders.
     const Around e = reference::edges(2, {2.1F, 1.95F, 2, 3});
     EXPECT_NEAR(e.left, 0.675, 2e-6);
     EXPECT_NEAR(e.right, 0.675, 2e-6);
@@ -740,7 +753,7 @@ TEST_F(cacao_formulas, the_cpu_reference_has_the_documented_values) {
 
 TEST_F(cacao_formulas, constants_follow_the_camera) {
     // Section 7 of the specification works one camera through, section 11.1 one texel and one tap of it.
-    CacaoOptions o = options("reference");
+    CacaoOptions o = options(Quality::high, false, CacaoProfile::reference);
     const Pinhole camera{525, 525, 319.5, 239.5, {640, 480}};
     const CacaoConstants k = constants_from(o, camera);
     EXPECT_NEAR(k.view_mul.x, 1.2190476, near_enough);
@@ -748,7 +761,7 @@ TEST_F(cacao_formulas, constants_follow_the_camera) {
     EXPECT_NEAR(k.view_add.x, -0.6095238, near_enough);
     EXPECT_NEAR(k.view_add.y, 0.4571429, near_enough);
     EXPECT_NEAR(k.near_limit_rec, 0.7619048, near_enough);
-    o.quality = "low";
+    o.quality = Quality::low;
     EXPECT_NEAR(constants_from(o, camera).near_limit_rec, 0.5079365, near_enough);
 
     const std::array<cv::Mat1f, 4> depth{cv::Mat1f(240, 320, 2.0F), {}, {}, {}};
@@ -786,8 +799,8 @@ struct Agreement {
 };
 
 TEST_F(cacao_formulas, edges_are_those_of_the_documentation) {
-    // Every packed edge byte of a scene, from the depth slices; two bits of it may fall on the other side of a tie.
-    const Both maps = both(options("", "medium"), ball_on_floor(camera_of(125)));
+    // Every packed edge byte of a scene, from the depth slices. Ties may round the other way.
+    const Both maps = both(options(Quality::medium), ball_on_floor(camera_of(125)));
     for (const Seen* seen : {&maps.scan, &maps.reference}) {
         const bool scan = seen == &maps.scan;
         Agreement agreement;
@@ -806,10 +819,10 @@ TEST_F(cacao_formulas, edges_are_those_of_the_documentation) {
 }
 
 TEST_F(cacao_formulas, mips_are_means_of_the_nearest_surface) {
-    // Mip 1 from the full-precision depth; AMD's weight is that of a radius of 1, whatever the radius, and its copies
-    // are binary16.
+    // Mip 1 from the full-precision depth. AMD's weight always assumes a radius of 1, and its stored copies are
+    // binary16.
     const DepthImage depth = ball_on_floor(camera_of(125));
-    const Both maps = both(options(""), depth);
+    const Both maps = both(options(), depth);
     for (const Seen* seen : {&maps.scan, &maps.reference}) {
         const bool scan = seen == &maps.scan;
         const float phi = scan ? -1 / (0.5F * 0.5F) : -1;
@@ -839,7 +852,8 @@ TEST_F(cacao_formulas, normals_are_those_of_the_four_quadrants) {
     const DepthImage whole = ball_on_floor(camera_of(125)), punched = with_holes(whole, 0.2);
     for (const bool scan : {true, false}) {
         const DepthImage& depth = scan ? punched : whole;
-        const Seen seen = run(options(scan ? "scan" : "reference"), depth);
+        const Seen seen =
+            run(options(Quality::high, false, scan ? CacaoProfile::scan : CacaoProfile::reference), depth);
         const Pinhole& camera = depth.camera;
         const auto z_at = [&](int x, int y) {
             const bool inside = cv::Rect({0, 0}, usual).contains({x, y});
@@ -868,7 +882,7 @@ TEST_F(cacao_formulas, normals_are_those_of_the_four_quadrants) {
                     reference::normal_of(e, place(x, y, own), place(x - 1, y, z.left), place(x + 1, y, z.right),
                                          place(x, y - 1, z.top), place(x, y + 1, z.bottom));
                 if (scan && cv::norm(n) < 0.01)
-                    continue; // lent by a neighbour, or absent: a test of its own
+                    continue; // taken from a neighbour, or absent: another test
                 const cv::Vec3f ours = seen.normals[static_cast<std::size_t>(x % 2 + 2 * (y % 2))](y / 2, x / 2);
                 agreement.add(cv::norm(cv::normalize(n) - ours, cv::NORM_INF) <= 1.01 / (scan ? 511 : 127));
             }
@@ -878,9 +892,9 @@ TEST_F(cacao_formulas, normals_are_those_of_the_four_quadrants) {
 }
 
 TEST_F(cacao_formulas, one_blur_pass_is_the_documented_sum) {
-    // From the AO and edges that went in. The reference mirrors at the rim and rounds to 8 bits; scan has 16, and
-    // nothing passes a cut edge.
-    CacaoOptions o = options("");
+    // From the AO and edges before the blur. The reference mirrors at the rim and rounds to 8 bits. Scan has 16 bits,
+    // and nothing passes a cut edge.
+    CacaoOptions o = options();
     o.blur_passes = 1;
     const Both maps = both(o, ball_on_floor(camera_of(125)));
     for (const Seen* seen : {&maps.scan, &maps.reference}) {
@@ -914,9 +928,9 @@ TEST_F(cacao_formulas, one_blur_pass_is_the_documented_sum) {
 }
 
 TEST_F(cacao_formulas, high_is_the_documented_kernel) {
-    // Every texel of every slice, from the depth mips and normals that went in: 12 tap pairs, detail shadows, edges,
-    // fade. A tap on a tie, or a mip on one, may go the other way.
-    const Seen seen = run(options("reference"), ball_on_floor(camera_of(125)));
+    // Every texel of every slice, from its depth mips and normals: 12 tap pairs, detail shadows, edges,
+    // fade. Ties of taps and mips may go the other way.
+    const Seen seen = run(options(Quality::high, false, CacaoProfile::reference), ball_on_floor(camera_of(125)));
     Agreement agreement;
     for (int a = 0; a < 4; ++a) {
         const auto i = static_cast<std::size_t>(a);
@@ -932,15 +946,15 @@ TEST_F(cacao_formulas, high_is_the_documented_kernel) {
 // --- C. tables and sizes
 
 TEST_F(cacao_passes, every_configuration_is_sound) {
-    // Twenty configurations, two profiles, zero to eight blur passes: all read only what was written, and the last pass
-    // writes the map.
-    for (const char* profile : {"scan", "reference"})
-        for (const char* quality : {"lowest", "low", "medium", "high", "highest"})
+    // Twenty configurations, two profiles, zero to eight blur passes. Passes read only buffers already written, and the
+    // last one writes the map.
+    for (const auto& [profile_word, profile] : cacao_profile_words)
+        for (const auto& [quality_word, quality] : quality_words)
             for (const bool downsampled : {false, true})
                 for (const bool supplied : {false, true})
                     for (int blur = 0; blur <= 8; ++blur)
                         for (const cv::Size size : {cv::Size(1, 1), cv::Size(641, 479)}) {
-                            CacaoOptions o = options(profile, quality, downsampled);
+                            CacaoOptions o = options(quality, downsampled, profile);
                             o.blur_passes = blur;
                             const CacaoTables tables =
                                 cacao_tables(o, constants_from(o, camera_of(500, size)), supplied);
@@ -950,7 +964,8 @@ TEST_F(cacao_passes, every_configuration_is_sound) {
                                 if (each == &in_images && !o.scan())
                                     continue;
                                 const auto wrong = gpu::problems(each->buffers, each->passes);
-                                EXPECT_TRUE(wrong.empty()) << profile << " " << quality << ": " << wrong.front();
+                                EXPECT_TRUE(wrong.empty())
+                                    << profile_word << " " << quality_word << ": " << wrong.front();
                                 EXPECT_EQ(each->passes.back().writes.front(), cacao_out);
                                 EXPECT_EQ(each->buffers.size(), static_cast<std::size_t>(cacao_buffer_count));
                             }
@@ -961,22 +976,23 @@ TEST_F(cacao_passes, odd_and_tiny_images_run_without_a_word_of_validation) {
     // Out-of-range accesses and missing barriers show at sizes that no tile divides. TearDown reads the messages.
     if (!device().validating())
         GTEST_SKIP() << "the validation layer is not installed";
-    const std::vector<std::pair<std::string, bool>> modes{{"highest", true}, {"lowest", true},   {"high", false},
-                                                          {"medium", true},  {"highest", false}, {"low", true},
-                                                          {"lowest", false}, {"high", true}};
+    const std::vector<std::pair<Quality, bool>> modes{
+        {Quality::highest, true},  {Quality::lowest, true}, {Quality::high, false},   {Quality::medium, true},
+        {Quality::highest, false}, {Quality::low, true},    {Quality::lowest, false}, {Quality::high, true}};
     std::size_t next = 0;
     for (const cv::Size size : {cv::Size(1, 1), cv::Size(1, 9), cv::Size(3, 2), cv::Size(641, 479)})
-        for (const char* profile : {"scan", "reference"}) {
+        for (const CacaoProfile profile : {CacaoProfile::scan, CacaoProfile::reference}) {
             const auto& [quality, downsampled] = modes[next++];
-            for (const char* storage : {"buffers", "images"}) {
-                CacaoOptions o = options(profile, quality, downsampled);
+            for (const CacaoStorage storage : {CacaoStorage::buffers, CacaoStorage::images}) {
+                CacaoOptions o = options(quality, downsampled, profile);
                 o.storage = storage;
                 Cacao cacao(device(), o);
                 const DepthImage depth = flat(camera_of(500, size), 2);
                 const cv::Mat1f v = cacao.compute({depth}).visibility;
                 EXPECT_EQ(v.size(), size);
-                if (profile == std::string("scan")) {
-                    EXPECT_GE(lowest(v), 0.999) << size << " " << quality << " in " << storage << ": a plane is open";
+                if (o.scan()) {
+                    EXPECT_GE(lowest(v), 0.999)
+                        << size << " " << name_of(quality) << " in " << name_of(storage) << ": a plane is open";
                 }
                 silent();
             }
@@ -984,25 +1000,26 @@ TEST_F(cacao_passes, odd_and_tiny_images_run_without_a_word_of_validation) {
 }
 
 TEST_F(cacao_passes, both_storages_make_the_same_map) {
-    // Buffers are what CPUs are fast with, images and fused passes what GPUs are fast with; one algorithm. Holes, odd
-    // sizes and every number of blur steps, in one pass or more.
+    // Buffers are faster on CPUs, images and fused passes on GPUs, and both run one algorithm. The runs cover holes,
+    // odd sizes, and zero to seven blur steps, fused or not.
     const DepthImage depth = with_holes(ball_on_floor(camera_of(125, {161, 119})), 0.05);
-    const std::vector<std::pair<std::string, bool>> modes{{"lowest", true},  {"lowest", false}, {"low", true},
-                                                          {"medium", false}, {"high", true},    {"high", false},
-                                                          {"highest", true}, {"highest", false}};
+    const std::vector<std::pair<Quality, bool>> modes{
+        {Quality::lowest, true}, {Quality::lowest, false}, {Quality::low, true},     {Quality::medium, false},
+        {Quality::high, true},   {Quality::high, false},   {Quality::highest, true}, {Quality::highest, false}};
     for (std::size_t blur = 0; blur < modes.size(); ++blur) {
         const auto& [quality, downsampled] = modes[blur];
-        CacaoOptions o = options("scan", quality, downsampled);
+        CacaoOptions o = options(quality, downsampled);
         o.blur_passes = static_cast<int>(blur);
-        o.storage = "buffers";
+        o.storage = CacaoStorage::buffers;
         const cv::Mat1f expected = Cacao(device(), o).compute({depth}).visibility;
-        o.storage = "images";
+        o.storage = CacaoStorage::images;
         const cv::Mat1f ours = Cacao(device(), o).compute({depth}).visibility;
-        EXPECT_EQ(cv::countNonZero((expected == expected) != (ours == ours)), 0) << quality << ": the same holes";
+        EXPECT_EQ(cv::countNonZero((expected == expected) != (ours == ours)), 0)
+            << name_of(quality) << ": the same holes";
         const cv::Mat1f apart = difference(ours, expected);
-        EXPECT_LE(average(apart), 0.1 / 255) << quality << " " << downsampled;
+        EXPECT_LE(average(apart), 0.1 / 255) << name_of(quality) << " " << downsampled;
         EXPECT_LE(cv::countNonZero(apart > 2.0 / 255), static_cast<int>(apart.total()) / 500)
-            << quality << " " << downsampled;
+            << name_of(quality) << " " << downsampled;
         silent();
     }
 }
@@ -1014,23 +1031,24 @@ TEST_F(cacao_depth_input, device_depth_is_the_same_scene) {
     // map.
     const DepthImage metric = ball_on_floor(camera_of(125));
     const double n = 0.1, f = 1000;
-    for (const char* profile : {"scan", "reference"}) {
-        CacaoOptions o = options(profile);
+    for (const CacaoProfile profile : {CacaoProfile::scan, CacaoProfile::reference}) {
+        CacaoOptions o = options(Quality::high, false, profile);
         const cv::Mat1f expected = run(o, metric).visibility;
-        for (const char* kind : {"normal_z", "reverse_z"}) {
+        for (const CacaoDepthInput kind : {CacaoDepthInput::normal_z, CacaoDepthInput::reverse_z}) {
             o.depth_input = kind;
             DepthImage device_depth{metric.camera, cv::Mat1f(usual), {}};
             for (int i = 0; i < usual.area(); ++i) {
                 const double z = metric.z_m(i / usual.width, i % usual.width);
                 const double d =
-                    kind == std::string("normal_z") ? f / (f - n) * (1 - n / z) : n / (f - n) * (f / z - 1);
+                    kind == CacaoDepthInput::normal_z ? f / (f - n) * (1 - n / z) : n / (f - n) * (f / z - 1);
                 device_depth.z_m(i / usual.width, i % usual.width) = static_cast<float>(d);
             }
             const cv::Mat1f apart = difference(run(o, device_depth).visibility, expected);
-            fmt::print("             {} {}: mean {:.4f}, worst {:.2f} of 255\n", profile, kind, 255 * average(apart),
-                       255 * highest(apart));
-            EXPECT_LE(average(apart), 0.1 / 255) << profile << " " << kind;
-            EXPECT_LE(cv::countNonZero(apart > 2.001 / 255), usual.area() / 1000) << profile << " " << kind;
+            fmt::print("             {} {}: mean {:.4f}, worst {:.2f} of 255\n", name_of(profile), name_of(kind),
+                       255 * average(apart), 255 * highest(apart));
+            EXPECT_LE(average(apart), 0.1 / 255) << name_of(profile) << " " << name_of(kind);
+            EXPECT_LE(cv::countNonZero(apart > 2.001 / 255), usual.area() / 1000)
+                << name_of(profile) << " " << name_of(kind);
         }
     }
 }
@@ -1038,23 +1056,25 @@ TEST_F(cacao_depth_input, device_depth_is_the_same_scene) {
 // --- E. goldens
 
 TEST_F(cacao_golden, maps_are_as_they_were) {
-    // Whatever changes a map must be seen: UPDATE_GOLDEN=1 rewrites them, and the change is reviewed with the code.
-    // Devices may differ in single decisions; a formula that changed differs everywhere.
+    // A change of a map must not go unnoticed. UPDATE_GOLDEN=1 rewrites the maps, and the change is reviewed with the
+    // code. Devices may differ in single pixels; a changed formula differs everywhere.
     namespace fs = std::filesystem;
     struct Case {
-        const char *profile, *quality;
+        Quality quality;
         bool downsampled;
+        CacaoProfile profile;
     };
     const DepthImage whole = ball_on_floor(test_camera({96, 72})), punched = with_holes(whole, 0.1);
-    for (const Case& c : {Case{"scan", "high", false}, Case{"scan", "highest", true}, Case{"reference", "high", false},
-                          Case{"reference", "low", true}}) {
-        const std::string name =
-            fmt::format("cacao_{}_{}{}.png", c.profile, c.quality, c.downsampled ? "_downsampled" : "");
+    for (const Case& c :
+         {Case{Quality::high, false, CacaoProfile::scan}, Case{Quality::highest, true, CacaoProfile::scan},
+          Case{Quality::high, false, CacaoProfile::reference}, Case{Quality::low, true, CacaoProfile::reference}}) {
+        const std::string name = fmt::format("cacao_{}_{}{}.png", name_of(c.profile), name_of(c.quality),
+                                             c.downsampled ? "_downsampled" : "");
         const fs::path file = fs::path(SCANSHADE_SOURCE) / "tests/golden" / name;
-        CacaoOptions o = options(c.profile, c.quality, c.downsampled);
+        CacaoOptions o = options(c.quality, c.downsampled, c.profile);
         o.radius = 1;
         Cacao cacao(device(), o);
-        const bool scan = c.profile == std::string("scan");
+        const bool scan = o.scan();
         const cv::Mat1f ours = cacao.compute({scan ? punched : whole}).visibility;
         if (const char* update = std::getenv("UPDATE_GOLDEN"); update && std::string(update) == "1")
             write_ao(file, ours, AoFormat::png16);

@@ -1,7 +1,7 @@
 // cacao_reference: runs the `reference` profile over a folder of AMD's own CACAO outputs and says how equal we are.
 //   cacao_reference [FOLDER] [--intermediates] [--only TEXT]      FOLDER holds manifest.json, inputs/, outputs/
 // Without FOLDER: SCANSHADE_FIXTURES, else ../shared/fixtures/cacao beside the source tree. Exit 0 all cases within the
-// contract, 1 a case misses, 2 unreadable, 77 no folder.
+// contract, 1 a case misses or fails to run, 2 manifest unreadable, 77 no folder.
 #include "ao/cacao/cacao.h"
 #include "ao/gpu/device.h"
 #include "projection/error.h"
@@ -41,8 +41,8 @@ CacaoOptions options_of(const json& manifest, const json& one) {
     s.update(one.value("settings", json::object()));
     const json constants = constants_of(manifest, one);
     CacaoOptions o;
-    o.profile = "reference";
-    o.quality = one.at("qualityLevel").get<std::string>();
+    o.profile = CacaoProfile::reference;
+    set(*row_named(o.parameters(), "quality"), one.at("qualityLevel").get<std::string>());
     o.downsampled = one.at("useDownsampledSsao").get<bool>();
     const auto take = [&](const char* name, auto& value) {
         if (s.contains(name))
@@ -169,12 +169,13 @@ int check(const fs::path& folder, bool with_intermediates, const std::string& on
     fmt::print("{} on {}\n{:<52} {:>10} {:>9} {:>6}\n", folder.string(), device.info().name, "case", "within 1", "mean",
                "worst");
     Score lowest{1, 0, 0};
-    int missed = 0, cases = 0;
+    int missed = 0, failed = 0, cases = 0;
     for (const json& one : manifest.at("cases")) {
         const std::string id = one.at("id");
         if (id.find(only) == std::string::npos)
             continue;
-        during(id, [&] {
+        ++cases;
+        try {
             const Input input = input_of(folder, manifest.at("inputs").at(one.at("input").get<std::string>()));
             const cv::Mat theirs =
                 cv::imread((folder / one.at("output").get<std::string>()).string(), cv::IMREAD_UNCHANGED);
@@ -192,14 +193,17 @@ int check(const fs::path& folder, bool with_intermediates, const std::string& on
                         compare_intermediates(folder, row, method);
             lowest = {std::min(lowest.share, s.share), std::max(lowest.mean, s.mean), std::max(lowest.worst, s.worst)};
             missed += !s.met();
-            ++cases;
-        });
+        } catch (const std::exception& failure) {
+            fmt::print("{:<52} FAILED: {}\n", id, failure.what());
+            ++failed;
+        }
     }
     for (const std::string& message : device.validation_messages())
         fmt::print("validation: {}\n", message);
-    fmt::print("worst of {} cases: {:.3f} % within 1/255 (wanted {:.1f}), mean {:.4f} (wanted {}), {} missed\n", cases,
-               100 * lowest.share, 100 * wanted_share, lowest.mean, wanted_mean, missed);
-    return missed || cases == 0 || !device.validation_messages().empty() ? 1 : 0;
+    fmt::print("worst of the {} cases that ran: {:.3f} % within 1/255 (wanted {:.1f}), mean {:.4f} (wanted {}), {} "
+               "missed, {} failed\n",
+               cases - failed, 100 * lowest.share, 100 * wanted_share, lowest.mean, wanted_mean, missed, failed);
+    return missed > 0 || failed > 0 || cases == 0 || !device.validation_messages().empty() ? 1 : 0;
 }
 
 } // namespace

@@ -18,7 +18,7 @@ layout(binding = 5, rgba32f) readonly uniform imageBuffer pattern;
 layout(binding = 16, r32ui) uniform writeonly uimageBuffer ao;
 #include "cacao/adaptive.glsl"
 
-// What a quality has (section 8.4, first table).
+// The features of a quality (section 8.4, first table).
 const bool detailed = kernel >= 1 && base == 0; // depth edges, edge fade-out, detail shadows
 const bool halo_weighted = kernel >= 1;
 const bool turned_edges = kernel >= 2 && base == 0; // edges where normals turn away
@@ -59,7 +59,7 @@ vec3 point_at(Surface s, vec2 offset, int mip) {
     return vec3((k.view_mul * uv + k.view_add) * z, z);
 }
 
-// Samples far in front of the surface count less: that is what keeps halos off whatever stands before a wall.
+// Samples far in front of the surface count less. That prevents halos around objects in front of a wall.
 float halo_weight_of(float dz) {
     return halo_weighted ? 0.6 * clamp(2.0 + k.neg_rec_radius * max(0.0, -dz), 0.0, 1.0) + 0.4 : 1.0;
 }
@@ -130,7 +130,7 @@ uint generated(int slice, ivec2 t) {
     }
     if (turned_edges) edges *= normal_edges(s.normal, slice, t);
 
-    if (kernel == 3 && base == 0) { // G3: the taps of the base pass, then as many as the picture asks for, without weights
+    if (kernel == 3 && base == 0) { // G3: the taps of the base pass, then as many as the image needs, without weights
         float wanted = importance_at(s.uv + vec2(parity_of(slice)) * k.slice_inv);
         sum.obscurance *= detail_share(wanted);
         uint b = imageLoad(base_result, here).x;
@@ -147,7 +147,7 @@ uint generated(int slice, ivec2 t) {
     float o = sum.obscurance / sum.weight;
     if (base != 0) return quantised(o, 255.0) | quantised(sum.weight / weight_range, 255.0) << 16; // GB
     float fade = clamp(s.point.z * k.fade_mul + k.fade_add, 0.0, 1.0);
-    if (detailed) { // fades what stands out on two sides
+    if (detailed) { // weaker AO on surfaces that stand out on two sides
         vec2 cut = clamp(0.35 * (1.0 - edges.xz - edges.yw), 0.0, 1.0);
         fade *= clamp(1.0 - cut.x - cut.y, 0.0, 1.0);
     }

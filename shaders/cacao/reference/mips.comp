@@ -8,7 +8,7 @@
 layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 16, r32f) uniform writeonly imageBuffer depths;
 
-// avg*: the mean of what lies on the nearest surface.
+// avg*: the mean depth of the nearest surface.
 float nearest_surface(float a, float b, float c, float d) {
     vec4 z = vec4(a, b, c, d), away = z - min(min(a, b), min(c, d));
     vec4 w = clamp(1.0 + k.mip_weight * (away * away), 0.0, 1.0);

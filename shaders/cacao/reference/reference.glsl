@@ -1,5 +1,5 @@
-// What every pass of `reference` needs: AMD's shaders bit for bit, as far as one device can repeat another's roundings. They know no holes,
-// and what they keep in 8- and 16-bit images is rounded here as lavapipe stores it (section 11.1).
+// What every pass of `reference` needs: AMD's shaders bit for bit, as far as one device can repeat another's roundings. They know no holes.
+// Values that they keep in 8- and 16-bit images are rounded here as lavapipe stores them (section 11.1).
 #include "cacao/cacao.glsl"
 
 const float inv_255 = 1.0 / 255.0;

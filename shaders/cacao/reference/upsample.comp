@@ -69,6 +69,6 @@ void main() {
     if (any(greaterThanEqual(p, k.image))) return;
     const ivec2 x = ivec2(1, 0), y = ivec2(0, 1);
     vec4 v = vec4(result(p, g, vec2(0.0)), result(p + x, g, vec2(0.5, 0.0)), result(p + y, g, vec2(0.0, 0.5)), result(p + x + y, g, vec2(0.5)));
-    store_visibility(p, v.xy); // both after all reads, which the four share
+    store_visibility(p, v.xy); // stored after all reads, because the four pixels share them
     store_visibility(p + y, v.zw);
 }

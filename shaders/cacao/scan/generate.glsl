@@ -15,7 +15,7 @@ layout(binding = 5, rgba32f) readonly uniform imageBuffer pattern;
 layout(binding = 16, r32ui) uniform writeonly uimageBuffer ao;
 #include "cacao/adaptive.glsl"
 
-// What a quality has (section 8.4, first table). Edges it has always: scan never blurs across a depth edge.
+// The features of a quality (section 8.4, first table). All have edges: scan never blurs across a depth edge.
 const bool detailed = kernel >= 1 && base == 0; // edge fade-out, shadows of adjacent texels
 const bool halo_weighted = kernel >= 1;
 const bool turned_edges = kernel >= 2; // edges where normals turn away
@@ -41,11 +41,11 @@ struct Sum {
     float obscurance, weight; // O, Wt
 };
 
-// Depth of a texel; 0 or that of another where there is none.
+// Depth of a texel. Outside the slice: 0, or the depth of another texel.
 float depth_of(int slice, ivec2 t);
-// What lookups of this texel's taps need.
+// The values that lookups of this texel's taps need.
 Lookup lookup_of(Surface s);
-// Calls look() for what lies `offset` texels ahead, and as far behind, in the mip that the bias asks for.
+// Calls look() for the texels at `offset` and at -`offset`, in the mip that the bias asks for.
 void look_both_ways(Surface s, vec2 offset, float mip_bias, inout Sum sum);
 // Row i of the sampling pattern.
 vec4 adaptive_tap(int i);
@@ -78,8 +78,8 @@ Surface surface_at(int slice, ivec2 t, float z) {
 
 // --- Taps.
 
-// A tap that sees depth z along a ray: that of the centre of the texel it reads, so that slopes stay planes. Holes and what lies outside
-// the image are unknown: they count neither as open nor as closed.
+// Adds a tap with depth z along a ray. The ray passes through the centre of the texel that the tap reads, so slopes stay planes.
+// Holes and texels outside the image are unknown: they count neither as open nor as closed.
 void look(Surface s, vec2 ray, float z, inout Sum sum) {
     vec3 d = vec3(ray * z, z) - s.point;
     float d2 = dot(d, d);
@@ -104,7 +104,7 @@ void add_taps(Surface s, inout Sum sum) {
     if (kernel == 2) { CACAO_PATTERN_5_12(TAP) }
 }
 
-// Those of the base pass, then as many as the picture asks for.
+// The taps of the base pass, then as many as the image needs.
 void add_adaptive_taps(Surface s, inout Sum sum) {
     float wanted = importance_at((vec2(s.texel) + 0.5) * k.slice_inv + vec2(parity_of(s.slice)) * k.slice_inv);
     sum.obscurance *= detail_share(wanted);
@@ -161,7 +161,7 @@ float detail(Surface s, vec4 z, vec4 edges) {
 
 // --- The pass.
 
-// Less is shown of what fades out with distance, and of what stands out on two sides; a hole does not say that a surface ends.
+// AO is reduced where it fades out with distance, and on surfaces that stand out on two sides. A hole is no sign that a surface ends.
 float fade_of(Surface s, vec4 edges, vec4 z) {
     float fade = clamp(s.point.z * k.fade_mul + k.fade_add, 0.0, 1.0);
     if (!detailed) return fade;
@@ -176,14 +176,14 @@ float visibility_of(float obscurance, float fade) {
 
 float obscurance_of(Sum sum) { return sum.obscurance / max(sum.weight, 1e-6); }
 
-// What the base pass stores of a texel.
+// The texel that the base pass stores.
 uint base_texel(Surface s) {
     Sum sum = Sum(0.0, 0.0);
     add_taps(s, sum);
     return quantised(obscurance_of(sum), 65535.0) | quantised(sum.weight / weight_range, weight_levels) << 16;
 }
 
-// The AO texel of t, or what the base pass stores for it.
+// The AO texel of t, or the texel of the base pass.
 uint generated(int slice, ivec2 t) {
     float zc = depth_of(slice, t);
     if (!(zc > 0.0)) return hole_texel;

@@ -14,18 +14,18 @@ void store_depth(int slice, ivec2 t, float z);
 bool inside(ivec2 p) { return all(lessThan(uvec2(p), uvec2(k.image))); }
 float smallest(vec4 v) { return min(min(v.x, v.y), min(v.z, v.w)); }
 
-// --- What is seen.
+// --- Depths and points.
 
 float depth_of(int pixel) { return depth_from(imageLoad(depth_in, pixel).x); }
 
-// Nothing is known outside the image: a hole. (AMD's repeats the rim, or reads zero.)
+// Outside the image depth is unknown, as in a hole. (AMD repeats the rim, or reads zero.)
 float depth_or_hole(ivec2 p) {
     ivec2 q = clamp(p, ivec2(0), k.image - 1);
     float z = depth_of(q.y * k.image.x + q.x);
     return inside(p) ? z : 0.0;
 }
 
-// Depths of 2x2 pixels of the grid and of those beside them:
+// Depths of 2x2 pixels of the grid and of their neighbours:
 //          a1 a2
 //       b0 b1 b2 b3
 //       c0 c1 c2 c3
@@ -47,7 +47,7 @@ Depths depths_around(ivec2 p) {
                   vec4(depth_or_hole(p - x + y), depth_or_hole(p + y), depth_or_hole(p + x + y), depth_or_hole(p + 2 * x + y)));
 }
 
-// What a pixel shows: its point, and 1/z, 0 in a hole. The point's z is the depth.
+// The point that a pixel shows, and 1/z, which is 0 in a hole. The point's z is the depth.
 vec4 shown(float x, float y, float z, float w) { return vec4(vec3(x, y, 1.0) * z, w); }
 
 struct Shown {
@@ -70,8 +70,8 @@ Shown shown_around(ivec2 p, Depths z) {
 
 // --- Holes.
 
-// A hole of one pixel between two of the same surface, as its neighbours need it: they find what occludes them, and what to blur with.
-// It gets no visibility itself. w: 1/z left, right, above and below.
+// Fills a hole of one pixel between two pixels of one surface. Its neighbours need its depth as an occluder and for the blur; the
+// hole itself gets no visibility. w: 1/z left, right, above and below.
 vec4 filled(vec4 own, vec4 w, vec2 ray) {
     vec2 sum = vec2(w.x + w.y, w.z + w.w);
     vec2 same = vec2(lessThan(abs(w.xz - w.yw), 0.025 * sum)); // no other hole is
@@ -79,12 +79,12 @@ vec4 filled(vec4 own, vec4 w, vec2 ray) {
     return own.w == 0.0 && mean > 0.0 ? shown(ray.x, ray.y, 1.0 / mean, mean) : own;
 }
 
-// Across a hole of one pixel, what lies beyond it: the direction is the same, and on any plane 1/z half way is the mean.
+// Across a hole of one pixel, uses the pixel beyond it: the direction is the same, and on any plane 1/z half way is the mean.
 vec4 bridged(vec4 next, vec4 beyond, float wc) {
     return next.w == 0.0 && beyond.w > 0.0 ? vec4(beyond.xyz, 0.5 * (wc + beyond.w)) : next;
 }
 
-// Where holes leave a pixel no whole quadrant, the other three pixels lend their normals if they lie as deep.
+// Where holes leave a pixel no complete quadrant, it takes the normals of the other three pixels at about its depth.
 vec3 completed(vec3 n, float c, vec3 z, vec3 a, vec3 b, vec3 d) {
     vec3 near = vec3(lessThan(abs(z - c), vec3(0.05 * c)));
     return is_normal(n) ? n : near.x * a + near.y * b + near.z * d;
@@ -101,7 +101,7 @@ vec3 supplied_normal(ivec2 p) {
     return dot(n, n) < 1e6 ? n : vec3(0.0); // false for NaN
 }
 
-// Normal of pixel p from what it and those left, right, above and below show.
+// Normal of pixel p from its point and those left, right, above and below.
 vec3 normal_of(ivec2 p, bool holes, vec4 c, vec4 left, vec4 right, vec4 top, vec4 bottom) {
     if (supplied != 0) return supplied_normal(p);
     vec4 w = vec4(left.w, right.w, top.w, bottom.w);
@@ -111,7 +111,7 @@ vec3 normal_of(ivec2 p, bool holes, vec4 c, vec4 left, vec4 right, vec4 top, vec
 
 // --- The pass.
 
-// `seen` is the recorded depth, c the filled one. A filled depth without a normal is left out: it would only brighten.
+// `seen` is the recorded depth, c the filled one. A filled depth without a normal is left out, because it would only brighten.
 void put(int slice, ivec2 t, float seen, float c, vec3 n) {
     if (two_slices != 0 && slice != 0 && slice != 3) return;
     c = is_normal(n) ? c : seen;

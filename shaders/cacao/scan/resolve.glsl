@@ -15,7 +15,7 @@ Known known_of(Texel texel) {
 }
 Known known(int slice, ivec2 t) { return known_of(texel_or_hole(slice, t)); }
 
-// Of left, right, above and below, and of the diagonals, row by row: each pair is shared out by the edges.
+// Weights of left, right, above and below, and of the diagonals, row by row. The edges divide the weight of each pair.
 struct Weights {
     vec4 beside, across;
 };
@@ -27,7 +27,7 @@ Weights smart_weights(uint edges) {
     return Weights(vec4(wh * wl, wh * wr, wv * wt, wv * wb), wd * vec4(wt * wl, wt * wr, wb * wl, wb * wr));
 }
 
-// Own value plus those around. Returns visibility, or -1 at a hole.
+// The weighted mean of a texel and its neighbours. Returns visibility, or -1 at a hole.
 float smart(Texel c, Known l, Known r, Known t, Known b, Known lt, Known rt, Known lb, Known rb) {
     Weights w = smart_weights(c.edges);
     float sum = c.value + dot(w.beside, vec4(l.value, r.value, t.value, b.value)) + dot(w.across, vec4(lt.value, rt.value, lb.value, rb.value));
@@ -36,14 +36,14 @@ float smart(Texel c, Known l, Known r, Known t, Known b, Known lt, Known rt, Kno
     return c.value >= 0.0 && !filled ? sum / (total * 65535.0) : -1.0;
 }
 
-// LOWEST has no value of its own at odd pixels of a row: the four neighbours', by their edges towards it.
+// LOWEST computes no value at every second pixel: it takes the four neighbours' values, weighted by their edges towards it.
 float from_neighbours(Texel l, Texel r, Texel t, Texel b) {
     Known nl = known_of(l), nr = known_of(r), nt = known_of(t), nb = known_of(b);
     vec4 w = vec4(unpack_edges(l.edges).y, unpack_edges(r.edges).x, unpack_edges(t.edges).w, unpack_edges(b.edges).z) + 1e-3;
     w *= vec4(nl.weight, nr.weight, nt.weight, nb.weight);
     float total = w.x + w.y + w.z + w.w;
     float sum = dot(w, vec4(nl.value, nr.value, nt.value, nb.value));
-    return total > 0.0 ? sum / (total * 65535.0) : 1.0; // alone among holes: nothing is known to occlude it
+    return total > 0.0 ? sum / (total * 65535.0) : 1.0; // among holes only, no occluder is known
 }
 
 // Visibility of grid pixels (2t, 2t + (1, 0), 2t + (0, 1), 2t + (1, 1)); -1 at holes.

@@ -6,10 +6,10 @@
 layout(binding = 0, rg32f) readonly uniform imageBuffer staged;
 layout(binding = 1, r32f) readonly uniform imageBuffer depth_in;
 
-// Value and depth of a grid pixel; `at` is the includer's, as it gives to upsample_pixels().
+// Value and depth of a grid pixel. `at` is an index of the includer's, as passed to upsample_pixels().
 vec2 staged_at(int at);
 
-// Four pixels share each tap. (1 - x / 4)^4 stands for exp(-x): no exponential, and nothing beyond two sigma. Depths are
+// Four pixels share each tap. (1 - x / 4)^4 stands for exp(-x): it needs no exponential, and is 0 beyond two sigma. Depths are
 // in units of 2 sigma.
 struct Four {
     vec4 z, sum, total;
@@ -18,7 +18,7 @@ struct Four {
 
 void tap(inout Four four, int at, vec2 gx) {
     vec2 s = staged_at(at);
-    vec4 dz = four.z - (s.y > 0.0 ? s.y * four.unit : 1e9); // holes lie far off
+    vec4 dz = four.z - (s.y > 0.0 ? s.y * four.unit : 1e9); // holes are far from any depth
     vec4 w = clamp(1.0 - dz * dz, 0.0, 1.0);
     w *= w;
     w *= w * gx.xyxy;
@@ -39,7 +39,7 @@ void row(inout Four four, int at, vec2 gy) {
     four.total += part.total * gy.xxyy;
 }
 
-// Visibilities of four pixels at depths z, round the grid pixel `at` of rows so long.
+// Visibilities of four pixels at depths z, around the grid pixel `at`.
 vec4 upsampled(int at, int row_length, vec4 z) {
     const float self_weight = 1e-3;
     vec2 own = staged_at(at);

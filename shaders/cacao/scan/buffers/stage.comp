@@ -10,7 +10,7 @@ layout(local_size_x = cacao_row) in;
 layout(binding = 1, r32f) readonly uniform imageBuffer depths;
 layout(binding = 16, rg32f) uniform writeonly imageBuffer staged;
 
-// Depth 0 keeps holes, and what LOWEST has not computed, out of the upsampler.
+// Depth 0 keeps holes and pixels that LOWEST has not computed out of the upsampler.
 float depth_or_hole(int slice, ivec2 t) {
     bool own = two_slices == 0 || slice == 0 || slice == 3;
     bool inside = all(greaterThanEqual(t, ivec2(0))) && all(lessThan(t, k.slice));

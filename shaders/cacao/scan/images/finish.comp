@@ -8,7 +8,7 @@
 #include "cacao/scan/resolve.glsl"
 #include "cacao/out.glsl"
 
-// A thread keeps its texel throughout, with the weights of its neighbours. Those at the rim only lend their values: each step
+// A thread keeps its texel throughout, with the weights of its neighbours. Threads at the rim only supply their values: each step
 // leaves one more texel at each side unknown, and so does the resolve.
 layout(local_size_x = cacao_wide, local_size_y = cacao_high) in;
 layout(constant_id = spec_steps) const int steps = 2;
@@ -28,7 +28,7 @@ Texel texel_or_hole(int slice, ivec2 t) {
     return Texel(values[slice * area + at + cacao_wide], edges[at] >> (8 * slice) & 0xffu);
 }
 
-// What a slice's texel takes from those left, right, above and below; the rest is its own.
+// The weights of the neighbours left, right, above and below; the rest is the texel's own.
 vec4 shares(uint e) {
     vec4 on = unpack_edges(e);
     return on * (1.0 / (0.5 + on.x + on.y + on.z + on.w));
@@ -57,15 +57,15 @@ float depth_at(ivec2 p) {
     return depth_from(imageLoad(depth_in, p.y * k.image.x + p.x).x);
 }
 
-// LOWEST has not computed every second pixel itself.
+// LOWEST does not compute every second pixel.
 bool own(ivec2 g) { return two_slices == 0 || (g.x & 1) == (g.y & 1); }
 
-// For the upsampler, which holes, and what LOWEST has not computed, are kept out of by depth 0.
+// For the upsampler: depth 0 marks holes and pixels that LOWEST has not computed, and keeps them out.
 void stage(ivec2 g, float v) {
     if (all(lessThan(g + 2, k.grid))) imageStore(staged, (g.y + 2) * k.grid.x + g.x + 2, vec4(v, own(g) ? depth_at(2 * g) : 0.0, 0.0, 0.0));
 }
 
-// -1 stands for a hole; what LOWEST has not computed has no such flag.
+// -1 stands for a hole. Pixels that LOWEST has not computed have no such flag.
 float result(ivec2 g, float v) { return or_unknown(v, v >= 0.0 && (own(g) || depth_at(g) > 0.0)); }
 
 // Grid pixels g and the next, and their visibilities.
