@@ -150,24 +150,24 @@ TEST_F(MeasureTest, an_earlier_comparison_is_replaced_only_when_asked) {
 
 // ---------------------------------------------------------------------------------------------------- the front
 
-Priced point(const std::string& name, double ns, double rms) { return {{"m", name, {}}, ns, rms}; }
+BenchmarkPoint point(const std::string& name, double ns, double rms) { return {{"m", name, {}}, ns, rms}; }
 
 TEST(FrontTest, holds_what_nothing_beats) {
     const double unknown = std::nan("");
-    const std::vector<Priced> points{point("dear and good", 9, 0.05), point("cheap", 1, 0.2),
-                                     point("beaten", 5, 0.12),        point("middle", 4, 0.1),
-                                     point("cheap again", 1, 0.2),    point("as dear, worse", 9, 0.06),
-                                     point("failed", unknown, 0.01)};
-    EXPECT_EQ(on_front(points), (std::vector<bool>{true, true, false, true, false, false, false}));
+    const std::vector<BenchmarkPoint> points{point("dear and good", 9, 0.05), point("cheap", 1, 0.2),
+                                             point("beaten", 5, 0.12),        point("middle", 4, 0.1),
+                                             point("cheap again", 1, 0.2),    point("as dear, worse", 9, 0.06),
+                                             point("failed", unknown, 0.01)};
+    EXPECT_EQ(on_pareto_front(points), (std::vector<bool>{true, true, false, true, false, false, false}));
 }
 
 TEST(FrontTest, survives_its_file_and_says_what_is_wrong_with_another) {
-    Front front{"some device", {{SensorClass::clean, "bench"}}, {}, {}, {}};
+    ParetoFront front{"some device", {{SensorClass::clean, "bench"}}, {}, {}, {}};
     front.points[SensorClass::clean] = {{{"cacao", "low", {{"quality", "low"}}}, 30, 0.12},
                                         {{"cacao", "high", {{"quality", "high"}}}, 60, 0.1}};
     front.others[SensorClass::clean] = {{{"cacao", "lowest", {{"quality", "lowest"}}}, 40, 0.2}};
     front.sequences[SensorClass::clean] = {"measured", {"surfel", "high", {{"quality", "high"}}}, 0.2, 0.1, 2};
-    const Front again = front_from(to_json(front), "front.json");
+    const ParetoFront again = front_from(to_json(front), "front.json");
     EXPECT_EQ(to_json(again), to_json(front));
     json bad = to_json(front);
     bad["clean"]["points"][1]["ns_per_pixel"] = 0;
@@ -176,14 +176,14 @@ TEST(FrontTest, survives_its_file_and_says_what_is_wrong_with_another) {
 }
 
 TEST(FrontTest, parts_of_two_devices_do_not_go_together) {
-    Front one{"a", {{SensorClass::clean, ""}}, {{SensorClass::clean, {point("x", 1, 0.1)}}}, {}, {}};
-    const Front other{"b", {{SensorClass::clean, ""}}, {{SensorClass::clean, {point("y", 1, 0.1)}}}, {}, {}};
+    ParetoFront one{"a", {{SensorClass::clean, ""}}, {{SensorClass::clean, {point("x", 1, 0.1)}}}, {}, {}};
+    const ParetoFront other{"b", {{SensorClass::clean, ""}}, {{SensorClass::clean, {point("y", 1, 0.1)}}}, {}, {}};
     EXPECT_TRUE(says(refusal([&] { one.replace_with(other); }), "two devices"));
 }
 
 TEST(FrontTest, the_shipped_one_is_a_front_of_configurations_that_are_there) {
     for (const auto& [sensor, points] : shipped_front().points) {
-        const std::vector<bool> front = on_front(points);
+        const std::vector<bool> front = on_pareto_front(points);
         for (std::size_t i = 0; i < points.size(); ++i) {
             EXPECT_TRUE(front[i]) << points[i].configuration.full_name();
             const auto setup = method_named(points[i].configuration.method).setup();
@@ -193,13 +193,13 @@ TEST(FrontTest, the_shipped_one_is_a_front_of_configurations_that_are_there) {
 }
 
 TEST(FrontTest, the_shipped_one_knows_the_error_of_every_preset) {
-    const Front& front = shipped_front();
+    const ParetoFront& front = shipped_front();
     for (const auto& [sensor, points] : front.points) {
         double last = 1;
         for (const auto& [name, preset] : preset_words) {
             const std::string wanted = configuration_of(preset).full_name();
-            const auto is_it = [&](const Priced& point) { return point.configuration.full_name() == wanted; };
-            const std::vector<Priced>& others = front.others.at(sensor);
+            const auto is_it = [&](const BenchmarkPoint& point) { return point.configuration.full_name() == wanted; };
+            const std::vector<BenchmarkPoint>& others = front.others.at(sensor);
             const auto on = std::ranges::find_if(points, is_it), off = std::ranges::find_if(others, is_it);
             ASSERT_TRUE(on != points.end() || off != others.end()) << wanted;
             const double rms = on != points.end() ? on->rms : off->rms;
@@ -228,25 +228,26 @@ TEST(ConfigurationTest, an_unknown_setting_is_told_with_the_configuration) {
 
 // ---------------------------------------------------------------------------------------------------- budgets
 
-const std::vector<Priced> priced_points{point("cheap", 10, 0.2), point("middle", 20, 0.1), point("dear", 90, 0.05)};
+const std::vector<BenchmarkPoint> benchmark_points{point("cheap", 10, 0.2), point("middle", 20, 0.1),
+                                                   point("dear", 90, 0.05)};
 
 TEST(BudgetTest, an_error_takes_the_cheapest_and_a_time_the_most_accurate) {
     const std::vector<double> ms{1, 2, 9};
-    EXPECT_EQ(pick(priced_points, ms, {.max_error = 0.15}), 1u);
-    EXPECT_EQ(pick(priced_points, ms, {.max_error = 0.3}), 0u);
-    EXPECT_EQ(pick(priced_points, ms, {.max_error = 0.05}), 2u);
-    EXPECT_EQ(pick(priced_points, ms, {.max_ms = 8.9}), 1u);
-    EXPECT_EQ(pick(priced_points, ms, {.max_ms = 100}), 2u);
-    EXPECT_EQ(pick(priced_points, ms, {.max_error = 0.15, .max_ms = 100}), 2u);
+    EXPECT_EQ(pick(benchmark_points, ms, {.max_error = 0.15}), 1u);
+    EXPECT_EQ(pick(benchmark_points, ms, {.max_error = 0.3}), 0u);
+    EXPECT_EQ(pick(benchmark_points, ms, {.max_error = 0.05}), 2u);
+    EXPECT_EQ(pick(benchmark_points, ms, {.max_ms = 8.9}), 1u);
+    EXPECT_EQ(pick(benchmark_points, ms, {.max_ms = 100}), 2u);
+    EXPECT_EQ(pick(benchmark_points, ms, {.max_error = 0.15, .max_ms = 100}), 2u);
 }
 
 TEST(BudgetTest, what_cannot_be_kept_is_told_with_what_could) {
     const std::vector<double> ms{1, 2, 9};
     EXPECT_TRUE(
-        says(refusal([&] { (void)pick(priced_points, ms, {.max_error = 0.01}); }), "the most accurate, m dear"));
-    EXPECT_TRUE(says(refusal([&] { (void)pick(priced_points, ms, {.max_ms = 0.5}); }), "the fastest, m cheap"));
+        says(refusal([&] { (void)pick(benchmark_points, ms, {.max_error = 0.01}); }), "the most accurate, m dear"));
+    EXPECT_TRUE(says(refusal([&] { (void)pick(benchmark_points, ms, {.max_ms = 0.5}); }), "the fastest, m cheap"));
     EXPECT_TRUE(
-        says(refusal([&] { (void)pick(priced_points, ms, {.max_error = 0.07, .max_ms = 5}); }), "RMSE 0.07, 5 ms"));
+        says(refusal([&] { (void)pick(benchmark_points, ms, {.max_error = 0.07, .max_ms = 5}); }), "RMSE 0.07, 5 ms"));
 }
 
 TEST_F(MeasureTest, a_budget_picks_says_and_verifies) {
@@ -255,8 +256,8 @@ TEST_F(MeasureTest, a_budget_picks_says_and_verifies) {
     ASSERT_EQ(ran.exit_code, 0) << ran.err;
     EXPECT_TRUE(says(ran.err, "picked"));
     EXPECT_TRUE(says(ran.err, "to truth"));
-    const std::vector<Priced>& points = shipped_front().points.at(SensorClass::clean);
-    const auto best = std::ranges::min_element(points, {}, &Priced::rms);
+    const std::vector<BenchmarkPoint>& points = shipped_front().points.at(SensorClass::clean);
+    const auto best = std::ranges::min_element(points, {}, &BenchmarkPoint::rms);
     const json manifest = read(folder / "out/manifest.json");
     EXPECT_EQ(manifest["method"], best->configuration.method);
     EXPECT_FALSE(manifest["budget"].empty());
@@ -311,7 +312,7 @@ TEST_F(MeasureTest, bench_leaves_one_page_with_everything_in_it) {
         ++of_cacao;
     }
     EXPECT_GE(on_the_front, 1u);
-    const Front front = front_from(read(folder / "front.json"), "front.json");
+    const ParetoFront front = front_from(read(folder / "front.json"), "front.json");
     EXPECT_EQ(front.points.at(SensorClass::clean).size(), on_the_front);
     const std::string csv = read_bytes(folder / "out/bench.csv");
     EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), 1 + 2 * of_cacao);
