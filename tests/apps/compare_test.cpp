@@ -22,7 +22,7 @@ cv::Mat1f wavy(cv::Size size) {
     return map;
 }
 
-cv::Mat1f with_tone_curve(const cv::Mat1f& map, const Look& look) {
+cv::Mat1f with_look(const cv::Mat1f& map, const Look& look) {
     cv::Mat1f shown(map.size());
     std::transform(map.begin(), map.end(), shown.begin(), [&](float v) { return static_cast<float>(look(v)); });
     return shown;
@@ -115,7 +115,7 @@ TEST(SimilarityTest, falls_with_what_is_lost) {
 TEST(ToneCurveTest, the_best_one_is_found_again) {
     const cv::Mat1f ours = wavy({64, 64});
     for (const Look& look : {Look{0.24, 3.9}, Look{0.6, 1}, Look{1, 0.5}, Look{1.4, 1.2}, Look{0.9, 3}}) {
-        const Difference d = compare(ours, with_tone_curve(ours, look));
+        const Difference d = compare(ours, with_look(ours, look));
         EXPECT_LT(d.calibrated_rms, 0.004) << look.strength << ", " << look.power;
         EXPECT_GT(d.rms, 0.05);
     }
@@ -132,8 +132,8 @@ TEST(ToneCurveTest, never_makes_it_worse) {
 TEST(ToneCurveTest, of_many_images_is_one) {
     const cv::Mat1f bright = cv::Mat1f(8, 8, 0.9F), dark = cv::Mat1f(8, 8, 0.3F);
     const Look look{0.5, 1.5};
-    PairSums pairs = pair_sums(bright, with_tone_curve(bright, look));
-    pairs.add(pair_sums(dark, with_tone_curve(dark, look)));
+    PairSums pairs = pair_sums(bright, with_look(bright, look));
+    pairs.add(pair_sums(dark, with_look(dark, look)));
     EXPECT_EQ(pairs.count(), 128u);
     EXPECT_NEAR(pairs.rms(look), 0, 1e-6);
     EXPECT_LT(pairs.rms(pairs.best_look()), 1e-4);
