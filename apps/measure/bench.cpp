@@ -1,5 +1,5 @@
-// `scanshade bench`: methods x settings on captures with a known answer, milliseconds against error, as one page. Flags
-// ask for other measurements instead, each a part (bench_part.h) with a file of its own.
+// `scanshade bench`: methods x settings on captures with a reference, milliseconds against error, as one page. Flags
+// ask for other measurements instead, each a part (bench_part.h).
 #include "ao/gpu/device.h"
 #include "apps/command.h"
 #include "apps/command_line.h"
@@ -64,12 +64,12 @@ std::string settings_text(const std::vector<Parameter>& rows) {
 
 // ---------------------------------------------------------------------------------------------------- one capture
 
-/// Trials are kept from capture to capture, by what they are made with.
+/// Trials are kept from capture to capture, by configuration and radius.
 class Trials {
   public:
     explicit Trials(gpu::Device& device) : device_(device) {}
 
-    /// The configuration's, ready for the capture. Throws where it cannot be made.
+    /// The configuration's trial, ready for the capture. Throws where it cannot be made.
     Trial& of(const Configuration& configuration, const TrialCapture& capture) {
         auto& trial = made_[{configuration.full_name(), capture.radius_m}];
         if (!trial)
@@ -83,7 +83,8 @@ class Trials {
     std::map<std::pair<std::string, double>, std::unique_ptr<Trial>> made_;
 };
 
-/// All configurations on one capture: errors once, since same input gives same bytes, then rounds of times.
+/// All configurations on one capture. Errors are computed once, since the same input gives the same bytes. Times are
+/// taken in rounds.
 class CaptureBench {
   public:
     CaptureBench(Trials& trials, const TrialCapture& capture, const std::vector<Configuration>& all)
@@ -116,14 +117,14 @@ class CaptureBench {
                 for (const TrialFrame& frame : capture_.frames)
                     maps[i].push_back(trials_[i]->compute(frame));
             });
-        // Finding the best look of a map takes longer than the map.
+        // Finding the best tone curve of a map takes longer than the map.
         tbb::parallel_for(std::size_t{0}, trials_.size(),
                           [&](std::size_t i) { attempt(i, [&] { judge(i, maps[i]); }); });
         for (int round = 0; round < rounds; ++round) {
             say(fmt::format("  {}: round {} of {}", capture_.name, round + 1, rounds));
             for (const TrialFrame& frame : capture_.frames)
-                for (std::size_t turn = 0; turn < trials_.size(); ++turn) {
-                    const std::size_t i = (turn + static_cast<std::size_t>(round)) % trials_.size();
+                for (std::size_t k = 0; k < trials_.size(); ++k) {
+                    const std::size_t i = (k + static_cast<std::size_t>(round)) % trials_.size();
                     attempt(i, [&] { time(i, frame); });
                 }
         }
@@ -144,7 +145,7 @@ class CaptureBench {
         });
     }
 
-    /// A configuration that fails is out of the race on this capture, and the report says why.
+    /// A configuration that fails is left out for this capture, and the report says why.
     template <class Step>
     void attempt(std::size_t i, Step&& step) {
         Measured& measured = result_.measured[i];
@@ -205,7 +206,9 @@ class Bench final : public Command {
                .help = "generates captures of the scenes first, in REPORT/captures",
                .value = &generated_},
               {.name = "scenes", .help = "which scenes: all, or names with commas", .value = &scenes_},
-              {.name = "sensor", .help = "which sensors see them: all, or names with commas", .value = &sensors_},
+              {.name = "sensor",
+               .help = "which simulated sensors record them: all, or names with commas",
+               .value = &sensors_},
               {.name = "size", .help = "their image size, width x height", .value = &generate_.size, .unit = "pixels"},
               {.name = "first",
                .help = "the index of their first frame on the scene's walk, in tenths of a second",
@@ -251,7 +254,7 @@ class Bench final : public Command {
                .help = "folder of the report: index.html, bench.csv, bench.json, a plot of each sensor class as .svg",
                .value = &out_},
               {.name = "front",
-               .help = "file for the measured front, as `run --max-error` takes it; parts of other sensors stay",
+               .help = "file for the measured Pareto front, as `run --max-error` takes it; parts of other sensors stay",
                .value = &front_},
               {.name = "overwrite", .help = "replaces an earlier report", .value = &overwrite_}}}};
         for (Stage& stage : all)
@@ -314,7 +317,7 @@ class Bench final : public Command {
             throw Misuse(out_ + "/index.html exists already: --overwrite replaces it, or choose another -o");
     }
 
-    /// The capture with its truth, or with what its posed frames tell together.
+    /// The capture with its truth, or with the reference fused from its posed frames.
     TrialCapture loaded(gpu::Device& device, const fs::path& path) const {
         TrialCapture capture = load_trial(path, request_);
         if (!capture.reference.empty())
@@ -327,7 +330,7 @@ class Bench final : public Command {
         return capture;
     }
 
-    /// The captures named, and those generated: made anew unless one of the same making lies there.
+    /// The captures named, and those generated.
     std::vector<fs::path> captures() {
         std::vector<fs::path> all(paths_.begin(), paths_.end());
         if (!generated_)
@@ -369,10 +372,10 @@ class Bench final : public Command {
         say(fmt::format("-> {}", (folder / "index.html").string()));
     }
 
-    /// Sensor classes that this bench did not see keep what an earlier one wrote.
-    void write_front(Front front) const {
+    /// Sensor classes that were not measured keep the points of an earlier bench.
+    void write_front(ParetoFront front) const {
         if (fs::exists(front_)) {
-            Front earlier = front_from(json::parse(read_bytes(front_), nullptr, false), front_);
+            ParetoFront earlier = front_from(json::parse(read_bytes(front_), nullptr, false), front_);
             earlier.replace_with(front);
             front = earlier;
         }
@@ -395,7 +398,7 @@ class Bench final : public Command {
     std::string scenes_ = "all", sensors_ = "ideal", methods_ = "all", device_, out_, front_;
     int rounds_ = 3;
     bool generated_ = false, overwrite_ = false;
-    /// Each is measured instead of captures, where its flag asks for it.
+    /// Each is measured instead of captures where its flag asks for it.
     std::array<std::unique_ptr<BenchPart>, 5> parts_{cacao_times(), cacao_maps(), cloud_errors(), hard_cases_kept(),
                                                      normals_kept()};
 };

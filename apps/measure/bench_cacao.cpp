@@ -1,5 +1,5 @@
-// `bench --cacao`: device milliseconds of CACAO's qualities, beside a plain gather timed in the same run; and
-// `bench --write-maps`, `--compare-maps`: whether two devices make the same maps.
+// `bench --cacao`: device milliseconds of CACAO's qualities and of a plain gather in the same run. `bench --write-maps`
+// and `--compare-maps`: whether two devices make the same maps.
 //
 // Times are the device's own (timestamps), transfers left out. Each run takes turns with a 32-tap gather over the same
 // image. The median of their ratios remains comparable on a busy machine.
@@ -29,7 +29,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A room of walls, floor and boxes seen from its middle: depth in closed form, enough relief for every tap to matter.
+/// A room of walls, floor and boxes seen from its middle. Its depth is in closed form, with enough relief for all taps.
 DepthImage room(cv::Size size) {
     const double f = 0.82 * size.width;
     DepthImage image{{f, f, (size.width - 1) / 2.0, (size.height - 1) / 2.0, size}, cv::Mat1f(size), {}};
@@ -42,7 +42,7 @@ DepthImage room(cv::Size size) {
             if (y < 0)
                 z = std::min(z, 1.4 / -y);                      // ceiling
             z = std::min(z, 2.0 / std::max(std::abs(x), 1e-6)); // side walls
-            for (int i = 0; i < 5; ++i) {                       // boxes standing on the floor, faces towards us
+            for (int i = 0; i < 5; ++i) {                       // boxes on the floor that face the camera
                 const double front = 3.0 + 0.6 * i, left = -1.6 + 0.7 * i, top = 1.4 - 0.3 * (i + 1);
                 if (x * front > left && x * front < left + 0.5 && y * front > top)
                     z = std::min(z, front);
@@ -52,7 +52,7 @@ DepthImage room(cv::Size size) {
     return image;
 }
 
-/// Device milliseconds of a program's passes, transfers left out, resubmitted without touching the host's images.
+/// Device milliseconds of a program's passes, transfers left out. The host's images stay as they are between runs.
 class Timed {
   public:
     Timed(gpu::Device& device, const CacaoTables& tables, std::span<const std::byte> constants,
@@ -99,7 +99,7 @@ struct Calibration {
     CacaoTables tables;
 };
 
-/// 32 taps over the same image: what relates the times of machines, and of one machine's better and worse minutes.
+/// 32 taps over the same image. Their time relates machines, and busy and quiet minutes of one machine.
 Calibration calibration(cv::Size size) {
     const auto pixels = static_cast<std::size_t>(size.area());
     const auto groups = [](int n) { return static_cast<std::uint32_t>((n + 7) / 8); };
@@ -108,7 +108,7 @@ Calibration calibration(cv::Size size) {
              {{"calibrate", "calibrate", {0}, {1}, {groups(size.width), groups(size.height), 1}, {}}}}};
 }
 
-/// What is timed: CACAO at these settings over one depth image.
+/// CACAO at these settings over one depth image.
 std::unique_ptr<Timed> timed_cacao(gpu::Device& device, CacaoOptions options, const DepthImage& depth,
                                    gpu::Program::Stamps stamps) {
     options.radius = 1.2F;
@@ -156,13 +156,13 @@ class CacaoTimes final : public BenchPart {
   public:
     Stage stage() override {
         return {"device milliseconds of CACAO",
-                {{"cacao", "time every quality on a generated room, beside a plain gather of 32 taps", &asked_},
+                {{"cacao", "times every quality on a generated room, and a plain gather of 32 taps", &asked_},
                  {"cacao.sizes", "image sizes, with commas", &sizes_, "pixels"},
                  {"cacao.repeat", "how often each is timed", &repeat_, "", 1, 100000},
-                 {"cacao.passes", "each pass by itself, too, and the GB/s that it moves; a stamp costs microseconds",
+                 {"cacao.passes", "times each pass by itself, too, with its GB/s; each time stamp adds microseconds",
                   &passes_},
                  {"cacao.profile", "which profile", OneOf(&options_.profile, cacao_profile_words)},
-                 {"cacao.model", "instead, fit milliseconds as a formula of pixels, taps and blur passes", &model_}}};
+                 {"cacao.model", "instead, fits milliseconds to a formula of pixels, taps and blur passes", &model_}}};
     }
     [[nodiscard]] bool asked() const override { return asked_; }
 
@@ -195,7 +195,7 @@ class CacaoTimes final : public BenchPart {
                 const auto method = timed_cacao(device, options_, depth,
                                                 passes_ ? gpu::Program::Stamps::passes : gpu::Program::Stamps::total);
                 std::vector<double> ms, taps, ratios;
-                for (int i = -warm_up; i < repeat_; ++i) { // in turns, so that both see the same minutes
+                for (int i = -warm_up; i < repeat_; ++i) { // in turns, so that a busy minute slows both
                     const double a = method->run(), b = gather.run();
                     if (i < 0)
                         continue;
@@ -242,9 +242,9 @@ void write_maps(gpu::Device& device, const fs::path& folder) {
     });
 }
 
-/// Prints how far each map is from the folder's; returns whether all are close enough.
+/// Prints each map's differences from the folder's. Returns whether all are small enough.
 bool compare_maps(gpu::Device& device, const fs::path& folder) {
-    bool all_met = true;
+    bool all_close = true;
     fmt::print("{:<32} {:>10} {:>8} {:>8}   differences in 1/255 to {}\n", "map", "mean", "p99", "worst",
                folder.string());
     each_map(device, [&](const std::string& name, const cv::Mat1f& map) {
@@ -264,21 +264,22 @@ bool compare_maps(gpu::Device& device, const fs::path& folder) {
         std::sort(differences.begin(), differences.end());
         const double mean = sum / static_cast<double>(differences.size()),
                      p99 = differences[differences.size() * 99 / 100];
-        const bool met = mean <= 0.5 && p99 <= 2;
+        const bool close = mean <= 0.5 && p99 <= 2;
         fmt::print("{:<32} {:>10.4f} {:>8.3f} {:>8.2f}{}\n", name, mean, p99, differences.back(),
-                   met ? "" : "  MISSED");
-        all_met &= met;
+                   close ? "" : "  MISSED");
+        all_close &= close;
     });
-    return all_met;
+    return all_close;
 }
 
 class CacaoMaps final : public BenchPart {
   public:
     Stage stage() override {
-        return {"CACAO's maps on two devices",
-                {{"write-maps", "folder for the maps of every quality on this device", &written_},
-                 {"compare-maps", "folder of another device's maps: how far this one's differ; exit 2 where too far",
-                  &compared_}}};
+        return {
+            "CACAO's maps on two devices",
+            {{"write-maps", "folder for the maps of every quality on this device", &written_},
+             {"compare-maps",
+              "folder of another device's maps: prints the differences; exit 2 where they are too large", &compared_}}};
     }
     [[nodiscard]] bool asked() const override { return !written_.empty() || !compared_.empty(); }
 

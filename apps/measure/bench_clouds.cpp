@@ -1,7 +1,7 @@
 // `bench --clouds`: visibility of a scene's points, from the points alone, against rays on the scene itself: error,
 // time, memory. With --clouds.sky it is the share of the sky, also by depth images from 256 directions.
 //
-// All rows are of one run, each compared at the same points (about 50000). Seconds are the wall's and the processor's.
+// All rows compare the same points (about 50000). Seconds are of wall clock and processor.
 #include "ao/cloud/cloud_ao.h"
 #include "ao/compare.h"
 #include "ao/gpu/device.h"
@@ -24,7 +24,7 @@ namespace {
 
 using Eigen::Vector3d, Eigen::Vector3f;
 
-/// The largest the process has been, in MiB.
+/// Peak memory of the process, in MiB.
 double peak_memory_mib() {
     std::ifstream status("/proc/self/status");
     for (std::string word; status >> word;)
@@ -34,7 +34,7 @@ double peak_memory_mib() {
 }
 
 struct Judge {
-    std::vector<float> truth; ///< NaN where a point is not judged
+    std::vector<float> truth; ///< NaN where a point is not compared
 
     template <class Compute>
     void row(const std::string& name, Compute&& compute) const {
@@ -57,7 +57,7 @@ struct Judge {
 /// Share of the sky by rays on the scene, cosine-weighted, of every `step`-th point.
 std::vector<float> true_sky(const scene::World& world, const scene::SceneCloud& cloud, std::size_t step) {
     constexpr int rays = 512;
-    constexpr double far_away = 300; // beyond all that stands on the ground, within the ground itself
+    constexpr double far_away = 300; // farther than all objects, nearer than the ground's border
     const CosineDirections directions(rays, 1);
     std::vector<float> truth(cloud.points.size(), std::numeric_limits<float>::quiet_NaN());
     tbb::parallel_for(std::size_t(0), (truth.size() + step - 1) / step, [&](std::size_t k) {
@@ -75,9 +75,9 @@ std::vector<float> true_sky(const scene::World& world, const scene::SceneCloud& 
     return truth;
 }
 
-/// The sky by orthographic depth images from `views` sides of the upper half sphere (after ShadeVis and CloudCompare's
-/// PCV, with normals: cosine-weighted, so that flat and open reads 1): splats of 1.5 spacings, tolerance 0.2 % of the
-/// extent.
+/// The sky by orthographic depth images from `views` directions of the upper half sphere, after ShadeVis and
+/// CloudCompare's PCV. Weighted by the cosine to the normal, so that open ground reads 1. Splats of 1.5 spacings,
+/// tolerance 0.2 % of the extent.
 std::vector<float> sky_by_views(const scene::SceneCloud& cloud, double spacing, int views, int raster) {
     Eigen::AlignedBox3d box;
     for (const Vector3d& p : cloud.points)
@@ -85,16 +85,16 @@ std::vector<float> sky_by_views(const scene::SceneCloud& cloud, double spacing, 
     const double extent = box.diagonal().norm(), pixel = extent / raster, bias = std::max(0.002 * extent, 2 * pixel);
     const int reach = static_cast<int>(std::lround(0.75 * spacing / pixel));
     tbb::combinable<std::vector<float>> lit([&] { return std::vector<float>(cloud.points.size(), 0.0F); });
-    tbb::combinable<std::vector<float>> front(
+    tbb::combinable<std::vector<float>> depths(
         [&] { return std::vector<float>(static_cast<std::size_t>(raster * raster)); });
     tbb::parallel_for(0, views, [&](int view) {
-        const double z = (view + 0.5) / views, turn = view * std::numbers::pi * (3 - std::sqrt(5.0)),
+        const double z = (view + 0.5) / views, angle = view * std::numbers::pi * (3 - std::sqrt(5.0)),
                      across = std::sqrt(1 - z * z);
-        const Vector3d towards(across * std::cos(turn), across * std::sin(turn), z), x = towards.unitOrthogonal(),
-                                                                                     y = towards.cross(x);
-        std::vector<float>&sum = lit.local(), &depth = front.local();
+        const Vector3d towards(across * std::cos(angle), across * std::sin(angle), z), x = towards.unitOrthogonal(),
+                                                                                       y = towards.cross(x);
+        std::vector<float>&sum = lit.local(), &depth = depths.local();
         std::fill(depth.begin(), depth.end(), -1e30F);
-        const auto place = [&](const Vector3d& p, int& u, int& v) {
+        const auto project = [&](const Vector3d& p, int& u, int& v) {
             const Vector3d offset = p - box.center();
             u = std::clamp(static_cast<int>(offset.dot(x) / pixel + raster / 2.0), 0, raster - 1);
             v = std::clamp(static_cast<int>(offset.dot(y) / pixel + raster / 2.0), 0, raster - 1);
@@ -102,7 +102,7 @@ std::vector<float> sky_by_views(const scene::SceneCloud& cloud, double spacing, 
         };
         for (const Vector3d& p : cloud.points) {
             int u = 0, v = 0;
-            const float near = place(p, u, v);
+            const float near = project(p, u, v);
             for (int dv = std::max(v - reach, 0); dv <= std::min(v + reach, raster - 1); ++dv)
                 for (int du = std::max(u - reach, 0); du <= std::min(u + reach, raster - 1); ++du)
                     depth[static_cast<std::size_t>(dv * raster + du)] =
@@ -111,7 +111,7 @@ std::vector<float> sky_by_views(const scene::SceneCloud& cloud, double spacing, 
         for (std::size_t i = 0; i < sum.size(); ++i) {
             const double cosine = cloud.normals[i].dot(towards);
             int u = 0, v = 0;
-            if (const float near = place(cloud.points[i], u, v);
+            if (const float near = project(cloud.points[i], u, v);
                 cosine > 0 && near >= depth[static_cast<std::size_t>(v * raster + u)] - static_cast<float>(bias))
                 sum[i] += static_cast<float>(2 * cosine / views); // over the half sphere the mean cosine is 1/2
         }
@@ -124,8 +124,8 @@ std::vector<float> sky_by_views(const scene::SceneCloud& cloud, double spacing, 
     return sky;
 }
 
-/// Of those that have one.
-double share_turned_away(const std::vector<Vector3f>& found, const std::vector<Vector3d>& exact) {
+/// Share of the normals that face the wrong side; missing normals do not count.
+double share_reversed(const std::vector<Vector3f>& found, const std::vector<Vector3d>& exact) {
     double away = 0, all = 0;
     for (std::size_t i = 0; i < found.size(); ++i) {
         away += found[i].cast<double>().dot(exact[i]) < 0;
@@ -138,15 +138,16 @@ class CloudErrors final : public BenchPart {
   public:
     Stage stage() override {
         return {"clouds against rays on their scene",
-                {{"clouds", "errors, seconds and memory of a scene's points", &asked_},
+                {{"clouds", "measures errors, seconds and memory of a scene's points", &asked_},
                  {"clouds.scene", "which scene; empty = office, or outdoor for the sky", &scene_},
                  {"clouds.points", "how many points", &points_, "", 1, 1e9},
-                 {"clouds.rays", "per point, with commas", &rays_},
-                 {"clouds.smooth", "means over neighbours; -1 = by the spacing", &smooth_, "", -1, 16},
-                 {"clouds.normals", "whether the points come with theirs", &normals_},
-                 {"clouds.gpu", "on the Vulkan device instead of the processor", &gpu_},
-                 {"clouds.raycast", "the method raycast with 64 rays, too", &raycast_},
-                 {"clouds.sky", "the share of the sky instead, also by depth images", &sky_},
+                 {"clouds.rays", "rays per point, with commas", &rays_},
+                 {"clouds.smooth", "how often values become means of neighbours; -1 = by the spacing", &smooth_, "", -1,
+                  16},
+                 {"clouds.normals", "whether the points come with their normals", &normals_},
+                 {"clouds.gpu", "computes on the Vulkan device instead of the processor", &gpu_},
+                 {"clouds.raycast", "measures the method raycast with 64 rays, too", &raycast_},
+                 {"clouds.sky", "measures the share of the sky instead, also by depth images", &sky_},
                  {"clouds.raster", "sizes of these images, pixels a side, with commas", &rasters_}}};
     }
     [[nodiscard]] bool asked() const override { return asked_; }
@@ -162,9 +163,9 @@ class CloudErrors final : public BenchPart {
         const Judge judge{sky_ ? true_sky(world, cloud, step)
                                : scene::true_visibility(world, cloud, {radius, 1024, 1, false}, step)};
         const PointSet set{cloud.points, normals_ ? cloud.normals : std::span<const Vector3d>()};
-        fmt::print("{}: {} points, radius {} m; judged at every {}. point\n", world.scene().name, points,
+        fmt::print("{}: {} points, radius {} m; every {}. point is compared\n", world.scene().name, points,
                    sky_ ? 0 : radius, step);
-        double spacing = 0, turned_away = 0;
+        double spacing = 0, reversed = 0;
         std::unique_ptr<gpu::Device> device;
         if (gpu_)
             device = std::make_unique<gpu::Device>(choice);
@@ -177,17 +178,18 @@ class CloudErrors final : public BenchPart {
                     fmt::print("{} {:.0f} ms; ", stage, ms);
                 fmt::print("\n");
                 spacing = found.spacing;
-                turned_away = share_turned_away(found.normals, cloud.normals);
+                reversed = share_reversed(found.normals, cloud.normals);
                 return found.visibility;
             });
         if (!normals_)
-            fmt::print("{:.2f} % of the points face the wrong side\n", 100 * turned_away);
+            fmt::print("{:.2f} % of the normals face the wrong side\n", 100 * reversed);
         if (sky_)
             for (const int raster : rasters)
                 judge.row(fmt::format("256 views of {0}x{0}", raster),
                           [&] { return sky_by_views(cloud, spacing, 256, raster); });
         if (raycast_)
-            judge.row("raycast, 64 rays", [&] { return Raycast({.radius_m = radius, .rays = 64}).compute(set).visibility; });
+            judge.row("raycast, 64 rays",
+                      [&] { return Raycast({.radius_m = radius, .rays = 64}).compute(set).visibility; });
         return all_well;
     }
 

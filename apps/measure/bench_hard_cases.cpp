@@ -1,5 +1,4 @@
-// `bench --hard-cases` and `bench --normals`: what recorded depth has that rendered depth has not, and what methods
-// make of it.
+// `bench --hard-cases` and `bench --normals`: methods on the holes, noise and edges of recorded depth.
 #include "apps/lists.h"
 #include "apps/measure/bench_part.h"
 #include "apps/measure/hard_cases/judge.h"
@@ -15,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace hard_cases;
 
-/// Says which gates were missed, and gives the exit code.
+/// Prints which gates were missed, and returns the exit code.
 int conclude(const gpu::Device& device, std::string misses) {
     for (const std::string& message : device.validation_messages())
         misses += message + "\n";
@@ -38,11 +37,11 @@ class HardCasesPart final : public BenchPart {
     Stage stage() override {
         return {
             "hard cases of recorded depth",
-            {{"hard-cases", "methods on holes, noise, steps, odd sizes and units; exit 2 where a gate is missed",
+            {{"hard-cases", "tests methods on holes, noise, steps, odd sizes and units; exit 2 where a gate is missed",
               &asked_},
              {"hard-cases.methods", "which methods, with commas", &methods_},
-             {"hard-cases.only", "families of cases whose name holds this", &only_},
-             {"hard-cases.each", "a line for each case, too", &each_},
+             {"hard-cases.only", "only families of cases whose name contains this", &only_},
+             {"hard-cases.each", "prints a line for each case, too", &each_},
              {"hard-cases.draw", "folder for a picture of each case: depth, expected, found, difference", &folder_}}};
     }
     [[nodiscard]] bool asked() const override { return asked_; }
@@ -98,7 +97,8 @@ class NormalsPart final : public BenchPart {
     Stage stage() override {
         return {
             "normals of recorded depth",
-            {{"normals", "degrees between normals and truth for each sensor; exit 2 where an aim is missed", &asked_}}};
+            {{"normals", "measures degrees between normals and truth for each sensor; exit 2 where an aim is missed",
+              &asked_}}};
     }
     [[nodiscard]] bool asked() const override { return asked_; }
 

@@ -16,10 +16,9 @@ std::string heading_of(const BenchGroup& group) {
                        group.captures.size() == 1 ? "capture" : "captures");
 }
 
-// ---------------------------------------------------------------------------------------------------- speed against
-// error
+// ---------------------------------------------------------------------------------------------------- plots of speed
 
-/// One series per method, its configurations from cheap to dear; the front is ringed.
+/// One series per method, its configurations from fast to slow. The Pareto front is ringed.
 page::Plot speed_plot(const BenchGroup& group, bool wall) {
     page::Plot plot{fmt::format("Speed against error, {} depth", name_of(group.sensor)),
                     wall ? "milliseconds per frame, transfers included (median)"
@@ -37,14 +36,14 @@ page::Plot speed_plot(const BenchGroup& group, bool wall) {
         const double ms = median(wall ? m.wall_ms : m.device_ms), rms = m.difference().rms;
         series->points.push_back({ms, rms,
                                   fmt::format("{}: {:.3f} ms, RMSE {:.4f}", m.configuration.full_name(), ms, rms),
-                                  !wall && group.front[i]});
+                                  !wall && group.on_front[i]});
     }
     return plot;
 }
 
 // ---------------------------------------------------------------------------------------------------- where errors are
 
-/// What plots of errors show: each method's most accurate configuration, most accurate first.
+/// Each method's most accurate configuration, most accurate first. Plots of errors show these.
 std::vector<std::size_t> best_of_each_method(const BenchGroup& group) {
     std::vector<std::size_t> best;
     const auto rms = [&](std::size_t i) { return group.measured[i].difference().rms; };
@@ -69,9 +68,9 @@ page::Plot plot_by_capture(const BenchGroup& group, const std::vector<std::size_
         plot.categories.push_back(capture->name);
     for (const std::size_t i : shown) {
         page::Series series{group.measured[i].configuration.full_name(), {}};
-        for (std::size_t place = 0; place < group.captures.size(); ++place) {
-            const double rms = group.captures[place]->measured[i].difference().rms;
-            series.points.push_back({static_cast<double>(place), rms, fmt::format("{}: {:.4f}", series.name, rms)});
+        for (std::size_t k = 0; k < group.captures.size(); ++k) {
+            const double rms = group.captures[k]->measured[i].difference().rms;
+            series.points.push_back({static_cast<double>(k), rms, fmt::format("{}: {:.4f}", series.name, rms)});
         }
         plot.series.push_back(series);
     }
@@ -83,27 +82,26 @@ page::Plot plot_by_class(const BenchGroup& group, const std::vector<std::size_t>
     if (shown.empty())
         return plot;
     const ErrorByClass& first = group.measured[shown.front()].errors[by];
-    std::vector<std::size_t> inhabited;
+    std::vector<std::size_t> filled;
     for (std::size_t i = 0; i < first.names().size(); ++i)
         if (first.pixels(i) > 0) {
             plot.categories.push_back(first.names()[i]);
-            inhabited.push_back(i);
+            filled.push_back(i);
         }
     for (const std::size_t i : shown) {
         const Measured& m = group.measured[i];
         page::Series series{m.configuration.full_name(), {}};
-        for (std::size_t place = 0; place < inhabited.size(); ++place) {
-            const double rms = m.errors[by].rms(inhabited[place]), pixels = m.errors[by].pixels(inhabited[place]);
-            series.points.push_back({static_cast<double>(place), rms,
-                                     fmt::format("{}: {:.4f} over {:.0f} pixels", series.name, rms, pixels)});
+        for (std::size_t k = 0; k < filled.size(); ++k) {
+            const double rms = m.errors[by].rms(filled[k]), pixels = m.errors[by].pixels(filled[k]);
+            series.points.push_back(
+                {static_cast<double>(k), rms, fmt::format("{}: {:.4f} over {:.0f} pixels", series.name, rms, pixels)});
         }
         plot.series.push_back(series);
     }
     return plot;
 }
 
-// ---------------------------------------------------------------------------------------------------- tables and
-// pictures
+// ---------------------------------------------------------------------------------------------------- tables, pictures
 
 std::string figures_table(const BenchGroup& group) {
     std::vector<std::vector<std::string>> rows;
@@ -119,7 +117,7 @@ std::string figures_table(const BenchGroup& group) {
     }
     return page::table({"configuration", "device ms", "least", "wall ms", "RMSE", "calibrated", "MAE", "bias", "95 %",
                         "worst", "SSIM", "corr."},
-                       rows, group.front);
+                       rows, group.on_front);
 }
 
 std::string pictures(const BenchGroup& group, const std::vector<std::size_t>& shown) {
@@ -171,10 +169,9 @@ std::string bench_page(const BenchReport& report) {
         {"What was measured", page::paragraph(fmt::format("{} ({}), {}, version {}: {}", report.device, report.driver,
                                                           report.date, report.version, report.command)) +
                                   page::paragraph(fmt::format("Configurations were timed in {} rounds over all frames, "
-                                                              "in turns, so that each met the same minutes of the "
-                                                              "machine. Device milliseconds are the device's own time "
-                                                              "stamps of all passes, plane fits included, transfers "
-                                                              "left out.",
+                                                              "in turns, so that a busy minute slows all alike. "
+                                                              "Device milliseconds are the device's own time stamps "
+                                                              "of all passes, plane fits included, transfers left out.",
                                                               report.rounds)) +
                                   captures_table(report)});
     for (const BenchGroup& group : report.groups) {
@@ -182,10 +179,11 @@ std::string bench_page(const BenchReport& report) {
         std::string where = page::svg(plot_by_capture(group, shown));
         for (std::size_t by = 0; by < error_by_count; ++by)
             where += page::svg(plot_by_class(group, shown, static_cast<ErrorBy>(by)));
-        sections.push_back({heading_of(group), page::paragraph("Ringed, and marked in the table: the front. No other "
-                                                               "configuration is both as fast and as accurate.") +
-                                                   page::svg(speed_plot(group, false)) +
-                                                   page::svg(speed_plot(group, true)) + figures_table(group)});
+        sections.push_back(
+            {heading_of(group), page::paragraph("The Pareto front is ringed, and marked in the table. No "
+                                                "other configuration is both as fast and as accurate.") +
+                                    page::svg(speed_plot(group, false)) + page::svg(speed_plot(group, true)) +
+                                    figures_table(group)});
         sections.push_back({"Where the errors are: " + heading_of(group),
                             page::paragraph("Each method's most accurate configuration.") + where});
         sections.push_back({"Pictures: " + heading_of(group), pictures(group, shown)});

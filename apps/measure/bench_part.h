@@ -1,4 +1,4 @@
-// What `bench` measures beside methods against truth: each part has a flag that asks for it, and settings of its own.
+// The other measurements of `bench`: each part has a flag that asks for it, and settings of its own.
 #pragma once
 
 #include "apps/command.h"
@@ -11,10 +11,10 @@ namespace scanshade {
 class BenchPart {
   public:
     virtual ~BenchPart() = default;
-    /// The flag that asks for the part stands first.
+    /// The first row is the flag that asks for the part.
     virtual Stage stage() = 0;
     [[nodiscard]] virtual bool asked() const = 0;
-    /// Prints to stdout what it measures on the Vulkan device of that name. Returns an ExitCode.
+    /// Measures on the Vulkan device of that name, and prints the results to stdout. Returns an ExitCode.
     virtual int run(const std::string& device) = 0;
 };
 

@@ -94,8 +94,8 @@ double least(const std::vector<double>& values) {
     return values.empty() ? std::numeric_limits<double>::quiet_NaN() : *std::ranges::min_element(values);
 }
 
-Priced priced(const Measured& measured) {
-    // A configuration that failed somewhere has no price: its error would be that of the easier captures.
+BenchmarkPoint benchmark_point(const Measured& measured) {
+    // A configuration that failed on a capture has no point: its error would be that of the easier captures.
     const double unknown = std::numeric_limits<double>::quiet_NaN();
     const bool whole = measured.why.empty();
     return {measured.configuration, whole ? median(measured.ns_per_pixel) : unknown,
@@ -119,9 +119,9 @@ std::vector<BenchGroup> grouped(const BenchReport& report) {
     }
     for (BenchGroup& group : groups) {
         tbb::parallel_for_each(group.measured, [](Measured& m) { m.sum_up(); });
-        std::vector<Priced> points;
-        std::ranges::transform(group.measured, std::back_inserter(points), priced);
-        group.front = on_front(points);
+        std::vector<BenchmarkPoint> points;
+        std::ranges::transform(group.measured, std::back_inserter(points), benchmark_point);
+        group.on_front = on_pareto_front(points);
     }
     return groups;
 }
@@ -138,7 +138,7 @@ std::string bench_table(const BenchReport& report) {
             text += fmt::format("{:<34}{:>12}{:>12}{:>12}{:>9.4f}{:>9.4f}{:>9.4f}{:>9.4f}  {}{}\n",
                                 m.configuration.full_name(), ms_text(median(m.device_ms)), ms_text(least(m.device_ms)),
                                 ms_text(median(m.wall_ms)), d.rms, d.calibrated_rms, d.bias, d.ssim,
-                                group.front[i] ? "*" : "", m.why.empty() ? "" : "failed: " + m.why);
+                                group.on_front[i] ? "*" : "", m.why.empty() ? "" : "failed: " + m.why);
         }
         text += "\n";
     }
@@ -153,7 +153,7 @@ std::string bench_csv(const BenchReport& report) {
     for (const BenchGroup& group : report.groups) {
         const std::string sensor(name_of(group.sensor));
         for (std::size_t i = 0; i < group.measured.size(); ++i)
-            text += csv_row(sensor, "all", group.measured[i], group.front[i]);
+            text += csv_row(sensor, "all", group.measured[i], group.on_front[i]);
         for (const BenchCapture* capture : group.captures)
             for (const Measured& m : capture->measured)
                 text += csv_row(sensor, capture->name, m, false);
@@ -169,7 +169,7 @@ json bench_json(const BenchReport& report) {
         json rows = json::array();
         for (std::size_t i = 0; i < group.measured.size(); ++i) {
             json row = measured_json(group.measured[i]);
-            row["front"] = static_cast<bool>(group.front[i]);
+            row["front"] = static_cast<bool>(group.on_front[i]);
             rows.push_back(row);
         }
         text["groups"].push_back({{"sensor", name_of(group.sensor)}, {"configurations", rows}});
@@ -191,17 +191,17 @@ json bench_json(const BenchReport& report) {
     return text;
 }
 
-Front front_of(const BenchReport& report) {
-    Front front{report.device, {}, {}, {}, {}};
+ParetoFront front_of(const BenchReport& report) {
+    ParetoFront front{report.device, {}, {}, {}, {}};
     for (const BenchGroup& group : report.groups) {
         front.made_by[group.sensor] = made_by(report, group);
-        std::vector<Priced>& points = front.points[group.sensor];
+        std::vector<BenchmarkPoint>& points = front.points[group.sensor];
         for (std::size_t i = 0; i < group.measured.size(); ++i)
-            if (const Priced point = priced(group.measured[i]); group.front[i])
+            if (const BenchmarkPoint point = benchmark_point(group.measured[i]); group.on_front[i])
                 points.push_back(point);
             else if (std::isfinite(point.rms) && std::isfinite(point.ns_per_pixel))
                 front.others[group.sensor].push_back(point);
-        std::ranges::stable_sort(points, {}, &Priced::ns_per_pixel);
+        std::ranges::stable_sort(points, {}, &BenchmarkPoint::ns_per_pixel);
     }
     return front;
 }

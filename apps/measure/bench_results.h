@@ -10,7 +10,7 @@
 
 namespace scanshade {
 
-/// The classifications by which errors are told apart, in the order of Measured::errors.
+/// The ways to classify errors, in the order of Measured::errors.
 enum ErrorBy : std::size_t { edge_distance, grazing_angle, range, error_by_count };
 [[nodiscard]] std::string_view name_of(ErrorBy by);
 
@@ -25,14 +25,14 @@ struct Measured {
     std::vector<double> ns_per_pixel;       ///< the same of the device, per pixel of the image
     std::string why;                        ///< what failed; empty = nothing
 
-    Difference sum; ///< of the images, once sum_up() was called: the best look takes a solver
+    Difference sum; ///< of the images, after sum_up(): the best tone curve takes a solver
 
     void add(const Measured& other);
     void sum_up() { sum = total(images, pairs); }
     [[nodiscard]] const Difference& difference() const { return sum; }
 };
 
-/// One capture and what became of every configuration on it.
+/// One capture and the results of every configuration on it.
 struct BenchCapture {
     std::string name, path, reference, noise;
     SensorClass sensor = SensorClass::clean;
@@ -40,16 +40,16 @@ struct BenchCapture {
     std::vector<std::string> frames;
     cv::Size size;
     std::vector<Measured> measured;      ///< in the order of the configurations
-    cv::Mat1f truth;                     ///< of the first frame, with
-    std::vector<cv::Mat1f> visibilities; ///< each configuration's map of it, empty where it failed
+    cv::Mat1f truth;                     ///< of the first frame
+    std::vector<cv::Mat1f> visibilities; ///< of the first frame by each configuration; empty where it failed
 };
 
-/// Captures of one sensor class together: what a user of such a sensor meets.
+/// All captures of one sensor class.
 struct BenchGroup {
     SensorClass sensor = SensorClass::clean;
     std::vector<const BenchCapture*> captures;
     std::vector<Measured> measured;
-    std::vector<bool> front; ///< by median device time and total RMSE
+    std::vector<bool> on_front; ///< the Pareto front of median device time and total RMSE
 };
 
 struct BenchReport {
@@ -64,8 +64,8 @@ struct BenchReport {
 /// NaN without values.
 [[nodiscard]] double least(const std::vector<double>& values);
 
-/// Median device time and total error, as fronts price it.
-[[nodiscard]] Priced priced(const Measured& measured);
+/// Median device time per pixel and total error; NaN where the configuration failed on a capture.
+[[nodiscard]] BenchmarkPoint benchmark_point(const Measured& measured);
 
 /// One aligned table per group, for people.
 [[nodiscard]] std::string bench_table(const BenchReport& report);
@@ -76,7 +76,7 @@ struct BenchReport {
 [[nodiscard]] std::string bench_page(const BenchReport& report);
 /// Speed against error of one sensor class, as a picture (SVG).
 [[nodiscard]] std::string bench_plot(const BenchGroup& group);
-/// The fronts of all groups.
-[[nodiscard]] Front front_of(const BenchReport& report);
+/// The Pareto fronts of all groups.
+[[nodiscard]] ParetoFront front_of(const BenchReport& report);
 
 } // namespace scanshade

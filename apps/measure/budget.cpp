@@ -13,14 +13,15 @@ namespace {
 
 constexpr int rounds = 3;
 
-/// The points of the capture's sensor class; where the front has none, those of the first class it has, and a sentence.
-const std::vector<Priced>& points_for(const Front& front, SensorClass sensor, std::vector<std::string>& sentences) {
+/// The points of the capture's sensor class. Where there are none: those of the first class, and a sentence.
+const std::vector<BenchmarkPoint>& points_for(const ParetoFront& front, SensorClass sensor,
+                                              std::vector<std::string>& sentences) {
     const auto own = front.points.find(sensor);
     if (own != front.points.end() && !own->second.empty())
         return own->second;
     const auto& [other, points] = *front.points.begin();
     sentences.push_back(
-        fmt::format("the front has no {} depth: errors are those of {} depth", name_of(sensor), name_of(other)));
+        fmt::format("the Pareto front has no {} depth: errors are those of {} depth", name_of(sensor), name_of(other)));
     return points;
 }
 
@@ -71,9 +72,9 @@ std::vector<cv::Mat1f> truths(const TrialCapture& capture) {
     return maps;
 }
 
-/// How many times slower than the front's this device is with these images: the cheapest and the middle point are
-/// timed.
-double slowness(const Trials& trials, const std::vector<Priced>& points, double pixels) {
+/// How many times slower this device is with these images than the Pareto front's device. Times the cheapest and the
+/// middle point.
+double slowness(const Trials& trials, const std::vector<BenchmarkPoint>& points, double pixels) {
     std::vector<double> ratios;
     for (const std::size_t i : {std::size_t{0}, points.size() / 2})
         ratios.push_back(std::log(trials.of(points[i].configuration).ms / points[i].ms(pixels)));
@@ -95,7 +96,7 @@ bool within(const Budget& budget, double ms, double rms) {
 
 } // namespace
 
-std::size_t pick(const std::vector<Priced>& points, const std::vector<double>& ms, const Budget& budget) {
+std::size_t pick(const std::vector<BenchmarkPoint>& points, const std::vector<double>& ms, const Budget& budget) {
     std::size_t best = points.size(), fastest = 0, most_accurate = 0;
     for (std::size_t i = 0; i < points.size(); ++i) {
         fastest = ms[i] < ms[fastest] ? i : fastest;
@@ -115,24 +116,24 @@ std::size_t pick(const std::vector<Priced>& points, const std::vector<double>& m
                     points[most_accurate].configuration.full_name(), points[most_accurate].rms, ms[most_accurate]));
 }
 
-Choice choose(gpu::Device& device, const Front& front, const TrialCapture& capture, double radius_m,
+Choice choose(gpu::Device& device, const ParetoFront& front, const TrialCapture& capture, double radius_m,
               const Budget& budget) {
     Choice choice;
-    std::vector<Priced> points = points_for(front, capture.sensor, choice.sentences);
+    std::vector<BenchmarkPoint> points = points_for(front, capture.sensor, choice.sentences);
     const Trials trials(device, capture, radius_m);
     const double pixels = static_cast<double>(capture.frames.front().depth.z_m.total());
     const double slower = slowness(trials, points, pixels);
     choice.sentences.push_back(
-        fmt::format("budget {}: front of {} depth measured on {}; this device takes {:.2f} times as long "
+        fmt::format("budget {}: Pareto front of {} depth measured on {}; this device takes {:.2f} times as long "
                     "per pixel",
                     limit_text(budget), name_of(capture.sensor), front.device, slower));
     const bool truth_fits = !capture.reference.empty() && std::abs(capture.radius_m - radius_m) < 1e-6 * radius_m;
-    const auto reference = std::ranges::min_element(points, {}, &Priced::rms)->configuration;
+    const auto reference = std::ranges::min_element(points, {}, &BenchmarkPoint::rms)->configuration;
     const std::vector<cv::Mat1f> right = truth_fits ? truths(capture) : trials.of(reference).maps;
 
     while (true) {
         std::vector<double> ms;
-        for (const Priced& point : points)
+        for (const BenchmarkPoint& point : points)
             ms.push_back(point.ms(pixels) * slower);
         const std::size_t picked = pick(points, ms, budget);
         const Tried tried = trials.of(points[picked].configuration);

@@ -34,28 +34,28 @@ Free free_setting(const std::vector<Parameter>& rows, const std::string& method,
     if (!row)
         throw Misuse(fmt::format("free: the method {} has no setting '{}'", method, name));
     if (!std::holds_alternative<float*>(row->value) && !std::holds_alternative<double*>(row->value))
-        throw Misuse(fmt::format("free: {} is no real number; only those can be fitted", name));
+        throw Misuse(fmt::format("free: {} is not a real number; only real numbers can be fitted", name));
     const double start = number_of(*row);
     const double span = std::isfinite(row->high - row->low) ? row->high - row->low : 1;
     return {name, start, start != 0 ? 0.25 * std::abs(start) : 0.05 * std::min(span, 1.0), row->low, row->high};
 }
 
-/// Settings by which a method applies a Look: the best ones follow from maps made without (1, 1), whatever else is
+/// The settings of a method's tone curve. The best ones follow from maps made without it (1, 1), whatever else is
 /// searched.
-struct LookRows {
+struct ToneCurveRows {
     std::string_view strength, power;
 };
-/// cacao applies its own before the blur, where the best look of the blurred map is as good as the best to within the
-/// blur.
-constexpr std::array look_rows{LookRows{"strength", "power"}, LookRows{"shadow-multiplier", "shadow-power"}};
+/// cacao applies its curve before the blur. The best curve of the blurred map is as good, to within the blur.
+constexpr std::array tone_curve_rows{ToneCurveRows{"strength", "power"},
+                                     ToneCurveRows{"shadow-multiplier", "shadow-power"}};
 
-/// A method's look rows, where both are to be fitted, and the bounds that they have.
-struct FreeLook {
-    LookRows rows;
+/// A method's tone curve, where both settings are to be fitted, and their bounds.
+struct FreeToneCurve {
+    ToneCurveRows rows;
     Look least, most;
 };
 
-/// What the errors are with some settings: of each capture, and over all (root mean square over captures).
+/// Errors of one configuration: of each capture, and over all (root mean square over captures).
 struct Score {
     std::vector<Difference> captures;
     PairSums pairs;
@@ -81,30 +81,30 @@ Score score(gpu::Device& device, const std::vector<TrialCapture>& captures, cons
     return all;
 }
 
-/// Nelder and Mead's simplex (1965) over the free settings, in units of their first steps; beyond a limit the nearest
-/// allowed value counts, and the way back costs something, so that the simplex turns round.
+/// Nelder and Mead's simplex (1965) over the free settings, in units of their first steps. Beyond a limit the nearest
+/// allowed value counts, with a penalty that grows with the distance, so that the simplex comes back.
 class Search final : public cv::MinProblemSolver::Function {
   public:
     Search(gpu::Device& device, const std::vector<TrialCapture>& captures, Configuration fixed, std::vector<Free> free,
-           std::optional<FreeLook> look)
-        : device_(device), captures_(captures), fixed_(std::move(fixed)), free_(std::move(free)), look_(look) {
-        if (look_)
-            for (const std::string_view row : {look_->rows.strength, look_->rows.power})
+           std::optional<FreeToneCurve> curve)
+        : device_(device), captures_(captures), fixed_(std::move(fixed)), free_(std::move(free)), curve_(curve) {
+        if (curve_)
+            for (const std::string_view row : {curve_->rows.strength, curve_->rows.power})
                 fixed_.settings.emplace_back(row, "1");
     }
 
     [[nodiscard]] int getDims() const override { return static_cast<int>(free_.size()); }
 
-    double calc(const double* place) const override {
+    double calc(const double* at) const override {
         Settings values;
-        double outside = 0;
+        double excess = 0;
         for (std::size_t i = 0; i < free_.size(); ++i) {
             const Free& free = free_[i];
-            const double wanted = free.start + place[i] * free.step, value = std::clamp(wanted, free.low, free.high);
-            outside += std::abs(wanted - value) / free.step;
+            const double wanted = free.start + at[i] * free.step, value = std::clamp(wanted, free.low, free.high);
+            excess += std::abs(wanted - value) / free.step;
             values.emplace_back(free.name, fmt::format("{:.6g}", value));
         }
-        return tried(values) * (1 + 0.01 * outside);
+        return tried(values) * (1 + 0.01 * excess);
     }
 
     /// The best settings found.
@@ -117,8 +117,8 @@ class Search final : public cv::MinProblemSolver::Function {
         solver->setFunction(cv::Ptr<Search>(this, [](Search*) {}));
         solver->setInitStep(cv::Mat1d::ones(1, getDims()));
         solver->setTermCriteria({cv::TermCriteria::MAX_ITER + cv::TermCriteria::EPS, evaluations, 1e-5});
-        cv::Mat1d place(1, getDims(), 0.0);
-        solver->minimize(place);
+        cv::Mat1d at(1, getDims(), 0.0);
+        solver->minimize(at);
         return best_;
     }
 
@@ -127,11 +127,11 @@ class Search final : public cv::MinProblemSolver::Function {
         Configuration configuration = fixed_;
         std::ranges::copy(values, std::back_inserter(configuration.settings));
         Score now = score(device_, captures_, configuration);
-        if (look_) {
-            const Look look = now.pairs.best_look(look_->least, look_->most);
-            now.rms = now.pairs.rms(look);
-            values.emplace_back(look_->rows.strength, fmt::format("{:.4g}", look.strength));
-            values.emplace_back(look_->rows.power, fmt::format("{:.4g}", look.power));
+        if (curve_) {
+            const Look best = now.pairs.best_look(curve_->least, curve_->most);
+            now.rms = now.pairs.rms(best);
+            values.emplace_back(curve_->rows.strength, fmt::format("{:.4g}", best.strength));
+            values.emplace_back(curve_->rows.power, fmt::format("{:.4g}", best.power));
         }
         std::string line;
         for (const auto& [name, value] : values)
@@ -148,8 +148,8 @@ class Search final : public cv::MinProblemSolver::Function {
     const std::vector<TrialCapture>& captures_;
     Configuration fixed_;
     std::vector<Free> free_;
-    std::optional<FreeLook> look_;
-    mutable int tried_ = 0; // the solver's interface is const, what it tells us is not
+    std::optional<FreeToneCurve> curve_;
+    mutable int tried_ = 0; // mutable, since the solver's interface is const
     mutable Settings best_;
     mutable double best_rms_ = 0;
 };
@@ -214,11 +214,11 @@ class Calibrate final : public Command {
         const std::vector<Parameter> rows = setup().parameters();
         for (const std::string& name : comma_separated(free_))
             free.push_back(free_setting(rows, method_, name));
-        const std::optional<FreeLook> look = taken_out(free);
-        const Settings found = Search(device, training, start, free, look).run(evaluations_);
+        const std::optional<FreeToneCurve> curve = taken_out(free);
+        const Settings found = Search(device, training, start, free, curve).run(evaluations_);
         Configuration fitted = start;
         std::ranges::copy(found, std::back_inserter(fitted.settings));
-        tell(device, start, fitted, found, training, others);
+        report(device, start, fitted, found, training, others);
         return all_well;
     }
 
@@ -236,16 +236,16 @@ class Calibrate final : public Command {
                     throw Misuse(fmt::format("held-out: {} is a training capture", path));
     }
 
-    /// The rows of a look, where both are free, leave the search.
-    static std::optional<FreeLook> taken_out(std::vector<Free>& free) {
-        for (const LookRows& rows : look_rows) {
+    /// Takes a tone curve out of the search, where both of its settings are free.
+    static std::optional<FreeToneCurve> taken_out(std::vector<Free>& free) {
+        for (const ToneCurveRows& rows : tone_curve_rows) {
             const auto strength = std::ranges::find(free, rows.strength, &Free::name);
             const auto power = std::ranges::find(free, rows.power, &Free::name);
             if (strength == free.end() || power == free.end())
                 continue;
-            const FreeLook look{rows, {strength->low, power->low}, {strength->high, power->high}};
+            const FreeToneCurve curve{rows, {strength->low, power->low}, {strength->high, power->high}};
             std::erase_if(free, [&](const Free& f) { return f.name == rows.strength || f.name == rows.power; });
-            return look;
+            return curve;
         }
         return std::nullopt;
     }
@@ -254,7 +254,7 @@ class Calibrate final : public Command {
         return *std::ranges::find(setups_, method_, [](const auto& s) { return s.first; })->second;
     }
 
-    /// Every setting as the command line left it, but for the radius: each capture's truth has its own.
+    /// Every setting from the command line, except the radius: each capture's truth has its own.
     Configuration as_given() {
         Configuration given{method_, "candidate", values_of(setup())};
         std::erase_if(given.settings, [](const auto& setting) { return setting.first == "radius"; });
@@ -273,24 +273,24 @@ class Calibrate final : public Command {
         return captures;
     }
 
-    void tell(gpu::Device& device, const Configuration& before, const Configuration& after, const Settings& found,
-              const std::vector<TrialCapture>& training, const std::vector<TrialCapture>& others) const {
-        json report{{"made_by", fmt::format("scanshade {} calibrate-look", SCANSHADE_VERSION)},
-                    {"command_line", command_line()},
-                    {"settings", {{"method", {{"method", method_}}}}}};
-        json& settings = report["settings"]["method " + method_];
+    void report(gpu::Device& device, const Configuration& before, const Configuration& after, const Settings& found,
+                const std::vector<TrialCapture>& training, const std::vector<TrialCapture>& others) const {
+        json text{{"made_by", fmt::format("scanshade {} calibrate-look", SCANSHADE_VERSION)},
+                  {"command_line", command_line()},
+                  {"settings", {{"method", {{"method", method_}}}}}};
+        json& settings = text["settings"]["method " + method_];
         for (const auto& [name, value] : found) {
             fmt::print("--{}.{} {}\n", method_, name, value);
             settings[fmt::format("{}.{}", method_, name)] = std::stod(value);
         }
         fmt::print("{:<12}{:<24}{:>12}{:>12}{:>14}{:>14}\n", "", "capture", "RMSE before", "after", "calib. before",
                    "after");
-        report["training"] =
+        text["training"] =
             judged("training", training, score(device, training, before), score(device, training, after));
-        report["held_out"] = judged("held out", others, score(device, others, before), score(device, others, after));
+        text["held_out"] = judged("held out", others, score(device, others, before), score(device, others, after));
         if (others.empty())
-            say("no --held-out captures: nothing says that this holds elsewhere");
-        write_atomically(out_, text_of(report) + "\n");
+            say("no --held-out captures: the result is not checked on other captures");
+        write_atomically(out_, text_of(text) + "\n");
     }
 
     static json judged(const std::string& role, const std::vector<TrialCapture>& captures, const Score& before,

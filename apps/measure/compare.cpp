@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What became of one pair of maps.
+/// The result of one pair of maps.
 struct Row {
     std::string name;
     Difference difference;
@@ -29,7 +29,7 @@ struct Row {
 
 void say(const std::string& line) { fmt::print(stderr, "{}\n", line); }
 
-/// A map, or what a cloud's points hold as ambient_occlusion, in a row.
+/// A map, or a cloud's field ambient_occlusion as one row.
 cv::Mat1f values_of(const fs::path& file) {
     if (!has_cloud_extension(file))
         return read_ao(file);
@@ -93,7 +93,7 @@ class Compare final : public Command {
         say(fmt::format("A {} ({}), {} maps", a.path.string(), a.kind, a.files.size()));
         say(fmt::format("B {} ({}), {} maps", b.path.string(), b.kind, b.files.size()));
         if (a.radius_m && b.radius_m && std::abs(*a.radius_m - *b.radius_m) > 1e-6 * *b.radius_m)
-            say(fmt::format("  warning: A was made with a radius of {:g} m, B with {:g} m: they show different things",
+            say(fmt::format("  warning: A was made with a radius of {:g} m, B with {:g} m: their values cannot agree",
                             *a.radius_m, *b.radius_m));
     }
 
@@ -102,8 +102,8 @@ class Compare final : public Command {
             const cv::Mat1f a = values_of(pair.a), b = values_of(pair.b);
             Row row{pair.name, during(pair.a.string() + " and " + pair.b.string(), [&] { return compare(a, b); }), {}};
             pairs.add(pair_sums(a, b));
-            if (const auto believed = confidence.find(pair.name); believed != confidence.end() && a.rows > 1)
-                by_confidence_.add(a, b, of_one_size(read_ao(believed->second), a, believed->second));
+            if (const auto map = confidence.find(pair.name); map != confidence.end() && a.rows > 1)
+                by_confidence_.add(a, b, of_one_size(read_ao(map->second), a, map->second));
             if (!out_.empty() && a.rows > 1)
                 write_difference(pair.name, a, b);
             return row;
@@ -155,7 +155,7 @@ class Compare final : public Command {
         fmt::print("{:<24}{}\n", "all (rms over images)", figure_cells(all));
     }
 
-    /// Whether what A believes less is farther off, too.
+    /// Shows whether values of less confidence have larger errors.
     void print_confidence() const {
         if (by_confidence_.names().empty())
             return;

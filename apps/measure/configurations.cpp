@@ -7,7 +7,7 @@
 namespace scanshade {
 namespace {
 
-/// What is worth measuring besides the levels of `quality`.
+/// Configurations measured besides the levels of `quality`.
 const std::vector<Configuration>& more() {
     static const std::vector<Configuration> table{
         {"cacao", "lowest downsampled", {{"quality", "lowest"}, {"downsampled", "true"}}},

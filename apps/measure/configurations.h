@@ -7,8 +7,8 @@
 
 namespace scanshade {
 
-/// What is measured: every level of each method's `quality` (the method as it comes where it has none), then the rows
-/// of a table of more. In the order of the table of methods.
+/// Every level of each method's `quality` (the method's defaults where it has none), then more rows. They are in the
+/// order of the table of methods.
 [[nodiscard]] std::vector<Configuration> configurations();
 
 } // namespace scanshade

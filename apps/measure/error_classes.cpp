@@ -47,7 +47,7 @@ bool jumps(const float* z, std::ptrdiff_t stride, int count, int i) {
     return !from_a && !from_b;
 }
 
-/// 0 beside a jump, 255 elsewhere.
+/// 0 at a jump, 255 elsewhere.
 cv::Mat1b edges(const cv::Mat1f& z_m) {
     cv::Mat1b away(z_m.size(), uchar(255));
     const std::ptrdiff_t row = z_m.cols;

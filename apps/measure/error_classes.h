@@ -1,4 +1,4 @@
-// Where errors live: pixels by their distance from depth edges, by how grazing they are seen, by range, by confidence.
+// Classes of pixels whose errors differ: by distance from depth edges, by viewing angle, by range, by confidence.
 #pragma once
 
 #include "projection/camera.h"
@@ -16,21 +16,21 @@ struct PixelClasses {
     cv::Mat1b of;
 };
 
-/// By distance in pixels to the nearest pixel beside a jump of depth. A jump is where 1/z differs by more than 1 % and
-/// neither side's slope foretells the other (1/z is linear on planes), or where the depth ends.
+/// By distance in pixels to the nearest pixel at a jump of depth. At a jump 1/z differs by more than 1 % and neither
+/// side's slope predicts the other (1/z is linear on planes), or the depth ends.
 [[nodiscard]] PixelClasses by_edge_distance(const cv::Mat1f& z_m);
-/// By the angle between the surface's normal and the way to the camera.
+/// By the angle between the surface's normal and the direction to the camera.
 [[nodiscard]] PixelClasses by_grazing_angle(const cv::Mat1f& z_m, const Pinhole& camera);
 /// By depth.
 [[nodiscard]] PixelClasses by_range(const cv::Mat1f& z_m);
 
-/// By confidence (projection/confidence.h); pixels without one, NaN, belong nowhere.
+/// By confidence (projection/confidence.h); pixels without one (NaN) have no class.
 [[nodiscard]] PixelClasses by_confidence(const cv::Mat1f& confidence);
 
 /// Squared differences of two maps, gathered by class over any number of images.
 class ErrorByClass {
   public:
-    /// All images have the same classes' names.
+    /// The class names must be the same for all images.
     void add(const cv::Mat1f& a, const cv::Mat1f& b, const PixelClasses& classes);
     void add(const ErrorByClass& other);
     [[nodiscard]] const std::vector<std::string>& names() const { return names_; }

@@ -7,7 +7,7 @@
 namespace scanshade {
 namespace {
 
-/// One figure: its name in files, its head in tables.
+/// One number: its name in files, its head in tables.
 struct Figure {
     std::string_view name, head;
     double (*of)(const Difference&);

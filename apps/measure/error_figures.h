@@ -1,4 +1,4 @@
-// The figures of a Difference as people and programs read them: one list of columns for tables, CSV and JSON.
+// The numbers of a Difference for people and programs: one list of columns for tables, CSV and JSON.
 #pragma once
 
 #include "ao/compare.h"
@@ -12,11 +12,11 @@ namespace scanshade {
 [[nodiscard]] std::string figure_heads();
 [[nodiscard]] std::string figure_cells(const Difference& difference);
 
-/// "pixels,only_a,only_b,mae,rms,..." and one row; what is unknown is an empty field.
+/// "pixels,only_a,only_b,mae,rms,..." and one row; unknown numbers are empty fields.
 [[nodiscard]] std::string figure_csv_heads();
 [[nodiscard]] std::string figure_csv(const Difference& difference);
 
-/// Every figure by name; what is unknown is null.
+/// Every number by name; unknown ones are null.
 [[nodiscard]] json to_json(const Difference& difference);
 
 } // namespace scanshade

@@ -13,11 +13,13 @@ namespace {
 
 constexpr std::array sensor_classes{SensorClass::clean, SensorClass::structured_light, SensorClass::time_of_flight};
 
-bool beats(const Priced& a, const Priced& b) {
+bool beats(const BenchmarkPoint& a, const BenchmarkPoint& b) {
     return a.ns_per_pixel <= b.ns_per_pixel && a.rms <= b.rms && (a.ns_per_pixel < b.ns_per_pixel || a.rms < b.rms);
 }
-bool equal(const Priced& a, const Priced& b) { return a.ns_per_pixel == b.ns_per_pixel && a.rms == b.rms; }
-bool finite(const Priced& point) { return std::isfinite(point.ns_per_pixel) && std::isfinite(point.rms); }
+bool equal(const BenchmarkPoint& a, const BenchmarkPoint& b) {
+    return a.ns_per_pixel == b.ns_per_pixel && a.rms == b.rms;
+}
+bool finite(const BenchmarkPoint& point) { return std::isfinite(point.ns_per_pixel) && std::isfinite(point.rms); }
 
 json to_json(const Configuration& configuration) {
     json settings = json::object();
@@ -33,9 +35,9 @@ Configuration configuration_from(const json& text) {
     return configuration;
 }
 
-json to_json(const std::vector<Priced>& points) {
+json to_json(const std::vector<BenchmarkPoint>& points) {
     json list = json::array();
-    for (const Priced& point : points) {
+    for (const BenchmarkPoint& point : points) {
         json& row = list.emplace_back(to_json(point.configuration));
         row["ns_per_pixel"] = point.ns_per_pixel;
         row["rms"] = point.rms;
@@ -43,8 +45,8 @@ json to_json(const std::vector<Priced>& points) {
     return list;
 }
 
-Priced point_from(const json& text) {
-    Priced point{configuration_from(text), text.at("ns_per_pixel"), text.at("rms")};
+BenchmarkPoint point_from(const json& text) {
+    BenchmarkPoint point{configuration_from(text), text.at("ns_per_pixel"), text.at("rms")};
     if (!(point.ns_per_pixel > 0 && point.rms >= 0))
         throw Error(fmt::format("{}: a time above zero and an error of zero or more expected",
                                 point.configuration.full_name()));
@@ -68,7 +70,7 @@ SequenceGain gain_from(const json& text) {
 
 } // namespace
 
-std::vector<bool> on_front(const std::vector<Priced>& points) {
+std::vector<bool> on_pareto_front(const std::vector<BenchmarkPoint>& points) {
     std::vector<bool> front(points.size());
     for (std::size_t i = 0; i < points.size(); ++i) {
         front[i] = finite(points[i]);
@@ -79,7 +81,7 @@ std::vector<bool> on_front(const std::vector<Priced>& points) {
     return front;
 }
 
-json to_json(const Front& front) {
+json to_json(const ParetoFront& front) {
     json text{{"device", front.device}};
     for (const auto& [sensor, points] : front.points) {
         const auto made_by = front.made_by.find(sensor);
@@ -93,9 +95,9 @@ json to_json(const Front& front) {
     return text;
 }
 
-Front front_from(const json& text, const std::string& origin) {
+ParetoFront front_from(const json& text, const std::string& origin) {
     return reading_json(origin, [&] {
-        Front front{text.at("device"), {}, {}, {}, {}};
+        ParetoFront front{text.at("device"), {}, {}, {}, {}};
         for (const SensorClass sensor : sensor_classes)
             if (const auto own = text.find(name_of(sensor)); own != text.end()) {
                 front.made_by[sensor] = own->at("made_by");
@@ -110,15 +112,16 @@ Front front_from(const json& text, const std::string& origin) {
         if (front.points.empty())
             throw Error("no points of any sensor class (clean, structured light, time of flight)");
         for (auto& [sensor, points] : front.points)
-            std::ranges::stable_sort(points, {}, &Priced::ns_per_pixel);
+            std::ranges::stable_sort(points, {}, &BenchmarkPoint::ns_per_pixel);
         return front;
     });
 }
 
-void Front::replace_with(const Front& other) {
+void ParetoFront::replace_with(const ParetoFront& other) {
     if (device != other.device)
-        throw Error(fmt::format("the front was measured on {}, this one on {}: times of two devices do not go together",
-                                device, other.device));
+        throw Error(
+            fmt::format("the Pareto front was measured on {}, this one on {}: times of two devices do not compare",
+                        device, other.device));
     for (const auto& [sensor, own] : other.points) {
         points[sensor] = own;
         made_by[sensor] = other.made_by.at(sensor);
@@ -128,8 +131,8 @@ void Front::replace_with(const Front& other) {
     }
 }
 
-const Front& shipped_front() {
-    static const Front front = front_from(json::parse(shipped_front_text), "apps/measure/front.json");
+const ParetoFront& shipped_front() {
+    static const ParetoFront front = front_from(json::parse(shipped_front_text), "apps/measure/front.json");
     return front;
 }
 

@@ -20,10 +20,10 @@ namespace {
 using Eigen::Isometry3d;
 using Eigen::Vector3d;
 
-/// Points and normals that fell into one cube of space.
+/// Sums of the points and normals in one cube of space.
 struct Voxel {
     Vector3d point = Vector3d::Zero(), normal = Vector3d::Zero();
-    double footprint_m = 0; ///< sum of what the pixels cover
+    double footprint_m = 0; ///< sum of the pixels' widths on the surface
     int count = 0;
 };
 
@@ -54,7 +54,7 @@ std::vector<Disc> discs_of(const Voxels& voxels, double voxel_m) {
     discs.reserve(voxels.size());
     for (const auto& [cell, voxel] : voxels)
         if (voxel.normal.norm() >
-            0.5 * voxel.count) // faces of both sides of something thin do not make a disc between them
+            0.5 * voxel.count) // the two faces of a thin surface must not become one disc between them
             discs.push_back({voxel.point / voxel.count, voxel.normal.normalized(),
                              0.75 * std::max(voxel_m, voxel.footprint_m / voxel.count)});
     return discs;
@@ -84,9 +84,9 @@ FusedReference::FusedReference(gpu::Device& device, const std::filesystem::path&
                         path.string(), frames.size()));
     Voxels voxels;
     const std::vector<std::size_t> taken = spread(most_frames, frames.size());
-    for (const std::size_t place : taken)
-        during("frame " + capture.entries[frames[place]].name, [&] {
-            Frame frame = capture.load(frames[place]);
+    for (const std::size_t index : taken)
+        during("frame " + capture.entries[frames[index]].name, [&] {
+            Frame frame = capture.load(frames[index]);
             frame.camera = camera_of(frame);
             const Surface surface = surface_of(project(frame));
             const Isometry3d& pose = *frame.world_from_camera;
@@ -109,10 +109,10 @@ FusedReference::FusedReference(gpu::Device& device, const std::filesystem::path&
         });
     discs_ = discs_of(voxels, voxel_m_);
     surface_.emplace(discs_);
-    description_ =
-        fmt::format("ray casting ({} rays) against the cloud fused of {} posed frames ({} discs): no truth, it has the "
-                    "sensor's noise and the poses' errors in it",
-                    rays, taken.size(), discs_.size());
+    description_ = fmt::format(
+        "ray casting ({} rays) against the cloud fused of {} posed frames ({} discs): no truth: it contains "
+        "the sensor's noise and the poses' errors",
+        rays, taken.size(), discs_.size());
 }
 
 FusedReference::Surface FusedReference::surface_of(const DepthImage& depth) {

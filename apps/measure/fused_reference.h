@@ -1,5 +1,4 @@
-// What to compare with where nobody knows the truth: rays against the cloud that all posed frames of a capture make
-// together.
+// The reference for captures without truth: rays against the cloud that all posed frames of a capture make together.
 #pragma once
 
 #include "ao/fit_plane/fit_plane.h"
@@ -10,22 +9,22 @@
 
 namespace scanshade {
 
-/// Not the truth: it knows what other frames saw behind and beside, but has their noise and the poses' errors in it.
+/// Not the truth: it holds surfaces that only other frames saw, but also their noise and the poses' errors.
 class FusedReference {
   public:
     static constexpr int rays = 256;
     static constexpr std::size_t most_frames = 60;
 
-    /// Fuses up to `most_frames` posed frames of the capture (depth and normals from plane fits where there is noise)
-    /// into voxels of a 25th of the radius, each a disc with the mean point and normal of what fell in, no smaller than
-    /// the pixels that saw it; depths whose sigma is above a tenth of the radius stay out. Throws Error where fewer
-    /// than two frames have poses.
+    /// Fuses up to `most_frames` posed frames of the capture into voxels of a 25th of the radius. Noisy depth and its
+    /// normals come from plane fits. Each voxel becomes a disc with the mean point and normal of its points, no smaller
+    /// than their pixels. Depths whose sigma is above a tenth of the radius are left out. Throws Error where fewer than
+    /// two frames have poses.
     FusedReference(gpu::Device& device, const std::filesystem::path& path, const TrialCapture& capture,
                    const CaptureOptions& options);
 
-    /// Visibility of the frame's recorded pixels by `rays` rays each, within the capture's radius, from where each
-    /// pixel's own ray first meets the fused surface; NaN where that is not near what the pixel saw, and everywhere in
-    /// a frame without a pose.
+    /// Visibility of the frame's recorded pixels by `rays` rays each, within the capture's radius. They start where the
+    /// pixel's own ray first hits the fused surface. NaN where that is not near the pixel's depth, and everywhere in a
+    /// frame without a pose.
     [[nodiscard]] cv::Mat1f visibility(const TrialFrame& frame) const;
 
     /// "ray casting against the cloud fused of 40 posed frames (1234567 discs)".
@@ -37,7 +36,7 @@ class FusedReference {
         NormalImage normals;
     };
     [[nodiscard]] Surface surface_of(const DepthImage& depth);
-    /// Positions in the world; sigma of the depth there.
+    /// Positions are in the world; `sigma_m` is of the depth there.
     [[nodiscard]] std::optional<RayStart> start(const Eigen::Vector3d& eye, const Eigen::Vector3d& seen,
                                                 double sigma_m) const;
 

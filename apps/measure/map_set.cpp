@@ -25,7 +25,7 @@ std::map<std::string, fs::path> maps_in(const fs::path& folder) {
             continue;
         const auto [there, fresh] = files.emplace(entry.path().stem().string(), entry.path());
         if (!fresh)
-            throw Error(fmt::format("{}: {} and {} are maps of one name; which is meant?", folder.string(),
+            throw Error(fmt::format("{}: {} and {} are maps of the same name; remove one of them", folder.string(),
                                     there->second.filename().string(), entry.path().filename().string()));
     }
     if (files.empty())
@@ -40,7 +40,7 @@ json read_json(const fs::path& file) {
     return text;
 }
 
-/// What is at the end of a path of keys, if all of them are there and it is of that type.
+/// The value at a path of keys, if it exists and has that type.
 template <class Value>
 std::optional<Value> at(const json& text, std::initializer_list<std::string> keys) {
     const json* place = &text;

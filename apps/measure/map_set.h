@@ -15,19 +15,18 @@ struct MapSet {
     std::filesystem::path path; ///< as asked for
     std::string kind;           ///< "run", "truth", "folder" or "map"
     std::map<std::string, std::filesystem::path> files;
-    std::filesystem::path
-        capture; ///< of a run: what it was made from, as its manifest says; of truth: the capture itself
-    std::map<std::string, std::filesystem::path>
-        confidence;                 ///< of a run: maps of how far each of `files` can be believed
+    std::filesystem::path capture; ///< of a run: its input, from the manifest; of truth: the capture itself
+    std::map<std::string, std::filesystem::path> confidence; ///< of a run: the confidence maps of `files`
     std::string sensor;             ///< of a generated capture: the one simulated, where its truth.json says
-    std::optional<double> radius_m; ///< the method's or the truth's, where it is said
+    std::optional<double> radius_m; ///< the method's or the truth's, where known
 };
 
-/// A folder with ao/ in it is a run, one with truth/ao/ a generated capture; else its own images are taken; a file is a
-/// map by itself. Throws Error naming the path when it is not there or holds no map.
+/// A folder with ao/ is a run, one with truth/ao/ a generated capture; of other folders the images are taken. A file is
+/// a single map. Throws Error naming the path where it does not exist or holds no map.
 [[nodiscard]] MapSet find_maps(const std::filesystem::path& path);
 
-/// The truth of the capture that `run` was made from. Throws Error where the run does not say or the capture has none.
+/// The truth of the capture that `run` was made from. Throws Error where the run does not name the capture or it has no
+/// truth.
 [[nodiscard]] MapSet truth_of(const MapSet& run);
 
 /// One view in both sets.
@@ -36,8 +35,8 @@ struct MapPair {
     std::filesystem::path a, b;
 };
 
-/// Pairs by name, in the order of names; two single maps are a pair whatever they are called. Throws Error, with names
-/// of either side, where nothing pairs.
+/// Pairs by name, in the order of names. Two single maps are a pair whatever their names. Throws Error, with names of
+/// both sides, where there is no pair.
 [[nodiscard]] std::vector<MapPair> paired(const MapSet& a, const MapSet& b);
 
 } // namespace scanshade

@@ -2,11 +2,11 @@
 
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/gpu/transfer.h"
-#include "projection/statistics.h"
 #include "ao/screen/screen.h"
 #include "apps/measure/error_classes.h"
 #include "apps/scenes/scene.h"
 #include "apps/scenes/sensor.h"
+#include "projection/statistics.h"
 
 #include <algorithm>
 #include <cmath>
@@ -35,7 +35,7 @@ std::vector<Sighted> views_of(const scene::Scene& scene, const Sensor& sensor) {
     return views;
 }
 
-/// What the pass `normals` makes of clean depth.
+/// The normals of clean depth, by the pass `normals`.
 FittedDepth from_depth(gpu::Device& device, const DepthImage& depth) {
     using Host = gpu::BufferRow::Host;
     const std::size_t pixels = depth.z_m.total();
@@ -57,7 +57,7 @@ FittedDepth from_depth(gpu::Device& device, const DepthImage& depth) {
     return found;
 }
 
-/// Whether depth jumps here by so much that no noise explains it: 10 cm and 5 %.
+/// Whether depth jumps here by more than noise does: 10 cm and 5 %.
 bool jumps(const cv::Mat1f& z, int v, int u) {
     const float most = std::max(0.1F, 0.05F * z(v, u));
     for (const auto& [y, x] : {std::pair{v, u - 1}, {v, u + 1}, {v - 1, u}, {v + 1, u}})

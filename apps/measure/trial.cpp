@@ -19,13 +19,13 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// The folder's own name, whatever slashes and dots it was written with.
+/// The folder's own name, without slashes and dots.
 std::string last_name(const fs::path& path) {
     const fs::path whole = fs::weakly_canonical(path);
     return (whole.has_filename() ? whole : whole.parent_path()).stem().string();
 }
 
-/// The class that a simulated sensor stands for.
+/// The class of a simulated sensor.
 std::optional<SensorClass> class_of_simulated(std::string_view sensor) {
     if (sensor == "ideal")
         return SensorClass::clean;
@@ -36,7 +36,7 @@ std::optional<SensorClass> class_of_simulated(std::string_view sensor) {
     return std::nullopt;
 }
 
-/// Where a generated capture keeps what is exact.
+/// The exact maps of a generated capture.
 struct Truth {
     std::optional<MapSet> ao;
     fs::path depth;
@@ -122,10 +122,10 @@ TrialCapture load_trial(const Capture& capture, const DepthNoise& noise, const s
         trial.radius_m = truth.ao->radius_m.value_or(request.radius_m);
         trial.reference = "ray-traced truth of the generated scene";
     }
-    for (const std::size_t place : spread(static_cast<std::size_t>(request.frames), among.size()))
+    for (const std::size_t index : spread(static_cast<std::size_t>(request.frames), among.size()))
         try {
-            during(fmt::format("{}: frame {}", path.string(), capture.entries[among[place]].name),
-                   [&] { trial.frames.push_back(load_frame(capture, among[place], truth)); });
+            during(fmt::format("{}: frame {}", path.string(), capture.entries[among[index]].name),
+                   [&] { trial.frames.push_back(load_frame(capture, among[index], truth)); });
         } catch (const Outage&) {
             throw;
         } catch (const Error&) {
@@ -139,7 +139,7 @@ TrialCapture load_trial(const Capture& capture, const DepthNoise& noise, const s
 
 namespace {
 
-/// The capture's radius first, so that a configuration may say otherwise.
+/// The capture's radius goes first, so that a configuration may override it.
 std::unique_ptr<MethodSetup> set_up(const Configuration& configuration, double radius_m) {
     std::unique_ptr<MethodSetup> setup = method_named(configuration.method).setup();
     const std::vector<Parameter> rows = setup->parameters();

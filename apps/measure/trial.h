@@ -1,5 +1,4 @@
-// A configuration tried on captures whose right answer is known: the ground that bench, calibrate-look and error
-// budgets stand on.
+// A configuration tried on captures whose truth is known. bench, calibrate-look and error budgets use it.
 #pragma once
 
 #include "ao/compare.h"
@@ -14,19 +13,19 @@
 
 namespace scanshade {
 
-/// How depth was measured, as far as its noise tells; errors differ more between these than between methods.
+/// How depth was measured, judged by its noise. Errors differ more between these classes than between methods.
 enum class SensorClass { clean, structured_light, time_of_flight };
 [[nodiscard]] std::string_view name_of(SensorClass sensor);
-/// Clean where sigma at 2 m is below 1 mm. The noise of structured light grows with the square of the distance (here:
-/// more than sevenfold from 1 to 4 m; Kinects 8 to 13), that of time of flight has a floor (simulated: 5).
+/// Clean where sigma at 2 m is below 1 mm. Structured light's noise grows with the square of the distance: here more
+/// than 7 times from 1 to 4 m (Kinects 8 to 13 times). Time of flight's noise has a floor (simulated: 5 times).
 [[nodiscard]] SensorClass class_of(const DepthNoise& noise);
 
-/// A frame ready for the methods, and what should come out.
+/// A frame ready for the methods, and its true visibility.
 struct TrialFrame {
     std::string name;
     Frame frame;
     DepthImage depth;
-    cv::Mat1f truth;     ///< on the recorded pixels, NaN = no surface; empty where nothing is known
+    cv::Mat1f truth;     ///< on the recorded pixels, NaN = no surface; empty where it is not known
     cv::Mat1f exact_z_m; ///< true depth of a generated capture, else the recorded one; 0 = hole
 };
 
@@ -49,17 +48,17 @@ struct TrialRequest {
     CaptureOptions capture;
     std::vector<std::size_t> among;   ///< indices of the frames that may be taken; empty = all
     bool leave_bad_out = false;       ///< frames that cannot be loaded are left out instead of being an Error
-    FitPlaneOptions preparation = {}; ///< of noisy depth; its smoothing goes over each method's own
+    FitPlaneOptions preparation = {}; ///< of noisy depth; its smoothing multiplies each method's own
 };
 
-/// Loads the frames with the truth that lies beside a generated capture. Throws Error naming the frame that fails, and
-/// where none is left.
+/// Loads the frames, with the truth of a generated capture. Throws Error naming the frame that fails, and where no
+/// frame is left.
 [[nodiscard]] TrialCapture load_trial(const std::filesystem::path& path, const TrialRequest& request);
-/// The same of a capture that is open already, with its noise and who says so.
+/// The same of an open capture, with its noise and the noise's origin.
 [[nodiscard]] TrialCapture load_trial(const Capture& capture, const DepthNoise& noise, const std::string& noise_origin,
                                       const TrialRequest& request);
 
-/// One configuration on one device, as `run` would use it on depth of some noise.
+/// One configuration on one device, as `run` would use it on depth with that noise.
 class Trial {
   public:
     /// `radius_m` goes into the method's radius, before the configuration's own settings; the preparation's smoothing
@@ -67,13 +66,13 @@ class Trial {
     Trial(gpu::Device& device, Configuration configuration, const DepthNoise& noise, double radius_m,
           FitPlaneOptions preparation = {});
 
-    /// From now on depth has that noise, or none. Pipelines stay: making them is most of a trial's time.
+    /// Sets the noise of depth from now on. Pipelines are kept: making them is most of a trial's time.
     void set_noise(const DepthNoise& noise) { noise_ = noise; }
     /// Visibility on the recorded pixels.
     [[nodiscard]] cv::Mat1f compute(const TrialFrame& frame);
 
     [[nodiscard]] const Configuration& configuration() const { return configuration_; }
-    /// Of the last compute(): the device's own time stamps without transfers; and all of it, by the host's clock.
+    /// Of the last compute(): device time stamps without transfers, and the whole by the host's clock.
     [[nodiscard]] double device_ms() const { return device_ms_; }
     [[nodiscard]] double wall_ms() const { return wall_ms_; }
     /// Every setting as used.

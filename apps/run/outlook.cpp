@@ -7,10 +7,10 @@ namespace scanshade {
 namespace {
 
 /// What was measured with these settings of a method; null where nothing was.
-const Priced* measured_with(const Front& front, SensorClass sensor, const std::string& method, const Settings& values) {
+const BenchmarkPoint* measured_with(const ParetoFront& front, SensorClass sensor, const std::string& method, const Settings& values) {
     for (const auto* by_class : {&front.points, &front.others})
         if (const auto points = by_class->find(sensor); points != by_class->end())
-            for (const Priced& point : points->second) {
+            for (const BenchmarkPoint& point : points->second) {
                 if (point.configuration.method != method)
                     continue;
                 const auto setup = method_named(method).setup();
@@ -21,7 +21,7 @@ const Priced* measured_with(const Front& front, SensorClass sensor, const std::s
     return nullptr;
 }
 
-const Priced* measured_with(const Front& front, SensorClass sensor, Preset preset) {
+const BenchmarkPoint* measured_with(const ParetoFront& front, SensorClass sensor, Preset preset) {
     const Configuration& configuration = configuration_of(preset);
     const auto setup = method_named(configuration.method).setup();
     apply(configuration, *setup);
@@ -29,10 +29,10 @@ const Priced* measured_with(const Front& front, SensorClass sensor, Preset prese
 }
 
 /// The cheapest preset that errs clearly less.
-std::optional<Preset> better_preset(const Front& front, SensorClass sensor, const Priced& used) {
+std::optional<Preset> better_preset(const ParetoFront& front, SensorClass sensor, const BenchmarkPoint& used) {
     constexpr double clearly = 0.98;
     for (const auto& [name, preset] : preset_words)
-        if (const Priced* point = measured_with(front, sensor, preset); point && point->rms < clearly * used.rms)
+        if (const BenchmarkPoint* point = measured_with(front, sensor, preset); point && point->rms < clearly * used.rms)
             return preset;
     return std::nullopt;
 }
@@ -51,12 +51,12 @@ bool is_prepared_as_measured(const RunSettings& settings) {
 } // namespace
 
 std::vector<std::string> outlook(const RunSettings& settings, const DepthNoise& noise, const Capture& capture,
-                                 const Front& front) {
+                                 const ParetoFront& front) {
     const bool clouds = std::ranges::any_of(capture.entries, [](const auto& entry) { return !entry.cloud.empty(); });
     if (clouds || settings.budget.any() || !is_prepared_as_measured(settings))
         return {};
     const SensorClass sensor = class_of(noise);
-    const Priced* used = measured_with(front, sensor, settings.method, values_of(settings.chosen_setup()));
+    const BenchmarkPoint* used = measured_with(front, sensor, settings.method, values_of(settings.chosen_setup()));
     if (!used)
         return {};
     const bool together = settings.in_sequence(capture);
@@ -68,7 +68,7 @@ std::vector<std::string> outlook(const RunSettings& settings, const DepthNoise& 
         sentences.push_back(gain_text(gain->second));
     const auto better = better_preset(front, sensor, *used);
     if (better) {
-        const Priced* point = measured_with(front, sensor, *better);
+        const BenchmarkPoint* point = measured_with(front, sensor, *better);
         sentences.push_back(fmt::format("--preset {}: RMSE {:.3f}, in {:.1f} times the time of the method's passes",
                                         word_for(*better, preset_words), point->rms,
                                         point->ns_per_pixel / used->ns_per_pixel));

@@ -13,6 +13,6 @@ namespace scanshade {
 /// preset with its time. Empty where nothing like it was measured: clouds, other radii, other depth preparation; and
 /// for budgets, which tell it themselves.
 [[nodiscard]] std::vector<std::string> outlook(const RunSettings& settings, const DepthNoise& noise,
-                                               const Capture& capture, const Front& front);
+                                               const Capture& capture, const ParetoFront& front);
 
 } // namespace scanshade

@@ -1,4 +1,4 @@
-// The scene clutter: several hundred things heaped up, hardly a plane in sight.
+// The scene clutter: heaps of several hundred objects, and hardly a plane.
 #include "apps/scenes/scenes.h"
 
 #include "apps/scenes/heap.h"
@@ -11,34 +11,34 @@ namespace scanshade::scene {
 Scene clutter() {
     Scene scene{.name = "clutter", .summary = "a store room full of shelves, boxes, pipes and heaped things"};
     Bodies& bodies = scene.bodies;
-    Dice dice(37);
+    Random random(37);
     add_shell(bodies, {4.6, 5.4, 2.7}, boards, plaster, whitewash);
-    add_shelf(bodies, {{0.8, 5.22, 0}, 0}, 1.4, 2.2, 6, dice);
-    add_shelf(bodies, {{2.3, 5.22, 0}, 0}, 1.4, 2.0, 5, dice);
-    add_shelf(bodies, {{0.18, 3.4, 0}, pi / 2}, 1.5, 2.1, 5, dice);
+    add_shelf(bodies, {{0.8, 5.22, 0}, 0}, 1.4, 2.2, 6, random);
+    add_shelf(bodies, {{2.3, 5.22, 0}, 0}, 1.4, 2.0, 5, random);
+    add_shelf(bodies, {{0.18, 3.4, 0}, pi / 2}, 1.5, 2.1, 5, random);
     add_table(bodies, {{3.95, 3.1, 0}, pi / 2}, 2.2, 0.75, 0.86);
-    drop_many(bodies, {3.6, 2.1}, {4.3, 4.1}, 0.86, 34, 0.05, 0.3, dice); // on the workbench
-    drop_many(bodies, {3.65, 2.2}, {4.4, 4.0}, 0, 20, 0.15, 0.4, dice);   // and below it
-    drop_many(bodies, {0.7, 2.4}, {2.9, 4.9}, 0, 70, 0.06, 0.45, dice);   // the heap in the middle
-    drop_many(bodies, {3.2, 4.3}, {4.5, 5.3}, 0, 22, 0.1, 0.45, dice);
-    drop_many(bodies, {0.1, 1.4}, {0.6, 2.5}, 0, 10, 0.08, 0.35, dice);
+    drop_many(bodies, {3.6, 2.1}, {4.3, 4.1}, 0.86, 34, 0.05, 0.3, random); // on the workbench
+    drop_many(bodies, {3.65, 2.2}, {4.4, 4.0}, 0, 20, 0.15, 0.4, random);   // and below it
+    drop_many(bodies, {0.7, 2.4}, {2.9, 4.9}, 0, 70, 0.06, 0.45, random);   // the heap in the middle
+    drop_many(bodies, {3.2, 4.3}, {4.5, 5.3}, 0, 22, 0.1, 0.45, random);
+    drop_many(bodies, {0.1, 1.4}, {0.6, 2.5}, 0, 10, 0.08, 0.35, random);
     for (int i = 0; i < 9; ++i) { // pipes and laths leaning in a corner
-        const double x = 3.1 + 0.12 * i, length = dice.between(1.4, 2.4);
+        const double x = 3.1 + 0.12 * i, length = random.between(1.4, 2.4);
         if (i % 3)
             add(bodies, steel,
-                {rod({x, 4.9, 0}, {x + dice.between(-0.1, 0.2), 5.38, length}, dice.between(0.008, 0.03))});
+                {rod({x, 4.9, 0}, {x + random.between(-0.1, 0.2), 5.38, length}, random.between(0.008, 0.03))});
         else
-            add(bodies, oak, {bar({x, 4.95, 0}, {x + dice.between(-0.1, 0.2), 5.37, length}, 0.035)});
+            add(bodies, oak, {bar({x, 4.95, 0}, {x + random.between(-0.1, 0.2), 5.37, length}, 0.035)});
     }
     // A board of tools over the workbench, a shelf over it, ducts under the ceiling, a ladder on the left wall.
     add(bodies, oak, {block({4.54, 2.1, 1.2}, {4.6, 4.1, 1.9}), block({4.3, 2.1, 2.0}, {4.6, 4.1, 2.03})});
     for (int i = 0; i < 14; ++i) {
-        const double y = 2.2 + 0.135 * i, z = dice.between(1.3, 1.5), top = z + dice.between(0.15, 0.35);
-        add(bodies, dice.one_of({steel, red, yellow}),
-            {rod({4.5, y, z}, {4.52, y, top}, dice.between(0.006, 0.02)),
-             Box{{4.5, y, top}, {0.03, dice.between(0.02, 0.06), 0.02}}});
+        const double y = 2.2 + 0.135 * i, z = random.between(1.3, 1.5), top = z + random.between(0.15, 0.35);
+        add(bodies, random.one_of({steel, red, yellow}),
+            {rod({4.5, y, z}, {4.52, y, top}, random.between(0.006, 0.02)),
+             Box{{4.5, y, top}, {0.03, random.between(0.02, 0.06), 0.02}}});
     }
-    drop_many(bodies, {4.3, 2.1}, {4.6, 4.1}, 2.03, 14, 0.1, 0.26, dice);
+    drop_many(bodies, {4.3, 2.1}, {4.6, 4.1}, 2.03, 14, 0.1, 0.26, random);
     add(bodies, steel,
         {rod({0.4, 0, 2.45}, {0.4, 5.4, 2.45}, 0.14), rod({0, 4.2, 2.35}, {4.6, 4.2, 2.35}, 0.05),
          rod({0, 4.36, 2.4}, {4.6, 4.36, 2.4}, 0.05), block({1.6, 0, 2.4}, {2.1, 5.4, 2.62})});

@@ -30,7 +30,7 @@ namespace {
 
 constexpr double units_per_metre = 5000; // TUM's
 constexpr double frames_per_s = 10, poses_per_s = 100;
-constexpr double depth_after_colour_s = 0.004; // the two images of real sensors are not of one instant either
+constexpr double depth_after_colour_s = 0.004; // real sensors do not take the two images at the same time either
 constexpr double first_stamp_s = 1700000000;
 
 /// Time since the walk began, in whole microseconds: stamps are names, so they must not depend on rounding.
@@ -52,12 +52,12 @@ Pinhole camera_of_size(cv::Size size) {
     return {f, f, (size.width - 1) / 2.0, (size.height - 1) / 2.0, size};
 }
 
-/// A generated capture is known by its truth/truth.json; nothing else is ever removed.
+/// truth/truth.json marks a generated capture. No other folder is ever removed.
 void make_room(const fs::path& out, bool overwrite) {
     if (!fs::exists(out) || (fs::is_directory(out) && fs::is_empty(out)))
         return;
     if (!overwrite)
-        throw Misuse(fmt::format("{} is there already; --overwrite replaces it", out.string()));
+        throw Misuse(fmt::format("{} exists already; --overwrite replaces it", out.string()));
     if (!fs::is_regular_file(out / "truth" / "truth.json"))
         throw Misuse(
             fmt::format("{} is not a generated capture (it has no truth/truth.json) and is left alone", out.string()));
@@ -76,7 +76,7 @@ std::vector<int> frames_of(const GenerateOptions& options) {
     return frames;
 }
 
-/// 16 bits at TUM's scale end at 13.1 m; what lies farther is written as float metres.
+/// 16 bits at TUM's scale end at 13.1 m. Scenes that reach farther are written as float metres.
 bool fits_png(const scene::Scene& scene) { return scene.far_m * units_per_metre < 65535; }
 
 std::string image_list(const char* folder, const char* extension, const std::vector<int>& frames,
@@ -87,7 +87,7 @@ std::string image_list(const char* folder, const char* extension, const std::vec
     return list;
 }
 
-/// What a recorded pose is off by, each time anew.
+/// The error of one recorded pose; independent between poses.
 Eigen::Isometry3d pose_error(const GenerateOptions& options, Microseconds time) {
     const Noise noise(options.seed, static_cast<int>(time / 1000), 77);
     const auto three = [&](int row, double sigma) {
@@ -95,14 +95,14 @@ Eigen::Isometry3d pose_error(const GenerateOptions& options, Microseconds time) 
                                sigma * noise.gaussian(2, row));
     };
     Eigen::Isometry3d error = Eigen::Isometry3d::Identity();
-    const Eigen::Vector3d turn = three(0, options.pose_noise_deg * std::numbers::pi / 180);
-    if (turn.norm() > 0)
-        error.linear() = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+    const Eigen::Vector3d rotation = three(0, options.pose_noise_deg * std::numbers::pi / 180);
+    if (rotation.norm() > 0)
+        error.linear() = Eigen::AngleAxisd(rotation.norm(), rotation.normalized()).toRotationMatrix();
     error.translation() = three(1, options.pose_noise_m);
     return error;
 }
 
-/// Poses at their own rate and at the very times of the images, so that what is paired with an image is its exact pose.
+/// Poses at their own rate and at the times of the images, so that each image pairs with its exact pose.
 std::string pose_list(const scene::Walk& walk, const std::vector<int>& frames, const GenerateOptions& options) {
     std::set<Microseconds> times;
     for (const int frame : frames)
@@ -221,7 +221,7 @@ TruthError write_truth(const GenerateOptions& options, const Sight& sight, const
     return summary_of(truth.standard_error);
 }
 
-/// How good the truth is, where it is written.
+/// The truth's errors, where truth is written.
 std::optional<TruthError> write_frame(const GenerateOptions& options, const scene::World& world,
                                       const scene::Optics& camera, int frame, const fs::path& out) {
     const scene::Walk& walk = world.scene().walk;
@@ -303,7 +303,7 @@ std::vector<Parameter> GenerateOptions::parameters() {
          .high = 100000},
         {.name = "size", .help = "image size, width x height", .value = &size, .unit = "pixels"},
         {.name = "lens-k1",
-         .help = "radial distortion of the lens that depth and colour are seen through",
+         .help = "radial distortion of the lens of depth and colour",
          .value = &lens_k1,
          .low = -1,
          .high = 1},
@@ -333,7 +333,7 @@ std::vector<Parameter> GenerateOptions::parameters() {
          .high = 1000},
         {.name = "truth-rays", .help = "rays per pixel of the truth", .value = &truth_rays, .low = 1, .high = 65536},
         {.name = "truth-falloff",
-         .help = "any of hard,quad,lin: how much an occluder counts with its distance",
+         .help = "any of hard,quad,lin: how an occluder's weight falls with its distance",
          .value = &truth_falloff},
         {.name = "cloud",
          .help = "a cloud of this many points on the scene's surfaces, instead of a recording; 0 = a recording",
@@ -341,7 +341,7 @@ std::vector<Parameter> GenerateOptions::parameters() {
          .low = 0,
          .high = 200000000},
         {.name = "cloud-normals", .help = "writes the cloud's normals", .value = &cloud_normals},
-        {.name = "overwrite", .help = "replaces a generated capture that is there already", .value = &overwrite},
+        {.name = "overwrite", .help = "replaces an earlier generated capture", .value = &overwrite},
     };
 }
 
@@ -355,11 +355,11 @@ void generate(const GenerateOptions& options, const fs::path& out, const Generat
     const std::vector<int> frames = frames_of(options);
 
     const scene::Optics optics(camera, {.k1 = options.lens_k1});
-    (void)optics.direction(0, 0); // the corner is what a lens loses first
+    (void)optics.direction(0, 0); // a lens loses the corner first
 
     make_room(out, options.overwrite);
     const fs::path note = out / "truth" / "truth.json";
-    write_atomically(note, truth_note(options, scene, camera, {})); // first: it marks the folder as ours
+    write_atomically(note, truth_note(options, scene, camera, {})); // first: it marks the folder as generated
     if (options.cloud > 0) {
         write_scene_cloud(options, scene::World(scene), out);
         return;
@@ -377,7 +377,7 @@ void generate(const GenerateOptions& options, const fs::path& out, const Generat
         if (progress)
             progress(static_cast<int>(i) + 1, options.frames);
     }
-    // Last, so that a capture that was cut short has no lists that promise more than there is.
+    // Last, so that the lists of an interrupted capture never name missing files.
     write_atomically(note, truth_note(options, scene, camera, errors));
     write_atomically(out / "groundtruth.txt", pose_list(scene.walk, frames, checked));
     write_atomically(out / "rgb.txt", image_list("rgb", ".png", frames, colour_time));

@@ -11,7 +11,7 @@
 
 namespace scanshade {
 
-/// What is generated. The rows of parameters() point into this object: keep it where it is while they are used.
+/// What to generate. The rows of parameters() point into this object: do not move it while they are used.
 struct GenerateOptions {
     std::string scene = "office";  ///< a name of scenes() (apps/scenes/scene.h)
     std::string sensor = "kinect"; ///< a name of sensors() (apps/scenes/sensor.h)
@@ -20,8 +20,8 @@ struct GenerateOptions {
     std::string size = "640x480";       ///< width x height in pixels; the field of view stays that of a Kinect
     double lens_k1 = 0;                 ///< radial distortion of the lens before both images (Brown 1971)
     int seed = 1;                       ///< of the sensor's and the poses' noise and the truth's rays
-    double pose_noise_m = 0;            ///< sigma of recorded places along each axis
-    double pose_noise_deg = 0;          ///< and of recorded attitudes about each
+    double pose_noise_m = 0;            ///< sigma of recorded positions along each axis
+    double pose_noise_deg = 0;          ///< sigma of recorded rotations about each axis
     bool truth = true;                  ///< whether truth/depth, truth/normals and truth/ao are written
     double truth_radius_m = 0;          ///< occluders farther than this do not count; 0 = the scene's own
     int truth_rays = 256;               ///< per pixel
@@ -30,7 +30,7 @@ struct GenerateOptions {
     bool cloud_normals = true;          ///< whether the cloud has them
     bool overwrite = false;
 
-    /// Every setting but the scene, which the command line takes as a word of its own.
+    /// Every setting but the scene, which is a word of the command line.
     [[nodiscard]] std::vector<Parameter> parameters();
 };
 
@@ -44,7 +44,7 @@ using GenerateProgress = std::function<void(int done, int total)>;
 /// farther than that counts), rgb.txt, depth.txt, groundtruth.txt (camera to world), camera.json, and truth/truth.json,
 /// truth/depth/<stamp>.tiff (exact z in metres), truth/normals/<stamp>.tiff (exact, x y z), truth/ao/<stamp>.tiff
 /// (cosine-weighted visibility within truth_radius_m; ao_quad and ao_lin for those falloffs). Same options, same bytes,
-/// however many threads there are, and a frame is the same whatever first and step it is reached by.
+/// however many threads there are. A frame is the same whatever first and step lead to it.
 /// With `cloud` set: NAME.ply, points of equal density on all that can be seen of the scene, and truth/NAME.ply, the
 /// same with the field ambient_occlusion, in place of images. Throws Misuse for options out of range, an `out` that
 /// holds something and is not to be overwritten, or (even then) is not a generated capture; Error where a file cannot

@@ -15,7 +15,7 @@ class Generate final : public Command {
     std::vector<Stage> stages() override {
         std::vector<Parameter> rows = options_.parameters();
         rows.insert(rows.begin(), {.name = "out", .help = "folder of the capture", .value = &out_});
-        rows.push_back({.name = "quiet", .help = "tells only failures", .value = &quiet_});
+        rows.push_back({.name = "quiet", .help = "prints only failures", .value = &quiet_});
         return {{"capture", rows}};
     }
 

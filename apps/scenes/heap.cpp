@@ -1,4 +1,4 @@
-// Things let down one by one, each on what lies there already.
+// Objects dropped one by one, each on those below it.
 #include "apps/scenes/heap.h"
 
 #include "apps/scenes/materials.h"
@@ -9,14 +9,14 @@
 namespace scanshade::scene {
 namespace {
 
-/// Where things come to rest that are let down one by one: the height of what lies there so far, on a grid of 2 cm.
+/// The heap's height so far, on a grid of 2 cm. Dropped objects rest on it.
 class Heap {
   public:
     Heap(const Vector2d& low, const Vector2d& high, double floor_z)
         : low_(low), columns_(cells(high.x() - low.x())), rows_(cells(high.y() - low.y())),
           top_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), floor_z) {}
 
-    /// Lets a thing with a round footprint down; returns the height it rests at.
+    /// Drops an object with a round footprint; returns the height that it rests at.
     double settle(const Vector2d& at, double radius, double height) {
         double rest = -1e9;
         for_cells(at, radius, [&](double& top) { rest = std::max(rest, top); });
@@ -45,24 +45,25 @@ class Heap {
     std::vector<double> top_;
 };
 
-/// One thing of about `size`, let down on a heap: boxes, some tipped over, balls, cans, bowls, pipes, open cartons.
-void drop(Bodies& bodies, Heap& heap, const Vector2d& at, double size, Dice& dice) {
-    const Material paint = dice.one_of({card, red, green, yellow, white, cloth, books, steel, clay});
-    const double yaw = dice.between(0, pi), tall = size * dice.between(0.4, 1.3);
-    switch (dice.below(8)) {
+/// Drops one object of about `size` on a heap: boxes, some tipped over, balls, cans, bowls, pipes, open cartons.
+void drop(Bodies& bodies, Heap& heap, const Vector2d& at, double size, Random& random) {
+    const Material paint = random.one_of({card, red, green, yellow, white, cloth, books, steel, clay});
+    const double yaw = random.between(0, pi), tall = size * random.between(0.4, 1.3);
+    switch (random.below(8)) {
     case 0:
     case 1:
     case 2: {
-        const double wide = size * dice.between(0.6, 1), deep = size * dice.between(0.4, 0.9);
+        const double wide = size * random.between(0.6, 1), deep = size * random.between(0.4, 0.9);
         const double z = heap.settle(at, 0.42 * std::min(wide, deep), tall);
         add(bodies, paint, {box_on(z, at.x(), at.y(), wide, deep, tall, yaw)});
         break;
     }
     case 3: { // tipped over, resting on an edge
-        const double tilt = dice.between(0.3, 1.2), half = size * 0.35;
+        const double tilt = random.between(0.3, 1.2), half = size * 0.35;
         const double high = 2 * half * (std::sin(tilt) + std::cos(tilt));
         const double z = heap.settle(at, half, high * 0.9);
-        const Eigen::Matrix3d axes = turned(yaw) * Eigen::AngleAxisd(tilt, Vector3d::UnitX()).toRotationMatrix();
+        const Eigen::Matrix3d axes =
+            rotation_about_z(yaw) * Eigen::AngleAxisd(tilt, Vector3d::UnitX()).toRotationMatrix();
         add(bodies, paint, {Box{{at.x(), at.y(), z + high / 2}, {half * 1.3, half, half}, axes}});
         break;
     }
@@ -78,19 +79,20 @@ void drop(Bodies& bodies, Heap& heap, const Vector2d& at, double size, Dice& dic
     }
     case 6: { // a bowl or bucket
         const double z = heap.settle(at, size * 0.4, tall * 0.3);
-        turn_on_lathe(bodies, paint, {at.x(), at.y(), z},
-                      {{0, 0.004}, {0.28 * size, 0.004}, {0.42 * size, 0.35 * tall}, {0.48 * size, 0.9 * tall}}, 20);
+        add_vessel(bodies, paint, {at.x(), at.y(), z},
+                   {{0, 0.004}, {0.28 * size, 0.004}, {0.42 * size, 0.35 * tall}, {0.48 * size, 0.9 * tall}}, 20);
         break;
     }
     default: { // an open carton
         const double half = size * 0.5, z = heap.settle(at, half, 0.3 * tall), wall = 0.006;
-        const Place place{{at.x(), at.y(), z}, yaw};
+        const LocalFrame local{{at.x(), at.y(), z}, yaw};
         add(bodies, card,
-            {place.box(0, 0, 0, 2 * half, 2 * half, wall), place.box(-half, 0, 0, wall, 2 * half, tall),
-             place.box(half, 0, 0, wall, 2 * half, tall), place.box(0, -half, 0, 2 * half, wall, tall),
-             place.box(0, half, 0, 2 * half, wall, tall)});
-        const Eigen::Matrix3d flap = turned(yaw) * Eigen::AngleAxisd(0.5, Vector3d::UnitY()).toRotationMatrix();
-        add(bodies, card, {Box{place(half + 0.07, 0, tall - 0.04), {0.08, half, wall / 2}, flap}});
+            {local.box(0, 0, 0, 2 * half, 2 * half, wall), local.box(-half, 0, 0, wall, 2 * half, tall),
+             local.box(half, 0, 0, wall, 2 * half, tall), local.box(0, -half, 0, 2 * half, wall, tall),
+             local.box(0, half, 0, 2 * half, wall, tall)});
+        const Eigen::Matrix3d flap =
+            rotation_about_z(yaw) * Eigen::AngleAxisd(0.5, Vector3d::UnitY()).toRotationMatrix();
+        add(bodies, card, {Box{local(half + 0.07, 0, tall - 0.04), {0.08, half, wall / 2}, flap}});
     }
     }
 }
@@ -98,12 +100,13 @@ void drop(Bodies& bodies, Heap& heap, const Vector2d& at, double size, Dice& dic
 } // namespace
 
 void drop_many(Bodies& bodies, const Vector2d& low, const Vector2d& high, double floor_z, int count, double smallest,
-               double largest, Dice& dice) {
+               double largest, Random& random) {
     Heap heap(low, high, floor_z);
-    for (int i = 0; i < count; ++i) { // large things first, as they lie in real heaps
+    for (int i = 0; i < count; ++i) { // large objects first, as in real heaps
         const double size = largest - (largest - smallest) * i / count, rim = size / 2;
-        drop(bodies, heap, {dice.between(low.x() + rim, high.x() - rim), dice.between(low.y() + rim, high.y() - rim)},
-             size, dice);
+        drop(bodies, heap,
+             {random.between(low.x() + rim, high.x() - rim), random.between(low.y() + rim, high.y() - rim)}, size,
+             random);
     }
 }
 

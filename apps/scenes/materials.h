@@ -1,4 +1,4 @@
-// What the scenes' surfaces look like.
+// Colours and patterns of the scenes' surfaces.
 #pragma once
 
 #include "apps/scenes/scene.h"

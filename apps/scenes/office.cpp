@@ -23,8 +23,8 @@ Scene office() {
     // Table with a lamp, books and a mug.
     add(bodies, oak, {box_on(0.72, 2.35, 3.55, 1.5, 0.8, 0.035, 0.12)});
     for (const auto& [x, y] : {std::pair{-0.68, -0.33}, {0.68, -0.33}, {-0.68, 0.33}, {0.68, 0.33}}) {
-        const Eigen::Rotation2Dd turn(0.12);
-        const Eigen::Vector2d leg = Eigen::Vector2d(2.35, 3.55) + turn * Eigen::Vector2d(x, y);
+        const Eigen::Rotation2Dd rotation(0.12);
+        const Eigen::Vector2d leg = Eigen::Vector2d(2.35, 3.55) + rotation * Eigen::Vector2d(x, y);
         add(bodies, steel, {Cylinder{{leg.x(), leg.y(), 0}, 0.025, 0.72}});
     }
     add(bodies, books, {box_on(0.755, 1.98, 3.66, 0.24, 0.17, 0.09, 0.5)});

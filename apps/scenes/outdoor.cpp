@@ -31,9 +31,9 @@ void add_ground(Bodies& bodies, const Material& material, double low_x, double h
 
 /// Walls with recessed windows and a door, a gable roof with eaves, a chimney, steps, a lean-to and gutters.
 void add_house(Bodies& bodies, const Vector2d& where, double yaw, double width, double depth, double eaves,
-               const Material& wall, Dice& dice) {
+               const Material& wall, Random& random) {
     const double ground = ground_at(where.x(), where.y()) - 0.3;
-    const Place at{{where.x(), where.y(), ground}, yaw};
+    const LocalFrame at{{where.x(), where.y(), ground}, yaw};
     const double w = width / 2, d = depth / 2, ridge = eaves + 0.42 * width, over = 0.55;
     add(bodies, wall, {at.box(0, 0, 0, width, depth, eaves)});
     for (const int end : {-1, 1})
@@ -86,37 +86,38 @@ void add_house(Bodies& bodies, const Vector2d& where, double yaw, double width, 
         for (int i = 0; i < 7; ++i)
             add(bodies, bark,
                 {rod(at(x - 0.9, 0.1 + 0.27 * i + 0.13 * (row % 2), 0.45 + 0.23 * row),
-                     at(x + dice.between(0.0, 0.15), 0.1 + 0.27 * i + 0.13 * (row % 2), 0.45 + 0.23 * row), 0.13)});
+                     at(x + random.between(0.0, 0.15), 0.1 + 0.27 * i + 0.13 * (row % 2), 0.45 + 0.23 * row), 0.13)});
 }
 
-void add_tree(Bodies& bodies, const Vector2d& where, double size, Dice& dice) {
+void add_tree(Bodies& bodies, const Vector2d& where, double size, Random& random) {
     const Vector3d foot(where.x(), where.y(), ground_at(where.x(), where.y()) - 0.2);
-    const Vector3d fork = foot + Vector3d(dice.between(-0.1, 0.1), dice.between(-0.1, 0.1), 0.4) * size;
+    const Vector3d fork = foot + Vector3d(random.between(-0.1, 0.1), random.between(-0.1, 0.1), 0.4) * size;
     add(bodies, bark, {rod(foot, fork, 0.035 * size)});
     for (int i = 0; i < 9; ++i) {
-        const double turn = 2.4 * i + dice.between(0, 0.5), out = dice.between(0.15, 0.34) * size;
+        const double angle = 2.4 * i + random.between(0, 0.5), out = random.between(0.15, 0.34) * size;
         const Vector3d tip =
-            fork + Vector3d(out * std::cos(turn), out * std::sin(turn), dice.between(0.12, 0.5) * size);
+            fork + Vector3d(out * std::cos(angle), out * std::sin(angle), random.between(0.12, 0.5) * size);
         add(bodies, bark, {rod(fork, tip, 0.012 * size)});
         for (int twig = 0; twig < 3; ++twig) {
-            const Vector3d end =
-                tip + size * Vector3d(dice.between(-0.16, 0.16), dice.between(-0.16, 0.16), dice.between(-0.04, 0.14));
+            const Vector3d end = tip + size * Vector3d(random.between(-0.16, 0.16), random.between(-0.16, 0.16),
+                                                       random.between(-0.04, 0.14));
             add(bodies, bark, {rod(tip, end, 0.005 * size)});
-            add(bodies, leaves, {Sphere{end, dice.between(0.05, 0.1) * size}});
+            add(bodies, leaves, {Sphere{end, random.between(0.05, 0.1) * size}});
         }
     }
 }
 
-void add_bush(Bodies& bodies, const Vector2d& where, double size, Dice& dice) {
+void add_bush(Bodies& bodies, const Vector2d& where, double size, Random& random) {
     const Vector3d foot(where.x(), where.y(), ground_at(where.x(), where.y()));
     for (int i = 0; i < 12; ++i)
         add(bodies, leaves,
-            {Sphere{foot + size * Vector3d(dice.between(-0.5, 0.5), dice.between(-0.4, 0.4), dice.between(0.1, 0.55)),
-                    dice.between(0.15, 0.26) * size}});
+            {Sphere{
+                foot + size * Vector3d(random.between(-0.5, 0.5), random.between(-0.4, 0.4), random.between(0.1, 0.55)),
+                random.between(0.15, 0.26) * size}});
 }
 
 void add_car(Bodies& bodies, const Vector2d& where, double yaw, const Material& paint) {
-    const Place at{{where.x(), where.y(), ground_at(where.x(), where.y())}, yaw};
+    const LocalFrame at{{where.x(), where.y(), ground_at(where.x(), where.y())}, yaw};
     add(bodies, paint, {at.box(0, 0, 0.28, 1.75, 4.2, 0.55), at.box(0, -1.7, 0.45, 1.7, 0.7, 0.42)});
     const auto roof = [&](double x, double y) { return at(x, y, 1.45); };
     const auto waist = [&](double x, double y) { return at(x, y, 0.83); };
@@ -155,7 +156,7 @@ Scene outdoor() {
                 .ao_radius_m = 2,
                 .far_m = 150};
     Bodies& bodies = scene.bodies;
-    Dice dice(53);
+    Random random(53);
     const Material asphalt{{0.17, 0.17, 0.17}, {0.21, 0.20, 0.20}, Pattern::plaster, 0.3};
     add_ground(bodies, asphalt, -3, 3, -20, 130, 1);
     for (const int side : {-1, 1}) {
@@ -183,7 +184,7 @@ Scene outdoor() {
           House{-12, 50, pi / 2, 8, 9, 5.8, &whitewash}, House{12, 58, -pi / 2, 8, 8, 3.2, &plaster},
           House{-14, 78, 1.2, 9, 11, 6, &brick}, House{14, 84, -1.9, 9, 9, 5.8, &whitewash},
           House{-2, 118, 0, 12, 8, 6, &plaster}})
-        add_house(bodies, {h.x, h.y}, h.yaw, h.width, h.depth, h.eaves, *h.wall, dice);
+        add_house(bodies, {h.x, h.y}, h.yaw, h.width, h.depth, h.eaves, *h.wall, random);
     for (const auto& [x, y, size] : {std::array{-6.0, 19.5, 6.0},
                                      {6.2, 7.0, 5.0},
                                      {6.0, 26.5, 7.0},
@@ -198,10 +199,10 @@ Scene outdoor() {
                                      {-25.0, 45.0, 10.0},
                                      {9.0, 98.0, 9.0},
                                      {-9.0, 100.0, 9.0}})
-        add_tree(bodies, {x, y}, size, dice);
+        add_tree(bodies, {x, y}, size, random);
     for (int i = 0; i < 26; ++i) {
         const double side = i % 2 ? 1 : -1;
-        add_bush(bodies, {side * dice.between(4.6, 6.5), 2 + 2.4 * i}, dice.between(0.8, 1.8), dice);
+        add_bush(bodies, {side * random.between(4.6, 6.5), 2 + 2.4 * i}, random.between(0.8, 1.8), random);
     }
     for (const auto& [x, y0, y1] : {std::array{-4.6, 2.0, 7.0},
                                     {-4.6, 13.5, 24.0},
@@ -225,24 +226,24 @@ Scene outdoor() {
     }
     for (int i = 0; i < 4; ++i) { // lamps
         const double y = 11 + 16.0 * i, z = ground_at(-3.6, y);
-        string_up(bodies, steel, {{-3.6, y, z}, {-3.6, y, z + 4.6}, {-2.9, y, z + 5.0}}, 0.05);
-        turn_on_lathe(bodies, steel, {-2.7, y, z + 4.85}, {{0.28, 0}, {0.1, 0.2}, {0, 0.22}}, 12);
+        add_rod_chain(bodies, steel, {{-3.6, y, z}, {-3.6, y, z + 4.6}, {-2.9, y, z + 5.0}}, 0.05);
+        add_vessel(bodies, steel, {-2.7, y, z + 4.85}, {{0.28, 0}, {0.1, 0.2}, {0, 0.22}}, 12);
     }
     add_car(bodies, {-1.9, 15}, 0.02, red);
     add_car(bodies, {1.9, 23}, pi, white);
     add_car(bodies, {2.0, 33.5}, pi + 0.04, yellow);
     add_car(bodies, {-1.9, 41}, 0, cloth);
     for (const double y : {9.5, 21.0, 38.0}) { // benches, bins, heaps of sacks and crates
-        const Place at{{-3.9, y, ground_at(-3.9, y)}, pi / 2};
+        const LocalFrame at{{-3.9, y, ground_at(-3.9, y)}, pi / 2};
         for (int slat = 0; slat < 4; ++slat)
             add(bodies, oak,
                 {at.box(0, 0.13 * slat, 0.44, 1.6, 0.09, 0.04),
                  at.box(0, -0.1 - 0.02 * slat, 0.55 + 0.13 * slat, 1.6, 0.03, 0.09)});
         for (const double x : {-0.65, 0.65})
             add(bodies, steel, {at.box(x, 0.2, 0, 0.06, 0.5, 0.44), at.box(x, -0.15, 0, 0.06, 0.06, 1.0)});
-        turn_on_lathe(bodies, green, at(1.3, 0.1, 0), {{0, 0.02}, {0.22, 0.02}, {0.27, 0.8}}, 18);
+        add_vessel(bodies, green, at(1.3, 0.1, 0), {{0, 0.02}, {0.22, 0.02}, {0.27, 0.8}}, 18);
         const double z = ground_at(4.0, y + 3) - 0.02;
-        drop_many(bodies, {3.5, y + 2}, {4.5, y + 5}, z, 9, 0.3, 0.9, dice);
+        drop_many(bodies, {3.5, y + 2}, {4.5, y + 5}, z, 9, 0.3, 0.9, random);
     }
     scene.windows = {{-40, -30, 60}, {60, 40, 90}};
     scene.walk = {{{{-0.50, -6.0, 1.75}, {-2.00, 14.0, 1.80}},

@@ -1,4 +1,4 @@
-// The parts things are built of, as the solids rays can hit.
+// The parts that furniture is built of, as solids that rays can hit.
 #include "apps/scenes/parts.h"
 
 #include <cmath>
@@ -15,10 +15,10 @@ void add(Bodies& bodies, const Material& material, const std::vector<Triangle>& 
         bodies.push_back({triangle, material});
 }
 
-Eigen::Matrix3d turned(double yaw) { return Eigen::AngleAxisd(yaw, Vector3d::UnitZ()).toRotationMatrix(); }
+Eigen::Matrix3d rotation_about_z(double yaw) { return Eigen::AngleAxisd(yaw, Vector3d::UnitZ()).toRotationMatrix(); }
 
 Box box_on(double floor_z, double x, double y, double width, double depth, double height, double yaw) {
-    return {{x, y, floor_z + height / 2}, {width / 2, depth / 2, height / 2}, turned(yaw)};
+    return {{x, y, floor_z + height / 2}, {width / 2, depth / 2, height / 2}, rotation_about_z(yaw)};
 }
 
 Box block(const Vector3d& low, const Vector3d& high) { return {(low + high) / 2, (high - low) / 2}; }
@@ -36,7 +36,7 @@ Box bar(const Vector3d& from, const Vector3d& to, double width) {
     return {(from + to) / 2, {width / 2, width / 2, (to - from).norm() / 2}, axes};
 }
 
-void string_up(Bodies& bodies, const Material& material, const std::vector<Vector3d>& points, double radius) {
+void add_rod_chain(Bodies& bodies, const Material& material, const std::vector<Vector3d>& points, double radius) {
     for (std::size_t i = 0; i + 1 < points.size(); ++i)
         add(bodies, material, {rod(points[i], points[i + 1], radius)});
 }
@@ -48,7 +48,7 @@ void hang_wire(Bodies& bodies, const Material& material, const Vector3d& from, c
         const double s = static_cast<double>(i) / pieces;
         points.push_back(from + s * (to - from) - Vector3d(0, 0, 4 * sag * s * (1 - s)));
     }
-    string_up(bodies, material, points, radius);
+    add_rod_chain(bodies, material, points, radius);
 }
 
 void add_ring(Bodies& bodies, const Material& material, const Vector3d& centre, const Vector3d& axis,
@@ -56,17 +56,17 @@ void add_ring(Bodies& bodies, const Material& material, const Vector3d& centre, 
     const Vector3d x = axis.unitOrthogonal(), y = axis.cross(x);
     std::vector<Vector3d> points;
     for (int i = 0; i <= pieces; ++i) {
-        const double turn = 2 * pi * i / pieces;
-        points.push_back(centre + ring_radius * (std::cos(turn) * x + std::sin(turn) * y));
+        const double angle = 2 * pi * i / pieces;
+        points.push_back(centre + ring_radius * (std::cos(angle) * x + std::sin(angle) * y));
     }
-    string_up(bodies, material, points, radius);
+    add_rod_chain(bodies, material, points, radius);
 }
 
-void turn_on_lathe(Bodies& bodies, const Material& material, const Vector3d& foot, const std::vector<Vector2d>& profile,
-                   int sides) {
+void add_vessel(Bodies& bodies, const Material& material, const Vector3d& foot, const std::vector<Vector2d>& profile,
+                int sides) {
     const auto at = [&](const Vector2d& p, int side) {
-        const double turn = 2 * pi * side / sides;
-        return Vector3d(foot + Vector3d(p.x() * std::cos(turn), p.x() * std::sin(turn), p.y()));
+        const double angle = 2 * pi * side / sides;
+        return Vector3d(foot + Vector3d(p.x() * std::cos(angle), p.x() * std::sin(angle), p.y()));
     };
     for (std::size_t i = 0; i + 1 < profile.size(); ++i)
         for (int side = 0; side < sides; ++side) {

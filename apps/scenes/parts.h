@@ -1,5 +1,5 @@
-// The parts things are built of: bars, rods, wires, vessels, shells. World axes as in apps/scenes/scene.h, metres,
-// radians.
+// The parts that furniture is built of: bars, rods, wires, vessels, shells. World axes are those of
+// apps/scenes/scene.h. Units are metres and radians.
 #pragma once
 
 #include "apps/scenes/scene.h"
@@ -14,11 +14,11 @@ using Eigen::Vector2d, Eigen::Vector3d;
 using Bodies = std::vector<Body>;
 inline constexpr double pi = std::numbers::pi;
 
-/// Throws that come out the same on every run.
-class Dice {
+/// Random numbers that are the same on every run.
+class Random {
   public:
-    explicit Dice(std::uint32_t seed) : seed_(seed) {}
-    double between(double low, double high) { return low + (high - low) * (hash(seed_, thrown_++) * 0x1p-32); }
+    explicit Random(std::uint32_t seed) : seed_(seed) {}
+    double between(double low, double high) { return low + (high - low) * (hash(seed_, drawn_++) * 0x1p-32); }
     int below(int count) { return static_cast<int>(between(0, count)); }
     template <class Item>
     Item one_of(std::initializer_list<Item> items) {
@@ -26,47 +26,47 @@ class Dice {
     }
 
   private:
-    std::uint32_t seed_, thrown_ = 0;
+    std::uint32_t seed_, drawn_ = 0;
 };
 
-/// Adds solids, or a surface of triangles, of one material.
+/// Adds solids, or triangles of a surface, of one material.
 void add(Bodies& bodies, const Material& material, std::initializer_list<Solid> solids);
 void add(Bodies& bodies, const Material& material, const std::vector<Triangle>& triangles);
 
-/// A turn about the vertical.
-[[nodiscard]] Eigen::Matrix3d turned(double yaw);
-/// An upright box standing at height `floor_z` with its middle over (x, y).
+/// Rotation about the vertical axis.
+[[nodiscard]] Eigen::Matrix3d rotation_about_z(double yaw);
+/// An upright box on a floor at height `floor_z`, with its middle over (x, y).
 [[nodiscard]] Box box_on(double floor_z, double x, double y, double width, double depth, double height, double yaw = 0);
-/// From one corner to the opposite one.
+/// An axis-aligned box from one corner to the opposite one.
 [[nodiscard]] Box block(const Vector3d& low, const Vector3d& high);
 [[nodiscard]] Cylinder rod(const Vector3d& from, const Vector3d& to, double radius);
 /// A bar of square section.
 [[nodiscard]] Box bar(const Vector3d& from, const Vector3d& to, double width);
-/// Corners in turn.
+/// Corners in order around it.
 [[nodiscard]] std::vector<Triangle> quad(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d);
 
 /// A chain of rods through points.
-void string_up(Bodies& bodies, const Material& material, const std::vector<Vector3d>& points, double radius);
-/// A wire between two points that hangs through by `sag`.
+void add_rod_chain(Bodies& bodies, const Material& material, const std::vector<Vector3d>& points, double radius);
+/// A wire between two points that sags by `sag`.
 void hang_wire(Bodies& bodies, const Material& material, const Vector3d& from, const Vector3d& to, double sag,
                double radius, int pieces = 12);
 /// A ring of rods.
 void add_ring(Bodies& bodies, const Material& material, const Vector3d& centre, const Vector3d& axis,
               double ring_radius, double radius, int pieces = 24);
-/// An upright thin-walled vessel with a polygon for a circle: (radius, height) pairs from the foot on.
-void turn_on_lathe(Bodies& bodies, const Material& material, const Vector3d& foot, const std::vector<Vector2d>& profile,
-                   int sides = 24);
-/// Walls, floor and ceiling as boxes round a room that begins at the world's origin.
+/// An upright thin-walled vessel with a polygon for a circle. The profile is (radius, height) pairs from the foot up.
+void add_vessel(Bodies& bodies, const Material& material, const Vector3d& foot, const std::vector<Vector2d>& profile,
+                int sides = 24);
+/// Walls, floor and ceiling as boxes around a room with one corner at the world's origin.
 void add_shell(Bodies& bodies, const Vector3d& size, const Material& floor, const Material& wall,
                const Material& ceiling);
 
-/// A thing's own axes in the room: x and y turned, the origin on the floor.
-struct Place {
+/// A piece of furniture's own axes in the room: rotated about z, the origin on the floor.
+struct LocalFrame {
     Vector3d foot;
     double yaw = 0;
 
     [[nodiscard]] Vector3d operator()(double x, double y, double z) const {
-        return foot + turned(yaw) * Vector3d(x, y, z);
+        return foot + rotation_about_z(yaw) * Vector3d(x, y, z);
     }
     [[nodiscard]] Box box(double x, double y, double z, double width, double depth, double height) const {
         const Vector3d at = (*this)(x, y, z);

@@ -1,4 +1,4 @@
-// Noise as a hash of what it belongs to: the same on every run, however many threads there are.
+// Noise as a hash of seed, frame, purpose and pixel: the same on every run, however many threads there are.
 #pragma once
 
 #include "projection/hash.h"
@@ -9,7 +9,7 @@
 
 namespace scanshade {
 
-/// A stream of independent numbers, told apart by seed, frame and purpose, indexed by pixel.
+/// A stream of independent numbers by seed, frame and purpose, indexed by pixel.
 class Noise {
   public:
     constexpr Noise(int seed, int frame, std::uint32_t purpose)

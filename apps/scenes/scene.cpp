@@ -1,4 +1,4 @@
-// Scenes seen by rays: a tree finds the solid, its formula says where exactly it is hit.
+// Rays against scenes: a tree finds the solid, and its formula gives the exact hit.
 #include "apps/scenes/scene.h"
 
 #include "apps/scenes/random_noise.h"
@@ -108,8 +108,8 @@ Crossing cross(const Triangle& triangle, const Ray& ray, double near) {
         return {};
     const Vector3d from_corner = ray.origin - triangle.a;
     const double u = from_corner.dot(lever) / volume;
-    const Vector3d turned = from_corner.cross(side);
-    const double v = ray.direction.dot(turned) / volume, t = other.dot(turned) / volume;
+    const Vector3d q = from_corner.cross(side);
+    const double v = ray.direction.dot(q) / volume, t = other.dot(q) / volume;
     constexpr double rim = 1e-9; // neighbours overlap by rounding rather than leave a gap
     if (u < -rim || v < -rim || u + v > 1 + rim || t <= near)
         return {};
@@ -142,7 +142,7 @@ std::pair<Vector3d, Vector3d> across(const Vector3d& axis) {
     return {x, axis.cross(x)};
 }
 
-/// Sides of a polygon whose middles lie within a thousandth of the radius, or a tenth of a millimetre, of the circle.
+/// Sides of a polygon whose middles are within a thousandth of the radius, or a tenth of a millimetre, of the circle.
 int sides_of_circle(double radius) {
     const double share = std::min(std::max(1e-3, 1e-4 / radius), 0.1);
     return static_cast<int>(std::ceil(std::numbers::pi / std::acos(1 - share)));
@@ -174,8 +174,8 @@ void tessellate(const Sphere& sphere, Mesh& mesh) {
     const int first = static_cast<int>(mesh.vertices.size());
     for (int ring = 0; ring <= rings; ++ring)
         for (int side = 0; side < sides; ++side) {
-            const double polar = std::numbers::pi * ring / rings, turn = 2 * std::numbers::pi * side / sides;
-            const Vector3d out(std::sin(polar) * std::cos(turn), std::sin(polar) * std::sin(turn), std::cos(polar));
+            const double polar = std::numbers::pi * ring / rings, angle = 2 * std::numbers::pi * side / sides;
+            const Vector3d out(std::sin(polar) * std::cos(angle), std::sin(polar) * std::sin(angle), std::cos(polar));
             add_vertex(mesh, sphere.centre + sphere.radius * out);
         }
     for (int ring = 0; ring < rings; ++ring)
@@ -191,8 +191,8 @@ void tessellate(const Cylinder& cylinder, Mesh& mesh) {
     const Vector3d top = cylinder.base + cylinder.height * cylinder.axis;
     const int low = add_vertex(mesh, cylinder.base), high = add_vertex(mesh, top), first = high + 1;
     for (int side = 0; side < sides; ++side) {
-        const double turn = 2 * std::numbers::pi * side / sides;
-        const Vector3d out = cylinder.radius * (std::cos(turn) * x + std::sin(turn) * y);
+        const double angle = 2 * std::numbers::pi * side / sides;
+        const Vector3d out = cylinder.radius * (std::cos(angle) * x + std::sin(angle) * y);
         add_vertex(mesh, cylinder.base + out);
         add_vertex(mesh, top + out);
     }
@@ -287,7 +287,7 @@ Vector3d albedo(const Material& material, const Vector3d& point, const Vector3d&
     return material.tone + share * (material.other_tone - material.tone);
 }
 
-/// Even light from above, soft light from each window, and a lamp beside the lens so that no face stays flat.
+/// Even light from above, soft light from each window, and a lamp at the lens so that every face has some shading.
 Vector3d light_at(const Scene& scene, const Vector3d& point, const Vector3d& normal, const Vector3d& eye) {
     const Vector3d sky(0.27, 0.28, 0.30), floor_glow(0.21, 0.19, 0.17), daylight(1.05, 1.0, 0.92),
         lamp(0.16, 0.155, 0.15);
@@ -339,21 +339,23 @@ Vector3d spline(const Vector3d& a, const Vector3d& b, const Vector3d& c, const V
 } // namespace
 
 Eigen::Isometry3d world_from_camera(const Walk& walk, double seconds) {
-    const int count = static_cast<int>(walk.looks.size());
+    const int count = static_cast<int>(walk.viewpoints.size());
     const double along = seconds / walk.period_s * count, before = std::floor(along);
-    const auto look = [&](int step) -> const Look& {
+    const auto viewpoint = [&](int step) -> const Viewpoint& {
         const int i = (static_cast<int>(before) + step) % count;
-        return walk.looks[static_cast<std::size_t>(i < 0 ? i + count : i)];
+        return walk.viewpoints[static_cast<std::size_t>(i < 0 ? i + count : i)];
     };
-    const auto through = [&](Vector3d Look::*place) {
-        return spline(look(-1).*place, look(0).*place, look(1).*place, look(2).*place, along - before);
+    const auto through = [&](Vector3d Viewpoint::*point) {
+        return spline(viewpoint(-1).*point, viewpoint(0).*point, viewpoint(1).*point, viewpoint(2).*point,
+                      along - before);
     };
     // Three sines without a common period, a few millimetres and tenths of a degree: a steady hand.
     const auto sway = [&](double hertz, double offset) {
         return std::sin(2 * std::numbers::pi * hertz * seconds + offset);
     };
     const Vector3d tremble(sway(1.3, 0.4), sway(0.9, 2.0), sway(1.7, 4.1));
-    Eigen::Isometry3d pose = looking_at(through(&Look::eye) + 0.004 * tremble, through(&Look::target) + 0.02 * tremble);
+    Eigen::Isometry3d pose =
+        looking_at(through(&Viewpoint::eye) + 0.004 * tremble, through(&Viewpoint::target) + 0.02 * tremble);
     pose.rotate(Eigen::AngleAxisd(0.01 * sway(0.7, 1.0), Vector3d::UnitZ()));
     return pose;
 }
@@ -381,7 +383,7 @@ Hit World::cast(const Ray& ray) const {
         const Body& body = *body_of_triangle_[static_cast<std::size_t>(met->primitive)];
         if (const Crossing exact = cross(body.solid, ray, 1e-9); exact.t < never)
             return facing(body, exact, ray);
-        near = met->distance * (1 + 1e-6); // it grazed a rim that in double precision it misses
+        near = met->distance * (1 + 1e-6); // in double precision the ray misses the rim that it grazed
     }
 }
 

@@ -20,13 +20,13 @@ struct Ray {
     Eigen::Vector3d origin, direction; ///< `t` counts in lengths of direction
 };
 
-/// A square of 1 km, as good as endless; `normal` has unit length.
+/// A square of 1 km, practically endless; `normal` has unit length.
 struct Plane {
     Eigen::Vector3d point, normal;
 };
 struct Box {
     Eigen::Vector3d centre, half;
-    Eigen::Matrix3d axes = Eigen::Matrix3d::Identity(); ///< columns: where its own axes point, unit
+    Eigen::Matrix3d axes = Eigen::Matrix3d::Identity(); ///< columns: the box's own axes, unit
 };
 struct Sphere {
     Eigen::Vector3d centre;
@@ -38,7 +38,7 @@ struct Cylinder {
     double radius, height;
     Eigen::Vector3d axis = Eigen::Vector3d::UnitZ(); ///< unit, from the base to the other end
 };
-/// Hollow things and ground are made of these.
+/// Hollow objects and ground are made of triangles.
 struct Triangle {
     Eigen::Vector3d a, b, c;
 };
@@ -46,7 +46,7 @@ using Solid = std::variant<Plane, Box, Sphere, Cylinder, Triangle>;
 
 enum class Pattern { plain, checks, boards, plaster, books };
 
-/// What a surface looks like: linear RGB, two tones woven by a pattern of size `scale_m`.
+/// A surface's appearance: linear RGB, two tones in a pattern of size `scale_m`.
 struct Material {
     Eigen::Vector3d tone{0.5, 0.5, 0.5}, other_tone{0.5, 0.5, 0.5};
     Pattern pattern = Pattern::plain;
@@ -64,13 +64,13 @@ struct Hit {
     const Body* body = nullptr;                       ///< null: nothing was hit
 };
 
-/// Where a recording stands and what it looks at.
-struct Look {
+/// A camera's position, and the point that it looks at.
+struct Viewpoint {
     Eigen::Vector3d eye, target;
 };
-/// A closed, smooth round through its looks, evenly timed.
+/// A closed, smooth path through the viewpoints, evenly timed.
 struct Walk {
-    std::vector<Look> looks;
+    std::vector<Viewpoint> viewpoints;
     double period_s = 16;
 };
 
@@ -79,26 +79,26 @@ struct Scene {
     std::vector<Body> bodies = {};
     std::vector<Eigen::Vector3d> windows = {}; ///< soft lights
     Walk walk = {};
-    double ao_radius_m = 0.5; ///< to which the truth looks unless told otherwise
+    double ao_radius_m = 0.5; ///< the truth's radius by default
     double far_m = 10;        ///< nothing is seen beyond
 };
 
 /// The table of scenes (apps/scenes/).
 [[nodiscard]] const std::vector<Scene>& scenes();
-/// Throws Misuse listing the names there are.
+/// Throws Misuse listing the known names.
 [[nodiscard]] const Scene& scene_named(std::string_view name);
 
-/// Camera to world at a time on the scene's walk, with the sway of a hand.
+/// Camera to world at a time on the scene's walk, with the sway of a hand-held camera.
 [[nodiscard]] Eigen::Isometry3d world_from_camera(const Walk& walk, double seconds);
-/// A camera at `eye` whose optical axis meets `target`, image upright.
+/// A camera at `eye` whose optical axis goes through `target`, image upright.
 [[nodiscard]] Eigen::Isometry3d looking_at(const Eigen::Vector3d& eye, const Eigen::Vector3d& target);
 
-/// The nearest surface beyond `near` lengths of the ray, by trying every body's formula.
+/// The nearest surface beyond `near` lengths of the ray. Tries every body's formula.
 [[nodiscard]] Hit cast(const std::vector<Body>& bodies, const Ray& ray, double near = 1e-9);
 
-/// A scene made ready for many rays: tessellated, in a tree. Round things become polyhedra inscribed within a
-/// thousandth of their radius (a tenth of a millimetre for small ones), which serve to find what is hit and to block;
-/// where it is hit the formula says.
+/// A scene made ready for many rays: tessellated, in a tree. Round bodies become polyhedra inscribed within a
+/// thousandth of their radius (a tenth of a millimetre for small ones). The polyhedra find the body that is hit, and
+/// block rays. The body's formula gives the point of the hit.
 class World {
   public:
     /// Keeps a reference to the scene.
@@ -118,12 +118,12 @@ class World {
 /// The tessellated scene as a mesh.
 [[nodiscard]] Mesh mesh_of(const Scene& scene);
 
-/// What pixels look through: a pinhole, and maybe a lens that bends.
+/// A pinhole camera, and optionally a distorting lens.
 struct Optics {
     Pinhole pinhole;
     Distortion lens;
     Optics(const Pinhole& camera, const Distortion& distortion = {}) : pinhole(camera), lens(distortion) {}
-    /// x and y at z = 1 of where a pixel looks. Throws Misuse where the lens shows nothing.
+    /// x and y at z = 1 of a pixel's ray. Throws Misuse where the lens has no ray for the pixel.
     [[nodiscard]] Eigen::Vector2d direction(double u, double v) const;
 };
 
@@ -136,8 +136,8 @@ struct Geometry {
 [[nodiscard]] Geometry render_geometry(const World& world, const Optics& camera,
                                        const Eigen::Isometry3d& world_from_camera);
 
-/// BGR as a camera would store it: albedo under window light and a lamp at the camera, four samples per pixel. There
-/// are no shadows and no occlusion in it: those are for the program under test to add.
+/// BGR as a camera would store it: albedo under window light and a lamp at the camera, four samples per pixel. It has
+/// no shadows and no occlusion, which the program under test must add.
 [[nodiscard]] cv::Mat3b render_colour(const World& world, const Optics& camera,
                                       const Eigen::Isometry3d& world_from_camera);
 

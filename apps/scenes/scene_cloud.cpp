@@ -18,20 +18,20 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Random numbers that depend on nothing but their number: threads cannot change them.
-class Dice {
+/// Random numbers that depend on seed and index only, so threads cannot change them.
+class Random {
   public:
-    Dice(std::uint32_t seed, std::uint64_t number)
+    Random(std::uint32_t seed, std::uint64_t number)
         : key_(hash(hash(seed, static_cast<std::uint32_t>(number)), static_cast<std::uint32_t>(number >> 32))) {}
-    double roll() { return (key_ = hash(key_, ++rolled_)) * 0x1p-32; }
+    double next() { return (key_ = hash(key_, ++drawn_)) * 0x1p-32; }
 
   private:
-    std::uint32_t key_, rolled_ = 0;
+    std::uint32_t key_, drawn_ = 0;
 };
 
-Vector3d on_sphere(Dice& dice) {
-    const double z = 2 * dice.roll() - 1, turn = 2 * std::numbers::pi * dice.roll(), across = std::sqrt(1 - z * z);
-    return {across * std::cos(turn), across * std::sin(turn), z};
+Vector3d on_sphere(Random& random) {
+    const double z = 2 * random.next() - 1, angle = 2 * std::numbers::pi * random.next(), across = std::sqrt(1 - z * z);
+    return {across * std::cos(angle), across * std::sin(angle), z};
 }
 
 std::vector<Vector3d> stations(const Walk& walk) {
@@ -42,31 +42,31 @@ std::vector<Vector3d> stations(const Walk& walk) {
     return eyes;
 }
 
-/// What is seen from the stations, as a box.
+/// The box around the surfaces seen from the stations.
 Eigen::AlignedBox3d seen_box(const World& world, const std::vector<Vector3d>& eyes) {
     Eigen::AlignedBox3d box;
     for (std::uint64_t i = 0; i < 20000; ++i) {
-        Dice dice(7, i);
-        const Ray ray{eyes[i % eyes.size()], on_sphere(dice)};
+        Random random(7, i);
+        const Ray ray{eyes[i % eyes.size()], on_sphere(random)};
         if (const Hit hit = world.cast(ray); hit.body && hit.t <= world.scene().far_m)
             box.extend(Vector3d(ray.origin + hit.t * ray.direction));
     }
     if (box.isEmpty())
         throw Error(fmt::format("scene {}: nothing is seen from its walk", world.scene().name));
-    const Vector3d margin = Vector3d::Constant(1e-3); // surfaces in the box's own sides belong to it
+    const Vector3d margin = Vector3d::Constant(1e-3); // surfaces on the box's faces belong to it
     return {box.min() - margin, box.max() + margin};
 }
 
-/// Places in the air that one of the stations sees: from some of them one looks under tables and behind cupboards.
-void add_free_places(const World& world, const Eigen::AlignedBox3d& box, std::vector<Vector3d>& eyes) {
+/// Free positions that one of the stations sees. Some of them see under tables and behind cupboards.
+void add_free_positions(const World& world, const Eigen::AlignedBox3d& box, std::vector<Vector3d>& eyes) {
     constexpr std::size_t wanted = 400;
     const std::vector<Vector3d> stations = eyes;
     for (std::uint64_t i = 0; eyes.size() < wanted && i < 100 * wanted; ++i) {
-        Dice dice(11, i);
-        const Vector3d place =
-            box.min() + Vector3d(dice.roll(), dice.roll(), dice.roll()).cwiseProduct(Vector3d(box.sizes()));
-        if (!world.surface().blocked(stations[i % stations.size()], place))
-            eyes.push_back(place);
+        Random random(11, i);
+        const Vector3d position =
+            box.min() + Vector3d(random.next(), random.next(), random.next()).cwiseProduct(Vector3d(box.sizes()));
+        if (!world.surface().blocked(stations[i % stations.size()], position))
+            eyes.push_back(position);
     }
 }
 
@@ -90,7 +90,7 @@ std::vector<Vector3d> clipped(std::vector<Vector3d> polygon, const Eigen::Aligne
     return polygon;
 }
 
-/// Triangles that points are drawn from, by area.
+/// Triangles to sample points from, by area.
 struct Drawable {
     std::vector<std::array<Vector3d, 3>> triangles;
     std::vector<double> area_up_to;
@@ -108,19 +108,20 @@ struct Drawable {
         }
     }
 
-    [[nodiscard]] std::pair<Vector3d, Vector3d> draw(Dice& dice) const {
-        const auto chosen = std::upper_bound(area_up_to.begin(), area_up_to.end() - 1, dice.roll() * area_up_to.back());
+    [[nodiscard]] std::pair<Vector3d, Vector3d> draw(Random& random) const {
+        const auto chosen =
+            std::upper_bound(area_up_to.begin(), area_up_to.end() - 1, random.next() * area_up_to.back());
         const auto& [a, b, c] = triangles[static_cast<std::size_t>(chosen - area_up_to.begin())];
-        const double root = std::sqrt(dice.roll()), along = dice.roll();
+        const double root = std::sqrt(random.next()), along = random.next();
         return {(1 - root) * a + root * (1 - along) * b + root * along * c, (b - a).cross(c - a).normalized()};
     }
 };
 
-/// The side of a surface that one of the stations sees; none where it is hidden from all.
+/// The normal of the side that one of the stations sees; none where the point is hidden from all.
 std::optional<Vector3d> seen_side(const World& world, const std::vector<Vector3d>& eyes, const Vector3d& point,
                                   const Vector3d& normal, std::size_t first) {
     const double clear = 2 * world.surface().rounding_m();
-    constexpr std::size_t tried = 64; // of a hidden surface each would be tried in vain
+    constexpr std::size_t tried = 64; // a limit, since hidden surfaces would try all stations
     for (std::size_t i = 0; i < tried; ++i) {
         const Vector3d& eye = eyes[(first + i) % eyes.size()];
         const Vector3d facing = normal.dot(eye - point) < 0 ? Vector3d(-normal) : normal;
@@ -135,15 +136,15 @@ std::optional<Vector3d> seen_side(const World& world, const std::vector<Vector3d
 SceneCloud scene_cloud(const World& world, std::size_t count, int seed) {
     std::vector<Vector3d> eyes = stations(world.scene().walk);
     const Eigen::AlignedBox3d box = seen_box(world, eyes);
-    add_free_places(world, box, eyes);
+    add_free_positions(world, box, eyes);
     const Drawable drawable(mesh_of(world.scene()), box);
     SceneCloud cloud;
     constexpr std::size_t batch = 1 << 16;
     std::vector<std::pair<Vector3d, std::optional<Vector3d>>> drawn(batch);
     for (std::uint64_t begun = 0; cloud.points.size() < count; begun += batch) {
         tbb::parallel_for(std::size_t(0), batch, [&](std::size_t i) {
-            Dice dice(static_cast<std::uint32_t>(seed), begun + i);
-            const auto [point, normal] = drawable.draw(dice);
+            Random random(static_cast<std::uint32_t>(seed), begun + i);
+            const auto [point, normal] = drawable.draw(random);
             drawn[i] = {point, seen_side(world, eyes, point, normal, i)};
         });
         for (std::size_t i = 0; i < batch && cloud.points.size() < count; ++i)

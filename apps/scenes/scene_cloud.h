@@ -1,4 +1,4 @@
-// A scene as a cloud: points spread evenly over all surfaces that anything in its free space sees, with exact truth.
+// A scene as a cloud: points spread evenly over all visible surfaces, with exact truth.
 #pragma once
 
 #include "apps/scenes/scene.h"
@@ -7,14 +7,14 @@
 
 namespace scanshade::scene {
 
-/// Points in world coordinates (z up, metres), with the unit normals of the sides they were seen from.
+/// Points in world coordinates (z up, metres), with unit normals that face the viewer.
 struct SceneCloud {
     std::vector<Eigen::Vector3d> points, normals;
 };
 
-/// `count` points of equal density on the tessellated surfaces, within the box that is seen from the walk, as far as
-/// they are seen from the walk or from one of many places that are: below tables, too, but not where a rug lies on the
-/// floor. The same seed gives the same points.
+/// `count` points of equal density on the tessellated surfaces, within the box that is seen from the walk. Each point
+/// is seen from the walk, or from a free position that the walk sees. So there are points below tables, but none on the
+/// floor under a rug. The same seed gives the same points.
 [[nodiscard]] SceneCloud scene_cloud(const World& world, std::size_t count, int seed = 1);
 
 /// True visibility of each point (all of them or every `step`-th, the rest NaN): rays against the scene itself.

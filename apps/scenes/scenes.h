@@ -1,21 +1,21 @@
-// The scenes themselves, one to a file: what stands where. Rooms are made of things, things of parts.
+// The scenes, one per file. Rooms are made of furniture, furniture of parts.
 #pragma once
 
 #include "apps/scenes/scene.h"
 
 namespace scanshade::scene {
 
-/// A room of 4.2 x 5.2 x 2.6 m with furniture against its walls and things on the floor.
+/// A room of 4.2 x 5.2 x 2.6 m with furniture against its walls and objects on the floor.
 [[nodiscard]] Scene office();
-/// A stairwell of 5 x 6.5 x 5.6 m: two flights with a landing between them, and what is kept below and beside them.
+/// A stairwell of 5 x 6.5 x 5.6 m: two flights with a landing, and objects stored below and beside them.
 [[nodiscard]] Scene staircase();
-/// A hall of 8 x 13 x 6 m with two arcades, niches, a coffered ceiling and what has fallen off.
+/// A hall of 8 x 13 x 6 m with two arcades, niches, a coffered ceiling and fallen stones.
 [[nodiscard]] Scene columns();
-/// A store room of 4.6 x 5.4 x 2.7 m with shelves, a workbench and heaps of several hundred things.
+/// A store room of 4.6 x 5.4 x 2.7 m with shelves, a workbench and heaps of several hundred objects.
 [[nodiscard]] Scene clutter();
 /// A lane between houses, to 150 m.
 [[nodiscard]] Scene outdoor();
-/// A conservatory of 4.4 x 5 x 2.7 m whose things are 5 to 20 mm thick.
+/// A conservatory of 4.4 x 5 x 2.7 m whose objects are 5 to 20 mm thick.
 [[nodiscard]] Scene thin();
 
 } // namespace scanshade::scene

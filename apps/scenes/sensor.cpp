@@ -12,7 +12,7 @@
 namespace scanshade {
 namespace {
 
-/// What each stream of noise is for.
+/// The purpose of each stream of noise.
 enum Purpose : std::uint32_t { axial, sideways, downward, grazing, fraying, flying, mixing };
 
 Noise noise_of(const Sight& sight, Purpose purpose) { return {sight.seed, sight.frame, purpose}; }
@@ -23,7 +23,7 @@ float depth_at(const Sight& sight, int u, int v) {
     return z_m(std::clamp(v, 0, z_m.rows - 1), std::clamp(u, 0, z_m.cols - 1));
 }
 
-/// A step of more than 4 % between two pixels is the outline of something, not a slope.
+/// A step of more than 4 % between two pixels is an outline, not a slope.
 bool is_edge(double z_m, double other_m) { return std::abs(z_m - other_m) > 0.04 * std::min(z_m, other_m); }
 
 bool beside_edge(const Sight& sight, int u, int v) {
@@ -49,7 +49,7 @@ double grazing_loss(double cosine) {
     return std::clamp((none - cosine) / (none - certain), 0.0, 1.0);
 }
 
-/// White noise under a 5x5 tent, sigma 1: devices measure in windows, so neighbouring pixels err alike.
+/// White noise under a 5x5 tent, sigma 1: devices measure in windows, so errors of neighbouring pixels are correlated.
 cv::Mat1f window_noise(const Sight& sight, Purpose purpose) {
     constexpr std::array<double, 5> tent{1 / 9.0, 2 / 9.0, 3 / 9.0, 2 / 9.0, 1 / 9.0};
     constexpr double left_over =
@@ -78,7 +78,8 @@ cv::Mat1f window_noise(const Sight& sight, Purpose purpose) {
     return smooth;
 }
 
-/// Normal noise, sigma 1, as evenly spread in (0, 1): what is lost is lost in patches, not as single grains.
+/// Normal noise of sigma 1, mapped to uniform in (0, 1). It is correlated, so depth is lost in patches, not single
+/// pixels.
 double evenly(double gaussian) { return 0.5 * std::erfc(-gaussian / std::numbers::sqrt2); }
 
 template <class Measure>
@@ -94,7 +95,7 @@ cv::Mat1f per_pixel(const Sight& sight, Measure&& measure) {
 
 // ---------------------------------------------------------------------------------------------------- structured light
 
-/// The projector stands beside the camera: what the camera sees but the projector does not reach has no dots.
+/// The projector is to one side of the camera. Surfaces that it does not reach have no dots, so no depth.
 bool in_shadow(const Sight& sight, int u, int v, double z_m) {
     const Eigen::Vector3d projector(0.075, 0, 0);
     const cv::Vec3f& n = sight.exact.normals(v, u);

@@ -1,4 +1,4 @@
-// Depth sensors, simulated: exact depth in, what the device would have recorded out.
+// Simulated depth sensors: exact depth in, recorded depth out.
 #pragma once
 
 #include "apps/scenes/scene.h"
@@ -8,7 +8,7 @@
 
 namespace scanshade {
 
-/// What a sensor looks at. All of one pixel grid.
+/// A sensor's view of the scene, all on one pixel grid.
 struct Sight {
     const scene::World& world;
     scene::Optics camera;
@@ -24,13 +24,13 @@ struct Sensor {
 
 /// The table of sensors: ideal, kinect, tof.
 [[nodiscard]] const std::vector<Sensor>& sensors();
-/// Throws Misuse listing the names there are.
+/// Throws Misuse listing the known names.
 [[nodiscard]] const Sensor& sensor_named(std::string_view name);
 
 /// Structured light (Kinect v1): one standard deviation of depth along the axis (Nguyen, Izadi and Lovell 2012, eq. 5).
 [[nodiscard]] constexpr double kinect_sigma_m(double z_m) { return 0.0012 + 0.0019 * (z_m - 0.4) * (z_m - 0.4); }
-/// Its disparity comes in eighths of a pixel, so depths at z lie kinect_step_per_m * z^2 apart (3 mm at 1 m, 11 mm at 2
-/// m: f b = 43.9 px m, Khoshelham and Elberink 2012).
+/// Its disparity has steps of an eighth of a pixel, so depths at z are kinect_step_per_m * z^2 apart (3 mm at 1 m, 11
+/// mm at 2 m: f b = 43.9 px m, Khoshelham and Elberink 2012).
 inline constexpr double kinect_step_per_m = 2.85e-3;
 
 /// Time of flight: depth noise of one pixel facing the sensor; grows with the square of the distance as less light

@@ -1,4 +1,4 @@
-// The scene staircase: two flights, so that floors overlap, with railings and narrow gaps.
+// The scene staircase: two flights above each other, with railings and narrow gaps.
 #include "apps/scenes/scenes.h"
 
 #include "apps/scenes/heap.h"
@@ -6,13 +6,12 @@
 #include "apps/scenes/parts.h"
 #include "apps/scenes/things.h"
 
-
 namespace scanshade::scene {
 
 Scene staircase() {
     Scene scene{.name = "staircase", .summary = "a stairwell with two flights, railings, niches and things kept below"};
     Bodies& bodies = scene.bodies;
-    Dice dice(11);
+    Random random(11);
     add_shell(bodies, {5, 6.5, 5.6}, tiles, plaster, whitewash);
     constexpr int steps = 10;
     constexpr double rise = 0.17, run = 0.29, start = 1.6;
@@ -36,7 +35,7 @@ Scene staircase() {
     add_railing(bodies, {2.75, landing_y + 0.1, landing_z}, {2.75, 6.4, landing_z}, 0.95, 0.11, 0.009);
     add_railing(bodies, {2.85, start - 0.05, 3.4}, {4.95, start - 0.05, 3.4}, 0.95, 0.11, 0.009);
     // Below the second flight and the landing: boxes, a bicycle, brooms.
-    drop_many(bodies, {1.6, 4.7}, {2.5, 6.4}, 0, 14, 0.12, 0.42, dice);
+    drop_many(bodies, {1.6, 4.7}, {2.5, 6.4}, 0, 14, 0.12, 0.42, random);
     add_bicycle(bodies, {{3.9, 6.18, 0}, 0});
     for (const double x : {2.95, 3.02, 3.12}) {
         add(bodies, oak, {rod({x, 6.05, 0.05}, {x + 0.05, 6.47, 1.4}, 0.012)});
@@ -48,20 +47,21 @@ Scene staircase() {
          block({4.6, 3.50, 0}, {4.98, 3.55, 0.40}), block({4.93, 2.2, 1.6}, {5, 3.6, 1.72})});
     for (int i = 0; i < 6; ++i) {
         const double y = 2.35 + 0.21 * i;
-        add(bodies, books, {box_on(0, 4.74 + dice.between(-0.05, 0.05), y, 0.26, 0.09, 0.09, dice.between(-0.3, 0.3))});
+        add(bodies, books,
+            {box_on(0, 4.74 + random.between(-0.05, 0.05), y, 0.26, 0.09, 0.09, random.between(-0.3, 0.3))});
         add(bodies, steel, {rod({4.93, y, 1.66}, {4.82, y, 1.70}, 0.008)});
     }
     add(bodies, cloth, {box_on(0.85, 4.86, 2.58, 0.14, 0.34, 0.84), box_on(0.95, 4.87, 3.02, 0.12, 0.38, 0.74, 0.1)});
     for (const double y : {3.85, 4.75})
         add(bodies, plaster, {block({4.8, y, 0}, {5, y + 0.18, 2.4})});
     add(bodies, plaster, {block({4.75, 3.82, 2.4}, {5, 4.96, 2.55})});
-    turn_on_lathe(bodies, clay, {4.8, 4.4, 0},
-                  {{0, 0.004}, {0.10, 0.004}, {0.16, 0.25}, {0.12, 0.45}, {0.07, 0.52}, {0.10, 0.58}});
+    add_vessel(bodies, clay, {4.8, 4.4, 0},
+               {{0, 0.004}, {0.10, 0.004}, {0.16, 0.25}, {0.12, 0.45}, {0.07, 0.52}, {0.10, 0.58}});
     add_radiator(bodies, {{4.88, 5.5, 0}, pi / 2}, 12);
     for (const double y : {5.02, 5.08, 6.35})
         add(bodies, white, {rod({4.96, y, 0}, {4.96, y, 5.6}, 0.018)});
     add(bodies, white, {rod({4.96, 5.08, 2.7}, {4.96, 6.35, 2.7}, 0.018)});
-    add_pot_plant(bodies, {3.3, 0.5, 0}, 1.1, dice);
+    add_pot_plant(bodies, {3.3, 0.5, 0}, 1.1, random);
     // On the left wall a handrail on brackets; on the far one panels, and a lamp over the well.
     add(bodies, oak, {rod({0.09, start, rise + 0.9}, {0.09, landing_y, landing_z + 0.9}, 0.022)});
     for (int i = 0; i <= 4; ++i) {
@@ -76,8 +76,8 @@ Scene staircase() {
              block({x, 6.46, landing_z + 0.1}, {x + 0.62, 6.5, landing_z + 0.16}),
              block({x, 6.46, 3.04}, {x + 0.62, 6.5, 3.1})});
     }
-    string_up(bodies, steel, {{3.4, 3.6, 5.6}, {3.4, 3.6, 4.3}}, 0.006);
-    turn_on_lathe(bodies, yellow, {3.4, 3.6, 4.0}, {{0.28, 0}, {0.22, 0.15}, {0.05, 0.3}});
+    add_rod_chain(bodies, steel, {{3.4, 3.6, 5.6}, {3.4, 3.6, 4.3}}, 0.006);
+    add_vessel(bodies, yellow, {3.4, 3.6, 4.0}, {{0.28, 0}, {0.22, 0.15}, {0.05, 0.3}});
     for (const double y : {start, 3.2, 4.8})
         add(bodies, oak, {block({0, y, 5.35}, {5, y + 0.14, 5.6})});
     scene.windows = {{4.6, 0.4, 2.4}, {2.5, 6.0, 5.0}};

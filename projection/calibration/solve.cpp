@@ -186,7 +186,7 @@ std::vector<int> clusters_of_rows(const ceres::Problem& problem,
     return of_rows;
 }
 
-/// The inverse of a symmetric matrix, scaled to a unit diagonal first; empty where double precision tells none.
+/// The inverse of a symmetric matrix, scaled to a unit diagonal first; empty where double precision cannot invert it.
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& normal) {
     constexpr double smallest = 1e-13; // of the eigenvalues: what is left of double precision after squaring
     const Eigen::VectorXd scale = normal.diagonal().cwiseSqrt().cwiseInverse();

@@ -1,4 +1,4 @@
-// Measuring as a person meets it: compare, bench, calibrate-look, budgets; and the parts they are made of.
+// The commands compare, bench and calibrate-look, budgets of run, and the parts that they are made of.
 #include "ao/compare.h"
 #include "ao/gpu/device.h"
 #include "apps/measure/bench_results.h"
@@ -30,7 +30,7 @@ using tests::says;
 using tests::TemporaryFolder;
 namespace fs = std::filesystem;
 
-/// A generated capture of two frames, 64x48, made once; and a run of it.
+/// A generated capture of two frames, 64x48, and a run of it. Both are made once.
 class MeasureTest : public testing::Test {
   protected:
     static void SetUpTestSuite() {
@@ -81,7 +81,7 @@ TEST_F(MeasureTest, truth_is_found_from_the_run_or_in_the_capture) {
     const Ran named = run_program(fmt::format("compare {} {}", made(), capture()));
     EXPECT_EQ(named.exit_code, 0) << named.err;
     EXPECT_EQ(by_itself.out, named.out);
-    // the same figures from the maps themselves
+    // the same numbers from the maps themselves
     std::vector<Difference> images;
     for (const auto& file : fs::directory_iterator(fs::path(made()) / "ao")) {
         const fs::path truth = fs::path(capture()) / "truth/ao" / (file.path().stem().string() + ".tiff");
@@ -107,7 +107,7 @@ TEST_F(MeasureTest, errors_by_confidence_share_out_all_pixels) {
     EXPECT_NEAR(squares, all_squares, 1e-4 * all_squares);
 }
 
-TEST_F(MeasureTest, maps_of_another_radius_are_told) {
+TEST_F(MeasureTest, maps_of_another_radius_get_a_warning) {
     ASSERT_EQ(run_program(fmt::format("run {} -o {} --write ao --radius 0.2", capture(), out())).exit_code, 0);
     EXPECT_TRUE(says(run_program(fmt::format("compare {} --truth", out())).err, "radius of 0.2 m, B with 0.5 m"));
 }
@@ -115,10 +115,10 @@ TEST_F(MeasureTest, maps_of_another_radius_are_told) {
 TEST_F(MeasureTest, a_comparison_is_printed_as_json_when_asked) {
     const Ran ran = run_program(fmt::format("compare {} --truth --json -o {}", made(), out()));
     ASSERT_EQ(ran.exit_code, 0) << ran.err;
-    EXPECT_EQ(json::parse(ran.out), read(folder / "out/compare.json")) << "and nothing else stands there";
+    EXPECT_EQ(json::parse(ran.out), read(folder / "out/compare.json")) << "and stdout holds nothing else";
 }
 
-TEST_F(MeasureTest, a_damaged_map_is_told_and_the_others_are_compared) {
+TEST_F(MeasureTest, a_damaged_map_is_reported_and_the_others_are_compared) {
     fs::copy(made(), out(), fs::copy_options::recursive);
     const fs::path first = fs::directory_iterator(folder / "out/ao")->path();
     fs::resize_file(first, 40);
@@ -148,26 +148,26 @@ TEST_F(MeasureTest, an_earlier_comparison_is_replaced_only_when_asked) {
     EXPECT_EQ(run_program(words + " --overwrite").exit_code, 0);
 }
 
-// ---------------------------------------------------------------------------------------------------- the front
+// ---------------------------------------------------------------------------------------------------- the Pareto front
 
-Priced point(const std::string& name, double ns, double rms) { return {{"m", name, {}}, ns, rms}; }
+BenchmarkPoint point(const std::string& name, double ns, double rms) { return {{"m", name, {}}, ns, rms}; }
 
-TEST(FrontTest, holds_what_nothing_beats) {
+TEST(ParetoFrontTest, holds_the_points_that_no_other_beats) {
     const double unknown = std::nan("");
-    const std::vector<Priced> points{point("dear and good", 9, 0.05), point("cheap", 1, 0.2),
-                                     point("beaten", 5, 0.12),        point("middle", 4, 0.1),
-                                     point("cheap again", 1, 0.2),    point("as dear, worse", 9, 0.06),
-                                     point("failed", unknown, 0.01)};
-    EXPECT_EQ(on_front(points), (std::vector<bool>{true, true, false, true, false, false, false}));
+    const std::vector<BenchmarkPoint> points{point("dear and good", 9, 0.05), point("cheap", 1, 0.2),
+                                             point("beaten", 5, 0.12),        point("middle", 4, 0.1),
+                                             point("cheap again", 1, 0.2),    point("as dear, worse", 9, 0.06),
+                                             point("failed", unknown, 0.01)};
+    EXPECT_EQ(on_pareto_front(points), (std::vector<bool>{true, true, false, true, false, false, false}));
 }
 
-TEST(FrontTest, survives_its_file_and_says_what_is_wrong_with_another) {
-    Front front{"some device", {{SensorClass::clean, "bench"}}, {}, {}, {}};
+TEST(ParetoFrontTest, survives_its_file_and_names_what_is_wrong_with_another) {
+    ParetoFront front{"some device", {{SensorClass::clean, "bench"}}, {}, {}, {}};
     front.points[SensorClass::clean] = {{{"cacao", "low", {{"quality", "low"}}}, 30, 0.12},
                                         {{"cacao", "high", {{"quality", "high"}}}, 60, 0.1}};
     front.others[SensorClass::clean] = {{{"cacao", "lowest", {{"quality", "lowest"}}}, 40, 0.2}};
     front.sequences[SensorClass::clean] = {"measured", {"surfel", "high", {{"quality", "high"}}}, 0.2, 0.1, 2};
-    const Front again = front_from(to_json(front), "front.json");
+    const ParetoFront again = front_from(to_json(front), "front.json");
     EXPECT_EQ(to_json(again), to_json(front));
     json bad = to_json(front);
     bad["clean"]["points"][1]["ns_per_pixel"] = 0;
@@ -175,15 +175,15 @@ TEST(FrontTest, survives_its_file_and_says_what_is_wrong_with_another) {
     EXPECT_TRUE(says(refusal([&] { (void)front_from({{"device", "x"}}, "front.json"); }), "no points"));
 }
 
-TEST(FrontTest, parts_of_two_devices_do_not_go_together) {
-    Front one{"a", {{SensorClass::clean, ""}}, {{SensorClass::clean, {point("x", 1, 0.1)}}}, {}, {}};
-    const Front other{"b", {{SensorClass::clean, ""}}, {{SensorClass::clean, {point("y", 1, 0.1)}}}, {}, {}};
+TEST(ParetoFrontTest, parts_of_two_devices_cannot_be_joined) {
+    ParetoFront one{"a", {{SensorClass::clean, ""}}, {{SensorClass::clean, {point("x", 1, 0.1)}}}, {}, {}};
+    const ParetoFront other{"b", {{SensorClass::clean, ""}}, {{SensorClass::clean, {point("y", 1, 0.1)}}}, {}, {}};
     EXPECT_TRUE(says(refusal([&] { one.replace_with(other); }), "two devices"));
 }
 
-TEST(FrontTest, the_shipped_one_is_a_front_of_configurations_that_are_there) {
+TEST(ParetoFrontTest, the_shipped_one_holds_existing_configurations) {
     for (const auto& [sensor, points] : shipped_front().points) {
-        const std::vector<bool> front = on_front(points);
+        const std::vector<bool> front = on_pareto_front(points);
         for (std::size_t i = 0; i < points.size(); ++i) {
             EXPECT_TRUE(front[i]) << points[i].configuration.full_name();
             const auto setup = method_named(points[i].configuration.method).setup();
@@ -192,14 +192,14 @@ TEST(FrontTest, the_shipped_one_is_a_front_of_configurations_that_are_there) {
     }
 }
 
-TEST(FrontTest, the_shipped_one_knows_the_error_of_every_preset) {
-    const Front& front = shipped_front();
+TEST(ParetoFrontTest, the_shipped_one_knows_the_error_of_every_preset) {
+    const ParetoFront& front = shipped_front();
     for (const auto& [sensor, points] : front.points) {
         double last = 1;
         for (const auto& [name, preset] : preset_words) {
             const std::string wanted = configuration_of(preset).full_name();
-            const auto is_it = [&](const Priced& point) { return point.configuration.full_name() == wanted; };
-            const std::vector<Priced>& others = front.others.at(sensor);
+            const auto is_it = [&](const BenchmarkPoint& point) { return point.configuration.full_name() == wanted; };
+            const std::vector<BenchmarkPoint>& others = front.others.at(sensor);
             const auto on = std::ranges::find_if(points, is_it), off = std::ranges::find_if(others, is_it);
             ASSERT_TRUE(on != points.end() || off != others.end()) << wanted;
             const double rms = on != points.end() ? on->rms : off->rms;
@@ -209,7 +209,7 @@ TEST(FrontTest, the_shipped_one_knows_the_error_of_every_preset) {
     }
 }
 
-TEST(ConfigurationTest, every_one_is_accepted_and_none_is_there_twice) {
+TEST(ConfigurationTest, each_is_accepted_and_unique) {
     std::set<std::string> names, of_methods;
     for (const Configuration& configuration : configurations()) {
         const auto setup = method_named(configuration.method).setup();
@@ -220,7 +220,7 @@ TEST(ConfigurationTest, every_one_is_accepted_and_none_is_there_twice) {
     EXPECT_EQ(of_methods.size(), methods().size()) << "every method is measured";
 }
 
-TEST(ConfigurationTest, an_unknown_setting_is_told_with_the_configuration) {
+TEST(ConfigurationTest, an_unknown_setting_is_reported_with_its_configuration) {
     const auto setup = method_named("cacao").setup();
     EXPECT_TRUE(says(refusal([&] { apply({"cacao", "odd", {{"colour", "red"}}}, *setup); }), "cacao odd"));
     EXPECT_TRUE(says(refusal([&] { apply({"cacao", "odd", {{"quality", "red"}}}, *setup); }), "cacao odd: quality"));
@@ -228,35 +228,36 @@ TEST(ConfigurationTest, an_unknown_setting_is_told_with_the_configuration) {
 
 // ---------------------------------------------------------------------------------------------------- budgets
 
-const std::vector<Priced> priced_points{point("cheap", 10, 0.2), point("middle", 20, 0.1), point("dear", 90, 0.05)};
+const std::vector<BenchmarkPoint> benchmark_points{point("cheap", 10, 0.2), point("middle", 20, 0.1),
+                                                   point("dear", 90, 0.05)};
 
-TEST(BudgetTest, an_error_takes_the_cheapest_and_a_time_the_most_accurate) {
+TEST(BudgetTest, an_error_limit_takes_the_cheapest_and_a_time_limit_the_most_accurate) {
     const std::vector<double> ms{1, 2, 9};
-    EXPECT_EQ(pick(priced_points, ms, {.max_error = 0.15}), 1u);
-    EXPECT_EQ(pick(priced_points, ms, {.max_error = 0.3}), 0u);
-    EXPECT_EQ(pick(priced_points, ms, {.max_error = 0.05}), 2u);
-    EXPECT_EQ(pick(priced_points, ms, {.max_ms = 8.9}), 1u);
-    EXPECT_EQ(pick(priced_points, ms, {.max_ms = 100}), 2u);
-    EXPECT_EQ(pick(priced_points, ms, {.max_error = 0.15, .max_ms = 100}), 2u);
+    EXPECT_EQ(pick(benchmark_points, ms, {.max_error = 0.15}), 1u);
+    EXPECT_EQ(pick(benchmark_points, ms, {.max_error = 0.3}), 0u);
+    EXPECT_EQ(pick(benchmark_points, ms, {.max_error = 0.05}), 2u);
+    EXPECT_EQ(pick(benchmark_points, ms, {.max_ms = 8.9}), 1u);
+    EXPECT_EQ(pick(benchmark_points, ms, {.max_ms = 100}), 2u);
+    EXPECT_EQ(pick(benchmark_points, ms, {.max_error = 0.15, .max_ms = 100}), 2u);
 }
 
-TEST(BudgetTest, what_cannot_be_kept_is_told_with_what_could) {
+TEST(BudgetTest, an_impossible_budget_is_refused_with_the_nearest_points) {
     const std::vector<double> ms{1, 2, 9};
     EXPECT_TRUE(
-        says(refusal([&] { (void)pick(priced_points, ms, {.max_error = 0.01}); }), "the most accurate, m dear"));
-    EXPECT_TRUE(says(refusal([&] { (void)pick(priced_points, ms, {.max_ms = 0.5}); }), "the fastest, m cheap"));
+        says(refusal([&] { (void)pick(benchmark_points, ms, {.max_error = 0.01}); }), "the most accurate, m dear"));
+    EXPECT_TRUE(says(refusal([&] { (void)pick(benchmark_points, ms, {.max_ms = 0.5}); }), "the fastest, m cheap"));
     EXPECT_TRUE(
-        says(refusal([&] { (void)pick(priced_points, ms, {.max_error = 0.07, .max_ms = 5}); }), "RMSE 0.07, 5 ms"));
+        says(refusal([&] { (void)pick(benchmark_points, ms, {.max_error = 0.07, .max_ms = 5}); }), "RMSE 0.07, 5 ms"));
 }
 
-TEST_F(MeasureTest, a_budget_picks_says_and_verifies) {
+TEST_F(MeasureTest, a_budget_picks_reports_and_verifies) {
     const Ran ran = run_program(
         fmt::format("run {} -o {} --write ao,confidence --depth-noise none --max-ms 100000", capture(), out()));
     ASSERT_EQ(ran.exit_code, 0) << ran.err;
     EXPECT_TRUE(says(ran.err, "picked"));
     EXPECT_TRUE(says(ran.err, "to truth"));
-    const std::vector<Priced>& points = shipped_front().points.at(SensorClass::clean);
-    const auto best = std::ranges::min_element(points, {}, &Priced::rms);
+    const std::vector<BenchmarkPoint>& points = shipped_front().points.at(SensorClass::clean);
+    const auto best = std::ranges::min_element(points, {}, &BenchmarkPoint::rms);
     const json manifest = read(folder / "out/manifest.json");
     EXPECT_EQ(manifest["method"], best->configuration.method);
     EXPECT_FALSE(manifest["budget"].empty());
@@ -293,7 +294,7 @@ TEST_F(MeasureTest, bench_leaves_one_page_with_everything_in_it) {
     ASSERT_EQ(ran.exit_code, 0) << ran.err;
     EXPECT_TRUE(says(ran.out, "cacao high"));
     const std::string html = read_bytes(folder / "out/index.html");
-    const std::string plot = read_bytes(folder / "out/clean.svg"); // stands alone: name space and style of its own
+    const std::string plot = read_bytes(folder / "out/clean.svg"); // complete by itself: its own name space and style
     EXPECT_TRUE(plot.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\"")) << plot.substr(0, 80);
     EXPECT_TRUE(says(plot, ".ring {") && says(plot, "Speed against error, clean depth") && says(plot, "</svg>"));
     for (const char* part : {"<svg", "Speed against error", "Error by capture", "distance from depth edges", "range",
@@ -311,7 +312,7 @@ TEST_F(MeasureTest, bench_leaves_one_page_with_everything_in_it) {
         ++of_cacao;
     }
     EXPECT_GE(on_the_front, 1u);
-    const Front front = front_from(read(folder / "front.json"), "front.json");
+    const ParetoFront front = front_from(read(folder / "front.json"), "front.json");
     EXPECT_EQ(front.points.at(SensorClass::clean).size(), on_the_front);
     const std::string csv = read_bytes(folder / "out/bench.csv");
     EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), 1 + 2 * of_cacao);
@@ -326,7 +327,6 @@ TEST_F(MeasureTest, bench_leaves_one_page_with_everything_in_it) {
     EXPECT_NEAR(std::sqrt(squares / pixels), row["difference"]["rms"].get<double>(), 2e-4);
 }
 
-/// What the fused reference says of a generated capture whose truth is known.
 TEST(FusedReferenceTest, comes_closer_to_truth_than_rays_against_one_depth_image) {
     const TemporaryFolder folder;
     const std::string capture = (folder / "capture").string();
@@ -381,8 +381,7 @@ TEST_F(MeasureTest, bench_parts_print_what_they_measure) {
     EXPECT_TRUE(says(printed(fmt::format("--compare-maps {}", maps.string())), "highest_downsampled"));
 }
 
-/// Maps of another device that are too far off are told in the exit code.
-TEST_F(MeasureTest, bench_tells_maps_that_are_far_apart) {
+TEST_F(MeasureTest, maps_of_two_devices_that_differ_too_much_give_exit_code_2) {
     const fs::path maps = folder / "maps";
     ASSERT_EQ(run_program(fmt::format("bench --write-maps {}", maps.string())).exit_code, 0);
     fs::copy_file(maps / "lowest_native.f32", maps / "high_downsampled.f32", fs::copy_options::overwrite_existing);
@@ -406,7 +405,7 @@ TEST_F(MeasureTest, bench_needs_truth_and_something_to_do) {
     EXPECT_TRUE(says(odd.err, "cacao"));
 }
 
-TEST(ErrorClassTest, the_pixels_beside_a_step_are_the_nearest_to_an_edge) {
+TEST(ErrorClassTest, the_pixels_at_a_step_are_the_nearest_to_an_edge) {
     cv::Mat1f z_m(20, 40, 1.0F);
     z_m.colRange(20, 40) = 2.0F;
     const PixelClasses classes = by_edge_distance(z_m);
@@ -416,11 +415,11 @@ TEST(ErrorClassTest, the_pixels_beside_a_step_are_the_nearest_to_an_edge) {
     EXPECT_EQ(classes.names[classes.of(10, 5)], "8 .. 16 px");
     z_m(3, 3) = 0;
     EXPECT_EQ(by_edge_distance(z_m).of(3, 3), PixelClasses::none);
-    EXPECT_EQ(by_edge_distance(z_m).of(3, 4), 0) << "beside a hole depth ends";
+    EXPECT_EQ(by_edge_distance(z_m).of(3, 4), 0) << "depth ends at a hole";
 }
 
-/// A plane through (0, 0, 2) whose normal leans by `degrees` from the optical axis.
-cv::Mat1f leaning_plane(const Pinhole& camera, double degrees) {
+/// A plane through (0, 0, 2) whose normal is tilted by `degrees` from the optical axis.
+cv::Mat1f tilted_plane(const Pinhole& camera, double degrees) {
     const double slope = std::tan(degrees * std::numbers::pi / 180);
     cv::Mat1f z_m(camera.size);
     for (int v = 0; v < z_m.rows; ++v)
@@ -429,9 +428,9 @@ cv::Mat1f leaning_plane(const Pinhole& camera, double degrees) {
     return z_m;
 }
 
-TEST(ErrorClassTest, a_leaning_plane_has_its_angle_and_no_edges) {
+TEST(ErrorClassTest, a_tilted_plane_has_its_angle_and_no_edges) {
     const Pinhole camera{500, 500, 31.5, 23.5, {64, 48}};
-    const cv::Mat1f z_m = leaning_plane(camera, 52); // rays lean by up to 4 degrees themselves: 48 .. 56
+    const cv::Mat1f z_m = tilted_plane(camera, 52); // rays are up to 4 degrees off the axis: 48 .. 56
     const PixelClasses angles = by_grazing_angle(z_m, camera), edges = by_edge_distance(z_m);
     for (int v = 0; v < z_m.rows; ++v)
         for (int u = 8; u < z_m.cols - 8; ++u) {
@@ -442,7 +441,7 @@ TEST(ErrorClassTest, a_leaning_plane_has_its_angle_and_no_edges) {
 
 // ---------------------------------------------------------------------------------------------------- pages
 
-TEST(PageTest, ticks_are_round_and_lie_in_the_range) {
+TEST(PageTest, ticks_are_round_and_within_the_range) {
     EXPECT_EQ(page::round_ticks(0, 10, 5), (std::vector<double>{0, 2, 4, 6, 8, 10}));
     for (const auto& [low, high] : {std::pair(0.013, 0.31), std::pair(-3.0, 8.5), std::pair(1e4, 7e6)}) {
         const std::vector<double> ticks = page::round_ticks(low, high, 6);

@@ -1,4 +1,4 @@
-// How far two maps differ, against values worked out by hand; and the command that says so.
+// Differences of two maps, against values worked out by hand; and difference pictures.
 #include "ao/compare.h"
 #include "apps/picture.h"
 #include "tests/support/says.h"
@@ -28,7 +28,7 @@ cv::Mat1f with_look(const cv::Mat1f& map, const Look& look) {
     return shown;
 }
 
-TEST(CompareTest, figures_are_those_worked_out_by_hand) {
+TEST(CompareTest, numbers_are_those_worked_out_by_hand) {
     // differences over the five common pixels: 0.1 -0.2 0.3 0 0.4
     const cv::Mat1f a = (cv::Mat1f(2, 4) << 0.5, 0.2, 0.8, hole, 0.4, 1.0, 0.9, hole);
     const cv::Mat1f b = (cv::Mat1f(2, 4) << 0.4, 0.4, 0.5, 0.7, 0.4, 0.6, hole, hole);
@@ -68,7 +68,7 @@ TEST(CompareTest, equal_maps_do_not_differ) {
     EXPECT_LT(d.calibrated_rms, 0.002); // a bin's width, spread evenly, is 1/256/sqrt(12)
 }
 
-TEST(CompareTest, maps_without_a_common_pixel_have_no_figures) {
+TEST(CompareTest, maps_without_a_common_pixel_have_no_numbers) {
     const cv::Mat1f a = (cv::Mat1f(1, 2) << 0.5, hole), b = (cv::Mat1f(1, 2) << hole, 0.5);
     const Difference d = compare(a, b);
     EXPECT_EQ(d.pixels, 0u);
@@ -110,9 +110,9 @@ TEST(SimilarityTest, falls_with_what_is_lost) {
     EXPECT_GT(structural_similarity(a, little), structural_similarity(a, much) + 0.01);
 }
 
-// ---------------------------------------------------------------------------------------------------- looks
+// ---------------------------------------------------------------------------------------------------- tone curves
 
-TEST(LookTest, the_best_one_is_found_again) {
+TEST(ToneCurveTest, the_best_one_is_found_again) {
     const cv::Mat1f ours = wavy({64, 64});
     for (const Look& look : {Look{0.24, 3.9}, Look{0.6, 1}, Look{1, 0.5}, Look{1.4, 1.2}, Look{0.9, 3}}) {
         const Difference d = compare(ours, with_look(ours, look));
@@ -121,7 +121,7 @@ TEST(LookTest, the_best_one_is_found_again) {
     }
 }
 
-TEST(LookTest, never_makes_it_worse) {
+TEST(ToneCurveTest, never_makes_it_worse) {
     const cv::Mat1f ours = wavy({64, 64});
     cv::Mat1f opposite;
     cv::subtract(1, ours, opposite);
@@ -129,7 +129,7 @@ TEST(LookTest, never_makes_it_worse) {
     EXPECT_LE(d.calibrated_rms, d.rms);
 }
 
-TEST(LookTest, of_many_images_is_one) {
+TEST(ToneCurveTest, of_many_images_is_one) {
     const cv::Mat1f bright = cv::Mat1f(8, 8, 0.9F), dark = cv::Mat1f(8, 8, 0.3F);
     const Look look{0.5, 1.5};
     PairSums pairs = pair_sums(bright, with_look(bright, look));

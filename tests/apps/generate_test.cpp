@@ -37,7 +37,7 @@ TEST(Scene, DepthOfAWallIsTheDistanceToItsPlaneNotTheRaysLength) {
         ASSERT_NEAR(cv::norm(n - cv::Vec3f(0, 0, -1)), 0, 1e-6) << "facing the camera";
 }
 
-TEST(Scene, RaysMeetEverySolidWhereItsFormulaSays) {
+TEST(Scene, RaysHitEverySolidWhereItsFormulaSays) {
     const auto t = [](const scene::Solid& solid, Eigen::Vector3d origin, Eigen::Vector3d direction) {
         return scene::cast({{solid, {}}}, {origin, direction}).t;
     };
@@ -97,7 +97,7 @@ double visibility_at(const Scene& scene, double x, double radius_m, int rays = 1
     return cv::mean(truth)[0];
 }
 
-TEST(Truth, FloorBesideALongWallFollowsTheClosedForm) {
+TEST(Truth, FloorNextToALongWallFollowsTheClosedForm) {
     const Scene room =
         scene_of({{Box{{0, 0, -1}, {50, 50, 1}}, {}}, {Box{{-1, 0, 5}, {1, 50, 5}}, {}}}); // wall at x < 0
     for (const double share : {0.05, 0.25, 0.5, 0.8, 1.2}) {
@@ -107,7 +107,7 @@ TEST(Truth, FloorBesideALongWallFollowsTheClosedForm) {
     }
 }
 
-TEST(Truth, FloorUnderACeilingAndBesideABallFollowTheClosedForms) {
+TEST(Truth, FloorUnderACeilingAndNextToABallFollowTheClosedForms) {
     const Scene low = scene_of({{Plane{{0, 0, 0}, {0, 0, 1}}, {}}, {Box{{0, 3, 0.35}, {50, 2.9, 0.05}}, {}}});
     // A ceiling at h = 0.3 over all directions would leave h^2 / R^2 = 0.36; this one starts 0.1 m to the side, so look
     // below it.
@@ -153,7 +153,7 @@ TEST(Truth, TheTreeAndTheFormulasAgree) {
     }
 }
 
-TEST(Truth, ConvexThingsAreOpenEverywhere) {
+TEST(Truth, ConvexBodiesAreOpenEverywhere) {
     const Scene ball = scene_of({{Sphere{{0, 2, 0}, 0.5}, {}}});
     const cv::Mat1f truth =
         true_visibility(scene::World(ball), test_camera(), scene::looking_at({0, 0, 0}, {0, 1, 0}), {0.5, 64})
@@ -170,7 +170,7 @@ TEST(Truth, ConvexThingsAreOpenEverywhere) {
 
 // ---------------------------------------------------------------------------------------------------- sensors
 
-/// What a sensor makes of a wall straight ahead.
+/// A sensor's depth of a wall straight ahead.
 cv::Mat1f recorded_wall(std::string_view sensor, double z_m, int frame = 0) {
     const Scene room = scene_of({{Plane{{0, z_m, 0}, {0, 1, 0}}, {}}});
     const Pinhole camera{525, 525, 159.5, 119.5, {320, 240}};
@@ -188,7 +188,7 @@ Spread spread_of(const cv::Mat1f& z_m) {
     return {mean[0], sigma[0]};
 }
 
-TEST(Kinect, DepthsLieWholeDisparityStepsApart) {
+TEST(Kinect, DepthsAreWholeDisparityStepsApart) {
     for (const double z : {1.0, 2.0, 3.0}) {
         const cv::Mat1f recorded = recorded_wall("kinect", z);
         const std::set<float> levels(recorded.begin(), recorded.end());
@@ -220,7 +220,7 @@ TEST(Kinect, HasNoDepthAtItsBorderNorOutOfRange) {
     EXPECT_EQ(cv::countNonZero(recorded_wall("kinect", 9)), 0);
 }
 
-TEST(Kinect, ThingsCastAShadowToOneSideAsWideAsTheBaselineSays) {
+TEST(Kinect, ObjectsCastAShadowToOneSideAsWideAsTheBaselineImplies) {
     // A post at 1 m before a wall at 2 m: 7.5 cm of baseline leave f b (1/1 - 1/2) = 19.7 columns without dots.
     const Scene room = scene_of({{Plane{{0, 2, 0}, {0, 1, 0}}, {}}, {Box{{0, 1.05, 0}, {0.1, 0.05, 5}}, {}}});
     const Pinhole camera{525, 525, 159.5, 119.5, {320, 240}};
@@ -270,7 +270,7 @@ TEST(Sensors, NoiseDependsOnSeedAndFrameAlone) {
     }
 }
 
-TEST(Sensors, UnknownNamesAreAnsweredWithTheKnownOnes) {
+TEST(Sensors, UnknownNamesAreRefusedWithTheKnownOnes) {
     EXPECT_TRUE(says(refusal([] { (void)sensor_named("lidar"); }), "ideal, kinect, tof"));
     EXPECT_THROW((void)scene::scene_named("moon"), Misuse);
 }
@@ -307,7 +307,7 @@ TEST(Generate, SameOptionsSameBytes) {
     EXPECT_NE(first, contents(folder / "c"));
 }
 
-TEST(Generate, TheCaptureOpensAsWhatItIs) {
+TEST(Generate, TheCaptureOpensAsATumRecording) {
     const TemporaryFolder folder;
     GenerateOptions options = tiny();
     options.sensor = "ideal";
@@ -389,7 +389,7 @@ TEST(Generate, FalloffsComeFromTheSameRays) {
     EXPECT_FALSE(fs::exists(folder / "other"));
 }
 
-TEST(Generate, WhatIsThereIsNotOverwrittenUnasked) {
+TEST(Generate, AnExistingCaptureIsNotOverwrittenUnasked) {
     const TemporaryFolder folder;
     GenerateOptions options = tiny();
     options.truth = false;
@@ -406,7 +406,7 @@ TEST(Generate, WhatIsThereIsNotOverwrittenUnasked) {
     EXPECT_TRUE(fs::exists(folder / "mine" / "rgb.txt"));
 }
 
-TEST(Generate, OptionsThatCannotBeAreRefusedBeforeAnythingIsWritten) {
+TEST(Generate, ImpossibleOptionsAreRefusedBeforeAnythingIsWritten) {
     const TemporaryFolder folder;
     for (const char* size : {"640", "640x", "x480", "0x480", "640x480x3", "640x-480", "99999x10"}) {
         GenerateOptions options = tiny();

@@ -1,4 +1,4 @@
-// What recorded depth has that rendered depth has not: methods keep the gates of every family of hard cases.
+// Hard cases of recorded depth: methods keep the gates of every family.
 #include "ao/gpu/device.h"
 #include "apps/measure/hard_cases/judge.h"
 

@@ -1,4 +1,4 @@
-// Normals of prepared depth, which is what methods see, are close to those of the generated scenes.
+// Normals of prepared depth are close to those of the generated scenes.
 #include "apps/measure/normal_errors.h"
 
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 // Cameras refined from recordings: tracks, planes, time offsets and a secondary colour camera.
-#include "apps/scenes/generate.h"
 #include "apps/refine/recording.h"
+#include "apps/scenes/generate.h"
 #include "apps/scenes/scene.h"
 #include "apps/scenes/sensor.h"
 #include "io/cameras/camera_file.h"
@@ -97,7 +97,7 @@ TEST(Recordings, ACaptureWithoutCameraStartsFromTheFlags) {
     const tests::TemporaryFolder folder;
     fs::copy(slow_office_folder(), folder / "bare", fs::copy_options::recursive);
     const std::string camera = tests::file_bytes(slow_office_folder() / "camera.json");
-    // As colour and depth folders: nothing in them tells a camera.
+    // As colour and depth folders, which name no camera.
     for (const char* file : {"camera.json", "depth.txt", "rgb.txt", "groundtruth.txt"})
         fs::remove(folder / (std::string("bare/") + file));
     fs::remove_all(folder / "bare/truth");

@@ -434,7 +434,7 @@ TEST(Chessboards, FullModelIsOpenCvsToTheLastDigitAndSigma) {
         EXPECT_NEAR(ours.selection.fit.sigma(cx), theirs_per_residual, 0.01 * theirs_per_residual);
         if (!plain_window)
             continue;
-        EXPECT_LE(ours.selection.train_px, 0.4095); // the published figure
+        EXPECT_LE(ours.selection.train_px, 0.4095); // the published value
         for (const ViewRow& view : ours.views)
             EXPECT_EQ(view.outlying, view.name == "left02.jpg") << view.name << " " << view.score.rms();
     }

@@ -1,4 +1,4 @@
-// Files from text, their bytes, and lists of warnings: what the tests of io share.
+// Files from text, their bytes, and lists of warnings, for the tests of io.
 #pragma once
 
 #include "tests/support/says.h"
@@ -14,7 +14,7 @@
 
 namespace scanshade::tests {
 
-/// Writes a file, folders and all; returns its path.
+/// Writes a file and its folders; returns its path.
 inline std::filesystem::path write_file(const std::filesystem::path& file, const std::string& bytes) {
     std::filesystem::create_directories(file.parent_path());
     std::ofstream(file, std::ios::binary) << bytes;
@@ -33,7 +33,7 @@ inline std::string joined(const std::vector<std::string>& texts) {
     return all;
 }
 
-/// Whether any of the warnings holds `part`; shows them all where none does.
+/// Whether any of the warnings contains `part`; shows them all where none does.
 inline testing::AssertionResult warned(const std::vector<std::string>& warnings, const std::string& part) {
     if (std::any_of(warnings.begin(), warnings.end(),
                     [&](const std::string& w) { return w.find(part) != std::string::npos; }))

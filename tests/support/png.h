@@ -29,7 +29,7 @@ inline std::string compressed(const std::string& raw) {
     return packed;
 }
 
-/// A PNG of sound chunks: whatever the header says, `rows` rows of 8 grey 16-bit pixels follow.
+/// A PNG of sound chunks. `rows` rows of 8 grey 16-bit pixels follow, whatever the header says.
 inline std::string png(std::uint32_t width, std::uint32_t height, int bits, int colour_type, int rows) {
     const std::string header = big_endian(width) + big_endian(height) + static_cast<char>(bits) +
                                static_cast<char>(colour_type) + std::string(3, '\0');

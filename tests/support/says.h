@@ -1,4 +1,4 @@
-// What a failure says, for tests that hold the program to its words.
+// Checks of messages.
 #pragma once
 
 #include "projection/error.h"

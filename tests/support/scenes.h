@@ -1,4 +1,4 @@
-// What tests look at: the program's shapes, in the tests' own namespace.
+// The program's shapes, in the tests' own namespace.
 #pragma once
 
 #include "apps/scenes/shapes.h"

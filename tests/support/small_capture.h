@@ -1,4 +1,4 @@
-// Captures small enough to be made anew for each test, in a folder that vanishes with it.
+// Captures small enough to be made anew for each test, in a folder that is removed with it.
 #pragma once
 
 #include "projection/frame.h"
@@ -27,14 +27,14 @@ class TemporaryFolder {
 /// The camera of write_capture(): 64x48 pixels, about 63 degrees wide.
 [[nodiscard]] Camera small_camera();
 
-/// Two walls that meet in a vertical edge 2 m away, with a block of holes at the upper left; metres. Each `index` has
-/// the edge at another column.
+/// Two walls that meet in a vertical edge 2 m away, with a block of holes at the upper left; metres. The edge's column
+/// depends on `index`.
 [[nodiscard]] cv::Mat1f corner_depth(int index);
 
 /// `frames` corners as color/NNN.png (a plain colour), depth/NNN.png (millimetres) and camera.json.
 void write_capture(const std::filesystem::path& folder, int frames, Registration registration = Registration::yes);
 
-/// What a command printed, and how it ended.
+/// A command's output and exit code.
 struct Ran {
     int exit_code = -1;
     std::string out, err;

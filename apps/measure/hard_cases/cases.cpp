@@ -25,7 +25,7 @@ Pinhole lens(double field_of_view, cv::Size size = {160, 120}) {
     return {f, f, 0.5 * (size.width - 1), 0.5 * (size.height - 1), size};
 }
 
-/// Bodies in camera space: exact depth, and the ray-traced answer.
+/// Bodies in camera space: exact depth, and ray-traced visibility.
 Case traced(std::string name, const Pinhole& camera, std::vector<Body> bodies, double radius_m = 0.5) {
     const Scene scene{"hard case", "", std::move(bodies)};
     const World world(scene);
@@ -93,28 +93,28 @@ std::vector<Body> saddle() {
     return patches;
 }
 
-/// Depth as a structured-light sensor writes it: noise of its windows' grain, then disparity steps.
+/// Depth as a structured-light sensor writes it: noise correlated by its windows, then disparity steps.
 DepthImage structured_light(const DepthImage& clean, unsigned seed) {
-    cv::Mat1f white(clean.z_m.size()), grained;
+    cv::Mat1f white(clean.z_m.size()), correlated;
     std::mt19937 random(seed);
     std::normal_distribution<float> normal;
     for (float& value : white)
         value = normal(random);
-    constexpr double deviation = 0.9; // of the window, pixels: what makes a grain of 3.2
-    cv::GaussianBlur(white, grained, {9, 9}, deviation);
-    grained *= 2 * deviation * std::sqrt(std::numbers::pi);
+    constexpr double deviation = 0.9; // of the window, pixels: a correlation length of 3.2
+    cv::GaussianBlur(white, correlated, {9, 9}, deviation);
+    correlated *= 2 * deviation * std::sqrt(std::numbers::pi);
     DepthImage noisy{clean.camera, clean.z_m.clone(), {}};
     for (int v = 0; v < white.rows; ++v)
         for (int u = 0; u < white.cols; ++u)
             if (float& z = noisy.z_m(v, u); z > 0) {
-                const double measured = z + kinect_sigma_m(z) * static_cast<double>(grained(v, u));
+                const double measured = z + kinect_sigma_m(z) * static_cast<double>(correlated(v, u));
                 z = static_cast<float>(
                     1 / (std::max(1.0, std::round(1 / (measured * kinect_step_per_m))) * kinect_step_per_m));
             }
     return noisy;
 }
 
-/// As `run` would measure it on a recording that holds this and more.
+/// As `run` would measure it on a recording with such frames.
 const DepthNoise& structured_light_noise() {
     static const DepthNoise noise = [] {
         std::vector<DepthImage> images;
@@ -149,7 +149,7 @@ DepthImage random_holes(const DepthImage& depth, double share) {
 
 // ---------------------------------------------------------------------------------------------------- families
 
-/// Planes whose radius shows as two pixels or more.
+/// Planes on which the radius covers two pixels or more.
 std::vector<Case> planes(bool noisy) {
     std::vector<Case> all;
     const Pinhole camera = shapes::off_centre_camera();
@@ -164,7 +164,7 @@ std::vector<Case> planes(bool noisy) {
             Case one =
                 open_everywhere(fmt::format("{} degrees, {} m", tilt, z_m), shapes::tilted_plane(camera, tilt, z_m));
             if (noisy) {
-                one.depth.z_m.setTo(0, one.depth.z_m > 8); // no structured light reaches farther
+                one.depth.z_m.setTo(0, one.depth.z_m > 8); // structured light reaches no farther
                 one.expected.setTo(unknown, one.depth.z_m == 0);
                 one = recorded(std::move(one));
             }
@@ -223,8 +223,8 @@ std::vector<Case> radii() {
         all.push_back(
             traced(fmt::format("{} m", radius_m), shapes::off_centre_camera({160, 120}), ball_on_floor(), radius_m));
     all.front().expected.setTo(1.0F, all.front().depth.z_m >
-                                         0); // rays cannot start closer than coordinates of a kilometre round
-    all.back().expected.release();           // most of what is within 100 m lies outside the image
+                                         0); // coordinates of a kilometre round too coarsely for rays to start so close
+    all.back().expected.release();           // most occluders within 100 m are outside the image
     return all;
 }
 
@@ -236,7 +236,7 @@ std::vector<Case> sizes() {
         const Pinhole camera{f, f, 0.5 * size.width, 0.5 * size.height, size};
         Case one = open_everywhere(fmt::format("{}x{}", size.width, size.height), shapes::tilted_plane(camera, 30));
         if (std::min(size.width, size.height) < 2)
-            one.expected.release(); // a line has no normal: any answer, or none
+            one.expected.release(); // a line has no normal: any value is right, NaN too
         all.push_back(std::move(one));
     }
     return all;
@@ -253,7 +253,7 @@ std::vector<Case> no_depth() {
         all.push_back({fmt::format("{}", value), sprinkled, {}, 0.5});
     }
     DepthImage sentinel{ball.camera, ball.z_m.clone(), {}};
-    sentinel.z_m.colRange(60, 80).setTo(65.535F); // in millimetres, where nobody said what it means
+    sentinel.z_m.colRange(60, 80).setTo(65.535F); // the sentinel of 16-bit millimetres, read as metres
     all.push_back({"65535 taken for depth", sentinel, {}, 0.5});
     const DepthImage none{ball.camera, cv::Mat1f(ball.z_m.size(), 0.0F), {}};
     all.push_back({"all holes", none, {}, 0.5});
@@ -263,10 +263,11 @@ std::vector<Case> no_depth() {
     return all;
 }
 
-/// Three scenes, each beside copies of it with holes. `punch` hands every copy of a depth image to its second argument,
-/// with the kind of its holes.
+/// Three scenes, each paired with copies that have holes. `punch` hands every copy of a depth image to its second
+/// argument, with the kind of its holes.
 using AddHoled = std::function<void(const std::string& kind, DepthImage holed)>;
-std::vector<std::pair<Case, Case>> beside_holed(const std::function<void(const DepthImage&, const AddHoled&)>& punch) {
+std::vector<std::pair<Case, Case>>
+paired_with_holed(const std::function<void(const DepthImage&, const AddHoled&)>& punch) {
     std::vector<std::pair<Case, Case>> all;
     for (const auto& [name, bodies] :
          {std::pair{"corner", corner_of_walls()}, {"ball", ball_on_floor()}, {"stairs", stairs()}}) {
@@ -279,14 +280,14 @@ std::vector<std::pair<Case, Case>> beside_holed(const std::function<void(const D
 }
 
 std::vector<std::pair<Case, Case>> holes() {
-    return beside_holed([](const DepthImage& depth, const AddHoled& add) {
+    return paired_with_holed([](const DepthImage& depth, const AddHoled& add) {
         for (const double share : {0.05, 0.3})
             add(fmt::format("{:.0f} % random", 100 * share), random_holes(depth, share));
     });
 }
 
 std::vector<std::pair<Case, Case>> worse_holes() {
-    return beside_holed([](const DepthImage& depth, const AddHoled& add) {
+    return paired_with_holed([](const DepthImage& depth, const AddHoled& add) {
         add("60 % random", random_holes(depth, 0.6));
         add("30 % in blocks", shapes::with_holes(depth, 0.3));
         add("checkerboard", punched(depth, [](int u, int v) { return (u + v) % 2 == 0; }));
@@ -305,8 +306,8 @@ std::vector<std::pair<Case, Case>> units() {
     return all;
 }
 
-/// The same corner from 0.2 to 200 m away, radius to match, through a normal, a long and a wide lens: what single
-/// precision takes away between the sensor's file and visibility. A fifth of a step of 8 bits is the bound.
+/// The same corner from 0.2 to 200 m away, radius to match, through a normal, a long and a wide lens: the error of
+/// single precision. A fifth of a step of 8 bits is the bound.
 std::vector<std::pair<Case, Case>> precision() {
     std::vector<std::pair<Case, Case>> all;
     const Pinhole tele{20.0 * 160, 20.0 * 160, 79.5, 59.5, {160, 120}};
@@ -325,7 +326,7 @@ std::vector<std::pair<Case, Case>> precision() {
     return all;
 }
 
-/// Depths between two surfaces, as time of flight reads them at outlines, and what the same view is without them.
+/// Depths between two surfaces, as time of flight reads them at outlines, and the same view without them.
 std::vector<std::pair<Case, Case>> flying_pixels() {
     std::vector<std::pair<Case, Case>> all;
     const DepthNoise tof{0.001, 0.0006};

@@ -1,4 +1,4 @@
-// The hard cases: what recorded depth has that rendered depth has not, each with the answer that should come out.
+// The hard cases: depth with holes, noise, steps and odd sizes, each with the expected visibility.
 #pragma once
 
 #include "projection/maps.h"
@@ -11,16 +11,17 @@
 
 namespace scanshade::hard_cases {
 
-/// What a case is looked at with, and what should come out.
+/// The input of a case, and the expected visibility.
 struct Case {
     std::string name;
     DepthImage depth;
-    cv::Mat1f expected; ///< visibility; NaN where nothing is expected in particular; empty: only sanity is asked for
+    cv::Mat1f
+        expected; ///< visibility; NaN where any value is right; empty: only NaN, range and repeatability are checked
     double radius_m = 0.5;
-    DepthNoise noise = {}; ///< where there is any, depth goes through the preparation that `run` gives it
+    DepthNoise noise = {}; ///< where there is any, depth is prepared as in `run`
 };
 
-/// Limits that every case of a family has to keep. RMSE and worst are differences to what is expected.
+/// Limits that every case of a family must keep. RMSE is the difference to the expected visibility.
 struct Gate {
     std::optional<double> rmse = {}, least = {}, mean = {}; ///< least and mean: visibility itself, from below
 };
@@ -29,7 +30,8 @@ struct Family {
     std::string name, what;
     Gate gate;
     std::function<std::vector<Case>()> cases;
-    /// Instead of an expected answer: what the method itself says of this image, on the pixels that both know.
+    /// Instead of cases: the method's own result on the first of a pair is expected of the second, on the pixels that
+    /// both have.
     std::function<std::vector<std::pair<Case, Case>>()> pairs = {};
 };
 

@@ -17,7 +17,7 @@ Score score_of(const Case& one, const cv::Mat1f& found, const cv::Mat1f& again, 
         for (int u = 0; u < found.cols; ++u) {
             const float value = found(v, u);
             const bool surface = is_depth(one.depth.z_m(v, u));
-            // Without a neighbour there is no normal, and a flying pixel is nobody's: then NaN is an answer.
+            // Without a neighbour there is no normal, and a flying pixel is on no surface: NaN is right there.
             const bool may_be_unknown = !surface || line || one.noise.any();
             score.wrong += std::isnan(value) ? !may_be_unknown : !surface || value < 0 || value > 1;
             if (std::isnan(value))
@@ -31,7 +31,7 @@ Score score_of(const Case& one, const cv::Mat1f& found, const cv::Mat1f& again, 
     return score;
 }
 
-/// What the gate says of a case, or nothing.
+/// The limits that a case misses; empty where it keeps all.
 std::string missed(const Gate& gate, const Score& score, bool expects) {
     std::string why;
     if (gate.rmse && score.rmse() > *gate.rmse)
@@ -43,7 +43,7 @@ std::string missed(const Gate& gate, const Score& score, bool expects) {
     if (score.wrong > 0)
         why += fmt::format(" {} pixels NaN or out of range", score.wrong);
     if (score.differs)
-        why += " another answer the second time";
+        why += " the second run differs";
     return why;
 }
 

@@ -1,4 +1,4 @@
-// A method over hard cases: how far it is from what should come out, and which gates it misses.
+// A method over hard cases: its errors, and the gates that it misses.
 #pragma once
 
 #include "ao/frame.h"
@@ -10,7 +10,7 @@
 
 namespace scanshade::hard_cases {
 
-/// What came out of one case, or of all cases of a family.
+/// The result of one case, or of all cases of a family.
 struct Score {
     double squares = 0, worst = 0, sum = 0, least = 1;
     std::size_t pixels = 0, values = 0;
@@ -25,9 +25,9 @@ struct Score {
 /// One case, judged.
 struct Verdict {
     const Case& looked_at;
-    const cv::Mat1f &expected, &found; ///< expected: empty where only sanity is asked for
+    const cv::Mat1f &expected, &found; ///< expected may be empty (cases.h)
     Score score;
-    std::string missed; ///< which limits, each with the number that missed it; empty where all were kept
+    std::string missed; ///< the limits missed, each with its number; empty where all were kept
 };
 
 /// A method at its default settings, with the radius of each case.
