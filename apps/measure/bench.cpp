@@ -116,7 +116,7 @@ class CaptureBench {
                 for (const TrialFrame& frame : capture_.frames)
                     maps[i].push_back(trials_[i]->compute(frame));
             });
-        // Finding the best look of a map takes longer than the map.
+        // Finding the best tone curve of a map takes longer than the map.
         tbb::parallel_for(std::size_t{0}, trials_.size(),
                           [&](std::size_t i) { attempt(i, [&] { judge(i, maps[i]); }); });
         for (int round = 0; round < rounds; ++round) {

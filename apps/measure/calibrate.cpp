@@ -40,19 +40,19 @@ Free free_setting(const std::vector<Parameter>& rows, const std::string& method,
     return {name, start, start != 0 ? 0.25 * std::abs(start) : 0.05 * std::min(span, 1.0), row->low, row->high};
 }
 
-/// Settings by which a method applies a Look: the best ones follow from maps made without (1, 1), whatever else is
+/// Settings by which a method applies a ToneCurve: the best ones follow from maps made without (1, 1), whatever else is
 /// searched.
 struct LookRows {
     std::string_view strength, power;
 };
-/// cacao applies its own before the blur, where the best look of the blurred map is as good as the best to within the
+/// cacao applies its own before the blur, where the best curve of the blurred map is as good as the best to within the
 /// blur.
 constexpr std::array look_rows{LookRows{"strength", "power"}, LookRows{"shadow-multiplier", "shadow-power"}};
 
-/// A method's look rows, where both are to be fitted, and the bounds that they have.
-struct FreeLook {
+/// A method's curve rows, where both are to be fitted, and the bounds that they have.
+struct FreeCurve {
     LookRows rows;
-    Look least, most;
+    ToneCurve least, most;
 };
 
 /// What the errors are with some settings: of each capture, and over all (root mean square over captures).
@@ -86,10 +86,10 @@ Score score(gpu::Device& device, const std::vector<TrialCapture>& captures, cons
 class Search final : public cv::MinProblemSolver::Function {
   public:
     Search(gpu::Device& device, const std::vector<TrialCapture>& captures, Configuration fixed, std::vector<Free> free,
-           std::optional<FreeLook> look)
-        : device_(device), captures_(captures), fixed_(std::move(fixed)), free_(std::move(free)), look_(look) {
-        if (look_)
-            for (const std::string_view row : {look_->rows.strength, look_->rows.power})
+           std::optional<FreeCurve> curve)
+        : device_(device), captures_(captures), fixed_(std::move(fixed)), free_(std::move(free)), curve_(curve) {
+        if (curve_)
+            for (const std::string_view row : {curve_->rows.strength, curve_->rows.power})
                 fixed_.settings.emplace_back(row, "1");
     }
 
@@ -127,11 +127,11 @@ class Search final : public cv::MinProblemSolver::Function {
         Configuration configuration = fixed_;
         std::ranges::copy(values, std::back_inserter(configuration.settings));
         Score now = score(device_, captures_, configuration);
-        if (look_) {
-            const Look look = now.pairs.best_look(look_->least, look_->most);
-            now.rms = now.pairs.rms(look);
-            values.emplace_back(look_->rows.strength, fmt::format("{:.4g}", look.strength));
-            values.emplace_back(look_->rows.power, fmt::format("{:.4g}", look.power));
+        if (curve_) {
+            const ToneCurve curve = now.pairs.best_curve(curve_->least, curve_->most);
+            now.rms = now.pairs.rms(curve);
+            values.emplace_back(curve_->rows.strength, fmt::format("{:.4g}", curve.strength));
+            values.emplace_back(curve_->rows.power, fmt::format("{:.4g}", curve.power));
         }
         std::string line;
         for (const auto& [name, value] : values)
@@ -148,7 +148,7 @@ class Search final : public cv::MinProblemSolver::Function {
     const std::vector<TrialCapture>& captures_;
     Configuration fixed_;
     std::vector<Free> free_;
-    std::optional<FreeLook> look_;
+    std::optional<FreeCurve> curve_;
     mutable int tried_ = 0; // the solver's interface is const, what it tells us is not
     mutable Settings best_;
     mutable double best_rms_ = 0;
@@ -214,8 +214,8 @@ class Calibrate final : public Command {
         const std::vector<Parameter> rows = setup().parameters();
         for (const std::string& name : comma_separated(free_))
             free.push_back(free_setting(rows, method_, name));
-        const std::optional<FreeLook> look = taken_out(free);
-        const Settings found = Search(device, training, start, free, look).run(evaluations_);
+        const std::optional<FreeCurve> curve = taken_out(free);
+        const Settings found = Search(device, training, start, free, curve).run(evaluations_);
         Configuration fitted = start;
         std::ranges::copy(found, std::back_inserter(fitted.settings));
         tell(device, start, fitted, found, training, others);
@@ -236,16 +236,16 @@ class Calibrate final : public Command {
                     throw Misuse(fmt::format("held-out: {} is a training capture", path));
     }
 
-    /// The rows of a look, where both are free, leave the search.
-    static std::optional<FreeLook> taken_out(std::vector<Free>& free) {
+    /// The rows of a curve, where both are free, leave the search.
+    static std::optional<FreeCurve> taken_out(std::vector<Free>& free) {
         for (const LookRows& rows : look_rows) {
             const auto strength = std::ranges::find(free, rows.strength, &Free::name);
             const auto power = std::ranges::find(free, rows.power, &Free::name);
             if (strength == free.end() || power == free.end())
                 continue;
-            const FreeLook look{rows, {strength->low, power->low}, {strength->high, power->high}};
+            const FreeCurve curve{rows, {strength->low, power->low}, {strength->high, power->high}};
             std::erase_if(free, [&](const Free& f) { return f.name == rows.strength || f.name == rows.power; });
-            return look;
+            return curve;
         }
         return std::nullopt;
     }
@@ -306,8 +306,8 @@ class Calibrate final : public Command {
             line(captures[i].name, before.captures[i].rms, after.captures[i].rms, before.captures[i].calibrated_rms,
                  after.captures[i].calibrated_rms);
         if (!captures.empty())
-            line("all", before.rms, after.rms, before.pairs.rms(before.pairs.best_look()),
-                 after.pairs.rms(after.pairs.best_look()));
+            line("all", before.rms, after.rms, before.pairs.rms(before.pairs.best_curve()),
+                 after.pairs.rms(after.pairs.best_curve()));
         return rows;
     }
 
