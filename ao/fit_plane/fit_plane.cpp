@@ -15,9 +15,9 @@ namespace {
 enum Buffers : int { recorded, kept, averages, depth_out, normals_out, others_in, fused, relief };
 
 /// Of the window's radius, squared, in units of correlation^2 sigma fx / z (pixels). Below it noise tilts normals,
-/// above it a plane no longer is what surfaces are. Without grain this leaves the least error in AO on simulated
-/// sensors. With grain the least error lies somewhat lower, but a real Kinect errs alike over more pixels than the
-/// grain tells, and its walls would stay mottled.
+/// above it a plane no longer is what surfaces are. For independent pixels this leaves the least error in AO on
+/// simulated sensors. For correlated ones a somewhat lower value does. But a real Kinect's noise correlates over more
+/// pixels than the correlation length says, and its walls would stay mottled.
 constexpr double window_scale = 1.8;
 
 std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bool planes, bool fuse) {

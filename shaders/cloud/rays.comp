@@ -1,4 +1,4 @@
-// Rays from every point of a cloud against the discs that stand for it: the share that meets nothing within the radius.
+// Rays from every point of a cloud against the discs of its points: the share that hits nothing within the radius.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -109,8 +109,8 @@ TEST(noise, correlation_length_is_that_of_the_sensors_window) {
         DepthImage grained{camera, {}, {}};
         cv::GaussianBlur(white.z_m - clean.z_m, grained.z_m, {11, 11}, deviation);
         const double correlation_px = 2 * deviation * std::sqrt(std::numbers::pi);
-        grained.z_m =
-            clean.z_m + correlation_px * grained.z_m; // its deviation fell by the correlation length along either axis
+        // The blur divided the deviation by the correlation length, once along either axis.
+        grained.z_m = clean.z_m + correlation_px * grained.z_m;
         const DepthNoise measured = measure_noise(std::vector{grained});
         EXPECT_NEAR(measured.correlation_px, correlation_px, 0.15 * correlation_px);
         EXPECT_NEAR(measured.at(2), 0.01, 0.0015);
