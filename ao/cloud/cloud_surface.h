@@ -66,6 +66,6 @@ struct CloudSurface {
 /// votes. In rooms (inward) points vote for the side with more free space, measured by `rays`, which must be given;
 /// pieces with clear votes against each other are not joined. Points without a plane face the viewpoint or the
 /// direction.
-void orient_normals(CloudSurface& surface, const NormalOrientation& outside, const DiscRays* rays = nullptr);
+void orient_normals(CloudSurface& surface, const NormalOrientation& orientation, const DiscRays* rays = nullptr);
 
 } // namespace scanshade

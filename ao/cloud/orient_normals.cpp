@@ -34,8 +34,8 @@ class Pieces {
         std::uint32_t root = point;
         for (; parent_[root] != root; root = parent_[root])
             turned ^= turned_[root] != 0;
-        for (bool rest = turned;
-             parent_[point] != point;) { // path compression: all on the way become the root's children
+        // Path compression: all points on the way become the root's children.
+        for (bool rest = turned; parent_[point] != point;) {
             const std::uint32_t next = parent_[point];
             const bool own = turned_[point] != 0;
             parent_[point] = root;

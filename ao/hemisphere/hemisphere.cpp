@@ -73,7 +73,7 @@ std::vector<Parameter> HemisphereOptions::parameters() {
                        .low = 0,
                        .high = 1024},
                       {.name = "renormalise",
-                       .help = "samples that met nothing known are left out where at least half met something; "
+                       .help = "samples of unknown depth are left out where at least half are known; "
                                "otherwise they count as open",
                        .value = &renormalise},
                       {.name = "blurs",

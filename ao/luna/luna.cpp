@@ -76,7 +76,7 @@ std::vector<Parameter> LunaOptions::parameters() {
              .help = "number of vectors: lowest 8, low 14 as published, medium 28, high 56, highest 224",
              .value = OneOf(&quality, quality_words)},
             {.name = "renormalise",
-             .help = "samples that met nothing known are left out where at least half met something; otherwise they "
+             .help = "samples of unknown depth are left out where at least half are known; otherwise they "
                      "count as open",
              .value = &renormalise},
             {.name = "blurs",
