@@ -69,7 +69,7 @@ void add(inout Mean mean, Tap tap, float share) {
     cosine *= cosine;
     float apart = distance * distance;
     float weight = positive(1.0 - apart) * (cosine * cosine);
-    // A pixel none of whose surface was sampled takes what is least far from it.
+    // A pixel without a sample of its surface takes a mean weighted by nearness to its plane.
     if (spacing > 1) weight += 1e-4 / (1.0 + apart);
     mean.sum += share * weight * tap.measure;
 }
