@@ -28,11 +28,12 @@ void each_pair(const cv::Mat1f& a, const cv::Mat1f& b, Use&& use) {
                 use(a(y, x), b(y, x));
 }
 
-// ---------------------------------------------------------------------------------------------------- the best look
+// ---------------------------------------------------------------------------------------------------- the best tone
+// curve
 
-constexpr double darkest = 1e-4; // a power's slope at 0 is infinite below power 1, which no solver likes
+constexpr double darkest = 1e-4; // below power 1 the slope at 0 is infinite, which solvers cannot handle
 
-/// sqrt(n) (look(v) - mean truth) of one bin: the part of the squared error that a look can change.
+/// sqrt(n) (curve(v) - mean truth) of one bin: the part of the squared error that a tone curve can change.
 struct BinResidual {
     double root_n, ours, truth;
     template <class Number>
@@ -44,8 +45,9 @@ struct BinResidual {
     }
 };
 
-/// Where fits begin: as it is, weaker, and the two ends of the valley that strength and power share.
-constexpr std::array starts{Look{1, 1}, Look{0.5, 1}, Look{0.25, 4}, Look{1, 0.5}, Look{0.8, 2}};
+/// Starts of the fit: the identity, a weaker curve, and both ends of the valley that strength and power share.
+constexpr std::array starts{ToneCurve{1, 1}, ToneCurve{0.5, 1}, ToneCurve{0.25, 4}, ToneCurve{1, 0.5},
+                            ToneCurve{0.8, 2}};
 
 // ---------------------------------------------------------------------------------------------------- similarity
 
@@ -63,7 +65,7 @@ cv::Mat1d blurred_product(const cv::Mat1d& p, const cv::Mat1d& q) {
     return blurred(product);
 }
 
-/// Holes as 0: they take part in no window that counts.
+/// Holes become 0; windows with holes do not count.
 cv::Mat1d filled(const cv::Mat1f& map) {
     cv::Mat1d image(map.size());
     std::transform(map.begin(), map.end(), image.begin(), [](float v) { return std::isfinite(v) ? double(v) : 0.0; });
@@ -98,7 +100,7 @@ double root_mean_square_of(const std::vector<Difference>& images, double Differe
 
 } // namespace
 
-double Look::operator()(double visibility) const {
+double ToneCurve::operator()(double visibility) const {
     return std::pow(std::clamp(1 - strength * (1 - visibility), 0.0, 1.0), power);
 }
 
@@ -121,41 +123,41 @@ void PairSums::add(const PairSums& other) {
     count_ += other.count_;
 }
 
-double PairSums::rms(const Look& look) const {
+double PairSums::rms(const ToneCurve& curve) const {
     double sum = 0;
     for (const Bin& bin : bins_) {
         if (bin.n == 0)
             continue;
-        const double shown = look(bin.ours / bin.n);
+        const double shown = curve(bin.ours / bin.n);
         sum += bin.n * shown * shown - 2 * shown * bin.truth + bin.truth_squared;
     }
     return count_ > 0 ? std::sqrt(std::max(sum, 0.0) / static_cast<double>(count_)) : unknown;
 }
 
-Look PairSums::best_look(const Look& least, const Look& most) const {
-    Look best;
+ToneCurve PairSums::best_curve(const ToneCurve& least, const ToneCurve& most) const {
+    ToneCurve best;
     if (count_ == 0)
         return best;
-    for (Look look : starts) {
-        look = {std::clamp(look.strength, least.strength, most.strength),
-                std::clamp(look.power, least.power, most.power)};
+    for (ToneCurve curve : starts) {
+        curve = {std::clamp(curve.strength, least.strength, most.strength),
+                 std::clamp(curve.power, least.power, most.power)};
         ceres::Problem problem;
         for (const Bin& bin : bins_)
             if (bin.n > 0)
                 problem.AddResidualBlock(new ceres::AutoDiffCostFunction<BinResidual, 1, 1, 1>(
                                              new BinResidual{std::sqrt(bin.n), bin.ours / bin.n, bin.truth / bin.n}),
-                                         nullptr, &look.strength, &look.power);
-        problem.SetParameterLowerBound(&look.strength, 0, least.strength);
-        problem.SetParameterUpperBound(&look.strength, 0, most.strength);
-        problem.SetParameterLowerBound(&look.power, 0, least.power);
-        problem.SetParameterUpperBound(&look.power, 0, most.power);
+                                         nullptr, &curve.strength, &curve.power);
+        problem.SetParameterLowerBound(&curve.strength, 0, least.strength);
+        problem.SetParameterUpperBound(&curve.strength, 0, most.strength);
+        problem.SetParameterLowerBound(&curve.power, 0, least.power);
+        problem.SetParameterUpperBound(&curve.power, 0, most.power);
         ceres::Solver::Options options;
         options.linear_solver_type = ceres::DENSE_QR;
         options.logging_type = ceres::SILENT;
         ceres::Solver::Summary summary;
         ceres::Solve(options, &problem, &summary);
-        if (rms(look) < rms(best))
-            best = look;
+        if (rms(curve) < rms(best))
+            best = curve;
     }
     return best;
 }
@@ -205,8 +207,8 @@ Difference compare(const cv::Mat1f& a, const cv::Mat1f& b) {
     d.correlation = spread_a > 0 && spread_b > 0 ? together / std::sqrt(spread_a * spread_b) : unknown;
     d.ssim = structural_similarity(a, b);
     const PairSums pairs = pair_sums(a, b);
-    d.look = pairs.best_look();
-    d.calibrated_rms = pairs.rms(d.look);
+    d.curve = pairs.best_curve();
+    d.calibrated_rms = pairs.rms(d.curve);
     return d;
 }
 
@@ -225,8 +227,8 @@ Difference total(const std::vector<Difference>& images, const PairSums& pairs) {
     all.percentile_95 = mean_of(images, &Difference::percentile_95);
     all.ssim = mean_of(images, &Difference::ssim);
     all.correlation = mean_of(images, &Difference::correlation);
-    all.look = pairs.best_look();
-    all.calibrated_rms = pairs.rms(all.look);
+    all.curve = pairs.best_curve();
+    all.calibrated_rms = pairs.rms(all.curve);
     return all;
 }
 

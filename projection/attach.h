@@ -1,4 +1,4 @@
-// AoMap -> one value per recorded pixel or point: the walk's only look back.
+// AoMap -> one value per recorded pixel or point.
 #pragma once
 
 #include "projection/frame.h"
@@ -8,7 +8,7 @@
 
 namespace scanshade {
 
-/// Visibility laid back onto what was recorded, with the share of valid pixels or points that received a value.
+/// Visibility of the recorded pixels or points, and the share of the valid ones that received a value.
 struct Attached {
     cv::Mat1f visibility; ///< per recorded pixel (distorted geometry) or point of an organised cloud's grid, NaN = no
                           ///< surface; of an unorganised cloud, the view it was seen in

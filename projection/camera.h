@@ -42,8 +42,8 @@ struct Pinhole {
     }
 };
 
-/// How a lens bends a direction: a polynomial in the tangent (Brown 1966; most lenses) or in the angle itself (Kannala
-/// and Brandt 2006; fisheyes, where the tangent runs away).
+/// How a lens bends a direction: a polynomial in the tangent (Brown 1966; most lenses) or in the angle (Kannala and
+/// Brandt 2006; fisheyes, where the tangent grows without bound).
 enum class LensModel { brown_conrady, kannala_brandt };
 
 /// Distortion in OpenCV's order. Brown-Conrady has k1, k2, p1, p2, k3, all zero = none; Kannala-Brandt (OpenCV's
@@ -95,7 +95,7 @@ void distort_fisheye(const Number* coefficients, const Number& x, const Number& 
     y_bent = y * bent / r;
 }
 
-/// What a recorded depth is worth: true z = scale z + offset + curve z^2, metres. As it stands it changes nothing.
+/// Correction of recorded depth: true z = scale z + offset + curve z^2, metres. The default changes nothing.
 struct DepthCorrection {
     double scale = 1, offset_m = 0, curve_per_m = 0;
     [[nodiscard]] bool any() const { return scale != 1 || offset_m != 0 || curve_per_m != 0; }
@@ -103,7 +103,7 @@ struct DepthCorrection {
     friend bool operator==(const DepthCorrection&, const DepthCorrection&) = default;
 };
 
-/// Refuses a camera that cannot be: non-finite or non-positive focal lengths, principal point far outside the image,
+/// Rejects an impossible camera: non-finite or non-positive focal lengths, principal point far outside the image,
 /// empty size. Throws Error naming the value and `camera.origin`.
 void check(const Camera& camera);
 

@@ -1,4 +1,4 @@
-// Two cameras side by side: triangles of recorded surface drawn into the colour image, and looked up there.
+// Renders triangles of the recorded surface into the colour image, and looks values up there.
 #include "projection/colour_view.h"
 
 #include "projection/error.h"
@@ -45,7 +45,7 @@ Seen seen_by(const Camera& camera, double fold, const Eigen::Vector3d& point) {
             static_cast<float>(point.z())};
 }
 
-/// Every depth pixel's place in the colour image.
+/// The position of every depth pixel in the colour image.
 cv::Mat_<Seen> places_in_colour(const cv::Mat1f& depth_m, const Camera& depth_camera, const ColourCamera& colour) {
     if (depth_m.size() != depth_camera.pinhole.size)
         throw Error(fmt::format("depth is {}x{}, but its camera is for {}x{}", depth_m.cols, depth_m.rows,
@@ -74,8 +74,7 @@ float area(const Seen& a, const Seen& b, float x, float y) {
     return (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]);
 }
 
-/// Fills the pixel centres within a triangle where it is nearer than what is there. Borders count as within, so that
-/// triangles side by side leave no seam.
+/// Fills the pixel centres in a triangle, with a depth test. Borders are inside, so adjacent triangles leave no seam.
 void draw(const std::array<Corner, 3>& corners, SurfaceInColour& surface) {
     const auto& [a, b, c] = corners;
     const auto [low_u, high_u] = std::minmax({a.seen[0], b.seen[0], c.seen[0]});
@@ -113,7 +112,7 @@ bool one_surface(const std::array<Corner, 3>& corners, const Pinhole& camera) {
     return low > 0 && high - low <= same_surface_m(camera, low);
 }
 
-/// The surface's depth nearest to the camera in the 3x3 pixels about a place; 0 where there is none.
+/// The surface's least depth in the 3x3 pixels around a position; 0 where there is none.
 float nearest_about(const cv::Mat1f& z_m, const Seen& place) {
     const int u = static_cast<int>(std::lround(place[0])), v = static_cast<int>(std::lround(place[1]));
     float nearest = 0;

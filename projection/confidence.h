@@ -1,5 +1,4 @@
-// How far a visibility can be believed: from what the camera saw of the ball around each pixel's point, whatever the
-// method.
+// The confidence of a visibility, for any method: how much of the ball around each point the camera saw.
 #pragma once
 
 #include "projection/maps.h"
@@ -8,13 +7,12 @@
 namespace scanshade {
 
 /// Confidence of each pixel's visibility, 0 .. 1; NaN where `visibility` is NaN. The product of three shares:
-/// - seen: of the image of the ball of that radius around the point, the part with depth that is not hidden by
-/// something in
-///   front of the ball. What lies outside the image, in a hole, or behind something near might occlude or not;
-/// - resolved: none where the radius shows as one pixel or less, all of it from three pixels on;
-/// - told from noise: 1 - 3 sigma(z) / radius, at least 0.
-/// `depth` and `visibility` have the same size; pixels without visibility count as holes. 16 places are looked at per
-/// pixel, so that steps of a sixteenth are to be expected.
+/// - seen: the part of the ball's image that has depth and is not hidden by something in front of the ball. Occluders
+///   outside the image, in a hole, or behind something near are unknown;
+/// - resolved: 0 where the radius is one pixel or less in the image, 1 from three pixels on;
+/// - above noise: 1 - 3 sigma(z) / radius, at least 0.
+/// `depth` and `visibility` have the same size; pixels without visibility count as holes. 16 positions are tested per
+/// pixel, so values come in steps of 1/16.
 [[nodiscard]] cv::Mat1f confidence_of(const DepthImage& depth, const cv::Mat1f& visibility, double radius_m,
                                       const DepthNoise& noise);
 

@@ -1,4 +1,4 @@
-// How a failure says what was being done, to what: errors gain context on their way out and keep their types.
+// Errors: they gain context on their way out and keep their types.
 #pragma once
 
 #include <exception>
@@ -14,26 +14,26 @@ class Error : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-/// The command line asked for something that cannot be: exit code 1, with the help at hand.
+/// The command line asked for something impossible: exit code 1.
 class Misuse : public Error {
   public:
     using Error::Error;
 };
 
-/// Neither input nor program is to blame: a disk is full, a share has gone, a lock is held. The same again may succeed.
+/// Neither input nor program is at fault: a full disk, a lost share, a held lock. A retry may succeed.
 class Outage : public Error {
   public:
     using Error::Error;
 };
 
-/// The device gave up. Nothing more can be computed on it by this process; a fresh one may.
+/// The device was lost. This process cannot use it any more; a new process may.
 class DeviceLost : public Outage {
   public:
     using Outage::Outage;
 };
 
-/// An exception that is not ours left during(): a mistake of the program, not of its input. The exception is nested
-/// inside. Code that calls a library turns what the library throws about bad input into Error on the spot.
+/// A foreign exception left during(): a bug of the program, not bad input. The exception is nested inside. Code that
+/// calls a library must convert the library's exceptions about bad input to Error.
 class InternalError : public std::logic_error {
   public:
     using std::logic_error::logic_error;

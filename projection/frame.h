@@ -26,10 +26,10 @@ struct Cloud {
     [[nodiscard]] bool organised() const { return grid.height > 1; }
 };
 
-/// Whether colour pixel (u, v) and depth pixel (u, v) see the same thing. Claimed only where the data say so.
+/// Whether colour pixel (u, v) and depth pixel (u, v) see the same point. Only set where the data say so.
 enum class Registration { unknown, yes, no };
 
-/// A camera that took the colour images from beside the depth camera.
+/// The secondary camera, which took the colour images.
 struct ColourCamera {
     Camera camera;
     Eigen::Isometry3d colour_from_depth = Eigen::Isometry3d::Identity(); ///< depth camera space to colour camera space
@@ -45,7 +45,7 @@ struct Frame {
     std::optional<Cloud> cloud;
     std::optional<Eigen::Isometry3d> world_from_camera;
     Registration registration = Registration::unknown;
-    std::vector<std::string> warnings; ///< what was odd and what was done about it; complete sentences
+    std::vector<std::string> warnings; ///< what was unusual and how it was handled; complete sentences
 };
 
 } // namespace scanshade

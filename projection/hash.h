@@ -1,4 +1,4 @@
-// A hash of whole numbers, from which every part of the program that needs noise takes it: the same on every run.
+// A hash of integers: the source of all noise in the program, the same on every run.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Images that share a pinhole camera, and what a hole is in each.
+// Images that share a pinhole camera, and the value of a hole in each.
 #pragma once
 
 #include "projection/camera.h"

@@ -1,13 +1,13 @@
-// Differences and mixtures of poses.
+// Differences of poses, and interpolation.
 #include "projection/motion.h"
 
 namespace scanshade {
 
 Motion motion_between(const Eigen::Isometry3d& before, const Eigen::Isometry3d& after, double seconds,
                       const Eigen::Isometry3d& at) {
-    const Eigen::AngleAxisd turn((before.linear().transpose() * after.linear()).eval());
-    const Eigen::Vector3d shift_in_world = after.translation() - before.translation();
-    return {turn.angle() * turn.axis() / seconds, at.linear().transpose() * shift_in_world / seconds};
+    const Eigen::AngleAxisd rotation((before.linear().transpose() * after.linear()).eval());
+    const Eigen::Vector3d translation_in_world = after.translation() - before.translation();
+    return {rotation.angle() * rotation.axis() / seconds, at.linear().transpose() * translation_in_world / seconds};
 }
 
 Eigen::Isometry3d pose_between(const Eigen::Isometry3d& before, const Eigen::Isometry3d& after, double share) {

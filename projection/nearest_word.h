@@ -1,4 +1,4 @@
-// What somebody meant who mistyped a word.
+// The word meant by a mistyped one.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace scanshade {
 
-/// The candidate that is fewest edits away (letters added, left out, changed, or two swapped), the first of equals;
-/// empty where none is near: more than a third of the word's letters, and at most three, would have to change.
+/// The candidate with the fewest edits (letters added, removed, changed, or two swapped), the first of equals. Empty if
+/// that takes more than three edits, or more than a third of the word's letters.
 [[nodiscard]] std::string nearest_word(std::string_view word, const std::vector<std::string>& candidates);
 
 /// "; did you mean WORD?", or nothing.

@@ -22,12 +22,12 @@ constexpr int lag_px = 4;  // longer than the sensor's own smoothing, shorter th
 constexpr int step_px = 3; // every third pixel of every third row is plenty
 constexpr int bands = 24;  // equal steps of log z over 0.2 .. 50 m
 constexpr double nearest_m = 0.2, farthest_m = 50;
-constexpr std::size_t enough = 400; // samples for a band to speak
+constexpr std::size_t enough = 400; // samples a band needs
 
 struct Band {
     std::vector<float> spread_m;   // |second difference| of depth
     std::vector<float> adjacent_m; // of neighbouring pixels
-    std::vector<float> depths_m;   // at their middles; those that occur, once all are collected
+    std::vector<float> depths_m;   // at their middles; keep_distinct() reduces them to the distinct values
     double z_sum = 0;
 };
 
@@ -65,7 +65,7 @@ struct Measured {
     double z, sigma, adjacent, weight; // deviations by distant and by adjacent pixels
 };
 
-/// Sigma from the mean of the smallest `share` of the differences, were they Gaussian; `mean_of_share` is that mean for
+/// Sigma from the mean of the smallest `share` of the differences, assumed Gaussian; `mean_of_share` is that mean for
 /// sigma 1. A second difference of three independent values has sqrt(6) times the deviation of one.
 double sigma_of(std::vector<float>& spread_m, double share, double mean_of_share) {
     const double count = share * static_cast<double>(spread_m.size());
@@ -74,13 +74,13 @@ double sigma_of(std::vector<float>& spread_m, double share, double mean_of_share
     return std::accumulate(spread_m.begin(), at, 0.0) / count / (mean_of_share * std::sqrt(6.0));
 }
 
-/// The values that occur, in order.
+/// Sorts the values and drops duplicates.
 void keep_distinct(std::vector<float>& values) {
     std::sort(values.begin(), values.end());
     values.erase(std::unique(values.begin(), values.end()), values.end());
 }
 
-/// The usual distance between neighbouring values that occur: the sensor's step where it has one.
+/// The median distance between distinct values: the sensor's step, where it has one.
 double step_of(const std::vector<float>& depths_m) {
     if (depths_m.size() < 2)
         return 0;
@@ -95,8 +95,8 @@ struct Spread {
 };
 
 /// The lower 80 % of |N(0, 1)| have the mean 0.5586, the lower 40 % 0.2563. Among clutter more than a fifth of the
-/// differences straddle an edge, so the smaller share decides; but not where the values come in steps: there many
-/// differences are exactly zero, and the steps are the noise.
+/// differences straddle an edge, so the smaller share decides. Quantised values are an exception: many
+/// differences are exactly zero there, and the steps are the noise.
 Spread spread_of(Band& band) {
     const double most = sigma_of(band.spread_m, 0.8, 0.5586), few = sigma_of(band.spread_m, 0.4, 0.2563);
     if (few >= most || step_of(band.depths_m) >= 0.5 * most)
@@ -111,8 +111,8 @@ double second_difference_variance(double lag, double s) {
     return 6 - 8 * correlation(lag) + 2 * correlation(2 * lag);
 }
 
-/// The integral of the correlation for which adjacent second differences are `ratio` times as large as distant ones.
-double grain_of(double ratio) {
+/// The integral of the correlation at which adjacent second differences are `ratio` times as large as distant ones.
+double correlation_length_of(double ratio) {
     double low = 0.3, high = 3; // of s
     for (int i = 0; i < 30; ++i) {
         const double s = (low + high) / 2;
@@ -123,7 +123,7 @@ double grain_of(double ratio) {
     return std::max(1.0, std::sqrt(2 * std::numbers::pi) * low);
 }
 
-/// What one step is if steps grow with that power of z, and the share of gaps between values that occur which are one.
+/// The step, if steps grow with that power of z, and the share of the gaps between distinct values that equal it.
 struct Step {
     double size = 0, share = 0;
 };
@@ -141,10 +141,10 @@ Step step_by(const std::vector<float>& values_m, int power) {
     return {sum / count, count / static_cast<double>(gaps.size())};
 }
 
-void tell_steps(DepthNoise& noise, const std::vector<float>& values_m) {
+void find_steps(DepthNoise& noise, const std::vector<float>& values_m) {
     const Step even = step_by(values_m, 0), growing = step_by(values_m, 2);
-    constexpr double told = 0.25; // of unquantised values a fiftieth lie so
-    if (std::max(even.share, growing.share) < told)
+    constexpr double enough_share = 0.25; // of unquantised values the share is 0.02
+    if (std::max(even.share, growing.share) < enough_share)
         return;
     (even.share >= growing.share ? noise.step_m : noise.step_per_z2) =
         (even.share >= growing.share ? even : growing).size;
@@ -163,7 +163,7 @@ DepthNoise law_through(const std::vector<Measured>& points) {
         noise.floor_m = (t0 * s11 - t1 * s01) / determinant;
         noise.per_z2 = (t1 * s00 - t0 * s01) / determinant;
     } else {
-        noise.floor_m = t0 / s00; // one distance: it cannot be told how noise grows
+        noise.floor_m = t0 / s00; // a single distance does not determine the growth
     }
     if (noise.per_z2 < 0)
         noise = {t0 / s00, 0};
@@ -198,7 +198,7 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
             points.push_back(*measured[i]);
     }
     DepthNoise steps;
-    tell_steps(steps, values_m);
+    find_steps(steps, values_m);
     if (points.empty())
         return steps;
     DepthNoise noise = law_through(points);
@@ -206,7 +206,7 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
     double ratios = 0, weights = 0;
     for (const Measured& p : points)
         ratios += p.weight * p.adjacent / p.sigma, weights += p.weight;
-    noise.grain_px = grain_of(ratios / weights);
+    noise.correlation_px = correlation_length_of(ratios / weights);
     const bool clean = std::all_of(points.begin(), points.end(),
                                    [&](const Measured& p) { return noise.at(p.z) < std::max(1e-4 * p.z, 1.2e-4); });
     return clean ? steps : noise;
@@ -222,23 +222,25 @@ DepthNoise noise_from_text(const std::string& text) {
     DepthNoise noise;
     int used = 0;
     const bool law = std::sscanf(text.c_str(), "%lf,%lf%n", &noise.floor_m, &noise.per_z2, &used) == 2;
-    if (law && used < static_cast<int>(text.size())) { // with a grain
+    if (law && used < static_cast<int>(text.size())) { // with a correlation length
         int more = 0;
-        if (std::sscanf(text.c_str() + used, ",%lf%n", &noise.grain_px, &more) == 1)
+        if (std::sscanf(text.c_str() + used, ",%lf%n", &noise.correlation_px, &more) == 1)
             used += more;
     }
     if (!law || used != static_cast<int>(text.size()) ||
         !(noise.floor_m >= 0 && noise.floor_m < 1 && noise.per_z2 >= 0 && noise.per_z2 < 1) ||
-        !(noise.grain_px >= 1 && noise.grain_px <= 16))
-        throw Misuse("depth noise '" + text +
-                     "': auto, none, kinect, tof or FLOOR,PER_Z2[,GRAIN] (metres, 0 .. 1; pixels, 1 .. 16) expected");
+        !(noise.correlation_px >= 1 && noise.correlation_px <= 16))
+        throw Misuse(
+            "depth noise '" + text +
+            "': auto, none, kinect, tof or FLOOR,PER_Z2[,CORRELATION] (metres, 0 .. 1; pixels, 1 .. 16) expected");
     return noise;
 }
 
 std::string describe(const DepthNoise& noise) {
     std::string text = "none";
     if (noise.any())
-        text = fmt::format("sigma {:.5f} + {:.5f} z^2 m, grain {:.1f} px", noise.floor_m, noise.per_z2, noise.grain_px);
+        text = fmt::format("sigma {:.5f} + {:.5f} z^2 m, correlation length {:.1f} px", noise.floor_m, noise.per_z2,
+                           noise.correlation_px);
     if (noise.step_m > 0)
         text += fmt::format(", steps of {:.2g} m", noise.step_m);
     if (noise.step_per_z2 > 0)

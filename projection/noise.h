@@ -1,4 +1,4 @@
-// How uncertain recorded depth is: sigma(z), measured from the data themselves.
+// The noise of recorded depth: sigma(z), measured from the data.
 #pragma once
 
 #include "projection/maps.h"
@@ -12,32 +12,31 @@ namespace scanshade {
 /// The square law is that of disparity sensors; time of flight is nearly all floor (Khoshelham and Elberink 2012).
 struct DepthNoise {
     double floor_m = 0;
-    double per_z2 = 0; ///< 1/m
-    double grain_px =
-        1; ///< over how many pixels of a row values err alike (integral of their correlation); 1 = each by itself
+    double per_z2 = 0;         ///< 1/m
+    double correlation_px = 1; ///< correlation length along a row (integral of the correlation); 1 = independent pixels
 
-    double step_m = 0,
-           step_per_z2 = 0; ///< of the values recorded, step_m + step_per_z2 z^2 apart; 0: none found. For people alone
+    /// Quantisation: recorded values are step_m + step_per_z2 z^2 apart; 0 = none found. Only reported.
+    double step_m = 0, step_per_z2 = 0;
 
     [[nodiscard]] double at(double z_m) const { return floor_m + per_z2 * z_m * z_m; }
     [[nodiscard]] bool any() const { return floor_m > 0 || per_z2 > 0; }
 };
 
 /// Measures sigma(z) on depth images of one sensor: the spread of second differences of 1/z (zero on any plane) in
-/// bands of z, and the law fitted through the bands. Edges and curvature are the spread's far tail and do not count, up
-/// to three fifths of the samples. The grain follows from how much less adjacent values differ than values 4 pixels
-/// apart: a correlation exp(-d^2 / 2 s^2) is taken for granted, since disparity comes from windows of pixels. Steps are
-/// told where a quarter of the values that occur lie one step from the next: all alike (16-bit files), or growing with
-/// z^2 (disparity).
-/// Returns no noise (but steps) where the spread stays below a tenth of a millimetre per metre, or 0.12 mm, which fine
-/// 16-bit steps (5000 per metre) make of clean depth: then nothing needs smoothing.
+/// bands of z, and the law fitted through the bands. Edges and curvature form the far tail of the spread; up to three
+/// fifths of the samples are ignored for them. The correlation length follows from the ratio of second differences over
+/// 1 and over 4 pixels. It assumes a correlation exp(-d^2 / 2 s^2), since disparity comes from windows of pixels.
+/// Steps are reported where a quarter of the distinct values are one step from the next. Steps are constant (16-bit
+/// files) or grow with z^2 (disparity).
+/// Returns no noise, only steps, where sigma is below 0.1 mm per metre or 0.12 mm: then nothing needs smoothing. Clean
+/// depth in fine 16-bit steps (5000 per metre) has as much.
 [[nodiscard]] DepthNoise measure_noise(std::span<const DepthImage> images);
 
-/// "auto" is not for here. "none", "kinect" (0.0015, 0.0018, grain 3), "tof" (0.0015, 0) or "floor,per_z2[,grain]".
-/// Throws Misuse.
+/// From "none", "kinect" (0.0015, 0.0018, 3 px), "tof" (0.0015, 0) or "floor,per_z2[,correlation]". The caller handles
+/// "auto". Throws Misuse.
 [[nodiscard]] DepthNoise noise_from_text(const std::string& text);
 
-/// "sigma 0.0014 + 0.0018 z^2 m, grain 3.1 px, steps of 0.0029 z^2 m", or "none, steps of 0.0002 m".
+/// "sigma 0.0014 + 0.0018 z^2 m, correlation length 3.1 px, steps of 0.0029 z^2 m", or "none, steps of 0.0002 m".
 [[nodiscard]] std::string describe(const DepthNoise& noise);
 
 } // namespace scanshade

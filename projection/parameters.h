@@ -44,11 +44,11 @@ class OneOf {
               *static_cast<Enum*>(held) = static_cast<const Named<Enum>*>(table)[i].value;
           }) {}
 
-    /// Without an empty one, which stands for "not given".
+    /// All words but the empty one, which means "not given".
     [[nodiscard]] std::vector<std::string> words() const;
-    /// The word for the present value; none where the table has none.
+    /// The word for the current value; none where the table has none.
     [[nodiscard]] std::optional<std::string_view> word() const;
-    /// Sets the variable; false, and nothing done, for a word that is not in the table.
+    /// Sets the variable; false and no change for a word that is not in the table.
     [[nodiscard]] bool set(std::string_view word) const;
 
   private:
@@ -78,12 +78,12 @@ struct Parameter {
 void set(const Parameter& row, const std::string& text);
 /// Sets a row of a real number. Throws Misuse where it is out of range.
 void set(const Parameter& row, double number);
-/// The row's present value as text: numbers shortest round trip, booleans "true"/"false", nothing for what was not
+/// The row's current value as text: numbers as the shortest that round-trips, booleans "true"/"false", none if not
 /// given.
 [[nodiscard]] std::string value_text(const Parameter& row);
-/// The present value of a row of numbers, as it would be typed: 0.1 of a float that holds 0.10000000149.
+/// The current value of a numeric row as typed: 0.1 for a float that holds 0.10000000149.
 [[nodiscard]] double number_of(const Parameter& row);
-/// The words that may be given; empty where the row takes anything else.
+/// The words allowed; empty for rows of other types.
 [[nodiscard]] std::vector<std::string> choices_of(const Parameter& row);
 /// "m, 0 .. 100000" or "lowest | low | ..." : what may be given.
 [[nodiscard]] std::string range_text(const Parameter& row);

@@ -47,7 +47,7 @@ Camera sized_camera(const Cloud& cloud, Camera camera) {
     return camera;
 }
 
-/// Where a cloud's points lie in the plane z = 1, as far as a camera at the origin can see them.
+/// The points of a cloud in the plane z = 1, if a camera at the origin can see them.
 struct Framing {
     int valid = 0, seen = 0;
     double x_low = INFINITY, x_high = -INFINITY, y_low = INFINITY, y_high = -INFINITY;
@@ -93,7 +93,7 @@ double occupied_share(const Cloud& cloud, const Framing& framing) {
 
 Camera framing_camera(const Cloud& cloud) {
     constexpr int largest_px = 1024, border_px = 2;
-    constexpr double enough = 0.99; // a few strays may stay unseen; coverage tells
+    constexpr double enough = 0.99; // a few outliers may stay outside; coverage counts them
     const Framing framing = framing_of(cloud);
     if (framing.valid == 0)
         return {{1.0 * cloud.grid.width,
@@ -148,8 +148,8 @@ cv::Mat1f without_invalid(const cv::Mat1f& depth_m, const ProjectOptions& option
     return clean;
 }
 
-/// Depth between four pixels of one surface: linear in 1/z, which any plane is in the image. 0 where they are not all
-/// of one surface.
+/// Depth between four pixels of one surface: linear in 1/z, as planes are. 0 where the four do not belong to one
+/// surface.
 float depth_between(const cv::Mat1f& depth_m, const cv::Vec2f& at, float nearest_m, double same_m) {
     const int u = static_cast<int>(std::floor(at[0])), v = static_cast<int>(std::floor(at[1]));
     if (u < 0 || v < 0 || u + 1 >= depth_m.cols || v + 1 >= depth_m.rows)
@@ -168,8 +168,8 @@ float depth_between(const cv::Mat1f& depth_m, const cv::Vec2f& at, float nearest
     return static_cast<float>(1 / inverse);
 }
 
-/// The nearest pixel's depth where it borders on another surface; within a surface, depth between pixels: repeated and
-/// skipped pixels would be terraces to a method that looks at relief.
+/// Interpolated depth within a surface, since repeated and skipped pixels would make terraces; the nearest pixel's
+/// depth at the border of a surface.
 cv::Mat1f without_distortion(const cv::Mat1f& depth_m, const Camera& camera, const ProjectOptions& options) {
     const auto maps = Undistortion::of(camera);
     cv::Mat1f z_m(depth_m.size(), 0.0F);
@@ -190,7 +190,7 @@ cv::Mat1f without_distortion(const cv::Mat1f& depth_m, const Camera& camera, con
 
 // ---------------------------------------------------------------------------------------------------- clouds
 
-/// Every point in range within half a pixel of its own place in the grid?
+/// Whether every point in range projects to within half a pixel of its grid cell.
 bool lies_on_grid(const Cloud& cloud, const Pinhole& camera, const ProjectOptions& options) {
     if (!cloud.organised() || cloud.grid != camera.size)
         return false;
@@ -236,8 +236,8 @@ DepthImage splat(const Cloud& cloud, const Pinhole& camera, const ProjectOptions
     return view;
 }
 
-/// The middle one of the 3x3 neighbours' front layer; {-1, -1} where fewer than three neighbours make one up.
-/// Three is what a pixel just outside a straight silhouette can have at most, so outlines hardly grow.
+/// The median of the front layer of the 3x3 neighbours; {-1, -1} where the layer has fewer than three. A pixel just
+/// outside a straight silhouette has at most three, so outlines hardly grow.
 cv::Point middle_of_front(const DepthImage& view, cv::Point centre) {
     std::array<std::pair<float, cv::Point>, 8> seen;
     std::size_t count = 0;
@@ -253,8 +253,8 @@ cv::Point middle_of_front(const DepthImage& view, cv::Point centre) {
     return front >= 3 ? seen[front / 2].second : cv::Point(-1, -1);
 }
 
-/// At one point per pixel a third of a surface's pixels stay empty by chance and show what lies behind (1 - 1/e are
-/// hit). Such pixels take a neighbour of the surface in front.
+/// At one point per pixel, 1/e of a surface's pixels stay empty by chance and show the surface behind. Such pixels take
+/// a neighbour of the surface in front.
 DepthImage without_gaps(const DepthImage& sparse) {
     DepthImage view{sparse.camera, sparse.z_m.clone(), sparse.source.clone()};
     for (int v = 0; v < view.z_m.rows; ++v)

@@ -1,4 +1,4 @@
-// Ranks of values: the median and its relatives, for every room.
+// Order statistics: median and quantiles.
 #pragma once
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 namespace scanshade {
 
-/// The value that `rank` others precede in order; `rank` must be below their number. Reorders the values.
+/// The value at index `rank` of the sorted values; `rank` must be below their number. Reorders the values.
 template <class Values>
 [[nodiscard]] typename Values::value_type ranked(Values& values, std::size_t rank) {
     const auto place = values.begin() + static_cast<std::ptrdiff_t>(rank);
@@ -15,7 +15,7 @@ template <class Values>
     return *place;
 }
 
-/// The middle value, the upper one of two; `none` where there are no values.
+/// The median, the upper one of two; `none` for no values.
 template <class Values>
 [[nodiscard]] typename Values::value_type
 median(Values values,
@@ -23,8 +23,7 @@ median(Values values,
     return values.empty() ? none : ranked(values, values.size() / 2);
 }
 
-/// The value that a `share` of 0 .. 1 of the values stays below, by the lower nearest rank; NaN where there are none.
-/// Reorders the values.
+/// The `share` quantile (0 .. 1) by the lower nearest rank; NaN for no values. Reorders the values.
 template <class Values>
 [[nodiscard]] typename Values::value_type quantile(Values& values, double share) {
     if (values.empty())

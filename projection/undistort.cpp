@@ -134,7 +134,7 @@ cv::Mat1i nearest_pixels(const cv::Mat2f& places) {
     return map;
 }
 
-/// Rounding there and back may land a pixel aside: a neighbour that shows the very same recorded pixel comes first.
+/// Rounding there and back may be off by one pixel: a neighbour that shows the same recorded pixel comes first.
 int same_pixel_near(const cv::Mat1i& recorded_pixel, cv::Point nearest, int recorded) {
     for (int v = std::max(nearest.y - 1, 0); v <= std::min(nearest.y + 1, recorded_pixel.rows - 1); ++v)
         for (int u = std::max(nearest.x - 1, 0); u <= std::min(nearest.x + 1, recorded_pixel.cols - 1); ++u)

@@ -1,4 +1,4 @@
-// Lens distortion taken off and put back: one point at a time, and as maps for whole images.
+// Lens distortion, removed and applied: for single points, and as maps for whole images.
 #pragma once
 
 #include "projection/camera.h"
@@ -17,28 +17,27 @@ namespace scanshade {
 [[nodiscard]] double fold_r2(const Distortion& distortion);
 
 /// The reverse, by Newton's method to 1e-10 (under 1e-6 px at any focal length in use). None where it does not converge
-/// or where the polynomial has turned round, so that two directions share one pixel.
+/// or where the polynomial folds back, so that two directions share one pixel.
 [[nodiscard]] std::optional<Eigen::Vector2d> undistorted(const Distortion& distortion, const Eigen::Vector2d& bent);
 
-/// Which pixel of the recorded image shows what pixel of the undistorted one, both ways. Both images
-/// have the same intrinsics and size. Immutable: frames and threads share it.
+/// The mapping between pixels of the recorded and the undistorted image. Both images have the same intrinsics and size.
+/// Immutable: frames and threads share it.
 class Undistortion {
   public:
     explicit Undistortion(const Camera& camera);
 
-    /// Made once per camera and kept while it is among the few used last; safe from several threads.
+    /// Cached for the few cameras used last; safe from several threads.
     [[nodiscard]] static std::shared_ptr<const Undistortion> of(const Camera& camera);
 
-    /// For each undistorted pixel the index (row-major) of the recorded pixel to look at; -1 where the lens saw
-    /// nothing.
+    /// For each undistorted pixel the index (row-major) of the recorded pixel; -1 where the lens saw nothing.
     [[nodiscard]] const cv::Mat1i& recorded_pixel() const { return recorded_pixel_; }
-    /// The same between pixels: where in the recorded image (column, row) the undistorted pixel's centre falls; NaN
-    /// where the lens saw nothing.
+    /// For each undistorted pixel the position (column, row) of its centre in the recorded image; NaN where the lens
+    /// saw nothing.
     [[nodiscard]] const cv::Mat2f& recorded_at() const { return recorded_at_; }
     /// For each recorded pixel the index of the undistorted pixel that shows it, or is nearest to it; -1 outside the
     /// image.
     [[nodiscard]] const cv::Mat1i& undistorted_pixel() const { return undistorted_pixel_; }
-    /// For each recorded pixel the direction it looks in as x and y at z = 1; NaN where the lens has none.
+    /// For each recorded pixel its ray as x and y at z = 1; NaN where the lens has none.
     [[nodiscard]] const cv::Mat2f& direction() const { return direction_; }
 
   private:

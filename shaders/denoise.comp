@@ -1,4 +1,4 @@
-// Last pass of the screen-space methods: a 5x5 mean over the pixels of the same plane, then the look. 2x2 pixels a thread,
+// Last pass of the screen-space methods: a 5x5 mean over the pixels of the same plane, then the tone curve. 2x2 pixels a thread,
 // because they share most of what they read.
 #version 460
 #extension GL_GOOGLE_include_directive : require

@@ -1,8 +1,7 @@
-// Normals from depth, before any screen-space method: along each axis the side that goes on straight in 1/z, which is
-// linear on any plane. Written with the depth: unit, facing the camera; (0, 0, 0) in holes and only there.
+// Normals from depth, before any screen-space method. Each axis uses the side along which 1/z, linear on any plane,
+// continues straight. Output with the depth: unit, facing the camera; (0, 0, 0) only in holes.
 //
-// Where the view brings normals they are kept, made unit and turned to the camera; those that are zero or not finite are
-// derived here like the rest.
+// Normals supplied with the view are kept, normalised and flipped to the camera; zero and non-finite ones are derived here.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -45,8 +44,8 @@ vec3 tangent(float z, float w, vec4 along, vec3 here, vec3 ray_before, vec3 ray_
     return any_side ? (cost.x < cost.y ? back : ahead) : vec3(0.0);
 }
 
-// Between holes an axis tells nothing: then whatever is known nearest, in any direction but the one there is, spans the plane.
-// Clean depth comes here once and leaves at once; a loop is what lavapipe can leave early.
+// Between holes an axis has no tangent. Then the nearest known pixel in any other direction spans the plane. Clean depth
+// leaves at once; lavapipe can leave a loop early.
 const int rings = 8;
 const float gentle = 4.0; // slope up to which what lies across holes is taken for the same surface
 

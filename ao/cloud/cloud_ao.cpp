@@ -1,4 +1,4 @@
-// Visibility of every point of a cloud: neighbours, planes, sides, discs, rays, and the mean of what neighbours saw.
+// Visibility of every point of a cloud: neighbours, planes, orientation, discs, rays, and means over neighbours.
 #include "ao/cloud/cloud_ao.h"
 
 #include "ao/cloud/cloud_gpu.h"
@@ -53,7 +53,7 @@ class Watch {
     Stopwatch stopwatch_;
 };
 
-/// About `wanted` of the points, chosen by a hash: recording order would take whole lines of a scan or none of them.
+/// About `wanted` of the points, chosen by a hash: every n-th point in recording order would skip whole scan lines.
 std::vector<Vector3d> sampled(std::span<const Vector3d> points, std::size_t wanted) {
     const double share =
         std::min(1.0, static_cast<double>(wanted) / static_cast<double>(std::max<std::size_t>(points.size(), 1)));
@@ -84,7 +84,7 @@ double extent_of(std::span<const Vector3d> points) {
 /// A neighbour's weight in the mean is e^(this distance^2): visibility hardly changes over a tenth of the radius.
 float mean_falloff(float radius) { return -1 / (2 * 0.01F * radius * radius); }
 
-/// The mean of a value and those beside it on the same surface: planes alike, near against the radius.
+/// The mean of a value and its neighbours' on the same surface: parallel planes, distances small against the radius.
 std::vector<float> smoothed(const CloudSurface& surface, const std::vector<float>& values, float radius) {
     std::vector<float> means(values.size(), nothing);
     const float falloff = mean_falloff(radius);
@@ -146,10 +146,10 @@ std::vector<Parameter> CloudAoOptions::parameters() {
          .help = "where estimated normals point: auto, up, outward, inward, or to the scanner at x,y,z",
          .value = &outside},
         {.name = "normals",
-         .help = "which normals are taken; auto = recorded ones where they lie on the planes of the points",
+         .help = "which normals are used; auto = recorded ones where they agree with the planes of the points",
          .value = OneOf(&normals, normals_words)},
         {.name = "memory",
-         .help = "memory for the points in work; larger clouds are taken in tiles",
+         .help = "memory for the points; larger clouds are computed in tiles",
          .value = &memory_mib,
          .unit = "MiB",
          .low = 64,
@@ -172,11 +172,11 @@ CloudAo::CloudAo(CloudAoOptions options, gpu::Device* device) : options_(std::mo
     viewpoint_ = triple(options_.outside);
     constexpr std::array words{"auto", "up", "outward", "inward"};
     if (!viewpoint_ && std::find(words.begin(), words.end(), options_.outside) == words.end())
-        throw Misuse(
-            fmt::format("outside: '{}' given, expected auto, up, outward, inward, or a place x,y,z", options_.outside));
+        throw Misuse(fmt::format("outside: '{}' given, expected auto, up, outward, inward, or a position x,y,z",
+                                 options_.outside));
 }
 
-/// One cloud on its way: what holds for all tiles, and the results so far.
+/// One cloud being computed: what all tiles share, and the results so far.
 class CloudAo::Work {
   public:
     Work(const CloudAoOptions& options, gpu::Device* device, const Vector3d& up,
@@ -191,7 +191,7 @@ class CloudAo::Work {
             if (cloud.points[i].allFinite())
                 valid_.push_back(static_cast<std::uint32_t>(i));
         const std::vector<Vector3d> some = sampled(cloud.points, enough_to_judge);
-        settle_outside(viewpoint, scanner, some);
+        settle_orientation(viewpoint, scanner, some);
         settle_radius(some);
         settle_rays();
         watch_.lap("survey");
@@ -212,30 +212,30 @@ class CloudAo::Work {
 
   private:
     static constexpr std::size_t enough_to_judge = 60000;
-    static constexpr double bytes_per_point = 420; ///< measured, with Embree's tree; GPUs need less of the host
+    static constexpr double bytes_per_point = 420; ///< measured, Embree's tree included; with a GPU it is less
 
     [[nodiscard]] std::size_t at_once() const {
         const auto fitting = static_cast<std::size_t>(options_.memory_mib * 1048576.0 / bytes_per_point);
         return gpu_ ? std::min(fitting, gpu_->most_points()) : fitting;
     }
 
-    void settle_outside(const std::optional<Vector3d>& viewpoint, const std::optional<Vector3d>& scanner,
-                        const std::vector<Vector3d>& some) {
-        using Kind = Outside::Kind;
+    void settle_orientation(const std::optional<Vector3d>& viewpoint, const std::optional<Vector3d>& scanner,
+                            const std::vector<Vector3d>& some) {
+        using Kind = NormalOrientation::Kind;
         if (viewpoint)
-            outside_ = {Kind::viewpoint, *viewpoint, "the place given by --cloud.outside"};
+            orientation_ = {Kind::viewpoint, *viewpoint, "the position given by --cloud.outside"};
         else if (options_.outside == "auto")
-            outside_ = guessed_outside(some, scanner);
+            orientation_ = guessed_orientation(some, scanner);
         else
-            outside_ = {options_.outside == "up"        ? Kind::direction
-                        : options_.outside == "outward" ? Kind::outward
-                                                        : Kind::inward,
-                        up_, options_.outside + ", as given"};
-        if (outside_.kind == Kind::direction)
-            outside_.point = up_;
+            orientation_ = {options_.outside == "up"        ? Kind::direction
+                            : options_.outside == "outward" ? Kind::outward
+                                                            : Kind::inward,
+                            up_, options_.outside + ", as given"};
+        if (orientation_.kind == Kind::direction)
+            orientation_.point = up_;
     }
 
-    /// A part of the points stands farther apart by the root of its share, as points on surfaces do.
+    /// The spacing of a sample is larger by the root of its share: points are on surfaces.
     void settle_radius(const std::vector<Vector3d>& some) {
         if (some.empty())
             return;
@@ -253,20 +253,20 @@ class CloudAo::Work {
                             options_.radius > 0 ? "as given" : "a twentieth of the extent, within 10 .. 200 spacings"));
     }
 
-    /// Visibility changes over parts of the radius: the more points these hold, the more of them may be taken together.
+    /// Visibility changes slowly against the radius: the more points the radius spans, the more may share their rays.
     void settle_rays() {
         const double spacings = options_.sky || !(result_.spacing > 0) ? 0 : result_.radius / result_.spacing;
         const int level = spacings > 120 ? 2 : spacings > 60 ? 1 : 0;
-        constexpr int on_gpu = 64; // they cost a GPU less than the rest costs the host
+        constexpr int on_gpu = 64; // costs a GPU less time than the other stages cost the host
         const int rays = options_.rays > 0 ? options_.rays
                          : gpu_            ? on_gpu
                                            : std::array{16, 8, 4}[static_cast<std::size_t>(level)];
         passes_ = options_.smooth >= 0 ? options_.smooth : std::array{2, 3, 5}[static_cast<std::size_t>(level)];
-        fan_.emplace(rays, options_.seed);
+        directions_.emplace(rays, options_.seed);
         result_.notes.push_back(fmt::format("{} rays a point, {} times the mean over neighbours.", rays, passes_));
     }
 
-    /// Values for `core`, which lies within `round`; on the GPU, where it has the memory for it.
+    /// Values for `core`, a part of `round`; on the GPU if its memory suffices.
     void tile(const Places& core, const Places& round) {
         if (round.empty())
             return;
@@ -275,9 +275,9 @@ class CloudAo::Work {
                 tile(core, round, &*gpu_);
                 ++gpu_tiles_;
                 return;
-            } catch (const Outage&) { // what concerns more than this cloud
+            } catch (const Outage&) { // concerns more than this cloud
                 throw;
-            } catch (const Error& failure) { // no memory, most likely: other programs' counts, too
+            } catch (const Error& failure) { // most likely out of memory, since other programs use the device, too
                 result_.notes.push_back(fmt::format("{}: {}", gpu_->device_name(), failure.what()));
             }
         }
@@ -291,10 +291,10 @@ class CloudAo::Work {
                 wanted[i] = 1;
         CloudSurface surface = planes_of(round, gpu);
         std::optional<DiscRays> rays;
-        if (sides_unknown()) {
-            if (outside_.kind == Outside::Kind::inward)
+        if (orientation_unknown()) {
+            if (orientation_.kind == NormalOrientation::Kind::inward)
                 rays.emplace(surface);
-            turn_outside(surface, outside_, rays ? &*rays : nullptr);
+            orient_normals(surface, orientation_, rays ? &*rays : nullptr);
         }
         watch_.lap("sides");
         const auto is_wanted = [&](std::size_t place) {
@@ -305,7 +305,7 @@ class CloudAo::Work {
         std::vector<float> values;
         if (gpu) {
             rays.reset();
-            values = gpu->visibility(surface, *fan_, {radius, up, mean_falloff(radius), passes_});
+            values = gpu->visibility(surface, *directions_, {radius, up, mean_falloff(radius), passes_});
             watch_.lap("rays and means");
         } else {
             if (!rays)
@@ -317,7 +317,7 @@ class CloudAo::Work {
             tbb::parallel_for(tbb::blocked_range<std::size_t>(0, surface.size(), 64), [&](const auto& range) {
                 for (std::size_t i = range.begin(); i < range.end(); ++i)
                     if (!surface.normals[i].isZero() && asked[i])
-                        values[i] = rays->open(i, *fan_, radius, up);
+                        values[i] = rays->open(i, *directions_, radius, up);
             });
             rays.reset();
             watch_.lap("rays");
@@ -337,7 +337,7 @@ class CloudAo::Work {
         result_.tiles = ++tiles_;
     }
 
-    /// By place, 1 for those whose values the means over neighbours of the wanted ones hang on.
+    /// 1 for each point whose value the means of the wanted points need.
     template <class IsWanted>
     [[nodiscard]] std::vector<char> asked_by_means(const CloudSurface& surface, const IsWanted& is_wanted) const {
         std::vector<char> asked(surface.size());
@@ -374,43 +374,44 @@ class CloudAo::Work {
             normals_refused_ = true;
             result_.notes.push_back(fmt::format(
                 "recorded normals are not used: the median angle between them and the planes of the points is "
-                "{:.0f} degrees; --cloud.normals recorded takes them all the same.",
+                "{:.0f} degrees; --cloud.normals recorded uses them anyway.",
                 std::acos(surface.agreement) * 180 / std::numbers::pi));
             normals = {};
             surface = cloud_surface(points, {}, gpu);
         }
         watch_.lap("planes");
-        sides_opposed_ |=
+        normals_opposed_ |=
             !normals.empty() && options_.normals == CloudNormals::automatic && surface.discord > too_many_opposed;
         return surface;
     }
 
-    /// Whether recorded normals are taken.
+    /// Whether recorded normals are used.
     [[nodiscard]] bool recorded() const {
         return !cloud_.normals.empty() && options_.normals != CloudNormals::estimated && !normals_refused_;
     }
-    [[nodiscard]] bool sides_unknown() const { return !recorded() || sides_opposed_; }
+    [[nodiscard]] bool orientation_unknown() const { return !recorded() || normals_opposed_; }
 
     void tell() {
-        const std::string facing = outside_.kind == Outside::Kind::viewpoint ? "turned to " : "turned ";
-        if (recorded() && sides_opposed_)
-            result_.notes.push_back("normals: recorded, but neighbours' oppose each other; " + facing + outside_.why +
-                                    ".");
+        const std::string facing = orientation_.kind == NormalOrientation::Kind::viewpoint ? "turned to " : "turned ";
+        if (recorded() && normals_opposed_)
+            result_.notes.push_back("normals: recorded, but neighbours' oppose each other; " + facing +
+                                    orientation_.why + ".");
         else
-            result_.notes.push_back(recorded()
-                                        ? "normals: recorded."
-                                        : "normals: from planes through 16 neighbours, " + facing + outside_.why + ".");
-        const bool apart = outside_.kind == Outside::Kind::outward || outside_.kind == Outside::Kind::inward;
+            result_.notes.push_back(recorded() ? "normals: recorded."
+                                               : "normals: from planes through 16 neighbours, " + facing +
+                                                     orientation_.why + ".");
+        const bool apart = orientation_.kind == NormalOrientation::Kind::outward ||
+                           orientation_.kind == NormalOrientation::Kind::inward;
         if (tiles_ > 1)
-            result_.notes.push_back(fmt::format(
-                "in {} tiles of at most {} points each{}.", tiles_, at_once(),
-                apart && !recorded() ? ", whose normals were turned tile by tile: where they look wrong, give "
-                                       "--cloud.outside or more --cloud.memory"
-                                     : ""));
+            result_.notes.push_back(
+                fmt::format("in {} tiles of at most {} points each{}.", tiles_, at_once(),
+                            apart && !recorded() ? "; normals were oriented tile by tile: where they look wrong, give "
+                                                   "--cloud.outside or more --cloud.memory"
+                                                 : ""));
         if (gpu_ && gpu_tiles_ > 0)
             result_.notes.push_back(fmt::format("neighbours, rays and means on {}.", gpu_->device_name()));
         if (gpu_ && gpu_tiles_ < tiles_)
-            result_.notes.push_back(fmt::format("{} of {} tiles were too large for {}; the processor took them.",
+            result_.notes.push_back(fmt::format("{} of {} tiles were too large for {}; the processor computed them.",
                                                 tiles_ - gpu_tiles_, tiles_, gpu_->device_name()));
         std::size_t unknown = 0;
         for (const std::uint32_t i : valid_)
@@ -426,10 +427,10 @@ class CloudAo::Work {
     PointVisibility result_;
     Watch watch_;
     std::optional<CloudGpu> gpu_;
-    std::optional<RayFan> fan_;
-    Outside outside_;
+    std::optional<DirectionSet> directions_;
+    NormalOrientation orientation_;
     Places valid_;
-    bool normals_refused_ = false, sides_opposed_ = false;
+    bool normals_refused_ = false, normals_opposed_ = false;
     int tiles_ = 0, gpu_tiles_ = 0, passes_ = 2;
 };
 
@@ -439,16 +440,16 @@ PointVisibility CloudAo::compute(const PointSet& cloud, const std::optional<Vect
     return Work(options_, device_, up_, viewpoint_, cloud, scanner).run();
 }
 
-/// Vertices see exactly what the faces hide; no mean over neighbours is needed, but more rays.
+/// Rays against the faces are exact: no mean over neighbours is needed, but more rays.
 PointVisibility CloudAo::of_mesh(const PointSet& mesh) const {
     PointVisibility result;
-    std::vector<float> sides;
+    std::vector<float> edges;
     for (const auto& [a, b, c] : mesh.triangles)
         if (std::min({a, b, c}) >= 0)
-            sides.push_back(static_cast<float>(
+            edges.push_back(static_cast<float>(
                 (mesh.points[static_cast<std::size_t>(a)] - mesh.points[static_cast<std::size_t>(b)]).norm()));
-    if (!sides.empty())
-        result.spacing = static_cast<double>(median(std::move(sides)));
+    if (!edges.empty())
+        result.spacing = static_cast<double>(median(std::move(edges)));
     const double extent = extent_of(sampled(mesh.points, 60000));
     result.radius =
         std::clamp(options_.radius > 0 ? options_.radius : default_radius(extent, result.spacing), 1e-6, 1e6);

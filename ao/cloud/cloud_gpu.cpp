@@ -15,13 +15,13 @@ namespace {
 using gpu::BufferRow, gpu::PassRow;
 using shared::vec4;
 
-/// So many groups of threads, in rows that every device allows.
+/// A dispatch of this many work groups, in rows that every device allows.
 std::array<std::uint32_t, 3> in_rows(std::size_t groups) {
     constexpr std::size_t row = 65535;
     return {static_cast<std::uint32_t>(std::min(groups, row)), static_cast<std::uint32_t>((groups + row - 1) / row), 1};
 }
 
-/// A thread for each.
+/// One thread for each.
 std::array<std::uint32_t, 3> groups_for(std::size_t items) {
     return in_rows((items + shared::cloud_group - 1) / shared::cloud_group);
 }
@@ -38,8 +38,8 @@ std::vector<BufferRow> tree_buffers(const NeighbourTree& tree) {
             {"begins", (leaves_of(tree) + 1) * sizeof(std::uint32_t)}};
 }
 
-/// From the points and the normals of their discs to the boxes of all nodes. Points without discs need no normals: any
-/// buffer of their size will do.
+/// Passes from the points and the normals of their discs to the boxes of all nodes. Points without discs need no
+/// normals: any buffer of that size will do.
 std::vector<PassRow> box_passes(const NeighbourTree& tree, int normals) {
     std::vector<PassRow> passes{
         {"leaves", "cloud/leaves", {points, normals}, {boxes, begins}, groups_for(leaves_of(tree)), {}}};
@@ -93,13 +93,13 @@ CloudGpu::Neighbourhoods CloudGpu::neighbourhoods(const NeighbourTree& tree) {
     return {std::move(program), found_near, found_rounds};
 }
 
-std::vector<float> CloudGpu::visibility(const CloudSurface& surface, const RayFan& fan, const Task& task) {
+std::vector<float> CloudGpu::visibility(const CloudSurface& surface, const DirectionSet& directions, const Task& task) {
     const NeighbourTree& tree = surface.tree;
-    const std::size_t count = tree.size(), directions = fan.runs() * fan.rays();
-    const int normals = others, fan_at = others + 1, near = others + 2, values = others + 3;
+    const std::size_t count = tree.size(), direction_count = directions.runs() * directions.rays();
+    const int normals = others, directions_at = others + 1, near = others + 2, values = others + 3;
     std::vector<BufferRow> buffers = tree_buffers(tree);
     buffers.push_back({"normals", count * sizeof(vec4), BufferRow::Host::upload});
-    buffers.push_back({"fan", directions * sizeof(vec4), BufferRow::Host::upload});
+    buffers.push_back({"directions", direction_count * sizeof(vec4), BufferRow::Host::upload});
     buffers.push_back(
         {"near", task.means > 0 ? count * sizeof(surface.near[0]) : sizeof(surface.near[0]), BufferRow::Host::upload});
     const int result = values + task.means % 2;
@@ -107,7 +107,8 @@ std::vector<float> CloudGpu::visibility(const CloudSurface& surface, const RayFa
         buffers.push_back({i == 0 ? "values" : "means", count * sizeof(float),
                            values + i == result ? BufferRow::Host::download : BufferRow::Host::none});
     std::vector<PassRow> passes = box_passes(tree, normals);
-    passes.push_back({"rays", "cloud/rays", {points, normals, boxes, begins, fan_at}, {values}, groups_for(count), {}});
+    passes.push_back(
+        {"rays", "cloud/rays", {points, normals, boxes, begins, directions_at}, {values}, groups_for(count), {}});
     for (int i = 0; i < task.means; ++i)
         passes.push_back({"mean",
                           "cloud/mean",
@@ -119,7 +120,7 @@ std::vector<float> CloudGpu::visibility(const CloudSurface& surface, const RayFa
 
     const auto to_points = program.host_as<vec4>(points), to_normals = program.host_as<vec4>(normals);
     using Box = Eigen::AlignedBox3f;
-    const Box of_discs = tbb::parallel_reduce( // a stray far off has none: it must not make the rest coarse
+    const Box of_discs = tbb::parallel_reduce( // a far outlier has no disc, and must not coarsen the rounding
         tbb::blocked_range<std::size_t>(0, count), Box(),
         [&](const auto& range, Box box) {
             for (std::size_t i = range.begin(); i < range.end(); ++i)
@@ -137,17 +138,18 @@ std::vector<float> CloudGpu::visibility(const CloudSurface& surface, const RayFa
     });
     if (task.means > 0)
         std::ranges::copy(surface.near, program.host_as<CloudSurface::Near>(near).begin());
-    const auto to_fan = program.host_as<vec4>(fan_at);
-    for (std::size_t i = 0; i < fan.runs(); ++i)
-        for (int ray = 0; ray < static_cast<int>(fan.rays()); ++ray) {
-            const RayFan::Run run = fan.run(i);
-            to_fan[i * fan.rays() + static_cast<std::size_t>(ray)] = {run.x[ray], run.y[ray], run.z[ray], 0};
+    const auto to_directions = program.host_as<vec4>(directions_at);
+    for (std::size_t i = 0; i < directions.runs(); ++i)
+        for (int ray = 0; ray < static_cast<int>(directions.rays()); ++ray) {
+            const DirectionSet::Run run = directions.run(i);
+            to_directions[i * directions.rays() + static_cast<std::size_t>(ray)] = {run.x[ray], run.y[ray], run.z[ray],
+                                                                                    0};
         }
     const Eigen::Vector3f up = task.up.value_or(Eigen::Vector3f::UnitZ());
     run(program, {.points = static_cast<std::uint32_t>(count),
                   .levels = static_cast<std::uint32_t>(tree.levels()),
-                  .rays = static_cast<std::uint32_t>(fan.rays()),
-                  .runs = static_cast<std::uint32_t>(fan.runs()),
+                  .rays = static_cast<std::uint32_t>(directions.rays()),
+                  .runs = static_cast<std::uint32_t>(directions.runs()),
                   .radius = task.radius,
                   .rounding = static_cast<float>(rounding_at(farthest)),
                   .falloff = task.mean_falloff,

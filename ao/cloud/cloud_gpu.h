@@ -2,7 +2,7 @@
 #pragma once
 
 #include "ao/cloud/cloud_surface.h"
-#include "ao/cloud/ray_fan.h"
+#include "ao/cloud/direction_set.h"
 #include "ao/gpu/program.h"
 #include "shaders/shared/cloud.h"
 
@@ -14,15 +14,16 @@
 
 namespace scanshade {
 
-/// Finds what NeighbourTree, DiscRays and the mean over neighbours find, but for rounding. One thread at a time.
+/// The results are those of NeighbourTree, DiscRays and the mean over neighbours, except for rounding. One thread at a
+/// time.
 class CloudGpu {
   public:
     explicit CloudGpu(gpu::Device& device) : device_(device) {}
 
-    /// How many points fit one call: the device's largest buffer and half of its memory hold so many neighbourhoods.
+    /// Most points of one call; the device's largest buffer and half of its memory set the limit.
     [[nodiscard]] std::size_t most_points() const;
 
-    /// What stands round each point, by place; views into the program's memory.
+    /// The neighbours of each point, in the tree's order; views into the program's memory.
     struct Neighbourhoods {
         std::unique_ptr<gpu::Program> program;
         std::span<const CloudSurface::Near> near;
@@ -30,15 +31,16 @@ class CloudGpu {
     };
     [[nodiscard]] Neighbourhoods neighbourhoods(const NeighbourTree& tree);
 
-    /// Where rays go, and how often values become the mean of those beside them.
+    /// The rays, and how often a value becomes the mean of its neighbours'.
     struct Task {
         float radius = 0; ///< the largest float for the sky
         std::optional<Eigen::Vector3f> up;
         float mean_falloff = 0; ///< weights are e^(falloff distance^2)
         int means = 0;
     };
-    /// By place; NaN for points without a plane.
-    [[nodiscard]] std::vector<float> visibility(const CloudSurface& surface, const RayFan& fan, const Task& task);
+    /// In the tree's order; NaN for points without a plane.
+    [[nodiscard]] std::vector<float> visibility(const CloudSurface& surface, const DirectionSet& directions,
+                                                const Task& task);
 
     /// Device milliseconds of all calls so far, by pass, transfers included.
     [[nodiscard]] const Timings& timings() const { return timings_; }

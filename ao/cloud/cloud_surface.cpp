@@ -19,11 +19,11 @@ namespace {
 using Eigen::Vector3d, Eigen::Vector3f;
 
 constexpr std::size_t usual = shared::cloud_neighbours, wider = Nearest::most;
-/// Discs of 1.13 spacings: at random places 2 % of a surface stay uncovered, which costs less than what larger discs
-/// reach beyond edges (cloud_bench: RMSE 0.024; at 1.2 it is 0.046, at 0.6 0.028).
+/// Discs of 1.13 spacings. With random points 2 % of a surface stay uncovered. Larger discs cost more, since they reach
+/// beyond edges (RMSE 0.024; at 1.2 it is 0.046, at 0.6 0.028).
 constexpr float disc_over_gap = 0.8F;
 
-/// The plane of least squares through a neighbourhood: near points weigh most, so that edges stay edges.
+/// The least-squares plane through a neighbourhood: near points weigh most, so that edges stay sharp.
 struct Plane {
     Vector3f normal = Vector3f::Zero();
     float variance_across = 0;                    ///< along the normal
@@ -56,8 +56,8 @@ Plane plane_round(const NeighbourTree& tree, std::size_t place, std::span<const 
 /// Whether points lie on a line rather than in a plane.
 bool on_a_line(const Plane& plane) { return !(plane.variance_narrow > 0.01F * plane.variance_wide); }
 
-/// Discs as wide as their neighbours' gaps, yet a point that strayed from a surface must not get a shield of its own:
-/// at most twice what its neighbours have, at least half of it.
+/// Discs are as wide as the gaps to their neighbours, within half and twice their neighbours' discs: an outlier must
+/// not get a large disc.
 void limit_discs(CloudSurface& surface) {
     std::vector<float> limited(surface.size());
     tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
@@ -73,7 +73,7 @@ void limit_discs(CloudSurface& surface) {
 
 bool is_direction(const Vector3d& normal) { return normal.allFinite() && normal.norm() > 0.1; }
 
-/// Counts given normals that oppose their nearest neighbour's; turns those filled in to the side of given ones beside.
+/// Counts given normals that oppose their nearest neighbour's; orients estimated ones like given ones next to them.
 void compare_sides(CloudSurface& surface, std::span<const Vector3d> given) {
     const std::size_t opposed = tbb::parallel_reduce(
         tbb::blocked_range<std::size_t>(0, surface.size()), std::size_t(0),
@@ -128,8 +128,8 @@ CloudSurface cloud_surface(std::span<const Vector3d> points, std::span<const Vec
             surface.tree.find_round(i, wider, far);
             plane = plane_round(surface.tree, i, far.all());
         }
-        // Points strewn with one per s^2 have their sixth neighbour at 1.4 s; rows farther apart than their points
-        // spread the plane's narrow side, sqrt(variance) = 0.8 rows.
+        // Random points, one per s^2, have their sixth neighbour at 1.4 s. Where rows are farther apart than their
+        // points, the narrow side's sqrt(variance) is 0.8 rows.
         surface.disc_radius[i] = disc_over_gap * std::max(sixth[i], std::sqrt(plane.variance_narrow));
         surface.roughness[i] = std::sqrt(plane.variance_across);
         const float variance = plane.variance_across + plane.variance_narrow + plane.variance_wide;
@@ -155,7 +155,7 @@ CloudSurface cloud_surface(std::span<const Vector3d> points, std::span<const Vec
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 512), [&](const auto& range) {
             Nearest found;
             float reach =
-                std::numeric_limits<float>::infinity(); // of the place before; its neighbours are not far from ours
+                std::numeric_limits<float>::infinity(); // of the previous point, whose neighbours are near ours
             for (std::size_t i = range.begin(); i < range.end(); ++i) {
                 const float moved = i > range.begin() ? (surface.tree[i] - surface.tree[i - 1]).norm() : 0;
                 const float known = (reach + moved) * (1 + 1e-5F);

@@ -1,4 +1,4 @@
-// A cloud as a surface: the plane round every point, which side of it is outside, and the disc that stands for it.
+// A cloud as a surface: for every point its plane, the orientation of its normal, and a disc.
 #pragma once
 
 #include "ao/cloud/neighbours.h"
@@ -13,25 +13,27 @@ namespace scanshade {
 class CloudGpu;
 class DiscRays;
 
-/// Where the outside of a surface without recorded normals is.
-struct Outside {
+/// How normals that were not recorded are oriented.
+struct NormalOrientation {
     enum class Kind {
-        viewpoint, ///< towards `point`, where the scanner stood
-        direction, ///< along `point`: the sky of terrain
-        outward,   ///< away from the rest: objects seen from all round
-        inward     ///< towards the rest: rooms
+        viewpoint, ///< towards `point`, the scanner's position
+        direction, ///< along `point`: terrain, towards the sky
+        outward,   ///< away from the other points: objects
+        inward     ///< towards the other points: rooms
     };
     Kind kind = Kind::outward;
     Eigen::Vector3d point = Eigen::Vector3d::Zero();
-    std::string why; ///< "the scanner's place as recorded", for people
+    std::string why; ///< the reason, for people
 };
 
-/// Where a cloud was seen from: from `recorded`, the viewpoint its file names, if nearly all points are seen first from
-/// there. Else what the cloud itself tells: one nearly all of which is seen first from the origin of its coordinates
-/// was recorded from there; one with hardly anything above anything is terrain, its outside above; one that hides many
-/// of its points from all sides is a room; else outward. `points` must be finite.
-[[nodiscard]] Outside guessed_outside(std::span<const Eigen::Vector3d> points,
-                                      const std::optional<Eigen::Vector3d>& recorded = {});
+/// Guesses the orientation; the first that applies:
+/// - to `recorded`, the viewpoint that the file names, if nearly all points are seen first from there;
+/// - to the origin of the coordinates, if nearly all points are seen first from there;
+/// - up, if hardly any point has another above it (terrain);
+/// - inward, if many points are hidden from all directions (a room);
+/// - outward. `points` must be finite.
+[[nodiscard]] NormalOrientation guessed_orientation(std::span<const Eigen::Vector3d> points,
+                                                    const std::optional<Eigen::Vector3d>& recorded = {});
 
 /// The neighbourhoods, planes and discs of a cloud, in the order of its tree; positions relative to `middle`.
 struct CloudSurface {
@@ -40,30 +42,30 @@ struct CloudSurface {
 
     Eigen::Vector3d middle = Eigen::Vector3d::Zero(); ///< of the box round the points, so that single precision serves
     NeighbourTree tree;
-    std::vector<Near> near;               ///< places, nearest first; the point's own where there are fewer
+    std::vector<Near> near; ///< indices in the tree's order, nearest first; the point's own where there are fewer
     std::vector<Eigen::Vector3f> normals; ///< unit; zero where the neighbours make no plane
     std::vector<float> disc_radius;       ///< covers the gaps between neighbours; 0 for a lonely point
     std::vector<float> roughness; ///< one sigma of the neighbours' distances from the plane, in the cloud's unit
     std::vector<float> flatness;  ///< 1 - 3 times the surface variation (Pauly, Gross and Kobbelt 2002): 1 = a plane
-    float spacing = 0;            ///< median over the points of the side of a square that holds one of them
-    double agreement = 1; ///< median |cosine| between given normals and planes: near 1/2 where the former are noise
+    float spacing = 0;            ///< median distance of points: the side of a square that holds one
+    double agreement = 1; ///< median |cosine| between given normals and planes: near 1/2 where the given ones are noise
     double discord = 0;   ///< share of points whose given normal opposes the nearest one's on the same plane
 
     [[nodiscard]] std::size_t size() const { return tree.size(); }
 };
 
-/// Finds neighbours and planes of `points`, which must be finite. Where `normals` holds one per point they are taken,
-/// and those that have no length are filled in from the planes. Planes come from 16 neighbours, weighted by distance;
-/// where these lie on a line, as on a scanner's rings, from 64. `normals` of estimated planes have no side yet.
-/// Neighbours and planes are found by `gpu`, if given.
+/// Finds neighbours and planes of `points`, which must be finite. `normals` is empty or holds one per point; those of
+/// zero length are replaced by the normals of the planes. Planes are fitted to 16 neighbours, weighted by distance, and
+/// to 64 where the 16 are on a line, as on a scanner's rings. Estimated normals are not oriented yet. `gpu`, if given,
+/// finds neighbours and planes.
 [[nodiscard]] CloudSurface cloud_surface(std::span<const Eigen::Vector3d> points,
                                          std::span<const Eigen::Vector3d> normals, CloudGpu* gpu = nullptr);
 
-/// Turns normals to the outside. Towards a viewpoint each point by itself; else neighbours are made to agree, those
-/// that most surely lie on one surface first (a spanning tree as of Hoppe et al. 1992, built as Kruskal's), and every
-/// piece that agrees in itself takes the side that most of it has evidence for. In rooms (inward) that is the side with
-/// more air, by rays against `rays`, which must be given then; pieces with clear evidence against each other are not
-/// joined. Points without a plane face the viewpoint or the direction.
-void turn_outside(CloudSurface& surface, const Outside& outside, const DiscRays* rays = nullptr);
+/// Orients the normals. To a viewpoint, each point is oriented by itself. Otherwise neighbours are made to agree, the
+/// surest pairs first (the spanning tree of Hoppe et al. 1992, built by Kruskal's algorithm); then each connected piece
+/// votes. In rooms (inward) points vote for the side with more free space, measured by `rays`, which must be given;
+/// pieces with clear votes against each other are not joined. Points without a plane face the viewpoint or the
+/// direction.
+void orient_normals(CloudSurface& surface, const NormalOrientation& orientation, const DiscRays* rays = nullptr);
 
 } // namespace scanshade

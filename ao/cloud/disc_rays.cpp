@@ -1,4 +1,4 @@
-// Rays from the points of a cloud: lifted off their own disc and those beside it, eight at a time.
+// Rays from the points of a cloud, eight at a time. They start above the discs of their own surface.
 #include "ao/cloud/disc_rays.h"
 
 #include "shaders/shared/cloud.h"
@@ -29,8 +29,8 @@ RaySurface discs_of(const CloudSurface& surface) {
     return RaySurface(std::span<const Disc>(all));
 }
 
-/// Rays `first` .. `first + 7` of a run, as far as there are so many.
-void aim(RayBundle& bundle, const Eigen::Matrix3f& axes, const RayFan::Run& run, int first) {
+/// Rays `first` .. `first + 7` of a run; the last bundle may hold fewer.
+void aim(RayBundle& bundle, const Eigen::Matrix3f& axes, const DirectionSet::Run& run, int first) {
     for (int i = 0; i < RayBundle::size; ++i) {
         const int ray = std::min(first + i, run.count - 1);
         const Vector3f direction = axes * Vector3f(run.x[ray], run.y[ray], run.z[ray]);
@@ -55,11 +55,12 @@ RayBundle DiscRays::bundle_from(std::size_t place, const Vector3f& side, float r
     return bundle;
 }
 
-float DiscRays::open(std::size_t place, const RayFan& fan, float radius, const std::optional<Vector3f>& up) const {
+float DiscRays::open(std::size_t place, const DirectionSet& directions, float radius,
+                     const std::optional<Vector3f>& up) const {
     const Vector3f& normal = surface_.normals[place];
     RayBundle bundle = bundle_from(place, normal, radius);
     const Eigen::Matrix3f axes = axes_about(normal);
-    const RayFan::Run run = fan.run(place);
+    const DirectionSet::Run run = directions.run(place);
     int free = 0;
     for (int first = 0; first < run.count; first += RayBundle::size) {
         aim(bundle, axes, run, first);
@@ -73,16 +74,16 @@ float DiscRays::open(std::size_t place, const RayFan& fan, float radius, const s
     return static_cast<float>(free) / static_cast<float>(run.count);
 }
 
-DiscRays::Looks DiscRays::look(std::size_t place, const Vector3f& side, const RayFan::Run& run) const {
+DiscRays::Hits DiscRays::first_hits(std::size_t place, const Vector3f& side, const DirectionSet::Run& run) const {
     RayBundle bundle = bundle_from(place, side, std::numeric_limits<float>::max());
     aim(bundle, axes_about(side), run, 0);
     const auto [distance, met] = discs_.meetings(bundle);
-    Looks looks{distance, {}};
+    Hits hits{distance, {}};
     for (std::size_t i = 0; i < RayBundle::size; ++i)
         if (met[i] >= 0)
-            looks.facing[i] = -Vector3f(bundle.x[i], bundle.y[i], bundle.z[i])
-                                   .dot(surface_.normals[static_cast<std::size_t>(met[i])]);
-    return looks;
+            hits.facing[i] = -Vector3f(bundle.x[i], bundle.y[i], bundle.z[i])
+                                  .dot(surface_.normals[static_cast<std::size_t>(met[i])]);
+    return hits;
 }
 
 } // namespace scanshade

@@ -1,4 +1,4 @@
-// Who lies next to whom: median splits along the widest side, and a search that opens the nearer half first.
+// k-d tree: median splits along the widest axis; the search opens the nearer half first.
 #include "ao/cloud/neighbours.h"
 
 #include <algorithm>
@@ -106,7 +106,7 @@ void NeighbourTree::find_round(std::size_t place, std::size_t wanted, Nearest& f
         Visit visit = stack[--depth];
         if (!found.may_hold(visit.distance2, visit.begin))
             continue;
-        while (visit.levels > 0) { // down to the leaf on the nearer side; the other side waits
+        while (visit.levels > 0) { // down to the nearer leaf; the other halves wait
             const std::size_t middle = visit.begin + (visit.end - visit.begin) / 2;
             Visit left{2 * visit.node + 1, visit.begin, middle, visit.levels - 1, 0};
             Visit right{2 * visit.node + 2, middle, visit.end, visit.levels - 1, 0};

@@ -1,4 +1,4 @@
-// Who lies next to whom: a cloud's points in the order of a k-d tree, and the nearest ones round each of them.
+// A cloud's points in the order of a k-d tree, and the nearest neighbours of each.
 #pragma once
 
 #include <array>
@@ -21,8 +21,8 @@ class Nearest {
 
     void begin(std::size_t wanted, float reach2);
     void offer(float distance2, std::uint32_t point);
-    /// Whether a point of `first` or a later number, no nearer than this, may be among them. Of equally near ones the
-    /// lower number counts, so that many points at one place do not have to be looked at each for each.
+    /// Whether a point at this distance or farther, with index `first` or higher, may be among them. Ties go to the
+    /// lower index, so that a search among many equal points can stop early.
     [[nodiscard]] bool may_hold(float distance2, std::size_t first) const {
         return distance2 < reach2_ || (distance2 == reach2_ && (count_ < wanted_ || first < found_[count_ - 1].point));
     }
@@ -34,23 +34,23 @@ class Nearest {
     float reach2_ = 0;
 };
 
-/// A balanced k-d tree whose points are stored in its order, so that points with near numbers lie near each other.
-/// Immutable once made; safe to use from several threads.
+/// A balanced k-d tree. Its points are stored in its order, so points with close indices are close in space. Immutable
+/// once made; safe to use from several threads.
 class NeighbourTree {
   public:
     /// `points` must be finite.
     explicit NeighbourTree(std::span<const Eigen::Vector3f> points);
 
     [[nodiscard]] std::size_t size() const { return points_.size(); }
-    /// Of nodes above the leaves: a node that holds n points has halves of n / 2 (rounded down) and the rest.
+    /// Levels of nodes above the leaves. A node of n points has children of n / 2 (rounded down) and the rest.
     [[nodiscard]] int levels() const { return levels_; }
-    /// By place in the tree's order.
+    /// By index in the tree's order (`place` throughout this room).
     [[nodiscard]] const Eigen::Vector3f& operator[](std::size_t place) const { return points_[place]; }
-    /// Which of the points given stands at a place.
+    /// The index of that point in the cloud given.
     [[nodiscard]] std::uint32_t index(std::size_t place) const { return index_[place]; }
 
-    /// The `wanted` nearest places round a place, itself not among them. `reach2`: a squared distance within which that
-    /// many are known to lie; infinite where nothing is known. Ties go to the lower place.
+    /// The `wanted` nearest neighbours of a point, without the point itself. `reach2`: a squared distance known to
+    /// contain that many; infinite if unknown. Ties go to the lower index.
     void find_round(std::size_t place, std::size_t wanted, Nearest& found,
                     float reach2 = std::numeric_limits<float>::infinity()) const;
 

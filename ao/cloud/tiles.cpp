@@ -1,5 +1,4 @@
-// Tiles of a cloud: always in the order of the file, since to go through its points in another takes several times as
-// long.
+// Tiles of a cloud. Their points keep the order of the file: any other order takes several times as long.
 #include "ao/cloud/tiles.h"
 
 #include "projection/hash.h"
@@ -26,7 +25,7 @@ class Cutter {
         if (round.size() <= at_once_ || core.size() <= least)
             return tile_(core, round);
         auto [low, high] = halves(core);
-        if (high.empty()) // all of them at one place
+        if (high.empty()) // all points coincide
             return tile_(core, round);
         Places near_low = within_reach(low, round), near_high = within_reach(high, round);
         constexpr double hardly_fewer = 0.9;
@@ -39,7 +38,7 @@ class Cutter {
     }
 
   private:
-    /// The second is empty where all points are at one place.
+    /// The second is empty where all points coincide.
     [[nodiscard]] std::pair<Places, Places> halves(const Places& core) const {
         const Eigen::AlignedBox3d all = box_of(core);
         int axis = 0;
@@ -57,7 +56,7 @@ class Cutter {
         return {std::move(low), std::move(high)};
     }
 
-    /// Those of `round` in the box about `core` that is wider by the reach.
+    /// The points of `round` in the box of `core` widened by the reach.
     [[nodiscard]] Places within_reach(const Places& core, const Places& round) const {
         Eigen::AlignedBox3d box = box_of(core);
         box.min().array() -= reach_;
@@ -75,7 +74,7 @@ class Cutter {
         return box;
     }
 
-    /// The median coordinate of a part of the points; recording order must not choose them.
+    /// The median coordinate of a sample, chosen by a hash so that recording order has no influence.
     [[nodiscard]] double middle_of(const Places& places, int axis) const {
         constexpr double enough = 60000;
         const auto chosen =

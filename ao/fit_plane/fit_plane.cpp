@@ -14,10 +14,10 @@ namespace {
 // The order of buffers; all but the first two only where planes are fitted, the last three only where frames are fused.
 enum Buffers : int { recorded, kept, averages, depth_out, normals_out, others_in, fused, relief };
 
-/// Of the window's radius, squared, in units of grain^2 sigma fx / z (pixels). Below it noise tilts normals, above it a
-/// plane no longer is what surfaces are. Without grain this leaves the least error in AO on simulated sensors. With
-/// grain the least error lies somewhat lower, but a real Kinect errs alike over more pixels than the grain tells, and
-/// its walls would stay mottled.
+/// Of the window's radius, squared, in units of correlation^2 sigma fx / z (pixels). Below it noise tilts normals,
+/// above it a plane no longer is what surfaces are. For independent pixels this leaves the least error in AO on
+/// simulated sensors. For correlated ones a somewhat lower value does. But a real Kinect's noise correlates over more
+/// pixels than the correlation length says, and its walls would stay mottled.
 constexpr double window_scale = 1.8;
 
 std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bool planes, bool fuse) {
@@ -72,7 +72,8 @@ void FitPlane::prepare(const DepthImage& depth, std::span<const OtherDepth> othe
         program_ = program_for(device_, size, planes(), fuse);
     size_ = size;
     fused_ = fuse;
-    const double window = window_scale * noise_.grain_px * noise_.grain_px * options_.smoothing * options_.smoothing;
+    const double window =
+        window_scale * noise_.correlation_px * noise_.correlation_px * options_.smoothing * options_.smoothing;
     constants_ = {{size.width, size.height},
                   depth.camera.on_gpu(),
                   static_cast<float>(noise_.floor_m),

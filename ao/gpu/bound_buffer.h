@@ -1,4 +1,4 @@
-// A Vulkan buffer with its memory, for the files of this folder alone.
+// A Vulkan buffer with its memory, only for this folder.
 #pragma once
 
 #include "ao/gpu/device_bytes.h"
@@ -10,11 +10,11 @@
 
 namespace scanshade::gpu {
 
-/// Memory that a shader and the host can both reach at full speed: then nothing is copied.
+/// Memory that shader and host both access at full speed: nothing is copied.
 constexpr auto shared_memory = vk::MemoryPropertyFlagBits::eDeviceLocal | vk::MemoryPropertyFlagBits::eHostVisible |
                                vk::MemoryPropertyFlagBits::eHostCoherent | vk::MemoryPropertyFlagBits::eHostCached;
 
-/// In the first kind of memory wished for that there is; mapped where the host can reach it.
+/// In the first available kind of memory wished for; mapped if the host can reach it.
 struct BoundBuffer {
     vk::raii::DeviceMemory memory = nullptr;
     vk::raii::Buffer buffer = nullptr;
@@ -34,7 +34,7 @@ struct BoundBuffer {
             if (type < 0 && (type = gpu.memory_type(needs.memoryTypeBits, wish)) >= 0)
                 flags = wish;
         if (type < 0)
-            throw Error("the device has no fitting memory");
+            throw Error("the device has no suitable memory");
         memory = gpu.device.allocateMemory({needs.size, static_cast<std::uint32_t>(type)});
         buffer.bindMemory(*memory, 0);
         if (flags & vk::MemoryPropertyFlagBits::eHostVisible)

@@ -79,7 +79,7 @@ int compute_family(const vk::raii::PhysicalDevice& physical) {
     return -1;
 }
 
-/// What the shaders and the pass runner cannot do without.
+/// The features that shaders and the pass runner require.
 std::string what_is_missing(const vk::raii::PhysicalDevice& physical) {
     if (physical.getProperties().apiVersion < VK_API_VERSION_1_3)
         return "Vulkan 1.3";

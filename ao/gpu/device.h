@@ -8,7 +8,7 @@
 
 namespace scanshade::gpu {
 
-/// What `scanshade devices` prints of one Vulkan device.
+/// One Vulkan device, as `scanshade devices` prints it.
 struct DeviceInfo {
     int index = 0;                       ///< in the order the Vulkan loader lists them
     std::string name;                    ///< "llvmpipe (LLVM 15.0.6, 256 bits)"
@@ -18,22 +18,22 @@ struct DeviceInfo {
     int most_threads = 0;                ///< of a work group
     std::uint64_t most_buffer_bytes = 0; ///< that a shader may reach of a buffer
     std::uint64_t memory_bytes = 0;      ///< of its largest heap of its own
-    std::string unusable;                ///< what it lacks; empty = usable
+    std::string unusable;                ///< what is missing; empty = usable
 };
 
-/// Whether "the device" is the processor's own cores.
+/// Whether the device is software on the processor.
 [[nodiscard]] inline bool is_cpu(const DeviceInfo& info) { return info.kind == "CPU"; }
 
 /// Every device the loader knows, usable or not. Empty without a driver; throws Error only when there is no Vulkan
 /// loader.
 [[nodiscard]] std::vector<DeviceInfo> list_devices();
 
-/// One opened device. Owns the Vulkan objects; programs made from it must not outlive it. Threads may make and run
-/// programs of their own on it side by side.
+/// One opened device. Owns the Vulkan objects; programs made from it must not outlive it. Several threads may make
+/// and run their own programs on it.
 class Device {
   public:
     /// `choice`: empty = discrete GPU, else integrated, else any usable (lavapipe); an index; or part of a name,
-    /// case-insensitive. Throws Error listing the devices there are when nothing fits.
+    /// case-insensitive. Throws Error that lists the devices when none matches.
     explicit Device(const std::string& choice = {});
     ~Device();
     Device(const Device&) = delete;

@@ -1,4 +1,4 @@
-// Bytes that stay on the device from run to run, whichever program made them or takes them.
+// Memory that stays on the device between runs, shared by programs.
 #pragma once
 
 #include "ao/gpu/device.h"
@@ -25,11 +25,11 @@ class DeviceBytes {
     std::unique_ptr<State> state_;
 };
 
-/// To allocate takes long on some devices: what nobody holds any more is given out again.
+/// Reuses memory that nobody holds any more, since allocation is slow on some devices.
 class DeviceBytesPool {
   public:
     explicit DeviceBytesPool(Device& device) : device_(device) {}
-    /// Whatever they held.
+    /// With undefined content.
     [[nodiscard]] std::shared_ptr<DeviceBytes> get(std::size_t bytes);
 
   private:

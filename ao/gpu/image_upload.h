@@ -1,4 +1,4 @@
-// Images of the host brought to the device, to stay there.
+// Uploads images that stay on the device.
 #pragma once
 
 #include "ao/gpu/program.h"
@@ -11,7 +11,7 @@ namespace scanshade::gpu {
 class ImageUpload {
   public:
     explicit ImageUpload(Device& device) : device_(device), pool_(device) {}
-    /// Single-channel floats, rows side by side.
+    /// Single-channel floats, rows without gaps.
     [[nodiscard]] std::shared_ptr<const DeviceBytes> operator()(const cv::Mat1f& image);
 
   private:

@@ -1,4 +1,4 @@
-// Compute pipelines, for the files of this folder alone: made once for a device, however many programs use them.
+// Compute pipelines, only for this folder: made once per device and shared by its programs.
 #pragma once
 
 #include <compare>
@@ -12,7 +12,7 @@
 
 namespace scanshade::gpu {
 
-/// What a shader finds at a binding of set 0.
+/// The kind of resource at a binding of set 0.
 struct Binding {
     std::uint32_t index;
     vk::DescriptorType type;
@@ -27,8 +27,8 @@ struct Pipeline {
     vk::raii::Pipeline pipeline = nullptr;
 };
 
-/// A device's pipelines: compiling takes longer than computing a frame, and no image size is compiled in, so that
-/// methods made alike and frames of other sizes find theirs here.
+/// A device's pipelines. Compiling takes longer than computing a frame. Image sizes are not compiled in, so methods
+/// with equal settings share pipelines for all sizes.
 class Pipelines {
   public:
     struct Key {
@@ -37,7 +37,7 @@ class Pipelines {
         std::vector<std::pair<int, int>> constants; ///< specialization: id, value
         auto operator<=>(const Key&) const = default;
     };
-    /// Made by the first who asks. Any thread may ask. Throws Error naming a shader that is not there.
+    /// Made on the first request, from any thread. Throws Error that names a missing shader.
     [[nodiscard]] const Pipeline& of(const vk::raii::Device& device, const Key& key);
 
   private:

@@ -40,7 +40,7 @@ struct BoundImage {
         const auto needs = image.getMemoryRequirements();
         const int type = gpu.memory_type(needs.memoryTypeBits, Memory::eDeviceLocal);
         if (type < 0)
-            throw Error("the device has no fitting memory");
+            throw Error("the device has no suitable memory");
         memory = gpu.device.allocateMemory({needs.size, static_cast<std::uint32_t>(type)});
         image.bindMemory(*memory, 0);
         const auto view = [&](std::uint32_t first, std::uint32_t count) {
@@ -179,7 +179,7 @@ struct Program::State {
     BoundBuffer constants;
     std::vector<const Pipeline*> pipelines; // per pass; null where it fills buffers
     Stamps stamps = Stamps::passes;
-    std::vector<std::string> intervals; // what lies between one time stamp and the next
+    std::vector<std::string> intervals; // names of the intervals between time stamps
     vk::raii::QueryPool queries = nullptr;
     vk::raii::Fence fence = nullptr;
     // A run submits them in this order: begin, taken, uploads, commands, download, given, end.
@@ -416,7 +416,7 @@ struct Program::State {
         submit({*once});
     }
 
-    /// What is taken before a run or given after it; null where there is nothing.
+    /// Copies taken before a run or given after it; null for none.
     vk::CommandBuffer record_copies(vk::raii::CommandBuffer& into, std::vector<Copy>& copies, bool in) {
         if (copies.empty())
             return nullptr;
@@ -495,7 +495,7 @@ void Program::take(int buffer, std::size_t offset, std::shared_ptr<const DeviceB
                           ? offset + from->size() <= row.bytes
                           : row.host == BufferRow::Host::upload && offset == 0 && from->size() == row.bytes;
     if (!fits)
-        throw Error(fmt::format("{} bytes at {} do not go into buffer {}", from->size(), offset, row.name));
+        throw Error(fmt::format("{} bytes at {} do not fit into buffer {}", from->size(), offset, row.name));
     state_->taken.push_back({buffer, offset, std::move(from)});
 }
 

@@ -24,39 +24,38 @@ struct BufferRow {
     std::string_view name;
     std::size_t bytes = 0;
     Host host = Host::none;
-    /// Bound as a storage texel buffer (imageBuffer, uimageBuffer) instead of a storage buffer: on lavapipe a load is
-    /// then one gather in place, without a branch per lane (storage buffer) or a call (sampled texel buffer).
+    /// Bound as a storage texel buffer (imageBuffer, uimageBuffer) instead of a storage buffer. On lavapipe a load is
+    /// then one inlined gather, without a branch per lane (storage buffer) or a call (sampled texel buffer).
     enum class Texels { none, r32f, rg32f, rgba32f, r32ui, rg32ui };
     Texels texels = Texels::none;
-    std::vector<float> initial = {}; ///< what it holds from the start instead of zeros; 64 KiB at most
+    std::vector<float> initial = {}; ///< initial content instead of zeros; 64 KiB at most
     /// Instead of a buffer, an array of layers of 32-bit floats with mips; `bytes` is image_bytes(image). Passes that
-    /// read it see a sampler2DArray (nearest texel, 0 outside), passes that write it an image2DArray[mips]. GPUs keep
-    /// images in tiles and find a texel in hardware; lavapipe does all of that step by step.
+    /// read it see a sampler2DArray (nearest texel, 0 outside), passes that write it an image2DArray[mips]. GPUs tile
+    /// images and address texels in hardware; lavapipe does both in software.
     struct Image {
         std::uint32_t width = 0, height = 0, layers = 0, mips = 0;
     };
     Image image = {};
 };
 
-/// Bytes of all mips of all layers, mip by mip, layer by layer, row by row: what Program::read_back() of an image
-/// returns.
+/// Bytes of all mips of all layers, mip by mip, layer by layer, row by row, as Program::read_back() returns them.
 [[nodiscard]] std::size_t image_bytes(const BufferRow::Image& image);
 
 /// One dispatch. `reads` bind from 0, `writes` (read-write included) from 16, the constants at 32.
 struct PassRow {
-    std::string name;               ///< for people: timings carry it
+    std::string name;               ///< for people, and for timings
     std::string_view shader;        ///< "cacao/blur"; empty = fill the written buffers with zero
     std::vector<int> reads, writes; ///< indices of BufferRow
     std::array<std::uint32_t, 3> groups{1, 1, 1};
     std::vector<std::pair<int, int>> constants; ///< specialization: id, value
 };
 
-/// What is wrong with the table, as sentences: unknown indices, reads before any write, empty dispatches, an output
+/// Errors of the table, as sentences: unknown indices, reads before any write, empty dispatches, an output
 /// never written. Empty = sound. Needs no GPU.
 [[nodiscard]] std::vector<std::string> problems(std::span<const BufferRow> buffers, std::span<const PassRow> passes);
 
-/// A table of passes made runnable on one device. One memory barrier goes before each pass that touches what an earlier
-/// pass wrote (or overwrites what it read) and only there.
+/// A table of passes, ready to run on one device. A memory barrier precedes each pass that depends on an earlier one
+/// (reads or overwrites its output, or overwrites its input), and no other.
 class Program {
   public:
     /// `constants_bytes` is the size of the uniform block every pass sees. Throws Error listing problems() or naming
@@ -83,15 +82,15 @@ class Program {
     void take(int buffer, std::size_t offset, std::shared_ptr<const DeviceBytes> from);
     void give(int buffer, std::shared_ptr<DeviceBytes> to);
 
-    /// Uploads, runs all passes, downloads, unless the results are wanted on the device alone; returns when all is
-    /// done. Throws Error on device loss.
+    /// Uploads, runs all passes, downloads unless the results stay on the device; returns when all is done. Throws
+    /// Error on device loss.
     enum class Results { on_host, on_device };
     void run(std::span<const std::byte> constants, Results results = Results::on_host);
 
     /// Device milliseconds of the last run: "upload", each pass by name, "download".
     [[nodiscard]] const std::vector<std::pair<std::string, double>>& timings() const { return timings_; }
 
-    /// Copies any buffer or image to the host, outside the hot path: for studying intermediates.
+    /// Copies any buffer or image to the host. Slow: for inspecting intermediates.
     [[nodiscard]] std::vector<std::byte> read_back(int buffer);
 
   private:

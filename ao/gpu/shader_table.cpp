@@ -25,7 +25,7 @@ std::span<const std::uint32_t> shader_words(std::string_view name) {
     for (const Row& row : table)
         if (row.name == name)
             return row.words;
-    throw Error("no shader is called " + std::string(name));
+    throw Error("unknown shader " + std::string(name));
 }
 
 } // namespace scanshade::gpu

@@ -1,4 +1,4 @@
-// Images to and from a program's buffers, whatever rows of memory they have on the host, and poses.
+// Copies images and poses to and from a program's buffers.
 #pragma once
 
 #include "projection/camera.h"
@@ -10,10 +10,10 @@
 
 namespace scanshade::gpu {
 
-/// Rows of `image` side by side; `to` holds as many bytes.
+/// Rows of `image` without gaps; `to` holds as many bytes.
 void upload(const cv::Mat& image, std::span<std::byte> to);
-/// Depth in metres; what is none (not finite, not positive, beyond what single precision can tell) becomes a hole here,
-/// once, so that shaders only ask z > 0.
+/// Depth in metres. Invalid values (not finite, not positive, beyond single precision) become holes here, so shaders
+/// only test z > 0.
 void upload_depth(const cv::Mat1f& z_m, cv::Mat1f to);
 inline void upload_depth(const cv::Mat1f& z_m, std::span<float> to) {
     upload_depth(z_m, cv::Mat1f(z_m.rows, z_m.cols, to.data()));

@@ -1,4 +1,4 @@
-// The Vulkan objects behind Device, for the files of this folder alone: everything else speaks Device and Program.
+// The Vulkan objects behind Device, only for this folder: all other code uses Device and Program.
 #pragma once
 
 #include "ao/gpu/device.h"
@@ -12,8 +12,8 @@
 
 namespace scanshade::gpu {
 
-/// Runs what calls Vulkan. Its error codes tell of the machine (no driver, no memory, a lost device), never of a
-/// mistake of ours: they become DeviceLost and Error.
+/// Runs code that calls Vulkan. Vulkan's error codes describe the machine (no driver, no memory, a lost device), not
+/// bugs of ours: they become DeviceLost and Error.
 template <class Action>
 decltype(auto) asking_vulkan(Action&& action) {
     try {
@@ -51,7 +51,7 @@ struct Device::State {
     vk::raii::PhysicalDevice physical = nullptr;
     vk::raii::Device device = nullptr;
     std::uint32_t queue_family = 0;
-    std::deque<Lane> lanes; ///< programs take them in turns: what one waits for does not hold up the others
+    std::deque<Lane> lanes; ///< programs take turns on them, so they do not wait for each other
     std::atomic<std::size_t> programs = 0;
     Pipelines pipelines;
     vk::PhysicalDeviceMemoryProperties memory;

@@ -1,5 +1,5 @@
-// Visibility bitmask: GTAO's slices with 32 sectors in place of two horizons, so that things have a thickness and light
-// passes behind them; after Therrien, Levesque and Gilet (2023).
+// Visibility bitmask: GTAO's slices with 32 sectors in place of two horizons. Surfaces have a thickness, and light
+// passes behind them. After Therrien, Levesque and Gilet (2023).
 //
 // Departures: sectors are of equal cosine-weighted measure (`--sectors angle` for the published ones of equal angle),
 // which makes the share of open ones the visibility itself, and samples count up to the radius (`--unbounded` for the
@@ -10,14 +10,14 @@
 
 namespace scanshade {
 
-/// What all 32 sectors have equal shares of: cosine-weighted measure, or angle.
+/// The measure of which all 32 sectors have equal shares: cosine-weighted, or angle.
 enum class Sectors { cosine, angle };
 
 struct BitmaskOptions {
     ScreenOptions screen;
     SliceOptions slices;
-    float thickness = 0.3F;    ///< of what is seen, in radii
-    float thickness_per_z = 0; ///< metres more per metre of depth
+    float thickness = 0.3F;    ///< of surfaces, in radii
+    float thickness_per_z = 0; ///< additional metres per metre of depth
     Sectors sectors = Sectors::cosine;
     bool unbounded = false;
 

@@ -40,7 +40,7 @@ std::vector<Parameter> GtaoOptions::parameters() {
         joined(screen.parameters(), slices.parameters()),
         {
             {.name = "profile",
-             .help = "metric estimates visibility within the radius; xegtao takes 1.457 times the radius, linear "
+             .help = "metric estimates visibility within the radius; xegtao uses 1.457 times the radius, linear "
                      "falloff and power 2.2",
              .value = OneOf(&profile, gtao_profile_words)},
             {.name = "falloff",

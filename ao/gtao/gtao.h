@@ -2,8 +2,7 @@
 // 2021).
 //
 // Profile `metric`, the default, estimates visibility within the radius itself; `xegtao` takes XeGTAO's constants,
-// which were tuned together for a look. Every surface is as thick as it needs to be: bitmask is the same with a
-// thickness.
+// which were tuned together for appearance. Surfaces have unlimited thickness; bitmask is the same with a limited one.
 #pragma once
 
 #include "ao/gtao/slices.h"

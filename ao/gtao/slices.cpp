@@ -14,7 +14,7 @@ struct Count {
 constexpr std::array counts{Count{Quality::lowest, 1, 4}, Count{Quality::low, 2, 4}, Count{Quality::medium, 2, 8},
                             Count{Quality::high, 4, 8}, Count{Quality::highest, 16, 16}};
 
-/// The quality's, but for what was given.
+/// The quality's values, except those given.
 Count count_of(const SliceOptions& options) {
     Count count = level_of(counts, options.quality);
     if (options.slices > 0)

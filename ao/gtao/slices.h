@@ -1,4 +1,4 @@
-// How many slices and steps the slice methods take: a quality by name, or numbers of one's own.
+// The number of slices and steps of the slice methods: by a named quality, or given.
 #pragma once
 
 #include "ao/screen/screen.h"

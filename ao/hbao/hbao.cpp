@@ -16,7 +16,7 @@ struct Count {
 constexpr std::array counts{Count{Quality::lowest, 4, 2}, Count{Quality::low, 4, 4}, Count{Quality::medium, 8, 4},
                             Count{Quality::high, 8, 8}, Count{Quality::highest, 32, 16}};
 
-/// The quality's, but for what was given.
+/// The quality's values, except those given.
 Count count_of(const HbaoOptions& options) {
     Count count = level_of(counts, options.quality);
     if (options.directions > 0)
@@ -41,7 +41,7 @@ std::vector<Parameter> HbaoOptions::parameters() {
     return joined(screen.parameters(),
                   {
                       {.name = "profile",
-                       .help = "metric counts all within the radius alike; published takes bias 30, attenuated, "
+                       .help = "metric weighs all samples within the radius alike; published uses bias 30, attenuated, "
                                "contrast 1.25",
                        .value = OneOf(&profile, profile_words)},
                       {.name = "quality",

@@ -11,7 +11,7 @@ namespace scanshade {
 namespace {
 
 constexpr double shortest = 0.01; // of the radius
-constexpr double lowest = 0.05;   // height above the tangent plane: points lower only meet the surface itself
+constexpr double lowest = 0.05;   // height above the tangent plane: lower points only hit the surface itself
 
 struct Count {
     Quality quality;
@@ -38,7 +38,7 @@ std::vector<float> hemisphere_kernel(int points) {
     std::vector<float> kernel;
     for (int i = 0; i < points; ++i) {
         const double away2 = (i + 0.5) / points, phi = 2 * std::numbers::pi * fraction(i * 0.6180339887);
-        // Which distance goes with which direction: another sequence, so that neither knows of the other.
+        // Distances come from another sequence, so that they are independent of the directions.
         const double share = fraction(0.5 + i * 0.7548776662);
         append(kernel, std::sqrt(away2) * std::cos(phi), std::sqrt(away2) * std::sin(phi),
                std::max(std::sqrt(1 - away2), lowest), share);
@@ -73,7 +73,7 @@ std::vector<Parameter> HemisphereOptions::parameters() {
                        .low = 0,
                        .high = 1024},
                       {.name = "renormalise",
-                       .help = "samples that met nothing known are left out where at least half met something; "
+                       .help = "samples of unknown depth are left out where at least half are known; "
                                "otherwise they count as open",
                        .value = &renormalise},
                       {.name = "blurs",

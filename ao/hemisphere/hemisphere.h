@@ -1,4 +1,4 @@
-// Hemisphere kernel: points in the half ball above the surface, tested against what is seen; the SSAO of many
+// Hemisphere kernel: points in the half ball above the surface, tested against the depth image; the SSAO of many
 // tutorials.
 //
 // Profile `metric`, the default, keeps planes open at any tilt; `published` is the tutorial, faults included.

@@ -32,14 +32,14 @@ struct Count {
 constexpr std::array counts{Count{Quality::lowest, 1, 8}, Count{Quality::low, 1, 14}, Count{Quality::medium, 2, 14},
                             Count{Quality::high, 4, 14}, Count{Quality::highest, 16, 14}};
 
-/// What stands less than `epsilon` in front of the surface does not occlude; occlusion ends between the other two.
+/// Samples less than `epsilon` in front of the surface do not occlude; occlusion fades out between the other two.
 struct Falloff {
     float epsilon, fade_from, fade_to;
 };
 constexpr Falloff published_m{0.05F, 0.2F, 1};
 Falloff falloff_of(float radius_m) { return {0.02F * radius_m, 0.4F * radius_m, radius_m}; }
 
-/// The companion code's power and blur belong to its look.
+/// The companion code's power and blur belong to its tone curve.
 LunaOptions resolved(LunaOptions options) {
     options = checked(std::move(options));
     if (options.profile == Profile::metric)
@@ -69,14 +69,14 @@ std::vector<Parameter> LunaOptions::parameters() {
         screen.parameters(),
         {
             {.name = "profile",
-             .help = "metric respects the radius; published takes the companion code's constants in metres, power 6 "
+             .help = "metric respects the radius; published uses the companion code's constants in metres, power 6 "
                      "and four blurs",
              .value = OneOf(&profile, profile_words)},
             {.name = "quality",
              .help = "number of vectors: lowest 8, low 14 as published, medium 28, high 56, highest 224",
              .value = OneOf(&quality, quality_words)},
             {.name = "renormalise",
-             .help = "samples that met nothing known are left out where at least half met something; otherwise they "
+             .help = "samples of unknown depth are left out where at least half are known; otherwise they "
                      "count as open",
              .value = &renormalise},
             {.name = "blurs",

@@ -1,4 +1,4 @@
-// Embree's device, one for everything in this room: it holds no geometry, only the choice of instructions.
+// Embree's device, one for this room: it holds no geometry, only the choice of instructions.
 #pragma once
 
 #include <embree3/rtcore.h>

@@ -1,4 +1,4 @@
-// Points that fill a square evenly, scrambled so that sets of them differ: where rays get their directions from.
+// Scrambled low-discrepancy points in the unit square, from which ray directions are made.
 #pragma once
 
 #include <cstdint>

@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::Vector3d, Eigen::Vector3f;
 
-/// The nearest points round a point, nearest first, itself not among them.
+/// The nearest neighbours of a point, nearest first, without the point itself.
 struct Neighbourhood {
     struct Neighbour {
         float distance;
@@ -95,7 +95,7 @@ class PointTree {
     RTCScene scene_;
 };
 
-/// Of the plane of least squares; none where the points have none.
+/// The normal of the least-squares plane; none where the points have none.
 Vector3d plane_normal(const PointTree& tree, unsigned point, const Neighbourhood& around) {
     Vector3d mean = tree[point].cast<double>();
     for (const auto& n : around.nearest)
@@ -107,7 +107,7 @@ Vector3d plane_normal(const PointTree& tree, unsigned point, const Neighbourhood
     for (const auto& n : around.nearest)
         add(tree[n.point].cast<double>() - mean);
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread);
-    const bool flat = axes.eigenvalues()[1] > 1e-6 * axes.eigenvalues()[2]; // else they lie on a line
+    const bool flat = axes.eigenvalues()[1] > 1e-6 * axes.eigenvalues()[2]; // else they are on a line
     return flat ? Vector3d(axes.eigenvectors().col(0)) : Vector3d::Zero();
 }
 

@@ -20,7 +20,7 @@ using Eigen::Vector3d, Eigen::Vector3f;
 
 // ---------------------------------------------------------------------------------------------------- directions
 
-/// Where a direction lies on a coarse grid of the hemisphere: sectors of azimuth, walked to and fro through elevation.
+/// Index of a direction on a coarse grid of the hemisphere: sectors of azimuth, alternately up and down in elevation.
 int place_of(const CosineDirections::Direction& d, int rays) {
     const int sectors = std::max(1, static_cast<int>(std::sqrt(rays / RayBundle::size)));
     const double turn = std::atan2(d.y, d.x) / (2 * std::numbers::pi) + 0.5;
@@ -80,13 +80,13 @@ struct Tally {
         for (std::size_t b = 0; b < open.size(); ++b)
             if (cast[b] > 0)
                 spread += std::pow(open[b] / cast[b] - mean, 2);
-        // Blocks are as good as sets of their own; the error of a low-discrepancy set falls as its size^-3/4.
+        // Blocks act as independent sets; the error of a low-discrepancy set falls as its size^-3/4.
         const double of_block = filled > 1 ? std::sqrt(spread / (filled - 1)) : 0;
         return {static_cast<float>(mean), static_cast<float>(of_block * std::pow(filled, -0.75))};
     }
 };
 
-/// Turns up to eight directions about the normal; lanes without one, and directions below all faces, stay dead.
+/// Rotates up to eight directions about the normal; unused lanes and directions below all faces stay dead.
 void aim(RayBundle& bundle, std::span<const CosineDirections::Direction> eight, const Eigen::Matrix3f& axes,
          std::span<const Vector3d> faces) {
     bundle.live.fill(0);
@@ -138,7 +138,8 @@ RayHemisphere::RayHemisphere(const RaySurface& surface, const CosineDirections& 
     : surface_(surface), directions_(directions), radius_m_(radius_m), all_falloffs_(all_falloffs) {}
 
 RayEstimate RayHemisphere::at(const RayStart& start) const {
-    const double lift = std::max(start.lift_m, surface_.rounding_m()); // no share of the radius: it may be endless
+    const double lift =
+        std::max(start.lift_m, surface_.rounding_m()); // not a share of the radius, which may be infinite
     const Eigen::Matrix3f axes = axes_about(start.normal, 2 * std::numbers::pi * hash(start.key) * 0x1p-32);
     RayBundle bundle;
     bundle.origin = surface_.local(start.point + lift * start.normal);

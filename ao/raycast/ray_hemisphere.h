@@ -1,4 +1,4 @@
-// Visibility of a point by rays: cosine-weighted directions, what each of them meets, and how sure the result is.
+// Visibility of a point by cosine-weighted rays, with its standard error.
 #pragma once
 
 #include "ao/raycast/ray_surface.h"
@@ -19,8 +19,8 @@ inline constexpr std::array falloff_words{Named{"hard", Falloff::hard}, Named{"q
 /// Throws Misuse listing the names.
 [[nodiscard]] Falloff falloff_named(std::string_view name);
 
-/// Cosine-weighted directions about z: Owen-scrambled Sobol points (Burley 2020), in sets that are scrambled apart.
-/// Made once; each point picks a set by its key and turns it about its normal.
+/// Cosine-weighted directions about z: Owen-scrambled Sobol points (Burley 2020), in independently scrambled sets. Made
+/// once; each point picks a set by its key and rotates it about its normal.
 class CosineDirections {
   public:
     CosineDirections(int rays, int seed);
@@ -37,30 +37,30 @@ class CosineDirections {
 
   private:
     int rays_, sets_;
-    std::vector<Direction> directions_; ///< neighbours in a set point alike: eight of them travel together
+    std::vector<Direction> directions_; ///< sorted, so that the eight rays of a bundle point in similar directions
 };
 
-/// Visibility under each falloff, from the same rays, and one standard error of it.
+/// Visibility under each falloff, from the same rays, with one standard error.
 struct RayEstimate {
     std::array<float, 3> visibility{1, 1, 1};     ///< by Falloff; quad and lin only where asked for
     std::array<float, 3> standard_error{0, 0, 0}; ///< 0 also where all rays agree
 };
 
-/// Where rays start from and what they do not count.
+/// The start of rays, and the surfaces they ignore.
 struct RayStart {
     Eigen::Vector3d point, normal; ///< unit
-    std::uint32_t key = 0;         ///< decides set and turn: equal keys give equal results on any number of threads
-    double lift_m = 0;             ///< above the point; at least as much as rounding asks for
+    std::uint32_t key = 0;         ///< selects set and rotation: equal keys give equal results on any number of threads
+    double lift_m = 0;             ///< above the point; at least the rounding error is used
     double disc_radius_m = 0;      ///< of the point's own disc, where it has one
-    std::span<const Eigen::Vector3d> faces = {}; ///< normals of the faces round a vertex: a direction below them all is
-                                                 ///< inside and is not cast
+    std::span<const Eigen::Vector3d> faces = {}; ///< normals of the faces round a vertex: directions below all of them
+                                                 ///< are inside and are not cast
 };
 
 /// Share of the cosine-weighted hemisphere about `normal` that is open within a radius, methods.md's equation 1.
 class RayHemisphere {
   public:
-    /// Keeps references: surface and directions must live as long. `all_falloffs` costs the nearest meeting of every
-    /// ray in place of any meeting.
+    /// Keeps references: surface and directions must live as long. `all_falloffs` needs the nearest hit of every ray
+    /// instead of any hit.
     RayHemisphere(const RaySurface& surface, const CosineDirections& directions, double radius_m, bool all_falloffs);
 
     [[nodiscard]] RayEstimate at(const RayStart& start) const;

@@ -1,4 +1,4 @@
-// What rays can meet: geometry recentred in double, handed to Embree in single precision.
+// Geometry recentred in double precision, passed to Embree in single precision.
 #include "ao/raycast/ray_surface.h"
 
 #include "ao/raycast/embree.h"
@@ -55,7 +55,7 @@ RTCDevice embree_device() {
 
 namespace {
 
-/// What a cast must know of where it starts; Embree hands it through to the filter.
+/// The start of a cast; Embree passes it to the filter.
 struct CastContext {
     RTCIntersectContext embree;
     OwnSurface own;
@@ -110,11 +110,11 @@ struct RaySurface::Tree {
     Item* buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::size_t count) {
         void* const memory = rtcSetNewGeometryBuffer(geometry, type, 0, format, sizeof(Item), count);
         if (!memory)
-            throw Error(fmt::format("no memory for {} items of geometry to cast rays at", count));
+            throw Error(fmt::format("no memory for {} items of geometry", count));
         return static_cast<Item*>(memory);
     }
 
-    /// Hands the geometry over and builds the tree.
+    /// Passes the geometry to Embree and builds the tree.
     void finish(RTCGeometry geometry) {
         rtcSetGeometryMask(geometry, 0xffffffffU);
         rtcCommitGeometry(geometry);

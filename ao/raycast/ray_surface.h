@@ -1,5 +1,4 @@
-// What rays can meet: triangles or oriented discs in Embree's tree. Every truth of the program is cast against one of
-// these.
+// Triangles or oriented discs in Embree's tree. Every ground truth of the program is cast against one of these.
 #pragma once
 
 #include <array>
@@ -23,9 +22,9 @@ struct Disc {
     double radius_m = 0;
 };
 
-/// Discs overlap, so a ray from one meets its neighbours at once: discs that are met closer than reach_m, in a plane
-/// that passes within depth_m of `point`, do not count, unless they are turned more than 45 degrees from `normal`
-/// (where there is one): those belong to the other wall of a corner. Means nothing to triangles.
+/// Discs overlap, so a ray from one hits its neighbours at once. Hits closer than reach_m are ignored if the disc's
+/// plane passes within depth_m of `point`. Discs more than 45 degrees from `normal` (if given) count: they belong to
+/// the other wall of a corner. No effect on triangles.
 struct OwnSurface {
     Eigen::Vector3f point = Eigen::Vector3f::Zero(); ///< local: RaySurface::local()
     float reach_m = 0, depth_m = 0;
@@ -46,13 +45,12 @@ struct RayBundle {
 [[nodiscard]] double rounding_at(float farthest);
 
 /// Immutable once made; safe to use from several threads. Coordinates are kept relative to the middle of the geometry,
-/// so that single precision serves far from the origin (methods.md's 2.3: at 500 km a float step is 31 mm).
+/// so that single precision suffices far from the origin (methods.md's 2.3: at 500 km a float step is 31 mm).
 class RaySurface {
   public:
-    /// Triangles that name a missing vertex, a vertex that is not finite, or are no wider than a micrometre, are left
-    /// out.
+    /// Triangles with a missing or non-finite vertex, or no wider than a micrometre, are left out.
     explicit RaySurface(const Mesh& mesh);
-    /// Discs that are not finite or have no radius are left out.
+    /// Non-finite discs and discs without a radius are left out.
     explicit RaySurface(std::span<const Disc> discs);
     ~RaySurface();
     RaySurface(RaySurface&&) noexcept;
@@ -69,7 +67,7 @@ class RaySurface {
     /// The first meeting beyond `near` lengths.
     [[nodiscard]] std::optional<Meeting> nearest(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                                  double near = 0) const;
-    /// Whether anything lies on the open segment between two points.
+    /// Whether any surface crosses the open segment between two points.
     [[nodiscard]] bool blocked(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
 
     [[nodiscard]] Eigen::Vector3f local(const Eigen::Vector3d& point) const;
@@ -77,7 +75,7 @@ class RaySurface {
     [[nodiscard]] double rounding_m() const;
     [[nodiscard]] bool empty() const;
 
-    /// Sets the dead lanes of `bundle` from rays that meet anything closer than far_m: live becomes 0 there.
+    /// Sets live to 0 for the rays of `bundle` that hit a surface closer than far_m.
     void drop_blocked(RayBundle& bundle) const;
     /// The first meeting of each live ray.
     [[nodiscard]] Meetings meetings(const RayBundle& bundle) const;

@@ -27,8 +27,8 @@ Facets::Facet facet_at(const DepthImage& depth, int u, int v, const DepthNoise& 
         return {Vector3d::Zero(), Vector3d::Zero()};
     const Pinhole& camera = depth.camera;
     const double here = 1 / z, sigma = noise.at(z) * here * here;
-    const double radius =
-        std::clamp(std::sqrt(1.8 * noise.grain_px * noise.grain_px * noise.at(z) * camera.fx / z), 2.0, 12.0);
+    const double radius = std::clamp(
+        std::sqrt(1.8 * noise.correlation_px * noise.correlation_px * noise.at(z) * camera.fx / z), 2.0, 12.0);
     Vector3d plane = Vector3d::Zero(); // a, b, offset from `here`
     for (int round = 0; round < 2; ++round) {
         const double limit = 4 * sigma + (round == 0 ? 0.7 * radius * here / camera.fx : 1e-3 * here);

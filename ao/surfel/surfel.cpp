@@ -29,22 +29,21 @@ SurfelOptions resolved(SurfelOptions options) {
     return options;
 }
 
-/// Where depth is clean, wide holes are the sky; noisy sensors have shadows beside whatever stands in front of
-/// something.
+/// In clean depth, wide holes are the sky. Noisy sensors have shadows next to foreground objects.
 constexpr int widest_fill_px = 40, narrowest_fill_px = 4;
 
 int divided_up(int n, int by) { return (n + by - 1) / by; }
 
-/// Half the thickness of a surface, in radii, at least and at most: what reads the least error. Where the ends of a
-/// surface are out of sight, it is as thick as can be.
+/// Limits of half the thickness of a surface, in radii, chosen for the least error. Surfaces whose ends are hidden get
+/// the upper one.
 constexpr float thinnest = 0.01F, thickest = 0.6F;
 /// That of all surfaces where they are alike.
 constexpr float alike = 0.25F;
 
-/// Half the thickness of what other views saw behind this one's surfaces, in radii.
+/// Half the thickness of surfaces that only other views saw, in radii.
 constexpr float hidden_layer = 0.05F;
 
-/// What other views saw behind this one's surfaces and outside its image, and how thick these can be: two buffers.
+/// Two buffers: the surfaces that other views saw behind this view's and outside its image, and limits of thickness.
 std::pair<int, int> add_layers(ScreenTables& tables) {
     using Texels = gpu::BufferRow::Texels;
     const auto halved = [](cv::Size size) { return cv::Size(divided_up(size.width, 2), divided_up(size.height, 2)); };
@@ -69,15 +68,15 @@ cv::Size words_of(cv::Size size) {
     return {divided_up(size.width, shared::surfel_run), divided_up(size.height, shared::surfel_run)};
 }
 
-/// Pixels that slices are marched from.
+/// The pixels sampled.
 cv::Size samples_of(cv::Size window, bool downsampled) {
     return downsampled ? cv::Size(divided_up(window.width, 2), divided_up(window.height, 2)) : window;
 }
 
-/// One of the 16 planes of what lies 4 apart.
+/// The size of one of the 16 planes of pixels 4 apart.
 cv::Size plane_of(cv::Size size) { return {divided_up(size.width, 4), divided_up(size.height, 4)}; }
 
-/// Work groups of a pass whose threads each take one of `n`.
+/// Work groups for `n` threads.
 std::array<std::uint32_t, 3> groups_of(int n) {
     return {static_cast<std::uint32_t>(divided_up(n, shared::surfel_group)), 1, 1};
 }
@@ -89,14 +88,14 @@ void add_fill(ScreenTables& tables) {
     tables.add_pass_over(tables.window.size(), "fill", "surfel/fill", {}, {screen_surfaces});
 }
 
-/// Surfaces as they are: a buffer that nothing reads, for the slot of surfels.
+/// Without surfels, surfaces are read directly: an unused buffer for the slot of surfels.
 int add_surfaces_alike(ScreenTables& tables) {
     if (tables.noisy)
         add_fill(tables);
     return tables.add_buffer({"no surfels", 8, gpu::BufferRow::Host::none, gpu::BufferRow::Texels::rg32ui, {0, 0}});
 }
 
-/// From surfaces to surfels as thick as they are wide: the buffer of these.
+/// Adds the passes from surfaces to surfels, which are as thick as wide; returns their buffer.
 int add_surfels(ScreenTables& tables, int layers) {
     using Texels = gpu::BufferRow::Texels;
     constexpr auto none = gpu::BufferRow::Host::none;
@@ -122,9 +121,9 @@ std::vector<Parameter> SurfelOptions::parameters() {
     return joined(
         screen.parameters(),
         {{.name = "quality",
-          .help =
-              "reads per pixel: lowest 8, low 8, medium 16, high 32, highest 64. RMSE 0.103, 0.095, 0.085, 0.081, "
-              "0.080; time on a CPU 0.37, 0.5, 0.65, 1, 1.6 of high's. lowest takes all surfaces to be equally thick",
+          .help = "reads per pixel: lowest 8, low 8, medium 16, high 32, highest 64. RMSE 0.103, 0.095, 0.085, 0.081, "
+                  "0.080; time on a CPU 0.37, 0.5, 0.65, 1, 1.6 of high's. lowest assumes that all surfaces are "
+                  "equally thick",
           .value = OneOf(&quality, quality_words)},
          {.name = "downsampled",
           .help = "samples every other pixel of every other row and fills in the rest: lowest RMSE 0.109, low 0.101, "
@@ -151,7 +150,7 @@ void Surfel::add_passes(ScreenTables& tables) const {
     const cv::Size samples = samples_of(tables.window.size(), options_.downsampled);
     const int layers = tables.neighbours > 0 ? 3 : 1;
     const bool packed =
-        layers > 1 || !level_of(levels, options_.quality).alike; // where other views saw between, none are alike
+        layers > 1 || !level_of(levels, options_.quality).alike; // layers of other views need thicknesses of their own
     const int surfels = packed ? add_surfels(tables, layers) : add_surfaces_alike(tables);
     const int sampled = tables.add_buffer({"sampled", bytes_of_texels(samples.area()), none, Texels::rg32f});
     const cv::Size plane = plane_of(samples); // its threads share a rotation

@@ -1,9 +1,8 @@
-// Surfel bitmask, the accurate method: every pixel is a surfel, a piece of surface with a direction and a thickness,
-// and the surfels that a slice of the hemisphere meets close the sectors they cover. An open plane is open to the last
-// bit.
+// Surfel bitmask, the accurate method. Every pixel is a surfel: a piece of surface with a direction and a thickness.
+// The surfels in a slice of the hemisphere close the sectors they cover. An open plane is open to the last bit.
 //
-// Outside the image surfaces go on as they are at its border, and in narrow holes (a sensor's shadows) as on their
-// farther side: as occluders only, never as pixels.
+// Outside the image surfaces continue as at its border. In narrow holes (a sensor's shadows) they continue as on the
+// hole's farther side. Both only occlude; they are no pixels.
 //
 // At quality `lowest` all surfaces are taken to be equally thick, which saves the passes that find widths (edges, runs,
 // surfels) for 0.008 of error.
@@ -22,7 +21,7 @@ namespace scanshade {
 /// What a person sets. Reads per pixel = 2 x slices x steps.
 struct SurfelOptions {
     ScreenOptions screen{.tangent_sine = 0.01F, .tangent_sigmas = 0};
-    Quality quality = Quality::high; ///< low 8 reads, medium 16, high 32, highest 64; lowest 8, and no look at widths
+    Quality quality = Quality::high; ///< low 8 reads, medium 16, high 32, highest 64; lowest 8, equal thickness
     bool downsampled = false;        ///< a quarter of the pixels are sampled
     int slices = 0, steps = 0;       ///< above 0: instead of the quality's
 

@@ -52,7 +52,7 @@ constexpr std::array tone_curve_rows{ToneCurveRows{"strength", "power"},
 /// A method's tone curve, where both settings are to be fitted, and their bounds.
 struct FreeToneCurve {
     ToneCurveRows rows;
-    Look least, most;
+    ToneCurve least, most;
 };
 
 /// Errors of one configuration: of each capture, and over all (root mean square over captures).
@@ -128,7 +128,7 @@ class Search final : public cv::MinProblemSolver::Function {
         std::ranges::copy(values, std::back_inserter(configuration.settings));
         Score now = score(device_, captures_, configuration);
         if (curve_) {
-            const Look best = now.pairs.best_look(curve_->least, curve_->most);
+            const ToneCurve best = now.pairs.best_curve(curve_->least, curve_->most);
             now.rms = now.pairs.rms(best);
             values.emplace_back(curve_->rows.strength, fmt::format("{:.4g}", best.strength));
             values.emplace_back(curve_->rows.power, fmt::format("{:.4g}", best.power));
@@ -306,8 +306,8 @@ class Calibrate final : public Command {
             line(captures[i].name, before.captures[i].rms, after.captures[i].rms, before.captures[i].calibrated_rms,
                  after.captures[i].calibrated_rms);
         if (!captures.empty())
-            line("all", before.rms, after.rms, before.pairs.rms(before.pairs.best_look()),
-                 after.pairs.rms(after.pairs.best_look()));
+            line("all", before.rms, after.rms, before.pairs.rms(before.pairs.best_curve()),
+                 after.pairs.rms(after.pairs.best_curve()));
         return rows;
     }
 

@@ -23,8 +23,8 @@ constexpr std::array figures{
     Figure{"ssim", "SSIM", [](const Difference& d) { return d.ssim; }, 4},
     Figure{"correlation", "corr.", [](const Difference& d) { return d.correlation; }, 4},
     Figure{"calibrated_rms", "calib.", [](const Difference& d) { return d.calibrated_rms; }, 4},
-    Figure{"strength", "strength", [](const Difference& d) { return d.look.strength; }, 3},
-    Figure{"power", "power", [](const Difference& d) { return d.look.power; }, 3},
+    Figure{"strength", "strength", [](const Difference& d) { return d.curve.strength; }, 3},
+    Figure{"power", "power", [](const Difference& d) { return d.curve.power; }, 3},
 };
 
 std::string cell(double value, int digits) { return std::isnan(value) ? "-" : fmt::format("{:.{}f}", value, digits); }

@@ -174,9 +174,10 @@ std::vector<Stage> RunSettings::common_stages() {
            .value = &s.depth_range,
            .common = true},
           {.name = "depth-noise",
-           .help = "noise of the depth: auto (measured), none, kinect, tof, or FLOOR,PER_Z2[,GRAIN]. Its sigma is "
-                   "FLOOR + PER_Z2 z^2 metres, its correlation length GRAIN pixels. The next two act only on noisy "
-                   "depth",
+           .help =
+               "noise of the depth: auto (measured), none, kinect, tof, or FLOOR,PER_Z2[,CORRELATION]. Its sigma is "
+               "FLOOR + PER_Z2 z^2 metres, its correlation length CORRELATION pixels. The next two act only on noisy "
+               "depth",
            .value = &s.depth_noise},
           {.name = "flying-pixels",
            .help = "pixels where the sensor mixed two surfaces: drop makes them holes",

@@ -174,9 +174,9 @@ std::vector<fs::path> inputs_of(const CaptureEntry& entry) {
 
 /// What the listing says of a frame that its results depend on: where colour lies depends on how the camera moved.
 std::string listed(const CaptureEntry& entry) {
-    const Eigen::Vector3d &turn = entry.motion.turn_per_s, &shift = entry.motion.shift_per_s;
+    const Eigen::Vector3d &rotation = entry.motion.rotation_per_s, &translation = entry.motion.translation_per_s;
     const double between_s = entry.stamp_s && entry.colour_stamp_s ? *entry.colour_stamp_s - *entry.stamp_s : 0;
-    return fmt::format("{}|{}|{}|{}|", entry.problem, between_s, fmt::join(turn, " "), fmt::join(shift, " "));
+    return fmt::format("{}|{}|{}|{}|", entry.problem, between_s, fmt::join(rotation, " "), fmt::join(translation, " "));
 }
 
 std::string stamps_of(const CaptureEntry& entry) {

@@ -1,4 +1,4 @@
-// The mean of a value and those beside it on the same surface: planes alike, near against the radius.
+// The mean of a value and its neighbours' on the same surface: parallel planes, distances small against the radius.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -42,8 +42,8 @@ float distance_to(vec3 at, vec3 low, vec3 high) {
     return dot(outside, outside);
 }
 
-// Whether a node as far away may hold one of the nearest. Of equally near points the lower number counts, so that many at one place do
-// not have to be looked at each for each.
+// Whether a node at this distance may hold one of the nearest. Ties go to the lower index, so that a search among many equal
+// points can stop early.
 bool may_hold(float distance, uint node) {
     float reach = distances[cloud_neighbours - 1];
     if (distance != reach) return distance < reach;

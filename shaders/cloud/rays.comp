@@ -1,4 +1,4 @@
-// Rays from every point of a cloud against the discs that stand for it: the share that meets nothing within the radius.
+// Rays from every point of a cloud against the discs of its points: the share that hits nothing within the radius.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -9,7 +9,7 @@ layout(binding = 0, std430) readonly buffer Points { vec4 points[]; };   // with
 layout(binding = 1, std430) readonly buffer Normals { vec4 normals[]; }; // with roughness; zero where there is no surface
 layout(binding = 2, std430) readonly buffer Boxes { vec4 boxes[]; };
 layout(binding = 3, std430) readonly buffer Begins { uint begins[]; };
-layout(binding = 4, std430) readonly buffer Fan { vec4 fan[]; };         // directions about z, run after run
+layout(binding = 4, std430) readonly buffer Directions { vec4 directions[]; };       // directions about z, run after run
 layout(binding = 16, std430) writeonly buffer Values { float values[]; };
 layout(binding = 32, scalar) uniform Constants { CloudConstants k; };
 #include "cloud/tree.glsl"
@@ -81,7 +81,7 @@ void main() {
     ray.reach = max(k.radius - lift, 0.0);
     uint first = place % k.runs * k.rays, open = 0;
     for (uint i = 0; i < k.rays; ++i) {
-        vec3 d = fan[first + i].xyz;
+        vec3 d = directions[first + i].xyz;
         ray.along = d.x * x + d.y * y + d.z * n;
         if (k.only_up != 0 && dot(ray.along, k.up) <= 0.0) continue;
         bvec3 level = lessThan(abs(ray.along), vec3(1e-12));

@@ -1,5 +1,5 @@
-// Second pass of depth preparation: the mean over each pixel's nearest surroundings, as a plane through them has it at the
-// pixel, so that the few samples of the next pass speak for all pixels of a large window.
+// Second pass of depth preparation: each pixel takes the value of a plane through its 5x5 surroundings. The few samples of the
+// next pass then represent all pixels of a large window.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -24,6 +24,6 @@ void main() {
     Plane plane;
     // A slope up to 45 degrees is still the pixel's own surface.
     float narrow = 1.0 / (3.0 * sigma_of(zc) * relief_at(here) * wc * wc + 0.7 * 2.8 * wc / k.camera.fx);
-    bool good = solve(square5(p, wc, 1.0, level, narrow), plane); // not good: the plane is level, the pixel stays as it is
+    bool good = solve(square5(p, wc, 1.0, level, narrow), plane); // not good: the plane is level, the pixel keeps its value
     imageStore(averages, here, vec4(hole ? 0.0 : wc + plane.c));
 }

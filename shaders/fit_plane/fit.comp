@@ -2,7 +2,8 @@
 // normal at the pixel. The window grows with the sensor's sigma at that depth and weights keep other surfaces out, so edges
 // stay where they are.
 //
-// Two rounds of weighted least squares: the first trusts what lies as deep as the pixel, the second what lies on the plane.
+// Two rounds of weighted least squares: the first weighs samples by their depth difference to the pixel, the second by their
+// distance from the plane.
 // 25 and 49 averages spread over the window stand for all its pixels.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -40,7 +41,7 @@ void main() {
     float w_principal = w_here - plane.a * (float(p.x) - k.camera.cx) - plane.b * (float(p.y) - k.camera.cy);
     vec3 n = -vec3(k.camera.fx * plane.a, k.camera.fy * plane.b, w_principal);
     n *= inversesqrt(max(dot(n, n), 1e-30));
-    bool near = abs(plane.c) < 3.0 * sigma; // within the tolerance of what lies there
+    bool near = abs(plane.c) < 3.0 * sigma; // within the tolerance of the depth there
     good = good && near && w_here > 1e-6 && !hole; // a kilometre of kilometres
     imageStore(depth_out, here, vec4(hole ? 0.0 : good ? 1.0 / w_here : zc));
     n = good ? n : vec3(0.0);

@@ -1,6 +1,6 @@
-// First pass of depth preparation: depth becomes 1/z, and flying pixels become holes, where a sensor saw two surfaces at once:
-// what hardly a neighbour agrees with, a quarter, or lies between something nearer and something farther and has less than
-// half of them on its side. A wire has two along itself, and nothing nearer beside it.
+// First pass of depth preparation: depth becomes 1/z, and flying pixels, where a sensor mixed two surfaces, become holes.
+// A flying pixel agrees with less than a quarter of its neighbours, or with less than half and has both nearer and farther
+// ones. A wire agrees with two neighbours and has no nearer ones.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,5 +1,5 @@
-// Between the first pass of depth preparation and the second, in a recording: the mean of what this frame and those around it
-// recorded of a pixel's surface. Frames that saw something else there have no say.
+// In recordings, between the first and the second pass of depth preparation: the mean depth of a pixel's surface over this
+// frame and its neighbours. Frames that saw another surface there do not count.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -76,7 +76,7 @@ float falloff_weight(float away2, float away) {
     return clamp(g.falloff_add + g.falloff_scale * (falloff == falloff_linear ? away : away2), 0.0, 1.0);
 }
 
-// What a side of a slice has met.
+// The occluders found on one side of a slice.
 struct Side {
     float horizon; // cosine of the horizon, gtao
     uint occupied; // sectors, bitmask
@@ -85,7 +85,7 @@ struct Side {
 void look(Surface s, Slice slice, ivec2 q, float side, inout Side met) {
     float z = imageLoad(depth_in, index_of(q)).x;
     vec3 sample_point = ray_of(vec2(q)) * z, apart = sample_point - s.point;
-    float away2 = dot(apart, apart) + 1e-20; // lengths to 7e-4 will do: what the angles lose by it is less than that
+    float away2 = dot(apart, apart) + 1e-20; // lengths to 7e-4 suffice: the error of the angles is smaller
     float inverse = quick_scale * quick_inversesqrt(away2), away = away2 * inverse;
     float weight = falloff_weight(away2, away);
     bool counts = z > 0.0 && weight > 0.0 && rises(s, apart, away);
@@ -138,7 +138,7 @@ void main() {
         Side plus = Side(-slice.sine, 0u), minus = Side(slice.sine, 0u);
         float jitter = noise.y + float(i) * golden;
         int j = 0;
-        do { // a loop that asks first runs once more on lavapipe, with every lane off
+        do { // a loop that tests first runs once more on lavapipe, with all lanes off
             float x = (float(j) + fract(jitter)) * inverse_steps;
             jitter += float(g.steps) * golden;
             x = square != 0 ? x * x : pow(x, g.distribution);

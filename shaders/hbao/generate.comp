@@ -50,7 +50,7 @@ void main() {
 
     float occlusion = 0.0;
     int i = 0;
-    do { // loops ask last: one that asks first runs once more on lavapipe, with every lane off
+    do { // the loop tests at its end: one that tests first runs once more on lavapipe, with all lanes off
         // The circle of radius R parallel to the image; pixels need not be square.
         vec2 line = turned * vec2(k.camera.fx, k.camera.fy) * (k.radius / s.point.z);
         turned = vec2(turned.x * h.turn_cosine - turned.y * h.turn_sine, turned.y * h.turn_cosine + turned.x * h.turn_sine);

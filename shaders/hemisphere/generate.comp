@@ -1,4 +1,4 @@
-// Hemisphere kernel: the share of weighted points in the half ball above the surface that lie behind what is seen.
+// Hemisphere kernel: the share of weighted points in the half ball above the surface that are behind the depth image.
 //
 // The well-known tutorial form (64 points, a random turn per pixel, range check, less weight for points along the view).
 // Departures, off with `published`: points are compared by their own depth, not the surface's, which darkened every slope;
@@ -34,7 +34,7 @@ void main() {
     Surface s = surface_at(p, z, here);
     vec2 noise = noise_at(p);
 
-    // A frame about the normal, turned at random; the axis least along the normal never vanishes in it.
+    // Axes about the normal, rotated at random. They start from a coordinate axis that is never parallel to the normal.
     vec3 axis = abs(s.normal.x) < 0.6 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0);
     vec3 e1 = normalize(axis - s.normal * dot(axis, s.normal)), e2 = cross(s.normal, e1);
     vec2 turn = vec2(cos(noise.x * 6.2831853), sin(noise.x * 6.2831853));
@@ -43,7 +43,7 @@ void main() {
 
     float occluded = 0.0, weights = 0.0, known = 0.0;
     int i = 0;
-    do { // loops ask last: one that asks first runs once more on lavapipe, with every lane off
+    do { // the loop tests at its end: one that tests first runs once more on lavapipe, with all lanes off
         vec3 c = imageLoad(kernel, i).xyz;
         vec3 a = tangent * c.x + bitangent * c.y + s.normal * c.z, q = s.point + k.radius * a;
         Seen seen = seen_at(q);

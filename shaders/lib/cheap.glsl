@@ -1,5 +1,5 @@
-// Float and integer steps that cost one instruction where the built-in ones cost several: conversions run at a quarter of
-// the rate on GPUs, and min/max must mind NaN on lavapipe. All need |x| < 2^22.
+// Operations of one instruction where the built-in ones take several: conversions run at a quarter of the rate on GPUs, and
+// min/max must handle NaN on lavapipe. All need |x| < 2^22.
 
 const float magic = 12582912.0; // 1.5 * 2^23: adding it leaves the nearest integer in the low mantissa bits
 const int magic_bits = 0x4b400000;

@@ -1,4 +1,4 @@
-// Where a point of this view lies in another one (shared/neighbour.h), and what that view saw lies in this one.
+// Transforms points between this view and another one (shared/neighbour.h).
 // The includer has lib/cheap.glsl.
 
 // The inverse of a place's rotation.

@@ -1,4 +1,4 @@
-// Where a point of space falls in the image, and what is seen there: for methods that test points around the surface.
+// The pixel of a point in space, and the depth there: for methods that test points around the surface.
 
 struct Seen {
     bool known;

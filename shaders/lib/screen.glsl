@@ -15,7 +15,7 @@ float sigma_of(float z) { return k.noise_floor + k.noise_per_z2 * z * z; }
 
 const uint not_a_number = 0x7fc00000u;
 
-// The look: visibility as it is shown.
+// The tone curve: visibility as shown.
 float shown(float v) {
     float v1 = clamp(1.0 - k.strength * (1.0 - v), 0.0, 1.0);
     return k.power == 1.0 ? v1 : pow(v1, k.power);

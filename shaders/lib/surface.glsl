@@ -1,5 +1,5 @@
-// The surface point a pixel asks for, how far its neighbourhood reaches, and what is done with the answer: expects the
-// texel buffers `surfaces`, and `raw` to write.
+// The surface point of a pixel, the extent of its neighbourhood in the image, and the output. Expects the texel buffers
+// `surfaces`, and `raw` to write.
 #include "lib/cheap.glsl"
 
 struct Surface {
@@ -11,7 +11,7 @@ struct Surface {
     float outline_sine, outline_cosine; // of the angle between its ray and the sphere's outline
 };
 
-// In holes a point that is as good as any: what comes of it is not kept.
+// Any point in holes, where the result is discarded.
 Surface surface_at(ivec2 p, float z, int index) {
     Surface s;
     vec3 ray = ray_of(vec2(p));
@@ -29,8 +29,8 @@ Surface surface_at(ivec2 p, float z, int index) {
     return s;
 }
 
-// Whether a sample lies on the surface or below it: pixels lie beside the marched line, and depth is noisy. `apart` is
-// the sample minus the point, `away` its length.
+// Whether a sample is on the surface or below it: pixels are next to the marched line, and depth is noisy. `apart` is the
+// sample minus the point, `away` its length.
 bool rises(Surface s, vec3 apart, float away) { return dot(s.normal, apart) > k.tangent_sine * away + s.rise; }
 
 // acos for |c| <= 1 to 7e-5 (Abramowitz and Stegun 4.4.45).
@@ -47,14 +47,14 @@ struct March {
     float within;   // the part of it that lies in the image
 };
 
-// Beyond the border nothing is known: steps spread over what lies before it.
+// Nothing is known beyond the border: steps spread over the part inside.
 March cut_at_border(vec2 p, vec2 direction, float reach) {
     vec2 room = mix(p + 0.49, vec2(k.size) - 0.51 - p, greaterThan(direction, vec2(0.0)));
     vec2 to_border = room / max(abs(direction), vec2(1e-6));
     return March(direction, reach, min(reach, min(to_border.x, to_border.y)));
 }
 
-// The pixel so many pixels along, but never outside the image: near the border that may be the pixel itself.
+// The pixel at this distance along a direction, clamped to the image: near the border it may be the pixel itself.
 ivec2 pixel_along(vec2 p, March march, float pixels) {
     vec2 at = p + march.direction * min(pixels, march.within);
     return ivec2(nearest(at.x), nearest(at.y));
@@ -73,7 +73,7 @@ void march_both_ways(Surface s, vec2 p, vec3 d, out March ahead, out March behin
     behind = cut_at_border(p, -direction, reach.y);
 }
 
-// Writes a pixel's result. Below a radius of one pixel nothing can be seen within it: open; up to three the occlusion fades in.
+// Writes a pixel's result. A radius below one pixel shows no occluders: open; up to three pixels the occlusion fades in.
 void finish(Surface s, bool hole, int index, float visibility) {
     float occlusion = 1.0 - visibility;
     occlusion *= clamp(0.5 * s.radius_px - 0.5, 0.0, 1.0);

@@ -1,5 +1,5 @@
-// Luna's SSAO: fourteen evenly spread vectors, reflected at a random one and turned above the surface; what is seen where
-// they end occludes by how far it stands in front of the surface and how high above it.
+// Luna's SSAO: fourteen evenly spread vectors, reflected at a random one and flipped above the surface. The depth at their ends
+// occludes by its distance in front of the surface and its elevation above it.
 //
 // Luna, "Introduction to 3D Game Programming with DirectX 12", chapter 21 (2016). Departures, off with `published`: the
 // random vector is unit, so that a reflection is one and the radius is respected; what is seen is where its pixel's centre
@@ -16,7 +16,7 @@ layout(constant_id = spec_renormalise) const int renormalise = 0;
 layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 1, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 2, rg32f) readonly uniform imageBuffer noise_table;
-layout(binding = 3, rgba32f) readonly uniform imageBuffer vectors; // set after set, each vector as long as it shall be
+layout(binding = 3, rgba32f) readonly uniform imageBuffer vectors; // set after set, each vector with its final length
 layout(binding = 16, r32f) uniform writeonly imageBuffer raw;
 layout(binding = 32, scalar) uniform Constants { LunaConstants constants; };
 
@@ -44,7 +44,7 @@ void main() {
 
     float occlusion = 0.0, known = 0.0;
     int set = 0;
-    do { // loops ask last: one that asks first runs once more on lavapipe, with every lane off
+    do { // the loop tests at its end: one that tests first runs once more on lavapipe, with all lanes off
         vec3 mirror = random_vector(noise);
         noise = fract(noise + vec2(0.7548776662, 0.5698402910));
         int i = 0;

@@ -1,5 +1,5 @@
-// The mean of what several frames found for the same piece of surface: each pixel's point is looked up in every frame, and
-// counts where that frame saw it, the more the better its view was. Nothing is averaged twice, so nothing blurs or drifts.
+// The mean visibility of a surface over several frames. Each pixel's point is looked up in every frame that saw it, weighted by
+// the quality of that view. No value is averaged twice, so results do not blur or drift.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

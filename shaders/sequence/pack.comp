@@ -1,4 +1,4 @@
-// Depth and normals as other frames of the recording look at them: two words a pixel.
+// Depth and normals packed for other frames of the recording: two words a pixel.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -19,7 +19,7 @@ void main() {
     ivec2 p = ivec2(gl_GlobalInvocationID.xy);
     if (!inside(p)) return;
     vec4 surface = imageLoad(surfaces, index_of(p));
-    // A noisy sensor's outlines lie elsewhere in every frame.
+    // The outlines of a noisy sensor move from frame to frame.
     bool noisy = k.noise_floor > 0.0 || k.noise_per_z2 > 0.0;
     if (noisy) {
         float tolerance = 3.0 * sigma_of(surface.w) + 4.0 * surface.w * k.ray_step.x * float(reach);

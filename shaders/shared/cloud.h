@@ -1,10 +1,10 @@
-// What host and shaders share of clouds: the constants, what stands round a point, and where rays start.
+// Clouds, for host and shaders: constants, the neighbours of a point, and the start of rays.
 #ifndef SCANSHADE_SHARED_CLOUD_H
 #define SCANSHADE_SHARED_CLOUD_H
 #include "types.h"
 SHARED_BEGIN
 
-// Lengths in the cloud's unit, places in the order of its tree.
+// Lengths in the cloud's unit, indices in the order of its tree.
 struct CloudConstants {
     uint points;
     uint levels;    // of the tree's nodes above its leaves
@@ -19,10 +19,10 @@ struct CloudConstants {
 
 // The plane through a point's neighbours.
 struct CloudRound {
-    vec3 normal;  // unit, either way; zero where they make none
-    float sixth;  // distance of the sixth neighbour, or of the last
+    vec3 normal;   // unit, not oriented; zero where there is no plane
+    float sixth;   // distance of the sixth neighbour, or of the last
     vec3 variance; // along the normal, along the narrow side, along the wide side
-    uint found;   // neighbours, of cloud_neighbours
+    uint found;    // neighbours, of cloud_neighbours
 };
 
 const int cloud_group = 64;      // threads
@@ -34,7 +34,7 @@ const int spec_level = 0; // of the boxes that are joined first
 
 SHARED_FN float larger(float a, float b) { return a > b ? a : b; }
 
-// Rays start this far above their point: so far neighbouring discs stand out at half of tan 10 degrees.
+// Rays start this far above their point: neighbouring discs rise that much at half of tan 10 degrees.
 SHARED_FN float lift_of(float disc, float roughness, float rounding) {
     return larger(larger(0.088F * disc, roughness), rounding);
 }
@@ -43,8 +43,7 @@ SHARED_FN float own_reach(float disc) { return 2 * disc; }
 SHARED_FN float own_depth(float disc, float roughness) { return larger(0.2F * disc, 2 * roughness); }
 const float own_alike = 0.7F; // cosine between the planes, at least: the other wall of a corner is not its own
 
-// Values that differ by so much tell of an edge, not of the few rays behind them: neither counts in the other's mean, and the less
-// the closer they come to it (1 - (difference / this)^2).
+// Values that differ by this much are on two sides of an edge: the weight of a neighbour is 1 - (difference / this)^2.
 const float mean_apart = 0.9F;
 
 SHARED_END

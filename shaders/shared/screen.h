@@ -27,7 +27,7 @@ const int screen_tile = 8;
 
 // Specialization constants of the shared passes.
 const int spec_supplied = 0;    // normals: 1 = the view brings some
-const int spec_denoise = 1;     // denoise: 0 = only the look is applied
+const int spec_denoise = 1;     // denoise: 0 = only the tone curve is applied
 const int spec_blur_radius = 3; // blur: taps to either side
 const int spec_blur_down = 4;   // blur: 1 = along columns, 0 = along rows
 

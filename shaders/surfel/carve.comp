@@ -1,4 +1,4 @@
-// How thick a surface can be where another view looked through what lies behind it: one pixel of 2x2, two depths.
+// Limits of thickness where another view saw through the space behind a surface: one pixel of 2x2, two depths.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -13,7 +13,7 @@ layout(binding = 1, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 16, r32f) writeonly uniform imageBuffer limits; // metres
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
-// Whether neighbour i looked through a point of this view.
+// Whether neighbour i saw through a point of this view.
 bool is_free(int i, NeighbourPlace place, vec3 point, float margin) {
     vec3 there = point_there(point, place);
     vec2 at;

@@ -1,7 +1,7 @@
-// Where one surface ends and another begins, along every row and every column: bit i of a word says that an edge lies
-// before pixel i of its run of 32; the second word, that what lies before the edge is farther away, or nothing.
+// Edges between surfaces along every row and column. Bit i of a word: an edge is before pixel i of its run of 32. Bit i of the
+// second word: the surface before that edge is farther away, or missing.
 //
-// Surfaces go on where 1/z, linear on any plane, changes little or as it did on either side (inverse-depth continuity).
+// A surface continues where 1/z, linear on any plane, changes little or with the slope of either side (inverse-depth continuity).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -12,8 +12,8 @@ layout(binding = 0, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 16, rg32ui) writeonly uniform uimageBuffer edges;
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
-const int narrow = 4;  // a surface may go on behind a hole of fewer pixels
-const int across = 24; // and it is known what lies beyond one of fewer
+const int narrow = 4;  // a surface may continue behind a hole of fewer pixels
+const int across = 24; // holes of fewer pixels have a known far end
 
 int start, stride, length_px;
 float noise_floor, noise_per_z2;
@@ -65,13 +65,13 @@ void main() {
         float d = inverse(first + i + 1);
         uint bit = 1u << i;
         bool on, beyond_is_nearer;
-        if (b > 0.0 && c == 0.0) { // where a hole begins: is what lies behind it the same surface, or what?
+        if (b > 0.0 && c == 0.0) { // a hole begins: does the same surface continue behind it?
             float beyond = d;
             int width = 2;
             while (beyond == 0.0 && width < across && first + i + width < length_px) beyond = inverse(first + i - 1 + ++width);
             on = goes_on(b, slope, beyond, width);
             beyond_is_nearer = b < beyond;
-        } else { // c may go on from b, or from behind the hole that ends here; a slope that begins may be told from d
+        } else { // c may continue b, or the surface before the hole that ends here; d gives a slope that begins
             on = goes_on(last, slope, c, gap) || (b > 0.0 && d > 0.0 && c > 0.0 && abs(b - (2.0 * c - d)) <= tolerance(b, c));
             beyond_is_nearer = last < c;
         }
@@ -83,6 +83,6 @@ void main() {
         b = c;
         c = d;
     }
-    // Words of one run of all lines lie side by side.
+    // Words of one run of all lines are contiguous.
     imageStore(edges, id, uvec4(edge, farther, 0u, 0u));
 }

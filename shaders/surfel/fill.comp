@@ -1,7 +1,6 @@
-// Narrow holes of a sensor's depth, as far as other pixels need them: what lies in a hole is taken to go on from its farther
-// side, as a plane, no nearer than its nearer side. Structured light leaves a shadow beside whatever stands in front of
-// something, and drops single pixels; without this the surface there would seem to end. Filled surfaces have a negative depth:
-// they occlude, but are no pixels.
+// Fills narrow holes of a sensor's depth for other pixels' sake: the surface on the farther side continues as a plane, no
+// nearer than the nearer side. Structured light leaves shadows next to foreground objects and drops single pixels. Without
+// this pass surfaces would seem to end there. Filled surfaces have a negative depth: they occlude, but are no pixels.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -25,8 +24,8 @@ int to_depth(ivec2 p, int direction, int most, out vec4 surface) {
 
 bool has_depth(ivec2 q) { return inside(q) && imageLoad(surfaces, index_of(q)).w > 0.0; }
 
-// Half the greatest width to either side of any pixel of a narrow hole something lies beyond it; three tries, since that may
-// be the next hole. Most holes are wide (the sky, what is too far), and to search them would cost more than all the rest.
+// A pixel of a narrow hole has depth at half the greatest width, to its left or its right; three tries, since that position may
+// be in the next hole. Most holes are wide (the sky, out of range), and searching them would cost more than the rest.
 bool may_be_narrow(ivec2 p, int half_width) {
     bool found = min(p.x, k.size.x - 1 - p.x) < half_width; // the border of the image ends a hole, too
     for (int i = 1; i <= 3; ++i)

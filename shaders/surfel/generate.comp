@@ -1,13 +1,13 @@
-// Visibility of every pixel from the surfels around it: each slice of the hemisphere is 31 sectors of equal cosine weight,
-// and every surfel that a slice meets closes those it covers (visibility bitmask, Therrien et al. 2023; slices and their
-// cosine measure, Jimenez et al. 2016). A surfel is a piece of surface with a direction and a thickness, not a point: between
-// two samples nothing leaks, and light passes behind what is thin.
+// Visibility of every pixel from the surfels around it. Each slice of the hemisphere has 31 sectors of equal cosine weight,
+// and every surfel in the slice closes the sectors it covers (visibility bitmask, Therrien et al. 2023; slices and their
+// cosine measure, Jimenez et al. 2016). A surfel is a piece of surface with a direction and a thickness, not a point: no light
+// leaks between two samples, and light passes behind thin surfaces.
 //
 // All angles of a slice are measured from the eye vector V, outwards on either side. They are compared as turns, 1 - c of a
 // vector (c, s) with |c| + s = 1, which need no arc function.
 //
-// Four reads go at once, two steps to either side, as the components of a vector: independent chains of arithmetic and of
-// loads keep a processor busy.
+// The four components of a vector are four reads, two steps to either side: independent chains of arithmetic and loads keep
+// a processor busy.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -33,15 +33,15 @@ layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 const float pi = 3.14159265358979, golden = 0.618034;
 const vec4 sides = vec4(1.0, -1.0, 1.0, -1.0);
-const float sector_count = 31.0; // so that a bit's place never reaches the width of a word
+const float sector_count = 31.0; // so that a bit's index never reaches the width of a word
 
-// Compare and select: min and max mind NaN, which costs.
+// Compare and select: min and max handle NaN, which costs time.
 vec4 least(vec4 a, vec4 b) { return mix(b, a, lessThan(a, b)); }
 vec4 most(vec4 a, float b) { return mix(vec4(b), a, greaterThan(a, vec4(b))); }
 // To 0.07 %: lengths of directions, not positions.
 vec4 inverse_length(vec4 squared) { return quick_scale * quick_inversesqrt(squared); }
 
-// x^1.5 on [0, 1] within 0.01: where the steps lie.
+// x^1.5 on [0, 1] within 0.01: the distribution of the steps.
 vec4 spread(vec4 x) { return x * (x * (0.95 - 0.25 * x) + 0.3); }
 
 // Of the angle t of (c, s) with s >= 0: 1 - c / (|c| + s), monotonic from 0 to 2.
@@ -60,7 +60,7 @@ void measures(vec4 turns, out vec4 along_sine, out vec4 along_cosine) {
     along_cosine = 1.0 - 2.0 * y * r;
 }
 
-// 1 where depth `other` stands in front of a sample at z and of the sample's plane, which is at z / plane there.
+// 1 where depth `other` is in front of a sample at z and of the sample's plane, which has depth z / plane there.
 vec4 hides(vec4 other, vec4 z, vec4 plane, float jut) {
     vec4 near = other + jut;
     return vec4(greaterThan(other, vec4(0.0))) * vec4(lessThan(near, z)) * vec4(lessThan(near * plane, z));
@@ -108,11 +108,11 @@ void main() {
     if (any(greaterThanEqual(at, s.samples))) return;
     vec4 surface = imageLoad(surfaces, index_of(pixel));
     float own = surface.w;
-    float z = own > 0.0 ? own : 1.0; // in holes a point as good as any: what comes of it is not kept
+    float z = own > 0.0 ? own : 1.0; // any point in holes, where the result is discarded
     vec2 ray = ray_of(vec2(pixel)).xy;
     float ray_length = sqrt(dot(ray, ray) + 1.0), distance = z * ray_length;
     vec3 eye = vec3(ray, 1.0) * (-1.0 / ray_length);
-    // Seen from behind its own plane nothing is defined: bend to the eye.
+    // A normal that faces away is undefined: bend it to the eye.
     vec3 n = normalize(surface.xyz + eye * max(0.01 - dot(surface.xyz, eye), 0.0));
 
     // Two axes across the eye vector, whose z is below 0 (Duff et al. 2017).
@@ -124,12 +124,12 @@ void main() {
     float reach = k.radius * inversesqrt(max(z * z - radius2, 1e-4 * z * z)); // in units of the image plane
     vec2 flat_eye = eye.xy * k.ray_step, flat_normal = n.xy * k.ray_step; // per pixel across
     float normal_per_z = dot(n, vec3(ray, 1.0));
-    // Rounding of depth in single precision is a noise, too.
+    // Rounding of depth in single precision is noise, too.
     float least_rise = (k.tangent_sigmas * sigma_of(z) + 1e-6 * z) * abs(normal_per_z);
     float lowest2 = k.tangent_sine * k.tangent_sine;
     float open = 0.0, all = 0.0;
 
-    // Loops ask last: lavapipe would run a `for` once more with nobody in it.
+    // The loop tests at its end: lavapipe would run a `for` once more with all lanes off.
     int i = 0;
     do {
         float phi = pi * (float(i) + noise.x) / float(slices);
@@ -152,7 +152,7 @@ void main() {
         vec2 along_ray = along * k.ray_step;
         float per_pixel = length(along_ray); // metres at z = 1 m
         float half_pixel = 0.5 * s.lengthen * per_pixel;
-        // Beyond half the image's size outside it a plane is no longer a guess worth a step.
+        // Farther outside than half the image's size, the plane is too poor a guess to spend a step on.
         vec2 room = vec2(to_border(vec2(pixel), along), to_border(vec2(pixel), -along)) + 0.5 * float(max(k.size.x, k.size.y));
         float full_reach = reach / per_pixel;
         vec2 far = max(min(vec2(full_reach), room), 1.0) - 1.0;
@@ -181,7 +181,7 @@ void main() {
             // From the pixel's point to the sample's, towards V and towards T (outwards on either side): differences first,
             // far away coordinates cancel badly.
             vec4 mx = vec4(ix), my = vec4(iy);
-            // Outside the image the surface at its border goes on, a plane, though not towards its horizon.
+            // Outside the image the surface at its border continues as a plane, but not towards its horizon.
             vec4 seen = nx * (ray.x + mx * k.ray_step.x) + ny * (ray.y + my * k.ray_step.y) + nz;
             vec4 go_on = (nx * (ray.x + vec4(jx) * k.ray_step.x) + ny * (ray.y + vec4(jy) * k.ray_step.y) + nz) / seen;
             go_on = mix(vec4(0.0), go_on, lessThan(abs(go_on - 1.5), vec4(layer == 0 ? 1.2 : 0.0)));
@@ -190,15 +190,15 @@ void main() {
             vec4 pv = zq * (mx * flat_eye.x + my * flat_eye.y) - ray_length * dz;
             vec4 pt = zq * (mx * flat_tangent.x + my * flat_tangent.y) * sides;
             vec4 rise = zq * (mx * flat_normal.x + my * flat_normal.y) + (dz * normal_per_z - least_rise);
-            // What other views saw lies off by some misfit; it must not occlude the surface that it continues.
+            // Surfaces of other views have an alignment error; they must not occlude the surface that they continue.
             if (layers > 1) rise -= vec4((four.marks >> 4) & 1) * k.misfit;
             vec4 d2 = pv * pv + pt * pt;
-            // The gaze at the sample; across it, outwards: (gt, -gv).
+            // The view direction of the sample; perpendicular to it, outwards: (gt, -gv).
             vec4 gv = pv - distance;
             vec4 g = inverse_length(gv * gv + (pt * pt + 1e-30));
             gv *= g;
             vec4 gt = pt * g;
-            // Where the surfel lies in the slice: its normal turned by a right angle, outwards.
+            // The surfel's direction in the slice: its normal rotated by a right angle, outwards.
             vec4 lv = -sides * (nx * tangent.x + ny * tangent.y + nz * tangent.z);
             vec4 lt = nx * eye.x + ny * eye.y + nz * eye.z;
             vec4 l = inverse_length(lv * lv + (lt * lt + 1e-30));
@@ -211,10 +211,10 @@ void main() {
             vec4 middle = pv * lv + pt * lt;
             vec4 chord = positive(middle * middle + (radius2 - d2)) + 1e-30;
             chord *= inverse_length(chord);
-            // Half way to its neighbours; farther where a neighbour stands in front of it and of its plane: there it goes on.
+            // Half way to its neighbours; farther where a neighbour is in front of it and of its plane and hides its continuation.
             vec4 back = (now - before) * size, ahead = (next - now) * size;
             vec4 bend = sides * (nx * along_ray.x + ny * along_ray.y) / seen;
-            vec4 z_before = vec4(last, zq.xy), z_next = vec4(zq.zw, 0.0, 0.0); // of the last step's nothing is known yet
+            vec4 z_before = vec4(last, zq.xy), z_next = vec4(zq.zw, 0.0, 0.0); // the neighbour of the last step is not known yet
             last = layer == 0 ? zq.zw : last;
             float longest = layer == 0 ? s.longest : 0.0; // hidden layers have neither
             back += hides(z_before, zq, 1.0 - (now - before) * bend, s.jut) * least(2.0 * back, vec4(longest));
@@ -222,7 +222,7 @@ void main() {
             back = least(back, middle + chord);
             ahead = least(ahead, chord - middle);
             vec4 fv = pv - lv * back, ft = pt - lt * back, uv = pv + lv * ahead, ut = pt + lt * ahead;
-            // Thickness lies behind, as the eye sees it: seen from the pixel, farther outwards.
+            // Thickness extends away from the eye: seen from the pixel, farther outwards.
             vec4 deep = four.thickness;
             vec4 fdv = fv + gv * deep, fdt = ft + gt * deep, udv = uv + gv * deep, udt = ut + gt * deep;
             bvec4 turns = greaterThan(fv * ut, ft * uv), deep_turns = greaterThan(fdv * udt, fdt * udv);
@@ -238,11 +238,11 @@ void main() {
             uvec4 below = bits_below(from), over = bits_below(until);
             uvec4 mask = uvec4(over.x & ~below.x, below.y & ~over.y, over.z & ~below.z, below.w & ~over.w);
             vec4 height = rise * abs(rise) - lowest2 * d2; // above the surface by the least sine
-            // Above, within the radius, known: what is not makes one of these negative.
+            // Above the plane, within the radius, known: otherwise one of these is negative.
             ivec4 misses = (floatBitsToInt(height) | floatBitsToInt(radius2 - d2) | (floatBitsToInt(zq) - 1)) >> 31;
             mask &= ~uvec4(misses);
             closed |= mask.x | mask.y | mask.z | mask.w;
-            // What lies behind these samples comes before the next ones.
+            // The layers behind these samples come before the next samples.
             ivec4 next_layer = four.marks & 15; // quarters of a radius behind this one, rounded up
             vec4 beyond = dz * (4.0 / k.radius) + vec4(next_layer);
             // It may lie within the radius; 15 is that or farther.
@@ -256,7 +256,7 @@ void main() {
         open += measure * (1.0 - float(bitCount(closed)) * (1.0 / sector_count));
         ++i;
     } while (i < slices);
-    // Where the radius shows as less than a pixel nothing can be seen within it: open; up to three it fades in.
+    // A radius below one pixel shows no occluders: open; up to three pixels the occlusion fades in.
     float shows = k.radius * sqrt(k.camera.fx * k.camera.fy) / z;
     open = mix(all, open, clamp(0.5 * shows - 0.5, 0.0, 1.0));
     int index = at.y * s.samples.x + at.x;

@@ -1,4 +1,4 @@
-// What another view saw behind a block of 2x2 pixels, in one word that orders by nearness: 16 bits of R/z, logarithmic, then the
+// A layer that another view saw behind a block of 2x2 pixels, in one word that orders by nearness: 16 bits of R/z, logarithmic, then the
 // normal. The depth is that of the plane in the middle of the block.
 
 const int least_nearness = (127 - 12) << 12; // of z = 2^12 R, where the radius no longer shows; the most is z = R / 16
@@ -37,5 +37,5 @@ float layer_depth_at(uint word, ivec2 p) {
     return plane_depth(ray_of(middle_of(p >> 1)) * z, layer_normal(word), ray_of(vec2(p)));
 }
 
-// By which a layer lies behind the one before it, at least.
+// The least distance of a layer behind the one before it.
 float layer_gap(float z, SurfelConstants s) { return max(max(s.apart, 0.01 * z), 3.0 * sigma_of(z)); }

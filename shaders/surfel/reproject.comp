@@ -1,6 +1,6 @@
-// What other views saw behind this one's surfaces: up to two layers for each block of 2x2 pixels, nearest first, each clearly
-// behind the one before it, the first behind the nearest of the block's pixels. Outside the image and in holes, where nothing
-// is, the first layer is the nearest surface there.
+// The surfaces that other views saw behind this view's: up to two layers for each block of 2x2 pixels, nearest first. Each is
+// clearly behind the one before it, the first behind the nearest pixel of the block. Outside the image and in holes the first
+// layer is the nearest surface there.
 //
 // One thread for one pixel of 2x2 of each neighbour, a round for each layer. The order of threads changes nothing.
 #version 460

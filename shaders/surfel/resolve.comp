@@ -1,5 +1,5 @@
-// Last pass of the surfel bitmask: the mean over samples of the same plane, then the look. What is averaged is open and
-// whole measure each by itself, since a slice that sees little of the hemisphere must not count like one that sees much.
+// Last pass of the surfel bitmask: the mean over samples of the same plane, then the tone curve. Open and whole measure
+// are averaged separately, since slices that see little of the hemisphere must count less.
 //
 // Sixteen rotations repeat every four samples, and the window weighs each of them alike. Where only every other pixel of
 // every other row was sampled, the rest is filled in here. 2x2 pixels a thread, because they share what they read.
@@ -69,7 +69,7 @@ void add(inout Mean mean, Tap tap, float share) {
     cosine *= cosine;
     float apart = distance * distance;
     float weight = positive(1.0 - apart) * (cosine * cosine);
-    // A pixel none of whose surface was sampled takes what is least far from it.
+    // A pixel without a sample of its surface takes a mean weighted by nearness to its plane.
     if (spacing > 1) weight += 1e-4 / (1.0 + apart);
     mean.sum += share * weight * tap.measure;
 }

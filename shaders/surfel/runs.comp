@@ -1,6 +1,5 @@
-// Where the nearest edge lies before each word of edges, and where after it: one thread walks a line's words. Each number is
-// twice the pixel that the edge lies before, plus 1 where what lies beyond it is farther away or nothing; surfel_nowhere at
-// the border of the image.
+// The nearest edge before and after each word of edges: one thread walks the words of a line. Each number is twice the pixel
+// after the edge, plus 1 where the surface beyond the edge is farther away or missing; surfel_nowhere at the image's border.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,5 +1,5 @@
-// Depth, normal and silhouette width -> surfels. What shows w pixels across between two drops to something farther is taken
-// to be half as thick; what goes on behind something nearer, or out of the image, is taken to be thick.
+// Depth, normal and silhouette width -> surfels. A surface w pixels wide between two drops to farther ones is assumed to be
+// half as thick. A surface that continues behind a nearer one, or out of the image, is assumed to be thick.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -70,14 +70,14 @@ void main() {
         imageStore(surfels, surfel_index(p, s.plane), uvec4(surfel(z, surface.xyz, thickness / s.thickest), 0u, 0u));
         return;
     }
-    // What other views saw behind this pixel; where this one saw nothing the first of it is the surface itself.
+    // Layers that other views saw behind this pixel; where this view saw nothing, the first layer is the surface itself.
     bool own = imageLoad(depth_in, index_of(p)).x > 0.0;
     int block = layer_index(p >> 1);
     uint one = imageLoad(behind, block).x, two = imageLoad(behind, layers_size() + block).x;
-    // What lies behind the nearest pixel of the block need not lie behind this one.
+    // A layer behind the nearest pixel of the block need not be behind this pixel.
     bool behind_this = own && layer_depth_at(one, p) > z + layer_gap(z, s);
     uint second = behind_this ? one : two, third = behind_this ? two : 0u;
-    // No surface is thicker than the way to what was seen behind it, or than where others looked through.
+    // No surface is thicker than the distance to the layer behind it, or to where other views saw through.
     ivec2 tested = p & ~1;
     float other = imageLoad(surfaces, index_of(tested)).w;
     float limit = imageLoad(limits, block).x;

@@ -1,6 +1,6 @@
-// Where this view has no surface, outside its image and in its holes, it takes what other views saw there; outside the image,
-// where they saw nothing either, the surface at its border goes on, a plane. In holes the depth is negative: these surfaces
-// occlude, but are no pixels.
+// Outside its image and in its holes this view takes the surfaces that other views saw. Outside the image, where there are
+// none, the surface at its border continues as a plane. In holes the depth is negative: these surfaces occlude, but are no
+// pixels.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

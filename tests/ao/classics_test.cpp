@@ -1,5 +1,5 @@
-// The classic methods against known answers: closed forms of visibility, and what each method's own equations give. The
-// laws that every method obeys are in method_test.
+// The classic methods compared with closed forms of visibility and with their own equations. The laws of all methods
+// are in method_test.
 #include "ao/gpu/device.h"
 #include "ao/gpu/program.h"
 #include "ao/method.h"
@@ -36,9 +36,9 @@ gpu::Device& device() {
 
 using Settings = std::vector<std::pair<std::string, std::string>>;
 
-/// A method with settings, made once: pipelines are what takes time here.
+/// A method with settings, made once, since pipelines take long to compile.
 Method& method_with(const std::string& method, const Settings& settings) {
-    static gpu::Device& opened = device(); // made before, gone after the methods
+    static gpu::Device& opened = device(); // opened before the methods, destroyed after them
     static std::map<std::pair<std::string, Settings>, std::unique_ptr<Method>> made;
     auto& one = made[{method, settings}];
     if (!one) {
@@ -141,7 +141,7 @@ TEST(Noise, the_hilbert_curve_visits_every_cell_and_never_jumps) {
 }
 
 TEST(Noise, any_8x8_pixels_hold_numbers_spread_over_zero_to_one) {
-    // 64 consecutive places of a golden-ratio-like sequence: no gap is wider than a few of the 64 even ones.
+    // 64 consecutive values of a golden-ratio-like sequence: no gap is wider than a few of the 64 even ones.
     const auto table = noise_table(3);
     for (int part = 0; part < 2; ++part) {
         std::set<float> values;
@@ -163,7 +163,7 @@ TEST(Noise, any_8x8_pixels_hold_numbers_spread_over_zero_to_one) {
 
 // ------------------------------------------------------------------------------------------------- normals
 
-/// The shared passes by themselves: depth, given normals and raw visibility in; normals and shown visibility out.
+/// Only the shared passes: depth, given normals and raw visibility in; normals and shown visibility out.
 struct SharedPasses {
     enum : int { depth, given, raw, surfaces, visibility };
     std::unique_ptr<gpu::Program> program;
@@ -219,7 +219,7 @@ TEST_F(Classics, normals_of_a_plane_are_its_own_up_to_grazing) {
 }
 
 TEST_F(Classics, normals_stop_at_edges_and_lend_nothing_across) {
-    // Two walls facing the camera, one metre apart in depth: every normal is (0, 0, -1), those beside the step, too.
+    // Two walls facing the camera, one metre apart in depth: every normal is (0, 0, -1), even next to the step.
     const DepthImage depth = seen(room_camera({64, 48}), [](double x, double) { return x < 0 ? 1.0 : 2.0; });
     for (const cv::Vec3f& n : normals_of(depth))
         ASSERT_LT(degrees_between(n, {0, 0, -1}), 0.01);
@@ -234,7 +234,7 @@ TEST_F(Classics, normals_are_absent_in_holes_and_only_there) {
 }
 
 TEST_F(Classics, normals_between_holes_are_those_of_the_surface) {
-    // Of a plane of which only every third column and row is left: no axis has a neighbour within two pixels.
+    // Only every third column and row of a plane is left: no axis has a neighbour within two pixels.
     DepthImage depth = seen(room_camera({96, 72}), plane(40));
     for (int v = 0; v < 72; ++v)
         for (int u = 0; u < 96; ++u)
@@ -248,8 +248,8 @@ TEST_F(Classics, normals_between_holes_are_those_of_the_surface) {
 }
 
 TEST_F(Classics, a_wire_faces_the_camera) {
-    // One pixel wide before a wall: there is no slope across, so the normal is square to the wire, turned to the
-    // camera.
+    // One pixel wide in front of a wall: there is no slope across, so the normal is perpendicular to the wire and faces
+    // the camera.
     const DepthImage depth =
         seen(room_camera({65, 48}), [](double x, double) { return std::abs(x) < 0.5 / 525 ? 1.0 : 2.0; });
     const cv::Mat3f normals = normals_of(depth);
@@ -259,7 +259,7 @@ TEST_F(Classics, a_wire_faces_the_camera) {
 
 TEST_F(Classics, supplied_normals_are_kept_and_mended) {
     const DepthImage depth = seen(room_camera({32, 24}), plane(30));
-    cv::Mat3f given(depth.z_m.size(), cv::Vec3f(0, 0, -2)); // too long, but else as wanted
+    cv::Mat3f given(depth.z_m.size(), cv::Vec3f(0, 0, -2)); // too long, otherwise right
     given(3, 4) = {0, 0, 1};                                // turned away
     given(5, 6) = {0, 0, 0};
     given(7, 8) = {nan, 0, -1};
@@ -278,10 +278,10 @@ cv::Mat1f denoised(const DepthImage& depth, const cv::Mat1f& raw, float strength
     SharedPasses passes(depth.z_m.size(), false);
     passes.put(SharedPasses::depth, depth.z_m);
     passes.put(SharedPasses::raw, raw);
-    ScreenOptions look;
-    look.strength = strength;
-    look.power = power;
-    const shared::ScreenConstants k = constants_from(look, {depth});
+    ScreenOptions curve;
+    curve.strength = strength;
+    curve.power = power;
+    const shared::ScreenConstants k = constants_from(curve, {depth});
     passes.program->run(std::as_bytes(std::span(&k, 1)));
     cv::Mat1f shown(raw.size());
     std::memcpy(shown.data, passes.program->host(SharedPasses::visibility).data(), shown.total() * 4);
@@ -322,7 +322,7 @@ TEST_F(Classics, denoise_keeps_a_step_at_a_depth_edge_and_at_a_crease) {
     }
 }
 
-TEST_F(Classics, the_look_is_strength_then_power) {
+TEST_F(Classics, the_tone_curve_is_strength_then_power) {
     const DepthImage depth = seen(room_camera({16, 16}), plane(0));
     const auto shown = [&](float v, float strength, float power) {
         return denoised(depth, cv::Mat1f(16, 16, v), strength, power)(8, 8);
@@ -346,7 +346,7 @@ TEST_F(Classics, denoise_keeps_the_mean_of_a_smooth_surface) {
 // ------------------------------------------------------------------------------------------------- planes
 
 TEST_F(Classics, planes_are_open_at_every_tilt) {
-    // Exactly what rule (2) is for: pixels lie beside the marched line, and of a slope some lie above it.
+    // The reason for rule (2): pixels are next to the marched line, and on a slope some are above it.
     for (const std::string& method : classics)
         for (const double tilt : {0.0, 45.0, 60.0, 80.0, 85.0, 89.0})
             EXPECT_GE(lowest(ao_of(method, seen(room_camera({200, 150}), plane(tilt))).visibility), 0.999)
@@ -373,8 +373,8 @@ TEST_F(Classics, planes_are_open_through_any_lens) {
                 << method << ", f " << camera.fx;
 }
 
-TEST_F(Classics, quantised_planes_are_open_where_the_noise_is_told) {
-    // Disparity steps of 2.85 mm z^2: 11 mm at 2 m. The step is told as sigma; normals are those of the plane.
+TEST_F(Classics, quantised_planes_are_open_where_the_noise_is_given) {
+    // Disparity steps of 2.85 mm z^2: 11 mm at 2 m. The step is given as sigma; normals are those of the plane.
     for (const auto& [tilt, z] : {std::pair{45.0, 2.0}, {60.0, 5.0}}) {
         DepthImage depth = seen(room_camera({300, 200}), plane(tilt, z));
         for (float& d : depth.z_m)
@@ -421,7 +421,7 @@ void expect_corner(const std::string& method, const Settings& settings, Corner e
 }
 
 TEST_F(Classics, a_right_angle_is_as_dark_as_the_closed_form_says) {
-    // 0.657; what is missed between finite steps errs towards open.
+    // 0.657; occluders missed between finite steps make the result brighter.
     const double truth = beside_wall(0.125, 0.5);
     EXPECT_NEAR(truth, 0.6575, 0.0001);
     expect_corner("gtao", {{"quality", "highest"}}, {truth + 0.01, truth + 0.01, truth + 0.01}, 0.02);
@@ -429,8 +429,8 @@ TEST_F(Classics, a_right_angle_is_as_dark_as_the_closed_form_says) {
 }
 
 TEST_F(Classics, the_corner_of_each_method_is_its_own) {
-    // Obscurance is no visibility: these follow from each method's equations, by independent prototypes. That nothing
-    // occludes a side wall is Luna's known defect: all its occluders lie behind in z.
+    // Obscurance is not visibility: these values follow from each method's equations, by independent prototypes.
+    // Nothing occludes a side wall in Luna's method, a known defect: all its occluders are behind in z.
     expect_corner("hbao", {{"directions", "16"}, {"steps", "8"}, {"bias", "10"}, {"attenuated", "true"}},
                   {0.83, 0.82, 0.79}, 0.03);
     expect_corner("luna", {{"quality", "highest"}}, {0.91, 1.0, 0.76}, 0.05);
@@ -461,9 +461,9 @@ TEST_F(Classics, telephoto_lenses_lose_no_bits) {
 
 // ------------------------------------------------------------------------------------------------- other shapes
 
-TEST_F(Classics, convex_things_are_open) {
-    // From outside, nothing of a sphere rises above any of its tangent planes: with its own normals nowhere, with those
-    // of its pixels but for the rim, where a pixel spans many degrees.
+TEST_F(Classics, convex_shapes_are_open) {
+    // From outside, no part of a sphere rises above its tangent planes. With exact normals this holds everywhere, with
+    // normals from pixels except at the rim, where a pixel spans many degrees.
     const Pinhole camera = room_camera({200, 200});
     const DepthImage ball = seen(camera, sphere({0, 0, 2}, 0.25, false));
     NormalImage normals{cv::Mat3f(ball.z_m.size(), cv::Vec3f())};
@@ -481,7 +481,7 @@ TEST_F(Classics, convex_things_are_open) {
 }
 
 TEST_F(Classics, a_bowl_is_half_open_everywhere) {
-    // Hemispherical, R beyond its size: the open share of the full sphere is one half, wherever in the bowl.
+    // Hemispherical, R beyond its size: the open share is one half everywhere in the bowl.
     const Pinhole camera = room_camera({300, 300});
     const Surface ball = sphere({0, 0, 2}, 0.5, true);
     const DepthImage bowl = seen(camera, [&](double x, double y) { // the half away from the camera, in a plane
@@ -507,14 +507,14 @@ TEST_F(Classics, inside_a_sphere_the_open_share_is_known) {
     }
 }
 
-TEST_F(Classics, what_stands_farther_in_front_than_the_radius_casts_no_halo) {
+TEST_F(Classics, objects_farther_in_front_than_the_radius_cast_no_halo) {
     const DepthImage jump = seen(room_camera({200, 150}), [](double x, double) { return x < 0 ? 1.0 : 3.0; });
     for (const std::string& method : classics)
         EXPECT_GE(lowest(ao_of(method, jump).visibility), 0.9999) << method;
 }
 
 TEST_F(Classics, beside_a_step_thickness_decides) {
-    // 1.0 to 1.3 m, five pixels beside, far side. A solid step reads 0.53, a sheet 0.70.
+    // 1.0 to 1.3 m, five pixels from the step on its far side. A solid step gives 0.53, a sheet 0.70.
     const Pinhole camera = room_camera({600, 400});
     const DepthImage step = seen(camera, [](double x, double) { return x < 0 ? 1.0 : 1.3; });
     const auto beside = [&](const std::string& method, Settings settings) {
@@ -529,7 +529,7 @@ TEST_F(Classics, beside_a_step_thickness_decides) {
 }
 
 TEST_F(Classics, light_passes_behind_a_thin_pole_of_a_bitmask) {
-    // One pixel wide, 0.2 m before a wall at 2 m; three pixels beside it the truth is 0.99.
+    // One pixel wide, 0.2 m in front of a wall at 2 m; three pixels from it the truth is 0.99.
     const Pinhole camera = room_camera({361, 300});
     const DepthImage pole = seen(camera, [](double x, double) { return std::abs(x) < 0.5 / 525 ? 1.8 : 2.0; });
     const auto beside = [&](const std::string& method, const Settings& settings) {
@@ -543,7 +543,7 @@ TEST_F(Classics, light_passes_behind_a_thin_pole_of_a_bitmask) {
 
 // ------------------------------------------------------------------------------------------------- holes
 
-TEST_F(Classics, what_is_no_depth_is_a_hole) {
+TEST_F(Classics, invalid_depth_is_a_hole) {
     DepthImage clean = ball_on_floor(test_camera()), dirty{clean.camera, clean.z_m.clone(), {}};
     const std::vector<float> sentinels{
         nan, std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity(), -1.0F, 1e30F, -nan};
@@ -560,8 +560,8 @@ TEST_F(Classics, what_is_no_depth_is_a_hole) {
 }
 
 TEST_F(Classics, renormalised_corners_keep_their_darkness_among_holes) {
-    // Where points are tested one by one, unknown ones are so much less occlusion. Looked at beside the corner's edge,
-    // with the slopes told: what holes do to normals is another matter.
+    // Methods that test points one by one lose occlusion with every unknown point. Measured near the corner's edge with
+    // given normals, since holes affect normals, too.
     const Pinhole camera = test_camera({240, 180});
     const DepthImage corner = wall_corner(camera), holed = with_holes(corner, 0.35);
     const NormalImage normals{normals_of(corner)};
@@ -626,7 +626,7 @@ TEST_F(Classics, pixels_need_not_be_square) {
 
 TEST_F(Classics, a_crop_knows_what_the_whole_knew) {
     const DepthImage whole = ball_on_floor(test_camera({320, 240}));
-    const cv::Rect cut(64, 64, 193, 131); // multiples of the noise's side, odd size
+    const cv::Rect cut(64, 64, 193, 131); // multiples of the noise table's size, odd size
     DepthImage crop{whole.camera, whole.z_m(cut).clone(), {}};
     crop.camera.size = cut.size();
     crop.camera.cx -= cut.x;

@@ -1,4 +1,4 @@
-// The device and the pass runner: what a table of passes promises, and that the alarm rings when it is broken.
+// The device and the pass runner: valid tables compute the right results, broken ones are refused.
 #include "ao/gpu/program.h"
 #include "projection/error.h"
 
@@ -41,7 +41,7 @@ TEST(gpu, a_device_that_is_not_there_is_refused_with_the_list_of_those_that_are)
 }
 
 TEST(gpu, a_chain_of_passes_sees_each_others_results) {
-    // Each pass reads the element at the far end of what the one before wrote, so a missing barrier gives wrong sums.
+    // Each pass reads the previous output in reverse order, so a missing barrier gives wrong sums.
     gpu::Device device;
     gpu::Program program(device, {words("in", Host::upload), words("a"), words("b"), words("out", Host::download)},
                          {add_one(0, 1), add_one(1, 2, 10), add_one(2, 1, 100), add_one(1, 3, 1000)}, 4);
@@ -96,8 +96,8 @@ TEST(gpu, a_broken_table_is_refused_before_anything_runs) {
     EXPECT_THROW(gpu::Program(device, buffers, {unknown}, 4), Error);
 }
 
-TEST(gpu, validation_rings_when_a_program_is_wrong) {
-    // More work groups than any device allows, recorded but never run: the layer must say so, or it is not watching.
+TEST(gpu, validation_reports_a_wrong_program) {
+    // More work groups than any device allows, recorded but never run: the layer must report it, or it is not active.
     setenv("SCANSHADE_VALIDATE", "1", 1);
     gpu::Device device;
     if (!device.validating())

@@ -1,4 +1,4 @@
-// Laws every method of the table obeys, whatever its paper says; a new room is tested the day it enters the table.
+// Laws that every method of the table obeys; a new method is tested as soon as it is in the table.
 #include "ao/gpu/device.h"
 #include "ao/method.h"
 #include "tests/support/scenes.h"
@@ -48,7 +48,7 @@ std::vector<Case> cases() {
 }
 
 gpu::Device& device() {
-    static gpu::Device opened; // one for all: opening costs more than a frame
+    static gpu::Device opened; // shared: opening takes longer than a frame
     return opened;
 }
 
@@ -64,9 +64,9 @@ class Laws : public testing::TestWithParam<Case> {
         set(*row_named(rows, "radius"), std::to_string(radius_m));
         return setup->make(opened);
     }
-    /// Made once per size: pipelines are what takes time here.
+    /// Made once per size, since pipelines take long to compile.
     AoMap ao(const DepthImage& depth, double radius_m = 0.5) {
-        static gpu::Device& opened = device(); // made before, gone after the methods
+        static gpu::Device& opened = device(); // opened before the methods, destroyed after them
         static std::map<std::string, std::unique_ptr<Method>> made;
         const cv::Size size = depth.z_m.size();
         auto& one = made[fmt::format("{} {} {} {} {}x{}", GetParam().method, GetParam().quality, GetParam().downsampled,
@@ -125,8 +125,7 @@ TEST_P(Laws, holes_stay_holes_and_surfaces_get_values) {
 }
 
 TEST_P(Laws, holes_neither_darken_nor_brighten_their_neighbours) {
-    // A plane with holes is a plane: open. And where a corner lies, taking pixels away at random must not shift its
-    // mean.
+    // A plane with holes is still open. Removing random pixels must not shift the mean of a corner.
     const Pinhole camera = test_camera({320, 240});
     EXPECT_GE(lowest_inside(visibility(with_holes(tilted_plane(camera, 30), 0.1)), 0), 0.98);
     const DepthImage corner = wall_corner(camera), punched = with_holes(corner, 0.1);

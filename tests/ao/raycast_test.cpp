@@ -1,5 +1,5 @@
-// Ray casting is the truth that methods are held against: here it is itself held against closed forms
-// (methods.md's 1.3), brute force, and geometry far from the origin.
+// Ray casting is the truth for the methods. Here it is compared with closed forms (methods.md's 1.3), with brute force,
+// and far from the origin.
 #include "ao/raycast/raycast.h"
 
 #include "ao/raycast/depth_surface.h"
@@ -137,7 +137,7 @@ TEST(ClosedForms, balls_from_outside_and_inside) { // cases h, i and j
     for (const double radius : {0.4, 1.0, 1.6})
         EXPECT_NEAR(hard(hollow, {0, 0, -0.9999}, up, radius), 1 - radius * radius / 4, tolerance) << radius;
     EXPECT_NEAR(hard(hollow, {0, 0, -0.9999}, up, 2.5), 0, tolerance);
-    const Mesh bowl = ball({0, 0, 0}, 1, 300, pi / 2, pi); // half a sphere: half is open, wherever one stands in it
+    const Mesh bowl = ball({0, 0, 0}, 1, 300, pi / 2, pi); // half a sphere: half is open at every point
     for (const double polar : {0.0, 0.5, 1.0, 1.3}) {
         const Vector3d in(-std::sin(polar), 0, std::cos(polar));
         EXPECT_NEAR(hard(bowl, -0.9998 * in, in, endless), 0.5, 2 * tolerance) << polar;
@@ -223,7 +223,7 @@ TEST(Tree, finds_what_brute_force_finds) {
     EXPECT_LE(differing, 2) << "rays through the very edge of a triangle may go either way in single precision";
 }
 
-TEST(Tree, triangles_that_are_none_are_left_out) {
+TEST(Tree, degenerate_triangles_are_left_out) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     const Mesh mesh{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {nan, 0, 0}, {0, 1, 0}},
                     {{0, 1, 2}, {0, 1, 3}, {0, 1, 9}, {-1, 1, 4}}};
@@ -233,7 +233,7 @@ TEST(Tree, triangles_that_are_none_are_left_out) {
 
 // ---------------------------------------------------------------------------------------------------- the rays
 
-TEST(Rays, directions_are_spread_as_their_cosine) {
+TEST(Rays, directions_are_cosine_weighted) {
     // Mean of z under the density cos / pi is 2/3, of z^2 1/2, of x and y 0.
     const CosineDirections directions(256, 5);
     for (std::uint32_t key = 0; key < 50; ++key) {
@@ -250,9 +250,9 @@ TEST(Rays, directions_are_spread_as_their_cosine) {
     }
 }
 
-TEST(Rays, the_standard_error_is_what_it_says) {
-    // Beside a wall, at points whose visibility is known: root mean square of the errors made against that of the
-    // errors told.
+TEST(Rays, the_standard_error_is_the_actual_error) {
+    // Next to a wall, where visibility is known: the root mean square of the actual errors equals that of the standard
+    // errors.
     Mesh wall;
     add_quad(wall, {0, -50, 0}, {0, 50, 0}, {0, 50, 50}, {0, -50, 50});
     const RaySurface surface(wall);
@@ -315,7 +315,7 @@ TEST(DepthSurface, a_step_is_open_as_a_sheet_and_closed_as_a_solid) {
     const auto beside = [](double thickness_m) {
         Raycast raycast({.rays = 256, .thickness_m = thickness_m});
         DepthImage depth = step(1.0, 1.3);
-        depth.camera.fx = depth.camera.fy = 260; // so wide that the radius stays in view: 2.5 px are as far as 5 at 525
+        depth.camera.fx = depth.camera.fy = 260; // wide enough to hold the radius: 2.5 px here are 5 px at 525
         return cv::mean(raycast.compute({depth}).visibility(cv::Rect(162, 110, 1, 20)))[0];
     };
     const double sheet = beside(0), half = beside(0.1), solid = beside(1000);
@@ -325,7 +325,7 @@ TEST(DepthSurface, a_step_is_open_as_a_sheet_and_closed_as_a_solid) {
     EXPECT_GT(half, solid + 0.03);
 }
 
-TEST(DepthSurface, what_is_farther_than_the_radius_casts_no_halo) {
+TEST(DepthSurface, occluders_beyond_the_radius_cast_no_halo) {
     const DepthImage depth = step(1, 3);
     for (const double thickness : {0.0, 1.0}) {
         const cv::Mat1f v = Raycast({.rays = 64, .thickness_m = thickness}).compute({depth}).visibility;
@@ -491,7 +491,7 @@ TEST(Meshes, vertices_without_a_triangle_have_no_value) {
     }
 }
 
-/// One array of NumPy's, whose bytes are those of so many floats.
+/// A NumPy array file of so many floats.
 void expect_floats(const std::filesystem::path& file, const std::string& shape, std::size_t count) {
     const std::string bytes = file_bytes(file);
     ASSERT_GT(bytes.size(), 4 * count) << file;
@@ -518,7 +518,7 @@ TEST(Rays, a_run_writes_the_standard_error_of_every_pixel_when_asked) {
 
 TEST(Meshes, the_file_comes_back_with_one_property_more) {
     const TemporaryFolder folder;
-    // Two triangles of a valley and a quad; a comment, a colour and a face property that are none of our business.
+    // Two triangles of a valley and a quad; a comment, a colour and a face property that must survive.
     const std::string head = "ply\nformat ascii 1.0\ncomment a valley\nelement vertex 6\nproperty float x\nproperty "
                              "float y\nproperty float z\nproperty uchar red\n";
     const std::string faces =
@@ -541,7 +541,7 @@ TEST(Meshes, the_file_comes_back_with_one_property_more) {
         EXPECT_NE(written.find("\n" + line + " "), std::string::npos) << line;
 }
 
-TEST(Settings, that_cannot_be_are_refused) {
+TEST(Settings, impossible_ones_are_refused) {
     EXPECT_THROW(Raycast(RaycastOptions{.radius_m = 0}), Misuse);
     EXPECT_THROW(Raycast(RaycastOptions{.rays = 0}), Misuse);
     RaycastOptions options;

@@ -26,12 +26,13 @@ SurfelOptions reads(int slices, int steps) {
     return options;
 }
 
-/// Beside a right-angled wall `share` of the radius away (any cosine-weighted hemisphere within the radius).
+/// Visibility next to a right-angled wall, `share` of the radius away (any cosine-weighted hemisphere within the
+/// radius).
 double beside_wall(double share) {
     return share >= 1 ? 1 : 1 - (std::acos(share) - share * std::sqrt(1 - share * share)) / std::numbers::pi;
 }
 
-/// Root mean square error and largest pixel error where all of the sphere of the radius is seen.
+/// Root mean square and largest error of the pixels whose whole sphere is in view.
 struct CornerError {
     double rms = 0, worst = 0;
 };
@@ -63,7 +64,7 @@ TEST(Surfel, a_right_angled_corner_is_as_dark_as_the_closed_form) {
     const CornerError alike = corner_error({.quality = Quality::lowest});
     EXPECT_LT(many.rms, 0.01);
     EXPECT_LT(few.rms, 0.01);
-    EXPECT_LT(alike.rms, 0.01); // nothing in a corner has ends, so its thickness does not show
+    EXPECT_LT(alike.rms, 0.01); // surfaces of a corner have no free ends, so thickness has no effect
     std::printf(
         "right-angled corner: RMS %.4f at 32 reads (worst pixel %.4f), %.4f at 8 (%.4f), %.4f at lowest (%.4f)\n",
         many.rms, many.worst, few.rms, few.worst, alike.rms, alike.worst);

@@ -22,9 +22,9 @@ cv::Mat1f wavy(cv::Size size) {
     return map;
 }
 
-cv::Mat1f with_look(const cv::Mat1f& map, const Look& look) {
+cv::Mat1f with_curve(const cv::Mat1f& map, const ToneCurve& curve) {
     cv::Mat1f shown(map.size());
-    std::transform(map.begin(), map.end(), shown.begin(), [&](float v) { return static_cast<float>(look(v)); });
+    std::transform(map.begin(), map.end(), shown.begin(), [&](float v) { return static_cast<float>(curve(v)); });
     return shown;
 }
 
@@ -114,9 +114,10 @@ TEST(SimilarityTest, falls_with_what_is_lost) {
 
 TEST(ToneCurveTest, the_best_one_is_found_again) {
     const cv::Mat1f ours = wavy({64, 64});
-    for (const Look& look : {Look{0.24, 3.9}, Look{0.6, 1}, Look{1, 0.5}, Look{1.4, 1.2}, Look{0.9, 3}}) {
-        const Difference d = compare(ours, with_look(ours, look));
-        EXPECT_LT(d.calibrated_rms, 0.004) << look.strength << ", " << look.power;
+    for (const ToneCurve& curve :
+         {ToneCurve{0.24, 3.9}, ToneCurve{0.6, 1}, ToneCurve{1, 0.5}, ToneCurve{1.4, 1.2}, ToneCurve{0.9, 3}}) {
+        const Difference d = compare(ours, with_curve(ours, curve));
+        EXPECT_LT(d.calibrated_rms, 0.004) << curve.strength << ", " << curve.power;
         EXPECT_GT(d.rms, 0.05);
     }
 }
@@ -131,12 +132,12 @@ TEST(ToneCurveTest, never_makes_it_worse) {
 
 TEST(ToneCurveTest, of_many_images_is_one) {
     const cv::Mat1f bright = cv::Mat1f(8, 8, 0.9F), dark = cv::Mat1f(8, 8, 0.3F);
-    const Look look{0.5, 1.5};
-    PairSums pairs = pair_sums(bright, with_look(bright, look));
-    pairs.add(pair_sums(dark, with_look(dark, look)));
+    const ToneCurve curve{0.5, 1.5};
+    PairSums pairs = pair_sums(bright, with_curve(bright, curve));
+    pairs.add(pair_sums(dark, with_curve(dark, curve)));
     EXPECT_EQ(pairs.count(), 128u);
-    EXPECT_NEAR(pairs.rms(look), 0, 1e-6);
-    EXPECT_LT(pairs.rms(pairs.best_look()), 1e-4);
+    EXPECT_NEAR(pairs.rms(curve), 0, 1e-6);
+    EXPECT_LT(pairs.rms(pairs.best_curve()), 1e-4);
 }
 
 TEST(TotalTest, is_the_root_mean_square_over_images_however_many_pixels_each_has) {

@@ -2,12 +2,12 @@
 #include "io/cameras/camera_file.h"
 #include "io/captures/capture.h"
 #include "io/images/exif.h"
+#include "io/images/format.h"
 #include "io/images/image_check.h"
 #include "io/images/image_file.h"
-#include "io/images/format.h"
-#include "io/output_file.h"
 #include "io/images/png_input.h"
 #include "io/images/png_output.h"
+#include "io/output_file.h"
 #include "projection/error.h"
 #include "tests/support/files.h"
 
@@ -667,7 +667,7 @@ TEST(captures, tum_poses_are_taken_between_their_neighbours_and_by_the_cameras_c
     const CaptureEntry plain = open_capture(folder.path()).entries[1];
     ASSERT_TRUE(plain.world_from_camera);
     EXPECT_NEAR(plain.world_from_camera->translation().x(), *plain.stamp_s, 1e-9);
-    EXPECT_NEAR(plain.motion.shift_per_s.x(), 1, 1e-6);
+    EXPECT_NEAR(plain.motion.translation_per_s.x(), 1, 1e-6);
     CameraFile file = read_camera_file(folder / "camera.json");
     file.pose_time_offset_s = 0.0123;
     write_camera_file(folder / "camera.json", file);

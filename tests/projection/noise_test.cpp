@@ -98,20 +98,21 @@ TEST(noise, disparity_steps_count_as_noise) {
     EXPECT_NEAR(measure_noise(images).at(2), q / std::sqrt(12.0), 0.5 * q / std::sqrt(12.0));
 }
 
-TEST(noise, grain_is_that_of_the_sensors_window) {
+TEST(noise, correlation_length_is_that_of_the_sensors_window) {
     // White noise under a Gaussian window of deviation d correlates by exp(-x^2 / 4 d^2), whose integral is 2 d
     // sqrt(pi).
     const Pinhole camera = test_camera({320, 240});
     const DepthImage clean = tilted_plane(camera, 35, 2);
     const DepthImage white = noisy(clean, {0.01, 0});
-    EXPECT_NEAR(measure_noise(std::vector{white}).grain_px, 1, 0.3);
+    EXPECT_NEAR(measure_noise(std::vector{white}).correlation_px, 1, 0.3);
     for (const double deviation : {0.8, 1.2}) {
         DepthImage grained{camera, {}, {}};
         cv::GaussianBlur(white.z_m - clean.z_m, grained.z_m, {11, 11}, deviation);
-        const double grain_px = 2 * deviation * std::sqrt(std::numbers::pi);
-        grained.z_m = clean.z_m + grain_px * grained.z_m; // its deviation fell by one grain along either axis
+        const double correlation_px = 2 * deviation * std::sqrt(std::numbers::pi);
+        // The blur divided the deviation by the correlation length, once along either axis.
+        grained.z_m = clean.z_m + correlation_px * grained.z_m;
         const DepthNoise measured = measure_noise(std::vector{grained});
-        EXPECT_NEAR(measured.grain_px, grain_px, 0.15 * grain_px);
+        EXPECT_NEAR(measured.correlation_px, correlation_px, 0.15 * correlation_px);
         EXPECT_NEAR(measured.at(2), 0.01, 0.0015);
     }
 }
@@ -137,7 +138,7 @@ TEST(noise, steps_are_told_and_nothing_is_taken_for_one) {
 TEST(noise, text_is_checked) {
     EXPECT_FALSE(noise_from_text("none").any());
     EXPECT_DOUBLE_EQ(noise_from_text("0.001,0.002").at(2), 0.009);
-    EXPECT_DOUBLE_EQ(noise_from_text("0.001,0.002,2.5").grain_px, 2.5);
+    EXPECT_DOUBLE_EQ(noise_from_text("0.001,0.002,2.5").correlation_px, 2.5);
     for (const char* wrong : {"", "much", "1", "0.1,", "0.1,0.2x", "-1,0", "nan,0", "0,5", "0,0,0.5", "0,0,"})
         EXPECT_TRUE(says(refusal([&] { (void)noise_from_text(wrong); }), "FLOOR,PER_Z2")) << wrong;
 }

@@ -29,8 +29,8 @@ void moved_by_camera_motion(const Motion& motion, const Number& seconds, Number*
         return;
     Number rotation[3], translated[3];
     for (int i = 0; i < 3; ++i) {
-        rotation[i] = -seconds * Number(motion.turn_per_s[i]);
-        translated[i] = in_camera[i] - seconds * Number(motion.shift_per_s[i]);
+        rotation[i] = -seconds * Number(motion.rotation_per_s[i]);
+        translated[i] = in_camera[i] - seconds * Number(motion.translation_per_s[i]);
     }
     ceres::AngleAxisRotatePoint(rotation, translated, in_camera);
 }

@@ -1,4 +1,4 @@
-// Directions: round the sphere, and cosine-weighted for many neighbouring points, each with a few of one long sequence.
+// Sets of directions: evenly round the sphere, and cosine-weighted for the rays of neighbouring points.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,12 +9,12 @@ namespace scanshade {
 /// Unit directions spread evenly over the sphere (Fibonacci's spiral).
 [[nodiscard]] std::vector<Eigen::Vector3d> spread_directions(int count);
 
-/// One scrambled Sobol sequence (Burley 2020) on the hemisphere about z, cut into runs of `rays`. Points in the order
-/// of a tree that take run after run hold, eight or sixteen together, an even set of their own: the mean over
-/// neighbours is as good as that many times the rays.
-class RayFan {
+/// One scrambled Sobol sequence (Burley 2020) on the hemisphere about z, cut into runs of `rays`. Points take run after
+/// run in the order of the tree. Eight or sixteen neighbours then hold an even set together, and their mean is as good
+/// as that many times the rays.
+class DirectionSet {
   public:
-    RayFan(int rays, int seed);
+    DirectionSet(int rays, int seed);
 
     struct Run {
         const float *x, *y, *z;
@@ -22,9 +22,9 @@ class RayFan {
     };
     [[nodiscard]] std::size_t rays() const { return rays_; } ///< of a run
     [[nodiscard]] std::size_t runs() const { return runs_; }
-    /// Of the point at a place.
-    [[nodiscard]] Run run(std::size_t place) const {
-        const std::size_t first = place % runs_ * rays_;
+    /// The directions of the point with this index in the tree's order.
+    [[nodiscard]] Run run(std::size_t index) const {
+        const std::size_t first = index % runs_ * rays_;
         return {x_.data() + first, y_.data() + first, z_.data() + first, static_cast<int>(rays_)};
     }
 

@@ -1,6 +1,6 @@
-// Where a cloud was seen from: what it tells of its scanner.
+// The orientation of a cloud's normals, guessed from where its points can be seen.
 #include "ao/cloud/cloud_surface.h"
-#include "ao/cloud/ray_fan.h"
+#include "ao/cloud/direction_set.h"
 
 #include <algorithm>
 #include <cmath>
@@ -24,15 +24,15 @@ void for_some(std::span<const Vector3d> points, Visit&& visit) {
             visit(points[i]);
 }
 
-/// How a cloud looks from a place.
-struct LookFrom {
+/// Measures of a cloud as seen from one position.
+struct ViewFrom {
     double seen_first = 0;  ///< share of points with nothing clearly in front of them
-    double off_centre = 0;  ///< distance of the middle from the place / the cloud's radius
+    double off_centre = 0;  ///< distance of the middle from the position / the cloud's radius
     double range_ratio = 1; ///< far points' distance / near points' distance (95 % and 5 %)
 };
 
-/// One cell per two degrees or so: wide enough to hold several points of a sparse scan.
-LookFrom look_from(const Vector3d& place, std::span<const Vector3d> points) {
+/// A cell spans about two degrees, wide enough to hold several points of a sparse scan.
+ViewFrom view_from(const Vector3d& position, std::span<const Vector3d> points) {
     constexpr int columns = 180, rows = 90;
     std::vector<float> nearest(columns * rows, std::numeric_limits<float>::infinity());
     const auto cell = [](const Vector3d& p, double range) {
@@ -44,7 +44,7 @@ LookFrom look_from(const Vector3d& place, std::span<const Vector3d> points) {
     std::vector<float> ranges;
     Vector3d sum = Vector3d::Zero();
     for_some(points, [&](const Vector3d& at) {
-        const Vector3d point = at - place;
+        const Vector3d point = at - position;
         const double range = point.norm();
         if (!(range > 0))
             return;
@@ -59,11 +59,11 @@ LookFrom look_from(const Vector3d& place, std::span<const Vector3d> points) {
     std::size_t first = 0, all = 0;
     double radius2 = 0;
     for_some(points, [&](const Vector3d& at) {
-        const Vector3d point = at - place;
+        const Vector3d point = at - position;
         const double range = point.norm();
         if (!(range > 0))
             return;
-        // Within a cell a surface met at 60 degrees recedes by 6 %; beyond that it takes a second surface.
+        // Within a cell, a surface seen at 60 degrees recedes by 6 %. More means a second surface.
         first += range <= 1.25 * static_cast<double>(nearest[static_cast<std::size_t>(cell(point, range))]);
         ++all;
         radius2 += (point - middle).squaredNorm();
@@ -103,7 +103,7 @@ double seen_from_above(std::span<const Vector3d> points) {
     return static_cast<double>(seen) / static_cast<double>(count);
 }
 
-/// Share of the points that lie behind others from wherever outside one looks.
+/// Share of the points that other points hide in each of 26 directions.
 double hidden_share(std::span<const Vector3d> all) {
     std::vector<Vector3d> points;
     Eigen::AlignedBox3d box;
@@ -139,29 +139,29 @@ double hidden_share(std::span<const Vector3d> all) {
 
 } // namespace
 
-Outside guessed_outside(std::span<const Vector3d> points, const std::optional<Vector3d>& recorded) {
+NormalOrientation guessed_orientation(std::span<const Vector3d> points, const std::optional<Vector3d>& recorded) {
     constexpr double nearly_all = 0.85, clearly_off = 0.5, many_ranges = 3;
-    constexpr double too_far = 20; // in radii of the cloud: from there nothing is behind anything, and tells nothing
+    constexpr double too_far = 20; // radii of the cloud: from so far off, few points hide others anyway
     if (recorded)
-        if (const LookFrom look = look_from(*recorded, points);
-            look.seen_first >= nearly_all && look.off_centre < too_far)
-            return {Outside::Kind::viewpoint, *recorded,
+        if (const ViewFrom view = view_from(*recorded, points);
+            view.seen_first >= nearly_all && view.off_centre < too_far)
+            return {NormalOrientation::Kind::viewpoint, *recorded,
                     fmt::format("the recorded viewpoint, from where {:.0f} % of the points are seen first",
-                                100 * look.seen_first)};
-    const LookFrom look = look_from(Vector3d::Zero(), points);
-    if (look.seen_first >= nearly_all && look.off_centre < too_far &&
-        (look.off_centre > clearly_off || look.range_ratio > many_ranges))
-        return {Outside::Kind::viewpoint, Vector3d::Zero(),
+                                100 * view.seen_first)};
+    const ViewFrom view = view_from(Vector3d::Zero(), points);
+    if (view.seen_first >= nearly_all && view.off_centre < too_far &&
+        (view.off_centre > clearly_off || view.range_ratio > many_ranges))
+        return {NormalOrientation::Kind::viewpoint, Vector3d::Zero(),
                 fmt::format("the origin of the coordinates, from where {:.0f} % of the points are seen first",
-                            100 * look.seen_first)};
+                            100 * view.seen_first)};
     if (const double above = seen_from_above(points); above >= nearly_all)
-        return {Outside::Kind::direction, Vector3d::UnitZ(),
+        return {NormalOrientation::Kind::direction, Vector3d::UnitZ(),
                 fmt::format("up along z, as of terrain: {:.0f} % of the points have nothing above them", 100 * above)};
     if (const double hidden = hidden_share(points); hidden > 0.05)
-        return {Outside::Kind::inward, Vector3d::Zero(),
+        return {NormalOrientation::Kind::inward, Vector3d::Zero(),
                 fmt::format("inward, as of a room: {:.0f} % of the points lie inside, hidden from all round",
                             100 * hidden)};
-    return {Outside::Kind::outward, Vector3d::Zero(), "outward, as nothing tells where the scanner stood"};
+    return {NormalOrientation::Kind::outward, Vector3d::Zero(), "outward, as nothing tells where the scanner stood"};
 }
 
 } // namespace scanshade

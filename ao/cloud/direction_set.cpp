@@ -1,5 +1,5 @@
 // Cosine-weighted directions for many neighbouring points.
-#include "ao/cloud/ray_fan.h"
+#include "ao/cloud/direction_set.h"
 
 #include "ao/raycast/low_discrepancy.h"
 #include "projection/hash.h"
@@ -11,8 +11,8 @@
 namespace scanshade {
 namespace {
 
-/// Eight rays travel together: those of a sector of azimuth, up one sector and down the next.
-int place_of(const Eigen::Vector3f& d, std::size_t rays) {
+/// Sort key. Eight rays are traced together: those of one sector of azimuth, up one sector and down the next.
+int order_of(const Eigen::Vector3f& d, std::size_t rays) {
     const int sectors = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(rays) / 8)));
     const double turn =
         std::atan2(static_cast<double>(d.y()), static_cast<double>(d.x())) / (2 * std::numbers::pi) + 0.5;
@@ -32,7 +32,7 @@ std::vector<Eigen::Vector3d> spread_directions(int count) {
     return directions;
 }
 
-RayFan::RayFan(int rays, int seed)
+DirectionSet::DirectionSet(int rays, int seed)
     : rays_(static_cast<std::size_t>(rays)), runs_(std::max<std::size_t>(16384 / rays_, 1)) {
     const std::uint32_t key = hash(static_cast<std::uint32_t>(seed));
     std::vector<Eigen::Vector3f> all;
@@ -45,7 +45,7 @@ RayFan::RayFan(int rays, int seed)
     for (std::size_t run = 0; run < runs_; ++run)
         std::stable_sort(all.begin() + static_cast<std::ptrdiff_t>(run * rays_),
                          all.begin() + static_cast<std::ptrdiff_t>((run + 1) * rays_),
-                         [&](const auto& one, const auto& two) { return place_of(one, rays_) < place_of(two, rays_); });
+                         [&](const auto& one, const auto& two) { return order_of(one, rays_) < order_of(two, rays_); });
     for (const Eigen::Vector3f& d : all) {
         x_.push_back(d.x());
         y_.push_back(d.y());
