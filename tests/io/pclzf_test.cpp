@@ -250,7 +250,7 @@ TEST(pcl_recordings, a_camera_is_taken_from_the_first_sound_xml_and_others_are_t
     EXPECT_TRUE(pcl::io::LZFDepth16ImageWriter().writeParameters({50, 61, 18.5, 11.5}, folder / (second + ".xml")));
     capture = open_capture(folder.path());
     EXPECT_EQ(capture.camera->pinhole.fx, 60);
-    EXPECT_TRUE(warned(capture.warnings, second + ".xml tells another camera than "));
+    EXPECT_TRUE(warned(capture.warnings, second + ".xml has another camera than "));
 
     write_file(folder / "camera.json", R"({"fx":70,"fy":70,"cx":18,"cy":12,"width":38,"height":24})");
     EXPECT_EQ(open_capture(folder.path()).camera->pinhole.fx, 70);
