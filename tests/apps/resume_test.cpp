@@ -383,7 +383,7 @@ class HalfOpen final : public Method {
 };
 
 /// What a worker of the program does with a capture, with a method that may be told to fail.
-int work(const fs::path& path, const fs::path& out, const Shift& shift,
+int work(const fs::path& path, const fs::path& out, const WorkerProcess& worker,
          const std::function<void(const View&)>& before) {
     const Capture capture = open_capture(path);
     HalfOpen method(before);
@@ -392,7 +392,7 @@ int work(const fs::path& path, const fs::path& out, const Shift& shift,
     options.frames.resize(capture.entries.size());
     std::iota(options.frames.begin(), options.frames.end(), 0);
     options.outputs.folder = out;
-    const Recording recording{journal, "settings", "task", "test", false, shift.carefully, shift.finished};
+    const Recording recording{journal, "settings", "task", "test", false, worker.carefully, worker.finished};
     FrameAo door(method);
     MethodPool pool(door);
     const auto rows = run_recorded(capture, pool, options, recording);
@@ -407,8 +407,8 @@ bool is_frame(const View& view, int index) {
 
 TEST_F(ResumeTest, a_frame_that_crashes_the_process_is_marked_and_the_others_are_done) {
     record(8);
-    const int code = supervise(1, [&](const Shift& shift) {
-        return work(capture(), out(), shift, [](const View& view) {
+    const int code = supervise(1, [&](const WorkerProcess& worker) {
+        return work(capture(), out(), worker, [](const View& view) {
             if (is_frame(view, 5))
                 raise(SIGSEGV);
         });
@@ -430,9 +430,9 @@ TEST_F(ResumeTest, a_lost_device_gets_a_fresh_process_and_no_frame_is_lost) {
         const fs::path mark = folder / "lost";
         fs::remove_all(out());
         fs::remove(mark);
-        const int code = supervise(1, [&](const Shift& shift) {
+        const int code = supervise(1, [&](const WorkerProcess& worker) {
             int calls = 0;
-            return work(capture(), out(), shift, [&](const View&) {
+            return work(capture(), out(), worker, [&](const View&) {
                 if (calls++ == injection && !fs::exists(mark)) {
                     tests::write_file(mark, "once");
                     throw DeviceLost("the device is lost");
@@ -450,8 +450,8 @@ TEST_F(ResumeTest, a_lost_device_gets_a_fresh_process_and_no_frame_is_lost) {
 
 TEST_F(ResumeTest, a_device_that_stays_lost_is_given_up) {
     record(3);
-    const int code = supervise(1, [&](const Shift& shift) {
-        return work(capture(), out(), shift, [](const View&) { throw DeviceLost("the device is lost"); });
+    const int code = supervise(1, [&](const WorkerProcess& worker) {
+        return work(capture(), out(), worker, [](const View&) { throw DeviceLost("the device is lost"); });
     });
     EXPECT_EQ(code, unfinished);
     EXPECT_TRUE(read_journal(journal_file(out(), "")).records.empty()) << "no frame is to blame";
