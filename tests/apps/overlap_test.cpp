@@ -1,4 +1,4 @@
-// Captures that overlap: begun in order, told in order, ended by the first that fails.
+// Overlapping captures start in order, report in order, and end after the first failure.
 #include "apps/walk/overlap.h"
 
 #include "projection/error.h"

@@ -1,5 +1,5 @@
 // Damaged and odd inputs: those made here, and, where they are at hand, those of the shared data folder and its good
-// captures. A refusal must name the file and the place; what can still be used must be used, with a warning.
+// captures. A refusal must name the file and the place; usable parts must be used, with a warning.
 #include "io/cameras/camera_file.h"
 #include "io/captures/capture.h"
 #include "io/clouds/cloud_file.h"
