@@ -1,4 +1,4 @@
-// What a command of the program is: words and flags bound to variables, and what to do once they are set.
+// A command of the program: words and flags bound to variables, and the work to do once they are set.
 #pragma once
 
 #include "projection/parameters.h"
@@ -10,14 +10,14 @@
 
 namespace scanshade {
 
-/// What the program's exit code tells a script.
+/// The program's exit codes, for scripts.
 enum ExitCode : int {
     all_well = 0,
     misuse = 1,
-    some_failed = 2,    ///< some frames' input is bad, and which; the others are done. Trying again will not help
+    some_failed = 2,    ///< the input of some frames is bad; the others are done. Trying again will not help
     nothing_done = 3,   ///< nothing could be done
-    unfinished = 4,     ///< interrupted, a device lost, a disk full, a share gone: the same again with --resume goes on
-    internal_error = 5, ///< the program's own mistake, or a frame that crashed it
+    unfinished = 4,     ///< interrupted, a device lost, a disk full, a share gone: --resume continues
+    internal_error = 5, ///< an error in the program, or a frame that crashed it
 };
 
 /// Flags of one stage of the walk, as the help groups them. Row "radius" is the flag --radius; row "out" is also -o.
@@ -30,7 +30,7 @@ struct Stage {
 /// The flag of a preset, in commands that have one: defaults of other flags.
 inline constexpr std::string_view preset_flag = "preset";
 
-/// What stands on the command line without a flag: PATH...
+/// The words on the command line without a flag: PATH...
 struct Words {
     std::string name; ///< "PATH", as the help shows it
     std::string help;
@@ -38,15 +38,15 @@ struct Words {
     int at_least = 0, at_most = 0;
 };
 
-/// One command, its settings held by itself. The parser fills words() and stages(), then calls run().
+/// One command with its settings. The parser fills words() and stages(), then calls run().
 class Command {
   public:
     virtual ~Command() = default;
     virtual Words words() { return {}; }
     virtual std::vector<Stage> stages() { return {}; }
-    /// Called once the row preset_flag is set, before any other is: changes defaults.
+    /// Changes defaults; called once the row preset_flag is set, before all other rows.
     virtual void take_preset() {}
-    /// Does the work; returns an ExitCode. Throws Misuse for settings that cannot be, Error when nothing can be done.
+    /// Does the work; returns an ExitCode. Throws Misuse for invalid settings, Error when nothing can be done.
     virtual int run() = 0;
 };
 

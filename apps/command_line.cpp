@@ -8,7 +8,7 @@
 namespace scanshade {
 namespace {
 
-/// A word as a shell would take it back.
+/// A word, quoted for a shell.
 std::string as_typed(const std::string& word) {
     const bool plain = std::ranges::all_of(word, [](unsigned char c) {
         return std::isalnum(c) || c >= 0x80 ||

@@ -1,4 +1,4 @@
-// `scanshade inspect`: what is in a capture, and what looks wrong, before anything is computed.
+// `scanshade inspect`: the content of a capture, and its problems, before anything is computed.
 #include "apps/command.h"
 #include "apps/json.h"
 #include "io/captures/capture.h"
@@ -24,7 +24,7 @@ struct DepthStep {
     double from_m, to_m, step_m;
 };
 
-/// What the sampled frames hold together.
+/// Sums over the sampled frames.
 struct Samples {
     std::vector<float> depths_m; ///< all that were seen
     std::size_t recorded = 0;    ///< pixels or points, seen or not
@@ -35,7 +35,7 @@ struct Samples {
     std::vector<std::string> warnings;
 };
 
-/// One frame's findings: those of a bad one are why it is bad.
+/// One frame's findings; for a bad frame, the reason.
 struct Problem {
     std::string frame, why;
 };
@@ -94,8 +94,8 @@ std::vector<std::size_t> spread(std::size_t count) {
     return chosen;
 }
 
-/// Steps in bands of half a metre to 6 m. A band with fewer than 1000 depths or 3 different ones tells nothing, and
-/// below a hundredth of a millimetre it is the numbers that are stepped, not the sensor.
+/// Steps in bands of half a metre to 6 m. Bands with fewer than 1000 depths or 3 different ones are left
+/// out. Steps below a hundredth of a millimetre come from the number format, not from the sensor.
 std::vector<DepthStep> depth_steps(const std::vector<float>& sorted) {
     constexpr float width_m = 0.5f, noise_m = 1e-5f;
     std::vector<DepthStep> steps;
@@ -170,7 +170,7 @@ double hole_share(const Samples& samples) {
                : 1 - static_cast<double>(samples.depths_m.size()) / static_cast<double>(samples.recorded);
 }
 
-// ---------------------------------------------------------------------------------------------------- telling
+// ---------------------------------------------------------------------------------------------------- printing
 
 void line(const std::string& name, const std::string& text) { fmt::print("  {:<14} {}\n", name, text); }
 
@@ -184,7 +184,7 @@ std::string sizes_text(const std::map<std::pair<int, int>, int>& sizes) {
 
 void print_depth(const Findings& found) {
     const DepthEncoding& depth = found.capture.depth;
-    if (!found.samples.clouds.empty()) { // z is no depth where a cloud has no camera, and may count feet
+    if (!found.samples.clouds.empty()) { // without a camera z is not a depth, and its unit may be feet
         line("z", fmt::format("{:.3f} .. {:.3f}, median {:.3f}", found.nearest_m, found.farthest_m, found.median_m));
         line("holes", fmt::format("{:.1f} %", 100 * hole_share(found.samples)));
         return;
@@ -199,7 +199,7 @@ void print_depth(const Findings& found) {
     line("depth step", steps.empty() ? "none seen" : steps);
 }
 
-/// Many frames often have the same trouble: the first few tell what it is.
+/// Many frames often have the same problem, so only the first few are listed.
 void print_some(const std::string& name, const std::vector<std::string>& texts) {
     constexpr std::size_t most = 8;
     for (const std::string& text : texts | std::views::take(most))
@@ -214,7 +214,7 @@ void print(const Findings& found) {
     fmt::print("{}\n", capture.path.string());
     line("kind", capture.kind);
     line("frames",
-         fmt::format("{}{}; {} looked into", capture.entries.size(),
+         fmt::format("{}{}; {} examined", capture.entries.size(),
                      found.problems.empty() ? "" : fmt::format(", {} of them unusable", found.problems.size()),
                      samples.frames));
     if (!samples.depth_sizes.empty())

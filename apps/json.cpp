@@ -1,4 +1,4 @@
-// Values that both the manifest and `inspect --json` tell.
+// Values that both the manifest and `inspect --json` contain.
 #include "apps/json.h"
 
 namespace scanshade {

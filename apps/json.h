@@ -1,4 +1,4 @@
-// Values that both the manifest and `inspect --json` tell.
+// Values that both the manifest and `inspect --json` contain.
 #pragma once
 
 #include "projection/camera.h"
@@ -21,7 +21,7 @@ using json = nlohmann::ordered_json;
 /// "yes", "no" or "unknown".
 [[nodiscard]] std::string_view name_of(Registration registration);
 
-/// A member that counts something. Throws Error naming the key where it is no whole number.
+/// A member that counts something. Throws Error naming the key if it is not a whole number.
 [[nodiscard]] std::size_t count_at(const json& object, const std::string& key);
 
 /// during() for code that reads JSON from outside: members that are missing or of another type become Error.

@@ -1,4 +1,4 @@
-// The commands that list what there is: methods, devices.
+// The commands that print lists: methods, devices.
 #include "ao/gpu/device.h"
 #include "ao/method.h"
 #include "apps/command.h"

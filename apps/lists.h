@@ -8,7 +8,7 @@ namespace scanshade {
 
 /// The words between the commas; empty ones are left out.
 [[nodiscard]] std::vector<std::string> comma_separated(const std::string& list);
-/// The same as whole numbers. Throws Misuse naming the flag where a word is none, or is below `least`.
+/// The same as whole numbers. Throws Misuse naming the flag if a word is not a number or is below `least`.
 [[nodiscard]] std::vector<int> whole_numbers(const std::string& flag, const std::string& list, int least);
 
 } // namespace scanshade

@@ -17,13 +17,13 @@ namespace scanshade {
 namespace {
 
 const std::array commands = {
-    CommandRow{"inspect", "tells what is in a capture: frames, sizes, depth range, holes, camera, poses",
+    CommandRow{"inspect", "shows what a capture contains: frames, sizes, depth range, holes, camera, poses",
                inspect_command},
     CommandRow{"run", "computes ambient occlusion for every frame: maps, shaded pictures, clouds, a report",
                run_command},
     CommandRow{"plan", "finds a dataset's captures and cuts them into tasks, for run on any number of machines",
                plan_command},
-    CommandRow{"status", "tells how far a planned job is: tasks, frames, processes at work, failures by reason",
+    CommandRow{"status", "shows the progress of a planned job: tasks, frames, processes at work, failures by reason",
                status_command},
     CommandRow{"merge", "joins a planned job's reports into one", merge_command},
     CommandRow{"refine",
@@ -52,7 +52,7 @@ const CommandRow& command_named(const std::string& name) {
 
 std::string flag_of(const Parameter& row) { return "--" + row.name; }
 
-/// With the letter of the few that have one.
+/// The flag's name, with its short form if it has one.
 std::string flag_names(const Parameter& row) {
     return row.name == "out" ? "-o,--out" : row.name == "quiet" ? "-q,--quiet" : flag_of(row);
 }
@@ -84,7 +84,7 @@ std::string limits(const Parameter& row) {
     return fmt::format(" [{}{}{}]", otherwise, otherwise.empty() || allowed.empty() ? "" : "; ", allowed);
 }
 
-/// A name, and beside it a text in lines of at most 110 columns.
+/// A name, followed by a text in lines of at most 110 columns.
 void print_entry(const std::string& name, std::size_t name_width, const std::string& text) {
     const std::size_t width = 110 - name_width - 4;
     fmt::print("  {:<{}}  ", name, name_width);
@@ -112,7 +112,7 @@ void print_stage(const Stage& stage) {
         print_entry(flag_names(row), longest, row.help + limits(row));
 }
 
-/// What `help COMMAND` shows of a command that has more: its common flags, or all without a topic where it marks none.
+/// The flags that `help COMMAND` shows: the common ones, or if none is marked, all without a topic.
 std::vector<Stage> first_page(std::vector<Stage> stages) {
     std::erase_if(stages, [](const Stage& stage) { return !stage.topic.empty(); });
     const bool marked =
@@ -156,11 +156,11 @@ void print_help(const CommandRow& row, const std::string& topic) {
 
 // ---------------------------------------------------------------------------------------------------- flags
 
-/// What stands on the command line and in the settings file, as it is read.
+/// Flags from the command line and the settings file, as they are read.
 using Given = std::vector<std::pair<Parameter, std::string>>;
 
 /// A switch is given as --name or --name=false; everything else takes a value. --settings FILE gives others theirs,
-/// unless they stand on the command line themselves.
+/// unless the command line gives them itself.
 void add_flag(CLI::App& parser, const Parameter& row, Given& given) {
     const std::string names = flag_names(row);
     const auto take = [&given, row](const std::string& text) { given.emplace_back(row, text); };
@@ -264,8 +264,8 @@ int execute(const std::vector<std::string>& arguments) {
 
 int main(int count, char** words) {
     using namespace scanshade;
-    // Images come and go by the megabyte: what one frame gives back the next one takes. By default each would ask the
-    // system for fresh pages, which costs more than most of what is done with them.
+    // Keeps freed memory for the next frame's images. By default each image would get fresh pages from the system,
+    // which costs more than most of the work on it.
     mallopt(M_MMAP_THRESHOLD, 32 << 20);
     mallopt(M_TRIM_THRESHOLD, 1 << 30);
     const std::vector<std::string> arguments(words + std::min(count, 1), words + count);
@@ -281,7 +281,7 @@ int main(int count, char** words) {
     } catch (const Error& failure) {
         fmt::print(stderr, "scanshade: {}\n", failure.what());
         return nothing_done;
-    } catch (const std::filesystem::filesystem_error& failure) { // a path of the command line leads nowhere
+    } catch (const std::filesystem::filesystem_error& failure) { // a path on the command line cannot be used
         fmt::print(stderr, "scanshade: {}\n", failure.what());
         return nothing_done;
     } catch (const std::exception& failure) {

@@ -15,17 +15,17 @@ using Settings = std::vector<std::pair<std::string, std::string>>;
 
 struct Configuration {
     std::string method;
-    std::string name; ///< tells it apart from the method's others: "high", "high downsampled"
+    std::string name; ///< unique among the method's configurations: "high", "high downsampled"
     Settings settings;
 
     [[nodiscard]] std::string full_name() const { return method + " " + name; }
 };
 
-/// Puts the settings into the rows of `setup`. Throws Misuse naming the configuration for a row that is not there or
+/// Puts the settings into the rows of `setup`. Throws Misuse naming the configuration for a row that does not exist or
 /// refuses its value.
 void apply(const Configuration& configuration, MethodSetup& setup);
 
-/// Every row's present value: applying it later brings the settings back.
+/// The value of every row; applying it later restores the settings.
 [[nodiscard]] Settings values_of(MethodSetup& setup);
 
 /// The method's rows as the command line shows them: "radius" of cacao is --cacao.radius.

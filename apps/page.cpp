@@ -14,14 +14,14 @@ namespace {
 // ---------------------------------------------------------------------------------------------------- axes
 
 constexpr double width = 900, height = 430, left = 64, right = 290, top = 34,
-                 bottom = 62; // px; the legend stands at the right
+                 bottom = 62; // px; the legend is on the right
 
 /// Okabe and Ito's palette for all kinds of colour vision, its yellow darkened for white paper.
 constexpr std::array<std::string_view, 8> colours{"#0072b2", "#d55e00", "#009e73", "#cc79a7",
                                                   "#56b4e9", "#e69f00", "#b8a800", "#444444"};
 
 struct Axis {
-    double low = 0, high = 1, from = 0, to = 1; ///< values, and pixels where they lie
+    double low = 0, high = 1, from = 0, to = 1; ///< values, and their pixels
     bool log = false;
     [[nodiscard]] double scale(double value) const { return log ? std::log10(value) : value; }
     [[nodiscard]] double at(double value) const {
@@ -79,7 +79,7 @@ Axis y_axis(const Plot& plot) {
     return axis;
 }
 
-/// 1, 2 and 5 of each decade in reach; where that is more than eight ticks, the decades alone.
+/// 1, 2 and 5 of each decade in range; only the decades if that makes more than eight ticks.
 std::vector<double> log_ticks(double low, double high) {
     std::vector<double> ticks;
     for (const int steps : {3, 1}) {

@@ -1,4 +1,4 @@
-// Measured numbers as one HTML file that needs nothing beside itself: SVG plots, tables, embedded pictures.
+// Measured numbers as one HTML file that needs no other file: SVG plots, tables, embedded pictures.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -8,7 +8,7 @@
 
 namespace scanshade::page {
 
-/// One measured point. `label` is shown when it is pointed at; `marked` points are ringed.
+/// One measured point. Pointing at it shows `label`; `marked` points have a ring.
 struct Point {
     double x = 0, y = 0;
     std::string label = {};
@@ -29,7 +29,7 @@ struct Plot {
     std::vector<Series> series;
     bool log_x = false;
     bool y_from_zero = true;
-    std::vector<std::string> categories = {}; ///< named places 0, 1, 2 ... in place of a numbered x axis
+    std::vector<std::string> categories = {}; ///< names of the positions 0, 1, 2 ... in place of a numeric x axis
 };
 
 /// Tick positions of even, round steps (1, 2 or 5 times a power of ten) that lie in [low, high], about `wanted` of

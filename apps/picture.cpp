@@ -94,7 +94,7 @@ float facing(const cv::Mat1f& inverse, cv::Point at, const Pinhole& camera) {
     return length > 0 ? static_cast<float>(std::abs(normal.dot(ray)) / length) : 0;
 }
 
-constexpr int white_at = 127; // of the 255 diverging colours
+constexpr int white_at = 127; // index among the 255 diverging colours
 
 /// Blue over white to red, BGR.
 std::vector<cv::Vec3b> diverging_colours() {

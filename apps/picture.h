@@ -16,11 +16,11 @@ namespace scanshade {
 /// Visibility as grey, 1 = white; where there is no surface a dim blue that no visibility has.
 [[nodiscard]] cv::Mat3b visibility_picture(const cv::Mat1f& visibility);
 
-/// The surface as grey clay lit from the camera: what `depth` alone knows of the shape. Holes get the same dim blue.
+/// The surface as grey clay lit from the camera: the shape that depth alone shows. Holes get the same dim blue.
 /// `camera` is the pinhole of `z_m`, same size; lens distortion may be ignored, it only bends the light a little.
 [[nodiscard]] cv::Mat3b clay(const cv::Mat1f& z_m, const Pinhole& camera);
 
-/// Signed differences: -full_scale is blue, 0 white, +full_scale red, what lies beyond is cut there; NaN gets the dim
+/// Signed differences: -full_scale is blue, 0 white, +full_scale red, values beyond are clamped; NaN gets the dim
 /// blue. Straight lines in CIELAB between ends of equal lightness and chroma: equal differences look equally far apart
 /// (after Moreland, "Diverging Color Maps for Scientific Visualization", 2009).
 [[nodiscard]] cv::Mat3b difference_picture(const cv::Mat1f& difference, double full_scale);
@@ -29,7 +29,7 @@ namespace scanshade {
 /// holes.
 [[nodiscard]] cv::Mat1f facing_camera(const cv::Mat1f& z_m, const Pinhole& camera);
 
-/// One picture of a panel, and what is written above it.
+/// One picture of a panel, and the title above it.
 struct Tile {
     std::string title;
     cv::Mat3b picture; ///< empty = an empty tile

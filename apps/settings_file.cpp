@@ -8,7 +8,7 @@
 namespace scanshade {
 namespace {
 
-/// A setting's value as it would be typed.
+/// A setting's value as typed on the command line.
 std::string typed(const std::string& name, const json& value) {
     if (value.is_string())
         return value.get<std::string>();

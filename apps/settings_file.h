@@ -1,5 +1,5 @@
-// Settings kept in a file: what calibrate-look writes and `run --settings` takes; an earlier run's manifest.json
-// serves, too.
+// Settings in a file: calibrate-look writes it and `run --settings` reads it. An earlier run's manifest.json works,
+// too.
 #pragma once
 
 #include "apps/json.h"
@@ -12,12 +12,12 @@ namespace scanshade {
 inline constexpr std::string_view settings_flag = "settings";
 
 /// {"settings": {"method": {"method": "cacao"}, "method cacao": {"cacao.radius": 0.3, ...}}}: the method's stages as a
-/// manifest has them; other stages (input, output) say where an earlier run's files lay and are left alone.
+/// manifest has them; other stages (input, output) hold an earlier run's paths and are ignored.
 class SettingsFile final : public CLI::Config {
   public:
-    /// Throws Misuse where it is no such JSON.
+    /// Throws Misuse if it is not such JSON.
     [[nodiscard]] std::vector<CLI::ConfigItem> from_config(std::istream& stream) const override;
-    /// Never asked for: the program's settings are written by write_manifest() and calibrate-look.
+    /// Never called: write_manifest() and calibrate-look write the program's settings.
     [[nodiscard]] std::string to_config(const CLI::App*, bool, bool, std::string) const override { return {}; }
 };
 

@@ -8,7 +8,7 @@
 namespace scanshade {
 
 /// The indices that a:b:step takes of 0 .. count - 1; a lone number takes that one frame, nothing takes all. Throws
-/// Misuse where the text makes no sense or takes none.
+/// Misuse if the text is invalid or selects none.
 [[nodiscard]] std::vector<std::size_t> slice(const std::string& text, std::size_t count);
 
 } // namespace scanshade

@@ -27,14 +27,14 @@ fs::path temporary_name(const fs::path& target) {
     return target.parent_path() / name;
 }
 
-/// Makes sure that what was written is on the disk before the rename says that it is there.
+/// Syncs the file to disk before the rename makes it visible.
 void sync(const fs::path& path, int flags) {
     const int handle = ::open(path.c_str(), flags | O_CLOEXEC);
     if (handle < 0)
         throw std::system_error(errno, std::generic_category(), "cannot be opened again");
     const int failed = ::fsync(handle) == 0 ? 0 : errno;
     ::close(handle);
-    // EINVAL: a file system without fsync, where nothing better can be done.
+    // EINVAL: a file system without fsync, which offers nothing better.
     if (failed != 0 && failed != EINVAL)
         throw std::system_error(failed, std::generic_category(), "cannot be synced");
 }

@@ -1,4 +1,4 @@
-// Writing without half files: everything goes to a temporary name beside the target, then is renamed.
+// Writing without half files: writes to a temporary name in the target's folder, then renames it.
 #pragma once
 
 #include <filesystem>
@@ -16,8 +16,8 @@ void write_atomically(const std::filesystem::path& target,
 void write_atomically(const std::filesystem::path& target, std::string_view bytes);
 
 /// Removes temporary files that a killed run left in `folder`: those that write_atomically made on the way to a target
-/// whose stem is `ours`. The caller holds the lock under which these targets are written, so that nobody, on whatever
-/// machine, is still at them. Returns how many.
+/// whose stem is `ours`. The caller holds the lock under which these targets are written, so that no process
+/// on any machine still writes them. Returns how many.
 int remove_leftovers(const std::filesystem::path& folder, const std::function<bool(std::string_view stem)>& ours);
 
 } // namespace scanshade

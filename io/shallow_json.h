@@ -1,4 +1,4 @@
-// JSON from outside, no deeper than anything of ours: printing and copying it recurse, and a stack ends.
+// JSON from outside with limited depth: printing and copying it recurse, and could overflow the stack.
 #pragma once
 
 #include "projection/error.h"

@@ -28,7 +28,7 @@ std::error_code last_error() { return {errno, std::generic_category()}; }
 } // namespace
 
 void fail_to_read(const std::filesystem::path& path, const std::error_code& trouble) {
-    // What ails the machine or the network, and not the file. (EIO is not among them: broken sectors stay broken.)
+    // Problems of the machine or the network, not of the file. (EIO is not among them: broken sectors stay broken.)
     constexpr std::array of_the_moment = {ESTALE,   ETIMEDOUT, ENOTCONN, EHOSTDOWN, EHOSTUNREACH,
                                           ENETDOWN, EMFILE,    ENFILE,   ENOMEM};
     const std::string what = path.string() + ": cannot be read: " + trouble.message();
@@ -64,7 +64,7 @@ std::string read_bytes(const std::filesystem::path& file, std::size_t limit) {
 }
 
 std::string read_at_most(std::uintmax_t most, const std::filesystem::path& file, std::string_view what) {
-    std::error_code trouble; // read_bytes() will tell of it
+    std::error_code trouble; // read_bytes() reports it
     if (const auto size = std::filesystem::file_size(file, trouble); !trouble && size > most)
         throw Error(fmt::format("{}: {} bytes, too large for {} (at most {})", file.string(), size, what, most));
     return read_bytes(file);
@@ -151,7 +151,7 @@ std::string as_utf8(std::string_view text) {
 std::string in_quotes(std::string_view text) {
     constexpr std::size_t longest = 40;
     std::string clean(text.substr(0, longest));
-    // Damaged files hold anything; a terminal must not obey it.
+    // Damaged files may hold control sequences, which a terminal must not get.
     std::replace_if(
         clean.begin(), clean.end(), [](char c) { return c < ' ' || c == 0x7f; }, '?');
     return '"' + clean + (text.size() > longest ? "...\"" : "\"");

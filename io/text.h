@@ -1,4 +1,4 @@
-// Files as bytes, lines and numbers, each number checked: what every text reader of io stands on.
+// Files as bytes, lines and numbers, each number checked; the base of every text reader of io.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace scanshade {
 
-/// Throws Error that `path` cannot be read, Outage where that is the machine's or the network's trouble of the moment.
+/// Throws Error that `path` cannot be read, or Outage for a temporary problem of machine or network.
 [[noreturn]] void fail_to_read(const std::filesystem::path& path, const std::error_code& trouble);
 /// The whole file, or its first `limit` bytes. Throws Error naming the file when it is missing, a folder, or
 /// unreadable, or larger than the machine's memory; Outage as fail_to_read().
@@ -36,9 +36,9 @@ struct TextLine {
 [[nodiscard]] std::vector<std::string_view> words(std::string_view line);
 /// Without blanks at either end.
 [[nodiscard]] std::string_view trimmed(std::string_view text);
-/// With "_" for every byte that is no part of UTF-8: what JSON can hold and read back.
+/// With "_" for every byte that is no part of UTF-8: JSON can hold and read back the result.
 [[nodiscard]] std::string as_utf8(std::string_view text);
-/// A word or line cut and cleaned so that it can stand in a message, in quotes.
+/// A word or line cut and cleaned for quoting in a message.
 [[nodiscard]] std::string in_quotes(std::string_view text);
 
 /// The number that is the whole word; "nan" and "inf" are numbers too. Nothing when it is anything else.
@@ -71,6 +71,5 @@ class RepeatedWarning {
     std::vector<std::string>& warnings_;
     std::size_t seen_ = 0;
 };
-
 
 } // namespace scanshade

@@ -1,4 +1,4 @@
-// A job's files, and how its tasks are dealt to shards.
+// A job's files, and the division of its tasks into shards.
 #include "apps/jobs/job.h"
 
 #include "apps/json.h"

@@ -1,4 +1,4 @@
-// A job: many captures cut into tasks, in a folder that every machine sees. plan.json says what was asked for,
+// A job: many captures cut into tasks, in a folder that every machine sees. plan.json holds the settings,
 // tasks.jsonl lists the tasks, results/NAME holds a capture's results and the journals of its tasks.
 #pragma once
 
@@ -17,16 +17,16 @@ namespace scanshade {
 struct Task {
     std::filesystem::path capture;
     std::string name;       ///< unique in the job: results/NAME
-    std::size_t first = 0;  ///< among the capture's frames that the plan takes
-    std::size_t frames = 0; ///< how many from there on
-    std::size_t of = 0;     ///< of all that the plan takes of the capture
-    double cost = 0;        ///< about megapixels or million points: what shards are balanced by
+    std::size_t first = 0;  ///< index among the capture's frames in the plan
+    std::size_t frames = 0; ///< number of frames
+    std::size_t of = 0;     ///< all frames of the capture in the plan
+    double cost = 0;        ///< about megapixels or million points; shards get equal sums of it
 
     /// "" for a whole capture, else "0-500": the end is not included.
     [[nodiscard]] std::string block() const;
 };
 
-/// What was asked for, and of which captures. Settings are those that differ from their defaults, as typed.
+/// The settings and captures of a job. Settings are those that differ from their defaults, as typed.
 struct Plan {
     std::vector<std::pair<std::string, std::string>> settings;
     std::vector<Task> tasks;

@@ -1,4 +1,4 @@
-// The order of a shard's tasks, and what is told between them.
+// The order of a shard's tasks, and the messages between them.
 #include "apps/jobs/job_run.h"
 
 #include "apps/command.h"
@@ -14,7 +14,7 @@
 namespace scanshade {
 namespace {
 
-/// How far the shard is; remaining time at the pace so far, tasks found done not counted.
+/// Progress of the shard. Remaining time follows from the pace so far, without tasks that were done already.
 class Pace {
   public:
     Pace(const Plan& plan, const std::vector<std::size_t>& tasks) : tasks_(tasks.size()) {
@@ -44,21 +44,21 @@ class Pace {
     Stopwatch stopwatch_; ///< since the last task was done
 };
 
-/// Tasks with what became of them.
+/// Runs tasks and collects their exit codes.
 class Attempts {
   public:
-    explicit Attempts(const std::function<int(const Task&, Turn&)>& run_task) : run_task_(run_task) {}
+    explicit Attempts(const std::function<int(const Task&, OrderedOutput&)>& run_task) : run_task_(run_task) {}
 
-    /// Whether it was taken: no other run is at it.
-    bool attempt(const Task& task, Turn& turn) {
+    /// False if another run holds the task.
+    bool attempt(const Task& task, OrderedOutput& output) {
         try {
-            add(run_task_(task, turn));
+            add(run_task_(task, output));
         } catch (const Misuse&) {
             throw;
-        } catch (const DeviceLost&) { // this process can do no other task either
+        } catch (const DeviceLost&) { // this process cannot do any other task either
             throw;
         } catch (const Busy& busy) {
-            say(fmt::format("left to another run: {}", busy.what()));
+            say(fmt::format("another run works on it: {}", busy.what()));
             return false;
         } catch (const Outage& failure) {
             warn(fmt::format("failed: {}", failure.what()));
@@ -79,7 +79,7 @@ class Attempts {
     [[nodiscard]] int code() const { return code_; }
 
   private:
-    const std::function<int(const Task&, Turn&)>& run_task_;
+    const std::function<int(const Task&, OrderedOutput&)>& run_task_;
     std::mutex mutex_;
     int code_ = all_well;
 };
@@ -87,21 +87,21 @@ class Attempts {
 } // namespace
 
 int work_through(const std::filesystem::path& job, const Plan& plan, const Shard& shard, const std::atomic<bool>& stop,
-                 std::size_t at_once, const std::function<int(const Task&, Turn&)>& run_task) {
+                 std::size_t at_once, const std::function<int(const Task&, OrderedOutput&)>& run_task) {
     const auto parts = cut(plan.tasks, shard.of);
     const auto& own = parts[static_cast<std::size_t>(shard.index - 1)];
     say(fmt::format("{}: shard {} of {}, {} of {} tasks", job.string(), shard.index, shard.of, own.size(),
                     plan.tasks.size()));
     Attempts attempts(run_task);
     Pace pace(plan, own);
-    overlapped(own.size(), at_once, [&](std::size_t i, Turn& turn) {
+    overlapped(own.size(), at_once, [&](std::size_t i, OrderedOutput& output) {
         if (stop)
             return attempts.add(unfinished);
-        (void)attempts.attempt(plan.tasks[own[i]], turn);
+        (void)attempts.attempt(plan.tasks[own[i]], output);
         pace.done(plan.tasks[own[i]]);
     });
-    // Other shards begin with their costliest tasks, so what they may leave lies at their ends. Our own come first:
-    // what another run held may be free by now.
+    // Other shards begin with their costliest tasks, so unfinished ones are at their ends. Our own shard comes first:
+    // tasks that another run held may be free by now.
     for (int next = 0; next < shard.of; ++next)
         for (const std::size_t index :
              parts[static_cast<std::size_t>((shard.index - 1 + next) % shard.of)] | std::views::reverse) {
@@ -111,8 +111,8 @@ int work_through(const std::filesystem::path& job, const Plan& plan, const Shard
             const std::filesystem::path journal = journal_file(results_of(job, task), task.block());
             if (is_complete(journal) || in_use(journal))
                 continue;
-            Turn turn;
-            if (attempts.attempt(task, turn) && next > 0)
+            OrderedOutput output;
+            if (attempts.attempt(task, output) && next > 0)
                 say(fmt::format("  taken over from shard {}: {}", (shard.index - 1 + next) % shard.of + 1, task.name));
         }
     return attempts.code();

@@ -23,21 +23,20 @@ namespace fs = std::filesystem;
 
 // ---------------------------------------------------------------------------------------------------- finding captures
 
-/// Results are no captures, though they hold depth-like images and clouds.
+/// Folders of results are not captures, though they hold images and clouds.
 bool is_result(const fs::path& folder) {
     return is_job(folder) || fs::exists(folder / "journal.jsonl") || fs::exists(folder / "frames.csv");
 }
 
 struct Found {
     fs::path path;
-    std::string name; ///< where it lies in its dataset
+    std::string name; ///< its path in its dataset
     std::optional<Capture> capture;
     std::string refused; ///< why it cannot be opened
 };
 
-/// Opens the folder where it is a capture, told by its content; else looks into its folders. Folders that hold
-/// nothing are passed over, those that hold something broken are told.
-/// `walked` are the folders of folders seen so far: links may lead back to them.
+/// Opens the folder if its content is a capture, else searches its folders. Skips empty folders, and reports broken
+/// captures. `walked` holds the parent folders seen so far, because links may lead back to them.
 void find_in(const fs::path& folder, const std::string& name, const CaptureOptions& options, std::set<fs::path>& walked,
              const std::function<void(Found)>& found) {
     if (is_result(folder))
@@ -94,7 +93,7 @@ void find_captures(const fs::path& dataset, const CaptureOptions& options, const
 
 // ---------------------------------------------------------------------------------------------------- cost
 
-/// What a frame costs whatever its size, in megapixels: opening, syncing and renaming its files.
+/// A frame's fixed cost in megapixels: opening, syncing and renaming its files.
 constexpr double fixed_cost = 0.05;
 
 double megapixels(const Capture& capture) {
@@ -111,7 +110,7 @@ double megapixels(const Capture& capture) {
     return 0;
 }
 
-/// Costs of a capture's frames: all alike where they are images, by bytes where they are clouds (about 32 a point).
+/// Costs of a capture's frames: equal for images, by bytes for clouds (about 32 per point).
 std::vector<double> costs_of(const Capture& capture, const std::vector<std::size_t>& frames) {
     const double image = megapixels(capture);
     std::vector<double> costs;
@@ -126,7 +125,7 @@ std::vector<double> costs_of(const Capture& capture, const std::vector<std::size
 
 // ---------------------------------------------------------------------------------------------------- the command
 
-/// Settings of `run` that are no part of a plan: where and how it runs, and budgets, which are chosen by the clock.
+/// Settings of `run` that a plan leaves out: where and how it runs, and budgets, which depend on measured times.
 constexpr std::array not_planned = {"out",    "overwrite", "resume",    "retry",  "shard", "dump",
                                     "device", "log",       "max-error", "max-ms", "quiet"};
 
@@ -187,7 +186,7 @@ class PlanCommand final : public Command {
     }
     std::string value(std::string_view name) { return value_text(row_of(name)); }
 
-    /// What differs from the defaults; a camera file by its whole path, since jobs run from anywhere.
+    /// Settings that differ from the defaults. A camera file gets its absolute path, since jobs run from any folder.
     std::vector<std::pair<std::string, std::string>> settings() {
         std::vector<std::pair<std::string, std::string>> given;
         for (const Stage& stage : run_->stages())

@@ -1,4 +1,4 @@
-// `scanshade status`: how a job stands. `scanshade merge`: its reports in one.
+// `scanshade status`: a job's progress. `scanshade merge`: one report of all its tasks.
 #include "apps/command.h"
 #include "apps/jobs/job.h"
 #include "apps/json.h"
@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 enum class Standing { waiting, running, begun, done };
 
-/// One task as its journal tells.
+/// One task, as its journal records it.
 struct Reading {
     Standing standing = Standing::waiting;
     std::vector<FrameRow> rows; ///< in recording order
@@ -47,7 +47,7 @@ Reading read_task(const fs::path& job, const Task& task) {
     return reading;
 }
 
-/// What a failure says without the names of its frame: digits become '#', the folder is left out.
+/// A failure's message without its frame's name: digits become '#', the folder is left out.
 std::string reason_of(const FrameRow& row, const Task& task) {
     std::string text = row.why;
     for (std::string folder = task.capture.string() + "/"; text.find(folder) != std::string::npos;)
@@ -61,7 +61,7 @@ std::string reason_of(const FrameRow& row, const Task& task) {
     return fmt::format("{}: {}", name_of(row.fault), reason);
 }
 
-/// Sums over a job, task by task, so that any number of them fits in memory.
+/// Sums over a job, task by task, so that memory does not grow with their number.
 struct Totals {
     std::size_t tasks = 0, frames = 0, ok = 0, failed = 0;
     std::map<Standing, std::size_t> standing;
@@ -175,7 +175,7 @@ class Status final : public Command {
     }
 
   private:
-    /// A task that a process works at now.
+    /// A task that a process works on now.
     struct Running {
         const Task* task;
         std::size_t frames; ///< done

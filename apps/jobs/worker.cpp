@@ -23,9 +23,9 @@ namespace scanshade {
 namespace {
 
 using Count = std::atomic<std::uint64_t>;
-static_assert(Count::is_always_lock_free, "it lies in memory that processes share");
+static_assert(Count::is_always_lock_free, "processes share its memory");
 
-/// A count per worker that parent and children see.
+/// A count per worker, in memory that parent and children share.
 class SharedCounts {
   public:
     explicit SharedCounts(int count) : bytes_(sizeof(Count) * static_cast<std::size_t>(count)) {
@@ -45,7 +45,7 @@ class SharedCounts {
     void* memory_;
 };
 
-/// Signals wait until they are asked for; children get back the mask that was.
+/// Blocks signals so that wait() receives them; children restore the earlier mask.
 class Signals {
   public:
     Signals() {
@@ -70,17 +70,17 @@ class Signals {
     sigset_t before_ = {}, waited_for_ = {};
 };
 
-/// One worker through all of its processes.
-struct Post {
-    Shift shift;
+/// One worker: the current process and the record of the earlier ones.
+struct Worker {
+    WorkerProcess process;
     std::uint64_t finished_before = 0;
     int in_vain = 0; ///< processes in a row that finished no frame
 };
 
 constexpr int patience = 3;
 
-pid_t start(const Post& post, const Signals& signals, const std::function<int(const Shift&)>& work) {
-    std::fflush(nullptr); // or the child would print what lies in the buffers once more
+pid_t start(const Worker& worker, const Signals& signals, const std::function<int(const WorkerProcess&)>& work) {
+    std::fflush(nullptr); // or the child would print the buffered text again
     const pid_t parent = ::getpid(), child = ::fork();
     if (child < 0)
         throw Outage(fmt::format("no worker process: {}", std::strerror(errno)));
@@ -92,7 +92,7 @@ pid_t start(const Post& post, const Signals& signals, const std::function<int(co
     signals.restore();
     int code = internal_error;
     try {
-        code = work(post.shift);
+        code = work(worker.process);
     } catch (const Misuse& failure) {
         fmt::print(stderr, "scanshade: {}\n", failure.what());
         code = misuse;
@@ -106,17 +106,17 @@ pid_t start(const Post& post, const Signals& signals, const std::function<int(co
         fmt::print(stderr, "scanshade: internal error: {}\n", failure.what());
     }
     std::fflush(nullptr);
-    ::_exit(code); // the caller's objects are the caller's to destroy
+    ::_exit(code); // without destructors: the objects belong to the parent
 }
 
-/// Whether the worker deserves another process, and what is to be done differently in it.
-bool goes_on(Post& post, int status) {
-    const std::uint64_t finished = *post.shift.finished;
-    post.in_vain = finished > std::exchange(post.finished_before, finished) ? 0 : post.in_vain + 1;
+/// Whether the worker gets another process; if so, sets `carefully` for it.
+bool restarts(Worker& worker, int status) {
+    const std::uint64_t finished = *worker.process.finished;
+    worker.in_vain = finished > std::exchange(worker.finished_before, finished) ? 0 : worker.in_vain + 1;
     const bool killed = WIFSIGNALED(status);
-    if ((!killed && WEXITSTATUS(status) != unfinished) || post.in_vain >= patience)
+    if ((!killed && WEXITSTATUS(status) != unfinished) || worker.in_vain >= patience)
         return false;
-    post.shift.carefully = killed;
+    worker.process.carefully = killed;
     return true;
 }
 
@@ -131,37 +131,37 @@ int worse(int a, int b) {
     return rank(a) > rank(b) ? a : b;
 }
 
-int supervise(int workers, const std::function<int(const Shift&)>& work) {
+int supervise(int workers, const std::function<int(const WorkerProcess&)>& work) {
     const SharedCounts counts(workers);
     const Signals signals;
-    std::map<pid_t, Post> posts;
-    for (int worker = 0; worker < workers; ++worker) {
-        const Post post{{worker, false, &counts.at(worker)}};
-        posts.emplace(start(post, signals, work), post);
+    std::map<pid_t, Worker> running;
+    for (int index = 0; index < workers; ++index) {
+        const Worker worker{{index, false, &counts.at(index)}};
+        running.emplace(start(worker, signals, work), worker);
     }
     bool interrupted = false;
     int code = -1;
-    while (!posts.empty()) {
+    while (!running.empty()) {
         const int signal = signals.wait();
         if (signal != SIGCHLD) {
-            // A terminal, and Slurm, signal children as well. The other of the two signals tells them the same without
-            // counting as a second one, which would kill.
+            // A terminal and Slurm signal the children as well. A second signal of the same kind would kill them, so
+            // they get the other one.
             interrupted = true;
-            for (const auto& [child, post] : posts)
+            for (const auto& [child, worker] : running)
                 ::kill(child, signal == SIGINT ? SIGTERM : SIGINT);
             continue;
         }
         int status = 0;
         for (pid_t child; (child = ::waitpid(-1, &status, WNOHANG)) > 0;) {
-            auto found = posts.extract(child);
+            auto found = running.extract(child);
             if (found.empty())
                 continue;
-            Post& post = found.mapped();
+            Worker& worker = found.mapped();
             const bool killed = WIFSIGNALED(status);
             if (killed)
-                warn(fmt::format("worker {} was killed: {}", post.shift.worker + 1, strsignal(WTERMSIG(status))));
-            if (!interrupted && goes_on(post, status)) {
-                posts.emplace(start(post, signals, work), post);
+                warn(fmt::format("worker {} was killed: {}", worker.process.index + 1, strsignal(WTERMSIG(status))));
+            if (!interrupted && restarts(worker, status)) {
+                running.emplace(start(worker, signals, work), worker);
                 continue;
             }
             const int its_code = !killed ? WEXITSTATUS(status) : interrupted ? unfinished : internal_error;

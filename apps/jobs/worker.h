@@ -1,4 +1,4 @@
-// Work in a process of its own, so that what kills it, a driver or a full memory, takes nothing else along.
+// Work in a process of its own: if a driver or full memory kills it, the parent survives.
 #pragma once
 
 #include <atomic>
@@ -7,21 +7,22 @@
 
 namespace scanshade {
 
-/// What a worker process knows of its start.
-struct Shift {
-    int worker = 0;         ///< 0 .. workers - 1
+/// What a worker process knows about its start.
+struct WorkerProcess {
+    int index = 0;          ///< 0 .. workers - 1
     bool carefully = false; ///< the process before this one was killed by a signal
     std::atomic<std::uint64_t>* finished =
-        nullptr; ///< to be counted up with each frame settled: progress earns new processes
+        nullptr; ///< the worker adds 1 per settled frame; a process that settles none counts as a failure
 };
 
-/// Runs work(shift) in `workers` child processes at once; the caller has no threads yet. A child that a signal killed
-/// is started again, carefully, and one that ended with `unfinished` (a lost device needs a fresh process) as well,
-/// until three in a row came to nothing. SIGINT and SIGTERM are passed on, and nothing is started after them; children
-/// do not outlive the caller. Returns the exit code that tells most (see worse()).
-[[nodiscard]] int supervise(int workers, const std::function<int(const Shift&)>& work);
+/// Runs work(worker) in `workers` child processes at once. The caller must have no threads yet. A child that a signal
+/// killed is restarted with `carefully`. A child that ended with `unfinished` is restarted, too, since a lost device
+/// needs a fresh process. After three processes in a row without a settled frame the worker is given up. SIGINT and
+/// SIGTERM are passed on, and nothing starts after them. Children do not outlive the caller. Returns the worst exit
+/// code (see worse()).
+[[nodiscard]] int supervise(int workers, const std::function<int(const WorkerProcess&)>& work);
 
-/// The exit code of two parts of one job: what may be tried again goes first, then our own mistakes, then bad input.
+/// The worse of two exit codes of one job: misuse first, then unfinished, internal error, and bad input.
 [[nodiscard]] int worse(int a, int b);
 
 } // namespace scanshade

@@ -34,8 +34,8 @@ std::string shading_sentence(const Capture& capture, Registration registration) 
     if (registration == Registration::yes)
         return "shaded pictures show the colour images.";
     if (capture.colour_camera)
-        return "shaded pictures show the colour images, carried over from the camera that took them (" +
-               describe(capture.colour_camera->camera) + "); what it did not see is grey clay.";
+        return "shaded pictures show the colour images, warped from the secondary camera (" +
+               describe(capture.colour_camera->camera) + "); pixels that it did not see are grey clay.";
     const std::string why = registration == Registration::no ? "do not lie on" : "are not known to lie on";
     return fmt::format(
         "shaded pictures show grey clay made from depth, because the colour images {} the depth pixels{}; "
@@ -46,7 +46,7 @@ std::string shading_sentence(const Capture& capture, Registration registration) 
 std::string noise_sentence(const DepthNoise& noise, const RunSettings& settings) {
     const std::string origin = settings.depth_noise == "auto" ? "measured" : "--depth-noise";
     if (!noise.any())
-        return fmt::format("{} to mind ({}); depth is used as recorded", describe(noise), origin);
+        return fmt::format("{} ({}); depth is used as recorded", describe(noise), origin);
     return fmt::format(
         "{} ({}); flying pixels are {}; {}", describe(noise), origin, settings.drop_flying ? "dropped" : "kept",
         settings.depth_smoothing > 0 ? "depth and normals come from plane fits" : "depth is used as recorded");
@@ -76,9 +76,9 @@ void conclude(const RunReport& report, const std::filesystem::path& table) {
     say(fmt::format("  {} of {} frames{} in {:.1f} s ({}) -> {}", ok, report.frames.size(), before,
                     report.took_ms / 1000, describe(rates_of(report)), table.parent_path().string()));
     if (count(report.frames, FrameStatus::failed) > 0)
-        warn(fmt::format("  failed: {} ({} says why)", names_of_failed(report.frames), table.string()));
+        warn(fmt::format("  failed: {} (reasons in {})", names_of_failed(report.frames), table.string()));
     if (const std::size_t skipped = count(report.frames, FrameStatus::skipped); skipped > 0)
-        warn(fmt::format("  not finished: {} frames of {} are left; --resume goes on with them", skipped,
+        warn(fmt::format("  not finished: {} of {} frames are left; --resume continues", skipped,
                          report.capture.path.string()));
 }
 

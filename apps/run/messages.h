@@ -1,4 +1,4 @@
-// What `scanshade run` tells people about a capture, before and after.
+// Messages of `scanshade run` about a capture, before and after its frames.
 #pragma once
 
 #include "apps/run/settings.h"
@@ -9,14 +9,14 @@
 
 namespace scanshade {
 
-/// What the shaded pictures of this capture show, and how to have it otherwise.
+/// What the shaded pictures show, and which flag changes that.
 [[nodiscard]] std::string shading_sentence(const Capture& capture, Registration registration);
-/// What is known of the depth's noise, and what is done about it.
+/// The depth's noise, and how the depth is prepared.
 [[nodiscard]] std::string noise_sentence(const DepthNoise& noise, const RunSettings& settings);
 
-/// What is there, how many frames of it are taken, and what was chosen for them.
+/// Prints what the capture holds, how many frames are used, and the settings chosen for them.
 void introduce(const RunReport& report, std::size_t frames);
-/// How it went; `table` is the run's frames.csv.
+/// Prints the result; `table` is the run's frames.csv.
 void conclude(const RunReport& report, const std::filesystem::path& table);
 
 } // namespace scanshade

@@ -40,7 +40,7 @@ std::optional<Preset> better_preset(const ParetoFront& front, SensorClass sensor
 std::string gain_text(const SequenceGain& gain) {
     const std::string time =
         gain.times_as_long > 0 ? fmt::format(", in {:.1f} times the time", gain.times_as_long) : "";
-    return fmt::format("on generated recordings, looking at frames together took {} from RMSE {:.3f} to {:.3f}{}",
+    return fmt::format("on generated recordings, computing frames together took {} from RMSE {:.3f} to {:.3f}{}",
                        gain.configuration.full_name(), gain.alone_rms, gain.together_rms, time);
 }
 

@@ -1,4 +1,4 @@
-// What a run tells at its end: how far its results are from truth, and what a better preset would cost.
+// The last messages of a run: the expected error of its results, and the cost of a better preset.
 #pragma once
 
 #include "apps/measure/front.h"
@@ -9,9 +9,9 @@
 
 namespace scanshade {
 
-/// Sentences of measured numbers: the error expected of these settings on depth of this noise, and of the next better
-/// preset with its time. Empty where nothing like it was measured: clouds, other radii, other depth preparation; and
-/// for budgets, which tell it themselves.
+/// Sentences with measured numbers: the error expected from these settings at this depth noise, and the error and time
+/// of the next better preset. Empty if nothing like it was measured (clouds, other radii, other depth preparation), and
+/// for budgets, which print their own.
 [[nodiscard]] std::vector<std::string> outlook(const RunSettings& settings, const DepthNoise& noise,
                                                const Capture& capture, const ParetoFront& front);
 

@@ -53,7 +53,7 @@ void end_gracefully_on_signals() {
 struct Job {
     Capture capture;
     BatchOptions batch;
-    std::vector<std::size_t> of = {}; ///< all that is taken of the capture, of which batch.frames may be a block
+    std::vector<std::size_t> of = {}; ///< all frames of the capture to compute; batch.frames may be a block of them
     std::string block = {};           ///< "" = all, else as Task::block() says
     LoadedFrames loaded = {};         ///< decoded for the noise; the walk takes them
 
@@ -71,7 +71,7 @@ std::string folder_name(const fs::path& path, std::set<std::string>& taken) {
     return name;
 }
 
-/// Nothing is begun when something would be lost: an earlier result is replaced only with --overwrite.
+/// Results of an earlier run are replaced only with --overwrite.
 void refuse_to_overwrite(const Job& job) {
     const Outputs& outputs = job.batch.outputs;
     const auto refuse = [](const std::vector<fs::path>& files) {
@@ -98,8 +98,8 @@ struct ReportFiles {
     }
 };
 
-/// Clears what a killed run left, and the report of an earlier one: a manifest says that what lies beside it is
-/// complete. The journal is held.
+/// Removes files of a killed run, and the report of an earlier one: a manifest means that the results next to it are
+/// complete. The caller holds the journal.
 void prepare_folder(const Job& job, const ReportFiles& reports) {
     std::set<std::string, std::less<>> stems;
     for (const std::size_t index : job.batch.frames)
@@ -112,7 +112,7 @@ void prepare_folder(const Job& job, const ReportFiles& reports) {
         remove_leftovers(job.folder() / part, [&](std::string_view stem) { return stems.contains(stem); });
 }
 
-/// A capture's frames together, by a method that is leased for the whole of it.
+/// Computes a capture's frames together, with one method leased for all of them.
 struct Together {
     Together(Workers& workers, const Job& job, const RunSettings& asked)
         : lease(workers.pool()), pool(*lease),
@@ -123,14 +123,14 @@ struct Together {
         if (workers.pool().size() > workers.devices())
             say("  frames of a sequence are computed one at a time, in their order");
         if (sequence.reach() > 0)
-            say(fmt::format("  frames within {} of each other are looked at together", sequence.reach()));
+            say(fmt::format("  frames within {} of each other are computed together", sequence.reach()));
     }
     MethodPool::Lease lease;
-    MethodPool pool; ///< of the one
+    MethodPool pool; ///< of that one method
     Neighbourhood sequence;
 };
 
-/// What became of the frames, for the exit code.
+/// Counts results of frames for the exit code.
 class Tally {
   public:
     void add(const std::vector<FrameRow>& rows) {
@@ -185,13 +185,13 @@ class Run final : public Command {
         cv::setNumThreads(1); // frames are the parallelism; threads inside a frame would only compete with them
         end_gracefully_on_signals();
         std::mutex counting;
-        overlapped(jobs.size(), at_once(), [&](std::size_t i, Turn& turn) {
+        overlapped(jobs.size(), at_once(), [&](std::size_t i, OrderedOutput& output) {
             if (interrupted)
                 return;
             std::vector<FrameRow> rows;
             Fault fault = Fault::none;
             try {
-                rows = process(std::move(jobs[i]), turn);
+                rows = process(std::move(jobs[i]), output);
             } catch (const DeviceLost&) { // the other captures need it, too
                 throw;
             } catch (const Outage& failure) {
@@ -222,7 +222,7 @@ class Run final : public Command {
         return job;
     }
 
-    /// Opens what is to be processed. A capture that cannot be opened is told and counted; it stops no other.
+    /// Opens the captures. One that cannot be opened is reported and counted; it stops no other.
     std::vector<Job> plan(int& unopened, Tally& tally) {
         std::vector<Job> jobs;
         std::set<std::string> taken;
@@ -250,7 +250,7 @@ class Run final : public Command {
     void refuse_absent_view(const Capture& capture) const {
         if (asked_.outputs().colour_view && !capture.colour_camera)
             throw Error(capture.path.string() +
-                        ": --view colour needs to know the colour camera beside the depth camera; refine finds it");
+                        ": --view colour needs the pose of a secondary camera for colour; refine finds it");
     }
 
     RunReport begun_report(const Job& job, Workers& workers) {
@@ -271,7 +271,7 @@ class Run final : public Command {
         return report;
     }
 
-    /// Picks method and settings for the capture, from where the command line left them. Says what it did.
+    /// Picks method and settings for the capture, starting from the command line. Returns sentences about the choice.
     std::vector<std::string> keep_to_budget(const Job& job, gpu::Device& device) {
         TrialRequest request;
         request.among = job.of;
@@ -291,7 +291,7 @@ class Run final : public Command {
     /// A job made by `plan`: in worker processes, task by task.
     int run_planned() {
         if (asked_.paths.size() != 1 || !asked_.out.empty() || asked_.overwrite)
-            throw Misuse("run JOB goes on with that job, in its own folder: neither other captures, nor -o, nor "
+            throw Misuse("run JOB continues that job in its own folder; it takes neither other captures, nor -o, nor "
                          "--overwrite");
         const fs::path job = asked_.paths.front();
         const Plan plan = read_plan(job);
@@ -303,20 +303,20 @@ class Run final : public Command {
         asked_.out = (job / "results").string();
         asked_.resume = true;
         asked_.resolve();
-        return supervise(1, [&](const Shift& shift) {
+        return supervise(1, [&](const WorkerProcess& worker) {
             cv::setNumThreads(1);
             end_gracefully_on_signals();
-            return work_through(job, plan, shard, interrupted, shift.carefully ? 1 : at_once(),
-                                [&](const Task& task, Turn& turn) {
+            return work_through(job, plan, shard, interrupted, worker.carefully ? 1 : at_once(),
+                                [&](const Task& task, OrderedOutput& output) {
                                     Tally tally;
-                                    tally.add(process(job_of(job, task), turn, shift));
+                                    tally.add(process(job_of(job, task), output, worker));
                                     return tally.exit_code(0);
                                 });
         });
     }
 
     Job job_of(const fs::path& folder, const Task& task) {
-        // The plan opened it: whatever is in the way now may be gone the next time.
+        // The plan could open it, so the problem may be temporary.
         if (std::error_code ignored; !fs::exists(task.capture, ignored))
             throw Outage(task.capture.string() + ": not there any more");
         Job job = job_from(task.capture, results_of(folder, task));
@@ -329,9 +329,9 @@ class Run final : public Command {
         return job;
     }
 
-    /// Captures: those whose frames enter the walk, and around them two that are made ready and two whose last frames
-    /// leave it: on a GPU 40 frames take as little time as opening their capture does. One fills sixteen cores. A
-    /// budget measures, which nothing may disturb, and picks other settings for each.
+    /// How many captures are open at once: those whose frames enter the walk (one per sixteen cores), two being opened
+    /// before them, and two being finished after them. On a GPU, 40 frames take no longer than opening their capture.
+    /// With a budget it is one: nothing may disturb its measurements, and each capture gets other settings.
     [[nodiscard]] std::size_t at_once() {
         if (asked_.budget.any())
             return 1;
@@ -342,7 +342,7 @@ class Run final : public Command {
         return entering + 4;
     }
 
-    /// Opened when the first frame needs them: where all is done already, never.
+    /// Opens the devices when the first frame needs them, so a run with nothing left to do opens none.
     Workers& workers() {
         if (!workers_)
             workers_ = std::make_unique<Workers>(asked_.device, asked_.in_flight);
@@ -367,8 +367,8 @@ class Run final : public Command {
     };
 
     /// One capture, from its journal to its report.
-    std::vector<FrameRow> process(Job job, Turn& turn, const Shift& shift = {}) {
-        turn.is_of(job.capture.path.string());
+    std::vector<FrameRow> process(Job job, OrderedOutput& output, const WorkerProcess& worker = {}) {
+        output.set_capture(job.capture.path.string());
         Journal journal(job.folder(), job.block);
         if (asked_.overwrite)
             journal.clear();
@@ -390,8 +390,8 @@ class Run final : public Command {
                                   .task = task,
                                   .device = ready.report.device.name,
                                   .retry = asked_.retry,
-                                  .carefully = shift.carefully,
-                                  .finished = shift.finished};
+                                  .carefully = worker.carefully,
+                                  .finished = worker.finished};
         walk(job, ready.report, recording);
         report_on(job, ready.report, journal, files);
         if (cloud && !interrupted)
@@ -415,7 +415,7 @@ class Run final : public Command {
         return rows;
     }
 
-    /// Of all that is taken of the capture, so that blocks of it agree. The block's own frames stay in memory.
+    /// Measures frames spread over the whole capture, so that its blocks agree. Frames of this block stay in memory.
     void measure_noise_of(Job& job) const {
         if (asked_.depth_noise != "auto") {
             job.batch.noise = noise_from_text(asked_.depth_noise);
@@ -428,14 +428,14 @@ class Run final : public Command {
         job.batch.loaded = &job.loaded;
     }
 
-    /// What a capture is computed with, and all there is to report before it is.
+    /// A capture's method, and its report before any frame is computed.
     struct Prepared {
         RunReport report;
         std::string settings; ///< settings_key()
         std::unique_ptr<PointMethod> points;
     };
 
-    /// Makes the methods, or finds them made for the capture before.
+    /// Makes the methods, or keeps those of the last capture.
     [[nodiscard]] Prepared prepare(Job& job) {
         const std::lock_guard alone(alone_);
         Workers& workers = this->workers();
@@ -454,7 +454,7 @@ class Run final : public Command {
         return {std::move(report), std::move(settings), std::move(points)};
     }
 
-    /// The frames that the journal does not have.
+    /// Computes the frames that the journal does not have.
     void walk(Job& job, RunReport& report, const Recording& recording) {
         Entrance entrance(entrance_);
         job.batch.all_begun = [&] { entrance.leave(); };
@@ -498,7 +498,7 @@ class Run final : public Command {
     }
 
     RunSettings asked_;
-    std::mutex alone_; ///< held while settings and devices are used by a capture, but not while frames are computed
+    std::mutex alone_; ///< held while a capture uses settings and devices, but not while its frames are computed
     std::counting_semaphore<> entrance_{1};
     std::unique_ptr<Workers> workers_;
     std::vector<std::string> outlook_; ///< of all captures, each sentence once

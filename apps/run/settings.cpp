@@ -1,4 +1,4 @@
-// Everything that `scanshade run` can be told, and what that means to the walk.
+// The settings of `scanshade run`, and the options of the walk that follow from them.
 #include "apps/run/settings.h"
 
 #include "ao/cloud/cloud_ao.h"
@@ -203,7 +203,7 @@ std::vector<Stage> RunSettings::common_stages() {
                    "unless the cloud has a grid or --camera is given",
            .value = OneOf(&s.clouds, cloud_words)},
           {.name = "sequence",
-           .help = "on: frames of a recording with poses are looked at together; auto: where there are poses",
+           .help = "on: frames of a recording with poses are computed together; auto: if there are poses",
            .value = OneOf(&s.sequence, sequence_words),
            .common = true},
           {.name = "radius",
@@ -258,7 +258,7 @@ std::vector<Stage> RunSettings::common_stages() {
            .value = OneOf(&s.format, format_words),
            .common = true},
           {.name = "view",
-           .help = "whose pixels maps and pictures have, if there is a colour camera beside the depth camera",
+           .help = "camera whose pixels maps and pictures use, if a secondary camera took the colour images",
            .value = OneOf(&s.colour_view, view_words)},
           {.name = "shade-strength",
            .help = "0 leaves the colour, 1 multiplies it by visibility",
@@ -284,11 +284,11 @@ std::vector<Stage> RunSettings::common_stages() {
            .value = &s.overwrite,
            .common = true},
           {.name = "resume",
-           .help = "goes on with an earlier run; frames done from the same input and settings stay",
+           .help = "continues an earlier run; frames done from the same input and settings stay",
            .value = &s.resume,
            .common = true},
           {.name = "retry", .help = "with --resume: tries failed frames again, too", .value = &s.retry},
-          {.name = "quiet", .help = "tells only warnings and failures", .value = &s.quiet, .common = true},
+          {.name = "quiet", .help = "prints only warnings and failures", .value = &s.quiet, .common = true},
           {.name = "log",
            .help = "what stderr gets: prose, or a JSON object per line",
            .value = OneOf(&s.log_json, log_words)},
@@ -305,7 +305,7 @@ Stage RunSettings::cloud_stage() {
 }
 
 Stage RunSettings::sequence_stage() {
-    return prefixed("sequences: with --sequence on, frames together with those around them", "sequence.",
+    return prefixed("sequences: with --sequence on, frames together with their neighbours", "sequence.",
                     sequences.parameters(), "sequence");
 }
 

@@ -1,4 +1,4 @@
-// Everything that `scanshade run` can be told, and what that means to the walk.
+// The settings of `scanshade run`, and the options of the walk that follow from them.
 #pragma once
 
 #include "ao/fit_plane/fit_plane.h"
@@ -18,10 +18,10 @@
 
 namespace scanshade {
 
-/// Whether frames of a recording are looked at together; automatic: where at least two frames have a pose.
+/// Whether frames of a recording are computed together; automatic: if at least two frames have a pose.
 enum class SequenceUse { off, on, automatic };
 
-/// What was typed, or its default; the rows of stages() are bound to it. Filled by the parser, then resolve()d once.
+/// Settings as typed, or their defaults. The parser fills them through the rows of stages(); then call resolve() once.
 class RunSettings {
   public:
     RunSettings();
@@ -53,25 +53,25 @@ class RunSettings {
     CloudAoOptions clouds_by_points;
     NeighbourhoodOptions sequences;
 
-    /// Every row there is, as the help groups them.
+    /// All rows, grouped as in the help.
     [[nodiscard]] std::vector<Stage> stages();
-    /// Without those of methods that were not chosen: what a report holds, and results depend on.
+    /// All rows except those of other methods: these shape the results and are in the report.
     [[nodiscard]] std::vector<Stage> stages_in_use();
 
-    /// Before anything else is set: changes defaults to those of `preset`.
+    /// Changes defaults to those of `preset`; call it before anything else is set.
     void take_preset();
-    /// Once everything is set: puts --radius and --quality into the chosen method's settings, and takes lists apart.
-    /// Throws Misuse where settings do not go together.
+    /// Call it once everything is set. Puts --radius and --quality into the chosen method's settings and splits lists.
+    /// Throws Misuse for settings that contradict each other.
     void resolve();
-    /// Takes method and settings of a budget's choice in place of those of its last choice.
+    /// Replaces method and settings of a budget's last choice by those of the new one.
     void choose(const Configuration& picked);
 
-    // What resolve() made of it.
+    // Results of resolve().
     [[nodiscard]] const Outputs& outputs() const { return outputs_; } ///< without a folder
     [[nodiscard]] const ProjectOptions& range() const { return range_; }
     [[nodiscard]] std::optional<Registration> registration() const;
     [[nodiscard]] FitPlaneOptions preparation() const; ///< of noisy depth
-    /// --radius holds for clouds, too, and --cloud.radius before it.
+    /// --radius applies to clouds, too; --cloud.radius overrides it.
     [[nodiscard]] const CloudAoOptions& cloud_ao() const { return cloud_options_; }
     [[nodiscard]] MethodSetup& chosen_setup() const { return setup_of(method); }
     [[nodiscard]] double radius_m() const; ///< the chosen method's
@@ -87,11 +87,11 @@ class RunSettings {
     std::vector<std::pair<std::string, std::unique_ptr<MethodSetup>>> setups_;
     Outputs outputs_;
     ProjectOptions range_;
-    CloudAoOptions cloud_options_;               ///< --radius holds for clouds, too, and --cloud.radius before it
+    CloudAoOptions cloud_options_;               ///< as typed; see cloud_ao()
     std::optional<Configuration> before_choice_; ///< the method of a budget's last choice, as it was before
 };
 
-/// Whether at least two depth frames have a pose: only then is there anything to look at together.
+/// Whether at least two depth frames have a pose, so that frames can be computed together.
 [[nodiscard]] bool has_poses(const Capture& capture);
 
 } // namespace scanshade

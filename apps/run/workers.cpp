@@ -1,4 +1,4 @@
-// The devices of a run, and what computes frames on them: as many methods, made alike, as frames are computed at once.
+// The devices of a run, and a method for each frame that is computed at once.
 #include "apps/run/workers.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// The devices of a run, and what computes frames on them: as many methods, made alike, as frames are computed at once.
+// The devices of a run, and a method for each frame that is computed at once.
 #pragma once
 
 #include "ao/frame.h"
@@ -12,18 +12,18 @@
 
 namespace scanshade {
 
-/// While one frame's passes run, the next one is packed and the one before unpacked: with one at a time a GPU waits for
-/// the host more than it works. Processor cores have no such gaps, and each frame in flight takes memory.
+/// While one frame's passes run, the next one is packed and the one before unpacked: with one at a time, a GPU mostly
+/// waits for the host. Processor cores have no such gaps, and each frame in flight takes memory.
 class Workers {
   public:
     /// Opens the devices that `choice` names (gpu::open_devices()); `in_flight` frames on each, 0 = three on a GPU, one
     /// on the processor's own cores.
     Workers(const std::string& choice, int in_flight);
 
-    /// The one that everything runs on that takes one frame after the other.
+    /// The device for work that computes one frame at a time.
     [[nodiscard]] gpu::Device& device() { return *devices_.front(); }
-    /// Makes the methods anew where method or settings are others than before: shaders are compiled once for all
-    /// captures. None may be leased then. Of a method that keeps all cores busy by itself there is one.
+    /// Makes the methods again if method or settings have changed, so that shaders are compiled once for all captures.
+    /// None may be leased then. A method that uses all cores by itself exists once.
     void make(const std::string& method, MethodSetup& setup, const FitPlaneOptions& preparation);
     [[nodiscard]] MethodPool& pool() { return *pool_; }
 

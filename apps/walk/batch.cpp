@@ -24,13 +24,13 @@
 namespace scanshade {
 namespace {
 
-void blame(FrameRow& row, FrameStatus status, Fault fault, const std::exception& failure) {
+void fail(FrameRow& row, FrameStatus status, Fault fault, const std::exception& failure) {
     row.status = status;
     row.fault = fault;
     row.why = failure.what();
 }
 
-/// Takes one step with a frame and its time; the only place where a frame's failure is caught.
+/// Runs and times one step of a frame. A frame's failure is caught only here.
 template <class Step>
 void take(Work& work, double StageTimes::*stage, Step&& step) {
     if (!work.row.why.empty())
@@ -38,14 +38,14 @@ void take(Work& work, double StageTimes::*stage, Step&& step) {
     const Stopwatch stopwatch;
     try {
         step();
-    } catch (const DeviceLost& failure) { // no fault of the frame: another device may do it
-        blame(work.row, FrameStatus::skipped, Fault::outage, failure);
+    } catch (const DeviceLost& failure) { // not the frame's fault: another device may compute it
+        fail(work.row, FrameStatus::skipped, Fault::outage, failure);
     } catch (const Outage& failure) {
-        blame(work.row, FrameStatus::failed, Fault::outage, failure);
+        fail(work.row, FrameStatus::failed, Fault::outage, failure);
     } catch (const Error& failure) {
-        blame(work.row, FrameStatus::failed, Fault::input, failure);
+        fail(work.row, FrameStatus::failed, Fault::input, failure);
     } catch (const std::exception& failure) {
-        blame(work.row, FrameStatus::failed, Fault::internal, failure);
+        fail(work.row, FrameStatus::failed, Fault::internal, failure);
     }
     work.row.ms.*stage = stopwatch.ms();
 }
@@ -81,14 +81,14 @@ void describe_frame(Work& work) {
                                            frame.colour.rows, frame.depth_m.cols, frame.depth_m.rows));
 }
 
-/// A camera that sees none of the points is a mistake to be told, not an empty result. (No depth at all is a result.)
+/// A camera that sees none of the points is an error, not an empty result. (No depth at all is a result.)
 void refuse_blind_view(const Work& work) {
     if (work.row.valid_share > 0 && cv::countNonZero(work.depth.z_m) == 0)
-        throw Error(fmt::format("nothing recorded lies in view of the camera ({}; {})", describe(work.frame.camera),
+        throw Error(fmt::format("the camera sees none of the recorded points ({}; {})", describe(work.frame.camera),
                                 work.frame.camera.origin));
 }
 
-/// Values from the points themselves: no view.
+/// Computes a value for every point, without a camera's view.
 void compute_points(Work& work, const BatchOptions& options) {
     work.of_points = visibility_of_points(work.frame, *options.points);
     std::ranges::copy(work.of_points.notes, std::back_inserter(work.row.notes));
@@ -145,31 +145,32 @@ std::vector<FrameRow> planned_rows(const Capture& capture, const std::vector<std
     return rows;
 }
 
-/// The walk as one pipeline; the frames' rows are filled in on the way.
+/// The walk as one pipeline, which fills in the frames' rows.
 class Pipeline {
   public:
     Pipeline(const Capture& capture, MethodPool& pool, const BatchOptions& options,
              const std::function<void(const FrameRow&)>& on_frame)
         : capture_(capture), pool_(pool), at_once_(options.sequence ? 1 : static_cast<int>(pool.size())),
           options_(options), on_frame_(on_frame), rows_(planned_rows(capture, options.frames)),
-          walk_(capture, rows_, options.sequence ? options.sequence->reach() : 0), waiting_(options.sequence) {}
+          order_(capture, rows_, options.sequence ? options.sequence->reach() : 0), sequence_buffer_(options.sequence) {
+    }
 
     [[nodiscard]] std::vector<FrameRow> run() {
         using tbb::filter_mode;
         using Flow = tbb::flow_control;
         const auto computing = at_once_ > 1 ? filter_mode::parallel : filter_mode::serial_in_order;
         const auto filters =
-            tbb::make_filter<void, Token>(filter_mode::serial_in_order, [&](Flow& flow) { return begin(flow); }) &
-            tbb::make_filter<Token, Token>(filter_mode::parallel, [&](Token work) { return prepared(work); }) &
-            tbb::make_filter<Token, Token>(computing, [&](Token work) { return computed(work); }) &
-            tbb::make_filter<Token, Token>(filter_mode::parallel, [&](Token work) { return finished(work); }) &
-            tbb::make_filter<Token, void>(filter_mode::serial_in_order, [&](const Token& work) { report(work); });
-        // Who waits for a device leaves its core to others.
+            tbb::make_filter<void, WorkPtr>(filter_mode::serial_in_order, [&](Flow& flow) { return begin(flow); }) &
+            tbb::make_filter<WorkPtr, WorkPtr>(filter_mode::parallel, [&](WorkPtr work) { return prepared(work); }) &
+            tbb::make_filter<WorkPtr, WorkPtr>(computing, [&](WorkPtr work) { return computed(work); }) &
+            tbb::make_filter<WorkPtr, WorkPtr>(filter_mode::parallel, [&](WorkPtr work) { return finished(work); }) &
+            tbb::make_filter<WorkPtr, void>(filter_mode::serial_in_order, [&](const WorkPtr& work) { report(work); });
+        // A thread that waits for a device leaves its core free, so there is one more for each.
         const int threads = cores() + (at_once_ > 1 ? at_once_ : 0);
         const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism,
                                           static_cast<std::size_t>(threads));
         tbb::task_arena(threads).execute([&] { tbb::parallel_pipeline(frames_in_memory(), filters); });
-        for (const Token& unfinished : waiting_.rest()) // interrupted before what lies around them was there
+        for (const WorkPtr& unfinished : sequence_buffer_.rest()) // interrupted before their neighbours arrived
             unfinished->row = skipped_row(capture_, unfinished->row.index);
         if (failure_)
             std::rethrow_exception(failure_);
@@ -183,16 +184,16 @@ class Pipeline {
                                                                       : cores() + 2 * at_once_);
     }
 
-    Token begin(tbb::flow_control& flow) {
-        if (walk_.goes_on() && !(options_.stop && *options_.stop) && !given_up_)
-            return with_frame_if_loaded(walk_.next());
+    WorkPtr begin(tbb::flow_control& flow) {
+        if (order_.has_next() && !(options_.stop && *options_.stop) && !given_up_)
+            return with_frame_if_loaded(order_.next());
         flow.stop();
         if (options_.all_begun)
             options_.all_begun();
         return {};
     }
 
-    [[nodiscard]] Token with_frame_if_loaded(Token work) const {
+    [[nodiscard]] WorkPtr with_frame_if_loaded(WorkPtr work) const {
         const auto known =
             work && options_.loaded ? options_.loaded->extract(work->row.index) : LoadedFrames::node_type();
         if (!known.empty()) {
@@ -202,8 +203,7 @@ class Pipeline {
         return work;
     }
 
-    /// Loaded and projected.
-    Token prepared(Token work) const {
+    WorkPtr prepared(WorkPtr work) const {
         if (!work)
             return work;
         take(*work, &StageTimes::load, [&] {
@@ -228,11 +228,11 @@ class Pipeline {
         return work;
     }
 
-    Token computed(Token arrived) {
-        Token work = waiting_.pass(std::move(arrived));
+    WorkPtr computed(WorkPtr arrived) {
+        WorkPtr work = sequence_buffer_.pass(std::move(arrived));
         if (!work || !work->row.why.empty())
             return work;
-        if (work->by_points) { // one at a time takes all cores and much memory; nor may it begin another while it waits
+        if (work->by_points) { // takes all cores and much memory: one at a time, and no other starts while it waits
             const std::lock_guard alone(pool_.alone());
             tbb::this_task_arena::isolate(
                 [&] { take(*work, &StageTimes::compute, [&] { compute_points(*work, options_); }); });
@@ -260,26 +260,26 @@ class Pipeline {
         write_intermediates(options_.dump / work.entry.name, all);
     }
 
-    Token finished(Token work) const {
+    WorkPtr finished(WorkPtr work) const {
         if (work)
             attach_and_write(*work, options_);
         return work;
     }
 
-    /// The images end here. Where telling fails, the frames under way come to their ends first: TBB never frees those
-    /// of a pipeline that an exception leaves.
-    void report(const Token& work) {
+    /// Frees the images. A failure in here is rethrown after the frames in flight have ended: TBB does not free frames
+    /// of a pipeline that throws.
+    void report(const WorkPtr& work) {
         if (!work || failure_)
             return;
         try {
-            tell(*work);
+            add_to_report(*work);
         } catch (...) {
             failure_ = std::current_exception();
             given_up_ = true;
         }
     }
 
-    void tell(Work& work) {
+    void add_to_report(Work& work) {
         if (options_.cloud && work.row.status == FrameStatus::ok)
             add_to(*options_.cloud, work);
         outages_ = work.row.fault == Fault::outage ? outages_ + 1 : 0;
@@ -296,11 +296,11 @@ class Pipeline {
     const BatchOptions& options_;
     const std::function<void(const FrameRow&)>& on_frame_;
     std::vector<FrameRow> rows_;
-    Walk walk_;
-    Waiting waiting_;
+    FrameOrder order_;
+    SequenceBuffer sequence_buffer_;
     std::atomic<bool> given_up_ = false;
     std::exception_ptr failure_; ///< the first while reporting
-    int outages_ = 0;            ///< in a row: a full disk does not empty itself, and whoever goes on wastes the rest
+    int outages_ = 0;            ///< in a row: a full disk stays full, so the run ends
 };
 
 } // namespace

@@ -7,11 +7,11 @@
 
 namespace scanshade {
 
-/// Runs the walk over the frames, as many of them computed at once as the pool has methods free; a sequence takes one
-/// after the other. A frame that fails says why in its row, leaves no file, and stops no other. A
-/// lost device ends the run: frames in flight and those after them come back as skipped, the fault of an outage.
+/// Runs the walk over the frames. It computes as many at once as the pool has free methods, or one at a time in a
+/// sequence. A failed frame has the reason in its row, leaves no file, and stops no other frame. A lost device ends the
+/// run: frames in flight and later ones come back as skipped, with fault `outage`.
 /// `on_frame` is called once per row, in the order of `options.frames`, never concurrently.
-/// Rows come back in that order too; what is written does not depend on timing.
+/// Rows come back in that order, too. The files do not depend on timing.
 [[nodiscard]] std::vector<FrameRow> run_batch(const Capture& capture, MethodPool& pool, const BatchOptions& options,
                                               const std::function<void(const FrameRow&)>& on_frame = {});
 

@@ -1,4 +1,4 @@
-// What the walk is told: which frames, what is written of them, and with what they are computed.
+// Options of the walk: which frames, how they are computed, and what is written.
 #pragma once
 
 #include "ao/method.h"
@@ -17,31 +17,31 @@
 
 namespace scanshade {
 
-/// What is written of each frame, under `folder`: ao/NAME.png, confidence/NAME.png, shaded/NAME.png, panel/NAME.png,
+/// The files written for each frame, under `folder`: ao/NAME.png, confidence/NAME.png, shaded/NAME.png, panel/NAME.png,
 /// clouds/NAME.pcd or .ply.
 struct Outputs {
     std::filesystem::path folder;
     bool ao = true;         ///< the visibility map
-    bool confidence = true; ///< how far the visibility can be believed (confidence_of()), as 8 bits or floats
+    bool confidence = true; ///< how reliable the visibility is (confidence_of()), as 8 bits or floats
     bool shaded = true; ///< colour times visibility; clay times visibility where colour is not known to fit the depth
     bool panel = false; ///< colour | depth | AO | shaded
     bool cloud = true; ///< a cloud input with the fields ambient_occlusion and ao_confidence, everything else as it was
     bool depth_cloud = false; ///< a new PLY of a depth frame's points, in camera space
     AoFormat format = AoFormat::png16;
     double shade_strength = 1; ///< 0 leaves the colour, 1 multiplies by visibility
-    bool colour_view = false;  ///< maps and pictures of frames with a colour camera have the colour image's pixels
+    bool colour_view = false;  ///< maps and pictures of frames with a secondary camera use its pixels
     bool colour_cloud = false; ///< replaces the cloud's colour by colour times visibility
 };
 
-/// The files that `outputs` makes of a frame; of a cloud both possible names, since only its content tells the format.
+/// The files that `outputs` makes of a frame. A cloud has both possible names, since only its content has the format.
 [[nodiscard]] std::vector<std::filesystem::path> files_of(const CaptureEntry& entry, const Outputs& outputs);
 
-/// Whether anything that is written shows the colour images.
+/// Whether any output shows the colour images.
 [[nodiscard]] inline bool shows_colour(const Outputs& outputs, bool recording_cloud) {
     return outputs.shaded || outputs.panel || outputs.depth_cloud || outputs.colour_view || recording_cloud;
 }
 
-/// How clouds are taken: rays from each of their points, one camera's view, or points unless one camera saw them all.
+/// How clouds are computed: rays from each point, one camera's view, or points unless one camera saw them all.
 enum class CloudWalk { automatic, points, view };
 
 struct BatchOptions {
@@ -50,16 +50,16 @@ struct BatchOptions {
     ProjectOptions range;                     ///< depth outside counts as a hole
     double radius_m = 0;                      ///< the method's, and
     DepthNoise noise;                         ///< the depth's: what confidence depends on
-    std::optional<Registration> registration; ///< what the user said; otherwise what the capture says
-    PointMethod* points = nullptr; ///< what clouds and meshes are computed with where `cloud_walk` asks for points
+    std::optional<Registration> registration; ///< as the user set it; none: as the capture says
+    PointMethod* points = nullptr;            ///< computes clouds and meshes where `cloud_walk` asks for points
     CloudWalk cloud_walk = CloudWalk::automatic;
-    RecordingCloud* cloud = nullptr;   ///< what frames with a pose are added to
-    Neighbourhood* sequence = nullptr; ///< what frames are computed with instead of the method, together with those
-                                       ///< around them; these are loaded whether or not `frames` has them
-    LoadedFrames* loaded = nullptr;    ///< frames that are in memory already; the walk takes them from there
-    std::filesystem::path dump;        ///< folder for the method's intermediates, frame by frame; empty = none
-    bool short_rows = false;           ///< rows come back shortened, once on_frame has seen them
-    int frames_in_memory = 0;          ///< 0 = cores, and two for each method
+    RecordingCloud* cloud = nullptr;         ///< receives the frames with a pose
+    Neighbourhood* sequence = nullptr;       ///< computes each frame with its neighbours, in place of the method;
+                                             ///< neighbours are loaded even if `frames` does not list them
+    LoadedFrames* loaded = nullptr;          ///< frames that are in memory already; the walk takes them from there
+    std::filesystem::path dump;              ///< folder for the method's intermediates, frame by frame; empty = none
+    bool short_rows = false;                 ///< rows come back shortened, once on_frame has seen them
+    int frames_in_memory = 0;                ///< 0 = cores, and two for each method
     const std::atomic<bool>* stop = nullptr; ///< set = begin no further frame
     std::function<void()> all_begun;         ///< called once no further frame will begin: another batch may
 };

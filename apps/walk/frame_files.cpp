@@ -1,4 +1,4 @@
-// The last step of the walk: what a frame's values look like, and its files.
+// The last step of the walk: a frame's pictures and files.
 #include "apps/walk/frame_files.h"
 
 #include "apps/picture.h"
@@ -18,13 +18,13 @@
 namespace scanshade {
 namespace {
 
-/// Whether colour is carried over from a camera of its own.
-bool colour_from_beside(const Frame& frame) {
+/// Whether a secondary camera took the colour images, so that they must be warped.
+bool has_secondary_camera(const Frame& frame) {
     return frame.registration != Registration::yes && frame.colour_camera && !frame.colour.empty();
 }
 
 /// Colour warped into the depth view, or everything else into the colour view.
-Scene scene_beside(const Work& work, bool colour_view) {
+Scene scene_across_cameras(const Work& work, bool colour_view) {
     const Frame& frame = work.frame;
     const SurfaceInColour surface = surface_in_colour(frame.depth_m, frame.camera, *frame.colour_camera);
     if (colour_view) {
@@ -79,7 +79,7 @@ std::vector<cv::Vec3b> shaded_colours(const std::vector<cv::Vec3b>& colours, con
     return {shaded.begin(), shaded.end()};
 }
 
-/// What each undistorted pixel shows of an image; the lens bends where to look. Zero where it saw nothing.
+/// The image without lens distortion. Zero where the camera saw nothing.
 template <class Pixel>
 cv::Mat_<Pixel> undistorted_image(const cv::Mat_<Pixel>& image, const Camera& camera) {
     if (image.empty() || !camera.distortion.any())
@@ -91,7 +91,7 @@ cv::Mat_<Pixel> undistorted_image(const cv::Mat_<Pixel>& image, const Camera& ca
     return straight;
 }
 
-/// In clouds, where nothing is known of a point it has no confidence.
+/// Clouds store confidence 0 where it is not known.
 float known_or_none(float confidence) { return std::isnan(confidence) ? 0.0F : confidence; }
 
 /// The depth frame's surface as points in camera space, coloured where the colour fits. Points that the colour camera
@@ -99,8 +99,8 @@ float known_or_none(float confidence) { return std::isnan(confidence) ? 0.0F : c
 void write_depth_cloud(const std::filesystem::path& file, const Work& work, const Scene& shown,
                        const Outputs& outputs) {
     const auto& [camera, z_m, source] = work.depth;
-    const bool beside = colour_from_beside(work.frame);
-    const Scene scene = beside && outputs.colour_view ? scene_beside(work, false) : shown;
+    const bool warped = has_secondary_camera(work.frame);
+    const Scene scene = warped && outputs.colour_view ? scene_across_cameras(work, false) : shown;
     const cv::Mat3b colour = undistorted_image(scene.colour, work.frame.camera);
     const cv::Mat1b colour_known = undistorted_image(scene.colour_known, work.frame.camera);
     std::vector<Eigen::Vector3d> points;
@@ -123,7 +123,7 @@ void write_depth_cloud(const std::filesystem::path& file, const Work& work, cons
     if (outputs.colour_cloud)
         colours = shaded_colours(colours, visibility, outputs.shade_strength);
     std::vector<AddedField> added = {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}};
-    if (beside)
+    if (warped)
         added.push_back({"colour_known", known});
     write_new_ply(file, points, colours, added, {"camera space: x right, y down, z forward, metres"});
 }
@@ -160,8 +160,8 @@ Scene scene_of(const Work& work, bool colour_view) {
     const Frame& frame = work.frame;
     const cv::Mat1f& visibility = work.attached.visibility;
     if (!frame.cloud) {
-        if (colour_from_beside(frame))
-            return scene_beside(work, colour_view);
+        if (has_secondary_camera(frame))
+            return scene_across_cameras(work, colour_view);
         const bool fits = frame.registration == Registration::yes && frame.colour.size() == frame.depth_m.size();
         return {frame.depth_m, visibility, fits ? frame.colour : cv::Mat3b(), frame.camera.pinhole};
     }
@@ -173,7 +173,7 @@ Scene scene_of(const Work& work, bool colour_view) {
 }
 
 /// Clay has no pixel colours to keep where there is no surface, so both kinds go through the same multiplication.
-/// What the colour camera did not see is clay, too.
+/// Pixels that the colour camera did not see are clay, too.
 cv::Mat3b shaded_picture(const Scene& scene, double strength) {
     cv::Mat3b base = scene.colour;
     if (base.empty() || !scene.colour_known.empty())

@@ -1,4 +1,4 @@
-// The last step of the walk: what a frame's values look like, and its files.
+// The last step of the walk: a frame's pictures and files.
 #pragma once
 
 #include "apps/walk/work.h"
@@ -15,25 +15,24 @@ struct Scene {
 };
 
 /// A depth frame is shown on its recorded pixels, an organised cloud on its grid, other clouds as projected.
-/// A point's colour is its own; a depth pixel's colour is claimed only where the images are registered, or where it is
-/// known how the colour camera stands beside the depth camera.
+/// A point has its own colour. A depth pixel has a colour only if the images are registered, or if the pose of the
+/// secondary camera is known.
 [[nodiscard]] Scene scene_of(const Work& work, bool colour_view);
 
 /// Colour times visibility; clay where there is no colour, or the colour camera did not see.
 [[nodiscard]] cv::Mat3b shaded_picture(const Scene& scene, double strength);
 
-/// Everything that `outputs` asks for of a frame with a view; row.files tells what.
+/// Writes every file that `outputs` asks for, for a frame with a view; row.files lists them.
 void write_all(Work& work, const Scene& scene, const cv::Mat3b& shaded, const Outputs& outputs);
-/// A cloud without a view, as it looks from two opposite sides.
+/// Writes a picture of a cloud without a view, from two opposite sides.
 void write_sides(Work& work, const Outputs& outputs);
-/// A failed frame leaves neither part of its own files nor those of an earlier run: what lies there is what the row
-/// says.
+/// Removes the files of a failed frame, and those of an earlier run: files never contradict the row.
 void remove_files(Work& work, const Outputs& outputs);
 
-/// Every array as .npy, and index.csv that says what they are.
+/// Writes every array as .npy, and an index.csv that describes them.
 void write_intermediates(const std::filesystem::path& folder, const std::vector<Intermediate>& all);
 
-/// The frame's surface with its values, as a view of the recording. Frames without a pose add nothing.
+/// Adds the frame's surface with its values. Frames without a pose add nothing.
 void add_to(RecordingCloud& cloud, const Work& work);
 
 } // namespace scanshade

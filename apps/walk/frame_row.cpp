@@ -1,4 +1,4 @@
-// What became of one frame: a row of frames.csv, a line of the journal.
+// The result of one frame: a row of frames.csv, a line of the journal.
 #include "apps/walk/frame_row.h"
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// What became of one frame: a row of frames.csv, a line of the journal.
+// The result of one frame: a row of frames.csv, a line of the journal.
 #pragma once
 
 #include "ao/method.h"
@@ -23,11 +23,11 @@ struct StageTimes {
 /// Sums; a time that is not known (NaN) counts as none.
 [[nodiscard]] StageTimes operator+(const StageTimes& a, const StageTimes& b);
 
-/// Who is to blame for a frame that has no result. Only an outage is worth another try.
+/// The cause of a frame without a result. Only an outage is worth another try.
 enum class Fault { none, input, outage, internal, crash };
 [[nodiscard]] std::string_view name_of(Fault fault);
 
-/// NaN and empty where the frame did not come that far.
+/// Values of steps that a frame did not reach are NaN or empty.
 struct FrameRow {
     std::size_t index = 0; ///< in capture.entries
     std::string name;
@@ -46,8 +46,8 @@ struct FrameRow {
     std::vector<std::filesystem::path> files; ///< written, relative to Outputs::folder
 };
 
-/// Lets go of what the journal keeps and only the manifest tells: camera, passes, notes and files. Of thousands of
-/// frames it would be what a run needs most memory for.
+/// Frees what the journal keeps and only the manifest needs: camera, passes, notes and files. For thousands of frames
+/// these would take most of a run's memory.
 void shorten(FrameRow& row);
 
 /// The row of a frame that was not begun.

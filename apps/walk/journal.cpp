@@ -119,7 +119,7 @@ Record record_from(const json& line) {
     return record;
 }
 
-/// What a line tells of: its first key.
+/// The kind of a line: its first key.
 std::string kind_of(const json& line) { return line.empty() ? "" : line.begin().key(); }
 
 void take_line(const json& line, JournalFacts& facts) {
@@ -146,7 +146,7 @@ void take_line(const json& line, JournalFacts& facts) {
     }
 }
 
-/// Calls take(line, where it begins) for every line that is JSON and that it makes sense of.
+/// Calls take(line, where it begins) for every line of JSON; skips lines that `take` cannot read.
 void for_each_line(const fs::path& file, const std::function<void(const json&, std::int64_t)>& take) {
     std::ifstream stream(file, std::ios::binary);
     std::int64_t at = 0;
@@ -172,7 +172,7 @@ std::vector<fs::path> inputs_of(const CaptureEntry& entry) {
     return files;
 }
 
-/// What the listing says of a frame that its results depend on: where colour lies depends on how the camera moved.
+/// What a frame's results depend on besides its files. The position of colour depends on the camera's motion.
 std::string listed(const CaptureEntry& entry) {
     const Eigen::Vector3d &rotation = entry.motion.rotation_per_s, &translation = entry.motion.translation_per_s;
     const double between_s = entry.stamp_s && entry.colour_stamp_s ? *entry.colour_stamp_s - *entry.stamp_s : 0;
@@ -186,7 +186,7 @@ std::string stamps_of(const CaptureEntry& entry) {
     return all;
 }
 
-/// A file that cannot be read is its own content: the frame fails, and fails again until it can.
+/// An unreadable file counts as the content "unreadable": the frame fails again until the file can be read.
 std::string hashes_of(const CaptureEntry& entry) {
     std::string all = listed(entry);
     for (const fs::path& file : inputs_of(entry)) {
@@ -209,7 +209,7 @@ std::string host_name() {
     throw Outage(fmt::format("{}: {}: {}", file.string(), what, std::strerror(errno)));
 }
 
-/// File systems without locks (a Lustre mounted without flock) leave every run alone with its folder.
+/// On file systems without locks (Lustre without flock) every run counts as the only one in its folder.
 bool no_locks_here(int error) { return error == ENOSYS || error == EOPNOTSUPP || error == ENOLCK; }
 
 bool is_journal(const fs::path& file) {
@@ -282,27 +282,27 @@ Journal::Journal(fs::path folder, const std::string& block)
     }
     journals_ = journals_in(folder_);
     std::erase(journals_, file_);
-    journals_.push_back(file_); // its lines outweigh the others'
+    journals_.push_back(file_); // last, since its lines override the others'
     for (std::size_t journal = 0; journal < journals_.size(); ++journal)
-        take_places(journal);
+        read_positions(journal);
 }
 
-void Journal::take_places(std::size_t journal) {
+void Journal::read_positions(std::size_t journal) {
     facts_ = {};
     for_each_line(journals_[journal], [&](const json& line, std::int64_t at) {
         take_line(line, facts_);
         for (const auto& [name, record] : facts_.records)
-            places_.insert_or_assign(name, Place{journal, at});
+            positions_.insert_or_assign(name, Position{journal, at});
         facts_.records.clear();
         if (kind_of(line) == "again")
             for (const json& name : line["again"])
-                places_.erase(name.get<std::string>());
+                positions_.erase(name.get<std::string>());
     });
 }
 
 std::optional<Record> Journal::record_of(const std::string& frame) const {
-    const auto place = places_.find(frame);
-    if (place == places_.end())
+    const auto place = positions_.find(frame);
+    if (place == positions_.end())
         return std::nullopt;
     std::ifstream stream(journals_[place->second.journal], std::ios::binary);
     stream.seekg(place->second.at);
@@ -324,7 +324,7 @@ void Journal::clear() {
     if (::ftruncate(handle_, 0) != 0)
         fail(file_, "cannot be cleared");
     facts_ = {};
-    places_.clear();
+    positions_.clear();
 }
 
 bool Journal::files_are_there(const Record& record) const {
@@ -358,7 +358,7 @@ FrameRow Journal::whole(const FrameRow& row) const {
 }
 
 std::int64_t Journal::append(const std::string& line, Sync sync) {
-    // A torn line, which only a full disk or a power cut leaves, ends here.
+    // Ends a torn line, as a full disk or a power cut leaves it.
     const off_t end = ::lseek(handle_, 0, SEEK_END);
     char last = '\n';
     if (end > 0 && ::pread(handle_, &last, 1, end - 1) != 1)
@@ -397,14 +397,14 @@ void Journal::add(const FrameRow& row, const CaptureEntry& entry, const std::str
                     {"input", record.input},
                     {"sizes", record.sizes}};
     const std::int64_t at = append(line.dump(-1, ' ', false, json::error_handler_t::replace), Sync::soon);
-    places_.insert_or_assign(row.name, Place{journals_.size() - 1, at});
+    positions_.insert_or_assign(row.name, Position{journals_.size() - 1, at});
     facts_.complete.clear();
 }
 
 void Journal::forget(const Capture& capture, const std::vector<std::size_t>& frames) {
     std::vector<std::string> known;
     for (const std::size_t index : frames)
-        if (places_.erase(capture.entries[index].name) > 0)
+        if (positions_.erase(capture.entries[index].name) > 0)
             known.push_back(capture.entries[index].name);
     if (!known.empty())
         append(json{{"again", known}}.dump(-1, ' ', false, json::error_handler_t::replace));

@@ -1,5 +1,4 @@
-// What is done: a line per finished frame, kept beside the results. A run that is to go on trusts it, `status` and
-// `merge` read it.
+// The journal: a line per finished frame, kept with the results. --resume trusts it; `status` and `merge` read it.
 #pragma once
 
 #include "apps/walk/frame_row.h"
@@ -19,29 +18,29 @@ namespace scanshade {
 /// One finished frame: its row of the report, and what it was made from.
 struct Record {
     FrameRow row;
-    std::string settings;              ///< hash of what was asked for, and of the program's version
-    std::string stamp, input;          ///< of the frame's files, joined: as stat tells, and hashed
+    std::string settings;              ///< hash of the settings and of the program's version
+    std::string stamp, input;          ///< of the frame's files, joined: stamp_of() and hash of the content
     std::vector<std::uintmax_t> sizes; ///< bytes of row.files
 };
 
-/// Who last wrote to a journal, and how its task stands.
+/// The last process that wrote to a journal, and the progress of its task.
 struct JournalFacts {
     std::string complete;                       ///< Journal::complete()'s key, unless frames were added since
     std::string host, device, started;          ///< of the last process that worked here
-    std::string begun;                          ///< a frame that was begun alone and did not come to its end
+    std::string begun;                          ///< a frame that was begun alone and did not end
     std::map<std::string, Record> records = {}; ///< by frame name; the latest of each
 };
 
 /// The journal of a whole capture ("") or of a block of its frames ("0-500") in the folder of its results.
 [[nodiscard]] std::filesystem::path journal_file(const std::filesystem::path& folder, const std::string& block);
 
-/// Every line that makes sense; a torn last one is what a kill leaves. Nothing is locked. Empty where there is no file.
+/// Reads every valid line, without a lock. A kill may leave the last line torn. Empty if there is no file.
 [[nodiscard]] JournalFacts read_journal(const std::filesystem::path& file);
 
 /// Whether a process holds the journal now.
 [[nodiscard]] bool in_use(const std::filesystem::path& file);
 
-/// Whether the journal's last line says that its task is complete, whatever it was made from: a look at a few bytes.
+/// Whether the journal's last line says that its task is complete, with whatever settings. Reads a few bytes only.
 [[nodiscard]] bool is_complete(const std::filesystem::path& file);
 
 /// "settings" of a Record, or the key of a task: parts joined in order and hashed, the program's version among them.
@@ -53,49 +52,48 @@ class Busy : public Outage {
     using Outage::Outage;
 };
 
-/// The journal held for writing; of what it says no more is in memory than where it says it. Its lock is the kernel's
-/// (flock): it goes with the process, however that ends, so that there are no stale ones; over NFS and Lustre it holds
-/// between machines.
+/// A journal held for writing. Memory holds only the position of each frame's line. The kernel's lock (flock) ends with
+/// the process, so it is never stale. Over NFS and Lustre it holds between machines.
 class Journal {
   public:
-    /// Makes the folder and the file where missing, waits for nobody. Throws Busy where another process holds it.
-    /// Frames of the folder's other journals (blocks of another plan) are known, too.
+    /// Makes the folder and the file if missing. Throws Busy at once if another process holds the journal. Also reads
+    /// the folder's other journals (blocks of another plan).
     Journal(std::filesystem::path folder, const std::string& block);
     ~Journal();
     Journal(const Journal&) = delete;
     Journal& operator=(const Journal&) = delete;
 
-    /// Forgets everything; the journal of a whole capture removes those of blocks beside it.
+    /// Deletes all records. The journal of a whole capture also removes the journals of its blocks.
     void clear();
-    /// The frame's row if it was made from the same settings (where given) and input, and its files lie there in full;
-    /// a failed row counts unless its fault was an outage or `retry` asks for all.
+    /// The frame's row, if settings (where given) and input are the same and all its files are complete. A failed row
+    /// counts, unless its fault was an outage or `retry` is set.
     [[nodiscard]] std::optional<FrameRow> done(const CaptureEntry& entry, const std::optional<std::string>& settings,
                                                bool retry) const;
-    /// A row with all that shorten() took of it; rows that are not recorded come back as they are.
+    /// The row with everything that shorten() removed. Rows that are not recorded come back unchanged.
     [[nodiscard]] FrameRow whole(const FrameRow& row) const;
-    /// One line, the kernel's when this returns, so that it outlives the process; the disk has it a second later: a
-    /// frame whose line a power cut takes is done again. Skipped frames are not recorded. Throws Outage where it cannot
-    /// be.
+    /// Writes one line. When this returns the kernel has it, so it outlives the process. The disk has it a second
+    /// later; a frame whose line is lost in a power cut is done again. Skipped frames are not recorded. Throws Outage
+    /// if the line cannot be written.
     void add(const FrameRow& row, const CaptureEntry& entry, const std::string& settings, const std::string& device);
-    /// Frames that are about to be done again: their records no longer say what lies in their files.
+    /// Drops the records of frames that are about to be computed again: their files will change.
     void forget(const Capture& capture, const std::vector<std::size_t>& frames);
-    /// A frame that is tried alone, because one of its neighbours killed an earlier process.
+    /// Records that a frame is tried alone, because it or another one killed an earlier process.
     void begin_alone(const std::string& frame);
-    /// All of the task's frames are recorded; `key` stands for settings and stamps of everything it was made from.
+    /// Records that all frames of the task are done; `key` is the task's task_key().
     void complete(const std::string& key);
-    /// Those of this journal, without the records.
+    /// The facts of this journal, without the records.
     [[nodiscard]] const JournalFacts& facts() const { return facts_; }
 
   private:
     /// Where a frame's line begins.
-    struct Place {
+    struct Position {
         std::size_t journal; ///< of journals_
-        std::int64_t at;     ///< bytes from its begin
+        std::int64_t at;     ///< bytes from its start
     };
     enum class Sync { now, soon };
     /// Where the line begins.
     std::int64_t append(const std::string& line, Sync sync = Sync::now);
-    void take_places(std::size_t journal);
+    void read_positions(std::size_t journal);
     [[nodiscard]] std::optional<Record> record_of(const std::string& frame) const;
     [[nodiscard]] bool files_are_there(const Record& record) const;
 
@@ -104,8 +102,8 @@ class Journal {
     bool introduced_ = false;
     std::chrono::steady_clock::time_point synced_; ///< when the disk last had every line
     JournalFacts facts_;
-    std::vector<std::filesystem::path> journals_;   ///< of the folder, this one last
-    std::unordered_map<std::string, Place> places_; ///< by frame name
+    std::vector<std::filesystem::path> journals_;         ///< of the folder, this one last
+    std::unordered_map<std::string, Position> positions_; ///< by frame name
 };
 
 } // namespace scanshade

@@ -28,9 +28,9 @@ DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& fram
                     images[i] = project(frame);
                 if (kept && (image || frames.size() == 1))
                     loaded[i] = {std::move(frame), ms};
-            } catch (const Outage&) { // a sigma of fewer frames would shape all results
+            } catch (const Outage&) { // a sigma from fewer frames would change all results
                 throw;
-            } catch (const Error&) { // whoever processes the frame says what is wrong with it
+            } catch (const Error&) { // processing the frame reports the error
             }
         });
     });

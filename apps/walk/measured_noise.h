@@ -18,9 +18,9 @@ struct LoadedFrame {
 };
 using LoadedFrames = std::map<std::size_t, LoadedFrame>; ///< by index in the capture
 
-/// sigma(z) of a capture, measured on up to five of the frames. No noise for clouds without a grid, which no sensor's
-/// image backs. Frames that cannot be loaded are left out. `kept`, where given, receives the frames (with their colour
-/// if `with_colour`), but of several clouds without a grid none: they may be large.
+/// sigma(z) of a capture, measured on up to five of the frames. Clouds without a grid are not a sensor's image, and
+/// have no noise. Frames that cannot be loaded are left out. `kept`, if given, receives the frames, with their colour
+/// if `with_colour`. Of several clouds without a grid it keeps none, since they may be large.
 [[nodiscard]] DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& frames,
                                   LoadedFrames* kept = nullptr, bool with_colour = false);
 

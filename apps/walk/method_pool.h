@@ -9,7 +9,7 @@
 
 namespace scanshade {
 
-/// Any number of walks may share one. Outlives its leases; the methods outlive it.
+/// Several walks may share one pool. It must outlive its leases, and the methods must outlive it.
 class MethodPool {
   public:
     explicit MethodPool(std::span<FrameAo* const> methods) : size_(methods.size()) {
@@ -37,7 +37,7 @@ class MethodPool {
     [[nodiscard]] Lease lease() { return Lease(*this); }
     /// How many frames may be computed at once.
     [[nodiscard]] std::size_t size() const { return size_; }
-    /// Held by what takes all cores and much memory by itself.
+    /// To be held by work that takes all cores and much memory.
     [[nodiscard]] std::mutex& alone() { return alone_; }
 
   private:

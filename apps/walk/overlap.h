@@ -1,4 +1,4 @@
-// Captures one after the other, the next begun while the one before is not quite done.
+// Processes captures in order, and starts the next ones before the first has ended.
 #pragma once
 
 #include "apps/walk/progress.h"
@@ -13,9 +13,10 @@
 
 namespace scanshade {
 
-/// Calls work(0, turn) .. work(count - 1, turn), begun in this order, `at_once` of them at a time, each on one thread.
-/// Where one throws, no further one is begun; the first exception is thrown once those begun have ended.
-inline void overlapped(std::size_t count, std::size_t at_once, const std::function<void(std::size_t, Turn&)>& work) {
+/// Calls work(0, output) .. work(count - 1, output), started in this order, `at_once` at a time, each on one thread.
+/// After an exception no further call starts. The first exception is rethrown once the running calls have ended.
+inline void overlapped(std::size_t count, std::size_t at_once,
+                       const std::function<void(std::size_t, OrderedOutput&)>& work) {
     std::mutex beginning;
     std::size_t next = 0;
     std::exception_ptr first;
@@ -25,10 +26,10 @@ inline void overlapped(std::size_t count, std::size_t at_once, const std::functi
             if (next == count || first)
                 return;
             const std::size_t i = next++;
-            Turn turn; // told in the order begun
+            OrderedOutput output; // messages appear in starting order
             begins.unlock();
             try {
-                work(i, turn);
+                work(i, output);
             } catch (...) {
                 const std::lock_guard alone(beginning);
                 if (!first)

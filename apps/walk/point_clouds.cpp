@@ -25,7 +25,7 @@ bool takes_points(const Frame& frame, const BatchOptions& options, std::vector<s
     if (frame.camera.pinhole.fx != 0)
         return false;
     if (!frame.cloud->organised()) {
-        notes.push_back("unorganised cloud: rays from every point (--clouds view would look at it with one camera).");
+        notes.push_back("unorganised cloud: rays from every point (--clouds view computes one camera's view).");
         return true;
     }
     try {
@@ -70,7 +70,8 @@ namespace {
 
 constexpr int side_px = 900;
 
-/// The box of all but the lowest and highest of a hundred points along each axis: strays must not shrink the rest.
+/// The box without the lowest and highest hundredth of the points along each axis, so that outliers do not shrink the
+/// rest.
 Eigen::AlignedBox3d framed_box(const Cloud& cloud) {
     Eigen::AlignedBox3d box;
     for (int axis = 0; axis < 3; ++axis) {
@@ -88,7 +89,7 @@ Eigen::AlignedBox3d framed_box(const Cloud& cloud) {
     return box;
 }
 
-/// What is seen along a direction: colour and visibility, where the nearest point's square covers the pixel.
+/// An orthographic view: colour and visibility of the nearest point whose square covers the pixel.
 struct SideView {
     cv::Mat3b colour = cv::Mat3b(side_px, side_px, nothing_there);
     cv::Mat1f visibility = cv::Mat1f(side_px, side_px, std::numeric_limits<float>::quiet_NaN());

@@ -1,4 +1,4 @@
-// Clouds that no single camera sees: which those are, their values, and how they look from two sides.
+// Clouds that no single camera sees: which ones these are, their values, and pictures from two sides.
 #pragma once
 
 #include "ao/method.h"
@@ -11,19 +11,19 @@
 
 namespace scanshade {
 
-/// Whether this cloud is computed from its points. Automatically: unless the user named a camera, or the cloud is a
-/// pinhole image's grid. `notes` receives why.
+/// Whether this cloud is computed from its points. `automatic` means yes, unless the user named a camera or the cloud
+/// is the grid of a pinhole image. `notes` receives the reason.
 [[nodiscard]] bool takes_points(const Frame& frame, const BatchOptions& options, std::vector<std::string>& notes);
 
-/// The cloud with its own normals, faces and viewpoint, as `method` sees it.
+/// Visibility of the cloud by `method`, with the file's own normals, faces and viewpoint.
 [[nodiscard]] PointVisibility visibility_of_points(const Frame& frame, PointMethod& method);
 
 /// Values of points, with how many of the valid ones have one.
 [[nodiscard]] Attached attached_points(const Cloud& cloud, std::vector<float> visibility);
 
 /// The cloud's points from two opposite sides, obliquely from above (z up): colours, or light grey, times visibility;
-/// below them visibility alone. Points are as large as they stand apart; those without a value are a dim blue; those
-/// that face away are left out, so that one looks into rooms.
+/// below them visibility alone. Points are as large as their spacing. Points without a value are a dim blue. Points
+/// that face away are left out, which shows the inside of rooms.
 [[nodiscard]] cv::Mat3b two_sides(const Cloud& cloud, const PointVisibility& found, double strength);
 
 } // namespace scanshade

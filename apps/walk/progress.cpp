@@ -17,54 +17,54 @@ namespace {
 
 const char* const clear_line = "\r\033[K";
 
-/// How often frames that are well are told of where there is no terminal.
+/// Seconds between lines about frames without problems, where there is no terminal.
 constexpr double between_lines_s = 5;
 
 bool as_json = false, quiet = false; // set once, before there are threads
 
 } // namespace
 
-struct Turn::Held {
+struct OrderedOutput::Buffer {
     std::string capture, text;
     bool ended = false;
 };
 
 namespace {
 
-std::mutex speaking;
-std::deque<std::shared_ptr<Turn::Held>> turns; // of which the first speaks
-thread_local std::shared_ptr<Turn::Held> own_turn;
+std::mutex output_mutex;
+std::deque<std::shared_ptr<OrderedOutput::Buffer>> buffers; // the first one prints, the others wait
+thread_local std::shared_ptr<OrderedOutput::Buffer> own_buffer;
 
-/// Whether what belongs to a turn, or to none, may be told at once. `speaking` is held.
-bool speaks(const std::shared_ptr<Turn::Held>& turn) { return !turn || turns.front() == turn; }
+/// Whether lines of this buffer, or of none, are printed at once. The caller holds `output_mutex`.
+bool writes_now(const std::shared_ptr<OrderedOutput::Buffer>& buffer) { return !buffer || buffers.front() == buffer; }
 
-/// The text, ended by its line breaks; or later.
-void tell(const std::shared_ptr<Turn::Held>& turn, const std::string& text) {
-    const std::lock_guard alone(speaking);
-    if (!speaks(turn)) {
-        turn->text += text;
+/// Prints the text, which includes its line breaks, or appends it to a buffer that waits.
+void tell(const std::shared_ptr<OrderedOutput::Buffer>& buffer, const std::string& text) {
+    const std::lock_guard alone(output_mutex);
+    if (!writes_now(buffer)) {
+        buffer->text += text;
         return;
     }
     std::fputs(text.c_str(), stderr);
     std::fflush(stderr);
 }
 
-/// `latest` draws over itself: held back, it is forgotten.
-void tell_for_now(const std::shared_ptr<Turn::Held>& turn, const std::string& latest) {
-    const std::lock_guard alone(speaking);
-    if (!speaks(turn))
+/// Prints text that the next one overwrites. Drops it if the buffer has to wait.
+void tell_for_now(const std::shared_ptr<OrderedOutput::Buffer>& buffer, const std::string& latest) {
+    const std::lock_guard alone(output_mutex);
+    if (!writes_now(buffer))
         return;
     std::fputs(latest.c_str(), stderr);
     std::fflush(stderr);
 }
 
-void log(const std::shared_ptr<Turn::Held>& turn, json object) {
+void log(const std::shared_ptr<OrderedOutput::Buffer>& buffer, json object) {
     const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
     json line{{"time", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(now))}};
-    if (turn && !turn->capture.empty())
-        line["capture"] = turn->capture;
+    if (buffer && !buffer->capture.empty())
+        line["capture"] = buffer->capture;
     line.update(object);
-    const std::lock_guard alone(speaking);
+    const std::lock_guard alone(output_mutex);
     fmt::print(stderr, "{}\n", line.dump(-1, ' ', false, json::error_handler_t::replace));
 }
 
@@ -97,30 +97,30 @@ void say(const std::string& line) {
 
 void warn(const std::string& line) {
     if (as_json)
-        log(own_turn, {{"message", line}});
+        log(own_buffer, {{"message", line}});
     else
-        tell(own_turn, line + "\n");
+        tell(own_buffer, line + "\n");
 }
 
-Turn::Turn() : held_(std::make_shared<Held>()) {
-    const std::lock_guard alone(speaking);
-    turns.push_back(held_);
-    own_turn = held_;
+OrderedOutput::OrderedOutput() : buffer_(std::make_shared<Buffer>()) {
+    const std::lock_guard alone(output_mutex);
+    buffers.push_back(buffer_);
+    own_buffer = buffer_;
 }
 
-Turn::~Turn() {
-    const std::lock_guard alone(speaking);
-    own_turn = nullptr;
-    held_->ended = true;
-    while (!turns.empty() && turns.front()->ended) {
-        turns.pop_front();
-        if (!turns.empty())
-            std::fputs(std::exchange(turns.front()->text, "").c_str(), stderr);
+OrderedOutput::~OrderedOutput() {
+    const std::lock_guard alone(output_mutex);
+    own_buffer = nullptr;
+    buffer_->ended = true;
+    while (!buffers.empty() && buffers.front()->ended) {
+        buffers.pop_front();
+        if (!buffers.empty())
+            std::fputs(std::exchange(buffers.front()->text, "").c_str(), stderr);
     }
     std::fflush(stderr);
 }
 
-void Turn::is_of(const std::string& capture) { held_->capture = capture; }
+void OrderedOutput::set_capture(const std::string& capture) { buffer_->capture = capture; }
 
 std::string duration_text(double seconds) {
     const auto whole = static_cast<long>(std::lround(std::max(seconds, 0.0)));
@@ -129,7 +129,7 @@ std::string duration_text(double seconds) {
 }
 
 Progress::Progress(std::size_t total)
-    : total_(total), on_terminal_(!as_json && !quiet && isatty(STDERR_FILENO) == 1), turn_(own_turn) {}
+    : total_(total), on_terminal_(!as_json && !quiet && isatty(STDERR_FILENO) == 1), buffer_(own_buffer) {}
 
 void Progress::add(const FrameRow& row) {
     ++done_;
@@ -139,31 +139,31 @@ void Progress::add(const FrameRow& row) {
     if (as_json) {
         const StageTimes& ms = row.ms;
         const double sum_ms = ms.load + ms.project + ms.compute + ms.attach + ms.write;
-        log(turn_, {{"frame", row.name},
-                    {"status", name_of(row.status)},
-                    {"fault", name_of(row.fault)},
-                    {"why", row.why},
-                    {"warnings", row.warnings},
-                    {"ms", sum_ms},
-                    {"done", done_},
-                    {"of", total_},
-                    {"left_s", seconds_left()}});
+        log(buffer_, {{"frame", row.name},
+                      {"status", name_of(row.status)},
+                      {"fault", name_of(row.fault)},
+                      {"why", row.why},
+                      {"warnings", row.warnings},
+                      {"ms", sum_ms},
+                      {"done", done_},
+                      {"of", total_},
+                      {"left_s", seconds_left()}});
         return;
     }
     if (quiet) {
-        tell(turn_, fmt::format("{}: {}\n", turn_ ? turn_->capture : "", line_of(row)));
+        tell(buffer_, fmt::format("{}: {}\n", buffer_ ? buffer_->capture : "", line_of(row)));
     } else if (on_terminal_ ? bad || !row.notes.empty() : bad || is_due()) {
         const std::string place = bad ? "" : fmt::format("  {}/{}", done_, total_);
-        tell(turn_, fmt::format("{}  {}\n", on_terminal_ ? clear_line : place, line_of(row)));
+        tell(buffer_, fmt::format("{}  {}\n", on_terminal_ ? clear_line : place, line_of(row)));
     }
     if (on_terminal_)
-        tell_for_now(turn_, bar());
+        tell_for_now(buffer_, bar());
 }
 
 bool Progress::is_due() {
-    if (last_told_ && last_told_->seconds() < between_lines_s)
+    if (last_line_ && last_line_->seconds() < between_lines_s)
         return false;
-    last_told_.emplace();
+    last_line_.emplace();
     return true;
 }
 
@@ -182,7 +182,7 @@ std::string Progress::bar() const {
 
 void Progress::end() {
     if (on_terminal_ && done_ > 0)
-        tell_for_now(turn_, "\n");
+        tell_for_now(buffer_, "\n");
 }
 
 } // namespace scanshade

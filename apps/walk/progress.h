@@ -1,5 +1,5 @@
-// How far a run has come, on stderr: a bar with rate and remaining time on a terminal; elsewhere a line every few
-// seconds, and one for each frame that failed.
+// The progress of a run, on stderr. A terminal shows a bar with rate and remaining time. Elsewhere a line appears every
+// few seconds, and one for each failed frame.
 #pragma once
 
 #include "apps/walk/frame_row.h"
@@ -11,32 +11,33 @@
 
 namespace scanshade {
 
-/// From now on, stderr gets one JSON object per line instead of prose: {"time", "message"}, and for each frame {"time",
-/// "capture", "frame", "status", "fault", "why", "warnings", "ms", "done", "of", "left_s"}. For programs that watch.
+/// From now on, stderr gets one JSON object per line, for programs: {"time", "message"}, and for each frame {"time",
+/// "capture", "frame", "status", "fault", "why", "warnings", "ms", "done", "of", "left_s"}.
 void log_as_json();
 /// From now on, stderr gets only warnings and failures.
 void be_quiet();
 
-/// A line on stderr.
+/// Prints a line on stderr, unless quiet.
 void say(const std::string& line);
-/// A line on stderr, however quiet the program is.
+/// Prints a line on stderr, even if quiet.
 void warn(const std::string& line);
 
-/// Keeps messages about one capture together while captures overlap. Lines of a thread that has a turn, and of its
-/// Progress, wait until earlier turns have ended. JSON lines do not wait: each names its capture.
-class Turn {
+/// Keeps messages about one capture together while captures overlap. A thread that holds one of these
+/// buffers its lines, and those of its Progress, until all earlier ones have ended. JSON lines do not wait: each names
+/// its capture.
+class OrderedOutput {
   public:
-    Turn();
-    ~Turn();
-    Turn(const Turn&) = delete;
-    Turn& operator=(const Turn&) = delete;
-    /// What JSON lines of this turn have as "capture" from now on.
-    void is_of(const std::string& capture);
+    OrderedOutput();
+    ~OrderedOutput();
+    OrderedOutput(const OrderedOutput&) = delete;
+    OrderedOutput& operator=(const OrderedOutput&) = delete;
+    /// Sets "capture" in the JSON lines that follow.
+    void set_capture(const std::string& capture);
 
-    struct Held;
+    struct Buffer;
 
   private:
-    std::shared_ptr<Held> held_;
+    std::shared_ptr<Buffer> buffer_;
 };
 
 /// "1:02:03" or "2:03"
@@ -50,15 +51,15 @@ class Progress {
     void end();
 
   private:
-    [[nodiscard]] bool is_due(); ///< whether the last line off a terminal is long ago; then the next one counts as told
+    [[nodiscard]] bool is_due(); ///< whether another line is due off a terminal; counts it as printed
     [[nodiscard]] std::string bar() const;
     [[nodiscard]] double seconds_left() const; ///< at the pace so far
 
     std::size_t total_, done_ = 0;
     bool on_terminal_;
-    std::shared_ptr<Turn::Held> turn_; ///< of the thread that made it
+    std::shared_ptr<OrderedOutput::Buffer> buffer_; ///< of the thread that made this
     Stopwatch stopwatch_;
-    std::optional<Stopwatch> last_told_; ///< off a terminal
+    std::optional<Stopwatch> last_line_; ///< off a terminal
 };
 
 } // namespace scanshade

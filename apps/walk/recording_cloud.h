@@ -1,4 +1,4 @@
-// One cloud of a whole recording: what several frames saw of a place becomes one point.
+// One cloud of a whole recording: points that several frames saw at the same position become one.
 #pragma once
 
 #include "projection/maps.h"
@@ -12,8 +12,8 @@
 
 namespace scanshade {
 
-/// What one frame adds. All images have the depth's size; `colour` may be empty, `colour_known` too where it is known
-/// everywhere.
+/// One frame's part of the cloud. All images have the depth's size. `colour` may be empty, and so may `colour_known` if
+/// colour is known everywhere.
 struct CloudFrame {
     const DepthImage& depth;
     const cv::Mat1f& visibility;
@@ -23,15 +23,14 @@ struct CloudFrame {
     Eigen::Isometry3d world_from_camera;
 };
 
-/// Its memory grows with the surface recorded, not with the number of frames. Frames must come in the same order every
-/// time.
+/// Its memory grows with the recorded surface, not with the number of frames. Equal results need equal order of frames.
 class RecordingCloud {
   public:
     /// Points are merged within cubes of this side; 0 = one and a half times what a pixel covers at the first frame's
     /// median depth.
     explicit RecordingCloud(double resolution_m) : resolution_m_(resolution_m) {}
 
-    /// Nearer and more confident views of a place count more. Pixels without visibility add nothing.
+    /// Nearer and more confident views of a point have more weight. Pixels without visibility add nothing.
     void add(const CloudFrame& frame);
     [[nodiscard]] std::size_t points() const { return cells_.size(); }
     [[nodiscard]] double resolution_m() const { return resolution_m_; }
@@ -52,7 +51,7 @@ class RecordingCloud {
     };
     double resolution_m_;
     int frames_ = 0;
-    std::vector<Cell> cells_; ///< in the order they were met
+    std::vector<Cell> cells_; ///< in the order they were added
     std::unordered_map<Key, std::size_t, KeyHash> index_;
 };
 

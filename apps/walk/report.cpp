@@ -1,4 +1,4 @@
-// What a run leaves beside its pictures: frames.csv, a row per frame, and manifest.json, enough to run it again.
+// The reports of a run: frames.csv, a row per frame, and manifest.json, which is enough to run it again.
 #include "apps/walk/report.h"
 
 #include "apps/command_line.h"
@@ -23,7 +23,7 @@ namespace {
 
 std::string number(double value, int digits) { return std::isnan(value) ? "" : fmt::format("{:.{}f}", value, digits); }
 
-/// JSON knows no NaN: what is not known is null.
+/// JSON has no NaN: unknown values are null.
 json known(double value, int digits = 4) {
     const double scale = std::pow(10.0, digits);
     return std::isfinite(value) ? json(std::round(value * scale) / scale) : json();
@@ -104,7 +104,7 @@ std::string indented(const std::string& text, const std::string& blanks) {
     return result;
 }
 
-/// The largest the process has been, in MiB, as the kernel counts it; NaN where /proc does not tell.
+/// The process's peak memory in MiB, as the kernel counts it; NaN without /proc.
 double peak_memory_mib() {
     std::ifstream status("/proc/self/status");
     for (std::string word; status >> word;)
@@ -236,9 +236,8 @@ void write_manifest(const std::filesystem::path& file, const RunReport& report,
     write_atomically(file, [&](const std::filesystem::path& target) {
         std::ofstream stream(target, std::ios::binary);
         stream.exceptions(std::ios::failbit | std::ios::badbit);
-        stream
-            << head
-            << ",\n  \"frames\": ["; // one by one: thousands as one value would be what the run needs most memory for
+        stream << head
+               << ",\n  \"frames\": ["; // one by one: thousands in one value would take most of the run's memory
         const char* between = "";
         for (const FrameRow& row : report.frames) {
             stream << std::exchange(between, ",") << "\n    "

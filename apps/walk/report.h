@@ -1,4 +1,4 @@
-// What a run leaves beside its pictures: frames.csv, a row per frame, and manifest.json, enough to run it again.
+// The reports of a run: frames.csv, a row per frame, and manifest.json, which is enough to run it again.
 #pragma once
 
 #include "ao/gpu/device.h"
@@ -15,7 +15,7 @@
 
 namespace scanshade {
 
-/// Everything there is to know about the run of one capture.
+/// Everything that the reports hold about the run of one capture.
 struct RunReport {
     std::chrono::system_clock::time_point started;
     gpu::DeviceInfo device;
@@ -26,24 +26,24 @@ struct RunReport {
     const Capture& capture;
     Registration registration = Registration::unknown; ///< as used
     std::string registration_reason;
-    std::string depth_noise;         ///< of the recorded depth, who says so, and what is done about it
-    std::vector<std::string> budget; ///< what an error or time budget picked, expects and found; empty without one
+    std::string depth_noise;         ///< the noise, its origin, and how the depth is prepared
+    std::vector<std::string> budget; ///< what an error or time budget chose, expected and found; empty without one
     std::string shading;             ///< what the shaded pictures show, and why
     std::vector<FrameRow> frames;    ///< shortened
-    std::size_t done_now = 0;        ///< frames that this process did; others were done before
-    StageTimes ms_now{};             ///< what they spent in each stage, summed
+    std::size_t done_now = 0;        ///< frames that this process computed; others were done before
+    StageTimes ms_now{};             ///< sums of their times in each stage
     double took_ms = 0;              ///< from the first frame's begin to the last one's end
 };
 
-/// Frames per second of the pipeline, and of each stage had it the machine as it was to itself: as many frames at once
-/// as there are cores, in `compute` RunReport::at_once. Where the device is the same cores, stages slow each other
-/// down.
+/// Frames per second of the pipeline, and of each stage if it had the machine to itself. A stage then works on as many
+/// frames at once as there are cores, `compute` on RunReport::at_once. If the device is the same cores, stages slow
+/// each other down.
 struct Rates {
     double pipeline = 0;
     StageTimes stage{};          ///< frames per second, not milliseconds
     std::string slowest;         ///< the stage that sets the pace
     double share_of_slowest = 0; ///< the pipeline's rate / that stage's
-    double device_busy = 0;      ///< share of the time that `compute` was at work, of all it could
+    double device_busy = 0;      ///< share of its possible time in which `compute` worked
 };
 [[nodiscard]] Rates rates_of(const RunReport& report);
 /// "12.3 frames/s, 94 % of compute alone"
@@ -59,8 +59,8 @@ struct Rates {
 /// Header and one line per frame, in the report's order. Fields with commas, quotes or line ends are quoted. Atomic.
 void write_frames_csv(const std::filesystem::path& file, const std::vector<FrameRow>& frames);
 
-/// Written last, so that its presence says that the run came to its end. `whole` gives back what shorten() took of a
-/// row. Atomic.
+/// Written last, so that its presence means that the run has ended. `whole` restores what shorten() removed from a row.
+/// Atomic.
 void write_manifest(const std::filesystem::path& file, const RunReport& report,
                     const std::function<FrameRow(const FrameRow&)>& whole);
 

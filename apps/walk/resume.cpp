@@ -1,4 +1,4 @@
-// Which frames are left, and a line in the journal for each one done.
+// Finds the frames that are left, and writes a line in the journal for each one done.
 #include "apps/walk/resume.h"
 
 #include "apps/json.h"
@@ -15,7 +15,7 @@
 namespace scanshade {
 namespace {
 
-/// Rows that do not shape results: where and how it runs, what is told as used beside them, what outputs say.
+/// Settings that do not go into the key as typed: they change no results, or the key has them as used.
 constexpr std::array aside = {"frames",         "camera",
                               "depth-scale",    "association-limit",
                               "registered",     "depth-noise",
@@ -32,13 +32,13 @@ constexpr std::array aside = {"frames",         "camera",
                               "poses",          "in-flight",
                               "preset",         "quiet"};
 
-/// Rows that shape nothing when they are typed differently.
+/// Settings that change no results when they are typed differently.
 constexpr std::array elsewhere = {"out", "overwrite", "dump",      "resume", "retry", "shard",
                                   "log", "device",    "in-flight", "preset", "quiet"};
 
 std::string row_text(const Parameter& row) { return row.name + "=" + value_text(row); }
 
-/// What is written, each kind with the settings that shape it.
+/// The outputs, each kind with the settings that affect it.
 std::string outputs_text(const Outputs& outputs) {
     std::string text;
     if (outputs.ao)
@@ -80,7 +80,7 @@ std::string stamps(const CaptureEntry& entry) {
                        entry.cloud.empty() ? "" : stamp_of(entry.cloud));
 }
 
-/// What a frame's result depends on beside its own files: the frames within reach, and where each of them stood.
+/// What a frame's result depends on besides its own files: the frames within reach, and their poses.
 std::string around(const Capture& capture, std::size_t index, std::size_t reach) {
     if (reach == 0)
         return "";
@@ -106,7 +106,7 @@ FrameRow crash_row(const Capture& capture, std::size_t index) {
     return row;
 }
 
-/// Each frame by itself, so that a crash names its frame.
+/// Runs each frame by itself, so that a crash names its frame.
 std::vector<FrameRow> run_one_by_one(const Capture& capture, MethodPool& pool, BatchOptions options, Journal& journal,
                                      const std::function<void(const FrameRow&)>& on_frame) {
     const std::string killer = journal.facts().begun;

@@ -1,4 +1,4 @@
-// Which frames enter the walk, and in which order they are computed, where each needs those around it.
+// The order in which frames enter the walk. In a sequence, each frame is computed after its neighbours have arrived.
 #include "apps/walk/sequence_order.h"
 
 #include <algorithm>
@@ -10,45 +10,45 @@
 namespace scanshade {
 namespace {
 
-std::string names_of(const Capture& capture, const std::vector<std::size_t>& places) {
+std::string names_of(const Capture& capture, const std::vector<std::size_t>& indices) {
     std::vector<std::string> names;
-    for (const std::size_t place : places)
-        names.push_back(capture.entries[place].name);
+    for (const std::size_t index : indices)
+        names.push_back(capture.entries[index].name);
     return fmt::format("{}", fmt::join(names, ", "));
 }
 
 } // namespace
 
-Walk::Walk(const Capture& capture, std::vector<FrameRow>& rows, std::size_t reach)
+FrameOrder::FrameOrder(const Capture& capture, std::vector<FrameRow>& rows, std::size_t reach)
     : capture_(capture), empty_(reach > 0 ? rows.size() : 0) {
-    std::map<std::size_t, FrameRow*> around;
+    std::map<std::size_t, FrameRow*> entering;
     for (FrameRow& row : rows) {
         const std::size_t first = row.index - std::min(row.index, reach);
         for (std::size_t i = first; reach > 0 && i <= std::min(row.index + reach, capture.entries.size() - 1); ++i)
-            around.try_emplace(i, nullptr);
+            entering.try_emplace(i, nullptr);
         if (reach > 0)
-            around[row.index] = &row;
+            entering[row.index] = &row;
         else
             steps_.emplace_back(row.index, &row);
     }
-    steps_.insert(steps_.end(), around.begin(), around.end());
+    steps_.insert(steps_.end(), entering.begin(), entering.end());
 }
 
-Token Walk::next() {
+WorkPtr FrameOrder::next() {
     if (next_ == steps_.size()) {
         --empty_;
         return {};
     }
     const auto [index, row] = steps_[next_++];
     if (!row)
-        beside_.push_back(skipped_row(capture_, index));
-    auto work = std::make_shared<Work>(Work{capture_.entries[index], row ? *row : beside_.back()});
+        neighbour_rows_.push_back(skipped_row(capture_, index));
+    auto work = std::make_shared<Work>(Work{capture_.entries[index], row ? *row : neighbour_rows_.back()});
     work->row.why.clear();
     work->wanted = row != nullptr;
     return work;
 }
 
-Token Waiting::pass(Token arrived) {
+WorkPtr SequenceBuffer::pass(WorkPtr arrived) {
     if (!sequence_)
         return arrived;
     if (arrived) {
@@ -56,7 +56,7 @@ Token Waiting::pass(Token arrived) {
         if (arrived->row.why.empty() && !arrived->by_points)
             sequence_->add(newest_, arrived->depth, arrived->frame.world_from_camera);
         if (arrived->row.fault == Fault::outage)
-            away_.emplace_back(newest_, arrived->row.why);
+            lost_.emplace_back(newest_, arrived->row.why);
         if (arrived->wanted)
             queue_.push_back(std::move(arrived));
     } else {
@@ -64,22 +64,22 @@ Token Waiting::pass(Token arrived) {
     }
     if (queue_.empty() || newest_ - queue_.front()->row.index < sequence_->reach())
         return {};
-    Token complete = std::move(queue_.front());
+    WorkPtr complete = std::move(queue_.front());
     queue_.pop_front();
     sequence_->forget_before(complete->row.index - std::min(complete->row.index, sequence_->reach()));
-    blame_if_alone(complete->row);
+    fail_if_neighbour_lost(complete->row);
     return complete;
 }
 
-void Waiting::blame_if_alone(FrameRow& row) const {
-    const auto missed = std::ranges::find_if(away_, [&](const auto& frame) {
+void SequenceBuffer::fail_if_neighbour_lost(FrameRow& row) const {
+    const auto lost = std::ranges::find_if(lost_, [&](const auto& frame) {
         return frame.first + sequence_->reach() >= row.index && row.index + sequence_->reach() >= frame.first;
     });
-    if (!row.why.empty() || missed == away_.end())
+    if (!row.why.empty() || lost == lost_.end())
         return;
     row.status = FrameStatus::failed;
     row.fault = Fault::outage;
-    row.why = "a frame that it is to be looked at together with: " + missed->second;
+    row.why = "a neighbouring frame is missing: " + lost->second;
 }
 
 NeighbourhoodOptions sequence_options(NeighbourhoodOptions asked, const Capture& capture, double radius_m) {
@@ -104,8 +104,8 @@ void compute_in_sequence(Work& work, const Capture& capture, Neighbourhood& sequ
         work.row.notes.push_back("visibility is averaged with frames " + names_of(capture, result.averaged) + ".");
     for (const LeftOut& other : result.left_out)
         work.row.notes.push_back(
-            fmt::format("frame {} is left out: {:.0f} % of its surfaces meet this one's, {:.0f} % contradict it, "
-                        "{:.1f} of the tolerable misfit.",
+            fmt::format("frame {} is left out: {:.0f} % of its surfaces overlap this frame, {:.0f} % contradict it, "
+                        "alignment error {:.1f} times the limit.",
                         capture.entries[other.place].name, 100 * other.agreement.overlap,
                         100 * other.agreement.contradicted, other.agreement.misfit));
 }

@@ -1,4 +1,4 @@
-// Which frames enter the walk, and in which order they are computed, where each needs those around it.
+// The order in which frames enter the walk. In a sequence, each frame is computed after its neighbours have arrived.
 #pragma once
 
 #include "apps/walk/work.h"
@@ -10,50 +10,51 @@
 
 namespace scanshade {
 
-/// Which frames enter the pipeline: those wanted, as they come; with a reach, in the recording's order, those wanted
-/// and those within reach of one, then as many empty tokens as frames may still wait for what lies around them.
-class Walk {
+/// The frames that enter the pipeline, in order. Without a reach these are the wanted frames. With a reach, frames
+/// within reach of a wanted frame enter as well, in recording order. Empty items follow, to flush the frames still
+/// buffered.
+class FrameOrder {
   public:
-    /// `rows` are those of the frames wanted; they are filled in on the way and must stay where they are.
-    Walk(const Capture& capture, std::vector<FrameRow>& rows, std::size_t reach);
+    /// `rows` belong to the wanted frames. The walk fills them in, so they must not move in memory.
+    FrameOrder(const Capture& capture, std::vector<FrameRow>& rows, std::size_t reach);
 
-    [[nodiscard]] bool goes_on() const { return next_ < steps_.size() || empty_ > 0; }
-    [[nodiscard]] Token next();
+    [[nodiscard]] bool has_next() const { return next_ < steps_.size() || empty_ > 0; }
+    [[nodiscard]] WorkPtr next();
 
   private:
     const Capture& capture_;
-    std::vector<std::pair<std::size_t, FrameRow*>> steps_; ///< null: only beside others
+    std::vector<std::pair<std::size_t, FrameRow*>> steps_; ///< null: only a neighbour
     std::size_t next_ = 0;
-    std::deque<FrameRow> beside_; ///< rows of those
+    std::deque<FrameRow> neighbour_rows_; ///< rows of frames that are only neighbours
     std::size_t empty_;
 };
 
-/// Frames of a sequence, held back until what lies around them has arrived. Without a sequence they pass as they come.
-class Waiting {
+/// Holds frames of a sequence back until their neighbours have arrived. Without a sequence, frames pass through.
+class SequenceBuffer {
   public:
-    explicit Waiting(Neighbourhood* sequence) : sequence_(sequence) {}
+    explicit SequenceBuffer(Neighbourhood* sequence) : sequence_(sequence) {}
 
-    /// Takes a frame (or none, when all have come) and gives the next one that is complete, or none. Where an outage
-    /// kept one of those around it away, it is complete only at another time, and its row says so.
-    [[nodiscard]] Token pass(Token arrived);
-    /// Those that an interrupted walk leaves behind.
-    [[nodiscard]] const std::deque<Token>& rest() const { return queue_; }
+    /// Takes a frame, or none after the last one. Returns the next frame whose neighbours are complete, or none. A
+    /// frame that lost a neighbour to an outage fails with that outage, so that --resume computes it again.
+    [[nodiscard]] WorkPtr pass(WorkPtr arrived);
+    /// Frames that an interrupted walk leaves behind.
+    [[nodiscard]] const std::deque<WorkPtr>& rest() const { return queue_; }
 
   private:
     Neighbourhood* sequence_;
-    void blame_if_alone(FrameRow& row) const;
+    void fail_if_neighbour_lost(FrameRow& row) const;
 
     std::size_t newest_ = 0;
-    std::deque<Token> queue_;
-    std::vector<std::pair<std::size_t, std::string>> away_; ///< frames that an outage kept away, and why
+    std::deque<WorkPtr> queue_;
+    std::vector<std::pair<std::size_t, std::string>> lost_; ///< frames lost to an outage, and why
 };
 
-/// What is asked, with the reach that the capture's poses ask for where none is given.
+/// The options asked for. A reach that is not given follows from the capture's poses.
 [[nodiscard]] NeighbourhoodOptions sequence_options(NeighbourhoodOptions asked, const Capture& capture,
                                                     double radius_m);
 
-/// A frame's visibility together with the frames around it; its row's notes say which these were, and which were left
-/// out and why.
+/// Computes a frame's visibility with its neighbours. The row's notes list the neighbours used, and those left out with
+/// the reason.
 void compute_in_sequence(Work& work, const Capture& capture, Neighbourhood& sequence);
 
 } // namespace scanshade

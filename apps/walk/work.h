@@ -1,4 +1,4 @@
-// One frame on its way through the walk: what each step found, for the steps behind it.
+// One frame on its way through the walk, with the results of each step for the next ones.
 #pragma once
 
 #include "apps/walk/batch_options.h"
@@ -15,15 +15,15 @@ struct Work {
     Frame frame = {};
     double loaded_in_ms = 0; ///< above 0: `frame` was in memory before the walk
     DepthImage depth = {};
-    DepthImage looked_at = {}; ///< of a sequence: what the methods saw in place of `depth`
+    DepthImage looked_at = {}; ///< of a sequence: the depth that the method got in place of `depth`
     AoMap ao = {};
     cv::Mat1f confidence_in_view = {}; ///< of `ao`, pixel by pixel
     Attached attached = {}, confidence = {};
     bool wanted = true;             ///< false: loaded for the frames around it
-    bool by_points = false;         ///< no view: values come from the points themselves
-    PointVisibility of_points = {}; ///< what they are
+    bool by_points = false;         ///< no view: values come from rays at every point
+    PointVisibility of_points = {}; ///< those values
 };
 
-using Token = std::shared_ptr<Work>;
+using WorkPtr = std::shared_ptr<Work>;
 
 } // namespace scanshade

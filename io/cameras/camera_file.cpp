@@ -1,4 +1,4 @@
-// Cameras on disk: which format a file is in, told by its content, and which one to write, told by name.
+// Cameras on disk: finds a file's format by its content, and the format to write by its name.
 #include "io/cameras/camera_formats.h"
 #include "io/cameras/known_cameras.h"
 #include "io/output_file.h"
@@ -48,7 +48,7 @@ Eigen::Isometry3d rigid_from(const fs::path& file, const Eigen::Matrix4d& matrix
 
 namespace {
 
-constexpr std::size_t largest_file = 1 << 20; // a camera is a page of text; a data set's file by mistake is not parsed
+constexpr std::size_t largest_file = 1 << 20; // a camera is a page of text; larger files are given by mistake
 
 struct FormatRow {
     const char* name;
@@ -60,7 +60,7 @@ constexpr FormatRow formats[] = {
     {"opencv", CameraFormat::opencv, ".yml"},        {"ros", CameraFormat::ros, ".yaml"},
     {"kalibr", CameraFormat::kalibr, ".yaml"},       {"colmap", CameraFormat::colmap, ".txt"}};
 
-/// YAML has keys at the line's start, and a file that is not JSON but has one is taken for it.
+/// YAML has keys at the start of lines. A file with such a key that is not JSON counts as YAML.
 bool is_yaml(const std::string& bytes) {
     if (bytes.starts_with("%YAML") || bytes.starts_with("---"))
         return true;
@@ -88,7 +88,7 @@ void refuse_what_is_only_ours(const CameraFile& camera, CameraFormat format) {
     if (format == CameraFormat::scanshade)
         return;
     if (camera.colour && format != CameraFormat::kalibr)
-        throw Error("this format holds one camera, and there is a colour camera beside the depth camera; write .json "
+        throw Error("this format holds one camera, and there is a secondary camera for colour; write .json "
                     "(ours) or --format kalibr");
     if (camera.depth_correction.any())
         throw Error(fmt::format("this format has no depth correction, and there is one ({}); write .json (ours)",

@@ -20,7 +20,7 @@ struct CameraFile {
     Registration registration = Registration::unknown;
     std::vector<std::string> warnings;
     DepthCorrection depth_correction = {};   ///< of the depths that this camera records
-    std::optional<ColourCamera> colour = {}; ///< the camera beside it, where colour was taken with another one
+    std::optional<ColourCamera> colour = {}; ///< the secondary camera, if another one took the colour
     double pose_time_offset_s = 0;           ///< an image stamped t was taken at t + offset of the poses' clock
 };
 
@@ -49,14 +49,14 @@ enum class CameraFormat { scanshade, open3d, opencv, ros, kalibr, colmap };
 /// By name, or where that is empty by the file's extension. Throws Misuse listing what there is.
 [[nodiscard]] CameraFormat camera_format(const std::filesystem::path& file, const std::string& name);
 
-/// What some formats also tell of how the camera was found; empty and NaN where nothing is known.
+/// How the camera was found, as far as the format says; empty and NaN if unknown.
 struct CameraQuality {
     double rms_px = std::numeric_limits<double>::quiet_NaN(); ///< OpenCV's avg_reprojection_error
     std::vector<double> view_rms_px;                          ///< OpenCV's per_view_reprojection_errors
     std::string details;                                      ///< a JSON object, kept by ours under "refinement"
 };
 
-/// Writes atomically. Throws Error naming the file where the format cannot say what the camera is (a lens for Open3D,
+/// Writes atomically. Throws Error naming the file where the format cannot hold the whole camera (a lens for Open3D,
 /// k3 for Kalibr, a colour camera for all but ours and Kalibr's, a depth correction for all but ours): nothing is
 /// dropped.
 void write_camera_file(const std::filesystem::path& file, const CameraFile& camera,

@@ -14,7 +14,7 @@ inline constexpr int widest_image = 1 << 16;
 
 [[noreturn]] void refuse_camera(const std::filesystem::path& file, const std::string& why);
 
-/// Focal lengths that a pinhole can have; `names` are the words the file uses for fx, fy, cx, cy.
+/// Refuses focal lengths that no pinhole has; `names` are the file's words for fx, fy, cx, cy.
 void check_numbers(const std::filesystem::path& file, const Pinhole& camera, const std::array<std::string, 4>& names);
 
 /// A 4x4 matrix as a rigid transform, its rotation made exact. Throws Error naming the key where it is none to 1e-3.
@@ -31,7 +31,7 @@ void check_numbers(const std::filesystem::path& file, const Pinhole& camera, con
 /// Whether a line reads "ID MODEL WIDTH HEIGHT numbers", as COLMAP's cameras.txt does.
 [[nodiscard]] bool is_colmap(const std::vector<TextLine>& lines);
 
-// What cannot be said in a format is refused, never dropped.
+// A value that the format cannot hold is an Error; nothing is dropped.
 [[nodiscard]] std::string camera_as_json(const CameraFile& camera, const std::string& details);
 [[nodiscard]] std::string camera_as_open3d(const Camera& camera);
 [[nodiscard]] std::string camera_as_opencv(const Camera& camera, const CameraQuality& quality);

@@ -27,7 +27,7 @@ std::string key_before(std::string_view text, std::size_t offset) {
     return open == std::string_view::npos ? std::string() : std::string(text.substr(open + 1, close - open - 1));
 }
 
-/// NaN and Infinity are what Python's json writes and JSON does not know; the parser's own message would not say so.
+/// Python's json writes NaN and Infinity, which JSON does not have. The parser's own message would not say so.
 bool mentions_not_a_number(std::string_view rest) {
     return rest.starts_with("NaN") || rest.starts_with("nan") || rest.starts_with("Inf") || rest.starts_with("inf") ||
            rest.starts_with("-Inf") || rest.starts_with("-inf");
@@ -154,8 +154,8 @@ DepthCorrection correction_of(const fs::path& file, const Json& object) {
     return correction;
 }
 
-/// The camera that stands beside the main one.
-ColourCamera beside(const fs::path& file, const Json& object) {
+/// The secondary camera, which took the colour images.
+ColourCamera secondary_camera(const fs::path& file, const Json& object) {
     if (!object.is_object())
         refuse_camera(file, "not an object that describes a camera");
     const Json& rows = member(file, object, "colour_from_depth");
@@ -198,7 +198,7 @@ CameraFile camera_from_json(const fs::path& file, const std::string& text) {
     if (object.contains("pose_time_offset_s"))
         result.pose_time_offset_s = number_of(file, object["pose_time_offset_s"], "pose_time_offset_s");
     if (object.contains("colour"))
-        result.colour = during("\"colour\"", [&] { return beside(file, object["colour"]); });
+        result.colour = during("\"colour\"", [&] { return secondary_camera(file, object["colour"]); });
     return result;
 }
 

@@ -69,7 +69,7 @@ CameraFile camera_from_xml(const fs::path& file, const std::string& text) {
             refuse_camera(file, fmt::format("\"{}\" is {}, expected metres per stored unit", unit, metres));
         result.depth_units_per_metre = units;
     }
-    // Depth laid onto colour pixels has the colour camera's numbers; the same numbers, though, do not tell that it was.
+    // Registered depth has the colour camera's numbers. But equal numbers do not prove that depth is registered.
     if (tree.get_child_optional("rgb") && !same_numbers(pinhole_at(file, tree, "rgb"), result.camera.pinhole))
         result.registration = Registration::no;
     return result;

@@ -1,5 +1,5 @@
-// Cameras as YAML: OpenCV's own, ROS's camera_info, Kalibr's camchain. (OpenCV's parser comes to no end with some
-// damaged files; yaml-cpp reads all three.)
+// Cameras as YAML: OpenCV's own, ROS's camera_info, Kalibr's camchain. (yaml-cpp reads all three, because
+// OpenCV's parser never returns from some damaged files.)
 #include "io/cameras/camera_formats.h"
 #include "projection/error.h"
 
@@ -83,7 +83,7 @@ Distortion fisheye(const fs::path& file, const std::string& key, const std::vect
     return {k[0], k[1], 0, 0, k[2], k[3], LensModel::kannala_brandt};
 }
 
-/// k1 k2 p1 p2 [k3 [k4 k5 k6 ...]]: what goes beyond k3 must be zero.
+/// k1 k2 p1 p2 [k3 [k4 k5 k6 ...]]: coefficients after k3 must be zero.
 Distortion polynomial(const fs::path& file, const std::string& key, std::vector<double> k) {
     for (std::size_t i = 5; i < k.size(); ++i)
         if (k[i] != 0)
@@ -142,7 +142,7 @@ Camera of_chain(const fs::path& file, const YAML::Node& node) {
     return camera;
 }
 
-Eigen::Isometry3d place_in_chain(const fs::path& file, const YAML::Node& node) {
+Eigen::Isometry3d pose_in_chain(const fs::path& file, const YAML::Node& node) {
     Eigen::Matrix4d matrix = Eigen::Matrix4d::Zero();
     bool whole = node.IsSequence() && node.size() == 4;
     for (std::size_t row = 0; row < 4 && whole; ++row) {
@@ -156,15 +156,15 @@ Eigen::Isometry3d place_in_chain(const fs::path& file, const YAML::Node& node) {
     return rigid_from(file, matrix, "T_cn_cnm1");
 }
 
-/// cam0 is the depth camera; a cam1 whose place is told is the colour camera.
+/// cam0 is the depth camera; a cam1 with a pose is the secondary camera, which took the colour.
 CameraFile from_camchain(const fs::path& file, const YAML::Node& root) {
     CameraFile result;
     result.camera = of_chain(file, root["cam0"]);
-    if (const YAML::Node beside = root["cam1"]; beside.IsDefined()) {
-        if (!beside.IsMap() || !beside["T_cn_cnm1"].IsDefined()) {
+    if (const YAML::Node secondary = root["cam1"]; secondary.IsDefined()) {
+        if (!secondary.IsMap() || !secondary["T_cn_cnm1"].IsDefined()) {
             result.warnings.push_back(file.string() + ": more than one camera; cam0 is used.");
         } else {
-            result.colour = ColourCamera{of_chain(file, beside), place_in_chain(file, beside["T_cn_cnm1"])};
+            result.colour = ColourCamera{of_chain(file, secondary), pose_in_chain(file, secondary["T_cn_cnm1"])};
             result.warnings.push_back(file.string() +
                                       ": cam0 is taken as the depth camera, cam1 as the colour camera.");
         }
@@ -200,7 +200,7 @@ CameraFile camera_from_yaml(const fs::path& file, const std::string& text) {
             return from_matrices(file, root);
         if (root["cam0"].IsDefined())
             return from_camchain(file, root);
-    } catch (const YAML::Exception& failure) { // a node of another kind than its use
+    } catch (const YAML::Exception& failure) { // a node of the wrong kind
         refuse_camera(file, failure.msg);
     }
     refuse_camera(file, "\"camera_matrix\" (OpenCV, ROS) and \"cam0\" (Kalibr) are both missing");

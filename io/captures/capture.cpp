@@ -2,13 +2,13 @@
 // other.
 #include "io/captures/capture.h"
 
+#include "io/captures/layouts.h"
+#include "io/captures/plausibility.h"
+#include "io/captures/trajectory.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
 #include "io/clouds/format.h"
 #include "io/images/format.h"
-#include "io/captures/layouts.h"
-#include "io/captures/plausibility.h"
-#include "io/captures/trajectory.h"
 #include "io/text.h"
 #include "projection/error.h"
 
@@ -38,9 +38,9 @@ Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
     if (auto listing = list_clouds(folder))
         return *std::move(listing);
     throw NoFrames(fmt::format("no frames found in {}: looked for depth.txt (TUM), frame-NNNNNN.depth.png (7-Scenes), "
-                            "TIME_depth.pclzf (PCL), a folder depth/ "
-                            "(Redwood, RealSense), 16-bit or float depth images, and clouds ({})",
-                            folder.string(), listed(cloud_format_names(), "or")));
+                               "TIME_depth.pclzf (PCL), a folder depth/ "
+                               "(Redwood, RealSense), 16-bit or float depth images, and clouds ({})",
+                               folder.string(), listed(cloud_format_names(), "or")));
 }
 
 Listing list_file(const fs::path& file) {
@@ -127,7 +127,7 @@ void settle_camera(Listing& listing, const CaptureOptions& options) {
 
 std::string text(cv::Size size) { return fmt::format("{}x{}", size.width, size.height); }
 
-/// Camera, depth and colour must be of one size: nothing is scaled without being asked for.
+/// Camera, depth and colour must have the same size: nothing is scaled unasked.
 void check_depth_size(const Frame& frame, const fs::path& depth) {
     const cv::Size expected = frame.camera.pinhole.size, found = frame.depth_m.size();
     if (!expected.empty() && found != expected)
@@ -135,7 +135,7 @@ void check_depth_size(const Frame& frame, const fs::path& depth) {
                                 text(expected), frame.camera.origin));
 }
 
-/// A share that went while frames were read is no fault of theirs.
+/// A network share that disappears while frames are read is not their fault.
 void check_still_there(const Capture& capture) {
     if (std::error_code trouble; !fs::exists(capture.path, trouble))
         throw Outage(capture.path.string() + ": not there any more");
@@ -164,7 +164,7 @@ void correct(cv::Mat1f& depth_m, const DepthCorrection& correction) {
     if (!correction.any())
         return;
     std::transform(depth_m.begin(), depth_m.end(), depth_m.begin(), [&](float z) {
-        return z > 0 ? std::max(0.0F, static_cast<float>(correction(z))) : z; // what is corrected away is a hole
+        return z > 0 ? std::max(0.0F, static_cast<float>(correction(z))) : z; // depth corrected below zero is a hole
     });
 }
 
@@ -203,7 +203,7 @@ void load_cloud(const Capture& capture, const CaptureEntry& entry, Frame& frame)
             throw Error(fmt::format("{}: the cloud's grid is {}, but its camera is for {} ({})", entry.cloud,
                                     text(grid), text(pinhole.size), frame.camera.origin));
     } else if (pinhole.size.empty()) {
-        // Four numbers say nothing about the image; a principal point is usually its middle.
+        // Four numbers do not include the image size; a principal point is usually in the middle.
         constexpr double widest = 1 << 14;
         if (!(pinhole.cx >= 0 && pinhole.cy >= 0 && pinhole.cx < widest / 2 && pinhole.cy < widest / 2))
             throw Error(fmt::format("{}: an image size is needed with this camera ({}); give a camera file",
@@ -220,7 +220,7 @@ void load_cloud(const Capture& capture, const CaptureEntry& entry, Frame& frame)
 
 namespace {
 
-/// Poses of a file in place of the recording's own. Throws Error where no frame finds one.
+/// Replaces the recording's poses by those of a file. Throws Error if no frame has one.
 void take_poses(Capture& capture, const CaptureOptions& options) {
     const std::vector<StampedPose> poses = read_tum_trajectory(options.poses, capture.warnings);
     std::size_t found = 0;

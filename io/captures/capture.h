@@ -14,7 +14,7 @@
 
 namespace scanshade {
 
-/// What the user said about a capture that its files may not say.
+/// Settings of the user for facts that a capture's files may lack.
 struct CaptureOptions {
     std::string camera;                ///< file or "fx,fy,cx,cy"; empty = from the capture
     std::string depth_scale;           ///< as depth_encoding() takes it; empty = from the layout
@@ -23,21 +23,21 @@ struct CaptureOptions {
         {}; ///< TUM's rows, by time or, where frames have none, by index; empty = the capture's own
 };
 
-/// One frame's listing: where its parts lie. Nothing is decoded yet.
+/// One frame's listing: the paths of its parts. Nothing is decoded yet.
 struct CaptureEntry {
     std::string name; ///< unique in the capture
-    /// Paths; empty where there is none. Not as std::filesystem::path, which holds every component apart: of thousands
-    /// of frames that would be most of what a capture takes.
+    /// Paths; empty where there is none. Not as std::filesystem::path, which stores every component separately: for
+    /// thousands of frames these would take most of a capture's memory.
     std::string colour, depth, cloud;
     std::optional<Eigen::Isometry3d> world_from_camera;
     std::optional<double> stamp_s;        ///< of the depth image
     std::optional<double> colour_stamp_s; ///< of the colour image paired with it
-    Motion motion;                        ///< of the camera then, where its trajectory tells
+    Motion motion;                        ///< of the camera at that time, if the trajectory has it
     std::string problem; ///< why this frame cannot be loaded (names file and line); empty = it may be tried
-    std::vector<std::string> warnings; ///< what was odd in the listing of this frame
+    std::vector<std::string> warnings; ///< oddities in the listing of this frame
 };
 
-/// A folder holds nothing of a known layout. Its own folders may.
+/// A folder has no known layout. Its own folders may.
 class NoFrames : public Error {
   public:
     using Error::Error;
@@ -51,7 +51,7 @@ struct Capture {
     std::optional<Camera> camera; ///< none: clouds recover theirs; depth images need --camera
     DepthEncoding depth;
     DepthCorrection depth_correction;          ///< from the camera's file; load() applies it
-    std::optional<ColourCamera> colour_camera; ///< where colour images were taken, if it is known and not the depth's
+    std::optional<ColourCamera> colour_camera; ///< the secondary camera, if one took the colour images and is known
     double pose_time_offset_s = 0;             ///< from the camera's file; already in the poses
     Registration registration = Registration::unknown;
     std::string registration_reason;
@@ -64,8 +64,8 @@ struct Capture {
     [[nodiscard]] Frame load(std::size_t index, bool with_colour = true) const;
 };
 
-/// Opens a folder (layout told by its content), a single depth image, or a cloud file.
-/// Throws Error "no frames found in ..." where there is nothing to do, naming what was looked for.
+/// Opens a folder (its content determines the layout), a single depth image, or a cloud file.
+/// Throws Error "no frames found in ..." if there are none, with the file names it looked for.
 [[nodiscard]] Capture open_capture(const std::filesystem::path& path, const CaptureOptions& options = {});
 
 } // namespace scanshade

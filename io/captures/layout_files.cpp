@@ -80,7 +80,7 @@ bool stays_inside(const fs::path& relative) {
     return !relative.empty() && relative.is_relative() && *relative.begin() != "..";
 }
 
-/// Whether a part of the name is a link: few are, and only those need to be followed to their ends.
+/// Whether a part of the path is a link: only these rare paths have to be resolved.
 bool through_a_link(fs::path at, const fs::path& relative) {
     return std::any_of(relative.begin(), relative.end(), [&](const fs::path& part) {
         std::error_code ignored;
@@ -137,7 +137,7 @@ std::optional<CameraFile> camera_in(const fs::path& folder, std::vector<std::str
         } catch (const Outage&) {
             throw;
         } catch (const Error&) {
-            continue; // a name that promises nothing may hold anything
+            continue; // other names may hold anything
         }
     }
     return found;
@@ -149,7 +149,7 @@ DepthEncoding assumed_encoding(const fs::path& first_depth) {
         floats = !first_depth.empty() && peek(first_depth).floats;
     } catch (const Outage&) {
         throw;
-    } catch (const Error&) { // loading that frame will say what is wrong with it
+    } catch (const Error&) { // loading that frame reports the error
     }
     if (floats)
         return depth_encoding("m", "assumed: floats are metres");
@@ -173,7 +173,7 @@ std::string fit_for_a_file(const std::string& name) {
 
 void settle_names(std::vector<CaptureEntry>& entries) {
     std::set<std::string> taken;
-    std::map<std::string, int> next; // of names that are wanted again and again
+    std::map<std::string, int> next; // per repeated name
     for (CaptureEntry& entry : entries) {
         const std::string wanted = fit_for_a_file(entry.name);
         for (entry.name = wanted; !taken.insert(entry.name).second;)

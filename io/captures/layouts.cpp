@@ -1,10 +1,10 @@
 // Layouts of folders other than TUM's: 7-Scenes, colour and depth folders, depth images alone, clouds.
 #include "io/captures/layouts.h"
 
+#include "io/captures/trajectory.h"
 #include "io/clouds/format.h"
 #include "io/images/format.h"
 #include "io/text.h"
-#include "io/captures/trajectory.h"
 #include "projection/error.h"
 
 #include <algorithm>
@@ -55,7 +55,7 @@ CaptureEntry scene_entry(const std::string& name, const SceneFrame& frame, const
         missing.emplace_back("no pose file");
     if (!missing.empty())
         entry.warnings.push_back(
-            fmt::format("{} stands alone: {}.", frame.depth.filename().string(), name_list(missing)));
+            fmt::format("{} has no partner: {}.", frame.depth.filename().string(), name_list(missing)));
     if (frame.pose.empty())
         return entry;
     const MatrixPose pose = read_matrix_pose(frame.pose);

@@ -1,4 +1,4 @@
-// The ways in which captures lie on disk, one function per layout: what open_capture() tries, in its order.
+// The layouts of captures on disk, one function each, in the order in which open_capture() tries them.
 #pragma once
 
 #include "io/captures/capture.h"
@@ -17,7 +17,7 @@ struct Listing {
     /// Called only when the user named no camera.
     std::function<std::optional<CameraFile>(cv::Size depth_size, std::vector<std::string>& warnings)> find_camera;
     /// Gives entries their poses by time; none where the layout ties poses to frames itself. Called once the camera is
-    /// known, whose file may tell how far the clocks are apart.
+    /// known, because its file may have the offset between the clocks.
     std::function<void(Capture& capture, double pose_time_offset_s)> find_poses = {};
 };
 
@@ -35,8 +35,8 @@ struct Listing {
 [[nodiscard]] std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder);
 [[nodiscard]] bool natural_less(const std::string& a, const std::string& b);
 
-/// Why a file that a list names cannot be opened: outside the capture's folder, by its name or through a link, or
-/// missing. Empty = it is there.
+/// Why a listed file cannot be opened: it is missing, or outside the capture's folder, by name or through a link.
+/// Empty = it can be opened.
 [[nodiscard]] std::string trouble_with(const std::filesystem::path& folder, const std::string& name);
 
 /// The camera among a folder's files: camera.json, any JSON or text file whose name speaks of a camera or intrinsics,
@@ -45,15 +45,15 @@ struct Listing {
 [[nodiscard]] std::optional<CameraFile> camera_in(const std::filesystem::path& folder,
                                                   std::vector<std::string>& warnings);
 
-/// The camera and depth unit in the XML file that PCL writes beside a depth image of its recordings (TIME.xml beside
+/// The camera and depth unit in the XML file that PCL writes with a depth image of its recordings (TIME.xml for
 /// TIME_depth.pclzf); nothing where there is none.
 [[nodiscard]] std::optional<CameraFile> camera_beside_pclzf(const std::filesystem::path& depth);
 
 /// "assumed: 16-bit integers are millimetres", or metres where `first_depth` holds floats.
 [[nodiscard]] DepthEncoding assumed_encoding(const std::filesystem::path& first_depth);
 
-/// Makes the entries' names unique, and fit for file names: UTF-8 without slashes and control characters, short enough
-/// to have something added, not hidden.
+/// Makes the entries' names unique, and fit for file names: UTF-8 without slashes and control characters, not hidden,
+/// and short enough to be extended.
 void settle_names(std::vector<CaptureEntry>& entries);
 
 } // namespace scanshade

@@ -66,7 +66,7 @@ CaptureEntry shot_entry(const std::string& name, const Shot& shot, bool colours)
                                     (shot.colour.parent_path() / (name + "_depth.pclzf")).string(),
                                     shot.colour.filename().string());
     else if (colours && shot.colour.empty())
-        entry.warnings.push_back(fmt::format("{} stands alone: no colour image.", shot.depth.filename().string()));
+        entry.warnings.push_back(fmt::format("{} has no colour image.", shot.depth.filename().string()));
     return entry;
 }
 
@@ -76,8 +76,7 @@ bool same(const CameraFile& a, const CameraFile& b) {
            a.depth_units_per_metre == b.depth_units_per_metre;
 }
 
-/// The camera that the first readable XML file tells. The others should tell the same; those that cannot be read or do
-/// not are warned about.
+/// The camera in the first readable XML file. Others that differ or cannot be read give a warning.
 std::optional<CameraFile> recorded_camera(const Shots& shots, std::vector<std::string>& warnings) {
     std::optional<CameraFile> first;
     RepeatedWarning trouble(warnings);
@@ -87,7 +86,7 @@ std::optional<CameraFile> recorded_camera(const Shots& shots, std::vector<std::s
             if (!first)
                 first = camera;
             else if (camera && !same(*camera, *first))
-                trouble.add(fmt::format("{} tells another camera than {}, whose is used for all frames.",
+                trouble.add(fmt::format("{} has another camera than {}, whose camera is used for all frames.",
                                         camera->camera.origin, first->camera.origin));
         } catch (const Outage&) {
             throw;
@@ -139,7 +138,7 @@ std::optional<Listing> list_pcl_recording(const fs::path& folder) {
     if (recorded && recorded->depth_units_per_metre) // also where the camera comes from elsewhere
         capture.depth = depth_encoding(fmt::format("{}", *recorded->depth_units_per_metre), recorded->camera.origin);
     listing.find_camera = [folder, recorded](cv::Size, std::vector<std::string>& warnings) {
-        const auto placed = camera_in(folder, warnings); // by someone who knew better
+        const auto placed = camera_in(folder, warnings); // placed by the user
         return placed ? placed : recorded;
     };
     return listing;

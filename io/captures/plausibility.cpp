@@ -69,7 +69,7 @@ std::string what_others_give(const cv::Mat& stored, const DepthEncoding& encodin
 
 std::vector<std::string> doubts_about(const cv::Mat1f& depth_m, const cv::Mat& stored, const DepthEncoding& encoding) {
     constexpr float nearest_median_m = 0.05F, farthest_median_m = 200, farthest_m = 1000;
-    // Where nobody named the encoding, what is beyond a room's sensor is worth a word as well.
+    // If nobody named the encoding, depth beyond an indoor sensor's range is worth a warning, too.
     constexpr float assumed_farthest_median_m = 12;
     const Statistics depth = statistics_of(depth_m);
     if (depth.valid == 0) {

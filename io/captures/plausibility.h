@@ -1,5 +1,5 @@
-// Does a depth image look like one? Nothing in a file tells the encodings apart, so what was assumed is checked against
-// what sensors can see.
+// Checks whether a depth image is plausible. A file does not name its encoding, so the assumed one is checked against
+// the range and smoothness of real sensors.
 #pragma once
 
 #include "io/images/image_file.h"

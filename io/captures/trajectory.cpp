@@ -29,7 +29,7 @@ Eigen::Isometry3d pose_from(const Eigen::Vector3d& translation, const Eigen::Qua
     return pose;
 }
 
-/// tx ty tz qx qy qz qw from seven words; what is wrong goes to `trouble`, what was mended to `warning`.
+/// tx ty tz qx qy qz qw from seven words; errors go to `trouble`, corrections to `warning`.
 std::optional<Eigen::Isometry3d> quaternion_pose(const std::vector<std::string_view>& row, std::size_t first,
                                                  std::string& trouble, std::string& warning) {
     static constexpr std::array names{"tx", "ty", "tz", "qx", "qy", "qz", "qw"};
@@ -69,7 +69,7 @@ Eigen::Isometry3d rigid(const Eigen::Matrix4d& m) {
     return pose_from(m.topRightCorner<3, 1>(), Eigen::Quaterniond(Eigen::Matrix3d(m.topLeftCorner<3, 3>())));
 }
 
-/// Lines that hold something: neither blank nor a comment.
+/// Lines that are neither blank nor a comment.
 std::vector<TextLine> content_lines(std::string_view bytes) {
     auto lines = text_lines(bytes);
     std::erase_if(
@@ -189,7 +189,7 @@ std::map<std::size_t, Eigen::Isometry3d> read_redwood_log(const fs::path& file, 
             trouble = read_row(text, matrix, row);
             line = text.number;
         }
-        if (!trouble.empty()) { // what follows cannot be told apart into poses any more
+        if (!trouble.empty()) { // the rest cannot be split into poses
             warnings.push_back(
                 fmt::format("{}: {}; this pose and all after it not used.", at_line(file, line), trouble));
             return poses;

@@ -21,8 +21,9 @@ struct StampedPose {
 [[nodiscard]] std::vector<StampedPose> read_tum_trajectory(const std::filesystem::path& file,
                                                            std::vector<std::string>& warnings);
 
-/// Where a camera was: between the poses before and after where both are near enough in time, else at the nearer one.
-[[nodiscard]] std::optional<Eigen::Isometry3d> pose_at(const std::vector<StampedPose>& poses, double stamp_s, double limit_s);
+/// A camera's pose: interpolated if the poses before and after are near enough in time, else the nearer one.
+[[nodiscard]] std::optional<Eigen::Isometry3d> pose_at(const std::vector<StampedPose>& poses, double stamp_s,
+                                                       double limit_s);
 
 /// The same rows without time: the pose of row N (counted from 1, comments and blank lines left out).
 [[nodiscard]] std::map<std::size_t, Eigen::Isometry3d> read_pose_rows(const std::filesystem::path& file,

@@ -38,7 +38,7 @@ void sort_by_time(std::vector<ListedImage>& images, const fs::path& list, std::v
                                      at_line(list, images[i].line), images[i].stamp, images[i - 1].line));
 }
 
-/// "time file name" per line; what cannot be used is left out with a warning.
+/// "time file name" per line; unusable lines are left out with a warning.
 std::vector<ListedImage> read_list(const fs::path& list, std::vector<std::string>& warnings) {
     const std::string bytes = read_list_file(list);
     std::vector<ListedImage> images;
@@ -72,7 +72,7 @@ std::vector<ListedImage> read_list(const fs::path& list, std::vector<std::string
 /// order.
 std::vector<std::optional<std::size_t>> pair_by_time(const std::vector<ListedImage>& depths,
                                                      const std::vector<ListedImage>& colours, double limit_s) {
-    // Of many images within a generous limit the nearest on either side are enough.
+    // If many images are within a generous limit, the nearest on either side are enough.
     constexpr std::size_t neighbours = 16;
     std::vector<std::tuple<double, std::size_t, std::size_t>> candidates;
     for (std::size_t d = 0; d < depths.size(); ++d) {
@@ -153,7 +153,7 @@ void add_colours(const fs::path& folder, const std::vector<ListedImage>& depths,
         std::count_if(colour_of.begin(), colour_of.end(), [](const auto& c) { return c.has_value(); }));
     if (pairs == 0)
         throw Error(fmt::format(
-            "{}: no depth and colour image lie within {} s of each other: depth.txt starts {:.3f} s {} rgb.txt "
+            "{}: no depth and colour image are within {} s of each other: depth.txt starts {:.3f} s {} rgb.txt "
             "({} against {})",
             folder.string(), limit_s, std::abs(depths[0].stamp_s - colours[0].stamp_s),
             depths[0].stamp_s < colours[0].stamp_s ? "before" : "after", depths[0].stamp, colours[0].stamp));
@@ -191,7 +191,7 @@ void add_poses(const fs::path& folder, double limit_s, double offset_s, Capture&
     }
     if (without == capture.entries.size())
         capture.warnings.push_back(
-            fmt::format("{}: no pose within {} s of any depth image; the first lies {:.3f} s from the first one.",
+            fmt::format("{}: no pose within {} s of any depth image; the first pose is {:.3f} s from the first image.",
                         list.string(), limit_s, std::abs(poses.front().stamp_s - *capture.entries.front().stamp_s)));
 }
 

@@ -1,4 +1,4 @@
-// Clouds in and out: the format told by content, points and colours taken from the records, fields added to them.
+// Clouds in and out: finds the format by content, reads points and colours from the records, adds fields to them.
 #include "io/clouds/cloud_file.h"
 
 #include "io/clouds/cloud_records.h"
@@ -39,7 +39,7 @@ CloudRecords read_records(const fs::path& file, std::vector<std::string>& warnin
     return records;
 }
 
-/// A coordinate of every point, its place looked up once where records are alike.
+/// A coordinate of every point; finds its offset once if records have equal length.
 void read_coordinate(const CloudRecords& records, std::size_t field, int axis, std::vector<Eigen::Vector3d>& points) {
     const bool alike = records.stride != 0;
     const std::size_t offset = records.fields[field].offset;
@@ -92,7 +92,7 @@ cv::Vec3b bgr_of(std::uint32_t bits) {
     return {static_cast<uchar>(bits), static_cast<uchar>(bits >> 8), static_cast<uchar>(bits >> 16)};
 }
 
-/// LAS has 16 bits a channel; many writers put bytes in them all the same. What the values are divided by.
+/// The divisor of colour values: LAS has 16 bits per channel, but many writers store 8-bit values in them.
 unsigned las_colour_step(const CloudRecords& records, const std::array<std::size_t, 3>& bgr) {
     for (std::size_t i = 0; i < records.point_count; ++i)
         for (const std::size_t channel : bgr)
@@ -148,7 +148,7 @@ void check_added(const Cloud& cloud, const AddedField& field) {
                                 counted(field.values.size(), "value"), counted(cloud.points.size(), "point")));
 }
 
-/// Splits what is to be added into fields the file already has and new ones.
+/// Splits the added fields into those that the file already has and new ones.
 void sort_out(const CloudRecords& records, const std::vector<AddedField>& added,
               std::vector<FieldReplacement>& replacements, std::vector<FieldAddition>& additions) {
     for (const AddedField& field : added) {

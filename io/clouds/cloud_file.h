@@ -16,7 +16,7 @@ namespace scanshade {
 /// LAS 1.0 to 1.4 (not LAZ), told by content; .xyz, .pts, .ptx and KITTI's .bin, told by name. Coordinates in the
 /// file's unit. Infinite or absurd (> 1e30) coordinates become NaN. Throws Error naming the file and the line or
 /// byte offset for every damage the header or body shows; nothing is allocated from an unchecked number. `warnings`
-/// receives what was odd but readable.
+/// receives oddities that do not prevent reading.
 [[nodiscard]] Cloud read_cloud(const std::filesystem::path& file, std::vector<std::string>& warnings);
 
 /// Indices of points, three per triangle, of a mesh (a PLY with faces; polygons are fanned, -1 names no vertex); empty
@@ -49,7 +49,7 @@ void write_new_ply(const std::filesystem::path& file, const std::vector<Eigen::V
 
 /// Properties of the file as people ask for them: format, encoding, fields, grid.
 [[nodiscard]] std::string describe(const CloudRecords& records);
-/// What the coordinates count, and who says so; empty for the formats whose custom is metres.
+/// The unit of the coordinates and its source; empty for formats that use metres by convention.
 [[nodiscard]] std::string unit_of(const CloudRecords& records);
 /// ".pcd", ".ply", ".las" ..., as read; what was read without a header is written as ".ply".
 [[nodiscard]] std::string extension(const CloudRecords& records);

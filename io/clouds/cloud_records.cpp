@@ -52,7 +52,7 @@ std::optional<std::size_t> CloudRecords::field_named(std::string_view name) cons
 
 namespace {
 
-/// Reads a `Number` whose bytes may lie in the other order.
+/// Reads a `Number` in either byte order.
 template <class Number>
 Number raw(const char* from, bool big_endian) {
     std::array<char, sizeof(Number)> bytes{};
@@ -98,7 +98,7 @@ decltype(auto) with_type(Scalar type, Action&& action) {
     return action(double());
 }
 
-/// Rounded and held within the type's range; integers know no NaN and get 0.
+/// Rounded and clamped to the type's range; integers have no NaN and get 0.
 template <class Number>
 Number nearest(double value) {
     if constexpr (std::is_floating_point_v<Number>)

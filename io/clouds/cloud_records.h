@@ -51,18 +51,18 @@ struct CloudRecords {
         ends;          ///< where each record ends in `points` (text: behind its last word), when stride is 0
     std::string after; ///< faces, other elements, left-over lines
     std::array<double, 3> scale{1, 1, 1}, shift{0, 0, 0}; ///< coordinates are field values times scale plus shift
-    std::vector<Eigen::Vector3d> placed;                  ///< the points, where fields alone do not tell them
-    std::string unit; ///< of the coordinates, and who says so; empty: metres, as clouds have by custom
-    std::optional<Eigen::Isometry3d> viewpoint; ///< world_from_camera as the PCD says, where it says something
+    std::vector<Eigen::Vector3d> placed;                  ///< the points, if fields alone do not give them
+    std::string unit;                           ///< of the coordinates, and its source; empty: metres, by convention
+    std::optional<Eigen::Isometry3d> viewpoint; ///< world_from_camera, if the PCD has one
 
     [[nodiscard]] bool text() const { return encoding == Encoding::ascii; }
     /// Point `index`'s bytes; for text what lies between the last word before it and its own last word.
     [[nodiscard]] std::string_view record(std::size_t index) const;
-    /// The first field of that name that is no list: lists may be empty, and have no value to read.
+    /// The first field of that name that is not a list, because a list may be empty.
     [[nodiscard]] std::optional<std::size_t> field_named(std::string_view name) const;
 };
 
-/// Where a field lies in a record: byte range of all its values (text: of its words).
+/// A field's byte range in a record: all its values (text: its words).
 struct FieldPlace {
     std::size_t offset = 0, length = 0;
 };
@@ -99,7 +99,7 @@ struct FieldAddition {
 [[nodiscard]] std::string edited_points(const CloudRecords& records, const std::vector<FieldReplacement>& replacements,
                                         const std::vector<FieldAddition>& additions);
 
-/// Lines of an ASCII body that hold words; blank ones are passed over.
+/// Lines of an ASCII body; skips blank ones.
 class TextRecords {
   public:
     TextRecords(std::string_view body, int first_line) : body_(body), line_(first_line - 1) {}

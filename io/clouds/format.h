@@ -1,5 +1,5 @@
-// The table of cloud formats. Whoever asks whether a file is a cloud, what it is called, or how it is read or written
-// asks here. A new format is a row in format.cpp and a file beside it.
+// The table of cloud formats: names, signatures, extensions, readers and writers. No other code tells formats apart. A
+// new format is a row in format.cpp and a file beside it.
 #pragma once
 
 #include "io/clouds/cloud_records.h"
@@ -15,11 +15,11 @@ namespace scanshade {
 
 struct CloudFormat {
     std::string_view name; ///< "PLY"
-    /// Whether a file that begins so is of this format. None: nothing but its name tells.
+    /// Whether a file that begins so is of this format. None: only the name says so.
     bool (*signature)(std::string_view start) = nullptr;
     std::array<std::string_view, 2> extensions; ///< lower case, with the dot
-    std::string_view written_extension = {};    ///< of what `written` makes, where it is not the first of them
-    std::string_view refusal = {};              ///< why it is not read, and what helps
+    std::string_view written_extension = {};    ///< of files that `written` makes, if it is not the first one
+    std::string_view refusal = {};              ///< why it is not read, and what to do instead
 
     CloudRecords (*read)(std::string_view bytes, const std::filesystem::path& file,
                          std::vector<std::string>& warnings) = nullptr;

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Places in the public header block.
+// Offsets in the public header block.
 constexpr std::size_t at_minor = 25, at_header_size = 94, at_points = 96, at_vlr_count = 100, at_format = 104,
                       at_length = 105, at_count = 107, at_scale = 131, at_shift = 155, at_box = 179, at_waveform = 227,
                       at_evlrs = 235, at_evlr_count = 243, at_count_64 = 247;
@@ -53,7 +53,7 @@ CloudField field(std::string name, Scalar type, std::size_t count = 1) {
 
 void add(std::vector<CloudField>& fields, std::initializer_list<CloudField> more) { fields.insert(fields.end(), more); }
 
-/// What a record of point format 0 .. 10 holds.
+/// The fields of a record of point format 0 .. 10.
 std::vector<CloudField> fields_of_format(int format) {
     std::vector<CloudField> fields{field("x", Scalar::int32), field("y", Scalar::int32), field("z", Scalar::int32),
                                    field("intensity", Scalar::uint16)};
@@ -87,7 +87,7 @@ std::size_t stride_of(const std::vector<CloudField>& fields) {
     return stride;
 }
 
-/// One variable length record, by places in the file.
+/// One variable length record, by offsets in the file.
 struct Vlr {
     std::string_view user, data;
     std::uint16_t id = 0;
@@ -110,8 +110,8 @@ std::vector<Vlr> vlrs_of(std::string_view header, std::size_t first, std::uint32
 
 bool names_extra_bytes(const Vlr& vlr) { return vlr.user == "LASF_Spec" && vlr.id == 4; }
 
-/// Fields behind the format's own, as far as a record describes them; what is left is one field of bytes. Returns where
-/// in the header the last description that makes sense ends; 0 where there is no such record.
+/// Fields after the format's own, as far as a record describes them; the rest is one field of bytes. Returns the offset
+/// in the header where the last valid description ends; 0 if there is no such record.
 std::size_t add_extra_fields(std::vector<CloudField>& fields, const std::vector<Vlr>& vlrs, std::size_t record_length) {
     static constexpr std::array types{Scalar::uint8, Scalar::int8,   Scalar::uint16, Scalar::int16,   Scalar::uint32,
                                       Scalar::int32, Scalar::uint64, Scalar::int64,  Scalar::float32, Scalar::float64};
@@ -143,7 +143,7 @@ std::size_t add_extra_fields(std::vector<CloudField>& fields, const std::vector<
 
 // --- units ---
 
-/// What the coordinates count, from GeoTIFF keys or well-known text; empty where the file does not say.
+/// The unit of the coordinates, from GeoTIFF keys or well-known text; empty if the file does not say.
 std::string unit_of(const std::vector<Vlr>& vlrs) {
     std::uint16_t linear = 0, model = 0;
     std::string_view text;
@@ -191,7 +191,7 @@ void check_scales(CloudRecords& records, std::string_view bytes, const fs::path&
     }
 }
 
-/// The box in the header is of no use to us, but a lie is worth a word.
+/// The header's box is not used, but a wrong one is worth a warning.
 void doubt_box(const CloudRecords& records, std::string_view header, const fs::path& file,
                std::vector<std::string>& warnings) {
     for (std::size_t axis = 0; axis < 3 && records.point_count > 0; ++axis) {
@@ -304,7 +304,7 @@ std::string descriptor(const std::string& name) {
     return bytes;
 }
 
-/// Extra bytes that nothing describes must be stepped over before ours are.
+/// Describes extra bytes that have no description, so that ours come after them.
 std::string descriptors_of_raw_bytes(std::size_t count) {
     constexpr std::size_t most = 255; // the number is a byte
     std::string all;
@@ -317,8 +317,8 @@ std::string descriptors_of_raw_bytes(std::size_t count) {
     return all;
 }
 
-/// Adds the descriptors to the record that describes extra bytes, before what makes no sense in it, or makes a record
-/// behind the last one. Returns by how much the header grew.
+/// Adds the descriptors to the record that describes extra bytes, after its valid ones, or makes a new record after the
+/// last one. Returns by how much the header grew.
 std::size_t describe_extra_bytes(std::string& header, const std::string& descriptors, std::size_t stride) {
     const std::size_t first = read_at<std::uint16_t>(header, at_header_size);
     const auto count = read_at<std::uint32_t>(header, at_vlr_count);
@@ -372,7 +372,7 @@ std::string las_bytes(const CloudRecords& records, const std::string& points,
     put(header, at_length, static_cast<std::uint16_t>(length));
     put(header, at_points, static_cast<std::uint32_t>(records.header.size() + grown));
     const int minor = read_at<std::uint8_t>(header, at_minor);
-    const auto shift = [&](std::size_t at) { // of what lies behind the points
+    const auto shift = [&](std::size_t at) { // an offset that follows the points
         if (const auto place = read_at<std::uint64_t>(header, at); place >= records.header.size())
             put(header, at, place + grown + wider);
     };

@@ -233,7 +233,7 @@ void check_length(std::size_t found, std::size_t expected, const CloudRecords& r
 void keep_trailing(CloudRecords& records, std::string_view rest, const fs::path& file,
                    std::vector<std::string>& warnings) {
     records.after = rest;
-    // PCL pads compressed files with zeros up to a memory page; they are kept, and nothing is said.
+    // PCL pads compressed files with zeros up to a memory page; they are kept without a warning.
     if (rest.find_first_not_of('\0') != std::string_view::npos)
         warnings.push_back(fmt::format("{}: {} after the last point; written back as they are.", file.string(),
                                        counted(rest.size(), "byte")));
@@ -247,7 +247,7 @@ void read_binary(CloudRecords& records, std::string_view body, const fs::path& f
     keep_trailing(records, body.substr(expected), file, warnings);
 }
 
-/// Copies values of `bytes` bytes from places `from_step` apart to places `to_step` apart.
+/// Copies values of `bytes` bytes; they are `from_step` apart in the source and `to_step` in the target.
 void copy_strided(const char* from, std::size_t from_step, char* to, std::size_t to_step, std::size_t bytes,
                   std::size_t count) {
     const bool usual = bytes == 4; // a copy whose length the compiler knows is several times faster

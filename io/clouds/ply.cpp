@@ -148,14 +148,14 @@ Header parse_header(std::string_view bytes, const fs::path& file) {
 
 // --- body ---
 
-/// Walks elements from one end of the body to the other, checking every length before using it.
+/// Walks through the body's elements in order, and checks every length before using it.
 class BodyWalk {
   public:
     BodyWalk(std::string_view body, const Header& header, const fs::path& file)
         : body_(body), encoding_(header.encoding), text_(body, header.next_line), file_(file) {}
 
-    /// Passes over all records of `element`; `record(index, start, end)` hears of each when lengths vary or `record`
-    /// needs it.
+    /// Skips all records of `element`. Calls `record(index, start, end)` for each when lengths vary or `record` needs
+    /// it.
     template <class OnRecord>
     void walk(const Element& element, OnRecord&& record) {
         if (element.properties.empty() && element.count > 0)
@@ -167,7 +167,7 @@ class BodyWalk {
         }
     }
 
-    /// A stretch of records of one size, checked as a whole.
+    /// Records of one size, checked as a whole.
     void skip_fixed(const Element& element) {
         const std::size_t stride = element.least_bytes(), left = body_.size() - at_;
         if (stride == 0 && element.count > 0)
@@ -276,7 +276,7 @@ class FaceIndices {
     }
 
   private:
-    CloudRecords view_; ///< only to say where a face's list lies
+    CloudRecords view_; ///< only to find a face's list
     std::size_t list_;
 };
 

@@ -1,4 +1,5 @@
-// Clouds as lines of numbers (.xyz, .pts, .ptx) and as bare floats (KITTI): little is said, so little is assumed.
+// Clouds as lines of numbers (.xyz, .pts, .ptx) and as bare floats (KITTI). These files say little, so little is
+// assumed.
 #include "io/clouds/cloud_records.h"
 
 #include "io/text.h"
@@ -15,7 +16,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// What the columns of a line are, where nothing names them; colours are bytes by custom.
+/// The columns of a line without names; colours are bytes by convention.
 std::vector<std::string> usual_names(std::size_t columns) {
     switch (columns) {
     case 3:
@@ -131,7 +132,7 @@ std::vector<double> numbers_of(const std::vector<std::string_view>& words, std::
 
 } // namespace
 
-/// Leica's PTX: columns, rows, the scanner's place and three axes, a 4x4 for row vectors; then the grid, column by
+/// Leica's PTX: columns, rows, the scanner's position and three axes, a 4x4 for row vectors; then the grid, column by
 /// column.
 CloudRecords read_ptx(std::string_view bytes, const fs::path& file, std::vector<std::string>&) {
     CloudRecords records;

@@ -1,4 +1,4 @@
-// EXIF tags read with libexif, and what they amount to.
+// The focal length from EXIF tags, read with libexif.
 #include "io/images/exif.h"
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// What a picture's EXIF says of its camera.
+// The focal length in a picture's EXIF tags.
 #pragma once
 
 #include <filesystem>
@@ -9,7 +9,7 @@ namespace scanshade {
 
 /// The focal length in pixels of a picture that is now `size` large, to a few percent: from FocalLengthIn35mmFilm (by
 /// the image's diagonal, 43.27 mm), else from FocalLength with FocalPlaneXResolution or FocalPlaneYResolution and the
-/// size at which those were taken. None where the file has no EXIF or its EXIF does not tell.
+/// size at which those were taken. None if the file has no such tags.
 [[nodiscard]] std::optional<double> exif_focal_length_px(const std::filesystem::path& picture, cv::Size size);
 
 } // namespace scanshade

@@ -30,7 +30,7 @@ class Source : public Imf::IStream {
         const auto length = static_cast<std::size_t>(std::max(count, 0));
         if (at_ > bytes_.size() || length > bytes_.size() - at_)
             throw std::runtime_error(
-                fmt::format("ends early: {} bytes, something is said to lie at byte {}", bytes_.size(), at_ + length));
+                fmt::format("ends early: {} bytes, its table points to byte {}", bytes_.size(), at_ + length));
         std::memcpy(to, bytes_.data() + at_, length);
         at_ += length;
         return at_ < bytes_.size();
@@ -72,8 +72,8 @@ auto checked(const Path& file, const Steps& steps) {
     }
 }
 
-/// How many bytes of floats one coded byte can become: twice what the code can make of it, since halves are read as
-/// floats; none where nothing is known of the compression.
+/// How many bytes of floats one coded byte can become: twice the code's own limit, since halves are read as floats.
+/// None for unknown compressions.
 std::optional<std::uint64_t> expansion(Imf::Compression compression) {
     switch (compression) {
     case Imf::NO_COMPRESSION:
@@ -94,7 +94,7 @@ std::optional<std::uint64_t> expansion(Imf::Compression compression) {
 
 } // namespace
 
-/// The header is looked at on its own, for opening the file allocates what the header says.
+/// Reads the header by itself, because opening the file allocates the size that it states.
 ImageFacts exr_header(std::string_view bytes, const Path& file) {
     constexpr std::size_t magic_and_version = 8;
     if (bytes.size() < magic_and_version)

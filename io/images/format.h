@@ -1,5 +1,5 @@
-// The table of image formats. Whoever asks whether a file is an image, what it is called, or how it is read or written
-// asks here. A new format is a row in format.cpp and a file beside it.
+// The table of image formats: names, signatures, extensions, readers and writers. No other code tells formats apart. A
+// new format is a row in format.cpp and a file beside it.
 #pragma once
 
 #include "io/images/image_check.h"
@@ -18,7 +18,7 @@ struct ImageFormat {
     std::string_view name;                      ///< "PNG"
     bool (*signature)(std::string_view start);  ///< whether a file that begins so is of this format
     std::array<std::string_view, 2> extensions; ///< lower case, with the dot; empty: none
-    std::size_t header_bytes;                   ///< so many of the first bytes hold the header
+    std::size_t header_bytes;                   ///< the header is in this many first bytes
     std::string_view no_depth = {};             ///< why the format cannot hold depth, where its header does not tell
 
     // Each throws Error, which names `file` and what is wrong, for anything that is damaged or cut short.
@@ -47,10 +47,10 @@ struct ImageFormat {
 [[nodiscard]] std::vector<std::string_view> depth_format_names();
 [[nodiscard]] std::vector<std::string_view> colour_format_names();
 
-/// What the header says, from the first header_bytes of the file or more. Throws Error naming `file` for a header that
-/// is cut short or absurd.
+/// The facts of the header, from the first header_bytes of the file or more. Throws Error naming `file` for a header
+/// that is cut short or absurd.
 [[nodiscard]] ImageFacts read_image_header(std::string_view bytes, const std::filesystem::path& file);
-/// The same of a file on disk, of which no more is read than the header takes.
+/// The same for a file on disk; reads no more than the header.
 [[nodiscard]] ImageFacts peek(const std::filesystem::path& image);
 
 } // namespace scanshade

@@ -1,4 +1,4 @@
-// What an image file's header says, and the checks that every format's reader makes of it before anything is decoded.
+// The facts of an image file's header, and the checks that every reader makes before it decodes anything.
 #pragma once
 
 #include <cstdint>
@@ -25,8 +25,8 @@ constexpr std::uint64_t most_pixels = std::uint64_t(1) << 28;
 namespace image_check {
 /// The image size, or Error when a side is 0 or there are more than most_pixels.
 [[nodiscard]] cv::Size checked_size(std::uint64_t width, std::uint64_t height, const std::filesystem::path& file);
-/// Error where `packed` bytes of coded data cannot become an image of that size, for no code makes more than `most`
-/// bytes of one: a small file cannot ask for much memory.
+/// Throws Error if `packed` coded bytes are too few for an image of that size, when one byte becomes at most `most`.
+/// So a small file cannot claim much memory.
 void check_expansion(std::uint64_t packed, std::uint64_t most, const ImageFacts& facts, int stored_channels,
                      const std::filesystem::path& file);
 [[nodiscard]] std::uint32_t big_endian_32(std::string_view bytes, std::size_t offset);

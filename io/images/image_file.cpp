@@ -81,7 +81,7 @@ DepthEncoding depth_encoding(const std::string& text, const std::string& origin)
 
 cv::Mat read_stored_depth(const fs::path& file) {
     const std::string bytes = read_image_bytes(file);
-    // The header speaks first: what cannot be depth is refused for that, whatever else is wrong with it.
+    // Check the header first: an image that cannot be depth is refused for that reason, whatever else is wrong.
     const ImageFacts facts = read_image_header(bytes, file);
     check_is_depth(facts, file);
     return read_as_stored(bytes, facts, file);

@@ -9,7 +9,7 @@
 
 namespace scanshade {
 
-/// How stored depth numbers become metres. Never guessed silently: `origin` says who decided.
+/// How stored depth numbers become metres. `origin` says where this comes from, even if it is assumed.
 struct DepthEncoding {
     enum class Kind {
         linear,        ///< metres = value / units_per_metre; 0 and 65535 (integers), NaN, inf and <= 0 (floats) = hole

@@ -1,4 +1,4 @@
-// AO maps, pictures and depth to disk: encoded in memory, or beside the target, then renamed.
+// AO maps, pictures and depth to disk: encoded in memory, or in a temporary file, then renamed.
 #include "io/images/image_file.h"
 
 #include "io/images/format.h"
@@ -101,7 +101,7 @@ void write_picture(const fs::path& file, const cv::Mat3b& picture) {
 void write_depth_png(const fs::path& file, const cv::Mat1f& depth_m, double units_per_metre) {
     cv::Mat1w image(depth_m.size());
     std::transform(depth_m.begin(), depth_m.end(), image.begin(), [&](float metres) {
-        // 65535 is some sensors' hole, so what is too far to be stored becomes one rather than a wrong distance.
+        // Some sensors mark holes with 65535, so a depth too large to store becomes a hole, not a wrong distance.
         const double value = std::round(metres * units_per_metre);
         return value >= 1 && value < 65535 ? static_cast<ushort>(value) : ushort(0);
     });

@@ -1,4 +1,4 @@
-// JPEG with libjpeg-turbo. Its errors jump out of its functions (setjmp), so what calls them holds no objects.
+// JPEG with libjpeg-turbo. Its errors jump out of its functions (setjmp), so their callers hold no objects.
 #include "io/images/readers.h"
 
 #include "projection/error.h"
@@ -33,7 +33,7 @@ struct Messages {
     std::longjmp(messages->back, 1);
 }
 
-/// Lost pixels are an error; what cameras are careless about, such as bytes between markers, is not.
+/// Lost pixels are an error. Common flaws of cameras' files, such as bytes between markers, are not.
 void judge(j_common_ptr info, int level) {
     auto* messages = reinterpret_cast<Messages*>(info->err);
     const int code = messages->manager.msg_code;
@@ -42,7 +42,7 @@ void judge(j_common_ptr info, int level) {
         leave(info);
 }
 
-/// Scans without end take no bytes to speak of, and each costs a pass over the picture.
+/// Limits the number of scans: each may take few bytes, but costs a pass over the picture.
 void limit_scans(j_common_ptr info) {
     constexpr int most_scans = 500;
     if (reinterpret_cast<j_decompress_ptr>(info)->input_scan_number > most_scans) {
@@ -59,7 +59,7 @@ jpeg_error_mgr* set_up(Messages& messages) {
     return manager;
 }
 
-/// Calls `steps`; whether they came to their end.
+/// Calls `steps`; returns whether they finished.
 template <class Steps>
 bool done(Messages& messages, const Steps& steps) {
     if (setjmp(messages.back) != 0)
@@ -132,7 +132,7 @@ ImageFacts jpeg_header(std::string_view bytes, const Path& file) { return facts_
 cv::Mat3b colour_jpeg(std::string_view bytes, const ImageFacts& facts, const Path& file) {
     Decoder decoder(bytes, file);
     jpeg_decompress_struct& info = decoder.info();
-    if (!info.arith_code) // of Huffman's codes every block of 8x8 pixels takes a bit at least
+    if (!info.arith_code) // with Huffman codes, every block of 8x8 pixels takes at least a bit
         image_check::check_expansion(bytes.size(), 512, facts, 1, file);
     const bool inks = info.num_components == 4;
     cv::Mat image(facts.size, inks ? CV_8UC4 : CV_8UC3);

@@ -29,8 +29,8 @@ cv::Mat from_planes(const cv::Mat& stored) {
     return bgr;
 }
 
-/// A U for two pixels, a Y for each, a V for two: a plane each. Analogue YUV over the whole range of 8 bits, which is
-/// what PCL takes it for and what COLOR_YUV2BGR means.
+/// A U for two pixels, a Y for each, a V for two: a plane each. Analogue YUV over the whole range of 8 bits, as in PCL
+/// and in COLOR_YUV2BGR.
 cv::Mat from_yuv422(const cv::Mat& stored) {
     const std::size_t pixels = stored.total();
     const uchar *u = stored.data, *y = u + pixels / 2, *v = y + pixels;
@@ -41,7 +41,7 @@ cv::Mat from_yuv422(const cv::Mat& stored) {
     return yuv;
 }
 
-/// The mosaic of Kinect and its kin: green and red in even rows, blue and green in odd ones.
+/// The Bayer pattern of Kinect and similar sensors: green and red in even rows, blue and green in odd ones.
 cv::Mat from_bayer(const cv::Mat& stored) {
     cv::Mat bgr;
     cv::cvtColor(stored, bgr, cv::COLOR_BayerGRBG2BGR);

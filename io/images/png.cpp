@@ -1,7 +1,7 @@
 // PNG: the plainest grey with ISA-L (png_input.h), all others with libpng, whose errors jump out of its functions
-// (setjmp), so that what calls them holds no objects.
-#include "io/images/readers.h"
+// (setjmp), so their callers hold no objects.
 #include "io/images/png_input.h"
+#include "io/images/readers.h"
 
 #include <algorithm>
 #include <cstdio>

@@ -1,5 +1,5 @@
-// PNG's container (W3C PNG, section 5): header, chunk lengths, checksums and end, for both ways in which its pixels are
-// read. That the pixels are all there once every chunk is sound, ISA-L and libpng do check.
+// PNG's container (W3C PNG, section 5): header, chunk lengths, checksums and end, for both readers of
+// its pixels. ISA-L and libpng themselves check that no pixels are missing.
 #include "io/images/readers.h"
 
 #include <fmt/format.h>

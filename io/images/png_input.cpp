@@ -1,4 +1,4 @@
-// Grey PNG files: what most runs read most of. ISA-L unpacks them, in half the time that libpng takes with zlib.
+// Grey PNG files, the most common input. ISA-L unpacks them, in half the time that libpng takes with zlib.
 #include "io/images/png_input.h"
 
 #include "io/images/image_check.h"
@@ -59,14 +59,14 @@ bool unpack(std::string_view packed, std::uint8_t* bytes, std::size_t size) {
     return isal_inflate_stateless(&state) == ISAL_DECOMP_OK && state.avail_out == 0;
 }
 
-/// Of a, b and c the one next to a + b - c; the earlier where two are (section 9.4).
+/// The one of a, b and c that is nearest to a + b - c; the first of equally near ones (section 9.4).
 int paeth(int a, int b, int c) {
     const int to_a = std::abs(b - c), to_b = std::abs(a - c), to_c = std::abs(a + b - 2 * c);
     const int nearer = to_b <= to_c ? b : c;
     return to_a <= to_b && to_a <= to_c ? a : nearer;
 }
 
-/// Undoes a row's filter (section 9.2). In front of `row` and `above` lies a pixel of zeros.
+/// Undoes a row's filter (section 9.2). A pixel of zeros precedes `row` and `above`.
 template <int pixel>
 bool unfilter(int filter, const std::uint8_t* from, const std::uint8_t* above, std::uint8_t* row, int length) {
     const auto each = [&](auto&& prediction) {
@@ -132,7 +132,8 @@ cv::Mat decoded_grey_png(std::string_view bytes) {
     const auto filtered = std::make_unique_for_overwrite<std::uint8_t[]>(all);
     if (!unpack(packed.bytes, filtered.get(), all))
         return {};
-    return bits == 16 ? image_from<std::uint16_t>(filtered.get(), size) : image_from<std::uint8_t>(filtered.get(), size);
+    return bits == 16 ? image_from<std::uint16_t>(filtered.get(), size)
+                      : image_from<std::uint8_t>(filtered.get(), size);
 }
 
 } // namespace scanshade

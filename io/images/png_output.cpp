@@ -1,4 +1,4 @@
-// Images as PNG files: what most runs write most of. ISA-L packs them in a quarter of zlib's time, to the same size.
+// Images as PNG files, the most common output. ISA-L packs them in a quarter of zlib's time, to the same size.
 #include "io/images/png_output.h"
 
 #include "projection/error.h"
@@ -65,7 +65,7 @@ void copy_samples(const cv::Mat& image, int row, unsigned char* to) {
 std::string filtered(const cv::Mat& image) {
     const std::size_t pixel = image.elemSize(), row = pixel * static_cast<std::size_t>(image.cols);
     std::string bytes((row + 1) * static_cast<std::size_t>(image.rows), '\1');
-    const auto samples = std::make_unique<unsigned char[]>(row + pixel); // a pixel of zeros lies in front
+    const auto samples = std::make_unique<unsigned char[]>(row + pixel); // a pixel of zeros comes first
     for (int v = 0; v < image.rows; ++v) {
         copy_samples(image, v, samples.get() + pixel);
         char* to = bytes.data() + static_cast<std::size_t>(v) * (row + 1) + 1;
@@ -75,9 +75,9 @@ std::string filtered(const cv::Mat& image) {
     return bytes;
 }
 
-/// A zlib stream of level 3. Level 0 knows no codes of its own and leaves maps larger than they were; levels 1 and 2 put the
-/// third byte into a slot of their table that hangs on where in memory `stream` lies (ISA-L 2.30: its assembly hashes a
-/// register that is not set yet), so that now and then the same pixels were packed into other bytes.
+/// A zlib stream of level 3. Level 0 has only fixed codes and makes maps larger. Levels 1 and 2 are not deterministic:
+/// the third byte's slot in their table depends on the address of `stream`, because ISA-L 2.30's assembly hashes a
+/// register that is not set yet. Sometimes the same pixels were therefore packed into other bytes.
 std::string packed(const std::string& bytes) {
     const auto scratch = std::make_unique<std::uint8_t[]>(ISAL_DEF_LVL3_DEFAULT);
     isal_zstream stream = {};
@@ -87,7 +87,7 @@ std::string packed(const std::string& bytes) {
     stream.level_buf_size = ISAL_DEF_LVL3_DEFAULT;
     stream.gzip_flag = IGZIP_ZLIB;
     stream.end_of_stream = 1;
-    std::string result(bytes.size() + bytes.size() / 8 + 1024, '\0'); // what cannot be packed is stored
+    std::string result(bytes.size() + bytes.size() / 8 + 1024, '\0'); // incompressible data are stored
     if (result.size() > std::numeric_limits<std::uint32_t>::max())
         throw Error(fmt::format("{} bytes of pixels are more than a PNG is made of here", bytes.size()));
     stream.next_in = const_cast<std::uint8_t*>(as_bytes(bytes.data())); // is only read

@@ -1,4 +1,4 @@
-// Images as PNG files: what most runs write most of.
+// Images as PNG files, the most common output.
 #pragma once
 
 #include <opencv2/core.hpp>

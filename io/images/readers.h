@@ -1,4 +1,4 @@
-// What the files of this folder give to the table of image formats: see format.h for what each function does.
+// The functions in the table of image formats; format.h says what each does.
 #pragma once
 
 #include "io/images/image_check.h"

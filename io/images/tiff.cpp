@@ -20,7 +20,7 @@ namespace {
 
 using image_check::refuse;
 
-/// A file in memory: what is read lies in `bytes`, what is written is appended to `sink`.
+/// A file in memory: reads from `bytes`, appends to `sink`.
 struct Memory {
     std::string_view bytes;
     std::string sink;
@@ -72,7 +72,7 @@ int keep_error(TIFF*, void* user, const char*, const char* format, va_list value
     char text[512];
     if (memory.trouble.empty() && std::vsnprintf(text, sizeof text, format, values) > 0)
         memory.trouble = text;
-    return 1; // told
+    return 1; // reported
 }
 
 int pass_over_warning(TIFF*, void*, const char*, const char*, va_list) { return 1; }
@@ -155,7 +155,7 @@ ImageFacts facts_of(const Source& source, const Path& file) {
     return facts;
 }
 
-/// As the tag for it says: the first row at the top, the first column on the left.
+/// The image as its orientation tag says: first row at the top, first column on the left.
 cv::Mat upright(const cv::Mat& stored, const Source& source) {
     constexpr int around_x = 0, around_y = 1, around_both = -1;
     const auto orientation = source.field<std::uint16_t>(TIFFTAG_ORIENTATION, ORIENTATION_TOPLEFT);
@@ -263,7 +263,7 @@ std::string encoded_tiff(const cv::Mat& image) {
         set(TIFFTAG_ROWSPERSTRIP, std::clamp(strip_bytes / row_bytes, 1, image.rows));
         set(TIFFTAG_SAMPLEFORMAT, depth == CV_32F ? SAMPLEFORMAT_IEEEFP : SAMPLEFORMAT_UINT);
         for (int y = 0; y < image.rows; ++y) {
-            cv::Mat row = image.row(y).clone(); // libtiff may change what it is given
+            cv::Mat row = image.row(y).clone(); // libtiff may change its input
             if (channels == 3)
                 cv::cvtColor(row, row, cv::COLOR_BGR2RGB);
             if (TIFFWriteScanline(tiff.get(), row.data, static_cast<std::uint32_t>(y), 0) != 1)

@@ -351,10 +351,10 @@ TEST(Sequence, what_an_outage_keeps_away_is_waited_for_by_its_neighbours) {
     Surfel surfel(device(), {});
     Neighbourhood sequence(device(), surfel, radius_m, {}, {}, only(0, 0, 1));
     ASSERT_EQ(sequence.reach(), 1U);
-    Waiting waiting(&sequence);
+    SequenceBuffer buffer(&sequence);
     std::vector<CaptureEntry> entries(5);
     std::vector<FrameRow> rows(5);
-    const auto pass = [&](std::size_t i) { (void)waiting.pass(std::make_shared<Work>(Work{entries[i], rows[i]})); };
+    const auto pass = [&](std::size_t i) { (void)buffer.pass(std::make_shared<Work>(Work{entries[i], rows[i]})); };
     for (std::size_t i = 0; i < rows.size(); ++i) {
         rows[i].index = i;
         if (i == 1) {
@@ -366,7 +366,7 @@ TEST(Sequence, what_an_outage_keeps_away_is_waited_for_by_its_neighbours) {
         }
         pass(i);
     }
-    while (waiting.pass({}))
+    while (buffer.pass({}))
         ;
     for (const std::size_t i : {0, 1, 2}) {
         EXPECT_EQ(rows[i].fault, Fault::outage) << i;

@@ -235,7 +235,7 @@ TEST_F(BatchTest, colour_is_shaded_only_where_it_is_registered) {
     EXPECT_TRUE(is_grey(shaded_pixel(Registration::yes, Registration::no, "e")));
 }
 
-TEST_F(BatchTest, a_depth_frames_cloud_lies_where_its_pixels_saw_it) {
+TEST_F(BatchTest, a_depth_frames_cloud_has_the_points_its_pixels_saw) {
     const Capture recorded = capture(1);
     HalfOpen method;
     BatchOptions options = all_frames(recorded, folder / "out");

@@ -1,4 +1,4 @@
-// The program as a person or a script meets it: exit codes, files, reports, and what a killed run leaves.
+// The program as a user or a script sees it: exit codes, files, reports, and the remains of a killed run.
 #include "io/cameras/camera_file.h"
 #include "io/clouds/cloud_file.h"
 #include "io/images/image_file.h"
@@ -80,7 +80,7 @@ TEST_F(CliTest, run_leaves_maps_pictures_and_reports) {
     EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 5); // header and four frames
 }
 
-TEST_F(CliTest, one_bad_frame_is_told_and_the_others_are_processed) {
+TEST_F(CliTest, one_bad_frame_is_reported_and_the_others_are_processed) {
     fs::resize_file(capture() / "depth/002.png", 60);
     const Ran ran = run();
     EXPECT_EQ(ran.exit_code, 2);
@@ -197,10 +197,10 @@ TEST_F(CliTest, frames_are_looked_at_together_only_where_there_are_poses) {
     const Ran together = run_program(
         fmt::format("run {} -o {} --preset best --surfel.quality lowest", recording.string(), (folder / "b").string()));
     ASSERT_EQ(together.exit_code, 0);
-    EXPECT_NE(together.err.find("looked at together"), std::string::npos) << together.err;
+    EXPECT_NE(together.err.find("computed together"), std::string::npos) << together.err;
 }
 
-TEST_F(CliTest, a_quiet_run_tells_only_what_went_wrong) {
+TEST_F(CliTest, a_quiet_run_prints_only_warnings_and_failures) {
     const Ran silent = run("-q");
     EXPECT_EQ(silent.exit_code, 0);
     EXPECT_EQ(silent.err, "");
@@ -213,7 +213,7 @@ TEST_F(CliTest, a_quiet_run_tells_only_what_went_wrong) {
     EXPECT_LE(std::count(failed.err.begin(), failed.err.end(), '\n'), 2) << failed.err;
 }
 
-TEST_F(CliTest, off_a_terminal_frames_that_are_well_are_told_of_now_and_then) {
+TEST_F(CliTest, off_a_terminal_good_frames_are_reported_now_and_then) {
     tests::write_capture(capture(), 40);
     fs::resize_file(capture() / "depth/030.png", 60);
     const Ran ran = run("--write ao");
@@ -255,7 +255,7 @@ TEST_F(CliTest, a_cloud_keeps_its_points_and_gains_a_field) {
     EXPECT_NE(manifest()["frames"][0]["camera"]["origin"].get<std::string>().find("recovered"), std::string::npos);
 }
 
-TEST_F(CliTest, a_colour_camera_beside_depth_is_warped_by_either_way_and_told) {
+TEST_F(CliTest, colour_of_a_secondary_camera_is_warped_into_either_view_and_reported) {
     CameraFile file{tests::small_camera(), 1000, Registration::no, {}};
     ColourCamera colour{tests::small_camera(), Eigen::Isometry3d::Identity()};
     colour.camera.pinhole = scaled(colour.camera.pinhole, {96, 72});
@@ -273,7 +273,7 @@ TEST_F(CliTest, a_colour_camera_beside_depth_is_warped_by_either_way_and_told) {
     const json text = manifest();
     EXPECT_EQ(text["capture"]["colour_camera"]["width"], 96);
     EXPECT_EQ(text["capture"]["depth"]["correction"]["offset_m"], 0.05);
-    EXPECT_NE(text["shading"].get<std::string>().find("carried over"), std::string::npos);
+    EXPECT_NE(text["shading"].get<std::string>().find("warped from the secondary camera"), std::string::npos);
     const std::string cloud = read_bytes(out() / "clouds/000.ply");
     EXPECT_NE(cloud.find("property float colour_known"), std::string::npos);
 
@@ -304,7 +304,7 @@ TEST_F(CliTest, several_captures_get_a_folder_each) {
 
 // ---------------------------------------------------------------------------------------------------- exit codes
 
-TEST_F(CliTest, misuse_is_told_with_exit_code_1) {
+TEST_F(CliTest, misuse_is_exit_code_1) {
     for (const char* words : {"", "fly", "run", "run x", "run x -o y --radius big", "run x -o y --unheard-of",
                               "run x -o y --format jpg", "run x -o y --write ao,sound", "help fly"})
         EXPECT_EQ(run_program(words).exit_code, 1) << words;
@@ -418,7 +418,7 @@ TEST_F(CliTest, inspect_says_what_is_there) {
     EXPECT_EQ(facts["camera"]["fx"], 52.0);
 }
 
-TEST_F(CliTest, inspect_tells_of_a_frame_that_cannot_be_read) {
+TEST_F(CliTest, inspect_reports_a_frame_that_cannot_be_read) {
     fs::resize_file(capture() / "depth/001.png", 60);
     const Ran ran = run_program("inspect " + capture().string());
     EXPECT_EQ(ran.exit_code, 2);
@@ -470,7 +470,7 @@ TEST(CliHelpTest, help_of_a_topic_shows_its_flags_alone) {
     EXPECT_NE(mistyped.err.find("did you mean surfel?"), std::string::npos) << mistyped.err;
 }
 
-TEST(CliHelpTest, mistyped_words_are_told_the_nearest_one) {
+TEST(CliHelpTest, mistyped_words_get_the_nearest_one_as_a_hint) {
     for (const auto& [words, meant] :
          {std::pair("run x -o y --quailty high", "--quailty: no such flag; did you mean --quality?"),
           std::pair("run x -o y --cacao.raduis=1", "--cacao.raduis: no such flag; did you mean --cacao.radius?"),

@@ -1,4 +1,4 @@
-// Captures that overlap: begun in order, told in order, ended by the first that fails.
+// Overlapping captures start in order, report in order, and end after the first failure.
 #include "apps/walk/overlap.h"
 
 #include "projection/error.h"
@@ -14,7 +14,7 @@ namespace {
 TEST(OverlapTest, the_next_is_begun_while_one_is_at_work_and_what_they_tell_keeps_its_order) {
     std::latch second_spoke(1);
     testing::internal::CaptureStderr();
-    overlapped(3, 2, [&](std::size_t i, Turn&) {
+    overlapped(3, 2, [&](std::size_t i, OrderedOutput&) {
         say("begin " + std::to_string(i));
         if (i == 1)
             second_spoke.count_down();
@@ -38,7 +38,7 @@ TEST(OverlapTest, each_is_done_once_by_as_many_threads_as_asked) {
     std::multiset<std::size_t> done;
     std::set<std::thread::id> threads;
     std::atomic<int> now = 0, most = 0;
-    overlapped(50, 3, [&](std::size_t i, Turn&) {
+    overlapped(50, 3, [&](std::size_t i, OrderedOutput&) {
         most = std::max(most.load(), ++now);
         std::this_thread::yield();
         --now;
@@ -50,13 +50,13 @@ TEST(OverlapTest, each_is_done_once_by_as_many_threads_as_asked) {
     EXPECT_EQ(std::set<std::size_t>(done.begin(), done.end()).size(), 50u);
     EXPECT_LE(threads.size(), 3u);
     EXPECT_LE(most, 3);
-    overlapped(0, 3, [](std::size_t, Turn&) { FAIL(); });
+    overlapped(0, 3, [](std::size_t, OrderedOutput&) { FAIL(); });
 }
 
 TEST(OverlapTest, after_a_failure_nothing_is_begun_and_those_begun_end) {
     std::atomic<int> begun = 0, ended = 0;
     std::latch both(2);
-    const auto work = [&](std::size_t i, Turn&) {
+    const auto work = [&](std::size_t i, OrderedOutput&) {
         ++begun;
         if (i < 2)
             both.arrive_and_wait();

@@ -27,7 +27,7 @@ TEST(PictureTest, clay_is_as_bright_as_it_faces_the_camera) {
 }
 
 /// A jump in depth is no surface: without the jump test its pixels would turn almost edge-on, and black.
-TEST(PictureTest, clay_keeps_its_brightness_beside_a_jump_and_a_hole) {
+TEST(PictureTest, clay_keeps_its_brightness_next_to_a_jump_and_a_hole) {
     cv::Mat1f z_m = plane(0);
     z_m.colRange(40, 64) = 3;
     z_m.colRange(0, 10) = 0;

@@ -1,5 +1,5 @@
 // What a run survives: kills, a second run at its side, a full disk, a lost device, a frame that crashes the process.
-// This program computes nothing itself: what it starts has its threads, so it may fork.
+// This program computes nothing itself, so it has no threads and may fork.
 #include "apps/command.h"
 #include "apps/jobs/job_run.h"
 #include "apps/json.h"
@@ -35,7 +35,7 @@ namespace fs = std::filesystem;
 
 // ---------------------------------------------------------------------------------------------------- helpers
 
-/// Results by name, without what tells of times and processes.
+/// Results by name, without reports of times and processes.
 std::map<std::string, std::string> results_in(const fs::path& folder) {
     std::map<std::string, std::string> files;
     for (const auto& entry : fs::recursive_directory_iterator(folder))
@@ -45,7 +45,7 @@ std::map<std::string, std::string> results_in(const fs::path& folder) {
     return files;
 }
 
-/// The names of files that only one has, or whose bytes differ: the bytes themselves would tell nobody anything.
+/// The names of files that only one has, or whose bytes differ: the bytes themselves would not help.
 std::vector<std::string> differences(const std::map<std::string, std::string>& found,
                                      const std::map<std::string, std::string>& expected) {
     std::vector<std::string> names;
@@ -276,7 +276,7 @@ TEST_F(ResumeTest, a_second_run_does_nothing_and_what_has_changed_is_done_again)
     EXPECT_EQ(resumed(""), 1u);
 }
 
-TEST_F(ResumeTest, a_resumed_report_tells_of_all_frames) {
+TEST_F(ResumeTest, a_resumed_report_holds_all_frames) {
     record(6);
     fs::resize_file(capture() / "depth/002.png", 60);
     ASSERT_EQ(run("--depth-noise none --frames :4").exit_code, 2);
@@ -382,8 +382,8 @@ class HalfOpen final : public Method {
     Timings timings_;
 };
 
-/// What a worker of the program does with a capture, with a method that may be told to fail.
-int work(const fs::path& path, const fs::path& out, const Shift& shift,
+/// A worker's task for one capture, with a method that can be made to fail.
+int work(const fs::path& path, const fs::path& out, const WorkerProcess& worker,
          const std::function<void(const View&)>& before) {
     const Capture capture = open_capture(path);
     HalfOpen method(before);
@@ -392,7 +392,7 @@ int work(const fs::path& path, const fs::path& out, const Shift& shift,
     options.frames.resize(capture.entries.size());
     std::iota(options.frames.begin(), options.frames.end(), 0);
     options.outputs.folder = out;
-    const Recording recording{journal, "settings", "task", "test", false, shift.carefully, shift.finished};
+    const Recording recording{journal, "settings", "task", "test", false, worker.carefully, worker.finished};
     FrameAo door(method);
     MethodPool pool(door);
     const auto rows = run_recorded(capture, pool, options, recording);
@@ -407,8 +407,8 @@ bool is_frame(const View& view, int index) {
 
 TEST_F(ResumeTest, a_frame_that_crashes_the_process_is_marked_and_the_others_are_done) {
     record(8);
-    const int code = supervise(1, [&](const Shift& shift) {
-        return work(capture(), out(), shift, [](const View& view) {
+    const int code = supervise(1, [&](const WorkerProcess& worker) {
+        return work(capture(), out(), worker, [](const View& view) {
             if (is_frame(view, 5))
                 raise(SIGSEGV);
         });
@@ -430,9 +430,9 @@ TEST_F(ResumeTest, a_lost_device_gets_a_fresh_process_and_no_frame_is_lost) {
         const fs::path mark = folder / "lost";
         fs::remove_all(out());
         fs::remove(mark);
-        const int code = supervise(1, [&](const Shift& shift) {
+        const int code = supervise(1, [&](const WorkerProcess& worker) {
             int calls = 0;
-            return work(capture(), out(), shift, [&](const View&) {
+            return work(capture(), out(), worker, [&](const View&) {
                 if (calls++ == injection && !fs::exists(mark)) {
                     tests::write_file(mark, "once");
                     throw DeviceLost("the device is lost");
@@ -450,8 +450,8 @@ TEST_F(ResumeTest, a_lost_device_gets_a_fresh_process_and_no_frame_is_lost) {
 
 TEST_F(ResumeTest, a_device_that_stays_lost_is_given_up) {
     record(3);
-    const int code = supervise(1, [&](const Shift& shift) {
-        return work(capture(), out(), shift, [](const View&) { throw DeviceLost("the device is lost"); });
+    const int code = supervise(1, [&](const WorkerProcess& worker) {
+        return work(capture(), out(), worker, [](const View&) { throw DeviceLost("the device is lost"); });
     });
     EXPECT_EQ(code, unfinished);
     EXPECT_TRUE(read_journal(journal_file(out(), "")).records.empty()) << "no frame is to blame";
@@ -508,7 +508,7 @@ TEST_F(ResumeTest, a_plan_finds_captures_of_several_layouts_and_no_results) {
     EXPECT_EQ(plan().exit_code, 1) << "a job there is replaced only when asked";
 }
 
-TEST_F(ResumeTest, shards_together_do_everything_and_a_late_one_stands_in_for_a_dead_one) {
+TEST_F(ResumeTest, shards_together_do_everything_and_a_late_one_takes_over_from_a_dead_one) {
     for (int i = 0; i < 4; ++i)
         tests::write_capture(folder / fmt::format("data/many/{}", i), 3 + i);
     ASSERT_EQ(plan("--write ao").exit_code, 0);

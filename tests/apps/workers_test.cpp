@@ -1,4 +1,4 @@
-// Frames computed side by side on one device: the same bytes as one after the other, and nothing for Vulkan's
+// Frames computed at once on one device: the same bytes as one after the other, and nothing for Vulkan's
 // validation layer to say.
 #include "apps/run/workers.h"
 

@@ -1,5 +1,5 @@
 // Damaged and odd inputs: those made here, and, where they are at hand, those of the shared data folder and its good
-// captures. A refusal must name the file and the place; what can still be used must be used, with a warning.
+// captures. A refusal must name the file and the place; usable parts must be used, with a warning.
 #include "io/cameras/camera_file.h"
 #include "io/captures/capture.h"
 #include "io/clouds/cloud_file.h"
@@ -530,7 +530,7 @@ TEST(broken_data, unpaired_files_are_reported_and_foreign_ones_ignored) {
     const Capture capture = open_capture(path);
     ASSERT_EQ(capture.entries.size(), 4); // 200, 220, the unpaired 239 and the misspelt 00239
     EXPECT_EQ(capture.entries[3].name, "frame-00239");
-    EXPECT_TRUE(warned(capture.entries[3].warnings, "stands alone"));
+    EXPECT_TRUE(warned(capture.entries[3].warnings, "has no partner"));
 }
 
 TEST(broken_data, crlf_and_byte_order_marks_are_valid) {

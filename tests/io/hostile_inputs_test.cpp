@@ -2,11 +2,11 @@
 // targets (tests/fuzz) found stays here as rows.
 #include "io/cameras/camera_file.h"
 #include "io/captures/capture.h"
+#include "io/captures/layouts.h"
+#include "io/captures/trajectory.h"
 #include "io/clouds/cloud_file.h"
 #include "io/images/image_file.h"
-#include "io/captures/layouts.h"
 #include "io/text.h"
-#include "io/captures/trajectory.h"
 #include "tests/support/files.h"
 #include "tests/support/png.h"
 
@@ -126,7 +126,7 @@ TEST_F(Hostile, a_name_listed_a_hundred_thousand_times_is_numbered_at_once) {
     EXPECT_EQ(entries.back().name, "frame-100000");
 }
 
-TEST_F(Hostile, utf8_is_told_from_what_only_looks_like_it) {
+TEST_F(Hostile, utf8_is_distinguished_from_similar_bytes) {
     for (const char* sound : {"", "a", "\xc3\xa9", "\xe2\x82\xac", "\xf0\x9f\x98\x80"})
         EXPECT_EQ(as_utf8(sound), sound);
     EXPECT_EQ(as_utf8("\xe9t\xe9"), "_t_");
@@ -136,7 +136,7 @@ TEST_F(Hostile, utf8_is_told_from_what_only_looks_like_it) {
     EXPECT_EQ(as_utf8("a\xe2\x82"), "a__");
 }
 
-TEST_F(Hostile, a_plan_walks_links_that_lead_back_once_and_tells_names_it_cannot_hold) {
+TEST_F(Hostile, a_plan_follows_circular_links_once_and_reports_names_it_cannot_hold) {
     write_capture(folder / "data/a/b", 1);
     write_capture(folder / "data/caf\xe9", 1);
     for (const char* link : {"data/back", "data/a/back", "data/a/again"})
@@ -244,7 +244,7 @@ std::string repeated(const std::string& text, int times) {
     return all;
 }
 
-TEST_F(Hostile, what_nests_deeply_is_refused_before_anything_recurses_into_it) {
+TEST_F(Hostile, deep_nesting_is_refused_before_anything_recurses_into_it) {
     const int deep = 100'000;
     for (const std::string& text : {"{\"fx\":" + repeated("[", deep) + repeated("]", deep) + "}", repeated("[", deep),
                                     "{\"fx\":" + repeated("{\"a\":", deep) + "1" + repeated("}", deep) + "}"})

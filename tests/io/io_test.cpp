@@ -159,7 +159,7 @@ TEST(depth_images, float_tiff_and_exr_are_metres_and_tiff_may_hold_integers) {
     EXPECT_EQ(worst_difference(read_stored_depth(folder / "i.tiff"), integers), 0);
 }
 
-TEST(depth_images, a_format_is_told_by_signature_not_by_name) {
+TEST(depth_images, the_signature_decides_the_format_not_the_name) {
     const TemporaryFolder folder;
     write_depth_png(folder / "depth.png", wall(), 1000);
     fs::rename(folder / "depth.png", folder / "depth.tiff");
@@ -274,7 +274,7 @@ TEST(colour_images, netpbm_and_bmp_of_rare_kinds_are_read) {
 }
 
 /// Names and signatures come from one table: a file is of the format that its extension says.
-TEST(image_formats, what_is_written_under_an_extension_is_told_by_its_signature) {
+TEST(image_formats, files_written_under_an_extension_have_its_signature) {
     const TemporaryFolder folder;
     for (const ImageFormat& format : image_formats())
         for (const std::string_view extension : format.extensions) {
@@ -402,19 +402,19 @@ TEST(camera_files, what_only_ours_can_hold_is_refused_elsewhere) {
     EXPECT_FALSE(fs::exists(folder / "c"));
 }
 
-TEST(camera_files, damage_beside_the_main_camera_names_the_key) {
+TEST(camera_files, damage_to_the_secondary_camera_names_the_key) {
     const TemporaryFolder folder;
     const std::string main = R"({"fx":5,"fy":5,"cx":1,"cy":1,"width":4,"height":4)";
     const auto message = [&](const std::string& more) {
         return refusal([&] { (void)read_camera_file(write_file(folder / "c.json", main + "," + more + "}")); });
     };
-    const std::string beside = R"("fx":5,"fy":5,"cx":1,"cy":1,"width":4,"height":4)";
+    const std::string numbers = R"("fx":5,"fy":5,"cx":1,"cy":1,"width":4,"height":4)";
     EXPECT_TRUE(says(message(R"("colour":3)"), "not an object that describes a camera"));
-    EXPECT_TRUE(says(message(R"("colour":{)" + beside + "}"), "\"colour_from_depth\" is missing"));
+    EXPECT_TRUE(says(message(R"("colour":{)" + numbers + "}"), "\"colour_from_depth\" is missing"));
     EXPECT_TRUE(
-        says(message(R"("colour":{)" + beside + R"(,"colour_from_depth":[[1,0,0,0]]})"), "not a list of 4 rows"));
+        says(message(R"("colour":{)" + numbers + R"(,"colour_from_depth":[[1,0,0,0]]})"), "not a list of 4 rows"));
     EXPECT_TRUE(
-        says(message(R"("colour":{)" + beside + R"(,"colour_from_depth":[[2,0,0,0],[0,2,0,0],[0,0,2,0],[0,0,0,1]]})"),
+        says(message(R"("colour":{)" + numbers + R"(,"colour_from_depth":[[2,0,0,0],[0,2,0,0],[0,0,2,0],[0,0,0,1]]})"),
              "not a rotation and a shift"));
     EXPECT_TRUE(says(message(R"("depth_correction":1)"), "\"depth_correction\""));
     EXPECT_TRUE(says(message(R"("depth_correction":{"scale":0})"), "\"scale\" is 0"));
@@ -460,7 +460,7 @@ fs::path jpeg_with(const fs::path& file, const std::vector<std::array<unsigned, 
     return write_file(file, jpeg);
 }
 
-TEST(exif, tells_the_focal_length_in_pixels) {
+TEST(exif, gives_the_focal_length_in_pixels) {
     const TemporaryFolder folder;
     const cv::Size size(80, 60); // its diagonal is 100
     // 26 mm on film of 43.27 mm diagonal.
@@ -716,7 +716,7 @@ TEST(captures, tum_takes_the_published_camera_only_for_the_benchmarks_own_record
 TEST(captures, the_users_words_override_the_captures) {
     const TemporaryFolder folder;
     write_tum(folder.path(), 1);
-    write_file(folder / "camera.json", "not even JSON"); // nobody needs it
+    write_file(folder / "camera.json", "not even JSON"); // not needed
     CaptureOptions options;
     options.camera = "70,70,31.5,23.5";
     options.depth_scale = "2500";
@@ -814,7 +814,7 @@ TEST(captures, single_files_are_captures_of_one_frame) {
     const auto cloud_file =
         write_file(folder / "c.dat", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
                                      "property float z\nend_header\n1 2 3\n");
-    const Capture cloud = open_capture(cloud_file); // told by content
+    const Capture cloud = open_capture(cloud_file); // recognised by content
     EXPECT_EQ(cloud.kind, "cloud");
     EXPECT_EQ(cloud.load(0).cloud->points[0], Eigen::Vector3d(1, 2, 3));
     EXPECT_TRUE(says(refusal([&] { (void)open_capture(write_file(folder / "notes.txt", "hello")); }), "neither"));
@@ -1026,7 +1026,7 @@ TEST(captures, what_ails_the_machine_or_the_share_is_no_fault_of_a_frame) {
     EXPECT_TRUE(says(refusal([&] { (void)capture.load(0); }), "no such file")) << "the share is there, the file is not";
 }
 
-TEST(captures, nothing_to_do_says_what_was_looked_for) {
+TEST(captures, an_empty_folder_error_names_the_files_looked_for) {
     const TemporaryFolder folder;
     const std::string message = refusal([&] { (void)open_capture(folder.path()); });
     EXPECT_TRUE(says(message, "no frames found in " + folder.path().string()));

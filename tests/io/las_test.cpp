@@ -155,7 +155,7 @@ TEST(Las, described_extra_bytes_keep_their_names) {
     EXPECT_EQ(get<std::uint32_t>(file_bytes(folder / "b.las"), 100), 2u); // one record describes both
 }
 
-TEST(Las, what_describes_nothing_does_not_hide_our_fields) {
+TEST(Las, invalid_descriptions_do_not_hide_our_fields) {
     // A description of no bytes, and one of more than a record holds: what comes behind them is not understood.
     const TemporaryFolder folder;
     std::string nothing(192, '\0'), sound(192, '\0'), too_long(192, '\0');
@@ -178,7 +178,7 @@ TEST(Las, what_describes_nothing_does_not_hide_our_fields) {
         }
 }
 
-TEST(Las, units_are_told_not_guessed) {
+TEST(Las, units_are_stated_not_guessed) {
     const TemporaryFolder folder;
     const auto unit = [&](const std::string& more) {
         std::vector<std::string> warnings;
@@ -200,7 +200,7 @@ TEST(Las, units_are_told_not_guessed) {
              "foot"));
 }
 
-TEST(Las, colours_of_eight_and_sixteen_bits_are_told_apart) {
+TEST(Las, colours_of_eight_and_sixteen_bits_are_distinguished) {
     const TemporaryFolder folder;
     std::string bytes = las(2, 2);
     const std::size_t points = get<std::uint32_t>(bytes, 96);

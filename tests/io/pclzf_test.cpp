@@ -123,7 +123,7 @@ TEST_F(DamagedPclzf, is_refused_wherever_it_is_cut) {
     EXPECT_TRUE(says(refused(sound_ + "x"), "packed data expected, found"));
 }
 
-TEST_F(DamagedPclzf, is_refused_where_its_header_lies) {
+TEST_F(DamagedPclzf, is_refused_if_its_header_is_wrong) {
     for (std::size_t at = 0; at < 37; ++at) {
         std::string changed = sound_;
         changed[at] = static_cast<char>(changed[at] ^ 0x10);
@@ -146,7 +146,7 @@ TEST_F(DamagedPclzf, asks_for_no_more_memory_than_its_bytes_can_fill) {
     std::memcpy(bytes.data() + 5, numbers, 8);
     std::memcpy(bytes.data() + 29, sizes, 8);
     EXPECT_TRUE(says(refused(bytes), "cannot become 16000x16000 pixels"));
-    const std::uint32_t one[] = {1, 1}, nothing[] = {0, 2}; // so small that any number of bytes might do
+    const std::uint32_t one[] = {1, 1}, nothing[] = {0, 2}; // so small that any number of bytes might be enough
     std::memcpy(bytes.data() + 5, one, 8);
     std::memcpy(bytes.data() + 29, nothing, 8);
     EXPECT_TRUE(says(refused(bytes), "do not become 2 bytes"));
@@ -216,7 +216,7 @@ TEST(pcl_recordings, two_cameras_are_not_registered) {
     const Capture capture = open_capture(folder.path());
     EXPECT_EQ(capture.registration, Registration::no);
     EXPECT_EQ(capture.camera->pinhole.fx, 60);
-    EXPECT_FALSE(capture.colour_camera); // its place is not known
+    EXPECT_FALSE(capture.colour_camera); // its pose is not known
 }
 
 TEST(pcl_recordings, name_what_is_missing_and_what_is_left_out) {
@@ -236,7 +236,7 @@ TEST(pcl_recordings, name_what_is_missing_and_what_is_left_out) {
     EXPECT_EQ(capture.load(2).depth_m.size(), small);
 }
 
-TEST(pcl_recordings, a_camera_is_taken_from_the_first_sound_xml_and_others_are_told) {
+TEST(pcl_recordings, the_first_sound_xml_gives_the_camera_and_others_are_reported) {
     const TemporaryFolder folder;
     write_shot(folder.path(), first);
     write_shot(folder.path(), second);
@@ -250,7 +250,7 @@ TEST(pcl_recordings, a_camera_is_taken_from_the_first_sound_xml_and_others_are_t
     EXPECT_TRUE(pcl::io::LZFDepth16ImageWriter().writeParameters({50, 61, 18.5, 11.5}, folder / (second + ".xml")));
     capture = open_capture(folder.path());
     EXPECT_EQ(capture.camera->pinhole.fx, 60);
-    EXPECT_TRUE(warned(capture.warnings, second + ".xml tells another camera than "));
+    EXPECT_TRUE(warned(capture.warnings, second + ".xml has another camera than "));
 
     write_file(folder / "camera.json", R"({"fx":70,"fy":70,"cx":18,"cy":12,"width":38,"height":24})");
     EXPECT_EQ(open_capture(folder.path()).camera->pinhole.fx, 70);
