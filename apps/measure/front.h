@@ -18,7 +18,6 @@ struct BenchmarkPoint {
     [[nodiscard]] double ms(double pixels) const { return ns_per_pixel * pixels * 1e-6; }
 };
 
-
 /// Whether each point is on the Pareto front: no other point is at least as fast and as accurate, and better in one of
 /// the two. Of equal points the first one counts. Points that are not finite are never on it.
 [[nodiscard]] std::vector<bool> on_pareto_front(const std::vector<BenchmarkPoint>& points);
@@ -42,7 +41,6 @@ struct ParetoFront {
     /// Replaces the classes that `other` has. Throws Error where that was measured on another device.
     void replace_with(const ParetoFront& other);
 };
-
 
 /// The front's JSON: {"device", "clean": {"made_by", "points": [{"method", "name", "settings": {...}, "ns_per_pixel",
 /// "rms"}], "others": [...], "sequence": {"made_by", "method", "name", "settings", "alone_rms", "together_rms",

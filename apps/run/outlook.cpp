@@ -7,7 +7,8 @@ namespace scanshade {
 namespace {
 
 /// What was measured with these settings of a method; null where nothing was.
-const BenchmarkPoint* measured_with(const ParetoFront& front, SensorClass sensor, const std::string& method, const Settings& values) {
+const BenchmarkPoint* measured_with(const ParetoFront& front, SensorClass sensor, const std::string& method,
+                                    const Settings& values) {
     for (const auto* by_class : {&front.points, &front.others})
         if (const auto points = by_class->find(sensor); points != by_class->end())
             for (const BenchmarkPoint& point : points->second) {
@@ -32,7 +33,8 @@ const BenchmarkPoint* measured_with(const ParetoFront& front, SensorClass sensor
 std::optional<Preset> better_preset(const ParetoFront& front, SensorClass sensor, const BenchmarkPoint& used) {
     constexpr double clearly = 0.98;
     for (const auto& [name, preset] : preset_words)
-        if (const BenchmarkPoint* point = measured_with(front, sensor, preset); point && point->rms < clearly * used.rms)
+        if (const BenchmarkPoint* point = measured_with(front, sensor, preset);
+            point && point->rms < clearly * used.rms)
             return preset;
     return std::nullopt;
 }

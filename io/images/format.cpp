@@ -1,8 +1,8 @@
 // The table of image formats, and the questions that it answers.
 #include "io/images/format.h"
 
-#include "io/images/readers.h"
 #include "io/images/png_output.h"
+#include "io/images/readers.h"
 #include "io/text.h"
 
 #include <algorithm>

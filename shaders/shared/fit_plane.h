@@ -5,13 +5,13 @@
 SHARED_BEGIN
 
 struct FitPlaneConstants {
-    ivec2 size;                       // of the image
+    ivec2 size; // of the image
     Pinhole camera;
-    float noise_floor, noise_per_z2;  // sigma(z) = floor + per_z2 z^2, metres
-    float window;                     // its radius is sqrt(window sigma fx / z), pixels
-    float largest_radius;             // but at most this
-    int drop_flying;                  // 0 = keep them
-    int neighbours;                   // other frames to average with
+    float noise_floor, noise_per_z2; // sigma(z) = floor + per_z2 z^2, metres
+    float window;                    // its radius is sqrt(window sigma fx / z), pixels
+    float largest_radius;            // but at most this
+    int drop_flying;                 // 0 = keep them
+    int neighbours;                  // other frames to average with
     NeighbourPlace places[most_neighbours];
 };
 

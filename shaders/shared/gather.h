@@ -8,7 +8,7 @@ const int most_gathered = 64;
 
 struct GatherConstants {
     ScreenConstants screen;
-    int frames;                  // to average with
+    int frames;                       // to average with
     float tolerance, tolerance_per_z; // metres between two frames' points of one surface, sigma apart
     NeighbourPlace places[most_gathered];
 };

@@ -6,10 +6,11 @@ SHARED_BEGIN
 
 struct GtaoConstants {
     ScreenConstants screen;
-    int slices, steps;               // steps to either side
-    float turn_cosine, turn_sine;    // of pi / slices
-    float falloff_scale, falloff_add; // weight of a sample: clamp(add + scale x), x its distance (linear) or that squared
-    float distribution;              // exponent of the steps' distances
+    int slices, steps;            // steps to either side
+    float turn_cosine, turn_sine; // of pi / slices
+    float falloff_scale,
+        falloff_add;    // weight of a sample: clamp(add + scale x), x its distance (linear) or that squared
+    float distribution; // exponent of the steps' distances
     float thickness, thickness_per_z; // bitmask: metres, metres per metre of depth
 };
 

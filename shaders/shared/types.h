@@ -1,4 +1,5 @@
-// What GLSL's vector types are to C++, and the words that let one text serve both. GLSL has no templates: Number is float.
+// What GLSL's vector types are to C++, and the words that let one text serve both. GLSL has no templates: Number is
+// float.
 #ifdef __cplusplus
 #pragma once
 #define SHARED_BEGIN namespace scanshade::shared {

@@ -1,7 +1,7 @@
 // Fuzz target: depth, colour and AO images of every format, and a picture's EXIF.
 #include "io/images/exif.h"
-#include "io/images/image_file.h"
 #include "io/images/format.h"
+#include "io/images/image_file.h"
 #include "tests/fuzz/fuzz.h"
 
 #include <zlib.h>

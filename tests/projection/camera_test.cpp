@@ -1,8 +1,8 @@
 // The conventions of projection/camera.h, and cameras recovered from what was recorded.
 #include "projection/camera.h"
 
-#include "projection/fit_pinhole.h"
 #include "projection/error.h"
+#include "projection/fit_pinhole.h"
 #include "projection/undistort.h"
 #include "tests/support/says.h"
 #include "tests/support/scenes.h"
