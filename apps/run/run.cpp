@@ -102,7 +102,10 @@ struct ReportFiles {
 /// complete. The caller holds the journal.
 void prepare_folder(const Job& job, const ReportFiles& reports) {
     std::set<std::string, std::less<>> stems;
-    for (const std::size_t index : job.batch.frames)
+    if (job.block.empty()) // of any frame: the earlier run may have taken others
+        for (const CaptureEntry& entry : job.capture.entries)
+            stems.insert(entry.name);
+    for (const std::size_t index : job.batch.frames) // of a block: others may be under work
         stems.insert(job.capture.entries[index].name);
     for (const fs::path& report : {reports.table, reports.manifest}) {
         stems.insert(report.stem().string());
