@@ -43,8 +43,12 @@ std::string shading_sentence(const Capture& capture, Registration registration) 
         why, capture.registration_reason.empty() ? "" : " (" + capture.registration_reason + ")");
 }
 
+std::string noise_origin(const RunSettings& settings) {
+    return settings.depth_noise == "auto" ? "measured" : "--depth-noise";
+}
+
 std::string noise_sentence(const DepthNoise& noise, const RunSettings& settings) {
-    const std::string origin = settings.depth_noise == "auto" ? "measured" : "--depth-noise";
+    const std::string origin = noise_origin(settings);
     if (!noise.any())
         return fmt::format("{} ({}); depth is used as recorded", describe(noise), origin);
     return fmt::format(

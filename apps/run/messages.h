@@ -11,6 +11,8 @@ namespace scanshade {
 
 /// What the shaded pictures show, and which flag changes that.
 [[nodiscard]] std::string shading_sentence(const Capture& capture, Registration registration);
+/// Who gave the noise of the depth: "measured", or the flag.
+[[nodiscard]] std::string noise_origin(const RunSettings& settings);
 /// The depth's noise, and how the depth is prepared.
 [[nodiscard]] std::string noise_sentence(const DepthNoise& noise, const RunSettings& settings);
 

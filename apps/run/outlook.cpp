@@ -64,7 +64,8 @@ std::vector<std::string> outlook(const RunSettings& settings, const DepthNoise& 
     const bool together = settings.in_sequence(capture);
     const auto gain = front.sequences.find(sensor);
     std::vector<std::string> sentences{fmt::format(
-        "expected error{}: RMSE {:.3f} to truth, measured with {} on generated scenes with {} depth",
+        "expected error{}: RMSE {:.3f} to truth, measured with {} on generated scenes with {} depth; real sensors may "
+        "err more",
         together ? " of each frame by itself" : "", used->rms, used->configuration.full_name(), name_of(sensor))};
     if (gain != front.sequences.end() && together)
         sentences.push_back(gain_text(gain->second));

@@ -280,15 +280,11 @@ class Run final : public Command {
         request.among = job.of;
         request.leave_bad_out = true;
         request.preparation = asked_.preparation();
-        const TrialCapture trial = load_trial(job.capture, job.batch.noise, noise_origin(), request);
+        const TrialCapture trial = load_trial(job.capture, job.batch.noise, noise_origin(asked_), request);
         const double radius_m = asked_.radius.value_or(request.radius_m);
         const Choice choice = choose(device, shipped_front(), trial, radius_m, asked_.budget);
         asked_.choose(choice.configuration);
         return choice.sentences;
-    }
-
-    [[nodiscard]] std::string noise_origin() const {
-        return asked_.depth_noise == "auto" ? "measured" : "--depth-noise";
     }
 
     /// A job made by `plan`: in worker processes, task by task.
