@@ -30,4 +30,15 @@ std::vector<int> whole_numbers(const std::string& flag, const std::string& list,
     return numbers;
 }
 
+std::vector<double> numbers(const std::string& flag, const std::string& list, double least) {
+    std::vector<double> found;
+    for (const std::string& word : comma_separated(list)) {
+        const auto value = number(word);
+        if (!value || !(*value >= least))
+            throw Misuse(fmt::format("{}: '{}' given, expected numbers from {} with commas", flag, word, least));
+        found.push_back(*value);
+    }
+    return found;
+}
+
 } // namespace scanshade

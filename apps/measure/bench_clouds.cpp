@@ -8,7 +8,8 @@
 #include "ao/raycast/raycast.h"
 #include "apps/lists.h"
 #include "apps/measure/bench_part.h"
-#include "apps/scenes/scene_cloud.h"
+#include "apps/scenes/random_noise.h"
+#include "apps/scenes/scanner.h"
 #include "projection/hash.h"
 #include "projection/stopwatch.h"
 
@@ -16,6 +17,8 @@
 #include <fmt/format.h>
 #include <fstream>
 #include <numbers>
+#include <numeric>
+#include <optional>
 #include <tbb/combinable.h>
 #include <tbb/parallel_for.h>
 
@@ -33,11 +36,17 @@ double peak_memory_mib() {
     return 0;
 }
 
+/// What a row of the table says besides its name.
+struct Measured {
+    Difference difference;
+    double wall_s = 0, cpu_s = 0;
+};
+
 struct Judge {
     std::vector<float> truth; ///< NaN where a point is not compared
 
     template <class Compute>
-    void row(const std::string& name, Compute&& compute) const {
+    Measured row(const std::string& name, Compute&& compute) const {
         const Stopwatch stopwatch;
         const std::clock_t cpu = std::clock();
         const std::vector<float> values = compute();
@@ -47,10 +56,11 @@ struct Judge {
         std::copy(values.begin(), values.end(), ours.begin());
         std::copy(truth.begin(), truth.end(), exact.begin());
         const Difference d = compare(ours, exact);
-        fmt::print("{:<26} RMSE {:.4f}  bias {:+.4f}  corr. {:.4f}  95 % {:.3f}  wall {:7.2f} s  cpu {:7.2f} s  peak "
-                   "{:6.0f} MiB\n",
+        fmt::print("{:<32} RMSE {:.4f}  bias {:+.4f}  corr. {:.4f}  95 % {:.3f}  wall {:6.2f} s  cpu {:6.2f} s  peak "
+                   "{:5.0f} MiB\n",
                    name, d.rms, d.bias, d.correlation, d.percentile_95, wall_s, cpu_s, peak_memory_mib());
         std::fflush(stdout);
+        return {d, wall_s, cpu_s};
     }
 };
 
@@ -124,79 +134,160 @@ std::vector<float> sky_by_views(const scene::SceneCloud& cloud, double spacing, 
     return sky;
 }
 
-/// Share of the normals that face the wrong side; missing normals do not count.
-double share_reversed(const std::vector<Vector3f>& found, const std::vector<Vector3d>& exact) {
-    double away = 0, all = 0;
-    for (std::size_t i = 0; i < found.size(); ++i) {
-        away += found[i].cast<double>().dot(exact[i]) < 0;
-        all += !found[i].isZero();
+/// How many normals face the wrong side: of all, and of those with a confidence above 0.8. Points without a normal, or
+/// with one more than 60 degrees from the true plane, do not count.
+struct Sides {
+    double wrong = 0, wrong_where_sure = 0, sure = 0; ///< shares
+};
+Sides sides_of(const PointVisibility& found, const std::vector<Vector3d>& exact) {
+    double all = 0, away = 0, sure = 0, sure_away = 0;
+    for (std::size_t i = 0; i < exact.size(); ++i) {
+        const double cosine = found.normals[i].cast<double>().dot(exact[i]);
+        if (std::abs(cosine) < 0.5)
+            continue;
+        const bool is_sure = found.confidence[i] > 0.8F;
+        all += 1;
+        away += cosine < 0;
+        sure += is_sure;
+        sure_away += is_sure && cosine < 0;
     }
-    return away / std::max(all, 1.0);
+    return {away / std::max(all, 1.0), sure_away / std::max(sure, 1.0), sure / std::max(all, 1.0)};
+}
+
+/// The normals that a cloud comes with: "recorded" ones are true, "random" ones turned over by chance.
+std::vector<Vector3d> given_normals(const std::string& kind, const std::vector<Vector3d>& exact) {
+    if (kind == "none")
+        return {};
+    if (kind != "recorded" && kind != "random")
+        throw Misuse(fmt::format("--clouds.normals: '{}' given, expected recorded, none or random", kind));
+    std::vector<Vector3d> given = exact;
+    const Noise noise(1, 0, 77);
+    for (std::size_t i = 0; kind == "random" && i < given.size(); ++i)
+        if (noise.uniform(static_cast<int>(i), 0) < 0.5)
+            given[i] = -given[i];
+    return given;
 }
 
 class CloudErrors final : public BenchPart {
   public:
     Stage stage() override {
-        return {"clouds against rays on their scene",
-                {{"clouds", "measures errors, seconds and memory of a scene's points", &asked_},
-                 {"clouds.scene", "which scene; empty = office, or outdoor for the sky", &scene_},
-                 {"clouds.points", "how many points", &points_, "", 1, 1e9},
-                 {"clouds.rays", "rays per point, with commas", &rays_},
-                 {"clouds.smooth", "how often values become means of neighbours; -1 = by the spacing", &smooth_, "", -1,
-                  16},
-                 {"clouds.normals", "whether the points come with their normals", &normals_},
-                 {"clouds.gpu", "computes on the Vulkan device instead of the processor", &gpu_},
-                 {"clouds.raycast", "measures the method raycast with 64 rays, too", &raycast_},
-                 {"clouds.sky", "measures the share of the sky instead, also by depth images", &sky_},
-                 {"clouds.raster", "sizes of these images, pixels a side, with commas", &rasters_}}};
+        Stage stage{
+            "clouds against rays on their scene",
+            {{"clouds", "measures errors, seconds and memory of scenes' points", &asked_},
+             {"clouds.scene", "which scenes, with commas; empty = office, or outdoor for the sky", &scenes_},
+             {"clouds.points", "how many points", &points_, "", 1, 1e9},
+             {"clouds.rays", "rays per point, with commas; 0 = as run chooses", &rays_},
+             {"clouds.smooth", "how often values become means of neighbours; -1 = by the spacing", &smooth_, "", -1,
+              16},
+             {"clouds.normals", "any of recorded,none,random (random signs): what the points come with", &normals_},
+             {"clouds.noises", "sigmas of the points along their normals, with commas", &noises_, "m"},
+             {"clouds.strays", "adds this share of stray points, up to 10^8 m away", &strays_, "", 0, 0.5},
+             {"clouds.gpu", "computes on the Vulkan device instead of the processor", &gpu_},
+             {"clouds.raycast", "measures the method raycast with 64 rays, too", &raycast_},
+             {"clouds.sky", "measures the share of the sky instead, also by depth images", &sky_},
+             {"clouds.raster", "sizes of these images, pixels a side, with commas", &rasters_}}};
+        for (Parameter& row : scanner_.parameters())
+            if (row.name != "noise") {
+                row.name = "clouds." + row.name;
+                stage.rows.push_back(std::move(row));
+            }
+        return stage;
     }
     [[nodiscard]] bool asked() const override { return asked_; }
 
     int run(const std::string& choice) override {
-        const std::vector<int> rays = whole_numbers("clouds.rays", rays_, 1),
-                               rasters = whole_numbers("clouds.raster", rasters_, 1);
-        const scene::World world(scene::scene_named(!scene_.empty() ? scene_ : sky_ ? "outdoor" : "office"));
-        const auto points = static_cast<std::size_t>(points_);
-        const auto cloud = scene::scene_cloud(world, points);
-        const std::size_t step = std::max<std::size_t>(1, points / 50000);
-        const double radius = world.scene().ao_radius_m;
-        const Judge judge{sky_ ? true_sky(world, cloud, step)
-                               : scene::true_visibility(world, cloud, {radius, 1024, 1, false}, step)};
-        const PointSet set{cloud.points, normals_ ? cloud.normals : std::span<const Vector3d>()};
-        fmt::print("{}: {} points, radius {} m; every {}. point is compared\n", world.scene().name, points,
-                   sky_ ? 0 : radius, step);
-        double spacing = 0, reversed = 0;
-        std::unique_ptr<gpu::Device> device;
         if (gpu_)
-            device = std::make_unique<gpu::Device>(choice);
-        for (const int count : rays)
-            judge.row(fmt::format("{} rays a point", count), [&] {
-                const auto found =
-                    CloudAo({.radius = radius, .rays = count, .smooth = smooth_, .sky = sky_}, device.get())
-                        .compute(set);
-                for (const auto& [stage, ms] : found.timings)
-                    fmt::print("{} {:.0f} ms; ", stage, ms);
-                fmt::print("\n");
-                spacing = found.spacing;
-                reversed = share_reversed(found.normals, cloud.normals);
-                return found.visibility;
-            });
-        if (!normals_)
-            fmt::print("{:.2f} % of the normals face the wrong side\n", 100 * reversed);
-        if (sky_)
-            for (const int raster : rasters)
-                judge.row(fmt::format("256 views of {0}x{0}", raster),
-                          [&] { return sky_by_views(cloud, spacing, 256, raster); });
-        if (raycast_)
-            judge.row("raycast, 64 rays",
-                      [&] { return Raycast({.radius_m = radius, .rays = 64}).compute(set).visibility; });
+            device_ = std::make_unique<gpu::Device>(choice);
+        for (const std::string& name : comma_separated(!scenes_.empty() ? scenes_ : sky_ ? "outdoor" : "office"))
+            measure(scene::World(scene::scene_named(name)));
+        if (squares_.size() > 1)
+            for (const auto& [name, squares] : squares_)
+                fmt::print("{:<32} RMSE {:.4f} over {} scenes\n", name,
+                           std::sqrt(std::accumulate(squares.begin(), squares.end(), 0.0) /
+                                     static_cast<double>(squares.size())),
+                           squares.size());
         return all_well;
     }
 
   private:
-    std::string scene_, rays_ = "8,16,32", rasters_ = "512,1024,2048";
+    void measure(const scene::World& world) {
+        const std::vector<int> rasters = whole_numbers("clouds.raster", rasters_, 1);
+        const auto points = static_cast<std::size_t>(points_);
+        const double radius = world.scene().ao_radius_m;
+        std::optional<Judge> judge; // noise does not change what is true
+        for (const double noise : numbers("clouds.noises", noises_, 0)) {
+            scanner_.noise_m = noise;
+            const auto cloud = scene::scanned_cloud(world, points, scanner_);
+            const std::size_t step = std::max<std::size_t>(1, cloud.points.size() / 50000);
+            if (!judge) {
+                fmt::print("{}: {} points, radius {} m; every {}. point is compared\n", world.scene().name,
+                           cloud.points.size(), sky_ ? 0 : radius, step);
+                judge.emplace(sky_ ? true_sky(world, cloud, step)
+                                   : scene::true_visibility(world, cloud, {radius, 1024, 1, false}, step));
+            }
+            double spacing = 0;
+            for (const std::string& kind : comma_separated(normals_))
+                for (const int rays : whole_numbers("clouds.rays", rays_, 0))
+                    spacing = row(cloud, *judge, radius, noise, kind, rays);
+            if (sky_)
+                for (const int raster : rasters)
+                    judge->row(fmt::format("256 views of {0}x{0}", raster),
+                               [&] { return sky_by_views(cloud, spacing, 256, raster); });
+            if (raycast_)
+                judge->row("raycast, 64 rays", [&] {
+                    return Raycast({.radius_m = radius, .rays = 64}).compute({cloud.points, cloud.normals}).visibility;
+                });
+        }
+    }
+
+    /// Returns the spacing.
+    double row(const scene::SceneCloud& cloud, const Judge& judge, double radius, double noise, const std::string& kind,
+               int rays) {
+        std::vector<Vector3d> points = cloud.points, normals = given_normals(kind, cloud.normals);
+        add_strays(points, normals, kind != "none");
+        const std::string name = fmt::format("{:g} mm, {}, {} rays", 1000 * noise, kind, rays);
+        PointVisibility found;
+        const Measured measured = judge.row(name, [&] {
+            found = CloudAo({.radius = radius, .rays = rays, .smooth = smooth_, .sky = sky_}, device_.get())
+                        .compute({points, normals});
+            return std::vector<float>(found.visibility.begin(),
+                                      found.visibility.begin() + static_cast<std::ptrdiff_t>(cloud.points.size()));
+        });
+        const auto same =
+            std::find_if(squares_.begin(), squares_.end(), [&](const auto& r) { return r.first == name; });
+        auto& squares =
+            same != squares_.end() ? same->second : squares_.emplace_back(name, std::vector<double>()).second;
+        squares.push_back(measured.difference.rms * measured.difference.rms);
+        for (const auto& [stage, ms] : found.timings)
+            fmt::print("{} {:.0f} ms; ", stage, ms);
+        const Sides sides = sides_of(found, cloud.normals);
+        fmt::print("\n    wrong sides {:.2f} %; {:.0f} % of the points are sure, {:.2f} % of them wrong\n",
+                   100 * sides.wrong, 100 * sides.sure, 100 * sides.wrong_where_sure);
+        for (const std::string& note : found.notes)
+            fmt::print("    {}\n", note);
+        std::fflush(stdout);
+        return found.spacing;
+    }
+
+    /// Points far off, at distances from 10 to 10^8 m, behind the others.
+    void add_strays(std::vector<Vector3d>& points, std::vector<Vector3d>& normals, bool with_normals) const {
+        const Noise noise(3, 0, 99);
+        const auto count = static_cast<int>(strays_ * static_cast<double>(points.size()));
+        for (int i = 0; i < count; ++i) {
+            const Vector3d towards(noise.gaussian(i, 0), noise.gaussian(i, 1), noise.gaussian(i, 2));
+            points.emplace_back(std::pow(10.0, 1 + 7 * noise.uniform(i, 3)) * towards.normalized());
+            if (with_normals)
+                normals.push_back(towards.normalized());
+        }
+    }
+
+    std::string scenes_, rays_ = "8,16,32", rasters_ = "512,1024,2048", normals_ = "recorded", noises_ = "0";
     int points_ = 1000000, smooth_ = -1;
-    bool asked_ = false, normals_ = true, gpu_ = false, raycast_ = false, sky_ = false;
+    double strays_ = 0;
+    bool asked_ = false, gpu_ = false, raycast_ = false, sky_ = false;
+    scene::ScannerOptions scanner_;
+    std::unique_ptr<gpu::Device> device_;
+    std::vector<std::pair<std::string, std::vector<double>>> squares_; ///< of RMSEs, by row
 };
 
 } // namespace

@@ -251,7 +251,8 @@ std::vector<std::string> names_of(const std::vector<Row>& table) {
 
 /// The cloud as a file of floats, and once more with the truth.
 void write_scene_cloud(const GenerateOptions& options, const scene::World& world, const fs::path& out) {
-    const scene::SceneCloud cloud = scene::scene_cloud(world, static_cast<std::size_t>(options.cloud), options.seed);
+    const scene::SceneCloud cloud =
+        scene::scanned_cloud(world, static_cast<std::size_t>(options.cloud), options.scanner, options.seed);
     std::array<std::vector<float>, 3> normals;
     std::vector<AddedField> fields;
     constexpr std::array names{"nx", "ny", "nz"};
@@ -288,7 +289,7 @@ cv::Size parsed_size(const std::string& text) {
 }
 
 std::vector<Parameter> GenerateOptions::parameters() {
-    return {
+    std::vector<Parameter> rows{
         {.name = "sensor", .help = "the depth sensor simulated", .value = &sensor, .choices = names_of(sensors())},
         {.name = "frames", .help = "frames to record", .value = &frames, .low = 1, .high = 100000},
         {.name = "first",
@@ -343,6 +344,11 @@ std::vector<Parameter> GenerateOptions::parameters() {
         {.name = "cloud-normals", .help = "writes the cloud's normals", .value = &cloud_normals},
         {.name = "overwrite", .help = "replaces an earlier generated capture", .value = &overwrite},
     };
+    for (Parameter& row : scanner.parameters()) {
+        row.name = "cloud-" + row.name;
+        rows.push_back(std::move(row));
+    }
+    return rows;
 }
 
 void generate(const GenerateOptions& options, const fs::path& out, const GenerateProgress& progress) {

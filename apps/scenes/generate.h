@@ -1,6 +1,7 @@
 // Captures with known truth: a synthetic scene seen by a simulated depth sensor, written in TUM's layout.
 #pragma once
 
+#include "apps/scenes/scanner.h"
 #include "projection/parameters.h"
 
 #include <filesystem>
@@ -28,6 +29,7 @@ struct GenerateOptions {
     std::string truth_falloff = "hard"; ///< any of hard,quad,lin
     int cloud = 0;                      ///< points; 0 = a recording
     bool cloud_normals = true;          ///< whether the cloud has them
+    scene::ScannerOptions scanner = {}; ///< of the cloud
     bool overwrite = false;
 
     /// Every setting but the scene, which is a word of the command line.
@@ -45,10 +47,10 @@ using GenerateProgress = std::function<void(int done, int total)>;
 /// truth/depth/<stamp>.tiff (exact z in metres), truth/normals/<stamp>.tiff (exact, x y z), truth/ao/<stamp>.tiff
 /// (cosine-weighted visibility within truth_radius_m; ao_quad and ao_lin for those falloffs). Same options, same bytes,
 /// however many threads there are. A frame is the same whatever first and step lead to it.
-/// With `cloud` set: NAME.ply, points of equal density on all that can be seen of the scene, and truth/NAME.ply, the
-/// same with the field ambient_occlusion, in place of images. Throws Misuse for options out of range, an `out` that
-/// holds something and is not to be overwritten, or (even then) is not a generated capture; Error where a file cannot
-/// be written.
+/// With `cloud` set: NAME.ply, points of equal density on all that can be seen of the scene or what the scanner
+/// records, and truth/NAME.ply, the same with the field ambient_occlusion, in place of images. Throws Misuse for
+/// options out of range, an `out` that holds something and is not to be overwritten, or (even then) is not a generated
+/// capture; Error where a file cannot be written.
 void generate(const GenerateOptions& options, const std::filesystem::path& out, const GenerateProgress& progress = {});
 
 } // namespace scanshade

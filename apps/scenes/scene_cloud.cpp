@@ -160,11 +160,12 @@ std::vector<float> true_visibility(const World& world, const SceneCloud& cloud, 
                                    std::size_t step) {
     const CosineDirections directions(options.rays, options.seed);
     const RayHemisphere hemisphere(world.surface(), directions, options.radius_m, false);
-    std::vector<float> truth(cloud.points.size(), std::numeric_limits<float>::quiet_NaN());
+    const std::vector<Vector3d>& points = cloud.surface.empty() ? cloud.points : cloud.surface;
+    std::vector<float> truth(points.size(), std::numeric_limits<float>::quiet_NaN());
     tbb::parallel_for(std::size_t(0), (truth.size() + step - 1) / step, [&](std::size_t k) {
         const std::size_t i = k * step;
-        truth[i] =
-            hemisphere.at({cloud.points[i], cloud.normals[i], hash(static_cast<std::uint32_t>(i))}).visibility[0];
+        if (!cloud.normals[i].isZero())
+            truth[i] = hemisphere.at({points[i], cloud.normals[i], hash(static_cast<std::uint32_t>(i))}).visibility[0];
     });
     return truth;
 }
