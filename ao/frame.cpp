@@ -17,6 +17,7 @@ FrameAo::FrameAo(gpu::Device& device, const MethodRow& row, const MethodSetup& s
 
 AoMap FrameAo::compute(const DepthImage& depth, const DepthNoise& noise) {
     timings_.clear();
+    doubts_.clear();
     AoMap ao;
     if (noise.any() && device_) {
         ao = compute_prepared(depth, noise);

@@ -9,6 +9,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace scanshade {
@@ -33,6 +34,8 @@ class FrameAo {
     [[nodiscard]] Neighbourhood sequence(double radius_m, const DepthNoise& noise,
                                          const NeighbourhoodOptions& options = alone());
 
+    /// Sentences: why the result of the last compute() may be wrong; empty = no reason known.
+    [[nodiscard]] const std::vector<std::string>& doubts() const { return doubts_; }
     /// Where the time of the last compute() went, in order of execution.
     [[nodiscard]] const Timings& timings() const { return timings_; }
     /// What lay between the method's passes in the last compute().
@@ -47,6 +50,7 @@ class FrameAo {
     FitPlaneOptions preparation_;
     std::optional<FitPlane> fit_; ///< made when noise first asks for it; its pipelines stay for other noise
     Timings timings_;
+    std::vector<std::string> doubts_;
 };
 
 /// How points are computed: by the method itself where it needs no view, else by rays from every point. `device` = null

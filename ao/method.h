@@ -128,7 +128,8 @@ struct PointVisibility {
     std::vector<Eigen::Vector3f> normals; ///< as used; zero where there is none; empty for meshes
     double radius = 0, spacing = 0;       ///< as used, in the cloud's unit; spacing 0 = not measured
     int tiles = 1;
-    std::vector<std::string> notes; ///< sentences: what was chosen and why
+    std::vector<std::string> notes;  ///< sentences: what was chosen and why
+    std::vector<std::string> doubts; ///< sentences: why the result may be wrong; empty = none
     Timings timings;
 };
 

@@ -47,9 +47,10 @@ Reading read_task(const fs::path& job, const Task& task) {
     return reading;
 }
 
-/// A failure's message without its frame's name: digits become '#', the folder is left out.
+/// A frame's failure or doubts without its name, so that those of many frames are one: digits become '#', the folder is
+/// left out.
 std::string reason_of(const FrameRow& row, const Task& task) {
-    std::string text = row.why;
+    std::string text = scanshade::reason_of(row);
     for (std::string folder = task.capture.string() + "/"; text.find(folder) != std::string::npos;)
         text.erase(text.find(folder), folder.size());
     if (const auto at = text.find(row.name); at != std::string::npos)
@@ -58,12 +59,12 @@ std::string reason_of(const FrameRow& row, const Task& task) {
     for (const char c : text)
         if (const bool digit = c >= '0' && c <= '9'; !digit || reason.empty() || reason.back() != '#')
             reason += digit ? '#' : c;
-    return fmt::format("{}: {}", name_of(row.fault), reason);
+    return row.status == FrameStatus::doubtful ? reason : fmt::format("{}: {}", name_of(row.fault), reason);
 }
 
 /// Sums over a job, task by task, so that memory does not grow with their number.
 struct Totals {
-    std::size_t tasks = 0, frames = 0, ok = 0, failed = 0;
+    std::size_t tasks = 0, frames = 0, ok = 0, doubtful = 0, failed = 0;
     std::map<Standing, std::size_t> standing;
     double cost = 0, done_cost = 0;
     StageTimes ms{};
@@ -71,7 +72,8 @@ struct Totals {
         std::size_t frames = 0;
         std::string example;
     };
-    std::map<std::string, Group> reasons;
+    using Groups = std::map<std::string, Group>;
+    Groups reasons, doubts; ///< of failed frames, of doubtful ones
     std::map<std::string, std::size_t> frames_by_host;
 
     [[nodiscard]] std::size_t in(Standing which) const {
@@ -99,45 +101,53 @@ struct Totals {
             ++ok;
             return;
         }
-        ++failed;
-        Group& group = reasons[reason_of(row, task)];
+        const bool is_doubtful = row.status == FrameStatus::doubtful;
+        ++(is_doubtful ? doubtful : failed);
+        Group& group = (is_doubtful ? doubts : reasons)[reason_of(row, task)];
         if (group.frames++ == 0)
             group.example = task.name + " " + row.name;
     }
 };
 
+std::size_t settled(const Totals& totals) { return totals.ok + totals.doubtful + totals.failed; }
+
 int code_of(const Totals& totals) {
-    if (totals.ok + totals.failed < totals.frames)
+    if (settled(totals) < totals.frames)
         return unfinished;
-    return totals.failed == 0 ? all_well : totals.ok == 0 ? nothing_done : some_failed;
+    if (totals.failed + totals.doubtful == 0)
+        return all_well;
+    return totals.ok + totals.doubtful == 0 ? nothing_done : some_failed;
 }
 
-std::vector<std::pair<std::string, Totals::Group>> most_frequent_first(const Totals& totals) {
-    std::vector<std::pair<std::string, Totals::Group>> groups(totals.reasons.begin(), totals.reasons.end());
+std::vector<std::pair<std::string, Totals::Group>> most_frequent_first(const Totals::Groups& reasons) {
+    std::vector<std::pair<std::string, Totals::Group>> groups(reasons.begin(), reasons.end());
     std::ranges::stable_sort(groups, [](const auto& a, const auto& b) { return a.second.frames > b.second.frames; });
     return groups;
 }
 
-std::size_t left_of(const Totals& totals) { return totals.frames - std::min(totals.frames, totals.ok + totals.failed); }
+std::size_t left_of(const Totals& totals) { return totals.frames - std::min(totals.frames, settled(totals)); }
 double work_done(const Totals& totals) { return totals.cost > 0 ? totals.done_cost / totals.cost : 1; }
 
-json failures_json(const Totals& totals) {
-    json failures = json::array();
-    for (const auto& [reason, group] : most_frequent_first(totals))
-        failures.push_back({{"reason", reason}, {"frames", group.frames}, {"first", group.example}});
-    return failures;
+json reasons_json(const Totals::Groups& reasons) {
+    json all = json::array();
+    for (const auto& [reason, group] : most_frequent_first(reasons))
+        all.push_back({{"reason", reason}, {"frames", group.frames}, {"first", group.example}});
+    return all;
 }
 
 void print(const Totals& totals, std::size_t refused) {
     fmt::print("tasks   {} done, {} running, {} begun, {} waiting, of {}\n", totals.in(Standing::done),
                totals.in(Standing::running), totals.in(Standing::begun), totals.in(Standing::waiting), totals.tasks);
-    fmt::print("frames  {} ok, {} failed, {} left, of {}\n", totals.ok, totals.failed, left_of(totals), totals.frames);
+    fmt::print("frames  {} ok, {} doubtful, {} failed, {} left, of {}\n", totals.ok, totals.doubtful, totals.failed,
+               left_of(totals), totals.frames);
     fmt::print("work    {:.1f} %\n", 100 * work_done(totals));
     if (refused > 0)
         fmt::print("refused {} captures, when the job was planned\n", refused);
     for (const auto& [host, frames] : totals.frames_by_host)
         fmt::print("  {:>8} frames by {}\n", frames, host);
-    for (const auto& [reason, group] : most_frequent_first(totals))
+    for (const auto& [reason, group] : most_frequent_first(totals.doubts))
+        fmt::print("  {:>8} doubtful: {} (first: {})\n", group.frames, reason, group.example);
+    for (const auto& [reason, group] : most_frequent_first(totals.reasons))
         fmt::print("  {:>8} failed: {} (first: {})\n", group.frames, reason, group.example);
 }
 
@@ -205,10 +215,15 @@ class Status final : public Command {
                   {"waiting", totals.in(Standing::waiting)},
                   {"of", totals.tasks}}},
                 {"frames",
-                 {{"ok", totals.ok}, {"failed", totals.failed}, {"left", left_of(totals)}, {"of", totals.frames}}},
+                 {{"ok", totals.ok},
+                  {"doubtful", totals.doubtful},
+                  {"failed", totals.failed},
+                  {"left", left_of(totals)},
+                  {"of", totals.frames}}},
                 {"work_done", work_done(totals)},
                 {"frames_by_host", totals.frames_by_host},
-                {"failures", failures_json(totals)},
+                {"doubts", reasons_json(totals.doubts)},
+                {"failures", reasons_json(totals.reasons)},
                 {"running", tasks},
                 {"refused", plan.refused}};
     }
@@ -254,10 +269,12 @@ class Merge final : public Command {
                          {{"tasks", totals.tasks},
                           {"frames", totals.frames},
                           {"ok", totals.ok},
+                          {"doubtful", totals.doubtful},
                           {"failed", totals.failed},
                           {"stage_ms", stage_json(totals.ms)}}},
                         {"frames_by_host", totals.frames_by_host},
-                        {"failures", failures_json(totals)},
+                        {"doubts", reasons_json(totals.doubts)},
+                        {"failures", reasons_json(totals.reasons)},
                         {"refused", plan.refused}};
         write_atomically(job / "manifest.json", text_of(text) + "\n");
     }

@@ -10,11 +10,11 @@
 namespace scanshade {
 namespace {
 
-/// The first ten by name, the rest by number.
-std::string names_of_failed(const std::vector<FrameRow>& rows) {
+/// Frames with that status: the first ten by name, the rest by number.
+std::string names_of(const std::vector<FrameRow>& rows, FrameStatus status) {
     std::vector<std::string> names;
     for (const FrameRow& row : rows)
-        if (row.status == FrameStatus::failed)
+        if (row.status == status)
             names.push_back(row.name);
     constexpr std::size_t most = 10;
     const std::string more = names.size() > most ? fmt::format(" and {} more", names.size() - most) : "";
@@ -74,13 +74,18 @@ void introduce(const RunReport& report, std::size_t frames) {
 }
 
 void conclude(const RunReport& report, const std::filesystem::path& table) {
-    const std::size_t ok = count(report.frames, FrameStatus::ok);
+    const std::size_t doubtful = count(report.frames, FrameStatus::doubtful);
+    const std::size_t done = count(report.frames, FrameStatus::ok) + doubtful;
     const std::string before =
-        ok > report.done_now ? fmt::format(", {} of them in an earlier run", ok - report.done_now) : "";
-    say(fmt::format("  {} of {} frames{} in {:.1f} s ({}) -> {}", ok, report.frames.size(), before,
+        done > report.done_now ? fmt::format(", {} of them in an earlier run", done - report.done_now) : "";
+    const std::string of_them = doubtful > 0 ? fmt::format(", {} doubtful", doubtful) : "";
+    say(fmt::format("  {} of {} frames{}{} in {:.1f} s ({}) -> {}", done, report.frames.size(), before, of_them,
                     report.took_ms / 1000, describe(rates_of(report)), table.parent_path().string()));
+    if (doubtful > 0)
+        warn(fmt::format("  doubtful: {} (reasons in {})", names_of(report.frames, FrameStatus::doubtful),
+                         table.string()));
     if (count(report.frames, FrameStatus::failed) > 0)
-        warn(fmt::format("  failed: {} (reasons in {})", names_of_failed(report.frames), table.string()));
+        warn(fmt::format("  failed: {} (reasons in {})", names_of(report.frames, FrameStatus::failed), table.string()));
     if (const std::size_t skipped = count(report.frames, FrameStatus::skipped); skipped > 0)
         warn(fmt::format("  not finished: {} of {} frames are left; --resume continues", skipped,
                          report.capture.path.string()));

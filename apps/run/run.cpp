@@ -139,6 +139,7 @@ class Tally {
     void add(const std::vector<FrameRow>& rows) {
         all_ += rows.size();
         ok_ += count(rows, FrameStatus::ok);
+        doubtful_ += count(rows, FrameStatus::doubtful);
         for (const FrameRow& row : rows)
             faults_.insert(row.fault);
     }
@@ -151,11 +152,11 @@ class Tally {
             return internal_error;
         if (ok_ == all_ && unopened == 0)
             return all_well;
-        return ok_ == 0 ? nothing_done : some_failed;
+        return ok_ + doubtful_ == 0 ? nothing_done : some_failed;
     }
 
   private:
-    std::size_t all_ = 0, ok_ = 0;
+    std::size_t all_ = 0, ok_ = 0, doubtful_ = 0;
     std::set<Fault> faults_;
 };
 
@@ -466,7 +467,7 @@ class Run final : public Command {
         const Stopwatch stopwatch;
         report.frames = run_recorded(job.capture, pool, job.batch, recording, [&](const FrameRow& row) {
             progress.add(row);
-            report.done_now += row.status == FrameStatus::ok;
+            report.done_now += is_done(row.status);
             report.ms_now = report.ms_now + row.ms;
         });
         report.took_ms = stopwatch.ms();
@@ -478,7 +479,7 @@ class Run final : public Command {
             const std::lock_guard alone(alone_); // the report names settings
             write_frames_csv(files.table, report.frames);
             write_manifest(files.manifest, report, [&](const FrameRow& row) { return journal.whole(row); });
-            if (count(report.frames, FrameStatus::ok) > 0)
+            if (count(report.frames, FrameStatus::ok) + count(report.frames, FrameStatus::doubtful) > 0)
                 for (const std::string& sentence : outlook(asked_, job.batch.noise, job.capture, shipped_front()))
                     if (!std::ranges::count(outlook_, sentence))
                         outlook_.push_back(sentence);

@@ -92,6 +92,7 @@ void refuse_blind_view(const Work& work) {
 void compute_points(Work& work, const BatchOptions& options) {
     work.of_points = visibility_of_points(work.frame, *options.points);
     std::ranges::copy(work.of_points.notes, std::back_inserter(work.row.notes));
+    std::ranges::copy(work.of_points.doubts, std::back_inserter(work.row.doubts));
     work.confidence.per_point = work.of_points.confidence;
     work.row.passes = work.of_points.timings;
     work.attached = attached_points(*work.frame.cloud, work.of_points.visibility);
@@ -134,7 +135,7 @@ void attach_and_write(Work& work, const BatchOptions& options) {
     if (!work.row.why.empty())
         remove_files(work, outputs);
     else
-        work.row.status = FrameStatus::ok;
+        work.row.status = work.row.doubts.empty() ? FrameStatus::ok : FrameStatus::doubtful;
 }
 
 std::vector<FrameRow> planned_rows(const Capture& capture, const std::vector<std::size_t>& frames) {
@@ -251,6 +252,7 @@ class Pipeline {
         } else {
             work.ao = method.compute(work.depth, options_.noise);
             work.row.passes = method.timings();
+            std::ranges::copy(method.doubts(), std::back_inserter(work.row.doubts));
         }
         if (options_.dump.empty())
             return;
@@ -280,7 +282,7 @@ class Pipeline {
     }
 
     void add_to_report(Work& work) {
-        if (options_.cloud && work.row.status == FrameStatus::ok)
+        if (options_.cloud && is_done(work.row.status))
             add_to(*options_.cloud, work);
         outages_ = work.row.fault == Fault::outage ? outages_ + 1 : 0;
         given_up_ = given_up_ || outages_ >= 4;

@@ -2,6 +2,8 @@
 #include "apps/walk/frame_row.h"
 
 #include <cmath>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <limits>
 
 namespace scanshade {
@@ -12,6 +14,8 @@ std::string_view name_of(FrameStatus status) {
     switch (status) {
     case FrameStatus::ok:
         return "ok";
+    case FrameStatus::doubtful:
+        return "doubtful";
     case FrameStatus::failed:
         return "failed";
     case FrameStatus::skipped:
@@ -47,6 +51,10 @@ void shorten(FrameRow& row) {
     row.passes = {}; // not clear(): that would keep the memory
     row.notes = {};
     row.files = {};
+}
+
+std::string reason_of(const FrameRow& row) {
+    return row.doubts.empty() ? row.why : fmt::format("{}", fmt::join(row.doubts, " "));
 }
 
 FrameRow skipped_row(const Capture& capture, std::size_t index) {

@@ -13,8 +13,13 @@
 
 namespace scanshade {
 
-enum class FrameStatus { ok, failed, skipped };
+/// Doubtful: computed and written, but the result is implausible; FrameRow::doubts has the reasons.
+enum class FrameStatus { ok, doubtful, failed, skipped };
 [[nodiscard]] std::string_view name_of(FrameStatus status);
+/// Whether the frame has results.
+[[nodiscard]] constexpr bool is_done(FrameStatus status) {
+    return status == FrameStatus::ok || status == FrameStatus::doubtful;
+}
 
 /// Milliseconds that one frame spent in each stage of the walk.
 struct StageTimes {
@@ -32,7 +37,8 @@ struct FrameRow {
     std::size_t index = 0; ///< in capture.entries
     std::string name;
     FrameStatus status = FrameStatus::skipped;
-    std::string why; ///< of a failed or skipped frame
+    std::string why;                 ///< of a failed or skipped frame
+    std::vector<std::string> doubts; ///< of a doubtful frame, sentences
     Fault fault = Fault::none;
     cv::Size size;
     double valid_share = 0; ///< pixels or points with a depth / all of them
@@ -49,6 +55,9 @@ struct FrameRow {
 /// Frees what the journal keeps and only the manifest needs: camera, passes, notes and files. For thousands of frames
 /// these would take most of a run's memory.
 void shorten(FrameRow& row);
+
+/// `why`, or the doubts as one line; empty for a frame that is ok.
+[[nodiscard]] std::string reason_of(const FrameRow& row);
 
 /// The row of a frame that was not begun.
 [[nodiscard]] FrameRow skipped_row(const Capture& capture, std::size_t index);

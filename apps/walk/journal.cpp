@@ -59,6 +59,8 @@ json row_json(
         text["files"].push_back(file.generic_string());
     if (!row.notes.empty())
         text["notes"] = row.notes;
+    if (!row.doubts.empty())
+        text["doubts"] = row.doubts;
     return text;
 }
 
@@ -91,7 +93,8 @@ FrameRow row_from(const json& text) {
     FrameRow row;
     row.index = count_at(text, "index");
     row.name = text.at("name");
-    row.status = named(text.at("status"), {FrameStatus::ok, FrameStatus::failed, FrameStatus::skipped});
+    row.status =
+        named(text.at("status"), {FrameStatus::ok, FrameStatus::doubtful, FrameStatus::failed, FrameStatus::skipped});
     row.why = text.at("why");
     row.fault = named(text.at("fault"), {Fault::none, Fault::input, Fault::outage, Fault::internal, Fault::crash});
     row.size = {text.at("size").at(0).get<int>(), text.at("size").at(1).get<int>()};
@@ -108,6 +111,8 @@ FrameRow row_from(const json& text) {
         row.files.emplace_back(file.get<std::string>());
     if (text.contains("notes"))
         row.notes = text["notes"].get<std::vector<std::string>>();
+    if (text.contains("doubts"))
+        row.doubts = text["doubts"].get<std::vector<std::string>>();
     return row;
 }
 

@@ -69,14 +69,16 @@ void log(const std::shared_ptr<OrderedOutput::Buffer>& buffer, json object) {
 }
 
 std::string line_of(const FrameRow& row) {
-    if (row.status != FrameStatus::ok)
+    if (!is_done(row.status))
         return fmt::format("{}: {}: {}", row.name, name_of(row.status), row.why);
     const StageTimes& ms = row.ms;
     const std::string visibility =
         std::isnan(row.mean_visibility) ? "no visibility" : fmt::format("visibility {:.3f}", row.mean_visibility);
-    std::string line =
-        fmt::format("{}: ok, valid {:.1f} %, coverage {:.1f} %, {}, {:.0f} ms", row.name, 100 * row.valid_share,
-                    100 * row.coverage, visibility, ms.load + ms.project + ms.compute + ms.attach + ms.write);
+    std::string line = fmt::format("{}: {}, valid {:.1f} %, coverage {:.1f} %, {}, {:.0f} ms", row.name,
+                                   name_of(row.status), 100 * row.valid_share, 100 * row.coverage, visibility,
+                                   ms.load + ms.project + ms.compute + ms.attach + ms.write);
+    for (const std::string& doubt : row.doubts)
+        line += "; doubtful: " + doubt;
     for (const std::string& warning : row.warnings)
         line += "; warning: " + warning;
     for (const std::string& note : row.notes)
@@ -143,6 +145,7 @@ void Progress::add(const FrameRow& row) {
                       {"status", name_of(row.status)},
                       {"fault", name_of(row.fault)},
                       {"why", row.why},
+                      {"doubts", row.doubts},
                       {"warnings", row.warnings},
                       {"ms", sum_ms},
                       {"done", done_},

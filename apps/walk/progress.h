@@ -12,7 +12,7 @@
 namespace scanshade {
 
 /// From now on, stderr gets one JSON object per line, for programs: {"time", "message"}, and for each frame {"time",
-/// "capture", "frame", "status", "fault", "why", "warnings", "ms", "done", "of", "left_s"}.
+/// "capture", "frame", "status", "fault", "why", "doubts", "warnings", "ms", "done", "of", "left_s"}.
 void log_as_json();
 /// From now on, stderr gets only warnings and failures.
 void be_quiet();

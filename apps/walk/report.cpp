@@ -78,6 +78,8 @@ json frame_json(const FrameRow& row, bool with_camera) {
     json text{{"index", row.index}, {"name", row.name}, {"status", name_of(row.status)}};
     if (!row.why.empty())
         text["why"] = row.why;
+    if (!row.doubts.empty())
+        text["doubts"] = row.doubts;
     if (!row.size.empty())
         text["size"] = {row.size.width, row.size.height};
     if (with_camera && !row.size.empty())
@@ -121,6 +123,7 @@ json totals_json(const RunReport& report) {
     const Rates rates = rates_of(report);
     return {{"frames", report.frames.size()},
             {"ok", ok},
+            {"doubtful", count(report.frames, FrameStatus::doubtful)},
             {"failed", count(report.frames, FrameStatus::failed)},
             {"skipped", count(report.frames, FrameStatus::skipped)},
             {"took_ms", known(report.took_ms, 3)},
@@ -149,7 +152,7 @@ std::string csv_line(const FrameRow& row) {
     const auto ms = [](double value) { return number(value, 2); };
     const bool loaded = !row.size.empty();
     return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.index, csv_field(row.name),
-                       name_of(row.status), csv_field(row.why), loaded ? std::to_string(row.size.width) : "",
+                       name_of(row.status), csv_field(reason_of(row)), loaded ? std::to_string(row.size.width) : "",
                        loaded ? std::to_string(row.size.height) : "", number(row.valid_share, 4),
                        number(row.coverage, 4), number(row.mean_visibility, 4), ms(row.ms.load), ms(row.ms.project),
                        ms(row.ms.compute), ms(row.ms.attach), ms(row.ms.write),
