@@ -73,8 +73,9 @@ void add_frame(const Frame& frame, Samples& samples) {
         ++samples.clouds[describe(*frame.cloud->records)];
     else
         ++samples.depth_sizes[{frame.depth_m.cols, frame.depth_m.rows}];
-    for (const std::string& warning : frame.warnings)
-        samples.warnings.push_back(frame.name + ": " + warning);
+    for (const auto* sentences : {&frame.warnings, &frame.doubts})
+        for (const std::string& sentence : *sentences)
+            samples.warnings.push_back(frame.name + ": " + sentence);
     const bool without_camera = !frame.cloud && frame.camera.pinhole.fx == 0; // the capture's own warning says so
     if (samples.camera || without_camera)
         return;

@@ -46,6 +46,7 @@ struct Frame {
     std::optional<Eigen::Isometry3d> world_from_camera;
     Registration registration = Registration::unknown;
     std::vector<std::string> warnings; ///< what was unusual and how it was handled; complete sentences
+    std::vector<std::string> doubts;   ///< why what was read may be wrong; complete sentences
 };
 
 } // namespace scanshade

@@ -1,6 +1,7 @@
 // The walk for many frames: load, project, compute, attach, write, with a bounded number of frames in memory.
 #include "apps/walk/batch.h"
 
+#include "apps/walk/doubts.h"
 #include "apps/walk/frame_files.h"
 #include "apps/walk/point_clouds.h"
 #include "apps/walk/sequence_order.h"
@@ -122,6 +123,7 @@ void attach_and_write(Work& work, const BatchOptions& options) {
         }
         work.row.coverage = work.attached.coverage;
         work.row.mean_visibility = work.attached.mean_visibility;
+        std::ranges::move(doubts_about(work, options.radius_m), std::back_inserter(work.row.doubts));
         if (!by_points)
             scene = scene_of(work, outputs.colour_view);
         if (outputs.shaded || outputs.panel)

@@ -179,8 +179,7 @@ void load_depth(const Capture& capture, const CaptureEntry& entry, Frame& frame,
     } else { // anything that needs the camera refuses this one, and says its origin
         frame.camera.origin = "none is known; give --camera FILE or --camera fx,fy,cx,cy";
     }
-    const auto doubts = doubts_about(frame.depth_m, stored, capture.depth);
-    frame.warnings.insert(frame.warnings.end(), doubts.begin(), doubts.end());
+    frame.doubts = doubts_about(frame.depth_m, stored, capture.depth);
     correct(frame.depth_m, capture.depth_correction);
     frame.colour_camera = capture.colour_camera;
     if (with_colour && !entry.colour.empty())

@@ -252,14 +252,15 @@ TEST_F(BatchTest, a_depth_frames_cloud_has_the_points_its_pixels_saw) {
     EXPECT_NEAR(last.z(), tests::corner_depth(0)(47, 63), 5.1e-4); // stored in millimetres
 }
 
-TEST_F(BatchTest, a_frame_of_holes_is_a_result_with_a_warning) {
+TEST_F(BatchTest, a_frame_of_holes_is_a_doubtful_result) {
     const Capture recorded = capture(1);
     write_depth_png(folder / "capture/depth/000.png", cv::Mat1f(48, 64, 0.0f), 1000);
     HalfOpen method;
     const auto rows = run_batch(recorded, method, all_frames(recorded, folder / "out"));
-    EXPECT_EQ(rows[0].status, FrameStatus::ok) << rows[0].why;
+    EXPECT_EQ(rows[0].status, FrameStatus::doubtful) << rows[0].why;
     EXPECT_EQ(rows[0].coverage, 0);
-    EXPECT_FALSE(rows[0].warnings.empty());
+    ASSERT_EQ(rows[0].doubts.size(), 1U) << "one reason, said once";
+    EXPECT_NE(rows[0].doubts[0].find("every pixel is a hole"), std::string::npos) << rows[0].doubts[0];
 }
 
 TEST_F(BatchTest, the_table_quotes_what_would_break_it) {

@@ -402,13 +402,14 @@ const Case cases[] = {
     {"camera/matrix_8_numbers.json", Reader::camera, true, "\"intrinsic_matrix\" has 8 numbers, expected 9"},
 };
 
-/// All warnings of a capture and its frames, which must all load.
+/// All warnings and doubts of a capture and its frames, which must all load.
 std::vector<std::string> warnings_of(const fs::path& path) {
     const Capture capture = open_capture(path);
     std::vector<std::string> warnings = capture.warnings;
     for (std::size_t i = 0; i < capture.entries.size(); ++i) {
         const Frame frame = capture.load(i);
         warnings.insert(warnings.end(), frame.warnings.begin(), frame.warnings.end());
+        warnings.insert(warnings.end(), frame.doubts.begin(), frame.doubts.end());
     }
     return warnings;
 }
@@ -613,6 +614,7 @@ TEST_P(GoodCapture, holds_what_its_readme_says) {
         EXPECT_EQ(frame.colour.size(), cv::Size(640, 480));
         EXPECT_EQ(frame.world_from_camera.has_value(), good.poses);
         EXPECT_TRUE(frame.warnings.empty()) << joined(frame.warnings);
+        EXPECT_TRUE(frame.doubts.empty()) << joined(frame.doubts);
         const double holes = 1 - cv::countNonZero(frame.depth_m) / (640.0 * 480.0);
         double nearest = 0, farthest = 0;
         cv::minMaxLoc(frame.depth_m, &nearest, &farthest, nullptr, nullptr, frame.depth_m > 0);
@@ -649,12 +651,13 @@ TEST(good_data, single_depth_images_need_their_encoding_and_doubt_the_wrong_one)
         options.depth_scale = row.scale;
         const Frame right = open_capture(folder / row.file, options).load(0);
         EXPECT_TRUE(right.warnings.empty()) << joined(right.warnings);
+        EXPECT_TRUE(right.doubts.empty()) << joined(right.doubts);
         double nearest = 0, farthest = 0;
         cv::minMaxLoc(right.depth_m, &nearest, &farthest, nullptr, nullptr, right.depth_m > 0);
         EXPECT_GE(nearest, row.nearest_m) << row.file;
         EXPECT_LE(farthest, row.farthest_m) << row.file;
         EXPECT_NEAR(1 - cv::countNonZero(right.depth_m) / 307200.0, row.holes, 0.001) << row.file;
-        EXPECT_TRUE(warned(open_capture(folder / row.file).load(0).warnings, "--depth-scale")) << row.file;
+        EXPECT_TRUE(warned(open_capture(folder / row.file).load(0).doubts, "--depth-scale")) << row.file;
     }
 }
 

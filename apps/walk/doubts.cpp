@@ -1,0 +1,187 @@
+// After a frame is computed: the reasons to doubt its result.
+#include "apps/walk/doubts.h"
+
+#include "projection/statistics.h"
+#include "projection/undistort.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <numbers>
+#include <span>
+
+namespace scanshade {
+namespace {
+
+using Doubts = std::vector<std::string>;
+
+constexpr double least_share = 0.2;         ///< of valid pixels, and of valid pixels or points with a value
+constexpr double all_alike = 0.999;         ///< share of the values that are exactly 0, or exactly 1
+constexpr std::size_t enough_values = 100;  ///< fewer may be alike by chance
+constexpr double least_radius_px = 2;       ///< at the median depth
+constexpr double least_radius_spacings = 2; ///< in a cloud
+constexpr double narrowest_degrees = 0.5;   ///< of view, along the wider side
+constexpr double widest_degrees = 175;
+constexpr double largest_aspect = 2;       ///< fx / fy, either way
+constexpr double most_blind = 0.02;        ///< share of the pixels beyond the radius at which the lens model folds back
+constexpr double most_blind_fisheye = 0.5; ///< a fisheye's corners may be beyond 90 degrees
+
+void add_if(bool doubtful, Doubts& doubts, const std::string& sentence) {
+    if (doubtful)
+        doubts.push_back(sentence);
+}
+
+void doubt_shares(const Work& work, Doubts& doubts) {
+    const FrameRow& row = work.row;
+    const bool image = !work.frame.cloud || (work.frame.cloud->organised() && !work.by_points);
+    if (row.valid_share == 0) {
+        add_if(work.frame.doubts.empty(), doubts,
+               work.frame.cloud ? "no point is valid." : "no pixel holds a valid depth.");
+        return;
+    }
+    add_if(image && row.valid_share < least_share, doubts,
+           fmt::format("only {:.1f} % of the pixels hold a depth: what hides in the holes cannot occlude.",
+                       100 * row.valid_share));
+    add_if(row.coverage < least_share, doubts,
+           fmt::format("only {:.1f} % of the valid {} got a value.", 100 * row.coverage,
+                       work.frame.cloud ? "points" : "pixels"));
+}
+
+void doubt_values(std::span<const float> values, Doubts& doubts) {
+    std::size_t known = 0, closed = 0, open = 0;
+    for (const float value : values) {
+        known += !std::isnan(value);
+        closed += value == 0;
+        open += value == 1;
+    }
+    if (known < enough_values)
+        return;
+    const auto most = static_cast<std::size_t>(all_alike * static_cast<double>(known));
+    add_if(open > most, doubts,
+           "every value is exactly 1, fully open: only a single flat surface reads so. Otherwise depth unit, camera or "
+           "radius are wrong.");
+    add_if(closed > most, doubts,
+           "every value is exactly 0, fully closed: no real surface reads so. Depth unit, camera, normals or radius "
+           "are wrong.");
+}
+
+/// The values below which 5 % and 95 % lie, and the median.
+struct Spread {
+    double low = 0, middle = 0, high = 0;
+};
+
+Spread spread_of(std::vector<double>& values) {
+    return {quantile(values, 0.05), quantile(values, 0.5), quantile(values, 0.95)};
+}
+
+/// Of every third row and column, which is enough to judge by.
+std::vector<double> depths_of(const cv::Mat1f& z_m) {
+    std::vector<double> depths;
+    for (int v = 0; v < z_m.rows; v += 3)
+        for (int u = 0; u < z_m.cols; u += 3)
+            if (z_m(v, u) > 0)
+                depths.push_back(z_m(v, u));
+    return depths;
+}
+
+void doubt_radius_in_view(const Work& work, double radius_m, Doubts& doubts) {
+    std::vector<double> depths = depths_of(work.depth.z_m);
+    if (depths.size() < 3 || !(radius_m > 0)) // a method without a radius
+        return;
+    const auto [near, middle, far] = spread_of(depths);
+    const Pinhole& camera = work.depth.camera;
+    const double radius_px = radius_m * std::min(camera.fx, camera.fy) / middle;
+    const double width = middle * camera.size.width / camera.fx, height = middle * camera.size.height / camera.fy;
+    const double scene_m = std::hypot(width, height, far - near);
+    add_if(radius_px < least_radius_px, doubts,
+           fmt::format("the radius of {:.3g} m spans {:.2g} pixels at the median depth of {:.3g} m: nothing within it "
+                       "can be seen. Check the depth unit, or give a larger --radius.",
+                       radius_m, radius_px, middle));
+    add_if(radius_m > scene_m, doubts,
+           fmt::format("the radius of {:.3g} m is larger than the scene of {:.3g} m: check the depth unit, or give a "
+                       "smaller --radius.",
+                       radius_m, scene_m));
+}
+
+/// The diagonal of the box without the lowest and highest twentieth of the points along each axis.
+double extent_of(const Cloud& cloud) {
+    const std::size_t step = std::max<std::size_t>(1, cloud.points.size() / 50000);
+    Eigen::Vector3d extent = Eigen::Vector3d::Zero();
+    for (int axis = 0; axis < 3; ++axis) {
+        std::vector<double> along;
+        for (std::size_t i = 0; i < cloud.points.size(); i += step)
+            if (cloud.points[i].allFinite())
+                along.push_back(cloud.points[i][axis]);
+        if (along.empty())
+            return 0;
+        const Spread spread = spread_of(along);
+        extent[axis] = spread.high - spread.low;
+    }
+    return extent.norm();
+}
+
+void doubt_radius_of_points(const Work& work, Doubts& doubts) {
+    const double radius = work.of_points.radius, spacing = work.of_points.spacing;
+    if (!(radius > 0))
+        return;
+    add_if(
+        spacing > 0 && radius < least_radius_spacings * spacing, doubts,
+        fmt::format("the radius of {:.3g} is only {:.2g} times the points' spacing of {:.3g}: surfaces within it are "
+                    "single points. Give a larger --radius.",
+                    radius, radius / spacing, spacing));
+    const double extent = extent_of(*work.frame.cloud);
+    add_if(
+        radius > extent, doubts,
+        fmt::format("the radius of {:.3g} is larger than the cloud of {:.3g}: give a smaller --radius, or a cloud of "
+                    "more than a few points.",
+                    radius, extent));
+}
+
+double view_degrees(double focal_length, int pixels) {
+    return 2 * std::atan(pixels / (2 * focal_length)) * 180 / std::numbers::pi;
+}
+
+void doubt_camera(const Camera& camera, Doubts& doubts) {
+    const Pinhole& pinhole = camera.pinhole;
+    const double wide =
+        std::max(view_degrees(pinhole.fx, pinhole.size.width), view_degrees(pinhole.fy, pinhole.size.height));
+    const double aspect = std::max(pinhole.fx / pinhole.fy, pinhole.fy / pinhole.fx);
+    add_if(wide < narrowest_degrees || wide > widest_degrees, doubts,
+           fmt::format("the camera sees an angle of {:.2g} degrees, which no depth camera does ({}; {}).", wide,
+                       describe(camera), camera.origin));
+    add_if(aspect > largest_aspect, doubts,
+           fmt::format("the camera's pixels are {:.3g} times as long as wide ({}; {}).", aspect, describe(camera),
+                       camera.origin));
+    if (!camera.distortion.any())
+        return;
+    const cv::Mat2f& direction = Undistortion::of(camera)->direction();
+    const auto blind =
+        std::count_if(direction.begin(), direction.end(), [](const cv::Vec2f& d) { return std::isnan(d[0]); });
+    const double share = static_cast<double>(blind) / static_cast<double>(std::max<std::size_t>(direction.total(), 1));
+    const bool fisheye = camera.distortion.model == LensModel::kannala_brandt;
+    add_if(share > (fisheye ? most_blind_fisheye : most_blind), doubts,
+           fmt::format("the lens distortion folds back within the image: {:.0f} % of the pixels have no direction ({}; "
+                       "{}).",
+                       100 * share, describe(camera), camera.origin));
+}
+
+} // namespace
+
+std::vector<std::string> doubts_about(const Work& work, double radius_m) {
+    Doubts doubts = work.frame.doubts;
+    doubt_shares(work, doubts);
+    if (work.by_points) {
+        doubt_values(work.of_points.visibility, doubts);
+        doubt_radius_of_points(work, doubts);
+        return doubts;
+    }
+    const cv::Mat1f& visibility = work.ao.visibility;
+    if (visibility.isContinuous())
+        doubt_values({visibility.ptr<float>(), visibility.total()}, doubts);
+    doubt_radius_in_view(work, radius_m, doubts);
+    if (!work.frame.cloud) // a cloud's camera is recovered or chosen, not given, unless --camera names it
+        doubt_camera(work.row.camera, doubts);
+    return doubts;
+}
+
+} // namespace scanshade

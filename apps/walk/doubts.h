@@ -1,0 +1,15 @@
+// After a frame is computed: the reasons to doubt its result.
+#pragma once
+
+#include "apps/walk/work.h"
+
+#include <string>
+#include <vector>
+
+namespace scanshade {
+
+/// Sentences: what is implausible about a computed frame, its camera or its settings. Empty = nothing is. Reads
+/// `row.valid_share` and `row.coverage`. Real captures are far from every limit; README.md has the table.
+[[nodiscard]] std::vector<std::string> doubts_about(const Work& work, double radius_m);
+
+} // namespace scanshade

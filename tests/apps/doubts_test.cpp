@@ -1,0 +1,203 @@
+// A result that is implausible is doubtful, with reasons, wherever the result is told; a plausible one is not.
+#include "apps/walk/batch.h"
+#include "apps/walk/doubts.h"
+#include "io/cameras/camera_file.h"
+#include "io/images/image_file.h"
+#include "tests/support/files.h"
+#include "tests/support/small_capture.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+namespace scanshade {
+namespace {
+
+using nlohmann::json;
+using tests::read_bytes;
+using tests::run_program;
+using tests::TemporaryFolder;
+using tests::warned;
+namespace fs = std::filesystem;
+
+constexpr float hole = std::numeric_limits<float>::quiet_NaN();
+
+/// A computed frame of two walls, half open, with nothing to doubt. Tests spoil one part of it.
+struct Computed {
+    CaptureEntry entry;
+    FrameRow row;
+    Work work{.entry = entry, .row = row};
+    double radius_m = 0.5;
+
+    Computed() {
+        row.valid_share = 0.9;
+        row.coverage = 0.99;
+        row.camera = tests::small_camera();
+        work.depth = {row.camera.pinhole, tests::corner_depth(0), {}};
+        work.ao.visibility = cv::Mat1f(work.depth.z_m.size(), 0.5F);
+    }
+    [[nodiscard]] std::vector<std::string> doubts() const { return doubts_about(work, radius_m); }
+};
+
+/// The same of a cloud: a square of 40 x 40 points, 10 cm apart.
+struct ComputedCloud : Computed {
+    ComputedCloud() {
+        Cloud cloud;
+        for (int i = 0; i < 1600; ++i)
+            cloud.points.emplace_back(0.1 * (i % 40), 0.1 * (i / 40), 0); // NOLINT(bugprone-integer-division)
+        cloud.grid = {1600, 1};
+        work.frame.cloud = cloud;
+        work.by_points = true;
+        work.of_points.visibility.assign(1600, 0.5F);
+        work.of_points.radius = 1;
+        work.of_points.spacing = 0.1;
+        row.valid_share = row.coverage = 1;
+    }
+};
+
+TEST(doubts, a_plausible_result_has_none) {
+    EXPECT_TRUE(Computed().doubts().empty()) << tests::joined(Computed().doubts());
+    EXPECT_TRUE(ComputedCloud().doubts().empty()) << tests::joined(ComputedCloud().doubts());
+}
+
+TEST(doubts, few_pixels_with_a_depth_or_a_value) {
+    Computed few;
+    few.row.valid_share = 0.19;
+    EXPECT_TRUE(warned(few.doubts(), "only 19.0 % of the pixels hold a depth"));
+    few.row.valid_share = 0.21;
+    EXPECT_TRUE(few.doubts().empty());
+    few.row.coverage = 0.1;
+    EXPECT_TRUE(warned(few.doubts(), "only 10.0 % of the valid pixels got a value"));
+    few.row.valid_share = 0;
+    EXPECT_TRUE(warned(few.doubts(), "no pixel holds a valid depth"));
+}
+
+TEST(doubts, a_sparse_grid_of_a_cloud_computed_from_its_points_is_no_reason) {
+    ComputedCloud cropped; // an object cut out of an organised cloud: the rest of the grid is NaN
+    cropped.work.frame.cloud->grid = {40, 40};
+    cropped.row.valid_share = 0.05;
+    EXPECT_TRUE(cropped.doubts().empty()) << tests::joined(cropped.doubts());
+}
+
+TEST(doubts, values_that_are_all_exactly_open_or_closed) {
+    for (const float value : {0.0F, 1.0F}) {
+        Computed alike;
+        alike.work.ao.visibility = cv::Mat1f(alike.work.depth.z_m.size(), value);
+        alike.work.ao.visibility.row(0) = hole;
+        EXPECT_TRUE(warned(alike.doubts(), fmt::format("every value is exactly {}", value)));
+        alike.work.ao.visibility.row(1) = 0.9F;
+        EXPECT_TRUE(alike.doubts().empty()) << "one row of 48 differs";
+        ComputedCloud cloud;
+        cloud.work.of_points.visibility.assign(1600, value);
+        EXPECT_TRUE(warned(cloud.doubts(), fmt::format("every value is exactly {}", value)));
+    }
+}
+
+TEST(doubts, a_radius_below_two_pixels_or_above_the_scene) {
+    Computed frame; // walls about 1.7 m away: 52 px of focal length make 2 px 6.5 cm
+    frame.radius_m = 0.05;
+    EXPECT_TRUE(warned(frame.doubts(), "spans 1."));
+    frame.radius_m = 0.1;
+    EXPECT_TRUE(frame.doubts().empty());
+    frame.radius_m = 5;
+    EXPECT_TRUE(warned(frame.doubts(), "larger than the scene"));
+    ComputedCloud cloud;
+    cloud.work.of_points.radius = 0.15;
+    EXPECT_TRUE(warned(cloud.doubts(), "only 1.5 times the points' spacing"));
+    cloud.work.of_points.radius = 8;
+    EXPECT_TRUE(warned(cloud.doubts(), "larger than the cloud"));
+}
+
+TEST(doubts, a_camera_that_no_sensor_has) {
+    Computed frame;
+    frame.row.camera.pinhole.fx = 1e30;
+    EXPECT_TRUE(warned(frame.doubts(), "pixels are 1.92e+28 times as long as wide"));
+    frame.row.camera.pinhole.fy = 1e30;
+    EXPECT_TRUE(warned(frame.doubts(), "sees an angle of"));
+    frame.row.camera = tests::small_camera();
+    frame.row.camera.distortion.k1 = -5;
+    EXPECT_TRUE(warned(frame.doubts(), "folds back within the image"));
+    frame.row.camera.distortion = {.k1 = 0.2624, .k2 = -0.9531, .p1 = -0.0054, .p2 = 0.0026, .k3 = 1.1633};
+    EXPECT_TRUE(frame.doubts().empty()) << "the published lens of TUM's first Kinect";
+}
+
+// ---------------------------------------------------------------------------------------------------- the program
+
+class DoubtfulRun : public testing::Test {
+  protected:
+    /// Four frames; the third one is nearly empty.
+    void SetUp() override {
+        tests::write_capture(folder / "capture", 4);
+        cv::Mat1f scattered(48, 64, 0.0F);
+        scattered(cv::Rect(10, 10, 16, 16)) = 1.5F; // 8 % of the pixels
+        write_depth_png(folder / "capture/depth/002.png", scattered, 1000);
+    }
+    [[nodiscard]] tests::Ran run(const std::string& flags) const {
+        return run_program(
+            fmt::format("run {} -o {} {}", (folder / "capture").string(), (folder / "out").string(), flags));
+    }
+    TemporaryFolder folder;
+};
+
+TEST_F(DoubtfulRun, is_told_by_exit_code_messages_table_and_manifest) {
+    const auto ran = run("--write ao");
+    EXPECT_EQ(ran.exit_code, 2) << ran.err;
+    EXPECT_NE(ran.err.find("002: doubtful"), std::string::npos) << ran.err;
+    EXPECT_NE(ran.err.find("doubtful: 002"), std::string::npos) << "the last lines name it: " << ran.err;
+    EXPECT_NE(ran.err.find("4 of 4 frames, 1 doubtful"), std::string::npos) << ran.err;
+    EXPECT_TRUE(fs::exists(folder / "out/ao/002.png")) << "doubtful results are written";
+    const std::string table = read_bytes(folder / "out/frames.csv");
+    EXPECT_NE(table.find("2,002,doubtful,\"only 8.3 % of the pixels hold a depth"), std::string::npos) << table;
+    const json manifest = json::parse(read_bytes(folder / "out/manifest.json"));
+    EXPECT_EQ(manifest["totals"]["ok"], 3);
+    EXPECT_EQ(manifest["totals"]["doubtful"], 1);
+    EXPECT_EQ(manifest["frames"][2]["status"], "doubtful");
+    EXPECT_EQ(manifest["frames"][2]["doubts"].size(), 2) << "the patch is flat, too: every value is exactly 1";
+    EXPECT_FALSE(manifest["frames"][1].contains("doubts"));
+}
+
+TEST_F(DoubtfulRun, is_done_and_stays_doubtful_when_resumed) {
+    ASSERT_EQ(run("--write ao").exit_code, 2);
+    const auto written = fs::last_write_time(folder / "out/ao/002.png");
+    const auto again = run("--write ao --resume");
+    EXPECT_EQ(again.exit_code, 2) << again.err;
+    EXPECT_NE(again.err.find("done already"), std::string::npos) << again.err;
+    fs::remove(folder / "out/manifest.json");
+    const auto reported = run("--write ao --resume --retry");
+    EXPECT_EQ(reported.exit_code, 2) << reported.err;
+    EXPECT_NE(reported.err.find("doubtful: 002"), std::string::npos) << reported.err;
+    EXPECT_EQ(fs::last_write_time(folder / "out/ao/002.png"), written) << "not computed again";
+}
+
+TEST_F(DoubtfulRun, is_a_json_line_with_its_doubts) {
+    const auto ran = run("--write ao --log json");
+    EXPECT_NE(ran.err.find("\"status\":\"doubtful\""), std::string::npos) << ran.err;
+    EXPECT_NE(ran.err.find("\"doubts\":[\"only 8.3 %"), std::string::npos) << ran.err;
+}
+
+TEST_F(DoubtfulRun, is_counted_and_explained_by_a_job) {
+    const std::string job = (folder / "job").string();
+    ASSERT_EQ(run_program(fmt::format("plan {} -o {} --write ao", (folder / "capture").string(), job)).exit_code, 0);
+    EXPECT_EQ(run_program("run " + job).exit_code, 2);
+    const auto status = run_program("status " + job);
+    EXPECT_EQ(status.exit_code, 2);
+    EXPECT_NE(status.out.find("3 ok, 1 doubtful, 0 failed, 0 left, of 4"), std::string::npos) << status.out;
+    EXPECT_NE(status.out.find("1 doubtful: only"), std::string::npos) << status.out;
+    const json text = json::parse(run_program("status " + job + " --json").out);
+    EXPECT_EQ(text["frames"]["doubtful"], 1);
+    EXPECT_EQ(text["doubts"].size(), 1);
+    EXPECT_EQ(run_program("merge " + job).exit_code, 2);
+    EXPECT_EQ(json::parse(read_bytes(folder / "job/manifest.json"))["totals"]["doubtful"], 1);
+}
+
+TEST_F(DoubtfulRun, cameras_that_see_nothing_usual) {
+    for (const char* camera : {"1e30,1e30,31.5,23.5", "52,52000,31.5,23.5"}) {
+        const auto ran = run(fmt::format("--write ao --overwrite --camera {}", camera));
+        EXPECT_EQ(ran.exit_code, 2) << camera << ran.err;
+        EXPECT_NE(ran.err.find("4 doubtful"), std::string::npos) << camera << ran.err;
+    }
+}
+
+} // namespace
+} // namespace scanshade
