@@ -3,6 +3,7 @@
 
 #include "ao/cloud/cloud_gpu.h"
 #include "ao/cloud/disc_rays.h"
+#include "ao/cloud/fitted_cloud.h"
 #include "ao/cloud/tiles.h"
 #include "ao/raycast/raycast.h"
 #include "projection/error.h"
@@ -240,7 +241,7 @@ class CloudAo::Work {
         if (some.empty())
             return;
         const double share = static_cast<double>(some.size()) / static_cast<double>(valid_.size());
-        result_.spacing = static_cast<double>(cloud_surface(some, {}).spacing) * std::sqrt(share);
+        result_.spacing = static_cast<double>(cloud_surface(LocalCloud(some), {}).spacing) * std::sqrt(share);
         const double extent = extent_of(some);
         result_.radius = options_.radius > 0 ? options_.radius : default_radius(extent, result_.spacing);
         result_.notes.push_back(
@@ -285,11 +286,7 @@ class CloudAo::Work {
     }
 
     void tile(const Places& core, const Places& round, CloudGpu* gpu) {
-        std::vector<char> wanted(core.size() == round.size() ? 0 : cloud_.points.size(), 0);
-        if (!wanted.empty())
-            for (const std::uint32_t i : core)
-                wanted[i] = 1;
-        CloudSurface surface = planes_of(round, gpu);
+        auto [surface, fitted] = planes_of(round, gpu);
         std::optional<DiscRays> rays;
         if (orientation_unknown()) {
             if (orientation_.kind == NormalOrientation::Kind::inward)
@@ -297,8 +294,22 @@ class CloudAo::Work {
             orient_normals(surface, orientation_, rays ? &*rays : nullptr);
         }
         watch_.lap("sides");
-        const auto is_wanted = [&](std::size_t place) {
-            return wanted.empty() || wanted[round[surface.tree.index(place)]];
+        // Both orders are ascending. A point of the surface is wanted if it stands for one of the core.
+        std::vector<char> in_core(core.size() == round.size() ? 0 : round.size(), 0), wanted;
+        for (std::size_t k = 0, c = 0; k < in_core.size() && c < core.size(); ++k)
+            if (round[k] == core[c]) {
+                in_core[k] = 1;
+                ++c;
+            }
+        if (!in_core.empty() && !fitted.empty()) {
+            wanted.resize(fitted.points.size(), 0);
+            for (std::size_t k = 0; k < round.size(); ++k)
+                wanted[fitted.fitted_of[k]] |= in_core[k];
+        } else {
+            wanted = in_core;
+        }
+        const auto is_wanted = [&, &tree = surface.tree](std::size_t place) {
+            return wanted.empty() || wanted[tree.index(place)];
         };
         const float radius = options_.sky ? std::numeric_limits<float>::max() : static_cast<float>(result_.radius);
         const std::optional<Vector3f> up = options_.sky ? std::optional<Vector3f>(up_.cast<float>()) : std::nullopt;
@@ -325,14 +336,26 @@ class CloudAo::Work {
                 values = smoothed(surface, values, radius);
             watch_.lap("means");
         }
-        tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
-            if (!is_wanted(i) || std::isnan(values[i]))
-                return;
-            const std::size_t point = round[surface.tree.index(i)];
-            result_.visibility[point] = values[i];
-            result_.normals[point] = surface.normals[i];
-            result_.confidence[point] = surface.flatness[i] * resolution(radius, surface.disc_radius[i]);
-        });
+        const auto give = [&, &surface = surface](std::size_t place, std::size_t point) {
+            result_.visibility[point] = values[place];
+            result_.normals[point] = surface.normals[place];
+            result_.confidence[point] = surface.flatness[place] * resolution(radius, surface.disc_radius[place]);
+        };
+        if (fitted.empty()) {
+            tbb::parallel_for(std::size_t(0), surface.size(), [&, &surface = surface](std::size_t i) {
+                if (is_wanted(i) && !std::isnan(values[i]))
+                    give(i, round[surface.tree.index(i)]);
+            });
+        } else {
+            std::vector<std::uint32_t> place_of(surface.size());
+            for (std::size_t i = 0; i < surface.size(); ++i)
+                place_of[surface.tree.index(i)] = static_cast<std::uint32_t>(i);
+            tbb::parallel_for(std::size_t(0), round.size(), [&](std::size_t k) {
+                const std::size_t place = place_of[fitted.fitted_of[k]];
+                if ((in_core.empty() || in_core[k]) && !std::isnan(values[place]))
+                    give(place, round[k]);
+            });
+        }
         watch_.lap("gather");
         result_.tiles = ++tiles_;
     }
@@ -354,8 +377,12 @@ class CloudAo::Work {
         return asked;
     }
 
-    /// Neighbours and planes of these points.
-    CloudSurface planes_of(const Places& which, CloudGpu* gpu) {
+    struct Fitted {
+        CloudSurface surface;
+        FittedCloud points; ///< empty where the surface's points are those of the cloud
+    };
+    /// Neighbours and planes of these points, without their noise.
+    Fitted planes_of(const Places& which, CloudGpu* gpu) {
         std::vector<Vector3d> some_points, some_normals;
         const auto pick = [&](std::span<const Vector3d> from, std::vector<Vector3d>& to) {
             if (which.size() == from.size())
@@ -368,7 +395,16 @@ class CloudAo::Work {
         std::span<const Vector3d> normals;
         if (recorded())
             normals = pick(cloud_.normals, some_normals);
-        CloudSurface surface = cloud_surface(points, normals, gpu);
+        FittedCloud fitted;
+        const auto surface_of = [&] {
+            LocalCloud local(points);
+            watch_.lap("points in order");
+            fitted = fitted_cloud(local, points, normals, options_.sky ? 10 * result_.spacing : result_.radius);
+            watch_.lap("noise");
+            return fitted.empty() ? cloud_surface(std::move(local), normals, gpu)
+                                  : cloud_surface(LocalCloud(fitted.points), fitted.normals, gpu, fitted.axes);
+        };
+        CloudSurface surface = surface_of();
         constexpr double same_planes = 0.8, too_many_opposed = 0.05;
         if (!normals.empty() && options_.normals == CloudNormals::automatic && surface.agreement < same_planes) {
             normals_refused_ = true;
@@ -377,12 +413,15 @@ class CloudAo::Work {
                 "{:.0f} degrees; --cloud.normals recorded uses them anyway.",
                 std::acos(surface.agreement) * 180 / std::numbers::pi));
             normals = {};
-            surface = cloud_surface(points, {}, gpu);
+            surface = surface_of();
         }
         watch_.lap("planes");
         normals_opposed_ |=
             !normals.empty() && options_.normals == CloudNormals::automatic && surface.discord > too_many_opposed;
-        return surface;
+        noise_ = std::max(noise_, fitted.noise);
+        moved_ += fitted.moved;
+        kept_ += fitted.points.size();
+        return {std::move(surface), std::move(fitted)};
     }
 
     /// Whether recorded normals are used.
@@ -392,6 +431,11 @@ class CloudAo::Work {
     [[nodiscard]] bool orientation_unknown() const { return !recorded() || normals_opposed_; }
 
     void tell() {
+        if (moved_ > 0)
+            result_.notes.push_back(
+                fmt::format("noise of {:.2g} (sigma across surfaces): {:.0f} % of the points were "
+                            "moved onto fitted planes; {} discs stand for them.",
+                            noise_, 100.0 * static_cast<double>(moved_) / static_cast<double>(valid_.size()), kept_));
         const std::string facing = orientation_.kind == NormalOrientation::Kind::viewpoint ? "turned to " : "turned ";
         if (recorded() && normals_opposed_)
             result_.notes.push_back("normals: recorded, but neighbours' oppose each other; " + facing +
@@ -431,6 +475,8 @@ class CloudAo::Work {
     NormalOrientation orientation_;
     Places valid_;
     bool normals_refused_ = false, normals_opposed_ = false;
+    float noise_ = 0;
+    std::size_t moved_ = 0, kept_ = 0;
     int tiles_ = 0, gpu_tiles_ = 0, passes_ = 2;
 };
 

@@ -98,24 +98,11 @@ void compare_sides(CloudSurface& surface, std::span<const Vector3d> given) {
 
 } // namespace
 
-CloudSurface cloud_surface(std::span<const Vector3d> points, std::span<const Vector3d> normals, CloudGpu* gpu) {
-    using Box = Eigen::AlignedBox3d;
-    const Box box = tbb::parallel_reduce(
-        tbb::blocked_range<std::size_t>(0, points.size()), Box(),
-        [&](const auto& range, Box part) {
-            for (std::size_t i = range.begin(); i < range.end(); ++i)
-                part.extend(points[i]);
-            return part;
-        },
-        [](const Box& a, const Box& b) { return a.merged(b); });
-    const Vector3d middle = points.empty() ? Vector3d(Vector3d::Zero()) : Vector3d(box.center());
-    std::vector<Vector3f> local(points.size());
-    tbb::parallel_for(std::size_t(0), points.size(),
-                      [&](std::size_t i) { local[i] = (points[i] - middle).cast<float>(); });
-
-    CloudSurface surface{middle, NeighbourTree(local), {}, {}, {}, {}, {}};
-    std::vector<float> cosines(normals.empty() ? 0 : points.size(), 1.0F); // between given normals and planes
+CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normals, CloudGpu* gpu,
+                           std::span<const Vector3f> axes) {
     const std::size_t count = points.size();
+    CloudSurface surface{points.middle, std::move(points.tree), {}, {}, {}, {}, {}};
+    std::vector<float> cosines(normals.empty() ? 0 : count, 1.0F); // between given normals and planes
     surface.near.resize(count);
     surface.normals.resize(count);
     surface.disc_radius.resize(count);
@@ -135,6 +122,8 @@ CloudSurface cloud_surface(std::span<const Vector3d> points, std::span<const Vec
         const float variance = plane.variance_across + plane.variance_narrow + plane.variance_wide;
         surface.flatness[i] = on_a_line(plane) ? 0 : 1 - 3 * plane.variance_across / variance;
         surface.normals[i] = on_a_line(plane) ? Vector3f(Vector3f::Zero()) : plane.normal;
+        if (!axes.empty() && !axes[surface.tree.index(i)].isZero())
+            surface.normals[i] = axes[surface.tree.index(i)];
         if (normals.empty())
             return;
         if (const Vector3d& given = normals[surface.tree.index(i)]; is_direction(given)) {

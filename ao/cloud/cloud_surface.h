@@ -54,12 +54,13 @@ struct CloudSurface {
     [[nodiscard]] std::size_t size() const { return tree.size(); }
 };
 
-/// Finds neighbours and planes of `points`, which must be finite. `normals` is empty or holds one per point; those of
+/// Finds neighbours and planes of `points`. `normals` is empty or holds one per point, in the order given; those of
 /// zero length are replaced by the normals of the planes. Planes are fitted to 16 neighbours, weighted by distance, and
-/// to 64 where the 16 are on a line, as on a scanner's rings. Estimated normals are not oriented yet. `gpu`, if given,
-/// finds neighbours and planes.
-[[nodiscard]] CloudSurface cloud_surface(std::span<const Eigen::Vector3d> points,
-                                         std::span<const Eigen::Vector3d> normals, CloudGpu* gpu = nullptr);
+/// to 64 where the 16 are on a line, as on a scanner's rings. Estimated normals are not oriented yet. `axes` is empty
+/// or holds one per point: where not zero, it is the normal of a better plane. `gpu`, if given, finds neighbours and
+/// planes.
+[[nodiscard]] CloudSurface cloud_surface(LocalCloud&& points, std::span<const Eigen::Vector3d> normals,
+                                         CloudGpu* gpu = nullptr, std::span<const Eigen::Vector3f> axes = {});
 
 /// Orients the normals. To a viewpoint, each point is oriented by itself. Otherwise neighbours are made to agree, the
 /// surest pairs first (the spanning tree of Hoppe et al. 1992, built by Kruskal's algorithm); then each connected piece

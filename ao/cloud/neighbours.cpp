@@ -2,12 +2,14 @@
 #include "ao/cloud/neighbours.h"
 
 #include <algorithm>
+#include <Eigen/Geometry>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
+#include <tbb/parallel_reduce.h>
 
 namespace scanshade {
 
-using Eigen::Vector3f;
+using Eigen::Vector3d, Eigen::Vector3f;
 
 void Nearest::begin(std::size_t wanted, float reach2) {
     count_ = 0;
@@ -35,10 +37,6 @@ void Nearest::offer(float distance2, std::uint32_t point) {
     found_[at] = offered;
     if (count_ == wanted_)
         reach2_ = found_[count_ - 1].distance2;
-}
-
-float NeighbourTree::Box::distance2(const Vector3f& point) const {
-    return (low - point).cwiseMax(point - high).cwiseMax(0).squaredNorm();
 }
 
 struct NeighbourTree::Placed {
@@ -125,5 +123,31 @@ void NeighbourTree::find_round(std::size_t place, std::size_t wanted, Nearest& f
                 found.offer((points_[other] - at).squaredNorm(), static_cast<std::uint32_t>(other));
     }
 }
+
+namespace {
+
+Vector3d middle_of(std::span<const Vector3d> points) {
+    using Box = Eigen::AlignedBox3d;
+    const Box box = tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, points.size()), Box(),
+        [&](const auto& range, Box part) {
+            for (std::size_t i = range.begin(); i < range.end(); ++i)
+                part.extend(points[i]);
+            return part;
+        },
+        [](const Box& a, const Box& b) { return a.merged(b); });
+    return points.empty() ? Vector3d(Vector3d::Zero()) : Vector3d(box.center());
+}
+
+std::vector<Vector3f> about(const Vector3d& middle, std::span<const Vector3d> points) {
+    std::vector<Vector3f> local(points.size());
+    tbb::parallel_for(std::size_t(0), points.size(),
+                      [&](std::size_t i) { local[i] = (points[i] - middle).cast<float>(); });
+    return local;
+}
+
+} // namespace
+
+LocalCloud::LocalCloud(std::span<const Vector3d> points) : middle(middle_of(points)), tree(about(middle, points)) {}
 
 } // namespace scanshade

@@ -54,12 +54,34 @@ class NeighbourTree {
     void find_round(std::size_t place, std::size_t wanted, Nearest& found,
                     float reach2 = std::numeric_limits<float>::infinity()) const;
 
+    /// Calls `visit(place)` for every point within `reach` of `at`, in no particular order.
+    template <class Visit>
+    void for_each_within(const Eigen::Vector3f& at, float reach, Visit&& visit) const;
+    /// Walks the nodes from the root down. `enter(diagonal, begin, end, is_leaf)` gets the diagonal of a node's box and
+    /// its places; where it returns true and the node is no leaf, its halves are walked, too.
+    template <class Enter>
+    void walk(Enter&& enter) const {
+        walk({0, 0, points_.size(), levels_}, enter);
+    }
+
+    static constexpr std::size_t leaf = 12; ///< points, at most
+
   private:
     struct Box {
         Eigen::Vector3f low, high;
-        [[nodiscard]] float distance2(const Eigen::Vector3f& point) const;
+        [[nodiscard]] float distance2(const Eigen::Vector3f& point) const {
+            return (low - point).cwiseMax(point - high).cwiseMax(0).squaredNorm();
+        }
     };
-    static constexpr std::size_t leaf = 12; ///< points, at most
+    struct Node {
+        std::size_t number, begin, end;
+        int levels; ///< above the leaves
+        [[nodiscard]] std::size_t middle() const { return begin + (end - begin) / 2; }
+        [[nodiscard]] Node left() const { return {2 * number + 1, begin, middle(), levels - 1}; }
+        [[nodiscard]] Node right() const { return {2 * number + 2, middle(), end, levels - 1}; }
+    };
+    template <class Enter>
+    void walk(const Node& node, Enter& enter) const;
 
     struct Placed;
     void build(std::span<Placed> points, std::size_t node, int levels);
@@ -69,5 +91,45 @@ class NeighbourTree {
     std::vector<Box> boxes_; ///< node n has the children 2n + 1 and 2n + 2, which halve its points
     int levels_ = 0;         ///< of nodes above the leaves
 };
+
+/// A cloud about its middle, so that single precision serves, in the order of its tree.
+struct LocalCloud {
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero(); ///< of the box round the points
+    NeighbourTree tree;
+
+    explicit LocalCloud(std::span<const Eigen::Vector3d> points);
+    [[nodiscard]] std::size_t size() const { return tree.size(); }
+};
+
+template <class Visit>
+void NeighbourTree::for_each_within(const Eigen::Vector3f& at, float reach, Visit&& visit) const {
+    const float reach2 = reach * reach;
+    std::array<Node, 64> stack;
+    std::size_t depth = 0;
+    stack[depth++] = {0, 0, points_.size(), levels_};
+    while (depth > 0) {
+        const Node node = stack[--depth];
+        if (boxes_[node.number].distance2(at) > reach2)
+            continue;
+        if (node.levels > 0) {
+            stack[depth++] = node.right();
+            stack[depth++] = node.left();
+            continue;
+        }
+        for (std::size_t place = node.begin; place < node.end; ++place)
+            if ((points_[place] - at).squaredNorm() <= reach2)
+                visit(place);
+    }
+}
+
+template <class Enter>
+void NeighbourTree::walk(const Node& node, Enter& enter) const {
+    const Box& box = boxes_[node.number];
+    if (node.begin == node.end || !enter((box.high - box.low).norm(), node.begin, node.end, node.levels == 0) ||
+        node.levels == 0)
+        return;
+    walk(node.left(), enter);
+    walk(node.right(), enter);
+}
 
 } // namespace scanshade

@@ -11,6 +11,7 @@
 #include "apps/scenes/random_noise.h"
 #include "apps/scenes/scanner.h"
 #include "projection/hash.h"
+#include "projection/statistics.h"
 #include "projection/stopwatch.h"
 
 #include <ctime>
@@ -138,11 +139,16 @@ std::vector<float> sky_by_views(const scene::SceneCloud& cloud, double spacing, 
 /// with one more than 60 degrees from the true plane, do not count.
 struct Sides {
     double wrong = 0, wrong_where_sure = 0, sure = 0; ///< shares
+    double median_deg = 0, most_deg = 0;              ///< angles to the true plane; 95 % are smaller
 };
 Sides sides_of(const PointVisibility& found, const std::vector<Vector3d>& exact) {
     double all = 0, away = 0, sure = 0, sure_away = 0;
+    std::vector<double> angles;
     for (std::size_t i = 0; i < exact.size(); ++i) {
         const double cosine = found.normals[i].cast<double>().dot(exact[i]);
+        if (found.normals[i].isZero() || exact[i].isZero())
+            continue;
+        angles.push_back(std::acos(std::min(std::abs(cosine), 1.0)) * 180 / std::numbers::pi);
         if (std::abs(cosine) < 0.5)
             continue;
         const bool is_sure = found.confidence[i] > 0.8F;
@@ -151,7 +157,8 @@ Sides sides_of(const PointVisibility& found, const std::vector<Vector3d>& exact)
         sure += is_sure;
         sure_away += is_sure && cosine < 0;
     }
-    return {away / std::max(all, 1.0), sure_away / std::max(sure, 1.0), sure / std::max(all, 1.0)};
+    return {away / std::max(all, 1.0), sure_away / std::max(sure, 1.0), sure / std::max(all, 1.0),
+            quantile(angles, 0.5), quantile(angles, 0.95)};
 }
 
 /// The normals that a cloud comes with: "recorded" ones are true, "random" ones turned over by chance.
@@ -261,8 +268,10 @@ class CloudErrors final : public BenchPart {
         for (const auto& [stage, ms] : found.timings)
             fmt::print("{} {:.0f} ms; ", stage, ms);
         const Sides sides = sides_of(found, cloud.normals);
-        fmt::print("\n    wrong sides {:.2f} %; {:.0f} % of the points are sure, {:.2f} % of them wrong\n",
-                   100 * sides.wrong, 100 * sides.sure, 100 * sides.wrong_where_sure);
+        fmt::print("\n    normals off by {:.1f} degrees (95 %: {:.1f}); wrong sides {:.2f} %; {:.0f} % of the points "
+                   "are sure, "
+                   "{:.2f} % of them wrong\n",
+                   sides.median_deg, sides.most_deg, 100 * sides.wrong, 100 * sides.sure, 100 * sides.wrong_where_sure);
         for (const std::string& note : found.notes)
             fmt::print("    {}\n", note);
         std::fflush(stdout);

@@ -61,7 +61,8 @@ TEST_F(CloudGpuTest, neighbours_and_planes_are_those_of_the_processor) {
         if (count > 100)
             points[10] = points[20] = points[30]; // at one place
         CloudGpu gpu(device());
-        const CloudSurface here = cloud_surface(points, {}), there = cloud_surface(points, {}, &gpu);
+        const CloudSurface here = cloud_surface(LocalCloud(points), {}),
+                           there = cloud_surface(LocalCloud(points), {}, &gpu);
         ASSERT_EQ(there.size(), count);
         EXPECT_NEAR(there.spacing, here.spacing, 1e-5F * here.spacing);
         std::size_t other_planes = 0;
