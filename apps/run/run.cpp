@@ -145,6 +145,11 @@ class Tally {
     }
     /// Of a whole capture.
     void add(Fault fault) { faults_.insert(fault); }
+    /// The last line of a run; empty if no frame is doubtful.
+    [[nodiscard]] std::string doubt_sentence() const {
+        return doubtful_ == 0 ? ""
+                              : fmt::format("doubtful: {} of {} frames; their results may be wrong", doubtful_, all_);
+    }
     [[nodiscard]] int exit_code(int unopened) const {
         if (interrupted || faults_.contains(Fault::outage))
             return unfinished;
@@ -208,6 +213,8 @@ class Run final : public Command {
         });
         for (const std::string& sentence : outlook_)
             say(sentence);
+        if (const std::string sentence = tally.doubt_sentence(); !sentence.empty())
+            warn(sentence);
         return tally.exit_code(unopened);
     }
 
@@ -479,7 +486,7 @@ class Run final : public Command {
             const std::lock_guard alone(alone_); // the report names settings
             write_frames_csv(files.table, report.frames);
             write_manifest(files.manifest, report, [&](const FrameRow& row) { return journal.whole(row); });
-            if (count(report.frames, FrameStatus::ok) + count(report.frames, FrameStatus::doubtful) > 0)
+            if (count(report.frames, FrameStatus::ok) > 0)
                 for (const std::string& sentence : outlook(asked_, job.batch.noise, job.capture, shipped_front()))
                     if (!std::ranges::count(outlook_, sentence))
                         outlook_.push_back(sentence);

@@ -131,8 +131,8 @@ void attach_and_write(Work& work, const BatchOptions& options) {
     });
     take(work, &StageTimes::write, [&] {
         write_all(work, scene, shaded, outputs);
-        if (by_points && options.outputs.shaded && work.of_points.spacing > 0)
-            write_sides(work, options.outputs);
+        if (by_points && options.outputs.shaded)
+            write_cloud_picture(work, options.outputs);
     });
     if (!work.row.why.empty())
         remove_files(work, outputs);

@@ -2,7 +2,7 @@
 #include "apps/walk/frame_files.h"
 
 #include "apps/picture.h"
-#include "apps/walk/point_clouds.h"
+#include "apps/walk/cloud_picture.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/format.h"
 #include "io/images/npy_file.h"
@@ -39,7 +39,7 @@ Scene scene_across_cameras(const Work& work, bool colour_view) {
 }
 
 cv::Mat3b colour_in_view(const Cloud& cloud, const DepthImage& depth) {
-    if (cloud.colours.empty())
+    if (!has_colours(cloud))
         return {};
     cv::Mat3b colour(depth.z_m.size(), cv::Vec3b(64, 40, 28));
     std::transform(depth.source.begin(), depth.source.end(), colour.begin(), colour.begin(),
@@ -168,7 +168,7 @@ Scene scene_of(const Work& work, bool colour_view) {
     const Cloud& cloud = *frame.cloud;
     if (!cloud.organised())
         return {work.depth.z_m, visibility, colour_in_view(cloud, work.depth), work.depth.camera};
-    const cv::Mat3b colour = cloud.colours.empty() ? cv::Mat3b() : on_grid(cloud.colours, cloud.grid);
+    const cv::Mat3b colour = has_colours(cloud) ? on_grid(cloud.colours, cloud.grid) : cv::Mat3b();
     return {depth_on_grid(cloud), visibility, colour, frame.camera.pinhole};
 }
 
@@ -209,9 +209,13 @@ void write_all(Work& work, const Scene& scene, const cv::Mat3b& shaded, const Ou
         wrote(cloud_file(name, ".ply"), [&](const auto& file) { write_depth_cloud(file, work, scene, outputs); });
 }
 
-void write_sides(Work& work, const Outputs& outputs) {
+void write_cloud_picture(Work& work, const Outputs& outputs) {
     const std::filesystem::path file = picture_file("shaded", work.entry.name);
-    write_picture(outputs.folder / file, two_sides(*work.frame.cloud, work.of_points, outputs.shade_strength));
+    std::optional<Eigen::Vector3d> viewpoint;
+    if (work.frame.world_from_camera)
+        viewpoint = work.frame.world_from_camera->translation();
+    write_picture(outputs.folder / file,
+                  cloud_picture(*work.frame.cloud, work.of_points, viewpoint, outputs.shade_strength));
     work.row.files.push_back(file);
 }
 

@@ -1,4 +1,4 @@
-// Clouds that no single camera sees: which ones these are, their values, and pictures from two sides.
+// Clouds that no single camera sees: which ones these are, and their values.
 #pragma once
 
 #include "ao/method.h"
@@ -20,10 +20,5 @@ namespace scanshade {
 
 /// Values of points, with how many of the valid ones have one.
 [[nodiscard]] Attached attached_points(const Cloud& cloud, std::vector<float> visibility);
-
-/// The cloud's points from two opposite sides, obliquely from above (z up): colours, or light grey, times visibility;
-/// below them visibility alone. Points are as large as their spacing. Points without a value are a dim blue. Points
-/// that face away are left out, which shows the inside of rooms.
-[[nodiscard]] cv::Mat3b two_sides(const Cloud& cloud, const PointVisibility& found, double strength);
 
 } // namespace scanshade

@@ -354,6 +354,8 @@ std::string describe(const CloudRecords& records) {
 
 std::string unit_of(const CloudRecords& records) { return records.unit; }
 
+bool z_is_up(const Cloud& cloud) { return cloud.records && cloud.records->format->z_up; }
+
 std::string extension(const CloudRecords& records) { return std::string(written_extension(*records.format)); }
 
 } // namespace scanshade

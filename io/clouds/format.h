@@ -29,6 +29,7 @@ struct CloudFormat {
     std::vector<std::array<int, 3>> (*triangles)(const CloudRecords& records) = nullptr; ///< none: no meshes
     std::string_view binary_encoding = "binary"; ///< what the format calls little-endian numbers
     bool wide_colours = false;                   ///< red, green and blue may have 16 bits
+    bool z_up = false;                           ///< z points up, by definition or custom
 };
 
 /// The format, by how the file begins, or by its name where only that tells; none where it is unknown.
