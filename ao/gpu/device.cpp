@@ -15,6 +15,7 @@ namespace {
 
 constexpr const char* validation_layer = "VK_LAYER_KHRONOS_validation";
 constexpr const char* push_descriptors = VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME;
+constexpr const char* no_driver = "no Vulkan driver is installed (Debian: mesa-vulkan-drivers brings a software one)";
 
 bool wants_validation() {
     const char* value = std::getenv("SCANSHADE_VALIDATE");
@@ -51,7 +52,11 @@ void make_instance(Device::State& state) {
     if (state.validating) {
         info.setPEnabledLayerNames(validation_layer).setPEnabledExtensionNames(extension).setPNext(&features);
     }
-    state.instance = vk::raii::Instance(state.context, info);
+    try {
+        state.instance = vk::raii::Instance(state.context, info);
+    } catch (const vk::IncompatibleDriverError&) { // what the loader says when it finds none
+        throw Error(no_driver);
+    }
     if (state.validating)
         state.messenger = vk::raii::DebugUtilsMessengerEXT(state.instance, messenger_info(state.messages.get()));
 }
@@ -152,7 +157,7 @@ const DeviceInfo* chosen(const std::vector<DeviceInfo>& all, const std::string& 
 
 std::string listing(const std::vector<DeviceInfo>& all) {
     if (all.empty())
-        return "no Vulkan driver is installed (Debian: mesa-vulkan-drivers brings a software one)";
+        return no_driver;
     std::string text = "there are:";
     for (const DeviceInfo& info : all)
         text += fmt::format(" {} {} ({}){};", info.index, info.name, info.kind,

@@ -25,7 +25,7 @@ std::string names_of(const std::vector<FrameRow>& rows, FrameStatus status) {
 } // namespace
 
 std::string shading_sentence(const Capture& capture, Registration registration) {
-    const bool clouds = std::ranges::all_of(capture.entries, [](const auto& entry) { return !entry.cloud.empty(); });
+    const bool clouds = std::ranges::none_of(capture.entries, [](const auto& entry) { return entry.cloud.empty(); });
     const bool colour = std::ranges::any_of(capture.entries, [](const auto& entry) { return !entry.colour.empty(); });
     if (clouds)
         return "shaded pictures show the points' own colours, or grey clay where they have none.";
@@ -56,16 +56,17 @@ std::string noise_sentence(const DepthNoise& noise, const RunSettings& settings)
         settings.depth_smoothing > 0 ? "depth and normals come from plane fits" : "depth is used as recorded");
 }
 
-void introduce(const RunReport& report, std::size_t frames) {
+void introduce(const RunReport& report, std::size_t frames, bool by_points) {
     const Capture& capture = report.capture;
     say(fmt::format("{}: {}, {} of {} frames", capture.path.string(), capture.kind, frames, capture.entries.size()));
     if (!capture.depth.origin.empty())
-        say(fmt::format("  depth: {} ({})", capture.depth.name, capture.depth.origin));
+        say(fmt::format("  {}: {} ({})", by_points ? "unit" : "depth", capture.depth.name, capture.depth.origin));
     if (capture.camera)
         say(fmt::format("  camera: {} ({})", describe(*capture.camera), capture.camera->origin));
     if (capture.depth_correction.any())
         say(fmt::format("  depth correction: {} ({})", describe(capture.depth_correction), capture.camera->origin));
-    say("  depth noise: " + report.depth_noise);
+    if (!by_points)
+        say("  depth noise: " + report.depth_noise);
     for (const std::string& warning : capture.warnings)
         warn(fmt::format("  warning: {}: {}", capture.path.string(), warning));
     for (const std::string& sentence : report.budget)

@@ -16,8 +16,9 @@ namespace scanshade {
 /// The depth's noise, and how the depth is prepared.
 [[nodiscard]] std::string noise_sentence(const DepthNoise& noise, const RunSettings& settings);
 
-/// Prints what the capture holds, how many frames are used, and the settings chosen for them.
-void introduce(const RunReport& report, std::size_t frames);
+/// Prints what the capture holds, how many frames are used, and the settings chosen for them. `by_points`: its clouds
+/// are computed from their points, so that depth images do not matter.
+void introduce(const RunReport& report, std::size_t frames, bool by_points);
 /// Prints the result; `table` is the run's frames.csv.
 void conclude(const RunReport& report, const std::filesystem::path& table);
 

@@ -9,6 +9,7 @@
 #include "apps/slice.h"
 #include "apps/walk/batch.h"
 #include "apps/walk/overlap.h"
+#include "apps/walk/point_clouds.h"
 #include "apps/walk/progress.h"
 #include "apps/walk/resume.h"
 #include "apps/walk/sequence_order.h"
@@ -264,11 +265,12 @@ class Run final : public Command {
                         ": --view colour needs the pose of a secondary camera for colour; refine finds it");
     }
 
-    RunReport begun_report(const Job& job, Workers& workers) {
+    /// `workers`: null without a Vulkan device.
+    RunReport begun_report(const Job& job, Workers* workers) {
         const auto& said = job.batch.registration;
         const Registration registration = said.value_or(job.capture.registration);
         RunReport report{.started = std::chrono::system_clock::now(),
-                         .device = workers.device().info(),
+                         .device = workers ? workers->device().info() : the_processor(),
                          .method = asked_.method,
                          .settings = asked_.stages_in_use(),
                          .capture = job.capture,
@@ -278,8 +280,15 @@ class Run final : public Command {
                          .budget = {},
                          .shading = shading_sentence(job.capture, registration),
                          .frames = {}};
-        report.devices = workers.devices();
+        report.devices = workers ? workers->devices() : 1;
         return report;
+    }
+
+    static gpu::DeviceInfo the_processor() {
+        gpu::DeviceInfo info;
+        info.name = "the processor, without Vulkan";
+        info.kind = "CPU";
+        return info;
     }
 
     /// Picks method and settings for the capture, starting from the command line. Returns sentences about the choice.
@@ -389,8 +398,8 @@ class Run final : public Command {
         std::optional<RecordingCloud> cloud;
         if (!asked_.recording_cloud.empty())
             job.batch.cloud = &cloud.emplace(asked_.cloud_resolution_m);
-        say(fmt::format("{} on {}", asked_.method, workers().description()));
-        introduce(ready.report, job.batch.frames.size());
+        say(ready.at_work);
+        introduce(ready.report, job.batch.frames.size(), ready.by_points);
         prepare_folder(job, files);
         const Recording recording{.journal = journal,
                                   .settings = ready.settings,
@@ -440,25 +449,62 @@ class Run final : public Command {
         RunReport report;
         std::string settings; ///< settings_key()
         std::unique_ptr<PointMethod> points;
+        bool by_points;      ///< the capture's clouds are computed from their points, as far as can be told
+        std::string at_work; ///< which method on which device, for people
     };
 
-    /// Makes the methods, or keeps those of the last capture.
+    /// Makes the methods, or keeps those of the last capture. Without a Vulkan device, clouds are computed from their
+    /// points on the processor.
     [[nodiscard]] Prepared prepare(Job& job) {
         const std::lock_guard alone(alone_);
-        Workers& workers = this->workers();
-        gpu::Device& device = workers.device();
-        const std::vector<std::string> budget =
-            asked_.budget.any() ? keep_to_budget(job, device) : std::vector<std::string>{};
+        MethodSetup& own = asked_.chosen_setup();
+        job.batch.cloud_walk = own.make_for_points() ? CloudWalk::points : asked_.clouds;
+        const bool by_points = computes_points(job);
+        Workers* workers =
+            by_points && !asked_.asks_for_device(job.capture) ? workers_if_any(job.batch.no_method) : &this->workers();
+        std::vector<std::string> budget;
+        if (asked_.budget.any())
+            budget = keep_to_budget(job, workers->device());
         MethodSetup& setup = asked_.chosen_setup();
-        workers.make(asked_.method, setup, asked_.preparation());
+        if (workers)
+            workers->make(asked_.method, setup, asked_.preparation());
         job.batch.radius_m = asked_.radius_m();
-        auto points = point_method(setup, asked_.cloud_ao(), gpu::is_cpu(device.info()) ? nullptr : &device);
+        gpu::Device* gpu = workers && !gpu::is_cpu(workers->device().info()) ? &workers->device() : nullptr;
+        auto points = point_method(setup, asked_.cloud_ao(), gpu);
         job.batch.points = points.get();
-        job.batch.cloud_walk = setup.make_for_points() ? CloudWalk::points : asked_.clouds;
         RunReport report = begun_report(job, workers);
         report.budget = budget;
         std::string settings = settings_key(report, job.batch.outputs, job.batch.noise);
-        return {std::move(report), std::move(settings), std::move(points)};
+        std::string at_work =
+            by_points ? fmt::format("{} on {}", own.make_for_points() ? asked_.method : "rays from every point",
+                                    gpu ? gpu->info().name : "the processor")
+                      : fmt::format("{} on {}", asked_.method, workers->description());
+        return {std::move(report), std::move(settings), std::move(points), by_points, std::move(at_work)};
+    }
+
+    /// Whether the capture holds clouds that are computed from their points. Judged by the clouds in memory; those that
+    /// were not kept have no grid, or the noise was not measured.
+    [[nodiscard]] static bool computes_points(const Job& job) {
+        const Capture& capture = job.capture;
+        if (capture.camera && job.batch.cloud_walk != CloudWalk::points)
+            return false;
+        std::vector<std::string> unused;
+        return std::ranges::none_of(capture.entries, [](const auto& entry) { return entry.cloud.empty(); }) &&
+               job.batch.cloud_walk != CloudWalk::view && std::ranges::all_of(job.loaded, [&](const auto& each) {
+                   return takes_points(each.second.frame, job.batch.cloud_walk, unused);
+               });
+    }
+
+    /// The devices; null where there are none, and why.
+    [[nodiscard]] Workers* workers_if_any(std::string& why_none) {
+        try {
+            return &workers();
+        } catch (const Outage&) {
+            throw;
+        } catch (const Error& failure) {
+            why_none = failure.what();
+            return nullptr;
+        }
     }
 
     /// Computes the frames that the journal does not have.
@@ -468,8 +514,9 @@ class Run final : public Command {
         std::optional<Together> together;
         if (asked_.in_sequence(job.capture) || job.batch.cloud)
             job.batch.sequence = &together.emplace(workers(), job, asked_).sequence;
-        MethodPool& pool = together ? together->pool : workers().pool();
-        report.at_once = pool.size();
+        MethodPool none;
+        MethodPool& pool = together ? together->pool : job.batch.no_method.empty() ? workers().pool() : none;
+        report.at_once = std::max<std::size_t>(pool.size(), 1);
         Progress progress(job.batch.frames.size());
         const Stopwatch stopwatch;
         report.frames = run_recorded(job.capture, pool, job.batch, recording, [&](const FrameRow& row) {

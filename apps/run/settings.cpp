@@ -380,6 +380,10 @@ bool RunSettings::in_sequence(const Capture& capture) const {
     return sequence == SequenceUse::on || (sequence == SequenceUse::automatic && has_poses(capture));
 }
 
+bool RunSettings::asks_for_device(const Capture& capture) const {
+    return !device.empty() || budget.any() || !recording_cloud.empty() || in_sequence(capture);
+}
+
 bool has_poses(const Capture& capture) {
     const auto posed = [](const CaptureEntry& entry) { return entry.world_from_camera && entry.cloud.empty(); };
     return std::ranges::count_if(capture.entries, posed) > 1;

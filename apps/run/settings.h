@@ -76,6 +76,8 @@ class RunSettings {
     [[nodiscard]] MethodSetup& chosen_setup() const { return setup_of(method); }
     [[nodiscard]] double radius_m() const; ///< the chosen method's
     [[nodiscard]] bool in_sequence(const Capture& capture) const;
+    /// Whether the capture needs a Vulkan device even if its clouds are computed from their points.
+    [[nodiscard]] bool asks_for_device(const Capture& capture) const;
 
   private:
     [[nodiscard]] std::vector<Stage> common_stages();

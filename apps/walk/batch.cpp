@@ -108,10 +108,8 @@ bool wants_confidence(const Work& work, const BatchOptions& options) {
 }
 
 void attach_and_write(Work& work, const BatchOptions& options) {
-    Outputs outputs = options.outputs;
     const bool by_points = work.by_points;
-    if (by_points)
-        outputs.ao = outputs.confidence = outputs.shaded = outputs.panel = false;
+    const Outputs outputs = by_points ? of_points(options.outputs) : options.outputs;
     Scene scene;
     cv::Mat3b shaded;
     take(work, &StageTimes::attach, [&] {
@@ -131,11 +129,11 @@ void attach_and_write(Work& work, const BatchOptions& options) {
     });
     take(work, &StageTimes::write, [&] {
         write_all(work, scene, shaded, outputs);
-        if (by_points && options.outputs.shaded)
+        if (by_points && (options.outputs.shaded || options.outputs.panel))
             write_cloud_picture(work, options.outputs);
     });
     if (!work.row.why.empty())
-        remove_files(work, outputs);
+        remove_files(work, options.outputs);
     else
         work.row.status = work.row.doubts.empty() ? FrameStatus::ok : FrameStatus::doubtful;
 }
@@ -153,7 +151,7 @@ class Pipeline {
   public:
     Pipeline(const Capture& capture, MethodPool& pool, const BatchOptions& options,
              const std::function<void(const FrameRow&)>& on_frame)
-        : capture_(capture), pool_(pool), at_once_(options.sequence ? 1 : static_cast<int>(pool.size())),
+        : capture_(capture), pool_(pool), at_once_(options.sequence ? 1 : std::max(1, static_cast<int>(pool.size()))),
           options_(options), on_frame_(on_frame), rows_(planned_rows(capture, options.frames)),
           order_(capture, rows_, options.sequence ? options.sequence->reach() : 0), sequence_buffer_(options.sequence) {
     }
@@ -217,8 +215,8 @@ class Pipeline {
             describe_frame(*work);
         });
         work->row.ms.load += work->loaded_in_ms;
-        if (work->row.status != FrameStatus::failed && work->frame.cloud)
-            work->by_points = takes_points(work->frame, options_, work->row.notes);
+        if (work->row.status != FrameStatus::failed && work->frame.cloud && options_.points)
+            work->by_points = takes_points(work->frame, options_.cloud_walk, work->row.notes);
         if (work->by_points) {
             work->row.ms.project = 0;
             return work;
@@ -239,6 +237,8 @@ class Pipeline {
             const std::lock_guard alone(pool_.alone());
             tbb::this_task_arena::isolate(
                 [&] { take(*work, &StageTimes::compute, [&] { compute_points(*work, options_); }); });
+        } else if (pool_.size() == 0) {
+            take(*work, &StageTimes::compute, [&] { throw Outage(options_.no_method); });
         } else {
             const MethodPool::Lease method = pool_.lease();
             take(*work, &StageTimes::compute, [&] { compute_view(*work, *method); });

@@ -33,6 +33,10 @@ struct Outputs {
     bool colour_cloud = false; ///< replaces the cloud's colour by colour times visibility
 };
 
+/// What is written of a cloud computed from its points, which has no pixels: maps of visibility and confidence are its
+/// fields, so each of them asks for the cloud.
+[[nodiscard]] Outputs of_points(const Outputs& outputs);
+
 /// The files that `outputs` makes of a frame. A cloud has both possible names, since only its content has the format.
 [[nodiscard]] std::vector<std::filesystem::path> files_of(const CaptureEntry& entry, const Outputs& outputs);
 
@@ -53,13 +57,14 @@ struct BatchOptions {
     std::optional<Registration> registration; ///< as the user set it; none: as the capture says
     PointMethod* points = nullptr;            ///< computes clouds and meshes where `cloud_walk` asks for points
     CloudWalk cloud_walk = CloudWalk::automatic;
-    RecordingCloud* cloud = nullptr;         ///< receives the frames with a pose
-    Neighbourhood* sequence = nullptr;       ///< computes each frame with its neighbours, in place of the method;
-                                             ///< neighbours are loaded even if `frames` does not list them
-    LoadedFrames* loaded = nullptr;          ///< frames that are in memory already; the walk takes them from there
-    std::filesystem::path dump;              ///< folder for the method's intermediates, frame by frame; empty = none
-    bool short_rows = false;                 ///< rows come back shortened, once on_frame has seen them
-    int frames_in_memory = 0;                ///< 0 = cores, and two for each method
+    std::string no_method;             ///< why there is no method for views, if the pool is empty; clouds need none
+    RecordingCloud* cloud = nullptr;   ///< receives the frames with a pose
+    Neighbourhood* sequence = nullptr; ///< computes each frame with its neighbours, in place of the method;
+                                       ///< neighbours are loaded even if `frames` does not list them
+    LoadedFrames* loaded = nullptr;    ///< frames that are in memory already; the walk takes them from there
+    std::filesystem::path dump;        ///< folder for the method's intermediates, frame by frame; empty = none
+    bool short_rows = false;           ///< rows come back shortened, once on_frame has seen them
+    int frames_in_memory = 0;          ///< 0 = cores, and two for each method
     const std::atomic<bool>* stop = nullptr; ///< set = begin no further frame
     std::function<void()> all_begun;         ///< called once no further frame will begin: another batch may
 };

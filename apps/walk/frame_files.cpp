@@ -210,7 +210,7 @@ void write_all(Work& work, const Scene& scene, const cv::Mat3b& shaded, const Ou
 }
 
 void write_cloud_picture(Work& work, const Outputs& outputs) {
-    const std::filesystem::path file = picture_file("shaded", work.entry.name);
+    const std::filesystem::path file = picture_file(outputs.shaded ? "shaded" : "panel", work.entry.name);
     std::optional<Eigen::Vector3d> viewpoint;
     if (work.frame.world_from_camera)
         viewpoint = work.frame.world_from_camera->translation();
@@ -245,6 +245,13 @@ void add_to(RecordingCloud& cloud, const Work& work) {
                undistorted_image(scene.colour_known, work.frame.camera), *work.frame.world_from_camera});
 }
 
+Outputs of_points(const Outputs& outputs) {
+    Outputs those = outputs;
+    those.cloud = outputs.cloud || outputs.ao || outputs.confidence;
+    those.ao = those.confidence = those.shaded = those.panel = false;
+    return those;
+}
+
 std::vector<std::filesystem::path> files_of(const CaptureEntry& entry, const Outputs& outputs) {
     std::vector<std::filesystem::path> files;
     const auto add = [&](const std::filesystem::path& file) { files.push_back(outputs.folder / file); };
@@ -258,7 +265,7 @@ std::vector<std::filesystem::path> files_of(const CaptureEntry& entry, const Out
         add(picture_file("panel", entry.name));
     if (entry.cloud.empty() && outputs.depth_cloud)
         add(cloud_file(entry.name, ".ply"));
-    if (!entry.cloud.empty() && outputs.cloud)
+    if (!entry.cloud.empty() && of_points(outputs).cloud)
         for (const std::string_view extension : written_cloud_extensions())
             add(cloud_file(entry.name, std::string(extension)));
     return files;

@@ -24,7 +24,7 @@ struct Scene {
 
 /// Writes every file that `outputs` asks for, for a frame with a view; row.files lists them.
 void write_all(Work& work, const Scene& scene, const cv::Mat3b& shaded, const Outputs& outputs);
-/// Writes a picture of a cloud without a view: cloud_picture().
+/// Writes a picture of a cloud without a view: cloud_picture(), in the folder of shaded pictures or else of panels.
 void write_cloud_picture(Work& work, const Outputs& outputs);
 /// Removes the files of a failed frame, and those of an earlier run: files never contradict the row.
 void remove_files(Work& work, const Outputs& outputs);

@@ -9,13 +9,15 @@
 
 namespace scanshade {
 
-/// Several walks may share one pool. It must outlive its leases, and the methods must outlive it.
+/// A pool without methods serves clouds that are computed from their points. Several walks may share one pool. It must
+/// outlive its leases, and the methods must outlive it.
 class MethodPool {
   public:
     explicit MethodPool(std::span<FrameAo* const> methods) : size_(methods.size()) {
         for (FrameAo* method : methods)
             free_.push(method);
     }
+    MethodPool() : size_(0) {}
     explicit MethodPool(FrameAo& method) : size_(1) { free_.push(&method); }
 
     /// A method, until the lease ends.
@@ -33,7 +35,7 @@ class MethodPool {
         FrameAo* method_ = nullptr;
     };
 
-    /// Waits until one is free.
+    /// Waits until one is free; for ever if there is none.
     [[nodiscard]] Lease lease() { return Lease(*this); }
     /// How many frames may be computed at once.
     [[nodiscard]] std::size_t size() const { return size_; }

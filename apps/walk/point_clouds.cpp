@@ -14,10 +14,10 @@ namespace scanshade {
 
 using Eigen::Vector3d;
 
-bool takes_points(const Frame& frame, const BatchOptions& options, std::vector<std::string>& notes) {
-    if (!options.points || options.cloud_walk == CloudWalk::view)
+bool takes_points(const Frame& frame, CloudWalk walk, std::vector<std::string>& notes) {
+    if (walk == CloudWalk::view)
         return false;
-    if (options.cloud_walk == CloudWalk::points)
+    if (walk == CloudWalk::points)
         return true;
     if (frame.camera.pinhole.fx != 0)
         return false;

@@ -13,7 +13,7 @@ namespace scanshade {
 
 /// Whether this cloud is computed from its points. `automatic` means yes, unless the user named a camera or the cloud
 /// is the grid of a pinhole image. `notes` receives the reason.
-[[nodiscard]] bool takes_points(const Frame& frame, const BatchOptions& options, std::vector<std::string>& notes);
+[[nodiscard]] bool takes_points(const Frame& frame, CloudWalk walk, std::vector<std::string>& notes);
 
 /// Visibility of the cloud by `method`, with the file's own normals, faces and viewpoint.
 [[nodiscard]] PointVisibility visibility_of_points(const Frame& frame, PointMethod& method);
