@@ -15,6 +15,7 @@ struct FittedCloud {
     std::vector<Eigen::Vector3d> points;
     std::vector<Eigen::Vector3d> normals; ///< the mean of the recorded ones; empty where none are given
     std::vector<Eigen::Vector3f> axes;    ///< fitted, not oriented; zero for points that no noise concerns
+    std::vector<char> alone;              ///< 1: off all surfaces near it by more than noise explains
     std::vector<std::uint32_t> fitted_of; ///< by point given: its index in `points`
     float noise = 0;                      ///< sigma across the surface, the median over the cloud, in its unit
     std::size_t moved = 0;                ///< points given that noise concerns
