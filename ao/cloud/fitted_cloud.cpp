@@ -299,10 +299,8 @@ class Fit {
         plane.thickness = std::sqrt(axes.variances[0]);
         plane.middle_off = moments.mean().dot(plane.normal);
         plane.flat = plane.thickness <= 1.4F * own.sigma;
-        // A recorded normal far from that of a flat window was estimated from fewer points than noise allows.
-        constexpr float still_recorded = 0.9945F; // the cosine of 6 degrees
-        if (const float cosine = plane.normal.dot(axes.normal); plane.flat && std::abs(cosine) < still_recorded)
-            plane.normal = cosine < 0 ? Vector3f(-axes.normal) : axes.normal;
+        if (plane.flat)
+            plane.normal = checked_normal(plane.normal, axes.normal);
     }
 
     static float weight(float distance2, float reach2) { return std::exp(-2 * distance2 / reach2); }
@@ -420,7 +418,8 @@ FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> poin
                                ? Vector3d(cell.middle.cast<double>() + local.middle)
                                : points[tree.index(cells.members[cell.begin])];
         if (!normals.empty())
-            fitted.normals[i] = cell.normal.cast<double>();
+            fitted.normals[i] =
+                (cell.normal.isZero() || fitted.axes[i].isZero() ? cell.normal : fitted.axes[i]).cast<double>();
         fitted.alone[i] = cell.alone;
         for (std::uint32_t k = cell.begin; k < cell.begin + cell.count; ++k)
             fitted.fitted_of[tree.index(cells.members[k])] = static_cast<std::uint32_t>(i);
