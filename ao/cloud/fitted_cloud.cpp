@@ -225,7 +225,7 @@ class Fit {
             const Offset found = offset(place);
             moved[i] += found.distance * planes_[place].normal;
             constexpr int fewest = 3;
-            cells_[i].alone = found.support < fewest;
+            cells_[i].alone = found.support < fewest && near_surfaces(place);
         });
         for (std::size_t i = 0; i < cells_.size(); ++i)
             cells_[i].middle = moved[i];
@@ -336,6 +336,14 @@ class Fit {
             planes_[place].normal = chosen[place];
     }
 
+    /// Whether most cells near it lie on flat surfaces. Where they do not, as among leaves, nothing is out of place.
+    [[nodiscard]] bool near_surfaces(std::size_t place) const {
+        const auto all = near(place);
+        const auto flat =
+            std::count_if(all.begin(), all.end(), [&](std::uint32_t other) { return planes_[other].flat; });
+        return 2 * static_cast<std::size_t>(flat) > all.size();
+    }
+
     /// How far the surface lies from the cell along its normal. Offsets along the mean of both normals: on a round
     /// surface those along either normal alone err in opposite directions.
     struct Offset {
@@ -393,7 +401,7 @@ FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> poin
     if (points.size() < 64)
         return fitted;
     const NeighbourTree& tree = local.tree;
-    const CloudNoise noise(tree, static_cast<float>(radius));
+    const CloudNoise noise(tree, static_cast<float>(radius) / 3);
     if (!noise.known())
         return fitted;
     const Thinning thinning(tree, normals, noise);
