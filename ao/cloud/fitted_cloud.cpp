@@ -115,16 +115,13 @@ class Thinning {
             return;
         }
         if (sizes.norm() <= thinned_to * sigma) { // two sides of a thin board
-            const Vector3f first = normal_of(members.front());
-            const auto middle = std::stable_partition(members.begin(), members.end(), [&](std::uint32_t place) {
-                return alike_to(first, normal_of(place)) >= one_side_from;
-            });
+            const Vector3f first = first_normal(members);
+            const auto middle = std::stable_partition(members.begin(), members.end(),
+                                                      [&](std::uint32_t place) { return on_side_of(first, place); });
             const auto front = static_cast<std::size_t>(middle - members.begin());
-            if (front < members.size()) {
-                halve(part, begin, begin + front, sigma);
-                halve(part, begin + front, end, sigma);
-                return;
-            }
+            halve(part, begin, begin + front, sigma);
+            halve(part, begin + front, end, sigma);
+            return;
         }
         int axis = 0;
         sizes.maxCoeff(&axis);
@@ -163,14 +160,24 @@ class Thinning {
         return sides_ ? first.dot(other) : std::abs(first.dot(other));
     }
 
-    static constexpr float one_side_from = 0.5F;
+    /// Of the first member that has one; zero if none has.
+    [[nodiscard]] Vector3f first_normal(std::span<const std::uint32_t> members) const {
+        for (const std::uint32_t place : members)
+            if (const Vector3f normal = normal_of(place); !normal.isZero())
+                return normal;
+        return Vector3f::Zero();
+    }
+    [[nodiscard]] bool on_side_of(const Vector3f& first, std::uint32_t place) const {
+        constexpr float from = 0.5F;
+        const Vector3f normal = normal_of(place);
+        return normal.isZero() || alike_to(first, normal) >= from;
+    }
     [[nodiscard]] bool one_side(std::span<const std::uint32_t> members) const {
         if (normals_.empty())
             return true;
-        const Vector3f first = normal_of(members.front());
-        return std::all_of(members.begin(), members.end(), [&](std::uint32_t place) {
-            return alike_to(first, normal_of(place)) >= one_side_from || normal_of(place).isZero();
-        });
+        const Vector3f first = first_normal(members);
+        return std::all_of(members.begin(), members.end(),
+                           [&](std::uint32_t place) { return on_side_of(first, place); });
     }
 
     [[nodiscard]] Cell cell_of(std::span<const std::uint32_t> members, float sigma) const {
