@@ -3,6 +3,7 @@
 
 #include "ao/cloud/cloud_gpu.h"
 #include "ao/cloud/disc_rays.h"
+#include "ao/cloud/extent.h"
 #include "ao/cloud/fitted_cloud.h"
 #include "ao/cloud/tiles.h"
 #include "ao/raycast/raycast.h"
@@ -64,22 +65,6 @@ std::vector<Vector3d> sampled(std::span<const Vector3d> points, std::size_t want
         if (points[i].allFinite() && hash(static_cast<std::uint32_t>(i)) < chosen)
             some.push_back(points[i]);
     return some;
-}
-
-/// The diagonal of the box that holds all but the lowest and highest hundredth of the points along each axis.
-double extent_of(std::span<const Vector3d> points) {
-    Vector3d extent = Vector3d::Zero();
-    for (int axis = 0; axis < 3; ++axis) {
-        std::vector<double> along;
-        for (const Vector3d& point : points)
-            along.push_back(point[axis]);
-        if (along.empty())
-            return 0;
-        std::sort(along.begin(), along.end());
-        const std::size_t cut = along.size() / 100;
-        extent[axis] = along[along.size() - 1 - cut] - along[cut];
-    }
-    return extent.norm();
 }
 
 /// A neighbour's weight in the mean is e^(this distance^2): visibility hardly changes over a tenth of the radius.
@@ -182,7 +167,8 @@ class CloudAo::Work {
   public:
     Work(const CloudAoOptions& options, gpu::Device* device, const Vector3d& up,
          const std::optional<Vector3d>& viewpoint, const PointSet& cloud, const std::optional<Vector3d>& scanner)
-        : options_(options), up_(up), cloud_(cloud), watch_(result_.timings) {
+        : options_(options), up_(up), given_viewpoint_(viewpoint), scanner_(scanner), cloud_(cloud),
+          watch_(result_.timings) {
         if (device)
             gpu_.emplace(*device);
         result_.visibility.assign(cloud.points.size(), nothing);
@@ -191,7 +177,8 @@ class CloudAo::Work {
         for (std::size_t i = 0; i < cloud.points.size(); ++i)
             if (cloud.points[i].allFinite())
                 valid_.push_back(static_cast<std::uint32_t>(i));
-        const std::vector<Vector3d> some = sampled(cloud.points, enough_to_judge);
+        std::vector<Vector3d> some = sampled(cloud.points, enough_to_judge);
+        settle_extent(some);
         settle_orientation(viewpoint, scanner, some);
         settle_radius(some);
         settle_rays();
@@ -204,6 +191,7 @@ class CloudAo::Work {
         else
             cut_into_tiles(cloud_.points, valid_, result_.radius + 16 * result_.spacing, at_once(),
                            [&](const Places& core, const Places& round) { tile(core, round); });
+        compute_strays();
         tell();
         if (gpu_)
             for (const auto& [pass, ms] : gpu_->timings())
@@ -236,13 +224,52 @@ class CloudAo::Work {
             orientation_.point = up_;
     }
 
+    /// Points that lie beyond the cloud are computed by themselves.
+    void settle_extent(std::vector<Vector3d>& some) {
+        extent_ = extent_of(some);
+        std::erase_if(some, [&](const Vector3d& point) { return beyond(point); });
+        const auto strays = std::stable_partition(valid_.begin(), valid_.end(),
+                                                  [&](std::uint32_t i) { return !beyond(cloud_.points[i]); });
+        strays_.assign(strays, valid_.end());
+        valid_.erase(strays, valid_.end());
+    }
+    [[nodiscard]] bool beyond(const Vector3d& point) const {
+        return (point - extent_.centre).norm() > extent_.farthest;
+    }
+
+    /// Strays by themselves, as a cloud of its own about its own middle: what they say of normals and sides must not
+    /// concern the others. A few of them make no surface; so do strays of strays.
+    void compute_strays() {
+        constexpr std::size_t fewest = 64;
+        if (strays_.size() < fewest || of_strays_)
+            return;
+        std::vector<Vector3d> points, normals;
+        for (const std::uint32_t i : strays_) {
+            points.push_back(cloud_.points[i]);
+            if (!cloud_.normals.empty())
+                normals.push_back(cloud_.normals[i]);
+        }
+        CloudAoOptions options = options_;
+        options.radius = result_.radius;
+        const PointSet strays{points, normals};
+        Work alone(options, nullptr, up_, given_viewpoint_, strays, scanner_);
+        alone.of_strays_ = true;
+        alone.result_.spacing = std::min(alone.result_.spacing, result_.spacing);
+        const PointVisibility found = alone.run();
+        for (std::size_t k = 0; k < strays_.size(); ++k) {
+            result_.visibility[strays_[k]] = found.visibility[k];
+            result_.confidence[strays_[k]] = found.confidence[k];
+            result_.normals[strays_[k]] = found.normals[k];
+        }
+    }
+
     /// The spacing of a sample is larger by the root of its share: points are on surfaces.
     void settle_radius(const std::vector<Vector3d>& some) {
         if (some.empty())
             return;
         const double share = static_cast<double>(some.size()) / static_cast<double>(valid_.size());
         result_.spacing = static_cast<double>(cloud_surface(LocalCloud(some), {}).spacing) * std::sqrt(share);
-        const double extent = extent_of(some);
+        const double extent = extent_.size;
         result_.radius = options_.radius > 0 ? options_.radius : default_radius(extent, result_.spacing);
         result_.notes.push_back(
             fmt::format("points stand {:.4g} apart (median), over {:.4g}.", result_.spacing, extent));
@@ -287,12 +314,18 @@ class CloudAo::Work {
 
     void tile(const Places& core, const Places& round, CloudGpu* gpu) {
         auto [surface, fitted] = planes_of(round, gpu);
+        for (std::size_t i = 0; i < surface.size() && !fitted.empty(); ++i)
+            if (fitted.alone[surface.tree.index(i)])
+                surface.disc_radius[i] = 0;
+        const std::vector<std::uint32_t> lonely = drop_strays(surface, extent_.centre, result_.spacing);
         std::optional<DiscRays> rays;
         if (orientation_unknown()) {
             if (orientation_.kind == NormalOrientation::Kind::inward)
                 rays.emplace(surface);
             orient_normals(surface, orientation_, rays ? &*rays : nullptr);
         }
+        for (const std::uint32_t place : lonely)
+            surface.normals[place].setZero();
         watch_.lap("sides");
         // Both orders are ascending. A point of the surface is wanted if it stands for one of the core.
         std::vector<char> in_core(core.size() == round.size() ? 0 : round.size(), 0), wanted;
@@ -457,23 +490,33 @@ class CloudAo::Work {
         if (gpu_ && gpu_tiles_ < tiles_)
             result_.notes.push_back(fmt::format("{} of {} tiles were too large for {}; the processor computed them.",
                                                 tiles_ - gpu_tiles_, tiles_, gpu_->device_name()));
+        if (!strays_.empty())
+            result_.notes.push_back(
+                fmt::format("{} points lie more than {:.4g} from the middle of the cloud, far from all "
+                            "others: they are taken for strays and occlude nothing else.",
+                            strays_.size(), extent_.farthest));
         std::size_t unknown = 0;
-        for (const std::uint32_t i : valid_)
-            unknown += std::isnan(result_.visibility[i]);
+        for (const Places* places : {&valid_, &strays_})
+            for (const std::uint32_t i : *places)
+                unknown += std::isnan(result_.visibility[i]);
         if (unknown > 0)
-            result_.notes.push_back(fmt::format(
-                "{} of {} points have no surface round them; their visibility is unknown.", unknown, valid_.size()));
+            result_.notes.push_back(
+                fmt::format("{} of {} points have no surface round them; their visibility is unknown.", unknown,
+                            valid_.size() + strays_.size()));
     }
 
     const CloudAoOptions& options_;
     Vector3d up_;
+    std::optional<Vector3d> given_viewpoint_, scanner_;
     const PointSet& cloud_;
+    bool of_strays_ = false;
     PointVisibility result_;
     Watch watch_;
     std::optional<CloudGpu> gpu_;
     std::optional<DirectionSet> directions_;
     NormalOrientation orientation_;
-    Places valid_;
+    Extent extent_;
+    Places valid_, strays_; ///< strays lie beyond the cloud
     bool normals_refused_ = false, normals_opposed_ = false;
     float noise_ = 0;
     std::size_t moved_ = 0, kept_ = 0;
@@ -496,7 +539,7 @@ PointVisibility CloudAo::of_mesh(const PointSet& mesh) const {
                 (mesh.points[static_cast<std::size_t>(a)] - mesh.points[static_cast<std::size_t>(b)]).norm()));
     if (!edges.empty())
         result.spacing = static_cast<double>(median(std::move(edges)));
-    const double extent = extent_of(sampled(mesh.points, 60000));
+    const double extent = extent_of(sampled(mesh.points, 60000)).size;
     result.radius =
         std::clamp(options_.radius > 0 ? options_.radius : default_radius(extent, result.spacing), 1e-6, 1e6);
     const int rays = options_.rays > 0 ? options_.rays : 64;

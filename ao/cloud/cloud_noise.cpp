@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <Eigen/Geometry>
 #include <optional>
+#include <span>
 #include <tbb/parallel_for.h>
 
 namespace scanshade {
@@ -18,29 +20,63 @@ using Eigen::Vector3f;
 constexpr std::size_t sample = 1024, most_points = 4096;
 constexpr std::size_t fewest_points = 12;
 
-/// Thickness and width of the points within a ball: standard deviations.
+/// The points within a ball, by the plane through them.
 struct Ball {
-    float thickness = 0, width = 0;
+    float thickness = 0, width = 0; ///< standard deviations
+    float unrelated = 0;            ///< standard deviation off the plane of points side by side: within cells of it
     std::size_t points = 0;
 };
 
+/// Of offsets (x, y in the plane, -1 .. 1; z off it), the standard deviation within cells that hold about four.
+/// Structure is alike side by side, noise is not.
+float spread_within_cells(std::span<const Vector3f> offsets) {
+    const int side = std::max(2, static_cast<int>(std::sqrt(static_cast<float>(offsets.size()) / 4)));
+    struct Sums {
+        float count = 0, sum = 0, squares = 0;
+    };
+    std::vector<Sums> cells(static_cast<std::size_t>(side * side));
+    const auto along = [side](float x) {
+        return std::clamp(static_cast<int>((x + 1) / 2 * static_cast<float>(side)), 0, side - 1);
+    };
+    for (const Vector3f& offset : offsets) {
+        Sums& cell = cells[static_cast<std::size_t>(along(offset.y()) * side + along(offset.x()))];
+        cell.count += 1;
+        cell.sum += offset.z();
+        cell.squares += offset.z() * offset.z();
+    }
+    float squares = 0, freedom = 0;
+    for (const Sums& cell : cells)
+        if (cell.count > 1) {
+            squares += cell.squares - cell.sum * cell.sum / cell.count;
+            freedom += cell.count - 1;
+        }
+    return freedom > 0 ? std::sqrt(std::max(squares, 0.0F) / freedom) : 0;
+}
+
 Ball ball_round(const NeighbourTree& tree, const Vector3f& at, float radius) {
     Moments moments;
-    std::size_t points = 0;
+    std::vector<Vector3f> offsets;
     tree.for_each_within(at, radius, [&](std::size_t place) {
-        if (++points <= most_points)
-            moments.add((tree[place] - at) / radius);
+        if (offsets.size() < most_points) {
+            offsets.emplace_back((tree[place] - at) / radius);
+            moments.add(offsets.back());
+        }
     });
+    const std::size_t points = offsets.size();
     if (points < fewest_points)
-        return {0, 0, points};
-    const Vector3f variances = PrincipalAxes(moments.covariance()).variances;
+        return {0, 0, 0, points};
+    const PrincipalAxes axes(moments.covariance());
     const float freed = static_cast<float>(points) / static_cast<float>(points - 3); // a plane takes three
-    return {radius * std::sqrt(freed * variances[0]), radius * std::sqrt(variances[1]), points};
+    const Vector3f x = axes.normal.unitOrthogonal(), y = axes.normal.cross(x), middle = moments.mean();
+    for (Vector3f& offset : offsets)
+        offset = Vector3f(offset.dot(x), offset.dot(y), (offset - middle).dot(axes.normal));
+    return {radius * std::sqrt(freed * axes.variances[0]), radius * std::sqrt(axes.variances[1]),
+            radius * spread_within_cells(offsets), points};
 }
 
 std::optional<float> sigma_round(const NeighbourTree& tree, std::size_t place, float widest) {
     constexpr float growth = 1.5F, flat = 3.5F; // a disc's width is half its radius
-    constexpr float no_thicker = 1.3F, rounding = 2e-4F;
+    constexpr float no_thicker = 1.3F, rounding = 2e-4F, mostly = 0.7F;
     Nearest nearest;
     tree.find_round(place, 16, nearest);
     if (nearest.all().empty())
@@ -53,8 +89,9 @@ std::optional<float> sigma_round(const NeighbourTree& tree, std::size_t place, f
         radius *= growth;
         const Ball larger = ball_round(tree, at, radius);
         if (ball.points >= fewest_points && ball.width > flat * ball.thickness &&
-            larger.thickness <= std::max(no_thicker * ball.thickness, rounding * radius))
-            return ball.thickness;
+            larger.thickness <= std::max(no_thicker * ball.thickness, rounding * radius) &&
+            larger.unrelated >= std::min(mostly * larger.thickness, larger.thickness - rounding * radius))
+            return larger.unrelated;
         ball = larger;
     }
     return std::nullopt;
@@ -72,12 +109,16 @@ CloudNoise::CloudNoise(const NeighbourTree& tree, float widest) {
             places_.push_back(tree[place_of(i)]);
             sigmas_.push_back(*found[i]);
         }
-    if (20 * sigmas_.size() < asked || sigmas_.empty()) {
+    constexpr std::size_t fewest_share = 5; // a fifth
+    if (sigmas_.empty() || fewest_share * sigmas_.size() < asked) {
         sigmas_.clear();
         places_.clear();
         return;
     }
     median_ = scanshade::median(sigmas_);
+    constexpr float varies_by = 4;
+    std::vector<float> sorted = sigmas_;
+    largest_ = varies_by * quantile(sorted, 0.25);
 }
 
 float CloudNoise::at(const Vector3f& point) const {
@@ -103,7 +144,7 @@ float CloudNoise::at(const Vector3f& point) const {
                    [](const Near& n) { return n.sigma; });
     std::nth_element(sigmas.begin(), sigmas.begin() + static_cast<std::ptrdiff_t>(count / 4),
                      sigmas.begin() + static_cast<std::ptrdiff_t>(count));
-    return sigmas[count / 4];
+    return std::min(sigmas[count / 4], largest_);
 }
 
 } // namespace scanshade

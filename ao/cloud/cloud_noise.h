@@ -11,23 +11,25 @@ namespace scanshade {
 /// Sigma of the points across their surface, where the cloud tells it: on planes. A sample of about a thousand places,
 /// evenly spread over the points, looks at balls of growing radius. A ball tells sigma if its points are flat (seven
 /// times wider than sigma) and those of the next larger ball are no thicker: on curved surfaces and at edges thickness
-/// grows with the ball. Registration errors of a few sigma count as noise.
+/// grows with the ball. And points side by side must differ as much as any two: structure is alike side by side.
+/// Registration errors of a few sigma count as noise.
 class CloudNoise {
   public:
     /// Looks at balls up to `widest`, in the tree's unit.
     CloudNoise(const NeighbourTree& tree, float widest);
 
-    /// Whether enough places tell it: a twentieth of the sample.
+    /// Whether enough places tell it: a fifth of the sample.
     [[nodiscard]] bool known() const { return !sigmas_.empty(); }
     /// The median of the places that tell it; 0 if unknown.
     [[nodiscard]] float median() const { return median_; }
-    /// The lower quartile of the 16 nearest places that tell it, since what is wrong there is too large; 0 if unknown.
+    /// The lower quartile of the 16 nearest places that tell it, since what is wrong there is too large. At most four
+    /// times the lower quartile of all: leaves are no noise. 0 if unknown.
     [[nodiscard]] float at(const Eigen::Vector3f& point) const;
 
   private:
     std::vector<Eigen::Vector3f> places_;
     std::vector<float> sigmas_; ///< by place
-    float median_ = 0;
+    float median_ = 0, largest_ = 0;
 };
 
 } // namespace scanshade

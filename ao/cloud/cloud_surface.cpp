@@ -2,6 +2,7 @@
 #include "ao/cloud/cloud_surface.h"
 
 #include "ao/cloud/cloud_gpu.h"
+#include "ao/cloud/moments.h"
 #include "projection/statistics.h"
 
 #include <algorithm>
@@ -22,6 +23,7 @@ constexpr std::size_t usual = shared::cloud_neighbours, wider = Nearest::most;
 /// Discs of 1.13 spacings. With random points 2 % of a surface stay uncovered. Larger discs cost more, since they reach
 /// beyond edges (RMSE 0.024; at 1.2 it is 0.046, at 0.6 0.028).
 constexpr float disc_over_gap = 0.8F;
+constexpr float sixth_on_grid = 1.414F; ///< distance of the sixth neighbour / spacing
 
 /// The least-squares plane through a neighbourhood: near points weigh most, so that edges stay sharp.
 struct Plane {
@@ -129,7 +131,9 @@ CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normal
         if (const Vector3d& given = normals[surface.tree.index(i)]; is_direction(given)) {
             const Vector3f unit = given.normalized().cast<float>();
             cosines[i] = surface.normals[i].isZero() ? 1.0F : std::abs(unit.dot(surface.normals[i]));
-            surface.normals[i] = unit;
+            constexpr float flat = 0.1F; // roughness / spacing: the plane's normal is then within a degree or two
+            const bool sure = !surface.normals[i].isZero() && surface.roughness[i] < flat * sixth[i] / sixth_on_grid;
+            surface.normals[i] = sure ? checked_normal(unit, surface.normals[i]) : unit;
         }
     };
     if (gpu) {
@@ -159,7 +163,6 @@ CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normal
             }
         });
     }
-    constexpr float sixth_on_grid = 1.414F;
     surface.spacing = median(std::move(sixth), 0) / sixth_on_grid;
     limit_discs(surface);
     if (!normals.empty()) {

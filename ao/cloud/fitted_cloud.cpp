@@ -17,10 +17,10 @@ namespace {
 using Eigen::Vector3d, Eigen::Vector3f;
 using Indices = std::vector<std::uint32_t>;
 
-constexpr float felt_from = 0.02F; ///< sigma / spacing from which noise is felt
-constexpr float thinned_to = 6;    ///< the diagonal of a cell, in sigma
-constexpr float alike = 0.8F;      ///< cosine between planes of one surface, at least
-constexpr float outlying = 3;      ///< sigma off the surface that no noise explains
+constexpr float felt_from = 0.02F;  ///< sigma / spacing from which noise is felt
+constexpr float thinned_to = 6;     ///< the diagonal of a cell, in sigma
+constexpr float least_alike = 0.8F; ///< cosine between planes of one surface, at least
+constexpr float outlying = 3;       ///< sigma off the surface that no noise explains
 
 /// Some points taken together.
 struct Cell {
@@ -29,6 +29,7 @@ struct Cell {
     Eigen::Matrix3f spread = Eigen::Matrix3f::Zero(); ///< covariance of its points
     float sigma = 0;                                  ///< of the noise; 0 where it is not felt
     std::uint32_t begin = 0, count = 0;               ///< of its members
+    bool alone = false;                               ///< the noise explains no other cells near it as of its surface
 };
 
 /// The points in cells. Members are places in the tree's order.
@@ -41,9 +42,10 @@ struct Cells {
 class Thinning {
   public:
     Thinning(const NeighbourTree& tree, std::span<const Vector3d> normals, const CloudNoise& noise)
-        : tree_(tree), normals_(normals), noise_(noise) {}
+        : tree_(tree), normals_(normals), noise_(noise), sides_(!normals.empty() && sides_agree()) {}
 
-    Cells run() {
+    [[nodiscard]] bool sides() const { return sides_; } ///< whether recorded normals tell them
+    [[nodiscard]] Cells run() const {
         std::vector<std::pair<std::size_t, std::size_t>> blocks;
         tree_.walk([&](float, std::size_t begin, std::size_t end, bool leaf) {
             constexpr std::size_t block = 256; // points that one sigma serves
@@ -74,14 +76,22 @@ class Thinning {
     }
 
   private:
-    /// 0 where it is far below the points' spacing.
+    /// 0 where it is far below the points' spacing. Of the smallest of eight parts, since a stray widens its own.
     [[nodiscard]] float felt_noise(std::size_t begin, std::size_t end) const {
-        Eigen::AlignedBox3f box;
-        for (std::size_t place = begin; place < end; ++place)
-            box.extend(tree_[place]);
-        Vector3f sizes = box.sizes();
-        std::sort(sizes.begin(), sizes.end());
-        const float spacing = std::sqrt(sizes[2] * sizes[1] / static_cast<float>(end - begin));
+        constexpr std::size_t parts = 8;
+        float spacing = std::numeric_limits<float>::infinity();
+        for (std::size_t part = 0; part < parts; ++part) {
+            Eigen::AlignedBox3f box;
+            const std::size_t first = begin + (end - begin) * part / parts,
+                              last = begin + (end - begin) * (part + 1) / parts;
+            for (std::size_t place = first; place < last; ++place)
+                box.extend(tree_[place]);
+            if (last - first < 2)
+                continue;
+            Vector3f sizes = box.sizes();
+            std::sort(sizes.begin(), sizes.end());
+            spacing = std::min(spacing, std::sqrt(sizes[2] * sizes[1] / static_cast<float>(last - first)));
+        }
         const float sigma = noise_.at(tree_[(begin + end) / 2]);
         return sigma > felt_from / 4 * spacing ? sigma : 0; // a quarter: spacing varies within a block
     }
@@ -105,16 +115,13 @@ class Thinning {
             return;
         }
         if (sizes.norm() <= thinned_to * sigma) { // two sides of a thin board
-            const Vector3f first = normal_of(members.front());
-            const auto middle = std::stable_partition(members.begin(), members.end(), [&](std::uint32_t place) {
-                return normal_of(place).dot(first) >= one_side_from;
-            });
+            const Vector3f first = first_normal(members);
+            const auto middle = std::stable_partition(members.begin(), members.end(),
+                                                      [&](std::uint32_t place) { return on_side_of(first, place); });
             const auto front = static_cast<std::size_t>(middle - members.begin());
-            if (front < members.size()) {
-                halve(part, begin, begin + front, sigma);
-                halve(part, begin + front, end, sigma);
-                return;
-            }
+            halve(part, begin, begin + front, sigma);
+            halve(part, begin + front, end, sigma);
+            return;
         }
         int axis = 0;
         sizes.maxCoeff(&axis);
@@ -133,14 +140,44 @@ class Thinning {
                                                          : Vector3f(Vector3f::Zero());
     }
 
-    static constexpr float one_side_from = 0.5F;
+    /// Recorded signs may be random; then both sides of a plane are one.
+    [[nodiscard]] bool sides_agree() const {
+        constexpr std::size_t sample = 2000;
+        constexpr double random_from = 0.1;
+        std::size_t opposed = 0, pairs = 0;
+        for (std::size_t k = 0; k < sample; ++k) {
+            const std::size_t place = (2 * k + 1) * tree_.size() / (2 * sample);
+            Nearest nearest;
+            tree_.find_round(place, 1, nearest);
+            if (nearest.all().empty())
+                continue;
+            ++pairs;
+            opposed += normal_of(static_cast<std::uint32_t>(place)).dot(normal_of(nearest.all()[0].point)) < -0.7F;
+        }
+        return static_cast<double>(opposed) < random_from * static_cast<double>(pairs);
+    }
+    [[nodiscard]] float alike_to(const Vector3f& first, const Vector3f& other) const {
+        return sides_ ? first.dot(other) : std::abs(first.dot(other));
+    }
+
+    /// Of the first member that has one; zero if none has.
+    [[nodiscard]] Vector3f first_normal(std::span<const std::uint32_t> members) const {
+        for (const std::uint32_t place : members)
+            if (const Vector3f normal = normal_of(place); !normal.isZero())
+                return normal;
+        return Vector3f::Zero();
+    }
+    [[nodiscard]] bool on_side_of(const Vector3f& first, std::uint32_t place) const {
+        constexpr float from = 0.5F;
+        const Vector3f normal = normal_of(place);
+        return normal.isZero() || alike_to(first, normal) >= from;
+    }
     [[nodiscard]] bool one_side(std::span<const std::uint32_t> members) const {
         if (normals_.empty())
             return true;
-        const Vector3f first = normal_of(members.front());
-        return std::all_of(members.begin(), members.end(), [&](std::uint32_t place) {
-            return normal_of(place).dot(first) >= one_side_from || normal_of(place).isZero();
-        });
+        const Vector3f first = first_normal(members);
+        return std::all_of(members.begin(), members.end(),
+                           [&](std::uint32_t place) { return on_side_of(first, place); });
     }
 
     [[nodiscard]] Cell cell_of(std::span<const std::uint32_t> members, float sigma) const {
@@ -149,8 +186,10 @@ class Thinning {
         Vector3f normal = Vector3f::Zero();
         for (const std::uint32_t place : members) {
             moments.add(tree_[place] - origin);
-            if (!normals_.empty())
-                normal += normal_of(place);
+            if (!normals_.empty()) {
+                const Vector3f of_point = normal_of(place);
+                normal += !sides_ && normal.dot(of_point) < 0 ? Vector3f(-of_point) : of_point;
+            }
         }
         return {origin + moments.mean(),
                 normal.stableNormalized(),
@@ -163,12 +202,15 @@ class Thinning {
     const NeighbourTree& tree_;
     std::span<const Vector3d> normals_;
     const CloudNoise& noise_;
+    bool sides_;
 };
 
 /// The surface through the cells.
 class Fit {
   public:
-    explicit Fit(std::vector<Cell>& cells) : cells_(cells), tree_(middles(cells)), planes_(cells.size()) {}
+    /// `sides`: the cells' normals tell them.
+    Fit(std::vector<Cell>& cells, bool sides)
+        : cells_(cells), sides_(sides), tree_(middles(cells)), planes_(cells.size()) {}
 
     /// Moves the cells where noise is felt onto the surface. Returns axes by cell; zero where nothing moves.
     std::vector<Vector3f> run() {
@@ -187,7 +229,10 @@ class Fit {
             if (planes_[place].near == 0)
                 return;
             axes[i] = planes_[place].normal;
-            moved[i] += offset(place) * planes_[place].normal;
+            const Offset found = offset(place);
+            moved[i] += found.distance * planes_[place].normal;
+            constexpr int fewest = 3;
+            cells_[i].alone = found.support < fewest && near_surfaces(place);
         });
         for (std::size_t i = 0; i < cells_.size(); ++i)
             cells_[i].middle = moved[i];
@@ -254,13 +299,15 @@ class Fit {
         Moments moments;
         add(moments, own, Vector3f::Zero(), 1);
         for (const auto& [distance2, other] : all)
-            if (const Cell& there = cell(other); own.normal.isZero() || own.normal.dot(there.normal) > alike)
+            if (const Cell& there = cell(other); own.normal.isZero() || alike(own.normal, there.normal))
                 add(moments, there, tree_[other] - tree_[place], weight(distance2, plane.reach2));
         const PrincipalAxes axes(moments.covariance());
         plane.normal = own.normal.isZero() ? axes.normal : own.normal;
         plane.thickness = std::sqrt(axes.variances[0]);
         plane.middle_off = moments.mean().dot(plane.normal);
         plane.flat = plane.thickness <= 1.4F * own.sigma;
+        if (plane.flat)
+            plane.normal = checked_normal(plane.normal, axes.normal);
     }
 
     static float weight(float distance2, float reach2) { return std::exp(-2 * distance2 / reach2); }
@@ -296,25 +343,39 @@ class Fit {
             planes_[place].normal = chosen[place];
     }
 
+    /// Whether most cells near it lie on flat surfaces. Where they do not, as among leaves, nothing is out of place.
+    [[nodiscard]] bool near_surfaces(std::size_t place) const {
+        const auto all = near(place);
+        const auto flat =
+            std::count_if(all.begin(), all.end(), [&](std::uint32_t other) { return planes_[other].flat; });
+        return 2 * static_cast<std::size_t>(flat) > all.size();
+    }
+
     /// How far the surface lies from the cell along its normal. Offsets along the mean of both normals: on a round
     /// surface those along either normal alone err in opposite directions.
-    [[nodiscard]] float offset(std::size_t place) const {
+    struct Offset {
+        float distance = 0;
+        int support = 0; ///< cells of the window that are of the same surface
+    };
+    [[nodiscard]] Offset offset(std::size_t place) const {
         const Plane& own = planes_[place];
         const float sigma = cell(place).sigma;
         float surface = 0;
+        int support = 0;
         for (const float wide : {2 * outlying, outlying}) {
             float sum = 0, weights = 0;
             const auto take = [&](float off, float of_weight) {
                 const float far = (off - surface) / (wide * sigma), inside = std::max(1 - far * far, 0.0F);
                 sum += of_weight * inside * inside * off;
                 weights += of_weight * inside * inside;
+                support += inside > 0;
             };
+            support = -1; // the cell itself
             take(0, static_cast<float>(cell(place).count));
             for (const std::uint32_t other : near(place)) {
                 const Vector3f there = planes_[other].near > 0 ? planes_[other].normal : cell(other).normal;
                 const float cosine = own.normal.dot(there);
-                const bool same_side = cell(place).normal.isZero() ? std::abs(cosine) > alike : cosine > alike;
-                if (!same_side)
+                if (!alike(own.normal, there))
                     continue;
                 const Vector3f apart = tree_[other] - tree_[place];
                 const Vector3f between = (own.normal + (cosine < 0 ? -1 : 1) * there).normalized();
@@ -324,10 +385,16 @@ class Fit {
             if (weights > 0)
                 surface = sum / weights;
         }
-        return surface;
+        return {surface, support};
+    }
+
+    /// Whether two planes may be of one surface.
+    [[nodiscard]] bool alike(const Vector3f& a, const Vector3f& b) const {
+        return (sides_ ? a.dot(b) : std::abs(a.dot(b))) > least_alike;
     }
 
     std::vector<Cell>& cells_;
+    bool sides_;
     NeighbourTree tree_; ///< of the cells' middles
     std::vector<Plane> planes_;
     Indices near_;
@@ -341,13 +408,14 @@ FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> poin
     if (points.size() < 64)
         return fitted;
     const NeighbourTree& tree = local.tree;
-    const CloudNoise noise(tree, static_cast<float>(radius));
+    const CloudNoise noise(tree, static_cast<float>(radius) / 3);
     if (!noise.known())
         return fitted;
-    Cells cells = Thinning(tree, normals, noise).run();
+    const Thinning thinning(tree, normals, noise);
+    Cells cells = thinning.run();
     if (std::none_of(cells.all.begin(), cells.all.end(), [](const Cell& cell) { return cell.sigma > 0; }))
         return fitted;
-    fitted.axes = Fit(cells.all).run();
+    fitted.axes = Fit(cells.all, thinning.sides()).run();
     for (std::size_t i = 0; i < cells.all.size(); ++i)
         if (cells.all[i].count > 1 || !fitted.axes[i].isZero())
             fitted.moved += cells.all[i].count;
@@ -356,6 +424,7 @@ FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> poin
     fitted.noise = noise.median();
     fitted.fitted_of.resize(points.size());
     fitted.points.resize(cells.all.size());
+    fitted.alone.resize(cells.all.size());
     if (!normals.empty())
         fitted.normals.resize(cells.all.size());
     tbb::parallel_for(std::size_t(0), cells.all.size(), [&](std::size_t i) {
@@ -364,7 +433,9 @@ FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> poin
                                ? Vector3d(cell.middle.cast<double>() + local.middle)
                                : points[tree.index(cells.members[cell.begin])];
         if (!normals.empty())
-            fitted.normals[i] = cell.normal.cast<double>();
+            fitted.normals[i] =
+                (cell.normal.isZero() || fitted.axes[i].isZero() ? cell.normal : fitted.axes[i]).cast<double>();
+        fitted.alone[i] = cell.alone;
         for (std::uint32_t k = cell.begin; k < cell.begin + cell.count; ++k)
             fitted.fitted_of[tree.index(cells.members[k])] = static_cast<std::uint32_t>(i);
     });

@@ -1,6 +1,7 @@
 // The first two moments of weighted points: their mean, their spread, and the plane through them.
 #pragma once
 
+#include <cmath>
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 
@@ -32,5 +33,15 @@ struct PrincipalAxes {
         variances = axes.eigenvalues().cwiseMax(0);
     }
 };
+
+/// A recorded normal, or that of the flat surface round it, turned to the same side, where they differ by more than 6
+/// degrees: it was estimated from too few points then.
+[[nodiscard]] inline Eigen::Vector3f checked_normal(const Eigen::Vector3f& recorded, const Eigen::Vector3f& of_plane) {
+    constexpr float still_recorded = 0.9945F;
+    const float cosine = recorded.dot(of_plane);
+    if (std::abs(cosine) > still_recorded)
+        return recorded;
+    return cosine < 0 ? Eigen::Vector3f(-of_plane) : of_plane;
+}
 
 } // namespace scanshade

@@ -84,6 +84,7 @@ class NeighbourTree {
     void walk(const Node& node, Enter& enter) const;
 
     struct Placed;
+    static int split_axis(std::span<const Placed> points, const Eigen::Vector3f& box);
     void build(std::span<Placed> points, std::size_t node, int levels);
 
     std::vector<Eigen::Vector3f> points_;
@@ -91,6 +92,10 @@ class NeighbourTree {
     std::vector<Box> boxes_; ///< node n has the children 2n + 1 and 2n + 2, which halve its points
     int levels_ = 0;         ///< of nodes above the leaves
 };
+
+/// Points relative to a place near them, in single precision.
+[[nodiscard]] std::vector<Eigen::Vector3f> local_points(const Eigen::Vector3d& middle,
+                                                        std::span<const Eigen::Vector3d> points);
 
 /// A cloud about its middle, so that single precision serves, in the order of its tree.
 struct LocalCloud {

@@ -161,38 +161,45 @@ Sides sides_of(const PointVisibility& found, const std::vector<Vector3d>& exact)
             quantile(angles, 0.5), quantile(angles, 0.95)};
 }
 
-/// The normals that a cloud comes with: "recorded" ones are true, "random" ones turned over by chance.
+/// The normals that a cloud comes with: "recorded" ones are true, "noisy" ones tilted by 15 degrees (median), "random"
+/// ones turned over by chance.
 std::vector<Vector3d> given_normals(const std::string& kind, const std::vector<Vector3d>& exact) {
     if (kind == "none")
         return {};
-    if (kind != "recorded" && kind != "random")
-        throw Misuse(fmt::format("--clouds.normals: '{}' given, expected recorded, none or random", kind));
+    if (kind != "recorded" && kind != "random" && kind != "noisy")
+        throw Misuse(fmt::format("--clouds.normals: '{}' given, expected recorded, noisy, none or random", kind));
     std::vector<Vector3d> given = exact;
     const Noise noise(1, 0, 77);
-    for (std::size_t i = 0; kind == "random" && i < given.size(); ++i)
-        if (noise.uniform(static_cast<int>(i), 0) < 0.5)
+    for (std::size_t i = 0; i < given.size(); ++i) {
+        const int k = static_cast<int>(i);
+        if (kind == "random" && noise.uniform(k, 0) < 0.5)
             given[i] = -given[i];
+        if (kind == "noisy" && !given[i].isZero()) // tan 15 degrees = 0.27 = 1.18 sigma
+            given[i] = (given[i] + 0.23 * Vector3d(noise.gaussian(k, 1), noise.gaussian(k, 2), noise.gaussian(k, 3)))
+                           .normalized();
+    }
     return given;
 }
 
 class CloudErrors final : public BenchPart {
   public:
     Stage stage() override {
-        Stage stage{
-            "clouds against rays on their scene",
-            {{"clouds", "measures errors, seconds and memory of scenes' points", &asked_},
-             {"clouds.scene", "which scenes, with commas; empty = office, or outdoor for the sky", &scenes_},
-             {"clouds.points", "how many points", &points_, "", 1, 1e9},
-             {"clouds.rays", "rays per point, with commas; 0 = as run chooses", &rays_},
-             {"clouds.smooth", "how often values become means of neighbours; -1 = by the spacing", &smooth_, "", -1,
-              16},
-             {"clouds.normals", "any of recorded,none,random (random signs): what the points come with", &normals_},
-             {"clouds.noises", "sigmas of the points along their normals, with commas", &noises_, "m"},
-             {"clouds.strays", "adds this share of stray points, up to 10^8 m away", &strays_, "", 0, 0.5},
-             {"clouds.gpu", "computes on the Vulkan device instead of the processor", &gpu_},
-             {"clouds.raycast", "measures the method raycast with 64 rays, too", &raycast_},
-             {"clouds.sky", "measures the share of the sky instead, also by depth images", &sky_},
-             {"clouds.raster", "sizes of these images, pixels a side, with commas", &rasters_}}};
+        Stage stage{"clouds against rays on their scene",
+                    {{"clouds", "measures errors, seconds and memory of scenes' points", &asked_},
+                     {"clouds.scene", "which scenes, with commas; empty = office, or outdoor for the sky", &scenes_},
+                     {"clouds.points", "how many points", &points_, "", 1, 1e9},
+                     {"clouds.rays", "rays per point, with commas; 0 = as run chooses", &rays_},
+                     {"clouds.smooth", "how often values become means of neighbours; -1 = by the spacing", &smooth_, "",
+                      -1, 16},
+                     {"clouds.normals", "any of recorded,noisy,none,random (random signs): what the points come with",
+                      &normals_},
+                     {"clouds.noises", "sigmas of the points along their normals, with commas", &noises_, "m"},
+                     {"clouds.strays", "adds this share of stray points: half of them near, half up to 10^8 m away",
+                      &strays_, "", 0, 0.5},
+                     {"clouds.gpu", "computes on the Vulkan device instead of the processor", &gpu_},
+                     {"clouds.raycast", "measures the method raycast with 64 rays, too", &raycast_},
+                     {"clouds.sky", "measures the share of the sky instead, also by depth images", &sky_},
+                     {"clouds.raster", "sizes of these images, pixels a side, with commas", &rasters_}}};
         for (Parameter& row : scanner_.parameters())
             if (row.name != "noise") {
                 row.name = "clouds." + row.name;
@@ -253,10 +260,10 @@ class CloudErrors final : public BenchPart {
         std::vector<Vector3d> points = cloud.points, normals = given_normals(kind, cloud.normals);
         add_strays(points, normals, kind != "none");
         const std::string name = fmt::format("{:g} mm, {}, {} rays", 1000 * noise, kind, rays);
+        const CloudAoOptions options{.radius = radius, .rays = rays, .smooth = smooth_, .sky = sky_};
         PointVisibility found;
         const Measured measured = judge.row(name, [&] {
-            found = CloudAo({.radius = radius, .rays = rays, .smooth = smooth_, .sky = sky_}, device_.get())
-                        .compute({points, normals});
+            found = CloudAo(options, device_.get()).compute({points, normals});
             return std::vector<float>(found.visibility.begin(),
                                       found.visibility.begin() + static_cast<std::ptrdiff_t>(cloud.points.size()));
         });
@@ -272,22 +279,45 @@ class CloudErrors final : public BenchPart {
                    "are sure, "
                    "{:.2f} % of them wrong\n",
                    sides.median_deg, sides.most_deg, 100 * sides.wrong, 100 * sides.sure, 100 * sides.wrong_where_sure);
+        if (strays_ > 0)
+            fmt::print("    strays change the others by {:.4f} RMS\n",
+                       changed_by_strays(found, options, cloud.points.size(), {points, normals}));
         for (const std::string& note : found.notes)
             fmt::print("    {}\n", note);
         std::fflush(stdout);
         return found.spacing;
     }
 
-    /// Points far off, at distances from 10 to 10^8 m, behind the others.
+    /// Half of them within three times the box of the points, half farther: 10 to 10^8 m off. All behind the others.
     void add_strays(std::vector<Vector3d>& points, std::vector<Vector3d>& normals, bool with_normals) const {
         const Noise noise(3, 0, 99);
+        Eigen::AlignedBox3d box;
+        for (const Vector3d& point : points)
+            box.extend(point);
         const auto count = static_cast<int>(strays_ * static_cast<double>(points.size()));
         for (int i = 0; i < count; ++i) {
-            const Vector3d towards(noise.gaussian(i, 0), noise.gaussian(i, 1), noise.gaussian(i, 2));
-            points.emplace_back(std::pow(10.0, 1 + 7 * noise.uniform(i, 3)) * towards.normalized());
+            const Vector3d towards =
+                Vector3d(noise.gaussian(i, 0), noise.gaussian(i, 1), noise.gaussian(i, 2)).normalized();
+            const Vector3d share(noise.uniform(i, 3), noise.uniform(i, 4), noise.uniform(i, 5));
+            points.push_back(i % 2 ? Vector3d(std::pow(10.0, 1 + 7 * noise.uniform(i, 3)) * towards)
+                                   : Vector3d(box.center() +
+                                              3 * (share.array() - 0.5).matrix().cwiseProduct(Vector3d(box.sizes()))));
             if (with_normals)
-                normals.push_back(towards.normalized());
+                normals.push_back(towards);
         }
+    }
+
+    /// By how much they change the other points' values, RMS.
+    double changed_by_strays(const PointVisibility& found, const CloudAoOptions& options, std::size_t others,
+                             const PointSet& set) {
+        const PointVisibility without =
+            CloudAo(options, device_.get())
+                .compute({set.points.first(others), set.normals.empty() ? set.normals : set.normals.first(others)});
+        double sum = 0;
+        for (std::size_t i = 0; i < others; ++i)
+            if (const double off = static_cast<double>(found.visibility[i] - without.visibility[i]); !std::isnan(off))
+                sum += off * off;
+        return std::sqrt(sum / static_cast<double>(others));
     }
 
     std::string scenes_, rays_ = "8,16,32", rasters_ = "512,1024,2048", normals_ = "recorded", noises_ = "0";
