@@ -221,7 +221,9 @@ class Run final : public Command {
 
   private:
     Job job_from(const fs::path& path, const fs::path& folder) const {
-        Job job{open_capture(path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s, asked_.poses}), {}};
+        Job job{open_capture(
+                    path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s, asked_.poses, asked_.colour}),
+                {}};
         refuse_absent_view(job.capture);
         job.batch.frames = job.of = slice(asked_.frames, job.capture.entries.size());
         job.batch.outputs = asked_.outputs();

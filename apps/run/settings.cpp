@@ -28,6 +28,8 @@ constexpr std::array sequence_words{Named{"off", SequenceUse::off}, Named{"on", 
 constexpr std::array format_words{Named{"png16", AoFormat::png16}, Named{"png8", AoFormat::png8},
                                   Named{"tiff", AoFormat::tiff}, Named{"exr", AoFormat::exr}};
 constexpr std::array view_words{Named{"depth", false}, Named{"colour", true}};
+constexpr std::array colour_words{Named{"kept", CloudColours::kept}, Named{"shaded", CloudColours::shaded},
+                                  Named{"grey", CloudColours::grey}};
 constexpr std::array log_words{Named{"text", false}, Named{"json", true}};
 
 /// quality_words, and none for a quality that was not given.
@@ -152,6 +154,9 @@ std::vector<Stage> RunSettings::common_stages() {
            .help = "a camera file, or fx,fy,cx,cy; replaces the capture's own",
            .value = &s.camera,
            .common = true},
+          {.name = "colour",
+           .help = "the colour image of a single depth image, whose pixels lie on the depth's",
+           .value = &s.colour},
           {.name = "poses",
            .help = "a trajectory in TUM's format, as refine --trajectory writes it; replaces the capture's own poses",
            .value = &s.poses},
@@ -277,8 +282,9 @@ std::vector<Stage> RunSettings::common_stages() {
            .low = 0,
            .high = 100},
           {.name = "colour-cloud",
-           .help = "replaces the clouds' colour by colour times visibility",
-           .value = &s.colour_cloud},
+           .help = "shaded: replaces the clouds' colours by colour times visibility; grey: also gives clouds without "
+                   "colours of their own visibility as grey",
+           .value = OneOf(&s.colour_cloud, colour_words)},
           {.name = "overwrite",
            .help = "replaces the results of an earlier run",
            .value = &s.overwrite,
@@ -330,6 +336,8 @@ void RunSettings::resolve() {
         throw Misuse("cloud: is made of all frames of one capture in one run, without --resume");
     if (budget.any() && (quality || preset != Preset::fast))
         throw Misuse("a budget (--max-error, --max-ms) picks method and quality: leave --quality and --preset out");
+    if (!colour.empty() && paths.size() > 1)
+        throw Misuse("colour: is the colour image of one depth image, and there are several captures");
     if (!depth_scale.empty())
         (void)depth_encoding(depth_scale, "--depth-scale");
     cloud_options_ = clouds_by_points;

@@ -27,7 +27,7 @@ class RunSettings {
     RunSettings();
 
     std::vector<std::string> paths;
-    std::string frames, camera, poses, depth_scale;
+    std::string frames, camera, colour, poses, depth_scale;
     Registration registered = Registration::unknown; ///< unknown: as the capture says
     std::string depth_noise = "auto", depth_range;
     bool drop_flying = true;
@@ -47,7 +47,8 @@ class RunSettings {
     double shade_strength = 1;
     std::string recording_cloud;
     double cloud_resolution_m = 0;
-    bool colour_cloud = false, overwrite = false, resume = false, retry = false;
+    CloudColours colour_cloud = CloudColours::kept;
+    bool overwrite = false, resume = false, retry = false;
     std::string shard;
     bool quiet = false, log_json = false;
     CloudAoOptions clouds_by_points;

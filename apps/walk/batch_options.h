@@ -17,6 +17,10 @@
 
 namespace scanshade {
 
+/// What becomes of a cloud's colours: they stay; they are multiplied by visibility; or so, and clouds without colours
+/// of their own get visibility as grey.
+enum class CloudColours { kept, shaded, grey };
+
 /// The files written for each frame, under `folder`: ao/NAME.png, confidence/NAME.png, shaded/NAME.png, panel/NAME.png,
 /// clouds/NAME.pcd or .ply.
 struct Outputs {
@@ -30,7 +34,7 @@ struct Outputs {
     AoFormat format = AoFormat::png16;
     double shade_strength = 1; ///< 0 leaves the colour, 1 multiplies by visibility
     bool colour_view = false;  ///< maps and pictures of frames with a secondary camera use its pixels
-    bool colour_cloud = false; ///< replaces the cloud's colour by colour times visibility
+    CloudColours colour_cloud = CloudColours::kept;
 };
 
 /// What is written of a cloud computed from its points, which has no pixels: maps of visibility and confidence are its

@@ -1,6 +1,7 @@
 // After a frame is computed: the reasons to doubt its result.
 #include "apps/walk/doubts.h"
 
+#include "io/clouds/cloud_file.h"
 #include "projection/statistics.h"
 #include "projection/undistort.h"
 
@@ -65,13 +66,13 @@ void doubt_values(std::span<const float> values, Doubts& doubts) {
            "are wrong.");
 }
 
-/// The values below which 5 % and 95 % lie, and the median.
+/// The values below which 1 % and 99 % lie, and the median.
 struct Spread {
     double low = 0, middle = 0, high = 0;
 };
 
 Spread spread_of(std::vector<double>& values) {
-    return {quantile(values, 0.05), quantile(values, 0.5), quantile(values, 0.95)};
+    return {quantile(values, 0.01), quantile(values, 0.5), quantile(values, 0.99)};
 }
 
 /// Of every third row and column, which is enough to judge by.
@@ -103,7 +104,7 @@ void doubt_radius_in_view(const Work& work, double radius_m, Doubts& doubts) {
                        radius_m, scene_m));
 }
 
-/// The diagonal of the box without the lowest and highest twentieth of the points along each axis.
+/// The diagonal of the box without the lowest and highest hundredth of the points along each axis.
 double extent_of(const Cloud& cloud) {
     const std::size_t step = std::max<std::size_t>(1, cloud.points.size() / 50000);
     Eigen::Vector3d extent = Eigen::Vector3d::Zero();
@@ -135,6 +136,11 @@ void doubt_radius_of_points(const Work& work, Doubts& doubts) {
         fmt::format("the radius of {:.3g} is larger than the cloud of {:.3g}: give a smaller --radius, or a cloud of "
                     "more than a few points.",
                     radius, extent));
+}
+
+void doubt_unit(const Cloud& cloud, Doubts& doubts) {
+    add_if(cloud.records && unit_of(*cloud.records).starts_with("degrees"), doubts,
+           "the coordinates are in degrees, so distances between points mean nothing: project them first.");
 }
 
 double view_degrees(double focal_length, int pixels) {
@@ -171,6 +177,7 @@ std::vector<std::string> doubts_about(const Work& work, double radius_m) {
     Doubts doubts = work.frame.doubts;
     doubt_shares(work, doubts);
     if (work.by_points) {
+        doubt_unit(*work.frame.cloud, doubts);
         doubt_values(work.of_points.visibility, doubts);
         doubt_radius_of_points(work, doubts);
         return doubts;

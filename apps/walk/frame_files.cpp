@@ -79,6 +79,23 @@ std::vector<cv::Vec3b> shaded_colours(const std::vector<cv::Vec3b>& colours, con
     return {shaded.begin(), shaded.end()};
 }
 
+/// Visibility as grey, so that 255 is open; black where it is not known.
+std::vector<cv::Vec3b> greys(const std::vector<float>& visibility) {
+    std::vector<cv::Vec3b> colours(visibility.size());
+    std::ranges::transform(visibility, colours.begin(), [](float value) {
+        return cv::Vec3b::all(std::isnan(value) ? uchar(0) : cv::saturate_cast<uchar>(255 * value));
+    });
+    return colours;
+}
+
+/// The colours of a written cloud; empty = none, or as they were.
+std::vector<cv::Vec3b> colours_of(const std::vector<cv::Vec3b>& own, const std::vector<float>& visibility,
+                                  const Outputs& outputs) {
+    if (own.empty())
+        return outputs.colour_cloud == CloudColours::grey ? greys(visibility) : std::vector<cv::Vec3b>();
+    return shaded_colours(own, visibility, outputs.shade_strength);
+}
+
 /// The image without lens distortion. Zero where the camera saw nothing.
 template <class Pixel>
 cv::Mat_<Pixel> undistorted_image(const cv::Mat_<Pixel>& image, const Camera& camera) {
@@ -120,8 +137,8 @@ void write_depth_cloud(const std::filesystem::path& file, const Work& work, cons
                 known.push_back(colour_known(v, u) > 0 ? 1.0F : 0.0F);
         }
     }
-    if (outputs.colour_cloud)
-        colours = shaded_colours(colours, visibility, outputs.shade_strength);
+    if (outputs.colour_cloud != CloudColours::kept)
+        colours = colours_of(colours, visibility, outputs);
     std::vector<AddedField> added = {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}};
     if (warped)
         added.push_back({"colour_known", known});
@@ -131,8 +148,9 @@ void write_depth_cloud(const std::filesystem::path& file, const Work& work, cons
 void write_recorded_cloud(const std::filesystem::path& file, const Work& work, const Outputs& outputs) {
     const Cloud& cloud = *work.frame.cloud;
     std::vector<cv::Vec3b> colours;
-    if (outputs.colour_cloud)
-        colours = shaded_colours(cloud.colours, work.attached.per_point, outputs.shade_strength);
+    if (outputs.colour_cloud != CloudColours::kept && takes_colours(cloud))
+        colours =
+            colours_of(has_colours(cloud) ? cloud.colours : std::vector<cv::Vec3b>(), work.attached.per_point, outputs);
     std::vector<AddedField> fields{{"ambient_occlusion", work.attached.per_point}};
     std::vector<float> confidence = work.confidence.per_point;
     std::ranges::transform(confidence, confidence.begin(), known_or_none);
@@ -202,6 +220,10 @@ void write_all(Work& work, const Scene& scene, const cv::Mat3b& shaded, const Ou
     if (outputs.panel)
         wrote(picture_file("panel", name),
               [&](const auto& file) { write_picture(file, panel_picture(work.frame, scene, shaded)); });
+    if (work.frame.cloud && outputs.cloud && outputs.colour_cloud == CloudColours::grey &&
+        !takes_colours(*work.frame.cloud))
+        work.row.warnings.push_back("the file's point format has no colour, so grey is not written; the field "
+                                    "ambient_occlusion has the values.");
     if (work.frame.cloud && outputs.cloud)
         wrote(cloud_file(name, extension(*work.frame.cloud->records)),
               [&](const auto& file) { write_recorded_cloud(file, work, outputs); });

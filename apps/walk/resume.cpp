@@ -30,7 +30,8 @@ constexpr std::array aside = {"frames",         "camera",
                               "shade-strength", "colour-cloud",
                               "cloud",          "cloud-resolution",
                               "poses",          "in-flight",
-                              "preset",         "quiet"};
+                              "preset",         "quiet",
+                              "colour"};
 
 /// Settings that change no results when they are typed differently.
 constexpr std::array elsewhere = {"out", "overwrite", "dump",      "resume", "retry", "shard",
@@ -41,6 +42,9 @@ std::string row_text(const Parameter& row) { return row.name + "=" + value_text(
 /// The outputs, each kind with the settings that affect it.
 std::string outputs_text(const Outputs& outputs) {
     std::string text;
+    const std::string colours = outputs.colour_cloud == CloudColours::kept     ? ""
+                                : outputs.colour_cloud == CloudColours::shaded ? "coloured "
+                                                                               : "coloured or grey ";
     if (outputs.ao)
         text += fmt::format("ao {};", static_cast<int>(outputs.format));
     if (outputs.confidence)
@@ -50,10 +54,10 @@ std::string outputs_text(const Outputs& outputs) {
     if (outputs.panel)
         text += "panel;";
     if (outputs.cloud)
-        text += outputs.colour_cloud ? "coloured cloud;" : "cloud;";
+        text += colours + "cloud;";
     if (outputs.depth_cloud)
-        text += outputs.colour_cloud ? "coloured depth cloud;" : "depth cloud;";
-    if (outputs.shaded || outputs.panel || outputs.colour_cloud)
+        text += colours + "depth cloud;";
+    if (outputs.shaded || outputs.panel || outputs.colour_cloud != CloudColours::kept)
         text += fmt::format("strength {};", outputs.shade_strength);
     return text;
 }

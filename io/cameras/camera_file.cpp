@@ -24,13 +24,9 @@ void check_numbers(const fs::path& file, const Pinhole& camera, const std::array
     for (std::size_t i = 0; i < 2; ++i) {
         if (values[i] == 0)
             refuse_camera(file, fmt::format("{} is 0, expected a focal length in pixels", names[i]));
-        if (values[i] < 0)
-            refuse_camera(
-                file,
-                fmt::format("{} is {}, expected a positive focal length (fy < 0 is ICL-NUIM's flipped image axis: "
-                            "flip the images or negate it yourself; nothing is mirrored silently)",
-                            names[i], values[i]));
     }
+    if (values[0] < 0)
+        refuse_camera(file, fmt::format("{} is {}, expected a positive focal length", names[0], values[0]));
 }
 
 Eigen::Isometry3d rigid_from(const fs::path& file, const Eigen::Matrix4d& matrix, const std::string& key) {
@@ -84,6 +80,26 @@ CameraFile read_any(const fs::path& file, const std::string& bytes) {
     return is_colmap(lines) ? camera_from_colmap(file, lines) : camera_from_matrix(file, lines);
 }
 
+/// With fy < 0, y is upwards and rows still go down. Turned downwards, the camera sees the same: a pixel's row does not
+/// change, y changes its sign, and with it the tangential distortion p1.
+void turn_y_down(CameraFile& file) {
+    Camera& camera = file.camera;
+    if (!(camera.pinhole.fy < 0))
+        return;
+    if (file.colour)
+        throw Error(fmt::format("{}: fy is {}, which flips the y axis, beside a secondary camera: expected a positive "
+                                "number, as it is not known whether that camera's pose is flipped, too",
+                                camera.origin, camera.pinhole.fy));
+    file.warnings.push_back(
+        fmt::format("{}: fy is {}: y is upwards, as in ICL-NUIM. The camera is used with y downwards, "
+                    "and the capture's poses are turned likewise.",
+                    camera.origin, camera.pinhole.fy));
+    camera.pinhole.fy = -camera.pinhole.fy;
+    if (camera.distortion.model == LensModel::brown_conrady)
+        camera.distortion.p1 = -camera.distortion.p1;
+    file.y_was_up = true;
+}
+
 void refuse_what_is_only_ours(const CameraFile& camera, CameraFormat format) {
     if (format == CameraFormat::scanshade)
         return;
@@ -108,6 +124,7 @@ CameraFile read_camera_file(const fs::path& file) {
     result.camera.origin = file.string();
     if (result.colour)
         result.colour->camera.origin = file.string();
+    turn_y_down(result);
     return result;
 }
 
@@ -135,16 +152,17 @@ CameraFile camera_from_argument(const std::string& text) {
     std::array<double, 4> values{};
     for (std::size_t i = 0; i < 4; ++i) {
         const auto value = number(parts[i]);
-        const bool usable = value && std::isfinite(*value) && (i >= 2 || *value > 0);
+        const bool usable = value && std::isfinite(*value) && (i >= 2 || (i == 0 ? *value > 0 : *value != 0));
         if (!usable)
             throw Misuse(
-                fmt::format("--camera {}: {} is {}, expected fx,fy,cx,cy in pixels (focal lengths positive) or a file",
+                fmt::format("--camera {}: {} is {}, expected fx,fy,cx,cy in pixels (fx positive, fy not 0) or a file",
                             text, std::array{"fx", "fy", "cx", "cy"}[i], in_quotes(parts[i])));
         values[i] = *value;
     }
     CameraFile result;
     result.camera.pinhole = {values[0], values[1], values[2], values[3], {}};
     result.camera.origin = "--camera " + text;
+    turn_y_down(result);
     return result;
 }
 

@@ -22,6 +22,8 @@ struct CameraFile {
     DepthCorrection depth_correction = {};   ///< of the depths that this camera records
     std::optional<ColourCamera> colour = {}; ///< the secondary camera, if another one took the colour
     double pose_time_offset_s = 0;           ///< an image stamped t was taken at t + offset of the poses' clock
+    /// The file has fy < 0: its y axis, and that of poses made with it, is upwards. `camera` has y downwards.
+    bool y_was_up = false;
 };
 
 /// Reads, told apart by content:
@@ -36,8 +38,8 @@ struct CameraFile {
 /// - COLMAP's cameras.txt (its first camera; SIMPLE_PINHOLE to FULL_OPENCV and OPENCV_FISHEYE)
 /// - a 3x3 row-major text matrix (7-Scenes, BundleFusion), BundleFusion's info.txt, PCL's XML beside .pclzf
 /// Throws Error naming the file, and the key, line or column, for: JSON syntax, missing keys, wrong counts, non-finite,
-/// zero or negative focal lengths (with a hint that fy < 0 is ICL-NUIM's flip), a row-major Open3D matrix, short
-/// matrices.
+/// zero focal lengths, a negative fx, a row-major Open3D matrix, short matrices. A negative fy is ICL-NUIM's way to say
+/// that y is upwards: it is read, with a warning.
 [[nodiscard]] CameraFile read_camera_file(const std::filesystem::path& file);
 
 /// `text` is a file's path, the name of a known camera (io/cameras/known_cameras.h), or "fx,fy,cx,cy". Throws Misuse

@@ -88,7 +88,39 @@ cv::Size depth_size(const std::vector<CaptureEntry>& entries) {
     return {};
 }
 
-void settle_camera(Listing& listing, const CaptureOptions& options) {
+/// Gives a single depth image its colour, which the user says belongs to it.
+void take_colour(Capture& capture, const fs::path& colour) {
+    if (capture.kind != "depth image")
+        throw Misuse(fmt::format("colour: {} is for a single depth image, and {} is a capture of the kind '{}', which "
+                                 "has its own colour images",
+                                 colour.string(), capture.path.string(), capture.kind));
+    if (std::error_code ignored; !fs::is_regular_file(colour, ignored))
+        throw Error(
+            fmt::format("{}: no such file, expected the colour image of {}", colour.string(), capture.path.string()));
+    capture.entries.front().colour = colour;
+    if (capture.registration != Registration::unknown)
+        return;
+    capture.registration = Registration::yes;
+    capture.registration_reason = "--colour names the image of these pixels";
+}
+
+/// The same poses for cameras with y downwards, in a world whose y is turned as well: mirrored twice, they stay
+/// rotations.
+void turn_poses_y_down(Capture& capture) {
+    const Eigen::DiagonalMatrix<double, 3> mirror(1, -1, 1);
+    for (CaptureEntry& entry : capture.entries) {
+        if (!entry.world_from_camera)
+            continue;
+        Eigen::Isometry3d& pose = *entry.world_from_camera;
+        pose.linear() = (mirror * pose.linear() * mirror).eval();
+        pose.translation() = (mirror * pose.translation()).eval();
+        entry.motion.rotation_per_s = -(mirror * entry.motion.rotation_per_s).eval();
+        entry.motion.translation_per_s = (mirror * entry.motion.translation_per_s).eval();
+    }
+}
+
+/// Whether the camera's y axis was upwards, so that the capture's own poses are those of such cameras.
+bool settle_camera(Listing& listing, const CaptureOptions& options) {
     Capture& capture = listing.capture;
     const bool depth_images = std::any_of(capture.entries.begin(), capture.entries.end(),
                                           [](const CaptureEntry& entry) { return !entry.depth.empty(); });
@@ -98,7 +130,7 @@ void settle_camera(Listing& listing, const CaptureOptions& options) {
     if (!found) {
         if (depth_images)
             capture.warnings.push_back("no camera: the capture has none; give --camera FILE or --camera fx,fy,cx,cy.");
-        return;
+        return false;
     }
     capture.warnings.insert(capture.warnings.end(), found->warnings.begin(), found->warnings.end());
     capture.camera = found->camera;
@@ -116,11 +148,12 @@ void settle_camera(Listing& listing, const CaptureOptions& options) {
         capture.registration_reason = "a camera of its own took the colour, according to " + found->camera.origin;
     }
     if (found->registration == Registration::unknown)
-        return;
+        return found->y_was_up;
     capture.registration = found->registration;
     capture.registration_reason =
         (found->registration == Registration::yes ? "registered, according to " : "unregistered, according to ") +
         found->camera.origin;
+    return found->y_was_up;
 }
 
 // --- loading ---
@@ -247,9 +280,13 @@ Capture open_capture(const fs::path& path, const CaptureOptions& options) {
     Capture& capture = listing.capture;
     capture.path = path;
     settle_names(capture.entries);
-    settle_camera(listing, options);
+    const bool y_was_up = settle_camera(listing, options);
     if (listing.find_poses)
         listing.find_poses(capture, capture.pose_time_offset_s);
+    if (y_was_up)
+        turn_poses_y_down(capture);
+    if (!options.colour.empty())
+        take_colour(capture, options.colour);
     if (!options.depth_scale.empty())
         capture.depth = depth_encoding(options.depth_scale, "--depth-scale");
     if (!options.poses.empty())

@@ -21,6 +21,7 @@ struct CaptureOptions {
     double association_limit_s = 0.02; ///< colour, depth and poses farther apart in time are not paired (TUM)
     std::filesystem::path poses =
         {}; ///< TUM's rows, by time or, where frames have none, by index; empty = the capture's own
+    std::filesystem::path colour = {}; ///< the colour image of a single depth image, registered to it; empty = none
 };
 
 /// One frame's listing: the paths of its parts. Nothing is decoded yet.

@@ -263,12 +263,26 @@ std::optional<CameraFile> tum_camera(const fs::path& folder, cv::Size size, std:
     return fallback;
 }
 
+/// The other lists tell a TUM recording. Read as a plain folder of images, its depth would be taken for millimetres.
+void refuse_without_depth_list(const fs::path& folder) {
+    std::error_code ignored;
+    const bool colours = fs::is_regular_file(folder / "rgb.txt", ignored);
+    const bool poses = fs::is_regular_file(folder / "groundtruth.txt", ignored);
+    if (colours && (poses || fs::is_directory(folder / "depth", ignored)))
+        throw Error(fmt::format("{}: missing, though {} a TUM recording: expected a list of \"time depth/FILE\" lines",
+                                (folder / "depth.txt").string(),
+                                poses ? "rgb.txt and groundtruth.txt say that this is"
+                                      : "rgb.txt and the folder depth/ say that this is"));
+}
+
 } // namespace
 
 std::optional<Listing> list_tum(const fs::path& folder, const CaptureOptions& options) {
     std::error_code ignored;
-    if (!fs::is_regular_file(folder / "depth.txt", ignored))
+    if (!fs::is_regular_file(folder / "depth.txt", ignored)) {
+        refuse_without_depth_list(folder);
         return std::nullopt;
+    }
     Listing listing;
     Capture& capture = listing.capture;
     capture.kind = "TUM RGB-D";

@@ -199,6 +199,27 @@ void replace_colours(const CloudRecords& records, std::span<const cv::Vec3b> col
     }
 }
 
+/// Fields for colours that the file does not have. `values` keeps what they point to.
+std::vector<FieldAddition> new_colour_fields(const CloudRecords& records, std::span<const cv::Vec3b> colours,
+                                             std::vector<std::vector<float>>& values) {
+    if (records.format->new_colours == NewColours::packed) {
+        values.resize(1);
+        for (const cv::Vec3b& c : colours) // no NaN among them: the highest byte is 0
+            values[0].push_back(std::bit_cast<float>(std::uint32_t(c[2]) << 16 | std::uint32_t(c[1]) << 8 | c[0]));
+        return {{"rgb", values[0]}};
+    }
+    values.resize(3);
+    for (const cv::Vec3b& c : colours)
+        for (int channel = 0; channel < 3; ++channel)
+            values[static_cast<std::size_t>(channel)].push_back(c[2 - channel]);
+    return {{"red", values[0], Scalar::uint8}, {"green", values[1], Scalar::uint8}, {"blue", values[2], Scalar::uint8}};
+}
+
+bool has_colour_fields(const CloudRecords& records) {
+    const ColourFields fields = colour_fields(records);
+    return fields.packed || fields.bgr || las_colours(records);
+}
+
 template <class Number>
 void append(std::string& bytes, Number value) {
     const auto raw = std::bit_cast<std::array<char, sizeof(Number)>>(value);
@@ -268,9 +289,13 @@ void write_cloud(const fs::path& file, const Cloud& cloud, const std::vector<Add
                 fmt::format("{} for {}", counted(colours.size(), "colour"), counted(cloud.points.size(), "point")));
         std::vector<FieldReplacement> replacements;
         std::vector<FieldAddition> additions;
-        sort_out(records, added, replacements, additions);
-        if (!colours.empty())
+        std::vector<std::vector<float>> channels;
+        const bool replaces = has_colour_fields(records);
+        if (!colours.empty() && !replaces && records.format->new_colours != NewColours::none)
+            additions = new_colour_fields(records, colours, channels);
+        else if (!colours.empty())
             replace_colours(records, colours, replacements);
+        sort_out(records, added, replacements, additions);
         std::sort(replacements.begin(), replacements.end(),
                   [](const FieldReplacement& a, const FieldReplacement& b) { return a.field < b.field; });
         const std::string points = edited_points(records, replacements, additions);
@@ -353,6 +378,11 @@ std::string describe(const CloudRecords& records) {
 }
 
 std::string unit_of(const CloudRecords& records) { return records.unit; }
+
+bool takes_colours(const Cloud& cloud) {
+    return cloud.records &&
+           (cloud.records->format->new_colours != NewColours::none || has_colour_fields(*cloud.records));
+}
 
 bool z_is_up(const Cloud& cloud) { return cloud.records && cloud.records->format->z_up; }
 

@@ -38,9 +38,12 @@ struct AddedField {
 
 /// Writes the cloud in the format, encoding and byte order it was read from, plus `added` fields (replacing a field of
 /// that name). All other fields, point count, grid, viewpoint, faces, comments keep their bits. `colours`, when not
-/// empty, replaces the colour field's r, g, b (alpha kept). Atomic.
+/// empty, replaces the colour field's r, g, b (alpha kept), or adds such fields where takes_colours(). Atomic.
 void write_cloud(const std::filesystem::path& file, const Cloud& cloud, const std::vector<AddedField>& added,
                  std::span<const cv::Vec3b> colours = {});
+
+/// Whether the file has colours, or its format takes them behind the other fields; LAS does not.
+[[nodiscard]] bool takes_colours(const Cloud& cloud);
 
 /// A new cloud as binary PLY (x y z float or double when far from the origin, red green blue, `added`). Atomic.
 void write_new_ply(const std::filesystem::path& file, const std::vector<Eigen::Vector3d>& points,

@@ -248,7 +248,9 @@ std::string edited_points(const CloudRecords& records, const std::vector<FieldRe
         result += record.substr(copied);
         for (const FieldAddition& addition : additions) {
             const float value = addition.values[point];
-            if (records.text())
+            if (addition.type != Scalar::float32)
+                result += (records.text() ? " " : "") + encoded(records, addition.type, static_cast<double>(value));
+            else if (records.text())
                 fmt::format_to(std::back_inserter(result), " {}", value);
             else
                 result += raw_bytes(value, big_endian);

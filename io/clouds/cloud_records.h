@@ -90,10 +90,11 @@ struct FieldReplacement {
     std::size_t field = 0;
     std::function<std::string(std::size_t point, std::string_view record)> content;
 };
-/// A field added behind the last one of every point.
+/// A field added behind the last one of every point. LAS and PCD take floats only.
 struct FieldAddition {
     std::string name;
     std::span<const float> values;
+    Scalar type = Scalar::float32;
 };
 /// All records in file order with replacements (sorted by field) and additions made.
 [[nodiscard]] std::string edited_points(const CloudRecords& records, const std::vector<FieldReplacement>& replacements,

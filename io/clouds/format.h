@@ -13,6 +13,9 @@
 
 namespace scanshade {
 
+/// How a format takes colours that the file did not have: as bytes red, green and blue, or packed in one float, rgb.
+enum class NewColours { none, bytes, packed };
+
 struct CloudFormat {
     std::string_view name; ///< "PLY"
     /// Whether a file that begins so is of this format. None: only the name says so.
@@ -29,6 +32,7 @@ struct CloudFormat {
     std::vector<std::array<int, 3>> (*triangles)(const CloudRecords& records) = nullptr; ///< none: no meshes
     std::string_view binary_encoding = "binary"; ///< what the format calls little-endian numbers
     bool wide_colours = false;                   ///< red, green and blue may have 16 bits
+    NewColours new_colours = NewColours::none;   ///< of a file that has none
     bool z_up = false;                           ///< z points up, by definition or custom
 };
 

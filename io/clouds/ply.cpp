@@ -448,7 +448,7 @@ std::string ply_bytes(const CloudRecords& records, const std::string& points,
     const std::string line_end = header.substr(0, vertex.properties_end).ends_with("\r\n") ? "\r\n" : "\n";
     std::string lines;
     for (const FieldAddition& addition : additions)
-        lines += "property float " + addition.name + line_end;
+        lines += (addition.type == Scalar::uint8 ? "property uchar " : "property float ") + addition.name + line_end;
     header.insert(vertex.properties_end, lines);
     return header + records.before + points + records.after;
 }

@@ -255,6 +255,85 @@ TEST_F(CliTest, a_cloud_keeps_its_points_and_gains_a_field) {
     EXPECT_NE(manifest()["frames"][0]["camera"]["origin"].get<std::string>().find("recovered"), std::string::npos);
 }
 
+/// A wavy floor and the name of its file; its points have no camera.
+std::string write_floor(const fs::path& file, bool black = false) {
+    std::string text = fmt::format("ply\nformat ascii 1.0\nelement vertex 900\nproperty float x\nproperty float y\n"
+                                   "property float z\n{}end_header\n",
+                                   black ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "");
+    for (int i = 0; i < 900; ++i)
+        text +=
+            fmt::format("{} {} {}{}\n", 0.1 * (i % 30), 0.1 * (i / 30), 0.4 * std::sin(i % 30), black ? " 0 0 0" : "");
+    std::ofstream(file) << text;
+    return file.string();
+}
+
+TEST_F(CliTest, maps_of_a_cloud_without_a_camera_are_its_fields) {
+    const std::string floor = write_floor(folder / "floor.ply");
+    for (const char* what : {"ao", "confidence", "cloud"}) {
+        const Ran ran = run_program(fmt::format("run {} -o {} --overwrite --write {}", floor, out().string(), what));
+        ASSERT_EQ(ran.exit_code, 0) << ran.err;
+        EXPECT_TRUE(fs::exists(out() / "clouds/floor.ply")) << what;
+        EXPECT_EQ(manifest()["frames"][0]["files"].size(), 1) << what;
+        fs::remove_all(out());
+    }
+    ASSERT_EQ(run_program(fmt::format("run {} -o {} --write panel", floor, out().string())).exit_code, 0);
+    EXPECT_TRUE(fs::exists(out() / "panel/floor.png"));
+    const Ran again = run_program(fmt::format("run {} -o {} --write panel", floor, out().string()));
+    EXPECT_EQ(again.exit_code, 1) << again.err;
+}
+
+TEST_F(CliTest, a_cloud_run_names_the_rays_and_says_nothing_of_depth_images) {
+    const Ran ran = run_program(fmt::format("run {} -o {}", write_floor(folder / "floor.ply"), out().string()));
+    EXPECT_TRUE(ran.err.starts_with("rays from every point on ")) << ran.err;
+    EXPECT_EQ(ran.err.find("depth noise"), std::string::npos) << ran.err;
+    EXPECT_EQ(ran.err.find("cacao"), std::string::npos) << ran.err;
+    EXPECT_TRUE(run("--overwrite").err.starts_with("cacao on ")) << "depth images are the method's";
+}
+
+TEST_F(CliTest, clouds_need_no_vulkan_driver_and_depth_images_name_its_package) {
+    const std::string floor = write_floor(folder / "floor.ply");
+    ::setenv("VK_DRIVER_FILES", "/nonexistent", 1);
+    ::setenv("VK_ICD_FILENAMES", "/nonexistent", 1); // the name before Vulkan 1.3.207
+    const Ran cloud = run_program(fmt::format("run {} -o {}", floor, (folder / "cloud").string()));
+    const Ran depth = run();
+    const Ran devices = run_program("devices");
+    ::unsetenv("VK_DRIVER_FILES");
+    ::unsetenv("VK_ICD_FILENAMES");
+    EXPECT_EQ(cloud.exit_code, 0) << cloud.err;
+    EXPECT_TRUE(fs::exists(folder / "cloud/clouds/floor.ply"));
+    EXPECT_EQ(depth.exit_code, 3);
+    EXPECT_NE(depth.err.find("mesa-vulkan-drivers"), std::string::npos) << depth.err;
+    EXPECT_NE(devices.err.find("mesa-vulkan-drivers"), std::string::npos) << devices.err;
+}
+
+TEST_F(CliTest, clouds_without_colours_of_their_own_take_visibility_as_grey) {
+    std::vector<std::string> warnings;
+    for (const bool black : {false, true}) {
+        const std::string floor = write_floor(folder / "floor.ply", black);
+        const std::string command = fmt::format("run {} -o {} --overwrite --colour-cloud ", floor, out().string());
+        ASSERT_EQ(run_program(command + "grey").exit_code, 0);
+        const Cloud cloud = read_cloud(out() / "clouds/floor.ply", warnings);
+        ASSERT_EQ(cloud.colours.size(), 900U);
+        const std::vector<float> visibility = recorded_field(cloud, "ambient_occlusion", "floor.ply");
+        for (std::size_t i = 0; i < 900; ++i)
+            ASSERT_EQ(cloud.colours[i], cv::Vec3b::all(cv::saturate_cast<uchar>(255 * visibility[i]))) << i;
+        ASSERT_EQ(run_program(command + "shaded").exit_code, 0);
+        EXPECT_EQ(read_cloud(out() / "clouds/floor.ply", warnings).colours.size(), black ? 900U : 0U);
+    }
+}
+
+TEST_F(CliTest, a_single_depth_image_is_shaded_with_the_colour_given) {
+    const std::string depth = (capture() / "depth/000.png").string();
+    const std::string flags =
+        fmt::format("-o {} --overwrite --camera 52,52,31.5,23.5 --shade-strength 0", out().string());
+    const Ran ran =
+        run_program(fmt::format("run {} {} --colour {}", depth, flags, (capture() / "color/000.png").string()));
+    ASSERT_EQ(ran.exit_code, 0) << ran.err;
+    EXPECT_EQ(read_colour(out() / "shaded/000.png")(30, 40), cv::Vec3b(40, 120, 200));
+    EXPECT_EQ(run_program(fmt::format("run {} {} --colour nowhere.png", depth, flags)).exit_code, 3);
+    EXPECT_EQ(run("--overwrite --colour " + depth).exit_code, 1) << "a folder has its own colour";
+}
+
 TEST_F(CliTest, colour_of_a_secondary_camera_is_warped_into_either_view_and_reported) {
     CameraFile file{tests::small_camera(), 1000, Registration::no, {}};
     ColourCamera colour{tests::small_camera(), Eigen::Isometry3d::Identity()};

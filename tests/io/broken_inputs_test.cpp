@@ -316,6 +316,7 @@ struct Case {
     Reader reader;
     bool refused;
     const char* words;
+    bool doubtful = false; ///< computed, but not to be believed
 };
 
 std::ostream& operator<<(std::ostream& out, const Case& c) { return out << c.path; }
@@ -327,8 +328,8 @@ const Case cases[] = {
     {"images/depth_jpeg_renamed.png", Reader::depth, true, "JPEG"},
     {"images/depth_crc_error.png", Reader::depth, true, "CRC"},
     {"images/depth_rgb16.png", Reader::depth, true, "3 channels"},
-    {"images/depth_all_zero.png", Reader::capture, false, "no valid depth"},
-    {"images/depth_all_65535.png", Reader::capture, false, "no valid depth"},
+    {"images/depth_all_zero.png", Reader::capture, false, "no valid depth", true},
+    {"images/depth_all_65535.png", Reader::capture, false, "no valid depth", true},
     {"images/depth_huge_header.png", Reader::depth, true, "60000x60000"},
     {"images/depth_no_iend.png", Reader::depth, true, "IEND"},
     {"images/depth_short.pgm", Reader::depth, true, "needs 614400 bytes of samples, found 199983"},
@@ -360,7 +361,7 @@ const Case cases[] = {
     {"pcd/no_data_line.pcd", Reader::cloud, true, "no DATA line"},
     {"pcd/missing_z.pcd", Reader::cloud, true, "no field z"},
     {"pcd/bad_size.pcd", Reader::cloud, true, "line 4: SIZE 3"},
-    {"pcd/all_nan.pcd", Reader::cloud, false, "no valid points"},
+    {"pcd/all_nan.pcd", Reader::cloud, false, "no valid points", true},
     {"pcd/inf_and_huge.pcd", Reader::cloud, false, "treated as invalid"},
     {"pcd/binary_truncated.pcd", Reader::cloud, true, "need 307200 bytes, found 153508"},
     {"pcd/compressed_truncated.pcd", Reader::cloud, true, "316800 bytes expected at byte 202, found 211132"},
@@ -377,8 +378,8 @@ const Case cases[] = {
     {"ply/unknown_format.ply", Reader::cloud, true, "binary_middle_endian"},
     {"ply/list_in_vertex.ply", Reader::cloud, false, ""},
     {"ply/list_length_lies.ply", Reader::cloud, true, "4294967295"},
-    {"ply/face_index_out_of_range.ply", Reader::cloud, false, "face 2 names vertex 99999 of 500"},
-    {"ply/zero_vertices.ply", Reader::cloud, false, "no points"},
+    {"ply/face_index_out_of_range.ply", Reader::cloud, false, "face 2 names vertex 99999 of 500", true},
+    {"ply/zero_vertices.ply", Reader::cloud, false, "no points", true},
     // The data's README says line 9, the second vertex; lines counted from 1, it is the tenth (the first stands in line
     // 9).
     {"ply/ascii_missing_column.ply", Reader::cloud, true, "line 10: 2 values, expected 3 (record 2"},
@@ -389,9 +390,9 @@ const Case cases[] = {
     {"las/scale_nan.las", Reader::cloud, true, "y scale factor"},
     {"las/offset_beyond_file.las", Reader::cloud, true, "points are said to begin at byte"},
     {"las/bbox_lies.las", Reader::cloud, false, "the header's box"},
-    {"las/real_bad_vlr_count.las", Reader::cloud, false, "variable length records"},
+    {"las/real_bad_vlr_count.las", Reader::cloud, false, "variable length records", true},
     {"las/real_empty_geotiff_vlrs.las", Reader::cloud, false, ""},
-    {"las/real_no_points.las", Reader::cloud, false, "no points"},
+    {"las/real_no_points.las", Reader::cloud, false, "no points", true},
     {"camera/ok_open3d.json", Reader::camera, false, ""},
     {"camera/row_major.json", Reader::camera, true, "row by row"},
     {"camera/negative_fx.json", Reader::camera, true, "fx is -525"},
@@ -475,9 +476,9 @@ TEST_P(BrokenData, the_program_ends_with_the_code_it_deserves) {
     const tests::Ran ran =
         tests::run_program(fmt::format("run {} -o {} --write ao", run_on(path, c.reader), (folder / "out").string()));
     const int some_frames_are_bad = 2, nothing_could_be_done = 3;
-    EXPECT_EQ(ran.exit_code, c.refused                    ? nothing_could_be_done
-                             : c.reader == Reader::camera ? some_frames_are_bad
-                                                          : 0)
+    EXPECT_EQ(ran.exit_code, c.refused                                  ? nothing_could_be_done
+                             : c.reader == Reader::camera || c.doubtful ? some_frames_are_bad
+                                                                        : 0)
         << ran.err;
     if (c.refused) {
         EXPECT_TRUE(!fs::exists(folder / "out/ao") || fs::is_empty(folder / "out/ao")) << "a result of a refused input";

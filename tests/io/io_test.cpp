@@ -570,6 +570,24 @@ TEST(camera_files, the_command_line_takes_numbers_or_a_file) {
         EXPECT_THROW((void)camera_from_argument(text), Misuse) << text;
 }
 
+TEST(camera_files, a_negative_fy_is_a_y_axis_upwards) {
+    const TemporaryFolder folder;
+    for (const CameraFile& read :
+         {camera_from_argument("481.2,-480,319.5,239.5"),
+          read_camera_file(write_file(folder / "k.txt", "481.2 0 319.5\n0 -480 239.5\n0 0 1\n"))}) {
+        EXPECT_EQ(read.camera.pinhole.fy, 480);
+        EXPECT_EQ(read.camera.pinhole.cy, 239.5) << "rows still go down";
+        EXPECT_TRUE(read.y_was_up);
+        EXPECT_TRUE(warned(read.warnings, "y is upwards")) << joined(read.warnings);
+    }
+    const CameraFile lens = read_camera_file(
+        write_file(folder / "c.json", R"({"fx": 50, "fy": -50, "cx": 31.5, "cy": 23.5, "width": 64, "height": 48,
+                                          "distortion": [0.1, 0, 0.02, 0.03, 0]})"));
+    EXPECT_EQ(lens.camera.distortion.p1, -0.02);
+    EXPECT_EQ(lens.camera.distortion.p2, 0.03);
+    EXPECT_FALSE(camera_from_argument("481.2,480,319.5,239.5").y_was_up);
+}
+
 TEST(camera_files, json_of_the_wrong_shape_names_the_key) {
     const TemporaryFolder folder;
     const auto message = [&](const std::string& text) {
@@ -615,6 +633,57 @@ void write_camera(const fs::path& file) {
     camera.camera.pinhole = {60, 60, 31.5, 23.5, {64, 48}};
     camera.registration = Registration::yes;
     write_camera_file(file, camera);
+}
+
+/// The world point that a pixel shows, up to the sign of the world's y.
+Eigen::Vector3d in_world(const Capture& capture, std::size_t index, double fy, double y_sign) {
+    const Pinhole& camera = capture.camera->pinhole;
+    const Eigen::Vector3d seen((20 - camera.cx) / camera.fx * 2, (10 - camera.cy) / fy * 2, 2);
+    Eigen::Vector3d world = *capture.entries[index].world_from_camera * seen;
+    world.y() *= y_sign;
+    return world;
+}
+
+TEST(captures, poses_of_cameras_with_y_upwards_are_turned_with_them) {
+    const TemporaryFolder folder;
+    write_tum(folder.path(), 3);
+    write_file(folder / "camera.json", R"({"fx": 50, "fy": 50, "cx": 31.5, "cy": 23.5, "width": 64, "height": 48})");
+    const Capture as_written = open_capture(folder.path());
+    write_file(folder / "camera.json", R"({"fx": 50, "fy": -50, "cx": 31.5, "cy": 23.5, "width": 64, "height": 48})");
+    const Capture turned = open_capture(folder.path());
+    EXPECT_EQ(turned.camera->pinhole.fy, 50);
+    for (std::size_t i = 0; i < 3; ++i) {
+        ASSERT_TRUE(turned.entries[i].world_from_camera.has_value());
+        EXPECT_NEAR(turned.entries[i].world_from_camera->linear().determinant(), 1, 1e-9) << "a rotation, no mirror";
+        // What fy = -50 meant with the poses as they are, and what is read, differ by the sign of the world's y only.
+        EXPECT_TRUE(in_world(turned, i, 50, -1).isApprox(in_world(as_written, i, -50, 1), 1e-9)) << i;
+    }
+}
+
+TEST(captures, tum_without_its_depth_list_is_refused_by_that_name) {
+    const TemporaryFolder folder;
+    write_tum(folder.path(), 2);
+    fs::remove(folder / "depth.txt");
+    EXPECT_TRUE(says(refusal([&] { (void)open_capture(folder.path()); }), "depth.txt: missing, though rgb.txt"));
+    fs::remove(folder / "groundtruth.txt");
+    EXPECT_TRUE(says(refusal([&] { (void)open_capture(folder.path()); }), "depth.txt: missing"));
+    fs::remove(folder / "rgb.txt");
+    EXPECT_EQ(open_capture(folder.path()).kind, "colour and depth folders") << "nothing says TUM any more";
+}
+
+TEST(captures, a_single_depth_image_takes_the_colour_that_the_user_names) {
+    const TemporaryFolder folder;
+    write_pair(folder / "c.png", folder / "d.png", 1000);
+    CaptureOptions options;
+    options.colour = folder / "c.png";
+    const Capture capture = open_capture(folder / "d.png", options);
+    EXPECT_EQ(capture.registration, Registration::yes);
+    EXPECT_FALSE(capture.load(0).colour.empty());
+    options.colour = folder / "none.png";
+    EXPECT_TRUE(says(refusal([&] { (void)open_capture(folder / "d.png", options); }), "none.png: no such file"));
+    options.colour = folder / "c.png";
+    write_tum(folder / "tum", 1);
+    EXPECT_THROW((void)open_capture(folder / "tum", options), Misuse);
 }
 
 TEST(captures, tum_pairs_by_time_and_reads_poses) {
