@@ -218,10 +218,37 @@ TEST(pcd, new_colours_keep_alpha_and_are_made_only_on_request) {
     write_cloud(folder / "out.pcd", read(file), {}, colours);
     EXPECT_TRUE(file_bytes(folder / "out.pcd")
                     .ends_with(bytes_of(1.0F, 1.0F, 1.0F, 0x00030201U, 1.0F, 1.0F, 1.0F, 0xff060504U)));
-    const auto grey =
-        write_file(folder / "g.pcd", pcd_header("x y z", "4 4 4", "F F F", {2, 1}, "ascii") + "1 1 1\n2 2 2\n");
-    EXPECT_TRUE(says(refusal([&] { write_cloud(folder / "no.pcd", read(grey), {}, colours); }), "no colour field"));
-    EXPECT_FALSE(fs::exists(folder / "no.pcd"));
+}
+
+TEST(clouds, colours_are_added_behind_the_fields_of_a_file_without_any) {
+    const TemporaryFolder folder;
+    const std::array colours{cv::Vec3b(1, 2, 3), cv::Vec3b(4, 5, 6)};
+    const std::array values{0.25F, 0.75F};
+    const std::string two = bytes_of(1.0F, 1.0F, 1.0F, 2.0F, 2.0F, 2.0F);
+    const std::string ply = "element vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+    const std::array files{
+        write_file(folder / "a.pcd", pcd_header("x y z", "4 4 4", "F F F", {2, 1}, "ascii") + "1 1 1\n2 2 2\n"),
+        write_file(folder / "b.pcd", pcd_header("x y z", "4 4 4", "F F F", {2, 1}, "binary") + two),
+        write_file(folder / "a.ply", "ply\nformat ascii 1.0\n" + ply + "1 1 1\n2 2 2\n"),
+        write_file(folder / "b.ply", "ply\nformat binary_little_endian 1.0\n" + ply + two),
+        write_file(folder / "a.xyz", "1 1 1\n2 2 2\n")};
+    for (const fs::path& file : files) {
+        const Cloud bare = read(file);
+        EXPECT_TRUE(bare.colours.empty());
+        ASSERT_TRUE(takes_colours(bare)) << file;
+        const fs::path out = folder / ("out-" + file.filename().string());
+        write_cloud(out, bare, {{ao, values}}, colours);
+        const Cloud coloured = read(out);
+        EXPECT_EQ(coloured.points, bare.points) << file;
+        if (file.extension() == ".xyz") { // seven columns without names; the colours are the fourth to sixth
+            EXPECT_TRUE(file_bytes(out).starts_with("1 1 1 3 2 1 0.25")) << file_bytes(out);
+            continue;
+        }
+        ASSERT_EQ(coloured.colours.size(), 2U) << file;
+        EXPECT_EQ(coloured.colours[0], colours[0]) << file;
+        EXPECT_EQ(coloured.colours[1], colours[1]) << file;
+        EXPECT_EQ(recorded_field(coloured, ao, out), std::vector<float>(values.begin(), values.end())) << file;
+    }
 }
 
 TEST(pcd, ascii_colours_are_replaced_as_the_words_of_their_type) {
