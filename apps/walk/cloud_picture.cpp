@@ -140,9 +140,10 @@ std::vector<Vector3d> half_sphere(int count) {
 
 /// Up where the file's format does not say it: across the largest plane, and floors are larger than walls because rooms
 /// and yards are wider than high. Axes win by a little. The sign is that of most normals, since floors are seen from
-/// above, and more often than ceilings.
+/// above, and more often than ceilings. z without a plane.
 Vector3d up_across_largest_plane(const Drawn& drawn) {
     constexpr double within = 0.97; // 14 degrees
+    constexpr double plane = 0.2;   // of the normals; those of a pole's sides have 0.16 in any horizontal direction
     if (drawn.normals.empty())
         return Vector3d::UnitZ();
     std::vector<Vector3d> candidates = half_sphere(150);
@@ -156,6 +157,8 @@ Vector3d up_across_largest_plane(const Drawn& drawn) {
         double alike = 0;
         for (std::size_t i = 0; i < drawn.normals.size(); i += step)
             alike += std::abs(drawn.normals[i].cast<double>().dot(candidates[c])) > within;
+        if (alike * static_cast<double>(step) < plane * static_cast<double>(drawn.normals.size()))
+            continue;
         const double height = std::max(range_along(drawn, candidates[c]).length(), 1e-12);
         const double score = alike / height * (c < others ? 1 : c == others ? 1.5 : 1.2);
         if (score > most) {
