@@ -118,6 +118,7 @@ class Method {
 struct PointSet {
     std::span<const Eigen::Vector3d> points, normals = {};
     std::span<const std::array<int, 3>> triangles = {};
+    bool z_up = false; ///< whether z is known to point to the sky
 };
 
 /// Values of points, and what was chosen on the way.

@@ -5,6 +5,7 @@
 #include "ao/cloud/disc_rays.h"
 #include "ao/cloud/extent.h"
 #include "ao/cloud/fitted_cloud.h"
+#include "ao/cloud/sides.h"
 #include "ao/cloud/tiles.h"
 #include "ao/raycast/raycast.h"
 #include "projection/error.h"
@@ -214,7 +215,7 @@ class CloudAo::Work {
         if (viewpoint)
             orientation_ = {Kind::viewpoint, *viewpoint, "the position given by --cloud.outside"};
         else if (options_.outside == "auto")
-            orientation_ = guessed_orientation(some, scanner);
+            orientation_ = guessed_orientation(some, scanner, cloud_.z_up);
         else
             orientation_ = {options_.outside == "up"        ? Kind::direction
                             : options_.outside == "outward" ? Kind::outward
@@ -319,11 +320,7 @@ class CloudAo::Work {
                 surface.disc_radius[i] = 0;
         const std::vector<std::uint32_t> lonely = drop_strays(surface, extent_.centre, result_.spacing);
         std::optional<DiscRays> rays;
-        if (orientation_unknown()) {
-            if (orientation_.kind == NormalOrientation::Kind::inward)
-                rays.emplace(surface);
-            orient_normals(surface, orientation_, rays ? &*rays : nullptr);
-        }
+        const std::vector<float> side_known = settle_sides(surface, rays);
         for (const std::uint32_t place : lonely)
             surface.normals[place].setZero();
         watch_.lap("sides");
@@ -372,7 +369,8 @@ class CloudAo::Work {
         const auto give = [&, &surface = surface](std::size_t place, std::size_t point) {
             result_.visibility[point] = values[place];
             result_.normals[point] = surface.normals[place];
-            result_.confidence[point] = surface.flatness[place] * resolution(radius, surface.disc_radius[place]);
+            result_.confidence[point] = surface.flatness[place] * resolution(radius, surface.disc_radius[place]) *
+                                        (side_known.empty() ? 1.0F : side_known[place]);
         };
         if (fitted.empty()) {
             tbb::parallel_for(std::size_t(0), surface.size(), [&, &surface = surface](std::size_t i) {
@@ -391,6 +389,117 @@ class CloudAo::Work {
         }
         watch_.lap("gather");
         result_.tiles = ++tiles_;
+    }
+
+    /// The sides that the cloud itself tells, or a person.
+    Sides found_sides(const CloudSurface& surface, std::optional<DiscRays>& rays,
+                      const SidesEffort& effort = {}) const {
+        using Kind = NormalOrientation::Kind;
+        if (orientation_.kind == Kind::viewpoint)
+            return sides_to(surface, (orientation_.point - surface.middle).cast<float>());
+        if (orientation_.kind == Kind::direction)
+            return sides_of(surface, nullptr, orientation_.point.cast<float>().normalized(), SidesRule::up);
+        if (!rays)
+            rays.emplace(surface);
+        const std::optional<Vector3f> up = cloud_.z_up ? std::optional<Vector3f>(up_.cast<float>()) : std::nullopt;
+        const SidesRule rule = orientation_.kind == Kind::outward  ? SidesRule::outward
+                               : orientation_.kind == Kind::inward ? SidesRule::inward
+                                                                   : SidesRule::automatic;
+        return sides_of(surface, &*rays, up, rule, effort);
+    }
+
+    /// Turns the normals to the sides that were scanned. Returns how sure that is by place, 0 .. 1; empty where the
+    /// recorded sides are taken.
+    std::vector<float> settle_sides(CloudSurface& surface, std::optional<DiscRays>& rays) {
+        if (recorded())
+            return settle_recorded_sides(surface, rays);
+        Sides found = found_sides(surface, rays);
+        for (std::size_t i = 0; i < surface.size(); ++i)
+            if (found.sign[i] < 0)
+                surface.normals[i] = -surface.normals[i];
+        // What has no plane faces the scanner, or the sky.
+        if (const auto kind = orientation_.kind;
+            kind == NormalOrientation::Kind::viewpoint || kind == NormalOrientation::Kind::direction)
+            for (std::size_t i = 0; i < surface.size(); ++i)
+                if (surface.normals[i].isZero())
+                    surface.normals[i] =
+                        kind == NormalOrientation::Kind::direction
+                            ? Vector3f(orientation_.point.cast<float>().normalized())
+                            : Vector3f((orientation_.point - surface.middle).cast<float>() - surface.tree[i])
+                                  .stableNormalized();
+        note_sides(found);
+        return std::move(found.confidence);
+    }
+
+    /// Recorded sides are right as a rule. Random ones show within patches; patches turned over, or all, show in where
+    /// a scanner could have stood.
+    std::vector<float> settle_recorded_sides(CloudSurface& surface, std::optional<DiscRays>& rays) {
+        constexpr double hardly_random = 0.01, mostly_random = 0.2, some_opposed = 0.05, all_opposed = 0.9;
+        constexpr float sure = 0.8F;
+        if (options_.normals != CloudNormals::automatic)
+            return {};
+        const RecordedSides order = recorded_sides(surface);
+        const auto opposed_share = [&](const Sides& sides) {
+            double opposed = 0, all = 0;
+            for (std::size_t i = 0; i < surface.size(); ++i)
+                if (sides.confidence[i] > sure && !surface.normals[i].isZero()) {
+                    all += 1;
+                    opposed += sides.sign[i] < 0;
+                }
+            constexpr double enough = 0.3; // of the points: else nothing is said
+            return all > enough * static_cast<double>(surface.size()) ? opposed / all : 0;
+        };
+        Sides found;
+        double opposed = 0;
+        if (order.random <= hardly_random) {
+            constexpr SidesEffort quick{4000, 60, 300};
+            found = found_sides(surface, rays, quick);
+            opposed = opposed_share(found);
+            if (opposed <= some_opposed)
+                return {};
+        }
+        found = found_sides(surface, rays);
+        opposed = opposed_share(found);
+        const bool in_order = order.random <= hardly_random;
+        if (in_order && opposed <= some_opposed)
+            return {};
+        if (constexpr double clearly = 0.3; in_order && opposed > all_opposed && found.margin < clearly) {
+            doubt(
+                fmt::format("{:.0f} % of the recorded normals face away from where the cloud seems to be scanned from "
+                            "({}); they are kept: --cloud.normals estimated or --cloud.outside decides otherwise",
+                            100 * opposed, found.why));
+            return {};
+        }
+        const bool all = in_order || order.random > mostly_random;
+        std::size_t turned = 0;
+        for (std::size_t i = 0; i < surface.size(); ++i)
+            if (found.sign[i] < 0 && (all || found.confidence[i] > sure) && !surface.normals[i].isZero()) {
+                surface.normals[i] = -surface.normals[i];
+                ++turned;
+            }
+        turned_ += turned;
+        sided_ += surface.size();
+        turned_why_ =
+            in_order ? fmt::format("where sides are sure, {:.0f} % of them opposed them", 100 * opposed)
+                     : fmt::format("{:.0f} % of the points lie in patches whose sides look random", 100 * order.random);
+        if (in_order)
+            doubt(fmt::format(
+                "{:.0f} % of the recorded normals face away from where scanners could have stood; they were "
+                "turned: --cloud.normals recorded keeps them",
+                100 * opposed));
+        note_sides(found);
+        return all ? std::move(found.confidence) : std::vector<float>();
+    }
+
+    void note_sides(const Sides& found) {
+        if (orientation_.why.empty() || orientation_.kind == NormalOrientation::Kind::automatic)
+            orientation_.why = found.why;
+        if (found.doubt)
+            doubt(*found.doubt);
+    }
+    void doubt(const std::string& sentence) {
+        if (std::find(result_.doubts.begin(), result_.doubts.end(), sentence) == result_.doubts.end())
+            result_.doubts.push_back(sentence);
     }
 
     /// 1 for each point whose value the means of the wanted points need.
@@ -438,7 +547,7 @@ class CloudAo::Work {
                                   : cloud_surface(LocalCloud(fitted.points), fitted.normals, gpu, fitted.axes);
         };
         CloudSurface surface = surface_of();
-        constexpr double same_planes = 0.8, too_many_opposed = 0.05;
+        constexpr double same_planes = 0.8;
         if (!normals.empty() && options_.normals == CloudNormals::automatic && surface.agreement < same_planes) {
             normals_refused_ = true;
             result_.notes.push_back(fmt::format(
@@ -449,8 +558,6 @@ class CloudAo::Work {
             surface = surface_of();
         }
         watch_.lap("planes");
-        normals_opposed_ |=
-            !normals.empty() && options_.normals == CloudNormals::automatic && surface.discord > too_many_opposed;
         noise_ = std::max(noise_, fitted.noise);
         moved_ += fitted.moved;
         kept_ += fitted.points.size();
@@ -461,7 +568,6 @@ class CloudAo::Work {
     [[nodiscard]] bool recorded() const {
         return !cloud_.normals.empty() && options_.normals != CloudNormals::estimated && !normals_refused_;
     }
-    [[nodiscard]] bool orientation_unknown() const { return !recorded() || normals_opposed_; }
 
     void tell() {
         if (moved_ > 0)
@@ -470,21 +576,22 @@ class CloudAo::Work {
                             "moved onto fitted planes; {} discs stand for them.",
                             noise_, 100.0 * static_cast<double>(moved_) / static_cast<double>(valid_.size()), kept_));
         const std::string facing = orientation_.kind == NormalOrientation::Kind::viewpoint ? "turned to " : "turned ";
-        if (recorded() && normals_opposed_)
-            result_.notes.push_back("normals: recorded, but neighbours' oppose each other; " + facing +
-                                    orientation_.why + ".");
+        if (recorded() && turned_ > 0)
+            result_.notes.push_back(fmt::format("normals: recorded; {:.2g} % of them were turned, since {}; {}{}.",
+                                                100.0 * static_cast<double>(turned_) / static_cast<double>(sided_),
+                                                turned_why_, facing, orientation_.why));
         else
             result_.notes.push_back(recorded() ? "normals: recorded."
                                                : "normals: from planes through 16 neighbours, " + facing +
                                                      orientation_.why + ".");
-        const bool apart = orientation_.kind == NormalOrientation::Kind::outward ||
-                           orientation_.kind == NormalOrientation::Kind::inward;
+        const bool by_whole = orientation_.kind != NormalOrientation::Kind::viewpoint &&
+                              orientation_.kind != NormalOrientation::Kind::direction;
         if (tiles_ > 1)
-            result_.notes.push_back(
-                fmt::format("in {} tiles of at most {} points each{}.", tiles_, at_once(),
-                            apart && !recorded() ? "; normals were oriented tile by tile: where they look wrong, give "
-                                                   "--cloud.outside or more --cloud.memory"
-                                                 : ""));
+            result_.notes.push_back(fmt::format(
+                "in {} tiles of at most {} points each{}.", tiles_, at_once(),
+                !recorded() && by_whole ? "; normals were oriented tile by tile: where they look wrong, give "
+                                          "--cloud.outside or more --cloud.memory"
+                                        : ""));
         if (gpu_ && gpu_tiles_ > 0)
             result_.notes.push_back(fmt::format("neighbours, rays and means on {}.", gpu_->device_name()));
         if (gpu_ && gpu_tiles_ < tiles_)
@@ -517,7 +624,9 @@ class CloudAo::Work {
     NormalOrientation orientation_;
     Extent extent_;
     Places valid_, strays_; ///< strays lie beyond the cloud
-    bool normals_refused_ = false, normals_opposed_ = false;
+    bool normals_refused_ = false;
+    std::size_t turned_ = 0, sided_ = 0; ///< of the recorded normals, where some were turned
+    std::string turned_why_;
     float noise_ = 0;
     std::size_t moved_ = 0, kept_ = 0;
     int tiles_ = 0, gpu_tiles_ = 0, passes_ = 2;

@@ -75,16 +75,8 @@ void limit_discs(CloudSurface& surface) {
 
 bool is_direction(const Vector3d& normal) { return normal.allFinite() && normal.norm() > 0.1; }
 
-/// Counts given normals that oppose their nearest neighbour's; orients estimated ones like given ones next to them.
-void compare_sides(CloudSurface& surface, std::span<const Vector3d> given) {
-    const std::size_t opposed = tbb::parallel_reduce(
-        tbb::blocked_range<std::size_t>(0, surface.size()), std::size_t(0),
-        [&](const auto& range, std::size_t sum) {
-            for (std::size_t i = range.begin(); i < range.end(); ++i)
-                sum += surface.normals[i].dot(surface.normals[surface.near[i][0]]) < -0.7F;
-            return sum;
-        },
-        std::plus());
+/// Orients estimated normals like given ones next to them.
+void orient_like_given(CloudSurface& surface, std::span<const Vector3d> given) {
     for (std::size_t i = 0; i < surface.size(); ++i) {
         if (is_direction(given[surface.tree.index(i)]))
             continue;
@@ -95,7 +87,6 @@ void compare_sides(CloudSurface& surface, std::span<const Vector3d> given) {
         if (surface.normals[i].dot(beside) < 0)
             surface.normals[i] = -surface.normals[i];
     }
-    surface.discord = surface.size() > 0 ? static_cast<double>(opposed) / static_cast<double>(surface.size()) : 0;
 }
 
 } // namespace
@@ -167,7 +158,7 @@ CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normal
     limit_discs(surface);
     if (!normals.empty()) {
         surface.agreement = static_cast<double>(median(std::move(cosines), 0));
-        compare_sides(surface, normals);
+        orient_like_given(surface, normals);
     }
     return surface;
 }

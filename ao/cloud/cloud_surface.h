@@ -11,29 +11,29 @@
 namespace scanshade {
 
 class CloudGpu;
-class DiscRays;
 
 /// How normals that were not recorded are oriented.
 struct NormalOrientation {
     enum class Kind {
+        automatic, ///< by free space and places where scanners could stand (ao/cloud/sides.h)
         viewpoint, ///< towards `point`, the scanner's position
         direction, ///< along `point`: terrain, towards the sky
         outward,   ///< away from the other points: objects
         inward     ///< towards the other points: rooms
     };
-    Kind kind = Kind::outward;
+    Kind kind = Kind::automatic;
     Eigen::Vector3d point = Eigen::Vector3d::Zero();
-    std::string why; ///< the reason, for people
+    std::string why{}; ///< the reason, for people
 };
 
 /// Guesses the orientation; the first that applies:
-/// - to `recorded`, the viewpoint that the file names, if nearly all points are seen first from there;
+/// - to `recorded`, the viewpoint that the file names, if most points are seen first from there;
 /// - to the origin of the coordinates, if nearly all points are seen first from there;
-/// - up, if hardly any point has another above it (terrain);
-/// - inward, if many points are hidden from all directions (a room);
-/// - outward. `points` must be finite.
+/// - up, if hardly any point has another above it (terrain), or with `z_up` not too many (plants over ground);
+/// - automatic. `points` must be finite.
 [[nodiscard]] NormalOrientation guessed_orientation(std::span<const Eigen::Vector3d> points,
-                                                    const std::optional<Eigen::Vector3d>& recorded = {});
+                                                    const std::optional<Eigen::Vector3d>& recorded = {},
+                                                    bool z_up = false);
 
 /// The neighbourhoods, planes and discs of a cloud, in the order of its tree; positions relative to `middle`.
 struct CloudSurface {
@@ -49,7 +49,6 @@ struct CloudSurface {
     std::vector<float> flatness;  ///< 1 - 3 times the surface variation (Pauly, Gross and Kobbelt 2002): 1 = a plane
     float spacing = 0;            ///< median distance of points: the side of a square that holds one
     double agreement = 1; ///< median |cosine| between given normals and planes: near 1/2 where the given ones are noise
-    double discord = 0;   ///< share of points whose given normal opposes the nearest one's on the same plane
 
     [[nodiscard]] std::size_t size() const { return tree.size(); }
 };
@@ -61,12 +60,5 @@ struct CloudSurface {
 /// planes.
 [[nodiscard]] CloudSurface cloud_surface(LocalCloud&& points, std::span<const Eigen::Vector3d> normals,
                                          CloudGpu* gpu = nullptr, std::span<const Eigen::Vector3f> axes = {});
-
-/// Orients the normals. To a viewpoint, each point is oriented by itself. Otherwise neighbours are made to agree, the
-/// surest pairs first (the spanning tree of Hoppe et al. 1992, built by Kruskal's algorithm); then each connected piece
-/// votes. In rooms (inward) points vote for the side with more free space, measured by `rays`, which must be given;
-/// pieces with clear votes against each other are not joined. Points without a plane face the viewpoint or the
-/// direction.
-void orient_normals(CloudSurface& surface, const NormalOrientation& orientation, const DiscRays* rays = nullptr);
 
 } // namespace scanshade

@@ -78,12 +78,27 @@ DiscRays::Hits DiscRays::first_hits(std::size_t place, const Vector3f& side, con
     RayBundle bundle = bundle_from(place, side, std::numeric_limits<float>::max());
     aim(bundle, axes_about(side), run, 0);
     const auto [distance, met] = discs_.meetings(bundle);
-    Hits hits{distance, {}};
-    for (std::size_t i = 0; i < RayBundle::size; ++i)
-        if (met[i] >= 0)
-            hits.facing[i] = -Vector3f(bundle.x[i], bundle.y[i], bundle.z[i])
-                                  .dot(surface_.normals[static_cast<std::size_t>(met[i])]);
+    Hits hits{distance, {}, {}, {}};
+    for (std::size_t i = 0; i < RayBundle::size; ++i) {
+        hits.direction[i] = {bundle.x[i], bundle.y[i], bundle.z[i]};
+        if (met[i] < 0)
+            continue;
+        hits.place[i] = static_cast<std::uint32_t>(met[i]);
+        hits.facing[i] = -hits.direction[i].dot(surface_.normals[hits.place[i]]);
+    }
     return hits;
+}
+
+int DiscRays::seen_from(std::size_t place, const Vector3f& position) const {
+    const Vector3f &normal = surface_.normals[place], apart = position - surface_.tree[place];
+    const float distance = apart.norm(), disc = surface_.disc_radius[place];
+    const float cosine = apart.dot(normal) / distance;
+    if (!(std::abs(cosine) >= 0.1F) || distance <= 2 * disc)
+        return 0;
+    const int side = cosine < 0 ? -1 : 1;
+    const float lift = shared::lift_of(disc, surface_.roughness[place], static_cast<float>(discs_.rounding_m()));
+    const Vector3f from = surface_.tree[place] + static_cast<float>(side) * lift * normal + 2 * disc / distance * apart;
+    return discs_.blocked(from.cast<double>(), position.cast<double>()) ? 0 : side;
 }
 
 } // namespace scanshade

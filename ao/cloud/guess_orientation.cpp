@@ -31,10 +31,14 @@ struct ViewFrom {
     double range_ratio = 1; ///< far points' distance / near points' distance (95 % and 5 %)
 };
 
-/// A cell spans about two degrees, wide enough to hold several points of a sparse scan.
+/// In cells of half a degree that hold two points or more: wider ones hold near and far surfaces of the same view.
 ViewFrom view_from(const Vector3d& position, std::span<const Vector3d> points) {
-    constexpr int columns = 180, rows = 90;
-    std::vector<float> nearest(columns * rows, std::numeric_limits<float>::infinity());
+    constexpr int columns = 720, rows = 360;
+    struct Cell {
+        float nearest = std::numeric_limits<float>::infinity();
+        int points = 0;
+    };
+    std::vector<Cell> cells(columns * rows);
     const auto cell = [](const Vector3d& p, double range) {
         const double turn = std::atan2(p.y(), p.x()) / (2 * std::numbers::pi) + 0.5;
         const double tilt = std::acos(std::clamp(p.z() / range, -1.0, 1.0)) / std::numbers::pi;
@@ -48,23 +52,26 @@ ViewFrom view_from(const Vector3d& position, std::span<const Vector3d> points) {
         const double range = point.norm();
         if (!(range > 0))
             return;
-        float& least = nearest[static_cast<std::size_t>(cell(point, range))];
-        least = std::min(least, static_cast<float>(range));
+        Cell& here = cells[static_cast<std::size_t>(cell(point, range))];
+        here.nearest = std::min(here.nearest, static_cast<float>(range));
+        ++here.points;
         ranges.push_back(static_cast<float>(range));
         sum += point;
     });
     if (ranges.empty())
         return {};
     const Vector3d middle = sum / static_cast<double>(ranges.size());
-    std::size_t first = 0, all = 0;
+    std::size_t first = 0, judged = 0, all = 0;
     double radius2 = 0;
     for_some(points, [&](const Vector3d& at) {
         const Vector3d point = at - position;
         const double range = point.norm();
         if (!(range > 0))
             return;
-        // Within a cell, a surface seen at 60 degrees recedes by 6 %. More means a second surface.
-        first += range <= 1.25 * static_cast<double>(nearest[static_cast<std::size_t>(cell(point, range))]);
+        if (const Cell& here = cells[static_cast<std::size_t>(cell(point, range))]; here.points > 1) {
+            first += range <= 1.25 * static_cast<double>(here.nearest); // more means a second surface
+            ++judged;
+        }
         ++all;
         radius2 += (point - middle).squaredNorm();
     });
@@ -73,7 +80,9 @@ ViewFrom view_from(const Vector3d& position, std::span<const Vector3d> points) {
         return static_cast<double>(ranges[static_cast<std::size_t>(share * static_cast<double>(ranges.size() - 1))]);
     };
     const double radius = std::sqrt(radius2 / static_cast<double>(all));
-    return {static_cast<double>(first) / static_cast<double>(all), radius > 0 ? middle.norm() / radius : 0,
+    // Of a cloud so sparse that hardly any two points share a cell, nothing is known.
+    const double seen = 10 * judged >= all ? static_cast<double>(first) / static_cast<double>(judged) : 0;
+    return {seen, radius > 0 ? middle.norm() / radius : 0,
             range_at(0.05) > 0 ? range_at(0.95) / range_at(0.05) : std::numeric_limits<double>::infinity()};
 }
 
@@ -103,48 +112,15 @@ double seen_from_above(std::span<const Vector3d> points) {
     return static_cast<double>(seen) / static_cast<double>(count);
 }
 
-/// Share of the points that other points hide in each of 26 directions.
-double hidden_share(std::span<const Vector3d> all) {
-    std::vector<Vector3d> points;
-    Eigen::AlignedBox3d box;
-    for_some(all, [&](const Vector3d& point) {
-        points.push_back(point);
-        box.extend(point);
-    });
-    const double radius = box.isEmpty() ? 0 : box.diagonal().norm() / 2;
-    if (!(radius > 0))
-        return 0;
-    // Pixels that hold several points each, so that surfaces have no holes to look through.
-    const int side = std::clamp(static_cast<int>(std::sqrt(static_cast<double>(points.size()) / 8)), 4, 128);
-    std::vector<char> seen(points.size(), 0);
-    std::vector<double> front(static_cast<std::size_t>(side * side));
-    for (const Vector3d& direction : spread_directions(26)) {
-        const Vector3d x = direction.unitOrthogonal(), y = direction.cross(x);
-        const auto pixel = [&](const Vector3d& p) {
-            const auto along = [&](const Vector3d& axis) {
-                return std::clamp(static_cast<int>((p.dot(axis) / radius + 1) / 2 * side), 0, side - 1);
-            };
-            return static_cast<std::size_t>(along(y) * side + along(x));
-        };
-        std::fill(front.begin(), front.end(), -std::numeric_limits<double>::infinity());
-        for (Vector3d& point : points)
-            front[pixel(point - box.center())] =
-                std::max(front[pixel(point - box.center())], (point - box.center()).dot(direction));
-        const double same = 6 * radius / side; // three pixels: a surface seen at 70 degrees
-        for (std::size_t i = 0; i < points.size(); ++i)
-            seen[i] |= (points[i] - box.center()).dot(direction) > front[pixel(points[i] - box.center())] - same;
-    }
-    return static_cast<double>(std::count(seen.begin(), seen.end(), 0)) / static_cast<double>(points.size());
-}
-
 } // namespace
 
-NormalOrientation guessed_orientation(std::span<const Vector3d> points, const std::optional<Vector3d>& recorded) {
-    constexpr double nearly_all = 0.85, clearly_off = 0.5, many_ranges = 3;
+NormalOrientation guessed_orientation(std::span<const Vector3d> points, const std::optional<Vector3d>& recorded,
+                                      bool z_up) {
+    constexpr double nearly_all = 0.975, clearly_off = 0.5, many_ranges = 3;
     constexpr double too_far = 20; // radii of the cloud: from so far off, few points hide others anyway
+    constexpr double most = 0.85;
     if (recorded)
-        if (const ViewFrom view = view_from(*recorded, points);
-            view.seen_first >= nearly_all && view.off_centre < too_far)
+        if (const ViewFrom view = view_from(*recorded, points); view.seen_first >= most && view.off_centre < too_far)
             return {NormalOrientation::Kind::viewpoint, *recorded,
                     fmt::format("the recorded viewpoint, from where {:.0f} % of the points are seen first",
                                 100 * view.seen_first)};
@@ -154,14 +130,12 @@ NormalOrientation guessed_orientation(std::span<const Vector3d> points, const st
         return {NormalOrientation::Kind::viewpoint, Vector3d::Zero(),
                 fmt::format("the origin of the coordinates, from where {:.0f} % of the points are seen first",
                             100 * view.seen_first)};
-    if (const double above = seen_from_above(points); above >= nearly_all)
+    // Surveyors' formats have z up: what a plane scans, plants over ground among it, is seen from above.
+    constexpr double scanned_from_above = 0.4;
+    if (const double above = seen_from_above(points); above >= (z_up ? scanned_from_above : most))
         return {NormalOrientation::Kind::direction, Vector3d::UnitZ(),
                 fmt::format("up along z, as of terrain: {:.0f} % of the points have nothing above them", 100 * above)};
-    if (const double hidden = hidden_share(points); hidden > 0.05)
-        return {NormalOrientation::Kind::inward, Vector3d::Zero(),
-                fmt::format("inward, as of a room: {:.0f} % of the points lie inside, hidden from all round",
-                            100 * hidden)};
-    return {NormalOrientation::Kind::outward, Vector3d::Zero(), "outward, as nothing tells where the scanner stood"};
+    return {};
 }
 
 } // namespace scanshade

@@ -41,7 +41,7 @@ PointVisibility visibility_of_points(const Frame& frame, PointMethod& method) {
     std::optional<Vector3d> scanner;
     if (frame.world_from_camera)
         scanner = frame.world_from_camera->translation();
-    PointVisibility found = method.compute({cloud.points, normals, triangles}, scanner);
+    PointVisibility found = method.compute({cloud.points, normals, triangles, z_is_up(cloud)}, scanner);
     if (const std::string unit = cloud.records ? unit_of(*cloud.records) : ""; !unit.empty())
         found.notes.insert(found.notes.begin(), fmt::format("coordinates are in {}.", unit));
     return found;

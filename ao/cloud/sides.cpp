@@ -1,0 +1,570 @@
+// Sides of planes by shared free space and by stations; see the header for the idea.
+#include "ao/cloud/sides.h"
+
+#include "ao/cloud/patches.h"
+#include "projection/hash.h"
+#include "projection/statistics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <numeric>
+#include <tbb/parallel_for.h>
+
+namespace scanshade {
+namespace {
+
+using Eigen::Vector3f;
+using Link = SignedGraph::Link;
+using Signs = std::vector<std::int8_t>;
+
+constexpr std::size_t at_once = RayBundle::size;
+
+/// The size of a cloud as seen from its middle.
+struct Reach {
+    Vector3f centre;
+    float usual = 0, far = 0; ///< distances from the centre: the median, 98 %
+};
+
+Reach reach_of(const CloudSurface& surface) {
+    constexpr std::size_t enough = 50000;
+    const std::size_t step = std::max<std::size_t>(1, surface.size() / enough);
+    std::vector<Vector3f> some;
+    for (std::size_t i = 0; i < surface.size(); i += step)
+        if (!surface.normals[i].isZero())
+            some.push_back(surface.tree[i]);
+    Reach reach{Vector3f::Zero()};
+    if (some.empty())
+        return reach;
+    std::vector<float> values(some.size());
+    for (int axis = 0; axis < 3; ++axis) {
+        std::transform(some.begin(), some.end(), values.begin(), [&](const Vector3f& at) { return at[axis]; });
+        reach.centre[axis] = ranked(values, values.size() / 2);
+    }
+    std::transform(some.begin(), some.end(), values.begin(),
+                   [&](const Vector3f& at) { return (at - reach.centre).norm(); });
+    reach.usual = ranked(values, values.size() / 2);
+    reach.far = quantile(values, 0.98);
+    return reach;
+}
+
+/// A ray that left one plane and met another.
+struct Meeting {
+    std::uint32_t from, to; ///< places
+    std::int8_t sign;       ///< +1: both sides are their normals', or neither is
+    float distance;
+    Vector3f direction;
+};
+
+std::vector<Meeting> shoot(const CloudSurface& surface, const DiscRays& rays, std::size_t places) {
+    const std::size_t asked = std::min(places, surface.size());
+    const DirectionSet directions(at_once, 1);
+    std::vector<std::array<Meeting, 2 * at_once>> met(asked);
+    std::vector<std::uint8_t> counts(asked, 0);
+    tbb::parallel_for(std::size_t(0), asked, [&](std::size_t k) {
+        const std::size_t place = (2 * k + 1) * surface.size() / (2 * asked);
+        const Vector3f& normal = surface.normals[place];
+        if (normal.isZero() || !(surface.disc_radius[place] > 0))
+            return;
+        constexpr float least = 0.1F; // grazing hits say nothing
+        for (const int side : {1, -1}) {
+            const DiscRays::Hits hits =
+                rays.first_hits(place, static_cast<float>(side) * normal, directions.run(2 * k + (side < 0)));
+            for (std::size_t i = 0; i < at_once; ++i)
+                if (std::isfinite(hits.distance[i]) && std::abs(hits.facing[i]) >= least)
+                    met[k][counts[k]++] = {static_cast<std::uint32_t>(place), hits.place[i],
+                                           static_cast<std::int8_t>(hits.facing[i] < 0 ? -side : side),
+                                           hits.distance[i], hits.direction[i]};
+        }
+    });
+    std::vector<Meeting> all;
+    for (std::size_t k = 0; k < asked; ++k)
+        all.insert(all.end(), met[k].begin(), met[k].begin() + counts[k]);
+    return all;
+}
+
+std::vector<Link> ray_links(const std::vector<Meeting>& meetings, const Patches& patches, float usual) {
+    std::vector<Link> links;
+    for (const Meeting& ray : meetings) {
+        const std::uint32_t a = patches.patch[ray.from], b = patches.patch[ray.to];
+        if (a == b)
+            continue;
+        const double weight = static_cast<double>(ray.distance / (ray.distance + 0.2F * usual));
+        links.push_back(
+            {std::min(a, b), std::max(a, b), ray.sign * patches.sign(ray.from) * patches.sign(ray.to) * weight});
+    }
+    return summed(std::move(links));
+}
+
+double strength(const std::vector<Link>& links) {
+    return std::accumulate(links.begin(), links.end(), 0.0,
+                           [](double sum, const Link& link) { return sum + std::abs(link.weight); });
+}
+
+/// Candidate stations and what they see of some points.
+class Stations {
+  public:
+    Stations(const CloudSurface& surface, const DiscRays& rays, const std::vector<Meeting>& meetings,
+             const Reach& reach, const std::optional<Vector3f>& up, const SidesEffort& effort)
+        : surface_(surface), up_(up) {
+        add_near(meetings, reach, effort.stations);
+        near_ = positions_.size();
+        for (const Eigen::Vector3d& direction : spread_directions(64))
+            positions_.emplace_back(reach.centre + 3 * reach.far * direction.cast<float>());
+        for (std::size_t k = 0; k < effort.tests; ++k) {
+            const std::size_t place = (2 * k + 1) * surface.size() / (2 * effort.tests);
+            if (!surface.normals[place].isZero() && (tests_.empty() || tests_.back() != place))
+                tests_.push_back(static_cast<std::uint32_t>(place));
+        }
+        seen_.resize(positions_.size() * tests_.size());
+        tbb::parallel_for(std::size_t(0), positions_.size(), [&](std::size_t c) {
+            for (std::size_t t = 0; t < tests_.size(); ++t)
+                seen_[c * tests_.size() + t] = static_cast<std::int8_t>(rays.seen_from(tests_[t], positions_[c]));
+        });
+        const auto counts_here = [&](std::size_t c) {
+            return c < near_ || !up_ ||
+                   (positions_[c] - reach.centre).dot(*up_) >= -0.1F * (positions_[c] - reach.centre).norm();
+        };
+        for (std::size_t c = 0; c < positions_.size(); ++c)
+            counts_.push_back(counts_here(c));
+    }
+
+    [[nodiscard]] const std::vector<std::uint32_t>& tests() const { return tests_; }
+    [[nodiscard]] std::size_t near() const { return near_; }
+    [[nodiscard]] const Vector3f& position(std::size_t c) const { return positions_[c]; }
+    [[nodiscard]] std::size_t size() const { return positions_.size(); }
+    /// +1: station c sees the front of test t, under `labels` (by test); -1: its back; 0: nothing.
+    [[nodiscard]] int seen(std::size_t c, std::size_t t, const Signs& labels) const {
+        return seen_[c * tests_.size() + t] * labels[t];
+    }
+
+    struct Cover {
+        double share = 0; ///< of the tests: fronts seen, less twice the backs
+        std::vector<std::size_t> chosen;
+    };
+    /// The few stations that explain a labelling best, one after the other.
+    [[nodiscard]] Cover cover(const Signs& labels) const {
+        constexpr std::size_t most = 16;
+        const double least = std::max(0.002 * static_cast<double>(tests_.size()), 1.0);
+        Cover cover;
+        std::vector<char> known(tests_.size(), 0);
+        while (cover.chosen.size() < most) {
+            double best = 0;
+            std::size_t chosen = 0;
+            for (std::size_t c = 0; c < positions_.size(); ++c) {
+                if (!counts_[c])
+                    continue;
+                double gain = 0;
+                for (std::size_t t = 0; t < tests_.size(); ++t) {
+                    const int sign = seen(c, t, labels);
+                    gain += sign < 0 ? -2 : sign > 0 && !known[t] ? 1 : 0;
+                }
+                if (gain > best) {
+                    best = gain;
+                    chosen = c;
+                }
+            }
+            if (best < least)
+                break;
+            cover.chosen.push_back(chosen);
+            cover.share += best / static_cast<double>(tests_.size());
+            for (std::size_t t = 0; t < tests_.size(); ++t)
+                known[t] |= seen(chosen, t, labels) > 0;
+        }
+        return cover;
+    }
+
+    /// Share of the tests whose front at least three far stations see.
+    [[nodiscard]] double seen_from_afar(const Signs& labels) const {
+        std::size_t well = 0;
+        for (std::size_t t = 0; t < tests_.size(); ++t) {
+            int fronts = 0;
+            for (std::size_t c = near_; c < positions_.size(); ++c)
+                fronts += seen(c, t, labels) > 0;
+            well += fronts >= 3;
+        }
+        return tests_.empty() ? 0 : static_cast<double>(well) / static_cast<double>(tests_.size());
+    }
+    /// Fronts among all that far stations see.
+    [[nodiscard]] double fronts_from_afar(const Signs& labels) const {
+        double fronts = 0, all = 0;
+        for (std::size_t c = near_; c < positions_.size(); ++c)
+            for (std::size_t t = 0; t < tests_.size(); ++t) {
+                fronts += seen(c, t, labels) > 0;
+                all += seen(c, t, labels) != 0;
+            }
+        return all > 0 ? fronts / all : 0;
+    }
+    /// The best correlation, over near stations that see much and hardly a back, of the points' density with what a
+    /// scanner there would make: cosine / distance^2.
+    [[nodiscard]] double density_fits(const Signs& labels) const {
+        double best = -1;
+        for (std::size_t c = 0; c < near_; ++c) {
+            double fronts = 0, backs = 0, n = 0, x = 0, y = 0, xx = 0, yy = 0, xy = 0;
+            for (std::size_t t = 0; t < tests_.size(); ++t) {
+                const int sign = seen(c, t, labels);
+                fronts += sign > 0;
+                backs += sign < 0;
+                if (sign <= 0)
+                    continue;
+                const std::uint32_t place = tests_[t];
+                const Vector3f apart = positions_[c] - surface_.tree[place];
+                const double cosine = static_cast<double>(std::abs(apart.normalized().dot(surface_.normals[place])));
+                const double expected = std::log(cosine / static_cast<double>(apart.squaredNorm()));
+                const double density = -2 * std::log(std::max(static_cast<double>(surface_.disc_radius[place]), 1e-30));
+                n += 1, x += expected, y += density;
+                xx += expected * expected, yy += density * density, xy += expected * density;
+            }
+            const double all = static_cast<double>(tests_.size());
+            if (fronts < 0.3 * all || backs > 0.05 * (fronts + backs))
+                continue;
+            const double spread = (xx - x * x / n) * (yy - y * y / n);
+            if (spread > 0)
+                best = std::max(best, (xy - x * y / n) / std::sqrt(spread));
+        }
+        return best;
+    }
+
+    /// The chosen ones first, then those that see most fronts and few backs.
+    [[nodiscard]] std::vector<std::size_t> best(std::vector<std::size_t> chosen, const Signs& labels,
+                                                std::size_t most) const {
+        std::vector<std::pair<double, std::size_t>> others;
+        for (std::size_t c = 0; c < positions_.size(); ++c) {
+            if (!counts_[c] || std::find(chosen.begin(), chosen.end(), c) != chosen.end())
+                continue;
+            double worth = 0;
+            for (std::size_t t = 0; t < tests_.size(); ++t) {
+                const int sign = seen(c, t, labels);
+                worth += sign < 0 ? -3 : sign;
+            }
+            if (worth > 0)
+                others.emplace_back(-worth, c);
+        }
+        std::sort(others.begin(), others.end());
+        for (std::size_t k = 0; k < others.size() && chosen.size() < most; ++k)
+            chosen.push_back(others[k].second);
+        return chosen;
+    }
+
+  private:
+    /// On rays through free space, or the space behind: long ones are likelier.
+    void add_near(const std::vector<Meeting>& meetings, const Reach& reach, std::size_t count) {
+        std::vector<double> up_to;
+        double sum = 0;
+        for (const Meeting& ray : meetings)
+            up_to.push_back(sum += static_cast<double>(std::min(ray.distance, 2 * reach.usual)));
+        for (std::size_t k = 0; k < count && sum > 0; ++k) {
+            const double at = (static_cast<double>(k) + 0.5) / static_cast<double>(count) * sum;
+            const auto ray =
+                static_cast<std::size_t>(std::upper_bound(up_to.begin(), up_to.end() - 1, at) - up_to.begin());
+            const Meeting& chosen = meetings[ray];
+            const float along = 0.2F + 0.6F * static_cast<float>(hash(static_cast<std::uint32_t>(k)) * 0x1p-32);
+            positions_.push_back(surface_.tree[chosen.from] + along * chosen.distance * chosen.direction);
+        }
+    }
+
+    const CloudSurface& surface_;
+    std::optional<Vector3f> up_;
+    std::vector<Vector3f> positions_; ///< the near ones first
+    std::size_t near_ = 0;
+    std::vector<std::uint32_t> tests_;
+    std::vector<std::int8_t> seen_; ///< by station and test, under the surface's own normals
+    std::vector<char> counts_;      ///< whether a station may explain a labelling
+};
+
+/// The sign of the whole labelling.
+struct Decision {
+    int sign = 1;
+    bool body = false; ///< closed, seen from all round
+    bool lost = false; ///< no station sees clean fronts
+    std::vector<std::size_t> chosen;
+    std::string why{};
+    double margin = 0;
+    std::optional<std::string> doubt{};
+};
+
+Decision decide(const Stations& stations, const Signs& labels, bool up_known, SidesRule rule) {
+    Signs other = labels;
+    for (std::int8_t& label : other)
+        label = static_cast<std::int8_t>(-label);
+    const auto labels_of = [&](int sign) -> const Signs& { return sign > 0 ? labels : other; };
+    const Stations::Cover covers[] = {stations.cover(labels), stations.cover(other)};
+    const double fits[] = {stations.density_fits(labels), stations.density_fits(other)};
+    const auto at = [](int sign) { return sign > 0 ? 0 : 1; };
+    const int outer = stations.fronts_from_afar(labels) >= stations.fronts_from_afar(other) ? 1 : -1;
+    const double fronts = stations.fronts_from_afar(labels_of(outer)), afar = stations.seen_from_afar(labels_of(outer));
+    constexpr double scanned_within = 0.4; // correlation of density with a place's distances
+    Decision decision;
+    const double margin = std::abs(covers[0].share - covers[1].share);
+    if (rule == SidesRule::outward || rule == SidesRule::inward) {
+        decision.sign = rule == SidesRule::outward ? outer : -outer;
+        decision.body = rule == SidesRule::outward;
+        decision.chosen = covers[at(decision.sign)].chosen;
+        return decision;
+    }
+    if (fronts >= 0.9 && afar >= 0.97 && fits[at(-outer)] <= scanned_within) {
+        decision.sign = outer;
+        decision.body = true;
+        decision.why =
+            fmt::format("outward, as of a body: {:.0f} % of it is seen from all round, and nothing tells of a "
+                        "scanner within",
+                        100 * afar);
+    } else if (margin < 0.05 && std::max(fits[0], fits[1]) <= scanned_within) {
+        decision.sign = outer;
+        decision.why = "to the outer side of a shell";
+        decision.doubt =
+            "both sides of the surface could be the scanned one, seen from within or from all round: the outer "
+            "one was taken; --cloud.outside sets it";
+    } else {
+        decision.sign = covers[0].share >= covers[1].share ? 1 : -1;
+        decision.margin = margin;
+        decision.why = fmt::format(
+            "to where a scanner could stand: {} places see {:.0f} % of the points from the front",
+            covers[at(decision.sign)].chosen.size(), 100 * std::clamp(covers[at(decision.sign)].share, 0.0, 1.0));
+        if (margin < 0.1)
+            decision.doubt = fmt::format("the other side of all surfaces explains the cloud nearly as well ({:.0f} % "
+                                         "against {:.0f} %); --cloud.outside sets it",
+                                         100 * covers[at(-decision.sign)].share, 100 * covers[at(decision.sign)].share);
+    }
+    decision.chosen = covers[at(decision.sign)].chosen;
+    if (up_known && !decision.body && covers[at(decision.sign)].share < 0.6) {
+        decision.lost = true;
+        decision.doubt.reset();
+        decision.why = "up, since no place of a scanner explains most of the surfaces (as among plants)";
+    }
+    return decision;
+}
+
+/// Votes of the stations for and against the side of each patch.
+struct Votes {
+    std::vector<double> sum, all; ///< by patch
+};
+
+Votes votes_of(const CloudSurface& surface, const DiscRays& rays, const Patches& patches, const Signs& label,
+               const std::vector<Vector3f>& stations) {
+    constexpr std::size_t wanted = 3;
+    std::vector<std::array<std::uint32_t, wanted>> points(patches.count);
+    std::vector<std::uint32_t> sizes(patches.count, 0), passed(patches.count, 0);
+    std::vector<std::uint8_t> counts(patches.count, 0);
+    for (std::size_t i = 0; i < surface.size(); ++i)
+        ++sizes[patches.patch[i]];
+    for (std::size_t i = 0; i < surface.size(); ++i) { // the first, and those a third and two thirds on
+        const std::uint32_t patch = patches.patch[i];
+        if (passed[patch]++ * wanted >= counts[patch] * sizes[patch] && counts[patch] < wanted &&
+            !surface.normals[i].isZero())
+            points[patch][counts[patch]++] = static_cast<std::uint32_t>(i);
+    }
+    Votes votes{std::vector<double>(patches.count, 0.0), std::vector<double>(patches.count, 0.0)};
+    tbb::parallel_for(std::uint32_t(0), patches.count, [&](std::uint32_t patch) {
+        for (std::size_t k = 0; k < counts[patch]; ++k) {
+            const std::uint32_t place = points[patch][k];
+            for (const Vector3f& station : stations) {
+                const int seen = rays.seen_from(place, station);
+                if (seen == 0)
+                    continue;
+                const double cosine = static_cast<double>(
+                    std::abs((station - surface.tree[place]).normalized().dot(surface.normals[place])));
+                votes.sum[patch] += seen * patches.sign(place) * label[patch] * cosine / counts[patch];
+                votes.all[patch] += cosine / counts[patch];
+            }
+        }
+    });
+    return votes;
+}
+
+/// What is known of the sides of patches, for (positive) and against their label, and at most.
+struct Evidence {
+    std::vector<double> stations, stations_most, rays, rays_most; ///< by patch
+
+    explicit Evidence(std::size_t patches)
+        : stations(patches, 0.0), stations_most(patches, 0.0), rays(patches, 0.0), rays_most(patches, 0.0) {}
+    [[nodiscard]] double sum(std::size_t patch) const { return 10 * stations[patch] + 0.3 * rays[patch]; }
+    [[nodiscard]] double most(std::size_t patch) const { return 10 * stations_most[patch] + 0.3 * rays_most[patch]; }
+};
+
+Evidence facing(const CloudSurface& surface, const Patches& patches, const Signs& label, const Vector3f& up) {
+    Evidence evidence(patches.count);
+    std::vector<double> sizes(patches.count, 0.0);
+    for (std::size_t i = 0; i < surface.size(); ++i) {
+        const std::uint32_t patch = patches.patch[i];
+        const double rise = static_cast<double>(surface.normals[i].dot(up)) * patches.sign(i) * label[patch];
+        evidence.stations[patch] += rise;
+        evidence.stations_most[patch] += std::abs(rise);
+        sizes[patch] += 1;
+    }
+    for (std::uint32_t patch = 0; patch < patches.count; ++patch) {
+        evidence.stations[patch] /= std::max(sizes[patch], 1.0);
+        evidence.stations_most[patch] /= std::max(sizes[patch], 1.0);
+    }
+    return evidence;
+}
+
+/// Signs of patches relative to each other, and what the stations and the rays say of them.
+struct Judged {
+    Signs label;
+    Evidence evidence;
+    Decision decision;
+};
+
+Judged judged(const CloudSurface& surface, const DiscRays& rays, const Patches& patches, const std::vector<Link>& near,
+              const std::optional<Vector3f>& up, SidesRule rule, const SidesEffort& effort, const Reach& reach) {
+    const std::vector<Meeting> meetings = shoot(surface, rays, effort.places);
+    std::vector<Link> free = ray_links(meetings, patches, reach.usual);
+    if (const double all = strength(free); all > 0) { // rays correct what neighbours say, and do not outvote it
+        const double scale = std::min(1.0, 0.35 * strength(near) / all);
+        for (Link& link : free)
+            link.weight *= scale;
+    }
+    SignedGraph relative(patches.count);
+    for (const Link& link : near)
+        relative.add(link.a, link.b, link.weight);
+    for (const Link& link : free)
+        relative.add(link.a, link.b, link.weight);
+    Signs label = relative.signs(0.5);
+
+    const Stations stations(surface, rays, meetings, reach, up, effort);
+    Signs of_tests;
+    for (const std::uint32_t place : stations.tests())
+        of_tests.push_back(static_cast<std::int8_t>(label[patches.patch[place]] * patches.sign(place)));
+    Decision decision = decide(stations, of_tests, up.has_value(), rule);
+    for (Signs* signs : {&label, &of_tests})
+        for (std::int8_t& sign : *signs)
+            sign = static_cast<std::int8_t>(sign * decision.sign);
+    if (decision.lost)
+        return {label, facing(surface, patches, label, *up), std::move(decision)};
+
+    constexpr std::size_t most = 24;
+    std::vector<std::size_t> chosen = decision.chosen;
+    if (decision.body) {
+        std::erase_if(chosen, [&](std::size_t c) { return c >= stations.near(); });
+        for (std::size_t c = stations.near(); c < stations.size(); ++c)
+            chosen.push_back(c);
+    } else {
+        chosen = stations.best(std::move(chosen), of_tests, most);
+    }
+    std::vector<Vector3f> positions;
+    for (const std::size_t c : chosen)
+        positions.push_back(stations.position(c));
+    Evidence evidence(patches.count);
+    Votes votes = votes_of(surface, rays, patches, label, positions);
+    evidence.stations = std::move(votes.sum);
+    evidence.stations_most = std::move(votes.all);
+    for (const Link& link : free) {
+        const double agreed = link.weight * label[link.a] * label[link.b];
+        for (const std::uint32_t patch : {link.a, link.b}) {
+            evidence.rays[patch] += agreed;
+            evidence.rays_most[patch] += std::abs(agreed);
+        }
+    }
+    return {std::move(label), std::move(evidence), std::move(decision)};
+}
+
+} // namespace
+
+Sides sides_of(const CloudSurface& surface, const DiscRays* rays, const std::optional<Vector3f>& up, SidesRule rule,
+               const SidesEffort& effort) {
+    Sides sides{Signs(surface.size(), 1), std::vector<float>(surface.size(), 0.0F), {}, 0, {}};
+    const Reach reach = reach_of(surface);
+    if (!(reach.far > 0)) {
+        sides.why = "as estimated: there are no surfaces to tell sides by";
+        return sides;
+    }
+    const SurePairs pairs(surface);
+    const Patches patches = patches_of(surface, pairs);
+    const std::vector<Link> near = surface_links(surface, pairs, patches);
+    auto [label, evidence, decision] = [&]() -> Judged {
+        if (rule != SidesRule::up)
+            return judged(surface, *rays, patches, near, up, rule, effort, reach);
+        Signs all(patches.count, 1);
+        return {all, facing(surface, patches, all, up.value_or(Vector3f::UnitZ())), {}};
+    }();
+    sides.why = decision.why;
+    sides.doubt = decision.doubt;
+    sides.margin = decision.margin;
+
+    // One more node is the truth: it links to every patch by what was seen of it.
+    SignedGraph absolute(patches.count + 1);
+    const std::uint32_t truth = patches.count;
+    for (const Link& link : near)
+        absolute.add(link.a, link.b, link.weight * label[link.a] * label[link.b]);
+    for (std::uint32_t patch = 0; patch < patches.count; ++patch)
+        absolute.add(patch, truth, evidence.sum(patch) + 0.001);
+    const Signs found = absolute.signs(0);
+    Signs turn(patches.count);
+    for (std::uint32_t patch = 0; patch < patches.count; ++patch) {
+        turn[patch] = static_cast<std::int8_t>(found[patch] * found[truth]);
+        label[patch] = static_cast<std::int8_t>(label[patch] * turn[patch]);
+    }
+    std::vector<double> agreed(patches.count, 0.0), most(patches.count, 0.0); // with neighbouring patches
+    for (const Link& link : near)
+        for (const std::uint32_t patch : {link.a, link.b}) {
+            agreed[patch] += link.weight * label[link.a] * label[link.b];
+            most[patch] += std::abs(link.weight);
+        }
+    tbb::parallel_for(std::size_t(0), surface.size(), [&, &label = label, &evidence = evidence](std::size_t i) {
+        const std::uint32_t patch = patches.patch[i];
+        sides.sign[i] = static_cast<std::int8_t>(label[patch] * patches.sign(i));
+        const double known = turn[patch] * evidence.sum(patch) + 0.3 * agreed[patch];
+        sides.confidence[i] =
+            static_cast<float>(std::clamp(known / (evidence.most(patch) + 0.3 * most[patch] + 2), 0.0, 1.0));
+    });
+    return sides;
+}
+
+Sides sides_to(const CloudSurface& surface, const Vector3f& position) {
+    Sides sides{Signs(surface.size(), 1), std::vector<float>(surface.size(), 1.0F), {}, 0, {}};
+    for (std::size_t i = 0; i < surface.size(); ++i)
+        if (surface.normals[i].dot(position - surface.tree[i]) < 0)
+            sides.sign[i] = -1;
+    return sides;
+}
+
+RecordedSides recorded_sides(const CloudSurface& surface) {
+    const Patches patches = patches_of(surface, SurePairs(surface));
+    std::vector<std::array<std::uint32_t, 2>> kinds(patches.count, {0, 0});
+    for (std::size_t i = 0; i < surface.size(); ++i)
+        ++kinds[patches.patch[i]][patches.turned[i] ? 1 : 0];
+    // Heights over their neighbours, along the patch's side, of both kinds: sums for a t test.
+    struct Heights {
+        double sum[2] = {0, 0}, squares[2] = {0, 0};
+    };
+    std::vector<Heights> heights(patches.count);
+    constexpr std::uint32_t fewest = 8;
+    const auto mixed = [&](std::uint32_t patch) {
+        const auto [one, other] = kinds[patch];
+        return one + other >= fewest && 10 * std::min(one, other) >= one + other;
+    };
+    for (std::size_t i = 0; i < surface.size(); ++i) {
+        const std::uint32_t patch = patches.patch[i];
+        if (!mixed(patch) || !(surface.disc_radius[i] > 0))
+            continue;
+        const Vector3f side = static_cast<float>(patches.sign(i)) * surface.normals[i];
+        float mean = 0;
+        for (const std::uint32_t j : surface.near[i])
+            mean += (surface.tree[i] - surface.tree[j]).dot(side) / CloudSurface::kept;
+        const double height = static_cast<double>(mean / surface.disc_radius[i]);
+        heights[patch].sum[patches.turned[i] ? 1 : 0] += height;
+        heights[patch].squares[patches.turned[i] ? 1 : 0] += height * height;
+    }
+    double all = 0, random = 0, opposed = 0;
+    for (std::uint32_t patch = 0; patch < patches.count; ++patch) {
+        const double one = kinds[patch][0], other = kinds[patch][1];
+        if (one + other < fewest)
+            continue;
+        all += one + other;
+        if (!mixed(patch))
+            continue;
+        const Heights& h = heights[patch];
+        const double mean_one = h.sum[0] / one, mean_other = h.sum[1] / other;
+        const double error =
+            (h.squares[0] / one - mean_one * mean_one) / one + (h.squares[1] / other - mean_other * mean_other) / other;
+        constexpr double surely = 3;
+        if (error > 0 && (mean_one - mean_other) / std::sqrt(error) > surely)
+            continue; // two sheets: those that face a side stand on it
+        random += one + other;
+        opposed += std::min(one, other);
+    }
+    return all > 0 ? RecordedSides{random / all, opposed / all} : RecordedSides{};
+}
+
+} // namespace scanshade
