@@ -530,7 +530,7 @@ TEST(Meshes, the_file_comes_back_with_one_property_more) {
     const std::string rest = "4 0 2 3 1 5\n4 1 5 4 0 6\n";
     write_file(folder / "valley.ply", head + faces + body + rest);
     const Ran ran = run_program("run " + (folder / "valley.ply").string() + " -o " + (folder / "out").string() +
-                                " --method raycast --radius 100 --raycast.mesh vertices --raycast.rays 1024 --dump " +
+                                " --method raycast --radius 2 --raycast.mesh vertices --raycast.rays 1024 --dump " +
                                 (folder / "dump").string());
     ASSERT_EQ(ran.exit_code, 0) << ran.err;
     expect_floats(folder / "dump/valley/standard_error.npy", "(6,)", 6);
