@@ -315,9 +315,17 @@ class CloudAo::Work {
 
     void tile(const Places& core, const Places& round, CloudGpu* gpu) {
         auto [surface, fitted] = planes_of(round, gpu);
-        for (std::size_t i = 0; i < surface.size() && !fitted.empty(); ++i)
-            if (fitted.alone[surface.tree.index(i)])
-                surface.disc_radius[i] = 0;
+        if (!fitted.empty()) {
+            std::vector<std::uint32_t> count(fitted.points.size(), 0);
+            for (const std::uint32_t point : fitted.fitted_of)
+                ++count[point];
+            surface.stands_for.resize(surface.size());
+            for (std::size_t i = 0; i < surface.size(); ++i) {
+                surface.stands_for[i] = count[surface.tree.index(i)];
+                if (fitted.alone[surface.tree.index(i)])
+                    surface.disc_radius[i] = 0;
+            }
+        }
         const std::vector<std::uint32_t> lonely = drop_strays(surface, extent_.centre, result_.spacing);
         std::optional<DiscRays> rays;
         const std::vector<float> side_known = settle_sides(surface, rays);
@@ -401,7 +409,8 @@ class CloudAo::Work {
             return sides_of(surface, nullptr, orientation_.point.cast<float>().normalized(), SidesRule::up);
         if (!rays)
             rays.emplace(surface);
-        const std::optional<Vector3f> up = cloud_.z_up ? std::optional<Vector3f>(up_.cast<float>()) : std::nullopt;
+        const std::optional<Vector3f> up =
+            orientation_.z_up || cloud_.z_up ? std::optional<Vector3f>(up_.cast<float>()) : std::nullopt;
         const SidesRule rule = orientation_.kind == Kind::outward  ? SidesRule::outward
                                : orientation_.kind == Kind::inward ? SidesRule::inward
                                                                    : SidesRule::automatic;
@@ -463,13 +472,8 @@ class CloudAo::Work {
         const bool in_order = order.random <= hardly_random;
         if (in_order && opposed <= some_opposed)
             return {};
-        if (constexpr double clearly = 0.3; in_order && opposed > all_opposed && found.margin < clearly) {
-            doubt(
-                fmt::format("{:.0f} % of the recorded normals face away from where the cloud seems to be scanned from "
-                            "({}); they are kept: --cloud.normals estimated or --cloud.outside decides otherwise",
-                            100 * opposed, found.why));
-            return {};
-        }
+        if (constexpr double clearly = 0.3; in_order && opposed > all_opposed && found.margin < clearly)
+            return {}; // both sides explain the cloud
         const bool all = in_order || order.random > mostly_random;
         std::size_t turned = 0;
         for (std::size_t i = 0; i < surface.size(); ++i)

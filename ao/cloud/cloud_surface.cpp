@@ -94,7 +94,7 @@ void orient_like_given(CloudSurface& surface, std::span<const Vector3d> given) {
 CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normals, CloudGpu* gpu,
                            std::span<const Vector3f> axes) {
     const std::size_t count = points.size();
-    CloudSurface surface{points.middle, std::move(points.tree), {}, {}, {}, {}, {}};
+    CloudSurface surface{points.middle, std::move(points.tree), {}, {}, {}, {}, {}, {}};
     std::vector<float> cosines(normals.empty() ? 0 : count, 1.0F); // between given normals and planes
     surface.near.resize(count);
     surface.normals.resize(count);

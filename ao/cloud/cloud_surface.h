@@ -24,13 +24,14 @@ struct NormalOrientation {
     Kind kind = Kind::automatic;
     Eigen::Vector3d point = Eigen::Vector3d::Zero();
     std::string why{}; ///< the reason, for people
+    bool z_up = false; ///< automatic: whether z is known to point to the sky
 };
 
 /// Guesses the orientation; the first that applies:
 /// - to `recorded`, the viewpoint that the file names, if most points are seen first from there;
 /// - to the origin of the coordinates, if nearly all points are seen first from there;
-/// - up, if hardly any point has another above it (terrain), or with `z_up` not too many (plants over ground);
-/// - automatic. `points` must be finite.
+/// - with `z_up`, up, if not too many points have another above them (terrain, and plants over it);
+/// - automatic; with z up if that is known or hardly any point has another above it. `points` must be finite.
 [[nodiscard]] NormalOrientation guessed_orientation(std::span<const Eigen::Vector3d> points,
                                                     const std::optional<Eigen::Vector3d>& recorded = {},
                                                     bool z_up = false);
@@ -47,10 +48,12 @@ struct CloudSurface {
     std::vector<float> disc_radius;       ///< covers the gaps between neighbours; 0 for a lonely point
     std::vector<float> roughness; ///< one sigma of the neighbours' distances from the plane, in the cloud's unit
     std::vector<float> flatness;  ///< 1 - 3 times the surface variation (Pauly, Gross and Kobbelt 2002): 1 = a plane
-    float spacing = 0;            ///< median distance of points: the side of a square that holds one
+    std::vector<std::uint32_t> stands_for; ///< how many points recorded; empty = one each
+    float spacing = 0;                     ///< median distance of points: the side of a square that holds one
     double agreement = 1; ///< median |cosine| between given normals and planes: near 1/2 where the given ones are noise
 
     [[nodiscard]] std::size_t size() const { return tree.size(); }
+    [[nodiscard]] std::uint32_t weight(std::size_t place) const { return stands_for.empty() ? 1 : stands_for[place]; }
 };
 
 /// Finds neighbours and planes of `points`. `normals` is empty or holds one per point, in the order given; those of

@@ -132,10 +132,11 @@ NormalOrientation guessed_orientation(std::span<const Vector3d> points, const st
                             100 * view.seen_first)};
     // Surveyors' formats have z up: what a plane scans, plants over ground among it, is seen from above.
     constexpr double scanned_from_above = 0.4;
-    if (const double above = seen_from_above(points); above >= (z_up ? scanned_from_above : most))
+    const double above = seen_from_above(points);
+    if (z_up && above >= scanned_from_above)
         return {NormalOrientation::Kind::direction, Vector3d::UnitZ(),
                 fmt::format("up along z, as of terrain: {:.0f} % of the points have nothing above them", 100 * above)};
-    return {};
+    return {.z_up = z_up || above >= most};
 }
 
 } // namespace scanshade

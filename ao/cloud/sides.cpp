@@ -116,6 +116,10 @@ class Stations {
             if (!surface.normals[place].isZero() && (tests_.empty() || tests_.back() != place))
                 tests_.push_back(static_cast<std::uint32_t>(place));
         }
+        for (const std::uint32_t place : tests_) {
+            const double disc = static_cast<double>(std::max(surface.disc_radius[place], 1e-30F));
+            density_.push_back(std::log(static_cast<double>(surface.weight(place))) - 2 * std::log(disc));
+        }
         seen_.resize(positions_.size() * tests_.size());
         tbb::parallel_for(std::size_t(0), positions_.size(), [&](std::size_t c) {
             for (std::size_t t = 0; t < tests_.size(); ++t)
@@ -136,6 +140,27 @@ class Stations {
     /// +1: station c sees the front of test t, under `labels` (by test); -1: its back; 0: nothing.
     [[nodiscard]] int seen(std::size_t c, std::size_t t, const Signs& labels) const {
         return seen_[c * tests_.size() + t] * labels[t];
+    }
+
+    /// The same under the surface's own normals.
+    [[nodiscard]] int seen(std::size_t c, std::size_t t) const { return seen_[c * tests_.size() + t]; }
+    /// How many pairs of station and test see each other.
+    [[nodiscard]] double all_seen() const {
+        return static_cast<double>(seen_.size()) - static_cast<double>(std::count(seen_.begin(), seen_.end(), 0));
+    }
+
+    /// Whether the lowest points lie in one level plane. Bodies hardly show what they stand on.
+    [[nodiscard]] bool on_a_floor() const {
+        const Vector3f up = up_.value_or(Vector3f::UnitZ());
+        std::vector<float> heights;
+        for (const std::uint32_t place : tests_)
+            heights.push_back(surface_.tree[place].dot(up));
+        const float low = quantile(heights, 0.02), high = quantile(heights, 0.98);
+        std::size_t level = 0;
+        for (const std::uint32_t place : tests_)
+            level += surface_.tree[place].dot(up) < low + 0.02F * (high - low) &&
+                     std::abs(surface_.normals[place].dot(up)) > 0.99F;
+        return 20 * level > tests_.size();
     }
 
     struct Cover {
@@ -174,6 +199,14 @@ class Stations {
         return cover;
     }
 
+    /// Of a labelling or its opposite, whichever is more.
+    [[nodiscard]] double best_cover(const Signs& labels) const {
+        Signs other = labels;
+        for (std::int8_t& label : other)
+            label = static_cast<std::int8_t>(-label);
+        return std::max(cover(labels).share, cover(other).share);
+    }
+
     /// Share of the tests whose front at least three far stations see.
     [[nodiscard]] double seen_from_afar(const Signs& labels) const {
         std::size_t well = 0;
@@ -195,34 +228,34 @@ class Stations {
             }
         return all > 0 ? fronts / all : 0;
     }
-    /// The best correlation, over near stations that see much and hardly a back, of the points' density with what a
-    /// scanner there would make: cosine / distance^2.
+    /// How well the density of the points is that of scans from within: the correlation of its logarithm with that of
+    /// what a few near stations would make together, each cosine / distance^2, or more towards their poles, as beams of
+    /// equal angles have it. -1 where no near station sees much.
     [[nodiscard]] double density_fits(const Signs& labels) const {
-        double best = -1;
+        std::vector<std::vector<double>> made[2]; // by kind of scanner and station: density by test
         for (std::size_t c = 0; c < near_; ++c) {
-            double fronts = 0, backs = 0, n = 0, x = 0, y = 0, xx = 0, yy = 0, xy = 0;
+            std::size_t fronts = 0, backs = 0;
             for (std::size_t t = 0; t < tests_.size(); ++t) {
-                const int sign = seen(c, t, labels);
-                fronts += sign > 0;
-                backs += sign < 0;
-                if (sign <= 0)
-                    continue;
-                const std::uint32_t place = tests_[t];
-                const Vector3f apart = positions_[c] - surface_.tree[place];
-                const double cosine = static_cast<double>(std::abs(apart.normalized().dot(surface_.normals[place])));
-                const double expected = std::log(cosine / static_cast<double>(apart.squaredNorm()));
-                const double density = -2 * std::log(std::max(static_cast<double>(surface_.disc_radius[place]), 1e-30));
-                n += 1, x += expected, y += density;
-                xx += expected * expected, yy += density * density, xy += expected * density;
+                fronts += seen(c, t, labels) > 0;
+                backs += seen(c, t, labels) < 0;
             }
-            const double all = static_cast<double>(tests_.size());
-            if (fronts < 0.3 * all || backs > 0.05 * (fronts + backs))
+            if (10 * fronts < tests_.size() || 20 * backs > fronts + backs)
                 continue;
-            const double spread = (xx - x * x / n) * (yy - y * y / n);
-            if (spread > 0)
-                best = std::max(best, (xy - x * y / n) / std::sqrt(spread));
+            for (auto& of_kind : made)
+                of_kind.emplace_back(tests_.size(), 0.0);
+            for (std::size_t t = 0; t < tests_.size(); ++t) {
+                if (seen(c, t, labels) <= 0)
+                    continue;
+                const Vector3f apart = positions_[c] - surface_.tree[tests_[t]];
+                const Vector3f towards = apart.normalized();
+                const double even =
+                    static_cast<double>(std::abs(towards.dot(surface_.normals[tests_[t]])) / apart.squaredNorm());
+                const float rise = towards.dot(up_.value_or(Vector3f::UnitZ()));
+                made[0].back()[t] = even;
+                made[1].back()[t] = even / static_cast<double>(std::sqrt(std::max(1 - rise * rise, 0.01F)));
+            }
         }
-        return best;
+        return std::max(best_fit(made[0]), best_fit(made[1]));
     }
 
     /// The chosen ones first, then those that see most fronts and few backs.
@@ -247,6 +280,39 @@ class Stations {
     }
 
   private:
+    /// The correlation that the best few of these densities reach together; the next is added while that helps.
+    [[nodiscard]] double best_fit(const std::vector<std::vector<double>>& made) const {
+        constexpr std::size_t most = 8;
+        constexpr double helps = 0.01;
+        std::vector<double> sum(tests_.size(), 0.0), fits(made.size());
+        double best = -1;
+        for (std::size_t round = 0; round < most && !made.empty(); ++round) {
+            tbb::parallel_for(std::size_t(0), made.size(), [&](std::size_t c) { fits[c] = fit(sum, made[c]); });
+            const auto next = std::max_element(fits.begin(), fits.end());
+            if (*next < best + helps)
+                break;
+            best = *next;
+            const std::vector<double>& chosen = made[static_cast<std::size_t>(next - fits.begin())];
+            std::transform(sum.begin(), sum.end(), chosen.begin(), sum.begin(), std::plus());
+        }
+        return best;
+    }
+    [[nodiscard]] double fit(const std::vector<double>& one, const std::vector<double>& other) const {
+        double n = 0, x = 0, y = 0, xx = 0, yy = 0, xy = 0;
+        for (std::size_t t = 0; t < tests_.size(); ++t) {
+            const double both = one[t] + other[t];
+            if (!(both > 0))
+                continue;
+            const double expected = std::log(both), density = density_[t];
+            n += 1, x += expected, y += density;
+            xx += expected * expected, yy += density * density, xy += expected * density;
+        }
+        if (n < 0.3 * static_cast<double>(tests_.size()))
+            return -1;
+        const double spread = (xx - x * x / n) * (yy - y * y / n);
+        return spread > 0 ? (xy - x * y / n) / std::sqrt(spread) : -1;
+    }
+
     /// On rays through free space, or the space behind: long ones are likelier.
     void add_near(const std::vector<Meeting>& meetings, const Reach& reach, std::size_t count) {
         std::vector<double> up_to;
@@ -268,6 +334,7 @@ class Stations {
     std::vector<Vector3f> positions_; ///< the near ones first
     std::size_t near_ = 0;
     std::vector<std::uint32_t> tests_;
+    std::vector<double> density_;   ///< its logarithm, by test
     std::vector<std::int8_t> seen_; ///< by station and test, under the surface's own normals
     std::vector<char> counts_;      ///< whether a station may explain a labelling
 };
@@ -293,7 +360,7 @@ Decision decide(const Stations& stations, const Signs& labels, bool up_known, Si
     const auto at = [](int sign) { return sign > 0 ? 0 : 1; };
     const int outer = stations.fronts_from_afar(labels) >= stations.fronts_from_afar(other) ? 1 : -1;
     const double fronts = stations.fronts_from_afar(labels_of(outer)), afar = stations.seen_from_afar(labels_of(outer));
-    constexpr double scanned_within = 0.4; // correlation of density with a place's distances
+    constexpr double scanned_within = 0.4, maybe_within = 0.2; // correlations of density with a place's distances
     Decision decision;
     const double margin = std::abs(covers[0].share - covers[1].share);
     if (rule == SidesRule::outward || rule == SidesRule::inward) {
@@ -302,13 +369,20 @@ Decision decide(const Stations& stations, const Signs& labels, bool up_known, Si
         decision.chosen = covers[at(decision.sign)].chosen;
         return decision;
     }
-    if (fronts >= 0.9 && afar >= 0.97 && fits[at(-outer)] <= scanned_within) {
+    // A closed room looks like a body from outside. Its floor and the density of its points tell.
+    const double within = fits[at(-outer)];
+    const bool room = within > scanned_within || (within > maybe_within && stations.on_a_floor());
+    if (fronts >= 0.9 && afar >= 0.97 && !room) {
         decision.sign = outer;
         decision.body = true;
         decision.why =
             fmt::format("outward, as of a body: {:.0f} % of it is seen from all round, and nothing tells of a "
                         "scanner within",
                         100 * afar);
+        if (within > maybe_within || stations.on_a_floor())
+            decision.doubt =
+                "the cloud may be a body seen from all round, or a closed room seen from within: a body was "
+                "taken; --cloud.outside inward sets it";
     } else if (margin < 0.05 && std::max(fits[0], fits[1]) <= scanned_within) {
         decision.sign = outer;
         decision.why = "to the outer side of a shell";
@@ -415,17 +489,46 @@ Judged judged(const CloudSurface& surface, const DiscRays& rays, const Patches& 
         for (Link& link : free)
             link.weight *= scale;
     }
-    SignedGraph relative(patches.count);
+    const Stations stations(surface, rays, meetings, reach, up, effort);
+    // All that is seen from one place is seen through the same air: every station is one more node.
+    SignedGraph relative(patches.count + stations.size());
     for (const Link& link : near)
         relative.add(link.a, link.b, link.weight);
     for (const Link& link : free)
         relative.add(link.a, link.b, link.weight);
-    Signs label = relative.signs(0.5);
+    const double of_station = 0.35 * strength(near) / std::max(stations.all_seen(), 1.0);
+    for (std::size_t c = 0; c < stations.size(); ++c)
+        for (std::size_t t = 0; t < stations.tests().size(); ++t)
+            if (const std::uint32_t place = stations.tests()[t]; stations.seen(c, t) != 0)
+                relative.add(patches.patch[place], static_cast<std::uint32_t>(patches.count + c),
+                             stations.seen(c, t) * patches.sign(place) * std::min(of_station, 1.0));
+    std::vector<std::vector<std::uint32_t>> late;
+    Signs label = relative.signs(0.5, &late);
+    label.resize(patches.count);
 
-    const Stations stations(surface, rays, meetings, reach, up, effort);
-    Signs of_tests;
-    for (const std::uint32_t place : stations.tests())
-        of_tests.push_back(static_cast<std::int8_t>(label[patches.patch[place]] * patches.sign(place)));
+    const auto of_tests_under = [&](const Signs& labels) {
+        Signs signs;
+        for (const std::uint32_t place : stations.tests())
+            signs.push_back(static_cast<std::int8_t>(labels[patches.patch[place]] * patches.sign(place)));
+        return signs;
+    };
+    // Large parts that were joined late hang on few links: stations know better.
+    Signs of_tests = of_tests_under(label);
+    constexpr std::size_t most_late = 12;
+    constexpr double clearly = 0.01;
+    double best = stations.best_cover(of_tests);
+    for (std::size_t k = late.size(); k-- > 0 && late.size() - k <= most_late;) {
+        Signs turned = label;
+        for (const std::uint32_t patch : late[k])
+            if (patch < patches.count)
+                turned[patch] = static_cast<std::int8_t>(-turned[patch]);
+        Signs tests_turned = of_tests_under(turned);
+        if (const double cover = stations.best_cover(tests_turned); cover > best + clearly) {
+            best = cover;
+            label = std::move(turned);
+            of_tests = std::move(tests_turned);
+        }
+    }
     Decision decision = decide(stations, of_tests, up.has_value(), rule);
     for (Signs* signs : {&label, &of_tests})
         for (std::int8_t& sign : *signs)
