@@ -221,7 +221,7 @@ class CloudAo::Work {
                             : options_.outside == "outward" ? Kind::outward
                                                             : Kind::inward,
                             up_, options_.outside + ", as given"};
-        if (orientation_.kind == Kind::direction)
+        if (orientation_.kind == Kind::direction || orientation_.kind == Kind::terrain)
             orientation_.point = up_;
     }
 
@@ -410,8 +410,10 @@ class CloudAo::Work {
         if (!rays)
             rays.emplace(surface);
         const std::optional<Vector3f> up =
-            orientation_.z_up || cloud_.z_up ? std::optional<Vector3f>(up_.cast<float>()) : std::nullopt;
-        const SidesRule rule = orientation_.kind == Kind::outward  ? SidesRule::outward
+            orientation_.kind == Kind::terrain || cloud_.z_up ? std::optional<Vector3f>(up_.cast<float>())
+                                                              : std::nullopt;
+        const SidesRule rule = orientation_.kind == Kind::terrain  ? SidesRule::terrain
+                               : orientation_.kind == Kind::outward ? SidesRule::outward
                                : orientation_.kind == Kind::inward ? SidesRule::inward
                                                                    : SidesRule::automatic;
         return sides_of(surface, &*rays, up, rule, effort);
@@ -427,15 +429,15 @@ class CloudAo::Work {
             if (found.sign[i] < 0)
                 surface.normals[i] = -surface.normals[i];
         // What has no plane faces the scanner, or the sky.
-        if (const auto kind = orientation_.kind;
-            kind == NormalOrientation::Kind::viewpoint || kind == NormalOrientation::Kind::direction)
+        using Kind = NormalOrientation::Kind;
+        const bool to_sky = orientation_.kind == Kind::direction || orientation_.kind == Kind::terrain;
+        if (to_sky || orientation_.kind == Kind::viewpoint)
             for (std::size_t i = 0; i < surface.size(); ++i)
                 if (surface.normals[i].isZero())
                     surface.normals[i] =
-                        kind == NormalOrientation::Kind::direction
-                            ? Vector3f(orientation_.point.cast<float>().normalized())
-                            : Vector3f((orientation_.point - surface.middle).cast<float>() - surface.tree[i])
-                                  .stableNormalized();
+                        to_sky ? Vector3f(orientation_.point.cast<float>().normalized())
+                               : Vector3f((orientation_.point - surface.middle).cast<float>() - surface.tree[i])
+                                     .stableNormalized();
         note_sides(found);
         return std::move(found.confidence);
     }

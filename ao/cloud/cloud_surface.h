@@ -17,21 +17,21 @@ struct NormalOrientation {
     enum class Kind {
         automatic, ///< by free space and places where scanners could stand (ao/cloud/sides.h)
         viewpoint, ///< towards `point`, the scanner's position
-        direction, ///< along `point`: terrain, towards the sky
+        terrain,   ///< as automatic, and the whole looks along `point`, to the sky
+        direction, ///< each plane by itself along `point`
         outward,   ///< away from the other points: objects
         inward     ///< towards the other points: rooms
     };
     Kind kind = Kind::automatic;
     Eigen::Vector3d point = Eigen::Vector3d::Zero();
     std::string why{}; ///< the reason, for people
-    bool z_up = false; ///< automatic: whether z is known to point to the sky
 };
 
 /// Guesses the orientation; the first that applies:
 /// - to `recorded`, the viewpoint that the file names, if most points are seen first from there;
 /// - to the origin of the coordinates, if nearly all points are seen first from there;
-/// - with `z_up`, up, if not too many points have another above them (terrain, and plants over it);
-/// - automatic; with z up if that is known or hardly any point has another above it. `points` must be finite.
+/// - terrain, if hardly any point has another above it, or with `z_up` not too many (plants over ground);
+/// - automatic. `points` must be finite.
 [[nodiscard]] NormalOrientation guessed_orientation(std::span<const Eigen::Vector3d> points,
                                                     const std::optional<Eigen::Vector3d>& recorded = {},
                                                     bool z_up = false);

@@ -63,23 +63,25 @@ ViewFrom view_from(const Vector3d& position, std::span<const Vector3d> points) {
     const Vector3d middle = sum / static_cast<double>(ranges.size());
     std::size_t first = 0, judged = 0, all = 0;
     double radius2 = 0;
+    for_some(points, [&](const Vector3d& point) { radius2 += (point - position - middle).squaredNorm(); });
+    const double radius = std::sqrt(radius2 / static_cast<double>(ranges.size()));
     for_some(points, [&](const Vector3d& at) {
         const Vector3d point = at - position;
         const double range = point.norm();
         if (!(range > 0))
             return;
         if (const Cell& here = cells[static_cast<std::size_t>(cell(point, range))]; here.points > 1) {
-            first += range <= 1.25 * static_cast<double>(here.nearest); // more means a second surface
+            // More means a second surface. The back of a small thing far away is hardly farther than its front.
+            const auto nearest = static_cast<double>(here.nearest);
+            first += range <= nearest + std::min(0.25 * nearest, 0.5 * radius);
             ++judged;
         }
         ++all;
-        radius2 += (point - middle).squaredNorm();
     });
     std::sort(ranges.begin(), ranges.end());
     const auto range_at = [&](double share) {
         return static_cast<double>(ranges[static_cast<std::size_t>(share * static_cast<double>(ranges.size() - 1))]);
     };
-    const double radius = std::sqrt(radius2 / static_cast<double>(all));
     // Of a cloud so sparse that hardly any two points share a cell, nothing is known.
     const double seen = 10 * judged >= all ? static_cast<double>(first) / static_cast<double>(judged) : 0;
     return {seen, radius > 0 ? middle.norm() / radius : 0,
@@ -132,11 +134,10 @@ NormalOrientation guessed_orientation(std::span<const Vector3d> points, const st
                             100 * view.seen_first)};
     // Surveyors' formats have z up: what a plane scans, plants over ground among it, is seen from above.
     constexpr double scanned_from_above = 0.4;
-    const double above = seen_from_above(points);
-    if (z_up && above >= scanned_from_above)
-        return {NormalOrientation::Kind::direction, Vector3d::UnitZ(),
+    if (const double above = seen_from_above(points); above >= (z_up ? scanned_from_above : most))
+        return {NormalOrientation::Kind::terrain, Vector3d::UnitZ(),
                 fmt::format("up along z, as of terrain: {:.0f} % of the points have nothing above them", 100 * above)};
-    return {.z_up = z_up || above >= most};
+    return {};
 }
 
 } // namespace scanshade

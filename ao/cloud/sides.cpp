@@ -106,7 +106,7 @@ class Stations {
   public:
     Stations(const CloudSurface& surface, const DiscRays& rays, const std::vector<Meeting>& meetings,
              const Reach& reach, const std::optional<Vector3f>& up, const SidesEffort& effort)
-        : surface_(surface), up_(up) {
+        : surface_(surface), up_(up), centre_(reach.centre) {
         add_near(meetings, reach, effort.stations);
         near_ = positions_.size();
         for (const Eigen::Vector3d& direction : spread_directions(64))
@@ -149,18 +149,37 @@ class Stations {
         return static_cast<double>(seen_.size()) - static_cast<double>(std::count(seen_.begin(), seen_.end(), 0));
     }
 
-    /// Whether the lowest points lie in one level plane. Bodies hardly show what they stand on.
-    [[nodiscard]] bool on_a_floor() const {
-        const Vector3f up = up_.value_or(Vector3f::UnitZ());
-        std::vector<float> heights;
-        for (const std::uint32_t place : tests_)
-            heights.push_back(surface_.tree[place].dot(up));
-        const float low = quantile(heights, 0.02), high = quantile(heights, 0.98);
-        std::size_t level = 0;
-        for (const std::uint32_t place : tests_)
-            level += surface_.tree[place].dot(up) < low + 0.02F * (high - low) &&
-                     std::abs(surface_.normals[place].dot(up)) > 0.99F;
-        return 20 * level > tests_.size();
+    /// Share of the tests that lie in large planes with nearly everything on one side, as walls, floor and ceiling
+    /// bound a room. Of things with round shapes next to none do.
+    [[nodiscard]] double boxed(float size) const {
+        constexpr double large = 0.03, beyond_at_most = 0.02;
+        const float thick = 0.01F * size;
+        std::vector<char> bounding(tests_.size(), 0);
+        tbb::parallel_for(std::size_t(0), tests_.size(), [&](std::size_t t) {
+            const Vector3f& at = surface_.tree[tests_[t]];
+            const Vector3f& normal = surface_.normals[tests_[t]];
+            std::size_t above = 0, below = 0, within = 0;
+            for (const std::uint32_t other : tests_) {
+                const float height = (surface_.tree[other] - at).dot(normal);
+                above += height > thick;
+                below += height < -thick;
+                within += std::abs(height) <= thick && std::abs(surface_.normals[other].dot(normal)) > 0.98F;
+            }
+            const auto all = static_cast<double>(tests_.size());
+            bounding[t] = static_cast<double>(std::min(above, below)) <= beyond_at_most * all &&
+                          static_cast<double>(within) >= large * all;
+        });
+        return tests_.empty() ? 0
+                              : static_cast<double>(std::count(bounding.begin(), bounding.end(), 1)) /
+                                    static_cast<double>(tests_.size());
+    }
+
+    /// The mean rise of the tests' fronts: 1 where all look up.
+    [[nodiscard]] double rise(const Signs& labels) const {
+        double sum = 0;
+        for (std::size_t t = 0; t < tests_.size(); ++t)
+            sum += static_cast<double>(surface_.normals[tests_[t]].dot(up_.value_or(Vector3f::UnitZ()))) * labels[t];
+        return sum / std::max(static_cast<double>(tests_.size()), 1.0);
     }
 
     struct Cover {
@@ -228,12 +247,13 @@ class Stations {
             }
         return all > 0 ? fronts / all : 0;
     }
-    /// How well the density of the points is that of scans from within: the correlation of its logarithm with that of
-    /// what a few near stations would make together, each cosine / distance^2, or more towards their poles, as beams of
-    /// equal angles have it. -1 where no near station sees much.
-    [[nodiscard]] double density_fits(const Signs& labels) const {
+    /// How well the density of the points is that of scans: the correlation of its logarithm with that of what a few
+    /// stations would make together, each cosine / distance^2, or more towards their poles, as beams of equal angles
+    /// have it. -1 where no station sees much. From `within`: near stations; else those round the cloud, at distances
+    /// that scanners round a body stand at.
+    [[nodiscard]] double density_fits(const Signs& labels, bool within) const {
         std::vector<std::vector<double>> made[2]; // by kind of scanner and station: density by test
-        for (std::size_t c = 0; c < near_; ++c) {
+        for (std::size_t c = within ? 0 : near_; c < (within ? near_ : size()); ++c) {
             std::size_t fronts = 0, backs = 0;
             for (std::size_t t = 0; t < tests_.size(); ++t) {
                 fronts += seen(c, t, labels) > 0;
@@ -241,18 +261,21 @@ class Stations {
             }
             if (10 * fronts < tests_.size() || 20 * backs > fronts + backs)
                 continue;
-            for (auto& of_kind : made)
-                of_kind.emplace_back(tests_.size(), 0.0);
-            for (std::size_t t = 0; t < tests_.size(); ++t) {
-                if (seen(c, t, labels) <= 0)
-                    continue;
-                const Vector3f apart = positions_[c] - surface_.tree[tests_[t]];
-                const Vector3f towards = apart.normalized();
-                const double even =
-                    static_cast<double>(std::abs(towards.dot(surface_.normals[tests_[t]])) / apart.squaredNorm());
-                const float rise = towards.dot(up_.value_or(Vector3f::UnitZ()));
-                made[0].back()[t] = even;
-                made[1].back()[t] = even / static_cast<double>(std::sqrt(std::max(1 - rise * rise, 0.01F)));
+            for (const float nearer : within ? std::vector<float>{1} : std::vector<float>{1, 2.0F / 3, 0.45F}) {
+                const Vector3f position = centre_ + nearer * (positions_[c] - centre_);
+                for (auto& of_kind : made)
+                    of_kind.emplace_back(tests_.size(), 0.0);
+                for (std::size_t t = 0; t < tests_.size(); ++t) {
+                    if (seen(c, t, labels) <= 0)
+                        continue;
+                    const Vector3f apart = position - surface_.tree[tests_[t]];
+                    const Vector3f towards = apart.normalized();
+                    const double even =
+                        static_cast<double>(std::abs(towards.dot(surface_.normals[tests_[t]])) / apart.squaredNorm());
+                    const float rise = towards.dot(up_.value_or(Vector3f::UnitZ()));
+                    made[0].back()[t] = even;
+                    made[1].back()[t] = even / static_cast<double>(std::sqrt(std::max(1 - rise * rise, 0.01F)));
+                }
             }
         }
         return std::max(best_fit(made[0]), best_fit(made[1]));
@@ -331,6 +354,7 @@ class Stations {
 
     const CloudSurface& surface_;
     std::optional<Vector3f> up_;
+    Vector3f centre_;
     std::vector<Vector3f> positions_; ///< the near ones first
     std::size_t near_ = 0;
     std::vector<std::uint32_t> tests_;
@@ -350,58 +374,73 @@ struct Decision {
     std::optional<std::string> doubt{};
 };
 
-Decision decide(const Stations& stations, const Signs& labels, bool up_known, SidesRule rule) {
+/// What decides between a labelling and its opposite.
+struct Scene {
+    const Reach& reach;
+    bool up_known = false;
+    double front_meets = 0.5; ///< share of the rays that met something, that left fronts
+};
+
+Decision decide(const Stations& stations, const Signs& labels, const Scene& scene, SidesRule rule) {
     Signs other = labels;
     for (std::int8_t& label : other)
         label = static_cast<std::int8_t>(-label);
     const auto labels_of = [&](int sign) -> const Signs& { return sign > 0 ? labels : other; };
-    const Stations::Cover covers[] = {stations.cover(labels), stations.cover(other)};
-    const double fits[] = {stations.density_fits(labels), stations.density_fits(other)};
     const auto at = [](int sign) { return sign > 0 ? 0 : 1; };
-    const int outer = stations.fronts_from_afar(labels) >= stations.fronts_from_afar(other) ? 1 : -1;
-    const double fronts = stations.fronts_from_afar(labels_of(outer)), afar = stations.seen_from_afar(labels_of(outer));
-    constexpr double scanned_within = 0.4, maybe_within = 0.2; // correlations of density with a place's distances
+    const Stations::Cover covers[] = {stations.cover(labels), stations.cover(other)};
+    const double shares[] = {std::clamp(covers[0].share, 0.0, 1.0), std::clamp(covers[1].share, 0.0, 1.0)};
+    const int inner = scene.front_meets > 0.5 ? 1 : -1, covered = shares[0] >= shares[1] ? 1 : -1;
+    const double fronts = stations.fronts_from_afar(labels_of(-inner)),
+                 afar = stations.seen_from_afar(labels_of(-inner)), within = stations.density_fits(labels_of(inner), true),
+                 outside = stations.density_fits(labels_of(-inner), false),
+                 boxed = stations.boxed(scene.reach.far);
+    constexpr double scanned_within = 0.4, clearly_better = 0.1; // correlations of density with stations' distances
+    constexpr double walled = 0.3, hardly_walled = 0.1;          // shares of the points in walls that bound the cloud
+    constexpr double empty = 0.02;               // of the rays that meet something, those from the outer side
+    constexpr double tie = 0.05, near_tie = 0.1; // between shares of points that stations explain
+    const double outer_meets = std::min(scene.front_meets, 1 - scene.front_meets);
     Decision decision;
-    const double margin = std::abs(covers[0].share - covers[1].share);
+    const double margin = std::abs(shares[0] - shares[1]);
+    const auto explained = [&](int sign) {
+        return fmt::format("{} places see {:.0f} % of the points from the front", covers[at(sign)].chosen.size(),
+                           100 * shares[at(sign)]);
+    };
     if (rule == SidesRule::outward || rule == SidesRule::inward) {
-        decision.sign = rule == SidesRule::outward ? outer : -outer;
+        decision.sign = rule == SidesRule::outward ? -inner : inner;
         decision.body = rule == SidesRule::outward;
-        decision.chosen = covers[at(decision.sign)].chosen;
-        return decision;
-    }
-    // A closed room looks like a body from outside. Its floor and the density of its points tell.
-    const double within = fits[at(-outer)];
-    const bool room = within > scanned_within || (within > maybe_within && stations.on_a_floor());
-    if (fronts >= 0.9 && afar >= 0.97 && !room) {
-        decision.sign = outer;
-        decision.body = true;
-        decision.why =
-            fmt::format("outward, as of a body: {:.0f} % of it is seen from all round, and nothing tells of a "
-                        "scanner within",
-                        100 * afar);
-        if (within > maybe_within || stations.on_a_floor())
-            decision.doubt =
-                "the cloud may be a body seen from all round, or a closed room seen from within: a body was "
-                "taken; --cloud.outside inward sets it";
-    } else if (margin < 0.05 && std::max(fits[0], fits[1]) <= scanned_within) {
-        decision.sign = outer;
-        decision.why = "to the outer side of a shell";
-        decision.doubt =
-            "both sides of the surface could be the scanned one, seen from within or from all round: the outer "
-            "one was taken; --cloud.outside sets it";
+    } else if (rule == SidesRule::terrain) {
+        decision.sign = stations.rise(labels) >= 0 ? 1 : -1;
+        decision.margin = 1;
+        decision.why = "up, as of terrain";
+    } else if (const bool body = fronts >= 0.9 && afar >= 0.97; body || margin < tie) {
+        // Both sides could be the scanned one: a closed room looks like a body from outside. Walls and floors tell, less
+        // so the density of the points.
+        const bool room = boxed > (body ? walled : hardly_walled) ||
+                          within > std::max(scanned_within, outside + clearly_better);
+        const bool sure_room = boxed > walled && outer_meets > empty;
+        decision.sign = room ? inner : -inner;
+        decision.body = body && !room;
+        if (room)
+            decision.why = fmt::format("inward, as of a room: {}", explained(inner));
+        else if (body)
+            decision.why = fmt::format("outward, as of a body: {:.0f} % of it is seen from all round", 100 * afar);
+        else
+            decision.why = "to the outer side of a shell";
+        if (room ? !sure_room : !body || within > std::max(scanned_within, outside))
+            decision.doubt = fmt::format("both sides of all surfaces could be the scanned one, as of a room and of a "
+                                         "body of its shape: the {} one was taken; --cloud.outside sets it",
+                                         room ? "inner" : "outer");
     } else {
-        decision.sign = covers[0].share >= covers[1].share ? 1 : -1;
+        decision.sign = covered;
         decision.margin = margin;
-        decision.why = fmt::format(
-            "to where a scanner could stand: {} places see {:.0f} % of the points from the front",
-            covers[at(decision.sign)].chosen.size(), 100 * std::clamp(covers[at(decision.sign)].share, 0.0, 1.0));
-        if (margin < 0.1)
+        decision.why = "to where a scanner could stand: " + explained(covered);
+        if (margin < near_tie && !(covered == inner && boxed > walled))
             decision.doubt = fmt::format("the other side of all surfaces explains the cloud nearly as well ({:.0f} % "
                                          "against {:.0f} %); --cloud.outside sets it",
-                                         100 * covers[at(-decision.sign)].share, 100 * covers[at(decision.sign)].share);
+                                         100 * shares[at(-covered)], 100 * shares[at(covered)]);
     }
     decision.chosen = covers[at(decision.sign)].chosen;
-    if (up_known && !decision.body && covers[at(decision.sign)].share < 0.6) {
+    if (scene.up_known && rule != SidesRule::outward && rule != SidesRule::inward && !decision.body && shares[at(decision.sign)] < 0.6) {
         decision.lost = true;
         decision.doubt.reset();
         decision.why = "up, since no place of a scanner explains most of the surfaces (as among plants)";
@@ -529,7 +568,14 @@ Judged judged(const CloudSurface& surface, const DiscRays& rays, const Patches& 
             of_tests = std::move(tests_turned);
         }
     }
-    Decision decision = decide(stations, of_tests, up.has_value(), rule);
+    double front_meets = 0, meets = 0;
+    for (const Meeting& ray : meetings) {
+        const bool normal_side = ray.direction.dot(surface.normals[ray.from]) > 0;
+        front_meets += (label[patches.patch[ray.from]] * patches.sign(ray.from) > 0) == normal_side;
+        meets += 1;
+    }
+    Decision decision =
+        decide(stations, of_tests, {reach, up.has_value(), meets > 0 ? front_meets / meets : 0.5}, rule);
     for (Signs* signs : {&label, &of_tests})
         for (std::int8_t& sign : *signs)
             sign = static_cast<std::int8_t>(sign * decision.sign);

@@ -27,7 +27,13 @@ struct Sides {
 };
 
 /// Who decides between the two sides of everything: the cloud itself, or a person who knows what it is.
-enum class SidesRule { automatic, up, outward, inward };
+enum class SidesRule {
+    automatic,
+    terrain, ///< fronts look up on the whole: `up` is needed
+    up,      ///< every plane by itself looks up
+    outward,
+    inward
+};
 
 /// Free space is shared: a ray that leaves one plane and meets another tells that both sides are scanned or neither is.
 /// And a scanner sees fronts only: places that see much and hardly any back are as good as the true ones. Both are put
