@@ -130,7 +130,8 @@ std::vector<Parameter> CloudAoOptions::parameters() {
          .value = &sky},
         {.name = "up", .help = "the direction of the sky, x,y,z", .value = &up},
         {.name = "outside",
-         .help = "where estimated normals point: auto, up, outward, inward, or to the scanner at x,y,z",
+         .help = "where normals point: auto, up, outward, inward, or to the scanner at x,y,z; all but auto turn recorded "
+                 "ones, too",
          .value = &outside},
         {.name = "normals",
          .help = "which normals are used; auto = recorded ones where they agree with the planes of the points",
@@ -445,7 +446,7 @@ class CloudAo::Work {
     /// Recorded sides are right as a rule. Random ones show within patches; patches turned over, or all, show in where
     /// a scanner could have stood.
     std::vector<float> settle_recorded_sides(CloudSurface& surface, std::optional<DiscRays>& rays) {
-        constexpr double hardly_random = 0.01, mostly_random = 0.2, some_opposed = 0.05, all_opposed = 0.9;
+        constexpr double hardly_random = 0.05, mostly_random = 0.2, some_opposed = 0.05, all_opposed = 0.9;
         constexpr float sure = 0.8F;
         if (options_.normals != CloudNormals::automatic)
             return {};
@@ -460,23 +461,29 @@ class CloudAo::Work {
             constexpr double enough = 0.3; // of the points: else nothing is said
             return all > enough * static_cast<double>(surface.size()) ? opposed / all : 0;
         };
+        const bool told = options_.outside != "auto";
+        const bool in_order = order.random <= hardly_random;
         Sides found;
         double opposed = 0;
-        if (order.random <= hardly_random) {
+        if (in_order && !told) {
             constexpr SidesEffort quick{4000, 60, 300};
             found = found_sides(surface, rays, quick);
-            opposed = opposed_share(found);
-            if (opposed <= some_opposed)
+            if (opposed_share(found) <= some_opposed)
                 return {};
         }
         found = found_sides(surface, rays);
         opposed = opposed_share(found);
-        const bool in_order = order.random <= hardly_random;
-        if (in_order && opposed <= some_opposed)
+        if (in_order && !told && opposed <= some_opposed)
             return {};
-        if (constexpr double clearly = 0.3; in_order && opposed > all_opposed && found.margin < clearly)
-            return {}; // both sides explain the cloud
-        const bool all = in_order || order.random > mostly_random;
+        if (constexpr double clearly = 0.3; in_order && !told && opposed > all_opposed && found.margin < clearly) {
+            if (orientation_.kind == NormalOrientation::Kind::terrain) // else both sides explain the cloud
+                doubt(fmt::format("{:.0f} % of the recorded normals look down, though the cloud seems to be seen from "
+                                  "above (z); they are kept: --cloud.outside up turns them, --cloud.normals recorded "
+                                  "is sure of them",
+                                  100 * opposed));
+            return {};
+        }
+        const bool all = in_order || told || order.random > mostly_random;
         std::size_t turned = 0;
         for (std::size_t i = 0; i < surface.size(); ++i)
             if (found.sign[i] < 0 && (all || found.confidence[i] > sure) && !surface.normals[i].isZero()) {
@@ -485,14 +492,18 @@ class CloudAo::Work {
             }
         turned_ += turned;
         sided_ += surface.size();
-        turned_why_ =
-            in_order ? fmt::format("where sides are sure, {:.0f} % of them opposed them", 100 * opposed)
-                     : fmt::format("{:.0f} % of the points lie in patches whose sides look random", 100 * order.random);
-        if (in_order)
-            doubt(fmt::format(
-                "{:.0f} % of the recorded normals face away from where scanners could have stood; they were "
-                "turned: --cloud.normals recorded keeps them",
-                100 * opposed));
+        if (told)
+            turned_why_ = "--cloud.outside says so";
+        else if (in_order)
+            turned_why_ = fmt::format("where sides are sure, {:.0f} % of them opposed them", 100 * opposed);
+        else
+            turned_why_ =
+                fmt::format("{:.0f} % of the points lie in patches whose sides look random", 100 * order.random);
+        if (!told && (in_order || turned > surface.size() * 3 / 5))
+            doubt(fmt::format("{:.0f} % of the recorded normals face away from where scanners could have stood; they "
+                              "were turned: --cloud.normals recorded keeps them",
+                              in_order ? 100 * opposed
+                                       : 100 * static_cast<double>(turned) / static_cast<double>(surface.size())));
         note_sides(found);
         return all ? std::move(found.confidence) : std::vector<float>();
     }

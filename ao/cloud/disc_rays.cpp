@@ -96,8 +96,11 @@ int DiscRays::seen_from(std::size_t place, const Vector3f& position) const {
     if (!(std::abs(cosine) >= 0.1F) || distance <= 2 * disc)
         return 0;
     const int side = cosine < 0 ? -1 : 1;
-    const float lift = shared::lift_of(disc, surface_.roughness[place], static_cast<float>(discs_.rounding_m()));
-    const Vector3f from = surface_.tree[place] + static_cast<float>(side) * lift * normal + 2 * disc / distance * apart;
+    const float rough = surface_.roughness[place];
+    const float lift = shared::lift_of(disc, rough, static_cast<float>(discs_.rounding_m()));
+    // Past the own surface, but not past the other side of a thin board.
+    const float past = std::min(shared::own_reach(disc), shared::own_depth(disc, rough) / std::abs(cosine));
+    const Vector3f from = surface_.tree[place] + static_cast<float>(side) * lift * normal + past / distance * apart;
     return discs_.blocked(from.cast<double>(), position.cast<double>()) ? 0 : side;
 }
 

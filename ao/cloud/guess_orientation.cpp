@@ -34,11 +34,11 @@ struct ViewFrom {
 /// In cells of half a degree that hold two points or more: wider ones hold near and far surfaces of the same view.
 ViewFrom view_from(const Vector3d& position, std::span<const Vector3d> points) {
     constexpr int columns = 720, rows = 360;
-    struct Cell {
+    struct Direction {
         float nearest = std::numeric_limits<float>::infinity();
         int points = 0;
     };
-    std::vector<Cell> cells(columns * rows);
+    std::vector<Direction> cells(columns * rows);
     const auto cell = [](const Vector3d& p, double range) {
         const double turn = std::atan2(p.y(), p.x()) / (2 * std::numbers::pi) + 0.5;
         const double tilt = std::acos(std::clamp(p.z() / range, -1.0, 1.0)) / std::numbers::pi;
@@ -52,7 +52,7 @@ ViewFrom view_from(const Vector3d& position, std::span<const Vector3d> points) {
         const double range = point.norm();
         if (!(range > 0))
             return;
-        Cell& here = cells[static_cast<std::size_t>(cell(point, range))];
+        Direction& here = cells[static_cast<std::size_t>(cell(point, range))];
         here.nearest = std::min(here.nearest, static_cast<float>(range));
         ++here.points;
         ranges.push_back(static_cast<float>(range));
@@ -70,7 +70,7 @@ ViewFrom view_from(const Vector3d& position, std::span<const Vector3d> points) {
         const double range = point.norm();
         if (!(range > 0))
             return;
-        if (const Cell& here = cells[static_cast<std::size_t>(cell(point, range))]; here.points > 1) {
+        if (const Direction& here = cells[static_cast<std::size_t>(cell(point, range))]; here.points > 1) {
             // More means a second surface. The back of a small thing far away is hardly farther than its front.
             const auto nearest = static_cast<double>(here.nearest);
             first += range <= nearest + std::min(0.25 * nearest, 0.5 * radius);

@@ -218,14 +218,6 @@ class Stations {
         return cover;
     }
 
-    /// Of a labelling or its opposite, whichever is more.
-    [[nodiscard]] double best_cover(const Signs& labels) const {
-        Signs other = labels;
-        for (std::int8_t& label : other)
-            label = static_cast<std::int8_t>(-label);
-        return std::max(cover(labels).share, cover(other).share);
-    }
-
     /// Share of the tests whose front at least three far stations see.
     [[nodiscard]] double seen_from_afar(const Signs& labels) const {
         std::size_t well = 0;
@@ -410,7 +402,6 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
         decision.body = rule == SidesRule::outward;
     } else if (rule == SidesRule::terrain) {
         decision.sign = stations.rise(labels) >= 0 ? 1 : -1;
-        decision.margin = 1;
         decision.why = "up, as of terrain";
     } else if (const bool body = fronts >= 0.9 && afar >= 0.97; body || margin < tie) {
         // Both sides could be the scanned one: a closed room looks like a body from outside. Walls and floors tell, less
@@ -524,7 +515,7 @@ Judged judged(const CloudSurface& surface, const DiscRays& rays, const Patches& 
     const std::vector<Meeting> meetings = shoot(surface, rays, effort.places);
     std::vector<Link> free = ray_links(meetings, patches, reach.usual);
     if (const double all = strength(free); all > 0) { // rays correct what neighbours say, and do not outvote it
-        const double scale = std::min(1.0, 0.35 * strength(near) / all);
+        const double scale = std::min(1.0, 0.7 * strength(near) / all);
         for (Link& link : free)
             link.weight *= scale;
     }
@@ -535,39 +526,18 @@ Judged judged(const CloudSurface& surface, const DiscRays& rays, const Patches& 
         relative.add(link.a, link.b, link.weight);
     for (const Link& link : free)
         relative.add(link.a, link.b, link.weight);
-    const double of_station = 0.35 * strength(near) / std::max(stations.all_seen(), 1.0);
+    const double of_station = 0.2 * strength(near) / std::max(stations.all_seen(), 1.0);
     for (std::size_t c = 0; c < stations.size(); ++c)
         for (std::size_t t = 0; t < stations.tests().size(); ++t)
             if (const std::uint32_t place = stations.tests()[t]; stations.seen(c, t) != 0)
                 relative.add(patches.patch[place], static_cast<std::uint32_t>(patches.count + c),
                              stations.seen(c, t) * patches.sign(place) * std::min(of_station, 1.0));
-    std::vector<std::vector<std::uint32_t>> late;
-    Signs label = relative.signs(0.5, &late);
+    Signs label = relative.signs(0.5);
     label.resize(patches.count);
 
-    const auto of_tests_under = [&](const Signs& labels) {
-        Signs signs;
-        for (const std::uint32_t place : stations.tests())
-            signs.push_back(static_cast<std::int8_t>(labels[patches.patch[place]] * patches.sign(place)));
-        return signs;
-    };
-    // Large parts that were joined late hang on few links: stations know better.
-    Signs of_tests = of_tests_under(label);
-    constexpr std::size_t most_late = 12;
-    constexpr double clearly = 0.01;
-    double best = stations.best_cover(of_tests);
-    for (std::size_t k = late.size(); k-- > 0 && late.size() - k <= most_late;) {
-        Signs turned = label;
-        for (const std::uint32_t patch : late[k])
-            if (patch < patches.count)
-                turned[patch] = static_cast<std::int8_t>(-turned[patch]);
-        Signs tests_turned = of_tests_under(turned);
-        if (const double cover = stations.best_cover(tests_turned); cover > best + clearly) {
-            best = cover;
-            label = std::move(turned);
-            of_tests = std::move(tests_turned);
-        }
-    }
+    Signs of_tests;
+    for (const std::uint32_t place : stations.tests())
+        of_tests.push_back(static_cast<std::int8_t>(label[patches.patch[place]] * patches.sign(place)));
     double front_meets = 0, meets = 0;
     for (const Meeting& ray : meetings) {
         const bool normal_side = ray.direction.dot(surface.normals[ray.from]) > 0;

@@ -15,7 +15,7 @@ void SignedGraph::add(std::uint32_t a, std::uint32_t b, double weight) {
     links_[b][a] += weight;
 }
 
-std::vector<std::int8_t> SignedGraph::signs(double least, std::vector<std::vector<std::uint32_t>>* late) const {
+std::vector<std::int8_t> SignedGraph::signs(double least) const {
     struct Entry {
         double strength;
         std::uint32_t a, b; ///< a < b
@@ -50,9 +50,6 @@ std::vector<std::int8_t> SignedGraph::signs(double least, std::vector<std::vecto
         const std::int8_t turn = entry.weight < 0 ? -1 : 1;
         for (const std::uint32_t member : members[gone])
             signs[member] = static_cast<std::int8_t>(signs[member] * turn);
-        const auto& smaller = members[kept].size() < members[gone].size() ? members[kept] : members[gone];
-        if (late && 50 * smaller.size() >= links.size())
-            late->push_back(smaller);
         members[kept].insert(members[kept].end(), members[gone].begin(), members[gone].end());
         members[gone] = {};
         for (const auto& [other, weight] : links[gone]) {

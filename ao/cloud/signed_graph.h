@@ -23,10 +23,8 @@ class SignedGraph {
     /// Greedy contraction: again and again the strongest link joins its ends, one of which turns over where the link is
     /// negative; links that become parallel add up. Ends when none is stronger than `least`. Returns a sign per node,
     /// +1 or -1: those of one joined part agree with each other.
-    /// Deterministic. `late`, if given, gets the smaller side of each join of two sides that both hold a fiftieth of
-    /// the nodes or more, in the order of the joins: what is decided there matters most, by links that are weak.
-    [[nodiscard]] std::vector<std::int8_t> signs(double least,
-                                                 std::vector<std::vector<std::uint32_t>>* late = nullptr) const;
+    /// Deterministic.
+    [[nodiscard]] std::vector<std::int8_t> signs(double least) const;
 
   private:
     std::vector<std::unordered_map<std::uint32_t, double>> links_; ///< by node: to others
