@@ -476,10 +476,10 @@ class CloudAo::Work {
         if (in_order && !told && opposed <= some_opposed)
             return {};
         if (constexpr double clearly = 0.3; in_order && !told && opposed > all_opposed && found.margin < clearly) {
-            if (orientation_.kind == NormalOrientation::Kind::terrain) // else both sides explain the cloud
+            if (cloud_.z_up) // else both sides explain the cloud, and z may point anywhere
                 doubt(fmt::format("{:.0f} % of the recorded normals look down, though the cloud seems to be seen from "
-                                  "above (z); they are kept: --cloud.outside up turns them, --cloud.normals recorded "
-                                  "is sure of them",
+                                  "above; they are kept: --cloud.outside up turns them, --cloud.normals recorded is "
+                                  "sure of them",
                                   100 * opposed));
             return {};
         }
