@@ -267,6 +267,15 @@ TEST(CloudAo, tiles_change_hardly_anything) {
     EXPECT_LT(rms_between(whole.visibility, tiled.visibility), 0.015);
 }
 
+/// A part of a ball by itself could be seen from either side.
+TEST(CloudAo, tiles_agree_about_sides) {
+    const auto found = visibility(sphere(250000, {10, 20, 30}), {.radius = 0.2, .memory_mib = 64});
+    EXPECT_GE(found.tiles, 2);
+    EXPECT_TRUE(found.doubts.empty()) << tests::joined(found.doubts);
+    EXPECT_TRUE(any_note(found, "outward")) << tests::joined(found.notes);
+    EXPECT_GT(mean(found.visibility), 0.99);
+}
+
 TEST(CloudAo, a_wall_that_holds_most_points_is_divided_too) {
     Points points = square(200000);
     for (std::size_t i = 0; i < points.size(); ++i) // most at the lowest coordinate of the longest axis
