@@ -92,7 +92,7 @@ Ball ball_round(const Facing& facing, std::size_t middle_place, float radius) {
 }
 
 std::optional<float> sigma_round(const Facing& facing, std::size_t place, float widest) {
-    constexpr float two_sheets = 1.6F; // kurtosis of noisy sheets five sigma apart
+    constexpr float two_sheets = 1.6F;          // kurtosis of noisy sheets five sigma apart
     constexpr float growth = 1.5F, flat = 3.5F; // a disc's width is half its radius
     constexpr float no_thicker = 1.3F, rounding = 2e-4F, mostly = 0.7F;
     Nearest nearest;
@@ -122,7 +122,8 @@ CloudNoise::CloudNoise(const NeighbourTree& tree, float widest, std::span<const 
     const std::size_t asked = std::min(sample, tree.size());
     std::vector<std::optional<float>> found(asked);
     const auto place_of = [&](std::size_t i) { return (2 * i + 1) * tree.size() / (2 * asked); };
-    tbb::parallel_for(std::size_t(0), asked, [&](std::size_t i) { found[i] = sigma_round(facing, place_of(i), widest); });
+    tbb::parallel_for(std::size_t(0), asked,
+                      [&](std::size_t i) { found[i] = sigma_round(facing, place_of(i), widest); });
     for (std::size_t i = 0; i < asked; ++i)
         if (found[i]) {
             places_.push_back(tree[place_of(i)]);

@@ -391,7 +391,7 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
                  outside = stations.density_fits(labels_of(-inner), false), boxed = stations.boxed(scene.reach.far);
     constexpr double scanned_within = 0.4, clearly_better = 0.1; // correlations of density with stations' distances
     constexpr double walled = 0.3, hardly_walled = 0.1;          // shares of the points in walls that bound the cloud
-    constexpr double empty = 0.02;               // of the rays that meet something, those from the outer side
+    constexpr double empty = 0.02; // of the rays that meet something, those from the outer side
     // Between shares of points that stations explain. Through the shadows of furniture, walls are seen from behind.
     constexpr double tie = 0.05, near_tie = 0.1, walled_tie = 0.2;
     const double outer_meets = std::min(scene.front_meets, 1 - scene.front_meets);
@@ -407,8 +407,7 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
     } else if (rule == SidesRule::terrain) {
         decision.sign = stations.rise(labels) >= 0 ? 1 : -1;
         decision.why = "up, as of terrain";
-    } else if (const bool body = fronts >= 0.9 && afar >= 0.97;
-               body || margin < (boxed > walled ? walled_tie : tie)) {
+    } else if (const bool body = fronts >= 0.9 && afar >= 0.97; body || margin < (boxed > walled ? walled_tie : tie)) {
         // Both sides could be the scanned one: a closed room looks like a body from outside. Walls and floors tell,
         // less so the density of the points.
         const bool room =
@@ -538,7 +537,7 @@ Judged judged(const CloudSurface& surface, const DiscRays& rays, const Patches& 
             if (const std::uint32_t place = stations.tests()[t]; stations.seen(c, t) != 0)
                 relative.add(patches.patch[place], static_cast<std::uint32_t>(patches.count + c),
                              stations.seen(c, t) * patches.sign(place) * std::min(of_station, 1.0));
-    Signs label = relative.signs(0.5);
+    Signs label = relative.signs();
     label.resize(patches.count);
 
     Signs of_tests;
@@ -614,7 +613,7 @@ Sides sides_of(const CloudSurface& surface, const DiscRays* rays, const std::opt
         absolute.add(link.a, link.b, link.weight * label[link.a] * label[link.b]);
     for (std::uint32_t patch = 0; patch < patches.count; ++patch)
         absolute.add(patch, truth, evidence.sum(patch) + 0.001);
-    const Signs found = absolute.signs(0);
+    const Signs found = absolute.signs();
     Signs turn(patches.count);
     for (std::uint32_t patch = 0; patch < patches.count; ++patch) {
         turn[patch] = static_cast<std::int8_t>(found[patch] * found[truth]);

@@ -37,7 +37,7 @@ enum class SidesRule {
 
 /// Free space is shared: a ray that leaves one plane and meets another tells that both sides are scanned or neither is.
 /// And a scanner sees fronts only: places that see much and hardly any back are as good as the true ones. Both are put
-/// into signed graphs of patches, solved by greedy contraction: first the signs relative to each other, then those to
+/// into signed graphs of patches: first the signs relative to each other, then those to
 /// the stations. `rays` must be made of the surface; null for SidesRule::up alone. With `up`, known to point to the
 /// sky, nobody looks from below, and where no station sees clean fronts (plants), planes face up.
 [[nodiscard]] Sides sides_of(const CloudSurface& surface, const DiscRays* rays,

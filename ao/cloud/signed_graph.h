@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <unordered_map>
 #include <vector>
 
 namespace scanshade {
@@ -10,24 +9,26 @@ namespace scanshade {
 /// Weights are positive where two nodes agree, negative where they oppose each other.
 class SignedGraph {
   public:
-    explicit SignedGraph(std::size_t nodes) : links_(nodes) {}
+    explicit SignedGraph(std::size_t nodes) : nodes_(nodes) {}
 
     struct Link {
         std::uint32_t a, b;
         double weight;
     };
-    /// Links add up.
+    /// Links between the same nodes add up; those of a node to itself say nothing.
     void add(std::uint32_t a, std::uint32_t b, double weight);
-    [[nodiscard]] std::size_t size() const { return links_.size(); }
+    [[nodiscard]] std::size_t size() const { return nodes_; }
 
-    /// Greedy contraction: again and again the strongest link joins its ends, one of which turns over where the link is
-    /// negative; links that become parallel add up. Ends when none is stronger than `least`. Returns a sign per node,
-    /// +1 or -1: those of one joined part agree with each other.
-    /// Deterministic.
-    [[nodiscard]] std::vector<std::int8_t> signs(double least) const;
+    /// A sign per node, +1 or -1, with which the sum of weight x sign x sign over all links is as large as two steps
+    /// make it: the signs of the leading eigenvector of the links, each divided by the root of its ends' weights
+    /// (Singer 2011, "Angular synchronization by eigenvectors", for two angles), by power iteration; then nodes that
+    /// most of their links oppose turn over, until there are none. Parts without a link between them have signs of
+    /// their own. Deterministic.
+    [[nodiscard]] std::vector<std::int8_t> signs() const;
 
   private:
-    std::vector<std::unordered_map<std::uint32_t, double>> links_; ///< by node: to others
+    std::size_t nodes_;
+    std::vector<Link> links_;
 };
 
 } // namespace scanshade

@@ -41,18 +41,35 @@ PointVisibility visibility(const Points& points, const Points& normals = {}, Clo
 }
 
 TEST(SignedGraph, strong_links_outvote_weak_ones_and_parallel_ones_add_up) {
-    SignedGraph graph(5);
+    SignedGraph graph(6);
     graph.add(0, 1, 5);
     graph.add(1, 2, -4);
     graph.add(0, 2, 1); // against the two above
     graph.add(2, 3, 0.6);
     graph.add(2, 3, -1.2); // together -0.6
-    graph.add(3, 4, 0.3);  // too weak
-    const auto signs = graph.signs(0.5);
+    graph.add(5, 5, -9);   // says nothing
+    const auto signs = graph.signs();
     EXPECT_EQ(signs[0], signs[1]);
     EXPECT_EQ(signs[1], -signs[2]);
     EXPECT_EQ(signs[2], -signs[3]);
-    EXPECT_EQ(signs, graph.signs(0.5)) << "deterministic";
+    EXPECT_EQ(signs, graph.signs()) << "deterministic";
+}
+
+/// Two halves, each of one mind, held together by many weak links that a few strong ones contradict.
+TEST(SignedGraph, many_weak_links_between_parts_outvote_a_few_strong_ones) {
+    constexpr std::uint32_t half = 200;
+    SignedGraph graph(2 * half);
+    Dice dice(5);
+    const auto any = [&] { return static_cast<std::uint32_t>(dice.roll() * half); };
+    for (std::uint32_t k = 0; k < 10 * half; ++k) {
+        graph.add(any(), any(), 1);
+        graph.add(half + any(), half + any(), 1);
+        graph.add(any(), half + any(), 0.1);
+    }
+    for (int k = 0; k < 20; ++k)
+        graph.add(any(), half + any(), -5);
+    const auto signs = graph.signs();
+    EXPECT_EQ(std::count(signs.begin(), signs.end(), signs[0]), 2 * half);
 }
 
 /// Every point of a patch agrees on a side, whatever signs its planes came with; patches do not cross a corner.
