@@ -59,14 +59,20 @@ struct Reference {
     std::vector<Vector3d> normals;
 };
 
+struct References {
+    Reference plain;                ///< the unperturbed result
+    std::optional<Reference> truth; ///< of generated clouds
+};
+
 struct Difference {
-    double rms = std::numeric_limits<double>::quiet_NaN(); ///< of visibility
-    double other_side = 0;                                 ///< share of the normals
+    double rms = std::numeric_limits<double>::quiet_NaN();      ///< of visibility
+    double sure_rms = std::numeric_limits<double>::quiet_NaN(); ///< where confidence is above a half
+    double other_side = 0;                                      ///< share of the normals
 };
 
 /// On the points that both have. Planes more than 60 degrees apart are different planes, not sides.
 Difference difference(const Perturbed& perturbed, const PointVisibility& found, const Reference& reference) {
-    double squares = 0, values = 0, opposed = 0, normals = 0;
+    double squares = 0, values = 0, sure_squares = 0, sure_values = 0, opposed = 0, normals = 0;
     for (std::size_t i = 0; i < perturbed.original.size(); ++i) {
         const std::uint32_t there = perturbed.original[i];
         if (there == Perturbed::none)
@@ -74,12 +80,15 @@ Difference difference(const Perturbed& perturbed, const PointVisibility& found, 
         if (const auto off = static_cast<double>(found.visibility[i] - reference.visibility[there]); !std::isnan(off)) {
             squares += off * off;
             values += 1;
+            const bool sure = found.confidence[i] > 0.5F;
+            sure_squares += sure ? off * off : 0;
+            sure_values += sure;
         }
         const double alike = (perturbed.turned * reference.normals[there]).dot(found.normals[i].cast<double>());
         normals += std::abs(alike) > 0.5;
         opposed += alike < -0.5;
     }
-    return {std::sqrt(squares / values), opposed / std::max(normals, 1.0)};
+    return {std::sqrt(squares / values), std::sqrt(sure_squares / sure_values), opposed / std::max(normals, 1.0)};
 }
 
 std::vector<Vector3d> as_doubles(const std::vector<Vector3f>& normals) {
@@ -93,8 +102,8 @@ std::vector<Vector3d> as_doubles(const std::vector<Vector3f>& normals) {
 class Gauntlet {
   public:
     explicit Gauntlet(std::vector<std::string> words) : words_(std::move(words)) {
-        fmt::print("{:<36} {:<16} {:>6} {:>7} {:>6} {:>7} {:>6}  {}\n", "cloud", "perturbation", "rms", "sides %",
-                   "rmse", "wrong %", "s", "status");
+        fmt::print("{:<36} {:<16} {:>6} {:>6} {:>7} {:>6} {:>7} {:>6}  {}\n", "cloud", "perturbation", "rms", "sure",
+                   "sides %", "rmse", "wrong %", "s", "status");
     }
 
     [[nodiscard]] bool wants(const std::string& name) const {
@@ -106,18 +115,21 @@ class Gauntlet {
     /// `truth_of` gives the true values and normals for a radius; null where nobody knows them.
     void run(const TestCloud& cloud, const std::function<Reference(double)>& truth_of = nullptr) {
         const Result plain = result_of(cloud, 0);
-        const Reference reference{plain.found.visibility, as_doubles(plain.found.normals)};
-        const std::optional<Reference> truth = truth_of ? std::optional(truth_of(plain.found.radius)) : std::nullopt;
+        const References references = references_of(plain, truth_of);
         std::vector<Vector3d> finite;
         std::ranges::copy_if(cloud.points, std::back_inserter(finite), [](const auto& p) { return p.allFinite(); });
-        const std::vector<Vector3d>& normals = cloud.normals.empty() ? reference.normals : cloud.normals;
-        const Known known{plain.found.spacing, extent_of(finite).size, normals};
+        const Known known{plain.found.spacing, extent_of(finite).size,
+                          cloud.normals.empty() ? references.plain.normals : cloud.normals};
         for (const Perturbation& perturbation : perturbations()) {
             if (perturbation.recorded_only && cloud.normals.empty())
                 continue;
             const Perturbed changed = perturbed(cloud, perturbation, known);
-            const Result result = result_of(changed.cloud, perturbation.same_radius ? plain.found.radius : 0);
-            print(changed, perturbation, result, reference, truth);
+            const Result result = result_of(changed.cloud, 0);
+            const double radius = result.found.radius;
+            if (perturbation.other_density && std::abs(radius / plain.found.radius - 1) > 0.02)
+                print(changed, perturbation, result, references_of(result_of(cloud, radius), truth_of));
+            else
+                print(changed, perturbation, result, references);
         }
     }
 
@@ -132,15 +144,23 @@ class Gauntlet {
     }
 
   private:
+    static References references_of(const Result& plain, const std::function<Reference(double)>& truth_of) {
+        References references{{plain.found.visibility, as_doubles(plain.found.normals)}, std::nullopt};
+        if (truth_of)
+            references.truth = truth_of(plain.found.radius);
+        return references;
+    }
+
     void print(const Perturbed& changed, const Perturbation& perturbation, const Result& result,
-               const Reference& reference, const std::optional<Reference>& truth) {
-        const Difference off = difference(changed, result.found, reference);
+               const References& references) {
+        const std::optional<Reference>& truth = references.truth;
+        const Difference off = difference(changed, result.found, references.plain);
         const Difference error = truth ? difference(changed, result.found, *truth) : Difference{};
-        const std::string row =
-            fmt::format("{:<36} {:<16} {:>6.3f} {:>7.1f} {:>6} {:>7} {:>6.1f}  {}", changed.cloud.name,
-                        perturbation.name, off.rms, 100 * off.other_side, truth ? fmt::format("{:.3f}", error.rms) : "",
-                        truth ? fmt::format("{:.1f}", 100 * error.other_side) : "", result.seconds,
-                        result.doubts.empty() ? "ok" : "doubtful: " + result.doubts.front());
+        const std::string row = fmt::format("{:<36} {:<16} {:>6.3f} {:>6.3f} {:>7.1f} {:>6} {:>7} {:>6.1f}  {}",
+                                            changed.cloud.name, perturbation.name, off.rms, off.sure_rms,
+                                            100 * off.other_side, truth ? fmt::format("{:.3f}", error.rms) : "",
+                                            truth ? fmt::format("{:.1f}", 100 * error.other_side) : "", result.seconds,
+                                            result.doubts.empty() ? "ok" : "doubtful: " + result.doubts.front());
         fmt::print("{}\n", row);
         if (std::getenv("GAUNTLET_NOTES"))
             for (const std::string& note : result.found.notes)

@@ -43,8 +43,7 @@ struct Perturbation {
     std::string_view name;
     void (*apply)(Perturbed& perturbed, const Known& known);
     bool recorded_only = false; ///< makes sense only where normals are recorded
-    bool same_radius =
-        false; ///< density changes, and with it the automatic radius: the unperturbed one is given instead
+    bool other_density = false; ///< the automatic radius may differ: the unperturbed cloud is computed again with it
 };
 
 /// The first row changes nothing.
