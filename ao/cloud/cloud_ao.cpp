@@ -130,8 +130,9 @@ std::vector<Parameter> CloudAoOptions::parameters() {
          .value = &sky},
         {.name = "up", .help = "the direction of the sky, x,y,z", .value = &up},
         {.name = "outside",
-         .help = "where normals point: auto, up, outward, inward, or to the scanner at x,y,z; all but auto turn recorded "
-                 "ones, too",
+         .help =
+             "where normals point: auto, up, outward, inward, or to the scanner at x,y,z; all but auto turn recorded "
+             "ones, too",
          .value = &outside},
         {.name = "normals",
          .help = "which normals are used; auto = recorded ones where they agree with the planes of the points",
@@ -190,9 +191,12 @@ class CloudAo::Work {
     PointVisibility run() {
         if (options_.sky)
             tile(valid_, valid_);
-        else
+        else {
+            if (valid_.size() > at_once())
+                settle_sides_of_whole();
             cut_into_tiles(cloud_.points, valid_, result_.radius + 16 * result_.spacing, at_once(),
                            [&](const Places& core, const Places& round) { tile(core, round); });
+        }
         compute_strays();
         tell();
         if (gpu_)
@@ -316,20 +320,9 @@ class CloudAo::Work {
 
     void tile(const Places& core, const Places& round, CloudGpu* gpu) {
         auto [surface, fitted] = planes_of(round, gpu);
-        if (!fitted.empty()) {
-            std::vector<std::uint32_t> count(fitted.points.size(), 0);
-            for (const std::uint32_t point : fitted.fitted_of)
-                ++count[point];
-            surface.stands_for.resize(surface.size());
-            for (std::size_t i = 0; i < surface.size(); ++i) {
-                surface.stands_for[i] = count[surface.tree.index(i)];
-                if (fitted.alone[surface.tree.index(i)])
-                    surface.disc_radius[i] = 0;
-            }
-        }
         const std::vector<std::uint32_t> lonely = drop_strays(surface, extent_.centre, result_.spacing);
         std::optional<DiscRays> rays;
-        const std::vector<float> side_known = settle_sides(surface, rays);
+        const std::vector<float> side_known = whole_ ? sides_as_in_whole(surface) : settle_sides(surface, rays);
         for (const std::uint32_t place : lonely)
             surface.normals[place].setZero();
         watch_.lap("sides");
@@ -400,6 +393,54 @@ class CloudAo::Work {
         result_.tiles = ++tiles_;
     }
 
+    /// A cloud of several tiles, thinned: its sides are settled once, so that tiles agree.
+    struct Whole {
+        CloudSurface surface;
+        std::vector<float> known; ///< by place; empty where recorded sides are taken
+    };
+    void settle_sides_of_whole() {
+        constexpr std::size_t enough = 300000;
+        Places some;
+        const std::size_t step = std::max<std::size_t>(1, valid_.size() / enough);
+        for (std::size_t k = step / 2; k < valid_.size(); k += step)
+            some.push_back(valid_[k]);
+        CloudSurface surface = planes_of(some, nullptr).surface;
+        noise_ = 0, moved_ = kept_ = fitted_from_ = 0; // tiles tell of themselves
+        drop_strays(surface, extent_.centre, static_cast<double>(surface.spacing));
+        std::optional<DiscRays> rays;
+        std::vector<float> known = settle_sides(surface, rays);
+        whole_ = {std::move(surface), std::move(known)};
+        watch_.lap("sides");
+    }
+    /// Turns normals like those of the whole's nearest place in the same plane. Returns how sure that is by place.
+    std::vector<float> sides_as_in_whole(CloudSurface& surface) const {
+        const CloudSurface& whole = whole_->surface;
+        const Vector3f apart = (surface.middle - whole.middle).cast<float>();
+        std::vector<float> known(whole_->known.empty() ? 0 : surface.size(), 0.0F);
+        tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
+            Vector3f& normal = surface.normals[i];
+            const Vector3f at = surface.tree[i] + apart;
+            const float reach = 3 * std::max(whole.spacing, surface.disc_radius[i]);
+            constexpr float alike = 0.7F;
+            float nearest = std::numeric_limits<float>::infinity(), cosine = 0;
+            whole.tree.for_each_within(at, reach, [&](std::size_t place) {
+                const float turn = normal.isZero() ? 1.0F : normal.dot(whole.normals[place]);
+                const Vector3f offset = whole.tree[place] - at;
+                const float off_plane = 2 * offset.dot(normal); // the other side of a board is near, too
+                const float distance = offset.squaredNorm() + off_plane * off_plane;
+                if (std::abs(turn) < alike || distance >= nearest)
+                    return;
+                nearest = distance;
+                cosine = turn;
+                if (!known.empty())
+                    known[i] = whole_->known[place];
+            });
+            if (cosine < 0)
+                normal = -normal;
+        });
+        return known;
+    }
+
     /// The sides that the cloud itself tells, or a person.
     Sides found_sides(const CloudSurface& surface, std::optional<DiscRays>& rays,
                       const SidesEffort& effort = {}) const {
@@ -410,13 +451,13 @@ class CloudAo::Work {
             return sides_of(surface, nullptr, orientation_.point.cast<float>().normalized(), SidesRule::up);
         if (!rays)
             rays.emplace(surface);
-        const std::optional<Vector3f> up =
-            orientation_.kind == Kind::terrain || cloud_.z_up ? std::optional<Vector3f>(up_.cast<float>())
-                                                              : std::nullopt;
-        const SidesRule rule = orientation_.kind == Kind::terrain  ? SidesRule::terrain
+        const std::optional<Vector3f> up = orientation_.kind == Kind::terrain || cloud_.z_up
+                                               ? std::optional<Vector3f>(up_.cast<float>())
+                                               : std::nullopt;
+        const SidesRule rule = orientation_.kind == Kind::terrain   ? SidesRule::terrain
                                : orientation_.kind == Kind::outward ? SidesRule::outward
-                               : orientation_.kind == Kind::inward ? SidesRule::inward
-                                                                   : SidesRule::automatic;
+                               : orientation_.kind == Kind::inward  ? SidesRule::inward
+                                                                    : SidesRule::automatic;
         return sides_of(surface, &*rays, up, rule, effort);
     }
 
@@ -476,10 +517,10 @@ class CloudAo::Work {
         if (in_order && !told && opposed <= some_opposed)
             return {};
         if (constexpr double clearly = 0.3; in_order && !told && opposed > all_opposed && found.margin < clearly) {
-            if (orientation_.kind == NormalOrientation::Kind::terrain) // else both sides explain the cloud
+            if (cloud_.z_up) // else both sides explain the cloud, and z may point anywhere
                 doubt(fmt::format("{:.0f} % of the recorded normals look down, though the cloud seems to be seen from "
-                                  "above (z); they are kept: --cloud.outside up turns them, --cloud.normals recorded "
-                                  "is sure of them",
+                                  "above; they are kept: --cloud.outside up turns them, --cloud.normals recorded is "
+                                  "sure of them",
                                   100 * opposed));
             return {};
         }
@@ -578,6 +619,18 @@ class CloudAo::Work {
         noise_ = std::max(noise_, fitted.noise);
         moved_ += fitted.moved;
         kept_ += fitted.points.size();
+        fitted_from_ += which.size();
+        if (!fitted.empty()) {
+            std::vector<std::uint32_t> count(fitted.points.size(), 0);
+            for (const std::uint32_t point : fitted.fitted_of)
+                ++count[point];
+            surface.stands_for.resize(surface.size());
+            for (std::size_t i = 0; i < surface.size(); ++i) {
+                surface.stands_for[i] = count[surface.tree.index(i)];
+                if (fitted.alone[surface.tree.index(i)])
+                    surface.disc_radius[i] = 0;
+            }
+        }
         return {std::move(surface), std::move(fitted)};
     }
 
@@ -591,7 +644,7 @@ class CloudAo::Work {
             result_.notes.push_back(
                 fmt::format("noise of {:.2g} (sigma across surfaces): {:.0f} % of the points were "
                             "moved onto fitted planes; {} discs stand for them.",
-                            noise_, 100.0 * static_cast<double>(moved_) / static_cast<double>(valid_.size()), kept_));
+                            noise_, 100.0 * static_cast<double>(moved_) / static_cast<double>(fitted_from_), kept_));
         const std::string facing = orientation_.kind == NormalOrientation::Kind::viewpoint ? "turned to " : "turned ";
         if (recorded() && turned_ > 0)
             result_.notes.push_back(fmt::format("normals: recorded; {:.2g} % of them were turned, since {}; {}{}.",
@@ -604,11 +657,11 @@ class CloudAo::Work {
         const bool by_whole = orientation_.kind != NormalOrientation::Kind::viewpoint &&
                               orientation_.kind != NormalOrientation::Kind::direction;
         if (tiles_ > 1)
-            result_.notes.push_back(fmt::format(
-                "in {} tiles of at most {} points each{}.", tiles_, at_once(),
-                !recorded() && by_whole ? "; normals were oriented tile by tile: where they look wrong, give "
-                                          "--cloud.outside or more --cloud.memory"
-                                        : ""));
+            result_.notes.push_back(
+                fmt::format("in {} tiles of at most {} points each{}.", tiles_, at_once(),
+                            by_whole && whole_
+                                ? fmt::format("; sides were settled on {} points of the whole", whole_->surface.size())
+                                : ""));
         if (gpu_ && gpu_tiles_ > 0)
             result_.notes.push_back(fmt::format("neighbours, rays and means on {}.", gpu_->device_name()));
         if (gpu_ && gpu_tiles_ < tiles_)
@@ -645,7 +698,8 @@ class CloudAo::Work {
     std::size_t turned_ = 0, sided_ = 0; ///< of the recorded normals, where some were turned
     std::string turned_why_;
     float noise_ = 0;
-    std::size_t moved_ = 0, kept_ = 0;
+    std::size_t moved_ = 0, kept_ = 0, fitted_from_ = 0; ///< points; of tiles, those of their rims as well
+    std::optional<Whole> whole_;
     int tiles_ = 0, gpu_tiles_ = 0, passes_ = 2;
 };
 

@@ -24,7 +24,19 @@ constexpr std::size_t fewest_points = 12;
 struct Ball {
     float thickness = 0, width = 0; ///< standard deviations
     float unrelated = 0;            ///< standard deviation off the plane of points side by side: within cells of it
+    float kurtosis = 3;             ///< of the offsets off the plane: 3 for noise, 1 for two sheets
     std::size_t points = 0;
+};
+
+/// Normals recorded with the points, or none.
+struct Facing {
+    const NeighbourTree& tree;
+    std::span<const Eigen::Vector3d> normals; ///< by index of the cloud
+
+    /// The other side of a thin board is no noise.
+    [[nodiscard]] bool alike(std::size_t one, std::size_t other) const {
+        return normals.empty() || normals[tree.index(one)].dot(normals[tree.index(other)]) >= 0;
+    }
 };
 
 /// Of offsets (x, y in the plane, -1 .. 1; z off it), the standard deviation within cells that hold about four.
@@ -53,43 +65,49 @@ float spread_within_cells(std::span<const Vector3f> offsets) {
     return freedom > 0 ? std::sqrt(std::max(squares, 0.0F) / freedom) : 0;
 }
 
-Ball ball_round(const NeighbourTree& tree, const Vector3f& at, float radius) {
+Ball ball_round(const Facing& facing, std::size_t middle_place, float radius) {
+    const Vector3f& at = facing.tree[middle_place];
     Moments moments;
     std::vector<Vector3f> offsets;
-    tree.for_each_within(at, radius, [&](std::size_t place) {
-        if (offsets.size() < most_points) {
-            offsets.emplace_back((tree[place] - at) / radius);
+    facing.tree.for_each_within(at, radius, [&](std::size_t place) {
+        if (offsets.size() < most_points && facing.alike(place, middle_place)) {
+            offsets.emplace_back((facing.tree[place] - at) / radius);
             moments.add(offsets.back());
         }
     });
     const std::size_t points = offsets.size();
     if (points < fewest_points)
-        return {0, 0, 0, points};
+        return {0, 0, 0, 3, points};
     const PrincipalAxes axes(moments.covariance());
     const float freed = static_cast<float>(points) / static_cast<float>(points - 3); // a plane takes three
     const Vector3f x = axes.normal.unitOrthogonal(), y = axes.normal.cross(x), middle = moments.mean();
-    for (Vector3f& offset : offsets)
+    float fourth = 0;
+    for (Vector3f& offset : offsets) {
         offset = Vector3f(offset.dot(x), offset.dot(y), (offset - middle).dot(axes.normal));
+        fourth += offset.z() * offset.z() * offset.z() * offset.z() / static_cast<float>(points);
+    }
+    const float square = axes.variances[0] * axes.variances[0];
     return {radius * std::sqrt(freed * axes.variances[0]), radius * std::sqrt(axes.variances[1]),
-            radius * spread_within_cells(offsets), points};
+            radius * spread_within_cells(offsets), square > 0 ? fourth / square : 3, points};
 }
 
-std::optional<float> sigma_round(const NeighbourTree& tree, std::size_t place, float widest) {
+std::optional<float> sigma_round(const Facing& facing, std::size_t place, float widest) {
+    constexpr float two_sheets = 1.6F; // kurtosis of noisy sheets five sigma apart
     constexpr float growth = 1.5F, flat = 3.5F; // a disc's width is half its radius
     constexpr float no_thicker = 1.3F, rounding = 2e-4F, mostly = 0.7F;
     Nearest nearest;
-    tree.find_round(place, 16, nearest);
+    facing.tree.find_round(place, 16, nearest);
     if (nearest.all().empty())
         return std::nullopt;
-    const Vector3f at = tree[place];
     float radius = std::sqrt(nearest.all().back().distance2);
     if (!(radius > 0))
         return std::nullopt;
-    for (Ball ball = ball_round(tree, at, radius); radius < widest && ball.points <= most_points / 2;) {
+    for (Ball ball = ball_round(facing, place, radius); radius < widest && ball.points <= most_points / 2;) {
         radius *= growth;
-        const Ball larger = ball_round(tree, at, radius);
+        const Ball larger = ball_round(facing, place, radius);
         if (ball.points >= fewest_points && ball.width > flat * ball.thickness &&
             larger.thickness <= std::max(no_thicker * ball.thickness, rounding * radius) &&
+            (!facing.normals.empty() || larger.kurtosis > two_sheets) &&
             larger.unrelated >= std::min(mostly * larger.thickness, larger.thickness - rounding * radius))
             return larger.unrelated;
         ball = larger;
@@ -99,11 +117,12 @@ std::optional<float> sigma_round(const NeighbourTree& tree, std::size_t place, f
 
 } // namespace
 
-CloudNoise::CloudNoise(const NeighbourTree& tree, float widest) {
+CloudNoise::CloudNoise(const NeighbourTree& tree, float widest, std::span<const Eigen::Vector3d> normals) {
+    const Facing facing{tree, normals};
     const std::size_t asked = std::min(sample, tree.size());
     std::vector<std::optional<float>> found(asked);
     const auto place_of = [&](std::size_t i) { return (2 * i + 1) * tree.size() / (2 * asked); };
-    tbb::parallel_for(std::size_t(0), asked, [&](std::size_t i) { found[i] = sigma_round(tree, place_of(i), widest); });
+    tbb::parallel_for(std::size_t(0), asked, [&](std::size_t i) { found[i] = sigma_round(facing, place_of(i), widest); });
     for (std::size_t i = 0; i < asked; ++i)
         if (found[i]) {
             places_.push_back(tree[place_of(i)]);

@@ -4,6 +4,7 @@
 #include "ao/cloud/neighbours.h"
 
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 namespace scanshade {
@@ -15,8 +16,9 @@ namespace scanshade {
 /// Registration errors of a few sigma count as noise.
 class CloudNoise {
   public:
-    /// Looks at balls up to `widest`, in the tree's unit.
-    CloudNoise(const NeighbourTree& tree, float widest);
+    /// Looks at balls up to `widest`, in the tree's unit. `normals` is empty or holds one per point of the cloud: points
+    /// that face away are another surface then. Without them, two sheets of equal weight are no noise.
+    CloudNoise(const NeighbourTree& tree, float widest, std::span<const Eigen::Vector3d> normals = {});
 
     /// Whether enough places tell it: a fifth of the sample.
     [[nodiscard]] bool known() const { return !sigmas_.empty(); }

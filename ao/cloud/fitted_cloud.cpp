@@ -408,7 +408,7 @@ FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> poin
     if (points.size() < 64)
         return fitted;
     const NeighbourTree& tree = local.tree;
-    const CloudNoise noise(tree, static_cast<float>(radius) / 3);
+    const CloudNoise noise(tree, static_cast<float>(radius) / 3, normals);
     if (!noise.known())
         return fitted;
     const Thinning thinning(tree, normals, noise);

@@ -324,6 +324,9 @@ class Stations {
         }
         if (n < 0.3 * static_cast<double>(tests_.size()))
             return -1;
+        constexpr double even = 0.6; // the logarithm's standard deviation where nothing but chance makes it
+        if ((yy - y * y / n) / n < even * even)
+            return -1;
         const double spread = (xx - x * x / n) * (yy - y * y / n);
         return spread > 0 ? (xy - x * y / n) / std::sqrt(spread) : -1;
     }
@@ -383,13 +386,14 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
     const double shares[] = {std::clamp(covers[0].share, 0.0, 1.0), std::clamp(covers[1].share, 0.0, 1.0)};
     const int inner = scene.front_meets > 0.5 ? 1 : -1, covered = shares[0] >= shares[1] ? 1 : -1;
     const double fronts = stations.fronts_from_afar(labels_of(-inner)),
-                 afar = stations.seen_from_afar(labels_of(-inner)), within = stations.density_fits(labels_of(inner), true),
-                 outside = stations.density_fits(labels_of(-inner), false),
-                 boxed = stations.boxed(scene.reach.far);
+                 afar = stations.seen_from_afar(labels_of(-inner)),
+                 within = stations.density_fits(labels_of(inner), true),
+                 outside = stations.density_fits(labels_of(-inner), false), boxed = stations.boxed(scene.reach.far);
     constexpr double scanned_within = 0.4, clearly_better = 0.1; // correlations of density with stations' distances
     constexpr double walled = 0.3, hardly_walled = 0.1;          // shares of the points in walls that bound the cloud
     constexpr double empty = 0.02;               // of the rays that meet something, those from the outer side
-    constexpr double tie = 0.05, near_tie = 0.1; // between shares of points that stations explain
+    // Between shares of points that stations explain. Through the shadows of furniture, walls are seen from behind.
+    constexpr double tie = 0.05, near_tie = 0.1, walled_tie = 0.2;
     const double outer_meets = std::min(scene.front_meets, 1 - scene.front_meets);
     Decision decision;
     const double margin = std::abs(shares[0] - shares[1]);
@@ -403,11 +407,12 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
     } else if (rule == SidesRule::terrain) {
         decision.sign = stations.rise(labels) >= 0 ? 1 : -1;
         decision.why = "up, as of terrain";
-    } else if (const bool body = fronts >= 0.9 && afar >= 0.97; body || margin < tie) {
-        // Both sides could be the scanned one: a closed room looks like a body from outside. Walls and floors tell, less
-        // so the density of the points.
-        const bool room = boxed > (body ? walled : hardly_walled) ||
-                          within > std::max(scanned_within, outside + clearly_better);
+    } else if (const bool body = fronts >= 0.9 && afar >= 0.97;
+               body || margin < (boxed > walled ? walled_tie : tie)) {
+        // Both sides could be the scanned one: a closed room looks like a body from outside. Walls and floors tell,
+        // less so the density of the points.
+        const bool room =
+            boxed > (body ? walled : hardly_walled) || within > std::max(scanned_within, outside + clearly_better);
         const bool sure_room = boxed > walled && outer_meets > empty;
         decision.sign = room ? inner : -inner;
         decision.body = body && !room;
@@ -431,7 +436,8 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
                                          100 * shares[at(-covered)], 100 * shares[at(covered)]);
     }
     decision.chosen = covers[at(decision.sign)].chosen;
-    if (scene.up_known && rule != SidesRule::outward && rule != SidesRule::inward && !decision.body && shares[at(decision.sign)] < 0.6) {
+    if (scene.up_known && rule != SidesRule::outward && rule != SidesRule::inward && !decision.body &&
+        shares[at(decision.sign)] < 0.6) {
         decision.lost = true;
         decision.doubt.reset();
         decision.why = "up, since no place of a scanner explains most of the surfaces (as among plants)";

@@ -1,0 +1,140 @@
+// The noise of a cloud: measured, thinned and taken away; what is no noise stays.
+#include "ao/cloud/cloud_noise.h"
+#include "ao/cloud/extent.h"
+#include "ao/cloud/fitted_cloud.h"
+#include "tests/support/points.h"
+
+#include <gtest/gtest.h>
+
+namespace scanshade {
+namespace {
+
+using Eigen::Vector3d;
+using tests::corner, tests::Dice, tests::Points, tests::sphere, tests::square;
+
+CloudNoise noise_of(const Points& points, float widest = 0.3F) {
+    const LocalCloud local(points);
+    return {local.tree, widest};
+}
+FittedCloud fitted(const Points& points, double radius = 1) {
+    return fitted_cloud(LocalCloud(points), points, {}, radius);
+}
+
+TEST(CloudNoise, of_a_plane_is_known_at_any_density) {
+    for (const std::size_t count : {20000, 200000})
+        for (const double sigma : {0.002, 0.005, 0.015}) {
+            const CloudNoise noise = noise_of(square(count, sigma));
+            ASSERT_TRUE(noise.known()) << count << " " << sigma;
+            EXPECT_NEAR(static_cast<double>(noise.median()), sigma, 0.12 * sigma) << count;
+            EXPECT_NEAR(static_cast<double>(noise.at({0.3F, 0.2F, 0})), sigma, 0.25 * sigma) << count;
+        }
+}
+
+TEST(CloudNoise, of_a_cloud_without_any_is_next_to_nothing) {
+    EXPECT_LT(noise_of(square(50000)).median(), 1e-5F);
+    EXPECT_LT(noise_of(sphere(50000, {0, 0, 0})).median(), 2e-4F) << "curvature is no noise";
+}
+
+/// Waves as high as noise, but the same side by side; leaves differ side by side, but make no surface.
+TEST(CloudNoise, is_neither_structure_nor_leaves) {
+    Points waves = square(100000);
+    for (Vector3d& p : waves)
+        p.z() = 0.01 * std::sin(40 * p.x());
+    EXPECT_LT(noise_of(waves).median(), 0.002F);
+    Points leaves = square(100000);
+    Dice dice(7);
+    for (Vector3d& p : leaves)
+        p.z() = dice.roll();
+    EXPECT_FALSE(noise_of(leaves).known());
+}
+
+TEST(CloudNoise, differs_from_place_to_place) {
+    Points points = square(100000);
+    Dice dice(7);
+    for (Vector3d& p : points)
+        p.z() = (p.x() < 0 ? 0.002 : 0.006) * dice.gauss();
+    const CloudNoise noise = noise_of(points);
+    EXPECT_NEAR(noise.at({-0.5F, 0, 0}), 0.002F, 0.0006F);
+    EXPECT_NEAR(noise.at({0.5F, 0, 0}), 0.006F, 0.0018F);
+}
+
+TEST(FittedCloud, a_noisy_plane_is_flat_and_every_point_is_stood_for) {
+    const double sigma = 0.005;
+    const Points points = square(100000, sigma);
+    const FittedCloud found = fitted(points);
+    ASSERT_FALSE(found.empty());
+    ASSERT_EQ(found.fitted_of.size(), points.size());
+    EXPECT_LT(found.points.size(), points.size() / 2) << "dense points are taken together";
+    double squares = 0;
+    for (const Vector3d& p : found.points)
+        squares += p.z() * p.z();
+    EXPECT_LT(std::sqrt(squares / static_cast<double>(found.points.size())), 0.2 * sigma);
+    for (std::size_t i = 0; i < points.size(); ++i)
+        ASSERT_LT((found.points[found.fitted_of[i]] - points[i]).norm(), 12 * sigma) << i;
+}
+
+TEST(FittedCloud, nothing_changes_without_noise) { EXPECT_TRUE(fitted(square(20000)).empty()); }
+
+TEST(FittedCloud, corners_stay_sharp) {
+    const double sigma = 0.004;
+    const FittedCloud found = fitted(corner(150000, sigma));
+    std::size_t off = 0, at_edge = 0;
+    for (const Vector3d& p : found.points)
+        if (std::min(p.x(), p.z()) < 0.05 && std::max(p.x(), p.z()) < 0.05) {
+            ++at_edge;
+            off += std::min(std::abs(p.x()), std::abs(p.z())) > 2 * sigma;
+        }
+    ASSERT_GT(at_edge, 50U);
+    EXPECT_LT(static_cast<double>(off), 0.1 * static_cast<double>(at_edge));
+}
+
+/// A board eight sigma thick has two sides.
+TEST(FittedCloud, sheets_do_not_merge) {
+    const double sigma = 0.003, thickness = 8 * sigma;
+    Points points = square(200000, sigma), normals;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        points[i].z() += i % 2 ? thickness : 0;
+        normals.emplace_back(0, 0, i % 2 ? 1 : -1);
+    }
+    EXPECT_TRUE(fitted(points).empty()) << "without normals, the board's thickness is no noise";
+    const FittedCloud found = fitted_cloud(LocalCloud(points), points, normals, 1);
+    ASSERT_FALSE(found.empty());
+    EXPECT_NEAR(static_cast<double>(found.noise), sigma, 0.15 * sigma);
+    std::size_t between = 0;
+    for (const Vector3d& p : found.points)
+        between += std::abs(p.z() - thickness / 2) < thickness / 4;
+    EXPECT_LT(static_cast<double>(between), 0.05 * static_cast<double>(found.points.size()));
+}
+
+TEST(Extent, is_that_of_the_cloud_and_not_of_its_strays) {
+    Points points = square(20000);
+    const Extent alone = extent_of(points);
+    EXPECT_NEAR(alone.size, 2 * std::sqrt(2.0), 0.1);
+    Dice dice(7);
+    for (int i = 0; i < 200; ++i)
+        points.emplace_back(1e8 * dice.gauss(), 1e8 * dice.gauss(), 1e8 * dice.gauss());
+    const Extent found = extent_of(points);
+    EXPECT_NEAR(found.size, alone.size, 0.05);
+    EXPECT_LT((found.centre - alone.centre).norm(), 0.05);
+    EXPECT_LT(found.farthest, 100);
+    EXPECT_GT(found.farthest, 1.4);
+}
+
+/// A point by itself above a plane occludes nothing; so does none that is a kilometre away.
+TEST(Extent, strays_lose_their_discs) {
+    Points points = square(20000);
+    points.emplace_back(0, 0, 0.5);
+    points.emplace_back(0, 0, 0.9);
+    CloudSurface surface = cloud_surface(LocalCloud(points), {});
+    const auto lonely = drop_strays(surface, Vector3d::Zero(), static_cast<double>(surface.spacing));
+    EXPECT_EQ(lonely.size(), 2U);
+    std::size_t without = 0;
+    for (std::size_t place = 0; place < surface.size(); ++place) {
+        without += surface.disc_radius[place] == 0;
+        EXPECT_TRUE(surface.tree[place].z() < 0.1F || surface.disc_radius[place] == 0) << place;
+    }
+    EXPECT_LT(without, 8U) << "the plane keeps its own";
+}
+
+} // namespace
+} // namespace scanshade

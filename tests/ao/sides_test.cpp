@@ -1,0 +1,190 @@
+// Which side of a cloud's planes was scanned: from graphs of patches to whole scenes.
+#include "ao/cloud/sides.h"
+
+#include "ao/cloud/cloud_ao.h"
+#include "ao/cloud/patches.h"
+#include "apps/scenes/scanner.h"
+#include "tests/support/files.h"
+#include "tests/support/points.h"
+
+#include <gtest/gtest.h>
+
+namespace scanshade {
+namespace {
+
+using Eigen::Vector3d, Eigen::Vector3f;
+using tests::Dice, tests::Points, tests::sphere, tests::square;
+
+/// Shares of the points whose normal is on the wrong side, and of those that claim to be sure of it.
+struct Wrong {
+    double all = 0, sure = 0, share_sure = 0;
+};
+Wrong wrong_sides(const PointVisibility& found, const Points& truth) {
+    double points = 0, wrong = 0, sure = 0, surely_wrong = 0;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+        const double cosine = found.normals[i].cast<double>().dot(truth[i]);
+        if (std::abs(cosine) < 0.5)
+            continue;
+        const bool is_sure = found.confidence[i] > 0.8F;
+        points += 1, wrong += cosine < 0, sure += is_sure, surely_wrong += is_sure && cosine < 0;
+    }
+    return {wrong / points, surely_wrong / std::max(sure, 1.0), sure / points};
+}
+
+const scene::World& world_of(const std::string& name) {
+    static std::map<std::string, scene::World> worlds;
+    return worlds.try_emplace(name, scene::scene_named(name)).first->second;
+}
+
+PointVisibility visibility(const Points& points, const Points& normals = {}, CloudAoOptions options = {.radius = 0.5}) {
+    return CloudAo(std::move(options)).compute({points, normals});
+}
+
+TEST(SignedGraph, strong_links_outvote_weak_ones_and_parallel_ones_add_up) {
+    SignedGraph graph(5);
+    graph.add(0, 1, 5);
+    graph.add(1, 2, -4);
+    graph.add(0, 2, 1); // against the two above
+    graph.add(2, 3, 0.6);
+    graph.add(2, 3, -1.2); // together -0.6
+    graph.add(3, 4, 0.3);  // too weak
+    const auto signs = graph.signs(0.5);
+    EXPECT_EQ(signs[0], signs[1]);
+    EXPECT_EQ(signs[1], -signs[2]);
+    EXPECT_EQ(signs[2], -signs[3]);
+    EXPECT_EQ(signs, graph.signs(0.5)) << "deterministic";
+}
+
+/// Every point of a patch agrees on a side, whatever signs its planes came with; patches do not cross a corner.
+TEST(Patches, agree_within_themselves_and_end_at_corners) {
+    Points points = tests::corner(20000);
+    CloudSurface surface = cloud_surface(LocalCloud(points), {});
+    Dice dice(7);
+    for (Vector3f& normal : surface.normals)
+        if (dice.roll() < 0.5)
+            normal = -normal;
+    const Patches patches = patches_of(surface, SurePairs(surface));
+    std::vector<Vector3f> sides(patches.count, Vector3f::Zero());
+    std::size_t opposed = 0;
+    for (std::size_t i = 0; i < surface.size(); ++i) {
+        const Vector3f side = static_cast<float>(patches.sign(i)) * surface.normals[i];
+        Vector3f& sum = sides[patches.patch[i]];
+        opposed += side.dot(sum) < 0;
+        sum += side;
+    }
+    EXPECT_LT(static_cast<double>(opposed), 0.002 * static_cast<double>(surface.size()));
+    EXPECT_LT(patches.count, surface.size() / 10);
+}
+
+TEST(RecordedSides, tell_random_signs_from_thin_boards) {
+    Points board = square(40000);
+    Points normals;
+    for (std::size_t i = 0; i < board.size(); ++i) {
+        board[i].z() = i % 2 ? 0.008 : 0;
+        normals.emplace_back(0, 0, i % 2 ? 1 : -1);
+    }
+    const auto random_share = [&] { return recorded_sides(cloud_surface(LocalCloud(board), normals)).random; };
+    EXPECT_LT(random_share(), 0.02) << "two sheets";
+    Dice dice(7);
+    for (Vector3d& normal : normals)
+        if (dice.roll() < 0.5)
+            normal = -normal;
+    EXPECT_GT(random_share(), 0.9);
+}
+
+class Scans : public testing::TestWithParam<const char*> {};
+
+TEST_P(Scans, without_normals_are_seen_from_where_they_were_scanned) {
+    const auto cloud = scene::scanned_cloud(world_of(GetParam()), 100000, {.stations = 6, .noise_m = 0.002});
+    const auto found = visibility(cloud.points);
+    const Wrong wrong = wrong_sides(found, cloud.normals);
+    EXPECT_LT(wrong.all, 0.03);
+    EXPECT_LT(wrong.sure, 0.002);
+    EXPECT_GT(wrong.share_sure, 0.6);
+    EXPECT_TRUE(found.doubts.empty()) << tests::joined(found.doubts);
+}
+
+TEST_P(Scans, with_random_signs_or_some_patches_turned_over_come_out_the_same) {
+    const auto cloud = scene::scanned_cloud(world_of(GetParam()), 100000, {.stations = 6, .noise_m = 0.002});
+    Dice dice(7);
+    Points random = cloud.normals, torn = cloud.normals;
+    for (Vector3d& normal : random)
+        if (dice.roll() < 0.5)
+            normal = -normal;
+    for (std::size_t i = 0; i < torn.size(); ++i) // every fourth cube of 60 cm
+        if (const Vector3d cell = (cloud.points[i] / 0.6).array().floor();
+            static_cast<long>(cell.sum()) % 4 == 0 && torn[i].norm() > 0)
+            torn[i] = -torn[i];
+    EXPECT_LT(wrong_sides(visibility(cloud.points, random), cloud.normals).all, 0.03);
+    const auto mended = visibility(cloud.points, torn);
+    EXPECT_LT(wrong_sides(mended, cloud.normals).all, 0.03);
+    EXPECT_TRUE(std::any_of(mended.notes.begin(), mended.notes.end(),
+                            [](const std::string& note) { return note.find("were turned") != note.npos; }));
+}
+
+TEST_P(Scans, keep_recorded_normals_that_are_right) {
+    const auto cloud = scene::scanned_cloud(world_of(GetParam()), 100000, {.stations = 6, .noise_m = 0.002});
+    const auto found = visibility(cloud.points, cloud.normals);
+    EXPECT_EQ(wrong_sides(found, cloud.normals).all, 0);
+    EXPECT_TRUE(found.doubts.empty()) << tests::joined(found.doubts);
+}
+
+INSTANTIATE_TEST_SUITE_P(of, Scans, testing::Values("office", "clutter", "thin", "columns", "outdoor"));
+
+/// Thin boards and backs of furniture, as dense as the rest; no scanner's density tells where it stood.
+TEST(Sides, a_room_of_even_density_is_seen_from_within) {
+    for (const char* name : {"office", "thin", "columns"}) {
+        const auto cloud = scene::scene_cloud(world_of(name), 100000);
+        const Wrong wrong = wrong_sides(visibility(cloud.points), cloud.normals);
+        EXPECT_LT(wrong.all, 0.06) << name;
+        EXPECT_LT(wrong.sure, 0.01) << name;
+    }
+}
+
+TEST(Sides, true_normals_of_boards_and_shelves_are_kept) {
+    for (const char* name : {"clutter", "thin"}) {
+        const auto cloud = scene::scene_cloud(world_of(name), 100000);
+        const auto found = visibility(cloud.points, cloud.normals);
+        EXPECT_EQ(wrong_sides(found, cloud.normals).all, 0) << name;
+    }
+}
+
+/// What two answers explain equally well is doubted.
+TEST(Sides, an_empty_box_could_be_either) {
+    Points box;
+    Dice dice(7);
+    for (int i = 0; i < 60000; ++i) {
+        Vector3d p(2 * dice.roll() - 1, 2 * dice.roll() - 1, 2 * dice.roll() - 1);
+        p[i % 3] = i % 2 ? 1 : -1;
+        box.push_back(p.cwiseProduct(Vector3d(2, 1.5, 1)) + Vector3d(10, 20, 5));
+    }
+    EXPECT_FALSE(visibility(box).doubts.empty());
+    EXPECT_TRUE(visibility(box, {}, {.radius = 0.5, .outside = "inward"}).doubts.empty());
+}
+
+TEST(Sides, round_bodies_are_seen_from_outside) {
+    Points snowman;
+    for (const auto& [x, z, r] : {std::array{0.0, 0.0, 1.0}, {0.0, 1.3, 0.7}, {0.0, 2.2, 0.45}, {0.8, 1.3, 0.3}})
+        for (const Vector3d& p : sphere(static_cast<std::size_t>(20000 * r * r), {0, 0, 0}))
+            snowman.push_back(r * p + Vector3d(x, 0, z));
+    const std::array<std::pair<Vector3d, double>, 4> balls = {
+        {{{0, 0, 0}, 1}, {{0, 0, 1.3}, 0.7}, {{0, 0, 2.2}, 0.45}, {{0.8, 0, 1.3}, 0.3}}};
+    std::erase_if(snowman, [&](const Vector3d& p) {
+        return std::any_of(balls.begin(), balls.end(),
+                           [&](const auto& ball) { return (p - ball.first).norm() < 0.999 * ball.second; });
+    });
+    const auto found = visibility(snowman);
+    double inward = 0;
+    for (std::size_t i = 0; i < snowman.size(); ++i) {
+        double outside = 0;
+        for (const auto& [centre, radius] : balls)
+            if (const Vector3d out = snowman[i] - centre; std::abs(out.norm() - radius) < 1e-6)
+                outside = found.normals[i].cast<double>().dot(out);
+        inward += outside < 0;
+    }
+    EXPECT_LT(inward, 0.01 * static_cast<double>(snowman.size()));
+    EXPECT_TRUE(found.doubts.empty()) << tests::joined(found.doubts);
+}
+
+} // namespace
+} // namespace scanshade
