@@ -638,9 +638,17 @@ Sides sides_of(const CloudSurface& surface, const DiscRays* rays, const std::opt
 
 Sides sides_to(const CloudSurface& surface, const Vector3f& position) {
     Sides sides{Signs(surface.size(), 1), std::vector<float>(surface.size(), 1.0F), {}, 0, {}};
+    std::vector<float> towards(surface.size()); // cosines
     for (std::size_t i = 0; i < surface.size(); ++i)
-        if (surface.normals[i].dot(position - surface.tree[i]) < 0)
+        towards[i] = surface.normals[i].dot((position - surface.tree[i]).stableNormalized());
+    tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
+        float votes = towards[i];
+        for (const std::uint32_t j : surface.near[i])
+            if (j != i)
+                votes += surface.normals[i].dot(surface.normals[j]) * towards[j];
+        if (votes < 0)
             sides.sign[i] = -1;
+    });
     return sides;
 }
 
