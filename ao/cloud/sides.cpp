@@ -391,9 +391,10 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
                  outside = stations.density_fits(labels_of(-inner), false), boxed = stations.boxed(scene.reach.far);
     constexpr double scanned_within = 0.4, clearly_better = 0.1; // correlations of density with stations' distances
     constexpr double walled = 0.3, hardly_walled = 0.1;          // shares of the points in walls that bound the cloud
-    constexpr double empty = 0.02;               // of the rays that meet something, those from the outer side
+    constexpr double empty = 0.02; // of the rays that meet something, those from the outer side
     // Between shares of points that stations explain. Through the shadows of furniture, walls are seen from behind.
     constexpr double tie = 0.05, near_tie = 0.1, walled_tie = 0.2;
+    constexpr double hardly_explained = 0.7; // share of the points
     const double outer_meets = std::min(scene.front_meets, 1 - scene.front_meets);
     Decision decision;
     const double margin = std::abs(shares[0] - shares[1]);
@@ -407,8 +408,7 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
     } else if (rule == SidesRule::terrain) {
         decision.sign = stations.rise(labels) >= 0 ? 1 : -1;
         decision.why = "up, as of terrain";
-    } else if (const bool body = fronts >= 0.9 && afar >= 0.97;
-               body || margin < (boxed > walled ? walled_tie : tie)) {
+    } else if (const bool body = fronts >= 0.9 && afar >= 0.97; body || margin < (boxed > walled ? walled_tie : tie)) {
         // Both sides could be the scanned one: a closed room looks like a body from outside. Walls and floors tell,
         // less so the density of the points.
         const bool room =
@@ -434,6 +434,10 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
             decision.doubt = fmt::format("the other side of all surfaces explains the cloud nearly as well ({:.0f} % "
                                          "against {:.0f} %); --cloud.outside sets it",
                                          100 * shares[at(-covered)], 100 * shares[at(covered)]);
+        else if (!scene.up_known && shares[at(covered)] < hardly_explained)
+            decision.doubt = fmt::format("the places where a scanner could have stood see only {:.0f} % of the points "
+                                         "from the front, as among plants; --cloud.outside sets the side",
+                                         100 * shares[at(covered)]);
     }
     decision.chosen = covers[at(decision.sign)].chosen;
     if (scene.up_known && rule != SidesRule::outward && rule != SidesRule::inward && !decision.body &&
