@@ -132,19 +132,19 @@ void misaligned(Perturbed& p, const Known& known) {
 }
 
 constexpr Perturbation table[] = {
-    {"unperturbed", nothing},
-    {"noise", noise},
-    {"strays", strays},
-    {"no normals", no_normals, true},
-    {"flipped", flipped},
-    {"random signs", random_signs},
-    {"flipped patches", flipped_patches},
-    {"10x units", ten_times},
-    {"y up", y_up},
-    {"x up", x_up},
-    {"a quarter", quarter, false, true},
-    {"twice", twice, false, true},
-    {"misaligned", misaligned},
+    {.name = "unperturbed", .apply = nothing},
+    {.name = "noise", .apply = noise},
+    {.name = "strays", .apply = strays},
+    {.name = "no normals", .apply = no_normals, .recorded_only = true},
+    {.name = "flipped", .apply = flipped, .turns_all = true},
+    {.name = "random signs", .apply = random_signs},
+    {.name = "flipped patches", .apply = flipped_patches},
+    {.name = "10x units", .apply = ten_times},
+    {.name = "y up", .apply = y_up},
+    {.name = "x up", .apply = x_up},
+    {.name = "a quarter", .apply = quarter, .other_density = true},
+    {.name = "twice", .apply = twice, .other_density = true},
+    {.name = "misaligned", .apply = misaligned},
 };
 
 } // namespace
