@@ -517,11 +517,16 @@ class CloudAo::Work {
         if (in_order && !told && opposed <= some_opposed)
             return {};
         if (constexpr double clearly = 0.3; in_order && !told && opposed > all_opposed && found.margin < clearly) {
-            if (cloud_.z_up) // else both sides explain the cloud, and z may point anywhere
+            const bool viewed = orientation_.kind == NormalOrientation::Kind::viewpoint;
+            if (cloud_.z_up)
                 doubt(fmt::format("{:.0f} % of the recorded normals look down, though the cloud seems to be seen from "
                                   "above; they are kept: --cloud.outside up turns them, --cloud.normals recorded is "
                                   "sure of them",
                                   100 * opposed));
+            else if (orientation_.kind != NormalOrientation::Kind::terrain && !found.doubt) // z may point anywhere
+                doubt(fmt::format("{:.0f} % of the recorded normals face away from {}; they are kept: --cloud.outside "
+                                  "turns them, --cloud.normals recorded is sure of them",
+                                  100 * opposed, viewed ? orientation_.why : "where scanners could have stood"));
             return {};
         }
         const bool all = in_order || told || order.random > mostly_random;

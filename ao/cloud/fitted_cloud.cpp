@@ -38,13 +38,37 @@ struct Cells {
     Indices members;
 };
 
+/// Zero where there is none.
+Vector3f unit_normal(const Vector3d& normal) {
+    return normal.allFinite() && normal.norm() > 0.1 ? Vector3f(normal.normalized().cast<float>())
+                                                     : Vector3f(Vector3f::Zero());
+}
+
+/// Recorded signs may be random; then both sides of a plane are one.
+bool sides_agree(const NeighbourTree& tree, std::span<const Vector3d> normals) {
+    constexpr std::size_t sample = 2000;
+    constexpr double random_from = 0.1;
+    std::size_t opposed = 0, pairs = 0;
+    for (std::size_t k = 0; k < sample; ++k) {
+        const std::size_t place = (2 * k + 1) * tree.size() / (2 * sample);
+        Nearest nearest;
+        tree.find_round(place, 1, nearest);
+        if (nearest.all().empty())
+            continue;
+        ++pairs;
+        opposed +=
+            unit_normal(normals[tree.index(place)]).dot(unit_normal(normals[tree.index(nearest.all()[0].point)])) <
+            -0.7F;
+    }
+    return static_cast<double>(opposed) < random_from * static_cast<double>(pairs);
+}
+
 /// Halves runs of the tree until each part is a cell.
 class Thinning {
   public:
-    Thinning(const NeighbourTree& tree, std::span<const Vector3d> normals, const CloudNoise& noise)
-        : tree_(tree), normals_(normals), noise_(noise), sides_(!normals.empty() && sides_agree()) {}
+    Thinning(const NeighbourTree& tree, std::span<const Vector3d> normals, const CloudNoise& noise, bool sides)
+        : tree_(tree), normals_(normals), noise_(noise), sides_(sides) {}
 
-    [[nodiscard]] bool sides() const { return sides_; } ///< whether recorded normals tell them
     [[nodiscard]] Cells run() const {
         std::vector<std::pair<std::size_t, std::size_t>> blocks;
         tree_.walk([&](float, std::size_t begin, std::size_t end, bool leaf) {
@@ -134,28 +158,8 @@ class Thinning {
         halve(part, begin + half, end, sigma);
     }
 
-    [[nodiscard]] Vector3f normal_of(std::uint32_t place) const {
-        const Vector3d& normal = normals_[tree_.index(place)];
-        return normal.allFinite() && normal.norm() > 0.1 ? Vector3f(normal.normalized().cast<float>())
-                                                         : Vector3f(Vector3f::Zero());
-    }
+    [[nodiscard]] Vector3f normal_of(std::uint32_t place) const { return unit_normal(normals_[tree_.index(place)]); }
 
-    /// Recorded signs may be random; then both sides of a plane are one.
-    [[nodiscard]] bool sides_agree() const {
-        constexpr std::size_t sample = 2000;
-        constexpr double random_from = 0.1;
-        std::size_t opposed = 0, pairs = 0;
-        for (std::size_t k = 0; k < sample; ++k) {
-            const std::size_t place = (2 * k + 1) * tree_.size() / (2 * sample);
-            Nearest nearest;
-            tree_.find_round(place, 1, nearest);
-            if (nearest.all().empty())
-                continue;
-            ++pairs;
-            opposed += normal_of(static_cast<std::uint32_t>(place)).dot(normal_of(nearest.all()[0].point)) < -0.7F;
-        }
-        return static_cast<double>(opposed) < random_from * static_cast<double>(pairs);
-    }
     [[nodiscard]] float alike_to(const Vector3f& first, const Vector3f& other) const {
         return sides_ ? first.dot(other) : std::abs(first.dot(other));
     }
@@ -408,14 +412,14 @@ FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> poin
     if (points.size() < 64)
         return fitted;
     const NeighbourTree& tree = local.tree;
-    const CloudNoise noise(tree, static_cast<float>(radius) / 3, normals);
+    const bool sides = !normals.empty() && sides_agree(tree, normals);
+    const CloudNoise noise(tree, static_cast<float>(radius) / 3, sides ? normals : std::span<const Vector3d>());
     if (!noise.known())
         return fitted;
-    const Thinning thinning(tree, normals, noise);
-    Cells cells = thinning.run();
+    Cells cells = Thinning(tree, normals, noise, sides).run();
     if (std::none_of(cells.all.begin(), cells.all.end(), [](const Cell& cell) { return cell.sigma > 0; }))
         return fitted;
-    fitted.axes = Fit(cells.all, thinning.sides()).run();
+    fitted.axes = Fit(cells.all, sides).run();
     for (std::size_t i = 0; i < cells.all.size(); ++i)
         if (cells.all[i].count > 1 || !fitted.axes[i].isZero())
             fitted.moved += cells.all[i].count;

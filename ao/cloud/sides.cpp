@@ -394,6 +394,7 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
     constexpr double empty = 0.02; // of the rays that meet something, those from the outer side
     // Between shares of points that stations explain. Through the shadows of furniture, walls are seen from behind.
     constexpr double tie = 0.05, near_tie = 0.1, walled_tie = 0.2;
+    constexpr double hardly_explained = 0.7; // share of the points
     const double outer_meets = std::min(scene.front_meets, 1 - scene.front_meets);
     Decision decision;
     const double margin = std::abs(shares[0] - shares[1]);
@@ -433,6 +434,10 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
             decision.doubt = fmt::format("the other side of all surfaces explains the cloud nearly as well ({:.0f} % "
                                          "against {:.0f} %); --cloud.outside sets it",
                                          100 * shares[at(-covered)], 100 * shares[at(covered)]);
+        else if (!scene.up_known && shares[at(covered)] < hardly_explained)
+            decision.doubt = fmt::format("the places where a scanner could have stood see only {:.0f} % of the points "
+                                         "from the front, as among plants; --cloud.outside sets the side",
+                                         100 * shares[at(covered)]);
     }
     decision.chosen = covers[at(decision.sign)].chosen;
     if (scene.up_known && rule != SidesRule::outward && rule != SidesRule::inward && !decision.body &&
@@ -637,9 +642,17 @@ Sides sides_of(const CloudSurface& surface, const DiscRays* rays, const std::opt
 
 Sides sides_to(const CloudSurface& surface, const Vector3f& position) {
     Sides sides{Signs(surface.size(), 1), std::vector<float>(surface.size(), 1.0F), {}, 0, {}};
+    std::vector<float> towards(surface.size()); // cosines
     for (std::size_t i = 0; i < surface.size(); ++i)
-        if (surface.normals[i].dot(position - surface.tree[i]) < 0)
+        towards[i] = surface.normals[i].dot((position - surface.tree[i]).stableNormalized());
+    tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
+        float votes = towards[i];
+        for (const std::uint32_t j : surface.near[i])
+            if (j != i)
+                votes += surface.normals[i].dot(surface.normals[j]) * towards[j];
+        if (votes < 0)
             sides.sign[i] = -1;
+    });
     return sides;
 }
 

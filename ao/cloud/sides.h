@@ -44,7 +44,8 @@ enum class SidesRule {
                              const std::optional<Eigen::Vector3f>& up, SidesRule rule = SidesRule::automatic,
                              const SidesEffort& effort = {});
 
-/// Sides towards a position relative to the surface's middle; each point by itself.
+/// Sides towards a position relative to the surface's middle. Neighbours vote, by the cosines under which they are
+/// seen: where a plane is seen at a grazing angle, a small error of its normal would turn it over.
 [[nodiscard]] Sides sides_to(const CloudSurface& surface, const Eigen::Vector3f& position);
 
 /// How recorded normals agree with their neighbours, patch by patch.

@@ -166,6 +166,8 @@ Vector3d up_across_largest_plane(const Drawn& drawn) {
             best = candidates[c];
         }
     }
+    if (most < 0) // no plane, so no floor
+        return best;
     double sign = 0;
     for (const Vector3f& normal : drawn.normals)
         if (const double along = normal.cast<double>().dot(best); std::abs(along) > within)
