@@ -7,6 +7,7 @@
 #include "ao/cloud/fitted_cloud.h"
 #include "ao/cloud/sides.h"
 #include "ao/cloud/tiles.h"
+#include "ao/cloud/twins.h"
 #include "ao/raycast/raycast.h"
 #include "projection/error.h"
 #include "projection/hash.h"
@@ -56,16 +57,24 @@ class Watch {
     Stopwatch stopwatch_;
 };
 
-/// About `wanted` of the points, chosen by a hash: every n-th point in recording order would skip whole scan lines.
-std::vector<Vector3d> sampled(std::span<const Vector3d> points, std::size_t wanted) {
+/// About `wanted` of these points, chosen by a hash: every n-th point in recording order would skip whole scan lines.
+std::vector<Vector3d> sampled(std::span<const Vector3d> points, const Places& places, std::size_t wanted) {
     const double share =
-        std::min(1.0, static_cast<double>(wanted) / static_cast<double>(std::max<std::size_t>(points.size(), 1)));
+        std::min(1.0, static_cast<double>(wanted) / static_cast<double>(std::max<std::size_t>(places.size(), 1)));
     const auto chosen = static_cast<std::uint64_t>(share * 0x1p32);
     std::vector<Vector3d> some;
-    for (std::size_t i = 0; i < points.size(); ++i)
-        if (points[i].allFinite() && hash(static_cast<std::uint32_t>(i)) < chosen)
+    for (const std::uint32_t i : places)
+        if (hash(i) < chosen)
             some.push_back(points[i]);
     return some;
+}
+
+Places finite(std::span<const Vector3d> points) {
+    Places places;
+    for (std::size_t i = 0; i < points.size(); ++i)
+        if (points[i].allFinite())
+            places.push_back(static_cast<std::uint32_t>(i));
+    return places;
 }
 
 /// A neighbour's weight in the mean is e^(this distance^2): visibility hardly changes over a tenth of the radius.
@@ -177,10 +186,9 @@ class CloudAo::Work {
         result_.visibility.assign(cloud.points.size(), nothing);
         result_.confidence.assign(cloud.points.size(), 0.0F);
         result_.normals.assign(cloud.points.size(), Vector3f::Zero());
-        for (std::size_t i = 0; i < cloud.points.size(); ++i)
-            if (cloud.points[i].allFinite())
-                valid_.push_back(static_cast<std::uint32_t>(i));
-        std::vector<Vector3d> some = sampled(cloud.points, enough_to_judge);
+        valid_ = finite(cloud.points);
+        twins_ = take_out_twins(cloud.points, recorded() ? cloud.normals : std::span<const Vector3d>(), valid_);
+        std::vector<Vector3d> some = sampled(cloud.points, valid_, enough_to_judge);
         settle_extent(some);
         settle_orientation(viewpoint, scanner, some);
         settle_radius(some);
@@ -198,6 +206,11 @@ class CloudAo::Work {
                            [&](const Places& core, const Places& round) { tile(core, round); });
         }
         compute_strays();
+        for (const auto& [point, same_as] : twins_) {
+            result_.visibility[point] = result_.visibility[same_as];
+            result_.confidence[point] = result_.confidence[same_as];
+            result_.normals[point] = result_.normals[same_as];
+        }
         tell();
         if (gpu_)
             for (const auto& [pass, ms] : gpu_->timings())
@@ -672,6 +685,9 @@ class CloudAo::Work {
         if (gpu_ && gpu_tiles_ < tiles_)
             result_.notes.push_back(fmt::format("{} of {} tiles were too large for {}; the processor computed them.",
                                                 tiles_ - gpu_tiles_, tiles_, gpu_->device_name()));
+        if (!twins_.empty())
+            result_.notes.push_back(
+                fmt::format("{} points are at the coordinates of others: they count once.", twins_.size()));
         if (!strays_.empty())
             result_.notes.push_back(
                 fmt::format("{} points lie more than {:.4g} from the middle of the cloud, far from all "
@@ -698,7 +714,8 @@ class CloudAo::Work {
     std::optional<DirectionSet> directions_;
     NormalOrientation orientation_;
     Extent extent_;
-    Places valid_, strays_; ///< strays lie beyond the cloud
+    Places valid_, strays_;   ///< strays lie beyond the cloud
+    std::vector<Twin> twins_; ///< copies of points, in neither
     bool normals_refused_ = false;
     std::size_t turned_ = 0, sided_ = 0; ///< of the recorded normals, where some were turned
     std::string turned_why_;
@@ -724,7 +741,7 @@ PointVisibility CloudAo::of_mesh(const PointSet& mesh) const {
                 (mesh.points[static_cast<std::size_t>(a)] - mesh.points[static_cast<std::size_t>(b)]).norm()));
     if (!edges.empty())
         result.spacing = static_cast<double>(median(std::move(edges)));
-    const double extent = extent_of(sampled(mesh.points, 60000)).size;
+    const double extent = extent_of(sampled(mesh.points, finite(mesh.points), 60000)).size;
     result.radius =
         std::clamp(options_.radius > 0 ? options_.radius : default_radius(extent, result.spacing), 1e-6, 1e6);
     const int rays = options_.rays > 0 ? options_.rays : 64;

@@ -1,0 +1,69 @@
+// Points recorded twice, found by sorting coordinates.
+#include "ao/cloud/twins.h"
+
+#include <algorithm>
+#include <bit>
+#include <tbb/parallel_sort.h>
+
+namespace scanshade {
+namespace {
+
+using Eigen::Vector3d;
+using Places = std::vector<std::uint32_t>;
+
+std::uint64_t hash_of(const Vector3d& point) {
+    std::uint64_t all = 0;
+    for (const double along : point) {
+        all = (all ^ std::bit_cast<std::uint64_t>(along)) * 0x9e3779b97f4a7c15ULL;
+        all ^= all >> 32;
+    }
+    return all;
+}
+
+/// Copies have the same hash, so choosing points by it chooses all copies of a point or none.
+bool any_twins(std::span<const Vector3d> points, const Places& places) {
+    constexpr std::size_t enough = 4096;
+    constexpr double hardly_any = 0.001;
+    const std::uint64_t every = std::max<std::size_t>(1, places.size() / enough);
+    std::vector<std::uint64_t> hashes;
+    for (const std::uint32_t place : places)
+        if (const std::uint64_t hash = hash_of(points[place]); hash % every == 0)
+            hashes.push_back(hash);
+    const std::size_t all = hashes.size();
+    std::sort(hashes.begin(), hashes.end());
+    hashes.erase(std::unique(hashes.begin(), hashes.end()), hashes.end());
+    return static_cast<double>(all - hashes.size()) > hardly_any * static_cast<double>(all);
+}
+
+} // namespace
+
+std::vector<Twin> take_out_twins(std::span<const Vector3d> points, std::span<const Vector3d> normals, Places& places) {
+    if (!any_twins(points, places))
+        return {};
+    Places order = places;
+    tbb::parallel_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+        for (int axis = 0; axis < 3; ++axis)
+            if (points[a][axis] != points[b][axis])
+                return points[a][axis] < points[b][axis];
+        return a < b;
+    });
+    std::vector<Twin> twins;
+    std::vector<bool> is_twin(points.size());
+    Places kept; // at the same coordinates
+    for (const std::uint32_t point : order) {
+        if (!kept.empty() && points[kept.front()] != points[point])
+            kept.clear();
+        const auto same = std::ranges::find_if(
+            kept, [&](std::uint32_t other) { return normals.empty() || !(normals[other].dot(normals[point]) < 0); });
+        if (same == kept.end()) {
+            kept.push_back(point);
+        } else {
+            twins.push_back({point, *same});
+            is_twin[point] = true;
+        }
+    }
+    std::erase_if(places, [&](std::uint32_t place) { return is_twin[place]; });
+    return twins;
+}
+
+} // namespace scanshade
