@@ -9,10 +9,10 @@
 #include "ao/cloud/tiles.h"
 #include "ao/cloud/twins.h"
 #include "ao/raycast/raycast.h"
+#include "ao/watch.h"
 #include "projection/error.h"
 #include "projection/hash.h"
 #include "projection/statistics.h"
-#include "projection/stopwatch.h"
 
 #include <algorithm>
 #include <array>
@@ -45,17 +45,6 @@ std::optional<Vector3d> triple(const std::string& text) {
     }
     return at == end ? std::optional(values) : std::nullopt;
 }
-
-/// Time between stages, by name.
-class Watch {
-  public:
-    explicit Watch(Timings& timings) : timings_(timings) {}
-    void lap(const std::string& name) { add(timings_, name, stopwatch_.lap_ms()); }
-
-  private:
-    Timings& timings_;
-    Stopwatch stopwatch_;
-};
 
 /// About `wanted` of these points, chosen by a hash: every n-th point in recording order would skip whole scan lines.
 std::vector<Vector3d> sampled(std::span<const Vector3d> points, const Places& places, std::size_t wanted) {

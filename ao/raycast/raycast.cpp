@@ -5,8 +5,8 @@
 
 #include "ao/raycast/depth_surface.h"
 #include "ao/raycast/point_surface.h"
+#include "ao/watch.h"
 #include "projection/hash.h"
-#include "projection/stopwatch.h"
 
 #include <algorithm>
 #include <cmath>
@@ -31,17 +31,6 @@ RaycastOptions checked(RaycastOptions options) {
         check(row);
     return options;
 }
-
-/// Time between stages, by name.
-class Watch {
-  public:
-    explicit Watch(Timings& timings) : timings_(timings) { timings_.clear(); }
-    void lap(std::string name) { timings_.emplace_back(std::move(name), stopwatch_.lap_ms()); }
-
-  private:
-    Timings& timings_;
-    Stopwatch stopwatch_;
-};
 
 Vector3d vector_of(const cv::Vec3f& v) { return Eigen::Vector3f(v[0], v[1], v[2]).cast<double>(); }
 
@@ -149,6 +138,7 @@ std::vector<float> Raycast::cast(const RaySurface& surface, std::size_t count, S
 }
 
 AoMap Raycast::compute(const View& view) {
+    timings_.clear();
     Watch watch(timings_);
     check_sizes(view.surfaces);
     const auto [depth, given] = on_host(view.surfaces, device_);
@@ -194,6 +184,7 @@ PointVisibility Raycast::compute(const PointSet& points, const std::optional<Vec
 }
 
 std::vector<float> Raycast::of_cloud(const PointSet& points) {
+    timings_.clear();
     Watch watch(timings_);
     const std::vector<Disc> discs = discs_of(points.points, points.normals);
     watch.lap("discs");
@@ -212,6 +203,7 @@ std::vector<float> Raycast::of_cloud(const PointSet& points) {
 }
 
 std::vector<float> Raycast::of_mesh(const PointSet& points) {
+    timings_.clear();
     Watch watch(timings_);
     const auto& triangles = points.triangles;
     const RaySurface surface({{points.points.begin(), points.points.end()}, {triangles.begin(), triangles.end()}});

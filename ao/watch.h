@@ -1,0 +1,20 @@
+// Time between stages, by name.
+#pragma once
+
+#include "ao/method.h"
+#include "projection/stopwatch.h"
+
+namespace scanshade {
+
+/// Adds what passed since the last lap, or since it was made, to a method's timings.
+class Watch {
+  public:
+    explicit Watch(Timings& timings) : timings_(timings) {}
+    void lap(const std::string& name) { add(timings_, name, stopwatch_.lap_ms()); }
+
+  private:
+    Timings& timings_;
+    Stopwatch stopwatch_;
+};
+
+} // namespace scanshade
