@@ -66,6 +66,17 @@ Places finite(std::span<const Vector3d> points) {
     return places;
 }
 
+/// The same cloud with about `wanted` points, evenly chosen, and with the normals that it has.
+CloudSurface thinned(const CloudSurface& surface, std::size_t wanted) {
+    std::vector<Vector3d> points, normals;
+    const std::size_t step = std::max<std::size_t>(1, surface.size() / wanted);
+    for (std::size_t place = step / 2; place < surface.size(); place += step) {
+        points.push_back(surface.tree[place].cast<double>());
+        normals.push_back(surface.normals[place].cast<double>());
+    }
+    return cloud_surface(LocalCloud(points), normals);
+}
+
 /// A neighbour's weight in the mean is e^(this distance^2): visibility hardly changes over a tenth of the radius.
 float mean_falloff(float radius) { return -1 / (2 * 0.01F * radius * radius); }
 
@@ -493,29 +504,35 @@ class CloudAo::Work {
         constexpr float sure = 0.8F;
         if (options_.normals != CloudNormals::automatic)
             return {};
-        const RecordedSides order = recorded_sides(surface);
-        const auto opposed_share = [&](const Sides& sides) {
+        const bool told = options_.outside != "auto";
+        const auto opposed_share = [&](const CloudSurface& of, const Sides& sides) {
             double opposed = 0, all = 0;
-            for (std::size_t i = 0; i < surface.size(); ++i)
-                if (sides.confidence[i] > sure && !surface.normals[i].isZero()) {
+            for (std::size_t i = 0; i < of.size(); ++i)
+                if (sides.confidence[i] > sure && !of.normals[i].isZero()) {
                     all += 1;
                     opposed += sides.sign[i] < 0;
                 }
             constexpr double enough = 0.3; // of the points: else nothing is said
-            return all > enough * static_cast<double>(surface.size()) ? opposed / all : 0;
+            return all > enough * static_cast<double>(of.size()) ? opposed / all : 0;
         };
-        const bool told = options_.outside != "auto";
+        const auto all_is_well = [&](const CloudSurface& of, std::optional<DiscRays>& rays_of) {
+            constexpr SidesEffort quick{4000, 60, 300};
+            return recorded_sides(of).random <= hardly_random &&
+                   opposed_share(of, found_sides(of, rays_of, quick)) <= some_opposed;
+        };
+        if (constexpr std::size_t enough = 100000; !told && surface.size() > 2 * enough) {
+            const CloudSurface some = thinned(surface, enough);
+            if (std::optional<DiscRays> rays_of_some; all_is_well(some, rays_of_some))
+                return {};
+        } else if (!told && all_is_well(surface, rays)) {
+            return {};
+        }
+        const RecordedSides order = recorded_sides(surface);
         const bool in_order = order.random <= hardly_random;
         Sides found;
         double opposed = 0;
-        if (in_order && !told) {
-            constexpr SidesEffort quick{4000, 60, 300};
-            found = found_sides(surface, rays, quick);
-            if (opposed_share(found) <= some_opposed)
-                return {};
-        }
         found = found_sides(surface, rays);
-        opposed = opposed_share(found);
+        opposed = opposed_share(surface, found);
         if (in_order && !told && opposed <= some_opposed)
             return {};
         if (constexpr double clearly = 0.3; in_order && !told && opposed > all_opposed && found.margin < clearly) {
