@@ -574,7 +574,7 @@ class CloudAo::Work {
     }
 
     void note_sides(const Sides& found) {
-        if (orientation_.why.empty() || orientation_.kind == NormalOrientation::Kind::automatic)
+        if (!found.why.empty())
             orientation_.why = found.why;
         if (found.doubt)
             doubt(*found.doubt);

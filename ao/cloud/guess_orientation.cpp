@@ -31,15 +31,15 @@ struct ViewFrom {
     double range_ratio = 1; ///< far points' distance / near points' distance (95 % and 5 %)
 };
 
-/// In cells of half a degree that hold two points or more: wider ones hold near and far surfaces of the same view.
-ViewFrom view_from(const Vector3d& position, std::span<const Vector3d> points) {
-    constexpr int columns = 720, rows = 360;
+/// In cells that hold two points or more; nothing where hardly any do.
+std::optional<ViewFrom> view_from(const Vector3d& position, std::span<const Vector3d> points, double cell_degrees) {
+    const auto columns = static_cast<int>(360 / cell_degrees), rows = static_cast<int>(180 / cell_degrees);
     struct Direction {
         float nearest = std::numeric_limits<float>::infinity();
         int points = 0;
     };
-    std::vector<Direction> cells(columns * rows);
-    const auto cell = [](const Vector3d& p, double range) {
+    std::vector<Direction> cells(static_cast<std::size_t>(columns * rows));
+    const auto cell = [=](const Vector3d& p, double range) {
         const double turn = std::atan2(p.y(), p.x()) / (2 * std::numbers::pi) + 0.5;
         const double tilt = std::acos(std::clamp(p.z() / range, -1.0, 1.0)) / std::numbers::pi;
         return std::min(static_cast<int>(tilt * rows), rows - 1) * columns +
@@ -59,7 +59,7 @@ ViewFrom view_from(const Vector3d& position, std::span<const Vector3d> points) {
         sum += point;
     });
     if (ranges.empty())
-        return {};
+        return std::nullopt;
     const Vector3d middle = sum / static_cast<double>(ranges.size());
     std::size_t first = 0, judged = 0, all = 0;
     double radius2 = 0;
@@ -82,10 +82,19 @@ ViewFrom view_from(const Vector3d& position, std::span<const Vector3d> points) {
     const auto range_at = [&](double share) {
         return static_cast<double>(ranges[static_cast<std::size_t>(share * static_cast<double>(ranges.size() - 1))]);
     };
-    // Of a cloud so sparse that hardly any two points share a cell, nothing is known.
-    const double seen = 10 * judged >= all ? static_cast<double>(first) / static_cast<double>(judged) : 0;
-    return {seen, radius > 0 ? middle.norm() / radius : 0,
-            range_at(0.05) > 0 ? range_at(0.95) / range_at(0.05) : std::numeric_limits<double>::infinity()};
+    if (10 * judged < all)
+        return std::nullopt;
+    const double seen = static_cast<double>(first) / static_cast<double>(judged);
+    return ViewFrom{seen, radius > 0 ? middle.norm() / radius : 0,
+                    range_at(0.05) > 0 ? range_at(0.95) / range_at(0.05) : std::numeric_limits<double>::infinity()};
+}
+
+/// In the smallest cells that tell: wider ones hold near and far surfaces of the same view.
+ViewFrom view_from(const Vector3d& position, std::span<const Vector3d> points) {
+    for (const double degrees : {0.5, 1.0, 1.5})
+        if (const std::optional<ViewFrom> view = view_from(position, points, degrees))
+            return *view;
+    return {};
 }
 
 /// Share of the points that are seen from straight above, in cells of about four.

@@ -395,6 +395,7 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
     // Between shares of points that stations explain. Through the shadows of furniture, walls are seen from behind.
     constexpr double tie = 0.05, near_tie = 0.1, walled_tie = 0.2;
     constexpr double hardly_explained = 0.7; // share of the points
+    constexpr double level = 0.35;           // mean rise of the fronts: terrain has it, rooms and halls have none
     const double outer_meets = std::min(scene.front_meets, 1 - scene.front_meets);
     Decision decision;
     const double margin = std::abs(shares[0] - shares[1]);
@@ -405,9 +406,8 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
     if (rule == SidesRule::outward || rule == SidesRule::inward) {
         decision.sign = rule == SidesRule::outward ? -inner : inner;
         decision.body = rule == SidesRule::outward;
-    } else if (rule == SidesRule::terrain) {
-        decision.sign = stations.rise(labels) >= 0 ? 1 : -1;
-        decision.why = "up, as of terrain";
+    } else if (const double rise = stations.rise(labels); rule == SidesRule::terrain && std::abs(rise) > level) {
+        decision.sign = rise > 0 ? 1 : -1;
     } else if (const bool body = fronts >= 0.9 && afar >= 0.97; body || margin < (boxed > walled ? walled_tie : tie)) {
         // Both sides could be the scanned one: a closed room looks like a body from outside. Walls and floors tell,
         // less so the density of the points.

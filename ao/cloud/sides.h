@@ -20,7 +20,7 @@ struct SidesEffort {
 struct Sides {
     std::vector<std::int8_t> sign; ///< by place: -1 = the normal has to be turned
     std::vector<float> confidence; ///< by place, 0 .. 1
-    std::string why;               ///< in words
+    std::string why;               ///< in words; empty where the rule says it all
     double margin = 0; ///< by how much more of the cloud stations explain with these sides than with all turned over;
                        ///< 0 where something else decided
     std::optional<std::string> doubt; ///< where both answers explain the cloud equally well
@@ -29,7 +29,7 @@ struct Sides {
 /// Who decides between the two sides of everything: the cloud itself, or a person who knows what it is.
 enum class SidesRule {
     automatic,
-    terrain, ///< fronts look up on the whole: `up` is needed
+    terrain, ///< fronts look up on the whole, unless it is as steep as a room: `up` is needed
     up,      ///< every plane by itself looks up
     outward,
     inward

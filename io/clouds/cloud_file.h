@@ -54,7 +54,7 @@ void write_new_ply(const std::filesystem::path& file, const std::vector<Eigen::V
 [[nodiscard]] std::string describe(const CloudRecords& records);
 /// The unit of the coordinates and its source; empty for formats that use metres by convention.
 [[nodiscard]] std::string unit_of(const CloudRecords& records);
-/// Whether the cloud's format has z upwards: surveyors' formats do; PLY and PCD have any axis upwards.
+/// Whether z points up: in surveyors' formats, and in PLY and PCD if their coordinates are those of a map.
 [[nodiscard]] bool z_is_up(const Cloud& cloud);
 /// ".pcd", ".ply", ".las" ..., as read; what was read without a header is written as ".ply".
 [[nodiscard]] std::string extension(const CloudRecords& records);
