@@ -5,6 +5,7 @@
 #include "ao/cloud/disc_rays.h"
 #include "ao/cloud/extent.h"
 #include "ao/cloud/fitted_cloud.h"
+#include "ao/cloud/repeatability.h"
 #include "ao/cloud/sides.h"
 #include "ao/cloud/tiles.h"
 #include "ao/cloud/twins.h"
@@ -206,6 +207,7 @@ class CloudAo::Work {
                            [&](const Places& core, const Places& round) { tile(core, round); });
         }
         compute_strays();
+        compute_thinned();
         for (const auto& [point, same_as] : twins_) {
             result_.visibility[point] = result_.visibility[same_as];
             result_.confidence[point] = result_.confidence[same_as];
@@ -260,7 +262,7 @@ class CloudAo::Work {
     /// concern the others. A few of them make no surface; so do strays of strays.
     void compute_strays() {
         constexpr std::size_t fewest = 64;
-        if (strays_.size() < fewest || of_strays_)
+        if (strays_.size() < fewest || part_)
             return;
         std::vector<Vector3d> points, normals;
         for (const std::uint32_t i : strays_) {
@@ -272,7 +274,7 @@ class CloudAo::Work {
         options.radius = result_.radius;
         const PointSet strays{points, normals};
         Work alone(options, nullptr, up_, given_viewpoint_, strays, scanner_);
-        alone.of_strays_ = true;
+        alone.part_ = true;
         alone.result_.spacing = std::min(alone.result_.spacing, result_.spacing);
         const PointVisibility found = alone.run();
         for (std::size_t k = 0; k < strays_.size(); ++k) {
@@ -280,6 +282,42 @@ class CloudAo::Work {
             result_.confidence[strays_[k]] = found.confidence[k];
             result_.normals[strays_[k]] = found.normals[k];
         }
+    }
+
+    /// Again with a part of the points: where that gives other values, these are not to be relied on.
+    void compute_thinned() {
+        constexpr double largest_error = 0.12;
+        const ThinnedCheck check = thinned_check(valid_.size(), result_.radius / result_.spacing);
+        if (part_ || options_.sky || !(check.keep > 0))
+            return;
+        const auto chosen = static_cast<std::uint64_t>(check.keep * 0x1p32);
+        Places kept;
+        std::vector<Vector3d> points, normals;
+        for (const std::uint32_t i : valid_)
+            if (hash(i, 1U) < chosen) {
+                kept.push_back(i);
+                points.push_back(cloud_.points[i]);
+                if (!cloud_.normals.empty())
+                    normals.push_back(cloud_.normals[i]);
+            }
+        CloudAoOptions options = options_;
+        options.radius = result_.radius;
+        const PointSet part{points, normals, {}, cloud_.z_up};
+        Work some(options, nullptr, up_, given_viewpoint_, part, scanner_);
+        some.part_ = true;
+        const Repeatability found =
+            repeatability(cloud_.points, result_.visibility, kept, some.run().visibility, check);
+        result_.expected_error = found.error;
+        for (std::size_t i = 0; i < result_.confidence.size(); ++i)
+            result_.confidence[i] *= found.confidence[i];
+        result_.notes.push_back(fmt::format(
+            "{:.2g} % of the points by themselves give values from which an error of {:.2f} RMS is expected.",
+            100 * check.keep, found.error));
+        if (found.error > largest_error)
+            doubt(fmt::format("an error of {:.2f} RMS is expected: {:.2g} % of the points by themselves give quite "
+                              "other values. A larger --radius spans more points; ao_confidence tells where",
+                              found.error, 100 * check.keep));
+        watch_.lap("check on a part");
     }
 
     /// The spacing of a sample is larger by the root of its share: points are on surfaces.
@@ -713,7 +751,7 @@ class CloudAo::Work {
     Vector3d up_;
     std::optional<Vector3d> given_viewpoint_, scanner_;
     const PointSet& cloud_;
-    bool of_strays_ = false;
+    bool part_ = false; ///< of another cloud, which computes and checks what is beyond
     PointVisibility result_;
     Watch watch_;
     std::optional<CloudGpu> gpu_;

@@ -31,8 +31,9 @@ struct ViewFrom {
     double range_ratio = 1; ///< far points' distance / near points' distance (95 % and 5 %)
 };
 
-/// In cells that hold two points or more; nothing where hardly any do.
-std::optional<ViewFrom> view_from(const Vector3d& position, std::span<const Vector3d> points, double cell_degrees) {
+/// In cells that hold two points or more; nothing where hardly any points, or fewer than `fewest`, are in such cells.
+std::optional<ViewFrom> view_from(const Vector3d& position, std::span<const Vector3d> points, double cell_degrees,
+                                  std::size_t fewest) {
     const auto columns = static_cast<int>(360 / cell_degrees), rows = static_cast<int>(180 / cell_degrees);
     struct Direction {
         float nearest = std::numeric_limits<float>::infinity();
@@ -82,17 +83,18 @@ std::optional<ViewFrom> view_from(const Vector3d& position, std::span<const Vect
     const auto range_at = [&](double share) {
         return static_cast<double>(ranges[static_cast<std::size_t>(share * static_cast<double>(ranges.size() - 1))]);
     };
-    if (10 * judged < all)
+    if (10 * judged < all || judged < fewest)
         return std::nullopt;
     const double seen = static_cast<double>(first) / static_cast<double>(judged);
     return ViewFrom{seen, radius > 0 ? middle.norm() / radius : 0,
                     range_at(0.05) > 0 ? range_at(0.95) / range_at(0.05) : std::numeric_limits<double>::infinity()};
 }
 
-/// In the smallest cells that tell: wider ones hold near and far surfaces of the same view.
+/// In the smallest cells that tell: wider ones hold near and far surfaces of the same view, and a few points in them
+/// are seen first from anywhere.
 ViewFrom view_from(const Vector3d& position, std::span<const Vector3d> points) {
     for (const double degrees : {0.5, 1.0, 1.5})
-        if (const std::optional<ViewFrom> view = view_from(position, points, degrees))
+        if (const std::optional<ViewFrom> view = view_from(position, points, degrees, degrees > 0.5 ? 1000 : 1))
             return *view;
     return {};
 }

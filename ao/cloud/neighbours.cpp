@@ -108,8 +108,15 @@ void NeighbourTree::build(std::span<Placed> points, std::size_t node, int levels
 }
 
 void NeighbourTree::find_round(std::size_t place, std::size_t wanted, Nearest& found, float reach2) const {
+    find(points_[place], place, wanted, found, reach2);
+}
+
+void NeighbourTree::find_near(const Vector3f& at, std::size_t wanted, Nearest& found) const {
+    find(at, size(), wanted, found, std::numeric_limits<float>::infinity());
+}
+
+void NeighbourTree::find(const Vector3f& at, std::size_t but, std::size_t wanted, Nearest& found, float reach2) const {
     found.begin(wanted, reach2);
-    const Vector3f at = points_[place];
     struct Visit {
         std::size_t node, begin, end;
         int levels;
@@ -137,7 +144,7 @@ void NeighbourTree::find_round(std::size_t place, std::size_t wanted, Nearest& f
         if (!found.may_hold(visit.distance2, visit.begin))
             continue;
         for (std::size_t other = visit.begin; other < visit.end; ++other)
-            if (other != place)
+            if (other != but)
                 found.offer((points_[other] - at).squaredNorm(), static_cast<std::uint32_t>(other));
     }
 }

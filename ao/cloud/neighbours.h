@@ -54,6 +54,9 @@ class NeighbourTree {
     void find_round(std::size_t place, std::size_t wanted, Nearest& found,
                     float reach2 = std::numeric_limits<float>::infinity()) const;
 
+    /// The `wanted` points nearest to a position.
+    void find_near(const Eigen::Vector3f& at, std::size_t wanted, Nearest& found) const;
+
     /// Calls `visit(place)` for every point within `reach` of `at`, in no particular order.
     template <class Visit>
     void for_each_within(const Eigen::Vector3f& at, float reach, Visit&& visit) const;
@@ -84,6 +87,7 @@ class NeighbourTree {
     void walk(const Node& node, Enter& enter) const;
 
     struct Placed;
+    void find(const Eigen::Vector3f& at, std::size_t but, std::size_t wanted, Nearest& found, float reach2) const;
     static int split_axis(std::span<const Placed> points, const Eigen::Vector3f& box);
     void build(std::span<Placed> points, std::size_t node, int levels);
 

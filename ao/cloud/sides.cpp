@@ -18,7 +18,7 @@ using Eigen::Vector3f;
 using Link = SignedGraph::Link;
 using Signs = std::vector<std::int8_t>;
 
-constexpr std::size_t at_once = RayBundle::size;
+constexpr std::size_t bundle = RayBundle::size;
 
 /// The size of a cloud as seen from its middle.
 struct Reach {
@@ -58,8 +58,8 @@ struct Meeting {
 
 std::vector<Meeting> shoot(const CloudSurface& surface, const DiscRays& rays, std::size_t places) {
     const std::size_t asked = std::min(places, surface.size());
-    const DirectionSet directions(at_once, 1);
-    std::vector<std::array<Meeting, 2 * at_once>> met(asked);
+    const DirectionSet directions(bundle, 1);
+    std::vector<std::array<Meeting, 2 * bundle>> met(asked);
     std::vector<std::uint8_t> counts(asked, 0);
     tbb::parallel_for(std::size_t(0), asked, [&](std::size_t k) {
         const std::size_t place = (2 * k + 1) * surface.size() / (2 * asked);
@@ -70,7 +70,7 @@ std::vector<Meeting> shoot(const CloudSurface& surface, const DiscRays& rays, st
         for (const int side : {1, -1}) {
             const DiscRays::Hits hits =
                 rays.first_hits(place, static_cast<float>(side) * normal, directions.run(2 * k + (side < 0)));
-            for (std::size_t i = 0; i < at_once; ++i)
+            for (std::size_t i = 0; i < bundle; ++i)
                 if (std::isfinite(hits.distance[i]) && std::abs(hits.facing[i]) >= least)
                     met[k][counts[k]++] = {static_cast<std::uint32_t>(place), hits.place[i],
                                            static_cast<std::int8_t>(hits.facing[i] < 0 ? -side : side),

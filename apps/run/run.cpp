@@ -288,7 +288,7 @@ class Run final : public Command {
 
     static gpu::DeviceInfo the_processor() {
         gpu::DeviceInfo info;
-        info.name = "the processor, without Vulkan";
+        info.name = "the processor";
         info.kind = "CPU";
         return info;
     }
@@ -477,10 +477,16 @@ class Run final : public Command {
         RunReport report = begun_report(job, workers);
         report.budget = budget;
         std::string settings = settings_key(report, job.batch.outputs, job.batch.noise);
-        std::string at_work =
-            by_points ? fmt::format("{} on {}", own.make_for_points() ? asked_.method : "rays from every point",
-                                    gpu ? gpu->info().name : "the processor")
-                      : fmt::format("{} on {}", asked_.method, workers->description());
+        std::string at_work;
+        if (by_points) {
+            if (!own.make_for_points())
+                report.method = "rays from every point";
+            if (!gpu)
+                report.device = the_processor();
+            at_work = fmt::format("{} on {}", report.method, report.device.name);
+        } else {
+            at_work = fmt::format("{} on {}", asked_.method, workers->description());
+        }
         return {std::move(report), std::move(settings), std::move(points), by_points, std::move(at_work)};
     }
 

@@ -171,6 +171,35 @@ TEST(CloudAo, noise_of_a_scanner_hardly_costs_accuracy) {
     EXPECT_LT(error(0.010), clean + 0.03);
 }
 
+/// From scarce even points to many scanned ones, true errors lie between 0.03 and 0.2.
+TEST(CloudAo, the_expected_error_is_near_the_true_one) {
+    for (const char* name : {"office", "columns", "outdoor"})
+        for (const auto& [points, stations] : {std::pair{40000, 0}, std::pair{150000, 6}}) {
+            const scene::World world(scene::scene_named(name));
+            const auto cloud = scene::scanned_cloud(world, static_cast<std::size_t>(points), {.stations = stations});
+            const double radius = world.scene().ao_radius_m;
+            const auto found = visibility(cloud.points, {.radius = radius}, cloud.normals);
+            const double error = rms_between(
+                found.visibility, scene::true_visibility(world, cloud, {.radius_m = radius, .rays = 256}, 4));
+            ASSERT_TRUE(found.expected_error);
+            EXPECT_LT(*found.expected_error, 2 * error) << name << ", " << points;
+            EXPECT_GT(*found.expected_error, error / 2) << name << ", " << points;
+            EXPECT_EQ(*found.expected_error > 0.12, !found.doubts.empty()) << tests::joined(found.doubts);
+        }
+}
+
+/// Errors where confidence is high are smaller.
+TEST(CloudAo, confidence_knows_where_the_error_is) {
+    const scene::World world(scene::scene_named("clutter"));
+    const auto cloud = scene::scanned_cloud(world, 60000, {.stations = 0});
+    const auto found = visibility(cloud.points, {.radius = 0.5});
+    const auto truth = scene::true_visibility(world, cloud, {.radius_m = 0.5, .rays = 256}, 4);
+    std::vector<float> sure = found.visibility, unsure = found.visibility;
+    for (std::size_t i = 0; i < sure.size(); ++i)
+        (found.confidence[i] > 0.5F ? unsure : sure)[i] = static_cast<float>(nan);
+    EXPECT_LT(rms_between(sure, truth), 0.5 * rms_between(unsure, truth));
+}
+
 TEST(CloudAo, noise_of_recorded_normals_is_no_noise_of_planes) {
     const Points points = square(20000);
     Dice dice(7);

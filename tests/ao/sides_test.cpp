@@ -109,6 +109,12 @@ TEST(RecordedSides, tell_random_signs_from_thin_boards) {
     EXPECT_GT(random_share(), 0.9);
 }
 
+/// What is doubted, but for an error that so few points make plausible.
+std::string doubts_of_sides(PointVisibility found) {
+    std::erase_if(found.doubts, [](const std::string& doubt) { return doubt.starts_with("an error of"); });
+    return tests::joined(found.doubts);
+}
+
 class Scans : public testing::TestWithParam<const char*> {};
 
 TEST_P(Scans, without_normals_are_seen_from_where_they_were_scanned) {
@@ -117,8 +123,8 @@ TEST_P(Scans, without_normals_are_seen_from_where_they_were_scanned) {
     const Wrong wrong = wrong_sides(found, cloud.normals);
     EXPECT_LT(wrong.all, 0.03);
     EXPECT_LT(wrong.sure, 0.002);
-    EXPECT_GT(wrong.share_sure, 0.6);
-    EXPECT_TRUE(found.doubts.empty()) << tests::joined(found.doubts);
+    EXPECT_GT(wrong.share_sure, 0.4); // confidence falls with the expected error, too
+    EXPECT_EQ(doubts_of_sides(found), "");
 }
 
 TEST_P(Scans, with_random_signs_or_some_patches_turned_over_come_out_the_same) {
@@ -143,7 +149,7 @@ TEST_P(Scans, keep_recorded_normals_that_are_right) {
     const auto cloud = scene::scanned_cloud(world_of(GetParam()), 100000, {.stations = 6, .noise_m = 0.002});
     const auto found = visibility(cloud.points, cloud.normals);
     EXPECT_EQ(wrong_sides(found, cloud.normals).all, 0);
-    EXPECT_TRUE(found.doubts.empty()) << tests::joined(found.doubts);
+    EXPECT_EQ(doubts_of_sides(found), "");
 }
 
 INSTANTIATE_TEST_SUITE_P(of, Scans, testing::Values("office", "clutter", "thin", "columns", "outdoor"));

@@ -1,0 +1,34 @@
+// How far values depend on which points were recorded: the same cloud, thinned, gives others.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+namespace scanshade {
+
+/// A check that costs at most about a quarter of the time: `keep` of the points are computed once more by themselves.
+struct ThinnedCheck {
+    double keep = 0; ///< share of the points; 0 = none, since so dense a cloud tells nothing new
+    /// An error that falls like the spacing is this times the difference between thinned and whole cloud (Richardson's
+    /// extrapolation): with a quarter of the points, spacings are twice as wide, and the difference is the error.
+    [[nodiscard]] double error_per_difference() const;
+};
+/// For so many points, and a radius that spans so many of their spacings.
+[[nodiscard]] ThinnedCheck thinned_check(std::size_t points, double radius_in_spacings);
+
+/// What the check found.
+struct Repeatability {
+    double error = 0; ///< expected RMS error of visibility
+    /// By place in `points` of error_of(): the same for its surroundings, as a factor of confidence, 1 = none, 1/2 = an
+    /// error of 0.15.
+    std::vector<float> confidence;
+};
+/// `whole` are values of `points`, `thinned` those of the points at `kept`; NaN where unknown.
+[[nodiscard]] Repeatability repeatability(std::span<const Eigen::Vector3d> points, std::span<const float> whole,
+                                          std::span<const std::uint32_t> kept, std::span<const float> thinned,
+                                          const ThinnedCheck& check);
+
+} // namespace scanshade
