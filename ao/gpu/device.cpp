@@ -188,6 +188,15 @@ void open_device(Device::State& state) {
 
 } // namespace
 
+vk::raii::Context loader() {
+    try {
+        return {};
+    } catch (const std::runtime_error&) {
+        throw Error("Vulkan: its loader is not installed (Debian: libvulkan1, and mesa-vulkan-drivers for a software "
+                    "driver)");
+    }
+}
+
 int Device::State::memory_type(std::uint32_t allowed, vk::MemoryPropertyFlags wanted) const {
     for (std::uint32_t i = 0; i < memory.memoryTypeCount; ++i)
         if ((allowed >> i & 1u) && (memory.memoryTypes[i].propertyFlags & wanted) == wanted)

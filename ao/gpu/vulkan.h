@@ -42,8 +42,11 @@ struct Lane {
     std::mutex submitting = {};
 };
 
+/// Vulkan's loader; throws Error where it is not installed.
+[[nodiscard]] vk::raii::Context loader();
+
 struct Device::State {
-    vk::raii::Context context;
+    vk::raii::Context context = loader();
     std::unique_ptr<Messages> messages = std::make_unique<Messages>(); // outlives the messenger that writes into it
     bool validating = false;
     vk::raii::Instance instance = nullptr;

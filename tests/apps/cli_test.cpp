@@ -261,8 +261,8 @@ std::string write_floor(const fs::path& file, bool black = false) {
                                    "property float z\n{}end_header\n",
                                    black ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "");
     for (int i = 0; i < 900; ++i)
-        text +=
-            fmt::format("{} {} {}{}\n", 0.1 * (i % 30), 0.1 * (i / 30), 0.4 * std::sin(i % 30), black ? " 0 0 0" : "");
+        text += fmt::format("{} {} {}{}\n", 0.1 * (i % 30), 0.1 * (i / 30), 0.1 * std::sin(0.3 * (i % 30)),
+                            black ? " 0 0 0" : "");
     std::ofstream(file) << text;
     return file.string();
 }
@@ -292,18 +292,28 @@ TEST_F(CliTest, a_cloud_run_names_the_rays_and_says_nothing_of_depth_images) {
 
 TEST_F(CliTest, clouds_need_no_vulkan_driver_and_depth_images_name_its_package) {
     const std::string floor = write_floor(folder / "floor.ply");
-    ::setenv("VK_DRIVER_FILES", "/nonexistent", 1);
-    ::setenv("VK_ICD_FILENAMES", "/nonexistent", 1); // the name before Vulkan 1.3.207
-    const Ran cloud = run_program(fmt::format("run {} -o {}", floor, (folder / "cloud").string()));
-    const Ran depth = run();
-    const Ran devices = run_program("devices");
-    ::unsetenv("VK_DRIVER_FILES");
-    ::unsetenv("VK_ICD_FILENAMES");
-    EXPECT_EQ(cloud.exit_code, 0) << cloud.err;
-    EXPECT_TRUE(fs::exists(folder / "cloud/clouds/floor.ply"));
-    EXPECT_EQ(depth.exit_code, 3);
-    EXPECT_NE(depth.err.find("mesa-vulkan-drivers"), std::string::npos) << depth.err;
-    EXPECT_NE(devices.err.find("mesa-vulkan-drivers"), std::string::npos) << devices.err;
+    fs::create_directories(folder / "no_loader");
+    for (const char* name : {"libvulkan.so", "libvulkan.so.1"})
+        std::ofstream(folder / "no_loader" / name) << "no library";
+    const std::string nowhere = "/nonexistent", no_loader = (folder / "no_loader").string();
+    // The second is the name before Vulkan 1.3.207.
+    for (const auto& hidden :
+         {std::vector<std::pair<std::string, std::string>>{{"VK_DRIVER_FILES", nowhere}, {"VK_ICD_FILENAMES", nowhere}},
+          {{"LD_LIBRARY_PATH", no_loader}}}) {
+        for (const auto& [name, value] : hidden)
+            ::setenv(name.c_str(), value.c_str(), 1);
+        const Ran cloud = run_program(fmt::format("run {} -o {} --overwrite", floor, (folder / "cloud").string()));
+        const Ran depth = run("--overwrite");
+        const Ran devices = run_program("devices");
+        for (const auto& [name, value] : hidden)
+            ::unsetenv(name.c_str());
+        EXPECT_EQ(cloud.exit_code, 0) << cloud.err;
+        EXPECT_TRUE(fs::exists(folder / "cloud/clouds/floor.ply"));
+        EXPECT_EQ(depth.exit_code, 3);
+        EXPECT_NE(depth.err.find("mesa-vulkan-drivers"), std::string::npos) << depth.err;
+        EXPECT_NE(devices.err.find("mesa-vulkan-drivers"), std::string::npos) << devices.err;
+        fs::remove_all(folder / "cloud");
+    }
 }
 
 TEST_F(CliTest, clouds_without_colours_of_their_own_take_visibility_as_grey) {
