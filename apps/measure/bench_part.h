@@ -22,6 +22,7 @@ std::unique_ptr<BenchPart> cacao_times();
 std::unique_ptr<BenchPart> cacao_maps();
 std::unique_ptr<BenchPart> cloud_errors();
 std::unique_ptr<BenchPart> hard_cases_kept();
+std::unique_ptr<BenchPart> flatness_of_planes();
 std::unique_ptr<BenchPart> normals_kept();
 
 } // namespace scanshade
