@@ -21,9 +21,10 @@ void main() {
     float w = imageLoad(samples, here).x;
     bool hole = !(w > 0.0);
     float wc = hole ? 1.0 : w, zc = 1.0 / wc;
-    Plane plane;
-    // A slope up to 45 degrees is still the pixel's own surface.
-    float narrow = 1.0 / (3.0 * sigma_of(zc) * relief_at(here) * wc * wc + 0.7 * 2.8 * wc / k.camera.fx);
-    bool good = solve(square5(p, wc, 1.0, level, narrow), plane); // not good: the plane is level, the pixel keeps its value
+    Plane expected = slope_at(p, wc, 2), plane;
+    // A slope up to 45 degrees more is still the pixel's own surface.
+    float sigma = sigma_on(expected, sigma_of(zc) * relief_at(here) * wc * wc);
+    float narrow = 1.0 / (3.0 * sigma + 0.7 * 2.8 * wc / k.camera.fx);
+    bool good = solve(square5(p, wc, 1.0, expected, narrow), plane); // not good: the plane is level, the pixel keeps its value
     imageStore(averages, here, vec4(hole ? 0.0 : wc + plane.c));
 }

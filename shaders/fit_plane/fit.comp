@@ -30,10 +30,12 @@ void main() {
     float relief_here = relief_at(here), sigma = sigma_of(zc) * wc * wc; // of 1/z, of a single frame
     float radius = window_of(zc, sigma_of(zc) * relief_here);
 
-    Plane first, plane;
-    // A slope up to 45 degrees is still the pixel's own surface in the first round.
-    bool good = solve(square5(p, wc, max(radius * 0.5, 1.0), level, 1.0 / (3.0 * sigma + 0.7 * radius * wc / k.camera.fx)), first);
-    float narrow = 1.0 / (3.0 * sigma * relief_here);
+    Plane expected = slope_at(p, wc, int(max(radius * 0.5, 1.0))), first, plane;
+    // A slope up to 45 degrees more is still the pixel's own surface in the first round.
+    float sigma_sloped = sigma_on(expected, sigma);
+    bool good = solve(square5(p, wc, max(radius * 0.5, 1.0), expected, 1.0 / (3.0 * sigma_sloped + 0.7 * radius * wc / k.camera.fx)),
+                      first);
+    float narrow = 1.0 / (3.0 * sigma_on(first, sigma) * relief_here);
     good = solve(square7(p, wc, max(radius * (1.0 / 3.0), 1.0), first, narrow), plane) && good;
 
     // Plane w = W + a u + b v  =>  n ~ (fx a, fy b, w at the principal point), turned to the camera.
@@ -41,7 +43,7 @@ void main() {
     float w_principal = w_here - plane.a * (float(p.x) - k.camera.cx) - plane.b * (float(p.y) - k.camera.cy);
     vec3 n = -vec3(k.camera.fx * plane.a, k.camera.fy * plane.b, w_principal);
     n *= inversesqrt(max(dot(n, n), 1e-30));
-    bool near = abs(plane.c) < 3.0 * sigma; // within the tolerance of the depth there
+    bool near = abs(plane.c) < 3.0 * sigma_on(first, sigma); // within the tolerance of the depth there
     good = good && near && w_here > 1e-6 && !hole; // a kilometre of kilometres
     imageStore(depth_out, here, vec4(hole ? 0.0 : good ? 1.0 / w_here : zc));
     n = good ? n : vec3(0.0);

@@ -91,3 +91,35 @@ float relief_at(int index) { return is_fused == 0 ? 1.0 : imageLoad(relief, inde
 float sigma_of(float z) { return k.noise_floor + k.noise_per_z2 * z * z; }
 
 float window_of(float z, float sigma) { return clamp(sqrt(k.window * sigma * k.camera.fx / z), 1.5, k.largest_radius); }
+
+// A value may belong to a place that far from its pixel: sensors match windows, and alignment to colour takes the nearest pixel.
+// Lateral noise of structured light is 0.8 px (Nguyen, Izadi and Lovell 2012).
+const float lateral_px = 0.8;
+
+// Sigma of 1/z on a slope.
+float sigma_on(Plane plane, float sigma) {
+    return sqrt(sigma * sigma + lateral_px * lateral_px * (plane.a * plane.a + plane.b * plane.b));
+}
+
+float sample_at(ivec2 q) {
+    bool inside = all(lessThan(uvec2(q), uvec2(k.size)));
+    return inside ? imageLoad(samples, q.y * k.size.x + q.x).x : 0.0;
+}
+
+// The slope along `step` where 1/z changes evenly from one side to the other, else 0: at a jump one side is level.
+float slope_along(ivec2 p, float w_here, ivec2 step, ivec2 aside) {
+    float first = 0.0, second = 0.0;
+    bool all_there = true;
+    for (int i = -1; i <= 1; ++i) {
+        float before = sample_at(p - step + i * aside), after = sample_at(p + step + i * aside);
+        all_there = all_there && before > 0.0 && after > 0.0;
+        first += after - before;
+        second += after + before - 2.0 * w_here;
+    }
+    return all_there && abs(second) < 0.4 * abs(first) ? first / (6.0 * float(step.x + step.y)) : 0.0;
+}
+
+// What the first samples are compared with: level, but for even slopes.
+Plane slope_at(ivec2 p, float w_here, int reach) {
+    return Plane(slope_along(p, w_here, ivec2(reach, 0), ivec2(0, 1)), slope_along(p, w_here, ivec2(0, reach), ivec2(1, 0)), 0.0);
+}
