@@ -96,10 +96,13 @@ struct Spread {
 
 /// The lower 80 % of |N(0, 1)| have the mean 0.5586, the lower 40 % 0.2563. Among clutter more than a fifth of the
 /// differences straddle an edge, so the smaller share decides. Quantised values are an exception: many
-/// differences are exactly zero there, and the steps are the noise.
+/// differences are exactly zero there, and the steps are the noise: a value errs by a root of 1/12 of the step or more.
 Spread spread_of(Band& band) {
     const double most = sigma_of(band.spread_m, 0.8, 0.5586), few = sigma_of(band.spread_m, 0.4, 0.2563);
-    if (few >= most || step_of(band.depths_m) >= 0.5 * most)
+    const double step = step_of(band.depths_m);
+    if (step >= 0.5 * most)
+        return {std::max(most, step / std::sqrt(12.0)), sigma_of(band.adjacent_m, 0.8, 0.5586)};
+    if (few >= most)
         return {most, sigma_of(band.adjacent_m, 0.8, 0.5586)};
     return {few, sigma_of(band.adjacent_m, 0.4, 0.2563)};
 }
