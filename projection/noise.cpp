@@ -18,7 +18,8 @@
 namespace scanshade {
 namespace {
 
-constexpr int lag_px = 4;  // longer than the sensor's own smoothing, shorter than most surfaces
+constexpr int lag_px = 4;  // longer than most sensors' own smoothing, shorter than most surfaces
+constexpr int far_px = 8;  // for sensors that smooth more
 constexpr int step_px = 3; // every third pixel of every third row is plenty
 constexpr int bands = 24;  // equal steps of log z over 0.2 .. 50 m
 constexpr double nearest_m = 0.2, farthest_m = 50;
@@ -27,6 +28,8 @@ constexpr std::size_t enough = 400; // samples a band needs
 struct Band {
     std::vector<float> spread_m;   // |second difference| of depth
     std::vector<float> adjacent_m; // of neighbouring pixels
+    std::vector<float> far_m;      // over far_px
+    std::vector<float> farther_m;  // over twice far_px
     std::vector<float> depths_m;   // at their middles; keep_distinct() reduces them to the distinct values
     double z_sum = 0;
 };
@@ -35,6 +38,8 @@ int band_of(double z) { return static_cast<int>(bands * std::log(z / nearest_m) 
 
 /// Second difference of 1/z along (dx, dy), as metres of depth at z; negative where something is unknown.
 float second_difference(const cv::Mat1f& z, int x, int y, int dx, int dy) {
+    if (x < dx || y < dy || x + dx >= z.cols || y + dy >= z.rows)
+        return -1;
     const float c = z(y, x), a = z(y - dy, x - dx), b = z(y + dy, x + dx);
     if (!(a > 0 && b > 0))
         return -1;
@@ -56,13 +61,20 @@ void collect(const cv::Mat1f& z, std::array<Band, bands>& all) {
                     continue;
                 band.spread_m.push_back(d);
                 band.adjacent_m.push_back(adjacent);
+                for (const auto& [lag, differences] :
+                     {std::pair{far_px, &band.far_m}, std::pair{2 * far_px, &band.farther_m}})
+                    if (const float far = second_difference(z, x, y, lag * dx, lag * dy); far >= 0)
+                        differences->push_back(far);
                 band.z_sum += c;
             }
         }
 }
 
 struct Measured {
-    double z, sigma, adjacent, weight; // deviations by distant and by adjacent pixels
+    double z, sigma;
+    double adjacent; // the deviation by adjacent pixels, in that by distant ones
+    int lag_px;      // over which sigma was measured
+    double weight;
 };
 
 /// Sigma from the mean of the smallest `share` of the differences, assumed Gaussian; `mean_of_share` is that mean for
@@ -90,21 +102,29 @@ double step_of(const std::vector<float>& depths_m) {
     return median(std::move(gaps));
 }
 
-struct Spread {
-    double distant, adjacent;
-};
-
 /// The lower 80 % of |N(0, 1)| have the mean 0.5586, the lower 40 % 0.2563. Among clutter more than a fifth of the
 /// differences straddle an edge, so the smaller share decides. Quantised values are an exception: many
 /// differences are exactly zero there, and the steps are the noise: a value errs by a root of 1/12 of the step or more.
-Spread spread_of(Band& band) {
+/// Noise that a sensor has smoothed is larger over more pixels, and then no longer; surfaces go on to bend.
+Measured measured_in(Band& band) {
     const double most = sigma_of(band.spread_m, 0.8, 0.5586), few = sigma_of(band.spread_m, 0.4, 0.2563);
     const double step = step_of(band.depths_m);
-    if (step >= 0.5 * most)
-        return {std::max(most, step / std::sqrt(12.0)), sigma_of(band.adjacent_m, 0.8, 0.5586)};
-    if (few >= most)
-        return {most, sigma_of(band.adjacent_m, 0.8, 0.5586)};
-    return {few, sigma_of(band.adjacent_m, 0.4, 0.2563)};
+    const bool quantised = step >= 0.5 * most, by_most = quantised || few >= most;
+    const auto sigma_by = [by_most](std::vector<float>& differences) {
+        return by_most ? sigma_of(differences, 0.8, 0.5586) : sigma_of(differences, 0.4, 0.2563);
+    };
+    const double count = static_cast<double>(band.spread_m.size()), distant = std::max(by_most ? most : few, 1e-6);
+    Measured measured{band.z_sum / count, distant, sigma_by(band.adjacent_m) / distant, lag_px, count};
+    if (std::min(band.far_m.size(), band.farther_m.size()) >= enough) {
+        const double far = sigma_by(band.far_m);
+        if (far > 1.3 * distant && far < 1.9 * distant && sigma_by(band.farther_m) < 1.35 * far) {
+            measured.sigma = far;
+            measured.lag_px = far_px;
+        }
+    }
+    if (quantised && band.spread_m.size() > 20 * band.depths_m.size())
+        measured.sigma = std::max(measured.sigma, step / std::sqrt(12.0));
+    return measured;
 }
 
 /// Variance of a second difference over `lag` pixels, in variances of one value, where values d pixels apart correlate
@@ -114,8 +134,8 @@ double second_difference_variance(double lag, double s) {
     return 6 - 8 * correlation(lag) + 2 * correlation(2 * lag);
 }
 
-/// The integral of the correlation at which adjacent second differences are `ratio` times as large as distant ones.
-double correlation_length_of(double ratio) {
+/// The deviation s of the correlation at which adjacent second differences are `ratio` times as large as distant ones.
+double correlation_of(double ratio) {
     double low = 0.3, high = 3; // of s
     for (int i = 0; i < 30; ++i) {
         const double s = (low + high) / 2;
@@ -123,7 +143,7 @@ double correlation_length_of(double ratio) {
             second_difference_variance(1, s) < ratio * ratio * second_difference_variance(lag_px, s);
         (too_smooth ? high : low) = s;
     }
-    return std::max(1.0, std::sqrt(2 * std::numbers::pi) * low);
+    return low;
 }
 
 /// The step, if steps grow with that power of z, and the share of the gaps between distinct values that equal it.
@@ -186,11 +206,8 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
         tbb::parallel_for(std::size_t(0), all.size(), [&](std::size_t i) {
             Band& band = all[i];
             keep_distinct(band.depths_m);
-            if (band.spread_m.size() < enough)
-                return;
-            const double count = static_cast<double>(band.spread_m.size());
-            const Spread spread = spread_of(band);
-            measured[i] = {band.z_sum / count, std::max(spread.distant, 1e-6), spread.adjacent, count};
+            if (band.spread_m.size() >= enough)
+                measured[i] = measured_in(band);
         });
     });
     std::vector<Measured> points;
@@ -204,15 +221,20 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
     find_steps(steps, values_m);
     if (points.empty())
         return steps;
-    DepthNoise noise = law_through(points);
-    noise.step_m = steps.step_m, noise.step_per_z2 = steps.step_per_z2;
+    const DepthNoise seen = law_through(points);
+    if (std::all_of(points.begin(), points.end(),
+                    [&](const Measured& p) { return seen.at(p.z) < std::max(1e-4 * p.z, 1.2e-4); }))
+        return steps;
     double ratios = 0, weights = 0;
     for (const Measured& p : points)
-        ratios += p.weight * p.adjacent / p.sigma, weights += p.weight;
-    noise.correlation_px = correlation_length_of(ratios / weights);
-    const bool clean = std::all_of(points.begin(), points.end(),
-                                   [&](const Measured& p) { return noise.at(p.z) < std::max(1e-4 * p.z, 1.2e-4); });
-    return clean ? steps : noise;
+        ratios += p.weight * p.adjacent, weights += p.weight;
+    const double s = correlation_of(ratios / weights);
+    for (Measured& p : points) // what correlates over the lag is missing in the differences
+        p.sigma *= std::sqrt(6 / second_difference_variance(p.lag_px, s));
+    DepthNoise noise = law_through(points);
+    noise.step_m = steps.step_m, noise.step_per_z2 = steps.step_per_z2;
+    noise.correlation_px = std::max(1.0, std::sqrt(2 * std::numbers::pi) * s);
+    return noise;
 }
 
 DepthNoise noise_from_text(const std::string& text) {

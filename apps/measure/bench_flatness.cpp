@@ -55,7 +55,7 @@ class FlatnessPart final : public BenchPart {
         request.leave_bad_out = true;
         const TrialCapture capture = load_trial(path, request);
         for (const double radius_m : numbers("flatness.radii", radii_, 0.01)) {
-            const FlatSurfaces flat = flat_surfaces(capture.frames, capture.noise, radius_m);
+            const FlatSurfaces flat = flat_surfaces(capture.frames, radius_m);
             for (const std::string& method : comma_separated(methods_)) {
                 Trial trial(device, {method, method, {}}, capture.noise, radius_m);
                 row(capture, flat, trial, radius_m);

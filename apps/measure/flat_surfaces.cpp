@@ -33,7 +33,7 @@ struct Plane {
     [[nodiscard]] double distance(const Vector3d& point) const { return normal.dot(point) - offset; }
 };
 
-std::vector<PlanePoint> points_of(const TrialFrame& frame, int number, const DepthNoise& noise, bool posed) {
+std::vector<PlanePoint> points_of(const TrialFrame& frame, int number, bool posed) {
     const cv::Mat1f& z = frame.exact_z_m;
     const bool bent = !frame.frame.depth_m.empty() && frame.frame.camera.distortion.any();
     const cv::Mat2f direction = bent ? Undistortion::of(frame.frame.camera)->direction() : cv::Mat2f();
@@ -50,7 +50,7 @@ std::vector<PlanePoint> points_of(const TrialFrame& frame, int number, const Dep
                 continue;
             if (posed)
                 point = *frame.frame.world_from_camera * point;
-            seen.push_back({point, std::max(3 * noise.at(depth), 0.01 * depth), number, v, u});
+            seen.push_back({point, 0.01 * depth + 0.003 * depth * depth, number, v, u});
         }
     return seen;
 }
@@ -133,7 +133,7 @@ class PlaneMap {
             ++(off > seen.tolerance_m ? before : on_)(at);
         }
         cv::Mat1b free(on_.size());
-        constexpr int fewest = 3, tail = 30; // noise of three sigma leaves less than a thirtieth outside
+        constexpr int fewest = 3, tail = 30; // of noise, a thirtieth may lie outside
         for (int y = 0; y < free.rows; ++y)
             for (int x = 0; x < free.cols; ++x)
                 free(y, x) = before(y, x) < std::max(fewest, on_(y, x) / tail + 1) ? 255 : 0;
@@ -192,7 +192,7 @@ int mark(const std::vector<PlanePoint>& all, std::span<const Vector3d> eyes, dou
 
 } // namespace
 
-FlatSurfaces flat_surfaces(std::span<const TrialFrame> frames, const DepthNoise& noise, double radius_m) {
+FlatSurfaces flat_surfaces(std::span<const TrialFrame> frames, double radius_m) {
     FlatSurfaces found;
     const bool posed =
         std::ranges::all_of(frames, [](const TrialFrame& each) { return each.frame.world_from_camera.has_value(); });
@@ -203,7 +203,7 @@ FlatSurfaces flat_surfaces(std::span<const TrialFrame> frames, const DepthNoise&
         eyes.push_back(posed ? Vector3d(frames[i].frame.world_from_camera->translation()) : Vector3d::Zero());
     }
     for (std::size_t i = 0; i < frames.size(); ++i) {
-        const std::vector<PlanePoint> seen = points_of(frames[i], static_cast<int>(i), noise, posed);
+        const std::vector<PlanePoint> seen = points_of(frames[i], static_cast<int>(i), posed);
         if (posed)
             all.insert(all.end(), seen.begin(), seen.end());
         else

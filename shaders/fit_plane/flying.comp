@@ -40,7 +40,7 @@ void main() {
         ivec2 step = ivec2(i % 3, i / 3) - 1;
         vec2 others = vec2(depth_at(p + step), depth_at(p - step));
         bvec2 there = greaterThan(others, vec2(0.0)), alike = lessThanEqual(abs(others - z), vec2(tolerance));
-        if (!any(alike) && (others.x - z) * (others.y - z) < 0.0 && is_slope(p, step, z)) alike = there;
+        if (!all(alike) && all(there) && is_slope(p, step, z)) alike = there;
         known += int(there.x) + int(there.y);
         friends += int(alike.x) + int(alike.y);
         nearer = nearer || any(bvec2(there.x && !alike.x && others.x < z, there.y && !alike.y && others.y < z));

@@ -117,6 +117,15 @@ TEST(noise, correlation_length_is_that_of_the_sensors_window) {
     }
 }
 
+/// The farthest wall of a Kinect's picture shows one value or two; its depth is not exact for that.
+TEST(noise, is_no_smaller_than_a_step_explains) {
+    const Pinhole camera = test_camera({320, 240});
+    std::vector<DepthImage> walls;
+    for (int k = 0; k < 60; ++k)
+        walls.push_back(noisy(tilted_plane(camera, 0, 1 + 0.07 * k), {0, 0.0002}, 0.003));
+    EXPECT_GT(measure_noise(walls).at(5), 25 * 0.003 / std::sqrt(12.0) * 0.7);
+}
+
 TEST(noise, steps_are_told_and_nothing_is_taken_for_one) {
     const Pinhole camera = test_camera({320, 240});
     const DepthImage slope = tilted_plane(camera, 50, 2), unquantised = noisy(slope, {0.002, 0.001});
@@ -238,6 +247,48 @@ TEST(fit_plane, flying_pixels_are_dropped_and_nothing_else) {
     EXPECT_LT(left, flying / 20);
     EXPECT_LT(lost, flying / 4); // single pixels of a surface among flying ones
     EXPECT_EQ(cv::countNonZero(fit.compute(noisy(clean, tof)).depth.z_m), clean.z_m.total());
+}
+
+/// A floor below a level camera; `row_of` says which row of the sensor each image row shows.
+template <class RowOf>
+DepthImage floor_seen(double height_m, const RowOf& row_of) {
+    const Pinhole camera = test_camera({320, 240});
+    DepthImage image{camera, cv::Mat1f(camera.size, 0.0F), {}};
+    for (int y = static_cast<int>(camera.cy) + 20; y < image.z_m.rows; ++y)
+        image.z_m.row(y) = static_cast<float>(height_m * camera.fy / (row_of(y) - camera.cy));
+    return image;
+}
+
+/// Alignment to a colour image of more rows doubles rows of depth, or interpolates them. On a floor, one row is as far
+/// from the next as a surface from another.
+TEST(fit_plane, floors_keep_their_rows_however_depth_was_resampled) {
+    const DepthNoise noise{0.0005, 0.001};
+    FitPlane fit(device(), noise);
+    const auto doubled = [](int y) { return y - y % 2; };
+    const auto interpolated = [](int y) { return y % 3 == 0 ? y + 0.5 : y; };
+    for (const DepthImage& seen :
+         {floor_seen(0.25, [](int y) { return y; }), floor_seen(0.25, doubled), floor_seen(0.25, interpolated)}) {
+        const cv::Mat1f kept = fit.compute(noisy(seen, noise)).depth.z_m;
+        const int top = static_cast<int>(seen.camera.cy) + 28; // where five rows above tell of the slope
+        EXPECT_GT(cv::countNonZero(kept.rowRange(top, kept.rows)), 0.995 * 320 * (kept.rows - top));
+    }
+}
+
+/// A sensor matches windows, so a value may belong half a pixel above or below. At a grazing angle that is far.
+TEST(fit_plane, lateral_noise_does_not_tilt_a_floor) {
+    const DepthNoise noise{0.0005, 0.001};
+    FitPlane fit(device(), noise);
+    std::mt19937 random(5);
+    std::normal_distribution<double> normal;
+    DepthImage seen = floor_seen(1, [](int y) { return y; });
+    for (int y = 0; y < seen.z_m.rows; ++y)
+        for (float& z : seen.z_m.row(y))
+            if (z > 0)
+                z = static_cast<float>(seen.camera.fy / (y + 0.5 * normal(random) - seen.camera.cy));
+    const std::vector<double> errors = normal_errors(fit.compute(noisy(seen, noise)).normals.normals, {0, -1, 0});
+    EXPECT_GT(errors.size(), 0.95 * 304 * (cv::countNonZero(seen.z_m) / 320 - 8));
+    EXPECT_LT(errors[errors.size() / 2], 2.5);
+    EXPECT_LT(errors[errors.size() * 19 / 20], 13);
 }
 
 TEST(fit_plane, a_wire_is_no_flying_pixel) {
