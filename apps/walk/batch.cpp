@@ -121,7 +121,7 @@ void attach_and_write(Work& work, const BatchOptions& options) {
         }
         work.row.coverage = work.attached.coverage;
         work.row.mean_visibility = work.attached.mean_visibility;
-        std::ranges::move(doubts_about(work, options.radius_m), std::back_inserter(work.row.doubts));
+        std::ranges::move(doubts_about(work, options.radius_m, options.noise), std::back_inserter(work.row.doubts));
         if (!by_points)
             scene = scene_of(work, outputs.colour_view);
         if (outputs.shaded || outputs.panel)

@@ -21,6 +21,8 @@ constexpr double all_alike = 0.999;         ///< share of the values that are ex
 constexpr std::size_t enough_values = 100;  ///< fewer may be alike by chance
 constexpr double least_radius_px = 2;       ///< at the median depth
 constexpr double least_radius_spacings = 2; ///< in a cloud
+constexpr double largest_sigma = 0.25;      ///< of the radius; beyond, noise is what occludes
+constexpr double most_noisy = 0.3;          ///< share of the valid pixels
 constexpr double narrowest_degrees = 0.5;   ///< of view, along the wider side
 constexpr double widest_degrees = 175;
 constexpr double largest_aspect = 2;       ///< fx / fy, either way
@@ -104,6 +106,19 @@ void doubt_radius_in_view(const Work& work, double radius_m, Doubts& doubts) {
                        radius_m, scene_m));
 }
 
+void doubt_noise_in_view(const Work& work, double radius_m, const DepthNoise& noise, Doubts& doubts) {
+    std::vector<double> depths = depths_of(work.depth.z_m);
+    if (depths.empty() || !(radius_m > 0) || !noise.any())
+        return;
+    const auto noisy = static_cast<double>(
+        std::ranges::count_if(depths, [&](double z) { return noise.at(z) > largest_sigma * radius_m; }));
+    const double share = noisy / static_cast<double>(depths.size()), far = quantile(depths, 0.9);
+    add_if(share > most_noisy, doubts,
+           fmt::format("noise is above a quarter of the radius at {:.0f} % of the pixels (sigma {:.2g} m at {:.2g} m): "
+                       "their values say little. Give a larger --radius, or leave them out with --depth-range.",
+                       100 * share, noise.at(far), far));
+}
+
 /// The diagonal of the box without the lowest and highest hundredth of the points along each axis.
 double extent_of(const Cloud& cloud) {
     const std::size_t step = std::max<std::size_t>(1, cloud.points.size() / 50000);
@@ -173,7 +188,7 @@ void doubt_camera(const Camera& camera, Doubts& doubts) {
 
 } // namespace
 
-std::vector<std::string> doubts_about(const Work& work, double radius_m) {
+std::vector<std::string> doubts_about(const Work& work, double radius_m, const DepthNoise& noise) {
     Doubts doubts = work.frame.doubts;
     doubt_shares(work, doubts);
     if (work.by_points) {
@@ -186,6 +201,7 @@ std::vector<std::string> doubts_about(const Work& work, double radius_m) {
     if (visibility.isContinuous())
         doubt_values({visibility.ptr<float>(), visibility.total()}, doubts);
     doubt_radius_in_view(work, radius_m, doubts);
+    doubt_noise_in_view(work, radius_m, noise, doubts);
     if (!work.frame.cloud) // a cloud's camera is recovered or chosen, not given, unless --camera names it
         doubt_camera(work.row.camera, doubts);
     return doubts;

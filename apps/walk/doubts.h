@@ -2,6 +2,7 @@
 #pragma once
 
 #include "apps/walk/work.h"
+#include "projection/noise.h"
 
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@ namespace scanshade {
 
 /// Sentences: what is implausible about a computed frame, its camera or its settings. Empty = nothing is. Reads
 /// `row.valid_share` and `row.coverage`. Real captures are far from every limit; README.md has the table.
-[[nodiscard]] std::vector<std::string> doubts_about(const Work& work, double radius_m);
+/// `noise`: of the depth, where it is an image.
+[[nodiscard]] std::vector<std::string> doubts_about(const Work& work, double radius_m, const DepthNoise& noise = {});
 
 } // namespace scanshade

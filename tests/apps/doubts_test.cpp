@@ -29,6 +29,7 @@ struct Computed {
     FrameRow row;
     Work work{.entry = entry, .row = row};
     double radius_m = 0.5;
+    DepthNoise noise{};
 
     Computed() {
         row.valid_share = 0.9;
@@ -37,7 +38,7 @@ struct Computed {
         work.depth = {row.camera.pinhole, tests::corner_depth(0), {}};
         work.ao.visibility = cv::Mat1f(work.depth.z_m.size(), 0.5F);
     }
-    [[nodiscard]] std::vector<std::string> doubts() const { return doubts_about(work, radius_m); }
+    [[nodiscard]] std::vector<std::string> doubts() const { return doubts_about(work, radius_m, noise); }
 };
 
 /// The same of a cloud: a square of 40 x 40 points, 10 cm apart.
@@ -71,6 +72,14 @@ TEST(doubts, few_pixels_with_a_depth_or_a_value) {
     EXPECT_TRUE(warned(few.doubts(), "only 10.0 % of the valid pixels got a value"));
     few.row.valid_share = 0;
     EXPECT_TRUE(warned(few.doubts(), "no pixel holds a valid depth"));
+}
+
+TEST(doubts, noise_as_large_as_the_radius) {
+    Computed noisy;
+    noisy.noise = {0.01, 0.002}; // a Kinect's at such distances
+    EXPECT_TRUE(noisy.doubts().empty()) << tests::joined(noisy.doubts());
+    noisy.radius_m = 0.05;
+    EXPECT_TRUE(warned(noisy.doubts(), "noise is above a quarter of the radius"));
 }
 
 TEST(doubts, a_sparse_grid_of_a_cloud_computed_from_its_points_is_no_reason) {
