@@ -59,7 +59,7 @@ std::vector<Parameter> CacaoOptions::parameters() {
          .value = &horizon_angle,
          .unit = "sine",
          .low = 0,
-         .high = 0.2},
+         .high = 1},
         {.name = "fade-from",
          .help = "depth at which AO starts to fade out. If this and fade-to are 0, scan never fades, and reference "
                  "fades from 50 to 300 m",
