@@ -84,7 +84,7 @@ double largest(const cv::Mat1d& grid) {
 } // namespace
 
 std::string verdict_of(const Refinement& r) {
-    constexpr double most_px = 1, most_sigma_px = 0.5, most_over_fitted = 1.5, least_coverage = 0.4;
+    constexpr double most_px = 1, most_sigma_px = 0.5, most_over_fitted = 2, least_coverage = 0.4;
     const Selection& found = r.selection;
     if (found.steps.empty())
         return "doubtful: the views determine nothing, so the camera is as it was before.";
