@@ -1,4 +1,5 @@
 // Cameras refined from boards and clouds: what is recovered, how certain it is, and when nothing changes.
+#include "apps/refine/report.h"
 #include "io/clouds/cloud_file.h"
 #include "io/images/image_file.h"
 #include "projection/calibration/boards/board_detection.h"
@@ -287,6 +288,20 @@ TEST(Boards, AnOutlyingViewIsFlaggedAndItsDroppingHelps) {
         EXPECT_EQ(result.views[i].used, i != 3);
     }
     EXPECT_LT(result.selection.train_px, 0.2);
+}
+
+TEST(Boards, TheVerdictDoubtsOutlyingViewsAndViewsThatDetermineNothing) {
+    std::mt19937 random(9);
+    const std::vector<ParameterGroup> groups = camera_groups(LensModel::brown_conrady);
+    std::vector<BoardView> views = boards_seen_by(plain, 10, 0.1, random);
+    Boards sound(views);
+    EXPECT_TRUE(says(verdict_of(refine(sound, plain, groups, {}, "")), "sound: held-out views are off by 0.1"));
+    std::normal_distribution<double> noise(0, 1);
+    for (Eigen::Vector2d& pixel : views[3].pixels)
+        pixel += Eigen::Vector2d(noise(random), noise(random));
+    Boards one_bad(views);
+    EXPECT_TRUE(says(verdict_of(refine(one_bad, plain, groups, {}, "")), "1 of 10 views is outlying"));
+    EXPECT_TRUE(says(verdict_of(refine(sound, plain, groups, {}, "the same tilt")), "doubtful: the views determine"));
 }
 
 // ---------------------------------------------------------------------------------------------------- targets in
