@@ -185,6 +185,11 @@ void check(const Parameter& row) {
             [&](const std::string* value) { return row.choices.empty() || std::ranges::count(row.choices, *value); },
             [](const OneOf& choice) { return choice.word().has_value(); },
             [&](const std::optional<double>* value) { return !*value || within(**value); },
+            // A limit such as 0.2 is no float, and the float next to it is allowed.
+            [&](const float* value) {
+                return std::isfinite(*value) && *value >= static_cast<float>(row.low) &&
+                       *value <= static_cast<float>(row.high);
+            },
             [&](const auto* value) { return within(*value); },
         },
         row.value);

@@ -83,8 +83,9 @@ CacaoConstants constants_from(const CacaoOptions& options, const Pinhole& camera
     const CacaoToneCurve own = options.scan() ? CacaoToneCurve::calibrated : CacaoToneCurve::documented;
     const bool calibrated = options.tone_curve.value_or(own) == CacaoToneCurve::calibrated;
     k.shadow_strength = std::clamp(4.3F * options.shadow_multiplier * (calibrated ? 0.294F : 1.0F), 0.0F, 10.0F);
+    // Not quite 0: the power 0 of visibility 0 is undefined in shaders.
     k.shadow_power =
-        std::clamp(options.shadow_power * (calibrated ? 5.0F / 1.5F : 1.0F), 0.0F, calibrated ? 100.0F : 10.0F);
+        std::clamp(options.shadow_power * (calibrated ? 5.0F / 1.5F : 1.0F), 1e-6F, calibrated ? 100.0F : 10.0F);
     k.shadow_clamp = std::clamp(options.shadow_clamp, 0.0F, 1.0F);
     k.horizon = std::clamp(options.horizon_angle, 0.0F, 1.0F);
     const bool documented = options.fade_to == 0 && options.fade_from == 0 && !options.scan();

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace scanshade {
 using namespace calibration;
@@ -82,10 +83,43 @@ double largest(const cv::Mat1d& grid) {
 
 } // namespace
 
+std::string verdict_of(const Refinement& r) {
+    constexpr double most_px = 1, most_sigma_px = 0.5, most_over_fitted = 2, least_coverage = 0.4;
+    const Selection& found = r.selection;
+    if (found.steps.empty())
+        return "doubtful: the views determine nothing, so the camera is as it was before.";
+    const bool pixels = r.unit == "px";
+    const double sigma_px = mean_pixel_sigma(found.fit);
+    const auto outlying =
+        std::count_if(r.views.begin(), r.views.end(), [](const ViewRow& view) { return view.outlying && view.used; });
+    std::vector<std::string> doubts;
+    if (pixels && found.held_out_px > most_px)
+        doubts.push_back(fmt::format("held-out views are off by {:.2g} px", found.held_out_px));
+    else if (found.held_out_px > most_over_fitted * found.train_px && (!pixels || found.held_out_px > 0.1))
+        doubts.push_back(fmt::format("held-out views are {:.1f} times as far off as fitted ones",
+                                     found.held_out_px / found.train_px));
+    if (sigma_px > most_sigma_px)
+        doubts.push_back(fmt::format("a pixel is known to {:.2g} px only", sigma_px));
+    if (outlying > 0)
+        doubts.push_back(
+            fmt::format("{} of {} views {} outlying", outlying, r.views.size(), outlying == 1 ? "is" : "are"));
+    if (r.coverage.share < least_coverage)
+        doubts.push_back(fmt::format("{:.0f} % of the image hold observations", 100 * r.coverage.share));
+    if (!doubts.empty())
+        return fmt::format("doubtful: {}.", fmt::join(doubts, "; "));
+    const std::string error = fmt::format("held-out views are off by {:.2g} {}", found.held_out_px, r.unit);
+    return r.changed() ? fmt::format("sound: {}, and a pixel is known to {:.2g} px.", error, sigma_px)
+                       : fmt::format("sound: {}, and nothing asks for another camera.", error);
+}
+
 std::string status_of(const Refinement& r) { return r.changed() ? "refined" : "unchanged"; }
 
 json details_of(const Refinement& r, double took_s) {
-    json text{{"status", status_of(r)}, {"source", r.source}, {"took_s", took_s}, {"error_unit", r.unit}};
+    json text{{"status", status_of(r)},
+              {"verdict", verdict_of(r)},
+              {"source", r.source},
+              {"took_s", took_s},
+              {"error_unit", r.unit}};
     text["before"] = to_json(r.before);
     for (const NumberRow& row : numbers_of(r))
         text["numbers"][row.name] = {{"before", row.before}, {"after", row.after}, {"sigma", finite(row.sigma)}};
@@ -112,7 +146,7 @@ json details_of(const Refinement& r, double took_s) {
 }
 
 std::string summary_of(const Refinement& r, double took_s) {
-    std::string text = fmt::format("{}: {} ({:.1f} s)\n\n", status_of(r), r.source, took_s);
+    std::string text = fmt::format("{}: {} ({:.1f} s)\n{}\n\n", status_of(r), r.source, took_s, verdict_of(r));
     text += fmt::format("  {:<14} {:>12} {:>12} {:>10}\n", "", "before", "after", "sigma");
     for (const NumberRow& row : numbers_of(r))
         text += fmt::format("  {:<14} {:>12.6g} {:>12.6g} {:>10}\n", row.name, row.before, row.after,
@@ -253,7 +287,8 @@ std::string page_of(const Refinement& r, double took_s) {
     if (r.full)
         errors.push_back({"full model, for comparison", number(r.full->train_px), number(r.full->held_out_px)});
 
-    std::string found = style + page::paragraph(fmt::format("From {}; {:.1f} s.", r.source, took_s));
+    std::string found =
+        style + page::paragraph(verdict_of(r)) + page::paragraph(fmt::format("From {}; {:.1f} s.", r.source, took_s));
     for (const std::string& note : r.notes)
         found += page::paragraph(note);
     std::vector<page::Section> sections = {

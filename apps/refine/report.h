@@ -18,6 +18,9 @@ namespace scanshade {
 /// A whole page: tables and inline SVG (residuals over the image, views, coverage, the pixel's sigma).
 [[nodiscard]] std::string page_of(const calibration::Refinement& refinement, double took_s);
 
+/// One sentence: sound or doubtful, and why.
+[[nodiscard]] std::string verdict_of(const calibration::Refinement& refinement);
+
 /// "refined" or "unchanged"
 [[nodiscard]] std::string status_of(const calibration::Refinement& refinement);
 

@@ -118,11 +118,25 @@ Refinement refine_from_boards(const fs::path& folder, const Target& target, cons
     const std::vector<Picture> pictures = pictures_in(folder, notes);
     const cv::Size size = pictures.front().pixels.size();
     std::vector<BoardView> views;
-    for (const Picture& picture : pictures)
-        if (auto view = find_board(picture.pixels, target, picture.name))
+    std::size_t larger = 0;
+    for (const Picture& picture : pictures) {
+        auto view = find_board(picture.pixels, target, picture.name);
+        const std::string file = (folder / picture.name).string();
+        if (!view) {
+            notes.push_back(fmt::format("no board found in {}; not used.", file));
+        } else if (view->goes_on) {
+            ++larger;
+            notes.push_back(fmt::format("the board in {} is larger than {}x{} corners; not used.", file,
+                                        target.count.width, target.count.height));
+        } else {
             views.push_back(*std::move(view));
-        else
-            notes.push_back(fmt::format("no board found in {}; not used.", (folder / picture.name).string()));
+        }
+    }
+    if (larger > 0 && larger >= views.size())
+        throw Error(fmt::format("{}: the board is larger than {}x{} corners in {} of the {} pictures where one is "
+                                "found; --board takes all inner corners, those at which four squares meet",
+                                folder.string(), target.count.width, target.count.height, larger,
+                                larger + views.size()));
     if (views.empty())
         throw Error(
             fmt::format("{}: no {} found in any of {} pictures", folder.string(), text_of(target), pictures.size()));

@@ -99,7 +99,11 @@ std::vector<ViewScore> held_out(const Problem& problem, const Fit& from, const F
 struct Gain {
     double mean = 0, standard_error = 0;
     [[nodiscard]] bool clear() const { return mean > standard_error; }
-    [[nodiscard]] double percent() const { return 100 * (1 - std::exp(-mean)); }
+    [[nodiscard]] std::string text() const {
+        const double percent = 100 * (1 - std::exp(-mean));
+        return fmt::format("held-out error {} by {:.2f} % +- {:.2f} %", percent < 0 ? "rises" : "falls",
+                           std::abs(percent), 100 * standard_error);
+    }
 };
 
 Gain gain_of(const std::vector<ViewScore>& before, const std::vector<ViewScore>& after) {
@@ -223,15 +227,13 @@ class ModelSelection {
         const auto scores = held_out(problem_, fit, free, used_, options_.folds);
         const Gain gain = gain_of(held_out_, scores);
         if (!gain.clear() && !must_free(group)) {
-            record(indices, false,
-                   fmt::format("not supported: held-out error falls by {:.2f} % +- {:.2f} %", gain.percent(),
-                               100 * gain.standard_error));
+            record(indices, false, "not supported: " + gain.text());
             return Outcome::rejected;
         }
         record(indices, true,
-               fmt::format("{:.1f} sigma, held-out error falls by {:.2f} % +- {:.2f} %{}",
-                           sigmas_from(fit, selection_.start.model, group.unknowns), gain.percent(),
-                           100 * gain.standard_error, indices.size() > 1 ? " (together)" : ""));
+               fmt::format("{:.1f} sigma, {}{}{}", sigmas_from(fit, selection_.start.model, group.unknowns),
+                           gain.text(), indices.size() > 1 ? " (together)" : "",
+                           gain.clear() ? "" : "; freed all the same, since its start is a guess"));
         selection_.fit = fit;
         selection_.free = free;
         held_out_ = scores;

@@ -729,6 +729,62 @@ TEST_F(cacao_scan, normals_beside_holes_are_true_or_absent) {
 
 constexpr float near_enough = 1e-6F;
 
+TEST_F(cacao_formulas, every_setting_that_amds_host_takes_is_taken) {
+    // Section 2 of the specification: documented ranges, and what the host clamps to where that is wider. A radius of 0
+    // is left out, since AMD's constants are then infinite.
+    struct Case {
+        const char* name;
+        std::vector<const char*> values;
+    };
+    for (const Case& of : {Case{"radius", {"0.0001", "100000"}},
+                           {"shadow-multiplier", {"0", "5"}},
+                           {"shadow-power", {"0", "10"}},
+                           {"shadow-clamp", {"0", "1"}},
+                           {"horizon-angle", {"0", "0.3", "1"}},
+                           {"fade-to", {"0.001", "1e30"}},
+                           {"adaptive-limit", {"0", "1"}},
+                           {"blur-passes", {"0", "8"}},
+                           {"sharpness", {"0", "1"}},
+                           {"detail-strength", {"0", "5", "100"}},
+                           {"sigma-squared", {"0.001", "1e6"}},
+                           {"depth-sigma-squared", {"1e-9", "1e6"}}})
+        for (const char* value : of.values)
+            for (const CacaoProfile profile : {CacaoProfile::scan, CacaoProfile::reference}) {
+                CacaoOptions o = options(Quality::high, false, profile);
+                bool found = false;
+                for (const Parameter& row : o.parameters())
+                    if (row.name == of.name) {
+                        found = true;
+                        EXPECT_NO_THROW(set(row, std::string(value))) << of.name << " " << value;
+                    }
+                EXPECT_TRUE(found) << of.name;
+                EXPECT_NO_THROW(Cacao(device(), o)) << of.name << " " << value;
+            }
+}
+
+TEST_F(cacao_formulas, a_horizon_of_one_occludes_nothing) {
+    // No sample is higher above the surface than straight up, whose sine is 1.
+    CacaoOptions o = options();
+    const DepthImage depth = step(camera_of(125), 1.8F, 2);
+    EXPECT_LT(lowest(both(o, depth).scan.visibility), 0.9);
+    o.horizon_angle = 1;
+    const Both maps = both(o, depth);
+    EXPECT_GE(lowest(maps.scan.visibility), 0.999);
+    EXPECT_GE(lowest(maps.reference.visibility), 0.999);
+}
+
+TEST_F(cacao_formulas, a_power_of_zero_leaves_numbers) {
+    // Full strength without a clamp makes visibility 0, and 0 to the power 0 is no number in shaders.
+    CacaoOptions o = options();
+    o.shadow_multiplier = 5;
+    o.shadow_clamp = 1;
+    o.shadow_power = 0;
+    const DepthImage depth = step(camera_of(125), 1.8F, 2);
+    const Both maps = both(o, depth);
+    EXPECT_EQ(cv::countNonZero(maps.scan.visibility == maps.scan.visibility), depth.z_m.size().area());
+    EXPECT_EQ(cv::countNonZero(maps.reference.visibility == maps.reference.visibility), depth.z_m.size().area());
+}
+
 TEST_F(cacao_formulas, the_cpu_reference_has_the_documented_values) {
     // The specification's worked values check the formulas with which the tests below compare the shaders.
     const Around e = reference::edges(2, {2.1F, 1.95F, 2, 3});

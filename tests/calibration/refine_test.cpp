@@ -1,4 +1,5 @@
 // Cameras refined from boards and clouds: what is recovered, how certain it is, and when nothing changes.
+#include "apps/refine/report.h"
 #include "io/clouds/cloud_file.h"
 #include "io/images/image_file.h"
 #include "projection/calibration/boards/board_detection.h"
@@ -13,6 +14,7 @@
 #include "tests/support/says.h"
 #include "tests/support/small_capture.h"
 
+#include <array>
 #include <cstdlib>
 #include <filesystem>
 #include <gtest/gtest.h>
@@ -163,6 +165,30 @@ TEST(ModelSelection, FindsTheTrueModelAndNoMore) {
     EXPECT_EQ(false_distortion, 0);
 }
 
+TEST(ModelSelection, AnErrorThatRoseIsNotSaidToFall) {
+    // A guessed focal length is freed whatever the held-out views say, so among a few trials their error rises.
+    int rose = 0;
+    for (int trial = 0; trial < 10; ++trial) {
+        std::mt19937 random(trial);
+        const Camera strong{{525, 525, 340, 225, image}, {-0.28, 0.1, 0, 0, 0}, "strong"};
+        const std::vector<BoardView> views = boards_seen_by(strong, 8, 0.2, random);
+        const Boards boards(views);
+        SelectionOptions options;
+        options.guessed = true;
+        const Selection selection =
+            select_model(boards, boards.start(model_of(guess_from_boards(views, image))),
+                         camera_groups(LensModel::brown_conrady), Views(views.size(), true), options);
+        for (const Step& step : selection.steps) {
+            EXPECT_EQ(step.why.find("by -"), std::string::npos) << step.why;
+            if (step.freed && step.why.find("rises") != std::string::npos) {
+                ++rose;
+                EXPECT_TRUE(says(step.why, "freed all the same, since its start is a guess"));
+            }
+        }
+    }
+    EXPECT_GT(rose, 0);
+}
+
 // ---------------------------------------------------------------------------------------------------- derivatives
 
 struct Pixel {
@@ -264,6 +290,20 @@ TEST(Boards, AnOutlyingViewIsFlaggedAndItsDroppingHelps) {
     EXPECT_LT(result.selection.train_px, 0.2);
 }
 
+TEST(Boards, TheVerdictDoubtsOutlyingViewsAndViewsThatDetermineNothing) {
+    std::mt19937 random(9);
+    const std::vector<ParameterGroup> groups = camera_groups(LensModel::brown_conrady);
+    std::vector<BoardView> views = boards_seen_by(plain, 10, 0.1, random);
+    Boards sound(views);
+    EXPECT_TRUE(says(verdict_of(refine(sound, plain, groups, {}, "")), "sound: held-out views are off by 0.1"));
+    std::normal_distribution<double> noise(0, 1);
+    for (Eigen::Vector2d& pixel : views[3].pixels)
+        pixel += Eigen::Vector2d(noise(random), noise(random));
+    Boards one_bad(views);
+    EXPECT_TRUE(says(verdict_of(refine(one_bad, plain, groups, {}, "")), "1 of 10 views is outlying"));
+    EXPECT_TRUE(says(verdict_of(refine(sound, plain, groups, {}, "the same tilt")), "doubtful: the views determine"));
+}
+
 // ---------------------------------------------------------------------------------------------------- targets in
 // pictures
 
@@ -336,6 +376,145 @@ TEST(Targets, ACharucoBoardIsFoundThoughPartOfItIsCovered) {
     const auto part = find_board(picture, target, "charuco");
     ASSERT_TRUE(part);
     EXPECT_LT(part->pixels.size(), 24);
+}
+
+/// A chessboard of 9x6 inner corners in a picture, and where its corners truly are. `outer` is how much of the
+/// outermost squares the paper shows.
+struct SeenChessboard {
+    cv::Mat3b picture;
+    std::vector<cv::Point2d> corners;
+};
+
+SeenChessboard chessboard_at(const double* pose, double k1, double outer, double blur_px, double noise,
+                             std::mt19937& random) {
+    constexpr int columns = 10, rows = 7, samples = 4; // squares; samples per pixel and axis
+    constexpr double square_m = 0.03, f = 525, cx = 319.5, cy = 239.5;
+    cv::Matx33d rotation;
+    cv::Rodrigues(cv::Vec3d(pose[0], pose[1], pose[2]), rotation);
+    const cv::Matx33d from_board(rotation(0, 0), rotation(0, 1), pose[3], rotation(1, 0), rotation(1, 1), pose[4],
+                                 rotation(2, 0), rotation(2, 1), pose[5]);
+    const cv::Matx33d board_from = from_board.inv();
+    SeenChessboard seen;
+    for (int i = 0; i < 54; ++i) {
+        const cv::Vec3d ray = from_board * cv::Vec3d((i % 9 - 4) * square_m, (i / 9 - 2.5) * square_m, 1);
+        const double x = ray[0] / ray[2], y = ray[1] / ray[2], lens = 1 + k1 * (x * x + y * y);
+        seen.corners.emplace_back(f * lens * x + cx, f * lens * y + cy);
+    }
+    const auto brightness = [&](double u, double v) {
+        const double wanted_x = (u - cx) / f, wanted_y = (v - cy) / f;
+        double x = wanted_x, y = wanted_y;
+        for (int i = 0; k1 != 0 && i < 8; ++i) { // the fixed point of the lens's inverse
+            const double lens = 1 + k1 * (x * x + y * y);
+            x = wanted_x / lens;
+            y = wanted_y / lens;
+        }
+        const cv::Vec3d on_board = board_from * cv::Vec3d(x, y, 1);
+        const double column = on_board[0] / on_board[2] / square_m + columns / 2.0,
+                     row = on_board[1] / on_board[2] / square_m + rows / 2.0, cut = 1 - outer;
+        const bool on = column >= cut && row >= cut && column < columns - cut && row < rows - cut;
+        return on && (static_cast<int>(column) + static_cast<int>(row)) % 2 == 0 ? 40.0 : 215.0;
+    };
+    std::normal_distribution<double> error(0, noise);
+    cv::Mat1d exact(image, 0.0);
+    for (int v = 0; v < image.height; ++v)
+        for (int u = 0; u < image.width; ++u)
+            for (int i = 0; i < samples * samples; ++i)
+                exact(v, u) +=
+                    brightness(u + (i % samples + 0.5) / samples - 0.5, v + (i / samples + 0.5) / samples - 0.5) /
+                    (samples * samples);
+    cv::GaussianBlur(exact, exact, {}, blur_px);
+    for (double& value : exact)
+        value += error(random);
+    cv::Mat1b grey;
+    exact.convertTo(grey, CV_8U);
+    cv::cvtColor(grey, seen.picture, cv::COLOR_GRAY2BGR);
+    return seen;
+}
+
+/// Poses that keep the whole board in view.
+std::vector<std::array<double, 6>> chessboard_poses(int count, double near_m, double far_m, std::mt19937& random) {
+    std::uniform_real_distribution<double> even(-1, 1);
+    std::vector<std::array<double, 6>> poses;
+    for (int i = 0; i < count; ++i) {
+        const double z_m = (near_m + far_m) / 2 + (far_m - near_m) / 2 * even(random), free_m = 0.35 * (z_m - 0.38);
+        poses.push_back({0.5 * even(random), 0.5 * even(random), 0.6 * even(random), free_m * even(random),
+                         0.7 * free_m * even(random), z_m});
+    }
+    return poses;
+}
+
+double squared_error(const std::vector<cv::Point2d>& truth, const std::vector<cv::Point2d>& found) {
+    double forward = 0, backward = 0; // boards may be counted from either end
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+        forward += (truth[i] - found[i]).dot(truth[i] - found[i]);
+        backward += (truth[i] - found[found.size() - 1 - i]).dot(truth[i] - found[found.size() - 1 - i]);
+    }
+    return std::min(forward, backward);
+}
+
+/// OpenCV's corners with one window for all, 11x11 pixels.
+std::vector<cv::Point2d> opencv_corners(const cv::Mat3b& picture, int half = 5) {
+    cv::Mat1b grey;
+    cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
+    std::vector<cv::Point2f> corners;
+    EXPECT_TRUE(cv::findChessboardCorners(grey, {9, 6}, corners));
+    cv::cornerSubPix(grey, corners, {half, half}, {-1, -1},
+                     {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 30, 1e-3});
+    return {corners.begin(), corners.end()};
+}
+
+TEST(Targets, ChessboardCornersAreNearerToTruthThanWithOneWindowForAll) {
+    // A window of 11x11 pixels is small for near boards, where noise counts, and must not be too large for far ones.
+    struct Case {
+        const char* name;
+        double near_m, far_m, k1, outer, blur_px, noise;
+    };
+    for (const Case& c : {Case{"near", 0.4, 0.5, 0, 1, 0.6, 2},
+                          {"near, barrel", 0.4, 0.5, -0.25, 1, 0.7, 2},
+                          {"near, blurred", 0.4, 0.5, 0, 1, 2, 2},
+                          {"far", 0.9, 1.3, 0, 1, 0.7, 2},
+                          {"far, blurred", 0.8, 1.2, 0, 1, 1.2, 2},
+                          {"cut", 0.45, 0.7, 0, 0.55, 0.6, 2}}) {
+        std::mt19937 random(3);
+        double ours = 0, theirs = 0;
+        int found = 0;
+        for (const auto& pose : chessboard_poses(6, c.near_m, c.far_m, random)) {
+            const SeenChessboard seen = chessboard_at(pose.data(), c.k1, c.outer, c.blur_px, c.noise, random);
+            const auto view = find_board(seen.picture, {}, c.name);
+            if (!view)
+                continue;
+            ++found;
+            EXPECT_FALSE(view->goes_on) << c.name;
+            std::vector<cv::Point2d> corners;
+            for (const Eigen::Vector2d& pixel : view->pixels)
+                corners.emplace_back(pixel.x(), pixel.y());
+            ours += squared_error(seen.corners, corners);
+            theirs += squared_error(seen.corners, opencv_corners(seen.picture));
+        }
+        ASSERT_GE(found, 5) << c.name;
+        const double ours_px = std::sqrt(ours / (54 * found)), theirs_px = std::sqrt(theirs / (54 * found));
+        std::printf("%-14s %d boards: %.4f px from truth, OpenCV's window of 11x11 %.4f px\n", c.name, found, ours_px,
+                    theirs_px);
+        EXPECT_LE(ours_px, theirs_px) << c.name;
+        EXPECT_LT(ours_px, 0.06) << c.name;
+    }
+}
+
+TEST(Targets, ABoardLargerThanToldIsNoticed) {
+    // Most sizes below the true 9x6 are not found at all; 8x6 often is, as a part of the board.
+    std::mt19937 random(4);
+    int found = 0;
+    for (const auto& pose : chessboard_poses(3, 0.45, 0.7, random)) {
+        const SeenChessboard seen = chessboard_at(pose.data(), -0.1, 1, 0.7, 2, random);
+        if (const auto part = find_board(seen.picture, {.count = {8, 6}}, "part")) {
+            ++found;
+            EXPECT_TRUE(part->goes_on);
+        }
+        const auto whole = find_board(seen.picture, {}, "whole");
+        ASSERT_TRUE(whole);
+        EXPECT_FALSE(whole->goes_on);
+    }
+    EXPECT_GT(found, 0);
 }
 
 // ---------------------------------------------------------------------------------------------------- recorded data
@@ -451,9 +630,64 @@ TEST(Chessboards, TheSelectedModelIsNoWorseThanTheFullModelOnHeldOutViews) {
         refine(boards, guess_from_boards(views, image), camera_groups(LensModel::brown_conrady), options, "");
     ASSERT_TRUE(result.full);
     EXPECT_LE(result.selection.held_out_px, result.full->held_out_px);
-    EXPECT_LT(result.selection.held_out_px, 0.26);
+    EXPECT_LT(result.selection.held_out_px, 0.19);
     EXPECT_FALSE(result.selection.free[k3]);
     EXPECT_TRUE(monotone(result.selection.fit.model));
+}
+
+TEST(Chessboards, CornersLeaveLessResidualThanOpenCvsUsualWindow) {
+    // chessboard_right is the other camera of OpenCV's stereo pair (samples/data/right*.jpg).
+    int folders = 0;
+    for (const char* name : {"chessboard_left", "chessboard_right"}) {
+        std::vector<BoardView> ours, theirs;
+        if (!fs::exists(data_folder() / name))
+            continue;
+        ++folders;
+        for (const auto& file : fs::directory_iterator(data_folder() / name)) {
+            if (file.path().extension() != ".jpg")
+                continue;
+            const cv::Mat3b picture = read_colour(file);
+            const auto view = find_board(picture, {}, file.path().filename().string());
+            ASSERT_TRUE(view) << file;
+            EXPECT_FALSE(view->goes_on) << file;
+            ours.push_back(*view);
+            theirs.push_back(*view);
+            theirs.back().pixels.clear();
+            for (const cv::Point2d pixel : opencv_corners(picture))
+                theirs.back().pixels.emplace_back(pixel.x, pixel.y);
+        }
+        EXPECT_EQ(ours.size(), 13);
+        const double ours_px = opencv_calibrates(ours).rms, theirs_px = opencv_calibrates(theirs).rms;
+        std::printf("%s: %.4f px, OpenCV's window of 11x11 %.4f px\n", name, ours_px, theirs_px);
+        EXPECT_LE(ours_px, 0.95 * theirs_px);
+    }
+    if (folders == 0)
+        GTEST_SKIP() << "no recorded chessboards; SCANSHADE_DATA names the folder of recorded data";
+}
+
+TEST(Chessboards, AWrongBoardOrSquareIsRefusedWithTheReason) {
+    const fs::path folder = data_folder() / "chessboard_left";
+    NEEDS(folder);
+    const tests::Ran part = tests::run_program("refine '" + folder.string() + "' --board 8x6");
+    EXPECT_EQ(part.exit_code, 3);
+    EXPECT_TRUE(says(part.err, "the board is larger than 8x6 corners in 11 of the 11 pictures"));
+    const tests::Ran millimetres = tests::run_program("refine '" + folder.string() + "' --board 9x6 --square 25");
+    EXPECT_EQ(millimetres.exit_code, 1);
+    EXPECT_TRUE(says(millimetres.err, "square: '25' given, expected m"));
+}
+
+TEST(Chessboards, TheVerdictIsOnTheTerminalThePageAndInTheCamera) {
+    const fs::path folder = data_folder() / "chessboard_left";
+    NEEDS(folder);
+    const tests::TemporaryFolder out;
+    const tests::Ran ran =
+        tests::run_program("refine '" + folder.string() + "' --board 9x6 -o '" + (out / "camera.json").string() +
+                           "' --report '" + (out / "page.html").string() + "'");
+    const char* verdict = "sound: held-out views are off by 0.18 px";
+    EXPECT_EQ(ran.exit_code, 0) << ran.err;
+    EXPECT_TRUE(says(ran.out, verdict));
+    EXPECT_TRUE(says(tests::read_bytes(out / "camera.json"), verdict));
+    EXPECT_TRUE(says(tests::read_bytes(out / "page.html"), verdict));
 }
 
 TEST(Clouds, OrganisedCloudsDetermineTheirCameraToAThousandthOfAPixel) {

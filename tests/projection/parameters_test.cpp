@@ -134,6 +134,16 @@ TEST(Parameters, WhatCannotBeIsRefusedByNameAndLeavesTheSettingAlone) {
     EXPECT_EQ(settings.quality, "high");
 }
 
+TEST(Parameters, ALimitItselfIsAllowedThoughItIsNoFloat) {
+    // The float nearest to 1e-4 is smaller, and the one nearest to 0.2 is larger.
+    float value = 0.1F;
+    const Parameter row{.name = "value", .value = &value, .low = 1e-4, .high = 0.2};
+    set(row, "0.0001");
+    set(row, "0.2");
+    EXPECT_EQ(value, 0.2F);
+    EXPECT_TRUE(says(refusal(row, "0.2001"), "value"));
+}
+
 TEST(Parameters, ValuesSetInCodeAreCheckedToo) {
     Settings settings;
     const auto rows = settings.parameters();

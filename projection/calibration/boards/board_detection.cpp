@@ -2,8 +2,11 @@
 #include "projection/calibration/boards/board_detection.h"
 
 #include "projection/error.h"
+#include "projection/statistics.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <opencv2/aruco/charuco.hpp>
@@ -54,28 +57,106 @@ BoardView view_of(const std::vector<cv::Point2f>& pixels, const Target& target, 
     return view;
 }
 
-/// The refinement's window must not reach a neighbouring corner: just under half the least distance between two.
-int window_half(const std::vector<cv::Point2f>& corners, cv::Size count) {
-    constexpr int largest = 11; // as in OpenCV's samples, enough for a blurred edge
-    double least = 2.0 * largest + 2;
+using Corners = std::vector<cv::Point2f>;
+
+/// How far a corner is from the next edge that is not its own. Windows are square, so this is in the maximum norm.
+double clearance(const Corners& corners, cv::Size count, int column, int row) {
+    const auto at = [&](int c, int r) -> cv::Point2d { return corners[r * count.width + c]; };
+    const cv::Point2d corner = at(column, row);
+    const auto step = [&](int across, int down) -> cv::Point2d {
+        const int c = column + across, r = row + down;
+        if (c >= 0 && r >= 0 && c < count.width && r < count.height)
+            return at(c, r) - corner;
+        // The edge of the paper often cuts the outermost squares, so only half of one counts on.
+        return 0.5 * (corner - at(column - across, row - down));
+    };
+    const cv::Point2d right = step(1, 0), left = step(-1, 0), below = step(0, 1), above = step(0, -1);
+    const auto to_line = [](cv::Point2d through, cv::Point2d along) {
+        return std::abs(through.cross(along)) / (std::abs(along.x) + std::abs(along.y));
+    };
+    return std::min({to_line(right, below - above), to_line(left, below - above), to_line(below, right - left),
+                     to_line(above, right - left)});
+}
+
+/// Each corner has its own window, as large as its squares allow: more pixels mean less noise, but an edge of another
+/// corner draws the result away. The share leaves room for blur, the least for first corners that are pixels off, and
+/// the most for edges that a lens bends.
+void refine_corners(const cv::Mat1b& grey, Corners& corners, cv::Size count) {
+    constexpr double share = 0.8;
+    constexpr int least_half = 4, most_half = 15;
+    const Corners found = corners;
     for (int i = 0; i < static_cast<int>(corners.size()); ++i) {
-        if ((i + 1) % count.width != 0)
-            least = std::min(least, cv::norm(corners[i + 1] - corners[i]));
-        if (i + count.width < static_cast<int>(corners.size()))
-            least = std::min(least, cv::norm(corners[i + count.width] - corners[i]));
+        const double clear = clearance(found, count, i % count.width, i / count.width);
+        const int half = std::clamp(static_cast<int>(share * clear), least_half, most_half);
+        Corners one{found[i]};
+        cv::cornerSubPix(grey, one, {half, half}, {-1, -1},
+                         {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 100, 1e-4});
+        corners[i] = one.front();
     }
-    return std::clamp(static_cast<int>(least / 2) - 1, 2, largest);
+}
+
+/// How clearly four squares meet at a pixel, in grey values: the darker of two opposite squares is this much brighter
+/// than the brighter of the other two. Not positive where only an edge passes; none beyond the image.
+std::optional<double> crossing(const cv::Mat1b& grey, cv::Point2d at, cv::Point2d along_row, cv::Point2d along_column) {
+    constexpr double inside = 0.3; // of a square from the corner to where its brightness is taken
+    const int half = std::max(1, static_cast<int>(std::min(cv::norm(along_row), cv::norm(along_column)) / 10));
+    std::array<double, 4> squares{};
+    for (int i = 0; i < 4; ++i) {
+        const cv::Point2d middle = at + inside * ((i % 2 == 0 ? 1 : -1) * along_row + (i < 2 ? 1 : -1) * along_column);
+        const cv::Rect patch(static_cast<int>(std::lround(middle.x)) - half,
+                             static_cast<int>(std::lround(middle.y)) - half, 2 * half + 1, 2 * half + 1);
+        if ((patch & cv::Rect({}, grey.size())) != patch)
+            return std::nullopt;
+        squares[i] = cv::mean(grey(patch))[0];
+    }
+    const auto [low_a, high_a] = std::minmax(squares[0], squares[3]);
+    const auto [low_b, high_b] = std::minmax(squares[1], squares[2]);
+    return std::max(low_a - high_b, low_b - high_a);
+}
+
+/// Whether a whole row or column of corners lies one square beyond the corners found: then they are part of a larger
+/// board.
+bool goes_on(const cv::Mat1b& grey, const Corners& corners, cv::Size count) {
+    constexpr double as_clear = 0.5; // as a typical corner of the board
+    std::vector<double> found;
+    const auto at = [&](int c, int r) -> cv::Point2d { return corners[r * count.width + c]; };
+    for (int row = 1; row < count.height; ++row)
+        for (int column = 1; column < count.width; ++column)
+            if (const auto clear = crossing(grey, at(column, row), at(column, row) - at(column - 1, row),
+                                            at(column, row) - at(column, row - 1)))
+                found.push_back(*clear);
+    const double wanted = as_clear * median(found);
+    // Lines of corners that end at one side of the board: `from` is a line's last corner, `inward` the step back.
+    const auto beyond = [&](int lines, auto&& from, cv::Point inward) {
+        int seen = 0, clear = 0;
+        for (int line = 0; line < lines; ++line) {
+            const cv::Point last = from(line), other = from(line > 0 ? line - 1 : 1);
+            const cv::Point2d end = at(last.x, last.y), before = at(last.x + inward.x, last.y + inward.y),
+                              first = at(last.x + 2 * inward.x, last.y + 2 * inward.y);
+            const cv::Point2d next = 3 * end - 3 * before + first; // straight on, with perspective and lens
+            if (const auto here = crossing(grey, next, next - end, end - at(other.x, other.y))) {
+                ++seen;
+                clear += *here > wanted;
+            }
+        }
+        return seen >= 3 && 2 * clear > seen;
+    };
+    const int right = count.width - 1, bottom = count.height - 1;
+    return wanted > 0 && (beyond(count.height, [&](int row) { return cv::Point(0, row); }, {1, 0}) ||
+                          beyond(count.height, [&](int row) { return cv::Point(right, row); }, {-1, 0}) ||
+                          beyond(count.width, [&](int column) { return cv::Point(column, 0); }, {0, 1}) ||
+                          beyond(count.width, [&](int column) { return cv::Point(column, bottom); }, {0, -1}));
 }
 
 std::optional<BoardView> find_chessboard(const cv::Mat1b& grey, const Target& target, const std::string& name) {
-    std::vector<cv::Point2f> corners;
+    Corners corners;
     const int flags = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK;
     if (!cv::findChessboardCorners(grey, target.count, corners, flags))
         return std::nullopt;
-    const int half = window_half(corners, target.count);
-    cv::cornerSubPix(grey, corners, {half, half}, {-1, -1},
-                     {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 100, 1e-4});
-    return view_of(corners, target, name);
+    refine_corners(grey, corners, target.count);
+    BoardView view = view_of(corners, target, name);
+    view.goes_on = goes_on(grey, corners, target.count);
+    return view;
 }
 
 std::optional<BoardView> find_circles(const cv::Mat1b& grey, const Target& target, const std::string& name) {

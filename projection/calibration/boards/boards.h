@@ -10,6 +10,7 @@ struct BoardView {
     std::string name;
     std::vector<Eigen::Vector3d> points_m;
     std::vector<Eigen::Vector2d> pixels;
+    bool goes_on = false; ///< it is part of a larger chessboard than was looked for
 };
 
 class Boards final : public Problem {
