@@ -42,6 +42,14 @@ class RunsTest : public testing::Test {
     [[nodiscard]] Ran run_of(const fs::path& path, const std::string& flags = "") const {
         return run_program(fmt::format("run '{}' -o '{}' {}", path.string(), out().string(), flags));
     }
+    /// The program after other words of the shell; keeps its messages alone.
+    [[nodiscard]] Ran shell(const std::string& before, const std::string& arguments) const {
+        const fs::path messages = folder / "messages";
+        const std::string command =
+            fmt::format("{} '{}' {} 2>'{}'", before, SCANSHADE_PROGRAM, arguments, messages.string());
+        const int status = std::system(command.c_str());
+        return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), "", read_bytes(messages)};
+    }
     [[nodiscard]] json manifest() const { return json::parse(read_bytes(out() / "manifest.json")); }
 
     TemporaryFolder folder;
@@ -219,10 +227,7 @@ TEST_F(RunsTest, a_huge_depth_image_is_examined_in_little_more_than_its_pixels) 
 TEST_F(RunsTest, a_lack_of_memory_is_predicted_and_is_exit_code_4) {
     const fs::path file = write_huge_depth(folder / "huge.png");
     const auto with_memory = [&](int mib, const std::string& arguments) {
-        const std::string command = fmt::format("ulimit -v {}; '{}' {} >/dev/null 2>'{}'", 1024 * mib,
-                                                SCANSHADE_PROGRAM, arguments, (folder / "err").string());
-        const int status = std::system(command.c_str());
-        return Ran{WEXITSTATUS(status), "", read_bytes(folder / "err")};
+        return shell(fmt::format("ulimit -v {};", 1024 * mib), arguments + " >/dev/null");
     };
     const Ran looked = with_memory(400, "inspect " + file.string());
     EXPECT_EQ(looked.exit_code, unfinished);
@@ -309,7 +314,7 @@ TEST_F(RunsTest, results_that_cannot_be_printed_are_an_error) {
           std::string("devices"), "inspect " + in, "inspect --json " + in, "status " + job, "merge " + job,
           fmt::format("compare {} {}", out().string(), out().string()),
           fmt::format("plan {} -o {}", in, (folder / "job2").string())}) {
-        const Ran ran = run_program(command + " >/dev/full");
+        const Ran ran = shell("", command + " >/dev/full");
         EXPECT_EQ(ran.exit_code, unfinished) << command;
         EXPECT_TRUE(says(ran.err, "standard output: No space left on device")) << command;
     }
