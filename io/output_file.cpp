@@ -82,6 +82,9 @@ void try_to_write(const fs::path& output, const fs::path& folder) {
 
 /// `output` is what the message names: the folder or a file in it.
 void require_folder(const fs::path& output, const fs::path& folder) {
+    for (const fs::path& part : output)
+        if (part.native().size() > longest_name)
+            refuse_output(output, fmt::format("a name of {} bytes", part.native().size()), ENAMETOOLONG);
     const auto or_here = [](const fs::path& path) { return path.empty() ? fs::path(".") : path; };
     fs::path there = or_here(folder);
     std::error_code trouble;

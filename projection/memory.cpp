@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
 #include <limits>
@@ -14,12 +15,15 @@
 #include <unistd.h>
 
 namespace scanshade {
+
+namespace fs = std::filesystem;
+
 namespace {
 
 constexpr std::uint64_t unlimited = std::numeric_limits<std::uint64_t>::max();
 
 /// A number of bytes in a file by itself; none for "max" and where there is no such file.
-std::optional<std::uint64_t> bytes_in(const std::string& file) {
+std::optional<std::uint64_t> bytes_in(const fs::path& file) {
     std::ifstream stream(file);
     std::uint64_t bytes = 0;
     if (stream >> bytes)
@@ -28,7 +32,7 @@ std::optional<std::uint64_t> bytes_in(const std::string& file) {
 }
 
 /// The number behind a word in a file of many.
-std::optional<std::uint64_t> number_behind(const std::string& wanted, const std::string& file) {
+std::optional<std::uint64_t> number_behind(const std::string& wanted, const fs::path& file) {
     std::ifstream stream(file);
     for (std::string word; stream >> word;)
         if (std::uint64_t number = 0; word == wanted && stream >> number)
@@ -38,13 +42,45 @@ std::optional<std::uint64_t> number_behind(const std::string& wanted, const std:
 
 std::uint64_t left_of(std::uint64_t limit, std::uint64_t used) { return limit - std::min(limit, used); }
 
-/// Left of a control group; its cache of files gives way.
-std::uint64_t left_of_group(const std::string& limit_file, const std::string& used_file, const std::string& statistics,
-                            const std::string& cache) {
-    const auto limit = bytes_in(limit_file), used = bytes_in(used_file);
-    if (!limit || !used)
-        return unlimited;
-    return left_of(*limit, left_of(*used, number_behind(cache, statistics).value_or(0)));
+/// Names of the files in which a version of control groups keeps its numbers.
+struct GroupFiles {
+    fs::path root;
+    const char *limit, *used, *cache; ///< cache: a word in memory.stat
+};
+const GroupFiles version_1{"/sys/fs/cgroup/memory", "memory.limit_in_bytes", "memory.usage_in_bytes",
+                           "total_inactive_file"};
+const GroupFiles version_2{"/sys/fs/cgroup", "memory.max", "memory.current", "inactive_file"};
+
+/// Left of a control group and of those around it. Its cache of files gives way.
+std::uint64_t left_of_groups(const GroupFiles& files, const std::string& path) {
+    std::uint64_t left = unlimited;
+    // In a container the path may be the host's, and the root the container's own group.
+    for (fs::path group = files.root / fs::path(path).relative_path();; group = group.parent_path()) {
+        const auto limit = bytes_in(group / files.limit), used = bytes_in(group / files.used);
+        if (limit && used) {
+            const std::uint64_t cache = number_behind(files.cache, group / "memory.stat").value_or(0);
+            left = std::min(left, left_of(*limit, left_of(*used, cache)));
+        }
+        if (group == files.root || !group.has_relative_path())
+            return left;
+    }
+}
+
+/// Of the groups that the process is in: lines "0::/path" (version 2) and "4:memory:/path" (version 1).
+std::uint64_t left_of_own_groups() {
+    std::uint64_t left = unlimited;
+    std::ifstream stream("/proc/self/cgroup");
+    for (std::string line; std::getline(stream, line);) {
+        const auto first = line.find(':'), second = line.find(':', first + 1);
+        if (second == std::string::npos)
+            continue;
+        const std::string kinds = line.substr(first + 1, second - first - 1), path = line.substr(second + 1);
+        if (kinds.empty())
+            left = std::min(left, left_of_groups(version_2, path));
+        else if (("," + kinds + ",").find(",memory,") != std::string::npos)
+            left = std::min(left, left_of_groups(version_1, path));
+    }
+    return left;
 }
 
 /// Of the process: its addresses, and those resident.
@@ -75,12 +111,7 @@ bool means_no_memory(const std::error_code& code) {
 
 std::uint64_t free_memory() {
     const auto machine_kib = number_behind("MemAvailable:", "/proc/meminfo");
-    const std::string group = "/sys/fs/cgroup/";
-    return std::min(
-        {machine_kib ? *machine_kib * 1024 : unlimited, left_of_own_limit(),
-         left_of_group(group + "memory.max", group + "memory.current", group + "memory.stat", "inactive_file"),
-         left_of_group(group + "memory/memory.limit_in_bytes", group + "memory/memory.usage_in_bytes",
-                       group + "memory/memory.stat", "total_inactive_file")});
+    return std::min({machine_kib ? *machine_kib * 1024 : unlimited, left_of_own_limit(), left_of_own_groups()});
 }
 
 void require_memory(std::uint64_t bytes, const std::string& what) {

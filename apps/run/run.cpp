@@ -21,6 +21,7 @@
 #include "projection/stopwatch.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <csignal>
@@ -119,6 +120,16 @@ struct ReportFiles {
     }
 };
 
+constexpr std::array result_folders = {"ao", "confidence", "shaded", "panel", "clouds"};
+
+/// Refuses a folder of results that cannot be written, or one in it that an earlier run has left.
+void require_folders(const fs::path& folder) {
+    require_folder(folder);
+    for (const char* part : result_folders)
+        if (std::error_code ignored; fs::exists(folder / part, ignored))
+            require_folder(folder / part);
+}
+
 /// Removes files of a killed run, and the report of an earlier one: a manifest means that the results next to it are
 /// complete. The caller holds the journal.
 void prepare_folder(const Job& job, const ReportFiles& reports) {
@@ -132,8 +143,10 @@ void prepare_folder(const Job& job, const ReportFiles& reports) {
         stems.insert(report.stem().string());
         fs::remove(report);
     }
-    for (const char* part : {"", "ao", "confidence", "shaded", "panel", "clouds"})
-        remove_leftovers(job.folder() / part, [&](std::string_view stem) { return stems.contains(stem); });
+    const auto ours = [&](std::string_view stem) { return stems.contains(stem); };
+    remove_leftovers(job.folder(), ours);
+    for (const char* part : result_folders)
+        remove_leftovers(job.folder() / part, ours);
 }
 
 /// The size of a capture's depth images; empty for clouds, and where no header can be read.
@@ -237,7 +250,7 @@ class Run final : public Command {
         Tally tally;
         std::vector<Job> jobs = plan(unopened, tally);
         for (const Job& job : jobs) {
-            require_folder(job.folder());
+            require_folders(job.folder());
             if (!asked_.overwrite)
                 asked_.resume ? refuse_another_captures_results(job) : refuse_to_overwrite(job);
         }

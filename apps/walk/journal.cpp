@@ -317,6 +317,9 @@ Journal::Journal(fs::path folder, const std::string& block)
     std::error_code trouble;
     fs::create_directories(folder_, trouble);
     handle_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+    for (const int needs_another_folder : {EACCES, EPERM, EROFS, EISDIR})
+        if (handle_ < 0 && errno == needs_another_folder)
+            throw Misuse(fmt::format("{}: cannot be written: {}", file_.string(), std::strerror(errno)));
     if (handle_ < 0)
         fail(file_, "cannot be opened");
     if (::flock(handle_, LOCK_EX | LOCK_NB) != 0 && !no_locks_here(errno)) {

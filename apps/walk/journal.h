@@ -63,7 +63,8 @@ class Busy : public Outage {
 /// the process, so it is never stale. Over NFS and Lustre it holds between machines.
 class Journal {
   public:
-    /// Makes the folder and the file if missing. Throws Busy at once if another process holds the journal. Also reads
+    /// Makes the folder and the file if missing. Throws Busy at once if another process holds the journal, and
+    /// Misuse if it may not be written. Also reads
     /// the folder's other journals (blocks of another plan).
     Journal(std::filesystem::path folder, const std::string& block);
     ~Journal();

@@ -4,7 +4,6 @@
 #include "io/images/format.h"
 #include "io/text.h"
 #include "projection/error.h"
-#include "projection/memory.h"
 
 #include <cmath>
 #include <fmt/format.h>
@@ -36,12 +35,6 @@ void check_is_depth(const ImageFacts& facts, const fs::path& file) {
         refuse(fmt::format("{} with {} channels", facts.format->name, facts.channels));
     if (facts.bits != 16 && !(facts.floats && facts.bits == 32))
         refuse(fmt::format("{}-bit {}", facts.bits, facts.format->name));
-}
-
-/// Refuses pixels that do not fit into memory.
-void check_memory(const ImageFacts& facts, int bytes_per_pixel, const fs::path& file) {
-    require_memory(static_cast<std::uint64_t>(facts.size.area()) * static_cast<unsigned>(bytes_per_pixel),
-                   fmt::format("{}: an image of {}x{} pixels", file.string(), facts.size.width, facts.size.height));
 }
 
 cv::Mat read_as_stored(const std::string& bytes, const ImageFacts& facts, const fs::path& file) {
@@ -91,7 +84,6 @@ cv::Mat read_stored_depth(const fs::path& file) {
     // Check the header first: an image that cannot be depth is refused for that reason, whatever else is wrong.
     const ImageFacts facts = read_image_header(bytes, file);
     check_is_depth(facts, file);
-    check_memory(facts, facts.bits / 8, file);
     return read_as_stored(bytes, facts, file);
 }
 
@@ -148,7 +140,6 @@ cv::Mat3b read_colour(const fs::path& file) {
     if (!facts.format->read_colour)
         throw Error(fmt::format("{}: {} of floats, expected a colour image of 8 or 16 bits", file.string(),
                                 facts.format->name));
-    check_memory(facts, 3, file);
     return facts.format->read_colour(bytes, facts, file);
 }
 
@@ -160,7 +151,6 @@ cv::Mat1f read_ao(const fs::path& file) {
             fmt::format("{}: not an AO map: expected 8- or 16-bit grey PNG, or float TIFF or EXR; found {}-bit {} "
                         "with {} channels",
                         file.string(), facts.bits, name_of(facts.format), facts.channels));
-    check_memory(facts, facts.bits / 8 + static_cast<int>(sizeof(float)), file);
     const cv::Mat image = read_as_stored(bytes, facts, file);
     if (image.depth() == CV_16U)
         return from_integers<ushort>(image);

@@ -144,6 +144,19 @@ TEST_F(RunsTest, outputs_that_cannot_be_written_are_misuse_with_the_systems_reas
     const Ran taken = run_program("refine " + in + " -o " + in);
     EXPECT_EQ(taken.exit_code, misuse);
     EXPECT_TRUE(says(taken.err, "a file is expected: Is a directory"));
+    for (const char* part : {"ao", "journal.jsonl"}) { // in the way of a folder, and of a file
+        const fs::path other = folder / (std::string("other_") + part);
+        part == std::string("ao") ? (void)tests::write_file(other / part, "")
+                                  : (void)fs::create_directories(other / part);
+        const Ran ran = run_program("run " + in + " -o " + other.string() + " --overwrite");
+        EXPECT_EQ(ran.exit_code, misuse) << part << ran.err;
+        EXPECT_TRUE(says(ran.err, part == std::string("ao") ? "ao: Not a directory"
+                                                            : "jsonl: cannot be written: Is a directory"));
+        fs::remove_all(other);
+    }
+    const Ran longer = run_program("run " + in + " -o " + (folder / "a" / std::string(256, 'n')).string());
+    EXPECT_EQ(longer.exit_code, misuse);
+    EXPECT_TRUE(says(longer.err, "a name of 256 bytes: File name too long"));
     EXPECT_FALSE(fs::exists(out()));
     EXPECT_EQ(files_in(folder.path()), 2u) << "the check leaves nothing behind";
 }
@@ -236,6 +249,12 @@ TEST_F(RunsTest, a_lack_of_memory_is_predicted_and_is_exit_code_4) {
         1400, fmt::format("run {} -o {} --camera 16000,16000,7999.5,7999.5 --write ao", file.string(), out().string()));
     EXPECT_EQ(ran.exit_code, unfinished) << ran.err;
     EXPECT_TRUE(says(ran.err, "GiB of memory, "));
+    // On lavapipe, the device of tests, its images are in the same memory.
+    const Ran computed = with_memory(6000, fmt::format("run {} -o {} --camera 16000,16000,7999.5,7999.5 --write ao "
+                                                       "--depth-noise none",
+                                                       file.string(), (folder / "computed").string()));
+    EXPECT_EQ(computed.exit_code, unfinished) << computed.err;
+    EXPECT_TRUE(says(computed.err, "huge.png: a frame of 16000x16000 pixels needs about 8.6 GiB of memory, "));
 }
 
 // ---------------------------------------------------------------------------------------------------- signals
