@@ -72,12 +72,11 @@ void print_overview() {
         fmt::print("  scanshade {:<14} {}\n", row.name, row.summary);
     fmt::print("  scanshade {:<14} {}\n  scanshade {:<14} {}\n", "help",
                "this, or the flags of one command: help COMMAND", "--version", "the version");
-    fmt::print(
-        "\nExit code: 0 all well; 1 misuse; 2 some frames' input is bad or their result doubtful, the others are "
-        "done;\n           3 nothing could be done;\n"
-        "           4 interrupted, device lost, disk or memory full, share gone: `run --resume` goes on;\n           5 "
-        "internal "
-        "error.\n");
+    fmt::print("\nExit code: 0 all well; 1 misuse; 2 some frames' input is bad or their result doubtful, the others "
+               "are done;\n"
+               "           3 nothing could be done;\n"
+               "           4 interrupted, device lost, disk or memory full, share gone: `run --resume` goes on;\n"
+               "           5 internal error.\n");
 }
 
 /// "[default 0.5; m, 0 .. 100]"
