@@ -17,7 +17,7 @@ enum ExitCode : int {
     some_failed = 2,    ///< some frames' input is bad or their result doubtful, the others are done. Trying again will
                         ///< not help
     nothing_done = 3,   ///< nothing could be done
-    unfinished = 4,     ///< interrupted, a device lost, a disk full, a share gone: --resume continues
+    unfinished = 4,     ///< interrupted, a device lost, a disk or memory full, a share gone: --resume continues
     internal_error = 5, ///< an error in the program, or a frame that crashed it
 };
 

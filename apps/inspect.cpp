@@ -9,8 +9,10 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <iterator>
 #include <map>
 #include <ranges>
+#include <utility>
 
 namespace scanshade {
 namespace {
@@ -26,8 +28,10 @@ struct DepthStep {
 
 /// Sums over the sampled frames.
 struct Samples {
-    std::vector<float> depths_m; ///< all that were seen
-    std::size_t recorded = 0;    ///< pixels or points, seen or not
+    std::vector<float> depths_m;         ///< that were seen, but for those in levels
+    std::map<float, std::size_t> levels; ///< depths of integers, and how often each was seen
+    std::size_t recorded = 0;            ///< pixels or points, seen or not
+    std::size_t seen = 0;
     std::size_t frames = 0;
     std::map<std::pair<int, int>, int> colour_sizes, depth_sizes; ///< width x height -> how many frames
     std::map<std::string, int> clouds;                            ///< description -> how many
@@ -50,29 +54,36 @@ struct Findings {
     double nearest_m = 0, median_m = 0, farthest_m = 0; ///< of the sampled depths
 };
 
-void add_depths(const Frame& frame, Samples& samples) {
+void add_depths(const ExaminedFrame& examined, Samples& samples) {
     const auto add = [&](double z) {
-        ++samples.recorded;
-        if (std::isfinite(z) && z != 0)
-            samples.depths_m.push_back(static_cast<float>(z));
+        if (!std::isfinite(z) || z == 0)
+            return;
+        samples.depths_m.push_back(static_cast<float>(z));
+        ++samples.seen;
     };
+    const Frame& frame = examined.frame;
+    samples.recorded += frame.cloud ? frame.cloud->points.size() : static_cast<std::size_t>(examined.depth_size.area());
+    for (const DepthLevel& level : examined.levels) {
+        samples.levels[level.z_m] += level.count;
+        samples.seen += level.count;
+    }
     if (frame.cloud)
         for (const Eigen::Vector3d& point : frame.cloud->points)
             add(point.z());
-    else
-        for (const float z : frame.depth_m)
-            add(z);
+    for (const float z : frame.depth_m)
+        add(z);
 }
 
-void add_frame(const Frame& frame, Samples& samples) {
+void add_frame(const ExaminedFrame& examined, Samples& samples) {
+    const Frame& frame = examined.frame;
     ++samples.frames;
-    add_depths(frame, samples);
+    add_depths(examined, samples);
     if (!frame.colour.empty())
         ++samples.colour_sizes[{frame.colour.cols, frame.colour.rows}];
     if (frame.cloud)
         ++samples.clouds[describe(*frame.cloud->records)];
     else
-        ++samples.depth_sizes[{frame.depth_m.cols, frame.depth_m.rows}];
+        ++samples.depth_sizes[{examined.depth_size.width, examined.depth_size.height}];
     for (const auto* sentences : {&frame.warnings, &frame.doubts})
         for (const std::string& sentence : *sentences)
             samples.warnings.push_back(frame.name + ": " + sentence);
@@ -80,7 +91,9 @@ void add_frame(const Frame& frame, Samples& samples) {
     if (samples.camera || without_camera)
         return;
     try {
-        samples.camera = camera_of(frame);
+        if (!frame.cloud)
+            check(frame.camera);
+        samples.camera = frame.cloud ? camera_of(frame) : frame.camera;
     } catch (const Error& none) {
         samples.warnings.push_back(frame.name + ": " + none.what());
     }
@@ -97,22 +110,20 @@ std::vector<std::size_t> spread(std::size_t count) {
 
 /// Steps in bands of half a metre to 6 m. Bands with fewer than 1000 depths or 3 different ones are left
 /// out. Steps below a hundredth of a millimetre come from the number format, not from the sensor.
-std::vector<DepthStep> depth_steps(const std::vector<float>& sorted) {
+std::vector<DepthStep> depth_steps(const std::vector<DepthLevel>& levels) {
     constexpr float width_m = 0.5f, noise_m = 1e-5f;
     std::vector<DepthStep> steps;
     for (float from = 0; from < 6; from += width_m) {
-        const auto begin = std::lower_bound(sorted.begin(), sorted.end(), from);
-        const auto end = std::lower_bound(begin, sorted.end(), from + width_m);
-        if (end - begin < 1000)
-            continue;
-        int different = 1;
+        const auto begin = std::ranges::lower_bound(levels, from, {}, &DepthLevel::z_m);
+        const auto end = std::ranges::lower_bound(begin, levels.end(), from + width_m, {}, &DepthLevel::z_m);
+        std::size_t depths = 0;
         float smallest = width_m;
-        for (auto z = begin + 1; z != end; ++z)
-            if (*z > *(z - 1)) {
-                smallest = std::min(smallest, *z - *(z - 1));
-                ++different;
-            }
-        if (different >= 3 && smallest > noise_m)
+        for (auto level = begin; level != end; ++level) {
+            depths += level->count;
+            if (level != begin)
+                smallest = std::min(smallest, level->z_m - std::prev(level)->z_m);
+        }
+        if (depths >= 1000 && end - begin >= 3 && smallest > noise_m)
             steps.push_back({from, from + width_m, smallest});
     }
     return steps;
@@ -143,32 +154,50 @@ void measure_samples(Findings& findings) {
     }
     for (const std::size_t place : spread(loadable.size())) {
         try {
-            add_frame(findings.capture.load(loadable[place]), findings.samples);
+            add_frame(findings.capture.examine(loadable[place]), findings.samples);
+        } catch (const OutOfMemory&) {
+            throw;
         } catch (const Error& failure) {
             findings.problems.push_back({findings.capture.entries[loadable[place]].name, failure.what()});
         }
     }
 }
 
+/// All sampled depths, rising.
+std::vector<DepthLevel> all_levels(Samples& samples) {
+    for (const float z : samples.levels.empty() ? std::vector<float>() : std::exchange(samples.depths_m, {}))
+        ++samples.levels[z];
+    std::vector<DepthLevel> levels;
+    for (const auto& [z_m, count] : samples.levels)
+        levels.push_back({z_m, static_cast<std::uint32_t>(count)});
+    std::ranges::sort(samples.depths_m);
+    for (const float z : samples.depths_m)
+        if (levels.empty() || levels.back().z_m != z)
+            levels.push_back({z, 1});
+        else
+            ++levels.back().count;
+    return levels;
+}
+
 Findings look_at(Capture capture) {
     Findings findings{.capture = std::move(capture), .samples = {}, .problems = {}, .steps = {}};
     measure_poses(findings);
     measure_samples(findings);
-    std::vector<float>& depths = findings.samples.depths_m;
-    if (depths.empty())
+    const std::vector<DepthLevel> levels = all_levels(findings.samples);
+    if (levels.empty())
         return findings;
-    std::ranges::sort(depths);
-    findings.nearest_m = depths.front();
-    findings.median_m = depths[depths.size() / 2];
-    findings.farthest_m = depths.back();
-    findings.steps = depth_steps(depths);
+    findings.nearest_m = levels.front().z_m;
+    std::size_t below = 0;
+    const auto middle = std::ranges::find_if(
+        levels, [&](const DepthLevel& level) { return (below += level.count) > findings.samples.seen / 2; });
+    findings.median_m = middle->z_m;
+    findings.farthest_m = levels.back().z_m;
+    findings.steps = depth_steps(levels);
     return findings;
 }
 
 double hole_share(const Samples& samples) {
-    return samples.recorded == 0
-               ? 0
-               : 1 - static_cast<double>(samples.depths_m.size()) / static_cast<double>(samples.recorded);
+    return samples.recorded == 0 ? 0 : 1 - static_cast<double>(samples.seen) / static_cast<double>(samples.recorded);
 }
 
 // ---------------------------------------------------------------------------------------------------- printing
@@ -318,6 +347,8 @@ class Inspect final : public Command {
                 problems += found.problems.size();
                 as_json_ ? all.push_back(to_json(found)) : print(found);
             } catch (const Misuse&) {
+                throw;
+            } catch (const OutOfMemory&) {
                 throw;
             } catch (const Error& failure) {
                 fmt::print(stderr, "scanshade: {}\n", failure.what());

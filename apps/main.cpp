@@ -1,12 +1,17 @@
 // The program: the table of commands, their help, and the exit codes.
 #include "apps/command.h"
 #include "apps/settings_file.h"
+#include "io/output_file.h"
 #include "projection/error.h"
+#include "projection/memory.h"
 #include "projection/nearest_word.h"
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <CLI/CLI.hpp>
+#include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -67,11 +72,11 @@ void print_overview() {
         fmt::print("  scanshade {:<14} {}\n", row.name, row.summary);
     fmt::print("  scanshade {:<14} {}\n  scanshade {:<14} {}\n", "help",
                "this, or the flags of one command: help COMMAND", "--version", "the version");
-    fmt::print(
-        "\nExit code: 0 all well; 1 misuse; 2 some frames' input is bad or their result doubtful, the others are "
-        "done;\n           3 nothing could be done;\n"
-        "           4 interrupted, device lost, disk full or share gone: `run --resume` goes on; 5 internal "
-        "error.\n");
+    fmt::print("\nExit code: 0 all well; 1 misuse; 2 some frames' input is bad or their result doubtful, the others "
+               "are done;\n"
+               "           3 nothing could be done;\n"
+               "           4 interrupted, device lost, disk or memory full, share gone: `run --resume` goes on;\n"
+               "           5 internal error.\n");
 }
 
 /// "[default 0.5; m, 0 .. 100]"
@@ -228,6 +233,16 @@ void parse(Command& command, std::vector<std::string> arguments) {
         set(row, text);
 }
 
+/// Refuses outputs that cannot be written before anything is computed for them.
+void check_outputs(Command& command) {
+    for (const Stage& stage : command.stages())
+        for (const Parameter& row : stage.rows) {
+            const std::string path = row.writes == Writes::nothing ? "" : value_text(row);
+            if (!path.empty())
+                row.writes == Writes::file ? require_file(path) : require_folder(path);
+        }
+}
+
 bool asks_for_help(const std::string& word) { return word == "help" || word == "--help" || word == "-h"; }
 
 int execute(const std::vector<std::string>& arguments) {
@@ -255,20 +270,11 @@ int execute(const std::vector<std::string>& arguments) {
     }
     const std::unique_ptr<Command> command = row.make();
     during(name, [&] { parse(*command, rest); });
+    check_outputs(*command);
     return command->run();
 }
 
-} // namespace
-
-} // namespace scanshade
-
-int main(int count, char** words) {
-    using namespace scanshade;
-    // Keeps freed memory for the next frame's images. By default each image would get fresh pages from the system,
-    // which costs more than most of the work on it.
-    mallopt(M_MMAP_THRESHOLD, 32 << 20);
-    mallopt(M_TRIM_THRESHOLD, 1 << 30);
-    const std::vector<std::string> arguments(words + std::min(count, 1), words + count);
+int exit_code_of(const std::vector<std::string>& arguments) {
     try {
         return execute(arguments);
     } catch (const Misuse& failure) {
@@ -285,7 +291,37 @@ int main(int count, char** words) {
         fmt::print(stderr, "scanshade: {}\n", failure.what());
         return nothing_done;
     } catch (const std::exception& failure) {
+        if (std::ferror(stdout) != 0) // printing threw; printed_all() says so
+            return unfinished;
+        if (const auto no_memory = failed_allocation(failure)) {
+            fmt::print(stderr, "scanshade: {}\n", *no_memory);
+            return unfinished;
+        }
         fmt::print(stderr, "scanshade: internal error: {}\n", failure.what());
         return internal_error;
     }
+}
+
+/// Whether all that was printed has arrived. A full disk shows only when the buffer is emptied.
+bool printed_all() {
+    const bool failed_before = std::ferror(stdout) != 0;
+    if (std::fflush(stdout) == 0 && !failed_before)
+        return true;
+    fmt::print(stderr, "scanshade: results could not be printed to standard output: {}\n", std::strerror(errno));
+    return false;
+}
+
+} // namespace
+
+} // namespace scanshade
+
+int main(int count, char** words) {
+    using namespace scanshade;
+    // Keeps freed memory for the next frame's images. By default each image would get fresh pages from the system,
+    // which costs more than most of the work on it.
+    mallopt(M_MMAP_THRESHOLD, 32 << 20);
+    mallopt(M_TRIM_THRESHOLD, 1 << 30);
+    const std::vector<std::string> arguments(words + std::min(count, 1), words + count);
+    const int code = exit_code_of(arguments);
+    return printed_all() ? code : unfinished;
 }

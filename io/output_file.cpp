@@ -1,9 +1,11 @@
 // Writing without half files: temporary name, sync, rename.
 #include "io/output_file.h"
 
+#include "io/content_hash.h"
 #include "io/text.h"
 #include "projection/error.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cstdio>
@@ -20,11 +22,14 @@ namespace fs = std::filesystem;
 
 namespace {
 
+constexpr std::size_t longest_name = 255; // bytes, on every common file system
+
 fs::path temporary_name(const fs::path& target) {
     static std::atomic<unsigned> count = 0;
-    const auto name =
-        fmt::format(".{}.tmp-{}-{}{}", target.stem().string(), ::getpid(), count++, target.extension().string());
-    return target.parent_path() / name;
+    const auto end = fmt::format(".tmp-{}-{}{}", ::getpid(), count++, target.extension().string());
+    const std::string stem = target.stem().string();
+    return target.parent_path() /
+           ("." + shortened(stem, longest_name - 1 - std::min(end.size(), longest_name / 2)) + end);
 }
 
 /// Syncs the file to disk before the rename makes it visible.
@@ -46,6 +51,55 @@ void write_bytes(const fs::path& file, std::string_view bytes) {
     const bool complete = std::fwrite(bytes.data(), 1, bytes.size(), stream.get()) == bytes.size();
     if (!complete || std::fflush(stream.get()) != 0)
         throw std::system_error(errno, std::generic_category(), "cannot be written");
+}
+
+/// Whether the system refuses for good, so that another path is needed.
+bool needs_another_path(int error) {
+    for (const int each : {EACCES, EPERM, EROFS, ENOTDIR, EISDIR, ENOENT, ENAMETOOLONG, ELOOP, EINVAL})
+        if (error == each)
+            return true;
+    return false;
+}
+
+[[noreturn]] void refuse_output(const fs::path& output, const std::string& why, int error) {
+    const std::string sentence =
+        fmt::format("{}: cannot be written: {}: {}", output.string(), why, std::generic_category().message(error));
+    if (needs_another_path(error))
+        throw Misuse(sentence);
+    throw Outage(sentence);
+}
+
+/// Makes a file there and removes it again. Permissions alone do not tell: root has them on file systems that take no
+/// files, such as /proc.
+void try_to_write(const fs::path& output, const fs::path& folder) {
+    const fs::path probe = temporary_name(folder / "probe");
+    const int handle = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (handle < 0)
+        refuse_output(output, "no file can be made in " + folder.string(), errno);
+    ::close(handle);
+    ::unlink(probe.c_str());
+}
+
+/// `output` is what the message names: the folder or a file in it.
+void require_folder(const fs::path& output, const fs::path& folder) {
+    for (const fs::path& part : output)
+        if (part.native().size() > longest_name)
+            refuse_output(output, fmt::format("a name of {} bytes", part.native().size()), ENAMETOOLONG);
+    const auto or_here = [](const fs::path& path) { return path.empty() ? fs::path(".") : path; };
+    fs::path there = or_here(folder);
+    std::error_code trouble;
+    fs::file_status status = fs::status(there, trouble);
+    while (status.type() == fs::file_type::not_found) {
+        if (std::error_code ignored; fs::is_symlink(fs::symlink_status(there, ignored)))
+            refuse_output(output, there.string() + " is a link to a missing folder", ENOENT);
+        there = or_here(there.parent_path());
+        status = fs::status(there, trouble);
+    }
+    if (!fs::status_known(status))
+        refuse_output(output, there.string(), trouble.value());
+    if (status.type() != fs::file_type::directory)
+        refuse_output(output, there.string(), ENOTDIR);
+    try_to_write(output, there);
 }
 
 /// The stem in a name that temporary_name() made; nothing for any other name.
@@ -91,6 +145,28 @@ void write_atomically(const fs::path& target, const std::function<void(const fs:
 
 void write_atomically(const fs::path& target, std::string_view bytes) {
     write_atomically(target, [&](const fs::path& temporary) { write_bytes(temporary, bytes); });
+}
+
+void require_folder(const fs::path& folder) { require_folder(folder, folder); }
+
+void require_file(const fs::path& file) {
+    std::error_code trouble;
+    const fs::file_status status = fs::status(file, trouble);
+    if (!fs::status_known(status))
+        refuse_output(file, "a file is expected", trouble.value());
+    if (status.type() == fs::file_type::directory)
+        refuse_output(file, "a file is expected", EISDIR);
+    require_folder(file, file.parent_path());
+}
+
+std::string shortened(const std::string& name, std::size_t most_bytes) {
+    constexpr std::size_t digits = 16;
+    if (name.size() <= most_bytes)
+        return name;
+    std::size_t kept = most_bytes - digits - 1;
+    while (kept > 0 && (static_cast<unsigned char>(name[kept]) & 0xc0) == 0x80) // characters stay whole
+        --kept;
+    return name.substr(0, kept) + "-" + hash_of(name).substr(0, digits);
 }
 
 int remove_leftovers(const fs::path& folder, const std::function<bool(std::string_view)>& ours) {

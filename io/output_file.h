@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <string>
 #include <string_view>
 
 namespace scanshade {
@@ -14,6 +15,15 @@ void write_atomically(const std::filesystem::path& target,
                       const std::function<void(const std::filesystem::path&)>& write);
 /// The same for bytes already in memory.
 void write_atomically(const std::filesystem::path& target, std::string_view bytes);
+
+/// Throws Misuse, with the system's reason, where no file can be made in `folder`, or in the nearest folder above it
+/// that exists. Throws Outage for a full disk and other trouble that passes. Leaves nothing behind.
+void require_folder(const std::filesystem::path& folder);
+/// The same for the folder of `file`; a folder in its place is refused, too.
+void require_file(const std::filesystem::path& file);
+
+/// The name if it has at most so many bytes, else its beginning and a hash of the whole. File systems take 255.
+[[nodiscard]] std::string shortened(const std::string& name, std::size_t most_bytes);
 
 /// Removes temporary files that a killed run left in `folder`: those that write_atomically made on the way to a target
 /// whose stem is `ours`. The caller holds the lock under which these targets are written, so that no process

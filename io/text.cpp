@@ -2,6 +2,7 @@
 #include "io/text.h"
 
 #include "projection/error.h"
+#include "projection/memory.h"
 
 #include <algorithm>
 #include <array>
@@ -52,6 +53,8 @@ std::string read_bytes(const std::filesystem::path& file, std::size_t limit) {
 
     if (std::min<std::uintmax_t>(size, limit) > memory_bytes())
         throw Error(fmt::format("{}: {} bytes, more than this machine's memory holds", file.string(), size));
+
+    require_memory(std::min<std::uintmax_t>(size, limit), fmt::format("{}: a file of {} bytes", file.string(), size));
 
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "rb"), &std::fclose);
     if (!stream)

@@ -32,6 +32,12 @@ class DeviceLost : public Outage {
     using Outage::Outage;
 };
 
+/// There is not enough memory. A retry may succeed on a larger machine, or when others leave this one more.
+class OutOfMemory : public Outage {
+  public:
+    using Outage::Outage;
+};
+
 /// A foreign exception left during(): a bug of the program, not bad input. The exception is nested inside. Code that
 /// calls a library must convert the library's exceptions about bad input to Error.
 class InternalError : public std::logic_error {
@@ -39,8 +45,12 @@ class InternalError : public std::logic_error {
     using std::logic_error::logic_error;
 };
 
-/// Runs `action`; a failure inside leaves as `what: <its message>`. Errors keep their types; any other exception
-/// becomes an InternalError.
+/// For a foreign exception that is being handled: throws OutOfMemory for a failed allocation, else an InternalError
+/// with the exception nested inside.
+[[noreturn]] void throw_foreign(const std::string& what, const std::exception& failure);
+
+/// Runs `action`; a failure inside leaves as `what: <its message>`. Errors keep their types, a failed
+/// allocation becomes OutOfMemory, and any other exception an InternalError.
 template <class Action>
 decltype(auto) during(const std::string& what, Action&& action) {
     try {
@@ -52,7 +62,7 @@ decltype(auto) during(const std::string& what, Action&& action) {
         static_cast<std::logic_error&>(failure) = std::logic_error(what + ": " + failure.what());
         throw;
     } catch (const std::exception& failure) {
-        std::throw_with_nested(InternalError(what + ": " + failure.what()));
+        throw_foreign(what, failure);
     }
 }
 

@@ -60,6 +60,9 @@ class OneOf {
     void (*assign_)(void* held, const void* table, std::size_t i);
 };
 
+/// What a command writes to the path that a setting holds.
+enum class Writes { nothing, file, folder };
+
 /// A setting bound to the variable that holds it.
 struct Parameter {
     using Target = std::variant<bool*, int*, float*, double*, std::optional<double>*, std::string*, OneOf>;
@@ -72,6 +75,7 @@ struct Parameter {
     double high = std::numeric_limits<double>::infinity(); ///< inclusive
     std::vector<std::string> choices{};                    ///< for strings: the only values allowed; empty = any
     bool common = false;                                   ///< shown on the first page of a command's help
+    Writes writes = Writes::nothing;                       ///< for strings: whether the value names an output
 };
 
 /// Sets the row's variable from text. Throws Misuse naming the row, the text, and what was expected.

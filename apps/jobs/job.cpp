@@ -87,9 +87,13 @@ void write_plan(const fs::path& job, const Plan& plan) {
         settings[name] = value;
     const double cost = std::accumulate(plan.tasks.begin(), plan.tasks.end(), 0.0,
                                         [](double sum, const Task& task) { return sum + task.cost; });
-    const json head{{"program", "scanshade"}, {"version", SCANSHADE_VERSION},
-                    {"settings", settings},   {"tasks", plan.tasks.size()},
-                    {"cost", cost},           {"refused", plan.refused}};
+    const json head{{"program", "scanshade"},
+                    {"version", SCANSHADE_VERSION},
+                    {"settings", settings},
+                    {"tasks", plan.tasks.size()},
+                    {"cost", cost},
+                    {"refused", plan.refused},
+                    {"passed_over", plan.passed_over}};
     write_atomically(job / "plan.json", text_of(head) + "\n");
 }
 

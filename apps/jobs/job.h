@@ -30,7 +30,8 @@ struct Task {
 struct Plan {
     std::vector<std::pair<std::string, std::string>> settings;
     std::vector<Task> tasks;
-    std::vector<std::string> refused; ///< captures that could not be opened, and why
+    std::vector<std::string> refused;          ///< captures that could not be opened, and why
+    std::vector<std::string> passed_over = {}; ///< folders that hold no capture to compute, and why; not read back
 };
 
 /// Which of N equal parts of a job: 1 .. of.

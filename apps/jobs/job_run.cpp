@@ -5,6 +5,7 @@
 #include "apps/walk/overlap.h"
 #include "apps/walk/progress.h"
 #include "projection/error.h"
+#include "projection/memory.h"
 #include "projection/stopwatch.h"
 
 #include <fmt/format.h>
@@ -22,24 +23,29 @@ class Pace {
             left_ += plan.tasks[task].cost;
         whole_ = left_;
     }
-    void done(const Task& task) {
+    /// `finished`: no frame of the task is left.
+    void ended(const Task& task, bool finished) {
         const std::lock_guard alone(mutex_);
         const double seconds = stopwatch_.lap_ms() / 1000;
         constexpr double found_done_s = 0.02;
-        if (seconds > found_done_s) {
+        if (finished && seconds > found_done_s) {
             worked_s_ += seconds;
             worked_ += task.cost;
         }
-        left_ -= task.cost;
+        finished_ += finished;
+        left_ -= finished ? task.cost : 0;
+        const bool anything_left = finished_ < tasks_;
         const std::string time_left =
-            worked_ > 0 ? fmt::format(", {} left", duration_text(left_ / worked_ * worked_s_)) : "";
-        say(fmt::format("task {} of {}, {:.0f} % of the work{}", ++count_, tasks_,
-                        whole_ > 0 ? 100 * (1 - left_ / whole_) : 100, time_left));
+            worked_ == 0 ? ""
+                         : fmt::format(", {} left",
+                                       anything_left ? time_left_text(left_ / worked_ * worked_s_) : duration_text(0));
+        say(fmt::format("task {} of {}{}, {} % of the work{}", ++count_, tasks_, finished ? "" : " is not finished",
+                        percent_text(whole_ > 0 ? 1 - left_ / whole_ : 1, anything_left), time_left));
     }
 
   private:
     std::mutex mutex_;
-    std::size_t tasks_, count_ = 0;
+    std::size_t tasks_, count_ = 0, finished_ = 0;
     double whole_ = 0, left_ = 0, worked_ = 0, worked_s_ = 0;
     Stopwatch stopwatch_; ///< since the last task was done
 };
@@ -49,17 +55,20 @@ class Attempts {
   public:
     explicit Attempts(const std::function<int(const Task&, OrderedOutput&)>& run_task) : run_task_(run_task) {}
 
-    /// False if another run holds the task.
-    bool attempt(const Task& task, OrderedOutput& output) {
+    enum class Result { finished, unfinished, held }; // held: by another run
+
+    Result attempt(const Task& task, OrderedOutput& output) {
         try {
-            add(run_task_(task, output));
+            const int code = run_task_(task, output);
+            add(code);
+            return code == unfinished ? Result::unfinished : Result::finished;
         } catch (const Misuse&) {
             throw;
         } catch (const DeviceLost&) { // this process cannot do any other task either
             throw;
         } catch (const Busy& busy) {
             say(fmt::format("another run works on it: {}", busy.what()));
-            return false;
+            return Result::held;
         } catch (const Outage& failure) {
             warn(fmt::format("failed: {}", failure.what()));
             add(unfinished);
@@ -67,10 +76,11 @@ class Attempts {
             warn(fmt::format("failed: {}", failure.what()));
             add(nothing_done);
         } catch (const std::exception& failure) {
-            warn(fmt::format("failed: internal error: {}", failure.what()));
-            add(internal_error);
+            const auto no_memory = failed_allocation(failure);
+            warn("failed: " + no_memory.value_or(fmt::format("internal error: {}", failure.what())));
+            add(no_memory ? unfinished : internal_error);
         }
-        return true;
+        return Result::unfinished;
     }
     void add(int code) {
         const std::lock_guard alone(mutex_);
@@ -97,8 +107,8 @@ int work_through(const std::filesystem::path& job, const Plan& plan, const Shard
     overlapped(own.size(), at_once, [&](std::size_t i, OrderedOutput& output) {
         if (stop)
             return attempts.add(unfinished);
-        (void)attempts.attempt(plan.tasks[own[i]], output);
-        pace.done(plan.tasks[own[i]]);
+        const Task& task = plan.tasks[own[i]];
+        pace.ended(task, attempts.attempt(task, output) == Attempts::Result::finished);
     });
     // Other shards begin with their costliest tasks, so unfinished ones are at their ends. Our own shard comes first:
     // tasks that another run held may be free by now.
@@ -112,7 +122,7 @@ int work_through(const std::filesystem::path& job, const Plan& plan, const Shard
             if (is_complete(journal) || in_use(journal))
                 continue;
             OrderedOutput output;
-            if (attempts.attempt(task, output) && next > 0)
+            if (attempts.attempt(task, output) != Attempts::Result::held && next > 0)
                 say(fmt::format("  taken over from shard {}: {}", (shard.index - 1 + next) % shard.of + 1, task.name));
         }
     return attempts.code();

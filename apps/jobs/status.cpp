@@ -2,6 +2,7 @@
 #include "apps/command.h"
 #include "apps/jobs/job.h"
 #include "apps/json.h"
+#include "apps/walk/progress.h"
 #include "apps/walk/report.h"
 #include "io/output_file.h"
 #include "projection/error.h"
@@ -86,8 +87,6 @@ struct Totals {
         ++standing[reading.standing];
         frames += task.frames;
         cost += task.cost;
-        done_cost += task.cost * static_cast<double>(std::min(reading.rows.size(), task.frames)) /
-                     static_cast<double>(task.frames);
         for (const FrameRow& row : reading.rows)
             add(task, row);
         if (!reading.rows.empty())
@@ -97,13 +96,21 @@ struct Totals {
   private:
     void add(const Task& task, const FrameRow& row) {
         ms = ms + row.ms;
+        if (row.fault == Fault::outage) { // tried again by the next run
+            add(reasons, task, row);
+            return;
+        }
+        done_cost += task.cost / static_cast<double>(task.frames);
         if (row.status == FrameStatus::ok) {
             ++ok;
             return;
         }
         const bool is_doubtful = row.status == FrameStatus::doubtful;
         ++(is_doubtful ? doubtful : failed);
-        Group& group = (is_doubtful ? doubts : reasons)[reason_of(row, task)];
+        add(is_doubtful ? doubts : reasons, task, row);
+    }
+    static void add(Groups& groups, const Task& task, const FrameRow& row) {
+        Group& group = groups[reason_of(row, task)];
         if (group.frames++ == 0)
             group.example = task.name + " " + row.name;
     }
@@ -126,7 +133,7 @@ std::vector<std::pair<std::string, Totals::Group>> most_frequent_first(const Tot
 }
 
 std::size_t left_of(const Totals& totals) { return totals.frames - std::min(totals.frames, settled(totals)); }
-double work_done(const Totals& totals) { return totals.cost > 0 ? totals.done_cost / totals.cost : 1; }
+double work_done(const Totals& totals) { return totals.cost > 0 ? std::min(1.0, totals.done_cost / totals.cost) : 1; }
 
 json reasons_json(const Totals::Groups& reasons) {
     json all = json::array();
@@ -140,7 +147,7 @@ void print(const Totals& totals, std::size_t refused) {
                totals.in(Standing::running), totals.in(Standing::begun), totals.in(Standing::waiting), totals.tasks);
     fmt::print("frames  {} ok, {} doubtful, {} failed, {} left, of {}\n", totals.ok, totals.doubtful, totals.failed,
                left_of(totals), totals.frames);
-    fmt::print("work    {:.1f} %\n", 100 * work_done(totals));
+    fmt::print("work    {} %\n", percent_text(work_done(totals), left_of(totals) > 0, 1));
     if (refused > 0)
         fmt::print("refused {} captures, when the job was planned\n", refused);
     for (const auto& [host, frames] : totals.frames_by_host)
@@ -239,6 +246,7 @@ class Merge final : public Command {
     int run() override {
         const fs::path job = job_.front();
         const Plan plan = plan_of(job_);
+        require_folder(job);
         Totals totals;
         write_atomically(job / "frames.csv", [&](const fs::path& file) {
             std::ofstream stream(file, std::ios::binary);

@@ -4,6 +4,7 @@
 #include "apps/command.h"
 #include "apps/walk/progress.h"
 #include "projection/error.h"
+#include "projection/memory.h"
 
 #include <algorithm>
 #include <array>
@@ -45,6 +46,13 @@ class SharedCounts {
     void* memory_;
 };
 
+/// Whether the process shall outlive its terminal, as nohup asks.
+bool ignores_hangup() {
+    struct sigaction action = {};
+    sigaction(SIGHUP, nullptr, &action);
+    return action.sa_handler == SIG_IGN;
+}
+
 /// Blocks signals so that wait() receives them; children restore the earlier mask.
 class Signals {
   public:
@@ -53,6 +61,8 @@ class Signals {
         sigemptyset(&set);
         for (const int signal : {SIGINT, SIGTERM, SIGCHLD})
             sigaddset(&set, signal);
+        if (!ignores_hangup()) // a blocked signal arrives even if it is ignored
+            sigaddset(&set, SIGHUP);
         sigprocmask(SIG_BLOCK, &set, &before_);
         waited_for_ = set;
     }
@@ -103,7 +113,9 @@ pid_t start(const Worker& worker, const Signals& signals, const std::function<in
         fmt::print(stderr, "scanshade: {}\n", failure.what());
         code = nothing_done;
     } catch (const std::exception& failure) {
-        fmt::print(stderr, "scanshade: internal error: {}\n", failure.what());
+        const auto no_memory = failed_allocation(failure);
+        fmt::print(stderr, "scanshade: {}\n", no_memory.value_or(fmt::format("internal error: {}", failure.what())));
+        code = no_memory ? unfinished : internal_error;
     }
     std::fflush(nullptr);
     ::_exit(code); // without destructors: the objects belong to the parent

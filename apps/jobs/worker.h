@@ -17,9 +17,9 @@ struct WorkerProcess {
 
 /// Runs work(worker) in `workers` child processes at once. The caller must have no threads yet. A child that a signal
 /// killed is restarted with `carefully`. A child that ended with `unfinished` is restarted, too, since a lost device
-/// needs a fresh process. After three processes in a row without a settled frame the worker is given up. SIGINT and
-/// SIGTERM are passed on, and nothing starts after them. Children do not outlive the caller. Returns the worst exit
-/// code (see worse()).
+/// needs a fresh process. After three processes in a row without a settled frame the worker is given up. SIGINT,
+/// SIGTERM and SIGHUP are passed on, and nothing starts after them. Children do not outlive the caller. Returns the
+/// worst exit code (see worse()).
 [[nodiscard]] int supervise(int workers, const std::function<int(const WorkerProcess&)>& work);
 
 /// The worse of two exit codes of one job: misuse first, then unfinished, internal error, and bad input.

@@ -252,10 +252,12 @@ class Bench final : public Command {
             {"output",
              {{.name = "out",
                .help = "folder of the report: index.html, bench.csv, bench.json, a plot of each sensor class as .svg",
-               .value = &out_},
+               .value = &out_,
+               .writes = Writes::folder},
               {.name = "front",
                .help = "file for the measured Pareto front, as `run --max-error` takes it; parts of other sensors stay",
-               .value = &front_},
+               .value = &front_,
+               .writes = Writes::file},
               {.name = "overwrite", .help = "replaces an earlier report", .value = &overwrite_}}}};
         for (Stage& stage : all)
             for (Parameter& row : stage.rows)

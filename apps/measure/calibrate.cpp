@@ -198,7 +198,10 @@ class Calibrate final : public Command {
                .help = "index of a Vulkan device, or a part of its name; empty = the fastest kind",
                .value = &device_}}},
             {"output",
-             {{.name = "out", .help = "JSON file of the fitted settings, as `run --settings` takes it", .value = &out_},
+             {{.name = "out",
+               .help = "JSON file of the fitted settings, as `run --settings` takes it",
+               .value = &out_,
+               .writes = Writes::file},
               {.name = "overwrite", .help = "replaces an earlier file", .value = &overwrite_}}}};
         for (const auto& [name, setup] : setups_)
             all.push_back(method_stage(name, *setup));

@@ -48,20 +48,22 @@ class Compare final : public Command {
     }
 
     std::vector<Stage> stages() override {
-        return {
-            {"input",
-             {{.name = "truth",
-               .help = "compares A with the truth of the generated capture that A was made from",
-               .value = &truth_}}},
-            {"output",
-             {{.name = "out", .help = "folder for difference/NAME.png, compare.csv and compare.json", .value = &out_},
-              {.name = "scale",
-               .help = "the difference that is shown in full blue (A too dark) or full red (A too bright)",
-               .value = &scale_,
-               .low = 1e-3,
-               .high = 1},
-              {.name = "json", .help = "prints JSON instead of tables", .value = &as_json_},
-              {.name = "overwrite", .help = "replaces an earlier comparison", .value = &overwrite_}}}};
+        return {{"input",
+                 {{.name = "truth",
+                   .help = "compares A with the truth of the generated capture that A was made from",
+                   .value = &truth_}}},
+                {"output",
+                 {{.name = "out",
+                   .help = "folder for difference/NAME.png, compare.csv and compare.json",
+                   .value = &out_,
+                   .writes = Writes::folder},
+                  {.name = "scale",
+                   .help = "the difference that is shown in full blue (A too dark) or full red (A too bright)",
+                   .value = &scale_,
+                   .low = 1e-3,
+                   .high = 1},
+                  {.name = "json", .help = "prints JSON instead of tables", .value = &as_json_},
+                  {.name = "overwrite", .help = "replaces an earlier comparison", .value = &overwrite_}}}};
     }
 
     int run() override {

@@ -92,15 +92,20 @@ class Refine final : public Command {
               {"sigmas", "least difference between a new number and its start, in sigmas",
                &options_.selection.least_sigmas, "", 0, 100}}},
             {"output",
-             {{"out",
-               "the camera's file; its extension sets the format: .json ours, .yml OpenCV, .yaml ROS, .txt COLMAP",
-               &out_},
+             {{.name = "out",
+               .help =
+                   "the camera's file; its extension sets the format: .json ours, .yml OpenCV, .yaml ROS, .txt COLMAP",
+               .value = &out_,
+               .writes = Writes::file},
               {.name = "format",
                .help = "the format, whatever the extension",
                .value = &format_,
                .choices = format_choices()},
-              {"trajectory", "file for the refined poses of a recording, in TUM's format", &trajectory_},
-              {"report", "HTML page with tables and plots", &report_},
+              {.name = "trajectory",
+               .help = "file for the refined poses of a recording, in TUM's format",
+               .value = &trajectory_,
+               .writes = Writes::file},
+              {.name = "report", .help = "HTML page with tables and plots", .value = &report_, .writes = Writes::file},
               {"overwrite", "replace earlier results", &overwrite_}}}};
     }
 

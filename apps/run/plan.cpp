@@ -6,14 +6,17 @@
 #include "io/captures/capture.h"
 #include "io/captures/layouts.h"
 #include "io/images/format.h"
+#include "io/output_file.h"
 #include "io/text.h"
 #include "projection/error.h"
 
 #include <algorithm>
 #include <array>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <map>
 #include <optional>
+#include <ranges>
 #include <set>
 
 namespace scanshade {
@@ -23,26 +26,75 @@ namespace fs = std::filesystem;
 
 // ---------------------------------------------------------------------------------------------------- finding captures
 
-/// Folders of results are not captures, though they hold images and clouds.
-bool is_result(const fs::path& folder) {
-    return is_job(folder) || fs::exists(folder / "journal.jsonl") || fs::exists(folder / "frames.csv");
+/// Why a folder is not searched though it holds images and clouds; empty: it may be a capture.
+std::string result_in(const fs::path& folder) {
+    if (is_job(folder))
+        return "a planned job";
+    const bool report = fs::exists(folder / "journal.jsonl") || fs::exists(folder / "frames.csv");
+    return report ? "results of an earlier run" : "";
 }
 
 struct Found {
     fs::path path;
     std::string name; ///< its path in its dataset
     std::optional<Capture> capture;
-    std::string refused; ///< why it cannot be opened
+    std::string refused;          ///< why it cannot be opened
+    std::string passed_over = {}; ///< why it is neither opened nor searched
 };
 
-/// Opens the folder if its content is a capture, else searches its folders. Skips empty folders, and reports broken
-/// captures. `walked` holds the parent folders seen so far, because links may lead back to them.
+Found passed_over(const fs::path& path, const std::string& why) { return {path, "", std::nullopt, "", why}; }
+
+struct Content {
+    std::vector<fs::path> folders; ///< sorted, without hidden ones
+    std::vector<fs::path> hidden;  ///< folders whose names begin with '.'
+    std::size_t files = 0;
+    std::set<std::string> kinds; ///< extensions of the files, at most a few
+    std::error_code unreadable;
+};
+
+Content content_of(const fs::path& folder) {
+    Content content;
+    constexpr std::size_t most_kinds = 5;
+    for (fs::directory_iterator entry(folder, content.unreadable), end; !content.unreadable && entry != end;
+         entry.increment(content.unreadable)) {
+        if (std::error_code ignored; entry->is_directory(ignored)) {
+            const bool hidden = entry->path().filename().string()[0] == '.';
+            (hidden ? content.hidden : content.folders).push_back(entry->path());
+            continue;
+        }
+        ++content.files;
+        if (content.kinds.size() < most_kinds)
+            content.kinds.insert(entry->path().has_extension() ? lower_extension(entry->path()) : "no extension");
+    }
+    std::ranges::sort(content.folders, natural_less, [](const fs::path& path) { return path.filename().string(); });
+    return content;
+}
+
+/// Folders in a capture's folder that hold none of its frames: they may be captures themselves.
+void report_unused_folders(const Capture& capture, const std::function<void(Found)>& found) {
+    const std::string whole = capture.path.string() + "/";
+    std::set<std::string, std::less<>> used;
+    for (const CaptureEntry& entry : capture.entries)
+        for (const std::string* file : {&entry.colour, &entry.depth, &entry.cloud})
+            if (const std::string_view path = *file; path.starts_with(whole))
+                if (const auto part = path.substr(whole.size(), path.find('/', whole.size()) - whole.size());
+                    !used.contains(part))
+                    used.emplace(part);
+    for (const fs::path& folder : content_of(capture.path).folders)
+        if (!used.contains(folder.filename().string()))
+            found(passed_over(folder, "in the folder of a capture, which takes no frames from it"));
+}
+
+/// Opens the folder if its content is a capture, else searches its folders. Reports broken captures and what it passes
+/// over. `walked` holds the parent folders seen so far, because links may lead back to them.
 void find_in(const fs::path& folder, const std::string& name, const CaptureOptions& options, std::set<fs::path>& walked,
              const std::function<void(Found)>& found) {
-    if (is_result(folder))
-        return;
+    if (const std::string result = result_in(folder); !result.empty())
+        return found(passed_over(folder, result));
     try {
-        found({folder, name, open_capture(folder, options), ""});
+        Capture capture = open_capture(folder, options);
+        report_unused_folders(capture, found);
+        found({folder, name, std::move(capture), ""});
         return;
     } catch (const Misuse&) {
         throw;
@@ -53,16 +105,18 @@ void find_in(const fs::path& folder, const std::string& name, const CaptureOptio
     }
     std::error_code unreadable;
     if (!walked.insert(fs::canonical(folder, unreadable)).second)
-        return;
-    std::vector<fs::path> folders;
-    for (fs::directory_iterator entry(folder, unreadable), end; !unreadable && entry != end;
-         entry.increment(unreadable))
-        if (std::error_code ignored; entry->is_directory(ignored) && entry->path().filename().string()[0] != '.')
-            folders.push_back(entry->path());
-    if (unreadable)
-        found({folder, name, std::nullopt, folder.string() + ": cannot be listed: " + unreadable.message()});
-    std::ranges::sort(folders, natural_less, [](const fs::path& path) { return path.filename().string(); });
-    for (const fs::path& each : folders)
+        return found(passed_over(folder, "a link to a folder that was searched already"));
+    const Content content = content_of(folder);
+    if (content.unreadable)
+        found({folder, name, std::nullopt, folder.string() + ": cannot be listed: " + content.unreadable.message()});
+    else if (content.files > 0)
+        found(passed_over(folder, fmt::format("no frames among its {} ({})", counted(content.files, "file"),
+                                              fmt::join(content.kinds, ", "))));
+    else if (content.folders.empty())
+        found(passed_over(folder, "empty"));
+    for (const fs::path& each : content.hidden)
+        found(passed_over(each, "hidden, as its name begins with '.'"));
+    for (const fs::path& each : content.folders)
         find_in(each, (fs::path(name) / each.filename()).string(), options, walked, found);
 }
 
@@ -138,7 +192,8 @@ class PlanCommand final : public Command {
                                    {{.name = "out",
                                      .help = "folder of the job and of its results, on a disk that every machine sees",
                                      .value = &out_,
-                                     .common = true},
+                                     .common = true,
+                                     .writes = Writes::folder},
                                     {.name = "block",
                                      .help = "captures of more frames than this are cut into blocks of about this many",
                                      .value = &block_,
@@ -170,6 +225,7 @@ class PlanCommand final : public Command {
             find_captures(dataset, options, [&](Found found) { add(std::move(found), plan); });
         for (const std::string& refused : plan.refused)
             fmt::print(stderr, "refused: {}\n", refused);
+        tell_passed_over(plan);
         if (plan.tasks.empty())
             throw Error("no captures found");
         write_plan(out_, plan);
@@ -212,13 +268,20 @@ class PlanCommand final : public Command {
     }
 
     std::string unique(const std::string& name) {
+        constexpr std::size_t longest = 240; // of the 255 bytes that file systems have
+        const fs::path path = name;
         std::string free = name;
         for (int n = 2; !taken_.insert(free).second; ++n)
-            free = fmt::format("{}-{}", name, n);
+            free =
+                (path.parent_path() / fmt::format("{}-{}", shortened(path.filename().string(), longest), n)).string();
         return free;
     }
 
     void add(Found found, Plan& plan) {
+        if (!found.passed_over.empty()) {
+            plan.passed_over.push_back(as_utf8(found.path.string()) + ": " + found.passed_over);
+            return;
+        }
         if (found.capture && as_utf8(found.path.string()) != found.path.string())
             found = {found.path, "", std::nullopt,
                      as_utf8(found.path.string()) + ": the name is not UTF-8, as a plan's must be"};
@@ -245,6 +308,15 @@ class PlanCommand final : public Command {
                 task.cost += costs[task.first + i];
             plan.tasks.push_back(std::move(task));
         }
+    }
+
+    void tell_passed_over(const Plan& plan) const {
+        constexpr std::size_t most = 20;
+        for (const std::string& each : plan.passed_over | std::views::take(most))
+            fmt::print(stderr, "passed over: {}\n", each);
+        if (plan.passed_over.size() > most)
+            fmt::print(stderr, "passed over: {} more, listed in {}\n", plan.passed_over.size() - most,
+                       (fs::path(out_) / "plan.json").string());
     }
 
     void tell(const Plan& plan) const {

@@ -13,11 +13,15 @@
 #include "apps/walk/progress.h"
 #include "apps/walk/resume.h"
 #include "apps/walk/sequence_order.h"
+#include "io/images/format.h"
 #include "io/output_file.h"
+#include "io/text.h"
 #include "projection/error.h"
+#include "projection/memory.h"
 #include "projection/stopwatch.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <csignal>
@@ -25,8 +29,10 @@
 #include <fmt/ranges.h>
 #include <mutex>
 #include <opencv2/core/utility.hpp>
+#include <ranges>
 #include <semaphore>
 #include <set>
+#include <thread>
 #include <utility>
 
 namespace scanshade {
@@ -39,13 +45,18 @@ namespace fs = std::filesystem;
 std::atomic<bool> interrupted = false;
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may touch nothing else");
 
-/// The first Ctrl-C ends the run after the frames in flight; the second one kills it, as always.
+/// The first Ctrl-C, or the end of the terminal, ends the run after the frames in flight; the second one kills it, as
+/// always.
 void end_gracefully_on_signals() {
     struct sigaction action = {};
     action.sa_handler = [](int) { interrupted = true; };
     action.sa_flags = static_cast<int>(SA_RESETHAND) | SA_RESTART;
     sigaction(SIGINT, &action, nullptr);
     sigaction(SIGTERM, &action, nullptr);
+    struct sigaction hangup = {};
+    sigaction(SIGHUP, nullptr, &hangup);
+    if (hangup.sa_handler != SIG_IGN) // nohup keeps a run alive without its terminal
+        sigaction(SIGHUP, &action, nullptr);
 }
 
 // ---------------------------------------------------------------------------------------------------- jobs
@@ -65,14 +76,15 @@ struct Job {
 std::string folder_name(const fs::path& path, std::set<std::string>& taken) {
     const fs::path whole = fs::weakly_canonical(path);
     const fs::path last = whole.has_filename() ? whole.filename() : whole.parent_path().filename();
-    const std::string stem = fs::is_directory(path) ? last.string() : last.stem().string();
+    constexpr std::size_t longest = 200; // of the 255 bytes that file systems have
+    const std::string stem = shortened(fs::is_directory(path) ? last.string() : last.stem().string(), longest);
     std::string name = stem.empty() ? "capture" : stem;
     for (int n = 2; !taken.insert(name).second; ++n)
         name = fmt::format("{}-{}", stem, n);
     return name;
 }
 
-/// Results of an earlier run are replaced only with --overwrite.
+/// Results of an earlier run are replaced only with --overwrite. The reports of a run that did nothing are no results.
 void refuse_to_overwrite(const Job& job) {
     const Outputs& outputs = job.batch.outputs;
     const auto refuse = [](const std::vector<fs::path>& files) {
@@ -82,9 +94,18 @@ void refuse_to_overwrite(const Job& job) {
                          " exists already: --resume goes on with an earlier run, --overwrite replaces its "
                          "results, or choose another -o");
     };
-    refuse({outputs.folder / "manifest.json", outputs.folder / "frames.csv", journal_file(outputs.folder, "")});
+    const fs::path journal = journal_file(outputs.folder, "");
+    if (!fs::exists(journal) || has_results(outputs.folder))
+        refuse({outputs.folder / "manifest.json", outputs.folder / "frames.csv", journal});
     for (const std::size_t index : job.batch.frames)
         refuse(files_of(job.capture.entries[index], outputs));
+}
+
+/// --resume continues a run of the same capture only: frames of two captures would share names and reports.
+void refuse_another_captures_results(const Job& job) {
+    if (const auto other = other_capture_in(job.folder(), job.capture))
+        throw Misuse(fmt::format("{} has results of {}, not of {}: choose another -o, or --overwrite replaces them",
+                                 job.folder().string(), *other, job.capture.path.string()));
 }
 
 /// "frames.csv" and "manifest.json", or "frames.0-500.csv" of a block.
@@ -99,6 +120,16 @@ struct ReportFiles {
     }
 };
 
+constexpr std::array result_folders = {"ao", "confidence", "shaded", "panel", "clouds"};
+
+/// Refuses a folder of results that cannot be written, or one in it that an earlier run has left.
+void require_folders(const fs::path& folder) {
+    require_folder(folder);
+    for (const char* part : result_folders)
+        if (std::error_code ignored; fs::exists(folder / part, ignored))
+            require_folder(folder / part);
+}
+
 /// Removes files of a killed run, and the report of an earlier one: a manifest means that the results next to it are
 /// complete. The caller holds the journal.
 void prepare_folder(const Job& job, const ReportFiles& reports) {
@@ -112,8 +143,40 @@ void prepare_folder(const Job& job, const ReportFiles& reports) {
         stems.insert(report.stem().string());
         fs::remove(report);
     }
-    for (const char* part : {"", "ao", "confidence", "shaded", "panel", "clouds"})
-        remove_leftovers(job.folder() / part, [&](std::string_view stem) { return stems.contains(stem); });
+    const auto ours = [&](std::string_view stem) { return stems.contains(stem); };
+    remove_leftovers(job.folder(), ours);
+    for (const char* part : result_folders)
+        remove_leftovers(job.folder() / part, ours);
+}
+
+/// The size of a capture's depth images; empty for clouds, and where no header can be read.
+cv::Size depth_size_of(const Job& job) {
+    if (job.capture.camera && !job.capture.camera->pinhole.size.empty())
+        return job.capture.camera->pinhole.size;
+    const std::string first = job.batch.frames.empty() ? "" : job.capture.entries[job.batch.frames.front()].depth;
+    try {
+        return first.empty() ? cv::Size() : peek(first).size;
+    } catch (const Outage&) {
+        throw;
+    } catch (const Error&) { // loading that frame reports the error
+        return {};
+    }
+}
+
+/// Refuses frames too large for the memory, and takes fewer at once where not all fit that the cores could use.
+/// `on_cpu`: the device's images are in the same memory.
+void fit_into_memory(Job& job, bool on_cpu) {
+    constexpr std::uint64_t host_bytes = 12, device_bytes = 24; // per pixel; depth and visibility; as CACAO has them
+    const cv::Size size = depth_size_of(job);
+    const std::uint64_t bytes = static_cast<std::uint64_t>(size.area()) * (host_bytes + (on_cpu ? device_bytes : 0));
+    require_memory(bytes,
+                   fmt::format("{}: a frame of {}x{} pixels", job.capture.path.string(), size.width, size.height));
+    constexpr std::uint64_t always_fits = 128 << 20;
+    const std::uint64_t usual = std::thread::hardware_concurrency() + 8;
+    if (bytes < always_fits)
+        return;
+    if (const std::uint64_t fit = free_memory() / bytes; fit < usual)
+        job.batch.frames_in_memory = std::max(1, static_cast<int>(fit));
 }
 
 /// Computes a capture's frames together, with one method leased for all of them.
@@ -186,9 +249,11 @@ class Run final : public Command {
         int unopened = 0;
         Tally tally;
         std::vector<Job> jobs = plan(unopened, tally);
-        for (const Job& job : jobs)
-            if (!asked_.overwrite && !asked_.resume)
-                refuse_to_overwrite(job);
+        for (const Job& job : jobs) {
+            require_folders(job.folder());
+            if (!asked_.overwrite)
+                asked_.resume ? refuse_another_captures_results(job) : refuse_to_overwrite(job);
+        }
         if (jobs.empty())
             return tally.exit_code(unopened);
 
@@ -254,8 +319,9 @@ class Run final : public Command {
                 warn(fmt::format("failed: {}", failure.what()));
                 ++unopened;
             } catch (const std::exception& failure) {
-                warn(fmt::format("failed: internal error: {}", failure.what()));
-                tally.add(Fault::internal);
+                const auto no_memory = failed_allocation(failure);
+                warn("failed: " + no_memory.value_or(fmt::format("internal error: {}", failure.what())));
+                tally.add(no_memory ? Fault::outage : Fault::internal);
             }
         }
         return jobs;
@@ -283,6 +349,7 @@ class Run final : public Command {
                          .shading = shading_sentence(job.capture, registration),
                          .frames = {}};
         report.devices = workers ? workers->devices() : 1;
+        report.alone = job.block.empty();
         return report;
     }
 
@@ -312,6 +379,7 @@ class Run final : public Command {
             throw Misuse("run JOB continues that job in its own folder; it takes neither other captures, nor -o, nor "
                          "--overwrite");
         const fs::path job = asked_.paths.front();
+        require_folder(job / "results");
         const Plan plan = read_plan(job);
         const Shard shard = shard_from(asked_.shard);
         for (const Stage& stage : stages())
@@ -388,7 +456,8 @@ class Run final : public Command {
     std::vector<FrameRow> process(Job job, OrderedOutput& output, const WorkerProcess& worker = {}) {
         output.set_capture(job.capture.path.string());
         Journal journal(job.folder(), job.block);
-        if (asked_.overwrite)
+        journal.set_capture(job.capture);
+        if (asked_.overwrite || !asked_.resume)
             journal.clear();
         const ReportFiles files(job.folder(), job.block);
         const std::string task = task_of(job);
@@ -400,6 +469,8 @@ class Run final : public Command {
         std::optional<RecordingCloud> cloud;
         if (!asked_.recording_cloud.empty())
             job.batch.cloud = &cloud.emplace(asked_.cloud_resolution_m);
+        if (!ready.by_points)
+            fit_into_memory(job, ready.report.device.kind == "CPU");
         say(ready.at_work);
         introduce(ready.report, job.batch.frames.size(), ready.by_points);
         prepare_folder(job, files);
@@ -540,13 +611,23 @@ class Run final : public Command {
         {
             const std::lock_guard alone(alone_); // the report names settings
             write_frames_csv(files.table, report.frames);
-            write_manifest(files.manifest, report, [&](const FrameRow& row) { return journal.whole(row); });
+            say_left_alone(
+                write_manifest(files.manifest, report, [&](const FrameRow& row) { return journal.whole(row); }));
             if (count(report.frames, FrameStatus::ok) > 0)
                 for (const std::string& sentence : outlook(asked_, job.batch.noise, job.capture, shipped_front()))
                     if (!std::ranges::count(outlook_, sentence))
                         outlook_.push_back(sentence);
         }
         conclude(report, files.table);
+    }
+
+    static void say_left_alone(const std::vector<std::string>& files) {
+        if (files.empty())
+            return;
+        constexpr std::ptrdiff_t most = 3;
+        const auto some = files | std::views::take(most);
+        say(fmt::format("  {} of earlier runs left alone ({}{}): `not_of_this_run` in manifest.json lists them",
+                        counted(files.size(), "file"), fmt::join(some, ", "), files.size() > most ? " ..." : ""));
     }
 
     void write_recording(const RecordingCloud& cloud) const {

@@ -253,7 +253,8 @@ std::vector<Stage> RunSettings::common_stages() {
          {{.name = "out",
            .help = "folder of the results; several captures get a folder each in it",
            .value = &s.out,
-           .common = true},
+           .common = true,
+           .writes = Writes::folder},
           {.name = "write",
            .help = "any of ao,confidence,shaded,cloud,panel; auto = ao,confidence,shaded, and cloud for clouds",
            .value = &s.write,
@@ -273,7 +274,8 @@ std::vector<Stage> RunSettings::common_stages() {
           {.name = "cloud",
            .help = "a PLY file: one cloud of all frames with poses, points of the same place merged",
            .value = &s.recording_cloud,
-           .common = true},
+           .common = true,
+           .writes = Writes::file},
           {.name = "cloud-resolution",
            .help = "points of that cloud are merged within cubes of this side; 0 = one and a half times what a pixel "
                    "covers",
@@ -303,7 +305,8 @@ std::vector<Stage> RunSettings::common_stages() {
            .value = &s.shard},
           {.name = "dump",
            .help = "folder for the data between the method's passes: .npy files with an index.csv per frame",
-           .value = &s.dump}}}};
+           .value = &s.dump,
+           .writes = Writes::folder}}}};
 }
 
 Stage RunSettings::cloud_stage() {

@@ -14,7 +14,8 @@ class Generate final : public Command {
 
     std::vector<Stage> stages() override {
         std::vector<Parameter> rows = options_.parameters();
-        rows.insert(rows.begin(), {.name = "out", .help = "folder of the capture", .value = &out_});
+        rows.insert(rows.begin(),
+                    {.name = "out", .help = "folder of the capture", .value = &out_, .writes = Writes::folder});
         rows.push_back({.name = "quiet", .help = "prints only failures", .value = &quiet_});
         return {{"capture", rows}};
     }

@@ -9,6 +9,7 @@
 #include "projection/attach.h"
 #include "projection/confidence.h"
 #include "projection/error.h"
+#include "projection/memory.h"
 #include "projection/project.h"
 #include "projection/stopwatch.h"
 
@@ -46,7 +47,10 @@ void take(Work& work, double StageTimes::*stage, Step&& step) {
     } catch (const Error& failure) {
         fail(work.row, FrameStatus::failed, Fault::input, failure);
     } catch (const std::exception& failure) {
-        fail(work.row, FrameStatus::failed, Fault::internal, failure);
+        if (const auto no_memory = failed_allocation(failure))
+            fail(work.row, FrameStatus::failed, Fault::outage, OutOfMemory(*no_memory));
+        else
+            fail(work.row, FrameStatus::failed, Fault::internal, failure);
     }
     work.row.ms.*stage = stopwatch.ms();
 }
@@ -91,6 +95,9 @@ void refuse_blind_view(const Work& work) {
 
 /// Computes a value for every point, without a camera's view.
 void compute_points(Work& work, const BatchOptions& options) {
+    constexpr std::uint64_t bytes_per_point = 300; // surface, tree, rays and picture, beyond the cloud itself
+    const std::size_t points = work.frame.cloud->points.size();
+    require_memory(points * bytes_per_point, fmt::format("visibility of {} points", points));
     work.of_points = visibility_of_points(work.frame, *options.points);
     std::ranges::copy(work.of_points.notes, std::back_inserter(work.row.notes));
     std::ranges::copy(work.of_points.doubts, std::back_inserter(work.row.doubts));

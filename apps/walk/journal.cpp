@@ -3,6 +3,7 @@
 
 #include "apps/json.h"
 #include "io/content_hash.h"
+#include "io/text.h"
 #include "projection/error.h"
 
 #include <algorithm>
@@ -222,9 +223,16 @@ bool is_journal(const fs::path& file) {
     return name.starts_with("journal") && name.ends_with(".jsonl");
 }
 
+/// Independent of the folder that the program was started in; JSON holds UTF-8.
+std::string path_of(const Capture& capture) {
+    std::error_code ignored;
+    return as_utf8(fs::weakly_canonical(capture.path, ignored).string());
+}
+
 std::vector<fs::path> journals_in(const fs::path& folder) {
     std::vector<fs::path> files;
-    for (const auto& entry : fs::directory_iterator(folder))
+    std::error_code none_there;
+    for (const auto& entry : fs::directory_iterator(folder, none_there))
         if (is_journal(entry.path()))
             files.push_back(entry.path());
     std::ranges::sort(files);
@@ -241,6 +249,40 @@ JournalFacts read_journal(const fs::path& file) {
     JournalFacts facts;
     for_each_line(file, [&](const json& line, std::int64_t) { take_line(line, facts); });
     return facts;
+}
+
+bool has_results(const fs::path& folder) {
+    bool any = false;
+    for (const fs::path& file : journals_in(folder))
+        for_each_line(file, [&](const json& line, std::int64_t) {
+            any = any || (kind_of(line) == "frame" && !line.at("frame").at("files").empty());
+        });
+    return any;
+}
+
+std::optional<std::string> other_capture_in(const fs::path& folder, const Capture& capture) {
+    std::map<std::string, const CaptureEntry*> entries;
+    for (const CaptureEntry& entry : capture.entries)
+        entries.emplace(entry.name, &entry);
+    std::string recorded;
+    bool same = false;
+    int compared = 0;
+    constexpr int enough = 8; // hashes of whole files take time
+    for_each_line(journal_file(folder, ""), [&](const json& line, std::int64_t) {
+        const std::string kind = kind_of(line);
+        if (kind == "process")
+            recorded = line["process"].value("capture", "");
+        if (kind != "frame" || same || compared == enough)
+            return;
+        const Record record = record_from(line);
+        if (const auto entry = entries.find(record.row.name); entry != entries.end()) {
+            ++compared;
+            same = record.stamp == stamps_of(*entry->second) || record.input == hashes_of(*entry->second);
+        }
+    });
+    if (same || recorded.empty() || recorded == path_of(capture))
+        return std::nullopt;
+    return recorded;
 }
 
 bool in_use(const fs::path& file) {
@@ -275,6 +317,9 @@ Journal::Journal(fs::path folder, const std::string& block)
     std::error_code trouble;
     fs::create_directories(folder_, trouble);
     handle_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+    for (const int needs_another_folder : {EACCES, EPERM, EROFS, EISDIR})
+        if (handle_ < 0 && errno == needs_another_folder)
+            throw Misuse(fmt::format("{}: cannot be written: {}", file_.string(), std::strerror(errno)));
     if (handle_ < 0)
         fail(file_, "cannot be opened");
     if (::flock(handle_, LOCK_EX | LOCK_NB) != 0 && !no_locks_here(errno)) {
@@ -380,17 +425,16 @@ std::int64_t Journal::append(const std::string& line, Sync sync) {
     return end + (last == '\n' ? 0 : 1);
 }
 
+void Journal::set_capture(const Capture& capture) { capture_ = path_of(capture); }
+
 void Journal::add(const FrameRow& row, const CaptureEntry& entry, const std::string& settings,
                   const std::string& device) {
     if (row.status == FrameStatus::skipped)
         return;
     if (!std::exchange(introduced_, true)) {
         const auto now = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
-        const json process{{"host", host_name()},
-                           {"pid", ::getpid()},
-                           {"device", device},
-                           {"started", now},
-                           {"version", SCANSHADE_VERSION}};
+        const json process{{"host", host_name()}, {"pid", ::getpid()}, {"device", device},
+                           {"capture", capture_}, {"started", now},    {"version", SCANSHADE_VERSION}};
         append(json{{"process", process}}.dump(-1, ' ', false, json::error_handler_t::replace));
     }
     Record record{row, settings, stamps_of(entry), hashes_of(entry), {}};

@@ -37,6 +37,13 @@ struct JournalFacts {
 /// Reads every valid line, without a lock. A kill may leave the last line torn. Empty if there is no file.
 [[nodiscard]] JournalFacts read_journal(const std::filesystem::path& file);
 
+/// Whether a journal in the folder records a frame with results.
+[[nodiscard]] bool has_results(const std::filesystem::path& folder);
+
+/// The path of the capture whose results the folder's journal records, if that is another one than `capture`. One that
+/// was moved is not another: then its frames' files are the same.
+[[nodiscard]] std::optional<std::string> other_capture_in(const std::filesystem::path& folder, const Capture& capture);
+
 /// Whether a process holds the journal now.
 [[nodiscard]] bool in_use(const std::filesystem::path& file);
 
@@ -56,7 +63,8 @@ class Busy : public Outage {
 /// the process, so it is never stale. Over NFS and Lustre it holds between machines.
 class Journal {
   public:
-    /// Makes the folder and the file if missing. Throws Busy at once if another process holds the journal. Also reads
+    /// Makes the folder and the file if missing. Throws Busy at once if another process holds the journal, and
+    /// Misuse if it may not be written. Also reads
     /// the folder's other journals (blocks of another plan).
     Journal(std::filesystem::path folder, const std::string& block);
     ~Journal();
@@ -71,6 +79,8 @@ class Journal {
                                                bool retry) const;
     /// The row with everything that shorten() removed. Rows that are not recorded come back unchanged.
     [[nodiscard]] FrameRow whole(const FrameRow& row) const;
+    /// Names the capture in the lines that follow; other_capture_in() reads it.
+    void set_capture(const Capture& capture);
     /// Writes one line. When this returns the kernel has it, so it outlives the process. The disk has it a second
     /// later; a frame whose line is lost in a power cut is done again. Skipped frames are not recorded. Throws Outage
     /// if the line cannot be written.
@@ -99,6 +109,7 @@ class Journal {
 
     std::filesystem::path folder_, file_;
     int handle_ = -1;
+    std::string capture_;
     bool introduced_ = false;
     std::chrono::steady_clock::time_point synced_; ///< when the disk last had every line
     JournalFacts facts_;

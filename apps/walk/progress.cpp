@@ -130,6 +130,14 @@ std::string duration_text(double seconds) {
     return h > 0 ? fmt::format("{}:{:02}:{:02}", h, m, s) : fmt::format("{}:{:02}", m, s);
 }
 
+std::string time_left_text(double seconds) { return duration_text(std::max(seconds, 1.0)); }
+
+std::string percent_text(double share_done, bool anything_left, int digits) {
+    const double step = std::pow(10.0, -digits);
+    const double percent = std::floor(100 * std::clamp(share_done, 0.0, 1.0) / step) * step;
+    return fmt::format("{:.{}f}", anything_left ? std::min(percent, 100 - step) : 100.0, digits);
+}
+
 Progress::Progress(std::size_t total)
     : total_(total), on_terminal_(!as_json && !quiet && isatty(STDERR_FILENO) == 1), buffer_(own_buffer) {}
 
@@ -177,7 +185,7 @@ double Progress::seconds_left() const {
 std::string Progress::bar() const {
     constexpr std::size_t width = 30;
     const double rate = static_cast<double>(done_) / stopwatch_.seconds();
-    const std::string left = duration_text(seconds_left());
+    const std::string left = done_ < total_ ? time_left_text(seconds_left()) : duration_text(0);
     const std::size_t filled = width * done_ / total_;
     return fmt::format("{}  [{:#<{}}{:.<{}}] {}/{}  {:.1f} frames/s  {} left", clear_line, "", filled, "",
                        width - filled, done_, total_, rate, left);

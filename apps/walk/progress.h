@@ -42,6 +42,10 @@ class OrderedOutput {
 
 /// "1:02:03" or "2:03"
 [[nodiscard]] std::string duration_text(double seconds);
+/// The same for work that is left: never less than a second.
+[[nodiscard]] std::string time_left_text(double seconds);
+/// "99.8": 100 only where nothing is left.
+[[nodiscard]] std::string percent_text(double share_done, bool anything_left, int digits = 0);
 
 class Progress {
   public:

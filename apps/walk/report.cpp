@@ -16,6 +16,7 @@
 #include <limits>
 #include <tbb/info.h>
 #include <type_traits>
+#include <unordered_set>
 #include <utility>
 
 namespace scanshade {
@@ -137,6 +138,22 @@ json totals_json(const RunReport& report) {
             {"peak_memory_mib", known(peak_memory_mib(), 1)}};
 }
 
+/// The files in the folders of results without those in `own`, sorted.
+std::vector<std::string> files_of_others(const std::filesystem::path& folder,
+                                         const std::unordered_set<std::string>& own) {
+    std::vector<std::string> others;
+    for (const char* part : {"ao", "confidence", "shaded", "panel", "clouds"}) {
+        std::error_code none_there;
+        for (const auto& entry : std::filesystem::directory_iterator(folder / part, none_there)) {
+            const std::string name = entry.path().filename().string(), whole = std::string(part) + "/" + name;
+            if (!name.starts_with('.') && !own.contains(whole))
+                others.push_back(whole);
+        }
+    }
+    std::ranges::sort(others);
+    return others;
+}
+
 std::string utc(std::chrono::system_clock::time_point time) {
     return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::chrono::system_clock::to_time_t(time)));
 }
@@ -215,8 +232,9 @@ void write_frames_csv(const std::filesystem::path& file, const std::vector<Frame
     write_atomically(file, text);
 }
 
-void write_manifest(const std::filesystem::path& file, const RunReport& report,
-                    const std::function<FrameRow(const FrameRow&)>& whole) {
+std::vector<std::string> write_manifest(const std::filesystem::path& file, const RunReport& report,
+                                        const std::function<FrameRow(const FrameRow&)>& whole) {
+    std::vector<std::string> left_alone;
     json text{{"program", "scanshade"},
               {"version", SCANSHADE_VERSION},
               {"command_line", command_line()},
@@ -242,13 +260,20 @@ void write_manifest(const std::filesystem::path& file, const RunReport& report,
         stream << head
                << ",\n  \"frames\": ["; // one by one: thousands in one value would take most of the run's memory
         const char* between = "";
+        std::unordered_set<std::string> own;
         for (const FrameRow& row : report.frames) {
+            const FrameRow all_of_row = whole(row);
+            for (const auto& each : all_of_row.files)
+                own.insert(each.generic_string());
             stream << std::exchange(between, ",") << "\n    "
-                   << indented(text_of(frame_json(whole(row), !report.capture.camera)), "    ");
+                   << indented(text_of(frame_json(all_of_row, !report.capture.camera)), "    ");
         }
-        stream << (report.frames.empty() ? "]" : "\n  ]") << "\n}\n";
+        stream << (report.frames.empty() ? "]" : "\n  ]");
+        left_alone = report.alone ? files_of_others(file.parent_path(), own) : std::vector<std::string>();
+        stream << ",\n  \"not_of_this_run\": " << indented(text_of(json(left_alone)), "  ") << "\n}\n";
         stream.flush();
     });
+    return left_alone;
 }
 
 } // namespace scanshade

@@ -33,6 +33,7 @@ struct RunReport {
     std::size_t done_now = 0;        ///< frames that this process computed; others were done before
     StageTimes ms_now{};             ///< sums of their times in each stage
     double took_ms = 0;              ///< from the first frame's begin to the last one's end
+    bool alone = true;               ///< no other run writes to the same folder, as runs of a capture's blocks do
 };
 
 /// Frames per second of the pipeline, and of each stage if it had the machine to itself. A stage then works on as many
@@ -60,9 +61,9 @@ struct Rates {
 void write_frames_csv(const std::filesystem::path& file, const std::vector<FrameRow>& frames);
 
 /// Written last, so that its presence means that the run has ended. `whole` restores what shorten() removed from a row.
-/// Atomic.
-void write_manifest(const std::filesystem::path& file, const RunReport& report,
-                    const std::function<FrameRow(const FrameRow&)>& whole);
+/// Atomic. Returns the files in the folders of results that are not of this run; the manifest lists them as such.
+std::vector<std::string> write_manifest(const std::filesystem::path& file, const RunReport& report,
+                                        const std::function<FrameRow(const FrameRow&)>& whole);
 
 /// How many of the rows have that status.
 [[nodiscard]] std::size_t count(const std::vector<FrameRow>& rows, FrameStatus status);

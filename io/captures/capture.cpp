@@ -11,6 +11,7 @@
 #include "io/images/format.h"
 #include "io/text.h"
 #include "projection/error.h"
+#include "projection/memory.h"
 
 #include <algorithm>
 #include <cmath>
@@ -161,8 +162,8 @@ bool settle_camera(Listing& listing, const CaptureOptions& options) {
 std::string text(cv::Size size) { return fmt::format("{}x{}", size.width, size.height); }
 
 /// Camera, depth and colour must have the same size: nothing is scaled unasked.
-void check_depth_size(const Frame& frame, const fs::path& depth) {
-    const cv::Size expected = frame.camera.pinhole.size, found = frame.depth_m.size();
+void check_depth_size(const Frame& frame, cv::Size found, const fs::path& depth) {
+    const cv::Size expected = frame.camera.pinhole.size;
     if (!expected.empty() && found != expected)
         throw Error(fmt::format("{}: depth is {}, but its camera is for {} ({})", depth.string(), text(found),
                                 text(expected), frame.camera.origin));
@@ -174,7 +175,7 @@ void check_still_there(const Capture& capture) {
         throw Outage(capture.path.string() + ": not there any more");
 }
 
-void load_colour(const Capture& capture, const fs::path& file, Frame& frame) {
+void load_colour(const Capture& capture, const fs::path& file, cv::Size depth_size, Frame& frame) {
     try {
         frame.colour = read_colour(file);
     } catch (const Outage&) {
@@ -185,7 +186,7 @@ void load_colour(const Capture& capture, const fs::path& file, Frame& frame) {
         return;
     }
     const cv::Size colour = frame.colour.size(),
-                   expected = frame.colour_camera ? frame.colour_camera->camera.pinhole.size : frame.depth_m.size();
+                   expected = frame.colour_camera ? frame.colour_camera->camera.pinhole.size : depth_size;
     if (colour == expected)
         return;
     frame.warnings.push_back(fmt::format("{}: colour is {}, {} is {}; processed without colour.", file.string(),
@@ -201,22 +202,75 @@ void correct(cv::Mat1f& depth_m, const DepthCorrection& correction) {
     });
 }
 
-void load_depth(const Capture& capture, const CaptureEntry& entry, Frame& frame, bool with_colour) {
-    const cv::Mat stored = read_stored_depth(entry.depth);
-    frame.depth_m = during(entry.depth, [&] { return depth_in_metres(stored, capture.depth); });
-    if (capture.camera) {
-        frame.camera = *capture.camera;
-        if (frame.camera.pinhole.size.empty())
-            frame.camera.pinhole.size = frame.depth_m.size();
-        check_depth_size(frame, entry.depth);
-    } else { // anything that needs the camera refuses this one, and says its origin
+void take_camera(const Capture& capture, const CaptureEntry& entry, cv::Size depth_size, Frame& frame) {
+    frame.colour_camera = capture.colour_camera;
+    if (!capture.camera) { // anything that needs the camera refuses this one, and says its origin
         frame.camera.origin = "none is known; give --camera FILE or --camera fx,fy,cx,cy";
+        return;
     }
+    frame.camera = *capture.camera;
+    if (frame.camera.pinhole.size.empty())
+        frame.camera.pinhole.size = depth_size;
+    check_depth_size(frame, depth_size, entry.depth);
+}
+
+void load_depth(const Capture& capture, const CaptureEntry& entry, const cv::Mat& stored, Frame& frame,
+                bool with_colour) {
+    require_memory(stored.total() * sizeof(float),
+                   fmt::format("{}: a depth image of {} pixels", entry.depth, text(stored.size())));
+    frame.depth_m = during(entry.depth, [&] { return depth_in_metres(stored, capture.depth); });
+    take_camera(capture, entry, stored.size(), frame);
     frame.doubts = doubts_about(frame.depth_m, stored, capture.depth);
     correct(frame.depth_m, capture.depth_correction);
-    frame.colour_camera = capture.colour_camera;
     if (with_colour && !entry.colour.empty())
-        load_colour(capture, entry.colour, frame);
+        load_colour(capture, entry.colour, stored.size(), frame);
+}
+
+/// How many pixels have each value. In four tables, by turns: equal neighbours would wait for each other's sums.
+std::vector<std::uint32_t> counts_of(const cv::Mat1w& stored) {
+    constexpr std::size_t values = 1 << 16;
+    std::vector<std::uint32_t> counts(4 * values);
+    std::uint32_t *a = counts.data(), *b = a + values, *c = b + values, *d = c + values;
+    for (int y = 0; y < stored.rows; ++y) {
+        const ushort* row = stored[y];
+        int x = 0;
+        for (; x + 4 <= stored.cols; x += 4) {
+            ++a[row[x]];
+            ++b[row[x + 1]];
+            ++c[row[x + 2]];
+            ++d[row[x + 3]];
+        }
+        for (; x < stored.cols; ++x)
+            ++a[row[x]];
+    }
+    for (std::size_t value = 0; value < values; ++value)
+        a[value] += b[value] + c[value] + d[value];
+    counts.resize(values);
+    return counts;
+}
+
+void examine_depth(const Capture& capture, const CaptureEntry& entry, ExaminedFrame& examined) {
+    const cv::Mat stored = read_stored_depth(entry.depth);
+    examined.depth_size = stored.size();
+    if (stored.type() != CV_16UC1) {
+        load_depth(capture, entry, stored, examined.frame, true);
+        return;
+    }
+    take_camera(capture, entry, stored.size(), examined.frame);
+    DepthTable metres = during(entry.depth, [&] { return depth_table(capture.depth); });
+    const std::vector<std::uint32_t> counts = counts_of(stored);
+    float largest_m = 0;
+    for (int value = 0; value < metres.cols; ++value)
+        if (counts[static_cast<std::size_t>(value)] > 0)
+            largest_m = std::max(largest_m, metres(value));
+    examined.frame.doubts = doubts_about(stored, metres, largest_m, capture.depth);
+    correct(metres, capture.depth_correction);
+    for (int value = 0; value < metres.cols; ++value)
+        if (const std::uint32_t count = counts[static_cast<std::size_t>(value)]; count > 0 && metres(value) != 0)
+            examined.levels.push_back({metres(value), count});
+    std::ranges::sort(examined.levels, {}, &DepthLevel::z_m);
+    if (!entry.colour.empty())
+        load_colour(capture, entry.colour, stored.size(), examined.frame);
 }
 
 void load_cloud(const Capture& capture, const CaptureEntry& entry, Frame& frame) {
@@ -294,24 +348,45 @@ Capture open_capture(const fs::path& path, const CaptureOptions& options) {
     return std::move(capture);
 }
 
-Frame Capture::load(std::size_t index, bool with_colour) const {
-    if (index >= entries.size())
-        throw Error(fmt::format("{}: frame {} of {}", path.string(), index, entries.size()));
-    const CaptureEntry& entry = entries[index];
+namespace {
+
+/// The frame with the listing's facts, to which `read` adds the files' content.
+template <class Read>
+void read_frame(const Capture& capture, std::size_t index, Frame& frame, const Read& read) {
+    if (index >= capture.entries.size())
+        throw Error(fmt::format("{}: frame {} of {}", capture.path.string(), index, capture.entries.size()));
+    const CaptureEntry& entry = capture.entries[index];
     if (!entry.problem.empty())
         throw Error(entry.problem);
-    Frame frame;
     frame.name = entry.name;
     frame.warnings = entry.warnings;
     frame.world_from_camera = entry.world_from_camera;
-    frame.registration = registration;
+    frame.registration = capture.registration;
     try {
-        entry.cloud.empty() ? load_depth(*this, entry, frame, with_colour) : load_cloud(*this, entry, frame);
+        read(entry);
     } catch (const std::exception&) {
-        check_still_there(*this);
+        check_still_there(capture);
         throw;
     }
+}
+
+} // namespace
+
+Frame Capture::load(std::size_t index, bool with_colour) const {
+    Frame frame;
+    read_frame(*this, index, frame, [&](const CaptureEntry& entry) {
+        entry.cloud.empty() ? load_depth(*this, entry, read_stored_depth(entry.depth), frame, with_colour)
+                            : load_cloud(*this, entry, frame);
+    });
     return frame;
+}
+
+ExaminedFrame Capture::examine(std::size_t index) const {
+    ExaminedFrame examined;
+    read_frame(*this, index, examined.frame, [&](const CaptureEntry& entry) {
+        entry.cloud.empty() ? examine_depth(*this, entry, examined) : load_cloud(*this, entry, examined.frame);
+    });
+    return examined;
 }
 
 } // namespace scanshade

@@ -7,6 +7,7 @@
 #include "projection/frame.h"
 #include "projection/motion.h"
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -38,6 +39,20 @@ struct CaptureEntry {
     std::vector<std::string> warnings; ///< oddities in the listing of this frame
 };
 
+/// A depth, and how many pixels or points have it.
+struct DepthLevel {
+    float z_m = 0;
+    std::uint32_t count = 0;
+};
+
+/// A frame without the places of its depths where these are integers: they take at most 65536 values, so that counts
+/// need far less memory than an image in metres.
+struct ExaminedFrame {
+    Frame frame;                    ///< as load() gives it, but depth_m is empty where `levels` has the depths
+    cv::Size depth_size;            ///< of the depth image; 0x0 for a cloud
+    std::vector<DepthLevel> levels; ///< rising, without holes
+};
+
 /// A folder has no known layout. Its own folders may.
 class NoFrames : public Error {
   public:
@@ -63,6 +78,8 @@ struct Capture {
     /// capture cannot be reached any more; a damaged colour image is a warning, not a failure. Without colour, whose
     /// decoding takes as long as the depth's, it is not looked at.
     [[nodiscard]] Frame load(std::size_t index, bool with_colour = true) const;
+    /// The same for a look at it: less memory, and faster.
+    [[nodiscard]] ExaminedFrame examine(std::size_t index) const;
 };
 
 /// Opens a folder (its content determines the layout), a single depth image, or a cloud file.

@@ -2,6 +2,7 @@
 #include "io/captures/layouts.h"
 
 #include "io/images/format.h"
+#include "io/output_file.h"
 #include "io/text.h"
 #include "projection/error.h"
 
@@ -159,8 +160,8 @@ DepthEncoding assumed_encoding(const fs::path& first_depth) {
 namespace {
 
 std::string fit_for_a_file(const std::string& name) {
-    constexpr std::size_t longest = 160; // of the 255 bytes that file systems have
-    std::string fit = as_utf8(name.substr(0, longest));
+    constexpr std::size_t longest = 160; // of the 255 bytes that file systems have: other parts are added
+    std::string fit = as_utf8(shortened(name, longest));
     std::replace_if(
         fit.begin(), fit.end(), [](char c) { return c == '/' || c == '\\' || static_cast<unsigned char>(c) < ' '; },
         '_');

@@ -10,9 +10,17 @@
 
 namespace scanshade {
 
+/// How 16-bit depth values read in metres: 65536 of them, by value.
+using DepthTable = cv::Mat1f;
+[[nodiscard]] DepthTable depth_table(const DepthEncoding& encoding);
+
 /// Sentences about what looks wrong in `depth_m` (decoded from `stored` with `encoding`): no valid depth, a range that
 /// no depth sensor has, noise in place of surfaces. Each says what other encodings would give.
 [[nodiscard]] std::vector<std::string> doubts_about(const cv::Mat1f& depth_m, const cv::Mat& stored,
+                                                    const DepthEncoding& encoding);
+
+/// The same without the image in metres. `largest_m`: of all pixels.
+[[nodiscard]] std::vector<std::string> doubts_about(const cv::Mat1w& stored, const DepthTable& table, float largest_m,
                                                     const DepthEncoding& encoding);
 
 } // namespace scanshade

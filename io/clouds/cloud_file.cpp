@@ -6,6 +6,7 @@
 #include "io/output_file.h"
 #include "io/text.h"
 #include "projection/error.h"
+#include "projection/memory.h"
 
 #include <algorithm>
 #include <array>
@@ -34,6 +35,8 @@ CloudRecords read_records(const fs::path& file, std::vector<std::string>& warnin
                                 listed(cloud_format_names(), "nor")));
     if (!format->read)
         throw Error(fmt::format("{}: {}", file.string(), format->refusal));
+    require_memory(2 * bytes.size(), // the records, and points as doubles
+                   fmt::format("{}: a cloud of {} bytes", file.string(), bytes.size()));
     CloudRecords records = format->read(bytes, file, warnings);
     records.format = format;
     return records;

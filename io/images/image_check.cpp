@@ -2,6 +2,7 @@
 #include "io/images/image_check.h"
 
 #include "projection/error.h"
+#include "projection/memory.h"
 
 #include <fmt/format.h>
 
@@ -26,6 +27,8 @@ void check_expansion(std::uint64_t packed, std::uint64_t most, const ImageFacts&
     if (needed / most > packed)
         refuse(file, fmt::format("{} bytes of image data cannot become {}x{} pixels", packed, facts.size.width,
                                  facts.size.height));
+    require_memory(needed,
+                   fmt::format("{}: an image of {}x{} pixels", file.string(), facts.size.width, facts.size.height));
 }
 
 std::uint32_t big_endian_32(std::string_view bytes, std::size_t offset) {

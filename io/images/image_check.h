@@ -26,7 +26,7 @@ namespace image_check {
 /// The image size, or Error when a side is 0 or there are more than most_pixels.
 [[nodiscard]] cv::Size checked_size(std::uint64_t width, std::uint64_t height, const std::filesystem::path& file);
 /// Throws Error if `packed` coded bytes are too few for an image of that size, when one byte becomes at most `most`.
-/// So a small file cannot claim much memory.
+/// So a small file cannot claim much memory. Throws OutOfMemory where an image of that size does not fit.
 void check_expansion(std::uint64_t packed, std::uint64_t most, const ImageFacts& facts, int stored_channels,
                      const std::filesystem::path& file);
 [[nodiscard]] std::uint32_t big_endian_32(std::string_view bytes, std::size_t offset);

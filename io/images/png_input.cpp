@@ -3,6 +3,7 @@
 
 #include "io/images/image_check.h"
 
+#include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <cstdlib>
@@ -44,20 +45,33 @@ Packed packed_pixels(std::string_view file) {
     return packed;
 }
 
-/// Whether the zlib stream is sound and unpacks to exactly `size` bytes.
-bool unpack(std::string_view packed, std::uint8_t* bytes, std::size_t size) {
-    constexpr std::size_t most = std::numeric_limits<std::uint32_t>::max();
-    if (packed.size() > most || size > most)
-        return false;
-    inflate_state state;
-    isal_inflate_init(&state);
-    state.crc_flag = ISAL_ZLIB;
-    state.next_in = reinterpret_cast<std::uint8_t*>(const_cast<char*>(packed.data())); // is only read
-    state.avail_in = static_cast<std::uint32_t>(packed.size());
-    state.next_out = bytes;
-    state.avail_out = static_cast<std::uint32_t>(size);
-    return isal_inflate_stateless(&state) == ISAL_DECOMP_OK && state.avail_out == 0;
-}
+/// Unpacks a zlib stream piece by piece: the whole of a large image would take as much memory again.
+class Unpacker {
+  public:
+    explicit Unpacker(std::string_view packed) {
+        isal_inflate_init(&state_);
+        state_.crc_flag = ISAL_ZLIB;
+        state_.next_in = reinterpret_cast<std::uint8_t*>(const_cast<char*>(packed.data())); // is only read
+        state_.avail_in = static_cast<std::uint32_t>(packed.size());
+    }
+    /// Whether there are as many more bytes.
+    bool next(std::uint8_t* bytes, std::size_t size) {
+        state_.next_out = bytes;
+        state_.avail_out = static_cast<std::uint32_t>(size);
+        return isal_inflate(&state_) == ISAL_DECOMP_OK && state_.avail_out == 0;
+    }
+    /// Whether the stream ends here and its checksum is right.
+    bool ends() {
+        std::uint8_t none = 0;
+        state_.next_out = &none;
+        state_.avail_out = 1;
+        return isal_inflate(&state_) == ISAL_DECOMP_OK && state_.avail_out == 1 &&
+               state_.block_state == ISAL_BLOCK_FINISH;
+    }
+
+  private:
+    inflate_state state_;
+};
 
 /// The one of a, b and c that is nearest to a + b - c; the first of equally near ones (section 9.4).
 int paeth(int a, int b, int c) {
@@ -94,14 +108,29 @@ bool unfilter(int filter, const std::uint8_t* from, const std::uint8_t* above, s
     }
 }
 
+/// The image; empty where the stream is unsound.
 template <class Integer>
-cv::Mat image_from(const std::uint8_t* filtered, cv::Size size) {
+cv::Mat image_from(std::string_view packed, cv::Size size) {
     constexpr int pixel = sizeof(Integer);
+    constexpr std::size_t band_bytes = 1 << 20;
     const int length = size.width * pixel;
+    const std::size_t with_filter = static_cast<std::size_t>(length) + 1;
+    const auto rows_at_once =
+        static_cast<int>(std::clamp<std::size_t>(band_bytes / with_filter, 1, static_cast<std::size_t>(size.height)));
+    const auto band =
+        std::make_unique_for_overwrite<std::uint8_t[]>(static_cast<std::size_t>(rows_at_once) * with_filter);
+    Unpacker unpacker(packed);
     const auto two_rows = std::make_unique<std::uint8_t[]>(2 * static_cast<std::size_t>(length + pixel));
     std::uint8_t *above = two_rows.get() + pixel, *row = above + length + pixel;
     cv::Mat_<Integer> image(size);
+    const std::uint8_t* filtered = nullptr;
     for (int y = 0; y < size.height; ++y, filtered += length + 1) {
+        if (y % rows_at_once == 0) {
+            const auto rows = static_cast<std::size_t>(std::min(rows_at_once, size.height - y));
+            if (!unpacker.next(band.get(), rows * with_filter))
+                return {};
+            filtered = band.get();
+        }
         if (!unfilter<pixel>(filtered[0], filtered + 1, above, row, length))
             return {};
         Integer* to = image[y];
@@ -112,6 +141,8 @@ cv::Mat image_from(const std::uint8_t* filtered, cv::Size size) {
                 to[x] = row[x];
         std::swap(above, row);
     }
+    if (!unpacker.ends())
+        return {};
     return image;
 }
 
@@ -125,15 +156,9 @@ cv::Mat decoded_grey_png(std::string_view bytes) {
         return {};
     const cv::Size size(static_cast<int>(big_endian_32(bytes, 16)), static_cast<int>(big_endian_32(bytes, 20)));
     const Packed packed = packed_pixels(bytes);
-    if (!packed.plain)
+    if (!packed.plain || packed.bytes.size() > std::numeric_limits<std::uint32_t>::max())
         return {};
-    const std::size_t row = static_cast<std::size_t>(size.width) * static_cast<std::size_t>(bits / 8) + 1;
-    const std::size_t all = row * static_cast<std::size_t>(size.height);
-    const auto filtered = std::make_unique_for_overwrite<std::uint8_t[]>(all);
-    if (!unpack(packed.bytes, filtered.get(), all))
-        return {};
-    return bits == 16 ? image_from<std::uint16_t>(filtered.get(), size)
-                      : image_from<std::uint8_t>(filtered.get(), size);
+    return bits == 16 ? image_from<std::uint16_t>(packed.bytes, size) : image_from<std::uint8_t>(packed.bytes, size);
 }
 
 } // namespace scanshade

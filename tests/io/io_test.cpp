@@ -120,6 +120,25 @@ TEST(depth_images, png_keeps_every_millimetre) {
     EXPECT_EQ(read(0, 0), 0);
 }
 
+TEST(depth_images, a_large_png_packed_and_unpacked_in_pieces_is_one_stream) {
+    // 72 MB of pixels: two pieces in one direction, 69 in the other. A change in the last ones must not go unseen.
+    cv::Mat1w image(6000, 6000);
+    std::uint32_t random = 1;
+    for (ushort& value : image) {
+        random = random * 1664525 + 1013904223;
+        value = static_cast<ushort>(2000 + (random >> 28));
+    }
+    std::string bytes = encoded_png(image);
+    EXPECT_EQ(cv::norm(decoded_grey_png(bytes), image, cv::NORM_INF), 0);
+    EXPECT_EQ(cv::norm(cv::imdecode(std::vector<char>(bytes.begin(), bytes.end()), cv::IMREAD_UNCHANGED), image,
+                       cv::NORM_INF),
+              0)
+        << "libpng reads the same";
+    constexpr std::size_t from_end_of_stream = 12 + 4 + 2; // IEND, a checksum, and into the stream's own
+    bytes[bytes.size() - from_end_of_stream] ^= 1;
+    EXPECT_TRUE(decoded_grey_png(bytes).empty()) << "the stream's checksum does not fit";
+}
+
 TEST(depth_images, what_a_png_cannot_hold_becomes_a_hole) {
     const TemporaryFolder folder;
     write_depth_png(folder / "depth.png", (cv::Mat1f(1, 4) << nan, -1.0F, 65.535F, 100.0F), 1000);

@@ -1,0 +1,21 @@
+// How much memory is left, and refusals before an allocation that cannot succeed: Linux grants more than it has, and
+// then kills the process without a word.
+#pragma once
+
+#include <cstdint>
+#include <exception>
+#include <optional>
+#include <string>
+
+namespace scanshade {
+
+/// Bytes that this process may still take: by the machine, by its control group (containers, Slurm), by its own limit.
+[[nodiscard]] std::uint64_t free_memory();
+
+/// Throws OutOfMemory, "`what` needs about 9.5 GiB of memory, 6.2 GiB are free", if that many bytes are not there.
+void require_memory(std::uint64_t bytes, const std::string& what);
+
+/// The sentence for an exception that means a failed allocation; none for any other.
+[[nodiscard]] std::optional<std::string> failed_allocation(const std::exception& failure);
+
+} // namespace scanshade
