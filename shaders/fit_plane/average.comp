@@ -23,7 +23,7 @@ void main() {
     float wc = hole ? 1.0 : w, zc = 1.0 / wc;
     Plane expected = slope_at(p, wc, 2), plane;
     // A slope up to 45 degrees more is still the pixel's own surface.
-    float sigma = sigma_on(expected, sigma_of(zc) * relief_at(here) * wc * wc);
+    float sigma = sigma_on(expected, sigma_of(zc) * wc * wc) * relief_at(here);
     float narrow = 1.0 / (3.0 * sigma + 0.7 * 2.8 * wc / k.camera.fx);
     bool good = solve(square5(p, wc, 1.0, expected, narrow), plane); // not good: the plane is level, the pixel keeps its value
     imageStore(averages, here, vec4(hole ? 0.0 : wc + plane.c));
