@@ -1,7 +1,9 @@
 // The flatness of real captures is judged where planes are open: on generated rooms, truth says whether they are.
 #include "apps/measure/flat_surfaces.h"
 #include "apps/scenes/scene.h"
+#include "projection/statistics.h"
 
+#include <cmath>
 #include <gtest/gtest.h>
 
 namespace scanshade {
@@ -31,18 +33,23 @@ TEST(flat_surfaces, are_open_where_they_say_so) {
                     view.frame.world_from_camera.reset();
             const FlatSurfaces flat = flat_surfaces(views, radius_m);
             EXPECT_GE(flat.planes, 2);
-            double open = 0, closed = 0, all = 0;
+            std::vector<double> open;
+            double all = 0, sum = 0;
             for (std::size_t i = 0; i < views.size(); ++i)
                 for (int v = 0; v < camera.size.height; ++v)
                     for (int u = 0; u < camera.size.width; ++u)
-                        if (const float truth = views[i].truth(v, u); truth == truth) {
-                            all += 1;
-                            const bool marked = flat.of_planes[i](v, u) == 255;
-                            open += marked;
-                            closed += marked && truth < 0.9F;
+                        if (const auto truth = static_cast<double>(views[i].truth(v, u)); !std::isnan(truth)) {
+                            ++all;
+                            if (flat.of_planes[i](v, u) == 255) {
+                                open.push_back(truth);
+                                sum += truth;
+                            }
                         }
-            EXPECT_GT(open, 0.05 * all) << name;
-            EXPECT_LT(closed, 0.02 * open) << name << (posed ? ", fused" : ", each by itself");
+            // What no view saw may stand there all the same, and low things lie within a plane's tolerance. But truth
+            // is well within the aim that methods are measured by: a mean of 0.90, and 0.75 for the lowest 5 %.
+            EXPECT_GT(static_cast<double>(open.size()), 0.05 * all) << name;
+            EXPECT_GT(sum / static_cast<double>(open.size()), 0.96) << name << (posed ? ", fused" : ", by itself");
+            EXPECT_GT(quantile(open, 0.05), 0.76) << name << (posed ? ", fused" : ", by itself");
         }
 }
 
