@@ -84,8 +84,11 @@ TEST_F(RunsTest, a_refused_budget_does_not_block_the_next_run) {
 /// Another capture than write_capture() makes: the same frames' names, farther walls.
 void write_other_capture(const fs::path& folder, int frames) {
     tests::write_capture(folder, frames);
-    for (int i = 0; i < frames; ++i)
-        write_depth_png(folder / fmt::format("depth/{:03}.png", i), 1.5 * tests::corner_depth(i), 1000);
+    for (int i = 0; i < frames; ++i) {
+        cv::Mat1f walls = tests::corner_depth(i);
+        walls *= 1.5;
+        write_depth_png(folder / fmt::format("depth/{:03}.png", i), walls, 1000);
+    }
 }
 
 TEST_F(RunsTest, results_of_another_capture_are_not_resumed) {
