@@ -10,6 +10,7 @@
 #include "apps/walk/batch.h"
 #include "apps/walk/overlap.h"
 #include "apps/walk/point_clouds.h"
+#include "apps/walk/pose_check.h"
 #include "apps/walk/progress.h"
 #include "apps/walk/resume.h"
 #include "apps/walk/sequence_order.h"
@@ -464,6 +465,8 @@ class Run final : public Command {
         if (auto rows = rows_if_done(job, journal, task, files))
             return *std::move(rows);
         measure_noise_of(job);
+        if (std::string doubt = pose_doubt(job.capture, job.of); !doubt.empty())
+            job.capture.warnings.push_back(std::move(doubt));
 
         Prepared ready = prepare(job);
         std::optional<RecordingCloud> cloud;

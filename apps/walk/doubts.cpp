@@ -23,6 +23,8 @@ constexpr double least_radius_px = 2;       ///< at the median depth
 constexpr double least_radius_spacings = 2; ///< in a cloud
 constexpr double largest_sigma = 0.25;      ///< of the radius; beyond, noise is what occludes
 constexpr double most_noisy = 0.3;          ///< share of the valid pixels
+constexpr double least_scene_radii = 2;     ///< extent of an image's scene, in radii
+constexpr double farthest_centre = 0.2;     ///< of the principal point from the image's middle, in widths or heights
 constexpr double narrowest_degrees = 0.5;   ///< of view, along the wider side
 constexpr double widest_degrees = 175;
 constexpr double largest_aspect = 2;       ///< fx / fy, either way
@@ -100,10 +102,11 @@ void doubt_radius_in_view(const Work& work, double radius_m, Doubts& doubts) {
            fmt::format("the radius of {:.3g} m spans {:.2g} pixels at the median depth of {:.3g} m: nothing within it "
                        "can be seen. Check the depth unit, or give a larger --radius.",
                        radius_m, radius_px, middle));
-    add_if(radius_m > scene_m, doubts,
-           fmt::format("the radius of {:.3g} m is larger than the scene of {:.3g} m: check the depth unit, or give a "
-                       "smaller --radius.",
-                       radius_m, scene_m));
+    add_if(
+        radius_m * least_scene_radii > scene_m, doubts,
+        fmt::format("the radius of {:.3g} m is larger than {} scene of {:.3g} m, so most of what is within it was not "
+                    "seen: check the depth unit, or give a smaller --radius.",
+                    radius_m, radius_m > scene_m ? "the" : "half the", scene_m));
 }
 
 void doubt_noise_in_view(const Work& work, double radius_m, const DepthNoise& noise, Doubts& doubts) {
@@ -173,6 +176,13 @@ void doubt_camera(const Camera& camera, Doubts& doubts) {
     add_if(aspect > largest_aspect, doubts,
            fmt::format("the camera's pixels are {:.3g} times as long as wide ({}; {}).", aspect, describe(camera),
                        camera.origin));
+    const double middle_x = (pinhole.size.width - 1) / 2.0, middle_y = (pinhole.size.height - 1) / 2.0;
+    add_if(std::abs(pinhole.cx - middle_x) > farthest_centre * pinhole.size.width ||
+               std::abs(pinhole.cy - middle_y) > farthest_centre * pinhole.size.height,
+           doubts,
+           fmt::format("the principal point is far from the middle of the image: the camera may be that of another "
+                       "image size, or of the image before it was cropped ({}; {}).",
+                       describe(camera), camera.origin));
     if (!camera.distortion.any())
         return;
     const cv::Mat2f& direction = Undistortion::of(camera)->direction();

@@ -144,6 +144,12 @@ std::optional<CameraFile> camera_in(const fs::path& folder, std::vector<std::str
     return found;
 }
 
+DepthEncoding usual_encoding(const std::string& text, const std::string& origin) {
+    DepthEncoding encoding = depth_encoding(text, origin);
+    encoding.stated = false;
+    return encoding;
+}
+
 DepthEncoding assumed_encoding(const fs::path& first_depth) {
     bool floats = false;
     try {
@@ -153,8 +159,8 @@ DepthEncoding assumed_encoding(const fs::path& first_depth) {
     } catch (const Error&) { // loading that frame reports the error
     }
     if (floats)
-        return depth_encoding("m", "assumed: floats are metres");
-    return depth_encoding("mm", "assumed: 16-bit integers are millimetres");
+        return usual_encoding("m", "assumed: floats are metres");
+    return usual_encoding("mm", "assumed: 16-bit integers are millimetres");
 }
 
 namespace {

@@ -101,7 +101,7 @@ std::optional<Listing> list_seven_scenes(const fs::path& folder) {
     Listing listing;
     Capture& capture = listing.capture;
     capture.kind = "7-Scenes";
-    capture.depth = depth_encoding("mm", "7-Scenes layout");
+    capture.depth = usual_encoding("mm", "7-Scenes layout");
     capture.registration = Registration::no;
     capture.registration_reason = "7-Scenes colour and depth are unregistered in this layout";
     for (const auto& [name, frame] : frames)

@@ -49,6 +49,8 @@ struct Listing {
 /// TIME_depth.pclzf); nothing where there is none.
 [[nodiscard]] std::optional<CameraFile> camera_beside_pclzf(const std::filesystem::path& depth);
 
+/// What recordings of a layout usually have, though nothing in them says so.
+[[nodiscard]] DepthEncoding usual_encoding(const std::string& text, const std::string& origin);
 /// "assumed: 16-bit integers are millimetres", or metres where `first_depth` holds floats.
 [[nodiscard]] DepthEncoding assumed_encoding(const std::filesystem::path& first_depth);
 

@@ -126,7 +126,7 @@ std::optional<Listing> list_pcl_recording(const fs::path& folder) {
     Listing listing;
     Capture& capture = listing.capture;
     capture.kind = "PCL recording";
-    capture.depth = depth_encoding("mm", "PCL's default");
+    capture.depth = usual_encoding("mm", "PCL's default");
     capture.registration_reason = "PCL's files do not say whether depth was registered to colour";
     for (const auto& [name, shot] : shots)
         capture.entries.push_back(shot_entry(name, shot, any_colour));

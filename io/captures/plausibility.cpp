@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <numeric>
@@ -74,6 +75,49 @@ Statistics statistics_of(const cv::Mat1w& stored, const DepthTable& table) {
     return result;
 }
 
+/// Every how many lines one repeats the line before it, exactly: 2 after an enlargement to twice the size; 0 where none
+/// does. Where all lines are alike, as of a wall seen by an ideal sensor, nothing was repeated.
+int repeats_every(const cv::Mat& lines) {
+    constexpr int most = 4;
+    constexpr double nearly_all = 0.9, hardly_any = 0.1;
+    std::vector<bool> counts(static_cast<std::size_t>(lines.rows)), repeats(counts.size());
+    for (int v = 1; v < lines.rows; ++v) {
+        counts[v] = 4 * cv::countNonZero(lines.row(v)) > lines.cols;
+        repeats[v] = counts[v] && std::memcmp(lines.ptr(v), lines.ptr(v - 1),
+                                              static_cast<std::size_t>(lines.cols) * lines.elemSize()) == 0;
+    }
+    for (int every = 2; every <= most; ++every)
+        for (int first = 0; first < every; ++first) {
+            double repeated = 0, of = 0, others_repeated = 0, others = 0;
+            for (int v = 1; v < lines.rows; ++v) {
+                const bool one = v % every == first;
+                (one ? of : others) += counts[v];
+                (one ? repeated : others_repeated) += repeats[v];
+            }
+            if (of > most && repeated > nearly_all * of && others_repeated < hardly_any * others)
+                return every;
+        }
+    return 0;
+}
+
+const char* ordinal(int every) { return every == 2 ? "second" : every == 3 ? "third" : "fourth"; }
+
+/// An image that was enlarged by copying pixels repeats rows and columns alike. Rows alone are a fault.
+void doubt_repeats(const cv::Mat& image, std::vector<std::string>& doubts) {
+    const int rows = repeats_every(image);
+    cv::Mat some, transposed; // parts of the columns are enough, and quicker
+    const int stride = std::max(1, image.rows / 60);
+    for (int v = 0; v < image.rows; v += stride)
+        some.push_back(image.row(v));
+    cv::transpose(some, transposed);
+    const int columns = repeats_every(transposed);
+    if (rows != columns)
+        doubts.push_back(fmt::format("every {} {} repeats the one before it, and {} do not: the image was stretched, "
+                                     "or lines were lost.",
+                                     ordinal(std::max(rows, columns)), rows > columns ? "row" : "column",
+                                     rows > columns ? "columns" : "rows"));
+}
+
 /// "mm: 2.10 m, tum: 0.42 m": the median under each preset for integers but the one in use.
 std::string what_others_give(const cv::Mat& stored, const DepthEncoding& encoding) {
     std::vector<std::string> parts;
@@ -92,16 +136,56 @@ std::string what_others_give(const cv::Mat& stored, const DepthEncoding& encodin
     return fmt::format(" With --depth-scale the other encodings give: {}.", fmt::join(parts, ", "));
 }
 
-std::vector<std::string> doubts_about(const Statistics& depth, const cv::Mat& stored, const DepthEncoding& encoding) {
+/// The largest number that nearly all stored values are multiples of; 1 where too few differ to tell.
+int common_divisor(const cv::Mat& stored) {
+    constexpr std::size_t enough = 50;
+    constexpr int largest = 100;
+    constexpr double nearly_all = 0.9; // beyond 8 m, SUN RGB-D's rotated bits end in odd ones
+    std::vector<bool> there(65536);
+    for (int v = 0; v < stored.rows; v += 3)
+        for (int u = 0; u < stored.cols; u += 3)
+            there[stored.at<std::uint16_t>(v, u)] = true;
+    there[0] = there[65535] = false; // holes
+    std::vector<int> values;
+    for (int value = 0; value < 65536; ++value)
+        if (there[static_cast<std::size_t>(value)])
+            values.push_back(value);
+    if (values.size() < enough)
+        return 1;
+    const auto wanted = static_cast<std::ptrdiff_t>(nearly_all * static_cast<double>(values.size()));
+    int divisor = largest;
+    while (std::ranges::count_if(values, [&](int value) { return value % divisor == 0; }) < wanted)
+        --divisor;
+    return divisor;
+}
+
+/// Sensors record steps of a millimetre, or finer ones. Multiples show that the values are in a finer unit than is
+/// assumed (a sensor's millimetres stored as TUM does: 5), or rotated bits (SUN RGB-D: 8).
+void doubt_steps(const cv::Mat& stored, const DepthEncoding& encoding, std::vector<std::string>& doubts) {
+    constexpr double largest_mm = 1.5;
+    if (encoding.stated || stored.type() != CV_16UC1 || encoding.kind != DepthEncoding::Kind::linear)
+        return;
+    const int divisor = common_divisor(stored);
+    if (const double step_mm = 1000 * divisor / encoding.units_per_metre; divisor > 1 && step_mm > largest_mm)
+        doubts.push_back(
+            fmt::format("nearly all depths are multiples of {:.2g} mm with encoding {} ({}), which is probably "
+                        "wrong.{}",
+                        step_mm, encoding.name, encoding.origin, what_others_give(stored, encoding)));
+}
+
+/// `image`: depths of any kind, 0 = hole.
+std::vector<std::string> doubts_about(const Statistics& depth, const cv::Mat& image, const cv::Mat& stored,
+                                      const DepthEncoding& encoding) {
     constexpr float nearest_median_m = 0.05F, farthest_median_m = 200, farthest_m = 1000;
-    // If nobody named the encoding, depth beyond an indoor sensor's range is worth a warning, too.
+    // If nobody named the encoding, but the layout or custom did, depth beyond an indoor sensor's range is worth a
+    // warning, too.
     constexpr float assumed_farthest_median_m = 12;
     if (depth.valid == 0) {
         if (depth.largest_m > 0)
             return {}; // a few pixels between those sampled
         return {"no valid depth in this frame: every pixel is a hole."};
     }
-    const bool assumed = encoding.origin.starts_with("assumed");
+    const bool assumed = !encoding.stated;
     const float farthest_likely_m = assumed ? assumed_farthest_median_m : farthest_median_m;
     const std::string stated = fmt::format("encoding {} ({})", encoding.name, encoding.origin);
     std::vector<std::string> doubts;
@@ -113,6 +197,9 @@ std::vector<std::string> doubts_about(const Statistics& depth, const cv::Mat& st
     else if (depth.median_m < nearest_median_m || depth.median_m > farthest_likely_m || depth.largest_m > farthest_m)
         doubts.push_back(fmt::format("a median depth of {:.3g} m and a largest of {:.3g} m are implausible with {}.{}",
                                      depth.median_m, depth.largest_m, stated, what_others_give(stored, encoding)));
+    if (doubts.empty())
+        doubt_steps(stored, encoding, doubts);
+    doubt_repeats(image, doubts);
     return doubts;
 }
 
@@ -125,14 +212,14 @@ DepthTable depth_table(const DepthEncoding& encoding) {
 }
 
 std::vector<std::string> doubts_about(const cv::Mat1f& depth_m, const cv::Mat& stored, const DepthEncoding& encoding) {
-    return doubts_about(statistics_of(depth_m), stored, encoding);
+    return doubts_about(statistics_of(depth_m), depth_m, stored, encoding);
 }
 
 std::vector<std::string> doubts_about(const cv::Mat1w& stored, const DepthTable& table, float largest_m,
                                       const DepthEncoding& encoding) {
     Statistics depth = statistics_of(stored, table);
     depth.largest_m = largest_m;
-    return doubts_about(depth, stored, encoding);
+    return doubts_about(depth, stored, stored, encoding);
 }
 
 } // namespace scanshade

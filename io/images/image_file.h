@@ -20,6 +20,7 @@ struct DepthEncoding {
     double units_per_metre = 1000;
     std::string name;   ///< "mm", "tum", "sun", "nyu", "m" or the number
     std::string origin; ///< "TUM layout", "--depth-scale", "assumed: 16-bit integers are millimetres" ...
+    bool stated = true; ///< by the user or a file; otherwise it is what the layout's recordings usually have
 };
 
 /// "mm" (1000), "tum" (5000), "sun", "nyu", "m" (1, float files), or a positive number of units per metre.

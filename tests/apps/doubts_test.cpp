@@ -111,6 +111,8 @@ TEST(doubts, a_radius_below_two_pixels_or_above_the_scene) {
     EXPECT_TRUE(frame.doubts().empty());
     frame.radius_m = 5;
     EXPECT_TRUE(warned(frame.doubts(), "larger than the scene"));
+    frame.radius_m = 1.6; // the scene measures 3 m: balls around its middle end outside the view
+    EXPECT_TRUE(warned(frame.doubts(), "larger than half the scene"));
     ComputedCloud cloud;
     cloud.work.of_points.radius = 0.15;
     EXPECT_TRUE(warned(cloud.doubts(), "only 1.5 times the points' spacing"));
@@ -129,6 +131,19 @@ TEST(doubts, a_camera_that_no_sensor_has) {
     EXPECT_TRUE(warned(frame.doubts(), "folds back within the image"));
     frame.row.camera.distortion = {.k1 = 0.2624, .k2 = -0.9531, .p1 = -0.0054, .p2 = 0.0026, .k3 = 1.1633};
     EXPECT_TRUE(frame.doubts().empty()) << "the published lens of TUM's first Kinect";
+}
+
+TEST(doubts, a_camera_of_another_image_size_or_of_the_image_before_it_was_cropped) {
+    Computed frame;
+    Pinhole& camera = frame.row.camera.pinhole;
+    const cv::Size whole = camera.size;
+    camera.size = {whole.width / 2, whole.height / 2};
+    EXPECT_TRUE(warned(frame.doubts(), "principal point"));
+    camera.size = {2 * whole.width, 2 * whole.height};
+    EXPECT_TRUE(warned(frame.doubts(), "principal point"));
+    camera.size = whole;
+    camera.cy += 0.15 * whole.height;
+    EXPECT_TRUE(frame.doubts().empty()) << "as of a lens that sits askew";
 }
 
 // ---------------------------------------------------------------------------------------------------- the program

@@ -1,0 +1,16 @@
+// Before the walk: whether a recording's depths fit its poses.
+#pragma once
+
+#include "io/captures/capture.h"
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+namespace scanshade {
+
+/// A sentence if pairs of the frames agree that all depths are too long or too short for the poses' motion. Empty where
+/// they are not, where there are no poses, and where nothing can be told. Decodes up to six depth images.
+[[nodiscard]] std::string pose_doubt(const Capture& capture, const std::vector<std::size_t>& frames);
+
+} // namespace scanshade
