@@ -24,8 +24,11 @@ struct DepthNoise {
 
 /// Measures sigma(z) on depth images of one sensor: the spread of second differences of 1/z (zero on any plane) in
 /// bands of z, and the law fitted through the bands. Edges and curvature form the far tail of the spread; up to three
-/// fifths of the samples are ignored for them. The correlation length follows from the ratio of second differences over
-/// 1 and over 4 pixels. It assumes a correlation exp(-d^2 / 2 s^2), since disparity comes from windows of pixels.
+/// fifths of the samples are ignored for them. They are taken over 4 pixels, or over 8 where these are larger and those
+/// over 16 are not: then the sensor smooths. Where values are quantised, sigma is a root of 1/12 of the step or more.
+/// The correlation length follows from the ratio of second differences over 1 and over 4 pixels. It assumes a
+/// correlation exp(-d^2 / 2 s^2), since disparity comes from windows of pixels; sigma is corrected for what of it
+/// reaches over those pixels.
 /// Steps are reported where a quarter of the distinct values are one step from the next. Steps are constant (16-bit
 /// files) or grow with z^2 (disparity).
 /// Returns no noise, only steps, where sigma is below 0.1 mm per metre or 0.12 mm: then nothing needs smoothing. Clean

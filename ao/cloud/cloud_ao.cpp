@@ -22,6 +22,7 @@
 #include <cmath>
 #include <Eigen/Geometry>
 #include <fmt/format.h>
+#include <iterator>
 #include <limits>
 #include <numbers>
 #include <tbb/parallel_for.h>
@@ -206,8 +207,8 @@ class CloudAo::Work {
             cut_into_tiles(cloud_.points, valid_, result_.radius + 16 * result_.spacing, at_once(),
                            [&](const Places& core, const Places& round) { tile(core, round); });
         }
-        compute_strays();
         compute_thinned();
+        compute_strays();
         for (const auto& [point, same_as] : twins_) {
             result_.visibility[point] = result_.visibility[same_as];
             result_.confidence[point] = result_.confidence[same_as];
@@ -258,18 +259,27 @@ class CloudAo::Work {
         return (point - extent_.centre).norm() > extent_.farthest;
     }
 
+    struct Picked {
+        std::vector<Vector3d> points, normals;
+    };
+    /// These points, with the normals that they have.
+    [[nodiscard]] Picked picked(const Places& places) const {
+        Picked some;
+        for (const std::uint32_t i : places) {
+            some.points.push_back(cloud_.points[i]);
+            if (!cloud_.normals.empty())
+                some.normals.push_back(cloud_.normals[i]);
+        }
+        return some;
+    }
+
     /// Strays by themselves, as a cloud of its own about its own middle: what they say of normals and sides must not
     /// concern the others. A few of them make no surface; so do strays of strays.
     void compute_strays() {
         constexpr std::size_t fewest = 64;
         if (strays_.size() < fewest || part_)
             return;
-        std::vector<Vector3d> points, normals;
-        for (const std::uint32_t i : strays_) {
-            points.push_back(cloud_.points[i]);
-            if (!cloud_.normals.empty())
-                normals.push_back(cloud_.normals[i]);
-        }
+        const auto [points, normals] = picked(strays_);
         CloudAoOptions options = options_;
         options.radius = result_.radius;
         const PointSet strays{points, normals};
@@ -292,14 +302,8 @@ class CloudAo::Work {
             return;
         const auto chosen = static_cast<std::uint64_t>(check.keep * 0x1p32);
         Places kept;
-        std::vector<Vector3d> points, normals;
-        for (const std::uint32_t i : valid_)
-            if (hash(i, 1U) < chosen) {
-                kept.push_back(i);
-                points.push_back(cloud_.points[i]);
-                if (!cloud_.normals.empty())
-                    normals.push_back(cloud_.normals[i]);
-            }
+        std::ranges::copy_if(valid_, std::back_inserter(kept), [&](auto i) { return hash(i, 1U) < chosen; });
+        const auto [points, normals] = picked(kept);
         CloudAoOptions options = options_;
         options.radius = result_.radius;
         const PointSet part{points, normals, {}, cloud_.z_up};
@@ -307,17 +311,19 @@ class CloudAo::Work {
         some.part_ = true;
         const Repeatability found =
             repeatability(cloud_.points, result_.visibility, kept, some.run().visibility, check);
+        watch_.lap("check on a part");
         result_.expected_error = found.error;
+        if (!found.error)
+            return;
         for (std::size_t i = 0; i < result_.confidence.size(); ++i)
             result_.confidence[i] *= found.confidence[i];
         result_.notes.push_back(fmt::format(
             "{:.2g} % of the points by themselves give values from which an error of {:.2f} RMS is expected.",
-            100 * check.keep, found.error));
-        if (found.error > largest_error)
+            100 * check.keep, *found.error));
+        if (*found.error > largest_error)
             doubt(fmt::format("an error of {:.2f} RMS is expected: {:.2g} % of the points by themselves give quite "
                               "other values. A larger --radius spans more points; ao_confidence tells where",
-                              found.error, 100 * check.keep));
-        watch_.lap("check on a part");
+                              *found.error, 100 * check.keep));
     }
 
     /// The spacing of a sample is larger by the root of its share: points are on surfaces.

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <Eigen/Core>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -21,12 +22,12 @@ struct ThinnedCheck {
 
 /// What the check found.
 struct Repeatability {
-    double error = 0; ///< expected RMS error of visibility
-    /// By place in `points` of error_of(): the same for its surroundings, as a factor of confidence, 1 = none, 1/2 = an
-    /// error of 0.15.
+    std::optional<double> error; ///< expected RMS error of visibility; nothing where no point has both values
+    /// One per point: the error expected of its surroundings as a factor of confidence: 1 = none, 1/2 = 0.15.
     std::vector<float> confidence;
 };
-/// `whole` are values of `points`, `thinned` those of the points at `kept`; NaN where unknown.
+/// `whole` are the values of `points`, in any unit; `thinned` those of the points with the indices `kept`; NaN where
+/// unknown.
 [[nodiscard]] Repeatability repeatability(std::span<const Eigen::Vector3d> points, std::span<const float> whole,
                                           std::span<const std::uint32_t> kept, std::span<const float> thinned,
                                           const ThinnedCheck& check);

@@ -22,7 +22,6 @@
 #include "projection/stopwatch.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <csignal>
@@ -120,8 +119,6 @@ struct ReportFiles {
         return block.empty() ? stem + extension : stem + "." + block + extension;
     }
 };
-
-constexpr std::array result_folders = {"ao", "confidence", "shaded", "panel", "clouds"};
 
 /// Refuses a folder of results that cannot be written, or one in it that an earlier run has left.
 void require_folders(const fs::path& folder) {
@@ -465,8 +462,8 @@ class Run final : public Command {
         if (auto rows = rows_if_done(job, journal, task, files))
             return *std::move(rows);
         measure_noise_of(job);
-        if (std::string doubt = pose_doubt(job.capture, job.of); !doubt.empty())
-            job.capture.warnings.push_back(std::move(doubt));
+        if (std::string warning = pose_warning(job.capture, job.of); !warning.empty())
+            job.capture.warnings.push_back(std::move(warning));
 
         Prepared ready = prepare(job);
         std::optional<RecordingCloud> cloud;

@@ -9,6 +9,7 @@
 #include "io/images/image_file.h"
 #include "projection/project.h"
 
+#include <array>
 #include <atomic>
 #include <filesystem>
 #include <functional>
@@ -20,6 +21,9 @@ namespace scanshade {
 /// What becomes of a cloud's colours: they stay; they are multiplied by visibility; or so, and clouds without colours
 /// of their own get visibility as grey.
 enum class CloudColours { kept, shaded, grey };
+
+/// The folders that Outputs fill.
+inline constexpr std::array result_folders = {"ao", "confidence", "shaded", "panel", "clouds"};
 
 /// The files written for each frame, under `folder`: ao/NAME.png, confidence/NAME.png, shaded/NAME.png, panel/NAME.png,
 /// clouds/NAME.pcd or .ply.

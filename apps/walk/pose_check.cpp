@@ -51,7 +51,7 @@ std::optional<double> factor_of(const Capture& capture, std::size_t a, std::size
 
 } // namespace
 
-std::string pose_doubt(const Capture& capture, const std::vector<std::size_t>& frames) {
+std::string pose_warning(const Capture& capture, const std::vector<std::size_t>& frames) {
     constexpr std::size_t pairs = 3;
     constexpr double alike = 1.3;
     std::vector<std::size_t> posed;

@@ -11,6 +11,6 @@ namespace scanshade {
 
 /// A sentence if pairs of the frames agree that all depths are too long or too short for the poses' motion. Empty where
 /// they are not, where there are no poses, and where nothing can be told. Decodes up to six depth images.
-[[nodiscard]] std::string pose_doubt(const Capture& capture, const std::vector<std::size_t>& frames);
+[[nodiscard]] std::string pose_warning(const Capture& capture, const std::vector<std::size_t>& frames);
 
 } // namespace scanshade

@@ -4,6 +4,7 @@
 #include "apps/command_line.h"
 #include "apps/csv.h"
 #include "apps/json.h"
+#include "apps/walk/batch_options.h"
 #include "io/output_file.h"
 
 #include <algorithm>
@@ -142,7 +143,7 @@ json totals_json(const RunReport& report) {
 std::vector<std::string> files_of_others(const std::filesystem::path& folder,
                                          const std::unordered_set<std::string>& own) {
     std::vector<std::string> others;
-    for (const char* part : {"ao", "confidence", "shaded", "panel", "clouds"}) {
+    for (const char* part : result_folders) {
         std::error_code none_there;
         for (const auto& entry : std::filesystem::directory_iterator(folder / part, none_there)) {
             const std::string name = entry.path().filename().string(), whole = std::string(part) + "/" + name;

@@ -417,35 +417,11 @@ TEST_F(CliTest, nothing_usable_is_exit_code_3) {
 // ---------------------------------------------------------------------------------------------------- killed and
 // interrupted
 
-/// The program started without waiting; its messages go nowhere.
-pid_t start(const std::vector<std::string>& words) {
-    const pid_t child = fork();
-    if (child != 0)
-        return child;
-    const int nowhere = open("/dev/null", O_WRONLY);
-    dup2(nowhere, STDOUT_FILENO);
-    dup2(nowhere, STDERR_FILENO);
-    std::vector<char*> arguments = {const_cast<char*>(SCANSHADE_PROGRAM)};
-    for (const std::string& word : words)
-        arguments.push_back(const_cast<char*>(word.c_str()));
-    arguments.push_back(nullptr);
-    execv(SCANSHADE_PROGRAM, arguments.data());
-    _exit(127);
-}
-
-/// Waits until `file` is there; false after a minute.
-bool wait_for(const fs::path& file) {
-    for (int tries = 0; tries < 6000; ++tries, std::this_thread::sleep_for(std::chrono::milliseconds(10)))
-        if (fs::exists(file))
-            return true;
-    return false;
-}
-
 TEST_F(CliTest, a_killed_run_leaves_no_half_file) {
     tests::write_capture(capture(), 200);
     for (int kill_after_ms : {0, 15, 40}) {
-        const pid_t child = start({"run", capture().string(), "-o", out().string(), "--overwrite"});
-        ASSERT_TRUE(wait_for(out() / "shaded"));
+        const pid_t child = tests::start_program({"run", capture().string(), "-o", out().string(), "--overwrite"});
+        ASSERT_TRUE(tests::wait_for_file(out() / "shaded"));
         std::this_thread::sleep_for(std::chrono::milliseconds(kill_after_ms));
         kill(child, SIGKILL);
         int status = 0;
@@ -463,8 +439,8 @@ TEST_F(CliTest, a_killed_run_leaves_no_half_file) {
 
 TEST_F(CliTest, what_a_killed_run_left_is_cleared_by_the_next) {
     tests::write_capture(capture(), 200);
-    const pid_t child = start({"run", capture().string(), "-o", out().string()});
-    ASSERT_TRUE(wait_for(out() / "shaded"));
+    const pid_t child = tests::start_program({"run", capture().string(), "-o", out().string()});
+    ASSERT_TRUE(tests::wait_for_file(out() / "shaded"));
     kill(child, SIGKILL);
     waitpid(child, nullptr, 0);
     ASSERT_EQ(run("--overwrite --frames :3").exit_code, 0);
@@ -475,8 +451,8 @@ TEST_F(CliTest, what_a_killed_run_left_is_cleared_by_the_next) {
 
 TEST_F(CliTest, an_interrupted_run_records_what_is_done) {
     tests::write_capture(capture(), 400);
-    const pid_t child = start({"run", capture().string(), "-o", out().string()});
-    ASSERT_TRUE(wait_for(out() / "ao/000.png"));
+    const pid_t child = tests::start_program({"run", capture().string(), "-o", out().string()});
+    ASSERT_TRUE(tests::wait_for_file(out() / "ao/000.png"));
     kill(child, SIGTERM);
     int status = 0;
     waitpid(child, &status, 0);

@@ -262,28 +262,6 @@ TEST_F(RunsTest, a_lack_of_memory_is_predicted_and_is_exit_code_4) {
 
 // ---------------------------------------------------------------------------------------------------- signals
 
-/// The program started without waiting; its messages go to a file.
-pid_t start(const std::vector<std::string>& words, const fs::path& messages) {
-    const pid_t child = fork();
-    if (child != 0)
-        return child;
-    dup2(open("/dev/null", O_WRONLY), STDOUT_FILENO);
-    dup2(open(messages.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0666), STDERR_FILENO);
-    std::vector<char*> arguments = {const_cast<char*>(SCANSHADE_PROGRAM)};
-    for (const std::string& word : words)
-        arguments.push_back(const_cast<char*>(word.c_str()));
-    arguments.push_back(nullptr);
-    execv(SCANSHADE_PROGRAM, arguments.data());
-    _exit(127);
-}
-
-bool wait_for(const fs::path& file) {
-    for (int tries = 0; tries < 6000; ++tries, std::this_thread::sleep_for(std::chrono::milliseconds(10)))
-        if (fs::exists(file))
-            return true;
-    return false;
-}
-
 int code_of(pid_t child) {
     int status = 0;
     waitpid(child, &status, 0);
@@ -292,8 +270,8 @@ int code_of(pid_t child) {
 
 TEST_F(RunsTest, a_hangup_ends_a_run_after_the_frames_in_flight) {
     tests::write_capture(capture(), 400);
-    const pid_t child = start({"run", capture().string(), "-o", out().string()}, folder / "err");
-    ASSERT_TRUE(wait_for(out() / "ao/000.png"));
+    const pid_t child = tests::start_program({"run", capture().string(), "-o", out().string()}, folder / "err");
+    ASSERT_TRUE(tests::wait_for_file(out() / "ao/000.png"));
     kill(child, SIGHUP);
     EXPECT_EQ(code_of(child), unfinished);
     EXPECT_GE(manifest()["totals"]["skipped"], 1);
@@ -304,8 +282,8 @@ TEST_F(RunsTest, a_job_that_is_cut_off_does_not_say_100_percent) {
     tests::write_capture(capture(), 400);
     const fs::path job = folder / "job";
     ASSERT_EQ(run_program(fmt::format("plan {} -o {}", capture().string(), job.string())).exit_code, all_well);
-    const pid_t child = start({"run", job.string()}, folder / "err");
-    ASSERT_TRUE(wait_for(job / "results/capture/ao/000.png"));
+    const pid_t child = tests::start_program({"run", job.string()}, folder / "err");
+    ASSERT_TRUE(tests::wait_for_file(job / "results/capture/ao/000.png"));
     kill(child, SIGHUP);
     EXPECT_EQ(code_of(child), unfinished);
     const std::string said = read_bytes(folder / "err");

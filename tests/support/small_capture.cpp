@@ -3,11 +3,15 @@
 #include "io/cameras/camera_file.h"
 #include "io/images/image_file.h"
 
+#include <chrono>
 #include <cstdlib>
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <fstream>
 #include <stdexcept>
 #include <sys/wait.h>
+#include <thread>
+#include <unistd.h>
 
 namespace scanshade::tests {
 
@@ -58,6 +62,27 @@ Ran run_program(const std::string& arguments) {
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_bytes(folder / "out"),
             read_bytes(folder / "err")};
+}
+
+pid_t start_program(const std::vector<std::string>& words, const std::filesystem::path& messages) {
+    const pid_t child = fork();
+    if (child != 0)
+        return child;
+    dup2(open("/dev/null", O_WRONLY), STDOUT_FILENO);
+    dup2(open(messages.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0666), STDERR_FILENO);
+    std::vector<char*> arguments = {const_cast<char*>(SCANSHADE_PROGRAM)};
+    for (const std::string& word : words)
+        arguments.push_back(const_cast<char*>(word.c_str()));
+    arguments.push_back(nullptr);
+    execv(SCANSHADE_PROGRAM, arguments.data());
+    _exit(127);
+}
+
+bool wait_for_file(const std::filesystem::path& file) {
+    for (int tries = 0; tries < 6000; ++tries, std::this_thread::sleep_for(std::chrono::milliseconds(10)))
+        if (std::filesystem::exists(file))
+            return true;
+    return false;
 }
 
 } // namespace scanshade::tests

@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <opencv2/core.hpp>
 #include <string>
+#include <sys/types.h>
+#include <vector>
 
 namespace scanshade::tests {
 
@@ -42,6 +44,10 @@ struct Ran {
 
 /// Runs the program with `arguments`, as a shell takes them.
 [[nodiscard]] Ran run_program(const std::string& arguments);
+/// The program started without waiting; what it says goes to a file.
+pid_t start_program(const std::vector<std::string>& words, const std::filesystem::path& messages = "/dev/null");
+/// Waits until `file` is there; false after a minute.
+bool wait_for_file(const std::filesystem::path& file);
 
 [[nodiscard]] std::string read_bytes(const std::filesystem::path& file);
 
