@@ -34,8 +34,8 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
     std::vector<gpu::PassRow> passes{{"flying pixels", "fit_plane/flying", {recorded}, {kept}, groups, {}}};
     if (planes) {
         buffers.insert(buffers.end(), {{"averages", pixels * 4, Host::none, floats},
-                                       {"depth out", pixels * 4, Host::download, floats},
-                                       {"normals out", pixels * 12, Host::download, floats}});
+                                       {"depth out", pixels * 4, Host::download},
+                                       {"normals out", pixels * 12, Host::download}});
         if (fuse) {
             buffers.insert(buffers.end(), {{"others", shared::most_neighbours * pixels * 4, Host::taken, floats},
                                            {"fused", pixels * 4, Host::none, floats},
@@ -47,6 +47,8 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
         passes.push_back({"average", "fit_plane/average", {samples, errs}, {averages}, groups_of(shared::average_rows), is_fused});
         passes.push_back({"fit plane", "fit_plane/fit", {averages, errs}, {depth_out, normals_out}, groups, is_fused});
     }
+    for (gpu::BufferRow& buffer : buffers)
+        buffer.plain_writes = true;
     return std::make_unique<gpu::Program>(device, buffers, passes, sizeof(shared::FitPlaneConstants));
 }
 

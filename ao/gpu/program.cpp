@@ -238,8 +238,8 @@ struct Program::State {
     [[nodiscard]] vk::DescriptorType type_of(int buffer, bool written) const {
         if (is_image(buffer))
             return written ? vk::DescriptorType::eStorageImage : vk::DescriptorType::eCombinedImageSampler;
-        return rows[buffer].texels == BufferRow::Texels::none ? vk::DescriptorType::eStorageBuffer
-                                                              : vk::DescriptorType::eStorageTexelBuffer;
+        const bool plain = rows[buffer].texels == BufferRow::Texels::none || (written && rows[buffer].plain_writes);
+        return plain ? vk::DescriptorType::eStorageBuffer : vk::DescriptorType::eStorageTexelBuffer;
     }
 
     /// Null where the pass fills buffers.

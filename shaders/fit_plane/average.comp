@@ -11,7 +11,7 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0, r32f) readonly uniform imageBuffer samples; // 1/z, `nowhere` where there is none
 layout(binding = 1, r32f) readonly uniform imageBuffer relief;
-layout(binding = 16, r32f) uniform writeonly imageBuffer averages;
+layout(binding = 16, scalar) writeonly buffer Averages { float averages[]; };
 layout(binding = 32, scalar) uniform Constants { FitPlaneConstants constants; };
 
 FitPlaneConstants k;
@@ -66,7 +66,7 @@ void main() {
         add_five(sums, 1.0, below, wc, expected, narrow);
         add_five(sums, 2.0, below2, wc, expected, narrow);
         solve(sums, expected, plane); // where none fits the plane is level, the pixel keeps its value
-        imageStore(averages, here, vec4(hole ? nowhere : wc + plane.c));
+        averages[here] = hole ? nowhere : wc + plane.c;
         above2 = above;
         above = middle;
         middle = below;

@@ -14,8 +14,8 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0, r32f) readonly uniform imageBuffer samples; // averages of 1/z, `nowhere` where there is none
 layout(binding = 1, r32f) readonly uniform imageBuffer relief;
-layout(binding = 16, r32f) uniform writeonly imageBuffer depth_out;
-layout(binding = 17, r32f) uniform writeonly imageBuffer normals_out;
+layout(binding = 16, scalar) writeonly buffer Depth { float depth_out[]; };
+layout(binding = 17, scalar) writeonly buffer Normals { vec3 normals_out[]; };
 layout(binding = 32, scalar) uniform Constants { FitPlaneConstants constants; };
 
 FitPlaneConstants k;
@@ -109,9 +109,6 @@ void main() {
     vec3 n = -vec3(k.camera.fx * plane.a, k.camera.fy * plane.b, w_principal);
     n *= inversesqrt(max(dot(n, n), 1e-30));
     good = good && abs(plane.c) < tolerance && w_here > 1e-6 && !hole; // a kilometre of kilometres
-    imageStore(depth_out, here, vec4(hole ? 0.0 : good ? 1.0 / w_here : zc));
-    n = good ? n : vec3(0.0);
-    imageStore(normals_out, 3 * here, vec4(n.x));
-    imageStore(normals_out, 3 * here + 1, vec4(n.y));
-    imageStore(normals_out, 3 * here + 2, vec4(n.z));
+    depth_out[here] = hole ? 0.0 : good ? 1.0 / w_here : zc;
+    normals_out[here] = good ? n : vec3(0.0);
 }

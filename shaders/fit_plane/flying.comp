@@ -9,7 +9,7 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0, r32f) readonly uniform imageBuffer recorded;
-layout(binding = 16, r32f) uniform writeonly imageBuffer kept; // 1/z, `nowhere` where there is none
+layout(binding = 16, scalar) writeonly buffer Kept { float kept[]; }; // 1/z, `nowhere` where there is none
 layout(binding = 32, scalar) uniform Constants { FitPlaneConstants constants; };
 
 FitPlaneConstants k;
@@ -85,5 +85,5 @@ void main() {
         left &= left - 1;
     } while (left != 0);
     bool keep = z > 0.0 && !(k.drop_flying != 0 && flies(around));
-    imageStore(kept, here, vec4(keep ? 1.0 / z : nowhere));
+    kept[here] = keep ? 1.0 / z : nowhere;
 }
