@@ -14,16 +14,19 @@ layout(binding = 32, scalar) uniform Constants { FitPlaneConstants constants; };
 
 FitPlaneConstants k;
 
-float depth_at(ivec2 p) {
-    bool inside = all(lessThan(uvec2(p), uvec2(k.size)));
-    float z = imageLoad(recorded, inside ? p.y * k.size.x + p.x : 0).x;
-    return inside ? z : 0.0;
+// Of two places on opposite sides of p.
+vec2 depths_at(ivec2 p, ivec2 step) {
+    ivec2 a = p - step, b = p + step, last = k.size - 1;
+    bool a_inside = uint(a.x) <= uint(last.x) && uint(a.y) <= uint(last.y);
+    bool b_inside = uint(b.x) <= uint(last.x) && uint(b.y) <= uint(last.y);
+    float za = imageLoad(recorded, a_inside ? a.y * k.size.x + a.x : 0).x, zb = imageLoad(recorded, b_inside ? b.y * k.size.x + b.x : 0).x;
+    return vec2(a_inside ? za : 0.0, b_inside ? zb : 0.0);
 }
 
 // Whether 1/z changes evenly over five pixels to either side. Between two surfaces it changes within fewer, even where a sensor
 // smears the edge over seven pixels.
 bool is_slope(ivec2 p, ivec2 step, float z_here) {
-    vec2 outer_z = vec2(depth_at(p - 5 * step), depth_at(p + 5 * step)), inner_z = vec2(depth_at(p - 2 * step), depth_at(p + 2 * step));
+    vec2 outer_z = depths_at(p, 5 * step), inner_z = depths_at(p, 2 * step);
     // Of 1/z, but for the factor 1 / (z_here z): as comparisons are of ratios, products do without divisions.
     vec2 outer_change = vec2(-1.0, 1.0) * (z_here - outer_z), inner_change = vec2(-1.0, 1.0) * (z_here - inner_z);
     vec2 sides = abs(inner_change * inner_z.yx);
@@ -40,13 +43,12 @@ struct Around {
     int strangers, half_strangers;  // a bit for each pair of known ones of which not both are friends, one is
 };
 
-void look(inout Around around, int pair, ivec2 p, ivec2 step, float z, float tolerance) {
-    vec2 others = vec2(depth_at(p + step), depth_at(p - step));
+void look(inout Around around, int bit, ivec2 p, ivec2 step, float z, float tolerance) {
+    vec2 others = depths_at(p, step);
     bvec2 there = greaterThan(others, vec2(0.0)), alike = lessThanEqual(abs(others - z), vec2(tolerance));
     bvec2 nearer = lessThan(others, vec2(z)), farther = greaterThan(others, vec2(z));
     around.known += int(there.x) + int(there.y);
     around.friends += int(alike.x) + int(alike.y);
-    int bit = 1 << pair;
     around.nearer |= (there.x && !alike.x && nearer.x) || (there.y && !alike.y && nearer.y) ? bit : 0;
     around.farther |= (!alike.x && farther.x) || (!alike.y && farther.y) ? bit : 0;
     bool both_there = there.x && there.y;
@@ -67,17 +69,18 @@ void main() {
     // A slope up to 76 degrees is one surface.
     float tolerance = 3.0 * (k.noise_floor + k.noise_per_z2 * z * z) + 4.0 * z / k.camera.fx;
     Around around = Around(0, 0, 0, 0, 0, 0);
-    look(around, 0, p, ivec2(-1, -1), z, tolerance);
-    look(around, 1, p, ivec2(0, -1), z, tolerance);
-    look(around, 2, p, ivec2(1, -1), z, tolerance);
-    look(around, 3, p, ivec2(-1, 0), z, tolerance);
+    look(around, 1, p, ivec2(-1, -1), z, tolerance);
+    look(around, 2, p, ivec2(0, -1), z, tolerance);
+    look(around, 4, p, ivec2(1, -1), z, tolerance);
+    look(around, 8, p, ivec2(-1, 0), z, tolerance);
 
     // Slopes turn strangers into friends, so the few pixels that seem to fly ask for them, pair by pair. The loop tests at its
     // end: lavapipe would run any other once more with all lanes off.
     int left = z > 0.0 && flies(around) ? around.strangers : 0;
     do {
-        int pair = findLSB(left), bit = left & -left;
-        if (is_slope(p, ivec2(pair % 3, pair / 3) - 1, z) && bit != 0) {
+        int bit = left & -left;
+        ivec2 step = ivec2(bit == 4 ? 1 : bit == 2 ? 0 : -1, bit == 8 ? 0 : -1);
+        if (is_slope(p, step, z) && bit != 0) {
             around.friends += (around.half_strangers & bit) != 0 ? 1 : 2;
             around.nearer &= ~bit;
             around.farther &= ~bit;
