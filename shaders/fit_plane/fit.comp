@@ -3,8 +3,7 @@
 // stay where they are.
 //
 // Two rounds of weighted least squares: the first weighs samples by their depth difference to the pixel, the second by their
-// distance from the plane.
-// 25 and 49 averages spread over the window stand for all its pixels.
+// distance from the plane. 25 and 49 averages spread over the window stand for all its pixels.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -28,41 +27,47 @@ struct Columns {
     float expected_left, expected_right;
 };
 
+// Where samples are taken, and what is expected of them.
+struct Window {
+    ivec2 p;
+    float expected, b; // at the pixel, and by how much more a row below
+    float narrow;
+    Columns one, two, three;
+};
+
 Columns columns_at(int u, float away, float a) {
     int o = nearest(away), left = u - o, right = u + o;
     float x = float(o);
     return Columns(x, max(left, 0), min(right, k.size.x - 1), left < 0 ? -nowhere : -x * a, right >= k.size.x ? -nowhere : x * a);
 }
 
-void add_pair_at(inout Row row, int line, Columns at, float expected, float narrow) {
+void add_columns(inout Row row, int line, float expected, Columns at, float narrow) {
     float left = imageLoad(samples, line + at.left).x, right = imageLoad(samples, line + at.right).x;
     add_pair(row, at.x, left - expected - at.expected_left, right - expected - at.expected_right, narrow);
 }
 
-// A row of samples, two or three to either side.
-void add_row_at(inout Sums sums, ivec2 p, float away, Columns one, Columns two, Columns three, bool wide, float w_here, Plane plane,
-                float narrow) {
-    int o = nearest(away), v = p.y + o, line = clamp(v, 0, k.size.y - 1) * k.size.x;
-    float y = float(o), expected = uint(v) < uint(k.size.y) ? w_here + plane.c + y * plane.b : -nowhere;
-    Row row = row_from(imageLoad(samples, line + p.x).x - expected, narrow);
-    add_pair_at(row, line, one, expected, narrow);
-    add_pair_at(row, line, two, expected, narrow);
-    if (wide) add_pair_at(row, line, three, expected, narrow);
+void add_row_at(inout Sums sums, Window at, float away, bool wide) {
+    int o = nearest(away), v = at.p.y + o, line = clamp(v, 0, k.size.y - 1) * k.size.x;
+    float y = float(o), expected = uint(v) < uint(k.size.y) ? at.expected + y * at.b : -nowhere;
+    Row row = row_from(imageLoad(samples, line + at.p.x).x - expected, at.narrow);
+    add_columns(row, line, expected, at.one, at.narrow);
+    add_columns(row, line, expected, at.two, at.narrow);
+    if (wide) add_columns(row, line, expected, at.three, at.narrow);
     add_row(sums, y, row);
 }
 
 // 5x5 samples, or 7x7, `spread` pixels apart.
 Sums square(ivec2 p, bool wide, float spread, float w_here, Plane plane, float narrow) {
-    Columns one = columns_at(p.x, spread, plane.a), two = columns_at(p.x, 2.0 * spread, plane.a);
-    Columns three = columns_at(p.x, 3.0 * spread, plane.a);
+    Window at = Window(p, w_here + plane.c, plane.b, narrow, columns_at(p.x, spread, plane.a),
+                       columns_at(p.x, 2.0 * spread, plane.a), columns_at(p.x, 3.0 * spread, plane.a));
     Sums sums = nothing;
-    if (wide) add_row_at(sums, p, -3.0 * spread, one, two, three, wide, w_here, plane, narrow);
-    add_row_at(sums, p, -2.0 * spread, one, two, three, wide, w_here, plane, narrow);
-    add_row_at(sums, p, -spread, one, two, three, wide, w_here, plane, narrow);
-    add_row_at(sums, p, 0.0, one, two, three, wide, w_here, plane, narrow);
-    add_row_at(sums, p, spread, one, two, three, wide, w_here, plane, narrow);
-    add_row_at(sums, p, 2.0 * spread, one, two, three, wide, w_here, plane, narrow);
-    if (wide) add_row_at(sums, p, 3.0 * spread, one, two, three, wide, w_here, plane, narrow);
+    if (wide) add_row_at(sums, at, -3.0 * spread, wide);
+    add_row_at(sums, at, -2.0 * spread, wide);
+    add_row_at(sums, at, -spread, wide);
+    add_row_at(sums, at, 0.0, wide);
+    add_row_at(sums, at, spread, wide);
+    add_row_at(sums, at, 2.0 * spread, wide);
+    if (wide) add_row_at(sums, at, 3.0 * spread, wide);
     return sums;
 }
 

@@ -36,11 +36,11 @@ bool is_slope(ivec2 p, ivec2 step, float z_here) {
            all(greaterThan(outer * inner, 1.6 * inner * inner)) && all(lessThan(outer * inner, 4.0 * inner * inner));
 }
 
-// What a pixel's neighbours say of it, in pairs on opposite sides.
+// What a pixel's neighbours say of it. They come in pairs on opposite sides, one bit each.
 struct Around {
-    int known, friends;
-    int nearer, farther;            // a bit for each pair with such a neighbour
-    int strangers, half_strangers;  // a bit for each pair of known ones of which not both are friends, one is
+    int known, friends;            // neighbours with a depth; those of the pixel's own depth
+    int nearer, farther;           // pairs with such a one
+    int strangers, half_strangers; // pairs of known ones, not both of them friends; one a friend
 };
 
 void look(inout Around around, int bit, ivec2 p, ivec2 step, float z, float tolerance) {
