@@ -44,7 +44,8 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
         }
         const std::vector<std::pair<int, int>> is_fused{{shared::spec_fused, fuse}};
         const int samples = fuse ? fused : kept, errs = fuse ? relief : kept; // unread without
-        passes.push_back({"average", "fit_plane/average", {samples, errs}, {averages}, groups_of(shared::average_rows), is_fused});
+        passes.push_back(
+            {"average", "fit_plane/average", {samples, errs}, {averages}, groups_of(shared::average_rows), is_fused});
         passes.push_back({"fit plane", "fit_plane/fit", {averages, errs}, {depth_out, normals_out}, groups, is_fused});
     }
     for (gpu::BufferRow& buffer : buffers)

@@ -18,7 +18,8 @@ struct FitPlaneConstants {
 // Specialization constant: 1 = samples have been averaged over frames, and tell by how much less they err.
 const int spec_fused = 0;
 
-// In place of 1/z where there is none: so far behind all surfaces that no fit gives it weight, and its square still is a number.
+// In place of 1/z where there is none: so far behind all surfaces that no fit gives it weight, and its square still is
+// a number.
 const float nowhere = -1e17f;
 
 // Pixels of a column that one thread averages around.
