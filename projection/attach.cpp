@@ -28,6 +28,29 @@ class Tally {
         ++attached_;
         sum_ += visibility;
     }
+    /// Pixels side by side. Eight sums at once: a processor adds them in one instruction.
+    void add_row(const float* z_m, const float* visibility, int count) {
+        constexpr int lanes = 8;
+        float sums[lanes] = {};
+        int valid = 0, attached = 0;
+        const auto take = [&](int x, int lane) {
+            const bool is_valid = z_m[x] > 0 && z_m[x] <= std::numeric_limits<float>::max();
+            const bool is_known = is_valid && visibility[x] == visibility[x];
+            valid += is_valid;
+            attached += is_known;
+            sums[lane] += is_known ? visibility[x] : 0;
+        };
+        int x = 0;
+        for (; x + lanes <= count; x += lanes)
+            for (int lane = 0; lane < lanes; ++lane)
+                take(x + lane, lane);
+        for (; x < count; ++x)
+            take(x, 0);
+        valid_ += valid;
+        attached_ += attached;
+        for (const float sum : sums)
+            sum_ += sum;
+    }
     void write_to(Attached& result) const {
         result.coverage = valid_ > 0 ? attached_ / valid_ : 0;
         result.mean_visibility = attached_ > 0 ? sum_ / attached_ : std::numeric_limits<double>::quiet_NaN();
@@ -80,9 +103,7 @@ Attached attach_to_image(const Frame& frame, const DepthImage& depth, const AoMa
     result.visibility = camera.distortion.any() ? bent_back(frame, camera, depth, ao) : ao.visibility;
     Tally tally;
     for (int v = 0; v < result.visibility.rows; ++v)
-        for (int u = 0; u < result.visibility.cols; ++u)
-            if (is_depth(frame.depth_m(v, u)))
-                tally.add(result.visibility(v, u));
+        tally.add_row(frame.depth_m[v], result.visibility[v], result.visibility.cols);
     tally.write_to(result);
     return result;
 }

@@ -204,6 +204,8 @@ Finished Finish::compute(const FinishInput& input, const FinishOutputs& outputs)
     if (!outputs.any())
         return {};
     check_sizes(input);
+    if (!outputs.picture && !outputs.confidence && outputs.confidence_bits == 0)
+        return {}; // a map alone would cost more to send than to pack
     const Shape shape = shape_of(input, outputs);
     const cv::Size size = shape.size;
     const bool on_device = packing_ == Packing::on_device;

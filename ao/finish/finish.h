@@ -42,7 +42,8 @@ struct FinishInput {
     double strength = 1;                                      ///< of the visibility in the picture
 };
 
-/// Empty images were not asked for. Maps are empty, too, and confidence has floats, where the host packs.
+/// Empty images were not asked for. Maps are empty, too, and confidence has floats, where the host packs: on
+/// processors, and where nothing but a map of visibility was asked for.
 struct Finished {
     cv::Mat1f confidence;     ///< 0 .. 1, NaN where there is no visibility
     cv::Mat1b confidence_map; ///< 0 = none, 1 .. 255 = 0 .. 1
