@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <iterator>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <ranges>
 #include <utility>
 

@@ -38,7 +38,7 @@ double peak_memory_mib() {
 }
 
 /// What a row of the table says besides its name.
-struct Measured {
+struct MeasuredCloud {
     Difference difference;
     double wall_s = 0, cpu_s = 0;
 };
@@ -47,7 +47,7 @@ struct Judge {
     std::vector<float> truth; ///< NaN where a point is not compared
 
     template <class Compute>
-    Measured row(const std::string& name, Compute&& compute) const {
+    MeasuredCloud row(const std::string& name, Compute&& compute) const {
         const Stopwatch stopwatch;
         const std::clock_t cpu = std::clock();
         const std::vector<float> values = compute();
@@ -262,7 +262,7 @@ class CloudErrors final : public BenchPart {
         const std::string name = fmt::format("{:g} mm, {}, {} rays", 1000 * noise, kind, rays);
         const CloudAoOptions options{.radius = radius, .rays = rays, .smooth = smooth_, .sky = sky_};
         PointVisibility found;
-        const Measured measured = judge.row(name, [&] {
+        const MeasuredCloud measured = judge.row(name, [&] {
             found = CloudAo(options, device_.get()).compute({points, normals});
             return std::vector<float>(found.visibility.begin(),
                                       found.visibility.begin() + static_cast<std::ptrdiff_t>(cloud.points.size()));
