@@ -2,9 +2,9 @@
 // depth, frames of a recording and the method are wired here once; the walk, `bench` and budgets all come in this way.
 #pragma once
 
+#include "ao/base/method.h"
 #include "ao/cloud/cloud_ao.h"
 #include "ao/fit_plane/fit_plane.h"
-#include "ao/method.h"
 #include "ao/sequence/neighbourhood.h"
 
 #include <memory>

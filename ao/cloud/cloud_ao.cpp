@@ -1,6 +1,7 @@
 // Visibility of every point of a cloud: neighbours, planes, orientation, discs, rays, and means over neighbours.
 #include "ao/cloud/cloud_ao.h"
 
+#include "ao/base/watch.h"
 #include "ao/cloud/cloud_gpu.h"
 #include "ao/cloud/disc_rays.h"
 #include "ao/cloud/extent.h"
@@ -10,7 +11,6 @@
 #include "ao/cloud/tiles.h"
 #include "ao/cloud/twins.h"
 #include "ao/raycast/raycast.h"
-#include "ao/watch.h"
 #include "projection/error.h"
 #include "projection/hash.h"
 #include "projection/statistics.h"

@@ -1,9 +1,9 @@
 // Frames of one recording, each looked at together with those around it: what hides from one view, another has seen.
 #pragma once
 
+#include "ao/base/method.h"
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/gpu/image_upload.h"
-#include "ao/method.h"
 #include "ao/sequence/agreement.h"
 #include "ao/sequence/gather.h"
 #include "ao/sequence/pack.h"

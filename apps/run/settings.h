@@ -1,9 +1,9 @@
 // The settings of `scanshade run`, and the options of the walk that follow from them.
 #pragma once
 
+#include "ao/base/method.h"
+#include "ao/base/quality.h"
 #include "ao/fit_plane/fit_plane.h"
-#include "ao/method.h"
-#include "ao/quality.h"
 #include "ao/sequence/neighbourhood.h"
 #include "apps/command.h"
 #include "apps/measure/budget.h"

@@ -1,7 +1,7 @@
 // Options of the walk: which frames, how they are computed, and what is written.
 #pragma once
 
-#include "ao/method.h"
+#include "ao/base/method.h"
 #include "ao/sequence/neighbourhood.h"
 #include "apps/walk/measured_noise.h"
 #include "apps/walk/recording_cloud.h"

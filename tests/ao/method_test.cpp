@@ -1,6 +1,6 @@
 // Laws that every method of the table obeys; a new method is tested as soon as it is in the table.
+#include "ao/base/method.h"
 #include "ao/gpu/device.h"
-#include "ao/method.h"
 #include "tests/support/scenes.h"
 
 #include <cmath>
