@@ -5,7 +5,7 @@
 #include "ao/base/method.h"
 #include "ao/cloud/cloud_ao.h"
 #include "ao/fit_plane/fit_plane.h"
-#include "ao/sequence/neighbourhood.h"
+#include "ao/sequence/sequence_ao.h"
 
 #include <memory>
 #include <optional>
@@ -31,8 +31,8 @@ class FrameAo {
     /// Visibility of each pixel of `depth`; NaN exactly where there is no surface. Depth with noise is prepared first.
     [[nodiscard]] AoMap compute(const DepthImage& depth, const DepthNoise& noise);
     /// For the frames of one recording, each computed together with those around it. Must not outlive this one.
-    [[nodiscard]] Neighbourhood sequence(double radius_m, const DepthNoise& noise,
-                                         const NeighbourhoodOptions& options = alone());
+    [[nodiscard]] SequenceAo sequence(double radius_m, const DepthNoise& noise,
+                                      const SequenceAoOptions& options = alone());
 
     /// Sentences: why the result of the last compute() may be wrong; empty = no reason known.
     [[nodiscard]] const std::vector<std::string>& doubts() const { return doubts_; }

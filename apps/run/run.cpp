@@ -192,7 +192,7 @@ struct Together {
     }
     MethodPool::Lease lease;
     MethodPool pool; ///< of that one method
-    Neighbourhood sequence;
+    SequenceAo sequence;
 };
 
 /// Counts results of frames for the exit code.

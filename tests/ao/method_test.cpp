@@ -91,7 +91,8 @@ std::string name_of(const testing::TestParamInfo<Case>& info) {
 double lowest_inside(const cv::Mat1f& v, int border) {
     double low = 0, high = 0;
     const cv::Mat1f inner = v(cv::Rect(border, border, v.cols - 2 * border, v.rows - 2 * border)).clone();
-    cv::minMaxLoc(inner, &low, &high, nullptr, nullptr, inner == inner); // NOLINT(misc-redundant-expression): false for NaN, which is no surface
+    cv::minMaxLoc(inner, &low, &high, nullptr, nullptr,
+                  inner == inner); // NOLINT(misc-redundant-expression): false for NaN, which is no surface
     return low;
 }
 
