@@ -12,12 +12,15 @@ FitPlaneOptions widened_for(const MethodRow& row, FitPlaneOptions preparation) {
 
 } // namespace
 
-FrameAo::FrameAo(gpu::Device& device, const MethodRow& row, const MethodSetup& setup, FitPlaneOptions preparation)
-    : device_(&device), owned_(setup.make(device)), method_(*owned_), preparation_(widened_for(row, preparation)) {}
+FrameAo::FrameAo(gpu::Device& device, const MethodRow& row, const MethodSetup& setup, FitPlaneOptions preparation,
+                 std::shared_ptr<Finishers> finishers)
+    : device_(&device), owned_(setup.make(device)), method_(*owned_), preparation_(widened_for(row, preparation)),
+      finishers_(finishers ? std::move(finishers) : std::make_shared<Finishers>(device)) {}
 
 AoMap FrameAo::compute(const DepthImage& depth, const DepthNoise& noise) {
     timings_.clear();
     doubts_.clear();
+    fitted_depth_.reset();
     AoMap ao;
     if (noise.any() && device_) {
         ao = compute_prepared(depth, noise);
@@ -34,8 +37,11 @@ AoMap FrameAo::compute_prepared(const DepthImage& depth, const DepthNoise& noise
         fit_->set_noise(noise);
     else
         fit_.emplace(*device_, noise, preparation_);
-    if (fit_->planes())
-        return method_.compute({.surfaces = fit_->compute_on_device(depth), .noise = noise, .smoothed = true});
+    if (fit_->planes()) {
+        const Surfaces fitted = fit_->compute_on_device(depth);
+        fitted_depth_ = fitted.z_there;
+        return method_.compute({.surfaces = fitted, .noise = noise, .smoothed = true});
+    }
     return method_.compute({.surfaces = fit_->compute(depth).depth, .noise = noise});
 }
 

@@ -4,6 +4,7 @@
 
 #include "ao/base/method.h"
 #include "ao/cloud/cloud_ao.h"
+#include "ao/finish/finish.h"
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/sequence/sequence_ao.h"
 
@@ -17,9 +18,10 @@ namespace scanshade {
 /// One method on one device, with the preparation of depth that it asks for. Not thread-safe: one frame at a time.
 class FrameAo {
   public:
-    /// Keeps a reference to the device. `preparation.smoothing` is multiplied by the method's own. Throws Misuse naming
-    /// a setting out of its range.
-    FrameAo(gpu::Device& device, const MethodRow& row, const MethodSetup& setup, FitPlaneOptions preparation = {});
+    /// Keeps a reference to the device. `preparation.smoothing` is multiplied by the method's own. Methods of one
+    /// device may share `finishers`, of that device. Throws Misuse naming a setting out of its range.
+    FrameAo(gpu::Device& device, const MethodRow& row, const MethodSetup& setup, FitPlaneOptions preparation = {},
+            std::shared_ptr<Finishers> finishers = nullptr);
     /// A method made elsewhere, which must outlive this one. It sees depth as recorded, whatever its noise.
     explicit FrameAo(Method& method) : method_(method) {}
     /// The same with preparation, just as said.
@@ -33,6 +35,11 @@ class FrameAo {
     /// For the frames of one recording, each computed together with those around it. Must not outlive this one.
     [[nodiscard]] SequenceAo sequence(double radius_m, const DepthNoise& noise,
                                       const SequenceAoOptions& options = alone());
+
+    /// Plane fits' depth of the last compute(), on the device; null where none were made.
+    [[nodiscard]] const std::shared_ptr<const gpu::DeviceBytes>& fitted_depth() const { return fitted_depth_; }
+    /// What makes confidence and pictures of frames on this device; null where there is none.
+    [[nodiscard]] Finishers* finishers() const { return finishers_.get(); }
 
     /// Sentences: why the result of the last compute() may be wrong; empty = no reason known.
     [[nodiscard]] const std::vector<std::string>& doubts() const { return doubts_; }
@@ -48,6 +55,8 @@ class FrameAo {
     std::unique_ptr<Method> owned_;
     Method& method_;
     FitPlaneOptions preparation_;
+    std::shared_ptr<Finishers> finishers_;
+    std::shared_ptr<const gpu::DeviceBytes> fitted_depth_;
     std::optional<FitPlane> fit_; ///< made when noise first asks for it; its pipelines stay for other noise
     Timings timings_;
     std::vector<std::string> doubts_;

@@ -1,7 +1,9 @@
 // Depth and visibility made visible: colours for depth, clay for shape, and the side-by-side panel.
 #include "apps/picture.h"
 
+#include "ao/finish/finish.h"
 #include "projection/statistics.h"
+#include "shaders/shared/finish.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +12,7 @@
 namespace scanshade {
 namespace {
 
-const cv::Vec3b no_surface(64, 40, 28); // BGR
+const cv::Vec3b no_surface(shared::no_surface_blue, shared::no_surface_green, shared::no_surface_red);
 
 /// The depths below which 1 % and 99 % of the seen pixels lie; {0, 0} when nothing was seen.
 std::pair<float, float> usual_range(const cv::Mat1f& z_m) {
@@ -167,14 +169,7 @@ cv::Mat1f facing_camera(const cv::Mat1f& z_m, const Pinhole& camera) {
     return cosine;
 }
 
-cv::Mat3b clay(const cv::Mat1f& z_m, const Pinhole& camera) {
-    const cv::Mat1f cosine = facing_camera(z_m, camera);
-    cv::Mat3b picture(z_m.size());
-    std::transform(z_m.begin(), z_m.end(), cosine.begin(), picture.begin(), [](float z, float c) {
-        return z > 0 ? cv::Vec3b::all(cv::saturate_cast<uchar>(70 + 165 * c)) : no_surface;
-    });
-    return picture;
-}
+cv::Mat3b clay(const cv::Mat1f& z_m, const Pinhole& camera) { return clay_of(facing_camera(z_m, camera), z_m); }
 
 cv::Mat3b panel(const std::vector<Tile>& tiles) {
     const auto first = std::find_if(tiles.begin(), tiles.end(), [](const Tile& t) { return !t.picture.empty(); });

@@ -6,7 +6,6 @@
 #include "projection/undistort.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <fmt/format.h>
 #include <limits>
@@ -121,29 +120,6 @@ Attached attach_to_cloud(const Cloud& cloud, const DepthImage& depth, const AoMa
                             : cv::Mat1f(ao.visibility);
     tally.write_to(result);
     return result;
-}
-
-// ---------------------------------------------------------------------------------------------------- shading
-
-/// 4096 steps of linear light are fine enough that all 256 stored values come back unchanged.
-constexpr int linear_steps = 4096;
-
-struct SrgbTables {
-    std::array<float, 256> linear{}; ///< in units of the other table's index
-    std::array<unsigned char, linear_steps> stored{};
-
-    SrgbTables() {
-        for (std::size_t i = 0; i < linear.size(); ++i)
-            linear[i] = static_cast<float>((linear_steps - 1) * linear_from_srgb(static_cast<double>(i) / 255));
-        for (std::size_t i = 0; i < stored.size(); ++i)
-            stored[i] = static_cast<unsigned char>(
-                std::lround(255 * srgb_from_linear(static_cast<double>(i) / (linear_steps - 1))));
-    }
-};
-
-const SrgbTables& srgb_tables() {
-    static const SrgbTables tables;
-    return tables;
 }
 
 } // namespace

@@ -10,22 +10,18 @@
 #include <numbers>
 
 namespace scanshade {
-namespace {
-
-constexpr int places = 16;
-
-/// Evenly over the unit disc: a sunflower's seeds (Vogel 1979).
-std::array<cv::Point2f, places> seeds() {
-    std::array<cv::Point2f, places> all;
-    for (int i = 0; i < places; ++i) {
-        const double r = std::sqrt((i + 0.5) / places), turn = i * std::numbers::pi * (3 - std::sqrt(5.0));
-        all[static_cast<std::size_t>(i)] = {static_cast<float>(r * std::cos(turn)),
-                                            static_cast<float>(r * std::sin(turn))};
-    }
-    return all;
+const std::array<cv::Point2f, 16>& confidence_seeds() {
+    static const std::array<cv::Point2f, 16> seeds = [] {
+        std::array<cv::Point2f, 16> all;
+        for (std::size_t i = 0; i < all.size(); ++i) {
+            const double place = static_cast<double>(i), r = std::sqrt((place + 0.5) / static_cast<double>(all.size())),
+                         turn = place * std::numbers::pi * (3 - std::sqrt(5.0));
+            all[i] = {static_cast<float>(r * std::cos(turn)), static_cast<float>(r * std::sin(turn))};
+        }
+        return all;
+    }();
+    return seeds;
 }
-
-} // namespace
 
 cv::Mat1f confidence_of(const DepthImage& depth, const cv::Mat1f& visibility, double radius_m,
                         const DepthNoise& noise) {
@@ -33,7 +29,7 @@ cv::Mat1f confidence_of(const DepthImage& depth, const cv::Mat1f& visibility, do
     if (visibility.size() != z_m.size())
         throw Error(fmt::format("visibility is {}x{}, its depth image {}x{}", visibility.cols, visibility.rows,
                                 z_m.cols, z_m.rows));
-    static const std::array<cv::Point2f, places> disc = seeds();
+    const std::array<cv::Point2f, 16>& disc = confidence_seeds();
     const auto radius = static_cast<float>(radius_m), fx = static_cast<float>(depth.camera.fx),
                fy = static_cast<float>(depth.camera.fy);
     const float f = std::sqrt(fx * fy);
@@ -55,7 +51,7 @@ cv::Mat1f confidence_of(const DepthImage& depth, const cv::Mat1f& visibility, do
             }
             const float resolved = std::clamp(0.5F * (radius * f / z) - 0.5F, 0.0F, 1.0F);
             const auto told = static_cast<float>(std::max(0.0, 1 - 3 * noise.at(z) / radius_m));
-            confidence(v, u) = static_cast<float>(seen) / places * resolved * told;
+            confidence(v, u) = static_cast<float>(seen) / static_cast<float>(disc.size()) * resolved * told;
         }
     return confidence;
 }

@@ -4,6 +4,8 @@
 #include "projection/maps.h"
 #include "projection/noise.h"
 
+#include <array>
+
 namespace scanshade {
 
 /// Confidence of each pixel's visibility, 0 .. 1; NaN where `visibility` is NaN. The product of three shares:
@@ -15,5 +17,8 @@ namespace scanshade {
 /// pixel, so values come in steps of 1/16.
 [[nodiscard]] cv::Mat1f confidence_of(const DepthImage& depth, const cv::Mat1f& visibility, double radius_m,
                                       const DepthNoise& noise);
+
+/// Those positions on the unit disc, evenly spread: a sunflower's seeds (Vogel 1979).
+[[nodiscard]] const std::array<cv::Point2f, 16>& confidence_seeds();
 
 } // namespace scanshade

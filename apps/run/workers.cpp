@@ -20,11 +20,15 @@ void Workers::make(const std::string& method, MethodSetup& setup, const FitPlane
     made_.clear();
     const bool keeps_cores_busy = setup.make_for_points() != nullptr;
     const std::size_t count = keeps_cores_busy ? 1 : in_flight_ * devices_.size();
+    std::vector<std::shared_ptr<Finishers>> finishers;
+    for (const auto& device : devices_)
+        finishers.push_back(std::make_shared<Finishers>(*device));
     std::vector<FrameAo*> methods;
     for (std::size_t i = 0; i < count; ++i) {
-        gpu::Device& device = *devices_[i % devices_.size()];
-        methods.push_back(
-            made_.emplace_back(std::make_unique<FrameAo>(device, method_named(method), setup, preparation)).get());
+        const std::size_t device = i % devices_.size();
+        made_.push_back(
+            std::make_unique<FrameAo>(*devices_[device], method_named(method), setup, preparation, finishers[device]));
+        methods.push_back(made_.back().get());
     }
     pool_ = std::make_unique<MethodPool>(methods);
     configuration_ = wanted;

@@ -6,8 +6,6 @@
 #include "apps/walk/point_clouds.h"
 #include "apps/walk/sequence_order.h"
 #include "io/clouds/cloud_file.h"
-#include "projection/attach.h"
-#include "projection/confidence.h"
 #include "projection/error.h"
 #include "projection/memory.h"
 #include "projection/project.h"
@@ -109,33 +107,19 @@ void compute_points(Work& work, const BatchOptions& options) {
         write_intermediates(options.dump / work.entry.name, intermediates);
 }
 
-bool wants_confidence(const Work& work, const BatchOptions& options) {
-    const Outputs& outputs = options.outputs;
-    return options.cloud || outputs.confidence || (work.frame.cloud ? outputs.cloud : outputs.depth_cloud);
-}
-
 void attach_and_write(Work& work, const BatchOptions& options) {
     const bool by_points = work.by_points;
     const Outputs outputs = by_points ? of_points(options.outputs) : options.outputs;
-    Scene scene;
-    cv::Mat3b shaded;
+    FrameImages images;
     take(work, &StageTimes::attach, [&] {
         if (!by_points)
-            work.attached = attach(work.frame, work.depth, work.ao);
-        if (!by_points && wants_confidence(work, options)) {
-            work.confidence_in_view = confidence_of(work.depth, work.ao.visibility, options.radius_m, options.noise);
-            work.confidence = attach(work.frame, work.depth, {work.confidence_in_view});
-        }
+            images = finish(work, options, outputs);
         work.row.coverage = work.attached.coverage;
         work.row.mean_visibility = work.attached.mean_visibility;
         std::ranges::move(doubts_about(work, options.radius_m, options.noise), std::back_inserter(work.row.doubts));
-        if (!by_points)
-            scene = scene_of(work, outputs.colour_view);
-        if (outputs.shaded || outputs.panel)
-            shaded = shaded_picture(scene, outputs.shade_strength);
     });
     take(work, &StageTimes::write, [&] {
-        write_all(work, scene, shaded, outputs);
+        write_all(work, images, outputs);
         if (by_points && (options.outputs.shaded || options.outputs.panel))
             write_cloud_picture(work, options.outputs);
     });
@@ -258,10 +242,12 @@ class Pipeline {
     }
 
     void compute_view(Work& work, FrameAo& method) const {
+        work.finishers = method.finishers();
         if (options_.sequence) {
             compute_in_sequence(work, capture_, *options_.sequence);
         } else {
             work.ao = method.compute(work.depth, options_.noise);
+            work.fitted = method.fitted_depth();
             work.row.passes = method.timings();
             std::ranges::copy(method.doubts(), std::back_inserter(work.row.doubts));
         }

@@ -18,47 +18,6 @@
 namespace scanshade {
 namespace {
 
-/// Whether a secondary camera took the colour images, so that they must be warped.
-bool has_secondary_camera(const Frame& frame) {
-    return frame.registration != Registration::yes && frame.colour_camera && !frame.colour.empty();
-}
-
-/// Colour warped into the depth view, or everything else into the colour view.
-Scene scene_across_cameras(const Work& work, bool colour_view) {
-    const Frame& frame = work.frame;
-    const SurfaceInColour surface = surface_in_colour(frame.depth_m, frame.camera, *frame.colour_camera);
-    if (colour_view) {
-        const cv::Mat1f& confidence = work.confidence.visibility;
-        return {surface.z_m,  on_colour_pixels(work.attached.visibility, surface),
-                frame.colour, frame.colour_camera->camera.pinhole,
-                {},           confidence.empty() ? cv::Mat1f() : on_colour_pixels(confidence, surface)};
-    }
-    const auto [colour, known] =
-        colour_on_depth(frame.colour, frame.depth_m, frame.camera, *frame.colour_camera, surface);
-    return {frame.depth_m, work.attached.visibility, colour, frame.camera.pinhole, known};
-}
-
-cv::Mat3b colour_in_view(const Cloud& cloud, const DepthImage& depth) {
-    if (!has_colours(cloud))
-        return {};
-    cv::Mat3b colour(depth.z_m.size(), cv::Vec3b(64, 40, 28));
-    std::transform(depth.source.begin(), depth.source.end(), colour.begin(), colour.begin(),
-                   [&](int point, const cv::Vec3b& none) { return point < 0 ? none : cloud.colours[point]; });
-    return colour;
-}
-
-/// Values of an organised cloud's points as an image; shares their memory.
-template <class Pixel>
-cv::Mat_<Pixel> on_grid(const std::vector<Pixel>& values, cv::Size grid) {
-    return cv::Mat_<Pixel>(grid.height, grid.width, const_cast<Pixel*>(values.data()));
-}
-
-cv::Mat1f depth_on_grid(const Cloud& cloud) {
-    cv::Mat1f z_m(cloud.grid);
-    std::transform(cloud.points.begin(), cloud.points.end(), z_m.begin(),
-                   [](const Eigen::Vector3d& p) { return p.allFinite() ? static_cast<float>(p.z()) : 0.0f; });
-    return z_m;
-}
 cv::Mat3b panel_picture(const Frame& frame, const Scene& scene, const cv::Mat3b& shaded) {
     const bool fits = !scene.colour.empty();
     const std::string colour = fits                   ? "colour"
@@ -117,7 +76,7 @@ void write_depth_cloud(const std::filesystem::path& file, const Work& work, cons
                        const Outputs& outputs) {
     const auto& [camera, z_m, source] = work.depth;
     const bool warped = has_secondary_camera(work.frame);
-    const Scene scene = warped && outputs.colour_view ? scene_across_cameras(work, false) : shown;
+    const Scene scene = warped && outputs.colour_view ? scene_of(work, false) : shown;
     const cv::Mat3b colour = undistorted_image(scene.colour, work.frame.camera);
     const cv::Mat1b colour_known = undistorted_image(scene.colour_known, work.frame.camera);
     std::vector<Eigen::Vector3d> points;
@@ -174,52 +133,35 @@ std::filesystem::path cloud_file(const std::string& name, const std::string& ext
 
 } // namespace
 
-Scene scene_of(const Work& work, bool colour_view) {
-    const Frame& frame = work.frame;
-    const cv::Mat1f& visibility = work.attached.visibility;
-    if (!frame.cloud) {
-        if (has_secondary_camera(frame))
-            return scene_across_cameras(work, colour_view);
-        const bool fits = frame.registration == Registration::yes && frame.colour.size() == frame.depth_m.size();
-        return {frame.depth_m, visibility, fits ? frame.colour : cv::Mat3b(), frame.camera.pinhole};
-    }
-    const Cloud& cloud = *frame.cloud;
-    if (!cloud.organised())
-        return {work.depth.z_m, visibility, colour_in_view(cloud, work.depth), work.depth.camera};
-    const cv::Mat3b colour = has_colours(cloud) ? on_grid(cloud.colours, cloud.grid) : cv::Mat3b();
-    return {depth_on_grid(cloud), visibility, colour, frame.camera.pinhole};
-}
-
-/// Clay has no pixel colours to keep where there is no surface, so both kinds go through the same multiplication.
-/// Pixels that the colour camera did not see are clay, too.
-cv::Mat3b shaded_picture(const Scene& scene, double strength) {
-    cv::Mat3b base = scene.colour;
-    if (base.empty() || !scene.colour_known.empty())
-        base = clay(scene.z_m, scene.camera);
-    if (!scene.colour_known.empty())
-        scene.colour.copyTo(base, scene.colour_known);
-    return shade(base, scene.visibility, strength);
-}
-
-void write_all(Work& work, const Scene& scene, const cv::Mat3b& shaded, const Outputs& outputs) {
+void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
     const std::string& name = work.entry.name;
+    const Scene& scene = images.scene;
     const auto wrote = [&](const std::filesystem::path& file, const auto& write) {
         write(outputs.folder / file);
         work.row.files.push_back(file);
     };
+    const auto write_map = [](const std::filesystem::path& file, const cv::Mat& integers, const cv::Mat1f& values,
+                              AoFormat format) {
+        if (integers.empty())
+            write_ao(file, values, format);
+        else
+            write_ao_integers(file, integers);
+    };
     if (outputs.ao)
-        wrote(ao_file(name, outputs), [&](const auto& file) { write_ao(file, scene.visibility, outputs.format); });
+        wrote(ao_file(name, outputs),
+              [&](const auto& file) { write_map(file, images.map, scene.visibility, outputs.format); });
     if (outputs.confidence)
         wrote(confidence_file(name, outputs), [&](const auto& file) {
             const bool floats = outputs.format == AoFormat::tiff || outputs.format == AoFormat::exr;
-            write_ao(file, scene.confidence.empty() ? work.confidence.visibility : scene.confidence,
-                     floats ? outputs.format : AoFormat::png8);
+            write_map(file, images.confidence_map,
+                      scene.confidence.empty() ? work.confidence.visibility : scene.confidence,
+                      floats ? outputs.format : AoFormat::png8);
         });
     if (outputs.shaded)
-        wrote(picture_file("shaded", name), [&](const auto& file) { write_picture(file, shaded); });
+        wrote(picture_file("shaded", name), [&](const auto& file) { write_picture(file, images.shaded); });
     if (outputs.panel)
         wrote(picture_file("panel", name),
-              [&](const auto& file) { write_picture(file, panel_picture(work.frame, scene, shaded)); });
+              [&](const auto& file) { write_picture(file, panel_picture(work.frame, scene, images.shaded)); });
     if (work.frame.cloud && outputs.cloud && outputs.colour_cloud == CloudColours::grey &&
         !takes_colours(*work.frame.cloud))
         work.row.warnings.push_back("the file's point format has no colour, so grey is not written; the field "

@@ -1,6 +1,7 @@
 // One frame on its way through the walk, with the results of each step for the next ones.
 #pragma once
 
+#include "ao/finish/finish.h"
 #include "apps/walk/batch_options.h"
 #include "apps/walk/frame_row.h"
 #include "projection/attach.h"
@@ -17,7 +18,9 @@ struct Work {
     DepthImage depth = {};
     DepthImage looked_at = {}; ///< of a sequence: the depth that the method got in place of `depth`
     AoMap ao = {};
-    cv::Mat1f confidence_in_view = {}; ///< of `ao`, pixel by pixel
+    Finishers* finishers = nullptr;                           ///< of the device that computed `ao`; null = none
+    std::shared_ptr<const gpu::DeviceBytes> fitted = nullptr; ///< depth of plane fits, on that device; null = none
+    cv::Mat1f confidence_in_view = {};                        ///< of `ao`, pixel by pixel
     Attached attached = {}, confidence = {};
     bool wanted = true;             ///< false: loaded for the frames around it
     bool by_points = false;         ///< no view: values come from rays at every point

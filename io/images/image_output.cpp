@@ -86,6 +86,10 @@ void write_ao(const fs::path& file, const cv::Mat1f& visibility, AoFormat format
     write_image(file, image, row.image());
 }
 
+void write_ao_integers(const fs::path& file, const cv::Mat& integers) {
+    write_image(file, integers, *image_format_by_extension(".png"));
+}
+
 void write_picture(const fs::path& file, const cv::Mat3b& picture) {
     const ImageFormat* format = image_format_by_extension(lower_extension(file));
     if (!format || !format->written || !format->read_colour) {

@@ -1,0 +1,279 @@
+#include "ao/finish/finish.h"
+
+#include "ao/gpu/transfer.h"
+#include "projection/attach.h"
+#include "projection/confidence.h"
+#include "projection/error.h"
+#include "projection/srgb.h"
+#include "shaders/shared/finish.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <fmt/format.h>
+
+namespace scanshade {
+namespace {
+
+enum Buffers : int {
+    seen,       // z; far behind the camera where there is no visibility
+    surface,    // of clay: 1/z, or z of plane fits; 0 in holes
+    visibility, // these two pack alone reads
+    colour,
+    colour_known,
+    linear_light,
+    stored_light,
+    confidence,
+    across, // 1/z smoothed along rows, and
+    smooth, // along columns, too
+    cosine,
+    map_out,
+    confidence_out,
+    picture_out
+};
+
+std::size_t words_of(cv::Size size) { return (static_cast<std::size_t>(size.area()) + 3) / 4; }
+
+std::vector<float> as_floats(std::span<const unsigned char> bytes) {
+    std::vector<float> words(bytes.size());
+    std::ranges::transform(bytes, words.begin(), [](unsigned char byte) {
+        return std::bit_cast<float>(static_cast<std::uint32_t>(byte)); // buffers begin with floats
+    });
+    return words;
+}
+
+void check_sizes(const FinishInput& input) {
+    const cv::Size size = input.z_m.size();
+    const auto differs = [&](const cv::Mat& image, bool may_be_empty) {
+        return image.size() != size && !(may_be_empty && image.empty());
+    };
+    if (size.empty() || differs(input.visibility, false) || differs(input.colour, true) ||
+        differs(input.colour_known, true) || differs(input.fitted_m, true))
+        throw Error(fmt::format("depth is {}x{}, visibility {}x{}, colour {}x{}: nothing says which pixel belongs to "
+                                "which",
+                                size.width, size.height, input.visibility.cols, input.visibility.rows,
+                                input.colour.cols, input.colour.rows));
+}
+
+/// A copy: the next frame overwrites the program's.
+template <class Pixel>
+cv::Mat_<Pixel> copied(gpu::Program& program, int buffer, cv::Size size) {
+    return gpu::image_on<Pixel>(program.host(buffer), size).clone();
+}
+
+/// One pass over two images; rows are plain loops, which become vector instructions.
+template <class Formula>
+void combine(const cv::Mat1f& a, const cv::Mat1f& b, cv::Mat1f to, Formula&& formula) {
+    for (int y = 0; y < to.rows; ++y) {
+        const float *left = a[y], *right = b[y];
+        float* result = to[y];
+        for (int x = 0; x < to.cols; ++x)
+            result[x] = formula(left[x], right[x]);
+    }
+}
+
+bool shows_clay(int picture) { return picture == shared::picture_clay || picture == shared::picture_both; }
+bool shows_colour(int picture) { return picture == shared::picture_colour || picture == shared::picture_both; }
+
+/// Clay has no pixel colours to keep where there is no surface, so both kinds go through the same multiplication.
+cv::Mat3b picture_on_host(const FinishInput& input, const cv::Mat3b& clay) {
+    cv::Mat3b base = clay.empty() ? input.colour : clay;
+    if (!clay.empty() && !input.colour.empty())
+        input.colour.copyTo(base, input.colour_known);
+    return shade(base, input.visibility, input.strength);
+}
+
+} // namespace
+
+bool Finish::Shape::clay() const { return shows_clay(picture); }
+
+Finish::Finish(gpu::Device& device)
+    : device_(device), packing_(gpu::is_cpu(device.info()) ? Packing::on_host : Packing::on_device) {}
+
+Finish::Shape Finish::shape_of(const FinishInput& input, const FinishOutputs& outputs) const {
+    Shape shape{input.z_m.size(), outputs, shared::picture_none};
+    if (outputs.picture)
+        shape.picture = input.colour.empty()         ? shared::picture_clay
+                        : input.colour_known.empty() ? shared::picture_colour
+                                                     : shared::picture_both;
+    shape.fitted = shape.clay() && input.fitted;
+    shape.smoothed = shape.clay() && !input.fitted && input.fitted_m.empty() && input.noise.any();
+    if (packing_ == Packing::on_host) {
+        shape.outputs.confidence = shape.confidence();
+        shape.outputs.confidence_bits = shape.outputs.map_bits = 0;
+    }
+    return shape;
+}
+
+gpu::Program& Finish::program_for(const Shape& shape) {
+    constexpr std::size_t most_kept = 3; // a frame has two at most: its confidence in the view, its picture as recorded
+    const auto known = std::ranges::find(programs_, shape, &decltype(programs_)::value_type::first);
+    if (known != programs_.end())
+        return *known->second;
+    if (programs_.size() == most_kept)
+        programs_.erase(programs_.begin());
+    using Host = gpu::BufferRow::Host;
+    constexpr auto floats = gpu::BufferRow::Texels::r32f, words = gpu::BufferRow::Texels::r32ui;
+    const auto pixels = static_cast<std::size_t>(shape.size.area()), packs = words_of(shape.size);
+    const FinishOutputs& outputs = shape.outputs;
+    const bool on_device = packing_ == Packing::on_device;
+    const bool packed = on_device && (outputs.map_bits > 0 || outputs.confidence_bits > 0 || outputs.picture);
+    const bool colours = on_device && shows_colour(shape.picture), clay = shape.clay();
+    // What these outputs do not need has one texel.
+    const auto image = [&](std::string_view name, bool needed, Host host = Host::none) {
+        return gpu::BufferRow{name, needed ? pixels * 4 : 4, needed ? host : Host::none, floats};
+    };
+    const auto bytes = [&](std::string_view name, int words_a_pack, Host host) {
+        return gpu::BufferRow{name, words_a_pack > 0 ? packs * static_cast<std::size_t>(words_a_pack) * 4 : 4,
+                              words_a_pack > 0 ? host : Host::none, words};
+    };
+    const SrgbTables& light = srgb_tables();
+    std::vector<gpu::BufferRow> buffers{
+        image("seen", true, Host::upload),
+        image("surface", clay, Host::upload),
+        image("visibility", packed, Host::upload),
+        bytes("colour", colours ? 3 : 0, Host::upload),
+        bytes("colour known", colours && shape.picture == shared::picture_both ? 1 : 0, Host::upload),
+        {"linear light", light.linear.size() * 4, Host::none, floats, {light.linear.begin(), light.linear.end()}},
+        {"stored light", light.stored.size() * 4, Host::none, words, as_floats(light.stored)},
+        image("confidence", shape.confidence(), outputs.confidence ? Host::download : Host::none),
+        image("across", shape.smoothed),
+        image("smooth", shape.smoothed),
+        image("cosine", clay, on_device ? Host::none : Host::download),
+        bytes("map", on_device ? outputs.map_bits / 8 : 0, Host::download),
+        bytes("confidence map", on_device && outputs.confidence_bits > 0 ? 1 : 0, Host::download),
+        bytes("picture", on_device && outputs.picture ? 3 : 0, Host::download),
+    };
+    const auto groups_of = [](std::size_t n) {
+        return static_cast<std::uint32_t>((n + shared::finish_row - 1) / shared::finish_row);
+    };
+    const std::array<std::uint32_t, 3> rows{groups_of(static_cast<std::size_t>(shape.size.width)),
+                                            static_cast<std::uint32_t>(shape.size.height), 1};
+    std::vector<gpu::PassRow> passes;
+    if (shape.confidence())
+        passes.push_back({"confidence", "finish/confidence", {seen}, {confidence}, rows, {}});
+    if (shape.smoothed) {
+        passes.push_back({"smooth across", "finish/smooth", {surface}, {across}, rows, {{shared::spec_down, 0}}});
+        passes.push_back({"smooth down", "finish/smooth", {across}, {smooth}, rows, {{shared::spec_down, 1}}});
+    }
+    const int shown = shape.smoothed ? smooth : surface;
+    if (clay)
+        passes.push_back({"clay", "finish/facing", {shown}, {cosine}, rows, {{shared::spec_is_depth, shape.fitted}}});
+    constexpr std::uint32_t most_groups = 1 << 15;
+    const std::uint32_t groups = groups_of(packs);
+    if (packed)
+        passes.push_back(
+            {"pack",
+             "finish/pack",
+             {visibility, shape.confidence() ? confidence : visibility, clay ? surface : visibility,
+              clay ? cosine : visibility, colours ? colour : linear_light,
+              shape.picture == shared::picture_both ? colour_known : linear_light, linear_light, stored_light},
+             {map_out, confidence_out, picture_out},
+             {std::min(groups, most_groups), (groups + most_groups - 1) / most_groups, 1},
+             {{shared::spec_map_bits, outputs.map_bits},
+              {shared::spec_confidence_bits, outputs.confidence_bits},
+              {shared::spec_picture, shape.picture}}});
+    auto program =
+        std::make_unique<gpu::Program>(device_, std::move(buffers), std::move(passes), sizeof(shared::FinishConstants));
+    return *programs_.emplace_back(shape, std::move(program)).second;
+}
+
+void Finish::upload(gpu::Program& program, const Shape& shape, const FinishInput& input) {
+    const auto image_of = [&](int buffer) { return gpu::image_on<float>(program.host(buffer), shape.size); };
+    const auto is_depth = [](float z) { return z >= 1e-4F && z <= 1e6F; }; // as gpu::upload_depth() has it
+    if (shape.confidence())
+        combine(input.z_m, input.visibility, image_of(seen),
+                [&](float z, float value) { return value == value && is_depth(z) ? z : -1e30F; });
+    if (shape.fitted)
+        program.take(surface, 0, input.fitted);
+    else if (shape.clay()) {
+        const cv::Mat1f& z_m = input.fitted_m.empty() ? input.z_m : input.fitted_m;
+        combine(z_m, z_m, image_of(surface), [&](float z, float) { return is_depth(z) ? 1 / z : 0.0F; });
+    }
+}
+
+Finished Finish::compute(const FinishInput& input, const FinishOutputs& outputs) {
+    timings_.clear();
+    if (!outputs.any())
+        return {};
+    check_sizes(input);
+    const Shape shape = shape_of(input, outputs);
+    const cv::Size size = shape.size;
+    const bool on_device = packing_ == Packing::on_device;
+    if (!on_device && !shape.confidence() && !shape.clay())
+        return {.picture = outputs.picture ? picture_on_host(input, {}) : cv::Mat3b()};
+    gpu::Program& program = program_for(shape);
+
+    shared::FinishConstants k{};
+    k.size = {size.width, size.height};
+    k.camera = input.camera.on_gpu();
+    k.radius = static_cast<float>(input.radius_m);
+    k.noise_floor = static_cast<float>(input.noise.floor_m);
+    k.noise_per_z2 = static_cast<float>(input.noise.per_z2);
+    k.strength = static_cast<float>(input.strength);
+    k.words = static_cast<int>(words_of(size));
+    std::ranges::transform(confidence_seeds(), k.seeds,
+                           [](const cv::Point2f& seed) { return shared::vec2(seed.x, seed.y); });
+
+    upload(program, shape, input);
+    if (on_device && (outputs.map_bits > 0 || outputs.confidence_bits > 0 || outputs.picture))
+        gpu::upload(input.visibility, program.host(visibility));
+    if (on_device && shows_colour(shape.picture))
+        gpu::upload(input.colour, program.host(colour));
+    if (on_device && shape.picture == shared::picture_both)
+        gpu::upload(input.colour_known, program.host(colour_known));
+    program.run(std::as_bytes(std::span(&k, 1)));
+    timings_ = program.timings();
+
+    Finished finished;
+    if (shape.outputs.confidence)
+        finished.confidence = copied<float>(program, confidence, size);
+    if (!on_device) {
+        if (outputs.picture)
+            finished.picture =
+                picture_on_host(input, shape.clay() ? clay_of(gpu::image_on<float>(program.host(cosine), size),
+                                                              gpu::image_on<float>(program.host(surface), size))
+                                                    : cv::Mat3b());
+        return finished;
+    }
+    if (outputs.confidence_bits > 0)
+        finished.confidence_map = copied<uchar>(program, confidence_out, size);
+    if (outputs.map_bits == 16)
+        finished.map = copied<ushort>(program, map_out, size);
+    if (outputs.map_bits == 8)
+        finished.map = copied<uchar>(program, map_out, size);
+    if (outputs.picture)
+        finished.picture = copied<cv::Vec3b>(program, picture_out, size);
+    return finished;
+}
+
+Finished Finishers::compute(const FinishInput& input, const FinishOutputs& outputs,
+                            std::vector<std::pair<std::string, double>>& timings) {
+    std::unique_ptr<Finish> finish;
+    {
+        const std::lock_guard alone(access_);
+        if (!idle_.empty()) {
+            finish = std::move(idle_.back());
+            idle_.pop_back();
+        }
+    }
+    if (!finish)
+        finish = std::make_unique<Finish>(device_);
+    Finished finished = finish->compute(input, outputs);
+    for (const auto& [pass, took_ms] : finish->timings())
+        timings.emplace_back(pass == "upload" || pass == "download" ? "finish: " + pass : pass, took_ms);
+    const std::lock_guard alone(access_);
+    idle_.push_back(std::move(finish));
+    return finished;
+}
+
+cv::Mat3b clay_of(const cv::Mat1f& cosine, const cv::Mat1f& surface) {
+    const cv::Vec3b none(shared::no_surface_blue, shared::no_surface_green, shared::no_surface_red);
+    cv::Mat3b picture(cosine.size());
+    std::transform(cosine.begin(), cosine.end(), surface.begin(), picture.begin(), [&](float c, float at) {
+        return at > 0 ? cv::Vec3b::all(cv::saturate_cast<uchar>(shared::clay_edge_on + shared::clay_facing * c)) : none;
+    });
+    return picture;
+}
+
+} // namespace scanshade

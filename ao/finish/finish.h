@@ -1,0 +1,106 @@
+// The last passes of a frame, on the device: confidence, shading, and the bytes of maps and pictures, downloaded once
+// and encoded as they are.
+#pragma once
+
+#include "ao/gpu/program.h"
+#include "projection/camera.h"
+#include "projection/noise.h"
+
+#include <array>
+#include <memory>
+#include <mutex>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace scanshade {
+
+/// What is made of a frame.
+struct FinishOutputs {
+    bool confidence = false; ///< as floats: confidence_of() of the view
+    int confidence_bits = 0; ///< as a map of 8 bits; 0 = no map
+    int map_bits = 0;        ///< of visibility, 16 or 8; 0 = no map
+    bool picture = false;    ///< colour, or clay where there is none, times visibility in linear light
+
+    [[nodiscard]] bool any() const { return confidence || confidence_bits > 0 || map_bits > 0 || picture; }
+    bool operator==(const FinishOutputs&) const = default;
+};
+
+/// A frame with its visibility, all on one pixel grid. Images may share memory with others; they are only read.
+struct FinishInput {
+    Pinhole camera;
+    cv::Mat1f z_m;                                            ///< metres; holes are 0 or not finite
+    cv::Mat1f visibility;                                     ///< NaN = no surface
+    std::shared_ptr<const gpu::DeviceBytes> fitted = nullptr; ///< z of plane fits on this device: clay shows it in
+                                                              ///< place of z_m
+    cv::Mat1f fitted_m = {};                                  ///< the same on the host; empty = none
+    double radius_m = 1;                                      ///< the method's; confidence depends on it and on
+    DepthNoise noise = {};                                    ///< that of z_m
+    cv::Mat3b colour = {};                                    ///< blue, green, red; empty = clay
+    cv::Mat1b colour_known = {};                              ///< 0 where colour has none; empty = known everywhere
+    double strength = 1;                                      ///< of the visibility in the picture
+};
+
+/// Empty images were not asked for. Maps are empty, too, and confidence has floats, where the host packs.
+struct Finished {
+    cv::Mat1f confidence;     ///< 0 .. 1, NaN where there is no visibility
+    cv::Mat1b confidence_map; ///< 0 = none, 1 .. 255 = 0 .. 1
+    cv::Mat map;              ///< of visibility: 0 = no surface, 1 .. 255 or 65535 = 0 .. 1
+    cv::Mat3b picture;        ///< blue, green, red
+};
+
+/// Whether the device turns values into the bytes of maps and pictures. A GPU then has less to download. Where the
+/// device is the processor, the host's own loops take half the time.
+enum class Packing { on_device, on_host };
+
+/// Not thread-safe: one frame at a time.
+class Finish {
+  public:
+    /// Packs on the device if that is no processor.
+    explicit Finish(gpu::Device& device);
+    Finish(gpu::Device& device, Packing packing) : device_(device), packing_(packing) {}
+    /// Throws Error where the images' sizes differ.
+    [[nodiscard]] Finished compute(const FinishInput& input, const FinishOutputs& outputs);
+    /// Where the time of the last compute() went.
+    [[nodiscard]] const std::vector<std::pair<std::string, double>>& timings() const { return timings_; }
+
+  private:
+    /// Everything that decides on the passes.
+    struct Shape {
+        cv::Size size;
+        FinishOutputs outputs;
+        int picture = 0;
+        bool fitted = false, smoothed = false; ///< of clay: which depth it shows
+        bool operator==(const Shape&) const = default;
+        [[nodiscard]] bool clay() const;
+        [[nodiscard]] bool confidence() const { return outputs.confidence || outputs.confidence_bits > 0; }
+    };
+    [[nodiscard]] Shape shape_of(const FinishInput& input, const FinishOutputs& outputs) const;
+    gpu::Program& program_for(const Shape& shape);
+    static void upload(gpu::Program& program, const Shape& shape, const FinishInput& input);
+
+    gpu::Device& device_;
+    Packing packing_;
+    std::vector<std::pair<Shape, std::unique_ptr<gpu::Program>>> programs_; ///< the last few shapes'
+    std::vector<std::pair<std::string, double>> timings_;
+};
+
+/// As many as are used at once on one device, so that no frame waits for another one's.
+class Finishers {
+  public:
+    explicit Finishers(gpu::Device& device) : device_(device) {}
+    /// Thread-safe. Adds its passes' times to `timings`.
+    [[nodiscard]] Finished compute(const FinishInput& input, const FinishOutputs& outputs,
+                                   std::vector<std::pair<std::string, double>>& timings);
+
+  private:
+    gpu::Device& device_;
+    std::mutex access_;
+    std::vector<std::unique_ptr<Finish>> idle_;
+};
+
+/// Clay as grey: `cosine` as facing_camera() has it, `surface` is 0 where there is none.
+[[nodiscard]] cv::Mat3b clay_of(const cv::Mat1f& cosine, const cv::Mat1f& surface);
+
+} // namespace scanshade

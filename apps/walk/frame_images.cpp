@@ -1,0 +1,146 @@
+// After a frame is computed: values on the recorded pixels or points, confidence, maps and pictures.
+#include "apps/walk/frame_images.h"
+
+#include "apps/picture.h"
+#include "projection/colour_view.h"
+#include "projection/confidence.h"
+
+#include <algorithm>
+
+namespace scanshade {
+namespace {
+
+/// Colour warped into the depth view, or everything else into the colour view.
+Scene scene_across_cameras(const Work& work, bool colour_view) {
+    const Frame& frame = work.frame;
+    const SurfaceInColour surface = surface_in_colour(frame.depth_m, frame.camera, *frame.colour_camera);
+    if (colour_view) {
+        const cv::Mat1f& confidence = work.confidence.visibility;
+        return {surface.z_m,  on_colour_pixels(work.attached.visibility, surface),
+                frame.colour, frame.colour_camera->camera.pinhole,
+                {},           confidence.empty() ? cv::Mat1f() : on_colour_pixels(confidence, surface)};
+    }
+    const auto [colour, known] =
+        colour_on_depth(frame.colour, frame.depth_m, frame.camera, *frame.colour_camera, surface);
+    return {frame.depth_m, work.attached.visibility, colour, frame.camera.pinhole, known};
+}
+
+cv::Mat3b colour_in_view(const Cloud& cloud, const DepthImage& depth) {
+    if (!has_colours(cloud))
+        return {};
+    cv::Mat3b colour(depth.z_m.size(), cv::Vec3b(64, 40, 28));
+    std::transform(depth.source.begin(), depth.source.end(), colour.begin(), colour.begin(),
+                   [&](int point, const cv::Vec3b& none) { return point < 0 ? none : cloud.colours[point]; });
+    return colour;
+}
+
+cv::Mat1f depth_on_grid(const Cloud& cloud) {
+    cv::Mat1f z_m(cloud.grid);
+    std::transform(cloud.points.begin(), cloud.points.end(), z_m.begin(),
+                   [](const Eigen::Vector3d& p) { return p.allFinite() ? static_cast<float>(p.z()) : 0.0f; });
+    return z_m;
+}
+
+/// Clay has no pixel colours to keep where there is no surface, so both kinds go through the same multiplication.
+cv::Mat3b shaded_picture(const FinishInput& input) {
+    cv::Mat3b base = input.colour;
+    if (base.empty() || !input.colour_known.empty())
+        base = clay(input.z_m, input.camera);
+    if (!input.colour_known.empty())
+        input.colour.copyTo(base, input.colour_known);
+    return shade(base, input.visibility, input.strength);
+}
+
+/// On the device that computed the frame. Without one, what Finish does, but for maps: these are made when written.
+Finished finished(Work& work, const FinishInput& input, const FinishOutputs& outputs) {
+    if (work.finishers)
+        return work.finishers->compute(input, outputs, work.row.passes);
+    Finished made;
+    if (outputs.confidence || outputs.confidence_bits > 0)
+        made.confidence = confidence_of({input.camera, input.z_m, {}}, input.visibility, input.radius_m, input.noise);
+    if (outputs.picture)
+        made.picture = shaded_picture(input);
+    return made;
+}
+
+bool is_float(AoFormat format) { return format == AoFormat::tiff || format == AoFormat::exr; }
+
+bool wants_confidence(const Work& work, const BatchOptions& options, const Outputs& outputs) {
+    return options.cloud || outputs.confidence || (work.frame.cloud ? outputs.cloud : outputs.depth_cloud);
+}
+
+/// Whether the view has the recorded pixels: nothing needs to be attached.
+bool is_as_recorded(const Frame& frame) {
+    return !frame.cloud && !frame.camera.distortion.any() && !has_secondary_camera(frame);
+}
+
+} // namespace
+
+bool has_secondary_camera(const Frame& frame) {
+    return frame.registration != Registration::yes && frame.colour_camera && !frame.colour.empty();
+}
+
+Scene scene_of(const Work& work, bool colour_view) {
+    const Frame& frame = work.frame;
+    const cv::Mat1f& visibility = work.attached.visibility;
+    if (!frame.cloud) {
+        if (has_secondary_camera(frame))
+            return scene_across_cameras(work, colour_view);
+        const bool fits = frame.registration == Registration::yes && frame.colour.size() == frame.depth_m.size();
+        return {frame.depth_m, visibility, fits ? frame.colour : cv::Mat3b(), frame.camera.pinhole};
+    }
+    const Cloud& cloud = *frame.cloud;
+    if (!cloud.organised())
+        return {work.depth.z_m, visibility, colour_in_view(cloud, work.depth), work.depth.camera};
+    const cv::Mat3b colour = has_colours(cloud) ? on_grid(cloud.colours, cloud.grid) : cv::Mat3b();
+    return {depth_on_grid(cloud), visibility, colour, frame.camera.pinhole};
+}
+
+FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outputs) {
+    work.attached = attach(work.frame, work.depth, work.ao);
+    const bool confidence = wants_confidence(work, options, outputs);
+    const FinishInput view{.camera = work.depth.camera,
+                           .z_m = work.depth.z_m,
+                           .visibility = work.ao.visibility,
+                           .fitted = work.fitted,
+                           .fitted_m = work.looked_at.z_m,
+                           .radius_m = options.radius_m,
+                           .noise = options.noise};
+    FinishOutputs made{.map_bits = !outputs.ao || is_float(outputs.format) ? 0
+                                   : outputs.format == AoFormat::png8      ? 8
+                                                                           : 16,
+                       .picture = outputs.shaded || outputs.panel};
+    FrameImages images;
+    if (is_as_recorded(work.frame)) {
+        images.scene = scene_of(work, outputs.colour_view);
+        FinishInput input = view;
+        input.colour = images.scene.colour;
+        input.strength = outputs.shade_strength;
+        made.confidence_bits = outputs.confidence && !is_float(outputs.format) ? 8 : 0;
+        made.confidence = confidence && (made.confidence_bits == 0 || options.cloud || outputs.depth_cloud);
+        Finished all = finished(work, input, made);
+        work.confidence_in_view = work.confidence.visibility = all.confidence;
+        images.map = all.map;
+        images.confidence_map = all.confidence_map;
+        images.shaded = all.picture;
+        return images;
+    }
+    if (confidence) {
+        work.confidence_in_view = finished(work, view, {.confidence = true}).confidence;
+        work.confidence = attach(work.frame, work.depth, {work.confidence_in_view});
+    }
+    const Scene scene = images.scene = scene_of(work, outputs.colour_view);
+    const Finished all = finished(work,
+                                  {.camera = scene.camera,
+                                   .z_m = scene.z_m,
+                                   .visibility = scene.visibility,
+                                   .colour = scene.colour,
+                                   .colour_known = scene.colour_known,
+                                   .strength = outputs.shade_strength},
+                                  made);
+    images.map = all.map;
+    images.shaded = all.picture;
+    return images;
+}
+
+} // namespace scanshade

@@ -1,0 +1,41 @@
+// What host and shaders share of the last passes of a frame: confidence, clay, and the bytes of maps and pictures.
+#ifndef SCANSHADE_SHARED_FINISH_H
+#define SCANSHADE_SHARED_FINISH_H
+#include "camera.h"
+#include "types.h"
+SHARED_BEGIN
+
+// Positions tested in each pixel's ball.
+const int confidence_seeds = 16;
+
+struct FinishConstants {
+    ivec2 size; // of the image
+    Pinhole camera;
+    float radius;                    // of the ball, metres
+    float noise_floor, noise_per_z2; // sigma(z) = floor + per_z2 z^2, metres
+    float strength;                  // of the visibility in pictures
+    int words;                       // of four pixels each
+    vec2 seeds[confidence_seeds];    // evenly over the unit disc
+};
+
+// A work group: so many pixels of a row, or words of four pixels.
+const int finish_row = 256;
+
+// The colour where there is no surface, a dim one that no visibility has.
+const int no_surface_blue = 64, no_surface_green = 40, no_surface_red = 28;
+// Grey of clay, out of 255: of a surface seen edge-on, and how much is added for one that faces the camera.
+const float clay_edge_on = 70, clay_facing = 165;
+
+// Specialization constants.
+const int spec_is_depth = 0;        // clay: 1 = the surface is given as z, 0 = as 1/z
+const int spec_down = 1;            // smooth: 1 = along columns, 0 = along rows
+const int spec_map_bits = 2;        // pack: of a value in the map, 16, 8 or 0 = no map
+const int spec_confidence_bits = 3; // pack: 8 or 0
+const int spec_picture = 4;         // pack: what the picture shows
+const int picture_none = 0;
+const int picture_colour = 1;
+const int picture_clay = 2;
+const int picture_both = 3; // colour where it is known, else clay
+
+SHARED_END
+#endif
