@@ -8,6 +8,7 @@
 #include <atomic>
 #include <deque>
 #include <mutex>
+#include <utility>
 #include <vulkan/vulkan_raii.hpp>
 
 namespace scanshade::gpu {
@@ -38,8 +39,9 @@ struct Messages {
 
 /// A queue that one thread at a time may submit to.
 struct Lane {
+    explicit Lane(vk::raii::Queue own) : queue(std::move(own)) {} // clang 14 makes no aggregate in place
     vk::raii::Queue queue;
-    std::mutex submitting = {};
+    std::mutex submitting;
 };
 
 /// Vulkan's loader; throws Error where it is not installed.
