@@ -472,6 +472,8 @@ TEST_P(BrokenData, the_program_ends_with_the_code_it_deserves) {
     const fs::path path = data_folder() / "broken" / c.path;
     if (!fs::exists(path))
         GTEST_SKIP() << path << " is not at hand";
+    if (!tests::program_is_built())
+        GTEST_SKIP() << "the program is not built";
     const TemporaryFolder folder;
     const tests::Ran ran =
         tests::run_program(fmt::format("run {} -o {} --write ao", run_on(path, c.reader), (folder / "out").string()));
