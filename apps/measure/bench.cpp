@@ -350,7 +350,7 @@ class Bench final : public Command {
         options.sensor = sensor;
         options.frames = request_.frames;
         options.overwrite = overwrite_;
-        const fs::path folder = fs::path(out_) / "captures" / fmt::format("{}-{}", scene, sensor);
+        fs::path folder = fs::path(out_) / "captures" / fmt::format("{}-{}", scene, sensor);
         say(fmt::format("generating {}", folder.string()));
         generate(options, folder);
         return folder;

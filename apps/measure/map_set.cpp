@@ -35,7 +35,7 @@ std::map<std::string, fs::path> maps_in(const fs::path& folder) {
 }
 
 json read_json(const fs::path& file) {
-    const json text = parsed_or_discarded(read_bytes(file));
+    json text = parsed_or_discarded(read_bytes(file));
     if (text.is_discarded())
         throw Error(file.string() + ": not JSON");
     return text;

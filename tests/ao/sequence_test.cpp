@@ -46,9 +46,10 @@ const scene::World& world_of(const char* name) {
 /// Frames `step_s` apart on the scene's walk, the middle one at `seconds`.
 std::vector<Recorded> walk(const char* name, const char* sensor, double seconds, double step_s, int frames) {
     std::vector<Recorded> all;
+    const int middle = frames / 2;
     for (int i = 0; i < frames; ++i) {
         const scene::World& world = world_of(name);
-        const Isometry3d pose = scene::world_from_camera(world.scene().walk, seconds + (i - frames / 2) * step_s);
+        const Isometry3d pose = scene::world_from_camera(world.scene().walk, seconds + (i - middle) * step_s);
         const Sight sight{world, small_camera(), pose, render_geometry(world, small_camera(), pose), 1, i};
         all.push_back({{small_camera(), sensor_named(sensor).record(sight), {}}, sight.exact.z_m, pose});
     }
