@@ -236,8 +236,8 @@ class CloudErrors final : public BenchPart {
             if (!judge) {
                 fmt::print("{}: {} points, radius {} m; every {}. point is compared\n", world.scene().name,
                            cloud.points.size(), sky_ ? 0 : radius, step);
-                judge.emplace(sky_ ? true_sky(world, cloud, step)
-                                   : scene::true_visibility(world, cloud, {radius, 1024, 1, false}, step));
+                judge = Judge{sky_ ? true_sky(world, cloud, step)
+                                   : scene::true_visibility(world, cloud, {radius, 1024, 1, false}, step)};
             }
             double spacing = 0;
             for (const std::string& kind : comma_separated(normals_))

@@ -36,7 +36,7 @@ class BrokenImages : public ::testing::Test {
   protected:
     std::string depth_refusal(const std::string& bytes, const std::string& name = "d.png") {
         const fs::path file = write_file(folder_ / name, bytes);
-        const std::string message = refusal([&] { (void)read_stored_depth(file); });
+        std::string message = refusal([&] { (void)read_stored_depth(file); });
         EXPECT_TRUE(message.empty() || says(message, file.string()));
         return message;
     }
@@ -157,7 +157,7 @@ class BrokenClouds : public ::testing::Test {
     std::string cloud_refusal(const std::string& bytes) {
         const fs::path file = write_file(folder_ / "c", bytes);
         warnings_.clear();
-        const std::string message = refusal([&] { (void)read_cloud(file, warnings_); });
+        std::string message = refusal([&] { (void)read_cloud(file, warnings_); });
         EXPECT_TRUE(message.empty() || says(message, file.string()));
         return message;
     }
