@@ -121,11 +121,18 @@ gpu::Program& Finish::program_for(const Shape& shape) {
     const bool colours = on_device && shows_colour(shape.picture), clay = shape.clay();
     // What these outputs do not need has one texel.
     const auto image = [&](std::string_view name, bool needed, Host host = Host::none) {
-        return gpu::BufferRow{name, needed ? pixels * 4 : 4, needed ? host : Host::none, floats};
+        return gpu::BufferRow{.name = name,
+                              .bytes = needed ? pixels * 4 : 4,
+                              .host = needed ? host : Host::none,
+                              .texels = floats,
+                              .plain_writes = true};
     };
     const auto bytes = [&](std::string_view name, int words_a_pack, Host host) {
-        return gpu::BufferRow{name, words_a_pack > 0 ? packs * static_cast<std::size_t>(words_a_pack) * 4 : 4,
-                              words_a_pack > 0 ? host : Host::none, words};
+        return gpu::BufferRow{.name = name,
+                              .bytes = words_a_pack > 0 ? packs * static_cast<std::size_t>(words_a_pack) * 4 : 4,
+                              .host = words_a_pack > 0 ? host : Host::none,
+                              .texels = words,
+                              .plain_writes = true};
     };
     const SrgbTables& light = srgb_tables();
     std::vector<gpu::BufferRow> buffers{
@@ -166,8 +173,8 @@ gpu::Program& Finish::program_for(const Shape& shape) {
             {"pack",
              "finish/pack",
              {visibility, shape.confidence() ? confidence : visibility, clay ? surface : visibility,
-              clay ? cosine : visibility, colours ? colour : linear_light,
-              shape.picture == shared::picture_both ? colour_known : linear_light, linear_light, stored_light},
+              clay ? cosine : visibility, colours ? colour : stored_light,
+              shape.picture == shared::picture_both ? colour_known : stored_light, linear_light, stored_light},
              {map_out, confidence_out, picture_out},
              {std::min(groups, most_groups), (groups + most_groups - 1) / most_groups, 1},
              {{shared::spec_map_bits, outputs.map_bits},

@@ -24,15 +24,18 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
     using Host = gpu::BufferRow::Host;
     constexpr auto floats = gpu::BufferRow::Texels::r32f;
     const auto pixels = static_cast<std::size_t>(size.area());
-    const auto tiles = [](int n) { return static_cast<std::uint32_t>((n + 7) / 8); };
-    const std::array<std::uint32_t, 3> groups{tiles(size.width), tiles(size.height), 1};
+    const auto groups_of = [&](int rows) { // of 8x8 threads, each of that many pixels
+        const auto tiles = [](int n, int of) { return static_cast<std::uint32_t>((n + of - 1) / of); };
+        return std::array<std::uint32_t, 3>{tiles(size.width, 8), tiles(size.height, 8 * rows), 1};
+    };
+    const std::array<std::uint32_t, 3> groups = groups_of(1);
     std::vector<gpu::BufferRow> buffers{{"recorded", pixels * 4, Host::upload, floats},
                                         {"kept", pixels * 4, planes ? Host::none : Host::download, floats}};
     std::vector<gpu::PassRow> passes{{"flying pixels", "fit_plane/flying", {recorded}, {kept}, groups, {}}};
     if (planes) {
         buffers.insert(buffers.end(), {{"averages", pixels * 4, Host::none, floats},
-                                       {"depth out", pixels * 4, Host::download, floats},
-                                       {"normals out", pixels * 12, Host::download, floats}});
+                                       {"depth out", pixels * 4, Host::download},
+                                       {"normals out", pixels * 12, Host::download}});
         if (fuse) {
             buffers.insert(buffers.end(), {{"others", shared::most_neighbours * pixels * 4, Host::taken, floats},
                                            {"fused", pixels * 4, Host::none, floats},
@@ -41,9 +44,12 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
         }
         const std::vector<std::pair<int, int>> is_fused{{shared::spec_fused, fuse}};
         const int samples = fuse ? fused : kept, errs = fuse ? relief : kept; // unread without
-        passes.push_back({"average", "fit_plane/average", {samples, errs}, {averages}, groups, is_fused});
+        passes.push_back(
+            {"average", "fit_plane/average", {samples, errs}, {averages}, groups_of(shared::average_rows), is_fused});
         passes.push_back({"fit plane", "fit_plane/fit", {averages, errs}, {depth_out, normals_out}, groups, is_fused});
     }
+    for (gpu::BufferRow& buffer : buffers)
+        buffer.plain_writes = true;
     return std::make_unique<gpu::Program>(device, buffers, passes, sizeof(shared::FitPlaneConstants));
 }
 

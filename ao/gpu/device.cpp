@@ -167,11 +167,10 @@ std::string listing(const std::vector<DeviceInfo>& all) {
 }
 
 void open_device(Device::State& state) {
-    constexpr std::uint32_t most_lanes = 8;
     state.queue_family = static_cast<std::uint32_t>(compute_family(state.physical));
     const auto family = state.physical.getQueueFamilyProperties()[state.queue_family];
-    const std::vector<float> priorities(std::min(family.queueCount, most_lanes), 1.0F);
-    const vk::DeviceQueueCreateInfo queue({}, state.queue_family, priorities);
+    constexpr float priority = 1;
+    const vk::DeviceQueueCreateInfo queue({}, state.queue_family, 1, &priority);
     vk::PhysicalDeviceVulkan13Features features13;
     features13.synchronization2 = features13.maintenance4 = VK_TRUE;
     vk::PhysicalDeviceVulkan12Features features12;
@@ -179,8 +178,7 @@ void open_device(Device::State& state) {
     features12.pNext = &features13;
     const vk::DeviceCreateInfo info({}, queue, {}, push_descriptors, nullptr, &features12);
     state.device = vk::raii::Device(state.physical, info);
-    for (std::uint32_t i = 0; i < priorities.size(); ++i)
-        state.lanes.emplace_back(state.device.getQueue(state.queue_family, i));
+    state.queue = state.device.getQueue(state.queue_family, 0);
     state.memory = state.physical.getMemoryProperties();
     state.nanoseconds_per_tick = state.physical.getProperties().limits.timestampPeriod;
     state.has_timestamps = family.timestampValidBits > 0;

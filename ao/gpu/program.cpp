@@ -168,7 +168,6 @@ std::vector<std::string> problems(std::span<const BufferRow> buffers, std::span<
 
 struct Program::State {
     Device::State& gpu;
-    Lane& lane;
     vk::raii::CommandPool pool; // of its own: pools, like programs, are one thread's at a time
     std::vector<BufferRow> rows;
     std::vector<PassRow> passes;
@@ -194,7 +193,7 @@ struct Program::State {
     std::vector<Copy> taken, given;
 
     State(Device::State& gpu_, std::vector<BufferRow> rows_, std::vector<PassRow> passes_)
-        : gpu(gpu_), lane(gpu.lanes[gpu.programs++ % gpu.lanes.size()]),
+        : gpu(gpu_),
           pool(gpu.device.createCommandPool({vk::CommandPoolCreateFlagBits::eResetCommandBuffer, gpu.queue_family})),
           rows(std::move(rows_)), passes(std::move(passes_)) {}
 
@@ -238,8 +237,8 @@ struct Program::State {
     [[nodiscard]] vk::DescriptorType type_of(int buffer, bool written) const {
         if (is_image(buffer))
             return written ? vk::DescriptorType::eStorageImage : vk::DescriptorType::eCombinedImageSampler;
-        return rows[buffer].texels == BufferRow::Texels::none ? vk::DescriptorType::eStorageBuffer
-                                                              : vk::DescriptorType::eStorageTexelBuffer;
+        const bool plain = rows[buffer].texels == BufferRow::Texels::none || (written && rows[buffer].plain_writes);
+        return plain ? vk::DescriptorType::eStorageBuffer : vk::DescriptorType::eStorageTexelBuffer;
     }
 
     /// Null where the pass fills buffers.
@@ -454,8 +453,8 @@ struct Program::State {
                 infos.emplace_back(each);
         constexpr std::uint64_t patience_ns = 120'000'000'000;
         {
-            const std::lock_guard alone(lane.submitting);
-            lane.queue.submit2(vk::SubmitInfo2({}, {}, infos), *fence);
+            const std::lock_guard alone(gpu.submitting);
+            gpu.queue.submit2(vk::SubmitInfo2({}, {}, infos), *fence);
         }
         if (gpu.device.waitForFences(*fence, VK_TRUE, patience_ns) != vk::Result::eSuccess)
             throw DeviceLost("did not finish within 120 s");

@@ -36,6 +36,8 @@ struct BufferRow {
         std::uint32_t width = 0, height = 0, layers = 0, mips = 0;
     };
     Image image = {};
+    /// Passes that write these texels see a storage buffer: lavapipe stores to one in a quarter of the time.
+    bool plain_writes = false;
 };
 
 /// Bytes of all mips of all layers, mip by mip, layer by layer, row by row, as Program::read_back() returns them.

@@ -5,10 +5,7 @@
 #include "ao/gpu/pipeline.h"
 #include "projection/error.h"
 
-#include <atomic>
-#include <deque>
 #include <mutex>
-#include <utility>
 #include <vulkan/vulkan_raii.hpp>
 
 namespace scanshade::gpu {
@@ -37,13 +34,6 @@ struct Messages {
     std::vector<std::string> texts;
 };
 
-/// A queue that one thread at a time may submit to.
-struct Lane {
-    explicit Lane(vk::raii::Queue own) : queue(std::move(own)) {} // clang 14 makes no aggregate in place
-    vk::raii::Queue queue;
-    std::mutex submitting;
-};
-
 /// Vulkan's loader; throws Error where it is not installed.
 [[nodiscard]] vk::raii::Context loader();
 
@@ -56,8 +46,10 @@ struct Device::State {
     vk::raii::PhysicalDevice physical = nullptr;
     vk::raii::Device device = nullptr;
     std::uint32_t queue_family = 0;
-    std::deque<Lane> lanes; ///< programs take turns on them, so they do not wait for each other
-    std::atomic<std::size_t> programs = 0;
+    /// One for all programs. With several, NVIDIA's driver 580 now and then lost the device (Xid 109, the switch
+    /// between them timed out), and frames came no faster.
+    vk::raii::Queue queue = nullptr;
+    std::mutex submitting; ///< to be held by who submits
     Pipelines pipelines;
     vk::PhysicalDeviceMemoryProperties memory;
     double nanoseconds_per_tick = 1;

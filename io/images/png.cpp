@@ -1,4 +1,4 @@
-// PNG: the plainest grey with ISA-L (png_input.h), all others with libpng, whose errors jump out of its functions
+// PNG: plain grey and RGB with ISA-L (png_input.h), all others with libpng, whose errors jump out of its functions
 // (setjmp), so their callers hold no objects.
 #include "io/images/png_input.h"
 #include "io/images/readers.h"
@@ -90,13 +90,15 @@ cv::Mat decoded(std::string_view bytes, const ImageFacts& facts, int type, const
 
 cv::Mat stored_png(std::string_view bytes, const ImageFacts& facts, const Path& file) {
     check_png_chunks(bytes, facts, file);
-    cv::Mat image = decoded_grey_png(bytes);
-    return image.empty() ? decoded(bytes, facts, facts.bits == 16 ? CV_16UC1 : CV_8UC1, file) : image;
+    const int type = facts.bits == 16 ? CV_16UC1 : CV_8UC1;
+    cv::Mat image = decoded_plain_png(bytes);
+    return image.empty() || image.type() != type ? decoded(bytes, facts, type, file) : image;
 }
 
 cv::Mat3b colour_png(std::string_view bytes, const ImageFacts& facts, const Path& file) {
     check_png_chunks(bytes, facts, file);
-    return decoded(bytes, facts, CV_8UC3, file);
+    cv::Mat image = facts.channels == 3 ? decoded_plain_png(bytes) : cv::Mat();
+    return image.empty() || image.type() != CV_8UC3 ? decoded(bytes, facts, CV_8UC3, file) : image;
 }
 
 } // namespace scanshade::images

@@ -4,10 +4,12 @@
 #include "projection/error.h"
 
 #include <algorithm>
+#include <cstring>
 #include <fmt/format.h>
 #include <isa-l/crc.h>
 #include <isa-l/igzip_lib.h>
 #include <memory>
+#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <string_view>
 
@@ -37,39 +39,55 @@ std::string header_of(const cv::Mat& image) {
     return header + std::string(3, '\0');            // deflate, the five filters, not interlaced
 }
 
-/// A row's samples in PNG's order: red first, high byte first.
-void copy_samples(const cv::Mat& image, int row, unsigned char* to) {
-    const int samples = image.cols * image.channels();
-    if (image.depth() == CV_16U) {
-        const ushort* from = image.ptr<ushort>(row);
-        for (int i = 0; i < samples; ++i) {
-            const ushort value = from[image.channels() == 3 ? i + 2 - 2 * (i % 3) : i];
-            to[2 * i] = static_cast<unsigned char>(value >> 8);
-            to[2 * i + 1] = static_cast<unsigned char>(value & 0xff);
-        }
-        return;
-    }
-    const uchar* from = image.ptr<uchar>(row);
-    if (image.channels() == 1)
-        std::copy_n(from, samples, to);
+/// Rows with samples in PNG's order: red first, high byte first.
+cv::Mat in_file_order(const cv::Mat& rows) {
+    cv::Mat ordered; // not the rows themselves: these are the caller's
+    if (rows.channels() == 3)
+        cv::cvtColor(rows, ordered, cv::COLOR_BGR2RGB);
     else
-        for (int i = 0; i < samples; i += 3) {
-            to[i] = from[i + 2];
-            to[i + 1] = from[i + 1];
-            to[i + 2] = from[i];
-        }
+        ordered = rows;
+    if (rows.depth() != CV_16U)
+        return ordered;
+    cv::Mat swapped(ordered.size(), ordered.type());
+    const int samples = ordered.cols * ordered.channels();
+    for (int v = 0; v < ordered.rows; ++v) {
+        const auto* from = ordered.ptr<std::uint16_t>(v);
+        auto* to = swapped.ptr<std::uint16_t>(v);
+        for (int i = 0; i < samples; ++i)
+            to[i] = static_cast<std::uint16_t>(from[i] << 8 | from[i] >> 8);
+    }
+    return swapped;
 }
 
-/// Rows as differences to the pixel on the left (filter 1, Sub), each behind the filter's number.
-std::string filtered(const cv::Mat& rows) {
-    const std::size_t pixel = rows.elemSize(), row = pixel * static_cast<std::size_t>(rows.cols);
-    std::string bytes((row + 1) * static_cast<std::size_t>(rows.rows), '\1');
-    const auto samples = std::make_unique<unsigned char[]>(row + pixel); // a pixel of zeros comes first
-    for (int v = 0; v < rows.rows; ++v) {
-        copy_samples(rows, v, samples.get() + pixel);
-        char* to = bytes.data() + static_cast<std::size_t>(v) * (row + 1) + 1;
-        for (std::size_t i = 0; i < row; ++i)
-            to[i] = static_cast<char>(samples[i + pixel] - samples[i]);
+/// Memory that is written before it is read: zeros would take as long as the filter.
+struct Bytes {
+    std::unique_ptr<char[]> data;
+    std::size_t size = 0;
+
+    explicit Bytes(std::size_t size_) : data(new char[size_]), size(size_) {}
+};
+
+void subtract(const uchar* a, const uchar* b, std::size_t count, char* to) {
+    for (std::size_t i = 0; i < count; ++i)
+        to[i] = static_cast<char>(a[i] - b[i]);
+}
+
+/// The rows from `from` to `to` as differences to the row above (filter 2, Up), each behind the filter's number. Of
+/// depth, AO and pictures of them it leaves 1 to 10 % fewer bytes than differences to the left.
+Bytes filtered(const cv::Mat& image, int from, int to) {
+    const std::size_t row = image.elemSize() * static_cast<std::size_t>(image.cols);
+    const int first = std::max(from - 1, 0); // the row above belongs to the band before
+    const cv::Mat rows = in_file_order(image.rowRange(first, to));
+    Bytes bytes((row + 1) * static_cast<std::size_t>(to - from));
+    char* out = bytes.data.get();
+    for (int v = from; v < to; ++v) {
+        const uchar* here = rows.ptr(v - first);
+        *out++ = '\2';
+        if (v == 0)
+            std::memcpy(out, here, row);
+        else
+            subtract(here, rows.ptr(v - first - 1), row, out);
+        out += row;
     }
     return bytes;
 }
@@ -86,17 +104,17 @@ class Packer {
         stream_.level_buf_size = ISAL_DEF_LVL3_DEFAULT;
         stream_.gzip_flag = IGZIP_ZLIB;
     }
-    void append(const std::string& bytes, bool last, std::string& packed) {
-        stream_.next_in = const_cast<std::uint8_t*>(as_bytes(bytes.data())); // is only read
-        stream_.avail_in = static_cast<std::uint32_t>(bytes.size());
+    void append(const Bytes& bytes, bool last, std::string& packed) {
+        stream_.next_in = reinterpret_cast<std::uint8_t*>(bytes.data.get());
+        stream_.avail_in = static_cast<std::uint32_t>(bytes.size);
         stream_.end_of_stream = last ? 1 : 0;
-        std::string piece(bytes.size() + bytes.size() / 8 + 1024, '\0'); // incompressible data are stored
+        const Bytes piece(bytes.size + bytes.size / 8 + 1024); // incompressible data are stored
         do {
-            stream_.next_out = reinterpret_cast<std::uint8_t*>(piece.data());
-            stream_.avail_out = static_cast<std::uint32_t>(piece.size());
+            stream_.next_out = reinterpret_cast<std::uint8_t*>(piece.data.get());
+            stream_.avail_out = static_cast<std::uint32_t>(piece.size);
             if (const int code = isal_deflate(&stream_); code != COMP_OK)
                 throw std::runtime_error(fmt::format("pixels could not be packed: ISA-L's code {}", code));
-            packed.append(piece, 0, piece.size() - stream_.avail_out);
+            packed.append(piece.data.get(), piece.size - stream_.avail_out);
         } while (stream_.avail_out == 0);
         if (last && stream_.internal_state.state != ZSTATE_END)
             throw std::runtime_error("pixels could not be packed: ISA-L did not end its stream");
@@ -116,7 +134,7 @@ std::string packed(const cv::Mat& image) {
     std::string result;
     for (int from = 0; from < image.rows; from += rows_at_once) {
         const int to = std::min(from + rows_at_once, image.rows);
-        packer.append(filtered(image.rowRange(from, to)), to == image.rows, result);
+        packer.append(filtered(image, from, to), to == image.rows, result);
     }
     return result;
 }
@@ -130,6 +148,7 @@ std::string encoded_png(const cv::Mat& image) {
     constexpr std::size_t most = std::size_t(1) << 30; // chunks end at 2^31 - 1 bytes
     const std::string pixels = packed(image);
     std::string bytes = "\x89PNG\r\n\x1a\n";
+    bytes.reserve(pixels.size() + pixels.size() / most * 12 + 100);
     append_chunk(bytes, "IHDR", header_of(image));
     for (std::size_t at = 0; at < pixels.size(); at += most)
         append_chunk(bytes, "IDAT", std::string_view(pixels).substr(at, most));

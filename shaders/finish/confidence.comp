@@ -7,7 +7,7 @@
 
 layout(local_size_x = finish_row) in;
 layout(binding = 0, r32f) readonly uniform imageBuffer seen; // z; far behind the camera where nothing was seen
-layout(binding = 16, r32f) uniform writeonly imageBuffer confidence;
+layout(binding = 16, scalar) writeonly buffer Out { float confidence[]; };
 layout(binding = 32, scalar) uniform Constants { FinishConstants constants; };
 
 void main() {
@@ -31,5 +31,5 @@ void main() {
     float resolved = clamp(0.5 * (k.radius * sqrt(focal.x * focal.y) * inverse) - 0.5, 0.0, 1.0);
     float told = max(0.0, 1.0 - 3.0 * (k.noise_floor + k.noise_per_z2 * z * z) / k.radius);
     float share = float(count) * (1.0 / float(confidence_seeds));
-    imageStore(confidence, here, vec4(known ? share * resolved * told : uintBitsToFloat(0x7fc00000u)));
+    confidence[here] = known ? share * resolved * told : uintBitsToFloat(0x7fc00000u);
 }

@@ -7,7 +7,7 @@
 
 layout(local_size_x = finish_row) in;
 layout(binding = 0, r32f) readonly uniform imageBuffer surface;
-layout(binding = 16, r32f) uniform writeonly imageBuffer cosine;
+layout(binding = 16, scalar) writeonly buffer Out { float cosine[]; };
 layout(binding = 32, scalar) uniform Constants { FinishConstants constants; };
 
 FinishConstants k;
@@ -27,5 +27,5 @@ void main() {
     vec3 normal = vec3(focal * vec2(du, dv), w - du * from_centre.x - dv * from_centre.y);
     vec3 ray = vec3(from_centre / focal, 1.0);
     float lengths = dot(normal, normal) * dot(ray, ray);
-    imageStore(cosine, at, vec4(w > 0.0 && lengths > 0.0 ? abs(dot(normal, ray)) * inversesqrt(lengths) : 0.0));
+    cosine[at] = w > 0.0 && lengths > 0.0 ? abs(dot(normal, ray)) * inversesqrt(lengths) : 0.0;
 }

@@ -17,9 +17,9 @@ layout(binding = 4, r32ui) readonly uniform uimageBuffer colour;       // bytes:
 layout(binding = 5, r32ui) readonly uniform uimageBuffer colour_known; // bytes: 0 = not
 layout(binding = 6, r32f) readonly uniform imageBuffer linear_light;   // of the 256 stored values, in steps
 layout(binding = 7, r32ui) readonly uniform uimageBuffer stored_light; // of every step
-layout(binding = 16, r32ui) uniform writeonly uimageBuffer map_out;
-layout(binding = 17, r32ui) uniform writeonly uimageBuffer confidence_out;
-layout(binding = 18, r32ui) uniform writeonly uimageBuffer picture_out;
+layout(binding = 16, scalar) writeonly buffer MapOut { uint map_out[]; };
+layout(binding = 17, scalar) writeonly buffer ConfidenceOut { uint confidence_out[]; };
+layout(binding = 18, scalar) writeonly buffer PictureOut { uint picture_out[]; };
 layout(binding = 32, scalar) uniform Constants { FinishConstants k; };
 
 const uvec3 no_surface = uvec3(no_surface_blue, no_surface_green, no_surface_red);
@@ -57,18 +57,18 @@ void main() {
     if (map_bits == 16) {
         uvec4 v = uvec4(as_integer(visible.x, 65535.0), as_integer(visible.y, 65535.0), as_integer(visible.z, 65535.0),
                         as_integer(visible.w, 65535.0));
-        imageStore(map_out, 2 * word, uvec4(v.x | v.y << 16));
-        imageStore(map_out, 2 * word + 1, uvec4(v.z | v.w << 16));
+        map_out[2 * word] = v.x | v.y << 16;
+        map_out[2 * word + 1] = v.z | v.w << 16;
     }
     if (map_bits == 8) {
         uvec4 v = uvec4(as_integer(visible.x, 255.0), as_integer(visible.y, 255.0), as_integer(visible.z, 255.0),
                         as_integer(visible.w, 255.0));
-        imageStore(map_out, word, uvec4(v.x | v.y << 8 | v.z << 16 | v.w << 24));
+        map_out[word] = v.x | v.y << 8 | v.z << 16 | v.w << 24;
     }
     if (confidence_bits == 8) {
         uvec4 v = uvec4(as_integer(imageLoad(confidence, at.x).x, 255.0), as_integer(imageLoad(confidence, at.y).x, 255.0),
                         as_integer(imageLoad(confidence, at.z).x, 255.0), as_integer(imageLoad(confidence, at.w).x, 255.0));
-        imageStore(confidence_out, word, uvec4(v.x | v.y << 8 | v.z << 16 | v.w << 24));
+        confidence_out[word] = v.x | v.y << 8 | v.z << 16 | v.w << 24;
     }
     if (picture == picture_none) return;
     uvec3 c = uvec3(0u);
@@ -80,7 +80,7 @@ void main() {
     uvec3 b = pixel_of(at.y, uvec3(byte_of(c.x, 3), byte_of(c.y, 0), byte_of(c.y, 1)), byte_of(known, 1), visible.y);
     uvec3 d = pixel_of(at.z, uvec3(byte_of(c.y, 2), byte_of(c.y, 3), byte_of(c.z, 0)), byte_of(known, 2), visible.z);
     uvec3 e = pixel_of(at.w, uvec3(byte_of(c.z, 1), byte_of(c.z, 2), byte_of(c.z, 3)), byte_of(known, 3), visible.w);
-    imageStore(picture_out, 3 * word, uvec4(a.x | a.y << 8 | a.z << 16 | b.x << 24));
-    imageStore(picture_out, 3 * word + 1, uvec4(b.y | b.z << 8 | d.x << 16 | d.y << 24));
-    imageStore(picture_out, 3 * word + 2, uvec4(d.z | e.x << 8 | e.y << 16 | e.z << 24));
+    picture_out[3 * word] = a.x | a.y << 8 | a.z << 16 | b.x << 24;
+    picture_out[3 * word + 1] = b.y | b.z << 8 | d.x << 16 | d.y << 24;
+    picture_out[3 * word + 2] = d.z | e.x << 8 | e.y << 16 | e.z << 24;
 }

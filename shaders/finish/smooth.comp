@@ -7,7 +7,7 @@
 layout(local_size_x = finish_row) in;
 layout(constant_id = spec_down) const int down = 0;
 layout(binding = 0, r32f) readonly uniform imageBuffer surface;
-layout(binding = 16, r32f) uniform writeonly imageBuffer mean;
+layout(binding = 16, scalar) writeonly buffer Out { float mean[]; };
 layout(binding = 32, scalar) uniform Constants { FinishConstants constants; };
 
 FinishConstants k;
@@ -22,5 +22,5 @@ void main() {
     Line line = along(p, down == 0 ? ivec2(1, 0) : ivec2(0, 1), w, 4);
     // Beside an edge the neighbours lie on one side only, where a slanted surface has another mean: leave it be.
     float smoothed = line.moment == 0.0 ? w + line.sum / (line.count + 1.0) : w;
-    imageStore(mean, at, vec4(w != 0.0 ? smoothed : 0.0));
+    mean[at] = w != 0.0 ? smoothed : 0.0;
 }

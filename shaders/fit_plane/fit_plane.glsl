@@ -1,5 +1,8 @@
 // A plane in 1/z through weighted samples: 1/z is linear in the image on any plane. Included by the passes of the plane fit,
-// which declare `samples`, their 1/z (0 where there is none), `relief`, and `k`.
+// which declare `samples`, their 1/z (`nowhere` where there is none), `relief`, and `k`.
+//
+// Almost all time goes into taking up a sample, so that is kept short: no sample is asked whether it is a hole or lies outside
+// the image. Those are so far from what is expected that their weight is zero. And what a row has in common waits for its end.
 
 // w = c + x a + y b, relative to the pixel and its own 1/z.
 struct Plane {
@@ -7,80 +10,63 @@ struct Plane {
 };
 const Plane level = Plane(0.0, 0.0, 0.0);
 
+// Of samples at (x, y) with weight g and residual r, their distance from the plane that is expected.
 struct Sums {
-    float g, gx, gy, gxx, gxy, gyy, gw, gxw, gyw;
+    float g, gx, gy, gxx, gxy, gyy, gr, gxr, gyr;
 };
 const Sums nothing = Sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
 
-// Weights (1 - (r / tolerance)^2)^2, none beyond it (Tukey's biweight); `narrow` is 1 / tolerance.
-void add(inout Sums s, float w_here, bool ok, int at, float x, float y, Plane plane, float narrow) {
-    float recorded = imageLoad(samples, ok ? at : 0).x;
-    float w = recorded - w_here;
-    float e = (w - (plane.c + x * plane.a + y * plane.b)) * narrow;
-    float g = positive(1.0 - e * e);
-    g = ok && recorded > 0.0 ? g * g : 0.0;
-    float gx = g * x, gy = g * y;
-    s.g += g;
-    s.gx += gx;
-    s.gy += gy;
-    s.gxx += gx * x;
-    s.gxy += gx * y;
-    s.gyy += gy * y;
-    s.gw += g * w;
-    s.gxw += gx * w;
-    s.gyw += gy * w;
+struct Row {
+    float g, gx, gxx, gr, gxr;
+};
+
+// (1 - (r / tolerance)^2)^2, none beyond it (Tukey's biweight); `narrow` is 1 / tolerance.
+float weight(float r, float narrow) {
+    float e = r * narrow, g = positive(1.0 - e * e);
+    return g * g;
 }
 
-// Least squares; false where the samples lie on a line or are too few to tell a plane.
-bool solve(Sums s, out Plane plane) {
+Row row_from(float middle, float narrow) {
+    float g = weight(middle, narrow);
+    return Row(g, 0.0, 0.0, g * middle, 0.0);
+}
+
+// Residuals of samples x to either side.
+void add_pair(inout Row row, float x, float before, float after, float narrow) {
+    float g = weight(before, narrow), h = weight(after, narrow), both = g + h;
+    float gr = g * before, hr = h * after;
+    row.g += both;
+    row.gx += x * (h - g);
+    row.gxx += x * x * both;
+    row.gr += gr + hr;
+    row.gxr += x * (hr - gr);
+}
+
+void add_row(inout Sums s, float y, Row row) {
+    s.g += row.g;
+    s.gx += row.gx;
+    s.gy += y * row.g;
+    s.gxx += row.gxx;
+    s.gxy += y * row.gx;
+    s.gyy += y * y * row.g;
+    s.gr += row.gr;
+    s.gxr += row.gxr;
+    s.gyr += y * row.gr;
+}
+
+// Least squares; false where the samples lie on a line or are too few to tell a plane, which then is level.
+bool solve(Sums s, Plane expected, out Plane plane) {
     float n = 1.0 / max(s.g, 1e-6);
-    float mx = s.gx * n, my = s.gy * n, mw = s.gw * n;
+    float mx = s.gx * n, my = s.gy * n, mr = s.gr * n;
     float xx = s.gxx - mx * s.gx, xy = s.gxy - mx * s.gy, yy = s.gyy - my * s.gy;
-    float xw = s.gxw - mx * s.gw, yw = s.gyw - my * s.gw;
+    float xr = s.gxr - mx * s.gr, yr = s.gyr - my * s.gr;
     float determinant = xx * yy - xy * xy;
     bool good = s.g > 3.0 && determinant > 0.02 * xx * yy;
     float d = 1.0 / max(determinant, 1e-12);
-    plane.a = good ? (xw * yy - yw * xy) * d : 0.0;
-    plane.b = good ? (yw * xx - xw * xy) * d : 0.0;
-    plane.c = good ? mw - mx * plane.a - my * plane.b : 0.0;
+    float a = (xr * yy - yr * xy) * d, b = (yr * xx - xr * xy) * d;
+    plane = level;
+    if (good) plane = Plane(expected.a + a, expected.b + b, expected.c + mr - mx * a - my * b);
     return good;
-}
-
-// The row j of samples `spread` pixels apart, `reach` to either side.
-#define COLUMN(i) { int o = nearest(float(i) * spread); int u = p.x + o; \
-    add(sums, w_here, row_ok && uint(u) < uint(k.size.x), line + u, float(o), y, plane, narrow); }
-
-void row(inout Sums sums, ivec2 p, float w_here, int j, int reach, float spread, Plane plane, float narrow) {
-    int o = nearest(float(j) * spread);
-    int v = p.y + o;
-    bool row_ok = uint(v) < uint(k.size.y);
-    int line = v * k.size.x;
-    float y = float(o);
-    if (reach == 3) COLUMN(-3)
-    COLUMN(-2) COLUMN(-1) COLUMN(0) COLUMN(1) COLUMN(2)
-    if (reach == 3) COLUMN(3)
-}
-
-Sums square5(ivec2 p, float w_here, float spread, Plane plane, float narrow) {
-    Sums sums = nothing;
-    row(sums, p, w_here, -2, 2, spread, plane, narrow);
-    row(sums, p, w_here, -1, 2, spread, plane, narrow);
-    row(sums, p, w_here, 0, 2, spread, plane, narrow);
-    row(sums, p, w_here, 1, 2, spread, plane, narrow);
-    row(sums, p, w_here, 2, 2, spread, plane, narrow);
-    return sums;
-}
-
-Sums square7(ivec2 p, float w_here, float spread, Plane plane, float narrow) {
-    Sums sums = nothing;
-    row(sums, p, w_here, -3, 3, spread, plane, narrow);
-    row(sums, p, w_here, -2, 3, spread, plane, narrow);
-    row(sums, p, w_here, -1, 3, spread, plane, narrow);
-    row(sums, p, w_here, 0, 3, spread, plane, narrow);
-    row(sums, p, w_here, 1, 3, spread, plane, narrow);
-    row(sums, p, w_here, 2, 3, spread, plane, narrow);
-    row(sums, p, w_here, 3, 3, spread, plane, narrow);
-    return sums;
 }
 
 layout(constant_id = spec_fused) const int is_fused = 0;
@@ -89,8 +75,6 @@ layout(constant_id = spec_fused) const int is_fused = 0;
 float relief_at(int index) { return is_fused == 0 ? 1.0 : imageLoad(relief, index).x; }
 
 float sigma_of(float z) { return k.noise_floor + k.noise_per_z2 * z * z; }
-
-float window_of(float z, float sigma) { return clamp(sqrt(k.window * sigma * k.camera.fx / z), 1.5, k.largest_radius); }
 
 // A value may belong to a place that far from its pixel: sensors match windows, and alignment to colour takes the nearest pixel.
 // Lateral noise of structured light is 0.8 px (Nguyen, Izadi and Lovell 2012).
@@ -101,25 +85,9 @@ float sigma_on(Plane plane, float sigma) {
     return sqrt(sigma * sigma + lateral_px * lateral_px * (plane.a * plane.a + plane.b * plane.b));
 }
 
-float sample_at(ivec2 q) {
-    bool inside = all(lessThan(uvec2(q), uvec2(k.size)));
-    return inside ? imageLoad(samples, q.y * k.size.x + q.x).x : 0.0;
-}
-
-// The slope along `step` where 1/z changes evenly from one side to the other, else 0: at a jump one side is level.
-float slope_along(ivec2 p, float w_here, ivec2 step, ivec2 aside) {
-    float first = 0.0, second = 0.0;
-    bool all_there = true;
-    for (int i = -1; i <= 1; ++i) {
-        float before = sample_at(p - step + i * aside), after = sample_at(p + step + i * aside);
-        all_there = all_there && before > 0.0 && after > 0.0;
-        first += after - before;
-        second += after + before - 2.0 * w_here;
-    }
-    return all_there && abs(second) < 0.4 * abs(first) ? first / (6.0 * float(step.x + step.y)) : 0.0;
-}
-
-// What the first samples are compared with: level, but for even slopes.
-Plane slope_at(ivec2 p, float w_here, int reach) {
-    return Plane(slope_along(p, w_here, ivec2(reach, 0), ivec2(0, 1)), slope_along(p, w_here, ivec2(0, reach), ivec2(1, 0)), 0.0);
+// The slope from three samples on one side to three on the other, `apart` pixels away, where 1/z changes evenly, else 0: at a
+// jump one side is level. A hole among them takes both sums far and almost equally so.
+float slope_between(vec3 before, vec3 after, float w_here, float apart) {
+    float rise = dot(after - before, vec3(1.0)), bend = dot(after + before, vec3(1.0)) - 6.0 * w_here;
+    return abs(bend) < 0.4 * abs(rise) ? rise / (3.0 * apart) : 0.0;
 }

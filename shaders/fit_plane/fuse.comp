@@ -8,10 +8,10 @@
 #include "lib/neighbour.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(binding = 0, r32f) readonly uniform imageBuffer kept;       // 1/z, 0 where there is none
+layout(binding = 0, r32f) readonly uniform imageBuffer kept;       // 1/z, `nowhere` where there is none
 layout(binding = 1, r32f) readonly uniform imageBuffer neighbours; // z of each, one image after the other
-layout(binding = 16, r32f) uniform writeonly imageBuffer fused;    // 1/z
-layout(binding = 17, r32f) uniform writeonly imageBuffer relief;   // of what one frame errs, how much is left
+layout(binding = 16, scalar) writeonly buffer Fused { float fused[]; };   // like `kept`
+layout(binding = 17, scalar) writeonly buffer Relief { float relief[]; }; // of what one frame errs, how much is left
 layout(binding = 32, scalar) uniform Constants { FitPlaneConstants constants; };
 
 void main() {
@@ -38,6 +38,6 @@ void main() {
         weights += weight;
         sum += weight * (recorded - there.z) / along;
     } while (++i < k.neighbours);
-    imageStore(fused, here, vec4(hole ? 0.0 : 1.0 / (z + sum / weights)));
-    imageStore(relief, here, vec4(inversesqrt(weights)));
+    fused[here] = hole ? nowhere : 1.0 / (z + sum / weights);
+    relief[here] = inversesqrt(weights);
 }

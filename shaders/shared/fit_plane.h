@@ -1,4 +1,4 @@
-// What host and shader share of the plane fit (shaders/fit_plane/fit.comp).
+// What host and shader share of the plane fit (shaders/fit_plane).
 #ifndef SCANSHADE_SHARED_FIT_PLANE_H
 #define SCANSHADE_SHARED_FIT_PLANE_H
 #include "neighbour.h"
@@ -17,6 +17,13 @@ struct FitPlaneConstants {
 
 // Specialization constant: 1 = samples have been averaged over frames, and tell by how much less they err.
 const int spec_fused = 0;
+
+// In place of 1/z where there is none: so far behind all surfaces that no fit gives it weight, and its square still is
+// a number.
+const float nowhere = -1e17f;
+
+// Pixels of a column that one thread averages around.
+const int average_rows = 4;
 
 SHARED_END
 #endif

@@ -129,14 +129,14 @@ TEST(depth_images, a_large_png_packed_and_unpacked_in_pieces_is_one_stream) {
         value = static_cast<ushort>(2000 + (random >> 28));
     }
     std::string bytes = encoded_png(image);
-    EXPECT_EQ(cv::norm(decoded_grey_png(bytes), image, cv::NORM_INF), 0);
+    EXPECT_EQ(cv::norm(decoded_plain_png(bytes), image, cv::NORM_INF), 0);
     EXPECT_EQ(cv::norm(cv::imdecode(std::vector<char>(bytes.begin(), bytes.end()), cv::IMREAD_UNCHANGED), image,
                        cv::NORM_INF),
               0)
         << "libpng reads the same";
     constexpr std::size_t from_end_of_stream = 12 + 4 + 2; // IEND, a checksum, and into the stream's own
     bytes[bytes.size() - from_end_of_stream] ^= 1;
-    EXPECT_TRUE(decoded_grey_png(bytes).empty()) << "the stream's checksum does not fit";
+    EXPECT_TRUE(decoded_plain_png(bytes).empty()) << "the stream's checksum does not fit";
 }
 
 TEST(depth_images, what_a_png_cannot_hold_becomes_a_hole) {
@@ -955,9 +955,10 @@ TEST(images, our_pngs_come_back_bit_by_bit) {
             ASSERT_EQ(back.type(), type);
             ASSERT_EQ(back.size(), size);
             EXPECT_EQ(cv::norm(back, image, cv::NORM_INF), 0);
-            if (image.channels() == 1) {
-                EXPECT_EQ(cv::norm(decoded_grey_png(bytes), image, cv::NORM_INF), 0);
-            }
+            if (type == CV_16UC3)
+                EXPECT_TRUE(decoded_plain_png(bytes).empty());
+            else
+                EXPECT_EQ(cv::norm(decoded_plain_png(bytes), image, cv::NORM_INF), 0);
             const cv::Mat inner = image(cv::Rect(0, 0, (size.width + 1) / 2, size.height)); // rows lie apart in memory
             EXPECT_EQ(encoded_png(inner), encoded_png(inner.clone()));
         }
@@ -999,9 +1000,18 @@ TEST(images, the_same_pixels_are_the_same_bytes_wherever_the_stack_lies) {
     EXPECT_EQ(different, 0U);
 }
 
-/// Grey PNGs that another library wrote, with each of the five filters, in one chunk or many, as it reads them itself;
-/// what is not plain grey is left to it, and so is what is damaged.
-TEST(images, grey_pngs_are_read_as_libpng_reads_them) {
+/// An image that is packed in bands: a row's differences are those to the last row of the band before.
+TEST(images, bands_of_a_large_png_fit_together) {
+    cv::Mat1w image(3000, 12000); // 72 MB
+    for (int y = 0; y < image.rows; ++y)
+        for (int x = 0; x < image.cols; ++x)
+            image(y, x) = static_cast<ushort>(x * (y / 500 + 1) + y);
+    EXPECT_EQ(cv::norm(decoded_plain_png(encoded_png(image)), image, cv::NORM_INF), 0);
+}
+
+/// PNGs that another library wrote, with each of the five filters, in one chunk or many, as it reads them itself; what
+/// is not plain grey or RGB is left to it, and so is what is damaged.
+TEST(images, plain_pngs_are_read_as_libpng_reads_them) {
     cv::theRNG().state = 3;
     const auto chunk = [](const std::string& type, const std::string& content) {
         std::string bytes;
@@ -1014,7 +1024,8 @@ TEST(images, grey_pngs_are_read_as_libpng_reads_them) {
         append(crc32(0, reinterpret_cast<const Bytef*>(bytes.data()) + 4, static_cast<uInt>(bytes.size() - 4)));
         return bytes;
     };
-    const auto png = [&](cv::Size size, int bits, const std::string& filtered, std::size_t piece, bool transparent) {
+    const auto png = [&](cv::Size size, int bits, int channels, const std::string& filtered, std::size_t piece,
+                         bool transparent) {
         std::string head(8, '\0');
         for (int i = 0; i < 4; ++i) {
             head[3 - i] = static_cast<char>(size.width >> (8 * i) & 0xff);
@@ -1025,9 +1036,11 @@ TEST(images, grey_pngs_are_read_as_libpng_reads_them) {
         compress2(reinterpret_cast<Bytef*>(packed.data()), &length, reinterpret_cast<const Bytef*>(filtered.data()),
                   filtered.size(), 6);
         packed.resize(length);
-        std::string file = "\x89PNG\r\n\x1a\n" + chunk("IHDR", head + static_cast<char>(bits) + std::string(4, '\0'));
+        std::string file =
+            "\x89PNG\r\n\x1a\n" +
+            chunk("IHDR", head + static_cast<char>(bits) + (channels == 3 ? '\x02' : '\0') + std::string(3, '\0'));
         if (transparent)
-            file += chunk("tRNS", std::string(2, '\0'));
+            file += chunk("tRNS", std::string(2 * static_cast<std::size_t>(channels), '\0'));
         for (std::size_t at = 0; at < packed.size(); at += piece)
             file += chunk("IDAT", packed.substr(at, piece));
         return file + chunk("IEND", "");
@@ -1036,29 +1049,31 @@ TEST(images, grey_pngs_are_read_as_libpng_reads_them) {
         return cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data())),
                             cv::IMREAD_UNCHANGED);
     };
-    for (const int bits : {8, 16})
+    for (const auto& [bits, channels] : {std::pair(8, 1), std::pair(16, 1), std::pair(8, 3)})
         for (const cv::Size size : {cv::Size(1, 1), cv::Size(1, 9), cv::Size(37, 11), cv::Size(320, 241)}) {
             std::string filtered; // any bytes are some image, whatever the filter
             for (int y = 0; y < size.height; ++y) {
                 filtered += static_cast<char>(y % 5);
-                for (int i = 0; i < size.width * bits / 8; ++i)
+                for (int i = 0; i < size.width * channels * bits / 8; ++i)
                     filtered += static_cast<char>(cv::theRNG().uniform(0, 256) & cv::theRNG().uniform(0, 256));
             }
             for (const std::size_t piece : {std::size_t(7), std::size_t(1) << 20}) {
-                const std::string file = png(size, bits, filtered, piece, false);
-                const cv::Mat ours = decoded_grey_png(file), theirs = libpng(file);
+                const std::string file = png(size, bits, channels, filtered, piece, false);
+                const cv::Mat ours = decoded_plain_png(file), theirs = libpng(file);
                 ASSERT_EQ(read_image_header(file, "image").bits, bits);
                 ASSERT_EQ(ours.type(), theirs.type());
                 ASSERT_EQ(ours.size(), size);
                 EXPECT_EQ(cv::norm(ours, theirs, cv::NORM_INF), 0) << size << " of " << bits << " bits";
             }
-            EXPECT_TRUE(decoded_grey_png(png(size, bits, filtered, 1000, true)).empty()) << "transparency";
-            EXPECT_TRUE(decoded_grey_png(png(size, bits, filtered + "x", 1000, false)).empty()) << "more than pixels";
-            EXPECT_TRUE(decoded_grey_png(png(size, bits, filtered.substr(1), 1000, false)).empty()) << "fewer";
+            EXPECT_TRUE(decoded_plain_png(png(size, bits, channels, filtered, 1000, true)).empty()) << "transparency";
+            EXPECT_TRUE(decoded_plain_png(png(size, bits, channels, filtered + "x", 1000, false)).empty())
+                << "more than pixels";
+            EXPECT_TRUE(decoded_plain_png(png(size, bits, channels, filtered.substr(1), 1000, false)).empty())
+                << "fewer";
             filtered[0] = 5;
-            EXPECT_TRUE(decoded_grey_png(png(size, bits, filtered, 1000, false)).empty()) << "no such filter";
+            EXPECT_TRUE(decoded_plain_png(png(size, bits, channels, filtered, 1000, false)).empty())
+                << "no such filter";
         }
-    EXPECT_TRUE(decoded_grey_png(encoded_png(cv::Mat3b(4, 4, cv::Vec3b(1, 2, 3)))).empty());
 }
 
 TEST(captures, noise_in_place_of_surfaces_is_doubted) {
