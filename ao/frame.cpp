@@ -45,7 +45,7 @@ AoMap FrameAo::compute_prepared(const DepthImage& depth, const DepthNoise& noise
     return method_.compute({.surfaces = fit_->compute(depth).depth, .noise = noise});
 }
 
-Neighbourhood FrameAo::sequence(double radius_m, const DepthNoise& noise, const NeighbourhoodOptions& options) {
+SequenceAo FrameAo::sequence(double radius_m, const DepthNoise& noise, const SequenceAoOptions& options) {
     assert(device_);
     return {*device_, method_, radius_m, noise, preparation_, options};
 }

@@ -2,11 +2,11 @@
 // depth, frames of a recording and the method are wired here once; the walk, `bench` and budgets all come in this way.
 #pragma once
 
+#include "ao/base/method.h"
 #include "ao/cloud/cloud_ao.h"
 #include "ao/finish/finish.h"
 #include "ao/fit_plane/fit_plane.h"
-#include "ao/method.h"
-#include "ao/sequence/neighbourhood.h"
+#include "ao/sequence/sequence_ao.h"
 
 #include <memory>
 #include <optional>
@@ -33,8 +33,8 @@ class FrameAo {
     /// Visibility of each pixel of `depth`; NaN exactly where there is no surface. Depth with noise is prepared first.
     [[nodiscard]] AoMap compute(const DepthImage& depth, const DepthNoise& noise);
     /// For the frames of one recording, each computed together with those around it. Must not outlive this one.
-    [[nodiscard]] Neighbourhood sequence(double radius_m, const DepthNoise& noise,
-                                         const NeighbourhoodOptions& options = alone());
+    [[nodiscard]] SequenceAo sequence(double radius_m, const DepthNoise& noise,
+                                      const SequenceAoOptions& options = alone());
 
     /// Plane fits' depth of the last compute(), on the device; null where none were made.
     [[nodiscard]] const std::shared_ptr<const gpu::DeviceBytes>& fitted_depth() const { return fitted_depth_; }

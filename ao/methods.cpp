@@ -1,11 +1,11 @@
 // The table of methods.
+#include "ao/base/method.h"
 #include "ao/cacao/cacao.h"
 #include "ao/gtao/bitmask.h"
 #include "ao/gtao/gtao.h"
 #include "ao/hbao/hbao.h"
 #include "ao/hemisphere/hemisphere.h"
 #include "ao/luna/luna.h"
-#include "ao/method.h"
 #include "ao/raycast/raycast.h"
 #include "ao/surfel/surfel.h"
 #include "projection/named.h"

@@ -11,7 +11,8 @@
 #include <fmt/format.h>
 #include <iterator>
 #include <map>
-#include <ranges>
+#include <nlohmann/json.hpp>
+#include <span>
 #include <utility>
 
 namespace scanshade {
@@ -224,7 +225,7 @@ void print_depth(const Findings& found) {
          fmt::format("{:.3f} .. {:.3f} m, median {:.3f} m", found.nearest_m, found.farthest_m, found.median_m));
     line("holes", fmt::format("{:.1f} %", 100 * hole_share(found.samples)));
     std::string steps;
-    for (const DepthStep& step : found.steps | std::views::take(6))
+    for (const DepthStep& step : std::span(found.steps).first(std::min<std::size_t>(found.steps.size(), 6)))
         steps += fmt::format("{}{:.2g} mm at {:.1f} m", steps.empty() ? "" : ", ", 1000 * step.step_m, step.from_m);
     line("depth step", steps.empty() ? "none seen" : steps);
 }
@@ -232,7 +233,7 @@ void print_depth(const Findings& found) {
 /// Many frames often have the same problem, so only the first few are listed.
 void print_some(const std::string& name, const std::vector<std::string>& texts) {
     constexpr std::size_t most = 8;
-    for (const std::string& text : texts | std::views::take(most))
+    for (const std::string& text : std::span(texts).first(std::min(texts.size(), most)))
         line(name, text);
     if (texts.size() > most)
         line(name, fmt::format("... and {} more; --json lists them all", texts.size() - most));

@@ -1,6 +1,8 @@
 // Values that both the manifest and `inspect --json` contain.
 #include "apps/json.h"
 
+#include <nlohmann/json.hpp>
+
 namespace scanshade {
 
 json to_json(const Camera& camera) {
@@ -40,6 +42,20 @@ std::size_t count_at(const json& object, const std::string& key) {
         throw Error("\"" + key + "\" is no whole number");
     return value.get<std::size_t>();
 }
+
+void rethrow_as_error() {
+    try {
+        throw;
+    } catch (const json::exception& failure) {
+        throw Error(failure.what());
+    }
+}
+
+json parsed_json(std::string_view text) { return json::parse(text); }
+
+json parsed_or_discarded(std::string_view text) { return json::parse(text, nullptr, false); }
+
+std::string json_line(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
 
 std::string text_of(const json& value) { return value.dump(2, ' ', false, json::error_handler_t::replace); }
 

@@ -1,6 +1,6 @@
 // The commands that print lists: methods, devices.
+#include "ao/base/method.h"
 #include "ao/gpu/device.h"
-#include "ao/method.h"
 #include "apps/command.h"
 #include "projection/error.h"
 

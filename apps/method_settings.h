@@ -1,7 +1,7 @@
 // A method with its settings as plain data, and the flags that set them.
 #pragma once
 
-#include "ao/method.h"
+#include "ao/base/method.h"
 #include "apps/command.h"
 
 #include <string>

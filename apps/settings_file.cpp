@@ -4,6 +4,7 @@
 #include "projection/error.h"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 namespace scanshade {
 namespace {

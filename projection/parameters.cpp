@@ -169,7 +169,7 @@ std::string range_text(const Parameter& row) {
         return "true | false";
     if (std::holds_alternative<std::string*>(row.value) || std::holds_alternative<OneOf>(row.value))
         return choices_text(row);
-    const std::string limits = limits_text(row);
+    std::string limits = limits_text(row); // not const: it is moved out
     if (!row.unit.empty())
         return limits.empty() ? row.unit : fmt::format("{}, {}", row.unit, limits);
     if (!limits.empty())

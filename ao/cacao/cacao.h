@@ -6,9 +6,9 @@
 // README, and each has a test that fails without it.
 #pragma once
 
+#include "ao/base/method.h"
+#include "ao/base/quality.h"
 #include "ao/gpu/program.h"
-#include "ao/method.h"
-#include "ao/quality.h"
 #include "shaders/shared/cacao.h"
 
 #include <array>

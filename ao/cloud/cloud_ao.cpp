@@ -1,6 +1,7 @@
 // Visibility of every point of a cloud: neighbours, planes, orientation, discs, rays, and means over neighbours.
 #include "ao/cloud/cloud_ao.h"
 
+#include "ao/base/watch.h"
 #include "ao/cloud/cloud_gpu.h"
 #include "ao/cloud/disc_rays.h"
 #include "ao/cloud/extent.h"
@@ -10,7 +11,6 @@
 #include "ao/cloud/tiles.h"
 #include "ao/cloud/twins.h"
 #include "ao/raycast/raycast.h"
-#include "ao/watch.h"
 #include "projection/error.h"
 #include "projection/hash.h"
 #include "projection/statistics.h"
@@ -376,7 +376,9 @@ class CloudAo::Work {
     }
 
     void tile(const Places& core, const Places& round, CloudGpu* gpu) {
-        auto [surface, fitted] = planes_of(round, gpu);
+        Fitted planes = planes_of(round, gpu);
+        CloudSurface& surface = planes.surface;
+        FittedCloud& fitted = planes.points;
         const std::vector<std::uint32_t> lonely = drop_strays(surface, extent_.centre, result_.spacing);
         std::optional<DiscRays> rays;
         const std::vector<float> side_known = whole_ ? sides_as_in_whole(surface) : settle_sides(surface, rays);
@@ -425,14 +427,14 @@ class CloudAo::Work {
                 values = smoothed(surface, values, radius);
             watch_.lap("means");
         }
-        const auto give = [&, &surface = surface](std::size_t place, std::size_t point) {
+        const auto give = [&](std::size_t place, std::size_t point) {
             result_.visibility[point] = values[place];
             result_.normals[point] = surface.normals[place];
             result_.confidence[point] = surface.flatness[place] * resolution(radius, surface.disc_radius[place]) *
                                         (side_known.empty() ? 1.0F : side_known[place]);
         };
         if (fitted.empty()) {
-            tbb::parallel_for(std::size_t(0), surface.size(), [&, &surface = surface](std::size_t i) {
+            tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
                 if (is_wanted(i) && !std::isnan(values[i]))
                     give(i, round[surface.tree.index(i)]);
             });

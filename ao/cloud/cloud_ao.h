@@ -1,8 +1,8 @@
 // Visibility of every point of a cloud without a view: rays from the points against discs at the points.
 #pragma once
 
+#include "ao/base/method.h"
 #include "ao/cloud/cloud_surface.h"
-#include "ao/method.h"
 
 #include <optional>
 #include <string>

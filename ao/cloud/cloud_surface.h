@@ -1,8 +1,8 @@
 // A cloud as a surface: for every point its plane, the orientation of its normal, and a disc.
 #pragma once
 
+#include "ao/base/method.h"
 #include "ao/cloud/neighbours.h"
-#include "ao/method.h"
 #include "shaders/shared/cloud.h"
 
 #include <optional>

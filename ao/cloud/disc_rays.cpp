@@ -77,7 +77,7 @@ float DiscRays::open(std::size_t place, const DirectionSet& directions, float ra
 DiscRays::Hits DiscRays::first_hits(std::size_t place, const Vector3f& side, const DirectionSet::Run& run) const {
     RayBundle bundle = bundle_from(place, side, std::numeric_limits<float>::max());
     aim(bundle, axes_about(side), run, 0);
-    const auto [distance, met] = discs_.meetings(bundle);
+    const auto [distance, met] = discs_.hits(bundle);
     Hits hits{distance, {}, {}, {}};
     for (std::size_t i = 0; i < RayBundle::size; ++i) {
         hits.direction[i] = {bundle.x[i], bundle.y[i], bundle.z[i]};

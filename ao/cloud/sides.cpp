@@ -49,17 +49,17 @@ Reach reach_of(const CloudSurface& surface) {
 }
 
 /// A ray that left one plane and met another.
-struct Meeting {
+struct RayHit {
     std::uint32_t from, to; ///< places
     std::int8_t sign;       ///< +1: both sides are their normals', or neither is
     float distance;
     Vector3f direction;
 };
 
-std::vector<Meeting> shoot(const CloudSurface& surface, const DiscRays& rays, std::size_t places) {
+std::vector<RayHit> shoot(const CloudSurface& surface, const DiscRays& rays, std::size_t places) {
     const std::size_t asked = std::min(places, surface.size());
     const DirectionSet directions(bundle, 1);
-    std::vector<std::array<Meeting, 2 * bundle>> met(asked);
+    std::vector<std::array<RayHit, 2 * bundle>> met(asked);
     std::vector<std::uint8_t> counts(asked, 0);
     tbb::parallel_for(std::size_t(0), asked, [&](std::size_t k) {
         const std::size_t place = (2 * k + 1) * surface.size() / (2 * asked);
@@ -77,15 +77,15 @@ std::vector<Meeting> shoot(const CloudSurface& surface, const DiscRays& rays, st
                                            hits.distance[i], hits.direction[i]};
         }
     });
-    std::vector<Meeting> all;
+    std::vector<RayHit> all;
     for (std::size_t k = 0; k < asked; ++k)
         all.insert(all.end(), met[k].begin(), met[k].begin() + counts[k]);
     return all;
 }
 
-std::vector<Link> ray_links(const std::vector<Meeting>& meetings, const Patches& patches, float usual) {
+std::vector<Link> ray_links(const std::vector<RayHit>& hits, const Patches& patches, float usual) {
     std::vector<Link> links;
-    for (const Meeting& ray : meetings) {
+    for (const RayHit& ray : hits) {
         const std::uint32_t a = patches.patch[ray.from], b = patches.patch[ray.to];
         if (a == b)
             continue;
@@ -104,10 +104,10 @@ double strength(const std::vector<Link>& links) {
 /// Candidate stations and what they see of some points.
 class Stations {
   public:
-    Stations(const CloudSurface& surface, const DiscRays& rays, const std::vector<Meeting>& meetings,
-             const Reach& reach, const std::optional<Vector3f>& up, const SidesEffort& effort)
+    Stations(const CloudSurface& surface, const DiscRays& rays, const std::vector<RayHit>& hits, const Reach& reach,
+             const std::optional<Vector3f>& up, const SidesEffort& effort)
         : surface_(surface), up_(up), centre_(reach.centre) {
-        add_near(meetings, reach, effort.stations);
+        add_near(hits, reach, effort.stations);
         near_ = positions_.size();
         for (const Eigen::Vector3d& direction : spread_directions(64))
             positions_.emplace_back(reach.centre + 3 * reach.far * direction.cast<float>());
@@ -332,16 +332,16 @@ class Stations {
     }
 
     /// On rays through free space, or the space behind: long ones are likelier.
-    void add_near(const std::vector<Meeting>& meetings, const Reach& reach, std::size_t count) {
+    void add_near(const std::vector<RayHit>& hits, const Reach& reach, std::size_t count) {
         std::vector<double> up_to;
         double sum = 0;
-        for (const Meeting& ray : meetings)
+        for (const RayHit& ray : hits)
             up_to.push_back(sum += static_cast<double>(std::min(ray.distance, 2 * reach.usual)));
         for (std::size_t k = 0; k < count && sum > 0; ++k) {
             const double at = (static_cast<double>(k) + 0.5) / static_cast<double>(count) * sum;
             const auto ray =
                 static_cast<std::size_t>(std::upper_bound(up_to.begin(), up_to.end() - 1, at) - up_to.begin());
-            const Meeting& chosen = meetings[ray];
+            const RayHit& chosen = hits[ray];
             const float along = 0.2F + 0.6F * static_cast<float>(hash(static_cast<std::uint32_t>(k)) * 0x1p-32);
             positions_.push_back(surface_.tree[chosen.from] + along * chosen.distance * chosen.direction);
         }
@@ -522,14 +522,14 @@ struct Judged {
 
 Judged judged(const CloudSurface& surface, const DiscRays& rays, const Patches& patches, const std::vector<Link>& near,
               const std::optional<Vector3f>& up, SidesRule rule, const SidesEffort& effort, const Reach& reach) {
-    const std::vector<Meeting> meetings = shoot(surface, rays, effort.places);
-    std::vector<Link> free = ray_links(meetings, patches, reach.usual);
+    const std::vector<RayHit> hits = shoot(surface, rays, effort.places);
+    std::vector<Link> free = ray_links(hits, patches, reach.usual);
     if (const double all = strength(free); all > 0) { // rays correct what neighbours say, and do not outvote it
         const double scale = std::min(1.0, 0.7 * strength(near) / all);
         for (Link& link : free)
             link.weight *= scale;
     }
-    const Stations stations(surface, rays, meetings, reach, up, effort);
+    const Stations stations(surface, rays, hits, reach, up, effort);
     // All that is seen from one place is seen through the same air: every station is one more node.
     SignedGraph relative(patches.count + stations.size());
     for (const Link& link : near)
@@ -549,7 +549,7 @@ Judged judged(const CloudSurface& surface, const DiscRays& rays, const Patches& 
     for (const std::uint32_t place : stations.tests())
         of_tests.push_back(static_cast<std::int8_t>(label[patches.patch[place]] * patches.sign(place)));
     double front_meets = 0, meets = 0;
-    for (const Meeting& ray : meetings) {
+    for (const RayHit& ray : hits) {
         const bool normal_side = ray.direction.dot(surface.normals[ray.from]) > 0;
         front_meets += (label[patches.patch[ray.from]] * patches.sign(ray.from) > 0) == normal_side;
         meets += 1;

@@ -45,10 +45,10 @@ struct FinishInput {
 /// Empty images were not asked for. Maps are empty, too, and confidence has floats, where the host packs: on
 /// processors, and where nothing but a map of visibility was asked for.
 struct Finished {
-    cv::Mat1f confidence;     ///< 0 .. 1, NaN where there is no visibility
-    cv::Mat1b confidence_map; ///< 0 = none, 1 .. 255 = 0 .. 1
-    cv::Mat map;              ///< of visibility: 0 = no surface, 1 .. 255 or 65535 = 0 .. 1
-    cv::Mat3b picture;        ///< blue, green, red
+    cv::Mat1f confidence = {};     ///< 0 .. 1, NaN where there is no visibility
+    cv::Mat1b confidence_map = {}; ///< 0 = none, 1 .. 255 = 0 .. 1
+    cv::Mat map = {};              ///< of visibility: 0 = no surface, 1 .. 255 or 65535 = 0 .. 1
+    cv::Mat3b picture = {};        ///< blue, green, red
 };
 
 /// Whether the device turns values into the bytes of maps and pictures. A GPU then has less to download. Where the

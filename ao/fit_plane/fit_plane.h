@@ -2,8 +2,8 @@
 // through its surroundings, on the device. Clean depth does not need it: DepthNoise says.
 #pragma once
 
+#include "ao/base/method.h"
 #include "ao/gpu/program.h"
-#include "ao/method.h"
 #include "projection/noise.h"
 #include "shaders/shared/fit_plane.h"
 

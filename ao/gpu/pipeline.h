@@ -17,7 +17,7 @@ struct Binding {
     std::uint32_t index;
     vk::DescriptorType type;
     std::uint32_t count = 1;
-    auto operator<=>(const Binding&) const = default;
+    auto operator<=>(const Binding&) const = default; // NOLINT(modernize-use-nullptr): clang-tidy 14 sees a 0 in it
 };
 
 /// A shader ready to run, and how it is bound (by push descriptors).
@@ -34,8 +34,8 @@ class Pipelines {
     struct Key {
         std::string shader; ///< "cacao/blur"
         std::vector<Binding> bindings;
-        std::vector<std::pair<int, int>> constants; ///< specialization: id, value
-        auto operator<=>(const Key&) const = default;
+        std::vector<std::pair<int, int>> constants;   ///< specialization: id, value
+        auto operator<=>(const Key&) const = default; // NOLINT(modernize-use-nullptr)
     };
     /// Made on the first request, from any thread. Throws Error that names a missing shader.
     [[nodiscard]] const Pipeline& of(const vk::raii::Device& device, const Key& key);

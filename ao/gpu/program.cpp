@@ -519,7 +519,7 @@ void Program::run(std::span<const std::byte> constants, Results results) {
                                                                      vk::QueryResultFlagBits::e64);
     if (result != vk::Result::eSuccess)
         return;
-    const auto ms = [&](std::size_t i) {
+    const auto ms = [&s, &ticks = ticks](std::size_t i) { // named anew: clang 14 captures no structured bindings
         return static_cast<double>(ticks[i + 1] - ticks[i]) * s.gpu.nanoseconds_per_tick * 1e-6;
     };
     for (std::size_t i = 0; i < s.intervals.size(); ++i)

@@ -153,7 +153,7 @@ RayEstimate RayHemisphere::at(const RayStart& start) const {
         aim(bundle, eight, axes, start.faces);
         const auto cast = bundle.live;
         if (all_falloffs_) {
-            const auto met = surface_.meetings(bundle).distance;
+            const auto met = surface_.hits(bundle).distance;
             for (std::size_t i = 0; i < eight.size(); ++i)
                 for (const Falloff falloff : {Falloff::hard, Falloff::quad, Falloff::lin})
                     if (cast[i])

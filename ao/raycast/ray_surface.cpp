@@ -219,8 +219,8 @@ void fill(Rays& rays, const RayBundle& bundle) {
 
 } // namespace
 
-std::optional<RaySurface::Meeting> RaySurface::nearest(const Vector3d& origin, const Vector3d& direction,
-                                                       double near) const {
+std::optional<RaySurface::Hit> RaySurface::nearest(const Vector3d& origin, const Vector3d& direction,
+                                                   double near) const {
     if (empty())
         return std::nullopt;
     RTCRayHit sought{};
@@ -231,7 +231,7 @@ std::optional<RaySurface::Meeting> RaySurface::nearest(const Vector3d& origin, c
     rtcIntersect1(tree_->scene, &context.embree, &sought);
     if (sought.hit.geomID == RTC_INVALID_GEOMETRY_ID)
         return std::nullopt;
-    return Meeting{sought.ray.tfar, tree_->index[sought.hit.primID]};
+    return Hit{sought.ray.tfar, tree_->index[sought.hit.primID]};
 }
 
 bool RaySurface::blocked(const Vector3d& from, const Vector3d& to) const {
@@ -256,8 +256,8 @@ void RaySurface::drop_blocked(RayBundle& bundle) const {
             bundle.live[i] = 0;
 }
 
-RaySurface::Meetings RaySurface::meetings(const RayBundle& bundle) const {
-    Meetings found;
+RaySurface::Hits RaySurface::hits(const RayBundle& bundle) const {
+    Hits found;
     found.distance.fill(std::numeric_limits<float>::infinity());
     found.primitive.fill(-1);
     if (empty())

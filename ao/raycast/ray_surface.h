@@ -56,17 +56,17 @@ class RaySurface {
     RaySurface(RaySurface&&) noexcept;
     RaySurface& operator=(RaySurface&&) noexcept;
 
-    struct Meeting {
+    struct Hit {
         double distance; ///< in lengths of the ray's direction
         int primitive;   ///< index of the triangle or disc, as given
     };
-    struct Meetings {
+    struct Hits {
         std::array<float, RayBundle::size> distance; ///< infinite where there is none
-        std::array<int, RayBundle::size> primitive;  ///< as in Meeting; -1 where there is none
+        std::array<int, RayBundle::size> primitive;  ///< as in Hit; -1 where there is none
     };
-    /// The first meeting beyond `near` lengths.
-    [[nodiscard]] std::optional<Meeting> nearest(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                                                 double near = 0) const;
+    /// The first hit beyond `near` lengths.
+    [[nodiscard]] std::optional<Hit> nearest(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                                             double near = 0) const;
     /// Whether any surface crosses the open segment between two points.
     [[nodiscard]] bool blocked(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
 
@@ -77,8 +77,8 @@ class RaySurface {
 
     /// Sets live to 0 for the rays of `bundle` that hit a surface closer than far_m.
     void drop_blocked(RayBundle& bundle) const;
-    /// The first meeting of each live ray.
-    [[nodiscard]] Meetings meetings(const RayBundle& bundle) const;
+    /// The first hit of each live ray.
+    [[nodiscard]] Hits hits(const RayBundle& bundle) const;
 
   private:
     struct Tree;

@@ -3,9 +3,9 @@
 
 #include "ao/gpu/image_upload.h"
 
+#include "ao/base/watch.h"
 #include "ao/raycast/depth_surface.h"
 #include "ao/raycast/point_surface.h"
-#include "ao/watch.h"
 #include "projection/hash.h"
 
 #include <algorithm>

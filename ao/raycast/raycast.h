@@ -2,7 +2,7 @@
 // faster methods are held against: the best that one depth image, a cloud or a mesh can tell.
 #pragma once
 
-#include "ao/method.h"
+#include "ao/base/method.h"
 #include "ao/raycast/ray_hemisphere.h"
 
 namespace scanshade {

@@ -2,9 +2,9 @@
 // download.
 #pragma once
 
+#include "ao/base/method.h"
+#include "ao/base/quality.h"
 #include "ao/gpu/program.h"
-#include "ao/method.h"
-#include "ao/quality.h"
 #include "projection/error.h"
 #include "shaders/shared/screen.h"
 

@@ -96,7 +96,7 @@ std::vector<Encounter> encounters(const Pair& pair, const Isometry3d& here_from_
 }
 
 /// Distances of the planes that meet, in what is tolerable or in metres.
-std::vector<double> misfits(const std::vector<Encounter>& all, bool in_metres = false) {
+std::vector<double> alignment_errors(const std::vector<Encounter>& all, bool in_metres = false) {
     std::vector<double> values;
     for (const Encounter& each : all)
         if (each.meets)
@@ -124,7 +124,7 @@ struct NormalEquations {
 std::optional<NormalEquations> normal_equations(const Pair& pair, const Vector6d& motion,
                                                 const Isometry3d& here_from_there, double gates) {
     const std::vector<Encounter> all = encounters(pair, moved(motion) * here_from_there, gates);
-    std::vector<double> values = misfits(all);
+    std::vector<double> values = alignment_errors(all);
     if (values.size() < 30)
         return std::nullopt;
     const double limit = std::max(3 * quantile(values, 0.5), 0.3);
@@ -174,7 +174,7 @@ Facets facets_of(const DepthImage& depth, const DepthNoise& noise) {
 
 Agreement agreement(const Pair& pair, const Isometry3d& here_from_there) {
     const std::vector<Encounter> all = encounters(pair, here_from_there);
-    std::vector<double> values = misfits(all), metres = misfits(all, true);
+    std::vector<double> values = alignment_errors(all), metres = alignment_errors(all, true);
     if (values.empty())
         return {};
     const double met = static_cast<double>(values.size());
@@ -199,7 +199,7 @@ Aligned aligned(const Pair& pair, const Isometry3d& here_from_there) {
         }
     const Isometry3d better = moved(motion) * here_from_there;
     // Noise fits better after any adjustment; a pose that is off, much better.
-    if (agreement(pair, better).misfit > 0.75 * agreement(pair, here_from_there).misfit)
+    if (agreement(pair, better).alignment_error > 0.75 * agreement(pair, here_from_there).alignment_error)
         return {here_from_there, 0};
     return {better, uncertainty(*system)};
 }

@@ -12,9 +12,9 @@
 namespace scanshade {
 namespace {
 
-enum Buffers : int { own_surfaces, own_visibility, surfaces, visibilities, mean, spread };
+enum GatherBuffers : int { own_surfaces, own_visibility, surfaces, visibilities, mean, spread };
 
-std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, std::size_t most) {
+std::unique_ptr<gpu::Program> gathering(gpu::Device& device, cv::Size size, std::size_t most) {
     using Host = gpu::BufferRow::Host;
     using Texels = gpu::BufferRow::Texels;
     const auto pixels = static_cast<std::size_t>(size.area());
@@ -40,7 +40,7 @@ AoMap Gather::compute(const Seen& own, std::span<const Seen> others, const Gathe
             throw Error("a frame of another image size");
     if (!program_ || size != size_ || others.size() > most_) {
         most_ = std::max(others.size(), std::size_t{1});
-        program_ = program_for(device_, size, most_);
+        program_ = gathering(device_, size, most_);
     }
     size_ = size;
     const DepthImage camera_only{own.surfaces->camera, {}, {}};

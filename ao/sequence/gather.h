@@ -4,8 +4,8 @@
 // Reverse reprojection caching (Nehab et al. 2007) without its recursion: offline, every frame can be asked itself.
 #pragma once
 
+#include "ao/base/method.h"
 #include "ao/gpu/program.h"
-#include "ao/method.h"
 
 #include <memory>
 

@@ -6,9 +6,9 @@
 namespace scanshade {
 namespace {
 
-enum Buffers : int { depth_in, given, surfaces, words };
+enum PackBuffers : int { depth_in, given_normals, with_normals, packed_words };
 
-std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bool supplied) {
+std::unique_ptr<gpu::Program> packing(gpu::Device& device, cv::Size size, bool supplied) {
     using Host = gpu::BufferRow::Host;
     using Texels = gpu::BufferRow::Texels;
     const auto pixels = static_cast<std::size_t>(size.area());
@@ -17,9 +17,9 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
                    {"given normals", supplied ? pixels * 12 : 4, supplied ? Host::upload : Host::none, Texels::r32f},
                    {"surfaces", pixels * 16, Host::none, Texels::rgba32f},
                    {"words", pixels * 8, Host::none, Texels::rg32ui}};
-    all.add_pass("normals", "normals", {depth_in, supplied ? given : depth_in}, {surfaces},
+    all.add_pass("normals", "normals", {depth_in, supplied ? given_normals : depth_in}, {with_normals},
                  {{shared::spec_supplied, supplied}});
-    all.add_pass("pack", "sequence/pack", {surfaces}, {words});
+    all.add_pass("pack", "sequence/pack", {with_normals}, {packed_words});
     return std::make_unique<gpu::Program>(device, all.buffers, all.passes, sizeof(shared::ScreenConstants));
 }
 
@@ -30,15 +30,15 @@ PackedSurfaces PackSurfaces::compute(const View& view) {
     const cv::Size size = surfaces.camera.size;
     const bool supplied = surfaces.has_normals();
     if (!program_ || size != size_ || supplied != supplied_)
-        program_ = program_for(device_, size, supplied);
+        program_ = packing(device_, size, supplied);
     size_ = size;
     supplied_ = supplied;
     gpu::upload_depth(surfaces.z_m, program_->host_as<float>(depth_in));
     if (supplied)
-        gpu::upload(surfaces.normals, program_->host(given));
+        gpu::upload(surfaces.normals, program_->host(given_normals));
     const shared::ScreenConstants constants = constants_from({}, view);
     const std::shared_ptr<gpu::DeviceBytes> packed = pool_.get(surfaces.z_m.total() * 8);
-    program_->give(words, packed);
+    program_->give(packed_words, packed);
     program_->run(std::as_bytes(std::span(&constants, 1)));
     timings_ = program_->timings();
     return {surfaces.camera, packed};

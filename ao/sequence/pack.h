@@ -1,8 +1,8 @@
 // Depth and normals of one frame, packed once for all the frames that look at it as a neighbour.
 #pragma once
 
+#include "ao/base/method.h"
 #include "ao/gpu/program.h"
-#include "ao/method.h"
 
 #include <memory>
 

@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <fmt/format.h>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <numeric>
 #include <queue>
 
@@ -79,7 +80,7 @@ void write_plan(const fs::path& job, const Plan& plan) {
         std::ofstream stream(file, std::ios::binary);
         stream.exceptions(std::ios::failbit | std::ios::badbit);
         for (const Task& task : plan.tasks)
-            stream << task_json(task).dump(-1, ' ', false, json::error_handler_t::replace) << '\n';
+            stream << json_line(task_json(task)) << '\n';
         stream.flush();
     });
     json settings = json::object();
@@ -100,7 +101,7 @@ void write_plan(const fs::path& job, const Plan& plan) {
 Plan read_plan(const fs::path& job) {
     Plan plan;
     reading_json((job / "plan.json").string(), [&] {
-        const json head = json::parse(read_at_most(1 << 28, job / "plan.json", "a plan"));
+        const json head = parsed_json(read_at_most(1 << 28, job / "plan.json", "a plan"));
         for (const auto& [name, value] : head.at("settings").items())
             plan.settings.emplace_back(name, value.get<std::string>());
         plan.refused = head.at("refused").get<std::vector<std::string>>();
@@ -109,7 +110,7 @@ Plan read_plan(const fs::path& job) {
     int number = 0;
     for (std::string line; std::getline(stream, line);)
         reading_json(at_line(job / "tasks.jsonl", ++number),
-                     [&] { plan.tasks.push_back(task_from(json::parse(line))); });
+                     [&] { plan.tasks.push_back(task_from(parsed_json(line))); });
     return plan;
 }
 

@@ -10,7 +10,6 @@
 
 #include <fmt/format.h>
 #include <mutex>
-#include <ranges>
 
 namespace scanshade {
 namespace {
@@ -112,12 +111,12 @@ int work_through(const std::filesystem::path& job, const Plan& plan, const Shard
     });
     // Other shards begin with their costliest tasks, so unfinished ones are at their ends. Our own shard comes first:
     // tasks that another run held may be free by now.
-    for (int next = 0; next < shard.of; ++next)
-        for (const std::size_t index :
-             parts[static_cast<std::size_t>((shard.index - 1 + next) % shard.of)] | std::views::reverse) {
+    for (int next = 0; next < shard.of; ++next) {
+        const auto& part = parts[static_cast<std::size_t>((shard.index - 1 + next) % shard.of)];
+        for (auto index = part.rbegin(); index != part.rend(); ++index) {
             if (stop)
                 return worse(attempts.code(), unfinished);
-            const Task& task = plan.tasks[index];
+            const Task& task = plan.tasks[*index];
             const std::filesystem::path journal = journal_file(results_of(job, task), task.block());
             if (is_complete(journal) || in_use(journal))
                 continue;
@@ -125,6 +124,7 @@ int work_through(const std::filesystem::path& job, const Plan& plan, const Shard
             if (attempts.attempt(task, output) != Attempts::Result::held && next > 0)
                 say(fmt::format("  taken over from shard {}: {}", (shard.index - 1 + next) % shard.of + 1, task.name));
         }
+    }
     return attempts.code();
 }
 

@@ -12,6 +12,7 @@
 #include <fmt/ranges.h>
 #include <fstream>
 #include <map>
+#include <nlohmann/json.hpp>
 
 namespace scanshade {
 namespace {

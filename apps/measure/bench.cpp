@@ -10,6 +10,7 @@
 #include "apps/scenes/generate.h"
 #include "apps/scenes/scene.h"
 #include "apps/scenes/sensor.h"
+#include "apps/walk/progress.h"
 #include "io/output_file.h"
 #include "io/text.h"
 #include "projection/error.h"
@@ -19,6 +20,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_for_each.h>
@@ -27,8 +29,6 @@ namespace scanshade {
 namespace {
 
 namespace fs = std::filesystem;
-
-void say(const std::string& line) { fmt::print(stderr, "{}\n", line); }
 
 /// The comma-separated words, each one of `known`; all of them for "all".
 std::vector<std::string> chosen(const std::string& flag, const std::string& list,
@@ -350,7 +350,7 @@ class Bench final : public Command {
         options.sensor = sensor;
         options.frames = request_.frames;
         options.overwrite = overwrite_;
-        const fs::path folder = fs::path(out_) / "captures" / fmt::format("{}-{}", scene, sensor);
+        fs::path folder = fs::path(out_) / "captures" / fmt::format("{}-{}", scene, sensor);
         say(fmt::format("generating {}", folder.string()));
         generate(options, folder);
         return folder;
@@ -377,7 +377,7 @@ class Bench final : public Command {
     /// Sensor classes that were not measured keep the points of an earlier bench.
     void write_front(ParetoFront front) const {
         if (fs::exists(front_)) {
-            ParetoFront earlier = front_from(json::parse(read_bytes(front_), nullptr, false), front_);
+            ParetoFront earlier = front_from(parsed_or_discarded(read_bytes(front_)), front_);
             earlier.replace_with(front);
             front = earlier;
         }

@@ -38,7 +38,7 @@ double peak_memory_mib() {
 }
 
 /// What a row of the table says besides its name.
-struct Measured {
+struct MeasuredCloud {
     Difference difference;
     double wall_s = 0, cpu_s = 0;
 };
@@ -47,7 +47,7 @@ struct Judge {
     std::vector<float> truth; ///< NaN where a point is not compared
 
     template <class Compute>
-    Measured row(const std::string& name, Compute&& compute) const {
+    MeasuredCloud row(const std::string& name, Compute&& compute) const {
         const Stopwatch stopwatch;
         const std::clock_t cpu = std::clock();
         const std::vector<float> values = compute();
@@ -236,8 +236,8 @@ class CloudErrors final : public BenchPart {
             if (!judge) {
                 fmt::print("{}: {} points, radius {} m; every {}. point is compared\n", world.scene().name,
                            cloud.points.size(), sky_ ? 0 : radius, step);
-                judge.emplace(sky_ ? true_sky(world, cloud, step)
-                                   : scene::true_visibility(world, cloud, {radius, 1024, 1, false}, step));
+                judge = Judge{sky_ ? true_sky(world, cloud, step)
+                                   : scene::true_visibility(world, cloud, {radius, 1024, 1, false}, step)};
             }
             double spacing = 0;
             for (const std::string& kind : comma_separated(normals_))
@@ -262,7 +262,7 @@ class CloudErrors final : public BenchPart {
         const std::string name = fmt::format("{:g} mm, {}, {} rays", 1000 * noise, kind, rays);
         const CloudAoOptions options{.radius = radius, .rays = rays, .smooth = smooth_, .sky = sky_};
         PointVisibility found;
-        const Measured measured = judge.row(name, [&] {
+        const MeasuredCloud measured = judge.row(name, [&] {
             found = CloudAo(options, device_.get()).compute({points, normals});
             return std::vector<float>(found.visibility.begin(),
                                       found.visibility.begin() + static_cast<std::ptrdiff_t>(cloud.points.size()));

@@ -31,9 +31,9 @@ struct Tried {
     std::vector<cv::Mat1f> maps;
 };
 
-class Trials {
+class TimedTrials {
   public:
-    Trials(gpu::Device& device, const TrialCapture& capture, double radius_m)
+    TimedTrials(gpu::Device& device, const TrialCapture& capture, double radius_m)
         : device_(device), capture_(capture), radius_m_(radius_m) {}
 
     /// The median over frames and rounds, after a warm-up.
@@ -74,7 +74,7 @@ std::vector<cv::Mat1f> truths(const TrialCapture& capture) {
 
 /// How many times slower this device is with these images than the Pareto front's device. Times the cheapest and the
 /// middle point.
-double slowness(const Trials& trials, const std::vector<BenchmarkPoint>& points, double pixels) {
+double slowness(const TimedTrials& trials, const std::vector<BenchmarkPoint>& points, double pixels) {
     std::vector<double> ratios;
     for (const std::size_t i : {std::size_t{0}, points.size() / 2})
         ratios.push_back(std::log(trials.of(points[i].configuration).ms / points[i].ms(pixels)));
@@ -120,7 +120,7 @@ Choice choose(gpu::Device& device, const ParetoFront& front, const TrialCapture&
               const Budget& budget) {
     Choice choice;
     std::vector<BenchmarkPoint> points = points_for(front, capture.sensor, choice.sentences);
-    const Trials trials(device, capture, radius_m);
+    const TimedTrials trials(device, capture, radius_m);
     const double pixels = static_cast<double>(capture.frames.front().depth.z_m.total());
     const double slower = slowness(trials, points, pixels);
     choice.sentences.push_back(

@@ -5,6 +5,7 @@
 #include "apps/json.h"
 #include "apps/lists.h"
 #include "apps/measure/trial.h"
+#include "apps/walk/progress.h"
 #include "io/output_file.h"
 #include "projection/error.h"
 
@@ -13,6 +14,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
 #include <opencv2/core/optim.hpp>
 #include <optional>
 
@@ -20,8 +22,6 @@ namespace scanshade {
 namespace {
 
 namespace fs = std::filesystem;
-
-void say(const std::string& line) { fmt::print(stderr, "{}\n", line); }
 
 /// A setting that the search may change.
 struct Free {

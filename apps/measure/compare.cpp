@@ -7,6 +7,7 @@
 #include "apps/measure/error_figures.h"
 #include "apps/measure/map_set.h"
 #include "apps/picture.h"
+#include "apps/walk/progress.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/format.h"
 #include "io/images/image_file.h"
@@ -14,6 +15,7 @@
 #include "projection/error.h"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 namespace scanshade {
 namespace {
@@ -26,8 +28,6 @@ struct Row {
     Difference difference;
     std::string why; ///< empty unless it failed
 };
-
-void say(const std::string& line) { fmt::print(stderr, "{}\n", line); }
 
 /// A map, or a cloud's field ambient_occlusion as one row.
 cv::Mat1f values_of(const fs::path& file) {

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 namespace scanshade {
 namespace {
@@ -132,7 +133,7 @@ void ParetoFront::replace_with(const ParetoFront& other) {
 }
 
 const ParetoFront& shipped_front() {
-    static const ParetoFront front = front_from(json::parse(shipped_front_text), "apps/measure/front.json");
+    static const ParetoFront front = front_from(parsed_json(shipped_front_text), "apps/measure/front.json");
     return front;
 }
 

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 namespace scanshade {
 
@@ -34,7 +35,7 @@ std::map<std::string, fs::path> maps_in(const fs::path& folder) {
 }
 
 json read_json(const fs::path& file) {
-    const json text = json::parse(read_bytes(file), nullptr, false);
+    json text = parsed_or_discarded(read_bytes(file));
     if (text.is_discarded())
         throw Error(file.string() + ": not JSON");
     return text;

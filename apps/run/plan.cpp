@@ -16,8 +16,8 @@
 #include <fmt/ranges.h>
 #include <map>
 #include <optional>
-#include <ranges>
 #include <set>
+#include <span>
 
 namespace scanshade {
 namespace {
@@ -312,7 +312,7 @@ class PlanCommand final : public Command {
 
     void tell_passed_over(const Plan& plan) const {
         constexpr std::size_t most = 20;
-        for (const std::string& each : plan.passed_over | std::views::take(most))
+        for (const std::string& each : std::span(plan.passed_over).first(std::min(plan.passed_over.size(), most)))
             fmt::print(stderr, "passed over: {}\n", each);
         if (plan.passed_over.size() > most)
             fmt::print(stderr, "passed over: {} more, listed in {}\n", plan.passed_over.size() - most,

@@ -29,9 +29,9 @@
 #include <fmt/ranges.h>
 #include <mutex>
 #include <opencv2/core/utility.hpp>
-#include <ranges>
 #include <semaphore>
 #include <set>
+#include <span>
 #include <thread>
 #include <utility>
 
@@ -192,7 +192,7 @@ struct Together {
     }
     MethodPool::Lease lease;
     MethodPool pool; ///< of that one method
-    Neighbourhood sequence;
+    SequenceAo sequence;
 };
 
 /// Counts results of frames for the exit code.
@@ -624,8 +624,8 @@ class Run final : public Command {
     static void say_left_alone(const std::vector<std::string>& files) {
         if (files.empty())
             return;
-        constexpr std::ptrdiff_t most = 3;
-        const auto some = files | std::views::take(most);
+        constexpr std::size_t most = 3;
+        const auto some = std::span(files).first(std::min(files.size(), most));
         say(fmt::format("  {} of earlier runs left alone ({}{}): `not_of_this_run` in manifest.json lists them",
                         counted(files.size(), "file"), fmt::join(some, ", "), files.size() > most ? " ..." : ""));
     }

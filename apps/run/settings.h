@@ -1,10 +1,10 @@
 // The settings of `scanshade run`, and the options of the walk that follow from them.
 #pragma once
 
+#include "ao/base/method.h"
+#include "ao/base/quality.h"
 #include "ao/fit_plane/fit_plane.h"
-#include "ao/method.h"
-#include "ao/quality.h"
-#include "ao/sequence/neighbourhood.h"
+#include "ao/sequence/sequence_ao.h"
 #include "apps/command.h"
 #include "apps/measure/budget.h"
 #include "apps/run/presets.h"
@@ -52,7 +52,7 @@ class RunSettings {
     std::string shard;
     bool quiet = false, log_json = false;
     CloudAoOptions clouds_by_points;
-    NeighbourhoodOptions sequences;
+    SequenceAoOptions sequences;
 
     /// All rows, grouped as in the help.
     [[nodiscard]] std::vector<Stage> stages();

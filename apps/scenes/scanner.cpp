@@ -11,20 +11,20 @@ namespace scanshade::scene {
 namespace {
 
 using Eigen::Vector3d;
-constexpr double pi = std::numbers::pi;
 enum Purpose : std::uint32_t { shift = 101, turn, across, along, beam_turn, beam_share };
 
 /// Beams of equal angles; half a step of jitter, so that no pattern is common to all stations.
 struct Grid {
-    static constexpr double lowest = -70 * pi / 180, highest = pi / 2;
+    static constexpr double lowest = -70 * std::numbers::pi / 180, highest = std::numbers::pi / 2;
     int rows, columns;
 
     explicit Grid(double beams)
-        : rows(std::max(1, static_cast<int>(std::sqrt(beams * (highest - lowest) / (2 * pi))))),
+        : rows(std::max(1, static_cast<int>(std::sqrt(beams * (highest - lowest) / (2 * std::numbers::pi))))),
           columns(std::max(1, static_cast<int>(beams / rows))) {}
 
     [[nodiscard]] Vector3d direction(int column, int row) const {
-        const double turned = 2 * pi * column / columns, raised = lowest + (highest - lowest) * (row + 0.5) / rows;
+        const double turned = 2 * std::numbers::pi * column / columns,
+                     raised = lowest + (highest - lowest) * (row + 0.5) / rows;
         return {std::cos(raised) * std::cos(turned), std::cos(raised) * std::sin(turned), std::sin(raised)};
     }
 };
@@ -59,7 +59,7 @@ Record record(const World& world, const Vector3d& eye, const Vector3d& direction
     const auto noise = [&](Purpose purpose) { return Noise(seed, station, purpose); };
     Record made{eye + hit.t * direction, eye + hit.t * direction, hit.normal, true};
     if (options.beam_rad > 0) { // the beam's other half
-        const double angle = 2 * pi * noise(beam_turn).uniform(column, row);
+        const double angle = 2 * std::numbers::pi * noise(beam_turn).uniform(column, row);
         const Vector3d x = direction.unitOrthogonal(), y = direction.cross(x);
         const Vector3d beside =
             (direction + options.beam_rad / 2 * (std::cos(angle) * x + std::sin(angle) * y)).normalized();

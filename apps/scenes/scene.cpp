@@ -137,7 +137,7 @@ void add_quad(Mesh& mesh, int a, int b, int c, int d) {
 }
 
 /// Two unit vectors that make a right-handed frame with `axis`.
-std::pair<Vector3d, Vector3d> across(const Vector3d& axis) {
+std::pair<Vector3d, Vector3d> axes_across(const Vector3d& axis) {
     const Vector3d x = axis.unitOrthogonal();
     return {x, axis.cross(x)};
 }
@@ -150,7 +150,7 @@ int sides_of_circle(double radius) {
 
 void tessellate(const Plane& plane, Mesh& mesh) {
     constexpr double half = 500;
-    const auto [x, y] = across(plane.normal);
+    const auto [x, y] = axes_across(plane.normal);
     const int first = add_vertex(mesh, plane.point - half * (x + y));
     add_vertex(mesh, plane.point + half * (x - y));
     add_vertex(mesh, plane.point + half * (x + y));
@@ -187,7 +187,7 @@ void tessellate(const Sphere& sphere, Mesh& mesh) {
 
 void tessellate(const Cylinder& cylinder, Mesh& mesh) {
     const int sides = sides_of_circle(cylinder.radius);
-    const auto [x, y] = across(cylinder.axis);
+    const auto [x, y] = axes_across(cylinder.axis);
     const Vector3d top = cylinder.base + cylinder.height * cylinder.axis;
     const int low = add_vertex(mesh, cylinder.base), high = add_vertex(mesh, top), first = high + 1;
     for (int side = 0; side < sides; ++side) {

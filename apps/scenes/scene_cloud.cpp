@@ -19,9 +19,9 @@ namespace {
 using Eigen::Vector3d;
 
 /// Random numbers that depend on seed and index only, so threads cannot change them.
-class Random {
+class IndexedRandom {
   public:
-    Random(std::uint32_t seed, std::uint64_t number)
+    IndexedRandom(std::uint32_t seed, std::uint64_t number)
         : key_(hash(hash(seed, static_cast<std::uint32_t>(number)), static_cast<std::uint32_t>(number >> 32))) {}
     double next() { return (key_ = hash(key_, ++drawn_)) * 0x1p-32; }
 
@@ -29,7 +29,7 @@ class Random {
     std::uint32_t key_, drawn_ = 0;
 };
 
-Vector3d on_sphere(Random& random) {
+Vector3d on_sphere(IndexedRandom& random) {
     const double z = 2 * random.next() - 1, angle = 2 * std::numbers::pi * random.next(), across = std::sqrt(1 - z * z);
     return {across * std::cos(angle), across * std::sin(angle), z};
 }
@@ -46,7 +46,7 @@ std::vector<Vector3d> stations(const Walk& walk) {
 Eigen::AlignedBox3d seen_box(const World& world, const std::vector<Vector3d>& eyes) {
     Eigen::AlignedBox3d box;
     for (std::uint64_t i = 0; i < 20000; ++i) {
-        Random random(7, i);
+        IndexedRandom random(7, i);
         const Ray ray{eyes[i % eyes.size()], on_sphere(random)};
         if (const Hit hit = world.cast(ray); hit.body && hit.t <= world.scene().far_m)
             box.extend(Vector3d(ray.origin + hit.t * ray.direction));
@@ -62,7 +62,7 @@ void add_free_positions(const World& world, const Eigen::AlignedBox3d& box, std:
     constexpr std::size_t wanted = 400;
     const std::vector<Vector3d> stations = eyes;
     for (std::uint64_t i = 0; eyes.size() < wanted && i < 100 * wanted; ++i) {
-        Random random(11, i);
+        IndexedRandom random(11, i);
         const Vector3d position =
             box.min() + Vector3d(random.next(), random.next(), random.next()).cwiseProduct(Vector3d(box.sizes()));
         if (!world.surface().blocked(stations[i % stations.size()], position))
@@ -108,7 +108,7 @@ struct Drawable {
         }
     }
 
-    [[nodiscard]] std::pair<Vector3d, Vector3d> draw(Random& random) const {
+    [[nodiscard]] std::pair<Vector3d, Vector3d> draw(IndexedRandom& random) const {
         const auto chosen =
             std::upper_bound(area_up_to.begin(), area_up_to.end() - 1, random.next() * area_up_to.back());
         const auto& [a, b, c] = triangles[static_cast<std::size_t>(chosen - area_up_to.begin())];
@@ -143,7 +143,7 @@ SceneCloud scene_cloud(const World& world, std::size_t count, int seed) {
     std::vector<std::pair<Vector3d, std::optional<Vector3d>>> drawn(batch);
     for (std::uint64_t begun = 0; cloud.points.size() < count; begun += batch) {
         tbb::parallel_for(std::size_t(0), batch, [&](std::size_t i) {
-            Random random(static_cast<std::uint32_t>(seed), begun + i);
+            IndexedRandom random(static_cast<std::uint32_t>(seed), begun + i);
             const auto [point, normal] = drawable.draw(random);
             drawn[i] = {point, seen_side(world, eyes, point, normal, i)};
         });

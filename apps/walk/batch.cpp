@@ -153,9 +153,11 @@ class Pipeline {
         const auto computing = at_once_ > 1 ? filter_mode::parallel : filter_mode::serial_in_order;
         const auto filters =
             tbb::make_filter<void, WorkPtr>(filter_mode::serial_in_order, [&](Flow& flow) { return begin(flow); }) &
-            tbb::make_filter<WorkPtr, WorkPtr>(filter_mode::parallel, [&](WorkPtr work) { return prepared(work); }) &
-            tbb::make_filter<WorkPtr, WorkPtr>(computing, [&](WorkPtr work) { return computed(work); }) &
-            tbb::make_filter<WorkPtr, WorkPtr>(filter_mode::parallel, [&](WorkPtr work) { return finished(work); }) &
+            tbb::make_filter<WorkPtr, WorkPtr>(filter_mode::parallel,
+                                               [&](const WorkPtr& work) { return prepared(work); }) &
+            tbb::make_filter<WorkPtr, WorkPtr>(computing, [&](const WorkPtr& work) { return computed(work); }) &
+            tbb::make_filter<WorkPtr, WorkPtr>(filter_mode::parallel,
+                                               [&](const WorkPtr& work) { return finished(work); }) &
             tbb::make_filter<WorkPtr, void>(filter_mode::serial_in_order, [&](const WorkPtr& work) { report(work); });
         // A thread that waits for a device leaves its core free, so there is one more for each.
         const int threads = cores() + (at_once_ > 1 ? at_once_ : 0);

@@ -1,7 +1,7 @@
 // A picture of a cloud without a camera: two views that show different parts of it.
 #pragma once
 
-#include "ao/method.h"
+#include "ao/base/method.h"
 #include "projection/frame.h"
 
 #include <opencv2/core.hpp>

@@ -1,7 +1,7 @@
 // The result of one frame: a row of frames.csv, a line of the journal.
 #pragma once
 
-#include "ao/method.h"
+#include "ao/base/method.h"
 #include "io/captures/capture.h"
 #include "projection/camera.h"
 

@@ -18,6 +18,7 @@
 #include <fstream>
 #include <functional>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <sys/file.h>
 #include <unistd.h>
 
@@ -157,7 +158,7 @@ void for_each_line(const fs::path& file, const std::function<void(const json&, s
     std::ifstream stream(file, std::ios::binary);
     std::int64_t at = 0;
     for (std::string line; std::getline(stream, line); at += static_cast<std::int64_t>(line.size()) + 1) {
-        const json text = json::parse(line, nullptr, false);
+        const json text = parsed_or_discarded(line);
         if (!text.is_object())
             continue;
         try {
@@ -359,7 +360,7 @@ std::optional<Record> Journal::record_of(const std::string& frame) const {
     std::string line;
     std::getline(stream, line);
     try {
-        return record_from(json::parse(line));
+        return record_from(parsed_json(line));
     } catch (const std::exception&) { // another block's journal, cleared meanwhile
         return std::nullopt;
     }
@@ -435,7 +436,7 @@ void Journal::add(const FrameRow& row, const CaptureEntry& entry, const std::str
         const auto now = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
         const json process{{"host", host_name()}, {"pid", ::getpid()}, {"device", device},
                            {"capture", capture_}, {"started", now},    {"version", SCANSHADE_VERSION}};
-        append(json{{"process", process}}.dump(-1, ' ', false, json::error_handler_t::replace));
+        append(json_line(json{{"process", process}}));
     }
     Record record{row, settings, stamps_of(entry), hashes_of(entry), {}};
     for (const fs::path& file : row.files)
@@ -445,7 +446,7 @@ void Journal::add(const FrameRow& row, const CaptureEntry& entry, const std::str
                     {"stamp", record.stamp},
                     {"input", record.input},
                     {"sizes", record.sizes}};
-    const std::int64_t at = append(line.dump(-1, ' ', false, json::error_handler_t::replace), Sync::soon);
+    const std::int64_t at = append(json_line(line), Sync::soon);
     positions_.insert_or_assign(row.name, Position{journals_.size() - 1, at});
     facts_.complete.clear();
 }
@@ -456,7 +457,7 @@ void Journal::forget(const Capture& capture, const std::vector<std::size_t>& fra
         if (positions_.erase(capture.entries[index].name) > 0)
             known.push_back(capture.entries[index].name);
     if (!known.empty())
-        append(json{{"again", known}}.dump(-1, ' ', false, json::error_handler_t::replace));
+        append(json_line(json{{"again", known}}));
 }
 
 void Journal::begin_alone(const std::string& frame) { append(json{{"begun", frame}}.dump()); }

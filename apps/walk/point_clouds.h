@@ -1,7 +1,7 @@
 // Clouds that no single camera sees: which ones these are, and their values.
 #pragma once
 
-#include "ao/method.h"
+#include "ao/base/method.h"
 #include "apps/walk/batch_options.h"
 #include "projection/attach.h"
 #include "projection/frame.h"

@@ -9,6 +9,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <unistd.h>
 #include <utility>
 
@@ -65,7 +66,7 @@ void log(const std::shared_ptr<OrderedOutput::Buffer>& buffer, json object) {
         line["capture"] = buffer->capture;
     line.update(object);
     const std::lock_guard alone(output_mutex);
-    fmt::print(stderr, "{}\n", line.dump(-1, ' ', false, json::error_handler_t::replace));
+    fmt::print(stderr, "{}\n", json_line(line));
 }
 
 std::string line_of(const FrameRow& row) {

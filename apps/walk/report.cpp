@@ -15,6 +15,7 @@
 #include <fmt/ranges.h>
 #include <fstream>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <tbb/info.h>
 #include <type_traits>
 #include <unordered_set>
@@ -35,7 +36,7 @@ json value_json(const Parameter& row) {
     return std::visit(
         [&]<class Target>(const Target& target) -> json {
             if constexpr (std::is_same_v<Target, float*>)
-                return json::parse(value_text(row)); // the number as typed: 0.1, not 0.10000000149011612
+                return parsed_json(value_text(row)); // the number as typed: 0.1, not 0.10000000149011612
             else if constexpr (std::is_same_v<Target, OneOf> || std::is_same_v<Target, std::optional<double>*>)
                 return value_text(row);
             else

@@ -11,6 +11,7 @@
 #include <fmt/ranges.h>
 #include <limits>
 #include <map>
+#include <nlohmann/json.hpp>
 
 namespace scanshade {
 namespace {
@@ -62,9 +63,7 @@ std::string outputs_text(const Outputs& outputs) {
     return text;
 }
 
-std::string camera_text(const Camera& camera) {
-    return to_json(camera).dump(-1, ' ', false, json::error_handler_t::replace);
-}
+std::string camera_text(const Camera& camera) { return json_line(to_json(camera)); }
 
 std::string capture_text(const Capture& capture) {
     const auto& [scale, offset_m, curve_per_m] = capture.depth_correction;

@@ -82,7 +82,7 @@ void SequenceBuffer::fail_if_neighbour_lost(FrameRow& row) const {
     row.why = "a neighbouring frame is missing: " + lost->second;
 }
 
-NeighbourhoodOptions sequence_options(NeighbourhoodOptions asked, const Capture& capture, double radius_m) {
+SequenceAoOptions sequence_options(SequenceAoOptions asked, const Capture& capture, double radius_m) {
     if (asked.reach > 0)
         return asked;
     std::vector<std::optional<Eigen::Isometry3d>> poses;
@@ -91,8 +91,8 @@ NeighbourhoodOptions sequence_options(NeighbourhoodOptions asked, const Capture&
     return asked;
 }
 
-void compute_in_sequence(Work& work, const Capture& capture, Neighbourhood& sequence) {
-    NeighbourhoodResult result = sequence.compute(work.row.index);
+void compute_in_sequence(Work& work, const Capture& capture, SequenceAo& sequence) {
+    SequenceAoResult result = sequence.compute(work.row.index);
     work.ao = std::move(result.ao);
     work.looked_at = std::move(result.depth);
     work.row.passes = std::move(result.timings);
@@ -106,8 +106,8 @@ void compute_in_sequence(Work& work, const Capture& capture, Neighbourhood& sequ
         work.row.notes.push_back(
             fmt::format("frame {} is left out: {:.0f} % of its surfaces overlap this frame, {:.0f} % contradict it, "
                         "alignment error {:.1f} times the limit.",
-                        capture.entries[other.place].name, 100 * other.agreement.overlap,
-                        100 * other.agreement.contradicted, other.agreement.misfit));
+                        capture.entries[other.index].name, 100 * other.agreement.overlap,
+                        100 * other.agreement.contradicted, other.agreement.alignment_error));
 }
 
 } // namespace scanshade

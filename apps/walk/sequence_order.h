@@ -32,7 +32,7 @@ class FrameOrder {
 /// Holds frames of a sequence back until their neighbours have arrived. Without a sequence, frames pass through.
 class SequenceBuffer {
   public:
-    explicit SequenceBuffer(Neighbourhood* sequence) : sequence_(sequence) {}
+    explicit SequenceBuffer(SequenceAo* sequence) : sequence_(sequence) {}
 
     /// Takes a frame, or none after the last one. Returns the next frame whose neighbours are complete, or none. A
     /// frame that lost a neighbour to an outage fails with that outage, so that --resume computes it again.
@@ -41,7 +41,7 @@ class SequenceBuffer {
     [[nodiscard]] const std::deque<WorkPtr>& rest() const { return queue_; }
 
   private:
-    Neighbourhood* sequence_;
+    SequenceAo* sequence_;
     void fail_if_neighbour_lost(FrameRow& row) const;
 
     std::size_t newest_ = 0;
@@ -50,11 +50,10 @@ class SequenceBuffer {
 };
 
 /// The options asked for. A reach that is not given follows from the capture's poses.
-[[nodiscard]] NeighbourhoodOptions sequence_options(NeighbourhoodOptions asked, const Capture& capture,
-                                                    double radius_m);
+[[nodiscard]] SequenceAoOptions sequence_options(SequenceAoOptions asked, const Capture& capture, double radius_m);
 
 /// Computes a frame's visibility with its neighbours. The row's notes list the neighbours used, and those left out with
 /// the reason.
-void compute_in_sequence(Work& work, const Capture& capture, Neighbourhood& sequence);
+void compute_in_sequence(Work& work, const Capture& capture, SequenceAo& sequence);
 
 } // namespace scanshade

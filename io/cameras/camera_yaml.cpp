@@ -53,7 +53,7 @@ std::vector<double> numbers_of(const fs::path& file, const YAML::Node& parent, c
 
 std::vector<double> numbers_of(const fs::path& file, const YAML::Node& parent, const std::string& key,
                                std::size_t count) {
-    const auto values = numbers_of(file, parent, key);
+    auto values = numbers_of(file, parent, key); // not const: it is moved out
     if (values.size() != count)
         refuse_camera(file, fmt::format("\"{}\" has {}, expected {}", key, counted(values.size(), "number"), count));
     return values;

@@ -24,7 +24,7 @@ constexpr std::size_t at_minor = 25, at_header_size = 94, at_points = 96, at_vlr
                       at_length = 105, at_count = 107, at_scale = 131, at_shift = 155, at_box = 179, at_waveform = 227,
                       at_evlrs = 235, at_evlr_count = 243, at_count_64 = 247;
 constexpr std::size_t least_header = 227, vlr_header = 54, descriptor_size = 192;
-constexpr std::uint64_t most_points = 0x7fffffff; // points are numbered with 32 bits
+constexpr std::uint64_t most_las_points = 0x7fffffff; // points are numbered with 32 bits
 
 template <class Number>
 Number read_at(std::string_view bytes, std::size_t at) {
@@ -262,8 +262,8 @@ CloudRecords read_las(std::string_view bytes, const fs::path& file, std::vector<
     if (count > room)
         refuse(file,
                fmt::format("the header says {} points of {} bytes, the file holds {}", count, records.stride, room));
-    if (count > most_points)
-        refuse(file, fmt::format("{} points, at most {} are read", count, most_points));
+    if (count > most_las_points)
+        refuse(file, fmt::format("{} points, at most {} are read", count, most_las_points));
     check_scales(records, bytes, file);
 
     const auto said_vlrs = read_at<std::uint32_t>(bytes, at_vlr_count);

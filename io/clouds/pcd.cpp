@@ -21,16 +21,16 @@ namespace {
 
 using Encoding = CloudRecords::Encoding;
 
-constexpr std::size_t longest_header = 1 << 16;
+constexpr std::size_t longest_pcd_header = 1 << 16;
 constexpr std::size_t widest_point = 1 << 20;
-constexpr std::uint64_t most_points = 0x7fffffff; // projection's images of point numbers are 32-bit
+constexpr std::uint64_t most_pcd_points = 0x7fffffff; // projection's images of point numbers are 32-bit
 
 struct HeaderLine {
     int number = 0;
     std::vector<std::string_view> values;
 };
 
-struct Header {
+struct PcdHeader {
     std::map<std::string, HeaderLine, std::less<>> lines;
     std::size_t length = 0; ///< bytes, the DATA line's end included
     int next_line = 0;      ///< number of the first line of the body
@@ -41,12 +41,12 @@ struct Header {
     }
 };
 
-Header split_header(std::string_view bytes, const fs::path& file) {
+PcdHeader split_header(std::string_view bytes, const fs::path& file) {
     static constexpr std::array known{"VERSION", "FIELDS", "COLUMNS",   "SIZE",   "TYPE", "COUNT",
                                       "WIDTH",   "HEIGHT", "VIEWPOINT", "POINTS", "DATA"};
-    Header header;
+    PcdHeader header;
     int number = 0;
-    for (std::size_t at = 0; at < std::min(bytes.size(), longest_header);) {
+    for (std::size_t at = 0; at < std::min(bytes.size(), longest_pcd_header);) {
         const std::size_t end = std::min(bytes.find('\n', at), bytes.size());
         const auto line = words(bytes.substr(at, end - at));
         at = std::min(end + 1, bytes.size());
@@ -69,7 +69,7 @@ Header split_header(std::string_view bytes, const fs::path& file) {
 }
 
 /// The values of a header line; one per field.
-const HeaderLine& required(const Header& header, std::string_view key, std::size_t values, const fs::path& file) {
+const HeaderLine& required(const PcdHeader& header, std::string_view key, std::size_t values, const fs::path& file) {
     const HeaderLine* line = header.find(key);
     if (!line)
         throw Error(fmt::format("{}: no {} line in the header", file.string(), key));
@@ -108,7 +108,7 @@ Scalar scalar_of(std::uint64_t size, std::string_view type, const fs::path& file
                             type == "F" ? "4 or 8" : "1, 2, 4 or 8"));
 }
 
-std::vector<CloudField> fields_of(const Header& header, const fs::path& file, std::size_t& stride) {
+std::vector<CloudField> fields_of(const PcdHeader& header, const fs::path& file, std::size_t& stride) {
     const HeaderLine& names = required(header, "FIELDS", 0, file);
     const std::size_t n = names.values.size();
     if (n == 0)
@@ -142,7 +142,7 @@ std::vector<CloudField> fields_of(const Header& header, const fs::path& file, st
 }
 
 /// WIDTH x HEIGHT, which must be POINTS where all three are given.
-cv::Size grid_of(const Header& header, const fs::path& file) {
+cv::Size grid_of(const PcdHeader& header, const fs::path& file) {
     const auto value = [&](std::string_view key) -> std::optional<std::uint64_t> {
         if (!header.find(key))
             return std::nullopt;
@@ -152,17 +152,17 @@ cv::Size grid_of(const Header& header, const fs::path& file) {
     if (!points && !width)
         throw Error(file.string() + ": neither POINTS nor WIDTH in the header");
     const std::uint64_t columns = width.value_or(points.value_or(0)), rows = height.value_or(1);
-    const bool too_many = columns > most_points || rows > most_points || columns * rows > most_points;
+    const bool too_many = columns > most_pcd_points || rows > most_pcd_points || columns * rows > most_pcd_points;
     if (too_many)
-        throw Error(
-            fmt::format("{}: WIDTH {} x HEIGHT {} is more than {} points", file.string(), columns, rows, most_points));
+        throw Error(fmt::format("{}: WIDTH {} x HEIGHT {} is more than {} points", file.string(), columns, rows,
+                                most_pcd_points));
     if (points && *points != columns * rows)
         throw Error(fmt::format("{}: WIDTH {} x HEIGHT {} is {}, but POINTS says {}", file.string(), columns, rows,
                                 columns * rows, *points));
     return {static_cast<int>(columns), static_cast<int>(rows)};
 }
 
-std::optional<Eigen::Isometry3d> viewpoint_of(const Header& header, const fs::path& file,
+std::optional<Eigen::Isometry3d> viewpoint_of(const PcdHeader& header, const fs::path& file,
                                               std::vector<std::string>& warnings) {
     const HeaderLine* line = header.find("VIEWPOINT");
     if (!line)
@@ -190,7 +190,7 @@ std::optional<Eigen::Isometry3d> viewpoint_of(const Header& header, const fs::pa
 
 // --- bodies ---
 
-void read_text(CloudRecords& records, std::string_view body, const Header& header, const fs::path& file,
+void read_text(CloudRecords& records, std::string_view body, const PcdHeader& header, const fs::path& file,
                std::vector<std::string>& warnings) {
     std::size_t values = 0;
     for (const CloudField& field : records.fields)
@@ -360,7 +360,7 @@ std::string header_with(const std::string& header, const std::vector<FieldAdditi
 } // namespace
 
 CloudRecords read_pcd(std::string_view bytes, const fs::path& file, std::vector<std::string>& warnings) {
-    const Header header = split_header(bytes, file);
+    const PcdHeader header = split_header(bytes, file);
     CloudRecords records;
     records.header = bytes.substr(0, header.length);
     std::size_t stride = 0;

@@ -16,7 +16,7 @@ namespace {
 
 using Encoding = CloudRecords::Encoding;
 
-constexpr std::size_t longest_header = 1 << 20;
+constexpr std::size_t longest_ply_header = 1 << 20;
 constexpr std::uint64_t most_records = 0x7fffffff;
 
 struct Element {
@@ -39,7 +39,7 @@ struct Element {
     }
 };
 
-struct Header {
+struct PlyHeader {
     Encoding encoding = Encoding::ascii;
     std::vector<Element> elements;
     std::size_t length = 0;
@@ -105,11 +105,11 @@ CloudField property_of(const std::vector<std::string_view>& line, const fs::path
     return property;
 }
 
-Header parse_header(std::string_view bytes, const fs::path& file) {
-    Header header;
+PlyHeader parse_header(std::string_view bytes, const fs::path& file) {
+    PlyHeader header;
     bool format_seen = false;
     int number = 0;
-    for (std::size_t at = 0; at < std::min(bytes.size(), longest_header);) {
+    for (std::size_t at = 0; at < std::min(bytes.size(), longest_ply_header);) {
         const std::size_t end = std::min(bytes.find('\n', at), bytes.size());
         const auto line = words(bytes.substr(at, end - at));
         at = std::min(end + 1, bytes.size());
@@ -151,7 +151,7 @@ Header parse_header(std::string_view bytes, const fs::path& file) {
 /// Walks through the body's elements in order, and checks every length before using it.
 class BodyWalk {
   public:
-    BodyWalk(std::string_view body, const Header& header, const fs::path& file)
+    BodyWalk(std::string_view body, const PlyHeader& header, const fs::path& file)
         : body_(body), encoding_(header.encoding), text_(body, header.next_line), file_(file) {}
 
     /// Skips all records of `element`. Calls `record(index, start, end)` for each when lengths vary or `record` needs
@@ -254,7 +254,7 @@ std::optional<std::size_t> index_list(const Element& element) {
 /// Reads the vertex indices of face records.
 class FaceIndices {
   public:
-    FaceIndices(const Element& faces, const Header& header) : list_(*index_list(faces)) {
+    FaceIndices(const Element& faces, const PlyHeader& header) : list_(*index_list(faces)) {
         view_.encoding = header.encoding;
         view_.fields = faces.properties;
     }
@@ -283,7 +283,7 @@ class FaceIndices {
 /// An index that names no vertex is worth a warning, not a refusal.
 class FaceCheck {
   public:
-    FaceCheck(const Element& faces, const Header& header, std::size_t vertices)
+    FaceCheck(const Element& faces, const PlyHeader& header, std::size_t vertices)
         : indices_(faces, header), vertices_(static_cast<double>(vertices)) {}
 
     void look_at(std::uint64_t index, std::string_view record) {
@@ -328,15 +328,15 @@ void read_vertices(CloudRecords& records, BodyWalk& walk, const Element& vertex)
     records.points = walk.body().substr(start, walk.at() - start);
 }
 
-void skip(BodyWalk& walk, const Element& element, const Header& header) {
+void skip(BodyWalk& walk, const Element& element, const PlyHeader& header) {
     if (header.encoding == Encoding::ascii || element.lists())
         walk.walk(element, [](std::uint64_t, std::size_t, std::size_t) {});
     else
         walk.skip_fixed(element);
 }
 
-void pass_over(BodyWalk& walk, const Element& element, const Header& header, std::size_t vertices, const fs::path& file,
-               std::vector<std::string>& warnings) {
+void pass_over(BodyWalk& walk, const Element& element, const PlyHeader& header, std::size_t vertices,
+               const fs::path& file, std::vector<std::string>& warnings) {
     if (element.name == "face" && index_list(element)) {
         FaceCheck faces(element, header, vertices);
         walk.walk(element, [&](std::uint64_t index, std::size_t start, std::size_t end) {
@@ -348,7 +348,7 @@ void pass_over(BodyWalk& walk, const Element& element, const Header& header, std
     }
 }
 
-const Element& vertex_element(const Header& header, const fs::path& file) {
+const Element& vertex_element(const PlyHeader& header, const fs::path& file) {
     const Element* vertex = nullptr;
     for (const Element& element : header.elements) {
         if (element.name != "vertex")
@@ -368,7 +368,7 @@ const Element& vertex_element(const Header& header, const fs::path& file) {
     return *vertex;
 }
 
-cv::Size grid_of(const Header& header, std::uint64_t vertices) {
+cv::Size grid_of(const PlyHeader& header, std::uint64_t vertices) {
     const auto columns = header.columns.value_or(0), rows = header.rows.value_or(0);
     const bool organised =
         columns > 0 && rows > 1 && columns <= vertices && rows <= vertices && columns * rows == vertices;
@@ -380,7 +380,7 @@ cv::Size grid_of(const Header& header, std::uint64_t vertices) {
 } // namespace
 
 CloudRecords read_ply(std::string_view bytes, const fs::path& file, std::vector<std::string>& warnings) {
-    const Header header = parse_header(bytes, file);
+    const PlyHeader header = parse_header(bytes, file);
     const Element& vertex = vertex_element(header, file);
     CloudRecords records;
     records.encoding = header.encoding;
@@ -414,7 +414,7 @@ CloudRecords read_ply(std::string_view bytes, const fs::path& file, std::vector<
 
 std::vector<std::array<int, 3>> ply_triangles(const CloudRecords& records) {
     const fs::path name = "mesh";
-    const Header header = parse_header(records.header, name);
+    const PlyHeader header = parse_header(records.header, name);
     BodyWalk before(records.before, header, name), after(records.after, header, name);
     BodyWalk* walk = &before;
     std::vector<std::array<int, 3>> triangles;
@@ -443,7 +443,7 @@ std::vector<std::array<int, 3>> ply_triangles(const CloudRecords& records) {
 std::string ply_bytes(const CloudRecords& records, const std::string& points,
                       const std::vector<FieldAddition>& additions) {
     std::string header = records.header;
-    const Header parsed = parse_header(header, "cloud");
+    const PlyHeader parsed = parse_header(header, "cloud");
     const Element& vertex = vertex_element(parsed, "cloud");
     const std::string line_end = header.substr(0, vertex.properties_end).ends_with("\r\n") ? "\r\n" : "\n";
     std::string lines;

@@ -38,7 +38,7 @@ void check_is_depth(const ImageFacts& facts, const fs::path& file) {
 }
 
 cv::Mat read_as_stored(const std::string& bytes, const ImageFacts& facts, const fs::path& file) {
-    const cv::Mat image = facts.format->read_stored(bytes, facts, file);
+    cv::Mat image = facts.format->read_stored(bytes, facts, file);
     const int depth = facts.floats ? CV_32F : facts.bits == 16 ? CV_16U : CV_8U;
     if (image.size() != facts.size || image.type() != CV_MAKETYPE(depth, 1))
         throw Error(fmt::format("{}: decoded to something else than its header says", file.string()));

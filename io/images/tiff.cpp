@@ -94,9 +94,10 @@ Tiff opened(Memory& memory, const char* mode) {
 }
 
 /// A TIFF to be read, its first image.
-class Source {
+class TiffSource {
   public:
-    Source(std::string_view bytes, const Path& file) : file_(file), memory_{bytes, {}}, tiff_(opened(memory_, "r")) {
+    TiffSource(std::string_view bytes, const Path& file)
+        : file_(file), memory_{bytes, {}}, tiff_(opened(memory_, "r")) {
         if (!tiff_)
             fail();
     }
@@ -134,7 +135,7 @@ std::optional<std::uint64_t> expansion(std::uint16_t compression) {
     }
 }
 
-std::uint64_t coded_bytes(const Source& source) {
+std::uint64_t coded_bytes(const TiffSource& source) {
     std::uint64_t sum = 0;
     const std::uint32_t pieces =
         TIFFIsTiled(source.get()) ? TIFFNumberOfTiles(source.get()) : TIFFNumberOfStrips(source.get());
@@ -143,7 +144,7 @@ std::uint64_t coded_bytes(const Source& source) {
     return sum;
 }
 
-ImageFacts facts_of(const Source& source, const Path& file) {
+ImageFacts facts_of(const TiffSource& source, const Path& file) {
     ImageFacts facts;
     facts.size = image_check::checked_size(source.field<std::uint32_t>(TIFFTAG_IMAGEWIDTH, 0),
                                            source.field<std::uint32_t>(TIFFTAG_IMAGELENGTH, 0), file);
@@ -156,7 +157,7 @@ ImageFacts facts_of(const Source& source, const Path& file) {
 }
 
 /// The image as its orientation tag says: first row at the top, first column on the left.
-cv::Mat upright(const cv::Mat& stored, const Source& source) {
+cv::Mat upright(const cv::Mat& stored, const TiffSource& source) {
     constexpr int around_x = 0, around_y = 1, around_both = -1;
     const auto orientation = source.field<std::uint16_t>(TIFFTAG_ORIENTATION, ORIENTATION_TOPLEFT);
     if (orientation <= ORIENTATION_TOPLEFT || orientation > ORIENTATION_LEFTBOT)
@@ -173,7 +174,7 @@ cv::Mat upright(const cv::Mat& stored, const Source& source) {
     return image;
 }
 
-void read_strips(const Source& source, cv::Mat& image) {
+void read_strips(const TiffSource& source, cv::Mat& image) {
     const auto rows = source.field<std::uint32_t>(TIFFTAG_ROWSPERSTRIP, 0);
     const auto height = static_cast<std::uint32_t>(image.rows);
     std::uint32_t strip = 0;
@@ -186,7 +187,7 @@ void read_strips(const Source& source, cv::Mat& image) {
     }
 }
 
-void read_tiles(const Source& source, cv::Mat& image) {
+void read_tiles(const TiffSource& source, cv::Mat& image) {
     const auto width = static_cast<int>(source.field<std::uint32_t>(TIFFTAG_TILEWIDTH, 0));
     const auto height = static_cast<int>(source.field<std::uint32_t>(TIFFTAG_TILELENGTH, 0));
     const tmsize_t size = TIFFTileSize(source.get());
@@ -207,10 +208,10 @@ void read_tiles(const Source& source, cv::Mat& image) {
 
 } // namespace
 
-ImageFacts tiff_header(std::string_view bytes, const Path& file) { return facts_of(Source(bytes, file), file); }
+ImageFacts tiff_header(std::string_view bytes, const Path& file) { return facts_of(TiffSource(bytes, file), file); }
 
 cv::Mat stored_tiff(std::string_view bytes, const ImageFacts& facts, const Path& file) {
-    const Source source(bytes, file);
+    const TiffSource source(bytes, file);
     const auto format = source.field<std::uint16_t>(TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT);
     const bool integers = (facts.bits == 8 || facts.bits == 16) && format == SAMPLEFORMAT_UINT;
     if (facts.channels != 1 || (!integers && !(facts.bits == 32 && facts.floats)))
@@ -223,7 +224,7 @@ cv::Mat stored_tiff(std::string_view bytes, const ImageFacts& facts, const Path&
 }
 
 cv::Mat3b colour_tiff(std::string_view bytes, const ImageFacts& facts, const Path& file) {
-    const Source source(bytes, file);
+    const TiffSource source(bytes, file);
     char reason[1024] = "";
     if (!TIFFRGBAImageOK(source.get(), reason))
         refuse(file, fmt::format("TIFF that is no colour image: {}", reason));

@@ -1,8 +1,8 @@
 // The classic methods compared with closed forms of visibility and with their own equations. The laws of all methods
 // are in method_test.
+#include "ao/base/method.h"
 #include "ao/gpu/device.h"
 #include "ao/gpu/program.h"
-#include "ao/method.h"
 #include "ao/screen/noise.h"
 #include "ao/screen/screen.h"
 #include "projection/error.h"

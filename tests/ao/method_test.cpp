@@ -1,6 +1,6 @@
 // Laws that every method of the table obeys; a new method is tested as soon as it is in the table.
+#include "ao/base/method.h"
 #include "ao/gpu/device.h"
-#include "ao/method.h"
 #include "tests/support/scenes.h"
 
 #include <cmath>
@@ -91,7 +91,8 @@ std::string name_of(const testing::TestParamInfo<Case>& info) {
 double lowest_inside(const cv::Mat1f& v, int border) {
     double low = 0, high = 0;
     const cv::Mat1f inner = v(cv::Rect(border, border, v.cols - 2 * border, v.rows - 2 * border)).clone();
-    cv::minMaxLoc(inner, &low, &high, nullptr, nullptr, inner == inner); // NaN is no surface
+    cv::minMaxLoc(inner, &low, &high, nullptr, nullptr,
+                  inner == inner); // NOLINT(misc-redundant-expression): false for NaN, which is no surface
     return low;
 }
 

@@ -1,7 +1,7 @@
 // Frames of a recording together: what other views add, what averaging takes away, and that nothing is ever worse than
 // a frame by itself.
 #include "ao/gpu/device.h"
-#include "ao/sequence/neighbourhood.h"
+#include "ao/sequence/sequence_ao.h"
 #include "ao/surfel/surfel.h"
 #include "apps/scenes/generate.h"
 #include "apps/scenes/scene.h"
@@ -46,9 +46,10 @@ const scene::World& world_of(const char* name) {
 /// Frames `step_s` apart on the scene's walk, the middle one at `seconds`.
 std::vector<Recorded> walk(const char* name, const char* sensor, double seconds, double step_s, int frames) {
     std::vector<Recorded> all;
+    const int middle = frames / 2;
     for (int i = 0; i < frames; ++i) {
         const scene::World& world = world_of(name);
-        const Isometry3d pose = scene::world_from_camera(world.scene().walk, seconds + (i - frames / 2) * step_s);
+        const Isometry3d pose = scene::world_from_camera(world.scene().walk, seconds + (i - middle) * step_s);
         const Sight sight{world, small_camera(), pose, render_geometry(world, small_camera(), pose), 1, i};
         all.push_back({{small_camera(), sensor_named(sensor).record(sight), {}}, sight.exact.z_m, pose});
     }
@@ -81,8 +82,8 @@ SurfelOptions with(Quality quality) {
     return options;
 }
 
-NeighbourhoodOptions only(int fuse, int layers, int average, int reach = 12) {
-    NeighbourhoodOptions options;
+SequenceAoOptions only(int fuse, int layers, int average, int reach = 12) {
+    SequenceAoOptions options;
     options.fuse = fuse;
     options.layers = layers;
     options.average = average;
@@ -92,10 +93,10 @@ NeighbourhoodOptions only(int fuse, int layers, int average, int reach = 12) {
 
 const DepthNoise kinect{0.0015, 0.0018, 3};
 
-NeighbourhoodResult together(const std::vector<Recorded>& frames, const NeighbourhoodOptions& options,
-                             std::size_t place, const DepthNoise& noise = {}, Quality level = Quality::high) {
+SequenceAoResult together(const std::vector<Recorded>& frames, const SequenceAoOptions& options, std::size_t place,
+                          const DepthNoise& noise = {}, Quality level = Quality::high) {
     Surfel surfel(device(), with(level));
-    Neighbourhood sequence(device(), surfel, radius_m, noise, {}, options);
+    SequenceAo sequence(device(), surfel, radius_m, noise, {}, options);
     for (std::size_t i = 0; i < frames.size(); ++i)
         sequence.add(i, frames[i].depth, frames[i].pose);
     return sequence.compute(place);
@@ -104,10 +105,10 @@ NeighbourhoodResult together(const std::vector<Recorded>& frames, const Neighbou
 TEST(Sequence, a_frame_without_pose_is_what_it_is_by_itself) {
     const auto frames = walk("clutter", "ideal", 3, 0.2, 3);
     Surfel surfel(device(), with(Quality::high));
-    Neighbourhood sequence(device(), surfel, radius_m, {}, {}, {});
+    SequenceAo sequence(device(), surfel, radius_m, {}, {}, {});
     for (std::size_t i = 0; i < 3; ++i)
         sequence.add(i, frames[i].depth, i == 1 ? std::nullopt : std::optional(frames[i].pose));
-    const NeighbourhoodResult result = sequence.compute(1);
+    const SequenceAoResult result = sequence.compute(1);
     EXPECT_TRUE(result.neighbours.empty() && result.averaged.empty());
     // The pattern of samples goes with the frame's place.
     View view{frames[1].depth};
@@ -121,7 +122,7 @@ TEST(Sequence, other_views_see_what_hides_from_one) {
         const auto frames = walk(name, "ideal", 5.5, 0.6, 9);
         const cv::Mat1f truth = truth_of(name, frames[4]);
         const double one = rms(together(frames, alone(), 4).ao.visibility, truth);
-        const NeighbourhoodResult seen = together(frames, only(0, 6, 0, 4), 4);
+        const SequenceAoResult seen = together(frames, only(0, 6, 0, 4), 4);
         const double seven = rms(seen.ao.visibility, truth);
         EXPECT_EQ(seen.neighbours.size(), 6U);
         EXPECT_LT(seven, 0.97 * one) << name;
@@ -137,7 +138,7 @@ TEST(Sequence, noisy_depth_is_averaged_before_its_planes_are_fitted) {
         const auto frames = walk(name, "kinect", 5.5, 0.1, 9);
         const cv::Mat1f truth = truth_of(name, frames[4]);
         const double one = rms(together(frames, alone(), 4, kinect).ao.visibility, truth);
-        const NeighbourhoodResult fused = together(frames, only(8, 0, 0), 4, kinect);
+        const SequenceAoResult fused = together(frames, only(8, 0, 0), 4, kinect);
         EXPECT_EQ(fused.fused.size(), 8U);
         const double nine = rms(fused.ao.visibility, truth);
         EXPECT_LT(nine, 0.98 * one) << name; // one frame is 0.0015 better since its slopes are fitted, nine 0.0007
@@ -150,9 +151,9 @@ TEST(Sequence, a_frame_whose_pose_is_wrong_is_left_out) {
     const cv::Mat1f by_itself =
         together({frames[0], frames[1]}, only(0, 2, 2, 1), 1).ao.visibility; // without the last one
     frames[2].pose = frames[2].pose * Eigen::Translation3d(0.4, 0, 0) * Eigen::AngleAxisd(0.2, Vector3d::UnitY());
-    const NeighbourhoodResult result = together(frames, only(0, 2, 2, 1), 1);
+    const SequenceAoResult result = together(frames, only(0, 2, 2, 1), 1);
     ASSERT_EQ(result.left_out.size(), 1U);
-    EXPECT_EQ(result.left_out[0].place, 2U);
+    EXPECT_EQ(result.left_out[0].index, 2U);
     EXPECT_EQ(result.neighbours, std::vector<std::size_t>{0});
     EXPECT_TRUE(same_bytes(result.ao.visibility, by_itself));
 }
@@ -189,10 +190,10 @@ TEST(Sequence, averaging_a_static_camera_leaves_the_mean_of_all_patterns) {
     }
     cv::Mat1f mean;
     cv::Mat(sum / 31).convertTo(mean, CV_32F);
-    Neighbourhood sequence(device(), surfel, radius_m, {}, {}, only(0, 0, 30));
+    SequenceAo sequence(device(), surfel, radius_m, {}, {}, only(0, 0, 30));
     for (std::size_t i = 0; i < frames.size(); ++i)
         sequence.add(i, frames[i].depth, frames[i].pose);
-    const NeighbourhoodResult result = sequence.compute(15);
+    const SequenceAoResult result = sequence.compute(15);
     EXPECT_LT(rms(result.ao.visibility, mean), 1e-4);
     const Intermediate averaged_frames = sequence.intermediates().at(0);
     EXPECT_NEAR(reinterpret_cast<const float*>(averaged_frames.data.data())[120 * 320 + 160], 31, 0.1);
@@ -248,9 +249,9 @@ double flicker(const std::vector<Recorded>& frames, const std::vector<cv::Mat1f>
 
 TEST(Sequence, static_points_flicker_a_third_as_much) {
     const auto frames = walk("office", "kinect", 5.5, 1.0 / 30, 25);
-    const auto all = [&](const NeighbourhoodOptions& options) {
+    const auto all = [&](const SequenceAoOptions& options) {
         Surfel surfel(device(), with(Quality::high));
-        Neighbourhood sequence(device(), surfel, radius_m, kinect, {}, options);
+        SequenceAo sequence(device(), surfel, radius_m, kinect, {}, options);
         for (std::size_t i = 0; i < frames.size(); ++i)
             sequence.add(i, frames[i].depth, frames[i].pose);
         std::vector<cv::Mat1f> visibility(frames.size());
@@ -267,7 +268,7 @@ TEST(Sequence, static_points_flicker_a_third_as_much) {
 std::vector<FrameRow> run_together(const Capture& capture, const std::vector<std::size_t>& frames,
                                    const std::filesystem::path& out, RecordingCloud* cloud = nullptr) {
     Surfel surfel(device(), with(Quality::low));
-    Neighbourhood sequence(device(), surfel, radius_m, kinect, {}, only(2, 2, 2, 2));
+    SequenceAo sequence(device(), surfel, radius_m, kinect, {}, only(2, 2, 2, 2));
     BatchOptions options;
     options.frames = frames;
     options.outputs.folder = out;
@@ -330,7 +331,7 @@ TEST(Sequence, what_was_removed_is_gone_beyond_the_window) {
         frames.push_back(record(i < 8 ? full : empty));
         never.push_back(record(empty));
     }
-    const NeighbourhoodOptions options = only(0, 0, 8);
+    const SequenceAoOptions options = only(0, 0, 8);
     const cv::Mat1f later = together(frames, options, 12).ao.visibility,
                     clean = together(never, options, 12).ao.visibility;
     EXPECT_TRUE(same_bytes(later, clean));
@@ -349,7 +350,7 @@ TEST(Sequence, what_was_removed_is_gone_beyond_the_window) {
 
 TEST(Sequence, what_an_outage_keeps_away_is_waited_for_by_its_neighbours) {
     Surfel surfel(device(), {});
-    Neighbourhood sequence(device(), surfel, radius_m, {}, {}, only(0, 0, 1));
+    SequenceAo sequence(device(), surfel, radius_m, {}, {}, only(0, 0, 1));
     ASSERT_EQ(sequence.reach(), 1U);
     SequenceBuffer buffer(&sequence);
     std::vector<CaptureEntry> entries(5);

@@ -4,6 +4,7 @@
 #include "tests/support/says.h"
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 namespace scanshade {
 namespace {

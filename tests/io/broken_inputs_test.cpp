@@ -36,7 +36,7 @@ class BrokenImages : public ::testing::Test {
   protected:
     std::string depth_refusal(const std::string& bytes, const std::string& name = "d.png") {
         const fs::path file = write_file(folder_ / name, bytes);
-        const std::string message = refusal([&] { (void)read_stored_depth(file); });
+        std::string message = refusal([&] { (void)read_stored_depth(file); });
         EXPECT_TRUE(message.empty() || says(message, file.string()));
         return message;
     }
@@ -157,7 +157,7 @@ class BrokenClouds : public ::testing::Test {
     std::string cloud_refusal(const std::string& bytes) {
         const fs::path file = write_file(folder_ / "c", bytes);
         warnings_.clear();
-        const std::string message = refusal([&] { (void)read_cloud(file, warnings_); });
+        std::string message = refusal([&] { (void)read_cloud(file, warnings_); });
         EXPECT_TRUE(message.empty() || says(message, file.string()));
         return message;
     }
@@ -472,6 +472,8 @@ TEST_P(BrokenData, the_program_ends_with_the_code_it_deserves) {
     const fs::path path = data_folder() / "broken" / c.path;
     if (!fs::exists(path))
         GTEST_SKIP() << path << " is not at hand";
+    if (!tests::program_is_built())
+        GTEST_SKIP() << "the program is not built";
     const TemporaryFolder folder;
     const tests::Ran ran =
         tests::run_program(fmt::format("run {} -o {} --write ao", run_on(path, c.reader), (folder / "out").string()));

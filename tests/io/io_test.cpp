@@ -1118,10 +1118,12 @@ TEST(captures, what_ails_the_machine_or_the_share_is_no_fault_of_a_frame) {
     write_picture(share / "color/1.png", picture(wall().size()));
     write_depth_png(share / "depth/1.png", wall(), 1000);
     const Capture capture = open_capture(share);
+#ifndef __SANITIZE_ADDRESS__ // to tell whether an object is one, the sanitizer of undefined behaviour opens a pipe
     {
         const NoFiles none;
         EXPECT_THROW((void)capture.load(0), Outage);
     }
+#endif
     EXPECT_FALSE(capture.load(0).colour.empty());
     std::filesystem::rename(share, folder / "elsewhere");
     EXPECT_THROW((void)capture.load(0), Outage);

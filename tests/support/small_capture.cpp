@@ -55,6 +55,8 @@ std::string read_bytes(const fs::path& file) {
     return {std::istreambuf_iterator<char>(stream), {}};
 }
 
+bool program_is_built() { return std::filesystem::exists(SCANSHADE_PROGRAM); }
+
 Ran run_program(const std::string& arguments) {
     const TemporaryFolder folder;
     const std::string command = fmt::format("'{}' {} >'{}' 2>'{}'", SCANSHADE_PROGRAM, arguments,

@@ -42,6 +42,8 @@ struct Ran {
     std::string out, err;
 };
 
+/// Whether there is a program to run: the tests of the readers are also built without it, with sanitizers.
+[[nodiscard]] bool program_is_built();
 /// Runs the program with `arguments`, as a shell takes them.
 [[nodiscard]] Ran run_program(const std::string& arguments);
 /// The program started without waiting; what it says goes to a file.

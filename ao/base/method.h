@@ -34,7 +34,7 @@ struct PackedSurfaces {
 struct Neighbour {
     const PackedSurfaces* surfaces;
     Eigen::Isometry3d here_from_there; ///< that camera's space to this one's
-    double misfit_m = 0;               ///< by which the surfaces of both lie apart where they should not
+    double alignment_error_m = 0;      ///< by which the surfaces of both lie apart where they should not
 };
 
 /// Depth and normals of one view, on the host or already on the device. Normals may be missing: methods then derive

@@ -1,7 +1,7 @@
 // Time between stages, by name.
 #pragma once
 
-#include "ao/method.h"
+#include "ao/base/method.h"
 #include "projection/stopwatch.h"
 
 namespace scanshade {

@@ -1,4 +1,4 @@
-#include "ao/sequence/neighbourhood.h"
+#include "ao/sequence/sequence_ao.h"
 
 #include "projection/statistics.h"
 #include "projection/stopwatch.h"
@@ -13,14 +13,14 @@ namespace {
 
 using Eigen::Isometry3d;
 
-/// Share of the tolerable misfit below which recorded poses are as good as aligned ones.
+/// Share of the tolerable alignment_error below which recorded poses are as good as aligned ones.
 constexpr double aligned_already = 0.05;
-/// Of what an alignment leaves open, how much counts as misfit: most of it slides surfaces along themselves.
+/// Of what an alignment leaves open, how much counts as alignment_error: most of it slides surfaces along themselves.
 constexpr double slides = 0.25;
 
 } // namespace
 
-std::vector<Parameter> NeighbourhoodOptions::parameters() {
+std::vector<Parameter> SequenceAoOptions::parameters() {
     return {{"fuse", "frames around each that noisy depth is averaged with; 0 = none", &fuse, "", 0, 16},
             {"layers", "other views whose surfaces occlude what a frame shows (surfel); 0 = none", &layers, "", 0, 16},
             {"reach",
@@ -29,8 +29,8 @@ std::vector<Parameter> NeighbourhoodOptions::parameters() {
             {"average", "frames around each whose visibility is averaged with its own; 0 = none", &average, "", 0, 64}};
 }
 
-Neighbourhood::Neighbourhood(gpu::Device& device, Method& method, double radius_m, const DepthNoise& noise,
-                             const FitPlaneOptions& fit, const NeighbourhoodOptions& options)
+SequenceAo::SequenceAo(gpu::Device& device, Method& method, double radius_m, const DepthNoise& noise,
+                       const FitPlaneOptions& fit, const SequenceAoOptions& options)
     : method_(method), options_(options), noise_(noise), pack_(device), upload_(device), gather_(device),
       radius_m_(radius_m) {
     if (!method.looks_at_neighbours())
@@ -63,16 +63,16 @@ int reach_for(std::span<const std::optional<Isometry3d>> world_from_camera, doub
     return most;
 }
 
-void Neighbourhood::add(std::size_t place, const DepthImage& depth,
-                        const std::optional<Eigen::Isometry3d>& world_from_camera) {
-    Slot& slot = slots_[place];
+void SequenceAo::add(std::size_t index, const DepthImage& depth,
+                     const std::optional<Eigen::Isometry3d>& world_from_camera) {
+    Slot& slot = slots_[index];
     slot.depth = depth;
     slot.world_from_camera = world_from_camera;
 }
 
-void Neighbourhood::forget_before(std::size_t place) { slots_.erase(slots_.begin(), slots_.lower_bound(place)); }
+void SequenceAo::forget_before(std::size_t index) { slots_.erase(slots_.begin(), slots_.lower_bound(index)); }
 
-const DepthImage& Neighbourhood::kept(Slot& slot) {
+const DepthImage& SequenceAo::kept(Slot& slot) {
     if (!slot.kept) {
         slot.kept = drop_flying_->compute(slot.depth).depth;
         account("flying pixels", drop_flying_->timings());
@@ -80,7 +80,7 @@ const DepthImage& Neighbourhood::kept(Slot& slot) {
     return *slot.kept;
 }
 
-const Facets& Neighbourhood::facets(Slot& slot) {
+const Facets& SequenceAo::facets(Slot& slot) {
     if (!slot.facets) {
         const DepthImage& depth = fit_ ? kept(slot) : slot.depth;
         const Stopwatch stopwatch;
@@ -90,18 +90,18 @@ const Facets& Neighbourhood::facets(Slot& slot) {
     return *slot.facets;
 }
 
-View Neighbourhood::view_of(std::size_t place) {
-    Slot& slot = slots_.at(place);
+View SequenceAo::view_of(std::size_t index) {
+    Slot& slot = slots_.at(index);
     if (!fit_)
         return {slot.depth};
     if (!slot.fitted) {
         std::vector<OtherDepth> others;
-        for (const Fitting& other : adjacent_views(place, options_.fuse)) {
-            Slot& there = slots_.at(other.place);
+        for (const Fitting& other : adjacent_views(index, options_.fuse)) {
+            Slot& there = slots_.at(other.index);
             if (!there.kept_there)
                 there.kept_there = upload_(kept(there).z_m);
             others.push_back({there.depth.camera, there.kept_there, other.here_from_there});
-            slot.fused.push_back(other.place);
+            slot.fused.push_back(other.index);
         }
         slot.fitted = fit_->compute(kept(slot), others);
         account("prepare", fit_->timings());
@@ -111,15 +111,15 @@ View Neighbourhood::view_of(std::size_t place) {
 }
 
 /// A frame's normals are asked for twice: to pack them, and to look from them.
-void Neighbourhood::let_go(Slot& slot) {
+void SequenceAo::let_go(Slot& slot) {
     if (slot.fitted && slot.packed && slot.ao)
         slot.fitted->normals = {};
 }
 
-const PackedSurfaces& Neighbourhood::packed(std::size_t place) {
-    Slot& slot = slots_.at(place);
+const PackedSurfaces& SequenceAo::packed(std::size_t index) {
+    Slot& slot = slots_.at(index);
     if (!slot.packed) {
-        slot.packed = pack_.compute(view_of(place));
+        slot.packed = pack_.compute(view_of(index));
         account("pack", pack_.timings());
         let_go(slot);
     }
@@ -127,30 +127,31 @@ const PackedSurfaces& Neighbourhood::packed(std::size_t place) {
 }
 
 /// From the earlier one's side, whichever asks: results must not hang on the order of questions.
-Neighbourhood::Meeting Neighbourhood::meeting_of(const Slot& earlier, const Slot& later) const {
+SequenceAo::PairRegistration SequenceAo::registered(const Slot& earlier, const Slot& later) const {
     const Pair pair{*earlier.facets, *later.facets, radius_m_, noise_}, back{pair.there, pair.here, radius_m_, noise_};
     const Isometry3d recorded = earlier.world_from_camera->inverse() * *later.world_from_camera;
     const auto [pose, sigma_m] =
-        agreement(pair, recorded).misfit > aligned_already ? aligned(pair, recorded) : Aligned{recorded};
+        agreement(pair, recorded).alignment_error > aligned_already ? aligned(pair, recorded) : Aligned{recorded};
     // Each must agree with the other: what one has looked through tells nothing of what is hidden from it.
     const Agreement there = agreement(pair, pose), here = agreement(back, pose.inverse());
     return {{std::min(there.overlap, here.overlap), std::max(there.contradicted, here.contradicted),
-             std::max({there.misfit_m, here.misfit_m, slides * sigma_m}), std::max(there.misfit, here.misfit)},
+             std::max({there.alignment_error_m, here.alignment_error_m, slides * sigma_m}),
+             std::max(there.alignment_error, here.alignment_error)},
             pose};
 }
 
-void Neighbourhood::meet(std::size_t place, std::span<const std::size_t> others) {
+void SequenceAo::register_with(std::size_t index, std::span<const std::size_t> others) {
     struct Task {
         const Slot *earlier, *later;
-        Meeting* meeting;
+        PairRegistration* registration;
     };
     std::vector<Task> tasks;
     for (const std::size_t other : others) {
         const auto there = slots_.find(other);
-        if (there == slots_.end() || !there->second.world_from_camera || !slots_.at(place).world_from_camera)
+        if (there == slots_.end() || !there->second.world_from_camera || !slots_.at(index).world_from_camera)
             continue;
-        Slot &earlier = slots_.at(std::min(place, other)), &later = slots_.at(std::max(place, other));
-        const auto [known, is_new] = earlier.meetings.try_emplace(std::max(place, other));
+        Slot &earlier = slots_.at(std::min(index, other)), &later = slots_.at(std::max(index, other));
+        const auto [known, is_new] = earlier.registrations.try_emplace(std::max(index, other));
         if (!is_new)
             continue;
         (void)facets(earlier);
@@ -162,36 +163,36 @@ void Neighbourhood::meet(std::size_t place, std::span<const std::size_t> others)
     const Stopwatch stopwatch;
     tbb::this_task_arena::isolate([&] { // no other frame is begun while this one waits
         tbb::parallel_for_each(tasks,
-                               [&](const Task& task) { *task.meeting = meeting_of(*task.earlier, *task.later); });
+                               [&](const Task& task) { *task.registration = registered(*task.earlier, *task.later); });
     });
     timings_.emplace_back("align", stopwatch.ms());
 }
 
-std::optional<Neighbourhood::Fitting> Neighbourhood::fitting(std::size_t here, std::size_t there) {
+std::optional<SequenceAo::Fitting> SequenceAo::fitting(std::size_t here, std::size_t there) {
     const auto own = slots_.find(here), other = slots_.find(there);
     if (other == slots_.end() || !own->second.world_from_camera || !other->second.world_from_camera)
         return std::nullopt;
-    meet(here, {&there, 1});
-    const Meeting& met = slots_.at(std::min(here, there)).meetings.at(std::max(here, there));
+    register_with(here, {&there, 1});
+    const PairRegistration& met = slots_.at(std::min(here, there)).registrations.at(std::max(here, there));
     if (met.agreement.fits())
         return Fitting{there, here < there ? met.earlier_from_later : met.earlier_from_later.inverse(),
-                       met.agreement.misfit_m};
+                       met.agreement.alignment_error_m};
     std::vector<LeftOut>& left_out = own->second.left_out;
-    if (std::ranges::none_of(left_out, [&](const LeftOut& each) { return each.place == there; }))
+    if (std::ranges::none_of(left_out, [&](const LeftOut& each) { return each.index == there; }))
         left_out.push_back({there, met.agreement});
     return std::nullopt;
 }
 
 /// As far away as they may be, and evenly between: near views see little that this one does not. Where the recording
 /// ends, or a frame does not fit, the next nearer one, and more from the other side.
-std::vector<Neighbourhood::Fitting> Neighbourhood::spread_views(std::size_t place) {
+std::vector<SequenceAo::Fitting> SequenceAo::spread_views(std::size_t index) {
     std::vector<Fitting> chosen;
     const int sides = (options_.layers + 1) / 2;
     const auto try_frame = [&](std::size_t other) {
-        const bool had = std::ranges::any_of(chosen, [&](const Fitting& each) { return each.place == other; });
+        const bool had = std::ranges::any_of(chosen, [&](const Fitting& each) { return each.index == other; });
         if (had || static_cast<int>(chosen.size()) == options_.layers)
             return had;
-        const auto fits = fitting(place, other);
+        const auto fits = fitting(index, other);
         if (fits)
             chosen.push_back(*fits);
         return fits.has_value();
@@ -200,79 +201,79 @@ std::vector<Neighbourhood::Fitting> Neighbourhood::spread_views(std::size_t plac
     std::vector<std::size_t> first_choice;
     for (int i = sides; i >= 1; --i)
         for (const int side : {-1, 1})
-            first_choice.push_back(place + static_cast<std::size_t>(side * ring(i)));
-    meet(place, first_choice);
+            first_choice.push_back(index + static_cast<std::size_t>(side * ring(i)));
+    register_with(index, first_choice);
     for (int i = sides; i >= 1; --i)
         for (const int side : {-1, 1})
-            for (int step = ring(i); step > ring(i - 1) && !try_frame(place + static_cast<std::size_t>(side * step));
+            for (int step = ring(i); step > ring(i - 1) && !try_frame(index + static_cast<std::size_t>(side * step));
                  --step) {
             }
     return chosen;
 }
 
 /// The nearest ones on either side.
-std::vector<Neighbourhood::Fitting> Neighbourhood::adjacent_views(std::size_t place, int count) {
+std::vector<SequenceAo::Fitting> SequenceAo::adjacent_views(std::size_t index, int count) {
     std::vector<Fitting> chosen;
     std::vector<std::size_t> candidates;
     for (int step = 1; step <= (count + 1) / 2; ++step) {
-        candidates.push_back(place - static_cast<std::size_t>(step));
-        candidates.push_back(place + static_cast<std::size_t>(step));
+        candidates.push_back(index - static_cast<std::size_t>(step));
+        candidates.push_back(index + static_cast<std::size_t>(step));
     }
-    meet(place, candidates);
+    register_with(index, candidates);
     for (const std::size_t other : candidates)
-        if (const auto fits = fitting(place, other))
+        if (const auto fits = fitting(index, other))
             chosen.push_back(*fits);
     return chosen;
 }
 
-void Neighbourhood::account(std::string_view step, const Timings& timings) {
+void SequenceAo::account(std::string_view step, const Timings& timings) {
     double sum = 0;
     for (const auto& [name, ms] : timings)
         sum += ms;
     timings_.emplace_back(step, sum);
 }
 
-const AoMap& Neighbourhood::visibility(std::size_t place) {
-    Slot& slot = slots_.at(place);
+const AoMap& SequenceAo::visibility(std::size_t index) {
+    Slot& slot = slots_.at(index);
     if (slot.ao)
         return *slot.ao;
-    View view = view_of(place);
+    View view = view_of(index);
     std::vector<Neighbour> neighbours;
-    for (const Fitting& other : spread_views(place)) {
-        neighbours.push_back({&packed(other.place), other.here_from_there, other.misfit_m});
-        slot.neighbours.push_back(other.place);
+    for (const Fitting& other : spread_views(index)) {
+        neighbours.push_back({&packed(other.index), other.here_from_there, other.alignment_error_m});
+        slot.neighbours.push_back(other.index);
     }
     view.neighbours = neighbours;
-    view.instant = options_.average > 0 ? static_cast<int>(place % 65536) : 0; // so that what is averaged differs
+    view.instant = options_.average > 0 ? static_cast<int>(index % 65536) : 0; // so that what is averaged differs
     slot.ao = method_.compute(view);
     let_go(slot);
     timings_.insert(timings_.end(), method_.timings().begin(), method_.timings().end());
     return *slot.ao;
 }
 
-Seen Neighbourhood::seen(std::size_t place) {
-    const AoMap& ao = visibility(place);
-    Slot& slot = slots_.at(place);
+Seen SequenceAo::seen(std::size_t index) {
+    const AoMap& ao = visibility(index);
+    Slot& slot = slots_.at(index);
     if (!slot.ao_there)
         slot.ao_there = upload_(ao.visibility);
-    return {&packed(place), slot.ao_there};
+    return {&packed(index), slot.ao_there};
 }
 
-NeighbourhoodResult Neighbourhood::compute(std::size_t place) {
-    NeighbourhoodResult result;
-    result.ao = visibility(place);
+SequenceAoResult SequenceAo::compute(std::size_t index) {
+    SequenceAoResult result;
+    result.ao = visibility(index);
     std::vector<Seen> others;
-    for (const Fitting& other : adjacent_views(place, options_.average)) {
-        others.push_back(seen(other.place));
+    for (const Fitting& other : adjacent_views(index, options_.average)) {
+        others.push_back(seen(other.index));
         others.back().here_from_there = other.here_from_there;
-        result.averaged.push_back(other.place);
+        result.averaged.push_back(other.index);
     }
     if (!others.empty()) {
-        result.ao = gather_.compute(seen(place), others, {radius_m_, noise_});
+        result.ao = gather_.compute(seen(index), others, {radius_m_, noise_});
         account("average", gather_.timings());
     }
     averaged_ = !others.empty();
-    const Slot& slot = slots_.at(place);
+    const Slot& slot = slots_.at(index);
     result.depth = fit_ ? slot.fitted->depth : slot.depth;
     result.fused = slot.fused;
     result.neighbours = slot.neighbours;
