@@ -25,6 +25,8 @@ struct Pinhole {
     double fx = 0, fy = 0, cx = 0, cy = 0;
     cv::Size size;
 
+    friend bool operator==(const Pinhole&, const Pinhole&) = default;
+
     /// The ray through pixel (u, v), z = 1.
     [[nodiscard]] Eigen::Vector3d ray(double u, double v) const {
         return {shared::ray_axis(fx, cx, u), shared::ray_axis(fy, cy, v), 1};

@@ -4,7 +4,6 @@
 #include "projection/error.h"
 
 #include <chrono>
-#include <cstring>
 #include <fmt/format.h>
 
 namespace scanshade {
@@ -22,7 +21,7 @@ void Cacao::prepare(const View& view) {
     const Pinhole& camera = view.surfaces.camera;
     const bool supplied = view.surfaces.has_normals();
     if (program_ && supplied == normals_supplied_ && camera.size == camera_.size) {
-        if (std::memcmp(&camera, &camera_, sizeof camera) == 0)
+        if (camera == camera_)
             return;
     } else {
         program_.reset();

@@ -142,7 +142,8 @@ AoMap Raycast::compute(const View& view) {
     Watch watch(timings_);
     check_sizes(view.surfaces);
     const auto [depth, given] = on_host(view.surfaces, device_);
-    const auto& [camera, z_m, source] = depth;
+    const Pinhole& camera = depth.camera;
+    const cv::Mat1f& z_m = depth.z_m;
     const cv::Mat3f normals = normals_for(depth, given);
     watch.lap("normals");
     const RaySurface surface(surface_of(depth, view.noise, options_.thickness_m));

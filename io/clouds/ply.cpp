@@ -198,7 +198,8 @@ class BodyWalk {
                     too_short(element, index);
                 const double count = decoded(body_.data() + at_, *p.list_length, encoding_ == Encoding::big_endian);
                 at_ += head;
-                if (count < 0 || count > static_cast<double>((body_.size() - at_) / size_of(p.type)))
+                const std::size_t most = (body_.size() - at_) / size_of(p.type);
+                if (count < 0 || count > static_cast<double>(most))
                     throw Error(fmt::format("{}: element {}, record {}: list {} claims {} values, {} bytes are left",
                                             file_.string(), element.name, index + 1, in_quotes(p.name), count,
                                             body_.size() - at_));

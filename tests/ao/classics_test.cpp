@@ -99,7 +99,7 @@ Surface plane(double tilt, double z = 2) {
 double back_and_side(double x, double) { return x < 0 ? std::min(2.0, 0.4 / -x) : 2.0; }
 
 /// A sphere's nearer side (outside) or farther side (inside), 0 where it is missed.
-Surface sphere(cv::Vec3d centre, double radius, bool inside) {
+Surface sphere(const cv::Vec3d& centre, double radius, bool inside) {
     return [=](double x, double y) {
         const cv::Vec3d ray(x, y, 1);
         const double a = ray.dot(ray), b = ray.dot(centre), c = centre.dot(centre) - radius * radius,
@@ -115,7 +115,8 @@ double column_mean(const cv::Mat1f& v, int u, int half_height = 40) {
 
 double lowest(const cv::Mat1f& v) {
     double low = 0;
-    cv::minMaxLoc(v, &low, nullptr, nullptr, nullptr, v == v);
+    const cv::Mat known = v == v; // NOLINT(misc-redundant-expression): false for NaN
+    cv::minMaxLoc(v, &low, nullptr, nullptr, nullptr, known);
     return low;
 }
 
