@@ -35,7 +35,7 @@ struct Plane {
 Plane plane_round(const NeighbourTree& tree, std::size_t place, std::span<const Nearest::Neighbour> near) {
     if (near.size() < 2 || !(near.back().distance2 > 0))
         return {};
-    const Vector3f at = tree[place];
+    const Vector3f& at = tree[place];
     const float scale = -2 / near.back().distance2; // the farthest weighs e^-2
     float sum = 1;
     Vector3f mean = Vector3f::Zero();

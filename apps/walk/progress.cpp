@@ -59,7 +59,7 @@ void tell_for_now(const std::shared_ptr<OrderedOutput::Buffer>& buffer, const st
     std::fflush(stderr);
 }
 
-void log(const std::shared_ptr<OrderedOutput::Buffer>& buffer, json object) {
+void log(const std::shared_ptr<OrderedOutput::Buffer>& buffer, const json& object) {
     const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
     json line{{"time", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(now))}};
     if (buffer && !buffer->capture.empty())

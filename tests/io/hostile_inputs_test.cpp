@@ -280,7 +280,8 @@ TEST_F(Hostile, lists_named_like_coordinates_are_not_read_as_such) {
     for (const std::string& lists : std::vector<std::string>{
              "property list uchar double x\n", "property list uchar double nx\nproperty float ny\nproperty float nz\n",
              "property list uchar double ambient_occlusion\n"}) {
-        const std::string body = twelve + (lists.find("ny") == std::string::npos ? "" : std::string(8, '\0')) + '\0';
+        std::string body = twelve;
+        body.append(lists.find("ny") == std::string::npos ? 1 : 9, '\0');
         const fs::path file = write_file(folder / "a.ply", start + place + lists + "end_header\n" + body);
         std::vector<std::string> warnings;
         const Cloud cloud = read_cloud(file, warnings);
