@@ -20,7 +20,7 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
     all.add_pass("normals", "normals", {depth_in, supplied ? given : depth_in}, {surfaces},
                  {{shared::spec_supplied, supplied}});
     all.add_pass("pack", "sequence/pack", {surfaces}, {words});
-    return std::make_unique<gpu::Program>(device, all.buffers, all.passes, sizeof(shared::ScreenConstants));
+    return all.program(device, sizeof(shared::ScreenConstants));
 }
 
 } // namespace

@@ -57,7 +57,7 @@ std::pair<int, int> add_layers(ScreenTables& tables) {
                              {screen_neighbours, screen_depth}, {behind}, {{shared::spec_round, round}});
         tables.passes.back().groups[2] = static_cast<std::uint32_t>(tables.neighbours);
     }
-    tables.add_pass("widen", "surfel/widen", {screen_depth, behind}, {screen_surfaces});
+    tables.add_pass("widen", "surfel/widen", {screen_depth, behind, screen_surfaces}, {screen_surfaces});
     tables.add_pass_over(halved(tables.window.size()), "carve", "surfel/carve", {screen_neighbours, screen_surfaces},
                          {limits});
     return {behind, limits};
@@ -85,7 +85,7 @@ std::array<std::uint32_t, 3> groups_of(int n) {
 std::size_t bytes_of_texels(int count) { return 8 * static_cast<std::size_t>(count); }
 
 void add_fill(ScreenTables& tables) {
-    tables.add_pass_over(tables.window.size(), "fill", "surfel/fill", {}, {screen_surfaces});
+    tables.add_pass_over(tables.window.size(), "fill", "surfel/fill", {screen_surfaces}, {screen_surfaces});
 }
 
 /// Without surfels, surfaces are read directly: an unused buffer for the slot of surfels.

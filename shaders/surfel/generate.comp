@@ -24,7 +24,7 @@ layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(binding = 0, rg32ui) readonly uniform uimageBuffer surfels;
 layout(binding = 1, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 2, rg32f) readonly uniform imageBuffer noise_table;
-layout(binding = 16, rg32f) writeonly uniform imageBuffer sampled; // open and whole measure
+layout(binding = 16, scalar) writeonly buffer Sampled { vec2 sampled[]; }; // open and whole measure
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 #include "lib/noise.glsl"
@@ -260,5 +260,5 @@ void main() {
     float shows = k.radius * sqrt(k.camera.fx * k.camera.fy) / z;
     open = mix(all, open, clamp(0.5 * shows - 0.5, 0.0, 1.0));
     int index = at.y * s.samples.x + at.x;
-    imageStore(sampled, index, own > 0.0 ? vec4(open, all, 0.0, 0.0) : vec4(0.0));
+    sampled[index] = own > 0.0 ? vec2(open, all) : vec2(0.0);
 }
