@@ -6,8 +6,8 @@
 // All angles of a slice are measured from the eye vector V, outwards on either side, and known by their cosine: sectors need
 // no arc function.
 //
-// A sample is where the slice meets the plane of the surfel that the nearest pixel shows. Geometry is then plane geometry
-// within the slice, and what lies outside the image needs no formula of its own.
+// A sample is taken to lie in the slice, at the depth of the nearest pixel: geometry is then plane geometry. Only whether it
+// rises above the surface is asked of that pixel's middle, or planes would close themselves.
 //
 // The four components of a vector are four reads, two steps to either side: independent chains of arithmetic and loads keep
 // a processor busy.
@@ -41,7 +41,7 @@ const float sector_count = 31.0; // so that a bit's index never reaches the widt
 // Compare and select: min and max handle NaN, which costs time.
 vec4 least(vec4 a, vec4 b) { return mix(b, a, lessThan(a, b)); }
 vec4 most(vec4 a, vec4 b) { return mix(b, a, greaterThan(a, b)); }
-// To 0.07 %: lengths of directions, not positions.
+// To 0.07 %, finite for 0: lengths of directions, not positions.
 vec4 inverse_length(vec4 squared) { return quick_scale * quick_inversesqrt(squared); }
 
 // Cosine and sine of an angle in [0, pi] to 0.0001: a direction to march in.
@@ -61,7 +61,7 @@ vec4 spread(vec4 x) { return x * (x * (0.95 - 0.25 * x) + 0.3); }
 vec2 spread(vec2 x) { return x * (x * (0.95 - 0.25 * x) + 0.3); }
 
 // The cosine of a vector's angle from V, with the scale of quick_inversesqrt().
-vec4 quick_cosine(vec4 v, vec4 t) { return v * quick_inversesqrt(v * v + (t * t + 1e-30)); }
+vec4 quick_cosine(vec4 v, vec4 t) { return v * quick_inversesqrt(v * v + t * t); }
 
 // Sectors before an angle: base + squared cos^2 + curved G(cos), with G(cos t) = pi - 2t + sin 2t to 0.002 on [-1, 1].
 struct Sectors {
@@ -80,6 +80,9 @@ ivec4 sectors_before(vec4 quick_cosine, Sectors sectors) {
 vec4 hidden_length(vec4 near, vec4 z, vec4 plane, vec4 length_) {
     return mix(vec4(0.0), mix(vec4(0.0), length_, lessThan(near * plane, z)), lessThan(near, z));
 }
+
+// A positive number, with the sign of the first.
+vec4 with_sign_of(vec4 sign_, vec4 x) { return intBitsToFloat(floatBitsToInt(x) ^ (floatBitsToInt(sign_) & 0x80000000)); }
 
 // Pixels from p to the border of the image, along a direction and the other way.
 vec2 to_border(vec2 p, vec2 direction) {
@@ -167,22 +170,22 @@ void main() {
         vec2 along_ray = along * k.ray_step;
         float per_pixel = length(along_ray); // metres at z = 1 m
         float half_pixel = 0.5 * s.lengthen * per_pixel;
-        float steepest = 5.0 * per_pixel; // of a depth, within half a pixel
         // Farther outside than half the image's size, the plane is too poor a guess to spend a step on.
         vec2 room = to_border(vec2(pixel), along) + 0.5 * float(max(k.size.x, k.size.y));
         float full_reach = reach / per_pixel;
         vec2 far = max(min(vec2(full_reach), room), 1.0) - 1.0;
         vec2 u = fract(noise.y + golden * vec2(2 * i, 2 * i + 1)) * (1.0 / float(steps));
-        // Of a pixel's step along the slice, at z = 1 m, on either side: parts towards V, outwards and along the normal; and x, y.
-        vec4 to_eye = dot(along_ray, eye.xy) * sides, to_normal = dot(along_ray, n.xy) * sides;
+        // Of a pixel's step along the slice, at z = 1 m, on either side: towards V and outwards; and x, y.
+        vec4 to_eye = dot(along_ray, eye.xy) * sides;
         float outwards = dot(along_ray, tangent.xy);
         vec4 along_x = along.x * sides, along_y = along.y * sides, ray_x = along_ray.x * sides, ray_y = along_ray.y * sides;
-        // The direction of a surfel in the slice from its plane's n . ray (1, towards T) and n . along (across).
-        vec4 eye_per_ray = tangent.z * ray_length * sides;
-        float eye_per_along = ray_length / outwards;
+        // The direction of a surfel in the slice is (its normal on T, on V), and the ray and `along` span the slice: what the
+        // normal is on those two gives the direction, ray_length long.
+        vec4 t_per_ray = tangent.z * ray_length * sides;
+        float t_per_step = ray_length / outwards;
 
         uint closed = 0u;
-        vec2 last = vec2(1e30); // depths of the step before, on either side
+        vec2 last = vec2(1e30);                               // depths of the step before, on either side
         vec4 reached = vec4(0.0, 0.0, spread(u) * far + 1.0); // pixels to the step before and to this one
         int j = 0, layer = 0;
         do {
@@ -197,42 +200,42 @@ void main() {
             vec4 zq = four.z, nx = four.nx, ny = four.ny;
             if (steps % 2 == 1 && j == steps - 1) zq.zw = vec2(0.0);
 
-            // Where the slice meets the pixel's plane: a fraction of a pixel from its middle, or its middle if the plane is too
-            // steep. Outside the image the surface at its border continues, but not towards its horizon, and not those that
+            // Outside the image the surface at its border continues as a plane, but not towards its horizon, and not those that
             // other views saw behind it. Filled holes have a negative depth.
-            bvec4 inside_image = equal((ix ^ jx) | (iy ^ jy), ivec4(0));
+            ivec4 out_x = ix - jx, out_y = iy - jy;
+            vec4 mx = vec4(ix) * k.ray_step.x, my = vec4(iy) * k.ray_step.y;
             vec4 by_ray = nx * ray.x + ny * ray.y + four.nz, by_step = nx * ray_x + ny * ray_y;
-            vec4 inverse_seen = 1.0 / (by_ray + now * by_step);
-            vec4 px = vec4(jx) * k.ray_step.x, py = vec4(jy) * k.ray_step.y;
-            vec4 ratio = (by_ray + (nx * px + ny * py)) * inverse_seen;
-            ratio = mix(vec4(0.0), ratio, lessThan(abs(ratio - 1.5), vec4(layer == 0 ? 1.2 : 0.0)));
-            zq = abs(zq) * mix(ratio, vec4(1.0), inside_image);
+            vec4 inverse_seen = 1.0 / (by_ray + (nx * mx + ny * my));
+            vec4 go_on = 1.0 - (nx * (vec4(out_x) * k.ray_step.x) + ny * (vec4(out_y) * k.ray_step.y)) * inverse_seen;
+            bvec4 goes_on = lessThan(abs(go_on - 1.5), vec4(1.2));
+            if (layers > 1) goes_on = mix(equal(out_x | out_y, ivec4(0)), goes_on, bvec4(layer == 0));
+            zq = abs(zq) * mix(vec4(0.0), go_on, goes_on);
             // From the pixel's point to the sample's, towards V and towards T (outwards on either side): differences first,
             // far away coordinates cancel badly.
             vec4 dz = zq - z, off = zq * now;
             vec4 pv = off * to_eye - ray_length * dz;
             vec4 pt = off * outwards;
-            vec4 rise = mix(off * to_normal, zq * (px * n.x + py * n.y), inside_image) + (dz * normal_per_z - least_rise);
+            vec4 rise = zq * (mx * n.x + my * n.y) + (dz * normal_per_z - least_rise);
             // Surfaces of other views have an alignment error; they must not occlude the surface that they continue.
             if (layers > 1) rise -= vec4((four.marks >> 4) & 1) * k.misfit;
             vec4 d2 = pv * pv + pt * pt;
             // The view direction of the sample; perpendicular to it, outwards: (gt, -gv).
             vec4 gv = pv - distance;
-            vec4 g = inverse_length(gv * gv + (pt * pt + 1e-30));
+            vec4 g = inverse_length(gv * gv + pt * pt);
             gv *= g;
             vec4 gt = pt * g;
             // The surfel's direction in the slice, outwards.
-            vec4 lv = by_step * eye_per_along + by_ray * eye_per_ray, lt = by_ray;
-            vec4 l = inverse_length(lv * lv + (lt * lt + 1e-30));
+            vec4 lv = by_step * t_per_step + by_ray * t_per_ray, lt = by_ray;
+            vec4 l = inverse_length(lv * lv + lt * lt);
             vec4 slope = (lv * gt - lt * gv) * l;
-            l = mix(-l, l, greaterThan(slope, vec4(0.0)));
+            l = with_sign_of(slope, l);
             lv *= l;
             lt *= l;
             slope = abs(slope);
             vec4 size = zq * half_pixel / most(slope, vec4(0.1));
             // Clipped to the radius.
             vec4 middle = pv * lv + pt * lt;
-            vec4 chord = positive(middle * middle + (radius2 - d2)) + 1e-30;
+            vec4 chord = positive(middle * middle + (radius2 - d2));
             chord *= inverse_length(chord);
             // Half way to its neighbours; farther where a neighbour is in front of it and of its plane and hides its continuation.
             vec4 back = passed * size, ahead = coming * size;
