@@ -122,12 +122,12 @@ std::vector<Parameter> SurfelOptions::parameters() {
         screen.parameters(),
         {{.name = "quality",
           .help = "reads per pixel: lowest 8, low 8, medium 16, high 32, highest 64. RMSE 0.103, 0.095, 0.085, 0.081, "
-                  "0.080; time on a CPU 0.37, 0.5, 0.65, 1, 1.6 of high's. lowest assumes that all surfaces are "
+                  "0.080; time on a CPU 0.39, 0.57, 0.7, 1, 1.5 of high's. lowest assumes that all surfaces are "
                   "equally thick",
           .value = OneOf(&quality, quality_words)},
          {.name = "downsampled",
           .help = "samples every other pixel of every other row and fills in the rest: lowest RMSE 0.109, low 0.101, "
-                  "high 0.085; time on a CPU 0.18, 0.27, 0.41 of high's",
+                  "high 0.085; time on a CPU 0.22, 0.37, 0.47 of high's",
           .value = &downsampled},
          {.name = "slices",
           .help = "slices of the hemisphere; 0 = as the quality says",
