@@ -11,7 +11,7 @@ layout(constant_id = spec_blur_down) const int down = 0;
 layout(binding = 0, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 1, r32f) readonly uniform imageBuffer from;
 layout(binding = 2, r32f) readonly uniform imageBuffer weights; // of offsets 0, 1, 2 ...
-layout(binding = 16, r32f) uniform writeonly imageBuffer to;
+layout(binding = 16, scalar) writeonly buffer To { float to[]; };
 layout(binding = 32, scalar) uniform Constants { ScreenConstants constants; };
 
 void main() {
@@ -36,5 +36,5 @@ void main() {
         sum += w * imageLoad(from, at).x;
         weight += w;
     }
-    imageStore(to, here, vec4(sum / weight));
+    to[here] = sum / weight;
 }

@@ -10,7 +10,7 @@ layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(constant_id = spec_denoise) const int denoise = 1;
 layout(binding = 0, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 1, r32f) readonly uniform imageBuffer raw;
-layout(binding = 16, r32f) uniform writeonly imageBuffer visibility;
+layout(binding = 16, scalar) writeonly buffer Visibility { float visibility[]; };
 layout(binding = 32, scalar) uniform Constants { ScreenConstants constants; };
 
 struct Mean {
@@ -50,7 +50,7 @@ void add(inout Mean mean, Tap tap) {
 void put(ivec2 p, Tap centre, Mean mean) {
     if (!inside(p)) return;
     bool hole = !(centre.point.z > 0.0);
-    imageStore(visibility, index_of(p), vec4(hole ? uintBitsToFloat(not_a_number) : shown(mean.sum / mean.weight)));
+    visibility[index_of(p)] = hole ? uintBitsToFloat(not_a_number) : shown(mean.sum / mean.weight);
 }
 
 // One tap for those of the four pixels that have it in their window; none is its own neighbour.

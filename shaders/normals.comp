@@ -11,7 +11,7 @@ layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(constant_id = spec_supplied) const int supplied = 0;
 layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 1, r32f) readonly uniform imageBuffer given; // normals of the view, if any, three floats a pixel
-layout(binding = 16, rgba32f) uniform writeonly imageBuffer surfaces;
+layout(binding = 16, scalar) writeonly buffer Surfaces { vec4 surfaces[]; };
 layout(binding = 32, scalar) uniform Constants { ScreenConstants constants; };
 
 #include "lib/depth.glsl"
@@ -107,5 +107,5 @@ void main() {
         n = usable ? own * inversesqrt(length2) : n;
     }
     n = hole ? vec3(0.0) : n;
-    imageStore(surfaces, here, vec4(n, z));
+    surfaces[here] = vec4(n, z);
 }

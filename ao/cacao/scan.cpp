@@ -97,6 +97,9 @@ CacaoStorage cacao_storage(const CacaoOptions& options, const gpu::Device& devic
 }
 
 CacaoTables scan_tables(CacaoPlan plan, CacaoStorage storage) {
+    // Not the importance map: it is small, and its blur is the reference's, too.
+    for (const int written : {cacao_depths, cacao_normals, cacao_ping, cacao_pong, cacao_staged})
+        plan.tables.buffers[written].plain_writes = true;
     return storage == CacaoStorage::images ? in_images(std::move(plan)) : in_buffers(std::move(plan));
 }
 

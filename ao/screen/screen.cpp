@@ -82,6 +82,13 @@ void ScreenTables::add_pass_over(cv::Size over, std::string name, std::string_vi
                       std::move(constants)});
 }
 
+std::unique_ptr<gpu::Program> ScreenTables::program(gpu::Device& device, std::size_t constants_bytes) const {
+    std::vector<gpu::BufferRow> rows = buffers;
+    for (gpu::BufferRow& row : rows)
+        row.plain_writes = true;
+    return std::make_unique<gpu::Program>(device, std::move(rows), passes, constants_bytes);
+}
+
 void ScreenTables::add_blurs(int iterations, const std::vector<float>& weights) {
     if (iterations == 0)
         return;
@@ -165,10 +172,8 @@ gpu::Program& ScreenMethod::program_for(const Shape& shape, std::size_t constant
             programs_.clear();
     }
     std::unique_ptr<gpu::Program>& program = programs_[shape];
-    if (!program) {
-        const ScreenTables all = tables(shape);
-        program = std::make_unique<gpu::Program>(device_, all.buffers, all.passes, constants_bytes);
-    }
+    if (!program)
+        program = tables(shape).program(device_, constants_bytes);
     return *program;
 }
 

@@ -69,6 +69,8 @@ struct ScreenTables {
     /// Appends so many iterations of a separable blur of screen_raw over the pixels of the same surface; `weights` are
     /// those of offsets 0, 1, 2 ... to either side.
     void add_blurs(int iterations, const std::vector<float>& weights);
+    /// Ready to run. Passes see texels where they read a buffer, plain storage where they write it.
+    [[nodiscard]] std::unique_ptr<gpu::Program> program(gpu::Device& device, std::size_t constants_bytes) const;
     [[nodiscard]] std::size_t pixels() const { return static_cast<std::size_t>(size.area()); }
 };
 

@@ -26,7 +26,7 @@ std::unique_ptr<gpu::Program> gathering(gpu::Device& device, cv::Size size, std:
                    {"mean", pixels * 4, Host::download, Texels::r32f},
                    {"spread", pixels * 8, Host::download, Texels::rg32f}};
     all.add_pass("gather", "sequence/gather", {own_surfaces, own_visibility, surfaces, visibilities}, {mean, spread});
-    return std::make_unique<gpu::Program>(device, all.buffers, all.passes, sizeof(shared::GatherConstants));
+    return all.program(device, sizeof(shared::GatherConstants));
 }
 
 } // namespace

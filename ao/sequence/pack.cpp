@@ -20,7 +20,7 @@ std::unique_ptr<gpu::Program> packing(gpu::Device& device, cv::Size size, bool s
     all.add_pass("normals", "normals", {depth_in, supplied ? given_normals : depth_in}, {with_normals},
                  {{shared::spec_supplied, supplied}});
     all.add_pass("pack", "sequence/pack", {with_normals}, {packed_words});
-    return std::make_unique<gpu::Program>(device, all.buffers, all.passes, sizeof(shared::ScreenConstants));
+    return all.program(device, sizeof(shared::ScreenConstants));
 }
 
 } // namespace

@@ -57,7 +57,7 @@ std::pair<int, int> add_layers(ScreenTables& tables) {
                              {screen_neighbours, screen_depth}, {behind}, {{shared::spec_round, round}});
         tables.passes.back().groups[2] = static_cast<std::uint32_t>(tables.neighbours);
     }
-    tables.add_pass("widen", "surfel/widen", {screen_depth, behind}, {screen_surfaces});
+    tables.add_pass("widen", "surfel/widen", {screen_depth, behind, screen_surfaces}, {screen_surfaces});
     tables.add_pass_over(halved(tables.window.size()), "carve", "surfel/carve", {screen_neighbours, screen_surfaces},
                          {limits});
     return {behind, limits};
@@ -85,7 +85,7 @@ std::array<std::uint32_t, 3> groups_of(int n) {
 std::size_t bytes_of_texels(int count) { return 8 * static_cast<std::size_t>(count); }
 
 void add_fill(ScreenTables& tables) {
-    tables.add_pass_over(tables.window.size(), "fill", "surfel/fill", {}, {screen_surfaces});
+    tables.add_pass_over(tables.window.size(), "fill", "surfel/fill", {screen_surfaces}, {screen_surfaces});
 }
 
 /// Without surfels, surfaces are read directly: an unused buffer for the slot of surfels.
@@ -122,12 +122,12 @@ std::vector<Parameter> SurfelOptions::parameters() {
         screen.parameters(),
         {{.name = "quality",
           .help = "reads per pixel: lowest 8, low 8, medium 16, high 32, highest 64. RMSE 0.103, 0.095, 0.085, 0.081, "
-                  "0.080; time on a CPU 0.37, 0.5, 0.65, 1, 1.6 of high's. lowest assumes that all surfaces are "
+                  "0.080; time on a CPU 0.39, 0.57, 0.7, 1, 1.5 of high's. lowest assumes that all surfaces are "
                   "equally thick",
           .value = OneOf(&quality, quality_words)},
          {.name = "downsampled",
           .help = "samples every other pixel of every other row and fills in the rest: lowest RMSE 0.109, low 0.101, "
-                  "high 0.085; time on a CPU 0.18, 0.27, 0.41 of high's",
+                  "high 0.085; time on a CPU 0.22, 0.37, 0.47 of high's",
           .value = &downsampled},
          {.name = "slices",
           .help = "slices of the hemisphere; 0 = as the quality says",

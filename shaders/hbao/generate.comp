@@ -13,7 +13,7 @@ layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 1, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 2, rg32f) readonly uniform imageBuffer noise_table;
-layout(binding = 16, r32f) uniform writeonly imageBuffer raw;
+layout(binding = 16, scalar) writeonly buffer Raw { float raw[]; };
 layout(binding = 32, scalar) uniform Constants { HbaoConstants constants; };
 
 #include "lib/normal.glsl"

@@ -1,5 +1,5 @@
-// The surface point of a pixel, the extent of its neighbourhood in the image, and the output. Expects the texel buffers
-// `surfaces`, and `raw` to write.
+// The surface point of a pixel, the extent of its neighbourhood in the image, and the output. Expects the texel buffer
+// `surfaces`, and the array `raw` to write.
 #include "lib/cheap.glsl"
 
 struct Surface {
@@ -77,5 +77,5 @@ void march_both_ways(Surface s, vec2 p, vec3 d, out March ahead, out March behin
 void finish(Surface s, bool hole, int index, float visibility) {
     float occlusion = 1.0 - visibility;
     occlusion *= clamp(0.5 * s.radius_px - 0.5, 0.0, 1.0);
-    imageStore(raw, index, vec4(hole ? 1.0 : clamp(1.0 - occlusion, 0.0, 1.0)));
+    raw[index] = hole ? 1.0 : clamp(1.0 - occlusion, 0.0, 1.0);
 }

@@ -8,6 +8,6 @@ uvec2 surfel(float z, vec3 n, float thickness) {
 // The normal as whole numbers, up to rounding 127 long.
 ivec3 bytes_of_normal(uint shape) { return ivec3(int(shape)) << ivec3(0, 8, 16) >> 24; }
 
-// Pixels 4 apart are contiguous, one plane for each position in a 4x4 tile. Threads of one plane share their rotation and
-// steps, so their reads are contiguous, too.
-int surfel_index(ivec2 p, ivec2 plane) { return (((p.y & 3) * 4 + (p.x & 3)) * plane.y + (p.y >> 2)) * plane.x + (p.x >> 2); }
+// In a row, pixels 4 apart are contiguous. Threads that share their rotation and steps lie 4 pixels apart, so their reads are
+// contiguous, too.
+int surfel_index(ivec2 p, ivec2 plane) { return (p.y << 2 | (p.x & 3)) * plane.x + (p.x >> 2); }

@@ -17,7 +17,7 @@ layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 1, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 2, rg32f) readonly uniform imageBuffer noise_table;
 layout(binding = 3, rgba32f) readonly uniform imageBuffer vectors; // set after set, each vector with its final length
-layout(binding = 16, r32f) uniform writeonly imageBuffer raw;
+layout(binding = 16, scalar) writeonly buffer Raw { float raw[]; };
 layout(binding = 32, scalar) uniform Constants { LunaConstants constants; };
 
 #include "lib/normal.glsl"

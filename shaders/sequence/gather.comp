@@ -13,8 +13,8 @@ layout(binding = 0, rg32ui) readonly uniform uimageBuffer own_surfaces;
 layout(binding = 1, r32f) readonly uniform imageBuffer own_visibility;
 layout(binding = 2, rg32ui) readonly uniform uimageBuffer surfaces;  // of each frame, one after the other
 layout(binding = 3, r32f) readonly uniform imageBuffer visibilities; // likewise
-layout(binding = 16, r32f) uniform writeonly imageBuffer mean;
-layout(binding = 17, rg32f) uniform writeonly imageBuffer spread;    // how many frames, in those as good as this one; deviation
+layout(binding = 16, scalar) writeonly buffer Mean { float mean[]; };
+layout(binding = 17, scalar) writeonly buffer Spread { vec2 spread[]; }; // how many frames, in those as good as this one; deviation
 layout(binding = 32, scalar) uniform Constants { GatherConstants constants; };
 
 #include "lib/surfel.glsl"
@@ -63,6 +63,6 @@ void main() {
     } while (++i < constants.frames);
     float m = sum / weights, variance = positive(squares / weights - m * m);
     float none = uintBitsToFloat(not_a_number);
-    imageStore(mean, here, vec4(hole ? none : m));
-    imageStore(spread, here, hole ? vec4(none) : vec4(weights / own, sqrt(variance), 0.0, 0.0));
+    mean[here] = hole ? none : m;
+    spread[here] = hole ? vec2(none) : vec2(weights / own, sqrt(variance));
 }

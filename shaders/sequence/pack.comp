@@ -7,7 +7,7 @@
 
 layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(binding = 0, rgba32f) readonly uniform imageBuffer surfaces;
-layout(binding = 16, rg32ui) uniform writeonly uimageBuffer words;
+layout(binding = 16, scalar) writeonly buffer Words { uvec2 words[]; };
 layout(binding = 32, scalar) uniform Constants { ScreenConstants constants; };
 
 #include "lib/surfel.glsl"
@@ -32,5 +32,5 @@ void main() {
         }
         surface.w = edge ? 0.0 : surface.w;
     }
-    imageStore(words, index_of(p), uvec4(surfel(surface.w, surface.xyz, 0.0), 0u, 0u));
+    words[index_of(p)] = surfel(surface.w, surface.xyz, 0.0);
 }

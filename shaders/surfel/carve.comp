@@ -10,7 +10,7 @@
 layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(binding = 0, rg32ui) readonly uniform uimageBuffer neighbours;
 layout(binding = 1, rgba32f) readonly uniform imageBuffer surfaces;
-layout(binding = 16, r32f) writeonly uniform imageBuffer limits; // metres
+layout(binding = 16, scalar) writeonly buffer Limits { float limits[]; }; // metres
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 // Whether neighbour i saw through a point of this view.
@@ -36,5 +36,5 @@ void main() {
         limit = limit > 0.4 && is_free(i, place, point + 0.5 * away, margin) ? 0.37 : limit;
         limit = is_free(i, place, point + 0.125 * away, margin) ? 0.09 : limit;
     } while (++i < k.neighbours);
-    imageStore(limits, block.y * ((k.size.x + 1) >> 1) + block.x, vec4(limit * s.thickest));
+    limits[block.y * ((k.size.x + 1) >> 1) + block.x] = limit * s.thickest;
 }

@@ -9,7 +9,7 @@
 
 layout(local_size_x = surfel_group) in;
 layout(binding = 0, rgba32f) readonly uniform imageBuffer surfaces;
-layout(binding = 16, rg32ui) writeonly uniform uimageBuffer edges;
+layout(binding = 16, scalar) writeonly buffer Edges { uvec2 edges[]; };
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 const int narrow = 4;  // a surface may continue behind a hole of fewer pixels
@@ -84,5 +84,5 @@ void main() {
         c = d;
     }
     // Words of one run of all lines are contiguous.
-    imageStore(edges, id, uvec4(edge, farther, 0u, 0u));
+    edges[id] = uvec2(edge, farther);
 }

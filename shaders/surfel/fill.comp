@@ -8,7 +8,8 @@
 #include "lib/screen.glsl"
 
 layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
-layout(binding = 16, rgba32f) uniform imageBuffer surfaces; // where there is depth only read, elsewhere only written
+layout(binding = 0, rgba32f) readonly uniform imageBuffer surfaces;
+layout(binding = 16, scalar) writeonly buffer Filled { vec4 filled[]; }; // the same: where there is depth it is only read
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 // Pixels from p along its row to the next one with depth, fill_px + 1 where there is none so near.
@@ -53,5 +54,5 @@ void main() {
     ivec2 at = ivec2(from_left ? p.x - left : p.x + right, p.y);
     float ratio = dot(source.xyz, ray_of(vec2(at))) / dot(source.xyz, ray_of(vec2(p)));
     float z = ratio > 0.0 ? clamp(source.w * ratio, nearest_z, 1.1 * source.w) : source.w;
-    if (fill) imageStore(surfaces, index_of(p), vec4(source.xyz, -z));
+    if (fill) filled[index_of(p)] = vec4(source.xyz, -z);
 }

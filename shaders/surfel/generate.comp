@@ -3,8 +3,11 @@
 // cosine measure, Jimenez et al. 2016). A surfel is a piece of surface with a direction and a thickness, not a point: no light
 // leaks between two samples, and light passes behind thin surfaces.
 //
-// All angles of a slice are measured from the eye vector V, outwards on either side. They are compared as turns, 1 - c of a
-// vector (c, s) with |c| + s = 1, which need no arc function.
+// All angles of a slice are measured from the eye vector V, outwards on either side, and known by their cosine: sectors need
+// no arc function.
+//
+// A sample is taken to lie in the slice, at the depth of the nearest pixel: geometry is then plane geometry. Only whether it
+// rises above the surface is asked of that pixel's middle, or planes would close themselves.
 //
 // The four components of a vector are four reads, two steps to either side: independent chains of arithmetic and loads keep
 // a processor busy.
@@ -24,7 +27,7 @@ layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(binding = 0, rg32ui) readonly uniform uimageBuffer surfels;
 layout(binding = 1, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 2, rg32f) readonly uniform imageBuffer noise_table;
-layout(binding = 16, rg32f) writeonly uniform imageBuffer sampled; // open and whole measure
+layout(binding = 16, scalar) writeonly buffer Sampled { vec2 sampled[]; }; // open and whole measure
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 #include "lib/noise.glsl"
@@ -37,40 +40,56 @@ const float sector_count = 31.0; // so that a bit's index never reaches the widt
 
 // Compare and select: min and max handle NaN, which costs time.
 vec4 least(vec4 a, vec4 b) { return mix(b, a, lessThan(a, b)); }
-vec4 most(vec4 a, float b) { return mix(vec4(b), a, greaterThan(a, vec4(b))); }
-// To 0.07 %: lengths of directions, not positions.
+vec4 most(vec4 a, vec4 b) { return mix(b, a, greaterThan(a, b)); }
+// To 0.07 %, finite for 0: lengths of directions, not positions.
 vec4 inverse_length(vec4 squared) { return quick_scale * quick_inversesqrt(squared); }
+
+// Cosine and sine of an angle in [0, pi] to 0.0001: a direction to march in.
+vec2 direction_at(float angle) {
+    float t = angle - 0.5 * pi, t2 = t * t;
+    return vec2(-t * (1.0 + t2 * (-0.16666 + t2 * (0.0083143 - t2 * 0.00018542))), 1.0 + t2 * (-0.4999987 + t2 * (0.0416555 + t2 * (-0.0013858 + t2 * 0.00002315))));
+}
+
+// The angle of a unit vector (c, s), c >= 0, to 7e-5 (Abramowitz and Stegun 4.4.45).
+float angle_of(float c, float s) {
+    float angle = sqrt(positive(1.0 - c)) * (((-0.0187293 * c + 0.0742610) * c - 0.2121144) * c + 1.5707288);
+    return s < 0.0 ? -angle : angle;
+}
 
 // x^1.5 on [0, 1] within 0.01: the distribution of the steps.
 vec4 spread(vec4 x) { return x * (x * (0.95 - 0.25 * x) + 0.3); }
+vec2 spread(vec2 x) { return x * (x * (0.95 - 0.25 * x) + 0.3); }
 
-// Of the angle t of (c, s) with s >= 0: 1 - c / (|c| + s), monotonic from 0 to 2.
-vec4 turn(vec4 c, vec4 s) { return 1.0 - c / (abs(c) + s + 1e-20); }
+// The cosine of a vector's angle from V, with the scale of quick_inversesqrt().
+vec4 quick_cosine(vec4 v, vec4 t) { return v * quick_inversesqrt(v * v + t * t); }
 
-// 2 t - sin 2t and 1 - cos 2t of a turn's angle t in [0, pi].
-void measures(vec4 turns, out vec4 along_sine, out vec4 along_cosine) {
-    vec4 c = 1.0 - turns;                 // |c| + |s| = 1
-    vec4 y = 2.0 * abs(c) - 1.0;          // tangent of pi/4 - t, with t folded into [0, pi/2]
-    vec4 y2 = y * y;
-    // Arc tangent on [-1, 1] to 1e-5 (Abramowitz and Stegun 4.4.49), doubled.
-    vec4 arc = y * (1.9997320 + y2 * (-0.6605990 + y2 * (0.3602820 + y2 * (-0.1702660 + y2 * 0.0416702))));
-    vec4 r = 1.0 / (1.0 + y2);
-    vec4 folded = 0.5 * pi - arc - (1.0 - y2) * r;
-    along_sine = mix(folded, 2.0 * pi - folded, lessThan(c, vec4(0.0)));
-    along_cosine = 1.0 - 2.0 * y * r;
+// Sectors before an angle: base + squared cos^2 + curved G(cos), with G(cos t) = pi - 2t + sin 2t to 0.002 on [-1, 1].
+struct Sectors {
+    vec4 base, squared;
+    float curved;
+};
+ivec4 sectors_before(vec4 quick_cosine, Sectors sectors) {
+    const float c = quick_scale, c2 = c * c;
+    vec4 q2 = quick_cosine * quick_cosine;
+    vec4 g = quick_cosine * (c * 4.0165217 + q2 * (c * c2 * -0.8318334 + q2 * (c * c2 * c2 * 0.3203379 + q2 * (c * c2 * c2 * c2 * -0.3613204))));
+    return ivec4(sectors.base + (sectors.squared * q2 + sectors.curved * g));
 }
 
-// 1 where depth `other` is in front of a sample at z and of the sample's plane, which has depth z / plane there.
-vec4 hides(vec4 other, vec4 z, vec4 plane, float jut) {
-    vec4 near = other + jut;
-    return vec4(greaterThan(other, vec4(0.0))) * vec4(lessThan(near, z)) * vec4(lessThan(near * plane, z));
+// What a surfel grows by where a neighbour at depth `near` is in front of its sample at z and of its plane, which has depth
+// z / plane there; 0 elsewhere.
+vec4 hidden_length(vec4 near, vec4 z, vec4 plane, vec4 length_) {
+    return mix(vec4(0.0), mix(vec4(0.0), length_, lessThan(near * plane, z)), lessThan(near, z));
 }
 
-// Pixels from p to the border of the image.
-float to_border(vec2 p, vec2 direction) {
-    vec2 room = mix(p + 0.49, vec2(k.size) - 0.51 - p, greaterThan(direction, vec2(0.0)));
-    vec2 at = room / max(abs(direction), vec2(1e-6));
-    return min(at.x, at.y);
+// A positive number, with the sign of the first.
+vec4 with_sign_of(vec4 sign_, vec4 x) { return intBitsToFloat(floatBitsToInt(x) ^ (floatBitsToInt(sign_) & 0x80000000)); }
+
+// Pixels from p to the border of the image, along a direction and the other way.
+vec2 to_border(vec2 p, vec2 direction) {
+    vec2 before = p + 0.49, after = vec2(k.size) - 0.51 - p, inverse = 1.0 / max(abs(direction), vec2(1e-6));
+    bvec2 up = greaterThan(direction, vec2(0.0));
+    vec2 ahead = mix(before, after, up) * inverse, back = mix(after, before, up) * inverse;
+    return vec2(min(ahead.x, ahead.y), min(back.x, back.y));
 }
 
 // Four surfels: depth, normal of any length, half the thickness, and the last bits of the depth.
@@ -122,7 +141,6 @@ void main() {
     vec2 noise = noise_at(phase);
     float radius2 = k.radius * k.radius;
     float reach = k.radius * inversesqrt(max(z * z - radius2, 1e-4 * z * z)); // in units of the image plane
-    vec2 flat_eye = eye.xy * k.ray_step, flat_normal = n.xy * k.ray_step; // per pixel across
     float normal_per_z = dot(n, vec3(ray, 1.0));
     // Rounding of depth in single precision is noise, too.
     float least_rise = (k.tangent_sigmas * sigma_of(z) + 1e-6 * z) * abs(normal_per_z);
@@ -132,20 +150,20 @@ void main() {
     // The loop tests at its end: lavapipe would run a `for` once more with all lanes off.
     int i = 0;
     do {
-        float phi = pi * (float(i) + noise.x) / float(slices);
-        vec3 tangent = e1 * cos(phi) + e2 * sin(phi);
+        vec2 towards = direction_at((float(i) + noise.x) * (pi / float(slices)));
+        vec3 tangent = e1 * towards.x + e2 * towards.y;
         vec2 in_slice = vec2(dot(n, eye), dot(n, tangent)); // projected normal, towards V and T
-        float weight = sqrt(dot(in_slice, in_slice));
-        float n_cos = in_slice.x / max(weight, 1e-6), n_sin = in_slice.y / max(weight, 1e-6);
-        float angle = atan(n_sin, n_cos);
+        float squared = dot(in_slice, in_slice) + 1e-12, inverse_weight = inversesqrt(squared), weight = squared * inverse_weight;
+        float n_cos = in_slice.x * inverse_weight, n_sin = in_slice.y * inverse_weight;
+        float angle = angle_of(n_cos, n_sin);
         float full = n_cos + angle * n_sin;
         // Sectors before an angle t to the side of T: start + scale ((1 - cos 2t) cos n + (2t - sin 2t) sin n); to the
-        // other side, with t counted that way, start - scale (... - ... sin n).
+        // other side, with t counted that way, start - scale (... - ... sin n). Their fractions leave room for rounding.
         float scale = 0.25 * sector_count / full;
-        vec4 scaled_cos = scale * n_cos * sides;
-        float scaled_sin = scale * n_sin;
-        float start = scale * (2.0 * n_cos + (2.0 * angle - pi) * n_sin) + fract(noise.x * 7.0 + golden * float(i));
-        vec4 horizon = turn(-n_sin * sides, vec4(n_cos));
+        float start = scale * (2.0 * n_cos + (2.0 * angle - pi) * n_sin) + (0.04 + 0.92 * fract(noise.x * 7.0 + golden * float(i)));
+        Sectors sectors = Sectors(start + scale * pi * n_sin + 2.0 * scale * n_cos * sides,
+                                  -2.0 * quick_scale * quick_scale * scale * n_cos * sides, -scale * n_sin);
+        vec4 horizon = (-1.0 / quick_scale) * n_sin * sides;
 
         vec2 along = vec2(k.camera.fx, k.camera.fy) * (tangent.xy - ray * tangent.z);
         along *= inversesqrt(dot(along, along));
@@ -153,87 +171,90 @@ void main() {
         float per_pixel = length(along_ray); // metres at z = 1 m
         float half_pixel = 0.5 * s.lengthen * per_pixel;
         // Farther outside than half the image's size, the plane is too poor a guess to spend a step on.
-        vec2 room = vec2(to_border(vec2(pixel), along), to_border(vec2(pixel), -along)) + 0.5 * float(max(k.size.x, k.size.y));
+        vec2 room = to_border(vec2(pixel), along) + 0.5 * float(max(k.size.x, k.size.y));
         float full_reach = reach / per_pixel;
         vec2 far = max(min(vec2(full_reach), room), 1.0) - 1.0;
-        vec2 u = fract(noise.y + golden * vec2(2 * i, 2 * i + 1));
-        vec2 flat_tangent = tangent.xy * k.ray_step;
+        vec2 u = fract(noise.y + golden * vec2(2 * i, 2 * i + 1)) * (1.0 / float(steps));
+        // Of a pixel's step along the slice, at z = 1 m, on either side: towards V and outwards; and x, y.
+        vec4 to_eye = dot(along_ray, eye.xy) * sides;
+        float outwards = dot(along_ray, tangent.xy);
+        vec4 along_x = along.x * sides, along_y = along.y * sides, ray_x = along_ray.x * sides, ray_y = along_ray.y * sides;
+        // The direction of a surfel in the slice is (its normal on T, on V), and the ray and `along` span the slice: what the
+        // normal is on those two gives the direction, ray_length long.
+        vec4 t_per_ray = tangent.z * ray_length * sides;
+        float t_per_step = ray_length / outwards;
 
         uint closed = 0u;
-        vec2 last = vec2(0.0); // depths of the step before, on either side
+        vec2 last = vec2(1e30);                               // depths of the step before, on either side
+        vec4 reached = vec4(0.0, 0.0, spread(u) * far + 1.0); // pixels to the step before and to this one
         int j = 0, layer = 0;
         do {
-            vec4 x = (float(j) + vec4(u, u + 1.0)) * (1.0 / float(steps));
-            vec4 before = spread(x - 1.0 / float(steps)) * far.xyxy + 1.0;
-            vec4 now = spread(x) * far.xyxy + 1.0, next = spread(x + 1.0 / float(steps)) * far.xyxy + 1.0;
-            if (j == 0) before.xy = vec2(0.0);
-            // Whole pixels away.
-            vec4 signed_now = now * sides;
-            ivec4 ix = nearest(along.x * signed_now), iy = nearest(along.y * signed_now);
+            vec4 x = float(j) * (1.0 / float(steps)) + vec4(u + 1.0 / float(steps), u + 2.0 / float(steps));
+            vec4 next = spread(x) * far.xyxy + 1.0, now = vec4(reached.zw, next.xy);
+            vec4 passed = now - reached, coming = next - now;
+            ivec4 ix = nearest(along_x * now), iy = nearest(along_y * now); // whole pixels away
             ivec4 jx = clamp(ix, -pixel.x, k.size.x - 1 - pixel.x), jy = clamp(iy, -pixel.y, k.size.y - 1 - pixel.y);
             Four four;
             if (packed != 0) four = packed_surfels(pixel.x + jx, pixel.y + jy, layer, s);
             else four = surfaces_alike(pixel.x + jx, pixel.y + jy, s);
-            vec4 zq = four.z, nx = four.nx, ny = four.ny, nz = four.nz;
+            vec4 zq = four.z, nx = four.nx, ny = four.ny;
             if (steps % 2 == 1 && j == steps - 1) zq.zw = vec2(0.0);
-            bvec4 inside_image = equal(abs(ix - jx) + abs(iy - jy), ivec4(0));
 
+            // Outside the image the surface at its border continues as a plane, but not towards its horizon, and not those that
+            // other views saw behind it. Filled holes have a negative depth.
+            ivec4 out_x = ix - jx, out_y = iy - jy;
+            vec4 mx = vec4(ix) * k.ray_step.x, my = vec4(iy) * k.ray_step.y;
+            vec4 by_ray = nx * ray.x + ny * ray.y + four.nz, by_step = nx * ray_x + ny * ray_y;
+            vec4 inverse_seen = 1.0 / (by_ray + (nx * mx + ny * my));
+            vec4 go_on = 1.0 - (nx * (vec4(out_x) * k.ray_step.x) + ny * (vec4(out_y) * k.ray_step.y)) * inverse_seen;
+            bvec4 goes_on = lessThan(abs(go_on - 1.5), vec4(1.2));
+            if (layers > 1) goes_on = mix(equal(out_x | out_y, ivec4(0)), goes_on, bvec4(layer == 0));
+            zq = abs(zq) * mix(vec4(0.0), go_on, goes_on);
             // From the pixel's point to the sample's, towards V and towards T (outwards on either side): differences first,
             // far away coordinates cancel badly.
-            vec4 mx = vec4(ix), my = vec4(iy);
-            // Outside the image the surface at its border continues as a plane, but not towards its horizon.
-            vec4 seen = nx * (ray.x + mx * k.ray_step.x) + ny * (ray.y + my * k.ray_step.y) + nz;
-            vec4 go_on = (nx * (ray.x + vec4(jx) * k.ray_step.x) + ny * (ray.y + vec4(jy) * k.ray_step.y) + nz) / seen;
-            go_on = mix(vec4(0.0), go_on, lessThan(abs(go_on - 1.5), vec4(layer == 0 ? 1.2 : 0.0)));
-            zq = abs(zq) * mix(go_on, vec4(1.0), inside_image); // filled holes have a negative depth
-            vec4 dz = zq - z;
-            vec4 pv = zq * (mx * flat_eye.x + my * flat_eye.y) - ray_length * dz;
-            vec4 pt = zq * (mx * flat_tangent.x + my * flat_tangent.y) * sides;
-            vec4 rise = zq * (mx * flat_normal.x + my * flat_normal.y) + (dz * normal_per_z - least_rise);
+            vec4 dz = zq - z, off = zq * now;
+            vec4 pv = off * to_eye - ray_length * dz;
+            vec4 pt = off * outwards;
+            vec4 rise = zq * (mx * n.x + my * n.y) + (dz * normal_per_z - least_rise);
             // Surfaces of other views have an alignment error; they must not occlude the surface that they continue.
             if (layers > 1) rise -= vec4((four.marks >> 4) & 1) * k.misfit;
             vec4 d2 = pv * pv + pt * pt;
             // The view direction of the sample; perpendicular to it, outwards: (gt, -gv).
             vec4 gv = pv - distance;
-            vec4 g = inverse_length(gv * gv + (pt * pt + 1e-30));
+            vec4 g = inverse_length(gv * gv + pt * pt);
             gv *= g;
             vec4 gt = pt * g;
-            // The surfel's direction in the slice: its normal rotated by a right angle, outwards.
-            vec4 lv = -sides * (nx * tangent.x + ny * tangent.y + nz * tangent.z);
-            vec4 lt = nx * eye.x + ny * eye.y + nz * eye.z;
-            vec4 l = inverse_length(lv * lv + (lt * lt + 1e-30));
+            // The surfel's direction in the slice, outwards.
+            vec4 lv = by_step * t_per_step + by_ray * t_per_ray, lt = by_ray;
+            vec4 l = inverse_length(lv * lv + lt * lt);
             vec4 slope = (lv * gt - lt * gv) * l;
-            l = mix(-l, l, greaterThan(slope, vec4(0.0)));
+            l = with_sign_of(slope, l);
             lv *= l;
             lt *= l;
-            vec4 size = zq * half_pixel / most(abs(slope), 0.1);
+            slope = abs(slope);
+            vec4 size = zq * half_pixel / most(slope, vec4(0.1));
             // Clipped to the radius.
             vec4 middle = pv * lv + pt * lt;
-            vec4 chord = positive(middle * middle + (radius2 - d2)) + 1e-30;
+            vec4 chord = positive(middle * middle + (radius2 - d2));
             chord *= inverse_length(chord);
             // Half way to its neighbours; farther where a neighbour is in front of it and of its plane and hides its continuation.
-            vec4 back = (now - before) * size, ahead = (next - now) * size;
-            vec4 bend = sides * (nx * along_ray.x + ny * along_ray.y) / seen;
-            vec4 z_before = vec4(last, zq.xy), z_next = vec4(zq.zw, 0.0, 0.0); // the neighbour of the last step is not known yet
-            last = layer == 0 ? zq.zw : last;
-            float longest = layer == 0 ? s.longest : 0.0; // hidden layers have neither
-            back += hides(z_before, zq, 1.0 - (now - before) * bend, s.jut) * least(2.0 * back, vec4(longest));
-            ahead += hides(z_next, zq, 1.0 + (next - now) * bend, s.jut) * least(2.0 * ahead, vec4(longest));
+            vec4 back = passed * size, ahead = coming * size;
+            vec4 bend = by_step * inverse_seen;
+            vec4 fore = mix(vec4(1e30), zq + s.jut, greaterThan(zq, vec4(0.0)));
+            vec4 fore_before = vec4(last, fore.xy), fore_next = vec4(fore.zw, 1e30, 1e30); // that of the last step is not known yet
+            last = layer == 0 ? fore.zw : last;
+            vec4 longest = vec4(layer == 0 ? s.longest : 0.0); // hidden layers have neither
+            back += hidden_length(fore_before, zq, 1.0 - passed * bend, least(2.0 * back, longest));
+            ahead += hidden_length(fore_next, zq, 1.0 + coming * bend, least(2.0 * ahead, longest));
             back = least(back, middle + chord);
             ahead = least(ahead, chord - middle);
-            vec4 fv = pv - lv * back, ft = pt - lt * back, uv = pv + lv * ahead, ut = pt + lt * ahead;
-            // Thickness extends away from the eye: seen from the pixel, farther outwards.
-            vec4 deep = four.thickness;
-            vec4 fdv = fv + gv * deep, fdt = ft + gt * deep, udv = uv + gv * deep, udt = ut + gt * deep;
-            bvec4 turns = greaterThan(fv * ut, ft * uv), deep_turns = greaterThan(fdv * udt, fdt * udv);
-            vec4 low = turn(mix(uv, fv, turns), abs(mix(ut, ft, turns)));
-            vec4 high = turn(mix(fdv, udv, deep_turns), abs(mix(fdt, udt, deep_turns)));
-
-            vec4 by_sine, by_cosine;
-            measures(least(low, horizon), by_sine, by_cosine);
-            ivec4 from = ivec4(by_cosine * scaled_cos + (by_sine * scaled_sin + start));
-            measures(least(high, horizon), by_sine, by_cosine);
-            ivec4 until = ivec4(by_cosine * scaled_cos + (by_sine * scaled_sin + start));
+            // The end of least angle; and, since thickness extends away from the eye, the end of the greatest angle behind. The
+            // line through the sample turns about the pixel's point with the sign of their cross product.
+            vec4 deep = four.thickness, cross_ = pv * lt - pt * lv;
+            vec4 front = mix(ahead, -back, greaterThan(cross_, vec4(0.0))), behind = mix(-back, ahead, greaterThan(cross_, deep * slope));
+            vec4 low = quick_cosine(pv + lv * front, pt + lt * front);
+            vec4 high = quick_cosine(pv + gv * deep + lv * behind, pt + gt * deep + lt * behind);
+            ivec4 from = sectors_before(most(low, horizon), sectors), until = sectors_before(most(high, horizon), sectors);
             // To the other side, angles are counted the other way.
             uvec4 below = bits_below(from), over = bits_below(until);
             uvec4 mask = uvec4(over.x & ~below.x, below.y & ~over.y, over.z & ~below.z, below.w & ~over.w);
@@ -250,6 +271,7 @@ void main() {
             bool deeper = layers > 1 && any(greaterThan(next_layer * near, ivec4(0)));
             layer = deeper ? layer + 1 : 0;
             j += deeper ? 0 : 2;
+            reached = deeper ? reached : vec4(now.zw, next.zw);
         } while (j < steps);
         float measure = weight * full;
         all += measure;
@@ -260,5 +282,5 @@ void main() {
     float shows = k.radius * sqrt(k.camera.fx * k.camera.fy) / z;
     open = mix(all, open, clamp(0.5 * shows - 0.5, 0.0, 1.0));
     int index = at.y * s.samples.x + at.x;
-    imageStore(sampled, index, own > 0.0 ? vec4(open, all, 0.0, 0.0) : vec4(0.0));
+    sampled[index] = own > 0.0 ? vec2(open, all) : vec2(0.0);
 }

@@ -16,7 +16,7 @@ layout(constant_id = spec_round) const int round = 0;
 layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(binding = 0, rg32ui) readonly uniform uimageBuffer neighbours;
 layout(binding = 1, r32f) readonly uniform imageBuffer depth_in;
-layout(binding = 16, r32ui) uniform uimageBuffer behind; // the first layer of all blocks, then the second
+layout(binding = 16, scalar) buffer Behind { uint behind[]; }; // the first layer of all blocks, then the second
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 #include "lib/depth.glsl"
@@ -47,7 +47,7 @@ void main() {
     if (!sees) return;
     ivec2 block = ivec2(nearest(at.x), nearest(at.y)) >> 1;
     float z = plane_depth(point, n, ray_of(middle_of(block)));
-    float before = round == 0 ? nearest_of(block) : layer_depth(imageLoad(behind, layer_index(block)).x, k.radius);
+    float before = round == 0 ? nearest_of(block) : layer_depth(behind[layer_index(block)], k.radius);
     if (z > before + (before > 0.0 ? layer_gap(z, s) : 0.0))
-        imageAtomicMax(behind, round * layers_size() + layer_index(block), layer_word(z, n, k.radius));
+        atomicMax(behind[round * layers_size() + layer_index(block)], layer_word(z, n, k.radius));
 }

@@ -18,7 +18,7 @@ layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(binding = 0, rg32ui) readonly uniform uimageBuffer surfels;
 layout(binding = 1, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 2, rg32f) readonly uniform imageBuffer sampled;
-layout(binding = 16, r32f) writeonly uniform imageBuffer visibility;
+layout(binding = 16, scalar) writeonly buffer Visibility { float visibility[]; };
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 #include "lib/surfel.glsl"
@@ -78,7 +78,7 @@ void put(ivec2 p, float z, Mean mean) {
     if (!inside(p)) return;
     bool hole = !(z > 0.0);
     float v = mean.sum.y > 0.0 ? mean.sum.x / mean.sum.y : 1.0;
-    imageStore(visibility, index_of(p), vec4(hole ? uintBitsToFloat(not_a_number) : shown(clamp(v, 0.0, 1.0))));
+    visibility[index_of(p)] = hole ? uintBitsToFloat(not_a_number) : shown(clamp(v, 0.0, 1.0));
 }
 
 // Share of a sample x columns (or rows) from the first pixel's in the mean of the first and the second pixel.

@@ -7,7 +7,7 @@
 
 layout(local_size_x = surfel_group) in;
 layout(binding = 0, rg32ui) readonly uniform uimageBuffer edges;
-layout(binding = 16, r32ui) writeonly uniform uimageBuffer runs; // two a word: of before it, of after it
+layout(binding = 16, scalar) writeonly buffer Runs { uint runs[]; }; // two a word: of before it, of after it
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 void main() {
@@ -23,8 +23,8 @@ void main() {
     for (int i = 0; i < words; ++i) {
         int up = base + i * stride, down = base + (words - 1 - i) * stride;
         uvec2 a = imageLoad(edges, up).xy, b = imageLoad(edges, down).xy;
-        imageStore(runs, 2 * up, uvec4(before));
-        imageStore(runs, 2 * down + 1, uvec4(after));
+        runs[2 * up] = before;
+        runs[2 * down + 1] = after;
         int last = findMSB(a.x), first = findLSB(b.x);
         before = a.x == 0u ? before : uint(i * surfel_run + last) << 1 | (a.y >> (last & 31) & 1u);
         after = b.x == 0u ? after : uint((words - 1 - i) * surfel_run + first) << 1 | (~b.y >> (first & 31) & 1u);

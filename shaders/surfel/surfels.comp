@@ -18,7 +18,7 @@ layout(binding = 2, r32ui) readonly uniform uimageBuffer runs;
 layout(binding = 3, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 4, r32ui) readonly uniform uimageBuffer behind;
 layout(binding = 5, r32f) readonly uniform imageBuffer limits;
-layout(binding = 16, rg32ui) writeonly uniform uimageBuffer surfels;
+layout(binding = 16, scalar) writeonly buffer Surfels { uvec2 surfels[]; };
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 const int open = 1 << 20; // a run that ends behind something nearer, or at the border of the image
@@ -67,7 +67,7 @@ void main() {
     float thickness = ends_in_sight ? clamp(0.5 * width, s.thinnest, s.thickest) : s.thickest;
 
     if (layers == 1) {
-        imageStore(surfels, surfel_index(p, s.plane), uvec4(surfel(z, surface.xyz, thickness / s.thickest), 0u, 0u));
+        surfels[surfel_index(p, s.plane)] = surfel(z, surface.xyz, thickness / s.thickest);
         return;
     }
     // Layers that other views saw behind this pixel; where this view saw nothing, the first layer is the surface itself.
@@ -85,7 +85,7 @@ void main() {
     thickness = max(min(thickness, min(limit, 0.7 * (layer_depth_at(second, p) - abs(z)))), s.thinnest);
     uvec2 word = surfel(z, surface.xyz, thickness / s.thickest);
     int at = surfel_index(p, s.plane), layer = 16 * s.plane.x * s.plane.y;
-    imageStore(surfels, at, uvec4((word.x & ~place_mask) | place_of(second, p, abs(z)) | (own ? 0u : foreign), word.y, 0u, 0u));
-    imageStore(surfels, layer + at, uvec4(hidden_surfel(second, p, s, place_of(third, p, layer_depth_at(second, p))), 0u, 0u));
-    imageStore(surfels, 2 * layer + at, uvec4(hidden_surfel(third, p, s, 0u), 0u, 0u));
+    surfels[at] = uvec2((word.x & ~place_mask) | place_of(second, p, abs(z)) | (own ? 0u : foreign), word.y);
+    surfels[layer + at] = hidden_surfel(second, p, s, place_of(third, p, layer_depth_at(second, p)));
+    surfels[2 * layer + at] = hidden_surfel(third, p, s, 0u);
 }

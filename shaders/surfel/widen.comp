@@ -11,7 +11,8 @@
 layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 1, r32ui) readonly uniform uimageBuffer behind;
-layout(binding = 16, rgba32f) uniform imageBuffer surfaces; // where there is depth only read, elsewhere only written
+layout(binding = 2, rgba32f) readonly uniform imageBuffer surfaces;
+layout(binding = 16, scalar) writeonly buffer Widened { vec4 widened[]; }; // the same: where there is depth it is only read
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 #include "lib/depth.glsl"
@@ -32,5 +33,5 @@ void main() {
     float ratio = dot(last.xyz, ray_of(vec2(border))) / dot(last.xyz, ray_of(vec2(p)));
     vec4 goes_on = last.w > 0.0 && abs(ratio - 1.5) < 1.2 ? vec4(last.xyz, last.w * ratio) : vec4(0.0);
     vec4 surface = first != 0u ? seen : goes_on;
-    imageStore(surfaces, here, vec4(surface.xyz, hole ? -surface.w : surface.w));
+    widened[here] = vec4(surface.xyz, hole ? -surface.w : surface.w);
 }

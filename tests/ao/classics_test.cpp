@@ -172,15 +172,15 @@ struct SharedPasses {
     SharedPasses(cv::Size size, bool supplied) {
         using Row = gpu::BufferRow;
         const auto pixels = static_cast<std::size_t>(size.area());
-        const std::vector<Row> buffers{{"depth", pixels * 4, Row::Host::upload, Row::Texels::r32f},
-                                       {"given", pixels * 12, Row::Host::upload, Row::Texels::r32f},
-                                       {"raw", pixels * 4, Row::Host::upload, Row::Texels::r32f},
-                                       {"surfaces", pixels * 16, Row::Host::download, Row::Texels::rgba32f},
-                                       {"visibility", pixels * 4, Row::Host::download, Row::Texels::r32f}};
         ScreenTables tables{{{}, size}, size, 0, {}, {}};
+        tables.buffers = {{"depth", pixels * 4, Row::Host::upload, Row::Texels::r32f},
+                          {"given", pixels * 12, Row::Host::upload, Row::Texels::r32f},
+                          {"raw", pixels * 4, Row::Host::upload, Row::Texels::r32f},
+                          {"surfaces", pixels * 16, Row::Host::download, Row::Texels::rgba32f},
+                          {"visibility", pixels * 4, Row::Host::download, Row::Texels::r32f}};
         tables.add_pass("normals", "normals", {depth, given}, {surfaces}, {{shared::spec_supplied, supplied}});
         tables.add_pass("denoise", "denoise", {surfaces, raw}, {visibility}, {}, 2);
-        program = std::make_unique<gpu::Program>(device(), buffers, tables.passes, sizeof(shared::ScreenConstants));
+        program = tables.program(device(), sizeof(shared::ScreenConstants));
     }
 
     void put(int buffer, const cv::Mat& image) {

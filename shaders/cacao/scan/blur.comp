@@ -7,7 +7,7 @@
 
 layout(local_size_x = cacao_row) in;
 layout(binding = 0, r32ui) readonly uniform uimageBuffer from;
-layout(binding = 16, r32ui) uniform writeonly uimageBuffer to;
+layout(binding = 16, scalar) writeonly buffer To { uint to[]; };
 
 uint read(int slice, ivec2 t) { return imageLoad(from, slice_index(slice, clamp(t, ivec2(0), k.slice - 1))).x; }
 
@@ -25,5 +25,5 @@ void main() {
     uint c = read(slice, t);
     uvec4 around = uvec4(read(slice, t - ivec2(1, 0)), read(slice, t + ivec2(1, 0)), read(slice, t - ivec2(0, 1)), read(slice, t + ivec2(0, 1)));
     float v = blurred(float(c & 0xffffu), vec4(around & 0xffffu), ao_edges(c));
-    imageStore(to, slice_index(slice, t), uvec4(whole(uint(v + 0.5) | (c & 0xffff0000u))));
+    to[slice_index(slice, t)] = whole(uint(v + 0.5) | (c & 0xffff0000u));
 }

@@ -12,7 +12,7 @@ layout(binding = 2, r32ui) readonly uniform uimageBuffer base_result;
 layout(binding = 3, r32ui) readonly uniform uimageBuffer importance;
 layout(binding = 4, r32ui) readonly uniform uimageBuffer load_counter;
 layout(binding = 5, rgba32f) readonly uniform imageBuffer pattern;
-layout(binding = 16, r32ui) uniform writeonly uimageBuffer ao;
+layout(binding = 16, scalar) writeonly buffer Ao { uint ao[]; };
 #include "cacao/adaptive.glsl"
 
 // The features of a quality (section 8.4, first table). All have edges: scan never blurs across a depth edge.

@@ -7,7 +7,7 @@
 layout(constant_id = spec_normals) const int supplied = 0;
 layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 1, r32f) readonly uniform imageBuffer normals_in;
-layout(binding = 17, r32ui) uniform writeonly uimageBuffer normals;
+layout(binding = 17, scalar) writeonly buffer Normals { uint normals[]; };
 
 void store_depth(int slice, ivec2 t, float z);
 
@@ -117,7 +117,7 @@ void put(int slice, ivec2 t, float seen, float c, vec3 n) {
     c = is_normal(n) ? c : seen;
     store_depth(slice, t, c);
     uint filled = c > 0.0 && seen == 0.0 ? filled_texel : 0u;
-    imageStore(normals, slice_index(slice, t), uvec4(whole(pack_normal(unit(n)) | filled)));
+    normals[slice_index(slice, t)] = whole(pack_normal(unit(n)) | filled);
 }
 
 // The four pixels of slice texel t; returns their depths as recorded.

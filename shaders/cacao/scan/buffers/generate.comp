@@ -57,5 +57,5 @@ void main() {
     ivec2 t = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(t, k.slice))) return;
     int slice = slice_of_layer(int(gl_GlobalInvocationID.z));
-    imageStore(ao, slice_index(slice, t), uvec4(whole(generated(slice, t))));
+    ao[slice_index(slice, t)] = whole(generated(slice, t));
 }

@@ -7,10 +7,10 @@
 #include "cacao/mips.glsl"
 
 layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
-layout(binding = 16, r32f) uniform writeonly imageBuffer depths;
+layout(binding = 16, scalar) writeonly buffer DepthsOut { float depths[]; };
 
 // Partial texels at the right and lower rim are kept (AMD's mips end before them).
-void store(int slice, int mip, ivec2 t, float z) { imageStore(depths, depth_index(slice, mip, t), vec4(whole(z))); }
+void store(int slice, int mip, ivec2 t, float z) { depths[depth_index(slice, mip, t)] = whole(z); }
 
 float depth_at(int slice, ivec2 t) {
     ivec2 p = spacing * (2 * t + parity_of(slice));

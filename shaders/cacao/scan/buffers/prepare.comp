@@ -5,9 +5,9 @@
 #include "cacao/scan/prepare.glsl"
 
 layout(local_size_x = cacao_row) in;
-layout(binding = 16, r32f) uniform writeonly imageBuffer depths;
+layout(binding = 16, scalar) writeonly buffer DepthsOut { float depths[]; };
 
-void store_depth(int slice, ivec2 t, float z) { imageStore(depths, depth_index(slice, 0, t), vec4(whole(z))); }
+void store_depth(int slice, ivec2 t, float z) { depths[depth_index(slice, 0, t)] = whole(z); }
 
 void main() {
     k = constants;

@@ -8,7 +8,7 @@
 
 layout(local_size_x = cacao_row) in;
 layout(binding = 1, r32f) readonly uniform imageBuffer depths;
-layout(binding = 16, rg32f) uniform writeonly imageBuffer staged;
+layout(binding = 16, scalar) writeonly buffer Staged { vec2 staged[]; };
 
 // Depth 0 keeps holes and pixels that LOWEST has not computed out of the upsampler.
 float depth_or_hole(int slice, ivec2 t) {
@@ -20,7 +20,7 @@ float depth_or_hole(int slice, ivec2 t) {
 void put(int slice, ivec2 t, float v) {
     ivec2 g = 2 * t + parity_of(slice) + 2;
     float z = depth_or_hole(slice, t);
-    if (all(lessThan(g, k.grid))) imageStore(staged, g.y * k.grid.x + g.x, vec4(v, z, 0.0, 0.0));
+    if (all(lessThan(g, k.grid))) staged[g.y * k.grid.x + g.x] = vec2(v, z);
 }
 
 // 2x2 grid pixels a thread, from the halo on.

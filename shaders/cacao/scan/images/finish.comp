@@ -14,7 +14,7 @@ layout(local_size_x = cacao_wide, local_size_y = cacao_high) in;
 layout(constant_id = spec_steps) const int steps = 2;
 layout(binding = 0, r32ui) readonly uniform uimageBuffer ao;
 layout(binding = 1, r32f) readonly uniform imageBuffer depth_in;
-layout(binding = 17, rg32f) uniform writeonly imageBuffer staged;
+layout(binding = 17, scalar) writeonly buffer Staged { vec2 staged[]; };
 
 const int rim = steps + 1, area = cacao_wide * cacao_high;
 shared float values[4 * area + 2 * cacao_wide]; // slice after slice, as in Texel; and a row at each end that nothing needs
@@ -62,7 +62,7 @@ bool own(ivec2 g) { return two_slices == 0 || (g.x & 1) == (g.y & 1); }
 
 // For the upsampler: depth 0 marks holes and pixels that LOWEST has not computed, and keeps them out.
 void stage(ivec2 g, float v) {
-    if (all(lessThan(g + 2, k.grid))) imageStore(staged, (g.y + 2) * k.grid.x + g.x + 2, vec4(v, own(g) ? depth_at(2 * g) : 0.0, 0.0, 0.0));
+    if (all(lessThan(g + 2, k.grid))) staged[(g.y + 2) * k.grid.x + g.x + 2] = vec2(v, own(g) ? depth_at(2 * g) : 0.0);
 }
 
 // -1 stands for a hole. Pixels that LOWEST has not computed have no such flag.

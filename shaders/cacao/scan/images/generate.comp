@@ -71,5 +71,5 @@ void main() {
     barrier();
     int i = int(gl_LocalInvocationIndex);
     at = ivec2(i % tile.x, i / tile.x);
-    if (all(lessThan(corner + at, k.slice))) imageStore(ao, slice_index(slice, corner + at), uvec4(made[at.y][at.x]));
+    if (all(lessThan(corner + at, k.slice))) ao[slice_index(slice, corner + at)] = made[at.y][at.x];
 }
