@@ -159,7 +159,7 @@ cv::Mat image_from(std::string_view packed, cv::Size size) {
 cv::Mat decoded_plain_png(std::string_view bytes) {
     constexpr std::size_t bits_at = 24, colour_at = 25, interlaced_at = 28; // methods between have one value each
     constexpr int grey = 0, rgb = 2;
-    const int bits = bytes[bits_at], colour = bytes[colour_at];
+    const auto bits = static_cast<unsigned char>(bytes[bits_at]), colour = static_cast<unsigned char>(bytes[colour_at]);
     const bool usual_methods = bytes[26] == 0 && bytes[27] == 0 && bytes[interlaced_at] == 0;
     const bool usual_samples = (colour == grey && (bits == 8 || bits == 16)) || (colour == rgb && bits == 8);
     if (!usual_methods || !usual_samples)
