@@ -69,6 +69,7 @@ class Thinning {
     Thinning(const NeighbourTree& tree, std::span<const Vector3d> normals, const CloudNoise& noise, bool sides)
         : tree_(tree), normals_(normals), noise_(noise), sides_(sides) {}
 
+    /// Empty where noise is felt nowhere.
     [[nodiscard]] Cells run() const {
         std::vector<std::pair<std::size_t, std::size_t>> blocks;
         tree_.walk([&](float, std::size_t begin, std::size_t end, bool leaf) {
@@ -78,6 +79,11 @@ class Thinning {
             blocks.emplace_back(begin, end);
             return false;
         });
+        std::vector<float> sigmas(blocks.size());
+        tbb::parallel_for(std::size_t(0), blocks.size(),
+                          [&](std::size_t i) { sigmas[i] = felt_noise(blocks[i].first, blocks[i].second); });
+        if (std::ranges::none_of(sigmas, [](float sigma) { return sigma > 0; }))
+            return {};
         std::vector<Cells> parts(blocks.size());
         tbb::parallel_for(std::size_t(0), blocks.size(), [&](std::size_t i) {
             const auto [begin, end] = blocks[i];
@@ -85,7 +91,7 @@ class Thinning {
             part.members.resize(end - begin);
             for (std::size_t k = begin; k < end; ++k)
                 part.members[k - begin] = static_cast<std::uint32_t>(k);
-            halve(part, 0, part.members.size(), felt_noise(begin, end));
+            halve(part, 0, part.members.size(), sigmas[i]);
         });
         Cells cells;
         for (Cells& part : parts) {
@@ -417,7 +423,7 @@ FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> poin
     if (!noise.known())
         return fitted;
     Cells cells = Thinning(tree, normals, noise, sides).run();
-    if (std::none_of(cells.all.begin(), cells.all.end(), [](const Cell& cell) { return cell.sigma > 0; }))
+    if (cells.all.empty())
         return fitted;
     fitted.axes = Fit(cells.all, sides).run();
     for (std::size_t i = 0; i < cells.all.size(); ++i)

@@ -97,7 +97,7 @@ Finish::Shape Finish::shape_of(const FinishInput& input, const FinishOutputs& ou
                         : input.colour_known.empty() ? shared::picture_colour
                                                      : shared::picture_both;
     shape.fitted = shape.clay() && input.fitted;
-    shape.smoothed = shape.clay() && !input.fitted && input.fitted_m.empty() && input.noise.any();
+    shape.smoothed = shape.clay() && !input.fitted && input.fitted_m.empty();
     if (packing_ == Packing::on_host) {
         shape.outputs.confidence = shape.confidence();
         shape.outputs.confidence_bits = shape.outputs.map_bits = 0;

@@ -53,8 +53,10 @@ cv::Mat3b shaded_picture(const FinishInput& input) {
 }
 
 /// On the device that computed the frame. Without one, what Finish does, but for maps: these are made when written.
+/// Very large images, too: the device's programs keep their memory, the host's images are freed one after the other.
 Finished finished(Work& work, const FinishInput& input, const FinishOutputs& outputs) {
-    if (work.finishers)
+    constexpr std::size_t most_pixels = std::size_t(1) << 26;
+    if (work.finishers && input.z_m.total() <= most_pixels)
         return work.finishers->compute(input, outputs, work.row.passes);
     Finished made;
     if (outputs.confidence || outputs.confidence_bits > 0)
