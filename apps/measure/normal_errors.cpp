@@ -47,11 +47,11 @@ FittedDepth from_depth(gpu::Device& device, const DepthImage& depth) {
                         {}};
     tables.add_pass("normals", "normals", {0, 0}, {1}, {{shared::spec_supplied, 0}});
     const shared::ScreenConstants constants = constants_from(ScreenOptions{}, {depth});
-    gpu::Program program(device, tables.buffers, tables.passes, sizeof constants);
-    gpu::upload_depth(depth.z_m, program.host_as<float>(0));
-    program.run(bytes_of(constants));
+    const std::unique_ptr<gpu::Program> program = tables.program(device, sizeof constants);
+    gpu::upload_depth(depth.z_m, program->host_as<float>(0));
+    program->run(bytes_of(constants));
     FittedDepth found{depth, {cv::Mat3f(depth.z_m.size())}};
-    const auto surfaces = program.host_as<cv::Vec4f>(1);
+    const auto surfaces = program->host_as<cv::Vec4f>(1);
     std::transform(surfaces.begin(), surfaces.end(), found.normals.normals.begin(),
                    [](const cv::Vec4f& s) { return cv::Vec3f(s[0], s[1], s[2]); });
     return found;
