@@ -75,14 +75,6 @@ void combine(const cv::Mat1f& a, const cv::Mat1f& b, cv::Mat1f to, Formula&& for
 bool shows_clay(int picture) { return picture == shared::picture_clay || picture == shared::picture_both; }
 bool shows_colour(int picture) { return picture == shared::picture_colour || picture == shared::picture_both; }
 
-/// Clay has no pixel colours to keep where there is no surface, so both kinds go through the same multiplication.
-cv::Mat3b picture_on_host(const FinishInput& input, const cv::Mat3b& clay) {
-    cv::Mat3b base = clay.empty() ? input.colour : clay;
-    if (!clay.empty() && !input.colour.empty())
-        input.colour.copyTo(base, input.colour_known);
-    return shade(base, input.visibility, input.strength);
-}
-
 } // namespace
 
 bool Finish::Shape::clay() const { return shows_clay(picture); }
@@ -256,8 +248,7 @@ Finished Finish::compute(const FinishInput& input, const FinishOutputs& outputs)
     return finished;
 }
 
-Finished Finishers::compute(const FinishInput& input, const FinishOutputs& outputs,
-                            std::vector<std::pair<std::string, double>>& timings) {
+Finished Finishers::compute(const FinishInput& input, const FinishOutputs& outputs, Timings& timings) {
     std::unique_ptr<Finish> finish;
     {
         const std::lock_guard alone(access_);
@@ -274,6 +265,14 @@ Finished Finishers::compute(const FinishInput& input, const FinishOutputs& outpu
     const std::lock_guard alone(access_);
     idle_.push_back(std::move(finish));
     return finished;
+}
+
+cv::Mat3b picture_on_host(const FinishInput& input, const cv::Mat3b& clay) {
+    // Clay has no colours to keep where there is no surface, so both kinds go through the same multiplication.
+    cv::Mat3b base = clay.empty() ? input.colour : clay.clone();
+    if (!clay.empty() && !input.colour.empty())
+        input.colour.copyTo(base, input.colour_known);
+    return shade(base, input.visibility, input.strength);
 }
 
 cv::Mat3b clay_of(const cv::Mat1f& cosine, const cv::Mat1f& surface) {

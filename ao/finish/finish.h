@@ -2,6 +2,7 @@
 // and encoded as they are.
 #pragma once
 
+#include "ao/base/method.h"
 #include "ao/gpu/program.h"
 #include "projection/camera.h"
 #include "projection/noise.h"
@@ -64,7 +65,7 @@ class Finish {
     /// Throws Error where the images' sizes differ.
     [[nodiscard]] Finished compute(const FinishInput& input, const FinishOutputs& outputs);
     /// Where the time of the last compute() went.
-    [[nodiscard]] const std::vector<std::pair<std::string, double>>& timings() const { return timings_; }
+    [[nodiscard]] const Timings& timings() const { return timings_; }
 
   private:
     /// Everything that decides on the passes.
@@ -84,7 +85,7 @@ class Finish {
     gpu::Device& device_;
     Packing packing_;
     std::vector<std::pair<Shape, std::unique_ptr<gpu::Program>>> programs_; ///< the last few shapes'
-    std::vector<std::pair<std::string, double>> timings_;
+    Timings timings_;
 };
 
 /// As many as are used at once on one device, so that no frame waits for another one's.
@@ -92,14 +93,16 @@ class Finishers {
   public:
     explicit Finishers(gpu::Device& device) : device_(device) {}
     /// Thread-safe. Adds its passes' times to `timings`.
-    [[nodiscard]] Finished compute(const FinishInput& input, const FinishOutputs& outputs,
-                                   std::vector<std::pair<std::string, double>>& timings);
+    [[nodiscard]] Finished compute(const FinishInput& input, const FinishOutputs& outputs, Timings& timings);
 
   private:
     gpu::Device& device_;
     std::mutex access_;
     std::vector<std::unique_ptr<Finish>> idle_;
 };
+
+/// Colour times visibility in linear light. `clay` is the base where `input` has no colour; empty = colour everywhere.
+[[nodiscard]] cv::Mat3b picture_on_host(const FinishInput& input, const cv::Mat3b& clay);
 
 /// Clay as grey: `cosine` as facing_camera() has it, `surface` is 0 where there is none.
 [[nodiscard]] cv::Mat3b clay_of(const cv::Mat1f& cosine, const cv::Mat1f& surface);

@@ -189,7 +189,7 @@ AoMap ScreenMethod::compute(const View& view) {
     screen.neighbours = static_cast<int>(neighbours.size());
     const bool noisy = screen.noise_floor > 0 || screen.noise_per_z2 > 0;
     for (const Neighbour& other : neighbours)
-        screen.misfit = std::max(screen.misfit, static_cast<float>(2 * other.alignment_error_m));
+        screen.alignment_error = std::max(screen.alignment_error, static_cast<float>(2 * other.alignment_error_m));
     std::ranges::transform(neighbours, screen.places, [](const Neighbour& other) {
         return gpu::place_of(other.surfaces->camera, other.here_from_there);
     });

@@ -164,9 +164,13 @@ cv::Size depth_size_of(const Job& job) {
 /// Refuses frames too large for the memory, and takes fewer at once where not all fit that the cores could use.
 /// `on_cpu`: the device's images are in the same memory.
 void fit_into_memory(Job& job, bool on_cpu) {
-    constexpr std::uint64_t host_bytes = 12, device_bytes = 24; // per pixel; depth and visibility; as CACAO has them
+    // Per pixel: depth and visibility; confidence, clay and its cosines; CACAO's buffers.
+    constexpr std::uint64_t maps = 12, pictures = 13, device = 24;
+    const Outputs& outputs = job.batch.outputs;
+    const bool finished = outputs.confidence || outputs.shaded || outputs.panel;
     const cv::Size size = depth_size_of(job);
-    const std::uint64_t bytes = static_cast<std::uint64_t>(size.area()) * (host_bytes + (on_cpu ? device_bytes : 0));
+    const std::uint64_t bytes =
+        static_cast<std::uint64_t>(size.area()) * (maps + (finished ? pictures : 0) + (on_cpu ? device : 0));
     require_memory(bytes,
                    fmt::format("{}: a frame of {}x{} pixels", job.capture.path.string(), size.width, size.height));
     constexpr std::uint64_t always_fits = 128 << 20;

@@ -42,16 +42,6 @@ cv::Mat1f depth_on_grid(const Cloud& cloud) {
     return z_m;
 }
 
-/// Clay has no pixel colours to keep where there is no surface, so both kinds go through the same multiplication.
-cv::Mat3b shaded_picture(const FinishInput& input) {
-    cv::Mat3b base = input.colour;
-    if (base.empty() || !input.colour_known.empty())
-        base = clay(input.z_m, input.camera);
-    if (!input.colour_known.empty())
-        input.colour.copyTo(base, input.colour_known);
-    return shade(base, input.visibility, input.strength);
-}
-
 /// On the device that computed the frame. Without one, what Finish does, but for maps: these are made when written.
 /// Very large images, too: the device's programs keep their memory, the host's images are freed one after the other.
 Finished finished(Work& work, const FinishInput& input, const FinishOutputs& outputs) {
@@ -61,8 +51,10 @@ Finished finished(Work& work, const FinishInput& input, const FinishOutputs& out
     Finished made;
     if (outputs.confidence || outputs.confidence_bits > 0)
         made.confidence = confidence_of({input.camera, input.z_m, {}}, input.visibility, input.radius_m, input.noise);
-    if (outputs.picture)
-        made.picture = shaded_picture(input);
+    if (outputs.picture) {
+        const bool has_gaps = input.colour.empty() || !input.colour_known.empty();
+        made.picture = picture_on_host(input, has_gaps ? clay(input.z_m, input.camera) : cv::Mat3b());
+    }
     return made;
 }
 

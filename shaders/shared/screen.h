@@ -18,7 +18,7 @@ struct ScreenConstants {
     float tangent_sigmas;            // kappa: nor do those within so many sigma(z) of it
     float strength, power;           // of what is shown: (1 - strength (1 - V))^power
     int neighbours;                  // other views there are of this one
-    float misfit;                    // metres that their surfaces may lie off
+    float alignment_error;           // metres that their surfaces may lie off
     NeighbourPlace places[most_neighbours];
 };
 

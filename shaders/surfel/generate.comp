@@ -217,7 +217,7 @@ void main() {
             vec4 pt = off * outwards;
             vec4 rise = zq * (mx * n.x + my * n.y) + (dz * normal_per_z - least_rise);
             // Surfaces of other views have an alignment error; they must not occlude the surface that they continue.
-            if (layers > 1) rise -= vec4((four.marks >> 4) & 1) * k.misfit;
+            if (layers > 1) rise -= vec4((four.marks >> 4) & 1) * k.alignment_error;
             vec4 d2 = pv * pv + pt * pt;
             // The view direction of the sample; perpendicular to it, outwards: (gt, -gv).
             vec4 gv = pv - distance;
