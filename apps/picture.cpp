@@ -26,12 +26,12 @@ std::pair<float, float> usual_range(const cv::Mat1f& z_m) {
     return {near, at_share(99)};
 }
 
-// Clay works on inverse depth: on a plane 1/z is linear in the pixel, so averages and slopes over neighbours are exact
-// there, and take out a sensor's depth steps, which are even in 1/z, elsewhere.
+// Clay works on inverse depth: on a plane 1/z is linear in the pixel, so averages and slopes over neighbours
+// are exact there. Elsewhere they take out a sensor's depth steps, which are even in 1/z.
 
-/// Calls visit(k, 1/z of the neighbour k pixels on) for the neighbours on the pixel's own surface along one image axis,
-/// up to `reach` to either side, stopping at the first hole or jump. `stride` is the axis' step in memory, `before` and
-/// `after` how many pixels the image has on either side.
+/// Calls visit(k, 1/z of the neighbour k pixels on) along one image axis, up to `reach` to either side. It stops at the
+/// first hole or jump, so all neighbours are on the pixel's own surface. `stride` is the axis' step in memory, `before`
+/// and `after` how many pixels the image has on either side.
 template <class Visit>
 void along_surface(const float* pixel, std::ptrdiff_t stride, int before, int after, int reach, Visit&& visit) {
     constexpr float jump = 0.01f; // of 1/z, per pixel: a surface seen at 80 degrees stays in one piece

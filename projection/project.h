@@ -21,8 +21,8 @@ struct ProjectOptions {
 /// points";
 /// - else one at the origin, looking along +z, that frames the cloud at about one point per pixel.
 /// Putting the result into frame.camera saves project() the search.
-/// Throws Error for a depth image without a camera or of another size than its camera's, for a frame without data, and
-/// for a cloud around or beside its origin, which has no single camera.
+/// Throws Error for a depth image without a camera or of another size than its camera's, and for a frame without data.
+/// Also for a cloud around or beside its origin, which has no single camera.
 [[nodiscard]] Camera camera_of(const Frame& frame);
 
 /// The depth image the methods work on, seen by camera_of(frame).

@@ -124,9 +124,9 @@ struct PointSet {
 /// Values of points, and what was chosen on the way.
 struct PointVisibility {
     std::vector<float> visibility; ///< per point; NaN where it is not finite or its neighbours make no surface
-    std::vector<float> confidence; ///< 0 .. 1: how flat the surface is round the point, how many discs span the radius,
-                                   ///< how sure its side is and how far values depend on single points; empty where the
-                                   ///< method has none
+    std::vector<float> confidence; ///< 0 .. 1: how flat the surface is round the point, and how many discs span the
+                                   ///< radius. How sure its side is. How far values depend on single points. Empty
+                                   ///< where the method has none
     std::vector<Eigen::Vector3f> normals; ///< as used; zero where there is none; empty for meshes
     double radius = 0, spacing = 0;       ///< as used, in the cloud's unit; spacing 0 = not measured
     std::optional<double> expected_error; ///< RMS of visibility; nothing where it was not estimated

@@ -1,25 +1,18 @@
 // Visibility bitmask: GTAO's slices with 32 sectors in place of two horizons. Surfaces have a thickness, and light
 // passes behind them. After Therrien, Levesque and Gilet (2023).
 //
-// Departures: sectors are of equal cosine-weighted measure (`--sectors angle` for the published ones of equal angle),
-// which makes the share of open ones the visibility itself, and samples count up to the radius (`--unbounded` for the
-// published way).
+// Departures: sectors are of equal cosine-weighted measure, so the share of open ones is the visibility itself; the
+// published ones are of equal angle. Samples count up to the radius; the published ones count at any distance.
 #pragma once
 
 #include "ao/gtao/slices.h"
 
 namespace scanshade {
 
-/// The measure of which all 32 sectors have equal shares: cosine-weighted, or angle.
-enum class Sectors { cosine, angle };
-
 struct BitmaskOptions {
     ScreenOptions screen;
     SliceOptions slices;
-    float thickness = 0.3F;    ///< of surfaces, in radii
-    float thickness_per_z = 0; ///< additional metres per metre of depth
-    Sectors sectors = Sectors::cosine;
-    bool unbounded = false;
+    float thickness = 0.3F; ///< of surfaces, in radii
 
     [[nodiscard]] std::vector<Parameter> parameters();
 };

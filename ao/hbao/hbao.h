@@ -1,7 +1,7 @@
 // HBAO: horizons above the tangent plane along directions in the image, after Bavoil, Sainz and Dimitrov (2008).
 //
-// Profile `metric`, the default, counts all within the radius alike and has no angle bias, because the rule that leaves
-// out samples on the tangent plane makes one needless; `published` has the paper's attenuation, bias and contrast.
+// Profile `metric`, the default, counts all within the radius alike and has no angle bias. It needs none, since samples
+// on the tangent plane are left out. `published` has the paper's attenuation, bias and contrast.
 #pragma once
 
 #include "ao/screen/screen.h"

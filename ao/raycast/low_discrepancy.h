@@ -13,8 +13,8 @@ namespace scanshade {
     return ((x & 0x55555555U) << 1) | ((x & 0xaaaaaaaaU) >> 1);
 }
 
-/// Owen's scrambling as a hash in which every bit depends on the higher ones alone (Laine and Karras 2011, with the
-/// constants of Burley 2020, "Practical Hash-based Owen Scrambling").
+/// Owen's scrambling as a hash in which every bit depends on the higher ones alone (Laine and Karras 2011). The
+/// constants are those of Burley 2020, "Practical Hash-based Owen Scrambling".
 [[nodiscard]] constexpr std::uint32_t owen_scrambled(std::uint32_t x, std::uint32_t seed) {
     x = bits_reversed(x) + seed;
     x ^= x * 0x6c50b47cU;

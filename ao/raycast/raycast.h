@@ -33,9 +33,9 @@ class Raycast final : public Method, public PointMethod {
     /// The depth image as the surface, about the given normals or its own. Memory grows with the image: 100 bytes a
     /// pixel.
     AoMap compute(const View& view) override;
-    /// Clouds as discs (discs_of()); meshes as they are. Per vertex of a mesh either the mean over its triangles of the
-    /// visibility at their centroids about their face normals (Luna 2016, chapter 21), or rays from the vertex about
-    /// the mean of their normals. NaN for points that are not finite and vertices without a triangle.
+    /// Clouds as discs (discs_of()); meshes as they are. A vertex of a mesh has the mean over its triangles: visibility
+    /// at their centroids about their face normals (Luna 2016, chapter 21). Or it has rays of its own, about the mean
+    /// of their normals. NaN for points that are not finite and vertices without a triangle.
     PointVisibility compute(const PointSet& points, const std::optional<Eigen::Vector3d>& scanner = {}) override;
 
     [[nodiscard]] const Timings& timings() const override { return timings_; }

@@ -75,8 +75,8 @@ struct ScreenTables {
 };
 
 /// A method of which the room itself is only the part from depth and normals to raw visibility. Where it looks at
-/// neighbours and there are any, the image has a guard band of guard_px() on every side, and add_passes() finds buffers
-/// for them.
+/// neighbours and there are any, the image has a guard band of guard_px() on every side. add_passes() then finds
+/// buffers for them.
 class ScreenMethod : public Method {
   public:
     AoMap compute(const View& view) final;

@@ -42,9 +42,9 @@ struct Pair {
 
 [[nodiscard]] Agreement agreement(const Pair& pair, const Eigen::Isometry3d& here_from_there);
 
-/// The pose next to the given one in which the planes of both frames lie on each other (point-to-plane, Chen and
-/// Medioni 1991, points paired along the view as Blais and Levine 1995 do). What the surfaces leave open stays as
-/// given.
+/// The pose next to the given one in which the planes of both frames lie on each other. The distances are
+/// point-to-plane (Chen and Medioni 1991); points are paired along the view (Blais and Levine 1995). What the surfaces
+/// leave open stays as given.
 struct Aligned {
     Eigen::Isometry3d here_from_there;
     double sigma_m = 0; ///< of where it puts the surfaces, in the direction that they tell least about

@@ -42,15 +42,16 @@ struct GenerateOptions {
 /// Called after each frame that is on disk, from the calling thread.
 using GenerateProgress = std::function<void(int done, int total)>;
 
-/// Writes to `out`: rgb/<stamp>.png, depth/<stamp>.png (5000 per metre; float .tiff in metres where the scene reaches
-/// farther than that counts), rgb.txt, depth.txt, groundtruth.txt (camera to world), camera.json, and truth/truth.json,
-/// truth/depth/<stamp>.tiff (exact z in metres), truth/normals/<stamp>.tiff (exact, x y z), truth/ao/<stamp>.tiff
-/// (cosine-weighted visibility within truth_radius_m; ao_quad and ao_lin for those falloffs). Same options, same bytes,
-/// however many threads there are. A frame is the same whatever first and step lead to it.
-/// With `cloud` set: NAME.ply, points of equal density on all that can be seen of the scene or what the scanner
-/// records, and truth/NAME.ply, the same with the field ambient_occlusion, in place of images. Throws Misuse for
-/// options out of range, an `out` that holds something and is not to be overwritten, or (even then) is not a generated
-/// capture; Error where a file cannot be written.
+/// Writes to `out`:
+/// - rgb/<stamp>.png, depth/<stamp>.png: 5000 per metre, or float .tiff in metres where the scene reaches farther
+/// - rgb.txt, depth.txt, groundtruth.txt (camera to world), camera.json, truth/truth.json
+/// - truth/depth/<stamp>.tiff: exact z in metres; truth/normals/<stamp>.tiff: exact, x y z
+/// - truth/ao/<stamp>.tiff: cosine-weighted visibility within truth_radius_m; ao_quad and ao_lin for those falloffs
+/// - with `cloud` set, in place of images: NAME.ply, points of equal density on all that can be seen of the scene, or
+///   what the scanner records; and truth/NAME.ply, the same with the field ambient_occlusion
+/// Same options, same bytes, however many threads there are. A frame is the same whatever first and step lead to it.
+/// Throws Misuse for options out of range, and for an `out` that holds something and is not to be overwritten. Also,
+/// even then, for one that is no generated capture. Throws Error where a file cannot be written.
 void generate(const GenerateOptions& options, const std::filesystem::path& out, const GenerateProgress& progress = {});
 
 } // namespace scanshade

@@ -23,9 +23,9 @@ namespace {
 
 using image_check::refuse;
 
-class Source : public Imf::IStream {
+class ExrBytes : public Imf::IStream {
   public:
-    Source(std::string_view bytes, const Path& file) : Imf::IStream(file.c_str()), bytes_(bytes) {}
+    ExrBytes(std::string_view bytes, const Path& file) : Imf::IStream(file.c_str()), bytes_(bytes) {}
     bool read(char to[], int count) override {
         const auto length = static_cast<std::size_t>(std::max(count, 0));
         if (at_ > bytes_.size() || length > bytes_.size() - at_)
@@ -101,7 +101,7 @@ ImageFacts exr_header(std::string_view bytes, const Path& file) {
         refuse(file, fmt::format("EXR ends early: {} bytes", bytes.size()));
     Imf::Header header;
     checked(file, [&] {
-        Source source(bytes, file);
+        ExrBytes source(bytes, file);
         source.seekg(magic_and_version);
         int version = static_cast<int>(image_check::little_endian_32(bytes, 4));
         header.readFrom(source, version);
@@ -125,7 +125,7 @@ ImageFacts exr_header(std::string_view bytes, const Path& file) {
 cv::Mat stored_exr(std::string_view bytes, const ImageFacts& facts, const Path& file) {
     cv::Mat1f image(facts.size);
     checked(file, [&] {
-        Source source(bytes, file);
+        ExrBytes source(bytes, file);
         Imf::InputFile input(source);
         const Imath::Box2i& window = input.header().dataWindow();
         Imf::FrameBuffer buffer;

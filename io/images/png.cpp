@@ -16,21 +16,21 @@ namespace {
 
 using image_check::refuse;
 
-struct Source {
+struct PngBytes {
     std::string_view rest;
     char trouble[256] = "";
 };
 
 void read_source(png_structp png, png_bytep to, std::size_t count) {
-    auto& source = *static_cast<Source*>(png_get_io_ptr(png));
+    auto& source = *static_cast<PngBytes*>(png_get_io_ptr(png));
     if (count > source.rest.size())
         png_error(png, "ends early");
     std::memcpy(to, source.rest.data(), count);
     source.rest.remove_prefix(count);
 }
 
-[[noreturn]] void keep_error(png_structp png, const char* text) {
-    auto& source = *static_cast<Source*>(png_get_error_ptr(png));
+[[noreturn]] void keep_png_error(png_structp png, const char* text) {
+    auto& source = *static_cast<PngBytes*>(png_get_error_ptr(png));
     std::snprintf(source.trouble, sizeof source.trouble, "%s", text);
     png_longjmp(png, 1);
 }
@@ -56,8 +56,8 @@ void choose_conversions(png_structp png, png_infop info, const cv::Mat& image) {
 }
 
 /// Whether libpng read `image`, whose rows begin at `rows`; if not, `source` says why.
-bool read_pixels(Source& source, const cv::Mat& image, png_bytepp rows) {
-    png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &source, &keep_error, &pass_over_warning);
+bool read_pixels(PngBytes& source, const cv::Mat& image, png_bytepp rows) {
+    png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &source, &keep_png_error, &pass_over_warning);
     png_infop info = png ? png_create_info_struct(png) : nullptr;
     const bool well = [&] {
         if (!info || setjmp(png_jmpbuf(png)) != 0)
@@ -80,7 +80,7 @@ cv::Mat decoded(std::string_view bytes, const ImageFacts& facts, int type, const
     std::vector<png_bytep> rows(static_cast<std::size_t>(image.rows));
     for (int y = 0; y < image.rows; ++y)
         rows[static_cast<std::size_t>(y)] = image.ptr(y);
-    Source source{bytes};
+    PngBytes source{bytes};
     if (!read_pixels(source, image, rows.data()))
         refuse(file, fmt::format("PNG is damaged: {}", source.trouble));
     return image;

@@ -67,7 +67,7 @@ int map_memory(thandle_t handle, void** base, toff_t* size) {
     return 1;
 }
 
-int keep_error(TIFF*, void* user, const char*, const char* format, va_list values) {
+int keep_tiff_error(TIFF*, void* user, const char*, const char* format, va_list values) {
     auto& memory = *static_cast<Memory*>(user);
     char text[512];
     if (memory.trouble.empty() && std::vsnprintf(text, sizeof text, format, values) > 0)
@@ -84,7 +84,7 @@ Tiff opened(Memory& memory, const char* mode) {
     const std::unique_ptr<TIFFOpenOptions, decltype(&TIFFOpenOptionsFree)> options(TIFFOpenOptionsAlloc(),
                                                                                    &TIFFOpenOptionsFree);
     TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), most_at_once);
-    TIFFOpenOptionsSetErrorHandlerExtR(options.get(), &keep_error, &memory);
+    TIFFOpenOptionsSetErrorHandlerExtR(options.get(), &keep_tiff_error, &memory);
     TIFFOpenOptionsSetWarningHandlerExtR(options.get(), &pass_over_warning, nullptr);
     const auto close_nothing = [](thandle_t) { return 0; };
     const auto unmap_nothing = [](thandle_t, void*, toff_t) {};

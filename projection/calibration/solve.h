@@ -37,8 +37,8 @@ struct Clusters {
 /// Without clusters the covariance is the inverse normal matrix times rss / (residuals - unknowns). With clusters,
 /// residuals of one cluster may be correlated in any way: a wall has the same depth error in all frames, and neighbours
 /// on an outline share theirs. The covariance is then the cluster-robust one (Liang and Zeger 1986). Of many clusters
-/// each is left out in turn, by one Newton step (the jackknife of Bell and McCaffrey 2002), because a cluster that
-/// dominates the fit has small residuals.
+/// each is left out in turn, by one Newton step (the jackknife of Bell and McCaffrey 2002): a cluster that dominates
+/// the fit has small residuals.
 void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const std::vector<double*>& kept,
                     const Clusters& clusters);
 

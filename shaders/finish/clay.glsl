@@ -1,5 +1,5 @@
-// Clay works on inverse depth: on a plane 1/z is linear in the pixel, so averages and slopes over neighbours are exact there,
-// and take out a sensor's depth steps, which are even in 1/z, elsewhere. Included by passes that declare
+// Clay works on inverse depth: on a plane 1/z is linear in the pixel, so averages and slopes over neighbours
+// are exact there. Elsewhere they take out a sensor's depth steps, which are even in 1/z. Included by passes that declare
 // `surface` and `k`.
 
 layout(constant_id = spec_is_depth) const int is_depth = 0; // what `surface` holds: 1 = z, 0 = 1/z; 0 in holes

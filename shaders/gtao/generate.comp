@@ -4,7 +4,8 @@
 // two horizons, cosine-weighted in closed form. Therrien, Levesque, Gilet, "Screen Space Indirect Lighting with Visibility
 // Bitmask" (2023): 32 sectors in place of the horizons, so that light passes behind thin things.
 // Departures: slices are uniform about the eye's ray and weighted by their own full measure, which makes a plane exactly
-// open for any number of slices; samples on the tangent plane are left out; sectors are of equal measure, not angle.
+// open for any number of slices; samples on the tangent plane are left out. Sectors are of equal measure, not angle, and
+// samples count up to the radius.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -15,7 +16,6 @@ layout(local_size_x = screen_tile, local_size_y = screen_tile) in;
 layout(constant_id = spec_bitmask) const int bitmask = 0;
 layout(constant_id = spec_falloff) const int falloff = falloff_hard;
 layout(constant_id = spec_square) const int square = 1;
-layout(constant_id = spec_uniform) const int equal_angles = 0;
 layout(binding = 0, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 1, rgba32f) readonly uniform imageBuffer surfaces;
 layout(binding = 2, rg32f) readonly uniform imageBuffer noise_table;
@@ -57,8 +57,7 @@ float arc_measure(Slice slice, float c, float side) {
 // Sectors of the slice that lie before the angle with cosine c on a side, counted from the end of side -1; a direction
 // behind the tangent plane is that end or the other.
 int sectors_before(Slice slice, float c, float side) {
-    float n = equal_angles != 0 ? slice.sectors.x + (side * angle_of(c) - slice.angle) * (32.0 / pi) + 16.0
-                                : slice.sectors.x + side * slice.sectors.y * positive(1.0 - c * c) + slice.sectors.z * segment(c);
+    float n = slice.sectors.x + side * slice.sectors.y * positive(1.0 - c * c) + slice.sectors.z * segment(c);
     bool behind = c < -side * slice.sine;
     return min(max(nearest(behind ? 16.0 + 17.0 * side : n), 0), 32);
 }
@@ -95,8 +94,7 @@ void look(Surface s, Slice slice, ivec2 q, float side, inout Side met) {
         float horizon = falloff == falloff_hard ? front : low + (front - low) * weight;
         met.horizon = counts && horizon > met.horizon ? horizon : met.horizon;
     } else {
-        float thickness = g.thickness + g.thickness_per_z * z;
-        vec3 behind = apart + sample_point * (thickness * quick_scale * quick_inversesqrt(dot(sample_point, sample_point) + 1e-20));
+        vec3 behind = apart + sample_point * (g.thickness * quick_scale * quick_inversesqrt(dot(sample_point, sample_point) + 1e-20));
         float back = dot(behind, s.eye) * (quick_scale * quick_inversesqrt(dot(behind, behind) + 1e-20));
         met.occupied |= counts ? sectors(slice, front, back, side) : 0u;
     }
@@ -131,7 +129,7 @@ void main() {
         float below = 0.5 * slice.cosine + 0.25 * (2.0 * slice.angle - pi) * slice.sine; // measure of side -1
         float dither = fract(noise.x * 7.0 + float(i) * golden) - 0.5; // so that the expected number of sectors is exact
         slice.sectors = vec3(32.0 * below, 16.0 * slice.cosine, 16.0 * slice.sine) / slice.full;
-        slice.sectors.x = dither + (equal_angles != 0 ? 0.0 : slice.sectors.x);
+        slice.sectors.x += dither;
 
         March ahead, behind;
         march_both_ways(s, vec2(p), d, ahead, behind);

@@ -11,13 +11,12 @@ struct GtaoConstants {
     float falloff_scale,
         falloff_add;    // weight of a sample: clamp(add + scale x), x its distance (linear) or that squared
     float distribution; // exponent of the steps' distances
-    float thickness, thickness_per_z; // bitmask: metres, metres per metre of depth
+    float thickness;    // bitmask: metres
 };
 
 const int spec_bitmask = 10; // 1: visibility bitmask, 0: horizons
 const int spec_falloff = 11; // one of the kinds below
 const int spec_square = 12;  // 1: distribution is 2
-const int spec_uniform = 13; // bitmask: 1 = sectors of equal angle (published), 0 = of equal cosine-weighted measure
 
 const int falloff_hard = 0;
 const int falloff_linear = 1;

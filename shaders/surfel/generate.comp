@@ -1,5 +1,5 @@
-// Visibility of every pixel from the surfels around it. Each slice of the hemisphere has 31 sectors of equal cosine weight,
-// and every surfel in the slice closes the sectors it covers (visibility bitmask, Therrien et al. 2023; slices and their
+// Visibility of every pixel from the surfels around it. Each slice of the hemisphere has 31 sectors of equal cosine weight.
+// Every surfel in the slice closes the sectors it covers (visibility bitmask, Therrien et al. 2023; slices and their
 // cosine measure, Jimenez et al. 2016). A surfel is a piece of surface with a direction and a thickness, not a point: no light
 // leaks between two samples, and light passes behind thin surfaces.
 //
@@ -75,8 +75,8 @@ ivec4 sectors_before(vec4 quick_cosine, Sectors sectors) {
     return ivec4(sectors.base + (sectors.squared * q2 + sectors.curved * g));
 }
 
-// What a surfel grows by where a neighbour at depth `near` is in front of its sample at z and of its plane, which has depth
-// z / plane there; 0 elsewhere.
+// What a surfel grows by where a neighbour at depth `near` is in front of its sample at z and of its plane; 0 elsewhere.
+// The plane has depth z / plane there.
 vec4 hidden_length(vec4 near, vec4 z, vec4 plane, vec4 length_) {
     return mix(vec4(0.0), mix(vec4(0.0), length_, lessThan(near * plane, z)), lessThan(near, z));
 }
@@ -200,8 +200,8 @@ void main() {
             vec4 zq = four.z, nx = four.nx, ny = four.ny;
             if (steps % 2 == 1 && j == steps - 1) zq.zw = vec2(0.0);
 
-            // Outside the image the surface at its border continues as a plane, but not towards its horizon, and not those that
-            // other views saw behind it. Filled holes have a negative depth.
+            // Outside the image the surface at its border continues as a plane, but not towards its horizon. What other views
+            // saw behind it does not continue. Filled holes have a negative depth.
             ivec4 out_x = ix - jx, out_y = iy - jy;
             vec4 mx = vec4(ix) * k.ray_step.x, my = vec4(iy) * k.ray_step.y;
             vec4 by_ray = nx * ray.x + ny * ray.y + four.nz, by_step = nx * ray_x + ny * ray_y;

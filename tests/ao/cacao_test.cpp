@@ -622,7 +622,7 @@ TEST_F(cacao_scan, pixels_are_where_they_are_at_odd_sizes) {
 }
 
 TEST_F(cacao_scan, depth_is_precise_from_near_to_far) {
-    // A plane is open at any tilt and distance. Through a telephoto lens a pixel is 2 cm wide at 65 m, where binary16
+    // A plane is open at any tilt and distance. Through a telephoto lens a pixel is 2 cm wide at 65 m. There binary16
     // has steps of 6 cm and AMD's bias covers 5, so a slope becomes a staircase. 32 bits have no such steps.
     CacaoOptions o = options();
     o.fade_from = 1e4F;
@@ -652,8 +652,8 @@ TEST_F(cacao_scan, depth_is_precise_from_near_to_far) {
 }
 
 TEST_F(cacao_scan, the_radius_is_metric_at_close_range) {
-    // A step 0.3 m aside and 0.1 m higher shades a wall within a radius of 0.5 m, both at half a metre from the camera
-    // and at five. The reference shrinks its radius, to less than 0.3 m here, where it would cover much of the screen.
+    // A step 0.3 m aside and 0.1 m higher shades a wall within a radius of 0.5 m, at half a metre from the camera as
+    // at five. The reference shrinks its radius, to less than 0.3 m here, where it would cover much of the screen.
     // How dark is not compared: perspective shows the two cameras different parts of the step.
     const auto aside = [](const Seen& seen, double pixel_m) {
         return average(seen.visibility(cv::Rect(80 + static_cast<int>(0.3 / pixel_m), 40, 1, 40)));
@@ -903,7 +903,7 @@ TEST_F(cacao_formulas, mips_are_means_of_the_nearest_surface) {
 TEST_F(cacao_formulas, normals_are_those_of_the_four_quadrants) {
     // Every derived normal of a scene with holes, from depth, up to one step of its storage. The reference replicates
     // depth at the rim and knows no holes (it is given none); scan takes a hole of one pixel to lie on the line of 1/z
-    // to what is beyond it, within the block of 2x2 and the pixels around it, and has no normal where no quadrant is
+    // to what is beyond it, within the block of 2x2 and the pixels around it. It has no normal where no quadrant is
     // whole.
     const DepthImage whole = ball_on_floor(camera_of(125)), punched = with_holes(whole, 0.2);
     for (const bool scan : {true, false}) {

@@ -11,8 +11,8 @@ float slice_filtered(int slice, vec2 at) {
                     imageLoad(ao, slice_index(slice, ivec2(f.low.x, f.high.y))).x & 0xffffu, imageLoad(ao, slice_index(slice, f.high)).x & 0xffffu);
 }
 
-// Own texel plus one filtered value from each other slice, pulled away from edges. `at` is the grid pixel as AMD's shader sees it
-// (coordinates left of or above the image wrap round to a huge number), parity its slice.
+// Own texel plus one filtered value from each other slice, pulled away from edges. `at` is the grid pixel as AMD's shader sees it:
+// coordinates left of or above the image wrap round to a huge number. `parity` is its slice.
 float smart(uint texel, vec2 at, ivec2 parity) {
     vec4 e = unpack_edges(ao_edges(texel));
     vec2 pull = vec2(e.y - e.x, e.w - e.z);

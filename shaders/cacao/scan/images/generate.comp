@@ -29,7 +29,7 @@ void look_at(Surface s, vec2 uv, float mip, inout Sum sum) {
     look(s, s.lookup.ray0 + uv * s.lookup.ray_range, textureLod(depths, vec3(uv, float(s.slice)), mip).x, sum);
 }
 
-// Coordinates that are `snap` too large keep 6 bits below one texel, as in a buffer, and clearing bits rounds them down to a texel of
+// Coordinates that are `snap` too large keep 6 bits below one texel, as in a buffer. Clearing bits rounds them down to a texel of
 // any mip. What snap adds to uv is taken off with its offset, and rays follow from uv: that costs 1e-4 texels of precision.
 void look_both_ways(Surface s, vec2 offset, float mip_bias, inout Sum sum) {
     const float magic = 12582912.0; // 1.5 * 2^23: adding it leaves the nearest integer in the low bits
