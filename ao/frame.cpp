@@ -22,7 +22,7 @@ AoMap FrameAo::compute(const DepthImage& depth, const DepthNoise& noise) {
     doubts_.clear();
     fitted_depth_.reset();
     AoMap ao;
-    if (noise.any() && device_) {
+    if (noise.needs_preparation() && device_) {
         ao = compute_prepared(depth, noise);
         timings_ = fit_->timings();
     } else {

@@ -173,6 +173,64 @@ void find_steps(DepthNoise& noise, const std::vector<float>& values_m) {
         (even.share >= growing.share ? even : growing).size;
 }
 
+/// Jumps from one even surface to another within 2 reach - 1 pixels, by how many of these lie between both.
+struct JumpCount {
+    double all = 0, sharp = 0, smeared = 0; // without such a pixel; with two and more
+};
+constexpr std::array<int, 3> reaches{2, 4, 8}; // pixels from the middle to the first one of either surface
+using JumpCounts = std::array<JumpCount, reaches.size()>;
+
+Jumps kind_of(const JumpCounts& counts) {
+    // Depth resized or smoothed has 0.8 with two and more, and hardly any without: by the reach that spans its edges.
+    // Rendered depth has 0.1 with two and more over the shortest reach. Over longer ones its slopes count, too, but
+    // sharp jumps are as many. Time of flight mixes one pixel: 0.35 are sharp, and 0.8 and more of rendered depth.
+    constexpr double enough = 100, least_smeared = 0.4, few_sharp = 0.05, least_sharp = 0.7;
+    for (const JumpCount& count : counts)
+        if (count.all > enough && count.smeared > least_smeared * count.all && count.sharp < few_sharp * count.all)
+            return Jumps::smeared;
+    const JumpCount& near = counts.front();
+    return near.all > enough && near.sharp < least_sharp * near.all ? Jumps::unknown : Jumps::sharp;
+}
+
+/// Along a row or a column: `next` is from one value to the next.
+void count_jump(const float* at, std::ptrdiff_t next, int reach, JumpCount& count) {
+    const float before = at[-reach * next], after = at[reach * next], jump = std::abs(after - before);
+    const float even = 0.15F * jump / static_cast<float>(reach); // a third of the mean slope between
+    const auto is_even = [&](float here, float beyond) {
+        return here > 0 && beyond > 0 && std::abs(here - beyond) <= even;
+    };
+    if (!(jump >= 0.1F && jump >= 0.05F * std::min(before, after)) || !is_even(before, at[-(reach + 1) * next]) ||
+        !is_even(after, at[(reach + 1) * next]))
+        return;
+    float share = 0; // of the way, which goes on in one direction
+    int mixed = 0;
+    for (int i = -reach + 1; i < reach; ++i) {
+        const float here = at[i * next], then = (here - before) / (after - before);
+        if (!(here > 0) || then < share - 0.05F || then > 1.05F)
+            return;
+        share = then;
+        mixed += share > 0.15F && share < 0.85F ? 1 : 0;
+    }
+    const double once = 1.0 / (2 * reach - mixed); // it is met from as many middles
+    count.all += once;
+    count.sharp += mixed == 0 ? once : 0;
+    count.smeared += mixed >= 2 ? once : 0;
+}
+
+void count_jumps(const cv::Mat1f& z, JumpCounts& counts) {
+    const auto down = static_cast<std::ptrdiff_t>(z.step1());
+    for (std::size_t i = 0; i < reaches.size(); ++i) {
+        const int border = reaches[i] + 1;
+        for (int y = border; y < z.rows - border; ++y)
+            for (int x = border; x < z.cols - border; ++x) {
+                if (y % step_px == 0)
+                    count_jump(z[y] + x, 1, reaches[i], counts[i]);
+                if (x % step_px == 0)
+                    count_jump(z[y] + x, down, reaches[i], counts[i]);
+            }
+    }
+}
+
 /// floor + per_z2 z^2 through the bands by least squares of relative error, both terms at least zero.
 DepthNoise law_through(const std::vector<Measured>& points) {
     double s00 = 0, s01 = 0, s11 = 0, t0 = 0, t1 = 0;
@@ -195,12 +253,41 @@ DepthNoise law_through(const std::vector<Measured>& points) {
     return noise;
 }
 
+/// Whether a value's error is that of rounding to a step, and hardly more: uniform over the step, whose deviation is
+/// step / sqrt(12). Noise would show between adjacent pixels at most depths. Noise that a sensor has smoothed would
+/// show over more pixels at all depths; a scene's relief, which looks like it, leaves some of them even.
+bool explains(double step_m, const std::vector<Measured>& points) {
+    constexpr double most = 1.6, most_distant = 3; // deviations of a step
+    const double step = step_m / std::sqrt(12.0);
+    double all = 0, adjacent = 0, distant = 0;
+    for (const Measured& p : points) {
+        all += p.weight;
+        adjacent += p.adjacent * p.sigma < most * step ? p.weight : 0;
+        distant += p.sigma < most_distant * step ? p.weight : 0;
+    }
+    return adjacent > 0.5 * all && distant > 0.1 * all;
+}
+
+/// Whether a step between adjacent pixels tilts the surface by more than AO bears.
+bool tilts(double step_m, double focal_px, const std::vector<Measured>& points) {
+    constexpr double most = 0.7;
+    double slopes = 0, weights = 0;
+    for (const Measured& p : points)
+        slopes += p.weight * step_m * focal_px / p.z, weights += p.weight;
+    return slopes > most * weights;
+}
+
 } // namespace
 
 DepthNoise measure_noise(std::span<const DepthImage> images) {
     std::array<Band, bands> all;
-    for (const DepthImage& image : images)
+    JumpCounts jumps;
+    double focal_px = 0;
+    for (const DepthImage& image : images) {
         collect(image.z_m, all);
+        count_jumps(image.z_m, jumps);
+        focal_px = std::max(focal_px, image.camera.fx);
+    }
     std::array<std::optional<Measured>, bands> measured;
     tbb::this_task_arena::isolate([&] {
         tbb::parallel_for(std::size_t(0), all.size(), [&](std::size_t i) {
@@ -219,6 +306,7 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
     }
     DepthNoise steps;
     find_steps(steps, values_m);
+    steps.jumps = kind_of(jumps);
     if (points.empty())
         return steps;
     const DepthNoise seen = law_through(points);
@@ -233,6 +321,14 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
         p.sigma *= std::sqrt(6 / second_difference_variance(p.lag_px, s));
     DepthNoise noise = law_through(points);
     noise.step_m = steps.step_m, noise.step_per_z2 = steps.step_per_z2;
+    if (explains(steps.step_m, points)) {
+        if (!tilts(steps.step_m, focal_px, points))
+            return steps;
+        noise.floor_m = steps.step_m / std::sqrt(12.0), noise.per_z2 = 0;
+        noise.jumps = steps.jumps;
+    } else if (steps.jumps == Jumps::smeared) {
+        noise.jumps = Jumps::smeared;
+    }
     noise.correlation_px = std::max(1.0, std::sqrt(2 * std::numbers::pi) * s);
     return noise;
 }
@@ -270,6 +366,8 @@ std::string describe(const DepthNoise& noise) {
         text += fmt::format(", steps of {:.2g} m", noise.step_m);
     if (noise.step_per_z2 > 0)
         text += fmt::format(", steps of {:.2g} z^2 m", noise.step_per_z2);
+    if (noise.jumps == Jumps::smeared)
+        text += ", edges smeared over several pixels";
     return text;
 }
 

@@ -8,6 +8,10 @@
 
 namespace scanshade {
 
+/// What depth shows where it jumps from one surface to another. Rendered depth is sharp. Depth that was resized by
+/// interpolation, or smoothed, has two and more pixels that belong to neither surface: it is smeared.
+enum class Jumps { unknown, sharp, smeared };
+
 /// Standard deviation of one depth value in metres, quantisation included: sigma(z) = floor_m + per_z2 z^2.
 /// The square law is that of disparity sensors; time of flight is nearly all floor (Khoshelham and Elberink 2012).
 struct DepthNoise {
@@ -18,8 +22,14 @@ struct DepthNoise {
     /// Quantisation: recorded values are step_m + step_per_z2 z^2 apart; 0 = none found. Only reported.
     double step_m = 0, step_per_z2 = 0;
 
+    Jumps jumps = Jumps::unknown;
+
     [[nodiscard]] double at(double z_m) const { return floor_m + per_z2 * z_m * z_m; }
     [[nodiscard]] bool any() const { return floor_m > 0 || per_z2 > 0; }
+    /// Whether flying pixels are to be expected, as with all noise.
+    [[nodiscard]] bool flies() const { return jumps == Jumps::smeared || (any() && jumps != Jumps::sharp); }
+    /// Whether depth is to be prepared before a method sees it.
+    [[nodiscard]] bool needs_preparation() const { return any() || flies(); }
 };
 
 /// Measures sigma(z) on depth images of one sensor: the spread of second differences of 1/z (zero on any plane) in
@@ -33,6 +43,9 @@ struct DepthNoise {
 /// files) or grow with z^2 (disparity).
 /// Returns no noise, only steps, where sigma is below 0.1 mm per metre or 0.12 mm: then nothing needs smoothing. Clean
 /// depth in fine 16-bit steps (5000 per metre) has as much.
+/// Constant steps that explain sigma are no noise: values err by half a step at most, and jumps stay sharp. Then sigma
+/// is that of the steps where they tilt the surface between adjacent pixels by much, and none where they do not.
+/// Depth without noise can be smeared, too.
 [[nodiscard]] DepthNoise measure_noise(std::span<const DepthImage> images);
 
 /// From "none", "kinect" (0.0015, 0.0018, 3 px), "tof" (0.0015, 0) or "floor,per_z2[,correlation]". The caller handles

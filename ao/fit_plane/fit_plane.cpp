@@ -61,8 +61,8 @@ FitPlane::FitPlane(gpu::Device& device, const DepthNoise& noise, const FitPlaneO
 }
 
 void FitPlane::set_noise(const DepthNoise& noise) {
-    if (!noise.any())
-        throw Error("a plane fit needs a noise above zero");
+    if (!noise.needs_preparation())
+        throw Error("depth without noise and flying pixels needs no preparation");
     noise_ = noise;
 }
 
@@ -74,10 +74,11 @@ void FitPlane::prepare(const DepthImage& depth, std::span<const OtherDepth> othe
     for (const OtherDepth& other : others) // before any is taken: a run that fails must leave nothing to the next
         if (other.camera.size != size)
             throw Error("another frame of another image size");
-    if (!program_ || size != size_ || fuse != fused_)
+    if (!program_ || size != size_ || fuse != fused_ || planes() != planes_)
         program_ = program_for(device_, size, planes(), fuse);
     size_ = size;
     fused_ = fuse;
+    planes_ = planes();
     const double window =
         window_scale * noise_.correlation_px * noise_.correlation_px * options_.smoothing * options_.smoothing;
     constants_ = {{size.width, size.height},
@@ -86,7 +87,7 @@ void FitPlane::prepare(const DepthImage& depth, std::span<const OtherDepth> othe
                   static_cast<float>(noise_.per_z2),
                   static_cast<float>(window),
                   static_cast<float>(options_.largest_radius_px),
-                  options_.drop_flying ? 1 : 0,
+                  options_.drop_flying && noise_.flies() ? 1 : 0,
                   fuse ? static_cast<int>(others.size()) : 0,
                   {}};
     for (std::size_t i = 0; fuse && i < others.size(); ++i) {

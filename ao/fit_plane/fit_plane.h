@@ -37,7 +37,7 @@ struct OtherDepth {
 /// Not thread-safe: one frame at a time.
 class FitPlane {
   public:
-    /// `noise.any()` must hold. The window's radius grows with the root of sigma(z), and with the correlation length.
+    /// `noise.needs_preparation()` must hold. Flying pixels are dropped where `noise` expects them. The window's radius grows with the root of sigma(z), and with the correlation length.
     FitPlane(gpu::Device& device, const DepthNoise& noise, const FitPlaneOptions& options = {});
 
     /// With others, each pixel's depth is first averaged with what they saw of its surface, and the windows shrink with
@@ -46,7 +46,7 @@ class FitPlane {
     /// The same of one frame, left on the device; planes() must hold.
     [[nodiscard]] Surfaces compute_on_device(const DepthImage& depth);
     /// Whether depth and normals come from planes, and not depth alone, without flying pixels.
-    [[nodiscard]] bool planes() const { return options_.smoothing > 0; }
+    [[nodiscard]] bool planes() const { return options_.smoothing > 0 && noise_.any(); }
     [[nodiscard]] const DepthNoise& noise() const { return noise_; }
     /// From now on depth has that noise; throws Error where it is none.
     void set_noise(const DepthNoise& noise);
@@ -62,7 +62,7 @@ class FitPlane {
     DepthNoise noise_;
     FitPlaneOptions options_;
     cv::Size size_;
-    bool fused_ = false;
+    bool fused_ = false, planes_ = false; ///< as the program has it
     shared::FitPlaneConstants constants_ = {};
     std::unique_ptr<gpu::Program> program_;
     Timings timings_;

@@ -35,10 +35,10 @@ SequenceAo::SequenceAo(gpu::Device& device, Method& method, double radius_m, con
       radius_m_(radius_m) {
     if (!method.looks_at_neighbours())
         options_.layers = 0;
-    if (!noise.any()) {
+    if (!noise.any())
         options_.fuse = 0;
+    if (!noise.needs_preparation())
         return;
-    }
     FitPlaneOptions only_drop = fit, after_drop = fit;
     only_drop.smoothing = 0;
     after_drop.drop_flying = false;

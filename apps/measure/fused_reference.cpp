@@ -73,7 +73,7 @@ std::vector<std::size_t> posed(const Capture& capture) {
 FusedReference::FusedReference(gpu::Device& device, const std::filesystem::path& path, const TrialCapture& trial,
                                const CaptureOptions& options)
     : noise_(trial.noise), radius_m_(trial.radius_m), voxel_m_(trial.radius_m / 25), directions_(rays, 1) {
-    if (noise_.any())
+    if (noise_.needs_preparation())
         fit_.emplace(device, noise_);
     const Capture capture = open_capture(path, options);
     const std::vector<std::size_t> frames = posed(capture);

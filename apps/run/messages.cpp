@@ -49,11 +49,12 @@ std::string noise_origin(const RunSettings& settings) {
 
 std::string noise_sentence(const DepthNoise& noise, const RunSettings& settings) {
     const std::string origin = noise_origin(settings);
-    if (!noise.any())
-        return fmt::format("{} ({}); depth is used as recorded", describe(noise), origin);
-    return fmt::format(
-        "{} ({}); flying pixels are {}; {}", describe(noise), origin, settings.drop_flying ? "dropped" : "kept",
-        settings.depth_smoothing > 0 ? "depth and normals come from plane fits" : "depth is used as recorded");
+    const std::string flying = !noise.flies()          ? ""
+                               : settings.drop_flying ? "flying pixels are dropped; "
+                                                      : "flying pixels are kept; ";
+    const bool planes = noise.any() && settings.depth_smoothing > 0;
+    return fmt::format("{} ({}); {}{}", describe(noise), origin, flying,
+                       planes ? "depth and normals come from plane fits" : "depth is used as recorded");
 }
 
 void introduce(const RunReport& report, std::size_t frames, bool by_points) {

@@ -28,7 +28,7 @@ namespace scanshade {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double units_per_metre = 5000; // TUM's
+constexpr double tum_units_per_metre = 5000;
 constexpr double frames_per_s = 10, poses_per_s = 100;
 constexpr double depth_after_colour_s = 0.004; // real sensors do not take the two images at the same time either
 constexpr double first_stamp_s = 1700000000;
@@ -76,8 +76,12 @@ std::vector<int> frames_of(const GenerateOptions& options) {
     return frames;
 }
 
-/// 16 bits at TUM's scale end at 13.1 m. Scenes that reach farther are written as float metres.
-bool fits_png(const scene::Scene& scene) { return scene.far_m * units_per_metre < 65535; }
+/// Of the 16-bit files; 0 = float metres. 16 bits at TUM's scale end at 13.1 m, and some scenes reach farther.
+double units_per_metre(const GenerateOptions& options, const scene::Scene& scene) {
+    if (options.depth_units > 0)
+        return options.depth_units;
+    return scene.far_m * tum_units_per_metre < 65535 ? tum_units_per_metre : 0;
+}
 
 std::string image_list(const char* folder, const char* extension, const std::vector<int>& frames,
                        Microseconds (*time_of)(int)) {
@@ -232,8 +236,8 @@ std::optional<TruthError> write_frame(const GenerateOptions& options, const scen
     write_picture(out / "rgb" / (stamp(colour_time(frame)) + ".png"), render_colour(world, camera, colour_pose));
     const Sight sight{world, camera, depth_pose, render_geometry(world, camera, depth_pose), options.seed, frame};
     const cv::Mat1f recorded = sensor_named(options.sensor).record(sight);
-    if (fits_png(world.scene()))
-        write_depth_png(out / "depth" / (depth_stamp + ".png"), recorded, units_per_metre);
+    if (const double units = units_per_metre(options, world.scene()); units > 0)
+        write_depth_png(out / "depth" / (depth_stamp + ".png"), recorded, units);
     else
         write_float_tiff(out / "depth" / (depth_stamp + ".tiff"), recorded);
     if (!options.truth)
@@ -308,6 +312,12 @@ std::vector<Parameter> GenerateOptions::parameters() {
          .value = &lens_k1,
          .low = -1,
          .high = 1},
+        {.name = "depth-units",
+         .help = "units per metre that depth is stored in; what is too far becomes a hole; 0 = 5000, or floats where "
+                 "the scene reaches farther",
+         .value = &depth_units,
+         .low = 0,
+         .high = 65535},
         {.name = "seed",
          .help = "seed of the sensor's noise, the poses' noise and the truth's rays",
          .value = &seed,
@@ -370,9 +380,9 @@ void generate(const GenerateOptions& options, const fs::path& out, const Generat
         write_scene_cloud(options, scene::World(scene), out);
         return;
     }
-    write_camera_file(
-        out / "camera.json",
-        {{camera, optics.lens, "generated"}, fits_png(scene) ? units_per_metre : 1, Registration::yes, {}});
+    const double units = units_per_metre(options, scene);
+    write_camera_file(out / "camera.json",
+                      {{camera, optics.lens, "generated"}, units > 0 ? units : 1, Registration::yes, {}});
     const scene::World world(scene);
     std::vector<TruthError> errors;
     for (std::size_t i = 0; i < frames.size(); ++i) {
@@ -387,7 +397,7 @@ void generate(const GenerateOptions& options, const fs::path& out, const Generat
     write_atomically(note, truth_note(options, scene, camera, errors));
     write_atomically(out / "groundtruth.txt", pose_list(scene.walk, frames, checked));
     write_atomically(out / "rgb.txt", image_list("rgb", ".png", frames, colour_time));
-    write_atomically(out / "depth.txt", image_list("depth", fits_png(scene) ? ".png" : ".tiff", frames, depth_time));
+    write_atomically(out / "depth.txt", image_list("depth", units > 0 ? ".png" : ".tiff", frames, depth_time));
 }
 
 } // namespace scanshade

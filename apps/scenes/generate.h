@@ -20,6 +20,7 @@ struct GenerateOptions {
     int first = 0, step = 1;            ///< frames first, first + step, ... of the scene's walk, ten per second
     std::string size = "640x480";       ///< width x height in pixels; the field of view stays that of a Kinect
     double lens_k1 = 0;                 ///< radial distortion of the lens before both images (Brown 1971)
+    double depth_units = 0;             ///< stored per metre of depth; 0 = 5000, or floats where the scene needs them
     int seed = 1;                       ///< of the sensor's and the poses' noise and the truth's rays
     double pose_noise_m = 0;            ///< sigma of recorded positions along each axis
     double pose_noise_deg = 0;          ///< sigma of recorded rotations about each axis
@@ -43,7 +44,7 @@ struct GenerateOptions {
 using GenerateProgress = std::function<void(int done, int total)>;
 
 /// Writes to `out`:
-/// - rgb/<stamp>.png, depth/<stamp>.png: 5000 per metre, or float .tiff in metres where the scene reaches farther
+/// - rgb/<stamp>.png, depth/<stamp>.png: depth_units per metre, or float .tiff in metres
 /// - rgb.txt, depth.txt, groundtruth.txt (camera to world), camera.json, truth/truth.json
 /// - truth/depth/<stamp>.tiff: exact z in metres; truth/normals/<stamp>.tiff: exact, x y z
 /// - truth/ao/<stamp>.tiff: cosine-weighted visibility within truth_radius_m; ao_quad and ao_lin for those falloffs

@@ -144,6 +144,98 @@ TEST(noise, steps_are_told_and_nothing_is_taken_for_one) {
     EXPECT_EQ(none.step_m + none.step_per_z2, 0) << describe(none);
 }
 
+/// Blocks of 40 pixels, each its own slanted plane.
+DepthImage blocks_of_planes(double far_m) {
+    const Pinhole camera = test_camera({320, 240});
+    DepthImage blocks{camera, cv::Mat1f(camera.size), {}};
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> depth(0.4 * far_m, far_m), slope(-1, 1);
+    for (int v = 0; v < 240; v += 40)
+        for (int u = 0; u < 320; u += 40) {
+            const double w = 1 / depth(random), along = slope(random) * w / 500, down = slope(random) * w / 500;
+            for (int y = v; y < v + 40; ++y)
+                for (int x = u; x < u + 40; ++x)
+                    blocks.z_m(y, x) = static_cast<float>(1 / (w + along * (x - u) + down * (y - v)));
+        }
+    return blocks;
+}
+
+DepthImage stored_in_steps(const DepthImage& exact, double step_m) {
+    DepthImage stored{exact.camera, exact.z_m.clone(), {}};
+    for (float& z : stored.z_m)
+        z = static_cast<float>(std::round(z / step_m) * step_m);
+    return stored;
+}
+
+TEST(noise, exact_depth_in_steps_has_none) {
+    // 1 mm at a metre tilts the surface between adjacent pixels by 1 mm / (z / f), some 20 degrees at most.
+    const DepthNoise fine = measure_noise(std::vector{stored_in_steps(blocks_of_planes(3), 0.001)});
+    EXPECT_NEAR(fine.step_m, 0.001, 5e-5);
+    EXPECT_FALSE(fine.needs_preparation()) << describe(fine);
+    const DepthNoise far = measure_noise(std::vector{stored_in_steps(blocks_of_planes(40), 0.01)});
+    EXPECT_FALSE(far.needs_preparation()) << describe(far);
+}
+
+TEST(noise, coarse_steps_are_smoothed_and_no_pixel_is_dropped) {
+    const double step_m = 0.02;
+    const DepthImage exact = blocks_of_planes(3), stored = stored_in_steps(exact, step_m);
+    const DepthNoise noise = measure_noise(std::vector{stored});
+    EXPECT_NEAR(noise.at(1), step_m / std::sqrt(12.0), 1e-3) << describe(noise);
+    EXPECT_EQ(noise.per_z2, 0);
+    EXPECT_FALSE(noise.flies());
+    FitPlane fit(device(), noise);
+    const cv::Mat1f fitted = fit.compute(stored).depth.z_m;
+    EXPECT_EQ(cv::countNonZero(fitted), static_cast<int>(fitted.total()));
+    EXPECT_LT(cv::norm(fitted, exact.z_m, cv::NORM_L1), 0.7 * cv::norm(stored.z_m, exact.z_m, cv::NORM_L1));
+}
+
+TEST(noise, steps_hide_no_noise) {
+    const DepthImage exact = blocks_of_planes(3);
+    const DepthNoise one_step = measure_noise(std::vector{stored_in_steps(noisy(exact, {0.001, 0}), 0.001)});
+    EXPECT_GT(one_step.at(2), 0.0009) << describe(one_step);
+    EXPECT_LT(one_step.at(2), 0.0016) << describe(one_step);
+    EXPECT_TRUE(one_step.flies());
+    // Noise that the sensor has smoothed is even from pixel to pixel, and large over a few.
+    DepthImage smooth = noisy(exact, {0.03, 0});
+    cv::GaussianBlur(smooth.z_m - exact.z_m, smooth.z_m, {13, 13}, 2);
+    smooth.z_m += exact.z_m;
+    const DepthNoise bumps = measure_noise(std::vector{stored_in_steps(smooth, 0.001)});
+    EXPECT_GT(bumps.at(2), 0.002) << describe(bumps);
+}
+
+TEST(noise, resized_depth_is_smeared_and_loses_what_belongs_to_no_surface) {
+    const DepthImage exact = blocks_of_planes(3);
+    EXPECT_EQ(measure_noise(std::vector{exact}).jumps, Jumps::sharp);
+    DepthImage resized{exact.camera, {}, {}};
+    cv::resize(exact.z_m, resized.z_m, {80, 60}, 0, 0, cv::INTER_NEAREST);
+    cv::resize(resized.z_m, resized.z_m, {320, 240}, 0, 0, cv::INTER_LINEAR);
+    const DepthNoise noise = measure_noise(std::vector{resized});
+    ASSERT_EQ(noise.jumps, Jumps::smeared) << describe(noise);
+    EXPECT_FALSE(noise.any()) << describe(noise);
+    ASSERT_TRUE(noise.needs_preparation());
+    FitPlane fit(device(), noise);
+    ASSERT_FALSE(fit.planes());
+    const cv::Mat1f kept = fit.compute(resized).depth.z_m;
+    int between = 0, left = 0, even = 0, lost = 0;
+    for (int y = 8; y < kept.rows - 8; ++y)
+        for (int x = 8; x < kept.cols - 8; ++x) {
+            const cv::Mat1f around = resized.z_m(cv::Rect(x - 3, y - 3, 7, 7));
+            double nearest = 0, farthest = 0;
+            cv::minMaxLoc(around, &nearest, &farthest);
+            const double z = resized.z_m(y, x), jump = farthest - nearest;
+            const bool belongs = jump < 0.1;
+            const bool flies = jump > 0.5 && z > nearest + 0.3 * jump && z < farthest - 0.3 * jump;
+            between += flies;
+            left += flies && kept(y, x) > 0;
+            even += belongs;
+            lost += belongs && !(kept(y, x) > 0);
+        }
+    EXPECT_GT(between, 500);
+    EXPECT_LT(left, between / 4);
+    EXPECT_GT(even, 20000);
+    EXPECT_EQ(lost, 0);
+}
+
 TEST(noise, text_is_checked) {
     EXPECT_FALSE(noise_from_text("none").any());
     EXPECT_DOUBLE_EQ(noise_from_text("0.001,0.002").at(2), 0.009);
