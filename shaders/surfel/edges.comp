@@ -27,7 +27,7 @@ float inverse(int i) {
 // 3 sigma(z) / z^2, or 2 % of the depth.
 float tolerance(float b, float c) {
     float w = min(b, c);
-    return max(3.0 * (noise_floor * w * w + noise_per_z2), 0.02 * w);
+    return max(3.0 * (noise_floor * w * w + noise_per_z2), 0.01 * w);
 }
 
 // Whether c, `gap` pixels on from b and its slope, is of the same surface.

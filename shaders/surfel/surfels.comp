@@ -23,19 +23,57 @@ layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
 const int open = 1 << 20; // a run that ends behind something nearer, or at the border of the image
 
-// Pixels of the run that pixel i of a line lies in; `open` where an end of it is hidden. `index` is that of the word.
-int run_length(int i, int index) {
-    int bit = i & 31;
-    uvec2 e = imageLoad(edges, index).xy;
-    uint here = e.x & (0xffffffffu >> (31 - bit)); // edges at or before the pixel
+// A row or column: its pixels in `surfaces`, its words in `edges`.
+struct Line {
+    int start, step, pixels, first_word, next_word;
+};
+
+// Edges beside pixel i, doubled; the last bit is set where what lies beyond is farther away, so that the end is in sight.
+uint edge_before(Line line, int i) { // the first pixel of its run
+    int word = line.first_word + (i >> 5) * line.next_word, bit = i & 31;
+    uvec2 e = imageLoad(edges, word).xy;
+    uint here = e.x & (0xffffffffu >> (31 - bit));
     int last = findMSB(here);
-    uint before = imageLoad(runs, 2 * index).x;
-    before = here != 0u ? uint((i & ~31) + last) << 1 | (e.y >> (last & 31) & 1u) : before;
-    uint there = bit == 31 ? 0u : e.x & (0xfffffffeu << bit); // edges behind it
+    uint before = imageLoad(runs, 2 * word).x;
+    return here != 0u ? uint((i & ~31) + last) << 1 | (e.y >> (last & 31) & 1u) : before;
+}
+uint edge_after(Line line, int i) { // the first pixel of the next run
+    int word = line.first_word + (i >> 5) * line.next_word, bit = i & 31;
+    uvec2 e = imageLoad(edges, word).xy;
+    uint there = bit == 31 ? 0u : e.x & (0xfffffffeu << bit);
     int first = findLSB(there);
-    uint after = imageLoad(runs, 2 * index + 1).x;
-    after = there != 0u ? uint((i & ~31) + first) << 1 | (~e.y >> (first & 31) & 1u) : after;
-    return (before & after & 1u) == 1u ? int(after >> 1) - int(before >> 1) : open;
+    uint after = imageLoad(runs, 2 * word + 1).x;
+    return there != 0u ? uint((i & ~31) + first) << 1 | (~e.y >> (first & 31) & 1u) : after;
+}
+
+float inverse_at(Line line, int i) { return 1.0 / max(abs(imageLoad(surfaces, line.start + i * line.step).w), 1e-6); }
+
+// Whether the surface that ends at pixel `last` goes on at pixel `i`, behind something nearer.
+bool goes_on(Line line, int last, int i) {
+    float w = inverse_at(line, last), there = inverse_at(line, i);
+    return abs(there - w) < 0.02 * w;
+}
+
+// Pixels of the run that pixel i lies in; `open` where an end is not known. A surface that ends behind something narrower goes
+// on there at most as far as that hides it, unless it is seen again beyond.
+int run_length(Line line, int i) {
+    uint before = edge_before(line, i), after = edge_after(line, i);
+    int first = int(before >> 1), end = int(after >> 1);
+    if ((before & 1u) == 0u) {
+        if (first >= line.pixels) return open; // the border of the image
+        uint hider = edge_before(line, first - 1);
+        int from = int(hider >> 1);
+        if ((hider & 1u) == 0u || goes_on(line, first, from - 1)) return open;
+        first = from;
+    }
+    if ((after & 1u) == 0u) {
+        if (end >= line.pixels) return open;
+        uint hider = edge_after(line, end);
+        int until = int(hider >> 1);
+        if ((hider & 1u) == 0u || goes_on(line, end - 1, until)) return open;
+        end = until;
+    }
+    return end - first;
 }
 
 // How far behind depth z the next layer lies, 0 where there is none, in the four last bits of a depth: quarters of the radius.
@@ -60,11 +98,11 @@ void main() {
     vec4 surface = imageLoad(surfaces, p.y * k.size.x + p.x);
     float z = surface.w;
 
-    int across = run_length(p.x, (p.x >> 5) * k.size.y + p.y);
-    int along = run_length(p.y, s.words.x * k.size.y + (p.y >> 5) * k.size.x + p.x);
+    int across = run_length(Line(p.y * k.size.x, 1, k.size.x, p.y, k.size.y), p.x);
+    int along = run_length(Line(p.x, k.size.x, k.size.y, s.words.x * k.size.y + p.x, k.size.x), p.y);
     float width = min(float(across) / k.camera.fx, float(along) / k.camera.fy) * abs(z);
     bool ends_in_sight = across < open || along < open;
-    float thickness = ends_in_sight ? clamp(0.5 * width, s.thinnest, s.thickest) : s.thickest;
+    float thickness = ends_in_sight ? clamp(0.65 * width, s.thinnest, s.thickest) : s.thickest;
 
     if (layers == 1) {
         surfels[surfel_index(p, s.plane)] = surfel(z, surface.xyz, thickness / s.thickest);
