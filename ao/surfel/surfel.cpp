@@ -16,7 +16,7 @@ struct Level {
     bool alike = false; ///< all surfaces are taken to be equally thick, and clean depth's narrow holes stay
 };
 constexpr std::array levels{Level{Quality::lowest, 1, 4, true}, Level{Quality::low, 1, 4}, Level{Quality::medium, 1, 8},
-                            Level{Quality::high, 2, 8}, Level{Quality::highest, 2, 16}};
+                            Level{Quality::high, 2, 8}, Level{Quality::highest, 4, 8}};
 
 /// Slices and steps of the quality, where none are given.
 SurfelOptions resolved(SurfelOptions options) {

@@ -18,6 +18,7 @@
 #include <gtest/gtest.h>
 #include <numbers>
 #include <set>
+#include <sstream>
 
 namespace scanshade {
 namespace {
@@ -395,6 +396,32 @@ TEST_F(MeasureTest, bench_measures_one_part_at_a_time) {
     EXPECT_EQ(run_program(fmt::format("bench {} --normals", capture())).exit_code, 1);
     EXPECT_EQ(run_program("bench --clouds --clouds.rays 8,some").exit_code, 1);
     EXPECT_EQ(run_program("bench --cacao --cacao.sizes 640").exit_code, 1);
+}
+
+/// RMSE of a method's configuration on a capture, from bench.csv.
+double rmse_in(const std::string& csv, const std::string& capture, const std::string& configuration) {
+    const std::string wanted = fmt::format("clean,{},surfel,{},", capture, configuration);
+    const auto row = csv.find("\n" + wanted);
+    if (row == std::string::npos)
+        return std::nan("");
+    std::istringstream cells(csv.substr(row + 1, csv.find('\n', row + 1) - row - 1));
+    std::string cell;
+    for (int column = 0; column < 14; ++column)
+        std::getline(cells, cell, ',');
+    return std::stod(cell);
+}
+
+TEST_F(MeasureTest, more_slices_of_surfel_have_less_error_in_every_scene) {
+    const Ran ran =
+        run_program(fmt::format("bench --generated --scenes office,clutter,thin --sensor ideal --frames 1 "
+                                "--first 20 --size 200x150 --truth-rays 64 --rounds 1 --methods surfel -o {}",
+                                out()));
+    ASSERT_EQ(ran.exit_code, 0) << ran.err;
+    const std::string csv = read_bytes(folder / "out/bench.csv");
+    for (const char* capture : {"office-ideal", "clutter-ideal", "thin-ideal"}) {
+        const double high = rmse_in(csv, capture, "high"), highest = rmse_in(csv, capture, "highest");
+        EXPECT_LT(highest, high) << capture;
+    }
 }
 
 TEST_F(MeasureTest, bench_needs_truth_and_something_to_do) {
