@@ -2,14 +2,15 @@
 #include "ao/cloud/cloud_surface.h"
 
 #include "ao/cloud/cloud_gpu.h"
+#include "ao/cloud/leaf_neighbours.h"
 #include "ao/cloud/moments.h"
 #include "projection/statistics.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
-#include <functional>
 #include <limits>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
@@ -77,16 +78,16 @@ bool is_direction(const Vector3d& normal) { return normal.allFinite() && normal.
 
 /// Orients estimated normals like given ones next to them.
 void orient_like_given(CloudSurface& surface, std::span<const Vector3d> given) {
-    for (std::size_t i = 0; i < surface.size(); ++i) {
+    tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) { // given normals are not turned
         if (is_direction(given[surface.tree.index(i)]))
-            continue;
+            return;
         Vector3f beside = Vector3f::Zero();
         for (const std::uint32_t j : surface.near[i])
             if (is_direction(given[surface.tree.index(j)]))
                 beside += surface.normals[j];
         if (surface.normals[i].dot(beside) < 0)
             surface.normals[i] = -surface.normals[i];
-    }
+    });
 }
 
 } // namespace
@@ -102,6 +103,7 @@ CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normal
     surface.roughness.resize(count);
     surface.flatness.resize(count);
     std::vector<float> sixth(count);
+    std::atomic<bool> all_given = true;
     const auto settle = [&](std::size_t i, std::size_t found, Plane plane) {
         if (on_a_line(plane) && found == usual) {
             Nearest far;
@@ -125,6 +127,8 @@ CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normal
             constexpr float flat = 0.1F; // roughness / spacing: the plane's normal is then within a degree or two
             const bool sure = !surface.normals[i].isZero() && surface.roughness[i] < flat * sixth[i] / sixth_on_grid;
             surface.normals[i] = sure ? checked_normal(unit, surface.normals[i]) : unit;
+        } else {
+            all_given.store(false, std::memory_order_relaxed);
         }
     };
     if (gpu) {
@@ -136,29 +140,19 @@ CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normal
             settle(i, found, {{normal.x, normal.y, normal.z}, variance.x, variance.y, variance.z});
         });
     } else {
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 512), [&](const auto& range) {
-            Nearest found;
-            float reach =
-                std::numeric_limits<float>::infinity(); // of the previous point, whose neighbours are near ours
-            for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                const float moved = i > range.begin() ? (surface.tree[i] - surface.tree[i - 1]).norm() : 0;
-                const float known = (reach + moved) * (1 + 1e-5F);
-                surface.tree.find_round(i, usual, found, known * known);
-                const auto near = found.all();
-                reach =
-                    near.size() == usual ? std::sqrt(near.back().distance2) : std::numeric_limits<float>::infinity();
-                for (std::size_t k = 0; k < CloudSurface::kept; ++k)
-                    surface.near[i][k] = k < near.size() ? near[k].point : static_cast<std::uint32_t>(i);
-                sixth[i] = near.empty() ? 0 : std::sqrt(near[std::min<std::size_t>(5, near.size() - 1)].distance2);
-                settle(i, near.size(), plane_round(surface.tree, i, near));
-            }
+        for_each_neighbourhood(surface.tree, usual, [&](std::size_t i, std::span<const Nearest::Neighbour> near) {
+            for (std::size_t k = 0; k < CloudSurface::kept; ++k)
+                surface.near[i][k] = k < near.size() ? near[k].point : static_cast<std::uint32_t>(i);
+            sixth[i] = near.empty() ? 0 : std::sqrt(near[std::min<std::size_t>(5, near.size() - 1)].distance2);
+            settle(i, near.size(), plane_round(surface.tree, i, near));
         });
     }
     surface.spacing = median(std::move(sixth), 0) / sixth_on_grid;
     limit_discs(surface);
     if (!normals.empty()) {
         surface.agreement = static_cast<double>(median(std::move(cosines), 0));
-        orient_like_given(surface, normals);
+        if (!all_given)
+            orient_like_given(surface, normals);
     }
     return surface;
 }

@@ -1,6 +1,7 @@
 // The extent of a cloud by order statistics, and strays by the distance of their neighbours.
 #include "ao/cloud/extent.h"
 
+#include "ao/cloud/leaf_neighbours.h"
 #include "projection/statistics.h"
 
 #include <algorithm>
@@ -49,14 +50,9 @@ Extent extent_of(std::span<const Vector3d> sample) {
     // Single precision suffices: strays lie so far from each other that rounding does not matter.
     const NeighbourTree tree(local_points(extent.centre, sample));
     std::vector<char> lonely(sample.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, sample.size(), 256), [&](const auto& range) {
-        Nearest found;
-        for (std::size_t place = range.begin(); place < range.end(); ++place) {
-            tree.find_round(place, 6, found);
-            const double sixth = found.all().empty() ? 0 : std::sqrt(static_cast<double>(found.all().back().distance2));
-            lonely[tree.index(place)] =
-                found.all().size() == 6 && sixth > lonely_share * static_cast<double>(tree[place].norm());
-        }
+    for_each_neighbourhood(tree, 6, [&](std::size_t i, std::span<const Nearest::Neighbour> near) {
+        const double sixth = near.empty() ? 0 : std::sqrt(static_cast<double>(near.back().distance2));
+        lonely[tree.index(i)] = near.size() == 6 && sixth > lonely_share * static_cast<double>(tree[i].norm());
     });
     std::vector<std::pair<double, std::uint32_t>> far; // by distance, of those that are not lonely
     for (std::uint32_t i = 0; i < sample.size(); ++i)

@@ -107,6 +107,13 @@ void NeighbourTree::build(std::span<Placed> points, std::size_t node, int levels
     }
 }
 
+std::pair<std::size_t, std::size_t> NeighbourTree::leaf_range(std::size_t number) const {
+    Node node{0, 0, points_.size(), levels_};
+    for (int level = levels_ - 1; level >= 0; --level)
+        node = (number >> level & 1) != 0 ? node.right() : node.left();
+    return {node.begin, node.end};
+}
+
 void NeighbourTree::find_round(std::size_t place, std::size_t wanted, Nearest& found, float reach2) const {
     find(points_[place], place, wanted, found, reach2);
 }

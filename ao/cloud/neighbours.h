@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace scanshade {
@@ -69,6 +70,14 @@ class NeighbourTree {
 
     static constexpr std::size_t leaf = 12; ///< points, at most
 
+    [[nodiscard]] std::size_t leaves() const { return std::size_t(1) << levels_; }
+    /// The first point of a leaf, and one behind its last.
+    [[nodiscard]] std::pair<std::size_t, std::size_t> leaf_range(std::size_t number) const;
+    /// Calls `visit(begin, end)` for the points of every leaf, in ascending order, whose box is within a squared
+    /// distance of the box of some points; until it returns false.
+    template <class Visit>
+    void for_each_leaf_near(std::size_t begin, std::size_t end, float reach2, Visit&& visit) const;
+
   private:
     struct Box {
         Eigen::Vector3f low, high;
@@ -128,6 +137,30 @@ void NeighbourTree::for_each_within(const Eigen::Vector3f& at, float reach, Visi
         for (std::size_t place = node.begin; place < node.end; ++place)
             if ((points_[place] - at).squaredNorm() <= reach2)
                 visit(place);
+    }
+}
+
+template <class Visit>
+void NeighbourTree::for_each_leaf_near(std::size_t begin, std::size_t end, float reach2, Visit&& visit) const {
+    Box round{points_[begin], points_[begin]};
+    for (std::size_t i = begin + 1; i < end; ++i) {
+        round.low = round.low.cwiseMin(points_[i]);
+        round.high = round.high.cwiseMax(points_[i]);
+    }
+    std::array<Node, 64> stack;
+    std::size_t depth = 0;
+    stack[depth++] = {0, 0, points_.size(), levels_};
+    while (depth > 0) {
+        const Node node = stack[--depth];
+        const Box& box = boxes_[node.number];
+        if ((box.low - round.high).cwiseMax(round.low - box.high).cwiseMax(0).squaredNorm() > reach2)
+            continue;
+        if (node.levels > 0) {
+            stack[depth++] = node.right();
+            stack[depth++] = node.left();
+        } else if (!visit(node.begin, node.end)) {
+            return;
+        }
     }
 }
 
