@@ -416,10 +416,9 @@ class CloudAo::Work {
             values.assign(surface.size(), nothing);
             const std::vector<char> asked =
                 wanted.empty() ? std::vector<char>(surface.size(), 1) : asked_by_means(surface, is_wanted);
-            tbb::parallel_for(tbb::blocked_range<std::size_t>(0, surface.size(), 64), [&](const auto& range) {
-                for (std::size_t i = range.begin(); i < range.end(); ++i)
-                    if (!surface.normals[i].isZero() && asked[i])
-                        values[i] = rays->open(i, *directions_, radius, up);
+            tbb::parallel_for(tbb::blocked_range<std::size_t>(0, surface.tree.leaves(), 8), [&](const auto& range) {
+                for (std::size_t leaf = range.begin(); leaf < range.end(); ++leaf)
+                    rays->open(leaf, *directions_, radius, up, asked, values);
             });
             rays.reset();
             watch_.lap("rays");

@@ -18,7 +18,7 @@ using Eigen::Vector3f;
 using Link = SignedGraph::Link;
 using Signs = std::vector<std::int8_t>;
 
-constexpr std::size_t bundle = RayBundle::size;
+constexpr std::size_t bundle = DiscRays::together;
 
 /// The size of a cloud as seen from its middle.
 struct Reach {
@@ -72,7 +72,7 @@ std::vector<RayHit> shoot(const CloudSurface& surface, const DiscRays& rays, std
                 rays.first_hits(place, static_cast<float>(side) * normal, directions.run(2 * k + (side < 0)));
             for (std::size_t i = 0; i < bundle; ++i)
                 if (std::isfinite(hits.distance[i]) && std::abs(hits.facing[i]) >= least)
-                    met[k][counts[k]++] = {static_cast<std::uint32_t>(place), hits.place[i],
+                    met[k][counts[k]++] = {static_cast<std::uint32_t>(place), hits.index[i],
                                            static_cast<std::int8_t>(hits.facing[i] < 0 ? -side : side),
                                            hits.distance[i], hits.direction[i]};
         }
