@@ -6,6 +6,7 @@
 #include "ao/cloud/disc_rays.h"
 #include "ao/cloud/extent.h"
 #include "ao/cloud/fitted_cloud.h"
+#include "ao/cloud/indices_where.h"
 #include "ao/cloud/repeatability.h"
 #include "ao/cloud/sides.h"
 #include "ao/cloud/tiles.h"
@@ -26,6 +27,7 @@
 #include <limits>
 #include <numbers>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 namespace scanshade {
 namespace {
@@ -54,18 +56,13 @@ std::vector<Vector3d> sampled(std::span<const Vector3d> points, const Places& pl
         std::min(1.0, static_cast<double>(wanted) / static_cast<double>(std::max<std::size_t>(places.size(), 1)));
     const auto chosen = static_cast<std::uint64_t>(share * 0x1p32);
     std::vector<Vector3d> some;
-    for (const std::uint32_t i : places)
-        if (hash(i) < chosen)
-            some.push_back(points[i]);
+    for (const std::uint32_t i : indices_where(places, [&](std::uint32_t point) { return hash(point) < chosen; }))
+        some.push_back(points[i]);
     return some;
 }
 
 Places finite(std::span<const Vector3d> points) {
-    Places places;
-    for (std::size_t i = 0; i < points.size(); ++i)
-        if (points[i].allFinite())
-            places.push_back(static_cast<std::uint32_t>(i));
-    return places;
+    return indices_where(points.size(), [&](std::size_t i) { return points[i].allFinite(); });
 }
 
 /// The same cloud with about `wanted` points, evenly chosen, and with the normals that it has.
@@ -83,10 +80,11 @@ CloudSurface thinned(const CloudSurface& surface, std::size_t wanted) {
 float mean_falloff(float radius) { return -1 / (2 * 0.01F * radius * radius); }
 
 /// The mean of a value and its neighbours' on the same surface: parallel planes, distances small against the radius.
-std::vector<float> smoothed(const CloudSurface& surface, const std::vector<float>& values, float radius) {
-    std::vector<float> means(values.size(), nothing);
+Untouched<float> smoothed(const CloudSurface& surface, const Untouched<float>& values, float radius) {
+    Untouched<float> means(values.size());
     const float falloff = mean_falloff(radius);
     tbb::parallel_for(std::size_t(0), values.size(), [&](std::size_t i) {
+        means[i] = nothing;
         if (std::isnan(values[i]))
             return;
         float sum = values[i], weights = 1;
@@ -185,9 +183,6 @@ class CloudAo::Work {
           watch_(result_.timings) {
         if (device)
             gpu_.emplace(*device);
-        result_.visibility.assign(cloud.points.size(), nothing);
-        result_.confidence.assign(cloud.points.size(), 0.0F);
-        result_.normals.assign(cloud.points.size(), Vector3f::Zero());
         valid_ = finite(cloud.points);
         twins_ = take_out_twins(cloud.points, recorded() ? cloud.normals : std::span<const Vector3d>(), valid_);
         std::vector<Vector3d> some = sampled(cloud.points, valid_, enough_to_judge);
@@ -207,6 +202,7 @@ class CloudAo::Work {
             cut_into_tiles(cloud_.points, valid_, result_.radius + 16 * result_.spacing, at_once(),
                            [&](const Places& core, const Places& round) { tile(core, round); });
         }
+        require_results();
         compute_thinned();
         compute_strays();
         for (const auto& [point, same_as] : twins_) {
@@ -224,6 +220,15 @@ class CloudAo::Work {
   private:
     static constexpr std::size_t enough_to_judge = 60000;
     static constexpr double bytes_per_point = 420; ///< measured, Embree's tree included; with a GPU it is less
+
+    /// Made as late as possible: the rays need the memory.
+    void require_results() {
+        const std::size_t count = cloud_.points.size();
+        if (result_.visibility.size() != count)
+            tbb::parallel_invoke([&] { result_.visibility.assign(count, nothing); },
+                                 [&] { result_.confidence.assign(count, 0.0F); },
+                                 [&] { result_.normals.assign(count, Vector3f::Zero()); });
+    }
 
     [[nodiscard]] std::size_t at_once() const {
         const auto fitting = static_cast<std::size_t>(options_.memory_mib * 1048576.0 / bytes_per_point);
@@ -250,10 +255,9 @@ class CloudAo::Work {
     void settle_extent(std::vector<Vector3d>& some) {
         extent_ = extent_of(some);
         std::erase_if(some, [&](const Vector3d& point) { return beyond(point); });
-        const auto strays = std::stable_partition(valid_.begin(), valid_.end(),
-                                                  [&](std::uint32_t i) { return !beyond(cloud_.points[i]); });
-        strays_.assign(strays, valid_.end());
-        valid_.erase(strays, valid_.end());
+        strays_ = indices_where(valid_, [&](std::uint32_t i) { return beyond(cloud_.points[i]); });
+        if (!strays_.empty())
+            valid_ = indices_where(valid_, [&](std::uint32_t i) { return !beyond(cloud_.points[i]); });
     }
     [[nodiscard]] bool beyond(const Vector3d& point) const {
         return (point - extent_.centre).norm() > extent_.farthest;
@@ -265,11 +269,13 @@ class CloudAo::Work {
     /// These points, with the normals that they have.
     [[nodiscard]] Picked picked(const Places& places) const {
         Picked some;
-        for (const std::uint32_t i : places) {
-            some.points.push_back(cloud_.points[i]);
-            if (!cloud_.normals.empty())
-                some.normals.push_back(cloud_.normals[i]);
-        }
+        some.points.resize(places.size());
+        some.normals.resize(cloud_.normals.empty() ? 0 : places.size());
+        tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t k) {
+            some.points[k] = cloud_.points[places[k]];
+            if (!some.normals.empty())
+                some.normals[k] = cloud_.normals[places[k]];
+        });
         return some;
     }
 
@@ -301,22 +307,22 @@ class CloudAo::Work {
         if (part_ || options_.sky || !(check.keep > 0))
             return;
         const auto chosen = static_cast<std::uint64_t>(check.keep * 0x1p32);
-        Places kept;
-        std::ranges::copy_if(valid_, std::back_inserter(kept), [&](auto i) { return hash(i, 1U) < chosen; });
+        const Places kept = indices_where(valid_, [&](std::uint32_t i) { return hash(i, 1U) < chosen; });
         const auto [points, normals] = picked(kept);
         CloudAoOptions options = options_;
         options.radius = result_.radius;
         const PointSet part{points, normals, {}, cloud_.z_up};
         Work some(options, nullptr, up_, given_viewpoint_, part, scanner_);
         some.part_ = true;
-        const Repeatability found =
-            repeatability(cloud_.points, result_.visibility, kept, some.run().visibility, check);
+        const Repeatability found = repeatability(cloud_.points, result_.visibility, kept, some.run().visibility, check,
+                                                  order_.empty() ? valid_ : order_);
+        order_.clear();
         watch_.lap("check on a part");
         result_.expected_error = found.error;
         if (!found.error)
             return;
-        for (std::size_t i = 0; i < result_.confidence.size(); ++i)
-            result_.confidence[i] *= found.confidence[i];
+        tbb::parallel_for(std::size_t(0), result_.confidence.size(),
+                          [&](std::size_t i) { result_.confidence[i] *= found.confidence[i]; });
         result_.notes.push_back(fmt::format(
             "{:.2g} % of the points by themselves give values from which an error of {:.2f} RMS is expected.",
             100 * check.keep, *found.error));
@@ -404,7 +410,7 @@ class CloudAo::Work {
         };
         const float radius = options_.sky ? std::numeric_limits<float>::max() : static_cast<float>(result_.radius);
         const std::optional<Vector3f> up = options_.sky ? std::optional<Vector3f>(up_.cast<float>()) : std::nullopt;
-        std::vector<float> values;
+        Untouched<float> values;
         if (gpu) {
             rays.reset();
             values = gpu->visibility(surface, *directions_, {radius, up, mean_falloff(radius), passes_});
@@ -413,7 +419,8 @@ class CloudAo::Work {
             if (!rays)
                 rays.emplace(surface);
             watch_.lap("tree");
-            values.assign(surface.size(), nothing);
+            values.resize(surface.size());
+            tbb::parallel_for(std::size_t(0), values.size(), [&](std::size_t i) { values[i] = nothing; });
             const std::vector<char> asked =
                 wanted.empty() ? std::vector<char>(surface.size(), 1) : asked_by_means(surface, is_wanted);
             tbb::parallel_for(tbb::blocked_range<std::size_t>(0, surface.tree.leaves(), 8), [&](const auto& range) {
@@ -426,6 +433,7 @@ class CloudAo::Work {
                 values = smoothed(surface, values, radius);
             watch_.lap("means");
         }
+        require_results();
         const auto give = [&](std::size_t place, std::size_t point) {
             result_.visibility[point] = values[place];
             result_.normals[point] = surface.normals[place];
@@ -446,6 +454,11 @@ class CloudAo::Work {
                 if ((in_core.empty() || in_core[k]) && !std::isnan(values[place]))
                     give(place, round[k]);
             });
+        }
+        if (core.size() == valid_.size() && !part_ && fitted.empty()) {
+            order_.resize(round.size());
+            tbb::parallel_for(std::size_t(0), order_.size(),
+                              [&](std::size_t i) { order_[i] = round[surface.tree.index(i)]; });
         }
         watch_.lap("gather");
         result_.tiles = ++tiles_;
@@ -525,9 +538,10 @@ class CloudAo::Work {
         if (recorded())
             return settle_recorded_sides(surface, rays);
         Sides found = found_sides(surface, rays);
-        for (std::size_t i = 0; i < surface.size(); ++i)
+        tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
             if (found.sign[i] < 0)
                 surface.normals[i] = -surface.normals[i];
+        });
         // What has no plane faces the scanner, or the sky.
         using Kind = NormalOrientation::Kind;
         const bool to_sky = orientation_.kind == Kind::direction || orientation_.kind == Kind::terrain;
@@ -766,6 +780,7 @@ class CloudAo::Work {
     NormalOrientation orientation_;
     Extent extent_;
     Places valid_, strays_;   ///< strays lie beyond the cloud
+    Places order_;            ///< of a cloud in one tile: its points in the order of the tree
     std::vector<Twin> twins_; ///< copies of points, in neither
     bool normals_refused_ = false;
     std::size_t turned_ = 0, sided_ = 0; ///< of the recorded normals, where some were turned

@@ -4,6 +4,7 @@
 #include "ao/cloud/cloud_gpu.h"
 #include "ao/cloud/leaf_neighbours.h"
 #include "ao/cloud/moments.h"
+#include "ao/cloud/order_statistics.h"
 #include "projection/statistics.h"
 
 #include <algorithm>
@@ -62,7 +63,7 @@ bool on_a_line(const Plane& plane) { return !(plane.variance_narrow > 0.01F * pl
 /// Discs are as wide as the gaps to their neighbours, within half and twice their neighbours' discs: an outlier must
 /// not get a large disc.
 void limit_discs(CloudSurface& surface) {
-    std::vector<float> limited(surface.size());
+    Untouched<float> limited(surface.size());
     tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
         std::array<float, CloudSurface::kept> round;
         std::transform(surface.near[i].begin(), surface.near[i].end(), round.begin(),
@@ -96,13 +97,13 @@ CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normal
                            std::span<const Vector3f> axes) {
     const std::size_t count = points.size();
     CloudSurface surface{points.middle, std::move(points.tree), {}, {}, {}, {}, {}, {}};
-    std::vector<float> cosines(normals.empty() ? 0 : count, 1.0F); // between given normals and planes
+    Untouched<float> cosines(normals.empty() ? 0 : count); // between given normals and planes
     surface.near.resize(count);
     surface.normals.resize(count);
     surface.disc_radius.resize(count);
     surface.roughness.resize(count);
     surface.flatness.resize(count);
-    std::vector<float> sixth(count);
+    Untouched<float> sixth(count);
     std::atomic<bool> all_given = true;
     const auto settle = [&](std::size_t i, std::size_t found, Plane plane) {
         if (on_a_line(plane) && found == usual) {
@@ -128,6 +129,7 @@ CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normal
             const bool sure = !surface.normals[i].isZero() && surface.roughness[i] < flat * sixth[i] / sixth_on_grid;
             surface.normals[i] = sure ? checked_normal(unit, surface.normals[i]) : unit;
         } else {
+            cosines[i] = 1;
             all_given.store(false, std::memory_order_relaxed);
         }
     };
@@ -147,10 +149,10 @@ CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normal
             settle(i, near.size(), plane_round(surface.tree, i, near));
         });
     }
-    surface.spacing = median(std::move(sixth), 0) / sixth_on_grid;
+    surface.spacing = median_of_lengths(sixth) / sixth_on_grid;
     limit_discs(surface);
     if (!normals.empty()) {
-        surface.agreement = static_cast<double>(median(std::move(cosines), 0));
+        surface.agreement = static_cast<double>(median_of_lengths(cosines));
         if (!all_given)
             orient_like_given(surface, normals);
     }

@@ -275,7 +275,8 @@ void DiscTree::join_boxes(const NeighbourTree& tree) {
         levels_.push_back(all);
         all += size;
     }
-    nodes_.assign(all, nobody);
+    nodes_.resize(all);
+    tbb::parallel_for(std::size_t(0), all, [&](std::size_t i) { nodes_[i] = nobody; });
     const auto put = [&](std::size_t level, std::size_t child, const Eigen::AlignedBox3f& box) {
         Node& node = nodes_[levels_[level] + child / wide];
         for (int axis = 0; axis < 3 && !box.isEmpty(); ++axis) {

@@ -76,10 +76,10 @@ class DiscTree {
     Eigen::Vector3d middle_ = Eigen::Vector3d::Zero();
     double rounding_ = 0;
     std::size_t stride_ = 0;
-    std::unique_ptr<float[]> discs_;    ///< x y z, normal x y z, radius: `stride_` of each, by index
-    std::vector<std::uint32_t> begins_; ///< the first disc of each leaf
-    std::vector<Node> nodes_;           ///< level after level; node n of a level has the children 8n .. 8n + 7
-    std::vector<std::size_t> levels_;   ///< the first node of each level; the children of the last are leaves
+    std::unique_ptr<float[]> discs_;  ///< x y z, normal x y z, radius: `stride_` of each, by index
+    Untouched<std::uint32_t> begins_; ///< the first disc of each leaf
+    Untouched<Node> nodes_;           ///< level after level; node n of a level has the children 8n .. 8n + 7
+    std::vector<std::size_t> levels_; ///< the first node of each level; the children of the last are leaves
 };
 
 } // namespace scanshade

@@ -1,6 +1,7 @@
 // The extent of a cloud by order statistics, and strays by the distance of their neighbours.
 #include "ao/cloud/extent.h"
 
+#include "ao/cloud/indices_where.h"
 #include "ao/cloud/leaf_neighbours.h"
 #include "projection/statistics.h"
 
@@ -80,7 +81,7 @@ Extent extent_of(std::span<const Vector3d> sample) {
 std::vector<std::uint32_t> drop_strays(CloudSurface& surface, const Vector3d& centre, double spacing) {
     constexpr std::size_t sixth = 5;
     constexpr float lonely_spacings = 8, detached_from = 4, apart_from = 1.5F;
-    std::vector<float> reach(surface.size()); // distance of the sixth neighbour
+    Untouched<float> reach(surface.size()); // distance of the sixth neighbour
     tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
         reach[i] = (surface.tree[surface.near[i][sixth]] - surface.tree[i]).norm();
     });
@@ -101,14 +102,11 @@ std::vector<std::uint32_t> drop_strays(CloudSurface& surface, const Vector3d& ce
         if (reach[i] > detached_from * of_near[1] || second > apart_from * median(of_near))
             kind[i] = detached;
     });
-    std::vector<std::uint32_t> all_alone;
-    for (std::size_t i = 0; i < surface.size(); ++i) {
+    tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
         if (kind[i] != connected)
             surface.disc_radius[i] = 0;
-        if (kind[i] == lonely)
-            all_alone.push_back(static_cast<std::uint32_t>(i));
-    }
-    return all_alone;
+    });
+    return indices_where(surface.size(), [&](std::size_t i) { return kind[i] == lonely; });
 }
 
 } // namespace scanshade

@@ -138,8 +138,11 @@ bool LeafNeighbours::gather() {
     candidates.count = 0;
     if (!(reach_ < infinite))
         return false;
+    Eigen::AlignedBox3f round;
+    for (std::size_t i = begin_; i < end_; ++i)
+        round.extend(tree_[i]);
     bool fits = true;
-    tree_.for_each_leaf_near(begin_, end_, reach_ * reach_, [&](std::size_t begin, std::size_t end) {
+    tree_.for_each_leaf_near(round, reach_ * reach_, [&](std::size_t begin, std::size_t end) {
         fits = candidates.count + (end - begin) <= most_candidates;
         if (!fits)
             return false;

@@ -45,7 +45,7 @@ struct NeighbourTree::Placed {
 };
 
 NeighbourTree::NeighbourTree(std::span<const Vector3f> points) {
-    std::vector<Placed> placed(points.size());
+    Untouched<Placed> placed(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
         placed[i] = {points[i], static_cast<std::uint32_t>(i)};
     });
@@ -80,14 +80,22 @@ int NeighbourTree::split_axis(std::span<const Placed> points, const Vector3f& bo
     return axis;
 }
 
+NeighbourTree::Box NeighbourTree::box_of(std::span<const Placed> points) {
+    const auto infinite = Vector3f::Constant(std::numeric_limits<float>::infinity());
+    const auto join = [](const Box& a, const Box& b) { return Box{a.low.cwiseMin(b.low), a.high.cwiseMax(b.high)}; };
+    const auto round = [&](const auto& range, Box box) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i)
+            box = join(box, {points[i].point, points[i].point});
+        return box;
+    };
+    constexpr std::size_t worth_tasks = 1 << 18;
+    const tbb::blocked_range<std::size_t> all(0, points.size(), worth_tasks / 8);
+    const Box nothing{infinite, -infinite};
+    return points.size() < worth_tasks ? round(all, nothing) : tbb::parallel_reduce(all, nothing, round, join);
+}
+
 void NeighbourTree::build(std::span<Placed> points, std::size_t node, int levels) {
-    Box& box = boxes_[node];
-    box.low.setConstant(std::numeric_limits<float>::infinity());
-    box.high = -box.low;
-    for (const Placed& placed : points) {
-        box.low = box.low.cwiseMin(placed.point);
-        box.high = box.high.cwiseMax(placed.point);
-    }
+    const Box& box = boxes_[node] = box_of(points);
     if (levels == 0)
         return;
     const int axis = split_axis(points, box.high - box.low);

@@ -1,9 +1,11 @@
 // A cloud's points in the order of a k-d tree, and the nearest neighbours of each.
 #pragma once
 
+#include "ao/cloud/untouched.h"
+
 #include <array>
 #include <cstdint>
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <limits>
 #include <span>
 #include <utility>
@@ -74,9 +76,9 @@ class NeighbourTree {
     /// The first point of a leaf, and one behind its last.
     [[nodiscard]] std::pair<std::size_t, std::size_t> leaf_range(std::size_t number) const;
     /// Calls `visit(begin, end)` for the points of every leaf, in ascending order, whose box is within a squared
-    /// distance of the box of some points; until it returns false.
+    /// distance of a box; until it returns false.
     template <class Visit>
-    void for_each_leaf_near(std::size_t begin, std::size_t end, float reach2, Visit&& visit) const;
+    void for_each_leaf_near(const Eigen::AlignedBox3f& round, float reach2, Visit&& visit) const;
 
   private:
     struct Box {
@@ -99,11 +101,12 @@ class NeighbourTree {
     void find(const Eigen::Vector3f& at, std::size_t but, std::size_t wanted, Nearest& found, float reach2) const;
     static int split_axis(std::span<const Placed> points, const Eigen::Vector3f& box);
     void build(std::span<Placed> points, std::size_t node, int levels);
+    [[nodiscard]] static Box box_of(std::span<const Placed> points);
 
-    std::vector<Eigen::Vector3f> points_;
-    std::vector<std::uint32_t> index_;
-    std::vector<Box> boxes_; ///< node n has the children 2n + 1 and 2n + 2, which halve its points
-    int levels_ = 0;         ///< of nodes above the leaves
+    Untouched<Eigen::Vector3f> points_;
+    Untouched<std::uint32_t> index_;
+    Untouched<Box> boxes_; ///< node n has the children 2n + 1 and 2n + 2, which halve its points
+    int levels_ = 0;       ///< of nodes above the leaves
 };
 
 /// Points relative to a place near them, in single precision.
@@ -141,19 +144,14 @@ void NeighbourTree::for_each_within(const Eigen::Vector3f& at, float reach, Visi
 }
 
 template <class Visit>
-void NeighbourTree::for_each_leaf_near(std::size_t begin, std::size_t end, float reach2, Visit&& visit) const {
-    Box round{points_[begin], points_[begin]};
-    for (std::size_t i = begin + 1; i < end; ++i) {
-        round.low = round.low.cwiseMin(points_[i]);
-        round.high = round.high.cwiseMax(points_[i]);
-    }
+void NeighbourTree::for_each_leaf_near(const Eigen::AlignedBox3f& round, float reach2, Visit&& visit) const {
     std::array<Node, 64> stack;
     std::size_t depth = 0;
     stack[depth++] = {0, 0, points_.size(), levels_};
     while (depth > 0) {
         const Node node = stack[--depth];
         const Box& box = boxes_[node.number];
-        if ((box.low - round.high).cwiseMax(round.low - box.high).cwiseMax(0).squaredNorm() > reach2)
+        if ((box.low - round.max()).cwiseMax(round.min() - box.high).cwiseMax(0).squaredNorm() > reach2)
             continue;
         if (node.levels > 0) {
             stack[depth++] = node.right();

@@ -27,9 +27,9 @@ struct Repeatability {
     std::vector<float> confidence;
 };
 /// `whole` are the values of `points`, in any unit; `thinned` those of the points with the indices `kept`; NaN where
-/// unknown.
+/// unknown. `order` holds every index once: the time is short where its neighbours are neighbours in space.
 [[nodiscard]] Repeatability repeatability(std::span<const Eigen::Vector3d> points, std::span<const float> whole,
                                           std::span<const std::uint32_t> kept, std::span<const float> thinned,
-                                          const ThinnedCheck& check);
+                                          const ThinnedCheck& check, std::span<const std::uint32_t> order);
 
 } // namespace scanshade

@@ -1,6 +1,8 @@
 // Points recorded twice, found by sorting coordinates.
 #include "ao/cloud/twins.h"
 
+#include "ao/cloud/indices_where.h"
+
 #include <algorithm>
 #include <bit>
 #include <tbb/parallel_sort.h>
@@ -26,9 +28,8 @@ bool any_twins(std::span<const Vector3d> points, const Places& places) {
     constexpr double hardly_any = 0.001;
     const std::uint64_t every = std::max<std::size_t>(1, places.size() / enough);
     std::vector<std::uint64_t> hashes;
-    for (const std::uint32_t place : places)
-        if (const std::uint64_t hash = hash_of(points[place]); hash % every == 0)
-            hashes.push_back(hash);
+    for (const std::uint32_t i : indices_where(places, [&](auto point) { return hash_of(points[point]) % every == 0; }))
+        hashes.push_back(hash_of(points[i]));
     const std::size_t all = hashes.size();
     std::sort(hashes.begin(), hashes.end());
     hashes.erase(std::unique(hashes.begin(), hashes.end()), hashes.end());
