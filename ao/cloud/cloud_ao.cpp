@@ -51,17 +51,17 @@ std::optional<Vector3d> triple(const std::string& text) {
 }
 
 /// About `wanted` of these points, chosen by a hash: every n-th point in recording order would skip whole scan lines.
-std::vector<Vector3d> sampled(std::span<const Vector3d> points, const Places& places, std::size_t wanted) {
+std::vector<Vector3d> sampled(std::span<const Vector3d> points, const Indices& indices, std::size_t wanted) {
     const double share =
-        std::min(1.0, static_cast<double>(wanted) / static_cast<double>(std::max<std::size_t>(places.size(), 1)));
+        std::min(1.0, static_cast<double>(wanted) / static_cast<double>(std::max<std::size_t>(indices.size(), 1)));
     const auto chosen = static_cast<std::uint64_t>(share * 0x1p32);
     std::vector<Vector3d> some;
-    for (const std::uint32_t i : indices_where(places, [&](std::uint32_t point) { return hash(point) < chosen; }))
+    for (const std::uint32_t i : indices_where(indices, [&](std::uint32_t point) { return hash(point) < chosen; }))
         some.push_back(points[i]);
     return some;
 }
 
-Places finite(std::span<const Vector3d> points) {
+Indices finite(std::span<const Vector3d> points) {
     return indices_where(points.size(), [&](std::size_t i) { return points[i].allFinite(); });
 }
 
@@ -69,9 +69,9 @@ Places finite(std::span<const Vector3d> points) {
 CloudSurface thinned(const CloudSurface& surface, std::size_t wanted) {
     std::vector<Vector3d> points, normals;
     const std::size_t step = std::max<std::size_t>(1, surface.size() / wanted);
-    for (std::size_t place = step / 2; place < surface.size(); place += step) {
-        points.push_back(surface.tree[place].cast<double>());
-        normals.push_back(surface.normals[place].cast<double>());
+    for (std::size_t index = step / 2; index < surface.size(); index += step) {
+        points.push_back(surface.tree[index].cast<double>());
+        normals.push_back(surface.normals[index].cast<double>());
     }
     return cloud_surface(LocalCloud(points), normals);
 }
@@ -200,7 +200,7 @@ class CloudAo::Work {
             if (valid_.size() > at_once())
                 settle_sides_of_whole();
             cut_into_tiles(cloud_.points, valid_, result_.radius + 16 * result_.spacing, at_once(),
-                           [&](const Places& core, const Places& round) { tile(core, round); });
+                           [&](const Indices& core, const Indices& round) { tile(core, round); });
         }
         require_results();
         compute_thinned();
@@ -267,14 +267,14 @@ class CloudAo::Work {
         std::vector<Vector3d> points, normals;
     };
     /// These points, with the normals that they have.
-    [[nodiscard]] Picked picked(const Places& places) const {
+    [[nodiscard]] Picked picked(const Indices& indices) const {
         Picked some;
-        some.points.resize(places.size());
-        some.normals.resize(cloud_.normals.empty() ? 0 : places.size());
-        tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t k) {
-            some.points[k] = cloud_.points[places[k]];
+        some.points.resize(indices.size());
+        some.normals.resize(cloud_.normals.empty() ? 0 : indices.size());
+        tbb::parallel_for(std::size_t(0), indices.size(), [&](std::size_t k) {
+            some.points[k] = cloud_.points[indices[k]];
             if (!some.normals.empty())
-                some.normals[k] = cloud_.normals[places[k]];
+                some.normals[k] = cloud_.normals[indices[k]];
         });
         return some;
     }
@@ -307,7 +307,7 @@ class CloudAo::Work {
         if (part_ || options_.sky || !(check.keep > 0))
             return;
         const auto chosen = static_cast<std::uint64_t>(check.keep * 0x1p32);
-        const Places kept = indices_where(valid_, [&](std::uint32_t i) { return hash(i, 1U) < chosen; });
+        const Indices kept = indices_where(valid_, [&](std::uint32_t i) { return hash(i, 1U) < chosen; });
         const auto [points, normals] = picked(kept);
         CloudAoOptions options = options_;
         options.radius = result_.radius;
@@ -364,7 +364,7 @@ class CloudAo::Work {
     }
 
     /// Values for `core`, a part of `round`; on the GPU if its memory suffices.
-    void tile(const Places& core, const Places& round) {
+    void tile(const Indices& core, const Indices& round) {
         if (round.empty())
             return;
         if (gpu_ && round.size() <= gpu_->most_points()) {
@@ -381,15 +381,15 @@ class CloudAo::Work {
         tile(core, round, nullptr);
     }
 
-    void tile(const Places& core, const Places& round, CloudGpu* gpu) {
+    void tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
         Fitted planes = planes_of(round, gpu);
         CloudSurface& surface = planes.surface;
         FittedCloud& fitted = planes.points;
         const std::vector<std::uint32_t> lonely = drop_strays(surface, extent_.centre, result_.spacing);
         std::optional<DiscRays> rays;
         const std::vector<float> side_known = whole_ ? sides_as_in_whole(surface) : settle_sides(surface, rays);
-        for (const std::uint32_t place : lonely)
-            surface.normals[place].setZero();
+        for (const std::uint32_t index : lonely)
+            surface.normals[index].setZero();
         watch_.lap("sides");
         // Both orders are ascending. A point of the surface is wanted if it stands for one of the core.
         std::vector<char> in_core(core.size() == round.size() ? 0 : round.size(), 0), wanted;
@@ -405,8 +405,8 @@ class CloudAo::Work {
         } else {
             wanted = in_core;
         }
-        const auto is_wanted = [&, &tree = surface.tree](std::size_t place) {
-            return wanted.empty() || wanted[tree.index(place)];
+        const auto is_wanted = [&, &tree = surface.tree](std::size_t index) {
+            return wanted.empty() || wanted[tree.original(index)];
         };
         const float radius = options_.sky ? std::numeric_limits<float>::max() : static_cast<float>(result_.radius);
         const std::optional<Vector3f> up = options_.sky ? std::optional<Vector3f>(up_.cast<float>()) : std::nullopt;
@@ -434,31 +434,31 @@ class CloudAo::Work {
             watch_.lap("means");
         }
         require_results();
-        const auto give = [&](std::size_t place, std::size_t point) {
-            result_.visibility[point] = values[place];
-            result_.normals[point] = surface.normals[place];
-            result_.confidence[point] = surface.flatness[place] * resolution(radius, surface.disc_radius[place]) *
-                                        (side_known.empty() ? 1.0F : side_known[place]);
+        const auto give = [&](std::size_t index, std::size_t point) {
+            result_.visibility[point] = values[index];
+            result_.normals[point] = surface.normals[index];
+            result_.confidence[point] = surface.flatness[index] * resolution(radius, surface.disc_radius[index]) *
+                                        (side_known.empty() ? 1.0F : side_known[index]);
         };
         if (fitted.empty()) {
             tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
                 if (is_wanted(i) && !std::isnan(values[i]))
-                    give(i, round[surface.tree.index(i)]);
+                    give(i, round[surface.tree.original(i)]);
             });
         } else {
-            std::vector<std::uint32_t> place_of(surface.size());
+            std::vector<std::uint32_t> index_of(surface.size());
             for (std::size_t i = 0; i < surface.size(); ++i)
-                place_of[surface.tree.index(i)] = static_cast<std::uint32_t>(i);
+                index_of[surface.tree.original(i)] = static_cast<std::uint32_t>(i);
             tbb::parallel_for(std::size_t(0), round.size(), [&](std::size_t k) {
-                const std::size_t place = place_of[fitted.fitted_of[k]];
-                if ((in_core.empty() || in_core[k]) && !std::isnan(values[place]))
-                    give(place, round[k]);
+                const std::size_t index = index_of[fitted.fitted_of[k]];
+                if ((in_core.empty() || in_core[k]) && !std::isnan(values[index]))
+                    give(index, round[k]);
             });
         }
         if (core.size() == valid_.size() && !part_ && fitted.empty()) {
             order_.resize(round.size());
             tbb::parallel_for(std::size_t(0), order_.size(),
-                              [&](std::size_t i) { order_[i] = round[surface.tree.index(i)]; });
+                              [&](std::size_t i) { order_[i] = round[surface.tree.original(i)]; });
         }
         watch_.lap("gather");
         result_.tiles = ++tiles_;
@@ -467,11 +467,11 @@ class CloudAo::Work {
     /// A cloud of several tiles, thinned: its sides are settled once, so that tiles agree.
     struct Whole {
         CloudSurface surface;
-        std::vector<float> known; ///< by place; empty where recorded sides are taken
+        std::vector<float> known; ///< by index in the tree; empty where recorded sides are taken
     };
     void settle_sides_of_whole() {
         constexpr std::size_t enough = 300000;
-        Places some;
+        Indices some;
         const std::size_t step = std::max<std::size_t>(1, valid_.size() / enough);
         for (std::size_t k = step / 2; k < valid_.size(); k += step)
             some.push_back(valid_[k]);
@@ -483,7 +483,8 @@ class CloudAo::Work {
         whole_ = {std::move(surface), std::move(known)};
         watch_.lap("sides");
     }
-    /// Turns normals like those of the whole's nearest place in the same plane. Returns how sure that is by place.
+    /// Turns normals like those of the whole's nearest point in the same plane. Returns how sure that is by index in
+    /// the tree.
     std::vector<float> sides_as_in_whole(CloudSurface& surface) const {
         const CloudSurface& whole = whole_->surface;
         const Vector3f apart = (surface.middle - whole.middle).cast<float>();
@@ -494,9 +495,9 @@ class CloudAo::Work {
             const float reach = 3 * std::max(whole.spacing, surface.disc_radius[i]);
             constexpr float alike = 0.7F;
             float nearest = std::numeric_limits<float>::infinity(), cosine = 0;
-            whole.tree.for_each_within(at, reach, [&](std::size_t place) {
-                const float turn = normal.isZero() ? 1.0F : normal.dot(whole.normals[place]);
-                const Vector3f offset = whole.tree[place] - at;
+            whole.tree.for_each_within(at, reach, [&](std::size_t index) {
+                const float turn = normal.isZero() ? 1.0F : normal.dot(whole.normals[index]);
+                const Vector3f offset = whole.tree[index] - at;
                 const float off_plane = 2 * offset.dot(normal); // the other side of a board is near, too
                 const float distance = offset.squaredNorm() + off_plane * off_plane;
                 if (std::abs(turn) < alike || distance >= nearest)
@@ -504,7 +505,7 @@ class CloudAo::Work {
                 nearest = distance;
                 cosine = turn;
                 if (!known.empty())
-                    known[i] = whole_->known[place];
+                    known[i] = whole_->known[index];
             });
             if (cosine < 0)
                 normal = -normal;
@@ -532,8 +533,8 @@ class CloudAo::Work {
         return sides_of(surface, &*rays, up, rule, effort);
     }
 
-    /// Turns the normals to the sides that were scanned. Returns how sure that is by place, 0 .. 1; empty where the
-    /// recorded sides are taken.
+    /// Turns the normals to the sides that were scanned. Returns how sure that is by index in the tree, 0 .. 1; empty
+    /// where the recorded sides are taken.
     std::vector<float> settle_sides(CloudSurface& surface, std::optional<DiscRays>& rays) {
         if (recorded())
             return settle_recorded_sides(surface, rays);
@@ -665,7 +666,7 @@ class CloudAo::Work {
         FittedCloud points; ///< empty where the surface's points are those of the cloud
     };
     /// Neighbours and planes of these points, without their noise.
-    Fitted planes_of(const Places& which, CloudGpu* gpu) {
+    Fitted planes_of(const Indices& which, CloudGpu* gpu) {
         std::vector<Vector3d> some_points, some_normals;
         const auto pick = [&](std::span<const Vector3d> from, std::vector<Vector3d>& to) {
             if (which.size() == from.size())
@@ -709,8 +710,8 @@ class CloudAo::Work {
                 ++count[point];
             surface.stands_for.resize(surface.size());
             for (std::size_t i = 0; i < surface.size(); ++i) {
-                surface.stands_for[i] = count[surface.tree.index(i)];
-                if (fitted.alone[surface.tree.index(i)])
+                surface.stands_for[i] = count[surface.tree.original(i)];
+                if (fitted.alone[surface.tree.original(i)])
                     surface.disc_radius[i] = 0;
             }
         }
@@ -759,8 +760,8 @@ class CloudAo::Work {
                             "others: they are taken for strays and occlude nothing else.",
                             strays_.size(), extent_.farthest));
         std::size_t unknown = 0;
-        for (const Places* places : {&valid_, &strays_})
-            for (const std::uint32_t i : *places)
+        for (const Indices* indices : {&valid_, &strays_})
+            for (const std::uint32_t i : *indices)
                 unknown += std::isnan(result_.visibility[i]);
         if (unknown > 0)
             result_.notes.push_back(
@@ -779,8 +780,8 @@ class CloudAo::Work {
     std::optional<DirectionSet> directions_;
     NormalOrientation orientation_;
     Extent extent_;
-    Places valid_, strays_;   ///< strays lie beyond the cloud
-    Places order_;            ///< of a cloud in one tile: its points in the order of the tree
+    Indices valid_, strays_;  ///< strays lie beyond the cloud
+    Indices order_;           ///< of a cloud in one tile: its points in the order of the tree
     std::vector<Twin> twins_; ///< copies of points, in neither
     bool normals_refused_ = false;
     std::size_t turned_ = 0, sided_ = 0; ///< of the recorded normals, where some were turned

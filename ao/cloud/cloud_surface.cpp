@@ -34,10 +34,10 @@ struct Plane {
     float variance_narrow = 0, variance_wide = 0; ///< within the plane
 };
 
-Plane plane_round(const NeighbourTree& tree, std::size_t place, std::span<const Nearest::Neighbour> near) {
+Plane plane_round(const NeighbourTree& tree, std::size_t index, std::span<const Nearest::Neighbour> near) {
     if (near.size() < 2 || !(near.back().distance2 > 0))
         return {};
-    const Vector3f& at = tree[place];
+    const Vector3f& at = tree[index];
     const float scale = -2 / near.back().distance2; // the farthest weighs e^-2
     float sum = 1;
     Vector3f mean = Vector3f::Zero();
@@ -80,11 +80,11 @@ bool is_direction(const Vector3d& normal) { return normal.allFinite() && normal.
 /// Orients estimated normals like given ones next to them.
 void orient_like_given(CloudSurface& surface, std::span<const Vector3d> given) {
     tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) { // given normals are not turned
-        if (is_direction(given[surface.tree.index(i)]))
+        if (is_direction(given[surface.tree.original(i)]))
             return;
         Vector3f beside = Vector3f::Zero();
         for (const std::uint32_t j : surface.near[i])
-            if (is_direction(given[surface.tree.index(j)]))
+            if (is_direction(given[surface.tree.original(j)]))
                 beside += surface.normals[j];
         if (surface.normals[i].dot(beside) < 0)
             surface.normals[i] = -surface.normals[i];
@@ -118,11 +118,11 @@ CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normal
         const float variance = plane.variance_across + plane.variance_narrow + plane.variance_wide;
         surface.flatness[i] = on_a_line(plane) ? 0 : 1 - 3 * plane.variance_across / variance;
         surface.normals[i] = on_a_line(plane) ? Vector3f(Vector3f::Zero()) : plane.normal;
-        if (!axes.empty() && !axes[surface.tree.index(i)].isZero())
-            surface.normals[i] = axes[surface.tree.index(i)];
+        if (!axes.empty() && !axes[surface.tree.original(i)].isZero())
+            surface.normals[i] = axes[surface.tree.original(i)];
         if (normals.empty())
             return;
-        if (const Vector3d& given = normals[surface.tree.index(i)]; is_direction(given)) {
+        if (const Vector3d& given = normals[surface.tree.original(i)]; is_direction(given)) {
             const Vector3f unit = given.normalized().cast<float>();
             cosines[i] = surface.normals[i].isZero() ? 1.0F : std::abs(unit.dot(surface.normals[i]));
             constexpr float flat = 0.1F; // roughness / spacing: the plane's normal is then within a degree or two

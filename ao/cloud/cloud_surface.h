@@ -53,7 +53,7 @@ struct CloudSurface {
     double agreement = 1; ///< median |cosine| between given normals and planes: near 1/2 where the given ones are noise
 
     [[nodiscard]] std::size_t size() const { return tree.size(); }
-    [[nodiscard]] std::uint32_t weight(std::size_t place) const { return stands_for.empty() ? 1 : stands_for[place]; }
+    [[nodiscard]] std::uint32_t weight(std::size_t index) const { return stands_for.empty() ? 1 : stands_for[index]; }
 };
 
 /// Finds neighbours and planes of `points`. `normals` is empty or holds one per point, in the order given; those of

@@ -228,11 +228,11 @@ const DiscTree::Node DiscTree::nobody = [] {
 }();
 
 DiscTree::DiscTree(const CloudSurface& surface) : stride_(surface.size() + wide) {
-    place_discs(surface);
+    copy_discs(surface);
     join_boxes(surface.tree);
 }
 
-void DiscTree::place_discs(const CloudSurface& surface) {
+void DiscTree::copy_discs(const CloudSurface& surface) {
     using Box = Eigen::AlignedBox3f;
     const NeighbourTree& tree = surface.tree;
     const auto radius_of = [&](std::size_t i) { return surface.normals[i].isZero() ? 0 : surface.disc_radius[i]; };

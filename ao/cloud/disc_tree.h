@@ -36,7 +36,7 @@ class DiscTree {
     /// Rounding of a coordinate anywhere on the discs.
     [[nodiscard]] double rounding() const { return rounding_; }
 
-    /// Nodes that rays of a limited length from a few places can reach. These rays start there, not at the root.
+    /// Nodes that rays of a limited length from a few points can reach. These rays start there, not at the root.
     class Start {
       public:
         static constexpr std::size_t most = 32;
@@ -69,7 +69,7 @@ class DiscTree {
         std::array<std::array<float, wide>, 6> box; ///< low x y z, high x y z of its children
     };
     static const Node nobody; ///< boxes that no ray hits
-    void place_discs(const CloudSurface& surface);
+    void copy_discs(const CloudSurface& surface);
     void join_boxes(const NeighbourTree& tree);
     [[nodiscard]] const float* coordinate(std::size_t which) const { return discs_.get() + which * stride_; }
 

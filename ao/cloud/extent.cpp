@@ -53,7 +53,7 @@ Extent extent_of(std::span<const Vector3d> sample) {
     std::vector<char> lonely(sample.size());
     for_each_neighbourhood(tree, 6, [&](std::size_t i, std::span<const Nearest::Neighbour> near) {
         const double sixth = near.empty() ? 0 : std::sqrt(static_cast<double>(near.back().distance2));
-        lonely[tree.index(i)] = near.size() == 6 && sixth > lonely_share * static_cast<double>(tree[i].norm());
+        lonely[tree.original(i)] = near.size() == 6 && sixth > lonely_share * static_cast<double>(tree[i].norm());
     });
     std::vector<std::pair<double, std::uint32_t>> far; // by distance, of those that are not lonely
     for (std::uint32_t i = 0; i < sample.size(); ++i)

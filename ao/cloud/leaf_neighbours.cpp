@@ -60,13 +60,13 @@ constexpr std::size_t too_many = std::numeric_limits<std::size_t>::max();
     }
     std::uint64_t taken = 0; // equal distances have equal ranks: they take the next free ones in the order of indices
     for (std::size_t i = 0; i < within; ++i) {
-        std::uint32_t place = rank[i];
-        while (place < wanted && (taken >> place & 1) != 0)
-            ++place;
-        if (place >= wanted)
+        std::uint32_t slot = rank[i];
+        while (slot < wanted && (taken >> slot & 1) != 0)
+            ++slot;
+        if (slot >= wanted)
             continue;
-        taken |= std::uint64_t(1) << place;
-        found[place] = {near[i], index[i]};
+        taken |= std::uint64_t(1) << slot;
+        found[slot] = {near[i], index[i]};
     }
     return std::min(within, wanted);
 }

@@ -54,10 +54,10 @@ NeighbourTree::NeighbourTree(std::span<const Vector3f> points) {
     boxes_.resize((std::size_t(2) << levels_) - 1);
     build(placed, 0, levels_);
     points_.resize(points.size());
-    index_.resize(points.size());
+    original_.resize(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
         points_[i] = placed[i].point;
-        index_[i] = placed[i].index;
+        original_[i] = placed[i].index;
     });
 }
 
@@ -122,8 +122,8 @@ std::pair<std::size_t, std::size_t> NeighbourTree::leaf_range(std::size_t number
     return {node.begin, node.end};
 }
 
-void NeighbourTree::find_round(std::size_t place, std::size_t wanted, Nearest& found, float reach2) const {
-    find(points_[place], place, wanted, found, reach2);
+void NeighbourTree::find_round(std::size_t index, std::size_t wanted, Nearest& found, float reach2) const {
+    find(points_[index], index, wanted, found, reach2);
 }
 
 void NeighbourTree::find_near(const Vector3f& at, std::size_t wanted, Nearest& found) const {

@@ -47,24 +47,24 @@ class NeighbourTree {
     [[nodiscard]] std::size_t size() const { return points_.size(); }
     /// Levels of nodes above the leaves. A node of n points has children of n / 2 (rounded down) and the rest.
     [[nodiscard]] int levels() const { return levels_; }
-    /// By index in the tree's order (`place` throughout this room).
-    [[nodiscard]] const Eigen::Vector3f& operator[](std::size_t place) const { return points_[place]; }
+    /// By index in the tree's order, which is what this room calls an index.
+    [[nodiscard]] const Eigen::Vector3f& operator[](std::size_t index) const { return points_[index]; }
     /// The index of that point in the cloud given.
-    [[nodiscard]] std::uint32_t index(std::size_t place) const { return index_[place]; }
+    [[nodiscard]] std::uint32_t original(std::size_t index) const { return original_[index]; }
 
     /// The `wanted` nearest neighbours of a point, without the point itself. `reach2`: a squared distance known to
     /// contain that many; infinite if unknown. Ties go to the lower index.
-    void find_round(std::size_t place, std::size_t wanted, Nearest& found,
+    void find_round(std::size_t index, std::size_t wanted, Nearest& found,
                     float reach2 = std::numeric_limits<float>::infinity()) const;
 
     /// The `wanted` points nearest to a position.
     void find_near(const Eigen::Vector3f& at, std::size_t wanted, Nearest& found) const;
 
-    /// Calls `visit(place)` for every point within `reach` of `at`, in no particular order.
+    /// Calls `visit(index)` for every point within `reach` of `at`, in no particular order.
     template <class Visit>
     void for_each_within(const Eigen::Vector3f& at, float reach, Visit&& visit) const;
     /// Walks the nodes from the root down. `enter(diagonal, begin, end, is_leaf)` gets the diagonal of a node's box and
-    /// its places; where it returns true and the node is no leaf, its halves are walked, too.
+    /// its indices; where it returns true and the node is no leaf, its halves are walked, too.
     template <class Enter>
     void walk(Enter&& enter) const {
         walk({0, 0, points_.size(), levels_}, enter);
@@ -104,12 +104,12 @@ class NeighbourTree {
     [[nodiscard]] static Box box_of(std::span<const Placed> points);
 
     Untouched<Eigen::Vector3f> points_;
-    Untouched<std::uint32_t> index_;
+    Untouched<std::uint32_t> original_;
     Untouched<Box> boxes_; ///< node n has the children 2n + 1 and 2n + 2, which halve its points
     int levels_ = 0;       ///< of nodes above the leaves
 };
 
-/// Points relative to a place near them, in single precision.
+/// Points relative to a position near them, in single precision.
 [[nodiscard]] std::vector<Eigen::Vector3f> local_points(const Eigen::Vector3d& middle,
                                                         std::span<const Eigen::Vector3d> points);
 
@@ -137,9 +137,9 @@ void NeighbourTree::for_each_within(const Eigen::Vector3f& at, float reach, Visi
             stack[depth++] = node.left();
             continue;
         }
-        for (std::size_t place = node.begin; place < node.end; ++place)
-            if ((points_[place] - at).squaredNorm() <= reach2)
-                visit(place);
+        for (std::size_t index = node.begin; index < node.end; ++index)
+            if ((points_[index] - at).squaredNorm() <= reach2)
+                visit(index);
     }
 }
 

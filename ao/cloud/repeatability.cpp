@@ -94,11 +94,11 @@ Repeatability repeatability(std::span<const Vector3d> points, std::span<const fl
 
     const LocalCloud cloud(compared);
     const auto scale = static_cast<float>(std::pow(check.error_per_difference(), 2) / (half_at * half_at));
-    std::vector<float> factor(cloud.size()); // by place
+    std::vector<float> factor(cloud.size()); // by index in the tree
     for_each_neighbourhood(cloud.tree, surroundings, [&](std::size_t index, std::span<const Nearest::Neighbour> near) {
-        float mean = squares[cloud.tree.index(index)];
+        float mean = squares[cloud.tree.original(index)];
         for (const Nearest::Neighbour& neighbour : near)
-            mean += squares[cloud.tree.index(neighbour.point)];
+            mean += squares[cloud.tree.original(neighbour.point)];
         mean /= static_cast<float>(near.size() + 1);
         factor[index] = 1 / (1 + scale * mean);
     });

@@ -50,29 +50,29 @@ Reach reach_of(const CloudSurface& surface) {
 
 /// A ray that left one plane and met another.
 struct RayHit {
-    std::uint32_t from, to; ///< places
+    std::uint32_t from, to; ///< indices in the tree
     std::int8_t sign;       ///< +1: both sides are their normals', or neither is
     float distance;
     Vector3f direction;
 };
 
-std::vector<RayHit> shoot(const CloudSurface& surface, const DiscRays& rays, std::size_t places) {
-    const std::size_t asked = std::min(places, surface.size());
+std::vector<RayHit> shoot(const CloudSurface& surface, const DiscRays& rays, std::size_t points) {
+    const std::size_t asked = std::min(points, surface.size());
     const DirectionSet directions(bundle, 1);
     std::vector<std::array<RayHit, 2 * bundle>> met(asked);
     std::vector<std::uint8_t> counts(asked, 0);
     tbb::parallel_for(std::size_t(0), asked, [&](std::size_t k) {
-        const std::size_t place = (2 * k + 1) * surface.size() / (2 * asked);
-        const Vector3f& normal = surface.normals[place];
-        if (normal.isZero() || !(surface.disc_radius[place] > 0))
+        const std::size_t index = (2 * k + 1) * surface.size() / (2 * asked);
+        const Vector3f& normal = surface.normals[index];
+        if (normal.isZero() || !(surface.disc_radius[index] > 0))
             return;
         constexpr float least = 0.1F; // grazing hits say nothing
         for (const int side : {1, -1}) {
             const DiscRays::Hits hits =
-                rays.first_hits(place, static_cast<float>(side) * normal, directions.run(2 * k + (side < 0)));
+                rays.first_hits(index, static_cast<float>(side) * normal, directions.run(2 * k + (side < 0)));
             for (std::size_t i = 0; i < bundle; ++i)
                 if (std::isfinite(hits.distance[i]) && std::abs(hits.facing[i]) >= least)
-                    met[k][counts[k]++] = {static_cast<std::uint32_t>(place), hits.index[i],
+                    met[k][counts[k]++] = {static_cast<std::uint32_t>(index), hits.index[i],
                                            static_cast<std::int8_t>(hits.facing[i] < 0 ? -side : side),
                                            hits.distance[i], hits.direction[i]};
         }
@@ -112,13 +112,13 @@ class Stations {
         for (const Eigen::Vector3d& direction : spread_directions(64))
             positions_.emplace_back(reach.centre + 3 * reach.far * direction.cast<float>());
         for (std::size_t k = 0; k < effort.tests; ++k) {
-            const std::size_t place = (2 * k + 1) * surface.size() / (2 * effort.tests);
-            if (!surface.normals[place].isZero() && (tests_.empty() || tests_.back() != place))
-                tests_.push_back(static_cast<std::uint32_t>(place));
+            const std::size_t index = (2 * k + 1) * surface.size() / (2 * effort.tests);
+            if (!surface.normals[index].isZero() && (tests_.empty() || tests_.back() != index))
+                tests_.push_back(static_cast<std::uint32_t>(index));
         }
-        for (const std::uint32_t place : tests_) {
-            const double disc = static_cast<double>(std::max(surface.disc_radius[place], 1e-30F));
-            density_.push_back(std::log(static_cast<double>(surface.weight(place))) - 2 * std::log(disc));
+        for (const std::uint32_t index : tests_) {
+            const double disc = static_cast<double>(std::max(surface.disc_radius[index], 1e-30F));
+            density_.push_back(std::log(static_cast<double>(surface.weight(index))) - 2 * std::log(disc));
         }
         seen_.resize(positions_.size() * tests_.size());
         tbb::parallel_for(std::size_t(0), positions_.size(), [&](std::size_t c) {
@@ -471,14 +471,14 @@ Votes votes_of(const CloudSurface& surface, const DiscRays& rays, const Patches&
     Votes votes{std::vector<double>(patches.count, 0.0), std::vector<double>(patches.count, 0.0)};
     tbb::parallel_for(std::uint32_t(0), patches.count, [&](std::uint32_t patch) {
         for (std::size_t k = 0; k < counts[patch]; ++k) {
-            const std::uint32_t place = points[patch][k];
+            const std::uint32_t index = points[patch][k];
             for (const Vector3f& station : stations) {
-                const int seen = rays.seen_from(place, station);
+                const int seen = rays.seen_from(index, station);
                 if (seen == 0)
                     continue;
                 const double cosine = static_cast<double>(
-                    std::abs((station - surface.tree[place]).normalized().dot(surface.normals[place])));
-                votes.sum[patch] += seen * patches.sign(place) * label[patch] * cosine / counts[patch];
+                    std::abs((station - surface.tree[index]).normalized().dot(surface.normals[index])));
+                votes.sum[patch] += seen * patches.sign(index) * label[patch] * cosine / counts[patch];
                 votes.all[patch] += cosine / counts[patch];
             }
         }
@@ -487,17 +487,17 @@ Votes votes_of(const CloudSurface& surface, const DiscRays& rays, const Patches&
 }
 
 /// What is known of the sides of patches, for (positive) and against their label, and at most.
-struct Evidence {
+struct UnaryTerms {
     std::vector<double> stations, stations_most, rays, rays_most; ///< by patch
 
-    explicit Evidence(std::size_t patches)
+    explicit UnaryTerms(std::size_t patches)
         : stations(patches, 0.0), stations_most(patches, 0.0), rays(patches, 0.0), rays_most(patches, 0.0) {}
     [[nodiscard]] double sum(std::size_t patch) const { return 10 * stations[patch] + 0.3 * rays[patch]; }
     [[nodiscard]] double most(std::size_t patch) const { return 10 * stations_most[patch] + 0.3 * rays_most[patch]; }
 };
 
-Evidence facing(const CloudSurface& surface, const Patches& patches, const Signs& label, const Vector3f& up) {
-    Evidence evidence(patches.count);
+UnaryTerms facing(const CloudSurface& surface, const Patches& patches, const Signs& label, const Vector3f& up) {
+    UnaryTerms evidence(patches.count);
     std::vector<double> sizes(patches.count, 0.0);
     for (std::size_t i = 0; i < surface.size(); ++i) {
         const std::uint32_t patch = patches.patch[i];
@@ -516,13 +516,13 @@ Evidence facing(const CloudSurface& surface, const Patches& patches, const Signs
 /// Signs of patches relative to each other, and what the stations and the rays say of them.
 struct Judged {
     Signs label;
-    Evidence evidence;
+    UnaryTerms evidence;
     Decision decision;
 };
 
 Judged judged(const CloudSurface& surface, const DiscRays& rays, const Patches& patches, const std::vector<Link>& near,
               const std::optional<Vector3f>& up, SidesRule rule, const SidesEffort& effort, const Reach& reach) {
-    const std::vector<RayHit> hits = shoot(surface, rays, effort.places);
+    const std::vector<RayHit> hits = shoot(surface, rays, effort.points);
     std::vector<Link> free = ray_links(hits, patches, reach.usual);
     if (const double all = strength(free); all > 0) { // rays correct what neighbours say, and do not outvote it
         const double scale = std::min(1.0, 0.7 * strength(near) / all);
@@ -530,7 +530,7 @@ Judged judged(const CloudSurface& surface, const DiscRays& rays, const Patches& 
             link.weight *= scale;
     }
     const Stations stations(surface, rays, hits, reach, up, effort);
-    // All that is seen from one place is seen through the same air: every station is one more node.
+    // All that is seen from one station is seen through the same free space: every station is one more node.
     SignedGraph relative(patches.count + stations.size());
     for (const Link& link : near)
         relative.add(link.a, link.b, link.weight);
@@ -539,15 +539,15 @@ Judged judged(const CloudSurface& surface, const DiscRays& rays, const Patches& 
     const double of_station = 0.2 * strength(near) / std::max(stations.all_seen(), 1.0);
     for (std::size_t c = 0; c < stations.size(); ++c)
         for (std::size_t t = 0; t < stations.tests().size(); ++t)
-            if (const std::uint32_t place = stations.tests()[t]; stations.seen(c, t) != 0)
-                relative.add(patches.patch[place], static_cast<std::uint32_t>(patches.count + c),
-                             stations.seen(c, t) * patches.sign(place) * std::min(of_station, 1.0));
+            if (const std::uint32_t index = stations.tests()[t]; stations.seen(c, t) != 0)
+                relative.add(patches.patch[index], static_cast<std::uint32_t>(patches.count + c),
+                             stations.seen(c, t) * patches.sign(index) * std::min(of_station, 1.0));
     Signs label = relative.signs();
     label.resize(patches.count);
 
     Signs of_tests;
-    for (const std::uint32_t place : stations.tests())
-        of_tests.push_back(static_cast<std::int8_t>(label[patches.patch[place]] * patches.sign(place)));
+    for (const std::uint32_t index : stations.tests())
+        of_tests.push_back(static_cast<std::int8_t>(label[patches.patch[index]] * patches.sign(index)));
     double front_meets = 0, meets = 0;
     for (const RayHit& ray : hits) {
         const bool normal_side = ray.direction.dot(surface.normals[ray.from]) > 0;
@@ -574,7 +574,7 @@ Judged judged(const CloudSurface& surface, const DiscRays& rays, const Patches& 
     std::vector<Vector3f> positions;
     for (const std::size_t c : chosen)
         positions.push_back(stations.position(c));
-    Evidence evidence(patches.count);
+    UnaryTerms evidence(patches.count);
     Votes votes = votes_of(surface, rays, patches, label, positions);
     evidence.stations = std::move(votes.sum);
     evidence.stations_most = std::move(votes.all);

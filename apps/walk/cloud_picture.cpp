@@ -53,7 +53,7 @@ std::vector<float> spacing_of(const std::vector<Vector3d>& points) {
     std::vector<float> spacing(points.size(), 0.0F);
     for_each_neighbourhood(tree, wanted, [&](std::size_t index, std::span<const Nearest::Neighbour> near) {
         if (!near.empty())
-            spacing[tree.index(index)] =
+            spacing[tree.original(index)] =
                 std::sqrt(near.back().distance2 * static_cast<float>(pi) / static_cast<float>(near.size() + 1));
     });
     const float usual = median(spacing, 0.0F); // a stray point is far from all others, and yet no large thing

@@ -376,7 +376,7 @@ TEST(Neighbours, are_those_that_trying_all_points_finds) {
         ASSERT_EQ(found.all().size(), 20u);
         for (std::size_t k = 0; k < 20; ++k)
             ASSERT_EQ(found.all()[k].distance2, all[k]) << i << " " << k;
-        ASSERT_EQ(tree[i], points[tree.index(i)]);
+        ASSERT_EQ(tree[i], points[tree.original(i)]);
     }
 }
 

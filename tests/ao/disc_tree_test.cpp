@@ -27,7 +27,7 @@ CloudSurface scattered(std::size_t count, Dice& dice) {
     }
     CloudSurface surface = cloud_surface(LocalCloud(points), normals);
     for (std::size_t i = 0; i < surface.size(); ++i) {
-        surface.normals[i] = normals[surface.tree.index(i)].cast<float>();
+        surface.normals[i] = normals[surface.tree.original(i)].cast<float>();
         surface.disc_radius[i] = i % 7 == 0 ? 0 : 0.03F;
     }
     return surface;
