@@ -8,7 +8,7 @@
 #include "ao/cloud/fitted_cloud.h"
 #include "ao/cloud/indices_where.h"
 #include "ao/cloud/repeatability.h"
-#include "ao/cloud/sides.h"
+#include "ao/cloud/settled_sides.h"
 #include "ao/cloud/tiles.h"
 #include "ao/cloud/twins.h"
 #include "ao/raycast/raycast.h"
@@ -19,7 +19,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <charconv>
 #include <cmath>
 #include <Eigen/Geometry>
 #include <fmt/format.h>
@@ -35,21 +34,6 @@ namespace {
 using Eigen::Vector3d, Eigen::Vector3f;
 constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
 
-/// "1,0,-2.5" as three numbers; none where it is anything else.
-std::optional<Vector3d> triple(const std::string& text) {
-    Vector3d values;
-    const char *at = text.data(), *end = at + text.size();
-    for (int axis = 0; axis < 3; ++axis) {
-        if (axis > 0 && (at == end || *at++ != ','))
-            return std::nullopt;
-        const auto [stop, trouble] = std::from_chars(at, end, values[axis]);
-        if (trouble != std::errc() || !std::isfinite(values[axis]))
-            return std::nullopt;
-        at = stop;
-    }
-    return at == end ? std::optional(values) : std::nullopt;
-}
-
 /// About `wanted` of these points, chosen by a hash: every n-th point in recording order would skip whole scan lines.
 std::vector<Vector3d> sampled(std::span<const Vector3d> points, const Indices& indices, std::size_t wanted) {
     const double share =
@@ -63,17 +47,6 @@ std::vector<Vector3d> sampled(std::span<const Vector3d> points, const Indices& i
 
 Indices finite(std::span<const Vector3d> points) {
     return indices_where(points.size(), [&](std::size_t i) { return points[i].allFinite(); });
-}
-
-/// The same cloud with about `wanted` points, evenly chosen, and with the normals that it has.
-CloudSurface thinned(const CloudSurface& surface, std::size_t wanted) {
-    std::vector<Vector3d> points, normals;
-    const std::size_t step = std::max<std::size_t>(1, surface.size() / wanted);
-    for (std::size_t index = step / 2; index < surface.size(); index += step) {
-        points.push_back(surface.tree[index].cast<double>());
-        normals.push_back(surface.normals[index].cast<double>());
-    }
-    return cloud_surface(LocalCloud(points), normals);
 }
 
 /// A neighbour's weight in the mean is e^(this distance^2): visibility hardly changes over a tenth of the radius.
@@ -106,72 +79,13 @@ Untouched<float> smoothed(const CloudSurface& surface, const Untouched<float>& v
     return means;
 }
 
-constexpr std::array normals_words{Named{"auto", CloudNormals::automatic}, Named{"recorded", CloudNormals::recorded},
-                                   Named{"estimated", CloudNormals::estimated}};
-
 /// Discs that span the radius: 0 for one, 1 for four or more.
 float resolution(float radius, float disc) { return disc > 0 ? std::clamp((radius / disc - 1) / 3, 0.0F, 1.0F) : 0.0F; }
 
 } // namespace
 
-std::vector<Parameter> CloudAoOptions::parameters() {
-    return {
-        {.name = "radius",
-         .help = "surfaces farther away than this do not occlude, in the cloud's unit; 0 = from the cloud's extent and "
-                 "spacing",
-         .value = &radius,
-         .low = 0,
-         .high = 1e9},
-        {.name = "rays",
-         .help = "rays per point; 0 = 64 on a GPU, else 16, or fewer where the radius spans many spacings",
-         .value = &rays,
-         .low = 0,
-         .high = 16384},
-        {.name = "smooth",
-         .help = "how often a value becomes the mean of its neighbours on the same surface; -1 = twice, or more where "
-                 "the radius spans many spacings",
-         .value = &smooth,
-         .low = -1,
-         .high = 16},
-        {.name = "sky",
-         .help = "computes the share of the sky that a point sees at any distance, instead of what is open within the "
-                 "radius",
-         .value = &sky},
-        {.name = "up", .help = "the direction of the sky, x,y,z", .value = &up},
-        {.name = "outside",
-         .help =
-             "where normals point: auto, up, outward, inward, or to the scanner at x,y,z; all but auto turn recorded "
-             "ones, too",
-         .value = &outside},
-        {.name = "normals",
-         .help = "which normals are used; auto = recorded ones where they agree with the planes of the points",
-         .value = OneOf(&normals, normals_words)},
-        {.name = "memory",
-         .help = "memory for the points; larger clouds are computed in tiles",
-         .value = &memory_mib,
-         .unit = "MiB",
-         .low = 64,
-         .high = 1 << 20},
-        {.name = "seed", .help = "scrambles the rays", .value = &seed, .low = 0, .high = 2147483647},
-    };
-}
-
 double default_radius(double extent, double spacing) {
     return std::clamp(extent / 20, 10 * spacing, std::max(200 * spacing, 0.0));
-}
-
-CloudAo::CloudAo(CloudAoOptions options, gpu::Device* device) : options_(std::move(options)), device_(device) {
-    for (const Parameter& row : options_.parameters())
-        check(row);
-    const auto up = triple(options_.up);
-    if (!up || !(up->norm() > 0))
-        throw Misuse(fmt::format("up: '{}' given, expected a direction x,y,z such as 0,0,1", options_.up));
-    up_ = up->normalized();
-    viewpoint_ = triple(options_.outside);
-    constexpr std::array words{"auto", "up", "outward", "inward"};
-    if (!viewpoint_ && std::find(words.begin(), words.end(), options_.outside) == words.end())
-        throw Misuse(fmt::format("outside: '{}' given, expected auto, up, outward, inward, or a position x,y,z",
-                                 options_.outside));
 }
 
 /// One cloud being computed: what all tiles share, and the results so far.
@@ -180,7 +94,7 @@ class CloudAo::Work {
     Work(const CloudAoOptions& options, gpu::Device* device, const Vector3d& up,
          const std::optional<Vector3d>& viewpoint, const PointSet& cloud, const std::optional<Vector3d>& scanner)
         : options_(options), up_(up), given_viewpoint_(viewpoint), scanner_(scanner), cloud_(cloud),
-          watch_(result_.timings) {
+          watch_(result_.timings), sides_(options, up, cloud.z_up) {
         if (device)
             gpu_.emplace(*device);
         valid_ = finite(cloud.points);
@@ -203,6 +117,8 @@ class CloudAo::Work {
                            [&](const Indices& core, const Indices& round) { tile(core, round); });
         }
         require_results();
+        for (const std::string& sentence : sides_.doubts)
+            doubt(sentence);
         compute_thinned();
         compute_strays();
         for (const auto& [point, same_as] : twins_) {
@@ -239,16 +155,16 @@ class CloudAo::Work {
                             const std::vector<Vector3d>& some) {
         using Kind = NormalOrientation::Kind;
         if (viewpoint)
-            orientation_ = {Kind::viewpoint, *viewpoint, "the position given by --cloud.outside"};
+            sides_.orientation = {Kind::viewpoint, *viewpoint, "the position given by --cloud.outside"};
         else if (options_.outside == "auto")
-            orientation_ = guessed_orientation(some, scanner, cloud_.z_up);
+            sides_.orientation = guessed_orientation(some, scanner, cloud_.z_up);
         else
-            orientation_ = {options_.outside == "up"        ? Kind::direction
-                            : options_.outside == "outward" ? Kind::outward
-                                                            : Kind::inward,
-                            up_, options_.outside + ", as given"};
-        if (orientation_.kind == Kind::direction || orientation_.kind == Kind::terrain)
-            orientation_.point = up_;
+            sides_.orientation = {options_.outside == "up"        ? Kind::direction
+                                  : options_.outside == "outward" ? Kind::outward
+                                                                  : Kind::inward,
+                                  up_, options_.outside + ", as given"};
+        if (sides_.orientation.kind == Kind::direction || sides_.orientation.kind == Kind::terrain)
+            sides_.orientation.point = up_;
     }
 
     /// Points that lie beyond the cloud are computed by themselves.
@@ -387,7 +303,8 @@ class CloudAo::Work {
         FittedCloud& fitted = planes.points;
         const std::vector<std::uint32_t> lonely = drop_strays(surface, extent_.centre, result_.spacing);
         std::optional<DiscRays> rays;
-        const std::vector<float> side_known = whole_ ? sides_as_in_whole(surface) : settle_sides(surface, rays);
+        const std::vector<float> side_known =
+            whole_ ? sides_as_in_whole(surface) : sides_.settle(surface, rays, recorded());
         for (const std::uint32_t index : lonely)
             surface.normals[index].setZero();
         watch_.lap("sides");
@@ -479,7 +396,7 @@ class CloudAo::Work {
         noise_ = 0, moved_ = kept_ = fitted_from_ = 0; // tiles tell of themselves
         drop_strays(surface, extent_.centre, static_cast<double>(surface.spacing));
         std::optional<DiscRays> rays;
-        std::vector<float> known = settle_sides(surface, rays);
+        std::vector<float> known = sides_.settle(surface, rays, recorded());
         whole_ = {std::move(surface), std::move(known)};
         watch_.lap("sides");
     }
@@ -513,132 +430,6 @@ class CloudAo::Work {
         return known;
     }
 
-    /// The sides that the cloud itself tells, or a person.
-    Sides found_sides(const CloudSurface& surface, std::optional<DiscRays>& rays,
-                      const SidesEffort& effort = {}) const {
-        using Kind = NormalOrientation::Kind;
-        if (orientation_.kind == Kind::viewpoint)
-            return sides_to(surface, (orientation_.point - surface.middle).cast<float>());
-        if (orientation_.kind == Kind::direction)
-            return sides_of(surface, nullptr, orientation_.point.cast<float>().normalized(), SidesRule::up);
-        if (!rays)
-            rays.emplace(surface);
-        const std::optional<Vector3f> up = orientation_.kind == Kind::terrain || cloud_.z_up
-                                               ? std::optional<Vector3f>(up_.cast<float>())
-                                               : std::nullopt;
-        const SidesRule rule = orientation_.kind == Kind::terrain   ? SidesRule::terrain
-                               : orientation_.kind == Kind::outward ? SidesRule::outward
-                               : orientation_.kind == Kind::inward  ? SidesRule::inward
-                                                                    : SidesRule::automatic;
-        return sides_of(surface, &*rays, up, rule, effort);
-    }
-
-    /// Turns the normals to the sides that were scanned. Returns how sure that is by index in the tree, 0 .. 1; empty
-    /// where the recorded sides are taken.
-    std::vector<float> settle_sides(CloudSurface& surface, std::optional<DiscRays>& rays) {
-        if (recorded())
-            return settle_recorded_sides(surface, rays);
-        Sides found = found_sides(surface, rays);
-        tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
-            if (found.sign[i] < 0)
-                surface.normals[i] = -surface.normals[i];
-        });
-        // What has no plane faces the scanner, or the sky.
-        using Kind = NormalOrientation::Kind;
-        const bool to_sky = orientation_.kind == Kind::direction || orientation_.kind == Kind::terrain;
-        if (to_sky || orientation_.kind == Kind::viewpoint)
-            for (std::size_t i = 0; i < surface.size(); ++i)
-                if (surface.normals[i].isZero())
-                    surface.normals[i] =
-                        to_sky ? Vector3f(orientation_.point.cast<float>().normalized())
-                               : Vector3f((orientation_.point - surface.middle).cast<float>() - surface.tree[i])
-                                     .stableNormalized();
-        note_sides(found);
-        return std::move(found.confidence);
-    }
-
-    /// Recorded sides are right as a rule. Random ones show within patches; patches turned over, or all, show in where
-    /// a scanner could have stood.
-    std::vector<float> settle_recorded_sides(CloudSurface& surface, std::optional<DiscRays>& rays) {
-        constexpr double hardly_random = 0.05, mostly_random = 0.2, some_opposed = 0.05, all_opposed = 0.9;
-        constexpr float sure = 0.8F;
-        if (options_.normals != CloudNormals::automatic)
-            return {};
-        const bool told = options_.outside != "auto";
-        const auto opposed_share = [&](const CloudSurface& of, const Sides& sides) {
-            double opposed = 0, all = 0;
-            for (std::size_t i = 0; i < of.size(); ++i)
-                if (sides.confidence[i] > sure && !of.normals[i].isZero()) {
-                    all += 1;
-                    opposed += sides.sign[i] < 0;
-                }
-            constexpr double enough = 0.3; // of the points: else nothing is said
-            return all > enough * static_cast<double>(of.size()) ? opposed / all : 0;
-        };
-        const auto all_is_well = [&](const CloudSurface& of, std::optional<DiscRays>& rays_of) {
-            constexpr SidesEffort quick{4000, 60, 300};
-            return recorded_sides(of).random <= hardly_random &&
-                   opposed_share(of, found_sides(of, rays_of, quick)) <= some_opposed;
-        };
-        if (constexpr std::size_t enough = 100000; !told && surface.size() > 2 * enough) {
-            const CloudSurface some = thinned(surface, enough);
-            if (std::optional<DiscRays> rays_of_some; all_is_well(some, rays_of_some))
-                return {};
-        } else if (!told && all_is_well(surface, rays)) {
-            return {};
-        }
-        const RecordedSides order = recorded_sides(surface);
-        const bool in_order = order.random <= hardly_random;
-        Sides found;
-        double opposed = 0;
-        found = found_sides(surface, rays);
-        opposed = opposed_share(surface, found);
-        if (in_order && !told && opposed <= some_opposed)
-            return {};
-        if (constexpr double clearly = 0.3; in_order && !told && opposed > all_opposed && found.margin < clearly) {
-            const bool viewed = orientation_.kind == NormalOrientation::Kind::viewpoint;
-            if (cloud_.z_up)
-                doubt(fmt::format("{:.0f} % of the recorded normals look down, though the cloud seems to be seen from "
-                                  "above; they are kept: --cloud.outside up turns them, --cloud.normals recorded is "
-                                  "sure of them",
-                                  100 * opposed));
-            else if (orientation_.kind != NormalOrientation::Kind::terrain && !found.doubt) // z may point anywhere
-                doubt(fmt::format("{:.0f} % of the recorded normals face away from {}; they are kept: --cloud.outside "
-                                  "turns them, --cloud.normals recorded is sure of them",
-                                  100 * opposed, viewed ? orientation_.why : "where scanners could have stood"));
-            return {};
-        }
-        const bool all = in_order || told || order.random > mostly_random;
-        std::size_t turned = 0;
-        for (std::size_t i = 0; i < surface.size(); ++i)
-            if (found.sign[i] < 0 && (all || found.confidence[i] > sure) && !surface.normals[i].isZero()) {
-                surface.normals[i] = -surface.normals[i];
-                ++turned;
-            }
-        turned_ += turned;
-        sided_ += surface.size();
-        if (told)
-            turned_why_ = "--cloud.outside says so";
-        else if (in_order)
-            turned_why_ = fmt::format("where sides are sure, {:.0f} % of them opposed them", 100 * opposed);
-        else
-            turned_why_ =
-                fmt::format("{:.0f} % of the points lie in patches whose sides look random", 100 * order.random);
-        if (!told && (in_order || turned > surface.size() * 3 / 5))
-            doubt(fmt::format("{:.0f} % of the recorded normals face away from where scanners could have stood; they "
-                              "were turned: --cloud.normals recorded keeps them",
-                              in_order ? 100 * opposed
-                                       : 100 * static_cast<double>(turned) / static_cast<double>(surface.size())));
-        note_sides(found);
-        return all ? std::move(found.confidence) : std::vector<float>();
-    }
-
-    void note_sides(const Sides& found) {
-        if (!found.why.empty())
-            orientation_.why = found.why;
-        if (found.doubt)
-            doubt(*found.doubt);
-    }
     void doubt(const std::string& sentence) {
         if (std::find(result_.doubts.begin(), result_.doubts.end(), sentence) == result_.doubts.end())
             result_.doubts.push_back(sentence);
@@ -729,17 +520,19 @@ class CloudAo::Work {
                 fmt::format("noise of {:.2g} (sigma across surfaces): {:.0f} % of the points were "
                             "moved onto fitted planes; {} discs stand for them.",
                             noise_, 100.0 * static_cast<double>(moved_) / static_cast<double>(fitted_from_), kept_));
-        const std::string facing = orientation_.kind == NormalOrientation::Kind::viewpoint ? "turned to " : "turned ";
-        if (recorded() && turned_ > 0)
+        const std::string facing =
+            sides_.orientation.kind == NormalOrientation::Kind::viewpoint ? "turned to " : "turned ";
+        if (recorded() && sides_.turned_points > 0)
             result_.notes.push_back(fmt::format("normals: recorded; {:.2g} % of them were turned, since {}; {}{}.",
-                                                100.0 * static_cast<double>(turned_) / static_cast<double>(sided_),
-                                                turned_why_, facing, orientation_.why));
+                                                100.0 * static_cast<double>(sides_.turned_points) /
+                                                    static_cast<double>(sides_.judged_points),
+                                                sides_.turned_why, facing, sides_.orientation.why));
         else
             result_.notes.push_back(recorded() ? "normals: recorded."
                                                : "normals: from planes through 16 neighbours, " + facing +
-                                                     orientation_.why + ".");
-        const bool by_whole = orientation_.kind != NormalOrientation::Kind::viewpoint &&
-                              orientation_.kind != NormalOrientation::Kind::direction;
+                                                     sides_.orientation.why + ".");
+        const bool by_whole = sides_.orientation.kind != NormalOrientation::Kind::viewpoint &&
+                              sides_.orientation.kind != NormalOrientation::Kind::direction;
         if (tiles_ > 1)
             result_.notes.push_back(
                 fmt::format("in {} tiles of at most {} points each{}.", tiles_, at_once(),
@@ -778,14 +571,12 @@ class CloudAo::Work {
     Watch watch_;
     std::optional<CloudGpu> gpu_;
     std::optional<DirectionSet> directions_;
-    NormalOrientation orientation_;
+    SettledSides sides_;
     Extent extent_;
     Indices valid_, strays_;  ///< strays lie beyond the cloud
     Indices order_;           ///< of a cloud in one tile: its points in the order of the tree
     std::vector<Twin> twins_; ///< copies of points, in neither
     bool normals_refused_ = false;
-    std::size_t turned_ = 0, sided_ = 0; ///< of the recorded normals, where some were turned
-    std::string turned_why_;
     float noise_ = 0;
     std::size_t moved_ = 0, kept_ = 0, fitted_from_ = 0; ///< points; of tiles, those of their rims as well
     std::optional<Whole> whole_;
