@@ -74,7 +74,6 @@ TEST(CloudPasses, the_order_of_points_does_not_change_their_confidence) {
     ASSERT_TRUE(in_file.error);
     EXPECT_EQ(in_file.error, in_space.error);
     EXPECT_EQ(in_file.confidence, in_space.confidence);
-    // A point that was computed again has its own surroundings' factor, so others at it have the same.
     std::size_t below = 0;
     for (const float factor : in_file.confidence)
         below += factor < 1;
