@@ -10,9 +10,9 @@
 namespace scanshade {
 
 /// Sigma of the points across their surface, where the cloud tells it: on planes. A sample of about a thousand points,
-/// evenly spread over the points, looks at balls of growing radius. A ball tells sigma if its points are flat (seven
-/// times wider than sigma) and those of the next larger ball are no thicker: on curved surfaces and at edges thickness
-/// grows with the ball. And points side by side must differ as much as any two: structure is alike side by side.
+/// evenly spread over the points, looks at balls of growing radius. A ball tells sigma if its points are flat: seven
+/// times wider than sigma. Those of the next larger ball must be no thicker, as they are on curved surfaces and at
+/// edges. And points side by side must differ as much as any two: structure is alike side by side.
 /// Registration errors of a few sigma count as noise.
 class CloudNoise {
   public:

@@ -33,8 +33,8 @@ class DiscRays {
     };
     /// A run of eight rays on one side of a point's plane.
     [[nodiscard]] Hits first_hits(std::size_t index, const Eigen::Vector3f& side, const DirectionSet::Run& run) const;
-    /// Whether nothing stands between a point and a position: 1 if it is seen from the side of its normal, -1 from
-    /// behind, 0 if it is hidden or seen at less than 6 degrees. Positions are relative to the surface's middle.
+    /// Whether nothing stands between a point and a position, which is relative to the surface's middle. 1: it is seen
+    /// from the side of its normal. -1: from behind. 0: it is hidden, or seen at less than 6 degrees.
     [[nodiscard]] int seen_from(std::size_t index, const Eigen::Vector3f& position) const;
 
   private:

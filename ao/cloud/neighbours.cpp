@@ -62,7 +62,7 @@ NeighbourTree::NeighbourTree(std::span<const Vector3f> points) {
 }
 
 /// The axis along which most points are far apart. In large nodes between the eighth and the seventh eighth of a
-/// sample: strays widen a box along all axes, and a wall halved along its noise makes two layers.
+/// sample, since strays widen a box along all axes. A wall halved along its noise would make two layers.
 int NeighbourTree::split_axis(std::span<const Placed> points, const Vector3f& box) {
     constexpr std::size_t sampled = 32, large = 8 * sampled;
     Vector3f width = box;

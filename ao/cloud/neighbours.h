@@ -64,7 +64,7 @@ class NeighbourTree {
     template <class Visit>
     void for_each_within(const Eigen::Vector3f& at, float reach, Visit&& visit) const;
     /// Walks the nodes from the root down. `enter(diagonal, begin, end, is_leaf)` gets the diagonal of a node's box and
-    /// its indices; where it returns true and the node is no leaf, its halves are walked, too.
+    /// its indices. Where it returns true and the node is no leaf, its halves are walked, too.
     template <class Enter>
     void walk(Enter&& enter) const {
         walk({0, 0, points_.size(), levels_}, enter);
@@ -75,8 +75,8 @@ class NeighbourTree {
     [[nodiscard]] std::size_t leaves() const { return std::size_t(1) << levels_; }
     /// The first point of a leaf, and one behind its last.
     [[nodiscard]] std::pair<std::size_t, std::size_t> leaf_range(std::size_t number) const;
-    /// Calls `visit(begin, end)` for the points of every leaf, in ascending order, whose box is within a squared
-    /// distance of a box; until it returns false.
+    /// Calls `visit(begin, end)` for the points of every leaf whose box is within a squared distance of a box. In
+    /// ascending order, until it returns false.
     template <class Visit>
     void for_each_leaf_near(const Eigen::AlignedBox3f& round, float reach2, Visit&& visit) const;
 

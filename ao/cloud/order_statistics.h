@@ -12,8 +12,8 @@
 
 namespace scanshade {
 
-/// The median of values of at least 0, the upper one of two; 0 for no values. Equal to median(): bits of such floats
-/// are in the order of their values, so they are counted by their upper half, then by their lower half.
+/// The median of values of at least 0, the upper one of two; 0 for no values. Equal to median(). Bits of such floats
+/// are in the order of their values: they are counted by their upper half, then by their lower half.
 [[nodiscard]] inline float median_of_lengths(std::span<const float> values) {
     if (values.empty())
         return 0;

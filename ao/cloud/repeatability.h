@@ -14,7 +14,7 @@ namespace scanshade {
 struct ThinnedCheck {
     double keep = 0; ///< share of the points; 0 = none, since so dense a cloud tells nothing new
     /// An error that falls like the spacing is this times the difference between thinned and whole cloud (Richardson's
-    /// extrapolation): with a quarter of the points, spacings are twice as wide, and the difference is the error.
+    /// extrapolation). With a quarter of the points, spacings are twice as wide, and the difference is the error.
     [[nodiscard]] double error_per_difference() const;
 };
 /// For so many points, and a radius that spans so many of their spacings.

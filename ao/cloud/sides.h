@@ -45,7 +45,7 @@ enum class SidesRule {
                              const SidesEffort& effort = {});
 
 /// Sides towards a position relative to the surface's middle. Neighbours vote, by the cosines under which they are
-/// seen: where a plane is seen at a grazing angle, a small error of its normal would turn it over.
+/// seen. Where a plane is seen at a grazing angle, a small error of its normal would turn it over.
 [[nodiscard]] Sides sides_to(const CloudSurface& surface, const Eigen::Vector3f& position);
 
 /// How recorded normals agree with their neighbours, patch by patch.
@@ -54,7 +54,7 @@ struct RecordedSides {
     double opposed = 0; ///< share of the points that oppose most of their patch, there
 };
 /// Of a surface whose normals are recorded ones. A patch of eight or more points is in order if fewer than a tenth
-/// oppose the others, or if those that do make a sheet of its own: they stand higher.
+/// oppose the others. So it is if those that do make a sheet of its own: they stand higher.
 [[nodiscard]] RecordedSides recorded_sides(const CloudSurface& surface);
 
 } // namespace scanshade

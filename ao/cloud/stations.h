@@ -68,10 +68,10 @@ class Stations {
     [[nodiscard]] double seen_from_afar(const Signs& labels) const;
     /// Fronts among all that far stations see.
     [[nodiscard]] double fronts_from_afar(const Signs& labels) const;
-    /// How well the density of the points is that of scans: the correlation of its logarithm with that of what a few
-    /// stations would make together, each cosine / distance^2, or more towards their poles, as beams of equal angles
-    /// have it. -1 where no station sees much. From `within`: near stations; else those round the cloud, at distances
-    /// that scanners round a body stand at.
+    /// How well the density of the points is that of scans: the logarithm's correlation with that of what a few
+    /// stations would make together. Each makes cosine / distance^2, or more towards its poles, as beams of equal
+    /// angles have it. -1 where no station sees much. From `within`: near stations; else those round the cloud, at
+    /// distances that scanners round a body stand at.
     [[nodiscard]] double density_fits(const Signs& labels, bool within) const;
 
     /// The chosen ones first, then those that see most fronts and few backs.
