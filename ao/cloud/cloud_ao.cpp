@@ -6,8 +6,9 @@
 #include "ao/cloud/disc_rays.h"
 #include "ao/cloud/extent.h"
 #include "ao/cloud/fitted_cloud.h"
+#include "ao/cloud/indices_where.h"
 #include "ao/cloud/repeatability.h"
-#include "ao/cloud/sides.h"
+#include "ao/cloud/settled_sides.h"
 #include "ao/cloud/tiles.h"
 #include "ao/cloud/twins.h"
 #include "ao/raycast/raycast.h"
@@ -18,7 +19,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <charconv>
 #include <cmath>
 #include <Eigen/Geometry>
 #include <fmt/format.h>
@@ -26,6 +26,7 @@
 #include <limits>
 #include <numbers>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 namespace scanshade {
 namespace {
@@ -33,60 +34,30 @@ namespace {
 using Eigen::Vector3d, Eigen::Vector3f;
 constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
 
-/// "1,0,-2.5" as three numbers; none where it is anything else.
-std::optional<Vector3d> triple(const std::string& text) {
-    Vector3d values;
-    const char *at = text.data(), *end = at + text.size();
-    for (int axis = 0; axis < 3; ++axis) {
-        if (axis > 0 && (at == end || *at++ != ','))
-            return std::nullopt;
-        const auto [stop, trouble] = std::from_chars(at, end, values[axis]);
-        if (trouble != std::errc() || !std::isfinite(values[axis]))
-            return std::nullopt;
-        at = stop;
-    }
-    return at == end ? std::optional(values) : std::nullopt;
-}
-
 /// About `wanted` of these points, chosen by a hash: every n-th point in recording order would skip whole scan lines.
-std::vector<Vector3d> sampled(std::span<const Vector3d> points, const Places& places, std::size_t wanted) {
+std::vector<Vector3d> sampled(std::span<const Vector3d> points, const Indices& indices, std::size_t wanted) {
     const double share =
-        std::min(1.0, static_cast<double>(wanted) / static_cast<double>(std::max<std::size_t>(places.size(), 1)));
+        std::min(1.0, static_cast<double>(wanted) / static_cast<double>(std::max<std::size_t>(indices.size(), 1)));
     const auto chosen = static_cast<std::uint64_t>(share * 0x1p32);
     std::vector<Vector3d> some;
-    for (const std::uint32_t i : places)
-        if (hash(i) < chosen)
-            some.push_back(points[i]);
+    for (const std::uint32_t i : indices_where(indices, [&](std::uint32_t point) { return hash(point) < chosen; }))
+        some.push_back(points[i]);
     return some;
 }
 
-Places finite(std::span<const Vector3d> points) {
-    Places places;
-    for (std::size_t i = 0; i < points.size(); ++i)
-        if (points[i].allFinite())
-            places.push_back(static_cast<std::uint32_t>(i));
-    return places;
-}
-
-/// The same cloud with about `wanted` points, evenly chosen, and with the normals that it has.
-CloudSurface thinned(const CloudSurface& surface, std::size_t wanted) {
-    std::vector<Vector3d> points, normals;
-    const std::size_t step = std::max<std::size_t>(1, surface.size() / wanted);
-    for (std::size_t place = step / 2; place < surface.size(); place += step) {
-        points.push_back(surface.tree[place].cast<double>());
-        normals.push_back(surface.normals[place].cast<double>());
-    }
-    return cloud_surface(LocalCloud(points), normals);
+Indices finite(std::span<const Vector3d> points) {
+    return indices_where(points.size(), [&](std::size_t i) { return points[i].allFinite(); });
 }
 
 /// A neighbour's weight in the mean is e^(this distance^2): visibility hardly changes over a tenth of the radius.
 float mean_falloff(float radius) { return -1 / (2 * 0.01F * radius * radius); }
 
 /// The mean of a value and its neighbours' on the same surface: parallel planes, distances small against the radius.
-std::vector<float> smoothed(const CloudSurface& surface, const std::vector<float>& values, float radius) {
-    std::vector<float> means(values.size(), nothing);
+Untouched<float> smoothed(const CloudSurface& surface, const Untouched<float>& values, float radius) {
+    Untouched<float> means(values.size());
     const float falloff = mean_falloff(radius);
     tbb::parallel_for(std::size_t(0), values.size(), [&](std::size_t i) {
+        means[i] = nothing;
         if (std::isnan(values[i]))
             return;
         float sum = values[i], weights = 1;
@@ -108,72 +79,13 @@ std::vector<float> smoothed(const CloudSurface& surface, const std::vector<float
     return means;
 }
 
-constexpr std::array normals_words{Named{"auto", CloudNormals::automatic}, Named{"recorded", CloudNormals::recorded},
-                                   Named{"estimated", CloudNormals::estimated}};
-
 /// Discs that span the radius: 0 for one, 1 for four or more.
 float resolution(float radius, float disc) { return disc > 0 ? std::clamp((radius / disc - 1) / 3, 0.0F, 1.0F) : 0.0F; }
 
 } // namespace
 
-std::vector<Parameter> CloudAoOptions::parameters() {
-    return {
-        {.name = "radius",
-         .help = "surfaces farther away than this do not occlude, in the cloud's unit; 0 = from the cloud's extent and "
-                 "spacing",
-         .value = &radius,
-         .low = 0,
-         .high = 1e9},
-        {.name = "rays",
-         .help = "rays per point; 0 = 64 on a GPU, else 16, or fewer where the radius spans many spacings",
-         .value = &rays,
-         .low = 0,
-         .high = 16384},
-        {.name = "smooth",
-         .help = "how often a value becomes the mean of its neighbours on the same surface; -1 = twice, or more where "
-                 "the radius spans many spacings",
-         .value = &smooth,
-         .low = -1,
-         .high = 16},
-        {.name = "sky",
-         .help = "computes the share of the sky that a point sees at any distance, instead of what is open within the "
-                 "radius",
-         .value = &sky},
-        {.name = "up", .help = "the direction of the sky, x,y,z", .value = &up},
-        {.name = "outside",
-         .help =
-             "where normals point: auto, up, outward, inward, or to the scanner at x,y,z; all but auto turn recorded "
-             "ones, too",
-         .value = &outside},
-        {.name = "normals",
-         .help = "which normals are used; auto = recorded ones where they agree with the planes of the points",
-         .value = OneOf(&normals, normals_words)},
-        {.name = "memory",
-         .help = "memory for the points; larger clouds are computed in tiles",
-         .value = &memory_mib,
-         .unit = "MiB",
-         .low = 64,
-         .high = 1 << 20},
-        {.name = "seed", .help = "scrambles the rays", .value = &seed, .low = 0, .high = 2147483647},
-    };
-}
-
 double default_radius(double extent, double spacing) {
     return std::clamp(extent / 20, 10 * spacing, std::max(200 * spacing, 0.0));
-}
-
-CloudAo::CloudAo(CloudAoOptions options, gpu::Device* device) : options_(std::move(options)), device_(device) {
-    for (const Parameter& row : options_.parameters())
-        check(row);
-    const auto up = triple(options_.up);
-    if (!up || !(up->norm() > 0))
-        throw Misuse(fmt::format("up: '{}' given, expected a direction x,y,z such as 0,0,1", options_.up));
-    up_ = up->normalized();
-    viewpoint_ = triple(options_.outside);
-    constexpr std::array words{"auto", "up", "outward", "inward"};
-    if (!viewpoint_ && std::find(words.begin(), words.end(), options_.outside) == words.end())
-        throw Misuse(fmt::format("outside: '{}' given, expected auto, up, outward, inward, or a position x,y,z",
-                                 options_.outside));
 }
 
 /// One cloud being computed: what all tiles share, and the results so far.
@@ -182,12 +94,9 @@ class CloudAo::Work {
     Work(const CloudAoOptions& options, gpu::Device* device, const Vector3d& up,
          const std::optional<Vector3d>& viewpoint, const PointSet& cloud, const std::optional<Vector3d>& scanner)
         : options_(options), up_(up), given_viewpoint_(viewpoint), scanner_(scanner), cloud_(cloud),
-          watch_(result_.timings) {
+          watch_(result_.timings), sides_(options, up, cloud.z_up) {
         if (device)
             gpu_.emplace(*device);
-        result_.visibility.assign(cloud.points.size(), nothing);
-        result_.confidence.assign(cloud.points.size(), 0.0F);
-        result_.normals.assign(cloud.points.size(), Vector3f::Zero());
         valid_ = finite(cloud.points);
         twins_ = take_out_twins(cloud.points, recorded() ? cloud.normals : std::span<const Vector3d>(), valid_);
         std::vector<Vector3d> some = sampled(cloud.points, valid_, enough_to_judge);
@@ -205,8 +114,11 @@ class CloudAo::Work {
             if (valid_.size() > at_once())
                 settle_sides_of_whole();
             cut_into_tiles(cloud_.points, valid_, result_.radius + 16 * result_.spacing, at_once(),
-                           [&](const Places& core, const Places& round) { tile(core, round); });
+                           [&](const Indices& core, const Indices& round) { tile(core, round); });
         }
+        require_results();
+        for (const std::string& sentence : sides_.doubts)
+            doubt(sentence);
         compute_thinned();
         compute_strays();
         for (const auto& [point, same_as] : twins_) {
@@ -225,6 +137,15 @@ class CloudAo::Work {
     static constexpr std::size_t enough_to_judge = 60000;
     static constexpr double bytes_per_point = 420; ///< measured, Embree's tree included; with a GPU it is less
 
+    /// Made as late as possible: the rays need the memory.
+    void require_results() {
+        const std::size_t count = cloud_.points.size();
+        if (result_.visibility.size() != count)
+            tbb::parallel_invoke([&] { result_.visibility.assign(count, nothing); },
+                                 [&] { result_.confidence.assign(count, 0.0F); },
+                                 [&] { result_.normals.assign(count, Vector3f::Zero()); });
+    }
+
     [[nodiscard]] std::size_t at_once() const {
         const auto fitting = static_cast<std::size_t>(options_.memory_mib * 1048576.0 / bytes_per_point);
         return gpu_ ? std::min(fitting, gpu_->most_points()) : fitting;
@@ -234,26 +155,25 @@ class CloudAo::Work {
                             const std::vector<Vector3d>& some) {
         using Kind = NormalOrientation::Kind;
         if (viewpoint)
-            orientation_ = {Kind::viewpoint, *viewpoint, "the position given by --cloud.outside"};
+            sides_.orientation = {Kind::viewpoint, *viewpoint, "the position given by --cloud.outside"};
         else if (options_.outside == "auto")
-            orientation_ = guessed_orientation(some, scanner, cloud_.z_up);
+            sides_.orientation = guessed_orientation(some, scanner, cloud_.z_up);
         else
-            orientation_ = {options_.outside == "up"        ? Kind::direction
-                            : options_.outside == "outward" ? Kind::outward
-                                                            : Kind::inward,
-                            up_, options_.outside + ", as given"};
-        if (orientation_.kind == Kind::direction || orientation_.kind == Kind::terrain)
-            orientation_.point = up_;
+            sides_.orientation = {options_.outside == "up"        ? Kind::direction
+                                  : options_.outside == "outward" ? Kind::outward
+                                                                  : Kind::inward,
+                                  up_, options_.outside + ", as given"};
+        if (sides_.orientation.kind == Kind::direction || sides_.orientation.kind == Kind::terrain)
+            sides_.orientation.point = up_;
     }
 
     /// Points that lie beyond the cloud are computed by themselves.
     void settle_extent(std::vector<Vector3d>& some) {
         extent_ = extent_of(some);
         std::erase_if(some, [&](const Vector3d& point) { return beyond(point); });
-        const auto strays = std::stable_partition(valid_.begin(), valid_.end(),
-                                                  [&](std::uint32_t i) { return !beyond(cloud_.points[i]); });
-        strays_.assign(strays, valid_.end());
-        valid_.erase(strays, valid_.end());
+        strays_ = indices_where(valid_, [&](std::uint32_t i) { return beyond(cloud_.points[i]); });
+        if (!strays_.empty())
+            valid_ = indices_where(valid_, [&](std::uint32_t i) { return !beyond(cloud_.points[i]); });
     }
     [[nodiscard]] bool beyond(const Vector3d& point) const {
         return (point - extent_.centre).norm() > extent_.farthest;
@@ -263,13 +183,15 @@ class CloudAo::Work {
         std::vector<Vector3d> points, normals;
     };
     /// These points, with the normals that they have.
-    [[nodiscard]] Picked picked(const Places& places) const {
+    [[nodiscard]] Picked picked(const Indices& indices) const {
         Picked some;
-        for (const std::uint32_t i : places) {
-            some.points.push_back(cloud_.points[i]);
-            if (!cloud_.normals.empty())
-                some.normals.push_back(cloud_.normals[i]);
-        }
+        some.points.resize(indices.size());
+        some.normals.resize(cloud_.normals.empty() ? 0 : indices.size());
+        tbb::parallel_for(std::size_t(0), indices.size(), [&](std::size_t k) {
+            some.points[k] = cloud_.points[indices[k]];
+            if (!some.normals.empty())
+                some.normals[k] = cloud_.normals[indices[k]];
+        });
         return some;
     }
 
@@ -301,22 +223,22 @@ class CloudAo::Work {
         if (part_ || options_.sky || !(check.keep > 0))
             return;
         const auto chosen = static_cast<std::uint64_t>(check.keep * 0x1p32);
-        Places kept;
-        std::ranges::copy_if(valid_, std::back_inserter(kept), [&](auto i) { return hash(i, 1U) < chosen; });
+        const Indices kept = indices_where(valid_, [&](std::uint32_t i) { return hash(i, 1U) < chosen; });
         const auto [points, normals] = picked(kept);
         CloudAoOptions options = options_;
         options.radius = result_.radius;
         const PointSet part{points, normals, {}, cloud_.z_up};
         Work some(options, nullptr, up_, given_viewpoint_, part, scanner_);
         some.part_ = true;
-        const Repeatability found =
-            repeatability(cloud_.points, result_.visibility, kept, some.run().visibility, check);
+        const Repeatability found = repeatability(cloud_.points, result_.visibility, kept, some.run().visibility, check,
+                                                  order_.empty() ? valid_ : order_);
+        order_.clear();
         watch_.lap("check on a part");
         result_.expected_error = found.error;
         if (!found.error)
             return;
-        for (std::size_t i = 0; i < result_.confidence.size(); ++i)
-            result_.confidence[i] *= found.confidence[i];
+        tbb::parallel_for(std::size_t(0), result_.confidence.size(),
+                          [&](std::size_t i) { result_.confidence[i] *= found.confidence[i]; });
         result_.notes.push_back(fmt::format(
             "{:.2g} % of the points by themselves give values from which an error of {:.2f} RMS is expected.",
             100 * check.keep, *found.error));
@@ -358,7 +280,7 @@ class CloudAo::Work {
     }
 
     /// Values for `core`, a part of `round`; on the GPU if its memory suffices.
-    void tile(const Places& core, const Places& round) {
+    void tile(const Indices& core, const Indices& round) {
         if (round.empty())
             return;
         if (gpu_ && round.size() <= gpu_->most_points()) {
@@ -375,15 +297,16 @@ class CloudAo::Work {
         tile(core, round, nullptr);
     }
 
-    void tile(const Places& core, const Places& round, CloudGpu* gpu) {
+    void tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
         Fitted planes = planes_of(round, gpu);
         CloudSurface& surface = planes.surface;
         FittedCloud& fitted = planes.points;
         const std::vector<std::uint32_t> lonely = drop_strays(surface, extent_.centre, result_.spacing);
         std::optional<DiscRays> rays;
-        const std::vector<float> side_known = whole_ ? sides_as_in_whole(surface) : settle_sides(surface, rays);
-        for (const std::uint32_t place : lonely)
-            surface.normals[place].setZero();
+        const std::vector<float> side_known =
+            whole_ ? sides_as_in_whole(surface) : sides_.settle(surface, rays, recorded());
+        for (const std::uint32_t index : lonely)
+            surface.normals[index].setZero();
         watch_.lap("sides");
         // Both orders are ascending. A point of the surface is wanted if it stands for one of the core.
         std::vector<char> in_core(core.size() == round.size() ? 0 : round.size(), 0), wanted;
@@ -399,12 +322,12 @@ class CloudAo::Work {
         } else {
             wanted = in_core;
         }
-        const auto is_wanted = [&, &tree = surface.tree](std::size_t place) {
-            return wanted.empty() || wanted[tree.index(place)];
+        const auto is_wanted = [&, &tree = surface.tree](std::size_t index) {
+            return wanted.empty() || wanted[tree.original(index)];
         };
         const float radius = options_.sky ? std::numeric_limits<float>::max() : static_cast<float>(result_.radius);
         const std::optional<Vector3f> up = options_.sky ? std::optional<Vector3f>(up_.cast<float>()) : std::nullopt;
-        std::vector<float> values;
+        Untouched<float> values;
         if (gpu) {
             rays.reset();
             values = gpu->visibility(surface, *directions_, {radius, up, mean_falloff(radius), passes_});
@@ -413,13 +336,13 @@ class CloudAo::Work {
             if (!rays)
                 rays.emplace(surface);
             watch_.lap("tree");
-            values.assign(surface.size(), nothing);
+            values.resize(surface.size());
+            tbb::parallel_for(std::size_t(0), values.size(), [&](std::size_t i) { values[i] = nothing; });
             const std::vector<char> asked =
                 wanted.empty() ? std::vector<char>(surface.size(), 1) : asked_by_means(surface, is_wanted);
-            tbb::parallel_for(tbb::blocked_range<std::size_t>(0, surface.size(), 64), [&](const auto& range) {
-                for (std::size_t i = range.begin(); i < range.end(); ++i)
-                    if (!surface.normals[i].isZero() && asked[i])
-                        values[i] = rays->open(i, *directions_, radius, up);
+            tbb::parallel_for(tbb::blocked_range<std::size_t>(0, surface.tree.leaves(), 8), [&](const auto& range) {
+                for (std::size_t leaf = range.begin(); leaf < range.end(); ++leaf)
+                    rays->open(leaf, *directions_, radius, up, asked, values);
             });
             rays.reset();
             watch_.lap("rays");
@@ -427,26 +350,32 @@ class CloudAo::Work {
                 values = smoothed(surface, values, radius);
             watch_.lap("means");
         }
-        const auto give = [&](std::size_t place, std::size_t point) {
-            result_.visibility[point] = values[place];
-            result_.normals[point] = surface.normals[place];
-            result_.confidence[point] = surface.flatness[place] * resolution(radius, surface.disc_radius[place]) *
-                                        (side_known.empty() ? 1.0F : side_known[place]);
+        require_results();
+        const auto give = [&](std::size_t index, std::size_t point) {
+            result_.visibility[point] = values[index];
+            result_.normals[point] = surface.normals[index];
+            result_.confidence[point] = surface.flatness[index] * resolution(radius, surface.disc_radius[index]) *
+                                        (side_known.empty() ? 1.0F : side_known[index]);
         };
         if (fitted.empty()) {
             tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
                 if (is_wanted(i) && !std::isnan(values[i]))
-                    give(i, round[surface.tree.index(i)]);
+                    give(i, round[surface.tree.original(i)]);
             });
         } else {
-            std::vector<std::uint32_t> place_of(surface.size());
+            std::vector<std::uint32_t> index_of(surface.size());
             for (std::size_t i = 0; i < surface.size(); ++i)
-                place_of[surface.tree.index(i)] = static_cast<std::uint32_t>(i);
+                index_of[surface.tree.original(i)] = static_cast<std::uint32_t>(i);
             tbb::parallel_for(std::size_t(0), round.size(), [&](std::size_t k) {
-                const std::size_t place = place_of[fitted.fitted_of[k]];
-                if ((in_core.empty() || in_core[k]) && !std::isnan(values[place]))
-                    give(place, round[k]);
+                const std::size_t index = index_of[fitted.fitted_of[k]];
+                if ((in_core.empty() || in_core[k]) && !std::isnan(values[index]))
+                    give(index, round[k]);
             });
+        }
+        if (core.size() == valid_.size() && !part_ && fitted.empty()) {
+            order_.resize(round.size());
+            tbb::parallel_for(std::size_t(0), order_.size(),
+                              [&](std::size_t i) { order_[i] = round[surface.tree.original(i)]; });
         }
         watch_.lap("gather");
         result_.tiles = ++tiles_;
@@ -455,11 +384,11 @@ class CloudAo::Work {
     /// A cloud of several tiles, thinned: its sides are settled once, so that tiles agree.
     struct Whole {
         CloudSurface surface;
-        std::vector<float> known; ///< by place; empty where recorded sides are taken
+        std::vector<float> known; ///< by index in the tree; empty where recorded sides are taken
     };
     void settle_sides_of_whole() {
         constexpr std::size_t enough = 300000;
-        Places some;
+        Indices some;
         const std::size_t step = std::max<std::size_t>(1, valid_.size() / enough);
         for (std::size_t k = step / 2; k < valid_.size(); k += step)
             some.push_back(valid_[k]);
@@ -467,11 +396,12 @@ class CloudAo::Work {
         noise_ = 0, moved_ = kept_ = fitted_from_ = 0; // tiles tell of themselves
         drop_strays(surface, extent_.centre, static_cast<double>(surface.spacing));
         std::optional<DiscRays> rays;
-        std::vector<float> known = settle_sides(surface, rays);
+        std::vector<float> known = sides_.settle(surface, rays, recorded());
         whole_ = {std::move(surface), std::move(known)};
         watch_.lap("sides");
     }
-    /// Turns normals like those of the whole's nearest place in the same plane. Returns how sure that is by place.
+    /// Turns normals like those of the whole's nearest point in the same plane. Returns how sure that is by index in
+    /// the tree.
     std::vector<float> sides_as_in_whole(CloudSurface& surface) const {
         const CloudSurface& whole = whole_->surface;
         const Vector3f apart = (surface.middle - whole.middle).cast<float>();
@@ -482,9 +412,9 @@ class CloudAo::Work {
             const float reach = 3 * std::max(whole.spacing, surface.disc_radius[i]);
             constexpr float alike = 0.7F;
             float nearest = std::numeric_limits<float>::infinity(), cosine = 0;
-            whole.tree.for_each_within(at, reach, [&](std::size_t place) {
-                const float turn = normal.isZero() ? 1.0F : normal.dot(whole.normals[place]);
-                const Vector3f offset = whole.tree[place] - at;
+            whole.tree.for_each_within(at, reach, [&](std::size_t index) {
+                const float turn = normal.isZero() ? 1.0F : normal.dot(whole.normals[index]);
+                const Vector3f offset = whole.tree[index] - at;
                 const float off_plane = 2 * offset.dot(normal); // the other side of a board is near, too
                 const float distance = offset.squaredNorm() + off_plane * off_plane;
                 if (std::abs(turn) < alike || distance >= nearest)
@@ -492,7 +422,7 @@ class CloudAo::Work {
                 nearest = distance;
                 cosine = turn;
                 if (!known.empty())
-                    known[i] = whole_->known[place];
+                    known[i] = whole_->known[index];
             });
             if (cosine < 0)
                 normal = -normal;
@@ -500,131 +430,6 @@ class CloudAo::Work {
         return known;
     }
 
-    /// The sides that the cloud itself tells, or a person.
-    Sides found_sides(const CloudSurface& surface, std::optional<DiscRays>& rays,
-                      const SidesEffort& effort = {}) const {
-        using Kind = NormalOrientation::Kind;
-        if (orientation_.kind == Kind::viewpoint)
-            return sides_to(surface, (orientation_.point - surface.middle).cast<float>());
-        if (orientation_.kind == Kind::direction)
-            return sides_of(surface, nullptr, orientation_.point.cast<float>().normalized(), SidesRule::up);
-        if (!rays)
-            rays.emplace(surface);
-        const std::optional<Vector3f> up = orientation_.kind == Kind::terrain || cloud_.z_up
-                                               ? std::optional<Vector3f>(up_.cast<float>())
-                                               : std::nullopt;
-        const SidesRule rule = orientation_.kind == Kind::terrain   ? SidesRule::terrain
-                               : orientation_.kind == Kind::outward ? SidesRule::outward
-                               : orientation_.kind == Kind::inward  ? SidesRule::inward
-                                                                    : SidesRule::automatic;
-        return sides_of(surface, &*rays, up, rule, effort);
-    }
-
-    /// Turns the normals to the sides that were scanned. Returns how sure that is by place, 0 .. 1; empty where the
-    /// recorded sides are taken.
-    std::vector<float> settle_sides(CloudSurface& surface, std::optional<DiscRays>& rays) {
-        if (recorded())
-            return settle_recorded_sides(surface, rays);
-        Sides found = found_sides(surface, rays);
-        for (std::size_t i = 0; i < surface.size(); ++i)
-            if (found.sign[i] < 0)
-                surface.normals[i] = -surface.normals[i];
-        // What has no plane faces the scanner, or the sky.
-        using Kind = NormalOrientation::Kind;
-        const bool to_sky = orientation_.kind == Kind::direction || orientation_.kind == Kind::terrain;
-        if (to_sky || orientation_.kind == Kind::viewpoint)
-            for (std::size_t i = 0; i < surface.size(); ++i)
-                if (surface.normals[i].isZero())
-                    surface.normals[i] =
-                        to_sky ? Vector3f(orientation_.point.cast<float>().normalized())
-                               : Vector3f((orientation_.point - surface.middle).cast<float>() - surface.tree[i])
-                                     .stableNormalized();
-        note_sides(found);
-        return std::move(found.confidence);
-    }
-
-    /// Recorded sides are right as a rule. Random ones show within patches; patches turned over, or all, show in where
-    /// a scanner could have stood.
-    std::vector<float> settle_recorded_sides(CloudSurface& surface, std::optional<DiscRays>& rays) {
-        constexpr double hardly_random = 0.05, mostly_random = 0.2, some_opposed = 0.05, all_opposed = 0.9;
-        constexpr float sure = 0.8F;
-        if (options_.normals != CloudNormals::automatic)
-            return {};
-        const bool told = options_.outside != "auto";
-        const auto opposed_share = [&](const CloudSurface& of, const Sides& sides) {
-            double opposed = 0, all = 0;
-            for (std::size_t i = 0; i < of.size(); ++i)
-                if (sides.confidence[i] > sure && !of.normals[i].isZero()) {
-                    all += 1;
-                    opposed += sides.sign[i] < 0;
-                }
-            constexpr double enough = 0.3; // of the points: else nothing is said
-            return all > enough * static_cast<double>(of.size()) ? opposed / all : 0;
-        };
-        const auto all_is_well = [&](const CloudSurface& of, std::optional<DiscRays>& rays_of) {
-            constexpr SidesEffort quick{4000, 60, 300};
-            return recorded_sides(of).random <= hardly_random &&
-                   opposed_share(of, found_sides(of, rays_of, quick)) <= some_opposed;
-        };
-        if (constexpr std::size_t enough = 100000; !told && surface.size() > 2 * enough) {
-            const CloudSurface some = thinned(surface, enough);
-            if (std::optional<DiscRays> rays_of_some; all_is_well(some, rays_of_some))
-                return {};
-        } else if (!told && all_is_well(surface, rays)) {
-            return {};
-        }
-        const RecordedSides order = recorded_sides(surface);
-        const bool in_order = order.random <= hardly_random;
-        Sides found;
-        double opposed = 0;
-        found = found_sides(surface, rays);
-        opposed = opposed_share(surface, found);
-        if (in_order && !told && opposed <= some_opposed)
-            return {};
-        if (constexpr double clearly = 0.3; in_order && !told && opposed > all_opposed && found.margin < clearly) {
-            const bool viewed = orientation_.kind == NormalOrientation::Kind::viewpoint;
-            if (cloud_.z_up)
-                doubt(fmt::format("{:.0f} % of the recorded normals look down, though the cloud seems to be seen from "
-                                  "above; they are kept: --cloud.outside up turns them, --cloud.normals recorded is "
-                                  "sure of them",
-                                  100 * opposed));
-            else if (orientation_.kind != NormalOrientation::Kind::terrain && !found.doubt) // z may point anywhere
-                doubt(fmt::format("{:.0f} % of the recorded normals face away from {}; they are kept: --cloud.outside "
-                                  "turns them, --cloud.normals recorded is sure of them",
-                                  100 * opposed, viewed ? orientation_.why : "where scanners could have stood"));
-            return {};
-        }
-        const bool all = in_order || told || order.random > mostly_random;
-        std::size_t turned = 0;
-        for (std::size_t i = 0; i < surface.size(); ++i)
-            if (found.sign[i] < 0 && (all || found.confidence[i] > sure) && !surface.normals[i].isZero()) {
-                surface.normals[i] = -surface.normals[i];
-                ++turned;
-            }
-        turned_ += turned;
-        sided_ += surface.size();
-        if (told)
-            turned_why_ = "--cloud.outside says so";
-        else if (in_order)
-            turned_why_ = fmt::format("where sides are sure, {:.0f} % of them opposed them", 100 * opposed);
-        else
-            turned_why_ =
-                fmt::format("{:.0f} % of the points lie in patches whose sides look random", 100 * order.random);
-        if (!told && (in_order || turned > surface.size() * 3 / 5))
-            doubt(fmt::format("{:.0f} % of the recorded normals face away from where scanners could have stood; they "
-                              "were turned: --cloud.normals recorded keeps them",
-                              in_order ? 100 * opposed
-                                       : 100 * static_cast<double>(turned) / static_cast<double>(surface.size())));
-        note_sides(found);
-        return all ? std::move(found.confidence) : std::vector<float>();
-    }
-
-    void note_sides(const Sides& found) {
-        if (!found.why.empty())
-            orientation_.why = found.why;
-        if (found.doubt)
-            doubt(*found.doubt);
-    }
     void doubt(const std::string& sentence) {
         if (std::find(result_.doubts.begin(), result_.doubts.end(), sentence) == result_.doubts.end())
             result_.doubts.push_back(sentence);
@@ -652,7 +457,7 @@ class CloudAo::Work {
         FittedCloud points; ///< empty where the surface's points are those of the cloud
     };
     /// Neighbours and planes of these points, without their noise.
-    Fitted planes_of(const Places& which, CloudGpu* gpu) {
+    Fitted planes_of(const Indices& which, CloudGpu* gpu) {
         std::vector<Vector3d> some_points, some_normals;
         const auto pick = [&](std::span<const Vector3d> from, std::vector<Vector3d>& to) {
             if (which.size() == from.size())
@@ -696,8 +501,8 @@ class CloudAo::Work {
                 ++count[point];
             surface.stands_for.resize(surface.size());
             for (std::size_t i = 0; i < surface.size(); ++i) {
-                surface.stands_for[i] = count[surface.tree.index(i)];
-                if (fitted.alone[surface.tree.index(i)])
+                surface.stands_for[i] = count[surface.tree.original(i)];
+                if (fitted.alone[surface.tree.original(i)])
                     surface.disc_radius[i] = 0;
             }
         }
@@ -715,17 +520,19 @@ class CloudAo::Work {
                 fmt::format("noise of {:.2g} (sigma across surfaces): {:.0f} % of the points were "
                             "moved onto fitted planes; {} discs stand for them.",
                             noise_, 100.0 * static_cast<double>(moved_) / static_cast<double>(fitted_from_), kept_));
-        const std::string facing = orientation_.kind == NormalOrientation::Kind::viewpoint ? "turned to " : "turned ";
-        if (recorded() && turned_ > 0)
+        const std::string facing =
+            sides_.orientation.kind == NormalOrientation::Kind::viewpoint ? "turned to " : "turned ";
+        if (recorded() && sides_.turned_points > 0)
             result_.notes.push_back(fmt::format("normals: recorded; {:.2g} % of them were turned, since {}; {}{}.",
-                                                100.0 * static_cast<double>(turned_) / static_cast<double>(sided_),
-                                                turned_why_, facing, orientation_.why));
+                                                100.0 * static_cast<double>(sides_.turned_points) /
+                                                    static_cast<double>(sides_.judged_points),
+                                                sides_.turned_why, facing, sides_.orientation.why));
         else
             result_.notes.push_back(recorded() ? "normals: recorded."
                                                : "normals: from planes through 16 neighbours, " + facing +
-                                                     orientation_.why + ".");
-        const bool by_whole = orientation_.kind != NormalOrientation::Kind::viewpoint &&
-                              orientation_.kind != NormalOrientation::Kind::direction;
+                                                     sides_.orientation.why + ".");
+        const bool by_whole = sides_.orientation.kind != NormalOrientation::Kind::viewpoint &&
+                              sides_.orientation.kind != NormalOrientation::Kind::direction;
         if (tiles_ > 1)
             result_.notes.push_back(
                 fmt::format("in {} tiles of at most {} points each{}.", tiles_, at_once(),
@@ -746,8 +553,8 @@ class CloudAo::Work {
                             "others: they are taken for strays and occlude nothing else.",
                             strays_.size(), extent_.farthest));
         std::size_t unknown = 0;
-        for (const Places* places : {&valid_, &strays_})
-            for (const std::uint32_t i : *places)
+        for (const Indices* indices : {&valid_, &strays_})
+            for (const std::uint32_t i : *indices)
                 unknown += std::isnan(result_.visibility[i]);
         if (unknown > 0)
             result_.notes.push_back(
@@ -764,13 +571,12 @@ class CloudAo::Work {
     Watch watch_;
     std::optional<CloudGpu> gpu_;
     std::optional<DirectionSet> directions_;
-    NormalOrientation orientation_;
+    SettledSides sides_;
     Extent extent_;
-    Places valid_, strays_;   ///< strays lie beyond the cloud
+    Indices valid_, strays_;  ///< strays lie beyond the cloud
+    Indices order_;           ///< of a cloud in one tile: its points in the order of the tree
     std::vector<Twin> twins_; ///< copies of points, in neither
     bool normals_refused_ = false;
-    std::size_t turned_ = 0, sided_ = 0; ///< of the recorded normals, where some were turned
-    std::string turned_why_;
     float noise_ = 0;
     std::size_t moved_ = 0, kept_ = 0, fitted_from_ = 0; ///< points; of tiles, those of their rims as well
     std::optional<Whole> whole_;

@@ -38,6 +38,17 @@ std::vector<BufferRow> tree_buffers(const NeighbourTree& tree) {
             {"begins", (leaves_of(tree) + 1) * sizeof(std::uint32_t)}};
 }
 
+/// On all cores.
+template <class Value>
+void copy(std::span<const Value> from, std::span<Value> to) {
+    constexpr std::size_t at_once = 1 << 16;
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, from.size(), at_once), [&](const auto& range) {
+        std::copy(from.begin() + static_cast<std::ptrdiff_t>(range.begin()),
+                  from.begin() + static_cast<std::ptrdiff_t>(range.end()),
+                  to.begin() + static_cast<std::ptrdiff_t>(range.begin()));
+    });
+}
+
 /// Passes from the points and the normals of their discs to the boxes of all nodes. Points without discs need no
 /// normals: any buffer of that size will do.
 std::vector<PassRow> box_passes(const NeighbourTree& tree, int normals) {
@@ -93,7 +104,7 @@ CloudGpu::Neighbourhoods CloudGpu::neighbourhoods(const NeighbourTree& tree) {
     return {std::move(program), found_near, found_rounds};
 }
 
-std::vector<float> CloudGpu::visibility(const CloudSurface& surface, const DirectionSet& directions, const Task& task) {
+Untouched<float> CloudGpu::visibility(const CloudSurface& surface, const DirectionSet& directions, const Task& task) {
     const NeighbourTree& tree = surface.tree;
     const std::size_t count = tree.size(), direction_count = directions.runs() * directions.rays();
     const int normals = others, directions_at = others + 1, near = others + 2, values = others + 3;
@@ -137,7 +148,7 @@ std::vector<float> CloudGpu::visibility(const CloudSurface& surface, const Direc
         to_normals[i] = {n.x(), n.y(), n.z(), surface.roughness[i]};
     });
     if (task.means > 0)
-        std::ranges::copy(surface.near, program.host_as<CloudSurface::Near>(near).begin());
+        copy(std::span<const CloudSurface::Near>(surface.near), program.host_as<CloudSurface::Near>(near));
     const auto to_directions = program.host_as<vec4>(directions_at);
     for (std::size_t i = 0; i < directions.runs(); ++i)
         for (int ray = 0; ray < static_cast<int>(directions.rays()); ++ray) {
@@ -155,8 +166,9 @@ std::vector<float> CloudGpu::visibility(const CloudSurface& surface, const Direc
                   .falloff = task.mean_falloff,
                   .only_up = task.up.has_value(),
                   .up = {up.x(), up.y(), up.z()}});
-    const auto found = program.host_as<float>(result);
-    return {found.begin(), found.end()};
+    Untouched<float> found(count);
+    copy(std::span<const float>(program.host_as<float>(result)), std::span(found));
+    return found;
 }
 
 } // namespace scanshade

@@ -39,8 +39,8 @@ class CloudGpu {
         int means = 0;
     };
     /// In the tree's order; NaN for points without a plane.
-    [[nodiscard]] std::vector<float> visibility(const CloudSurface& surface, const DirectionSet& directions,
-                                                const Task& task);
+    [[nodiscard]] Untouched<float> visibility(const CloudSurface& surface, const DirectionSet& directions,
+                                              const Task& task);
 
     /// Device milliseconds of all calls so far, by pass, transfers included.
     [[nodiscard]] const Timings& timings() const { return timings_; }

@@ -35,7 +35,7 @@ struct Facing {
 
     /// The other side of a thin board is no noise.
     [[nodiscard]] bool alike(std::size_t one, std::size_t other) const {
-        return normals.empty() || normals[tree.index(one)].dot(normals[tree.index(other)]) >= 0;
+        return normals.empty() || normals[tree.original(one)].dot(normals[tree.original(other)]) >= 0;
     }
 };
 
@@ -65,13 +65,13 @@ float spread_within_cells(std::span<const Vector3f> offsets) {
     return freedom > 0 ? std::sqrt(std::max(squares, 0.0F) / freedom) : 0;
 }
 
-Ball ball_round(const Facing& facing, std::size_t middle_place, float radius) {
-    const Vector3f& at = facing.tree[middle_place];
+Ball ball_round(const Facing& facing, std::size_t middle_index, float radius) {
+    const Vector3f& at = facing.tree[middle_index];
     Moments moments;
     std::vector<Vector3f> offsets;
-    facing.tree.for_each_within(at, radius, [&](std::size_t place) {
-        if (offsets.size() < most_points && facing.alike(place, middle_place)) {
-            offsets.emplace_back((facing.tree[place] - at) / radius);
+    facing.tree.for_each_within(at, radius, [&](std::size_t index) {
+        if (offsets.size() < most_points && facing.alike(index, middle_index)) {
+            offsets.emplace_back((facing.tree[index] - at) / radius);
             moments.add(offsets.back());
         }
     });
@@ -91,20 +91,20 @@ Ball ball_round(const Facing& facing, std::size_t middle_place, float radius) {
             radius * spread_within_cells(offsets), square > 0 ? fourth / square : 3, points};
 }
 
-std::optional<float> sigma_round(const Facing& facing, std::size_t place, float widest) {
+std::optional<float> sigma_round(const Facing& facing, std::size_t index, float widest) {
     constexpr float two_sheets = 1.6F;          // kurtosis of noisy sheets five sigma apart
     constexpr float growth = 1.5F, flat = 3.5F; // a disc's width is half its radius
     constexpr float no_thicker = 1.3F, rounding = 2e-4F, mostly = 0.7F;
     Nearest nearest;
-    facing.tree.find_round(place, 16, nearest);
+    facing.tree.find_round(index, 16, nearest);
     if (nearest.all().empty())
         return std::nullopt;
     float radius = std::sqrt(nearest.all().back().distance2);
     if (!(radius > 0))
         return std::nullopt;
-    for (Ball ball = ball_round(facing, place, radius); radius < widest && ball.points <= most_points / 2;) {
+    for (Ball ball = ball_round(facing, index, radius); radius < widest && ball.points <= most_points / 2;) {
         radius *= growth;
-        const Ball larger = ball_round(facing, place, radius);
+        const Ball larger = ball_round(facing, index, radius);
         if (ball.points >= fewest_points && ball.width > flat * ball.thickness &&
             larger.thickness <= std::max(no_thicker * ball.thickness, rounding * radius) &&
             (!facing.normals.empty() || larger.kurtosis > two_sheets) &&
@@ -121,18 +121,18 @@ CloudNoise::CloudNoise(const NeighbourTree& tree, float widest, std::span<const 
     const Facing facing{tree, normals};
     const std::size_t asked = std::min(sample, tree.size());
     std::vector<std::optional<float>> found(asked);
-    const auto place_of = [&](std::size_t i) { return (2 * i + 1) * tree.size() / (2 * asked); };
+    const auto index_of = [&](std::size_t i) { return (2 * i + 1) * tree.size() / (2 * asked); };
     tbb::parallel_for(std::size_t(0), asked,
-                      [&](std::size_t i) { found[i] = sigma_round(facing, place_of(i), widest); });
+                      [&](std::size_t i) { found[i] = sigma_round(facing, index_of(i), widest); });
     for (std::size_t i = 0; i < asked; ++i)
         if (found[i]) {
-            places_.push_back(tree[place_of(i)]);
+            positions_.push_back(tree[index_of(i)]);
             sigmas_.push_back(*found[i]);
         }
     constexpr std::size_t fewest_share = 5; // a fifth
     if (sigmas_.empty() || fewest_share * sigmas_.size() < asked) {
         sigmas_.clear();
-        places_.clear();
+        positions_.clear();
         return;
     }
     median_ = scanshade::median(sigmas_);
@@ -148,8 +148,8 @@ float CloudNoise::at(const Vector3f& point) const {
     };
     std::array<Near, wanted> near;
     std::size_t count = 0;
-    for (std::size_t i = 0; i < places_.size(); ++i) {
-        const float distance2 = (places_[i] - point).squaredNorm();
+    for (std::size_t i = 0; i < positions_.size(); ++i) {
+        const float distance2 = (positions_[i] - point).squaredNorm();
         if (count == wanted && distance2 >= near[count - 1].distance2)
             continue;
         std::size_t at = count < wanted ? count++ : count - 1;

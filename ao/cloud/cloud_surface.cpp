@@ -2,14 +2,16 @@
 #include "ao/cloud/cloud_surface.h"
 
 #include "ao/cloud/cloud_gpu.h"
+#include "ao/cloud/leaf_neighbours.h"
 #include "ao/cloud/moments.h"
+#include "ao/cloud/order_statistics.h"
 #include "projection/statistics.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
-#include <functional>
 #include <limits>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
@@ -32,10 +34,10 @@ struct Plane {
     float variance_narrow = 0, variance_wide = 0; ///< within the plane
 };
 
-Plane plane_round(const NeighbourTree& tree, std::size_t place, std::span<const Nearest::Neighbour> near) {
+Plane plane_round(const NeighbourTree& tree, std::size_t index, std::span<const Nearest::Neighbour> near) {
     if (near.size() < 2 || !(near.back().distance2 > 0))
         return {};
-    const Vector3f& at = tree[place];
+    const Vector3f& at = tree[index];
     const float scale = -2 / near.back().distance2; // the farthest weighs e^-2
     float sum = 1;
     Vector3f mean = Vector3f::Zero();
@@ -61,7 +63,7 @@ bool on_a_line(const Plane& plane) { return !(plane.variance_narrow > 0.01F * pl
 /// Discs are as wide as the gaps to their neighbours, within half and twice their neighbours' discs: an outlier must
 /// not get a large disc.
 void limit_discs(CloudSurface& surface) {
-    std::vector<float> limited(surface.size());
+    Untouched<float> limited(surface.size());
     tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
         std::array<float, CloudSurface::kept> round;
         std::transform(surface.near[i].begin(), surface.near[i].end(), round.begin(),
@@ -77,16 +79,16 @@ bool is_direction(const Vector3d& normal) { return normal.allFinite() && normal.
 
 /// Orients estimated normals like given ones next to them.
 void orient_like_given(CloudSurface& surface, std::span<const Vector3d> given) {
-    for (std::size_t i = 0; i < surface.size(); ++i) {
-        if (is_direction(given[surface.tree.index(i)]))
-            continue;
+    tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) { // given normals are not turned
+        if (is_direction(given[surface.tree.original(i)]))
+            return;
         Vector3f beside = Vector3f::Zero();
         for (const std::uint32_t j : surface.near[i])
-            if (is_direction(given[surface.tree.index(j)]))
+            if (is_direction(given[surface.tree.original(j)]))
                 beside += surface.normals[j];
         if (surface.normals[i].dot(beside) < 0)
             surface.normals[i] = -surface.normals[i];
-    }
+    });
 }
 
 } // namespace
@@ -95,13 +97,14 @@ CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normal
                            std::span<const Vector3f> axes) {
     const std::size_t count = points.size();
     CloudSurface surface{points.middle, std::move(points.tree), {}, {}, {}, {}, {}, {}};
-    std::vector<float> cosines(normals.empty() ? 0 : count, 1.0F); // between given normals and planes
+    Untouched<float> cosines(normals.empty() ? 0 : count); // between given normals and planes
     surface.near.resize(count);
     surface.normals.resize(count);
     surface.disc_radius.resize(count);
     surface.roughness.resize(count);
     surface.flatness.resize(count);
-    std::vector<float> sixth(count);
+    Untouched<float> sixth(count);
+    std::atomic<bool> all_given = true;
     const auto settle = [&](std::size_t i, std::size_t found, Plane plane) {
         if (on_a_line(plane) && found == usual) {
             Nearest far;
@@ -115,16 +118,19 @@ CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normal
         const float variance = plane.variance_across + plane.variance_narrow + plane.variance_wide;
         surface.flatness[i] = on_a_line(plane) ? 0 : 1 - 3 * plane.variance_across / variance;
         surface.normals[i] = on_a_line(plane) ? Vector3f(Vector3f::Zero()) : plane.normal;
-        if (!axes.empty() && !axes[surface.tree.index(i)].isZero())
-            surface.normals[i] = axes[surface.tree.index(i)];
+        if (!axes.empty() && !axes[surface.tree.original(i)].isZero())
+            surface.normals[i] = axes[surface.tree.original(i)];
         if (normals.empty())
             return;
-        if (const Vector3d& given = normals[surface.tree.index(i)]; is_direction(given)) {
+        if (const Vector3d& given = normals[surface.tree.original(i)]; is_direction(given)) {
             const Vector3f unit = given.normalized().cast<float>();
             cosines[i] = surface.normals[i].isZero() ? 1.0F : std::abs(unit.dot(surface.normals[i]));
             constexpr float flat = 0.1F; // roughness / spacing: the plane's normal is then within a degree or two
             const bool sure = !surface.normals[i].isZero() && surface.roughness[i] < flat * sixth[i] / sixth_on_grid;
             surface.normals[i] = sure ? checked_normal(unit, surface.normals[i]) : unit;
+        } else {
+            cosines[i] = 1;
+            all_given.store(false, std::memory_order_relaxed);
         }
     };
     if (gpu) {
@@ -136,29 +142,19 @@ CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normal
             settle(i, found, {{normal.x, normal.y, normal.z}, variance.x, variance.y, variance.z});
         });
     } else {
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 512), [&](const auto& range) {
-            Nearest found;
-            float reach =
-                std::numeric_limits<float>::infinity(); // of the previous point, whose neighbours are near ours
-            for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                const float moved = i > range.begin() ? (surface.tree[i] - surface.tree[i - 1]).norm() : 0;
-                const float known = (reach + moved) * (1 + 1e-5F);
-                surface.tree.find_round(i, usual, found, known * known);
-                const auto near = found.all();
-                reach =
-                    near.size() == usual ? std::sqrt(near.back().distance2) : std::numeric_limits<float>::infinity();
-                for (std::size_t k = 0; k < CloudSurface::kept; ++k)
-                    surface.near[i][k] = k < near.size() ? near[k].point : static_cast<std::uint32_t>(i);
-                sixth[i] = near.empty() ? 0 : std::sqrt(near[std::min<std::size_t>(5, near.size() - 1)].distance2);
-                settle(i, near.size(), plane_round(surface.tree, i, near));
-            }
+        for_each_neighbourhood(surface.tree, usual, [&](std::size_t i, std::span<const Nearest::Neighbour> near) {
+            for (std::size_t k = 0; k < CloudSurface::kept; ++k)
+                surface.near[i][k] = k < near.size() ? near[k].point : static_cast<std::uint32_t>(i);
+            sixth[i] = near.empty() ? 0 : std::sqrt(near[std::min<std::size_t>(5, near.size() - 1)].distance2);
+            settle(i, near.size(), plane_round(surface.tree, i, near));
         });
     }
-    surface.spacing = median(std::move(sixth), 0) / sixth_on_grid;
+    surface.spacing = median_of_lengths(sixth) / sixth_on_grid;
     limit_discs(surface);
     if (!normals.empty()) {
-        surface.agreement = static_cast<double>(median(std::move(cosines), 0));
-        orient_like_given(surface, normals);
+        surface.agreement = static_cast<double>(median_of_lengths(cosines));
+        if (!all_given)
+            orient_like_given(surface, normals);
     }
     return surface;
 }

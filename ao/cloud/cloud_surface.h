@@ -43,17 +43,17 @@ struct CloudSurface {
 
     Eigen::Vector3d middle = Eigen::Vector3d::Zero(); ///< of the box round the points, so that single precision serves
     NeighbourTree tree;
-    std::vector<Near> near; ///< indices in the tree's order, nearest first; the point's own where there are fewer
-    std::vector<Eigen::Vector3f> normals; ///< unit; zero where the neighbours make no plane
-    std::vector<float> disc_radius;       ///< covers the gaps between neighbours; 0 for a lonely point
-    std::vector<float> roughness; ///< one sigma of the neighbours' distances from the plane, in the cloud's unit
-    std::vector<float> flatness;  ///< 1 - 3 times the surface variation (Pauly, Gross and Kobbelt 2002): 1 = a plane
+    Untouched<Near> near; ///< indices in the tree's order, nearest first; the point's own where there are fewer
+    Untouched<Eigen::Vector3f> normals; ///< unit; zero where the neighbours make no plane
+    Untouched<float> disc_radius;       ///< covers the gaps between neighbours; 0 for a lonely point
+    Untouched<float> roughness;         ///< one sigma of the neighbours' distances from the plane, in the cloud's unit
+    Untouched<float> flatness; ///< 1 - 3 times the surface variation (Pauly, Gross and Kobbelt 2002): 1 = a plane
     std::vector<std::uint32_t> stands_for; ///< how many points recorded; empty = one each
     float spacing = 0;                     ///< median distance of points: the side of a square that holds one
     double agreement = 1; ///< median |cosine| between given normals and planes: near 1/2 where the given ones are noise
 
     [[nodiscard]] std::size_t size() const { return tree.size(); }
-    [[nodiscard]] std::uint32_t weight(std::size_t place) const { return stands_for.empty() ? 1 : stands_for[place]; }
+    [[nodiscard]] std::uint32_t weight(std::size_t index) const { return stands_for.empty() ? 1 : stands_for[index]; }
 };
 
 /// Finds neighbours and planes of `points`. `normals` is empty or holds one per point, in the order given; those of

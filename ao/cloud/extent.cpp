@@ -1,6 +1,8 @@
 // The extent of a cloud by order statistics, and strays by the distance of their neighbours.
 #include "ao/cloud/extent.h"
 
+#include "ao/cloud/indices_where.h"
+#include "ao/cloud/leaf_neighbours.h"
 #include "projection/statistics.h"
 
 #include <algorithm>
@@ -49,14 +51,9 @@ Extent extent_of(std::span<const Vector3d> sample) {
     // Single precision suffices: strays lie so far from each other that rounding does not matter.
     const NeighbourTree tree(local_points(extent.centre, sample));
     std::vector<char> lonely(sample.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, sample.size(), 256), [&](const auto& range) {
-        Nearest found;
-        for (std::size_t place = range.begin(); place < range.end(); ++place) {
-            tree.find_round(place, 6, found);
-            const double sixth = found.all().empty() ? 0 : std::sqrt(static_cast<double>(found.all().back().distance2));
-            lonely[tree.index(place)] =
-                found.all().size() == 6 && sixth > lonely_share * static_cast<double>(tree[place].norm());
-        }
+    for_each_neighbourhood(tree, 6, [&](std::size_t i, std::span<const Nearest::Neighbour> near) {
+        const double sixth = near.empty() ? 0 : std::sqrt(static_cast<double>(near.back().distance2));
+        lonely[tree.original(i)] = near.size() == 6 && sixth > lonely_share * static_cast<double>(tree[i].norm());
     });
     std::vector<std::pair<double, std::uint32_t>> far; // by distance, of those that are not lonely
     for (std::uint32_t i = 0; i < sample.size(); ++i)
@@ -84,7 +81,7 @@ Extent extent_of(std::span<const Vector3d> sample) {
 std::vector<std::uint32_t> drop_strays(CloudSurface& surface, const Vector3d& centre, double spacing) {
     constexpr std::size_t sixth = 5;
     constexpr float lonely_spacings = 8, detached_from = 4, apart_from = 1.5F;
-    std::vector<float> reach(surface.size()); // distance of the sixth neighbour
+    Untouched<float> reach(surface.size()); // distance of the sixth neighbour
     tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
         reach[i] = (surface.tree[surface.near[i][sixth]] - surface.tree[i]).norm();
     });
@@ -105,14 +102,11 @@ std::vector<std::uint32_t> drop_strays(CloudSurface& surface, const Vector3d& ce
         if (reach[i] > detached_from * of_near[1] || second > apart_from * median(of_near))
             kind[i] = detached;
     });
-    std::vector<std::uint32_t> all_alone;
-    for (std::size_t i = 0; i < surface.size(); ++i) {
+    tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
         if (kind[i] != connected)
             surface.disc_radius[i] = 0;
-        if (kind[i] == lonely)
-            all_alone.push_back(static_cast<std::uint32_t>(i));
-    }
-    return all_alone;
+    });
+    return indices_where(surface.size(), [&](std::size_t i) { return kind[i] == lonely; });
 }
 
 } // namespace scanshade

@@ -9,7 +9,7 @@
 
 namespace scanshade {
 
-/// The place and size of a cloud, whatever lies far from it.
+/// The position and size of a cloud, whatever lies far from it.
 struct Extent {
     Eigen::Vector3d centre = Eigen::Vector3d::Zero(); ///< the median along each axis
     double size = 0; ///< the diagonal of the box that holds all but the lowest and highest hundredth along each axis
@@ -22,8 +22,8 @@ struct Extent {
 [[nodiscard]] Extent extent_of(std::span<const Eigen::Vector3d> sample);
 
 /// Takes the discs of strays within the surface, so that they occlude nothing: points whose sixth neighbour is four
-/// times farther than those neighbours' own. Returns the places of lonely ones, for which nothing tells a surface:
-/// their sixth neighbour is farther than 8 spacings and a tenth of their distance from the centre.
+/// times farther than those neighbours' own. Returns the indices of lonely ones, for which nothing tells a surface.
+/// Their sixth neighbour is farther than 8 spacings and a tenth of their distance from the centre.
 std::vector<std::uint32_t> drop_strays(CloudSurface& surface, const Eigen::Vector3d& centre, double spacing);
 
 } // namespace scanshade

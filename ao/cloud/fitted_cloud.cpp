@@ -32,7 +32,7 @@ struct Cell {
     bool alone = false;                               ///< the noise explains no other cells near it as of its surface
 };
 
-/// The points in cells. Members are places in the tree's order.
+/// The points in cells. Members are indices in the tree.
 struct Cells {
     std::vector<Cell> all;
     Indices members;
@@ -50,15 +50,14 @@ bool sides_agree(const NeighbourTree& tree, std::span<const Vector3d> normals) {
     constexpr double random_from = 0.1;
     std::size_t opposed = 0, pairs = 0;
     for (std::size_t k = 0; k < sample; ++k) {
-        const std::size_t place = (2 * k + 1) * tree.size() / (2 * sample);
+        const std::size_t index = (2 * k + 1) * tree.size() / (2 * sample);
         Nearest nearest;
-        tree.find_round(place, 1, nearest);
+        tree.find_round(index, 1, nearest);
         if (nearest.all().empty())
             continue;
         ++pairs;
-        opposed +=
-            unit_normal(normals[tree.index(place)]).dot(unit_normal(normals[tree.index(nearest.all()[0].point)])) <
-            -0.7F;
+        opposed += unit_normal(normals[tree.original(index)])
+                       .dot(unit_normal(normals[tree.original(nearest.all()[0].point)])) < -0.7F;
     }
     return static_cast<double>(opposed) < random_from * static_cast<double>(pairs);
 }
@@ -114,8 +113,8 @@ class Thinning {
             Eigen::AlignedBox3f box;
             const std::size_t first = begin + (end - begin) * part / parts,
                               last = begin + (end - begin) * (part + 1) / parts;
-            for (std::size_t place = first; place < last; ++place)
-                box.extend(tree_[place]);
+            for (std::size_t index = first; index < last; ++index)
+                box.extend(tree_[index]);
             if (last - first < 2)
                 continue;
             Vector3f sizes = box.sizes();
@@ -136,8 +135,8 @@ class Thinning {
             return;
         }
         Eigen::AlignedBox3f box;
-        for (const std::uint32_t place : members)
-            box.extend(tree_[place]);
+        for (const std::uint32_t index : members)
+            box.extend(tree_[index]);
         const Vector3f sizes = box.sizes();
         if (members.size() == 1 || (sizes.norm() <= thinned_to * sigma && one_side(members))) {
             part.all.push_back(cell_of(members, sigma));
@@ -147,7 +146,7 @@ class Thinning {
         if (sizes.norm() <= thinned_to * sigma) { // two sides of a thin board
             const Vector3f first = first_normal(members);
             const auto middle = std::stable_partition(members.begin(), members.end(),
-                                                      [&](std::uint32_t place) { return on_side_of(first, place); });
+                                                      [&](std::uint32_t index) { return on_side_of(first, index); });
             const auto front = static_cast<std::size_t>(middle - members.begin());
             halve(part, begin, begin + front, sigma);
             halve(part, begin + front, end, sigma);
@@ -164,7 +163,7 @@ class Thinning {
         halve(part, begin + half, end, sigma);
     }
 
-    [[nodiscard]] Vector3f normal_of(std::uint32_t place) const { return unit_normal(normals_[tree_.index(place)]); }
+    [[nodiscard]] Vector3f normal_of(std::uint32_t index) const { return unit_normal(normals_[tree_.original(index)]); }
 
     [[nodiscard]] float alike_to(const Vector3f& first, const Vector3f& other) const {
         return sides_ ? first.dot(other) : std::abs(first.dot(other));
@@ -172,14 +171,14 @@ class Thinning {
 
     /// Of the first member that has one; zero if none has.
     [[nodiscard]] Vector3f first_normal(std::span<const std::uint32_t> members) const {
-        for (const std::uint32_t place : members)
-            if (const Vector3f normal = normal_of(place); !normal.isZero())
+        for (const std::uint32_t index : members)
+            if (const Vector3f normal = normal_of(index); !normal.isZero())
                 return normal;
         return Vector3f::Zero();
     }
-    [[nodiscard]] bool on_side_of(const Vector3f& first, std::uint32_t place) const {
+    [[nodiscard]] bool on_side_of(const Vector3f& first, std::uint32_t index) const {
         constexpr float from = 0.5F;
-        const Vector3f normal = normal_of(place);
+        const Vector3f normal = normal_of(index);
         return normal.isZero() || alike_to(first, normal) >= from;
     }
     [[nodiscard]] bool one_side(std::span<const std::uint32_t> members) const {
@@ -187,17 +186,17 @@ class Thinning {
             return true;
         const Vector3f first = first_normal(members);
         return std::all_of(members.begin(), members.end(),
-                           [&](std::uint32_t place) { return on_side_of(first, place); });
+                           [&](std::uint32_t index) { return on_side_of(first, index); });
     }
 
     [[nodiscard]] Cell cell_of(std::span<const std::uint32_t> members, float sigma) const {
         const Vector3f origin = tree_[members.front()];
         Moments moments;
         Vector3f normal = Vector3f::Zero();
-        for (const std::uint32_t place : members) {
-            moments.add(tree_[place] - origin);
+        for (const std::uint32_t index : members) {
+            moments.add(tree_[index] - origin);
             if (!normals_.empty()) {
-                const Vector3f of_point = normal_of(place);
+                const Vector3f of_point = normal_of(index);
                 normal += !sides_ && normal.dot(of_point) < 0 ? Vector3f(-of_point) : of_point;
             }
         }
@@ -227,22 +226,22 @@ class Fit {
         near_.resize(cells_.size() * most);
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cells_.size(), 256), [&](const auto& range) {
             Search search;
-            for (std::size_t place = range.begin(); place < range.end(); ++place)
-                fit(place, search);
+            for (std::size_t index = range.begin(); index < range.end(); ++index)
+                fit(index, search);
         });
         std::vector<Vector3f> axes(cells_.size(), Vector3f::Zero());
         choose_planes();
         std::vector<Vector3f> moved(cells_.size());
-        tbb::parallel_for(std::size_t(0), cells_.size(), [&](std::size_t place) {
-            const std::uint32_t i = tree_.index(place);
-            moved[i] = tree_[place];
-            if (planes_[place].near == 0)
+        tbb::parallel_for(std::size_t(0), cells_.size(), [&](std::size_t index) {
+            const std::uint32_t i = tree_.original(index);
+            moved[i] = tree_[index];
+            if (planes_[index].near == 0)
                 return;
-            axes[i] = planes_[place].normal;
-            const Offset found = offset(place);
-            moved[i] += found.distance * planes_[place].normal;
+            axes[i] = planes_[index].normal;
+            const Offset found = offset(index);
+            moved[i] += found.distance * planes_[index].normal;
             constexpr int fewest = 3;
-            cells_[i].alone = found.support < fewest && near_surfaces(place);
+            cells_[i].alone = found.support < fewest && near_surfaces(index);
         });
         for (std::size_t i = 0; i < cells_.size(); ++i)
             cells_[i].middle = moved[i];
@@ -268,9 +267,9 @@ class Fit {
         return all;
     }
 
-    [[nodiscard]] const Cell& cell(std::size_t place) const { return cells_[tree_.index(place)]; }
-    [[nodiscard]] std::span<const std::uint32_t> near(std::size_t place) const {
-        return {near_.data() + place * most, planes_[place].near};
+    [[nodiscard]] const Cell& cell(std::size_t index) const { return cells_[tree_.original(index)]; }
+    [[nodiscard]] std::span<const std::uint32_t> near(std::size_t index) const {
+        return {near_.data() + index * most, planes_[index].near};
     }
 
     /// Neighbours of one cell after the other: those of the last one are near the next one's.
@@ -279,19 +278,19 @@ class Fit {
         std::size_t last = 0;
         float reach = std::numeric_limits<float>::infinity();
     };
-    std::span<const Nearest::Neighbour> nearest(std::size_t place, std::size_t wanted, Search& search) const {
-        const float known = (search.reach + (tree_[place] - tree_[search.last]).norm()) * (1 + 1e-5F);
-        tree_.find_round(place, wanted, search.found, known * known);
+    std::span<const Nearest::Neighbour> nearest(std::size_t index, std::size_t wanted, Search& search) const {
+        const float known = (search.reach + (tree_[index] - tree_[search.last]).norm()) * (1 + 1e-5F);
+        tree_.find_round(index, wanted, search.found, known * known);
         return search.found.all();
     }
 
-    void fit(std::size_t place, Search& search) {
-        Plane& plane = planes_[place];
-        const Cell& own = cell(place);
+    void fit(std::size_t index, Search& search) {
+        Plane& plane = planes_[index];
+        const Cell& own = cell(index);
         if (!(own.sigma > 0))
             return;
-        auto all = nearest(place, few, search);
-        search.last = place;
+        auto all = nearest(index, few, search);
+        search.last = index;
         search.reach = all.size() == few ? std::sqrt(all.back().distance2) : std::numeric_limits<float>::infinity();
         if (all.size() < 6 || !(all[5].distance2 > 0))
             return;
@@ -299,18 +298,18 @@ class Fit {
         if (own.sigma < felt_from * spacing)
             return;
         if (own.sigma > many_from * spacing) {
-            tree_.find_round(place, most, search.found);
+            tree_.find_round(index, most, search.found);
             all = search.found.all();
         }
         plane.near = static_cast<std::uint32_t>(all.size());
         plane.reach2 = all.back().distance2;
         for (std::size_t k = 0; k < all.size(); ++k)
-            near_[place * most + k] = all[k].point;
+            near_[index * most + k] = all[k].point;
         Moments moments;
         add(moments, own, Vector3f::Zero(), 1);
         for (const auto& [distance2, other] : all)
             if (const Cell& there = cell(other); own.normal.isZero() || alike(own.normal, there.normal))
-                add(moments, there, tree_[other] - tree_[place], weight(distance2, plane.reach2));
+                add(moments, there, tree_[other] - tree_[index], weight(distance2, plane.reach2));
         const PrincipalAxes axes(moments.covariance());
         plane.normal = own.normal.isZero() ? axes.normal : own.normal;
         plane.thickness = std::sqrt(axes.variances[0]);
@@ -330,32 +329,32 @@ class Fit {
     /// Where a window holds two surfaces, the plane of a flat window near by that passes the cell.
     void choose_planes() {
         std::vector<Vector3f> chosen(cells_.size());
-        tbb::parallel_for(std::size_t(0), cells_.size(), [&](std::size_t place) {
-            const Plane& own = planes_[place];
-            chosen[place] = own.normal;
-            if (own.near == 0 || own.flat || !cell(place).normal.isZero())
+        tbb::parallel_for(std::size_t(0), cells_.size(), [&](std::size_t index) {
+            const Plane& own = planes_[index];
+            chosen[index] = own.normal;
+            if (own.near == 0 || own.flat || !cell(index).normal.isZero())
                 return;
             float least = 1;
-            for (const std::uint32_t other : near(place)) {
+            for (const std::uint32_t other : near(index)) {
                 const Plane& there = planes_[other];
                 if (!there.flat)
                     continue;
-                const Vector3f apart = tree_[place] - tree_[other];
-                const float off = (apart.dot(there.normal) - there.middle_off) / (outlying * cell(place).sigma);
+                const Vector3f apart = tree_[index] - tree_[other];
+                const float off = (apart.dot(there.normal) - there.middle_off) / (outlying * cell(index).sigma);
                 const float cost = off * off + apart.squaredNorm() / own.reach2 / 4;
                 if (std::abs(off) < 1 && cost < least) {
                     least = cost;
-                    chosen[place] = there.normal;
+                    chosen[index] = there.normal;
                 }
             }
         });
-        for (std::size_t place = 0; place < cells_.size(); ++place)
-            planes_[place].normal = chosen[place];
+        for (std::size_t index = 0; index < cells_.size(); ++index)
+            planes_[index].normal = chosen[index];
     }
 
     /// Whether most cells near it lie on flat surfaces. Where they do not, as among leaves, nothing is out of place.
-    [[nodiscard]] bool near_surfaces(std::size_t place) const {
-        const auto all = near(place);
+    [[nodiscard]] bool near_surfaces(std::size_t index) const {
+        const auto all = near(index);
         const auto flat =
             std::count_if(all.begin(), all.end(), [&](std::uint32_t other) { return planes_[other].flat; });
         return 2 * static_cast<std::size_t>(flat) > all.size();
@@ -367,9 +366,9 @@ class Fit {
         float distance = 0;
         int support = 0; ///< cells of the window that are of the same surface
     };
-    [[nodiscard]] Offset offset(std::size_t place) const {
-        const Plane& own = planes_[place];
-        const float sigma = cell(place).sigma;
+    [[nodiscard]] Offset offset(std::size_t index) const {
+        const Plane& own = planes_[index];
+        const float sigma = cell(index).sigma;
         float surface = 0;
         int support = 0;
         for (const float wide : {2 * outlying, outlying}) {
@@ -381,13 +380,13 @@ class Fit {
                 support += inside > 0;
             };
             support = -1; // the cell itself
-            take(0, static_cast<float>(cell(place).count));
-            for (const std::uint32_t other : near(place)) {
+            take(0, static_cast<float>(cell(index).count));
+            for (const std::uint32_t other : near(index)) {
                 const Vector3f there = planes_[other].near > 0 ? planes_[other].normal : cell(other).normal;
                 const float cosine = own.normal.dot(there);
                 if (!alike(own.normal, there))
                     continue;
-                const Vector3f apart = tree_[other] - tree_[place];
+                const Vector3f apart = tree_[other] - tree_[index];
                 const Vector3f between = (own.normal + (cosine < 0 ? -1 : 1) * there).normalized();
                 take(apart.dot(between),
                      static_cast<float>(cell(other).count) * weight(apart.squaredNorm(), own.reach2));
@@ -441,13 +440,13 @@ FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> poin
         const Cell& cell = cells.all[i];
         fitted.points[i] = cell.count > 1 || !fitted.axes[i].isZero()
                                ? Vector3d(cell.middle.cast<double>() + local.middle)
-                               : points[tree.index(cells.members[cell.begin])];
+                               : points[tree.original(cells.members[cell.begin])];
         if (!normals.empty())
             fitted.normals[i] =
                 (cell.normal.isZero() || fitted.axes[i].isZero() ? cell.normal : fitted.axes[i]).cast<double>();
         fitted.alone[i] = cell.alone;
         for (std::uint32_t k = cell.begin; k < cell.begin + cell.count; ++k)
-            fitted.fitted_of[tree.index(cells.members[k])] = static_cast<std::uint32_t>(i);
+            fitted.fitted_of[tree.original(cells.members[k])] = static_cast<std::uint32_t>(i);
     });
     return fitted;
 }

@@ -23,12 +23,13 @@ struct FittedCloud {
     [[nodiscard]] bool empty() const { return points.empty(); }
 };
 
-/// Where sigma (CloudNoise) is above a fiftieth of the points' spacing, points closer together than six sigma are taken
-/// together, and all move along their normals onto the local surface: the mean, weighted by distance, of the points
-/// whose planes are alike and which lie within three sigma of it. Windows hold 16 to 64 of the thinned points, so that
-/// what noise is left is small against their spacing. Near edges, where a window holds two surfaces, the plane is that
-/// of a neighbour whose window is flat. Empty where that concerns less than a hundredth of the points. `local` is made
-/// of `points`; `normals` is empty or holds one per point. Noise is looked for in balls up to a third of `radius`.
+/// Acts where sigma (CloudNoise) is above a fiftieth of the points' spacing. Points closer together than six sigma are
+/// taken together. Then all move along their normals onto the local surface. That is the mean, weighted by distance, of
+/// the points whose planes are alike and which lie within three sigma of it. Windows hold 16 to 64 of the thinned
+/// points, so that what noise is left is small against their spacing. Near edges, where a window holds two surfaces,
+/// the plane is that of a neighbour whose window is flat. Empty where that concerns less than a hundredth of the
+/// points. `local` is made of `points`; `normals` is empty or holds one per point. Noise is looked for in balls up to a
+/// third of `radius`.
 [[nodiscard]] FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Eigen::Vector3d> points,
                                        std::span<const Eigen::Vector3d> normals, double radius);
 

@@ -90,7 +90,7 @@ std::optional<ViewFrom> view_from(const Vector3d& position, std::span<const Vect
                     range_at(0.05) > 0 ? range_at(0.95) / range_at(0.05) : std::numeric_limits<double>::infinity()};
 }
 
-/// In the smallest cells that tell: wider ones hold near and far surfaces of the same view, and a few points in them
+/// In the smallest cells that tell. Wider ones hold near and far surfaces of the same view, and a few points in them
 /// are seen first from anywhere.
 ViewFrom view_from(const Vector3d& position, std::span<const Vector3d> points) {
     for (const double degrees : {0.5, 1.0, 1.5})

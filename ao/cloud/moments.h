@@ -34,8 +34,8 @@ struct PrincipalAxes {
     }
 };
 
-/// A recorded normal, or that of the flat surface round it, turned to the same side, where they differ by more than 6
-/// degrees: it was estimated from too few points then.
+/// A recorded normal, or that of the flat surface round it, turned to the same side. The latter where they differ by
+/// more than 6 degrees: the normal was estimated from too few points then.
 [[nodiscard]] inline Eigen::Vector3f checked_normal(const Eigen::Vector3f& recorded, const Eigen::Vector3f& of_plane) {
     constexpr float still_recorded = 0.9945F;
     const float cosine = recorded.dot(of_plane);

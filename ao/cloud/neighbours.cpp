@@ -45,7 +45,7 @@ struct NeighbourTree::Placed {
 };
 
 NeighbourTree::NeighbourTree(std::span<const Vector3f> points) {
-    std::vector<Placed> placed(points.size());
+    Untouched<Placed> placed(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
         placed[i] = {points[i], static_cast<std::uint32_t>(i)};
     });
@@ -54,15 +54,15 @@ NeighbourTree::NeighbourTree(std::span<const Vector3f> points) {
     boxes_.resize((std::size_t(2) << levels_) - 1);
     build(placed, 0, levels_);
     points_.resize(points.size());
-    index_.resize(points.size());
+    original_.resize(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
         points_[i] = placed[i].point;
-        index_[i] = placed[i].index;
+        original_[i] = placed[i].index;
     });
 }
 
 /// The axis along which most points are far apart. In large nodes between the eighth and the seventh eighth of a
-/// sample: strays widen a box along all axes, and a wall halved along its noise makes two layers.
+/// sample, since strays widen a box along all axes. A wall halved along its noise would make two layers.
 int NeighbourTree::split_axis(std::span<const Placed> points, const Vector3f& box) {
     constexpr std::size_t sampled = 32, large = 8 * sampled;
     Vector3f width = box;
@@ -80,14 +80,22 @@ int NeighbourTree::split_axis(std::span<const Placed> points, const Vector3f& bo
     return axis;
 }
 
+NeighbourTree::Box NeighbourTree::box_of(std::span<const Placed> points) {
+    const auto infinite = Vector3f::Constant(std::numeric_limits<float>::infinity());
+    const auto join = [](const Box& a, const Box& b) { return Box{a.low.cwiseMin(b.low), a.high.cwiseMax(b.high)}; };
+    const auto round = [&](const auto& range, Box box) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i)
+            box = join(box, {points[i].point, points[i].point});
+        return box;
+    };
+    constexpr std::size_t worth_tasks = 1 << 18;
+    const tbb::blocked_range<std::size_t> all(0, points.size(), worth_tasks / 8);
+    const Box nothing{infinite, -infinite};
+    return points.size() < worth_tasks ? round(all, nothing) : tbb::parallel_reduce(all, nothing, round, join);
+}
+
 void NeighbourTree::build(std::span<Placed> points, std::size_t node, int levels) {
-    Box& box = boxes_[node];
-    box.low.setConstant(std::numeric_limits<float>::infinity());
-    box.high = -box.low;
-    for (const Placed& placed : points) {
-        box.low = box.low.cwiseMin(placed.point);
-        box.high = box.high.cwiseMax(placed.point);
-    }
+    const Box& box = boxes_[node] = box_of(points);
     if (levels == 0)
         return;
     const int axis = split_axis(points, box.high - box.low);
@@ -107,8 +115,15 @@ void NeighbourTree::build(std::span<Placed> points, std::size_t node, int levels
     }
 }
 
-void NeighbourTree::find_round(std::size_t place, std::size_t wanted, Nearest& found, float reach2) const {
-    find(points_[place], place, wanted, found, reach2);
+std::pair<std::size_t, std::size_t> NeighbourTree::leaf_range(std::size_t number) const {
+    Node node{0, 0, points_.size(), levels_};
+    for (int level = levels_ - 1; level >= 0; --level)
+        node = (number >> level & 1) != 0 ? node.right() : node.left();
+    return {node.begin, node.end};
+}
+
+void NeighbourTree::find_round(std::size_t index, std::size_t wanted, Nearest& found, float reach2) const {
+    find(points_[index], index, wanted, found, reach2);
 }
 
 void NeighbourTree::find_near(const Vector3f& at, std::size_t wanted, Nearest& found) const {

@@ -1,11 +1,14 @@
 // A cloud's points in the order of a k-d tree, and the nearest neighbours of each.
 #pragma once
 
+#include "ao/cloud/untouched.h"
+
 #include <array>
 #include <cstdint>
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace scanshade {
@@ -44,30 +47,38 @@ class NeighbourTree {
     [[nodiscard]] std::size_t size() const { return points_.size(); }
     /// Levels of nodes above the leaves. A node of n points has children of n / 2 (rounded down) and the rest.
     [[nodiscard]] int levels() const { return levels_; }
-    /// By index in the tree's order (`place` throughout this room).
-    [[nodiscard]] const Eigen::Vector3f& operator[](std::size_t place) const { return points_[place]; }
+    /// By index in the tree's order, which is what this room calls an index.
+    [[nodiscard]] const Eigen::Vector3f& operator[](std::size_t index) const { return points_[index]; }
     /// The index of that point in the cloud given.
-    [[nodiscard]] std::uint32_t index(std::size_t place) const { return index_[place]; }
+    [[nodiscard]] std::uint32_t original(std::size_t index) const { return original_[index]; }
 
     /// The `wanted` nearest neighbours of a point, without the point itself. `reach2`: a squared distance known to
     /// contain that many; infinite if unknown. Ties go to the lower index.
-    void find_round(std::size_t place, std::size_t wanted, Nearest& found,
+    void find_round(std::size_t index, std::size_t wanted, Nearest& found,
                     float reach2 = std::numeric_limits<float>::infinity()) const;
 
     /// The `wanted` points nearest to a position.
     void find_near(const Eigen::Vector3f& at, std::size_t wanted, Nearest& found) const;
 
-    /// Calls `visit(place)` for every point within `reach` of `at`, in no particular order.
+    /// Calls `visit(index)` for every point within `reach` of `at`, in no particular order.
     template <class Visit>
     void for_each_within(const Eigen::Vector3f& at, float reach, Visit&& visit) const;
     /// Walks the nodes from the root down. `enter(diagonal, begin, end, is_leaf)` gets the diagonal of a node's box and
-    /// its places; where it returns true and the node is no leaf, its halves are walked, too.
+    /// its indices. Where it returns true and the node is no leaf, its halves are walked, too.
     template <class Enter>
     void walk(Enter&& enter) const {
         walk({0, 0, points_.size(), levels_}, enter);
     }
 
     static constexpr std::size_t leaf = 12; ///< points, at most
+
+    [[nodiscard]] std::size_t leaves() const { return std::size_t(1) << levels_; }
+    /// The first point of a leaf, and one behind its last.
+    [[nodiscard]] std::pair<std::size_t, std::size_t> leaf_range(std::size_t number) const;
+    /// Calls `visit(begin, end)` for the points of every leaf whose box is within a squared distance of a box. In
+    /// ascending order, until it returns false.
+    template <class Visit>
+    void for_each_leaf_near(const Eigen::AlignedBox3f& round, float reach2, Visit&& visit) const;
 
   private:
     struct Box {
@@ -90,14 +101,15 @@ class NeighbourTree {
     void find(const Eigen::Vector3f& at, std::size_t but, std::size_t wanted, Nearest& found, float reach2) const;
     static int split_axis(std::span<const Placed> points, const Eigen::Vector3f& box);
     void build(std::span<Placed> points, std::size_t node, int levels);
+    [[nodiscard]] static Box box_of(std::span<const Placed> points);
 
-    std::vector<Eigen::Vector3f> points_;
-    std::vector<std::uint32_t> index_;
-    std::vector<Box> boxes_; ///< node n has the children 2n + 1 and 2n + 2, which halve its points
-    int levels_ = 0;         ///< of nodes above the leaves
+    Untouched<Eigen::Vector3f> points_;
+    Untouched<std::uint32_t> original_;
+    Untouched<Box> boxes_; ///< node n has the children 2n + 1 and 2n + 2, which halve its points
+    int levels_ = 0;       ///< of nodes above the leaves
 };
 
-/// Points relative to a place near them, in single precision.
+/// Points relative to a position near them, in single precision.
 [[nodiscard]] std::vector<Eigen::Vector3f> local_points(const Eigen::Vector3d& middle,
                                                         std::span<const Eigen::Vector3d> points);
 
@@ -125,9 +137,28 @@ void NeighbourTree::for_each_within(const Eigen::Vector3f& at, float reach, Visi
             stack[depth++] = node.left();
             continue;
         }
-        for (std::size_t place = node.begin; place < node.end; ++place)
-            if ((points_[place] - at).squaredNorm() <= reach2)
-                visit(place);
+        for (std::size_t index = node.begin; index < node.end; ++index)
+            if ((points_[index] - at).squaredNorm() <= reach2)
+                visit(index);
+    }
+}
+
+template <class Visit>
+void NeighbourTree::for_each_leaf_near(const Eigen::AlignedBox3f& round, float reach2, Visit&& visit) const {
+    std::array<Node, 64> stack;
+    std::size_t depth = 0;
+    stack[depth++] = {0, 0, points_.size(), levels_};
+    while (depth > 0) {
+        const Node node = stack[--depth];
+        const Box& box = boxes_[node.number];
+        if ((box.low - round.max()).cwiseMax(round.min() - box.high).cwiseMax(0).squaredNorm() > reach2)
+            continue;
+        if (node.levels > 0) {
+            stack[depth++] = node.right();
+            stack[depth++] = node.left();
+        } else if (!visit(node.begin, node.end)) {
+            return;
+        }
     }
 }
 

@@ -27,11 +27,11 @@ class SurePairs {
 
 /// Points in patches; each point knows whether its normal opposes its patch.
 struct Patches {
-    std::vector<std::uint32_t> patch; ///< by place
-    std::vector<char> turned;         ///< by place: against its patch's side
+    std::vector<std::uint32_t> patch; ///< by index in the tree
+    std::vector<char> turned;         ///< by index in the tree: against its patch's side
     std::uint32_t count = 0;
 
-    [[nodiscard]] int sign(std::size_t place) const { return turned[place] ? -1 : 1; }
+    [[nodiscard]] int sign(std::size_t index) const { return turned[index] ? -1 : 1; }
 };
 
 /// Joins the surest pairs first, while patches are small: so that a wrong pair cannot turn a wall over.

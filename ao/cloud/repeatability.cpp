@@ -1,14 +1,61 @@
 #include "ao/cloud/repeatability.h"
 
-#include "ao/cloud/neighbours.h"
+#include "ao/cloud/leaf_neighbours.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <tbb/parallel_for.h>
 
 namespace scanshade {
 
 using Eigen::Vector3d, Eigen::Vector3f;
+
+namespace {
+
+/// The point of the tree nearest to each position; of equal distances the lower index. Positions side by side share a
+/// walk through the tree.
+void find_nearest(const NeighbourTree& tree, std::span<const Vector3f> positions, std::span<std::uint32_t> nearest) {
+    if (positions.empty())
+        return;
+    Nearest single;
+    tree.find_near(positions[0], 1, single);
+    const float to_first = std::sqrt(single.all()[0].distance2);
+    Eigen::AlignedBox3f round;
+    float apart = 0;
+    for (const Vector3f& position : positions) {
+        round.extend(position);
+        apart = std::max(apart, (position - positions[0]).norm());
+    }
+    constexpr std::size_t most = 256;
+    std::array<std::uint32_t, most> candidates;
+    std::size_t count = 0;
+    bool fits = true;
+    const float reach = (to_first + apart) * (1 + 1e-5F); // to the first one's nearest point at most
+    tree.for_each_leaf_near(round, reach * reach, [&](std::size_t begin, std::size_t end) {
+        fits = count + (end - begin) <= most;
+        for (std::size_t i = begin; fits && i < end; ++i)
+            candidates[count++] = static_cast<std::uint32_t>(i);
+        return fits;
+    });
+    for (std::size_t k = 0; k < positions.size(); ++k) {
+        if (!fits) {
+            tree.find_near(positions[k], 1, single);
+            nearest[k] = single.all()[0].point;
+            continue;
+        }
+        float least = std::numeric_limits<float>::infinity();
+        nearest[k] = candidates[0];
+        for (std::size_t c = 0; c < count; ++c)
+            if (const float distance2 = (tree[candidates[c]] - positions[k]).squaredNorm(); distance2 < least) {
+                least = distance2;
+                nearest[k] = candidates[c];
+            }
+    }
+}
+
+} // namespace
 
 double ThinnedCheck::error_per_difference() const { return keep > 0 && keep < 1 ? 1 / (std::sqrt(1 / keep) - 1) : 0; }
 
@@ -26,7 +73,7 @@ ThinnedCheck thinned_check(std::size_t points, double radius_in_spacings) {
 
 Repeatability repeatability(std::span<const Vector3d> points, std::span<const float> whole,
                             std::span<const std::uint32_t> kept, std::span<const float> thinned,
-                            const ThinnedCheck& check) {
+                            const ThinnedCheck& check, std::span<const std::uint32_t> order) {
     constexpr std::size_t surroundings = 12; // kept points
     constexpr float half_at = 0.15F;
     std::vector<Vector3d> compared;
@@ -47,22 +94,28 @@ Repeatability repeatability(std::span<const Vector3d> points, std::span<const fl
 
     const LocalCloud cloud(compared);
     const auto scale = static_cast<float>(std::pow(check.error_per_difference(), 2) / (half_at * half_at));
-    std::vector<float> factor(cloud.size()); // by place
-    tbb::parallel_for(std::size_t(0), cloud.size(), [&](std::size_t place) {
-        Nearest nearest;
-        cloud.tree.find_round(place, surroundings, nearest);
-        float mean = squares[cloud.tree.index(place)];
-        for (const Nearest::Neighbour& neighbour : nearest.all())
-            mean += squares[cloud.tree.index(neighbour.point)];
-        mean /= static_cast<float>(nearest.all().size() + 1);
-        factor[place] = 1 / (1 + scale * mean);
+    std::vector<float> factor(cloud.size()); // by index in the tree
+    for_each_neighbourhood(cloud.tree, surroundings, [&](std::size_t index, std::span<const Nearest::Neighbour> near) {
+        float mean = squares[cloud.tree.original(index)];
+        for (const Nearest::Neighbour& neighbour : near)
+            mean += squares[cloud.tree.original(neighbour.point)];
+        mean /= static_cast<float>(near.size() + 1);
+        factor[index] = 1 / (1 + scale * mean);
     });
-    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
-        if (std::isnan(whole[i]))
-            return;
-        Nearest nearest;
-        cloud.tree.find_near((points[i] - cloud.middle).cast<float>(), 1, nearest);
-        found.confidence[i] = factor[nearest.all().front().point];
+    constexpr std::size_t at_once = 16;
+    tbb::parallel_for(std::size_t(0), (order.size() + at_once - 1) / at_once, [&](std::size_t block) {
+        const auto some = order.subspan(at_once * block, std::min(at_once, order.size() - at_once * block));
+        std::array<Vector3f, at_once> positions;
+        std::array<std::uint32_t, at_once> index, nearest;
+        std::size_t count = 0;
+        for (const std::uint32_t i : some)
+            if (!std::isnan(whole[i])) {
+                index[count] = i;
+                positions[count++] = (points[i] - cloud.middle).cast<float>();
+            }
+        find_nearest(cloud.tree, std::span(positions.data(), count), nearest);
+        for (std::size_t k = 0; k < count; ++k)
+            found.confidence[index[k]] = factor[nearest[k]];
     });
     return found;
 }

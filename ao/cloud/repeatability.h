@@ -14,7 +14,7 @@ namespace scanshade {
 struct ThinnedCheck {
     double keep = 0; ///< share of the points; 0 = none, since so dense a cloud tells nothing new
     /// An error that falls like the spacing is this times the difference between thinned and whole cloud (Richardson's
-    /// extrapolation): with a quarter of the points, spacings are twice as wide, and the difference is the error.
+    /// extrapolation). With a quarter of the points, spacings are twice as wide, and the difference is the error.
     [[nodiscard]] double error_per_difference() const;
 };
 /// For so many points, and a radius that spans so many of their spacings.
@@ -27,9 +27,9 @@ struct Repeatability {
     std::vector<float> confidence;
 };
 /// `whole` are the values of `points`, in any unit; `thinned` those of the points with the indices `kept`; NaN where
-/// unknown.
+/// unknown. `order` holds every index once: the time is short where its neighbours are neighbours in space.
 [[nodiscard]] Repeatability repeatability(std::span<const Eigen::Vector3d> points, std::span<const float> whole,
                                           std::span<const std::uint32_t> kept, std::span<const float> thinned,
-                                          const ThinnedCheck& check);
+                                          const ThinnedCheck& check, std::span<const std::uint32_t> order);
 
 } // namespace scanshade

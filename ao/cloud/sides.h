@@ -11,15 +11,15 @@ namespace scanshade {
 
 /// How much is spent on it; the rest of the effort does not grow with the cloud.
 struct SidesEffort {
-    std::size_t places = 25000; ///< that eight rays leave from on either side
+    std::size_t points = 25000; ///< that eight rays leave from on either side
     std::size_t stations = 200; ///< candidates within the cloud; 64 round it come on top
     std::size_t tests = 1000;   ///< points that candidates are judged by
 };
 
 /// The sides found. Signs refer to the surface's normals as they were given.
 struct Sides {
-    std::vector<std::int8_t> sign; ///< by place: -1 = the normal has to be turned
-    std::vector<float> confidence; ///< by place, 0 .. 1
+    std::vector<std::int8_t> sign; ///< by index in the tree: -1 = the normal has to be turned
+    std::vector<float> confidence; ///< by index in the tree, 0 .. 1
     std::string why;               ///< in words; empty where the rule says it all
     double margin = 0; ///< by how much more of the cloud stations explain with these sides than with all turned over;
                        ///< 0 where something else decided
@@ -45,7 +45,7 @@ enum class SidesRule {
                              const SidesEffort& effort = {});
 
 /// Sides towards a position relative to the surface's middle. Neighbours vote, by the cosines under which they are
-/// seen: where a plane is seen at a grazing angle, a small error of its normal would turn it over.
+/// seen. Where a plane is seen at a grazing angle, a small error of its normal would turn it over.
 [[nodiscard]] Sides sides_to(const CloudSurface& surface, const Eigen::Vector3f& position);
 
 /// How recorded normals agree with their neighbours, patch by patch.
@@ -54,7 +54,7 @@ struct RecordedSides {
     double opposed = 0; ///< share of the points that oppose most of their patch, there
 };
 /// Of a surface whose normals are recorded ones. A patch of eight or more points is in order if fewer than a tenth
-/// oppose the others, or if those that do make a sheet of its own: they stand higher.
+/// oppose the others. So it is if those that do make a sheet of its own: they stand higher.
 [[nodiscard]] RecordedSides recorded_sides(const CloudSurface& surface);
 
 } // namespace scanshade

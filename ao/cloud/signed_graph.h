@@ -19,11 +19,10 @@ class SignedGraph {
     void add(std::uint32_t a, std::uint32_t b, double weight);
     [[nodiscard]] std::size_t size() const { return nodes_; }
 
-    /// A sign per node, +1 or -1, with which the sum of weight x sign x sign over all links is as large as two steps
-    /// make it: the signs of the leading eigenvector of the links, each divided by the root of its ends' weights
-    /// (Singer 2011, "Angular synchronization by eigenvectors", for two angles); then nodes that most of their links
-    /// oppose turn over, until there are none. Parts without a link between them have signs of
-    /// their own. Deterministic.
+    /// A sign per node, +1 or -1, that makes the sum of weight x sign x sign over all links large, in two steps. First
+    /// come the signs of the leading eigenvector of the links, each divided by the root of its ends' weights. (Singer
+    /// 2011, "Angular synchronization by eigenvectors", for two angles.) Then nodes that most of their links oppose
+    /// turn over, until there are none. Parts without a link between them have signs of their own. Deterministic.
     [[nodiscard]] std::vector<std::int8_t> signs() const;
 
   private:

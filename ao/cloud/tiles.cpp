@@ -17,17 +17,17 @@ using Eigen::Vector3d;
 class Cutter {
   public:
     Cutter(std::span<const Vector3d> points, double reach, std::size_t at_once,
-           const std::function<void(const Places&, const Places&)>& tile)
+           const std::function<void(const Indices&, const Indices&)>& tile)
         : points_(points), reach_(reach), at_once_(at_once), tile_(tile) {}
 
-    void cut(const Places& core, const Places& round) {
+    void cut(const Indices& core, const Indices& round) {
         constexpr std::size_t least = 10000;
         if (round.size() <= at_once_ || core.size() <= least)
             return tile_(core, round);
         auto [low, high] = halves(core);
         if (high.empty()) // all points coincide
             return tile_(core, round);
-        Places near_low = within_reach(low, round), near_high = within_reach(high, round);
+        Indices near_low = within_reach(low, round), near_high = within_reach(high, round);
         constexpr double hardly_fewer = 0.9;
         if (static_cast<double>(std::min(near_low.size(), near_high.size())) >
             hardly_fewer * static_cast<double>(round.size())) // all within reach of all
@@ -39,12 +39,12 @@ class Cutter {
 
   private:
     /// The second is empty where all points coincide.
-    [[nodiscard]] std::pair<Places, Places> halves(const Places& core) const {
+    [[nodiscard]] std::pair<Indices, Indices> halves(const Indices& core) const {
         const Eigen::AlignedBox3d all = box_of(core);
         int axis = 0;
         all.sizes().maxCoeff(&axis);
         const double middle = middle_of(core, axis);
-        Places low, high;
+        Indices low, high;
         for (const std::uint32_t i : core)
             (points_[i][axis] < middle ? low : high).push_back(i);
         if (low.empty()) { // most of them at the lowest coordinate
@@ -57,47 +57,47 @@ class Cutter {
     }
 
     /// The points of `round` in the box of `core` widened by the reach.
-    [[nodiscard]] Places within_reach(const Places& core, const Places& round) const {
+    [[nodiscard]] Indices within_reach(const Indices& core, const Indices& round) const {
         Eigen::AlignedBox3d box = box_of(core);
         box.min().array() -= reach_;
         box.max().array() += reach_;
-        Places near;
+        Indices near;
         std::copy_if(round.begin(), round.end(), std::back_inserter(near),
                      [&](std::uint32_t i) { return box.contains(points_[i]); });
         return near;
     }
 
-    [[nodiscard]] Eigen::AlignedBox3d box_of(const Places& places) const {
+    [[nodiscard]] Eigen::AlignedBox3d box_of(const Indices& indices) const {
         Eigen::AlignedBox3d box;
-        for (const std::uint32_t i : places)
+        for (const std::uint32_t i : indices)
             box.extend(points_[i]);
         return box;
     }
 
     /// The median coordinate of a sample, chosen by a hash so that recording order has no influence.
-    [[nodiscard]] double middle_of(const Places& places, int axis) const {
+    [[nodiscard]] double middle_of(const Indices& indices, int axis) const {
         constexpr double enough = 60000;
         const auto chosen =
-            static_cast<std::uint64_t>(std::min(1.0, enough / static_cast<double>(places.size())) * 0x1p32);
+            static_cast<std::uint64_t>(std::min(1.0, enough / static_cast<double>(indices.size())) * 0x1p32);
         std::vector<double> along;
-        for (const std::uint32_t i : places)
+        for (const std::uint32_t i : indices)
             if (hash(i) < chosen)
                 along.push_back(points_[i][axis]);
         if (along.empty())
-            return points_[places.front()][axis];
+            return points_[indices.front()][axis];
         return median(std::move(along));
     }
 
     std::span<const Vector3d> points_;
     double reach_;
     std::size_t at_once_;
-    const std::function<void(const Places&, const Places&)>& tile_;
+    const std::function<void(const Indices&, const Indices&)>& tile_;
 };
 
 } // namespace
 
-void cut_into_tiles(std::span<const Vector3d> points, const Places& core, double reach, std::size_t at_once,
-                    const std::function<void(const Places&, const Places&)>& tile) {
+void cut_into_tiles(std::span<const Vector3d> points, const Indices& core, double reach, std::size_t at_once,
+                    const std::function<void(const Indices&, const Indices&)>& tile) {
     Cutter(points, reach, at_once, tile).cut(core, core);
 }
 

@@ -1,6 +1,8 @@
 // Points recorded twice, found by sorting coordinates.
 #include "ao/cloud/twins.h"
 
+#include "ao/cloud/indices_where.h"
+
 #include <algorithm>
 #include <bit>
 #include <tbb/parallel_sort.h>
@@ -9,7 +11,7 @@ namespace scanshade {
 namespace {
 
 using Eigen::Vector3d;
-using Places = std::vector<std::uint32_t>;
+using Indices = std::vector<std::uint32_t>;
 
 std::uint64_t hash_of(const Vector3d& point) {
     std::uint64_t all = 0;
@@ -21,14 +23,14 @@ std::uint64_t hash_of(const Vector3d& point) {
 }
 
 /// Copies have the same hash, so choosing points by it chooses all copies of a point or none.
-bool any_twins(std::span<const Vector3d> points, const Places& places) {
+bool any_twins(std::span<const Vector3d> points, const Indices& indices) {
     constexpr std::size_t enough = 4096;
     constexpr double hardly_any = 0.001;
-    const std::uint64_t every = std::max<std::size_t>(1, places.size() / enough);
+    const std::uint64_t every = std::max<std::size_t>(1, indices.size() / enough);
     std::vector<std::uint64_t> hashes;
-    for (const std::uint32_t place : places)
-        if (const std::uint64_t hash = hash_of(points[place]); hash % every == 0)
-            hashes.push_back(hash);
+    for (const std::uint32_t i :
+         indices_where(indices, [&](auto point) { return hash_of(points[point]) % every == 0; }))
+        hashes.push_back(hash_of(points[i]));
     const std::size_t all = hashes.size();
     std::sort(hashes.begin(), hashes.end());
     hashes.erase(std::unique(hashes.begin(), hashes.end()), hashes.end());
@@ -37,10 +39,11 @@ bool any_twins(std::span<const Vector3d> points, const Places& places) {
 
 } // namespace
 
-std::vector<Twin> take_out_twins(std::span<const Vector3d> points, std::span<const Vector3d> normals, Places& places) {
-    if (!any_twins(points, places))
+std::vector<Twin> take_out_twins(std::span<const Vector3d> points, std::span<const Vector3d> normals,
+                                 Indices& indices) {
+    if (!any_twins(points, indices))
         return {};
-    Places order = places;
+    Indices order = indices;
     tbb::parallel_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
         for (int axis = 0; axis < 3; ++axis)
             if (points[a][axis] != points[b][axis])
@@ -49,7 +52,7 @@ std::vector<Twin> take_out_twins(std::span<const Vector3d> points, std::span<con
     });
     std::vector<Twin> twins;
     std::vector<bool> is_twin(points.size());
-    Places kept; // at the same coordinates
+    Indices kept; // at the same coordinates
     for (const std::uint32_t point : order) {
         if (!kept.empty() && points[kept.front()] != points[point])
             kept.clear();
@@ -62,7 +65,7 @@ std::vector<Twin> take_out_twins(std::span<const Vector3d> points, std::span<con
             is_twin[point] = true;
         }
     }
-    std::erase_if(places, [&](std::uint32_t place) { return is_twin[place]; });
+    std::erase_if(indices, [&](std::uint32_t index) { return is_twin[index]; });
     return twins;
 }
 

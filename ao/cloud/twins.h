@@ -13,11 +13,11 @@ struct Twin {
     std::uint32_t point, same_as;
 };
 
-/// Takes copies out of `places`, which stays in its order. Points whose recorded normals face away from each other are
+/// Takes copies out of `indices`, which stays in its order. Points whose recorded normals face away from each other are
 /// the two sides of a sheet, not copies. Finite points only. A look at some of the coordinates tells whether there are
 /// any: where fewer than one in a thousand are copies, they stay.
 [[nodiscard]] std::vector<Twin> take_out_twins(std::span<const Eigen::Vector3d> points,
                                                std::span<const Eigen::Vector3d> normals,
-                                               std::vector<std::uint32_t>& places);
+                                               std::vector<std::uint32_t>& indices);
 
 } // namespace scanshade

@@ -3,7 +3,6 @@
 
 #include "ao/raycast/embree.h"
 #include "projection/error.h"
-#include "shaders/shared/cloud.h"
 
 #include <algorithm>
 #include <cmath>
@@ -79,9 +78,7 @@ void pass_own_surface(const RTCFilterFunctionNArguments* arguments) {
                              t * Vector3f(RTCRayN_dir_x(ray, n, i), RTCRayN_dir_y(ray, n, i), RTCRayN_dir_z(ray, n, i));
         RTCHitN* hit = arguments->hit;
         const Vector3f normal(RTCHitN_Ng_x(hit, n, i), RTCHitN_Ng_y(hit, n, i), RTCHitN_Ng_z(hit, n, i));
-        const float length = normal.norm();
-        const bool alike = own.normal.isZero() || std::abs(normal.dot(own.normal)) > shared::own_alike * length;
-        if (alike && std::abs(normal.dot(own.point - met)) <= own.depth_m * length)
+        if (std::abs(normal.dot(own.point - met)) <= own.depth_m * normal.norm())
             arguments->valid[i] = 0;
     }
 }

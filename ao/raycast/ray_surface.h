@@ -23,12 +23,10 @@ struct Disc {
 };
 
 /// Discs overlap, so a ray from one hits its neighbours at once. Hits closer than reach_m are ignored if the disc's
-/// plane passes within depth_m of `point`. Discs more than 45 degrees from `normal` (if given) count: they belong to
-/// the other wall of a corner. No effect on triangles.
+/// plane passes within depth_m of `point`. No effect on triangles.
 struct OwnSurface {
     Eigen::Vector3f point = Eigen::Vector3f::Zero(); ///< local: RaySurface::local()
     float reach_m = 0, depth_m = 0;
-    Eigen::Vector3f normal = Eigen::Vector3f::Zero();
 };
 
 /// Eight rays from one origin, as Embree takes them: directions of unit length.

@@ -18,6 +18,7 @@
 #include <optional>
 #include <tbb/global_control.h>
 #include <tbb/info.h>
+#include <tbb/parallel_invoke.h>
 #include <tbb/parallel_pipeline.h>
 #include <tbb/task_arena.h>
 
@@ -119,9 +120,14 @@ void attach_and_write(Work& work, const BatchOptions& options) {
         std::ranges::move(doubts_about(work, options.radius_m, options.noise), std::back_inserter(work.row.doubts));
     });
     take(work, &StageTimes::write, [&] {
-        write_all(work, images, outputs);
-        if (by_points && (options.outputs.shaded || options.outputs.panel))
-            write_cloud_picture(work, options.outputs);
+        if (by_points && (options.outputs.shaded || options.outputs.panel)) {
+            std::filesystem::path picture;
+            tbb::parallel_invoke([&] { write_all(work, images, outputs); },
+                                 [&] { picture = write_cloud_picture(work, options.outputs); });
+            work.row.files.push_back(picture);
+        } else {
+            write_all(work, images, outputs);
+        }
     });
     if (!work.row.why.empty())
         remove_files(work, options.outputs);

@@ -1,7 +1,7 @@
 // A picture of a cloud without a camera: two views that show different parts of it.
 #include "apps/walk/cloud_picture.h"
 
-#include "ao/cloud/neighbours.h"
+#include "ao/cloud/leaf_neighbours.h"
 #include "apps/picture.h"
 #include "io/clouds/cloud_file.h"
 #include "projection/attach.h"
@@ -51,12 +51,10 @@ std::vector<float> spacing_of(const std::vector<Vector3d>& points) {
     std::ranges::transform(points, single.begin(), [](const Vector3d& point) { return Vector3f(point.cast<float>()); });
     const NeighbourTree tree(single);
     std::vector<float> spacing(points.size(), 0.0F);
-    tbb::parallel_for(std::size_t(0), tree.size(), [&](std::size_t place) {
-        Nearest nearest;
-        tree.find_round(place, wanted, nearest);
-        if (!nearest.all().empty())
-            spacing[tree.index(place)] = std::sqrt(nearest.all().back().distance2 * static_cast<float>(pi) /
-                                                   static_cast<float>(nearest.all().size() + 1));
+    for_each_neighbourhood(tree, wanted, [&](std::size_t index, std::span<const Nearest::Neighbour> near) {
+        if (!near.empty())
+            spacing[tree.original(index)] =
+                std::sqrt(near.back().distance2 * static_cast<float>(pi) / static_cast<float>(near.size() + 1));
     });
     const float usual = median(spacing, 0.0F); // a stray point is far from all others, and yet no large thing
     for (float& each : spacing)
@@ -151,21 +149,20 @@ Vector3d up_across_largest_plane(const Drawn& drawn) {
     for (const Vector3d& axis : {Vector3d(0, 0, 1), Vector3d(0, 1, 0), Vector3d(1, 0, 0)})
         candidates.push_back(axis);
     const std::size_t step = std::max<std::size_t>(1, drawn.at.size() / 20000);
-    Vector3d best = Vector3d::UnitZ();
-    double most = -1;
-    for (std::size_t c = 0; c < candidates.size(); ++c) {
+    std::vector<double> scores(candidates.size(), -1.0);
+    tbb::parallel_for(std::size_t(0), candidates.size(), [&](std::size_t c) {
         double alike = 0;
         for (std::size_t i = 0; i < drawn.normals.size(); i += step)
             alike += std::abs(drawn.normals[i].cast<double>().dot(candidates[c])) > within;
         if (alike * static_cast<double>(step) < plane * static_cast<double>(drawn.normals.size()))
-            continue;
+            return;
         const double height = std::max(range_along(drawn, candidates[c]).length(), 1e-12);
-        const double score = alike / height * (c < others ? 1 : c == others ? 1.5 : 1.2);
-        if (score > most) {
-            most = score;
-            best = candidates[c];
-        }
-    }
+        scores[c] = alike / height * (c < others ? 1 : c == others ? 1.5 : 1.2);
+    });
+    const auto highest = std::ranges::max_element(scores);
+    const double most = *highest;
+    const Vector3d best =
+        most < 0 ? Vector3d(Vector3d::UnitZ()) : candidates[static_cast<std::size_t>(highest - scores.begin())];
     if (most < 0) // no plane, so no floor
         return best;
     double sign = 0;
@@ -226,12 +223,18 @@ Ground ground_of(const Drawn& drawn, const Vector3d& up) {
     const Vector3d first = up.unitOrthogonal(), second = up.cross(first);
     Ground ground{up, first, second};
     double least = std::numeric_limits<double>::infinity();
-    constexpr int steps = 36;
-    for (int step = 0; step < steps; ++step) {
-        const double turn = step * pi / steps;
-        const Vector3d deep = std::cos(turn) * first + std::sin(turn) * second;
-        if (const double length = range_along(drawn, deep).length(); length < least) {
-            least = length;
+    constexpr std::size_t steps = 36;
+    std::array<Vector3d, steps> directions;
+    std::array<double, steps> lengths{};
+    tbb::parallel_for(std::size_t(0), steps, [&](std::size_t step) {
+        const double turn = static_cast<double>(step) * pi / steps;
+        directions[step] = std::cos(turn) * first + std::sin(turn) * second;
+        lengths[step] = range_along(drawn, directions[step]).length();
+    });
+    for (std::size_t step = 0; step < steps; ++step) {
+        const Vector3d& deep = directions[step];
+        if (lengths[step] < least) {
+            least = lengths[step];
             ground.deep = deep;
             ground.wide = deep.cross(up).normalized();
         }
@@ -445,6 +448,18 @@ class Density {
     std::array<cv::Mat1i, 4> counts_;
 };
 
+/// The distance of two pixels, whose coordinates differ by at most the largest splat's radius.
+double offset_px(int across, int down) {
+    static const auto known = [] {
+        std::array<std::array<double, 64>, 64> all;
+        for (int y = 0; y < 64; ++y)
+            for (int x = 0; x < 64; ++x)
+                all[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)] = std::hypot(x, y);
+        return all;
+    }();
+    return known[static_cast<std::size_t>(std::abs(down))][static_cast<std::size_t>(std::abs(across))];
+}
+
 /// The picture of one view. The nearest splat wins; a splat is a cone, so that of two on one surface the pixel gets the
 /// closer one.
 struct Canvas {
@@ -458,7 +473,7 @@ struct Canvas {
         const cv::Point centre(static_cast<int>(std::floor(u)), static_cast<int>(std::floor(v)));
         for (int y = std::max(centre.y - reach, 0); y <= std::min(centre.y + reach, depth.rows - 1); ++y)
             for (int x = std::max(centre.x - reach, 0); x <= std::min(centre.x + reach, depth.cols - 1); ++x) {
-                const double off = std::hypot(x - centre.x, y - centre.y);
+                const double off = offset_px(x - centre.x, y - centre.y);
                 const auto z = static_cast<float>(seen.depth + off * length_per_px);
                 if (off > radius_px || z >= depth(y, x))
                     continue;
@@ -533,11 +548,12 @@ bool has_colours(const Cloud& cloud) {
 cv::Mat3b cloud_picture(const Cloud& cloud, const PointVisibility& found, const std::optional<Vector3d>& viewpoint,
                         double strength) {
     const Drawn drawn = drawn_of(cloud, found);
-    std::vector<cv::Mat3b> rows;
-    for (const PictureView& view : views_of(cloud, drawn, viewpoint)) {
-        const Canvas canvas = drawing_of(cloud, found, drawn, view);
-        rows.push_back(both(shade(canvas.colour, canvas.visibility, strength), visibility_picture(canvas.visibility)));
-    }
+    const std::array<PictureView, 2> views = views_of(cloud, drawn, viewpoint);
+    std::array<cv::Mat3b, 2> rows;
+    tbb::parallel_for(std::size_t(0), rows.size(), [&](std::size_t i) {
+        const Canvas canvas = drawing_of(cloud, found, drawn, views[i]);
+        rows[i] = both(shade(canvas.colour, canvas.visibility, strength), visibility_picture(canvas.visibility));
+    });
     constexpr int gap = 8;
     const int width = std::max(rows[0].cols, rows[1].cols);
     cv::Mat3b picture(rows[0].rows + gap + rows[1].rows, width, Canvas::nothing_there);

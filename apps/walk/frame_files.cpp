@@ -173,14 +173,14 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
         wrote(cloud_file(name, ".ply"), [&](const auto& file) { write_depth_cloud(file, work, scene, outputs); });
 }
 
-void write_cloud_picture(Work& work, const Outputs& outputs) {
+std::filesystem::path write_cloud_picture(const Work& work, const Outputs& outputs) {
     const std::filesystem::path file = picture_file(outputs.shaded ? "shaded" : "panel", work.entry.name);
     std::optional<Eigen::Vector3d> viewpoint;
     if (work.frame.world_from_camera)
         viewpoint = work.frame.world_from_camera->translation();
     write_picture(outputs.folder / file,
                   cloud_picture(*work.frame.cloud, work.of_points, viewpoint, outputs.shade_strength));
-    work.row.files.push_back(file);
+    return file;
 }
 
 void remove_files(Work& work, const Outputs& outputs) {

@@ -8,7 +8,8 @@ namespace scanshade {
 /// Writes every file that `outputs` asks for, for a frame with a view; row.files lists them.
 void write_all(Work& work, const FrameImages& images, const Outputs& outputs);
 /// Writes a picture of a cloud without a view: cloud_picture(), in the folder of shaded pictures or else of panels.
-void write_cloud_picture(Work& work, const Outputs& outputs);
+/// Returns its name.
+[[nodiscard]] std::filesystem::path write_cloud_picture(const Work& work, const Outputs& outputs);
 /// Removes the files of a failed frame, and those of an earlier run: files never contradict the row.
 void remove_files(Work& work, const Outputs& outputs);
 

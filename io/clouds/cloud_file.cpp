@@ -10,10 +10,14 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <fmt/format.h>
 #include <limits>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+#include <utility>
 
 namespace scanshade {
 
@@ -48,9 +52,10 @@ void read_coordinate(const CloudRecords& records, std::size_t field, int axis, s
     const std::size_t offset = records.fields[field].offset;
     const Scalar type = records.fields[field].type;
     const bool big_endian = records.encoding == Encoding::big_endian;
-    for (std::size_t i = 0; i < points.size(); ++i)
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
         points[i][axis] = alike ? decoded(records.points.data() + i * records.stride + offset, type, big_endian)
                                 : value_at(records, records.record(i), field);
+    });
 }
 
 /// The same in the cloud's unit.
@@ -60,8 +65,8 @@ void place_coordinate(const CloudRecords& records, const char* name, int axis, s
                  shift = records.shift[static_cast<std::size_t>(axis)];
     if (scale == 1 && shift == 0)
         return;
-    for (Eigen::Vector3d& point : points)
-        point[axis] = point[axis] * scale + shift;
+    tbb::parallel_for(std::size_t(0), points.size(),
+                      [&](std::size_t i) { points[i][axis] = points[i][axis] * scale + shift; });
 }
 
 std::vector<Eigen::Vector3d> points_of(const CloudRecords& records, const fs::path& file,
@@ -73,20 +78,21 @@ std::vector<Eigen::Vector3d> points_of(const CloudRecords& records, const fs::pa
         place_coordinate(records, "y", 1, points);
         place_coordinate(records, "z", 2, points);
     }
-    std::size_t absurd = 0, valid = 0;
-    for (Eigen::Vector3d& point : points) {
-        const bool usable = (point.array().abs() <= largest_coordinate).all();
-        valid += usable;
-        absurd += !usable && !point.array().isNaN().any();
-        if (!usable)
-            point.setConstant(std::numeric_limits<double>::quiet_NaN());
-    }
+    std::atomic<std::size_t> absurd = 0, unusable = 0; // hardly ever counted up
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
+        Eigen::Vector3d& point = points[i];
+        if ((point.array().abs() <= largest_coordinate).all())
+            return;
+        ++unusable;
+        absurd += !point.array().isNaN().any();
+        point.setConstant(std::numeric_limits<double>::quiet_NaN());
+    });
     if (absurd > 0)
         warnings.push_back(fmt::format("{}: {} with infinite or absurd coordinates (beyond 1e30), treated as invalid.",
-                                       file.string(), counted(absurd, "point")));
+                                       file.string(), counted(absurd.load(), "point")));
     if (points.empty())
         warnings.push_back(file.string() + ": no points.");
-    else if (valid == 0)
+    else if (unusable == points.size())
         warnings.push_back(fmt::format("{}: no valid points among {}.", file.string(), points.size()));
     return points;
 }
@@ -259,11 +265,17 @@ std::vector<Eigen::Vector3d> recorded_normals(const Cloud& cloud) {
             }
         if (found < 3)
             continue;
-        std::size_t valid = 0, unit = 0;
-        for (std::size_t i = 0; i < normals.size(); ++i) {
-            valid += cloud.points[i].allFinite();
-            unit += cloud.points[i].allFinite() && std::abs(normals[i].norm() - 1) < 0.01;
-        }
+        using Counts = std::pair<std::size_t, std::size_t>;
+        const auto [valid, unit] = tbb::parallel_reduce(
+            tbb::blocked_range<std::size_t>(0, normals.size()), Counts(0, 0),
+            [&](const auto& range, Counts counts) {
+                for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                    counts.first += cloud.points[i].allFinite();
+                    counts.second += cloud.points[i].allFinite() && std::abs(normals[i].norm() - 1) < 0.01;
+                }
+                return counts;
+            },
+            [](const Counts& a, const Counts& b) { return Counts(a.first + b.first, a.second + b.second); });
         return 10 * unit >= 9 * valid ? normals : std::vector<Eigen::Vector3d>();
     }
     return {};
@@ -301,8 +313,7 @@ void write_cloud(const fs::path& file, const Cloud& cloud, const std::vector<Add
         sort_out(records, added, replacements, additions);
         std::sort(replacements.begin(), replacements.end(),
                   [](const FieldReplacement& a, const FieldReplacement& b) { return a.field < b.field; });
-        const std::string points = edited_points(records, replacements, additions);
-        return records.format->written(records, points, additions);
+        return records.format->written(records, edited_points(records, replacements, additions), additions);
     });
     write_atomically(file, bytes);
 }

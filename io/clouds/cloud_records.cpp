@@ -10,6 +10,7 @@
 #include <cstring>
 #include <fmt/format.h>
 #include <limits>
+#include <tbb/parallel_for.h>
 
 namespace scanshade {
 
@@ -230,33 +231,63 @@ std::string encoded_bits(const CloudRecords& records, Scalar type, std::uint32_t
     return fmt::format("{}", std::bit_cast<float>(text_loses_it ? bits & colour_only : bits));
 }
 
+namespace {
+
+/// A record with replacements and additions made, behind `result`.
+void append_edited(std::string& result, const CloudRecords& records, std::size_t point,
+                   const std::vector<FieldReplacement>& replacements, const std::vector<FieldAddition>& additions) {
+    const bool big_endian = records.encoding == CloudRecords::Encoding::big_endian;
+    const std::string_view record = records.record(point);
+    std::size_t copied = 0;
+    for (const FieldReplacement& replacement : replacements) {
+        const FieldPlace place = locate(records, record, replacement.field);
+        result += record.substr(copied, place.offset - copied);
+        result += replacement.content(point, record);
+        copied = place.offset + place.length;
+    }
+    result += record.substr(copied);
+    for (const FieldAddition& addition : additions) {
+        const float value = addition.values[point];
+        if (addition.type != Scalar::float32)
+            result += (records.text() ? " " : "") + encoded(records, addition.type, static_cast<double>(value));
+        else if (records.text())
+            fmt::format_to(std::back_inserter(result), " {}", value);
+        else
+            result += raw_bytes(value, big_endian);
+    }
+}
+
+} // namespace
+
 std::string edited_points(const CloudRecords& records, const std::vector<FieldReplacement>& replacements,
                           const std::vector<FieldAddition>& additions) {
-    const bool big_endian = records.encoding == CloudRecords::Encoding::big_endian;
-    std::string result;
-    result.reserve(records.points.size() +
+    constexpr std::size_t at_once = 1 << 14;
+    const std::size_t blocks = (records.point_count + at_once - 1) / at_once;
+    const std::size_t spare = records.header.size() + records.before.size() + records.after.size() + 4096;
+    std::string result; // with room for what stands round the points: see between()
+    result.reserve(records.points.size() + spare +
                    records.point_count * additions.size() * (records.text() ? 12 : sizeof(float)));
-    for (std::size_t point = 0; point < records.point_count; ++point) {
-        const std::string_view record = records.record(point);
-        std::size_t copied = 0;
-        for (const FieldReplacement& replacement : replacements) {
-            const FieldPlace place = locate(records, record, replacement.field);
-            result += record.substr(copied, place.offset - copied);
-            result += replacement.content(point, record);
-            copied = place.offset + place.length;
-        }
-        result += record.substr(copied);
-        for (const FieldAddition& addition : additions) {
-            const float value = addition.values[point];
-            if (addition.type != Scalar::float32)
-                result += (records.text() ? " " : "") + encoded(records, addition.type, static_cast<double>(value));
-            else if (records.text())
-                fmt::format_to(std::back_inserter(result), " {}", value);
-            else
-                result += raw_bytes(value, big_endian);
-        }
+    // A few blocks at once, so that hardly any memory is needed besides the result.
+    constexpr std::size_t row = 64;
+    std::vector<std::string> parts(std::min(blocks, row));
+    for (std::size_t first = 0; first < blocks; first += row) {
+        const std::size_t count = std::min(row, blocks - first);
+        tbb::parallel_for(std::size_t(0), count, [&](std::size_t k) {
+            const std::size_t begin = (first + k) * at_once, end = std::min(begin + at_once, records.point_count);
+            parts[k].clear();
+            for (std::size_t point = begin; point < end; ++point)
+                append_edited(parts[k], records, point, replacements, additions);
+        });
+        for (std::size_t k = 0; k < count; ++k)
+            result += parts[k];
     }
     return result;
+}
+
+std::string between(std::string_view header, std::string points, std::string_view after) {
+    points.insert(0, header);
+    points += after;
+    return points;
 }
 
 bool TextRecords::next() {

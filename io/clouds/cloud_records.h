@@ -96,9 +96,13 @@ struct FieldAddition {
     std::span<const float> values;
     Scalar type = Scalar::float32;
 };
-/// All records in file order with replacements (sorted by field) and additions made.
+/// All records in file order with replacements (sorted by field) and additions made. Replacements are asked for from
+/// several threads.
 [[nodiscard]] std::string edited_points(const CloudRecords& records, const std::vector<FieldReplacement>& replacements,
                                         const std::vector<FieldAddition>& additions);
+
+/// A file's bytes: `points` between these; its memory is used again.
+[[nodiscard]] std::string between(std::string_view header, std::string points, std::string_view after);
 
 /// Lines of an ASCII body; skips blank ones.
 class TextRecords {
@@ -140,14 +144,14 @@ class TextRecords {
 /// read.
 [[nodiscard]] std::vector<std::array<int, 3>> ply_triangles(const CloudRecords& records);
 /// The file again with `points` (from edited_points) and the header naming `additions`.
-[[nodiscard]] std::string pcd_bytes(const CloudRecords& records, const std::string& points,
+[[nodiscard]] std::string pcd_bytes(const CloudRecords& records, std::string points,
                                     const std::vector<FieldAddition>& additions);
 /// `additions` become extra bytes: floats behind each point, and a record that names them.
-[[nodiscard]] std::string las_bytes(const CloudRecords& records, const std::string& points,
+[[nodiscard]] std::string las_bytes(const CloudRecords& records, std::string points,
                                     const std::vector<FieldAddition>& additions);
-[[nodiscard]] std::string text_bytes(const CloudRecords& records, const std::string& points,
+[[nodiscard]] std::string text_bytes(const CloudRecords& records, std::string points,
                                      const std::vector<FieldAddition>& additions);
-[[nodiscard]] std::string ply_bytes(const CloudRecords& records, const std::string& points,
+[[nodiscard]] std::string ply_bytes(const CloudRecords& records, std::string points,
                                     const std::vector<FieldAddition>& additions);
 
 } // namespace scanshade

@@ -27,7 +27,7 @@ struct CloudFormat {
     CloudRecords (*read)(std::string_view bytes, const std::filesystem::path& file,
                          std::vector<std::string>& warnings) = nullptr;
     /// The file again with `points` (from edited_points) and a header that names `additions`.
-    std::string (*written)(const CloudRecords& records, const std::string& points,
+    std::string (*written)(const CloudRecords& records, std::string points,
                            const std::vector<FieldAddition>& additions) = nullptr;
     std::vector<std::array<int, 3>> (*triangles)(const CloudRecords& records) = nullptr; ///< none: no meshes
     std::string_view binary_encoding = "binary"; ///< what the format calls little-endian numbers

@@ -353,10 +353,9 @@ std::size_t describe_extra_bytes(std::string& header, const std::string& descrip
 
 } // namespace
 
-std::string las_bytes(const CloudRecords& records, const std::string& points,
-                      const std::vector<FieldAddition>& additions) {
+std::string las_bytes(const CloudRecords& records, std::string points, const std::vector<FieldAddition>& additions) {
     if (additions.empty())
-        return records.header + points + records.after;
+        return between(records.header, std::move(points), records.after);
     std::string descriptors;
     const bool described = records.fields.back().name != "undocumented";
     if (!described)

@@ -390,11 +390,10 @@ CloudRecords read_pcd(std::string_view bytes, const fs::path& file, std::vector<
     return records;
 }
 
-std::string pcd_bytes(const CloudRecords& records, const std::string& points,
-                      const std::vector<FieldAddition>& additions) {
+std::string pcd_bytes(const CloudRecords& records, std::string points, const std::vector<FieldAddition>& additions) {
     std::string result = header_with(records.header, additions);
     if (records.encoding != Encoding::compressed)
-        return result + points + records.after;
+        return between(result, std::move(points), records.after);
     if (!records.packed.empty() && additions.empty() && points == records.points) // else LZF might pack them otherwise
         return result + records.packed + records.after;
 

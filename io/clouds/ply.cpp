@@ -441,8 +441,7 @@ std::vector<std::array<int, 3>> ply_triangles(const CloudRecords& records) {
     return triangles;
 }
 
-std::string ply_bytes(const CloudRecords& records, const std::string& points,
-                      const std::vector<FieldAddition>& additions) {
+std::string ply_bytes(const CloudRecords& records, std::string points, const std::vector<FieldAddition>& additions) {
     std::string header = records.header;
     const PlyHeader parsed = parse_header(header, "cloud");
     const Element& vertex = vertex_element(parsed, "cloud");
@@ -451,7 +450,7 @@ std::string ply_bytes(const CloudRecords& records, const std::string& points,
     for (const FieldAddition& addition : additions)
         lines += (addition.type == Scalar::uint8 ? "property uchar " : "property float ") + addition.name + line_end;
     header.insert(vertex.properties_end, lines);
-    return header + records.before + points + records.after;
+    return between(header + records.before, std::move(points), records.after);
 }
 
 } // namespace scanshade

@@ -220,14 +220,13 @@ CloudRecords read_xyz(std::string_view bytes, const fs::path& file, std::vector<
     return records;
 }
 
-std::string text_bytes(const CloudRecords& records, const std::string& points,
-                       const std::vector<FieldAddition>& additions) {
+std::string text_bytes(const CloudRecords& records, std::string points, const std::vector<FieldAddition>& additions) {
     std::string header = records.header;
     const auto names = words(header);
     if (!names.empty() && !number(names[0])) // a line of names gets those of the new columns
         for (const FieldAddition& addition : additions)
             header.insert(header.find_last_not_of("\r\n") + 1, " " + addition.name);
-    return header + points + records.after;
+    return between(header, std::move(points), records.after);
 }
 
 CloudRecords read_kitti(std::string_view bytes, const fs::path& file, std::vector<std::string>&) {

@@ -1,5 +1,6 @@
 // Clouds without a view: laws and closed forms that visibility from the points themselves must keep.
 #include "ao/cloud/cloud_ao.h"
+#include "ao/cloud/leaf_neighbours.h"
 #include "apps/scenes/scanner.h"
 #include "projection/error.h"
 #include "tests/support/files.h"
@@ -375,8 +376,46 @@ TEST(Neighbours, are_those_that_trying_all_points_finds) {
         ASSERT_EQ(found.all().size(), 20u);
         for (std::size_t k = 0; k < 20; ++k)
             ASSERT_EQ(found.all()[k].distance2, all[k]) << i << " " << k;
-        ASSERT_EQ(tree[i], points[tree.index(i)]);
+        ASSERT_EQ(tree[i], points[tree.original(i)]);
     }
+}
+
+/// A leaf's points share one list of candidates, whose reach is guessed from the leaf before. Ties, equal points,
+/// lonely points and jumps of density must not show.
+TEST(Neighbours, of_leaves_are_those_of_single_searches) {
+    Dice dice(11);
+    const auto roll = [&] { return static_cast<float>(dice.roll()); };
+    std::vector<std::vector<Eigen::Vector3f>> clouds(6);
+    for (int i = 0; i < 3000; ++i)
+        clouds[0].emplace_back(roll(), roll(), std::round(4 * roll())); // sheets
+    for (int i = 0; i < 2500; ++i)
+        clouds[1].emplace_back(static_cast<float>(i % 50), static_cast<float>(i / 50), 0.0F); // ties everywhere
+    clouds[2].assign(2000, Eigen::Vector3f(1, 2, 3));
+    for (int i = 0; i < 2000; ++i)
+        clouds[3].emplace_back(std::pow(10.0F, 8 * roll()), roll(), 0.0F); // every density
+    clouds[4].assign(clouds[0].begin(), clouds[0].begin() + 9);            // fewer than wanted
+    clouds[5] = clouds[0];
+    clouds[5].insert(clouds[5].end(), clouds[2].begin(), clouds[2].end());
+    for (const auto& points : clouds)
+        for (const std::size_t wanted : {std::size_t(1), std::size_t(6), std::size_t(16), Nearest::most}) {
+            const NeighbourTree tree(points);
+            std::vector<int> visits(tree.size(), 0);
+            std::vector<std::vector<Nearest::Neighbour>> of_leaves(tree.size());
+            for_each_neighbourhood(tree, wanted, [&](std::size_t i, std::span<const Nearest::Neighbour> round) {
+                ++visits[i];
+                of_leaves[i].assign(round.begin(), round.end());
+            });
+            for (std::size_t i = 0; i < tree.size(); ++i) {
+                Nearest single;
+                tree.find_round(i, wanted, single);
+                ASSERT_EQ(visits[i], 1);
+                ASSERT_EQ(of_leaves[i].size(), single.all().size());
+                for (std::size_t k = 0; k < of_leaves[i].size(); ++k) {
+                    ASSERT_EQ(of_leaves[i][k].point, single.all()[k].point) << i << " " << k;
+                    ASSERT_EQ(of_leaves[i][k].distance2, single.all()[k].distance2);
+                }
+            }
+        }
 }
 
 TEST(CloudAo, run_gives_a_plain_cloud_a_value_on_every_point) {

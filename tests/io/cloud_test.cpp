@@ -418,5 +418,31 @@ TEST(clouds, describe_themselves) {
     EXPECT_EQ(extension(*cloud.records), ".pcd");
 }
 
+/// Points are edited in blocks on all cores, some dozens of blocks at a time: more points than these hold.
+TEST(ply, a_million_points_keep_their_order) {
+    const TemporaryFolder folder;
+    constexpr std::size_t count = 1100000;
+    const std::string head = "ply\nformat binary_little_endian 1.0\n",
+                      rest = "element edge 1\nproperty int to\nend_header\n",
+                      vertices = fmt::format("element vertex {}\nproperty float x\nproperty float y\nproperty float "
+                                             "z\n",
+                                             count);
+    std::string plain, wider;
+    std::vector<float> values(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        const auto x = static_cast<float>(i);
+        values[i] = x / 3;
+        plain += bytes_of(x, x + 1, -x);
+        wider += bytes_of(x, x + 1, -x, values[i]);
+    }
+    write_file(folder / "in.ply", head + vertices + rest + plain + bytes_of(7));
+    const Cloud cloud = read(folder / "in.ply");
+    ASSERT_EQ(cloud.points.size(), count);
+    EXPECT_EQ(cloud.points[count - 1], Eigen::Vector3d(count - 1, count, -1099999));
+    write_cloud(folder / "out.ply", cloud, {{ao, values}});
+    EXPECT_TRUE(file_bytes(folder / "out.ply") ==
+                head + vertices + "property float " + ao + "\n" + rest + wider + bytes_of(7));
+}
+
 } // namespace
 } // namespace scanshade

@@ -1,0 +1,153 @@
+// Which rule turns a surface's normals, and whether recorded ones are believed.
+#include "ao/cloud/settled_sides.h"
+
+#include <algorithm>
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+namespace scanshade {
+
+using Eigen::Vector3d, Eigen::Vector3f;
+
+namespace {
+
+/// The same cloud with about `wanted` points, evenly chosen, and with the normals that it has.
+CloudSurface thinned(const CloudSurface& surface, std::size_t wanted) {
+    std::vector<Vector3d> points, normals;
+    const std::size_t step = std::max<std::size_t>(1, surface.size() / wanted);
+    for (std::size_t index = step / 2; index < surface.size(); index += step) {
+        points.push_back(surface.tree[index].cast<double>());
+        normals.push_back(surface.normals[index].cast<double>());
+    }
+    return cloud_surface(LocalCloud(points), normals);
+}
+
+} // namespace
+
+/// The sides that the cloud itself tells, or a person.
+Sides SettledSides::found_in(const CloudSurface& surface, std::optional<DiscRays>& rays,
+                             const SidesEffort& effort) const {
+    using Kind = NormalOrientation::Kind;
+    if (orientation.kind == Kind::viewpoint)
+        return sides_to(surface, (orientation.point - surface.middle).cast<float>());
+    if (orientation.kind == Kind::direction)
+        return sides_of(surface, nullptr, orientation.point.cast<float>().normalized(), SidesRule::up);
+    if (!rays)
+        rays.emplace(surface);
+    const std::optional<Vector3f> up =
+        orientation.kind == Kind::terrain || z_up_ ? std::optional<Vector3f>(up_.cast<float>()) : std::nullopt;
+    const SidesRule rule = orientation.kind == Kind::terrain   ? SidesRule::terrain
+                           : orientation.kind == Kind::outward ? SidesRule::outward
+                           : orientation.kind == Kind::inward  ? SidesRule::inward
+                                                               : SidesRule::automatic;
+    return sides_of(surface, &*rays, up, rule, effort);
+}
+
+std::vector<float> SettledSides::settle(CloudSurface& surface, std::optional<DiscRays>& rays, bool recorded) {
+    if (recorded)
+        return settle_recorded(surface, rays);
+    Sides found = found_in(surface, rays);
+    tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
+        if (found.sign[i] < 0)
+            surface.normals[i] = -surface.normals[i];
+    });
+    // What has no plane faces the scanner, or the sky.
+    using Kind = NormalOrientation::Kind;
+    const bool to_sky = orientation.kind == Kind::direction || orientation.kind == Kind::terrain;
+    if (to_sky || orientation.kind == Kind::viewpoint)
+        for (std::size_t i = 0; i < surface.size(); ++i)
+            if (surface.normals[i].isZero())
+                surface.normals[i] =
+                    to_sky ? Vector3f(orientation.point.cast<float>().normalized())
+                           : Vector3f((orientation.point - surface.middle).cast<float>() - surface.tree[i])
+                                 .stableNormalized();
+    note(found);
+    return std::move(found.confidence);
+}
+
+/// Recorded sides are right as a rule. Random ones show within patches; patches turned over, or all, show in where
+/// a scanner could have stood.
+std::vector<float> SettledSides::settle_recorded(CloudSurface& surface, std::optional<DiscRays>& rays) {
+    constexpr double hardly_random = 0.05, mostly_random = 0.2, some_opposed = 0.05, all_opposed = 0.9;
+    constexpr float sure = 0.8F;
+    if (options_.normals != CloudNormals::automatic)
+        return {};
+    const bool told = options_.outside != "auto";
+    const auto opposed_share = [&](const CloudSurface& of, const Sides& sides) {
+        double opposed = 0, all = 0;
+        for (std::size_t i = 0; i < of.size(); ++i)
+            if (sides.confidence[i] > sure && !of.normals[i].isZero()) {
+                all += 1;
+                opposed += sides.sign[i] < 0;
+            }
+        constexpr double enough = 0.3; // of the points: else nothing is said
+        return all > enough * static_cast<double>(of.size()) ? opposed / all : 0;
+    };
+    const auto all_is_well = [&](const CloudSurface& of, std::optional<DiscRays>& rays_of) {
+        constexpr SidesEffort quick{4000, 60, 300};
+        return recorded_sides(of).random <= hardly_random &&
+               opposed_share(of, found_in(of, rays_of, quick)) <= some_opposed;
+    };
+    if (constexpr std::size_t enough = 100000; !told && surface.size() > 2 * enough) {
+        const CloudSurface some = thinned(surface, enough);
+        if (std::optional<DiscRays> rays_of_some; all_is_well(some, rays_of_some))
+            return {};
+    } else if (!told && all_is_well(surface, rays)) {
+        return {};
+    }
+    const RecordedSides order = recorded_sides(surface);
+    const bool in_order = order.random <= hardly_random;
+    Sides found;
+    double opposed = 0;
+    found = found_in(surface, rays);
+    opposed = opposed_share(surface, found);
+    if (in_order && !told && opposed <= some_opposed)
+        return {};
+    if (constexpr double clearly = 0.3; in_order && !told && opposed > all_opposed && found.margin < clearly) {
+        const bool viewed = orientation.kind == NormalOrientation::Kind::viewpoint;
+        if (z_up_)
+            doubts.push_back(
+                fmt::format("{:.0f} % of the recorded normals look down, though the cloud seems to be seen from "
+                            "above; they are kept: --cloud.outside up turns them, --cloud.normals recorded is "
+                            "sure of them",
+                            100 * opposed));
+        else if (orientation.kind != NormalOrientation::Kind::terrain && !found.doubt) // z may point anywhere
+            doubts.push_back(
+                fmt::format("{:.0f} % of the recorded normals face away from {}; they are kept: --cloud.outside "
+                            "turns them, --cloud.normals recorded is sure of them",
+                            100 * opposed, viewed ? orientation.why : "where scanners could have stood"));
+        return {};
+    }
+    const bool all = in_order || told || order.random > mostly_random;
+    std::size_t turned = 0;
+    for (std::size_t i = 0; i < surface.size(); ++i)
+        if (found.sign[i] < 0 && (all || found.confidence[i] > sure) && !surface.normals[i].isZero()) {
+            surface.normals[i] = -surface.normals[i];
+            ++turned;
+        }
+    turned_points += turned;
+    judged_points += surface.size();
+    if (told)
+        turned_why = "--cloud.outside says so";
+    else if (in_order)
+        turned_why = fmt::format("where sides are sure, {:.0f} % of them opposed them", 100 * opposed);
+    else
+        turned_why = fmt::format("{:.0f} % of the points lie in patches whose sides look random", 100 * order.random);
+    if (!told && (in_order || turned > surface.size() * 3 / 5))
+        doubts.push_back(fmt::format(
+            "{:.0f} % of the recorded normals face away from where scanners could have stood; they "
+            "were turned: --cloud.normals recorded keeps them",
+            in_order ? 100 * opposed : 100 * static_cast<double>(turned) / static_cast<double>(surface.size())));
+    note(found);
+    return all ? std::move(found.confidence) : std::vector<float>();
+}
+
+void SettledSides::note(const Sides& found) {
+    if (!found.why.empty())
+        orientation.why = found.why;
+    if (found.doubt)
+        doubts.push_back(*found.doubt);
+}
+
+} // namespace scanshade

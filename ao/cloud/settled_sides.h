@@ -1,0 +1,42 @@
+// The sides of a cloud's surfaces, settled as its settings say.
+#pragma once
+
+#include "ao/cloud/cloud_ao.h"
+#include "ao/cloud/sides.h"
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace scanshade {
+
+/// Turns normals, tile by tile, and remembers what there is to tell people.
+class SettledSides {
+  public:
+    /// `up`: unit, the direction of the sky. `z_up`: whether the cloud is known to have it along z.
+    SettledSides(const CloudAoOptions& options, Eigen::Vector3d up, bool z_up)
+        : options_(options), up_(std::move(up)), z_up_(z_up) {}
+
+    NormalOrientation orientation;   ///< as given or guessed; `why` becomes what was found
+    std::vector<std::string> doubts; ///< sentences, some of them twice
+    std::size_t turned_points = 0;   ///< whose recorded normals were turned
+    std::size_t judged_points = 0;   ///< of the surfaces where some were
+    std::string turned_why;
+
+    /// Turns the normals to the sides that were scanned. Returns how sure that is, 0 .. 1, by index in the tree; empty
+    /// where the recorded sides are taken. `rays` are made of the surface if they are needed. `recorded`: the normals
+    /// are recorded ones.
+    std::vector<float> settle(CloudSurface& surface, std::optional<DiscRays>& rays, bool recorded);
+
+  private:
+    [[nodiscard]] Sides found_in(const CloudSurface& surface, std::optional<DiscRays>& rays,
+                                 const SidesEffort& effort = {}) const;
+    std::vector<float> settle_recorded(CloudSurface& surface, std::optional<DiscRays>& rays);
+    void note(const Sides& found);
+
+    const CloudAoOptions& options_;
+    Eigen::Vector3d up_;
+    bool z_up_;
+};
+
+} // namespace scanshade
