@@ -2,6 +2,7 @@
 #include "apps/jobs/job_run.h"
 #include "apps/measure/front.h"
 #include "apps/measure/trial.h"
+#include "apps/page/run_page.h"
 #include "apps/run/messages.h"
 #include "apps/run/outlook.h"
 #include "apps/run/settings.h"
@@ -28,6 +29,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <opencv2/core/utility.hpp>
 #include <semaphore>
 #include <set>
@@ -141,6 +143,8 @@ void prepare_folder(const Job& job, const ReportFiles& reports) {
         stems.insert(report.stem().string());
         fs::remove(report);
     }
+    stems.insert("index");
+    page::remove_page(job.folder());
     const auto ours = [&](std::string_view stem) { return stems.contains(stem); };
     remove_leftovers(job.folder(), ours);
     for (const char* part : result_folders)
@@ -482,9 +486,8 @@ class Run final : public Command {
                                   .carefully = worker.carefully,
                                   .finished = worker.finished};
         walk(job, ready.report, recording);
-        report_on(job, ready.report, journal, files);
-        if (cloud && !interrupted)
-            write_recording(*cloud);
+        const bool recorded = cloud && !interrupted && write_recording(*cloud, job);
+        report_on(job, ready.report, journal, files, recorded);
         return std::move(ready.report.frames);
     }
 
@@ -497,7 +500,7 @@ class Run final : public Command {
     [[nodiscard]] std::optional<std::vector<FrameRow>> rows_if_done(const Job& job, const Journal& journal,
                                                                     const std::string& task, const ReportFiles& files) {
         auto rows = rows_if_complete(journal, task, job.capture, job.batch.frames, asked_.retry);
-        if (!rows || !fs::exists(files.manifest))
+        if (!rows || !fs::exists(files.manifest) || (writes_page(job) && !page::has_page(job.folder())))
             return std::nullopt;
         say(fmt::format("{}: done already, {} frames -> {}", job.capture.path.string(), rows->size(),
                         job.folder().string()));
@@ -607,18 +610,36 @@ class Run final : public Command {
         progress.end();
     }
 
-    void report_on(const Job& job, const RunReport& report, const Journal& journal, const ReportFiles& files) {
+    /// A capture's blocks are joined by `merge`, which writes their page.
+    [[nodiscard]] static bool writes_page(const Job& job) { return job.batch.outputs.preview && job.block.empty(); }
+
+    /// `recorded`: a cloud of all frames is there for the page.
+    void report_on(const Job& job, RunReport& report, const Journal& journal, const ReportFiles& files, bool recorded) {
         {
             const std::lock_guard alone(alone_); // the report names settings
-            write_frames_csv(files.table, report.frames);
-            say_left_alone(
-                write_manifest(files.manifest, report, [&](const FrameRow& row) { return journal.whole(row); }));
             if (count(report.frames, FrameStatus::ok) > 0)
-                for (const std::string& sentence : outlook(asked_, job.batch.noise, job.capture, shipped_front()))
-                    if (!std::ranges::count(outlook_, sentence))
-                        outlook_.push_back(sentence);
+                report.outlook = outlook(asked_, job.batch.noise, job.capture, shipped_front());
+            for (const std::string& sentence : report.outlook)
+                if (!std::ranges::count(outlook_, sentence))
+                    outlook_.push_back(sentence);
+            write_frames_csv(files.table, report.frames);
+            page::RunPage page;
+            say_left_alone(write_manifest(files.manifest, report, [&](const FrameRow& row) {
+                FrameRow whole = journal.whole(row);
+                if (writes_page(job))
+                    page.add(page_row(whole, job.capture.entries.at(row.index)));
+                return whole;
+            }));
+            if (writes_page(job)) {
+                json head = manifest_head(report);
+                if (recorded)
+                    head["recording_points"] = recording_stem;
+                page.write(job.folder(), page::run_head(head));
+            }
         }
         conclude(report, files.table);
+        if (writes_page(job))
+            say(fmt::format("  page -> {}", (job.folder() / "index.html").string()));
     }
 
     static void say_left_alone(const std::vector<std::string>& files) {
@@ -630,15 +651,21 @@ class Run final : public Command {
                         counted(files.size(), "file"), fmt::join(some, ", "), files.size() > most ? " ..." : ""));
     }
 
-    void write_recording(const RecordingCloud& cloud) const {
+    /// Returns whether the page has the cloud, too.
+    bool write_recording(const RecordingCloud& cloud, const Job& job) const {
         if (cloud.points() == 0) {
             say("  no frame had a pose: " + asked_.recording_cloud + " is not written");
-            return;
+            return false;
         }
+        if (writes_page(job))
+            cloud.write_for_page(job.folder(), recording_stem, job.batch.outputs.page_points);
         cloud.write(asked_.recording_cloud);
         say(fmt::format("  {} points, merged within {:.4f} m -> {}", cloud.points(), cloud.resolution_m(),
                         asked_.recording_cloud));
+        return writes_page(job);
     }
+
+    static constexpr const char* recording_stem = "recording"; ///< recording.000.js ... beside the page
 
     RunSettings asked_;
     std::mutex alone_; ///< held while a capture uses settings and devices, but not while its frames are computed

@@ -122,6 +122,8 @@ void attach_and_write(Work& work, const BatchOptions& options) {
         write_all(work, images, outputs);
         if (by_points && (options.outputs.shaded || options.outputs.panel))
             write_cloud_picture(work, options.outputs);
+        if (by_points && options.outputs.preview)
+            write_page_points(work, options.outputs);
     });
     if (!work.row.why.empty())
         remove_files(work, options.outputs);

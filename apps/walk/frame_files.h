@@ -9,6 +9,8 @@ namespace scanshade {
 void write_all(Work& work, const FrameImages& images, const Outputs& outputs);
 /// Writes a picture of a cloud without a view: cloud_picture(), in the folder of shaded pictures or else of panels.
 void write_cloud_picture(Work& work, const Outputs& outputs);
+/// Writes points/NAME.000.js and on: a cloud computed from its points, as the page draws it.
+void write_page_points(Work& work, const Outputs& outputs);
 /// Removes the files of a failed frame, and those of an earlier run: files never contradict the row.
 void remove_files(Work& work, const Outputs& outputs);
 

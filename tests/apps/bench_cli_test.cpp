@@ -5,7 +5,7 @@
 #include "apps/measure/budget.h"
 #include "apps/measure/configurations.h"
 #include "apps/measure/fused_reference.h"
-#include "apps/page.h"
+#include "apps/page/document.h"
 #include "apps/run/presets.h"
 #include "io/images/image_file.h"
 #include "tests/support/says.h"
