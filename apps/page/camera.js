@@ -53,7 +53,7 @@
         const ahead = Math.abs(camera.up[2]) > 0.5 ? [0.5, 0.8, 0] : [0.3, 0, 0.95];
         Object.assign(camera, looking(add(ahead, camera.up, -0.45), camera.up.map((value) => -value)));
         camera.half_height = Math.tan(25 * Math.PI / 180);
-        camera.distance = 0.5 * size / camera.half_height;
+        camera.distance = 0.36 * size / camera.half_height;
         about(centre);
       },
       /** To a place with axes and angle of view; at once where people ask for less motion. */

@@ -142,8 +142,7 @@ std::string dot(const Point& p, const Axis& x, const Axis& y, std::size_t series
                               x.at(p.x), y.at(p.y), series, colours[series], escaped(p.label));
 }
 
-std::string drawn_series(const Plot& plot, const Series& series, const Axis& x, const Axis& y,
-                         std::size_t number) {
+std::string drawn_series(const Plot& plot, const Series& series, const Axis& x, const Axis& y, std::size_t number) {
     std::string path, dots;
     for (const Point& p : series.points) {
         if (!drawn(plot, p))
@@ -153,9 +152,8 @@ std::string drawn_series(const Plot& plot, const Series& series, const Axis& x, 
     }
     if (!series.joined || path.empty())
         return dots;
-    return fmt::format(
-        "<path d=\"{}\" class=\"line series-{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\"/>\n{}", path, number,
-        colours[number], dots);
+    return fmt::format("<path d=\"{}\" class=\"line series-{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\"/>\n{}",
+                       path, number, colours[number], dots);
 }
 
 std::string legend(const Plot& plot) {

@@ -58,8 +58,9 @@
     };
 
     const mix = () => {
-      for (const layer of Object.values(layers))
-        for (const top of layer.querySelectorAll(".mixes")) top.style.opacity = strength.value;
+      const tops = Object.values(layers).flatMap((layer) => [...layer.querySelectorAll(".mixes")]);
+      for (const top of tops) top.style.opacity = strength.value;
+      strength.disabled = tops.length === 0;
     };
 
     const fill = (side) => {
@@ -224,7 +225,8 @@
       const each = rows[index];
       const option = make("div", { role: "option", class: `thumb ${each.status}`, title: each.name, "aria-label": `${each.name}, ${each.status}`, "aria-selected": "false", onclick: () => on_select(each) });
       option.style.left = `${index * thumb_width}px`;
-      const fill_in = (element) => option.replaceChildren(element, make("span", {}, each.name));
+      const label = each.name.length > 13 ? "…" + each.name.slice(-12) : each.name; // ends differ where names are long
+      const fill_in = (element) => option.replaceChildren(element, make("span", {}, label));
       fill_in(make("div", { class: "blank" }));
       scanshade.preview_of(each).then((found) => {
         if (found?.ao) fill_in(scanshade.painted.ao(found));

@@ -116,7 +116,8 @@
     layout(location = 3) in vec3 normal;
     uniform mat4 clip_from_world;
     uniform vec3 eye, forward;
-    uniform float pixels_per_radian, spacing, strength, clip_low, clip_high;
+    uniform vec3 seen_from;
+    uniform float pixels_per_radian, spacing, slope, size, strength, clip_low, clip_high;
     uniform int mode;
     uniform bool has_colour;
     out vec3 shown;
@@ -124,7 +125,8 @@
     float coded(float v) { return v <= 0.0031308 ? 12.92 * v : 1.055 * pow(v, 1.0 / 2.4) - 0.055; }
     void main() {
       gl_Position = clip_from_world * vec4(position, 1.0);
-      gl_PointSize = clamp(spacing * pixels_per_radian / max(gl_Position.w, 1e-6), 1.5, 32.0);
+      float across = size * (spacing + slope * distance(position, seen_from));
+      gl_PointSize = clamp(across * pixels_per_radian / max(gl_Position.w, 1e-6), 1.5, 32.0);
       float code = floor(paint.a * 255.0 + 0.5);
       bool known = code > 0.5;
       float ao = clamp(((code - 1.0) / 127.0 - clip_low) / max(clip_high - clip_low, 1e-3), 0.0, 1.0);
@@ -257,7 +259,7 @@
         gl.enableVertexAttribArray(3);
         gl.vertexAttribPointer(3, 3, gl.BYTE, true, 4, 1);
         gl.bindVertexArray(null);
-        return { vertices, buffers: [position, paint, more], count: chunk.count, has: chunk.has };
+        return { vertices, buffers: [position, paint, more], count: chunk.count, has: chunk.has, spacing: chunk.spacing || 0, slope: chunk.slope || 0, seen_from: chunk.seen_from || [0, 0, 0] };
       },
       upload_lines(positions) {
         const vertices = gl.createVertexArray();
@@ -285,13 +287,16 @@
         gl.uniformMatrix4fv(points.at.clip_from_world, false, clip);
         gl.uniform3fv(points.at.eye, camera.eye);
         gl.uniform1f(points.at.pixels_per_radian, canvas.height / (2 * camera.half_height));
-        gl.uniform1f(points.at.spacing, look.spacing);
+        gl.uniform1f(points.at.size, look.size);
         gl.uniform1f(points.at.strength, look.strength);
         gl.uniform1f(points.at.clip_low, look.clip_low);
         gl.uniform1f(points.at.clip_high, look.clip_high);
         gl.uniform1i(points.at.mode, look.mode);
         for (const chunk of chunks) {
           gl.uniform1i(points.at.has_colour, chunk.has.colour ? 1 : 0);
+          gl.uniform1f(points.at.spacing, chunk.spacing);
+          gl.uniform1f(points.at.slope, chunk.slope);
+          gl.uniform3fv(points.at.seen_from, chunk.seen_from);
           gl.bindVertexArray(chunk.vertices);
           gl.drawArrays(gl.POINTS, 0, chunk.count);
         }
@@ -340,7 +345,7 @@
     const canvas = by_id("point-canvas"), stage = by_id("point-stage"), source_select = by_id("point-source"), colour_select = by_id("point-colour");
     const posed = rows.filter((row) => row.pose);
     const camera = scanshade.camera();
-    let painter = null, shown = false, row = null, chunks = [], outlines = [], box = null, spacing = 0.01, loading = 0, source = null, said = "", moving = 0, moved_at = 0, drawn_ms = 0;
+    let painter = null, shown = false, row = null, chunks = [], outlines = [], box = null, loading = 0, source = null, said = "", moving = 0, moved_at = 0, drawn_ms = 0;
 
     for (const [key, label] of modes) colour_select.append(make("option", { value: key, selected: key === "shaded" }, label));
 
@@ -360,17 +365,21 @@
       for (let part = 0, parts = 1; part < parts; ++part) {
         const data = await scanshade.load(`${stem}.${String(part).padStart(3, "0")}.js`);
         parts = data.parts;
-        const facts = { spacing: data.spacing, total: data.total, of: data.of, up: data.up, left_out: data.left_out };
-        if (!take(await opened_chunk(data), facts)) return;
+        const facts = { total: data.total, of: data.of, up: data.up, left_out: data.left_out };
+        const chunk = await opened_chunk(data);
+        chunk.spacing = 1.5 * data.spacing || 0.01; // neighbours on the curve are nearer than the points' spacing
+        if (!take(chunk, facts)) return;
       }
     };
     const load_frames = async (some, stride, take) => {
       for (const each of some) {
         const preview = await scanshade.preview_of(each);
         if (!preview?.z_m || !preview.camera) continue;
-        const depth = preview.range[1] > 0 ? 0.5 * (preview.range[0] + preview.range[1]) : 1;
-        const facts = { spacing: stride * preview.step * depth / preview.camera[0], frame: preview };
-        if (!take(await chunk_of_preview(preview, each.pose, stride), facts)) return;
+        const chunk = await chunk_of_preview(preview, each.pose, stride);
+        // A pixel covers more the farther away it is; slanted surfaces lie wider apart.
+        chunk.slope = 1.3 * stride * preview.step / preview.camera[0];
+        chunk.seen_from = each.pose ? [each.pose[3], each.pose[7], each.pose[11]] : [0, 0, 0];
+        if (!take(chunk, {})) return;
       }
     };
 
@@ -411,7 +420,6 @@
         if (number !== loading_number) return false;
         if (chunk.count === 0) return true;
         if (chunks.length === 0) {
-          spacing = facts.spacing || 0.01;
           if (facts.up) camera.up = facts.up;
         }
         source.of = facts.of;
@@ -473,10 +481,12 @@
       outlines = [];
       if (!source?.world || posed.length === 0 || !box) return;
       const preview = current_preview, half = preview?.camera ? [preview.whole[0] / (2 * preview.camera[0]), preview.whole[1] / (2 * preview.camera[1])] : [0.5, 0.4];
-      const depth = 0.04 * Math.hypot(...box[1].map((value, i) => value - box[0][i]));
-      const others = spread(posed, 200).filter((each) => each !== row).flatMap((each) => pyramid(each.pose, half, depth));
+      const depth = 0.025 * Math.hypot(...box[1].map((value, i) => value - box[0][i]));
+      // Cameras close to the eye would fill the picture with their edges.
+      const apart = (each) => Math.hypot(...[3, 7, 11].map((at, axis) => each.pose[at] - camera.eye[axis]));
+      const others = spread(posed, 200).filter((each) => each !== row && apart(each) > 4 * depth).flatMap((each) => pyramid(each.pose, half, depth));
       if (others.length) outlines.push({ shape: painter.upload_lines(new Float32Array(others)), tint: [0.55, 0.6, 0.66, 1] });
-      if (row?.pose) outlines.push({ shape: painter.upload_lines(new Float32Array(pyramid(row.pose, half, 1.6 * depth))), tint: [1, 0.75, 0.2, 1] });
+      if (row?.pose && apart(row) > 2 * depth) outlines.push({ shape: painter.upload_lines(new Float32Array(pyramid(row.pose, half, 1.6 * depth))), tint: [1, 0.75, 0.2, 1] });
     };
     let current_preview = null;
 
@@ -496,7 +506,7 @@
       const began = performance.now();
       draw_cameras();
       painter.draw(some, outlines, camera, {
-        near, far, spacing: spacing * value("point-size") / 2, strength: value("point-strength"),
+        near, far, size: value("point-size") / 3, strength: value("point-strength"),
         clip_low: Math.min(value("clip-low"), value("clip-high")), clip_high: Math.max(value("clip-low"), value("clip-high")),
         mode: modes.findIndex(([key]) => key === colour_select.value), edges: by_id("point-edl").checked, background: [0.08, 0.09, 0.105],
       });

@@ -124,8 +124,8 @@ std::string preview_script(const Preview& preview) {
         text += fmt::format(",\"camera\":[{:.7g},{:.7g},{:.7g},{:.7g}]", camera.fx, camera.fy, camera.cx, camera.cy);
     if (!preview.z_m.empty()) {
         const auto [near, far] = range_of(preview.z_m, sampling);
-        text += fmt::format(",\"range\":[{:.5g},{:.5g}],\"depth\":\"{}\"", near, far,
-                            packed_depth(preview.z_m, sampling));
+        text +=
+            fmt::format(",\"range\":[{:.5g},{:.5g}],\"depth\":\"{}\"", near, far, packed_depth(preview.z_m, sampling));
     }
     const auto itself = [](float share) { return share; };
     if (!preview.visibility.empty())

@@ -35,6 +35,8 @@ scanshade.parts.push(() => {
   for (const note of head.notes) by_id("notes").append(make("li", {}, note));
   by_id("notes").parentElement.hidden = head.notes.length === 0;
 
+  by_id("lead").hidden = !head.lead;
+  text("lead", head.lead || "");
   const by_status = new Map(statuses.map((status) => [status, rows.filter((row) => row.status === status).length]));
   let only = null;
   const chips = [["all", rows.length], ...by_status].filter(([name, count]) => name === "all" || count > 0).map(([name, count]) => {
@@ -99,7 +101,7 @@ scanshade.parts.push(() => {
         kind("valid", "valid", (row) => row.valid, 3, "pixels or points with a depth / all of them"),
         kind("visibility", "AO", (row) => row.visibility, 3, "mean visibility: 1 = open"),
         kind("total", "ms", (row) => row.total, 1, "milliseconds in all stages")]),
-    { key: "warnings", label: "said", value: (row) => row.why || row.warnings[0] || "", text: (row) => [row.why, ...row.warnings].filter(Boolean).join(" ") },
+    ...(rows.some((row) => row.why || row.warnings.length > 0) ? [{ key: "warnings", label: "said", value: (row) => row.why || row.warnings[0] || "", text: (row) => [row.why, ...row.warnings].filter(Boolean).join(" ") }] : []),
     ...(of_errors ? [] : stages.map((stage, i) => kind(stage, stage, (row) => row.ms[i], 1, `milliseconds: ${stage}`))),
   ];
 
@@ -152,6 +154,8 @@ scanshade.parts.push(() => {
   by_id("worst").addEventListener("click", () => table.sort_worst());
 
   // -------------------------------------------------------------------------------------------------- switching, keys
+
+  by_id("show-frame").parentElement.hidden = of_errors; // maps without depth have no points
 
   const show_points = (wanted) => {
     by_id("frame-view").hidden = wanted;

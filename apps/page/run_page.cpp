@@ -190,12 +190,12 @@ json run_head(const json& manifest) {
     if (const std::string slowest = text_at(totals, "slowest_stage"); !slowest.empty())
         facts.push_back({"slowest stage", slowest});
     fact("peak memory", number_at(totals, "peak_memory_mib"), 0, " MiB");
-    fact("expected RMSE", number_at(manifest, "expected_rmse"), 3, "");
     head["facts"] = facts;
     json notes = json::array();
-    for (const char* key : {"budget", "outlook"})
-        for (const std::string& sentence : texts_at(manifest, key))
-            notes.push_back(sentence);
+    std::vector<std::string> first = texts_at(manifest, "budget");
+    std::ranges::move(texts_at(manifest, "outlook"), std::back_inserter(first));
+    for (const std::string& sentence : first) // what to expect comes first
+        head.contains("lead") ? notes.push_back(sentence) : void(head["lead"] = sentence);
     for (const char* key : {"depth_noise", "shading"})
         if (const std::string sentence = text_at(manifest, key); !sentence.empty())
             notes.push_back((std::string(key) == "depth_noise" ? "depth noise: " : "") + sentence);
@@ -244,6 +244,8 @@ void write_from_manifests(const fs::path& folder, const std::vector<fs::path>& m
     }
     if (first.is_null())
         throw Error(folder.string() + ": no manifest.json, so nothing says what was run");
+    if (manifests.size() > 1)
+        first.erase("totals"); // of one block; several may have run at the same time
     page.write(folder, reading_json(manifests.front().string(), [&] { return run_head(first); }));
 }
 

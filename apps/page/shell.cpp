@@ -39,10 +39,11 @@ std::string joined(std::initializer_list<std::string_view> scripts) {
 } // namespace
 
 std::string run_shell(std::string_view title) {
-    return filled(page_html,
-                  {{"title", escaped(title)},
-                   {"style", style_css},
-                   {"script", joined({core_js, table_js, plots_js, maps_js, frames_js, camera_js, points_js, run_js})}});
+    return filled(
+        page_html,
+        {{"title", escaped(title)},
+         {"style", style_css},
+         {"script", joined({core_js, table_js, plots_js, maps_js, frames_js, camera_js, points_js, run_js})}});
 }
 
 std::string list_shell(std::string_view title) {

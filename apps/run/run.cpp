@@ -2,6 +2,7 @@
 #include "apps/jobs/job_run.h"
 #include "apps/measure/front.h"
 #include "apps/measure/trial.h"
+#include "apps/page/list_page.h"
 #include "apps/page/run_page.h"
 #include "apps/run/messages.h"
 #include "apps/run/outlook.h"
@@ -25,6 +26,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -262,13 +264,16 @@ class Run final : public Command {
         cv::setNumThreads(1); // frames are the parallelism; threads inside a frame would only compete with them
         end_gracefully_on_signals();
         std::mutex counting;
+        std::vector<page::ListRow> list_rows(jobs.size());
         overlapped(jobs.size(), at_once(), [&](std::size_t i, OrderedOutput& output) {
             if (interrupted)
                 return;
             std::vector<FrameRow> rows;
             Fault fault = Fault::none;
             try {
+                const fs::path folder = jobs[i].folder();
                 rows = process(std::move(jobs[i]), output);
+                list_rows[i] = list_row(folder, rows);
             } catch (const DeviceLost&) { // the other captures need it, too
                 throw;
             } catch (const Outage& failure) {
@@ -279,6 +284,8 @@ class Run final : public Command {
             tally.add(rows);
             tally.add(fault);
         });
+        if (asked_.page && jobs.size() > 1)
+            write_list(std::move(list_rows));
         for (const std::string& sentence : outlook_)
             say(sentence);
         if (const std::string sentence = tally.doubt_sentence(); !sentence.empty())
@@ -287,6 +294,42 @@ class Run final : public Command {
     }
 
   private:
+    /// A capture's row in the page of all.
+    [[nodiscard]] page::ListRow list_row(const fs::path& folder, const std::vector<FrameRow>& rows) const {
+        page::ListRow all{.name = folder.filename().string(),
+                          .frames = rows.size(),
+                          .ok = count(rows, FrameStatus::ok),
+                          .doubtful = count(rows, FrameStatus::doubtful),
+                          .failed = count(rows, FrameStatus::failed),
+                          .left = count(rows, FrameStatus::skipped)};
+        const auto done = static_cast<double>(all.ok + all.doubtful);
+        for (const FrameRow& row : rows) {
+            if (!is_done(row.status))
+                continue;
+            const StageTimes ms = row.ms + StageTimes{};
+            all.coverage += row.coverage / done;
+            all.visibility += (std::isfinite(row.mean_visibility) ? row.mean_visibility : 0) / done;
+            all.ms += (ms.load + ms.project + ms.compute + ms.attach + ms.write) / done;
+        }
+        if (done == 0)
+            all.coverage = all.visibility = all.ms = std::nan("");
+        if (page::has_page(folder))
+            all.page = (folder / "index.html").lexically_relative(asked_.out).generic_string();
+        return all;
+    }
+
+    /// The page of all captures. One that an outage ended has no row.
+    void write_list(std::vector<page::ListRow> rows) const {
+        std::erase_if(rows, [](const page::ListRow& row) { return row.name.empty(); });
+        const fs::path out = fs::weakly_canonical(asked_.out);
+        page::write_list(asked_.out, {.title = (out.has_filename() ? out : out.parent_path()).filename().string(),
+                                      .subtitle = fmt::format("{} captures, {}", rows.size(), asked_.method),
+                                      .notes = {},
+                                      .reasons = {},
+                                      .rows = std::move(rows)});
+        say(fmt::format("page of all captures -> {}", (fs::path(asked_.out) / "index.html").string()));
+    }
+
     Job job_from(const fs::path& path, const fs::path& folder) const {
         Job job{open_capture(
                     path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s, asked_.poses, asked_.colour}),

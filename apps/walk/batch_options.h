@@ -41,7 +41,7 @@ struct Outputs {
     double shade_strength = 1; ///< 0 leaves the colour, 1 multiplies by visibility
     bool colour_view = false;  ///< maps and pictures of frames with a secondary camera use its pixels
     CloudColours colour_cloud = CloudColours::kept;
-    bool preview = false; ///< what the page shows of the frame beside the other files
+    bool preview = false;              ///< what the page shows of the frame beside the other files
     std::size_t page_points = 1000000; ///< of a cloud, at most, on the page
 };
 

@@ -218,8 +218,8 @@ void write_page_points(Work& work, const Outputs& outputs) {
                               .confidence = work.confidence.per_point,
                               .normals = work.of_points.normals,
                               .z_up = z_is_up(cloud)};
-    for (const auto& file : page::write_points(outputs.folder, std::filesystem::path("points") / work.entry.name, points,
-                                               outputs.page_points))
+    for (const auto& file : page::write_points(outputs.folder, std::filesystem::path("points") / work.entry.name,
+                                               points, outputs.page_points))
         work.row.files.push_back(file);
 }
 

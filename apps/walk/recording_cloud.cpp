@@ -90,12 +90,10 @@ RecordingCloud::Columns RecordingCloud::columns() const {
 void RecordingCloud::write_for_page(const std::filesystem::path& folder, const std::string& stem,
                                     std::size_t most) const {
     const Columns all = columns();
-    (void)page::write_points(folder, stem,
-                             {.points = all.points,
-                              .colours = all.colours,
-                              .visibility = all.visibility,
-                              .confidence = all.confidence},
-                             most);
+    (void)page::write_points(
+        folder, stem,
+        {.points = all.points, .colours = all.colours, .visibility = all.visibility, .confidence = all.confidence},
+        most);
 }
 
 void RecordingCloud::write(const std::filesystem::path& file) const {

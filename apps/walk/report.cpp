@@ -305,8 +305,9 @@ std::vector<std::string> write_manifest(const std::filesystem::path& file, const
             for (const auto& each : all_of_row.files)
                 own.insert(each.generic_string());
             stream << std::exchange(between, ",") << "\n    "
-                   << indented(text_of(frame_json(all_of_row, !report.capture.camera, report.capture.entries.at(row.index))),
-                               "    ");
+                   << indented(
+                          text_of(frame_json(all_of_row, !report.capture.camera, report.capture.entries.at(row.index))),
+                          "    ");
         }
         stream << (report.frames.empty() ? "]" : "\n  ]");
         left_alone = report.alone ? files_of_others(file.parent_path(), own) : std::vector<std::string>();

@@ -31,11 +31,11 @@ struct RunReport {
     std::vector<std::string> budget; ///< what an error or time budget chose, expected and found; empty without one
     std::string shading;             ///< what the shaded pictures show, and why
     std::vector<std::string> outlook = {}; ///< the error to expect, and the cost of less
-    std::vector<FrameRow> frames;    ///< shortened
-    std::size_t done_now = 0;        ///< frames that this process computed; others were done before
-    StageTimes ms_now{};             ///< sums of their times in each stage
-    double took_ms = 0;              ///< from the first frame's begin to the last one's end
-    bool alone = true;               ///< no other run writes to the same folder, as runs of a capture's blocks do
+    std::vector<FrameRow> frames;          ///< shortened
+    std::size_t done_now = 0;              ///< frames that this process computed; others were done before
+    StageTimes ms_now{};                   ///< sums of their times in each stage
+    double took_ms = 0;                    ///< from the first frame's begin to the last one's end
+    bool alone = true;                     ///< no other run writes to the same folder, as runs of a capture's blocks do
 };
 
 /// Frames per second of the pipeline, and of each stage if it had the machine to itself. A stage then works on as many
