@@ -223,10 +223,10 @@
     let rows = [];
     const thumb = (index) => {
       const each = rows[index];
-      const option = make("div", { role: "option", class: `thumb ${each.status}`, title: each.name, "aria-label": `${each.name}, ${each.status}`, "aria-selected": "false", onclick: () => on_select(each) });
+      const option = make("button", { type: "button", tabindex: "-1", class: `thumb ${each.status}`, title: each.name, onclick: () => on_select(each) });
       option.style.left = `${index * thumb_width}px`;
       const label = each.name.length > 13 ? "…" + each.name.slice(-12) : each.name; // ends differ where names are long
-      const fill_in = (element) => option.replaceChildren(element, make("span", {}, label));
+      const fill_in = (element) => option.replaceChildren(element, make("span", { "aria-hidden": "true" }, label), make("span", { class: "hidden" }, `${each.name}, ${each.status}`));
       fill_in(make("div", { class: "blank" }));
       scanshade.preview_of(each).then((found) => {
         if (found?.ao) fill_in(scanshade.painted.ao(found));
@@ -251,7 +251,7 @@
           thumbs.set(index, element);
           inside.append(element);
         }
-        thumbs.get(index).setAttribute("aria-selected", String(rows[index] === row));
+        thumbs.get(index).setAttribute("aria-current", String(rows[index] === row));
       }
     };
     strip.addEventListener("scroll", scanshade.once_per_picture(draw_strip));

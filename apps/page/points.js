@@ -66,6 +66,8 @@
     return { count, positions, paint, more, has: { colour: Boolean(colour), ao: true, confidence: Boolean(data.confidence), normal: Boolean(data.normal) } };
   };
 
+  scanshade.opened_chunk = opened_chunk;
+
   /** The pixels of a preview's colour picture, at the size of its maps. */
   const colour_pixels = async (preview) => {
     if (!preview.picture || !preview.fits) return null;
@@ -345,6 +347,7 @@
     const canvas = by_id("point-canvas"), stage = by_id("point-stage"), source_select = by_id("point-source"), colour_select = by_id("point-colour");
     const posed = rows.filter((row) => row.pose);
     const camera = scanshade.camera();
+    scanshade.shown_camera = () => camera;
     let painter = null, shown = false, row = null, chunks = [], outlines = [], box = null, loading = 0, source = null, said = "", moving = 0, moved_at = 0, drawn_ms = 0;
 
     for (const [key, label] of modes) colour_select.append(make("option", { value: key, selected: key === "shaded" }, label));
