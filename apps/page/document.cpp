@@ -222,10 +222,10 @@ std::string svg_file(const Plot& plot) {
 
 std::string table(const std::vector<std::string>& heads, const std::vector<std::vector<std::string>>& rows,
                   const std::vector<bool>& marked) {
-    std::string html = "<div class=\"wide\"><table>\n" + row(heads, "th", false);
+    std::string html = "<div class=\"wide\"><table>\n<thead>\n" + row(heads, "th", false) + "</thead>\n<tbody>\n";
     for (std::size_t i = 0; i < rows.size(); ++i)
         html += row(rows[i], "td", i < marked.size() && marked[i]);
-    return html + "</table></div>\n";
+    return html + "</tbody>\n</table></div>\n";
 }
 
 std::string figure(const cv::Mat3b& picture, std::string_view caption) {
