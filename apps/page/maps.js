@@ -26,14 +26,13 @@
   /** {size, step, first, whole, camera, range, z_m, ao, confidence, reference: codes, 0 = none, picture: an address}. */
   scanshade.opened_preview = async (data) => {
     const opened = { size: data.size, step: data.step, first: data.first, whole: data.whole, camera: data.camera, range: data.range, fits: data.fits };
-    const parts = [];
-    const part = (name, use) => { if (data[name]) parts.push(unpacked(data[name]).then(use)); };
-    part("depth", (bytes) => { opened.z_m = depth_of(bytes); });
-    part("ao", (bytes) => { opened.ao = summed(bytes); });
-    part("confidence", (bytes) => { opened.confidence = summed(bytes); });
-    part("reference", (bytes) => { opened.reference = summed(bytes); });
+    const count = data.size[0] * data.size[1], bytes = await unpacked(data.bytes);
+    let at = 0;
+    const next = (length) => bytes.subarray(at, at += length);
+    for (const name of data.maps) // one stream, in this order
+      if (name === "depth") opened.z_m = depth_of(next(2 * count));
+      else opened[name] = summed(next(count));
     if (data.colour) opened.picture = "data:image/jpeg;base64," + data.colour;
-    await Promise.all(parts);
     return opened;
   };
 

@@ -63,7 +63,7 @@
         for (let axis = 0; axis < 3; ++axis) more[4 * i + 1 + axis] = Math.round(127 * n[axis]) & 0xff;
       }
     }
-    return { count, positions, paint, more, has: { colour: Boolean(colour), ao: true, confidence: Boolean(data.confidence), normal: Boolean(data.normal) } };
+    return { count, positions, paint, more, has: { colour: Boolean(colour), ao: true, confidence: Boolean(data.confidence), normal: Boolean(data.normal), sides: Boolean(data.normal) } };
   };
 
   scanshade.opened_chunk = opened_chunk;
@@ -121,7 +121,7 @@
     uniform vec3 seen_from;
     uniform float pixels_per_radian, spacing, slope, size, strength, clip_low, clip_high;
     uniform int mode;
-    uniform bool has_colour;
+    uniform bool has_colour, fronts_only;
     out vec3 shown;
     float linear(float v) { return v <= 0.04045 ? v / 12.92 : pow((v + 0.055) / 1.055, 2.4); }
     float coded(float v) { return v <= 0.0031308 ? 12.92 * v : 1.055 * pow(v, 1.0 / 2.4) - 0.055; }
@@ -129,6 +129,8 @@
       gl_Position = clip_from_world * vec4(position, 1.0);
       float across = size * (spacing + slope * distance(position, seen_from));
       gl_PointSize = clamp(across * pixels_per_radian / max(gl_Position.w, 1e-6), 1.5, 32.0);
+      // A room seen from outside opens where its walls' backs would be.
+      if (fronts_only && dot(normal, normal) > 0.1 && dot(normal, position - eye) > 0.0) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
       float code = floor(paint.a * 255.0 + 0.5);
       bool known = code > 0.5;
       float ao = clamp(((code - 1.0) / 127.0 - clip_low) / max(clip_high - clip_low, 1e-3), 0.0, 1.0);
@@ -272,6 +274,17 @@
         gl.bindVertexArray(null);
         return { vertices, buffers: [buffer], count: positions.length / 3 };
       },
+      /** Calls back once the device has drawn what it was asked to. */
+      when_done(call) {
+        const sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+        gl.flush();
+        const look = () => {
+          if (gl.getSyncParameter(sync, gl.SYNC_STATUS) !== gl.SIGNALED) return void setTimeout(look, 8);
+          gl.deleteSync(sync);
+          call();
+        };
+        setTimeout(look, 0);
+      },
       release(each) {
         gl.deleteVertexArray(each.vertices);
         for (const buffer of each.buffers) gl.deleteBuffer(buffer);
@@ -298,6 +311,7 @@
           gl.uniform1i(points.at.has_colour, chunk.has.colour ? 1 : 0);
           gl.uniform1f(points.at.spacing, chunk.spacing);
           gl.uniform1f(points.at.slope, chunk.slope);
+          gl.uniform1i(points.at.fronts_only, chunk.has.sides && !look.backs ? 1 : 0);
           gl.uniform3fv(points.at.seen_from, chunk.seen_from);
           gl.bindVertexArray(chunk.vertices);
           gl.drawArrays(gl.POINTS, 0, chunk.count);
@@ -348,7 +362,7 @@
     const posed = rows.filter((row) => row.pose);
     const camera = scanshade.camera();
     scanshade.shown_camera = () => camera;
-    let painter = null, shown = false, row = null, chunks = [], outlines = [], box = null, loading = 0, source = null, said = "", moving = 0, moved_at = 0, drawn_ms = 0;
+    let painter = null, shown = false, row = null, chunks = [], outlines = [], box = null, loading = 0, source = null, said = "", moving = false, rest = 0, drawn_ms = 0;
 
     for (const [key, label] of modes) colour_select.append(make("option", { value: key, selected: key === "shaded" }, label));
 
@@ -370,7 +384,7 @@
         parts = data.parts;
         const facts = { total: data.total, of: data.of, up: data.up, left_out: data.left_out };
         const chunk = await opened_chunk(data);
-        chunk.spacing = 1.5 * data.spacing || 0.01; // neighbours on the curve are nearer than the points' spacing
+        chunk.spacing = 2 * data.spacing || 0.01; // neighbours on the curve are nearer than the points' spacing
         if (!take(chunk, facts)) return;
       }
     };
@@ -431,6 +445,7 @@
         chunks.push(painter.upload(chunk));
         if (chunks.length === 1) {
           offer_modes(chunk.has);
+          by_id("point-backs").parentElement.hidden = !chunk.has.sides;
           if (!keep_view) home(false);
         }
         draw();
@@ -504,25 +519,23 @@
       const away = box ? Math.hypot(...box[0].map((v, i) => (v + box[1][i]) / 2 - camera.eye[i])) : 1;
       const far = 3 * reach + away, near = far / 20000;
       // While the view moves, only as many chunks as were drawn in time: each prefix is an even sample.
-      const busy = performance.now() - moved_at < 150 && drawn_ms > 60 && chunks.length > 1;
+      const busy = moving && drawn_ms > 60 && chunks.length > 1;
       const some = busy ? chunks.slice(0, Math.max(1, Math.floor(chunks.length * 60 / drawn_ms))) : chunks;
       const began = performance.now();
       draw_cameras();
       painter.draw(some, outlines, camera, {
         near, far, size: value("point-size") / 3, strength: value("point-strength"),
         clip_low: Math.min(value("clip-low"), value("clip-high")), clip_high: Math.max(value("clip-low"), value("clip-high")),
-        mode: modes.findIndex(([key]) => key === colour_select.value), edges: by_id("point-edl").checked, background: [0.08, 0.09, 0.105],
+        mode: modes.findIndex(([key]) => key === colour_select.value), edges: by_id("point-edl").checked, backs: by_id("point-backs").checked, background: [0.08, 0.09, 0.105],
       });
-      if (!busy && chunks.length > 1) {
-        painter.gl.finish();
-        drawn_ms = performance.now() - began;
-      }
+      if (!busy && chunks.length > 1) painter.when_done(() => { drawn_ms = performance.now() - began; });
       canvas.dataset.drawn = String(Number(canvas.dataset.drawn || 0) + 1);
-      clearTimeout(moving);
-      if (busy) moving = setTimeout(draw, 200);
+      if (!moving) return;
+      clearTimeout(rest);
+      rest = setTimeout(() => { moving = false; draw(); }, 200);
     };
     const draw = scanshade.once_per_picture(render);
-    const moved = () => { moved_at = performance.now(); camera.stop(); draw(); };
+    const moved = () => { moving = true; clearTimeout(rest); camera.stop(); draw(); };
 
     // ------------------------------------------------------------------------------------------------ hands
 
@@ -563,7 +576,7 @@
       event.preventDefault();
       event.stopPropagation();
     });
-    for (const id of ["point-strength", "point-size", "point-edl", "clip-low", "clip-high"]) by_id(id).addEventListener("input", draw);
+    for (const id of ["point-strength", "point-size", "point-edl", "point-backs", "clip-low", "clip-high"]) by_id(id).addEventListener("input", draw);
     colour_select.addEventListener("change", draw);
     by_id("point-home").addEventListener("click", () => home());
     source_select.addEventListener("change", () => {

@@ -3,6 +3,7 @@
 
 #include "apps/page/text.h"
 #include "io/images/jpeg_output.h"
+#include "projection/statistics.h"
 
 #include <algorithm>
 #include <bit>
@@ -36,38 +37,32 @@ void each_sample(const cv::Mat_<Pixel>& map, const Sampling& sampling, Take&& ta
     }
 }
 
-/// Differences between neighbours, so that surfaces become small numbers.
-std::string differences(const std::vector<std::uint8_t>& values) {
-    std::string bytes(values.size(), '\0');
-    std::uint8_t before = 0;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-        bytes[i] = static_cast<char>(values[i] - before);
-        before = values[i];
-    }
-    return bytes;
-}
-
-/// 0 = none, 1 .. levels = 0 .. 1.
+/// A map of shares as differences between neighbours, so that surfaces become small numbers: 0 = none, 1 .. levels =
+/// 0 .. 1.
 template <class Pixel, class ToShare>
-std::string shares(const cv::Mat_<Pixel>& map, const Sampling& sampling, int levels, ToShare&& to_share) {
-    std::vector<std::uint8_t> values;
-    values.reserve(static_cast<std::size_t>(sampling.size.area()));
+void append_shares(std::string& bytes, const cv::Mat_<Pixel>& map, const Sampling& sampling, int levels,
+                   ToShare&& to_share) {
+    std::size_t i = bytes.size();
+    bytes.resize(i + static_cast<std::size_t>(sampling.size.area()));
+    const auto steps = static_cast<float>(levels - 1);
+    std::uint8_t before = 0;
     each_sample(map, sampling, [&](Pixel value) {
         const float share = to_share(value); // a NaN stays one
-        values.push_back(share == share ? static_cast<std::uint8_t>(
-                                              std::clamp(share, 0.0F, 1.0F) * static_cast<float>(levels - 1) + 1.5F)
-                                        : std::uint8_t(0));
+        const auto code =
+            share == share ? static_cast<std::uint8_t>(static_cast<int>(std::clamp(share, 0.0F, 1.0F) * steps + 1.5F))
+                           : std::uint8_t(0);
+        bytes[i++] = static_cast<char>(code - before);
+        before = code;
     });
-    return packed(differences(values));
 }
 
 /// Depth as differences of shortened floats, whose order is that of their bits; holes are 0. Two planes: low bytes,
 /// high bytes.
-std::string packed_depth(const cv::Mat1f& z_m, const Sampling& sampling) {
+void append_depth(std::string& bytes, const cv::Mat1f& z_m, const Sampling& sampling) {
     const auto count = static_cast<std::size_t>(sampling.size.area());
-    std::string planes(2 * count, '\0');
-    std::int32_t before = static_cast<std::int32_t>(std::bit_cast<std::uint32_t>(1.0F) >> dropped_mantissa_bits);
-    std::size_t i = 0;
+    std::size_t i = bytes.size();
+    bytes.resize(i + 2 * count);
+    auto before = static_cast<std::int32_t>(std::bit_cast<std::uint32_t>(1.0F) >> dropped_mantissa_bits);
     each_sample(z_m, sampling, [&](float z) {
         std::uint32_t stored = 0;
         if (z > 0 && z < std::numeric_limits<float>::max()) {
@@ -76,10 +71,9 @@ std::string packed_depth(const cv::Mat1f& z_m, const Sampling& sampling) {
             before += apart;
             stored = static_cast<std::uint32_t>(apart < 0 ? -2 * apart - 1 : 2 * apart) + 1;
         }
-        planes[i] = static_cast<char>(stored);
-        planes[count + i++] = static_cast<char>(stored >> 8);
+        bytes[i] = static_cast<char>(stored);
+        bytes[count + i++] = static_cast<char>(stored >> 8);
     });
-    return packed(planes);
 }
 
 cv::Mat3b small(const cv::Mat3b& picture) {
@@ -92,21 +86,19 @@ cv::Mat3b small(const cv::Mat3b& picture) {
     return result;
 }
 
-/// The smallest and largest depth of the sample; {0, 0} where there is none.
+/// The depths below which 1 % and 99 % of some thousand pixels lie; {0, 0} where there is none.
 std::pair<float, float> range_of(const cv::Mat1f& z_m, const Sampling& sampling) {
+    constexpr int most_looked_at = 4000;
     std::vector<float> known;
-    known.reserve(static_cast<std::size_t>(sampling.size.area()));
+    const int step = std::max(1, sampling.size.area() / most_looked_at);
+    int i = 0;
     each_sample(z_m, sampling, [&](float z) {
-        if (z > 0)
+        if (i++ % step == 0 && z > 0)
             known.push_back(z);
     });
     if (known.empty())
         return {0.0F, 0.0F};
-    const auto at = [&](std::size_t percent) {
-        const auto place = known.begin() + static_cast<std::ptrdiff_t>((known.size() - 1) * percent / 100);
-        std::ranges::nth_element(known, place);
-        return *place;
-    };
+    const auto at = [&](std::size_t percent) { return ranked(known, (known.size() - 1) * percent / 100); };
     const float near = at(1);
     return {near, at(99)};
 }
@@ -122,23 +114,34 @@ std::string preview_script(const Preview& preview) {
     const Pinhole& camera = preview.camera;
     if (camera.fx != 0)
         text += fmt::format(",\"camera\":[{:.7g},{:.7g},{:.7g},{:.7g}]", camera.fx, camera.fy, camera.cx, camera.cy);
+    // All maps are one stream: beginning a stream takes as long as packing some thousand bytes.
+    std::string maps, bytes;
+    const auto add = [&](std::string_view name) { maps += fmt::format("{}\"{}\"", maps.empty() ? "" : ",", name); };
     if (!preview.z_m.empty()) {
         const auto [near, far] = range_of(preview.z_m, sampling);
-        text +=
-            fmt::format(",\"range\":[{:.5g},{:.5g}],\"depth\":\"{}\"", near, far, packed_depth(preview.z_m, sampling));
+        text += fmt::format(",\"range\":[{:.5g},{:.5g}]", near, far);
+        append_depth(bytes, preview.z_m, sampling);
+        add("depth");
     }
     const auto itself = [](float share) { return share; };
-    if (!preview.visibility.empty())
-        text += fmt::format(",\"ao\":\"{}\"", shares(preview.visibility, sampling, 128, itself));
-    if (!preview.reference.empty())
-        text += fmt::format(",\"reference\":\"{}\"", shares(preview.reference, sampling, 128, itself));
-    if (!preview.confidence_map.empty())
-        text += fmt::format(",\"confidence\":\"{}\"", shares(preview.confidence_map, sampling, 32, [](uchar code) {
-                                return code == 0 ? std::numeric_limits<float>::quiet_NaN()
-                                                 : static_cast<float>(code - 1) / 254;
-                            }));
-    else if (!preview.confidence.empty())
-        text += fmt::format(",\"confidence\":\"{}\"", shares(preview.confidence, sampling, 32, itself));
+    if (!preview.visibility.empty()) {
+        append_shares(bytes, preview.visibility, sampling, 128, itself);
+        add("ao");
+    }
+    if (!preview.reference.empty()) {
+        append_shares(bytes, preview.reference, sampling, 128, itself);
+        add("reference");
+    }
+    if (!preview.confidence_map.empty() || !preview.confidence.empty()) {
+        if (preview.confidence_map.empty())
+            append_shares(bytes, preview.confidence, sampling, 32, itself);
+        else
+            append_shares(bytes, preview.confidence_map, sampling, 32, [](uchar code) {
+                return code == 0 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(code - 1) / 254;
+            });
+        add("confidence");
+    }
+    text += fmt::format(",\"maps\":[{}],\"bytes\":\"{}\"", maps, packed(bytes));
     if (!preview.colour.empty()) {
         constexpr int quality = 80;
         text += fmt::format(",\"fits\":{},\"colour\":\"{}\"", preview.colour_fits,
