@@ -1,11 +1,39 @@
-// Times of a page in Chromium: node measure.js MODULES CHROMIUM page|points INDEX.HTML. Prints cells of a table.
+// Times of a page in Chromium: node measure.js MODULES CHROMIUM page|points INDEX.HTML prints cells of a table; pictures
+// INDEX.HTML FOLDER takes its pictures.
 "use strict";
+const fs = require("fs");
 const path = require("path");
-const [modules, chromium, what, file] = process.argv.slice(2);
+const [modules, chromium, what, file, folder] = process.argv.slice(2);
 const { chromium: launcher } = require(path.resolve(modules, "playwright-core"));
 
 (async () => {
   const browser = await launcher.launch({ executablePath: chromium, args: ["--no-sandbox", "--headless=new", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"] });
+  const address = "file://" + path.resolve(file).split("/").map(encodeURIComponent).join("/");
+  if (what === "pictures") {
+    fs.mkdirSync(folder, { recursive: true });
+    for (const { name, width, height, dark, points, view } of [
+      { name: "frame", width: 1440, height: 900, view: "depth" },
+      { name: "points", width: 1440, height: 900, dark: true, points: true },
+      { name: "phone", width: 390, height: 844 },
+    ]) {
+      const page = await (await browser.newContext({ viewport: { width, height }, colorScheme: dark ? "dark" : "light", reducedMotion: "reduce" })).newPage();
+      await page.goto(address + "#3");
+      await page.waitForTimeout(1500);
+      if (view) await page.selectOption("#left", view);
+      if (points) {
+        await page.click("#show-points");
+        await page.waitForFunction(() => document.querySelector("#point-canvas").dataset.loaded, null, { timeout: 60000 });
+        for (let i = 0; i < 5; ++i) await page.keyboard.press("-"); // out of the room
+        await page.focus("#point-canvas");
+        for (let i = 0; i < 6; ++i) await page.keyboard.press("ArrowDown");
+        await page.waitForTimeout(2500);
+      }
+      await page.waitForTimeout(500);
+      await page.screenshot({ path: path.join(folder, `${name}.jpg`), type: "jpeg", quality: 72 });
+    }
+    await browser.close();
+    return;
+  }
   const runs = [];
   for (let i = 0; i < (what === "page" ? 5 : 1); ++i) {
     const page = await (await browser.newContext({ viewport: { width: 1440, height: 900 } })).newPage();
@@ -16,7 +44,7 @@ const { chromium: launcher } = require(path.resolve(modules, "playwright-core"))
         if (document.querySelector("#layer-right .inside") && !window.times?.images) seen("images");
       }).observe(document, { attributes: true, childList: true, subtree: true });
     });
-    await page.goto("file://" + path.resolve(file).split("/").map(encodeURIComponent).join("/"));
+    await page.goto(address);
     await page.waitForSelector("html[data-ready]");
     await page.waitForTimeout(1500);
     if (what === "page") {
@@ -24,7 +52,7 @@ const { chromium: launcher } = require(path.resolve(modules, "playwright-core"))
       const times = await page.evaluate(() => window.times);
       runs.push([paint, times.ready, times.images]);
     } else {
-      const began = await page.evaluate(() => {
+      await page.evaluate(() => {
         const canvas = document.querySelector("#point-canvas"), times = {};
         window.point_times = times;
         const start = performance.now();
@@ -33,9 +61,7 @@ const { chromium: launcher } = require(path.resolve(modules, "playwright-core"))
           if (canvas.dataset.loaded) times.all ??= performance.now() - start;
         }).observe(canvas, { attributes: true });
         document.querySelector("#show-points").click();
-        return start;
       });
-      void began;
       await page.waitForFunction(() => window.point_times.all, null, { timeout: 60000 });
       await page.waitForTimeout(1500);
       const rate = (act, seconds) => page.evaluate(async ([code, length]) => {
