@@ -47,11 +47,11 @@
         camera.distance = Math.max(1e-6, camera.distance / factor);
         about(centre);
       },
-      /** Before everything in the box, from in front and above. */
-      frame_box(low, high) {
+      /** Before everything in the box, from in front and above; from the side that most of it faces, the mean normal's. */
+      frame_box(low, high, facing) {
         const centre = low.map((value, i) => (value + high[i]) / 2), size = Math.hypot(...high.map((value, i) => value - low[i])) || 1;
         const ahead = Math.abs(camera.up[2]) > 0.5 ? [0.5, 0.8, 0] : [0.3, 0, 0.95];
-        Object.assign(camera, looking(add(ahead, camera.up, -0.45), camera.up.map((value) => -value)));
+        Object.assign(camera, looking(add(add(ahead, camera.up, -0.45), facing, -2.5), camera.up.map((value) => -value)));
         camera.half_height = Math.tan(25 * Math.PI / 180);
         camera.distance = 0.36 * size / camera.half_height;
         about(centre);

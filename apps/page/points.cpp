@@ -249,11 +249,12 @@ std::vector<fs::path> write_points(const fs::path& folder, const fs::path& stem,
         static_cast<std::size_t>(std::ranges::count_if(cloud.points, [](const auto& p) { return p.allFinite(); }));
     std::vector<std::uint32_t> order = even_order(shown.size());
     const std::size_t parts = (order.size() + points_in_a_chunk - 1) / points_in_a_chunk;
-    const std::string facts = fmt::format(
-        ",\"parts\":{},\"total\":{},\"of\":{},\"left_out\":{},\"spacing\":{:.5g},\"up\":[{}],"
-        "\"box\":[{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}]",
-        parts, shown.size(), finite, finite - in_box, spacing_of(cloud, shown), cloud.z_up ? "0,0,1" : "0,-1,0",
-        box.low.x(), box.low.y(), box.low.z(), box.size.x(), box.size.y(), box.size.z());
+    const std::string facts =
+        fmt::format(",\"parts\":{},\"total\":{},\"of\":{},\"left_out\":{},\"spacing\":{:.5g},\"up\":[{}],"
+                    "\"box\":[{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}]",
+                    parts, shown.size(), finite, finite - in_box, spacing_of(cloud, shown),
+                    fmt::format("{:.6g},{:.6g},{:.6g}", cloud.up.x(), cloud.up.y(), cloud.up.z()), box.low.x(),
+                    box.low.y(), box.low.z(), box.size.x(), box.size.y(), box.size.z());
     std::vector<fs::path> files(parts);
     tbb::parallel_for(std::size_t(0), parts, [&](std::size_t part) {
         const auto begin = order.begin() + static_cast<std::ptrdiff_t>(part * points_in_a_chunk);

@@ -16,7 +16,7 @@ struct Points {
     std::span<const cv::Vec3b> colours = {};                 ///< BGR
     std::span<const float> visibility = {}, confidence = {}; ///< 0 .. 1, NaN = none
     std::span<const Eigen::Vector3f> normals = {};           ///< zero = none
-    bool z_up = false;                                       ///< else the camera's y points down
+    Eigen::Vector3d up = {0, -1, 0};                         ///< as of a camera's space
 };
 
 inline constexpr std::size_t points_in_a_chunk = 100000;

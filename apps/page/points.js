@@ -362,7 +362,7 @@
     const posed = rows.filter((row) => row.pose);
     const camera = scanshade.camera();
     scanshade.shown_camera = () => camera;
-    let painter = null, shown = false, row = null, chunks = [], outlines = [], box = null, loading = 0, source = null, said = "", moving = false, rest = 0, drawn_ms = 0;
+    let painter = null, shown = false, row = null, chunks = [], outlines = [], box = null, facing = [0, 0, 0], loading = 0, source = null, said = "", moving = false, rest = 0, drawn_ms = 0;
 
     for (const [key, label] of modes) colour_select.append(make("option", { value: key, selected: key === "shaded" }, label));
 
@@ -413,6 +413,13 @@
       for (const chunk of chunks) painter.release(chunk);
       chunks = [];
       box = null;
+      facing = [0, 0, 0];
+    };
+
+    const mean_normal = (chunk) => {
+      const sum = [0, 0, 0], normals = new Int8Array(chunk.more.buffer);
+      for (let i = 0; i < chunk.count; ++i) for (let axis = 0; axis < 3; ++axis) sum[axis] += normals[4 * i + 1 + axis];
+      return sum.map((value) => value / (127 * Math.max(1, chunk.count)));
     };
 
     const tell = () => {
@@ -438,6 +445,7 @@
         if (chunk.count === 0) return true;
         if (chunks.length === 0) {
           if (facts.up) camera.up = facts.up;
+          if (chunk.has.sides) facing = mean_normal(chunk);
         }
         source.of = facts.of;
         source.left_out = facts.left_out;
@@ -491,7 +499,7 @@
         const view = view_of(row, preview);
         if (flying) camera.fly_to(view, draw);
         else Object.assign(camera, view);
-      } else if (box) camera.frame_box(...box);
+      } else if (box) camera.frame_box(...box, facing);
       draw();
     };
     const draw_cameras = () => {

@@ -127,7 +127,9 @@ void RunPage::add(const Row& row) {
     FileSet files;
     for (const std::string& file : row.files) {
         const std::size_t folder = file.find('/');
-        if (folder != std::string::npos && std::string_view(file).substr(folder + 1).starts_with(row.name))
+        if (folder == std::string::npos || file.starts_with('.') || row.name.find('/') != std::string::npos)
+            continue; // of a manifest that was tampered with: nothing outside the page's folder is shown
+        if (std::string_view(file).substr(folder + 1).starts_with(row.name))
             files.emplace_back(file.substr(0, folder), file.substr(folder + 1 + row.name.size()));
     }
     const auto [set, is_new] = known_.try_emplace(files, sets_.size());
@@ -135,7 +137,7 @@ void RunPage::add(const Row& row) {
         sets_.push_back(files);
     json ms = json::array(), errors = json::object();
     for (const double each : row.ms)
-        ms.push_back(known(each, 2));
+        ms.push_back(known(each, 3));
     trim(ms);
     for (const auto& [name, value] : row.errors)
         errors[name] = known(value, 5);
@@ -231,6 +233,9 @@ void remove_page(const fs::path& folder) {
         std::error_code gone_already;
         fs::remove(folder / file, gone_already);
     }
+    std::error_code trouble;
+    for (int part = 0; fs::remove(folder / fmt::format("{}.{:03}.js", recording_stem, part), trouble); ++part)
+        continue;
 }
 
 void write_from_manifests(const fs::path& folder, const std::vector<fs::path>& manifests) {
@@ -246,6 +251,8 @@ void write_from_manifests(const fs::path& folder, const std::vector<fs::path>& m
         throw Error(folder.string() + ": no manifest.json, so nothing says what was run");
     if (manifests.size() > 1)
         first.erase("totals"); // of one block; several may have run at the same time
+    if (fs::exists(folder / fmt::format("{}.000.js", recording_stem)))
+        first["recording_points"] = recording_stem;
     page.write(folder, reading_json(manifests.front().string(), [&] { return run_head(first); }));
 }
 

@@ -15,6 +15,9 @@
 
 namespace scanshade::page {
 
+/// The cloud of all frames for the page: recording.000.js and on, beside it.
+inline constexpr const char* recording_stem = "recording";
+
 /// A frame's line. Numbers that are not known are NaN.
 struct Row {
     std::size_t index = 0;
@@ -47,7 +50,8 @@ class RunPage {
 
 /// Whether a folder has a page.
 [[nodiscard]] bool has_page(const std::filesystem::path& folder);
-/// Removes a page that no longer fits the results. Previews and points belong to their frames and stay.
+/// Removes a page that no longer fits the results, and the cloud of all frames. Previews and points of frames belong to
+/// these and stay.
 void remove_page(const std::filesystem::path& folder);
 
 /// The page of results from their manifests: of a whole capture, or of its blocks, in order. Frames are read one by

@@ -146,8 +146,13 @@ void prepare_folder(const Job& job, const ReportFiles& reports) {
         fs::remove(report);
     }
     stems.insert("index");
+    stems.insert(page::recording_stem);
     page::remove_page(job.folder());
-    const auto ours = [&](std::string_view stem) { return stems.contains(stem); };
+    const auto ours = [&](std::string_view stem) { // "office", or "office.003" of a cloud's chunks
+        const std::size_t dot = stem.rfind('.');
+        return stems.contains(stem) || (dot != std::string_view::npos && whole_number(stem.substr(dot + 1)) &&
+                                        stems.contains(stem.substr(0, dot)));
+    };
     remove_leftovers(job.folder(), ours);
     for (const char* part : result_folders)
         remove_leftovers(job.folder() / part, ours);
@@ -676,7 +681,7 @@ class Run final : public Command {
             if (writes_page(job)) {
                 json head = manifest_head(report);
                 if (recorded)
-                    head["recording_points"] = recording_stem;
+                    head["recording_points"] = page::recording_stem;
                 page.write(job.folder(), page::run_head(head));
             }
         }
@@ -701,14 +706,12 @@ class Run final : public Command {
             return false;
         }
         if (writes_page(job))
-            cloud.write_for_page(job.folder(), recording_stem, job.batch.outputs.page_points);
+            cloud.write_for_page(job.folder(), page::recording_stem, job.batch.outputs.page_points);
         cloud.write(asked_.recording_cloud);
         say(fmt::format("  {} points, merged within {:.4f} m -> {}", cloud.points(), cloud.resolution_m(),
                         asked_.recording_cloud));
         return writes_page(job);
     }
-
-    static constexpr const char* recording_stem = "recording"; ///< recording.000.js ... beside the page
 
     RunSettings asked_;
     std::mutex alone_; ///< held while a capture uses settings and devices, but not while its frames are computed

@@ -212,12 +212,15 @@ void write_cloud_picture(Work& work, const Outputs& outputs) {
 
 void write_page_points(Work& work, const Outputs& outputs) {
     const Cloud& cloud = *work.frame.cloud;
+    std::optional<Eigen::Vector3d> viewpoint;
+    if (work.frame.world_from_camera)
+        viewpoint = work.frame.world_from_camera->translation();
     const page::Points points{.points = cloud.points,
                               .colours = has_colours(cloud) ? std::span(cloud.colours) : std::span<const cv::Vec3b>(),
                               .visibility = work.attached.per_point,
                               .confidence = work.confidence.per_point,
                               .normals = work.of_points.normals,
-                              .z_up = z_is_up(cloud)};
+                              .up = up_of(cloud, work.of_points, viewpoint)};
     for (const auto& file : page::write_points(outputs.folder, std::filesystem::path("points") / work.entry.name,
                                                points, outputs.page_points))
         work.row.files.push_back(file);

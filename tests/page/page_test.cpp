@@ -175,6 +175,31 @@ TEST_F(PageFilesTest, view_makes_the_page_that_a_run_makes) {
     EXPECT_EQ(new_rows, rows);
 }
 
+TEST_F(PageFilesTest, a_manifest_cannot_lead_a_page_out_of_its_folder) {
+    tests::write_file(out() / "manifest.json",
+                      R"({"frames": [{"index": 0, "name": "a", "status": "ok", "files": ["ao/a.png", "../a.png"]},
+                                     {"index": 1, "name": "../b", "status": "ok", "files": ["ao/../b.png"]}]})");
+    ASSERT_EQ(run_program(fmt::format("view '{}'", out().string())).exit_code, 0);
+    const auto [head, rows] = data_of(out());
+    EXPECT_EQ(rows.size(), 2u);
+    EXPECT_EQ(head["file_sets"], nlohmann::json::parse(R"([[["ao", ".png"]], []])"));
+}
+
+TEST_F(PageFilesTest, the_cloud_of_a_recording_is_on_its_page_until_the_next_run) {
+    const std::string made =
+        fmt::format("generate office --frames 2 --size 160x120 --truth=false -o '{}'", capture().string());
+    ASSERT_EQ(run_program(made).exit_code, 0);
+    ASSERT_EQ(run(fmt::format("--cloud '{}/all.ply'", folder.path().string())).exit_code, 0);
+    EXPECT_TRUE(fs::exists(out() / "recording.000.js"));
+    EXPECT_EQ(data_of(out()).first["recording_points"], "recording");
+    fs::remove(out() / "index.html");
+    ASSERT_EQ(run_program(fmt::format("view '{}'", out().string())).exit_code, 0);
+    EXPECT_EQ(data_of(out()).first["recording_points"], "recording");
+    ASSERT_EQ(run("--overwrite").exit_code, 0);
+    EXPECT_FALSE(fs::exists(out() / "recording.000.js"));
+    EXPECT_FALSE(data_of(out()).first.contains("recording_points"));
+}
+
 TEST_F(PageFilesTest, view_refuses_what_is_no_result) {
     const auto refused = [&](const fs::path& path) {
         const Ran ran = run_program(fmt::format("view '{}'", path.string()));
