@@ -327,8 +327,9 @@ class Run final : public Command {
     void write_list(std::vector<page::ListRow> rows) const {
         std::erase_if(rows, [](const page::ListRow& row) { return row.name.empty(); });
         const fs::path out = fs::weakly_canonical(asked_.out);
+        const std::string subtitle = fmt::format("{} captures, {}", rows.size(), asked_.method);
         page::write_list(asked_.out, {.title = (out.has_filename() ? out : out.parent_path()).filename().string(),
-                                      .subtitle = fmt::format("{} captures, {}", rows.size(), asked_.method),
+                                      .subtitle = subtitle,
                                       .notes = {},
                                       .reasons = {},
                                       .rows = std::move(rows)});
