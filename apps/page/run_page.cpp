@@ -9,6 +9,8 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 
 namespace scanshade::page {
@@ -169,8 +171,13 @@ void RunPage::write(const fs::path& folder, json head) const {
             files.push_back({part, extension});
         head["file_sets"].push_back(files);
     }
-    write_atomically(folder / "index.js", "scanshade.set_head(" + for_script(json_line(head)) +
-                                              ");\nscanshade.add_rows([\n" + lines_ + "\n]);\n");
+    write_atomically(folder / "index.js", [&](const fs::path& file) { // piece by piece: no second copy of the lines
+        std::ofstream stream(file, std::ios::binary);
+        stream.exceptions(std::ios::failbit | std::ios::badbit);
+        stream << "scanshade.set_head(" << for_script(json_line(head)) << ");\nscanshade.add_rows([\n"
+               << lines_ << "\n]);\n";
+        stream.flush();
+    });
     write_atomically(folder / "index.html", run_shell(as_utf8(head.at("title").get<std::string>()) + " - scanshade"));
 }
 
