@@ -2,12 +2,16 @@
 #include "apps/command.h"
 #include "apps/jobs/job.h"
 #include "apps/json.h"
+#include "apps/page/list_page.h"
+#include "apps/page/run_page.h"
 #include "apps/walk/progress.h"
 #include "apps/walk/report.h"
 #include "io/output_file.h"
 #include "projection/error.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <fstream>
@@ -165,6 +169,82 @@ Plan plan_of(const std::vector<std::string>& words) {
     return read_plan(words.front());
 }
 
+// ---------------------------------------------------------------------------------------------------- pages
+
+/// The list of a job's captures, and the pages of those that were computed in blocks.
+class Pages {
+  public:
+    explicit Pages(fs::path job) : job_(std::move(job)) {}
+
+    /// Tasks in their order: the blocks of a capture follow each other.
+    void add(const Task& task, const std::vector<FrameRow>& rows) {
+        if (captures_.empty() || captures_.back().name() != task.name)
+            captures_.push_back({results_of(job_, task), {.name = task.name}, {}});
+        Capture& capture = captures_.back();
+        capture.row.frames += task.frames;
+        for (const FrameRow& row : rows)
+            capture.add(row);
+        const std::string block = task.block();
+        if (!block.empty())
+            capture.manifests.push_back(capture.folder / ("manifest." + block + ".json"));
+    }
+
+    void write(const Plan& plan, const Totals& totals) {
+        page::ListPage list{
+            .title = fs::weakly_canonical(job_).filename().string(),
+            .subtitle = fmt::format("{} tasks, {} of {} frames done", totals.tasks, settled(totals), totals.frames),
+            .notes = {},
+            .reasons = {},
+            .rows = {}};
+        for (const std::string& refused : plan.refused)
+            list.notes.push_back("refused when the job was planned: " + refused);
+        for (const auto& [kind, groups] : {std::pair("failed", &totals.reasons), std::pair("doubtful", &totals.doubts)})
+            for (const auto& [reason, group] : most_frequent_first(*groups))
+                list.reasons.push_back({kind, group.frames, reason, group.example});
+        for (Capture& capture : captures_)
+            list.rows.push_back(capture.finished(job_));
+        page::write_list(job_, list);
+    }
+
+  private:
+    struct Capture {
+        fs::path folder;
+        page::ListRow row;
+        std::vector<fs::path> manifests; ///< of blocks; none for a whole capture, whose run has written its page
+        std::size_t done = 0;
+
+        [[nodiscard]] const std::string& name() const { return row.name; }
+        void add(const FrameRow& frame) {
+            row.ok += frame.status == FrameStatus::ok;
+            row.doubtful += frame.status == FrameStatus::doubtful;
+            row.failed += frame.status == FrameStatus::failed && frame.fault != Fault::outage;
+            if (!is_done(frame.status))
+                return;
+            ++done;
+            row.coverage += frame.coverage;
+            row.visibility += std::isfinite(frame.mean_visibility) ? frame.mean_visibility : 0;
+            const StageTimes ms = frame.ms + StageTimes{};
+            row.ms += ms.load + ms.project + ms.compute + ms.attach + ms.write;
+        }
+        /// The row with means, once the capture has its page.
+        page::ListRow finished(const fs::path& job) {
+            std::erase_if(manifests, [](const fs::path& file) { return !fs::exists(file); });
+            if (!manifests.empty())
+                page::write_from_manifests(folder, manifests);
+            page::ListRow all = row;
+            all.left = row.frames - std::min(row.frames, row.ok + row.doubtful + row.failed);
+            for (double* mean : {&all.coverage, &all.visibility, &all.ms})
+                *mean = done > 0 ? *mean / static_cast<double>(done) : std::nan("");
+            if (page::has_page(folder))
+                all.page = (folder / "index.html").lexically_relative(job).generic_string();
+            return all;
+        }
+    };
+
+    fs::path job_;
+    std::vector<Capture> captures_;
+};
+
 // ---------------------------------------------------------------------------------------------------- the commands
 
 class Status final : public Command {
@@ -244,11 +324,19 @@ class Merge final : public Command {
   public:
     Words words() override { return {"JOB", "the job's folder", &job_, 1, 1}; }
 
+    std::vector<Stage> stages() override {
+        return {{"output",
+                 {{.name = "page",
+                   .help = "index.html, a list of the captures, and a page for each",
+                   .value = OneOf(&page_, page_words)}}}};
+    }
+
     int run() override {
         const fs::path job = job_.front();
         const Plan plan = plan_of(job_);
         require_folder(job);
         Totals totals;
+        Pages pages(job);
         write_atomically(job / "frames.csv", [&](const fs::path& file) {
             std::ofstream stream(file, std::ios::binary);
             stream.exceptions(std::ios::failbit | std::ios::badbit);
@@ -256,12 +344,15 @@ class Merge final : public Command {
             for (const Task& task : plan.tasks) {
                 const Reading reading = read_task(job, task);
                 totals.add(task, reading);
+                pages.add(task, reading.rows);
                 for (const FrameRow& row : reading.rows)
                     stream << csv_line(task.name, row);
             }
             stream.flush();
         });
         write_manifest(job, plan, totals);
+        if (page_)
+            pages.write(plan, totals);
         print(totals, plan.refused.size());
         return code_of(totals);
     }
@@ -288,7 +379,9 @@ class Merge final : public Command {
         write_atomically(job / "manifest.json", text_of(text) + "\n");
     }
 
+    static constexpr std::array page_words{Named{"yes", true}, Named{"no", false}};
     std::vector<std::string> job_;
+    bool page_ = true;
 };
 
 } // namespace

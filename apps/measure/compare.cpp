@@ -6,6 +6,8 @@
 #include "apps/measure/error_classes.h"
 #include "apps/measure/error_figures.h"
 #include "apps/measure/map_set.h"
+#include "apps/page/preview.h"
+#include "apps/page/run_page.h"
 #include "apps/picture.h"
 #include "apps/walk/progress.h"
 #include "io/clouds/cloud_file.h"
@@ -14,7 +16,9 @@
 #include "io/output_file.h"
 #include "projection/error.h"
 
+#include <cmath>
 #include <fmt/format.h>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 namespace scanshade {
@@ -54,7 +58,7 @@ class Compare final : public Command {
                    .value = &truth_}}},
                 {"output",
                  {{.name = "out",
-                   .help = "folder for difference/NAME.png, compare.csv and compare.json",
+                   .help = "folder for difference/NAME.png, compare.csv, compare.json and a page of them, index.html",
                    .value = &out_,
                    .writes = Writes::folder},
                   {.name = "scale",
@@ -126,6 +130,8 @@ class Compare final : public Command {
         cv::Mat1f apart;
         cv::subtract(a, b, apart);
         write_picture(fs::path(out_) / "difference" / (name + ".png"), difference_picture(apart, scale_));
+        write_atomically(fs::path(out_) / "previews" / (name + ".js"),
+                         page::preview_script({.z_m = {}, .visibility = a, .reference = b}));
     }
 
     int conclude(const MapSet& a, const MapSet& b, const std::vector<Row>& rows, const PairSums& pairs) const {
@@ -192,8 +198,54 @@ class Compare final : public Command {
         for (const Row& row : rows)
             csv += csv_field(row.name) + "," + figure_csv(row.difference) + "," + csv_field(row.why) + "\n";
         write_atomically(fs::path(out_) / "compare.csv", csv);
+        write_page(a, b, rows, all);
         write_atomically(fs::path(out_) / "compare.json",
                          text_of(report_json(a, b, rows, all)) + "\n"); // last: it says that the rest is there
+    }
+
+    /// Frames as in the page of a run, with errors in place of times.
+    void write_page(const MapSet& a, const MapSet& b, const std::vector<Row>& rows, const Difference& all) const {
+        page::RunPage page;
+        for (std::size_t i = 0; i < rows.size(); ++i) {
+            const auto& [name, d, why] = rows[i];
+            constexpr double none = std::numeric_limits<double>::quiet_NaN();
+            page::Row line{.index = i,
+                           .name = name,
+                           .status = why.empty() ? "ok" : "failed",
+                           .why = why,
+                           .fault = {},
+                           .valid_share = none,
+                           .coverage = none,
+                           .mean_visibility = none,
+                           .ms = {none, none, none, none, none},
+                           .warnings = {},
+                           .notes = {},
+                           .files = {},
+                           .world_from_camera = {}};
+            if (why.empty())
+                line.errors = {{"rmse", d.rms}, {"bias", d.bias}, {"mae", d.mae}, {"worst", d.worst}, {"ssim", d.ssim}};
+            for (const char* file : {"difference/{}.png", "previews/{}.js"})
+                if (const std::string whole = fmt::format(fmt::runtime(file), name); fs::exists(fs::path(out_) / whole))
+                    line.files.push_back(whole);
+            page.add(line);
+        }
+        json facts = json::array();
+        for (const auto& [title, value] : {std::pair("RMSE", all.rms), std::pair("bias", all.bias),
+                                           std::pair("MAE", all.mae), std::pair("SSIM", all.ssim)})
+            if (std::isfinite(value))
+                facts.push_back({title, fmt::format("{:.4f}", value)});
+        const json head{
+            {"kind", "compare"},
+            {"version", SCANSHADE_VERSION},
+            {"title", "Comparison"},
+            {"subtitle", fmt::format("A {} ({}) with B {} ({})", a.path.string(), a.kind, b.path.string(), b.kind)},
+            {"facts", facts},
+            {"notes",
+             {fmt::format("The AO is A's, the reference is B's. Differences: blue where A is darker, red where it is "
+                          "brighter, white where both agree; full colour at {:g}.",
+                          scale_)}},
+            {"details", json::object()}};
+        page.write(out_, head);
     }
 
     std::vector<std::string> paths_;

@@ -1,7 +1,7 @@
 // Writes the results of `refine` as JSON, as a table, and as a page.
 #include "apps/refine/report.h"
 
-#include "apps/page.h"
+#include "apps/page/document.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,6 +2,8 @@
 #include "apps/jobs/job_run.h"
 #include "apps/measure/front.h"
 #include "apps/measure/trial.h"
+#include "apps/page/list_page.h"
+#include "apps/page/run_page.h"
 #include "apps/run/messages.h"
 #include "apps/run/outlook.h"
 #include "apps/run/settings.h"
@@ -24,10 +26,12 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <opencv2/core/utility.hpp>
 #include <semaphore>
 #include <set>
@@ -141,7 +145,14 @@ void prepare_folder(const Job& job, const ReportFiles& reports) {
         stems.insert(report.stem().string());
         fs::remove(report);
     }
-    const auto ours = [&](std::string_view stem) { return stems.contains(stem); };
+    stems.insert("index");
+    stems.insert(page::recording_stem);
+    page::remove_page(job.folder());
+    const auto ours = [&](std::string_view stem) { // "office", or "office.003" of a cloud's chunks
+        const std::size_t dot = stem.rfind('.');
+        return stems.contains(stem) || (dot != std::string_view::npos && whole_number(stem.substr(dot + 1)) &&
+                                        stems.contains(stem.substr(0, dot)));
+    };
     remove_leftovers(job.folder(), ours);
     for (const char* part : result_folders)
         remove_leftovers(job.folder() / part, ours);
@@ -262,13 +273,16 @@ class Run final : public Command {
         cv::setNumThreads(1); // frames are the parallelism; threads inside a frame would only compete with them
         end_gracefully_on_signals();
         std::mutex counting;
+        std::vector<page::ListRow> list_rows(jobs.size());
         overlapped(jobs.size(), at_once(), [&](std::size_t i, OrderedOutput& output) {
             if (interrupted)
                 return;
             std::vector<FrameRow> rows;
             Fault fault = Fault::none;
             try {
+                const fs::path folder = jobs[i].folder();
                 rows = process(std::move(jobs[i]), output);
+                list_rows[i] = list_row(folder, rows);
             } catch (const DeviceLost&) { // the other captures need it, too
                 throw;
             } catch (const Outage& failure) {
@@ -279,6 +293,8 @@ class Run final : public Command {
             tally.add(rows);
             tally.add(fault);
         });
+        if (asked_.page && jobs.size() > 1)
+            write_list(std::move(list_rows));
         for (const std::string& sentence : outlook_)
             say(sentence);
         if (const std::string sentence = tally.doubt_sentence(); !sentence.empty())
@@ -287,6 +303,43 @@ class Run final : public Command {
     }
 
   private:
+    /// A capture's row in the page of all.
+    [[nodiscard]] page::ListRow list_row(const fs::path& folder, const std::vector<FrameRow>& rows) const {
+        page::ListRow all{.name = folder.filename().string(),
+                          .frames = rows.size(),
+                          .ok = count(rows, FrameStatus::ok),
+                          .doubtful = count(rows, FrameStatus::doubtful),
+                          .failed = count(rows, FrameStatus::failed),
+                          .left = count(rows, FrameStatus::skipped)};
+        const auto done = static_cast<double>(all.ok + all.doubtful);
+        for (const FrameRow& row : rows) {
+            if (!is_done(row.status))
+                continue;
+            const StageTimes ms = row.ms + StageTimes{};
+            all.coverage += row.coverage / done;
+            all.visibility += (std::isfinite(row.mean_visibility) ? row.mean_visibility : 0) / done;
+            all.ms += (ms.load + ms.project + ms.compute + ms.attach + ms.write) / done;
+        }
+        if (done == 0)
+            all.coverage = all.visibility = all.ms = std::nan("");
+        if (page::has_page(folder))
+            all.page = (folder / "index.html").lexically_relative(asked_.out).generic_string();
+        return all;
+    }
+
+    /// The page of all captures. One that an outage ended has no row.
+    void write_list(std::vector<page::ListRow> rows) const {
+        std::erase_if(rows, [](const page::ListRow& row) { return row.name.empty(); });
+        const fs::path out = fs::weakly_canonical(asked_.out);
+        const std::string subtitle = fmt::format("{} captures, {}", rows.size(), asked_.method);
+        page::write_list(asked_.out, {.title = (out.has_filename() ? out : out.parent_path()).filename().string(),
+                                      .subtitle = subtitle,
+                                      .notes = {},
+                                      .reasons = {},
+                                      .rows = std::move(rows)});
+        say(fmt::format("page of all captures -> {}", (fs::path(asked_.out) / "index.html").string()));
+    }
+
     Job job_from(const fs::path& path, const fs::path& folder) const {
         Job job{open_capture(
                     path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s, asked_.poses, asked_.colour}),
@@ -486,9 +539,8 @@ class Run final : public Command {
                                   .carefully = worker.carefully,
                                   .finished = worker.finished};
         walk(job, ready.report, recording);
-        report_on(job, ready.report, journal, files);
-        if (cloud && !interrupted)
-            write_recording(*cloud);
+        const bool recorded = cloud && !interrupted && write_recording(*cloud, job);
+        report_on(job, ready.report, journal, files, recorded);
         return std::move(ready.report.frames);
     }
 
@@ -501,7 +553,7 @@ class Run final : public Command {
     [[nodiscard]] std::optional<std::vector<FrameRow>> rows_if_done(const Job& job, const Journal& journal,
                                                                     const std::string& task, const ReportFiles& files) {
         auto rows = rows_if_complete(journal, task, job.capture, job.batch.frames, asked_.retry);
-        if (!rows || !fs::exists(files.manifest))
+        if (!rows || !fs::exists(files.manifest) || (writes_page(job) && !page::has_page(job.folder())))
             return std::nullopt;
         say(fmt::format("{}: done already, {} frames -> {}", job.capture.path.string(), rows->size(),
                         job.folder().string()));
@@ -611,18 +663,36 @@ class Run final : public Command {
         progress.end();
     }
 
-    void report_on(const Job& job, const RunReport& report, const Journal& journal, const ReportFiles& files) {
+    /// A capture's blocks are joined by `merge`, which writes their page.
+    [[nodiscard]] static bool writes_page(const Job& job) { return job.batch.outputs.preview && job.block.empty(); }
+
+    /// `recorded`: a cloud of all frames is there for the page.
+    void report_on(const Job& job, RunReport& report, const Journal& journal, const ReportFiles& files, bool recorded) {
         {
             const std::lock_guard alone(alone_); // the report names settings
-            write_frames_csv(files.table, report.frames);
-            say_left_alone(
-                write_manifest(files.manifest, report, [&](const FrameRow& row) { return journal.whole(row); }));
             if (count(report.frames, FrameStatus::ok) > 0)
-                for (const std::string& sentence : outlook(asked_, job.batch.noise, job.capture, shipped_front()))
-                    if (!std::ranges::count(outlook_, sentence))
-                        outlook_.push_back(sentence);
+                report.outlook = outlook(asked_, job.batch.noise, job.capture, shipped_front());
+            for (const std::string& sentence : report.outlook)
+                if (!std::ranges::count(outlook_, sentence))
+                    outlook_.push_back(sentence);
+            write_frames_csv(files.table, report.frames);
+            page::RunPage page;
+            say_left_alone(write_manifest(files.manifest, report, [&](const FrameRow& row) {
+                FrameRow whole = journal.whole(row);
+                if (writes_page(job))
+                    page.add(page_row(whole, job.capture.entries.at(row.index)));
+                return whole;
+            }));
+            if (writes_page(job)) {
+                json head = manifest_head(report);
+                if (recorded)
+                    head["recording_points"] = page::recording_stem;
+                page.write(job.folder(), page::run_head(head));
+            }
         }
         conclude(report, files.table);
+        if (writes_page(job))
+            say(fmt::format("  page -> {}", (job.folder() / "index.html").string()));
     }
 
     static void say_left_alone(const std::vector<std::string>& files) {
@@ -634,14 +704,18 @@ class Run final : public Command {
                         counted(files.size(), "file"), fmt::join(some, ", "), files.size() > most ? " ..." : ""));
     }
 
-    void write_recording(const RecordingCloud& cloud) const {
+    /// Returns whether the page has the cloud, too.
+    bool write_recording(const RecordingCloud& cloud, const Job& job) const {
         if (cloud.points() == 0) {
             say("  no frame had a pose: " + asked_.recording_cloud + " is not written");
-            return;
+            return false;
         }
+        if (writes_page(job))
+            cloud.write_for_page(job.folder(), page::recording_stem, job.batch.outputs.page_points);
         cloud.write(asked_.recording_cloud);
         say(fmt::format("  {} points, merged within {:.4f} m -> {}", cloud.points(), cloud.resolution_m(),
                         asked_.recording_cloud));
+        return writes_page(job);
     }
 
     RunSettings asked_;

@@ -30,6 +30,7 @@ constexpr std::array format_words{Named{"png16", AoFormat::png16}, Named{"png8",
 constexpr std::array view_words{Named{"depth", false}, Named{"colour", true}};
 constexpr std::array colour_words{Named{"kept", CloudColours::kept}, Named{"shaded", CloudColours::shaded},
                                   Named{"grey", CloudColours::grey}};
+constexpr std::array page_words{Named{"yes", true}, Named{"no", false}};
 constexpr std::array log_words{Named{"text", false}, Named{"json", true}};
 
 /// quality_words, and none for a quality that was not given.
@@ -60,6 +61,8 @@ Outputs outputs_from(const RunSettings& asked) {
     wanted.shade_strength = asked.shade_strength;
     wanted.colour_cloud = asked.colour_cloud;
     wanted.colour_view = asked.colour_view;
+    wanted.preview = asked.page;
+    wanted.page_points = static_cast<std::size_t>(asked.page_points);
     if (asked.write != "auto") {
         const std::set<std::string> words = words_of(asked.write);
         wanted.ao = words.contains("ao");
@@ -287,6 +290,15 @@ std::vector<Stage> RunSettings::common_stages() {
            .help = "shaded: replaces the clouds' colours by colour times visibility; grey: also gives clouds without "
                    "colours of their own visibility as grey",
            .value = OneOf(&s.colour_cloud, colour_words)},
+          {.name = "page",
+           .help = "index.html, a page to look at the results in a browser, with a small preview of each frame",
+           .value = OneOf(&s.page, page_words),
+           .common = true},
+          {.name = "page-points",
+           .help = "points of a cloud on the page, at most; the page says where there are more",
+           .value = &s.page_points,
+           .low = 1000,
+           .high = 20e6},
           {.name = "overwrite",
            .help = "replaces the results of an earlier run",
            .value = &s.overwrite,

@@ -48,6 +48,8 @@ class RunSettings {
     std::string recording_cloud;
     double cloud_resolution_m = 0;
     CloudColours colour_cloud = CloudColours::kept;
+    bool page = true;
+    int page_points = 1000000;
     bool overwrite = false, resume = false, retry = false;
     std::string shard;
     bool quiet = false, log_json = false;

@@ -120,11 +120,19 @@ void attach_and_write(Work& work, const BatchOptions& options) {
         std::ranges::move(doubts_about(work, options.radius_m, options.noise), std::back_inserter(work.row.doubts));
     });
     take(work, &StageTimes::write, [&] {
-        if (by_points && (options.outputs.shaded || options.outputs.panel)) {
-            std::filesystem::path picture;
+        if (by_points) {
+            std::vector<std::filesystem::path> picture, chunks;
             tbb::parallel_invoke([&] { write_all(work, images, outputs); },
-                                 [&] { picture = write_cloud_picture(work, options.outputs); });
-            work.row.files.push_back(picture);
+                                 [&] {
+                                     if (options.outputs.shaded || options.outputs.panel)
+                                         picture = {write_cloud_picture(work, options.outputs)};
+                                 },
+                                 [&] {
+                                     if (options.outputs.preview)
+                                         chunks = write_page_points(work, options.outputs);
+                                 });
+            std::ranges::move(picture, std::back_inserter(work.row.files));
+            std::ranges::move(chunks, std::back_inserter(work.row.files));
         } else {
             write_all(work, images, outputs);
         }

@@ -11,6 +11,7 @@
 
 #include <array>
 #include <atomic>
+#include <cstddef>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -23,10 +24,11 @@ namespace scanshade {
 enum class CloudColours { kept, shaded, grey };
 
 /// The folders that Outputs fill.
-inline constexpr std::array result_folders = {"ao", "confidence", "shaded", "panel", "clouds"};
+inline constexpr std::array result_folders = {"ao", "confidence", "shaded", "panel", "clouds", "previews", "points"};
 
 /// The files written for each frame, under `folder`: ao/NAME.png, confidence/NAME.png, shaded/NAME.png, panel/NAME.png,
-/// clouds/NAME.pcd or .ply.
+/// clouds/NAME.pcd or .ply; for the page previews/NAME.js, or points/NAME.000.js and on of a cloud computed from its
+/// points.
 struct Outputs {
     std::filesystem::path folder;
     bool ao = true;         ///< the visibility map
@@ -39,6 +41,8 @@ struct Outputs {
     double shade_strength = 1; ///< 0 leaves the colour, 1 multiplies by visibility
     bool colour_view = false;  ///< maps and pictures of frames with a secondary camera use its pixels
     CloudColours colour_cloud = CloudColours::kept;
+    bool preview = false;              ///< what the page shows of the frame beside the other files
+    std::size_t page_points = 1000000; ///< of a cloud, at most, on the page
 };
 
 /// What is written of a cloud computed from its points, which has no pixels: maps of visibility and confidence are its

@@ -62,13 +62,14 @@ std::vector<float> spacing_of(const std::vector<Vector3d>& points) {
     return spacing;
 }
 
-Drawn drawn_of(const Cloud& cloud, const PointVisibility& found) {
+/// At most about so many of the points, without their spacing.
+Drawn some_of(const Cloud& cloud, const PointVisibility& found, std::size_t most) {
     Drawn drawn;
     std::size_t valid = 0;
     for (const Vector3d& point : cloud.points)
         valid += point.allFinite();
     const double share =
-        std::min(1.0, static_cast<double>(most_drawn) / static_cast<double>(std::max(valid, std::size_t(1))));
+        std::min(1.0, static_cast<double>(most) / static_cast<double>(std::max(valid, std::size_t(1))));
     const auto chosen = static_cast<std::uint64_t>(share * 0x1p32);
     for (std::size_t i = 0; i < cloud.points.size(); ++i)
         if (cloud.points[i].allFinite() && hash(static_cast<std::uint32_t>(i)) < chosen) {
@@ -78,7 +79,6 @@ Drawn drawn_of(const Cloud& cloud, const PointVisibility& found) {
     drawn.middle = median_of(drawn.at);
     for (Vector3d& point : drawn.at)
         point -= drawn.middle;
-    drawn.spacing = spacing_of(drawn.at);
     if (!found.normals.empty()) {
         for (const std::uint32_t i : drawn.index)
             drawn.normals.push_back(found.normals[i]);
@@ -86,6 +86,12 @@ Drawn drawn_of(const Cloud& cloud, const PointVisibility& found) {
         for (const std::uint32_t i : drawn.index)
             drawn.normals.push_back(recorded[i].allFinite() ? Vector3f(recorded[i].cast<float>()) : Vector3f::Zero());
     }
+    return drawn;
+}
+
+Drawn drawn_of(const Cloud& cloud, const PointVisibility& found) {
+    Drawn drawn = some_of(cloud, found, most_drawn);
+    drawn.spacing = spacing_of(drawn.at);
     return drawn;
 }
 
@@ -349,14 +355,16 @@ Eye eye_of(const Drawn& drawn, const std::optional<Vector3d>& recorded) {
     return {surrounded(drawn, eye) ? Eye::Sees::all_round : Eye::Sees::unknown, eye};
 }
 
+Vector3d up_of(const Cloud& cloud, const Drawn& drawn, const Eye& eye) {
+    // A camera's cloud has y down and z forward, whatever its planes.
+    const bool y_down = eye.sees == Eye::Sees::one_image && -eye.at.z() > 0.5 * eye.at.norm();
+    return z_is_up(cloud) ? Vector3d(0, 0, 1) : y_down ? Vector3d(0, -1, 0) : up_across_largest_plane(drawn);
+}
+
 std::array<PictureView, 2> views_of(const Cloud& cloud, const Drawn& drawn, const std::optional<Vector3d>& recorded) {
     const Eye eye = eye_of(drawn, recorded);
     const bool camera = eye.sees == Eye::Sees::one_image;
-    // A camera's cloud has y down and z forward, whatever its planes.
-    const bool y_down = camera && -eye.at.z() > 0.5 * eye.at.norm();
-    const Vector3d up = z_is_up(cloud) ? Vector3d(0, 0, 1)
-                        : y_down       ? Vector3d(0, -1, 0)
-                                       : up_across_largest_plane(drawn);
+    const Vector3d up = up_of(cloud, drawn, eye);
     const Ground ground = ground_of(drawn, up);
     if (camera) {
         PictureView front, side;
@@ -543,6 +551,12 @@ cv::Mat3b both(const cv::Mat3b& first, const cv::Mat3b& second) {
 
 bool has_colours(const Cloud& cloud) {
     return std::ranges::any_of(cloud.colours, [](const cv::Vec3b& colour) { return colour != cv::Vec3b(); });
+}
+
+Vector3d up_of(const Cloud& cloud, const PointVisibility& found, const std::optional<Vector3d>& viewpoint) {
+    constexpr std::size_t enough = 8000;
+    const Drawn drawn = some_of(cloud, found, enough);
+    return drawn.at.empty() ? Vector3d(0, -1, 0) : up_of(cloud, drawn, eye_of(drawn, viewpoint));
 }
 
 cv::Mat3b cloud_picture(const Cloud& cloud, const PointVisibility& found, const std::optional<Vector3d>& viewpoint,

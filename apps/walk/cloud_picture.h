@@ -20,6 +20,10 @@ namespace scanshade {
 [[nodiscard]] cv::Mat3b cloud_picture(const Cloud& cloud, const PointVisibility& found,
                                       const std::optional<Eigen::Vector3d>& viewpoint, double strength);
 
+/// The direction that these pictures take for up.
+[[nodiscard]] Eigen::Vector3d up_of(const Cloud& cloud, const PointVisibility& found,
+                                    const std::optional<Eigen::Vector3d>& viewpoint);
+
 constexpr std::size_t most_drawn = 400000;
 
 /// Whether the cloud's points have colours of their own: some programs write all of them as zero.

@@ -1,6 +1,8 @@
 // The last step of the walk: a frame's pictures and files.
 #include "apps/walk/frame_files.h"
 
+#include "apps/page/points.h"
+#include "apps/page/preview.h"
 #include "apps/picture.h"
 #include "apps/walk/cloud_picture.h"
 #include "io/clouds/cloud_file.h"
@@ -14,6 +16,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <span>
 
 namespace scanshade {
 namespace {
@@ -131,6 +134,28 @@ std::filesystem::path cloud_file(const std::string& name, const std::string& ext
     return std::filesystem::path("clouds") / (name + extension);
 }
 
+std::filesystem::path preview_file(const std::string& name) {
+    return std::filesystem::path("previews") / (name + ".js");
+}
+
+std::filesystem::path points_file(const std::string& name, std::size_t part) {
+    return std::filesystem::path("points") / fmt::format("{}.{:03}.js", name, part);
+}
+
+/// The maps of what the pictures show. A colour image of other pixels is shown by itself.
+std::string preview_of(const Work& work, const FrameImages& images) {
+    const Scene& scene = images.scene;
+    const cv::Mat1f& confidence = scene.confidence.empty() ? work.confidence.visibility : scene.confidence;
+    page::Preview preview{.z_m = scene.z_m, .visibility = scene.visibility, .camera = scene.camera};
+    if (images.confidence_map.size() == scene.z_m.size())
+        preview.confidence_map = images.confidence_map;
+    else if (confidence.size() == scene.z_m.size())
+        preview.confidence = confidence;
+    preview.colour_fits = !scene.colour.empty();
+    preview.colour = preview.colour_fits ? scene.colour : work.frame.colour;
+    return page::preview_script(preview);
+}
+
 } // namespace
 
 void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
@@ -162,6 +187,8 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
     if (outputs.panel)
         wrote(picture_file("panel", name),
               [&](const auto& file) { write_picture(file, panel_picture(work.frame, scene, images.shaded)); });
+    if (outputs.preview && !scene.z_m.empty())
+        wrote(preview_file(name), [&](const auto& file) { write_atomically(file, preview_of(work, images)); });
     if (work.frame.cloud && outputs.cloud && outputs.colour_cloud == CloudColours::grey &&
         !takes_colours(*work.frame.cloud))
         work.row.warnings.push_back("the file's point format has no colour, so grey is not written; the field "
@@ -183,12 +210,28 @@ std::filesystem::path write_cloud_picture(const Work& work, const Outputs& outpu
     return file;
 }
 
+std::vector<std::filesystem::path> write_page_points(const Work& work, const Outputs& outputs) {
+    const Cloud& cloud = *work.frame.cloud;
+    std::optional<Eigen::Vector3d> viewpoint;
+    if (work.frame.world_from_camera)
+        viewpoint = work.frame.world_from_camera->translation();
+    const page::Points points{.points = cloud.points,
+                              .colours = has_colours(cloud) ? std::span(cloud.colours) : std::span<const cv::Vec3b>(),
+                              .visibility = work.attached.per_point,
+                              .confidence = work.confidence.per_point,
+                              .normals = work.of_points.normals,
+                              .up = up_of(cloud, work.of_points, viewpoint)};
+    return page::write_points(outputs.folder, std::filesystem::path("points") / work.entry.name, points,
+                              outputs.page_points);
+}
+
 void remove_files(Work& work, const Outputs& outputs) {
     work.row.files.clear();
-    for (const auto& file : files_of(work.entry, outputs)) {
-        std::error_code gone_already;
+    std::error_code gone_already;
+    for (const auto& file : files_of(work.entry, outputs))
         std::filesystem::remove(file, gone_already);
-    }
+    for (std::size_t part = 0; outputs.preview && part * page::points_in_a_chunk < outputs.page_points; ++part)
+        std::filesystem::remove(outputs.folder / points_file(work.entry.name, part), gone_already);
 }
 
 void write_intermediates(const std::filesystem::path& folder, const std::vector<Intermediate>& all) {
@@ -227,6 +270,10 @@ std::vector<std::filesystem::path> files_of(const CaptureEntry& entry, const Out
         add(picture_file("shaded", entry.name));
     if (outputs.panel)
         add(picture_file("panel", entry.name));
+    if (outputs.preview)
+        add(preview_file(entry.name));
+    if (outputs.preview && !entry.cloud.empty())
+        add(points_file(entry.name, 0));
     if (entry.cloud.empty() && outputs.depth_cloud)
         add(cloud_file(entry.name, ".ply"));
     if (!entry.cloud.empty() && of_points(outputs).cloud)

@@ -10,6 +10,8 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs);
 /// Writes a picture of a cloud without a view: cloud_picture(), in the folder of shaded pictures or else of panels.
 /// Returns its name.
 [[nodiscard]] std::filesystem::path write_cloud_picture(const Work& work, const Outputs& outputs);
+/// Writes points/NAME.000.js and on: a cloud computed from its points, as the page draws it. Returns their names.
+[[nodiscard]] std::vector<std::filesystem::path> write_page_points(const Work& work, const Outputs& outputs);
 /// Removes the files of a failed frame, and those of an earlier run: files never contradict the row.
 void remove_files(Work& work, const Outputs& outputs);
 

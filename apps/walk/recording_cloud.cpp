@@ -1,5 +1,6 @@
 #include "apps/walk/recording_cloud.h"
 
+#include "apps/page/points.h"
 #include "io/clouds/cloud_file.h"
 #include "projection/error.h"
 #include "projection/hash.h"
@@ -67,10 +68,9 @@ void RecordingCloud::add(const CloudFrame& frame) {
     ++frames_;
 }
 
-void RecordingCloud::write(const std::filesystem::path& file) const {
-    std::vector<Vector3d> points;
-    std::vector<cv::Vec3b> colours;
-    std::vector<float> visibility, confidence, views;
+RecordingCloud::Columns RecordingCloud::columns() const {
+    Columns all;
+    auto& [points, colours, visibility, confidence, views] = all;
     const bool coloured = std::ranges::any_of(cells_, [](const Cell& cell) { return cell.colour_weight > 0; });
     for (const Cell& cell : cells_) {
         points.push_back(cell.point / cell.weight);
@@ -84,6 +84,20 @@ void RecordingCloud::write(const std::filesystem::path& file) const {
         colours.emplace_back(cv::saturate_cast<uchar>(bgr[0]), cv::saturate_cast<uchar>(bgr[1]),
                              cv::saturate_cast<uchar>(bgr[2]));
     }
+    return all;
+}
+
+void RecordingCloud::write_for_page(const std::filesystem::path& folder, const std::string& stem,
+                                    std::size_t most) const {
+    const Columns all = columns();
+    (void)page::write_points(
+        folder, stem,
+        {.points = all.points, .colours = all.colours, .visibility = all.visibility, .confidence = all.confidence},
+        most);
+}
+
+void RecordingCloud::write(const std::filesystem::path& file) const {
+    const auto [points, colours, visibility, confidence, views] = columns();
     write_new_ply(file, points, colours,
                   {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}, {"ao_views", views}},
                   {fmt::format("one cloud of {} frames, merged within {:.6f} m", frames_, resolution_m_)});

@@ -36,8 +36,18 @@ class RecordingCloud {
     [[nodiscard]] double resolution_m() const { return resolution_m_; }
     /// Binary PLY in world coordinates: ambient_occlusion, ao_confidence, ao_views. Atomic.
     void write(const std::filesystem::path& file) const;
+    /// The same for a page: FOLDER/STEM.000.js and on, at most so many points.
+    void write_for_page(const std::filesystem::path& folder, const std::string& stem, std::size_t most) const;
 
   private:
+    /// What both kinds of files hold. `colours` is empty where no frame had any.
+    struct Columns {
+        std::vector<Eigen::Vector3d> points;
+        std::vector<cv::Vec3b> colours;
+        std::vector<float> visibility, confidence, views;
+    };
+    [[nodiscard]] Columns columns() const;
+
     struct Cell {
         Eigen::Vector3d point = Eigen::Vector3d::Zero();
         Eigen::Vector3f colour = Eigen::Vector3f::Zero();

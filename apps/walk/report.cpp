@@ -77,7 +77,15 @@ json passes_json(const Timings& passes) {
     return text;
 }
 
-json frame_json(const FrameRow& row, bool with_camera) {
+/// The upper three rows of world_from_camera, row by row.
+json pose_json(const Eigen::Isometry3d& pose) {
+    json numbers = json::array();
+    for (int i = 0; i < 12; ++i)
+        numbers.push_back(known(pose.matrix()(i / 4, i % 4), 6));
+    return numbers;
+}
+
+json frame_json(const FrameRow& row, bool with_camera, const CaptureEntry& entry) {
     json text{{"index", row.index}, {"name", row.name}, {"status", name_of(row.status)}};
     if (!row.why.empty())
         text["why"] = row.why;
@@ -87,6 +95,10 @@ json frame_json(const FrameRow& row, bool with_camera) {
         text["size"] = {row.size.width, row.size.height};
     if (with_camera && !row.size.empty())
         text["camera"] = to_json(row.camera);
+    if (row.fault != Fault::none)
+        text["fault"] = name_of(row.fault);
+    if (entry.world_from_camera)
+        text["world_from_camera"] = pose_json(*entry.world_from_camera);
     text["valid_share"] = known(row.valid_share);
     text["coverage"] = known(row.coverage);
     text["mean_visibility"] = known(row.mean_visibility);
@@ -234,28 +246,53 @@ void write_frames_csv(const std::filesystem::path& file, const std::vector<Frame
     write_atomically(file, text);
 }
 
+json manifest_head(const RunReport& report) {
+    return {{"program", "scanshade"},
+            {"version", SCANSHADE_VERSION},
+            {"command_line", command_line()},
+            {"started", utc(report.started)},
+            {"device",
+             {{"name", report.device.name},
+              {"kind", report.device.kind},
+              {"driver", report.device.driver},
+              {"api", report.device.api},
+              {"count", report.devices},
+              {"frames_at_once", report.at_once}}},
+            {"method", report.method},
+            {"settings", settings_json(report.settings)},
+            {"capture", capture_json(report)},
+            {"depth_noise", report.depth_noise},
+            {"budget", report.budget},
+            {"outlook", report.outlook},
+            {"shading", report.shading},
+            {"totals", totals_json(report)}};
+}
+
+page::Row page_row(const FrameRow& row, const CaptureEntry& entry) {
+    page::Row shown{.index = row.index,
+                    .name = row.name,
+                    .status = std::string(name_of(row.status)),
+                    .why = reason_of(row),
+                    .fault = row.fault == Fault::none ? "" : std::string(name_of(row.fault)),
+                    .width = row.size.width,
+                    .height = row.size.height,
+                    .valid_share = row.valid_share,
+                    .coverage = row.coverage,
+                    .mean_visibility = row.mean_visibility,
+                    .ms = {row.ms.load, row.ms.project, row.ms.compute, row.ms.attach, row.ms.write},
+                    .warnings = row.warnings,
+                    .notes = row.notes,
+                    .files = {},
+                    .world_from_camera = entry.world_from_camera};
+    for (const auto& file : row.files)
+        shown.files.push_back(file.generic_string());
+    return shown;
+}
+
 std::vector<std::string> write_manifest(const std::filesystem::path& file, const RunReport& report,
                                         const std::function<FrameRow(const FrameRow&)>& whole) {
     std::vector<std::string> left_alone;
-    json text{{"program", "scanshade"},
-              {"version", SCANSHADE_VERSION},
-              {"command_line", command_line()},
-              {"started", utc(report.started)},
-              {"device",
-               {{"name", report.device.name},
-                {"kind", report.device.kind},
-                {"driver", report.device.driver},
-                {"api", report.device.api},
-                {"count", report.devices},
-                {"frames_at_once", report.at_once}}},
-              {"method", report.method},
-              {"settings", settings_json(report.settings)},
-              {"capture", capture_json(report)},
-              {"depth_noise", report.depth_noise},
-              {"budget", report.budget},
-              {"shading", report.shading},
-              {"totals", totals_json(report)}};
-    const std::string all = text_of(text), head = all.substr(0, all.rfind("\n}"));
+    const std::string all = text_of(manifest_head(report)), head = all.substr(0, all.rfind("\n}"));
     write_atomically(file, [&](const std::filesystem::path& target) {
         std::ofstream stream(target, std::ios::binary);
         stream.exceptions(std::ios::failbit | std::ios::badbit);
@@ -268,7 +305,9 @@ std::vector<std::string> write_manifest(const std::filesystem::path& file, const
             for (const auto& each : all_of_row.files)
                 own.insert(each.generic_string());
             stream << std::exchange(between, ",") << "\n    "
-                   << indented(text_of(frame_json(all_of_row, !report.capture.camera)), "    ");
+                   << indented(
+                          text_of(frame_json(all_of_row, !report.capture.camera, report.capture.entries.at(row.index))),
+                          "    ");
         }
         stream << (report.frames.empty() ? "]" : "\n  ]");
         left_alone = report.alone ? files_of_others(file.parent_path(), own) : std::vector<std::string>();

@@ -4,6 +4,7 @@
 #include "ao/gpu/device.h"
 #include "apps/command.h"
 #include "apps/json.h"
+#include "apps/page/run_page.h"
 #include "apps/walk/frame_row.h"
 #include "io/captures/capture.h"
 
@@ -29,11 +30,12 @@ struct RunReport {
     std::string depth_noise;         ///< the noise, its origin, and how the depth is prepared
     std::vector<std::string> budget; ///< what an error or time budget chose, expected and found; empty without one
     std::string shading;             ///< what the shaded pictures show, and why
-    std::vector<FrameRow> frames;    ///< shortened
-    std::size_t done_now = 0;        ///< frames that this process computed; others were done before
-    StageTimes ms_now{};             ///< sums of their times in each stage
-    double took_ms = 0;              ///< from the first frame's begin to the last one's end
-    bool alone = true;               ///< no other run writes to the same folder, as runs of a capture's blocks do
+    std::vector<std::string> outlook = {}; ///< the error to expect, and the cost of less
+    std::vector<FrameRow> frames;          ///< shortened
+    std::size_t done_now = 0;              ///< frames that this process computed; others were done before
+    StageTimes ms_now{};                   ///< sums of their times in each stage
+    double took_ms = 0;                    ///< from the first frame's begin to the last one's end
+    bool alone = true;                     ///< no other run writes to the same folder, as runs of a capture's blocks do
 };
 
 /// Frames per second of the pipeline, and of each stage if it had the machine to itself. A stage then works on as many
@@ -59,6 +61,11 @@ struct Rates {
 
 /// Header and one line per frame, in the report's order. Fields with commas, quotes or line ends are quoted. Atomic.
 void write_frames_csv(const std::filesystem::path& file, const std::vector<FrameRow>& frames);
+
+/// The manifest's members before "frames".
+[[nodiscard]] json manifest_head(const RunReport& report);
+/// A frame as its page lists it.
+[[nodiscard]] page::Row page_row(const FrameRow& row, const CaptureEntry& entry);
 
 /// Written last, so that its presence means that the run has ended. `whole` restores what shorten() removed from a row.
 /// Atomic. Returns the files in the folders of results that are not of this run; the manifest lists them as such.

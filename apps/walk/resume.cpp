@@ -32,7 +32,8 @@ constexpr std::array aside = {"frames",         "camera",
                               "cloud",          "cloud-resolution",
                               "poses",          "in-flight",
                               "preset",         "quiet",
-                              "colour"};
+                              "colour",         "page",
+                              "page-points"};
 
 /// Settings that change no results when they are typed differently.
 constexpr std::array elsewhere = {"out", "overwrite", "dump",      "resume", "retry", "shard",
@@ -60,6 +61,8 @@ std::string outputs_text(const Outputs& outputs) {
         text += colours + "depth cloud;";
     if (outputs.shaded || outputs.panel || outputs.colour_cloud != CloudColours::kept)
         text += fmt::format("strength {};", outputs.shade_strength);
+    if (outputs.preview)
+        text += fmt::format("page {};", outputs.page_points);
     return text;
 }
 

@@ -1,4 +1,5 @@
 // JPEG with libjpeg-turbo. Its errors jump out of its functions (setjmp), so their callers hold no objects.
+#include "io/images/jpeg_output.h"
 #include "io/images/readers.h"
 
 #include "projection/error.h"
@@ -148,10 +149,11 @@ cv::Mat3b colour_jpeg(std::string_view bytes, const ImageFacts& facts, const Pat
     return inks ? from_cmyk(image) : cv::Mat3b(image);
 }
 
-std::string encoded_jpeg(const cv::Mat& image) {
+namespace {
+
+std::string encoded(const cv::Mat& image, int quality) {
     if (image.type() != CV_8UC3)
         throw Error(fmt::format("a JPEG is made of 8-bit BGR here, not of OpenCV's type {}", image.type()));
-    constexpr int quality = 95;
     Messages messages{};
     jpeg_compress_struct info{};
     info.err = set_up(messages);
@@ -180,4 +182,14 @@ std::string encoded_jpeg(const cv::Mat& image) {
     return {reinterpret_cast<const char*>(bytes), size};
 }
 
+} // namespace
+
+std::string encoded_jpeg(const cv::Mat& image) { return encoded(image, 95); }
+
 } // namespace scanshade::images
+
+namespace scanshade {
+
+std::string encoded_jpeg(const cv::Mat3b& picture, int quality) { return images::encoded(picture, quality); }
+
+} // namespace scanshade

@@ -1,16 +1,15 @@
-// Images as PNG files, the most common output. ISA-L packs them in a quarter of zlib's time, to the same size.
+// Images as PNG files, the most common output.
 #include "io/images/png_output.h"
 
+#include "io/images/deflate.h"
 #include "projection/error.h"
 
 #include <algorithm>
 #include <cstring>
 #include <fmt/format.h>
 #include <isa-l/crc.h>
-#include <isa-l/igzip_lib.h>
 #include <memory>
 #include <opencv2/imgproc.hpp>
-#include <stdexcept>
 #include <string_view>
 
 namespace scanshade {
@@ -92,39 +91,6 @@ Bytes filtered(const cv::Mat& image, int from, int to) {
     return bytes;
 }
 
-/// A zlib stream of level 3. Level 0 has only fixed codes and makes maps larger. Levels 1 and 2 are not deterministic:
-/// the third byte's slot in their table depends on the address of `stream`, because ISA-L 2.30's assembly hashes a
-/// register that is not set yet. Sometimes the same pixels were therefore packed into other bytes.
-class Packer {
-  public:
-    Packer() : scratch_(std::make_unique<std::uint8_t[]>(ISAL_DEF_LVL3_DEFAULT)) {
-        isal_deflate_init(&stream_);
-        stream_.level = 3;
-        stream_.level_buf = scratch_.get();
-        stream_.level_buf_size = ISAL_DEF_LVL3_DEFAULT;
-        stream_.gzip_flag = IGZIP_ZLIB;
-    }
-    void append(const Bytes& bytes, bool last, std::string& packed) {
-        stream_.next_in = reinterpret_cast<std::uint8_t*>(bytes.data.get());
-        stream_.avail_in = static_cast<std::uint32_t>(bytes.size);
-        stream_.end_of_stream = last ? 1 : 0;
-        const Bytes piece(bytes.size + bytes.size / 8 + 1024); // incompressible data are stored
-        do {
-            stream_.next_out = reinterpret_cast<std::uint8_t*>(piece.data.get());
-            stream_.avail_out = static_cast<std::uint32_t>(piece.size);
-            if (const int code = isal_deflate(&stream_); code != COMP_OK)
-                throw std::runtime_error(fmt::format("pixels could not be packed: ISA-L's code {}", code));
-            packed.append(piece.data.get(), piece.size - stream_.avail_out);
-        } while (stream_.avail_out == 0);
-        if (last && stream_.internal_state.state != ZSTATE_END)
-            throw std::runtime_error("pixels could not be packed: ISA-L did not end its stream");
-    }
-
-  private:
-    std::unique_ptr<std::uint8_t[]> scratch_;
-    isal_zstream stream_ = {};
-};
-
 /// The image's pixels, packed. A large image goes in bands: the filtered bytes of all would take as much memory again.
 std::string packed(const cv::Mat& image) {
     constexpr std::size_t band_bytes = std::size_t(1) << 26;
@@ -134,7 +100,8 @@ std::string packed(const cv::Mat& image) {
     std::string result;
     for (int from = 0; from < image.rows; from += rows_at_once) {
         const int to = std::min(from + rows_at_once, image.rows);
-        packer.append(filtered(image, from, to), to == image.rows, result);
+        const Bytes band = filtered(image, from, to);
+        packer.append({band.data.get(), band.size}, to == image.rows, result);
     }
     return result;
 }

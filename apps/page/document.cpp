@@ -1,5 +1,7 @@
-#include "apps/page.h"
+#include "apps/page/document.h"
 
+#include "apps/page/shell.h"
+#include "apps/page/text.h"
 #include "io/images/png_output.h"
 
 #include <algorithm>
@@ -130,34 +132,36 @@ std::string frame(const Plot& plot, const Axis& x, const Axis& y) {
     return drawn + text(16, middle, "middle", plot.y_label, fmt::format("transform=\"rotate(-90 16 {:.1f})\"", middle));
 }
 
-std::string dot(const Point& p, const Axis& x, const Axis& y, std::string_view colour) {
+/// Colours are attributes, for files of their own; in a page the style's classes win, which know light and dark.
+std::string dot(const Point& p, const Axis& x, const Axis& y, std::size_t series) {
     const std::string ring =
         p.marked ? fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"7\" class=\"ring\"/>\n", x.at(p.x), y.at(p.y))
                  : "";
-    return ring + fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\" fill=\"{}\"><title>{}</title></circle>\n",
-                              x.at(p.x), y.at(p.y), colour, escaped(p.label));
+    return ring + fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\" class=\"dot series-{}\" fill=\"{}\">"
+                              "<title>{}</title></circle>\n",
+                              x.at(p.x), y.at(p.y), series, colours[series], escaped(p.label));
 }
 
-std::string drawn_series(const Plot& plot, const Series& series, const Axis& x, const Axis& y,
-                         std::string_view colour) {
+std::string drawn_series(const Plot& plot, const Series& series, const Axis& x, const Axis& y, std::size_t number) {
     std::string path, dots;
     for (const Point& p : series.points) {
         if (!drawn(plot, p))
             continue;
         path += fmt::format("{}{:.1f} {:.1f}", path.empty() ? "M" : " L", x.at(p.x), y.at(p.y));
-        dots += dot(p, x, y, colour);
+        dots += dot(p, x, y, number);
     }
     if (!series.joined || path.empty())
         return dots;
-    return fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\"/>\n{}", path, colour, dots);
+    return fmt::format("<path d=\"{}\" class=\"line series-{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\"/>\n{}",
+                       path, number, colours[number], dots);
 }
 
 std::string legend(const Plot& plot) {
     std::string drawn;
     double place = top + 8;
     for (std::size_t i = 0; i < plot.series.size(); ++i, place += 18) {
-        drawn += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\" fill=\"{}\"/>\n", width - right + 18,
-                             place - 4, colours[i % colours.size()]);
+        drawn += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\" class=\"dot series-{}\" fill=\"{}\"/>\n",
+                             width - right + 18, place - 4, i % colours.size(), colours[i % colours.size()]);
         drawn += text(width - right + 28, place, "start", plot.series[i].name);
     }
     return drawn;
@@ -167,43 +171,17 @@ std::string everything(const Plot& plot) {
     const Axis x = x_axis(plot), y = y_axis(plot);
     std::string drawn = frame(plot, x, y);
     for (std::size_t i = 0; i < plot.series.size(); ++i)
-        drawn += drawn_series(plot, plot.series[i], x, y, colours[i % colours.size()]);
+        drawn += drawn_series(plot, plot.series[i], x, y, i % colours.size());
     return drawn + legend(plot);
 }
 
 constexpr int figure_width = 340; ///< px, as the style has it: a page of fifty pictures stays below some megabytes
 
-std::string base64(std::string_view bytes) {
-    constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    std::string coded;
-    for (std::size_t i = 0; i < bytes.size(); i += 3) {
-        const auto byte = [&](std::size_t k) {
-            return i + k < bytes.size() ? unsigned{static_cast<unsigned char>(bytes[i + k])} : 0U;
-        };
-        const unsigned group = byte(0) << 16 | byte(1) << 8 | byte(2);
-        for (std::size_t k = 0; k < 4; ++k)
-            coded += i + k <= bytes.size() ? digits[group >> (18 - 6 * k) & 63] : '=';
-    }
-    return coded;
-}
-
-/// What a plot looks like, in a page and in a file of its own.
+/// What a plot looks like as a file of its own, on white.
 constexpr std::string_view plot_style = R"css(
 svg text { font: 12px system-ui, sans-serif; fill: #333; }
 svg .title { font-weight: 600; font-size: 14px; } .grid { stroke: #e4e4e4; } .axis { stroke: #777; }
 .ring { fill: none; stroke: #222; stroke-width: 1.2; }
-)css";
-
-constexpr std::string_view style = R"css(
-body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 1100px; margin: 2em auto; padding: 0 1em; }
-h1 { font-size: 1.5em; } h2 { font-size: 1.15em; margin-top: 2em; border-bottom: 1px solid #ccc; }
-svg { max-width: 100%; height: auto; display: block; }
-table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums; }
-th, td { padding: 2px 9px; text-align: right; border-bottom: 1px solid #eee; }
-th { border-bottom: 1px solid #999; } th:first-child, td:first-child { text-align: left; }
-tr.marked td { font-weight: 600; background: #f1f6fb; }
-figure { display: inline-block; margin: 0 10px 14px 0; vertical-align: top; } figure img { max-width: 340px; display: block; }
-figcaption { font-size: 12px; color: #555; max-width: 340px; }
 )css";
 
 std::string row(const std::vector<std::string>& cells, std::string_view tag, bool marked) {
@@ -229,31 +207,10 @@ std::vector<double> round_ticks(double low, double high, int wanted) {
     return ticks;
 }
 
-std::string escaped(std::string_view text) {
-    std::string html;
-    for (const char c : text)
-        switch (c) {
-        case '<':
-            html += "&lt;";
-            break;
-        case '>':
-            html += "&gt;";
-            break;
-        case '&':
-            html += "&amp;";
-            break;
-        case '"':
-            html += "&quot;";
-            break;
-        default:
-            html += c;
-        }
-    return html;
-}
-
 std::string svg(const Plot& plot) {
-    return fmt::format("<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\">\n{2}</svg>\n", width,
-                       height, everything(plot));
+    return fmt::format(
+        "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\" aria-label=\"{3}\">\n{2}</svg>\n",
+        width, height, everything(plot), escaped(plot.title));
 }
 
 std::string svg_file(const Plot& plot) {
@@ -265,10 +222,10 @@ std::string svg_file(const Plot& plot) {
 
 std::string table(const std::vector<std::string>& heads, const std::vector<std::vector<std::string>>& rows,
                   const std::vector<bool>& marked) {
-    std::string html = "<table>\n" + row(heads, "th", false);
+    std::string html = "<div class=\"wide\"><table>\n<thead>\n" + row(heads, "th", false) + "</thead>\n<tbody>\n";
     for (std::size_t i = 0; i < rows.size(); ++i)
         html += row(rows[i], "td", i < marked.size() && marked[i]);
-    return html + "</table>\n";
+    return html + "</tbody>\n</table></div>\n";
 }
 
 std::string figure(const cv::Mat3b& picture, std::string_view caption) {
@@ -283,13 +240,16 @@ std::string figure(const cv::Mat3b& picture, std::string_view caption) {
 std::string paragraph(std::string_view text) { return fmt::format("<p>{}</p>\n", escaped(text)); }
 
 std::string document(std::string_view title, const std::vector<Section>& sections) {
-    std::string html =
-        fmt::format("<!doctype html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"><title>{0}</title>\n"
-                    "<style>{1}{2}</style></head>\n<body>\n<h1>{0}</h1>\n",
-                    escaped(title), style, plot_style);
+    std::string html = fmt::format(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+        "<meta name=\"color-scheme\" content=\"light dark\">\n<link rel=\"icon\" href=\"data:,\">\n<title>{0}</title>\n"
+        "<style>{1}{2}</style>\n</head>\n<body class=\"document\">\n<header class=\"top\">\n"
+        "<p class=\"brand\">scanshade {3}</p>\n<h1>{0}</h1>\n</header>\n<main>\n",
+        escaped(title), shared_style(), document_style(), SCANSHADE_VERSION);
     for (const Section& section : sections)
         html += fmt::format("<h2>{}</h2>\n{}", escaped(section.heading), section.html);
-    return html + "</body>\n</html>\n";
+    return html + "</main>\n</body>\n</html>\n";
 }
 
 } // namespace scanshade::page

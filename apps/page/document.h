@@ -1,6 +1,8 @@
 // Measured numbers as one HTML file that needs no other file: SVG plots, tables, embedded pictures.
 #pragma once
 
+#include "apps/page/text.h"
+
 #include <opencv2/core.hpp>
 #include <string>
 #include <string_view>
@@ -35,9 +37,6 @@ struct Plot {
 /// Tick positions of even, round steps (1, 2 or 5 times a power of ten) that lie in [low, high], about `wanted` of
 /// them.
 [[nodiscard]] std::vector<double> round_ticks(double low, double high, int wanted);
-
-/// The text with <, >, & and quotes as entities.
-[[nodiscard]] std::string escaped(std::string_view text);
 
 [[nodiscard]] std::string svg(const Plot& plot);
 /// The plot as a file of its own, on white.

@@ -1,0 +1,272 @@
+// Points as the page draws them. points.js reads what is written here.
+#include "apps/page/points.h"
+
+#include "apps/page/text.h"
+#include "io/output_file.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <fmt/format.h>
+#include <limits>
+#include <string>
+#include <tbb/parallel_for.h>
+
+namespace scanshade::page {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Eigen::Vector3d;
+
+struct Box {
+    Vector3d low = Vector3d::Zero(), size = Vector3d::Zero();
+
+    [[nodiscard]] bool holds(const Vector3d& point) const {
+        return ((point - low).array() >= 0).all() && ((low + size - point).array() >= 0).all();
+    }
+    /// 0 .. 65535 along an axis.
+    [[nodiscard]] std::uint16_t code(const Vector3d& point, Eigen::Index axis) const {
+        const double share = size[axis] > 0 ? (point[axis] - low[axis]) / size[axis] : 0;
+        return static_cast<std::uint16_t>(std::clamp(share, 0.0, 1.0) * 65535 + 0.5);
+    }
+};
+
+/// Round everything but stray points: twice the extent of 99 of 100 points to either side, and no more than all.
+Box box_of(std::span<const Vector3d> points) {
+    constexpr std::size_t most_sampled = 100000;
+    std::array<std::vector<double>, 3> sample;
+    Vector3d least = Vector3d::Constant(std::numeric_limits<double>::infinity()), greatest = -least;
+    const std::size_t step = std::max<std::size_t>(1, points.size() / most_sampled);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        if (!points[i].allFinite())
+            continue;
+        least = least.cwiseMin(points[i]);
+        greatest = greatest.cwiseMax(points[i]);
+        if (i % step == 0)
+            for (std::size_t axis = 0; axis < 3; ++axis)
+                sample[axis].push_back(points[i][static_cast<Eigen::Index>(axis)]);
+    }
+    if (sample[0].empty())
+        return least.allFinite() ? Box{least, greatest - least} : Box{};
+    Box box;
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+        auto& values = sample[static_cast<std::size_t>(axis)];
+        const auto at = [&](double share) {
+            const auto place =
+                values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+            std::ranges::nth_element(values, place);
+            return *place;
+        };
+        const double low = at(0.005), high = at(0.995), margin = 2 * (high - low);
+        // An axis along which the sample has no extent keeps all.
+        box.low[axis] = margin > 0 ? std::max(least[axis], low - margin) : least[axis];
+        box.size[axis] = (margin > 0 ? std::min(greatest[axis], high + margin) : greatest[axis]) - box.low[axis];
+    }
+    return box;
+}
+
+/// The lower ten bits with two zeros between each.
+std::uint32_t spread(std::uint32_t bits) {
+    bits = (bits | bits << 16) & 0x030000ff;
+    bits = (bits | bits << 8) & 0x0300f00f;
+    bits = (bits | bits << 4) & 0x030c30c3;
+    return (bits | bits << 2) & 0x09249249;
+}
+
+/// A point's place on the Z-order curve (Morton 1966) and its index. Neighbours on the curve are neighbours in space.
+struct Place {
+    std::uint32_t curve, index;
+};
+
+/// By place on the curve; three passes over 30 bits.
+void sort(std::vector<Place>& places) {
+    std::vector<Place> other(places.size());
+    for (const int shift : {0, 10, 20}) {
+        std::array<std::size_t, 1025> begin{};
+        for (const Place& place : places)
+            ++begin[(place.curve >> shift & 1023) + 1];
+        for (std::size_t i = 1; i < begin.size(); ++i)
+            begin[i] += begin[i - 1];
+        for (const Place& place : places)
+            other[begin[place.curve >> shift & 1023]++] = place;
+        places.swap(other);
+    }
+}
+
+/// The points in the box along the curve, at most about 2 `most` of them.
+std::vector<Place> along_curve(const Points& cloud, const Box& box, std::size_t most, std::size_t& in_box) {
+    const std::size_t step = std::max<std::size_t>(1, cloud.points.size() / (2 * std::max<std::size_t>(most, 1)));
+    std::vector<Place> places;
+    places.reserve(cloud.points.size() / step + 1);
+    for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+        const Vector3d& point = cloud.points[i];
+        if (!point.allFinite() || !box.holds(point))
+            continue;
+        if (in_box++ % step != 0)
+            continue;
+        const double scale = box.size.maxCoeff() > 0 ? 1023 / box.size.maxCoeff() : 0;
+        const auto cell = [&](Eigen::Index axis) {
+            return spread(static_cast<std::uint32_t>((point[axis] - box.low[axis]) * scale));
+        };
+        places.push_back({cell(0) | cell(1) << 1 | cell(2) << 2, static_cast<std::uint32_t>(i)});
+    }
+    sort(places);
+    return places;
+}
+
+/// 0 .. count - 1 such that each beginning is spread evenly: the numbers with their bits reversed.
+std::vector<std::uint32_t> even_order(std::size_t count) {
+    std::vector<std::uint32_t> order;
+    order.reserve(count);
+    const auto bits = static_cast<int>(std::bit_width(count > 0 ? count - 1 : 0));
+    for (std::uint64_t i = 0; i < std::uint64_t(1) << bits; ++i) {
+        std::uint64_t reversed = 0;
+        for (int bit = 0; bit < bits; ++bit)
+            reversed |= (i >> bit & 1) << (bits - 1 - bit);
+        if (reversed < count)
+            order.push_back(static_cast<std::uint32_t>(reversed));
+    }
+    return order;
+}
+
+/// Differences of 16-bit numbers, folded so that small ones of either sign have a zero high byte, in two planes.
+void append_planes(std::string& bytes, const std::vector<std::uint16_t>& values) {
+    const std::size_t at = bytes.size(), count = values.size();
+    bytes.resize(at + 2 * count);
+    std::uint16_t before = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        const auto apart = static_cast<std::int16_t>(static_cast<std::uint16_t>(values[i] - before));
+        const auto folded = static_cast<std::uint16_t>(apart < 0 ? -2 * apart - 1 : 2 * apart);
+        bytes[at + i] = static_cast<char>(folded);
+        bytes[at + count + i] = static_cast<char>(folded >> 8);
+        before = values[i];
+    }
+}
+
+/// Differences of bytes, point by point.
+template <class Value>
+void append_differences(std::string& bytes, std::span<const std::uint32_t> chunk, Value&& value) {
+    std::uint8_t before = 0;
+    for (const std::uint32_t point : chunk) {
+        const std::uint8_t now = value(point);
+        bytes += static_cast<char>(now - before);
+        before = now;
+    }
+}
+
+/// 0 = none, 1 .. levels = 0 .. 1.
+std::uint8_t share_code(float share, int levels) {
+    return share == share
+               ? static_cast<std::uint8_t>(std::clamp(share, 0.0F, 1.0F) * static_cast<float>(levels - 1) + 1.5F)
+               : std::uint8_t(0);
+}
+
+/// The octahedron unfolded (Cigolle et al. 2014), a byte an axis; no normal points along z.
+std::array<std::uint8_t, 2> normal_codes(const Eigen::Vector3f& normal) {
+    const float sum = normal.cwiseAbs().sum();
+    if (!(sum > 0))
+        return {127, 127};
+    float x = normal.x() / sum, y = normal.y() / sum;
+    if (normal.z() < 0) {
+        const float across = x;
+        x = (1 - std::abs(y)) * (across < 0 ? -1.0F : 1.0F);
+        y = (1 - std::abs(across)) * (y < 0 ? -1.0F : 1.0F);
+    }
+    const auto code = [](float value) { return static_cast<std::uint8_t>((value + 1) * 127.5F + 0.5F); };
+    return {code(x), code(y)};
+}
+
+/// The parts of a chunk; `chunk` holds indices of points, along the curve.
+std::string parts_of(const Points& cloud, const Box& box, std::span<const std::uint32_t> chunk) {
+    std::string bytes;
+    std::vector<std::uint16_t> codes(chunk.size());
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+        std::ranges::transform(chunk, codes.begin(), [&](std::uint32_t i) { return box.code(cloud.points[i], axis); });
+        append_planes(bytes, codes);
+    }
+    std::string text = fmt::format(",\"positions\":\"{}\"", packed(bytes));
+    if (!cloud.colours.empty()) {
+        bytes.clear(); // red and blue as differences to green, which mostly are the same for neighbours
+        append_differences(bytes, chunk, [&](std::uint32_t i) { return cloud.colours[i][1]; });
+        for (const int channel : {2, 0})
+            append_differences(bytes, chunk, [&](std::uint32_t i) {
+                return static_cast<std::uint8_t>(cloud.colours[i][channel] - cloud.colours[i][1]);
+            });
+        text += fmt::format(",\"colour\":\"{}\"", packed(bytes));
+    }
+    bytes.clear();
+    append_differences(bytes, chunk, [&](std::uint32_t i) {
+        return cloud.visibility.empty() ? std::uint8_t(0) : share_code(cloud.visibility[i], 128);
+    });
+    text += fmt::format(",\"ao\":\"{}\"", packed(bytes));
+    if (!cloud.confidence.empty()) {
+        bytes.clear();
+        append_differences(bytes, chunk, [&](std::uint32_t i) { return share_code(cloud.confidence[i], 32); });
+        text += fmt::format(",\"confidence\":\"{}\"", packed(bytes));
+    }
+    if (!cloud.normals.empty()) {
+        bytes.clear();
+        for (const std::size_t axis : {0, 1})
+            append_differences(bytes, chunk, [&](std::uint32_t i) { return normal_codes(cloud.normals[i])[axis]; });
+        text += fmt::format(",\"normal\":\"{}\"", packed(bytes));
+    }
+    return text;
+}
+
+/// The median distance between points that follow each other on the curve.
+double spacing_of(const Points& cloud, const std::vector<std::uint32_t>& shown) {
+    constexpr std::size_t most_pairs = 5000;
+    std::vector<double> apart;
+    const std::size_t step = std::max<std::size_t>(1, shown.size() / most_pairs);
+    for (std::size_t i = 0; i + 1 < shown.size(); i += step)
+        apart.push_back((cloud.points[shown[i + 1]] - cloud.points[shown[i]]).norm());
+    if (apart.empty())
+        return 0;
+    const auto middle = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 2);
+    std::ranges::nth_element(apart, middle);
+    return *middle;
+}
+
+} // namespace
+
+std::vector<fs::path> write_points(const fs::path& folder, const fs::path& stem, const Points& cloud,
+                                   std::size_t most) {
+    const Box box = box_of(cloud.points);
+    std::size_t in_box = 0;
+    std::vector<std::uint32_t> shown; // along the curve
+    {
+        const std::vector<Place> places = along_curve(cloud, box, most, in_box);
+        shown.resize(std::min(places.size(), most));
+        for (std::size_t i = 0; i < shown.size(); ++i)
+            shown[i] = places[i * places.size() / shown.size()].index;
+    }
+    if (shown.empty())
+        return {};
+    const auto finite =
+        static_cast<std::size_t>(std::ranges::count_if(cloud.points, [](const auto& p) { return p.allFinite(); }));
+    std::vector<std::uint32_t> order = even_order(shown.size());
+    const std::size_t parts = (order.size() + points_in_a_chunk - 1) / points_in_a_chunk;
+    const std::string facts =
+        fmt::format(",\"parts\":{},\"total\":{},\"of\":{},\"left_out\":{},\"spacing\":{:.5g},\"up\":[{}],"
+                    "\"box\":[{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}]",
+                    parts, shown.size(), finite, finite - in_box, spacing_of(cloud, shown),
+                    fmt::format("{:.6g},{:.6g},{:.6g}", cloud.up.x(), cloud.up.y(), cloud.up.z()), box.low.x(),
+                    box.low.y(), box.low.z(), box.size.x(), box.size.y(), box.size.z());
+    std::vector<fs::path> files(parts);
+    tbb::parallel_for(std::size_t(0), parts, [&](std::size_t part) {
+        const auto begin = order.begin() + static_cast<std::ptrdiff_t>(part * points_in_a_chunk);
+        const auto end = part + 1 < parts ? begin + points_in_a_chunk : order.end();
+        std::sort(begin, end); // along the curve again: small differences
+        std::vector<std::uint32_t> chunk(static_cast<std::size_t>(end - begin));
+        std::transform(begin, end, chunk.begin(), [&](std::uint32_t place) { return shown[place]; });
+        files[part] = fs::path(fmt::format("{}.{:03}.js", stem.string(), part));
+        write_atomically(folder / files[part], fmt::format("scanshade.points({{\"part\":{},\"count\":{}{}{}}})\n", part,
+                                                           chunk.size(), facts, parts_of(cloud, box, chunk)));
+    });
+    return files;
+}
+
+} // namespace scanshade::page

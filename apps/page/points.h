@@ -1,0 +1,30 @@
+// Points as the page draws them: chunks of 100,000 in an order of which each beginning is an even sample of the whole.
+#pragma once
+
+#include <cstddef>
+#include <Eigen/Core>
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <span>
+#include <vector>
+
+namespace scanshade::page {
+
+/// One value per point each; all but `points` may be empty. Points that are not finite are left out.
+struct Points {
+    std::span<const Eigen::Vector3d> points;
+    std::span<const cv::Vec3b> colours = {};                 ///< BGR
+    std::span<const float> visibility = {}, confidence = {}; ///< 0 .. 1, NaN = none
+    std::span<const Eigen::Vector3f> normals = {};           ///< zero = none
+    Eigen::Vector3d up = {0, -1, 0};                         ///< as of a camera's space
+};
+
+inline constexpr std::size_t points_in_a_chunk = 100000;
+
+/// Writes FOLDER/STEM.000.js, FOLDER/STEM.001.js ... of at most `most` points; returns these names without the folder.
+/// Positions get 16 bits in a box round all but stray points, which are left out. Each file is atomic; equal inputs
+/// give equal bytes. Memory: 16 bytes for each of at most 2 `most` points, and a few megabytes for each core.
+std::vector<std::filesystem::path> write_points(const std::filesystem::path& folder, const std::filesystem::path& stem,
+                                                const Points& cloud, std::size_t most);
+
+} // namespace scanshade::page

@@ -1,0 +1,17 @@
+// The texts of pages that hold no data of a run: markup, style and scripts, all in one file.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace scanshade::page {
+
+/// index.html of a run or a comparison, and of a list of captures; index.js beside it brings the data.
+[[nodiscard]] std::string run_shell(std::string_view title);
+[[nodiscard]] std::string list_shell(std::string_view title);
+
+/// What all pages look like, and what those of one column add.
+[[nodiscard]] std::string_view shared_style();
+[[nodiscard]] std::string_view document_style();
+
+} // namespace scanshade::page

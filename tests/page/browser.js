@@ -1,0 +1,483 @@
+// Looks at pages in Chromium, as people do: node browser.js SPEC.json RESULT.json. The result has a line for each check:
+// "" where it holds, else what was found.
+"use strict";
+const fs = require("fs");
+const http = require("http");
+const path = require("path");
+
+const spec = JSON.parse(fs.readFileSync(process.argv[2], "utf8"));
+const module_of = (name) => require(path.join(spec.modules, name));
+const { chromium } = module_of("playwright-core");
+const results = {};
+
+class Wrong extends Error {}
+const expect = (held, words) => { if (!held) throw new Wrong(words); };
+
+/** Serves folders by path; nothing else listens. */
+const serve = () => new Promise((resolve) => {
+  const types = { ".html": "text/html", ".js": "text/javascript", ".png": "image/png" };
+  const server = http.createServer((request, response) => {
+    const file = decodeURIComponent(request.url.split(/[?#]/)[0]);
+    fs.readFile(file, (failure, bytes) => {
+      response.writeHead(failure ? 404 : 200, { "content-type": types[path.extname(file)] || "application/octet-stream" });
+      response.end(failure ? "" : bytes);
+    });
+  });
+  server.listen(0, "127.0.0.1", () => resolve(server));
+});
+
+const coded = (file) => file.split("/").map(encodeURIComponent).join("/");
+
+(async () => {
+  const browser = await chromium.launch({ executablePath: spec.chromium, args: ["--no-sandbox", "--headless=new", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"] });
+  const server = await serve();
+  const schemes = { file: (file) => "file://" + coded(file), http: (file) => `http://127.0.0.1:${server.address().port}${coded(file)}` };
+
+  /** A fresh page at a file; what it complains of and asks for is kept. */
+  const open = async (file, { scheme = "file", width = 1440, height = 900, dark = false, before, hash = "", wait = true } = {}) => {
+    const context = await browser.newContext({ viewport: { width, height }, colorScheme: dark ? "dark" : "light", reducedMotion: "reduce" });
+    const page = await context.newPage();
+    page.complaints = [];
+    page.asked = [];
+    page.on("console", (message) => { if (["error", "warning"].includes(message.type()) && !/GPU stall|GL Driver Message/.test(message.text())) page.complaints.push(message.text()); });
+    page.on("pageerror", (failure) => page.complaints.push(failure.message));
+    page.on("request", (request) => page.asked.push(request.url()));
+    if (before) await page.addInitScript(before);
+    await page.goto(schemes[scheme](file) + hash);
+    if (wait) await page.waitForSelector("html[data-ready]", { timeout: 20000 });
+    return page;
+  };
+  const loaded = (page) => page.waitForFunction(() => [...document.querySelectorAll(".layer img")].every((image) => image.complete) && document.querySelector("#layer-right .inside"), null, { timeout: 10000 });
+  const settle = async (page) => { await loaded(page); await page.waitForTimeout(120); };
+
+  const decoder = await (await browser.newContext()).newPage();
+  /** Red, green, blue of the element's picture at shares of its width and height. */
+  const pixel = async (page, selector, x, y) => {
+    const shot = (await page.locator(selector).screenshot()).toString("base64");
+    return decoder.evaluate(async ([base64, a, b]) => {
+      const image = new Image();
+      image.src = "data:image/png;base64," + base64;
+      await image.decode();
+      const canvas = new OffscreenCanvas(image.width, image.height), context = canvas.getContext("2d");
+      context.drawImage(image, 0, 0);
+      return [...context.getImageData(Math.floor(a * image.width), Math.floor(b * image.height), 1, 1).data.slice(0, 3)];
+    }, [shot, x, y]);
+  };
+  const apart = (a, b) => Math.max(...a.map((value, i) => Math.abs(value - b[i])));
+  const slide = (page, id, value) => page.locator(id).evaluate((element, to) => { element.value = to; element.dispatchEvent(new Event("input", { bubbles: true })); }, value);
+  const names = (page) => page.$$eval("#rows tbody tr[data-row]", (lines) => lines.map((line) => line.children[1].textContent));
+  const column = (page, index) => page.$$eval("#rows tbody tr[data-row]", (lines, at) => lines.map((line) => Number(line.children[at].textContent)), index);
+  const frame = (page) => page.textContent("#frame-name");
+
+  /** Where a pixel of the image is on the stage, as shares: the stage may be wider than the image. */
+  const on_stage = async (page, selector, [x, y]) => {
+    const box = await page.locator(selector).boundingBox(), shape = spec.size[0] / spec.size[1], width = Math.min(box.width, box.height * shape);
+    return [0.5 + ((x + 0.5) / spec.size[0] - 0.5) * width / box.width, 0.5 + ((y + 0.5) / spec.size[1] - 0.5) * width / shape / box.height];
+  };
+
+  const only = new RegExp(process.env.ONLY || "");
+  const check = async (name, steps) => {
+    if (!only.test(name)) return;
+    const pages = [];
+    try {
+      await steps(async (...words) => { const page = await open(...words); pages.push(page); return page; });
+      results[name] = "";
+    } catch (failure) {
+      results[name] = failure instanceof Wrong ? failure.message : String(failure.stack || failure);
+    }
+    for (const page of pages) await page.context().close().catch(() => {});
+  };
+
+  const { run, cloud, hostile, comparison, list, large, bench, old } = spec.pages;
+
+  for (const scheme of ["file", "http"])
+    await check(`quiet over ${scheme}`, async (open_page) => {
+      for (const file of [run, cloud, comparison, list, bench]) {
+        const page = await open_page(file, { scheme, wait: file !== bench });
+        await page.waitForTimeout(300);
+        if (file === run || file === cloud) {
+          await page.click("#show-points");
+          await page.waitForFunction(() => document.querySelector("#point-canvas").dataset.loaded, null, { timeout: 20000 });
+        }
+        expect(page.complaints.length === 0, `${file}: ${page.complaints.join(" | ")}`);
+        const folder = schemes[scheme](path.dirname(file)) + "/";
+        const outside = page.asked.filter((url) => !url.startsWith(folder) && !url.startsWith("data:"));
+        expect(outside.length === 0, `${file} asked for ${outside.join(", ")}`);
+      }
+    });
+
+  await check("worst first", async (open_page) => {
+    const page = await open_page(hostile);
+    const statuses = await page.$$eval("#rows tbody tr[data-row]", (lines) => lines.map((line) => line.children[2].textContent));
+    expect(statuses[0].includes("failed"), `first: ${statuses[0]}`);
+    expect(!statuses[statuses.length - 1].includes("failed"), "last: failed");
+    expect((await frame(page)) === (await names(page))[0], "the worst frame is not the one shown");
+  });
+
+  await check("sorting", async (open_page) => {
+    const page = await open_page(run);
+    const index = (await page.$$eval("#rows th", (heads) => heads.map((head) => head.textContent))).indexOf("AO");
+    await page.click(`#rows th:nth-child(${index + 1}) button`);
+    const rising = await column(page, index);
+    expect(rising.length > 3 && rising.every((value, i) => i === 0 || value >= rising[i - 1]), `not rising: ${rising}`);
+    expect((await page.getAttribute(`#rows th:nth-child(${index + 1})`, "aria-sort")) === "ascending", "aria-sort");
+    await page.click(`#rows th:nth-child(${index + 1}) button`);
+    const falling = await column(page, index);
+    expect(falling.every((value, i) => i === 0 || value <= falling[i - 1]), `not falling: ${falling}`);
+    expect(rising[0] !== falling[0], "both ways are the same");
+  });
+
+  await check("filter", async (open_page) => {
+    const page = await open_page(run);
+    const all = await names(page);
+    await page.fill("#filter", all[2].slice(-8));
+    const left = await names(page);
+    expect(left.length === 1 && left[0] === all[2], `left: ${left}`);
+    expect((await page.textContent("#shown")) === `1 of ${all.length}`, await page.textContent("#shown"));
+    await page.fill("#filter", "no such frame anywhere");
+    expect((await names(page)).length === 0, "rows are left");
+  });
+
+  await check("chips and reasons", async (open_page) => {
+    const page = await open_page(hostile);
+    await page.click(".chip.failed");
+    const statuses = await page.$$eval("#rows tbody tr[data-row]", (lines) => lines.map((line) => line.children[2].textContent));
+    expect(statuses.length > 0 && statuses.every((status) => status.includes("failed")), statuses.join());
+    expect((await page.textContent("#reason-list")).includes("failed"), "no reason of the failure");
+  });
+
+  await check("keys", async (open_page) => {
+    const page = await open_page(run, { hash: "#0" });
+    await settle(page);
+    const first = await frame(page);
+    await page.keyboard.press("ArrowRight");
+    const second = await frame(page);
+    expect(second !== first, "right arrow: the same frame");
+    expect(page.url().endsWith("#1"), page.url());
+    await page.keyboard.press("ArrowLeft");
+    expect((await frame(page)) === first, "left arrow does not lead back");
+    await settle(page);
+    await page.keyboard.press("2");
+    expect((await page.getAttribute("#layer-right", "data-kind")) === "depth", await page.getAttribute("#layer-right", "data-kind"));
+    await page.keyboard.press("Shift+3");
+    expect((await page.getAttribute("#layer-left", "data-kind")) === "ao", await page.getAttribute("#layer-left", "data-kind"));
+    expect(!(await page.locator("#legend").isHidden()), "no legend beside depth");
+    await page.keyboard.press("+");
+    const zoomed = await page.locator("#layer-left .inside").evaluate((inside) => inside.style.transform);
+    expect(/scale\(1\.25\)/.test(zoomed) && zoomed === await page.locator("#layer-right .inside").evaluate((inside) => inside.style.transform), `zoom: ${zoomed}`);
+    await page.keyboard.press("0");
+    expect(/scale\(1\)/.test(await page.locator("#layer-left .inside").evaluate((inside) => inside.style.transform)), "0 does not fit");
+    await page.focus("#rows");
+    await page.keyboard.press("End");
+    expect((await frame(page)) === (await names(page)).pop(), "End of the table");
+    await page.keyboard.press("/");
+    expect(await page.evaluate(() => document.activeElement.id === "filter"), "/ does not reach the filter");
+    await page.keyboard.type("p");
+    expect(await page.locator("#point-view").isHidden(), "a letter in the filter switched the view");
+  });
+
+  await check("divider", async (open_page) => {
+    const page = await open_page(run, { hash: "#0" });
+    await page.selectOption("#left", "depth");
+    await page.selectOption("#right", "ao");
+    await settle(page);
+    const box = await page.locator("#stage").boundingBox();
+    const at = (x) => [box.x + x * box.width, box.y + 0.6 * box.height];
+    await page.mouse.move(...at(0.5));
+    await page.mouse.down();
+    await page.mouse.move(...at(0.9), { steps: 4 });
+    await page.mouse.up();
+    const depth = await pixel(page, "#stage", 0.7, 0.6);
+    await page.mouse.move(...at(0.9));
+    await page.mouse.down();
+    await page.mouse.move(...at(0.2), { steps: 4 });
+    await page.mouse.up();
+    const grey = await pixel(page, "#stage", 0.7, 0.6);
+    expect(apart(depth, grey) > 25, `the same on both sides: ${depth} and ${grey}`);
+    expect(Math.max(...grey) - Math.min(...grey) < 8, `AO is not grey: ${grey}`);
+    await page.focus("#divider");
+    const before = Number(await page.getAttribute("#divider", "aria-valuenow"));
+    await page.keyboard.press("ArrowRight");
+    expect(Number(await page.getAttribute("#divider", "aria-valuenow")) > before, "the arrow key does not move it");
+  });
+
+  await check("strength", async (open_page) => {
+    const page = await open_page(run, { hash: "#0" });
+    await page.selectOption("#left", "shaded");
+    await page.selectOption("#right", "shaded");
+    await settle(page);
+    const [x, y] = await on_stage(page, "#stage", spec.dark); // where little of the surroundings is open
+    const strong = await pixel(page, "#stage", x, y);
+    await slide(page, "#strength", 0);
+    const none = await pixel(page, "#stage", x, y);
+    await slide(page, "#strength", 0.5);
+    const half = await pixel(page, "#stage", x, y);
+    const sum = (colour) => colour[0] + colour[1] + colour[2];
+    expect(sum(none) > sum(half) + 6 && sum(half) > sum(strong) + 6, `0: ${none}, 0.5: ${half}, 1: ${strong}`);
+  });
+
+  await check("values", async (open_page) => {
+    const page = await open_page(run, { hash: "#0" });
+    await settle(page);
+    for (const { x, y, z, ao } of spec.values) {
+      const found = await page.evaluate(async ([px, py]) => {
+        const preview = await scanshade.preview_of({ file: (folder, end) => `previews/${document.querySelector("#frame-name").textContent}${end}` });
+        const u = Math.round((px - preview.first) / preview.step), v = Math.round((py - preview.first) / preview.step), i = v * preview.size[0] + u;
+        return { z: preview.z_m[i], ao: scanshade.share_of(preview.ao[i], 128) };
+      }, [x, y]);
+      expect(Math.abs(found.z - z) <= 0.001 * z, `depth at ${x}, ${y}: ${found.z} for ${z}`);
+      expect(Math.abs(found.ao - ao) <= 0.005, `AO at ${x}, ${y}: ${found.ao} for ${ao}`);
+      const box = await page.locator("#stage").boundingBox(), shape = spec.size[0] / spec.size[1];
+      const shown = Math.min(box.width, box.height * shape);
+      await page.mouse.move(box.x + box.width / 2 + ((x + 0.5) / spec.size[0] - 0.5) * shown, box.y + box.height / 2 + ((y + 0.5) / spec.size[1] - 0.5) * shown / shape);
+      const said = await page.textContent("#readout"), depth = Number(/depth ([0-9.]+) m/.exec(said)?.[1]);
+      expect(Math.abs(depth - z) < 0.02 * z, `${said} for ${z} m at ${x}, ${y}`);
+    }
+  });
+
+  const points_of = async (page) => {
+    await page.click("#show-points");
+    await page.waitForFunction(() => document.querySelector("#point-canvas").dataset.loaded, null, { timeout: 20000 });
+    await page.waitForTimeout(300);
+  };
+  const background = [20, 23, 27];
+
+  await check("points of a frame", async (open_page) => {
+    const page = await open_page(run, { hash: "#0" });
+    await points_of(page);
+    await page.selectOption("#point-source", "frame 0");
+    await page.waitForTimeout(500);
+    expect(apart(await pixel(page, "#point-stage", 0.5, 0.5), background) > 20, "the centre is background");
+    const [x, y] = await on_stage(page, "#point-stage", spec.dark);
+    const strong = await pixel(page, "#point-stage", x, y);
+    await slide(page, "#point-strength", 0);
+    await page.waitForTimeout(300);
+    const none = await pixel(page, "#point-stage", x, y);
+    expect(none[0] + none[1] + none[2] > strong[0] + strong[1] + strong[2] + 12, `AO strength 0: ${none}, 1: ${strong}`);
+    const seen = [];
+    for (const mode of ["colour", "ao", "confidence", "normal"]) {
+      await page.selectOption("#point-colour", mode);
+      await page.waitForTimeout(200);
+      seen.push((await pixel(page, "#point-stage", x, y)).join());
+    }
+    expect(new Set(seen).size === 4, `modes look the same: ${seen.join(" ")}`);
+  });
+
+  await check("points are where the depth is", async (open_page) => {
+    const page = await open_page(run, { hash: "#0" });
+    // The view from the frame's own camera is its image: a pixel's colour is that of the picture.
+    await points_of(page);
+    await page.selectOption("#point-source", "frame 0");
+    await page.selectOption("#point-colour", "colour");
+    await page.locator("#point-edl").uncheck();
+    await page.waitForTimeout(500);
+    const drawn = await pixel(page, "#point-stage", 0.5, 0.5);
+    await page.click("#show-frame");
+    await page.selectOption("#left", "colour");
+    await page.selectOption("#right", "colour");
+    await settle(page);
+    await page.locator("#divider").evaluate((divider) => { divider.style.visibility = "hidden"; });
+    const pictured = await pixel(page, "#stage", 0.5, 0.5);
+    expect(apart(drawn, pictured) < 30, `${drawn} in space, ${pictured} in the picture`);
+  });
+
+  await check("flight to a frame's camera", async (open_page) => {
+    const page = await open_page(run, { hash: "#0" });
+    await points_of(page);
+    await page.selectOption("#point-source", "recording");
+    await page.waitForTimeout(1200);
+    expect((await page.textContent("#point-readout")).includes("points"), "nothing said of the points");
+    for (let i = 0; i < spec.frames - 1; ++i) await page.keyboard.press("ArrowRight");
+    await page.waitForTimeout(900);
+    const eye = await page.evaluate(() => scanshade.shown_camera().eye);
+    const pose = spec.last_position;
+    expect(Math.hypot(...eye.map((value, i) => value - pose[i])) < 1e-3, `the eye is at ${eye}, the camera at ${pose}`);
+    expect(apart(await pixel(page, "#point-stage", 0.5, 0.5), background) > 20, "the centre is background");
+    const box = await page.locator("#point-canvas").boundingBox();
+    await page.mouse.move(box.x + 200, box.y + 200);
+    await page.mouse.down();
+    await page.mouse.move(box.x + 320, box.y + 220, { steps: 4 });
+    await page.mouse.up();
+    const turned = await page.evaluate(() => scanshade.shown_camera().eye);
+    expect(Math.hypot(...eye.map((value, i) => value - turned[i])) > 0.05, "dragging does not turn");
+    await page.click("#point-home");
+    await page.waitForTimeout(300);
+    const back = await page.evaluate(() => scanshade.shown_camera().eye);
+    expect(Math.hypot(...back.map((value, i) => value - pose[i])) < 1e-3, "the button does not lead back");
+  });
+
+  await check("points of a cloud", async (open_page) => {
+    const page = await open_page(cloud);
+    await points_of(page);
+    expect((await page.textContent("#point-readout")) === spec.cloud_said, await page.textContent("#point-readout"));
+    expect(apart(await pixel(page, "#point-stage", 0.5, 0.5), background) > 20, "the centre is background");
+    // Each chunk spans the whole cloud, and positions are as stored to a 65535th of the box.
+    const found = await page.evaluate(async (stem) => {
+      const all = [];
+      for (let part = 0; part < 2; ++part) {
+        const chunk = await scanshade.opened_chunk(await scanshade.load(`${stem}.00${part}.js`));
+        const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+        for (let i = 0; i < chunk.count; ++i) for (let axis = 0; axis < 3; ++axis) {
+          low[axis] = Math.min(low[axis], chunk.positions[3 * i + axis]);
+          high[axis] = Math.max(high[axis], chunk.positions[3 * i + axis]);
+        }
+        let sides = 0;
+        for (let i = 0; i < chunk.count; ++i) sides += chunk.positions[3 * i] < (low[0] + high[0]) / 2;
+        all.push({ count: chunk.count, low, high, share: sides / chunk.count });
+      }
+      return all;
+    }, spec.cloud_stem);
+    for (const part of found)
+      for (let axis = 0; axis < 3; ++axis) {
+        expect(Math.abs(part.low[axis] - spec.cloud_box[0][axis]) < 0.05 && Math.abs(part.high[axis] - spec.cloud_box[1][axis]) < 0.05, `a chunk does not span the cloud: ${JSON.stringify(part)}`);
+        expect(Math.abs(part.share - 0.75) < 0.01, `a chunk is no even sample: ${part.share}`);
+      }
+    expect(found[0].count === 100000, `${found[0].count} points in the first chunk`);
+  });
+
+  await check("without WebGL", async (open_page) => {
+    const page = await open_page(run, { before: () => {
+      const real = HTMLCanvasElement.prototype.getContext;
+      HTMLCanvasElement.prototype.getContext = function (kind, ...more) { return kind === "webgl2" ? null : real.call(this, kind, ...more); };
+    } });
+    await page.click("#show-points");
+    expect((await page.textContent("#point-empty")).includes("WebGL 2"), await page.textContent("#point-empty"));
+    await page.click("#show-frame");
+    await page.keyboard.press("ArrowRight");
+    await settle(page);
+    expect(page.complaints.length === 0, page.complaints.join());
+  });
+
+  await check("hostile names", async (open_page) => {
+    const page = await open_page(hostile);
+    const shown = new Set();
+    for (let i = 0; i < spec.hostile_frames; ++i) {
+      await page.locator(`#rows tr[data-row="${i}"]`).click();
+      shown.add(await frame(page));
+      if ((await page.getAttribute(`#rows tr[data-row="${i}"] td:nth-child(3)`, "class")).includes("failed")) continue;
+      await settle(page);
+      const sizes = await page.$$eval(".layer img", (images) => images.map((image) => image.naturalWidth));
+      expect(sizes.length > 0 && sizes.every((size) => size > 0), `images of ${await frame(page)}: ${sizes}`);
+    }
+    for (const name of spec.hostile_names) expect(shown.has(name), `${JSON.stringify(name)} is not shown: ${JSON.stringify([...shown])}`);
+    expect(await page.evaluate(() => window.hit === undefined), "a name ran as a script");
+    expect((await page.textContent("#title")) === spec.hostile_title, await page.textContent("#title"));
+    expect((await page.evaluate(() => document.querySelectorAll("script").length)) === 3, "scripts were added");
+    expect(page.complaints.length === 0, page.complaints.join(" | "));
+  });
+
+  await check("ten thousand rows", async (open_page) => {
+    const page = await open_page(large);
+    expect((await page.textContent(".chip.all")) === "10000 frames", await page.textContent(".chip.all"));
+    const in_page = () => page.$$eval("#rows tbody tr[data-row]", (lines) => lines.length);
+    expect((await in_page()) < 100, `${await in_page()} rows in the document`);
+    await page.locator("#rows").evaluate((place) => { place.scrollTop = place.scrollHeight; });
+    await page.waitForTimeout(150);
+    const order = await page.$$eval("#rows tbody tr[data-row]", (lines) => lines.map((line) => Number(line.getAttribute("aria-rowindex"))));
+    expect(Math.max(...order) === 10001, `the last row is ${Math.max(...order)}`);
+    const visible = await page.locator("#rows").evaluate((place) => {
+      const line = [...place.querySelectorAll("tr[data-row]")].pop().getBoundingClientRect(), box = place.getBoundingClientRect();
+      return line.bottom <= box.bottom + 1 && line.top >= box.top;
+    });
+    expect(visible, "the last row is not in sight");
+    const ms = await page.evaluate(() => {
+      const began = performance.now();
+      document.querySelector("#rows th:nth-child(2) button").click();
+      document.querySelector("#rows").getBoundingClientRect();
+      return performance.now() - began;
+    });
+    expect(ms < 1500, `sorting took ${ms} ms`);
+    expect((await names(page))[0] === "frame 00000", (await names(page))[0]);
+    await page.locator(".plot svg").first().click({ position: { x: 300, y: 60 } });
+    const picked = Number(/frame (\d+)/.exec(await frame(page))[1]);
+    expect(picked > 2000 && picked < 8000, `a click in the middle of the plot picked frame ${picked}`);
+  });
+
+  await check("comparison", async (open_page) => {
+    const page = await open_page(comparison);
+    const index = (await page.$$eval("#rows th", (heads) => heads.map((head) => head.textContent))).indexOf("RMSE");
+    const errors = await column(page, index);
+    expect(errors.length > 3 && errors.every((value, i) => i === 0 || value <= errors[i - 1]), `not worst first: ${errors}`);
+    await page.selectOption("#right", "difference");
+    await settle(page);
+    expect((await page.$$eval("#layer-right img", (images) => images.length)) === 1, "no difference picture");
+    expect(await page.locator("#show-points").isHidden(), "points of maps without depth");
+  });
+
+  await check("list", async (open_page) => {
+    const page = await open_page(list);
+    const first = await page.getAttribute("#rows tbody tr[data-row] a", "href");
+    await page.click("#rows tbody tr[data-row] a");
+    await page.waitForSelector("html[data-ready] #stage");
+    expect(page.url().includes("/list/" + first), page.url());
+  });
+
+  await check("older results", async (open_page) => {
+    const page = await open_page(old); // made by `view` of results without previews
+    await settle(page);
+    const sizes = await page.$$eval(".layer img", (images) => images.map((image) => image.naturalWidth));
+    expect(sizes.length > 0 && sizes.every((size) => size > 0), "no images");
+    await page.click("#show-points");
+    expect((await page.textContent("#point-empty")).includes("no points"), await page.textContent("#point-empty"));
+  });
+
+  await check("missing files", async (open_page) => {
+    const bare = path.join(path.dirname(spec.scratch), "alone.html");
+    fs.copyFileSync(run, bare);
+    const page = await open_page(bare, { wait: false });
+    await page.waitForTimeout(300);
+    expect((await page.textContent("#trouble")).includes("index.js is not beside this page"), await page.textContent("#trouble"));
+    const folder = path.join(path.dirname(spec.scratch), "partly");
+    fs.mkdirSync(folder, { recursive: true });
+    for (const file of ["index.html", "index.js"]) fs.copyFileSync(path.join(path.dirname(run), file), path.join(folder, file));
+    const partly = await open_page(path.join(folder, "index.html"));
+    await partly.waitForTimeout(500);
+    expect((await partly.textContent("#readout")).includes("is missing"), await partly.textContent("#readout"));
+  });
+
+  await check("narrow screens", async (open_page) => {
+    for (const file of [run, cloud, comparison, list, bench]) {
+      const page = await open_page(file, { width: 360, height: 740, wait: file !== bench });
+      await page.waitForTimeout(200);
+      const wide = await page.evaluate(() => document.scrollingElement.scrollWidth - innerWidth);
+      expect(wide <= 0, `${file} is ${wide} px too wide`);
+    }
+  });
+
+  await check("valid markup", async () => {
+    const { HtmlValidate } = module_of("html-validate");
+    const validator = new HtmlValidate({ extends: ["html-validate:recommended"], rules: { "no-inline-style": "off", "long-title": "off", "require-sri": "off", "no-trailing-whitespace": "off" } });
+    const amiss = [];
+    for (const file of [run, hostile, list, comparison, bench]) {
+      const report = await validator.validateString(fs.readFileSync(file, "utf8"), file);
+      amiss.push(...report.results.flatMap((each) => each.messages.map((message) => `${file}:${message.line}: ${message.ruleId}: ${message.message}`)).slice(0, 10));
+    }
+    expect(amiss.length === 0, amiss.join("\n"));
+  });
+
+  await check("accessible", async (open_page) => {
+    const amiss = [];
+    const axe = fs.readFileSync(path.join(spec.modules, "axe-core", "axe.min.js"), "utf8");
+    for (const file of [run, cloud, hostile, comparison, list, bench])
+      for (const dark of [false, true]) {
+        const page = await open_page(file, { dark, wait: file !== bench });
+        await page.waitForTimeout(300);
+        for (const view of file === run ? ["frame", "points"] : [""]) {
+          if (view === "points") await page.click("#show-points");
+          await page.evaluate(axe);
+          const found = await page.evaluate(() => axe.run(document, { resultTypes: ["violations"] }));
+          for (const each of found.violations)
+            amiss.push(`${file} ${dark ? "dark" : "light"} ${view}: ${each.id}: ${each.nodes.slice(0, 3).map((node) => `${node.html.slice(0, 160)} ${(node.any[0] || node.all[0] || node.none[0])?.message || ""}`).join(" ; ")}`);
+        }
+        await page.context().close();
+      }
+    expect(amiss.length === 0, amiss.join("\n"));
+  });
+
+  await browser.close();
+  server.close();
+  fs.writeFileSync(process.argv[3], JSON.stringify(results, null, 1));
+})().catch((failure) => {
+  console.error(failure);
+  process.exit(1);
+});
