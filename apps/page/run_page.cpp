@@ -85,7 +85,7 @@ Row row_of(const json& frame) {
             .files = texts_at(frame, "files"),
             .world_from_camera = pose_at(frame, "world_from_camera")};
     for (const std::string& doubt : texts_at(frame, "doubts"))
-        row.why += (row.why.empty() ? "" : " ") + doubt;
+        row.why += (row.why.empty() ? "" : "; ") + doubt;
     if (const auto size = frame.find("size"); size != frame.end()) {
         row.width = size->at(0);
         row.height = size->at(1);
