@@ -30,7 +30,8 @@ class FrameAo {
     FrameAo(const FrameAo&) = delete;
     FrameAo& operator=(const FrameAo&) = delete;
 
-    /// Visibility of each pixel of `depth`; NaN exactly where there is no surface. Depth with noise or flying pixels is prepared first.
+    /// Visibility of each pixel of `depth`; NaN exactly where there is no surface. Depth with noise or flying pixels is
+    /// prepared first.
     [[nodiscard]] AoMap compute(const DepthImage& depth, const DepthNoise& noise);
     /// For the frames of one recording, each computed together with those around it. Must not outlive this one.
     [[nodiscard]] SequenceAo sequence(double radius_m, const DepthNoise& noise,

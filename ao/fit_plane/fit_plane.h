@@ -37,7 +37,8 @@ struct OtherDepth {
 /// Not thread-safe: one frame at a time.
 class FitPlane {
   public:
-    /// `noise.needs_preparation()` must hold. Flying pixels are dropped where `noise` expects them. The window's radius grows with the root of sigma(z), and with the correlation length.
+    /// `noise.needs_preparation()` must hold. Flying pixels are dropped where `noise` expects them. The window's radius
+    /// grows with the root of sigma(z), and with the correlation length.
     FitPlane(gpu::Device& device, const DepthNoise& noise, const FitPlaneOptions& options = {});
 
     /// With others, each pixel's depth is first averaged with what they saw of its surface, and the windows shrink with

@@ -49,7 +49,7 @@ std::string noise_origin(const RunSettings& settings) {
 
 std::string noise_sentence(const DepthNoise& noise, const RunSettings& settings) {
     const std::string origin = noise_origin(settings);
-    const std::string flying = !noise.flies()          ? ""
+    const std::string flying = !noise.flies()         ? ""
                                : settings.drop_flying ? "flying pixels are dropped; "
                                                       : "flying pixels are kept; ";
     const bool planes = noise.any() && settings.depth_smoothing > 0;
