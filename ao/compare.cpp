@@ -1,6 +1,6 @@
 #include "ao/compare.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <ceres/ceres.h>

@@ -8,7 +8,7 @@
 #include "ao/luna/luna.h"
 #include "ao/raycast/raycast.h"
 #include "ao/surfel/surfel.h"
-#include "projection/named.h"
+#include "projection/base/named.h"
 
 #include <type_traits>
 

@@ -1,7 +1,7 @@
 // A command of the program: words and flags bound to variables, and the work to do once they are set.
 #pragma once
 
-#include "projection/parameters.h"
+#include "projection/base/parameters.h"
 
 #include <memory>
 #include <string>

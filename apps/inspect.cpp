@@ -3,7 +3,7 @@
 #include "apps/json.h"
 #include "io/captures/capture.h"
 #include "io/clouds/cloud_file.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "projection/project.h"
 
 #include <algorithm>

@@ -2,8 +2,8 @@
 // the whole of nlohmann/json.hpp takes a compiler seconds, so that files which handle values include it themselves.
 #pragma once
 
+#include "projection/base/error.h"
 #include "projection/camera.h"
-#include "projection/error.h"
 #include "projection/frame.h"
 
 #include <cstddef>

@@ -2,7 +2,7 @@
 #include "ao/base/method.h"
 #include "ao/gpu/device.h"
 #include "apps/command.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <fmt/format.h>
 

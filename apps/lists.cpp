@@ -1,7 +1,7 @@
 #include "apps/lists.h"
 
 #include "io/text.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <fmt/format.h>
 #include <limits>

@@ -2,9 +2,9 @@
 #include "apps/command.h"
 #include "apps/settings_file.h"
 #include "io/output_file.h"
-#include "projection/error.h"
-#include "projection/memory.h"
-#include "projection/nearest_word.h"
+#include "projection/base/error.h"
+#include "projection/base/memory.h"
+#include "projection/base/nearest_word.h"
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,6 @@
 #include "apps/method_settings.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <fmt/format.h>
 

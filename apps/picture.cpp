@@ -2,7 +2,7 @@
 #include "apps/picture.h"
 
 #include "ao/finish/finish.h"
-#include "projection/statistics.h"
+#include "projection/base/statistics.h"
 #include "shaders/shared/finish.h"
 
 #include <algorithm>

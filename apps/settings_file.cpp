@@ -1,7 +1,7 @@
 #include "apps/settings_file.h"
 
 #include "io/shallow_json.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>

@@ -1,8 +1,8 @@
 // --frames a:b:step.
 #include "apps/slice.h"
 
-#include "projection/error.h"
-#include "projection/parameters.h"
+#include "projection/base/error.h"
+#include "projection/base/parameters.h"
 
 #include <algorithm>
 #include <fmt/format.h>

@@ -1,7 +1,7 @@
 // Hashes and stamps of input files.
 #include "io/content_hash.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #define XXH_INLINE_ALL
 #include <array>

@@ -3,7 +3,7 @@
 
 #include "io/content_hash.h"
 #include "io/text.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <atomic>

@@ -1,7 +1,7 @@
 // JSON from outside with limited depth: printing and copying it recurse, and could overflow the stack.
 #pragma once
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <fmt/format.h>
 #include <utility>

@@ -1,8 +1,8 @@
 // Files as bytes, lines and numbers: strict where std::stod and operator>> are forgiving.
 #include "io/text.h"
 
-#include "projection/error.h"
-#include "projection/memory.h"
+#include "projection/base/error.h"
+#include "projection/base/memory.h"
 
 #include <algorithm>
 #include <array>

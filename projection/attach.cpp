@@ -1,6 +1,6 @@
 #include "projection/attach.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "projection/project.h"
 #include "projection/srgb.h"
 #include "projection/undistort.h"

@@ -1,6 +1,6 @@
 #include "projection/camera.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <cmath>
 #include <fmt/format.h>

@@ -1,7 +1,7 @@
 // Renders triangles of the recorded surface into the colour image, and looks values up there.
 #include "projection/colour_view.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "projection/project.h"
 #include "projection/undistort.h"
 

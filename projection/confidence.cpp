@@ -1,6 +1,6 @@
 #include "projection/confidence.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <array>

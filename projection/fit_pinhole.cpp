@@ -1,6 +1,6 @@
 #include "projection/fit_pinhole.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 #include "projection/noise.h"
 
-#include "projection/error.h"
-#include "projection/statistics.h"
+#include "projection/base/error.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <array>
@@ -184,12 +184,13 @@ Jumps kind_of(const JumpCounts& counts) {
     // Depth resized or smoothed has 0.8 with two and more, and hardly any without: by the reach that spans its edges.
     // Rendered depth has 0.1 with two and more over the shortest reach. Over longer ones its slopes count, too, but
     // sharp jumps are as many. Time of flight mixes one pixel: 0.35 are sharp, and 0.8 and more of rendered depth.
-    constexpr double enough = 100, least_smeared = 0.4, few_sharp = 0.05, least_sharp = 0.7;
+    constexpr double enough_jumps = 100, least_smeared = 0.4, few_sharp = 0.05, least_sharp = 0.7;
     for (const JumpCount& count : counts)
-        if (count.all > enough && count.smeared > least_smeared * count.all && count.sharp < few_sharp * count.all)
+        if (count.all > enough_jumps && count.smeared > least_smeared * count.all &&
+            count.sharp < few_sharp * count.all)
             return Jumps::smeared;
     const JumpCount& near = counts.front();
-    return near.all > enough && near.sharp < least_sharp * near.all ? Jumps::unknown : Jumps::sharp;
+    return near.all > enough_jumps && near.sharp < least_sharp * near.all ? Jumps::unknown : Jumps::sharp;
 }
 
 /// Along a row or a column: `next` is from one value to the next.

@@ -1,6 +1,6 @@
 #include "projection/project.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "projection/undistort.h"
 
 #include <algorithm>

@@ -1,10 +1,10 @@
 // Depth in, visibility out: the one interface every AO method has, and the row type of the table of methods.
 #pragma once
 
-#include "projection/error.h"
+#include "projection/base/error.h"
+#include "projection/base/parameters.h"
 #include "projection/maps.h"
 #include "projection/noise.h"
-#include "projection/parameters.h"
 
 #include <array>
 #include <Eigen/Geometry>

@@ -1,7 +1,7 @@
 // The quality levels that methods share; what a level costs and brings is each method's own.
 #pragma once
 
-#include "projection/parameters.h"
+#include "projection/base/parameters.h"
 
 namespace scanshade {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "ao/base/method.h"
-#include "projection/stopwatch.h"
+#include "projection/base/stopwatch.h"
 
 namespace scanshade {
 

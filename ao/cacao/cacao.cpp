@@ -1,7 +1,7 @@
 #include "ao/cacao/cacao.h"
 
 #include "ao/gpu/transfer.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <chrono>
 #include <fmt/format.h>

@@ -2,19 +2,19 @@
 #include "ao/cloud/cloud_ao.h"
 
 #include "ao/base/watch.h"
-#include "ao/cloud/cloud_gpu.h"
-#include "ao/cloud/disc_rays.h"
 #include "ao/cloud/extent.h"
-#include "ao/cloud/fitted_cloud.h"
 #include "ao/cloud/indices_where.h"
 #include "ao/cloud/repeatability.h"
 #include "ao/cloud/settled_sides.h"
+#include "ao/cloud/surface/cloud_gpu.h"
+#include "ao/cloud/surface/disc_rays.h"
+#include "ao/cloud/surface/fitted_cloud.h"
 #include "ao/cloud/tiles.h"
 #include "ao/cloud/twins.h"
 #include "ao/raycast/raycast.h"
-#include "projection/error.h"
-#include "projection/hash.h"
-#include "projection/statistics.h"
+#include "projection/base/error.h"
+#include "projection/base/hash.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <array>

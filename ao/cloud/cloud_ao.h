@@ -2,7 +2,7 @@
 #pragma once
 
 #include "ao/base/method.h"
-#include "ao/cloud/cloud_surface.h"
+#include "ao/cloud/surface/cloud_surface.h"
 
 #include <optional>
 #include <string>

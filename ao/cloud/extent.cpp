@@ -2,8 +2,8 @@
 #include "ao/cloud/extent.h"
 
 #include "ao/cloud/indices_where.h"
-#include "ao/cloud/leaf_neighbours.h"
-#include "projection/statistics.h"
+#include "ao/cloud/surface/leaf_neighbours.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,7 @@
 // Where a cloud lies, and which of its points are strays.
 #pragma once
 
-#include "ao/cloud/cloud_surface.h"
+#include "ao/cloud/surface/cloud_surface.h"
 
 #include <Eigen/Core>
 #include <span>

@@ -1,6 +1,6 @@
 #include "ao/cloud/repeatability.h"
 
-#include "ao/cloud/leaf_neighbours.h"
+#include "ao/cloud/surface/leaf_neighbours.h"
 
 #include <algorithm>
 #include <array>

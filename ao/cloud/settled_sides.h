@@ -2,7 +2,7 @@
 #pragma once
 
 #include "ao/cloud/cloud_ao.h"
-#include "ao/cloud/sides.h"
+#include "ao/cloud/sides/sides.h"
 
 #include <optional>
 #include <string>

@@ -1,8 +1,8 @@
 // Tiles of a cloud. Their points keep the order of the file: any other order takes several times as long.
 #include "ao/cloud/tiles.h"
 
-#include "projection/hash.h"
-#include "projection/statistics.h"
+#include "projection/base/hash.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <Eigen/Geometry>

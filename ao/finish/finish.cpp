@@ -2,8 +2,8 @@
 
 #include "ao/gpu/transfer.h"
 #include "projection/attach.h"
+#include "projection/base/error.h"
 #include "projection/confidence.h"
-#include "projection/error.h"
 #include "projection/srgb.h"
 #include "shaders/shared/finish.h"
 

@@ -1,7 +1,7 @@
 #include "ao/fit_plane/fit_plane.h"
 
 #include "ao/gpu/transfer.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "shaders/shared/fit_plane.h"
 
 #include <algorithm>

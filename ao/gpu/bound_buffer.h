@@ -3,7 +3,7 @@
 
 #include "ao/gpu/device_bytes.h"
 #include "ao/gpu/vulkan.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <cstddef>
 #include <initializer_list>

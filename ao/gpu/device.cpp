@@ -1,7 +1,7 @@
 #include "ao/gpu/device.h"
 
 #include "ao/gpu/vulkan.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <cctype>

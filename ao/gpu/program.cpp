@@ -2,7 +2,7 @@
 
 #include "ao/gpu/bound_buffer.h"
 #include "ao/gpu/vulkan.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <fmt/format.h>

@@ -1,6 +1,6 @@
 #include "ao/gpu/shader_table.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <iterator>
 #include <string>

@@ -3,7 +3,7 @@
 
 #include "ao/gpu/device.h"
 #include "ao/gpu/pipeline.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <mutex>
 #include <vulkan/vulkan_raii.hpp>

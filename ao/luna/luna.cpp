@@ -1,6 +1,6 @@
 #include "ao/luna/luna.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "shaders/shared/point_samples.h"
 
 #include <array>

@@ -2,7 +2,7 @@
 #include "ao/raycast/point_surface.h"
 
 #include "ao/raycast/embree.h"
-#include "projection/statistics.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <Eigen/Eigenvalues>

@@ -2,8 +2,8 @@
 #include "ao/raycast/ray_hemisphere.h"
 
 #include "ao/raycast/low_discrepancy.h"
-#include "projection/error.h"
-#include "projection/hash.h"
+#include "projection/base/error.h"
+#include "projection/base/hash.h"
 
 #include <algorithm>
 #include <cmath>

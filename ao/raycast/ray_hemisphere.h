@@ -2,7 +2,7 @@
 #pragma once
 
 #include "ao/raycast/ray_surface.h"
-#include "projection/parameters.h"
+#include "projection/base/parameters.h"
 
 #include <cstdint>
 #include <string>

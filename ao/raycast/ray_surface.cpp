@@ -2,7 +2,7 @@
 #include "ao/raycast/ray_surface.h"
 
 #include "ao/raycast/embree.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,7 +6,7 @@
 #include "ao/base/watch.h"
 #include "ao/raycast/depth_surface.h"
 #include "ao/raycast/point_surface.h"
-#include "projection/hash.h"
+#include "projection/base/hash.h"
 
 #include <algorithm>
 #include <cmath>

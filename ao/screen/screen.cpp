@@ -2,7 +2,7 @@
 
 #include "ao/gpu/transfer.h"
 #include "ao/screen/noise.h"
-#include "projection/stopwatch.h"
+#include "projection/base/stopwatch.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,7 +5,7 @@
 #include "ao/base/method.h"
 #include "ao/base/quality.h"
 #include "ao/gpu/program.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "shaders/shared/screen.h"
 
 #include <map>

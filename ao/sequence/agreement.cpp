@@ -1,6 +1,6 @@
 #include "ao/sequence/agreement.h"
 
-#include "projection/statistics.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 
 #include "ao/gpu/transfer.h"
 #include "ao/screen/screen.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "shaders/shared/gather.h"
 
 #include <algorithm>

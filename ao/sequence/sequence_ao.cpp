@@ -1,7 +1,7 @@
 #include "ao/sequence/sequence_ao.h"
 
-#include "projection/statistics.h"
-#include "projection/stopwatch.h"
+#include "projection/base/statistics.h"
+#include "projection/base/stopwatch.h"
 
 #include <algorithm>
 #include <tbb/parallel_for_each.h>

@@ -4,7 +4,7 @@
 #include "apps/json.h"
 #include "io/output_file.h"
 #include "io/text.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <cstdio>

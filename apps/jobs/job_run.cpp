@@ -4,9 +4,9 @@
 #include "apps/command.h"
 #include "apps/walk/overlap.h"
 #include "apps/walk/progress.h"
-#include "projection/error.h"
-#include "projection/memory.h"
-#include "projection/stopwatch.h"
+#include "projection/base/error.h"
+#include "projection/base/memory.h"
+#include "projection/base/stopwatch.h"
 
 #include <fmt/format.h>
 #include <mutex>

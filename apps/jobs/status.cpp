@@ -7,7 +7,7 @@
 #include "apps/walk/progress.h"
 #include "apps/walk/report.h"
 #include "io/output_file.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <array>

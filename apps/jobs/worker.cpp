@@ -3,8 +3,8 @@
 
 #include "apps/command.h"
 #include "apps/walk/progress.h"
-#include "projection/error.h"
-#include "projection/memory.h"
+#include "projection/base/error.h"
+#include "projection/base/memory.h"
 
 #include <algorithm>
 #include <array>

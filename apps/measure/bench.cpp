@@ -13,7 +13,7 @@
 #include "apps/walk/progress.h"
 #include "io/output_file.h"
 #include "io/text.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <fmt/chrono.h>

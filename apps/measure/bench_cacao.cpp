@@ -10,8 +10,8 @@
 #include "apps/measure/bench_part.h"
 #include "apps/measure/bench_results.h"
 #include "apps/scenes/generate.h"
-#include "projection/error.h"
-#include "projection/statistics.h"
+#include "projection/base/error.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <array>

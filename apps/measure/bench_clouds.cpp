@@ -10,9 +10,9 @@
 #include "apps/measure/bench_part.h"
 #include "apps/scenes/random_noise.h"
 #include "apps/scenes/scanner.h"
-#include "projection/hash.h"
-#include "projection/statistics.h"
-#include "projection/stopwatch.h"
+#include "projection/base/hash.h"
+#include "projection/base/statistics.h"
+#include "projection/base/stopwatch.h"
 
 #include <ctime>
 #include <fmt/format.h>

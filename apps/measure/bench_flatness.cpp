@@ -4,8 +4,8 @@
 #include "apps/measure/flat_surfaces.h"
 #include "apps/picture.h"
 #include "io/images/image_file.h"
-#include "projection/error.h"
-#include "projection/statistics.h"
+#include "projection/base/error.h"
+#include "projection/base/statistics.h"
 
 #include <cmath>
 #include <fmt/format.h>

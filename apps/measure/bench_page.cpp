@@ -2,7 +2,7 @@
 #include "apps/measure/bench_results.h"
 #include "apps/page/document.h"
 #include "apps/picture.h"
-#include "projection/statistics.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 #include "apps/csv.h"
 
 #include "apps/measure/error_figures.h"
-#include "projection/statistics.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 #include "apps/measure/budget.h"
 
 #include "apps/measure/bench_results.h"
-#include "projection/error.h"
-#include "projection/statistics.h"
+#include "projection/base/error.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <cmath>

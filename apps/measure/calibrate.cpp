@@ -7,7 +7,7 @@
 #include "apps/measure/trial.h"
 #include "apps/walk/progress.h"
 #include "io/output_file.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <array>

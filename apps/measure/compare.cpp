@@ -14,7 +14,7 @@
 #include "io/clouds/format.h"
 #include "io/images/image_file.h"
 #include "io/output_file.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <cmath>
 #include <fmt/format.h>

@@ -1,6 +1,6 @@
 #include "apps/measure/configurations.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 

@@ -1,6 +1,6 @@
 #include "apps/measure/flat_surfaces.h"
 
-#include "projection/hash.h"
+#include "projection/base/hash.h"
 #include "projection/undistort.h"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 #include "apps/measure/front.h"
 
 #include "front.inc"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <array>

@@ -2,8 +2,8 @@
 
 #include "ao/raycast/depth_surface.h"
 #include "projection/attach.h"
-#include "projection/error.h"
-#include "projection/hash.h"
+#include "projection/base/error.h"
+#include "projection/base/hash.h"
 #include "projection/project.h"
 
 #include <array>

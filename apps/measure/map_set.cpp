@@ -3,7 +3,7 @@
 #include "apps/json.h"
 #include "io/images/image_file.h"
 #include "io/text.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <array>
 #include <fmt/format.h>

@@ -6,7 +6,7 @@
 #include "apps/measure/error_classes.h"
 #include "apps/scenes/scene.h"
 #include "apps/scenes/sensor.h"
-#include "projection/statistics.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,9 +4,9 @@
 #include "apps/measure/map_set.h"
 #include "io/images/image_file.h"
 #include "projection/attach.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
+#include "projection/base/stopwatch.h"
 #include "projection/project.h"
-#include "projection/stopwatch.h"
 
 #include <algorithm>
 #include <fmt/format.h>

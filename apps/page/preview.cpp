@@ -3,7 +3,7 @@
 
 #include "apps/page/text.h"
 #include "io/images/jpeg_output.h"
-#include "projection/statistics.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <bit>

@@ -2,7 +2,7 @@
 #include "apps/command.h"
 #include "apps/page/run_page.h"
 #include "io/output_file.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <cstdlib>

@@ -5,8 +5,8 @@
 #include "apps/refine/sources.h"
 #include "io/cameras/camera_file.h"
 #include "io/output_file.h"
-#include "projection/error.h"
-#include "projection/stopwatch.h"
+#include "projection/base/error.h"
+#include "projection/base/stopwatch.h"
 
 #include <cmath>
 #include <fmt/format.h>

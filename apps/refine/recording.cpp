@@ -2,11 +2,11 @@
 #include "apps/refine/recording.h"
 
 #include "io/images/image_file.h"
+#include "projection/base/error.h"
 #include "projection/calibration/recording/agreement.h"
 #include "projection/calibration/recording/overlap.h"
 #include "projection/calibration/recording/planes.h"
 #include "projection/calibration/recording/sequence.h"
-#include "projection/error.h"
 
 #include <algorithm>
 #include <cmath>

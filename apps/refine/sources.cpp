@@ -6,8 +6,8 @@
 #include "io/images/exif.h"
 #include "io/images/format.h"
 #include "io/images/image_file.h"
+#include "projection/base/error.h"
 #include "projection/calibration/boards/organised_clouds.h"
-#include "projection/error.h"
 
 #include <algorithm>
 #include <cmath>

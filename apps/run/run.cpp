@@ -19,9 +19,9 @@
 #include "io/images/format.h"
 #include "io/output_file.h"
 #include "io/text.h"
-#include "projection/error.h"
-#include "projection/memory.h"
-#include "projection/stopwatch.h"
+#include "projection/base/error.h"
+#include "projection/base/memory.h"
+#include "projection/base/stopwatch.h"
 
 #include <algorithm>
 #include <atomic>

@@ -4,8 +4,8 @@
 #include "ao/cloud/cloud_ao.h"
 #include "apps/method_settings.h"
 #include "apps/settings_file.h"
-#include "projection/error.h"
-#include "projection/nearest_word.h"
+#include "projection/base/error.h"
+#include "projection/base/nearest_word.h"
 
 #include <algorithm>
 #include <cstdio>

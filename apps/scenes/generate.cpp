@@ -9,8 +9,8 @@
 #include "io/clouds/cloud_file.h"
 #include "io/images/image_file.h"
 #include "io/output_file.h"
-#include "projection/error.h"
-#include "projection/statistics.h"
+#include "projection/base/error.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <charconv>

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "apps/scenes/scanner.h"
-#include "projection/parameters.h"
+#include "projection/base/parameters.h"
 
 #include <filesystem>
 #include <functional>

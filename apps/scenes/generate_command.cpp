@@ -1,7 +1,7 @@
 // `scanshade generate`: a capture of a synthetic scene with exact truth.
 #include "apps/command.h"
 #include "apps/scenes/generate.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <fmt/format.h>
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "apps/scenes/scene.h"
-#include "projection/hash.h"
+#include "projection/base/hash.h"
 
 #include <initializer_list>
 #include <numbers>

@@ -1,7 +1,7 @@
 // Noise as a hash of seed, frame, purpose and pixel: the same on every run, however many threads there are.
 #pragma once
 
-#include "projection/hash.h"
+#include "projection/base/hash.h"
 
 #include <cmath>
 #include <cstdint>

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "apps/scenes/scene_cloud.h"
-#include "projection/parameters.h"
+#include "projection/base/parameters.h"
 
 namespace scanshade::scene {
 

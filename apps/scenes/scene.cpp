@@ -2,7 +2,7 @@
 #include "apps/scenes/scene.h"
 
 #include "apps/scenes/random_noise.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "projection/srgb.h"
 #include "projection/undistort.h"
 

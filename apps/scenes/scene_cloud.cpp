@@ -1,8 +1,8 @@
 // A scene as a cloud.
 #include "apps/scenes/scene_cloud.h"
 
-#include "projection/error.h"
-#include "projection/hash.h"
+#include "projection/base/error.h"
+#include "projection/base/hash.h"
 
 #include <algorithm>
 #include <array>

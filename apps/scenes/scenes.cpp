@@ -1,7 +1,7 @@
 // The table of scenes.
 #include "apps/scenes/scenes.h"
 
-#include "projection/named.h"
+#include "projection/base/named.h"
 
 namespace scanshade::scene {
 

@@ -1,7 +1,7 @@
 #include "apps/scenes/sensor.h"
 
 #include "apps/scenes/random_noise.h"
-#include "projection/named.h"
+#include "projection/base/named.h"
 
 #include <algorithm>
 #include <array>

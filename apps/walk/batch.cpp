@@ -6,10 +6,10 @@
 #include "apps/walk/point_clouds.h"
 #include "apps/walk/sequence_order.h"
 #include "io/clouds/cloud_file.h"
-#include "projection/error.h"
-#include "projection/memory.h"
+#include "projection/base/error.h"
+#include "projection/base/memory.h"
+#include "projection/base/stopwatch.h"
 #include "projection/project.h"
-#include "projection/stopwatch.h"
 
 #include <algorithm>
 #include <exception>

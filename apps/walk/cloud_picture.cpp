@@ -1,12 +1,12 @@
 // A picture of a cloud without a camera: two views that show different parts of it.
 #include "apps/walk/cloud_picture.h"
 
-#include "ao/cloud/leaf_neighbours.h"
+#include "ao/cloud/surface/leaf_neighbours.h"
 #include "apps/picture.h"
 #include "io/clouds/cloud_file.h"
 #include "projection/attach.h"
-#include "projection/hash.h"
-#include "projection/statistics.h"
+#include "projection/base/hash.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <array>

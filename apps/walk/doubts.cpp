@@ -2,7 +2,7 @@
 #include "apps/walk/doubts.h"
 
 #include "io/clouds/cloud_file.h"
-#include "projection/statistics.h"
+#include "projection/base/statistics.h"
 #include "projection/undistort.h"
 
 #include <algorithm>

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "apps/walk/frame_row.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <chrono>
 #include <cstdint>

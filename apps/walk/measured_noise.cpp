@@ -1,8 +1,8 @@
 #include "apps/walk/measured_noise.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
+#include "projection/base/stopwatch.h"
 #include "projection/project.h"
-#include "projection/stopwatch.h"
 
 #include <algorithm>
 #include <optional>

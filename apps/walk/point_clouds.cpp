@@ -3,7 +3,7 @@
 
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "projection/project.h"
 
 #include <cmath>

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "apps/walk/frame_row.h"
-#include "projection/stopwatch.h"
+#include "projection/base/stopwatch.h"
 
 #include <memory>
 #include <optional>

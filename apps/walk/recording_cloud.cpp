@@ -2,9 +2,9 @@
 
 #include "apps/page/points.h"
 #include "io/clouds/cloud_file.h"
-#include "projection/error.h"
-#include "projection/hash.h"
-#include "projection/statistics.h"
+#include "projection/base/error.h"
+#include "projection/base/hash.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 
 #include "apps/json.h"
 #include "io/content_hash.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <array>

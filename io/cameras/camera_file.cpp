@@ -3,7 +3,7 @@
 #include "io/cameras/known_cameras.h"
 #include "io/output_file.h"
 #include "io/text.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <array>
 #include <cmath>

@@ -1,7 +1,7 @@
 // Cameras as JSON: ours, and Open3D's.
 #include "io/cameras/camera_formats.h"
 #include "io/shallow_json.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // Cameras as text: 3x3 matrices, BundleFusion's info.txt, and COLMAP's cameras.txt.
 #include "io/cameras/camera_formats.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // The cameras of PCL's recordings: XML with the two roots <rgb> and <depth>, as pcl/io/lzf_image_io.h writes it.
 #include "io/cameras/camera_formats.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <boost/property_tree/ptree.hpp>

@@ -1,7 +1,7 @@
 // Cameras as YAML: OpenCV's own, ROS's camera_info, Kalibr's camchain. (yaml-cpp reads all three, because
 // OpenCV's parser never returns from some damaged files.)
 #include "io/cameras/camera_formats.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <cmath>
 #include <fmt/format.h>

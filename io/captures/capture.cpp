@@ -10,8 +10,8 @@
 #include "io/clouds/format.h"
 #include "io/images/format.h"
 #include "io/text.h"
-#include "projection/error.h"
-#include "projection/memory.h"
+#include "projection/base/error.h"
+#include "projection/base/memory.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 
 #include "io/cameras/camera_file.h"
 #include "io/images/image_file.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "projection/frame.h"
 #include "projection/motion.h"
 

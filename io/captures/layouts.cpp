@@ -5,7 +5,7 @@
 #include "io/clouds/format.h"
 #include "io/images/format.h"
 #include "io/text.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <fmt/format.h>

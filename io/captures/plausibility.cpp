@@ -1,7 +1,7 @@
 // Range and smoothness of a depth image, from a sample of its pixels.
 #include "io/captures/plausibility.h"
 
-#include "projection/statistics.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 #include "io/captures/trajectory.h"
 
 #include "io/text.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "projection/motion.h"
 
 #include <algorithm>

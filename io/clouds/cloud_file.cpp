@@ -5,8 +5,8 @@
 #include "io/clouds/format.h"
 #include "io/output_file.h"
 #include "io/text.h"
-#include "projection/error.h"
-#include "projection/memory.h"
+#include "projection/base/error.h"
+#include "projection/base/memory.h"
 
 #include <algorithm>
 #include <array>

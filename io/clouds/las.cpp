@@ -2,7 +2,7 @@
 #include "io/clouds/cloud_records.h"
 
 #include "io/text.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <array>

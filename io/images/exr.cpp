@@ -1,7 +1,7 @@
 // EXR with OpenEXR, from memory and to memory: one channel of any name, halves and integers as floats.
 #include "io/images/readers.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <cstring>

@@ -1,8 +1,8 @@
 // The checks that every image format's reader makes of its header.
 #include "io/images/image_check.h"
 
-#include "projection/error.h"
-#include "projection/memory.h"
+#include "projection/base/error.h"
+#include "projection/base/memory.h"
 
 #include <fmt/format.h>
 

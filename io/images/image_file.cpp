@@ -3,7 +3,7 @@
 
 #include "io/images/format.h"
 #include "io/text.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <cmath>
 #include <fmt/format.h>

@@ -4,7 +4,7 @@
 #include "io/images/format.h"
 #include "io/output_file.h"
 #include "io/text.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <cmath>

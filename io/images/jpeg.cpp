@@ -2,7 +2,7 @@
 #include "io/images/jpeg_output.h"
 #include "io/images/readers.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <csetjmp>
 #include <cstdio> // jpeglib.h lacks it

@@ -1,7 +1,7 @@
 #include "io/images/npy_file.h"
 
 #include "io/output_file.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -2,7 +2,7 @@
 #include "io/images/png_output.h"
 
 #include "io/images/deflate.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <cstring>

@@ -1,7 +1,7 @@
 // TIFF with libtiff, from memory and to memory; its errors become ours.
 #include "io/images/readers.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <algorithm>
 #include <cstdarg>

@@ -1,8 +1,8 @@
 // One refinement from observations to findings: model selection, outlying views, coverage, effect.
 #include "projection/calibration/refinement.h"
 
-#include "projection/error.h"
-#include "projection/statistics.h"
+#include "projection/base/error.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <fmt/format.h>

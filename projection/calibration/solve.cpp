@@ -1,7 +1,7 @@
 // Ceres, as all problems use it: settings, fixed numbers, covariance.
 #include "projection/calibration/solve.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <Eigen/Dense>
 #include <glog/logging.h>

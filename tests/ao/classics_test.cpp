@@ -5,7 +5,7 @@
 #include "ao/gpu/program.h"
 #include "ao/screen/noise.h"
 #include "ao/screen/screen.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "shaders/shared/screen.h"
 #include "tests/support/says.h"
 #include "tests/support/scenes.h"

@@ -1,8 +1,8 @@
 // Clouds without a view: laws and closed forms that visibility from the points themselves must keep.
 #include "ao/cloud/cloud_ao.h"
-#include "ao/cloud/leaf_neighbours.h"
+#include "ao/cloud/surface/leaf_neighbours.h"
 #include "apps/scenes/scanner.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "tests/support/files.h"
 #include "tests/support/points.h"
 

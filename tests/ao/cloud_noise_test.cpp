@@ -1,7 +1,7 @@
 // The noise of a cloud: measured, thinned and taken away; what is no noise stays.
-#include "ao/cloud/cloud_noise.h"
 #include "ao/cloud/extent.h"
-#include "ao/cloud/fitted_cloud.h"
+#include "ao/cloud/surface/cloud_noise.h"
+#include "ao/cloud/surface/fitted_cloud.h"
 #include "tests/support/points.h"
 
 #include <gtest/gtest.h>

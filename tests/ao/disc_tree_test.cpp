@@ -1,5 +1,5 @@
 // Rays against the discs of a cloud, compared with trying every disc.
-#include "ao/cloud/disc_tree.h"
+#include "ao/cloud/surface/disc_tree.h"
 #include "tests/support/points.h"
 
 #include <gtest/gtest.h>

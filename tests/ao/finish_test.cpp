@@ -3,8 +3,8 @@
 
 #include "apps/picture.h"
 #include "projection/attach.h"
+#include "projection/base/error.h"
 #include "projection/confidence.h"
-#include "projection/error.h"
 #include "tests/support/scenes.h"
 
 #include <cmath>

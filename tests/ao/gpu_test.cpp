@@ -1,6 +1,6 @@
 // The device and the pass runner: valid tables compute the right results, broken ones are refused.
 #include "ao/gpu/program.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <cstdlib>
 #include <gtest/gtest.h>

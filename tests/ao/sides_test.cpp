@@ -1,8 +1,8 @@
 // Which side of a cloud's planes was scanned: from graphs of patches to whole scenes.
-#include "ao/cloud/sides.h"
+#include "ao/cloud/sides/sides.h"
 
 #include "ao/cloud/cloud_ao.h"
-#include "ao/cloud/patches.h"
+#include "ao/cloud/sides/patches.h"
 #include "apps/scenes/scanner.h"
 #include "tests/support/files.h"
 #include "tests/support/points.h"

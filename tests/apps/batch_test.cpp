@@ -3,7 +3,7 @@
 
 #include "apps/walk/report.h"
 #include "io/clouds/cloud_file.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "tests/support/small_capture.h"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 // The flatness of real captures is judged where planes are open: on generated rooms, truth says whether they are.
 #include "apps/measure/flat_surfaces.h"
 #include "apps/scenes/scene.h"
-#include "projection/statistics.h"
+#include "projection/base/statistics.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

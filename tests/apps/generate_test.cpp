@@ -4,7 +4,7 @@
 #include "apps/scenes/scene.h"
 #include "apps/scenes/sensor.h"
 #include "io/captures/capture.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "projection/project.h"
 #include "tests/support/says.h"
 #include "tests/support/scenes.h"

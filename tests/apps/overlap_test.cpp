@@ -1,7 +1,7 @@
 // Overlapping captures start in order, report in order, and end after the first failure.
 #include "apps/walk/overlap.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <atomic>
 #include <gtest/gtest.h>

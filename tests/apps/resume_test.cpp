@@ -4,7 +4,7 @@
 #include "apps/jobs/job_run.h"
 #include "apps/json.h"
 #include "apps/walk/resume.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "tests/support/files.h"
 #include "tests/support/small_capture.h"
 

@@ -4,7 +4,7 @@
 #include "apps/walk/progress.h"
 #include "io/images/image_file.h"
 #include "io/output_file.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "tests/support/files.h"
 #include "tests/support/png.h"
 #include "tests/support/says.h"

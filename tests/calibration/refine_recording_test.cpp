@@ -4,12 +4,12 @@
 #include "apps/scenes/scene.h"
 #include "apps/scenes/sensor.h"
 #include "io/cameras/camera_file.h"
+#include "projection/base/error.h"
 #include "projection/calibration/recording/agreement.h"
 #include "projection/calibration/recording/planes.h"
 #include "projection/calibration/recording/residuals.h"
 #include "projection/calibration/recording/sequence.h"
 #include "projection/calibration/refinement.h"
-#include "projection/error.h"
 #include "tests/support/files.h"
 
 #include <algorithm>

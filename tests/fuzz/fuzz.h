@@ -2,7 +2,7 @@
 // libFuzzer drives (tests/fuzz/run); whatever is found becomes a row of tests/io/broken_inputs_test.cpp.
 #pragma once
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <cstdint>
 #include <cstdlib>

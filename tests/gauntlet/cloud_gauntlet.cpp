@@ -6,8 +6,8 @@
 #include "apps/walk/point_clouds.h"
 #include "io/captures/capture.h"
 #include "io/clouds/cloud_file.h"
-#include "projection/error.h"
-#include "projection/stopwatch.h"
+#include "projection/base/error.h"
+#include "projection/base/stopwatch.h"
 #include "tests/gauntlet/perturb.h"
 
 #include <algorithm>

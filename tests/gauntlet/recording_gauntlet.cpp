@@ -2,8 +2,8 @@
 // without a word?
 #include "io/captures/capture.h"
 #include "io/images/image_file.h"
+#include "projection/base/stopwatch.h"
 #include "projection/project.h"
-#include "projection/stopwatch.h"
 #include "tests/gauntlet/perturb_recordings.h"
 
 #include <algorithm>

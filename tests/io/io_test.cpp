@@ -8,7 +8,7 @@
 #include "io/images/png_input.h"
 #include "io/images/png_output.h"
 #include "io/output_file.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "tests/support/files.h"
 
 #include <array>

@@ -3,7 +3,7 @@
 #include "apps/page/run_page.h"
 #include "io/clouds/cloud_file.h"
 #include "io/images/image_file.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "tests/support/points.h"
 #include "tests/support/small_capture.h"
 

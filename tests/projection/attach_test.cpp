@@ -1,7 +1,7 @@
 // AoMap -> per recorded pixel or point: the right value comes back to the right place.
 #include "projection/attach.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "projection/project.h"
 #include "projection/undistort.h"
 #include "tests/support/scenes.h"

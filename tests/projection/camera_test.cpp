@@ -1,7 +1,7 @@
 // The conventions of projection/camera.h, and cameras recovered from what was recorded.
 #include "projection/camera.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "projection/fit_pinhole.h"
 #include "projection/undistort.h"
 #include "tests/support/says.h"

@@ -1,9 +1,9 @@
 // Colour laid over depth and AO over colour: right where both cameras see the surface, nothing where one does not.
 #include "apps/scenes/scene.h"
+#include "projection/base/error.h"
+#include "projection/base/statistics.h"
 #include "projection/colour_view.h"
-#include "projection/error.h"
 #include "projection/project.h"
-#include "projection/statistics.h"
 #include "projection/undistort.h"
 #include "tests/support/says.h"
 #include "tests/support/scenes.h"

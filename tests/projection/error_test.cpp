@@ -1,6 +1,6 @@
 // during(): context for every failure, and every failure's type kept.
-#include "projection/error.h"
-#include "projection/memory.h"
+#include "projection/base/error.h"
+#include "projection/base/memory.h"
 
 #include <gtest/gtest.h>
 #include <new>

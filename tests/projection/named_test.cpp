@@ -1,5 +1,5 @@
 // Rows by name.
-#include "projection/named.h"
+#include "projection/base/named.h"
 
 #include "tests/support/says.h"
 

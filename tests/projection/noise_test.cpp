@@ -3,7 +3,7 @@
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/frame.h"
 #include "ao/gpu/device.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "tests/support/says.h"
 #include "tests/support/scenes.h"
 

@@ -1,8 +1,8 @@
 // Rows of settings: text in, text out, and every refusal names the row and what was expected.
-#include "projection/parameters.h"
+#include "projection/base/parameters.h"
 
-#include "projection/error.h"
-#include "projection/nearest_word.h"
+#include "projection/base/error.h"
+#include "projection/base/nearest_word.h"
 #include "tests/support/says.h"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 // Frame -> DepthImage: what is kept, what becomes a hole, which point a pixel shows.
 #include "projection/project.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "projection/undistort.h"
 #include "tests/support/says.h"
 #include "tests/support/scenes.h"

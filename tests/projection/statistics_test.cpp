@@ -1,5 +1,5 @@
 // Ranks of values, against the definition: sort and look.
-#include "projection/statistics.h"
+#include "projection/base/statistics.h"
 
 #include <array>
 #include <cmath>

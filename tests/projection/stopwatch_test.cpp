@@ -1,5 +1,5 @@
 // The stopwatch against a sleep, which never returns early.
-#include "projection/stopwatch.h"
+#include "projection/base/stopwatch.h"
 
 #include <gtest/gtest.h>
 #include <thread>

@@ -4,7 +4,7 @@
 // contract, 1 a case misses or fails to run, 2 manifest unreadable, 77 no folder.
 #include "ao/cacao/cacao.h"
 #include "ao/gpu/device.h"
-#include "projection/error.h"
+#include "projection/base/error.h"
 #include "tests/reference/npz.h"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 #include "tests/reference/npz.h"
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <cstring>
 #include <fmt/format.h>

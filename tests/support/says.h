@@ -1,7 +1,7 @@
 // Checks of messages.
 #pragma once
 
-#include "projection/error.h"
+#include "projection/base/error.h"
 
 #include <gtest/gtest.h>
 #include <string>

@@ -1,8 +1,8 @@
 // Calls OpenCV's detector of each target and returns points and pixels.
 #include "projection/calibration/boards/board_detection.h"
 
-#include "projection/error.h"
-#include "projection/statistics.h"
+#include "projection/base/error.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <array>

@@ -1,8 +1,8 @@
 // The bundle adjustment of boards, first guesses, and degenerate views.
 #include "projection/calibration/boards/boards.h"
 
+#include "projection/base/error.h"
 #include "projection/calibration/solve.h"
-#include "projection/error.h"
 
 #include <fmt/format.h>
 #include <opencv2/calib3d.hpp>

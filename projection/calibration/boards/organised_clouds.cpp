@@ -1,8 +1,8 @@
 // Samples points per tile of an organised cloud, and fits a camera to them.
 #include "projection/calibration/boards/organised_clouds.h"
 
+#include "projection/base/error.h"
 #include "projection/calibration/solve.h"
-#include "projection/error.h"
 #include "projection/fit_pinhole.h"
 
 #include <fmt/format.h>

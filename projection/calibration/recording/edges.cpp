@@ -1,9 +1,9 @@
 // Finds depth edges and colour edges, and pairs them.
 #include "projection/calibration/recording/edges.h"
 
+#include "projection/base/statistics.h"
 #include "projection/calibration/recording/geometry.h"
 #include "projection/calibration/solve.h"
-#include "projection/statistics.h"
 
 #include <algorithm>
 #include <cmath>

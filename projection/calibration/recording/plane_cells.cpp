@@ -1,9 +1,9 @@
 // Cuts depth images into cells, grows planes from them, and weights the cells by depth.
 #include "projection/calibration/recording/plane_cells.h"
 
+#include "projection/base/error.h"
+#include "projection/base/statistics.h"
 #include "projection/calibration/recording/geometry.h"
-#include "projection/error.h"
-#include "projection/statistics.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,10 +1,10 @@
 // Fits and scores of planes, and what the planes cannot determine.
 #include "projection/calibration/recording/planes.h"
 
+#include "projection/base/error.h"
+#include "projection/base/statistics.h"
 #include "projection/calibration/recording/geometry.h"
 #include "projection/calibration/recording/plane_adjustment.h"
-#include "projection/error.h"
-#include "projection/statistics.h"
 
 #include <algorithm>
 #include <Eigen/Eigenvalues>

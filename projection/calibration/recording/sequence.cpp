@@ -1,10 +1,10 @@
 // Fits and scores of a recorded sequence, and what its frames cannot determine.
 #include "projection/calibration/recording/sequence.h"
 
+#include "projection/base/statistics.h"
 #include "projection/calibration/recording/geometry.h"
 #include "projection/calibration/recording/sequence_adjustment.h"
 #include "projection/calibration/recording/sequence_setup.h"
-#include "projection/statistics.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,10 +1,10 @@
 // Lifts tracks, estimates missing poses, pairs outlines with colour edges, and removes outliers.
 #include "projection/calibration/recording/sequence_setup.h"
 
+#include "projection/base/error.h"
+#include "projection/base/statistics.h"
 #include "projection/calibration/recording/sequence_adjustment.h"
 #include "projection/calibration/recording/tracks.h"
-#include "projection/error.h"
-#include "projection/statistics.h"
 
 #include <algorithm>
 #include <Eigen/Dense>

@@ -1,0 +1,37 @@
+// The noise of a cloud, measured from its points.
+#pragma once
+
+#include "ao/cloud/surface/neighbours.h"
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+namespace scanshade {
+
+/// Sigma of the points across their surface, where the cloud tells it: on planes. A sample of about a thousand points,
+/// evenly spread over the points, looks at balls of growing radius. A ball tells sigma if its points are flat: seven
+/// times wider than sigma. Those of the next larger ball must be no thicker, as they are on curved surfaces and at
+/// edges. And points side by side must differ as much as any two: structure is alike side by side.
+/// Registration errors of a few sigma count as noise.
+class CloudNoise {
+  public:
+    /// Looks at balls up to `widest`, in the tree's unit. `normals` is empty or holds one per point of the cloud:
+    /// points that face away are another surface then. Without them, two sheets of equal weight are no noise.
+    CloudNoise(const NeighbourTree& tree, float widest, std::span<const Eigen::Vector3d> normals = {});
+
+    /// Whether enough points tell it: a fifth of the sample.
+    [[nodiscard]] bool known() const { return !sigmas_.empty(); }
+    /// The median of the points that tell it; 0 if unknown.
+    [[nodiscard]] float median() const { return median_; }
+    /// The lower quartile of the 16 nearest points that tell it, since what is wrong there is too large. At most four
+    /// times the lower quartile of all: leaves are no noise. 0 if unknown.
+    [[nodiscard]] float at(const Eigen::Vector3f& point) const;
+
+  private:
+    std::vector<Eigen::Vector3f> positions_;
+    std::vector<float> sigmas_; ///< by index in the tree
+    float median_ = 0, largest_ = 0;
+};
+
+} // namespace scanshade
