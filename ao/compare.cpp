@@ -14,6 +14,11 @@ namespace {
 
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
+/// Pixels with a value.
+std::size_t known(const cv::Mat1f& map) {
+    return static_cast<std::size_t>(std::count_if(map.begin(), map.end(), [](float v) { return !std::isnan(v); }));
+}
+
 void check_sizes(const cv::Mat1f& a, const cv::Mat1f& b) {
     if (a.size() != b.size())
         throw Error(fmt::format("maps of one size expected, found {}x{} and {}x{}", a.cols, a.rows, b.cols, b.rows));
@@ -182,8 +187,8 @@ Difference compare(const cv::Mat1f& a, const cv::Mat1f& b) {
         sum_b += q;
     });
     d.pixels = apart.size();
-    d.only_a = static_cast<std::size_t>(cv::countNonZero(a == a)) - d.pixels; // a NaN differs from itself
-    d.only_b = static_cast<std::size_t>(cv::countNonZero(b == b)) - d.pixels;
+    d.only_a = known(a) - d.pixels;
+    d.only_b = known(b) - d.pixels;
     if (apart.empty()) {
         d.mae = d.rms = d.bias = d.percentile_95 = d.worst = d.ssim = d.correlation = d.calibrated_rms = unknown;
         return d;

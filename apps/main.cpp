@@ -226,8 +226,7 @@ void parse(Command& command, std::vector<std::string> arguments) {
     }
     const auto rest =
         std::ranges::stable_partition(given, [](const auto& each) { return each.first.name == preset_flag; });
-    for (const auto& [row, text] : std::ranges::subrange(given.begin(), rest.begin()))
-        set(row, text);
+    std::for_each(given.begin(), rest.begin(), [](const auto& each) { set(each.first, each.second); });
     if (rest.begin() != given.begin())
         command.take_preset();
     for (const auto& [row, text] : rest)

@@ -184,7 +184,7 @@ Jumps kind_of(const JumpCounts& counts) {
     // Depth resized or smoothed has 0.8 with two and more, and hardly any without: by the reach that spans its edges.
     // Rendered depth has 0.1 with two and more over the shortest reach. Over longer ones its slopes count, too, but
     // sharp jumps are as many. Time of flight mixes one pixel: 0.35 are sharp, and 0.8 and more of rendered depth.
-    constexpr double enough_jumps = 100, least_smeared = 0.4, few_sharp = 0.05, least_sharp = 0.7;
+    constexpr double enough_jumps = 50, least_smeared = 0.4, few_sharp = 0.05, least_sharp = 0.7;
     for (const JumpCount& count : counts)
         if (count.all > enough_jumps && count.smeared > least_smeared * count.all &&
             count.sharp < few_sharp * count.all)
@@ -218,18 +218,35 @@ void count_jump(const float* at, std::ptrdiff_t next, int reach, JumpCount& coun
     count.smeared += mixed >= 2 ? once : 0;
 }
 
-void count_jumps(const cv::Mat1f& z, JumpCounts& counts) {
+void count_jumps(const cv::Mat1f& z, int reach, JumpCount& count) {
+    constexpr int line_px = 6; // every sixth row and column is plenty
     const auto down = static_cast<std::ptrdiff_t>(z.step1());
-    for (std::size_t i = 0; i < reaches.size(); ++i) {
-        const int border = reaches[i] + 1;
-        for (int y = border; y < z.rows - border; ++y)
-            for (int x = border; x < z.cols - border; ++x) {
-                if (y % step_px == 0)
-                    count_jump(z[y] + x, 1, reaches[i], counts[i]);
-                if (x % step_px == 0)
-                    count_jump(z[y] + x, down, reaches[i], counts[i]);
-            }
+    const int border = reach + 1;
+    for (int y = border; y < z.rows - border; ++y) {
+        if (y % line_px == 0)
+            for (int x = border; x < z.cols - border; ++x)
+                count_jump(z[y] + x, 1, reach, count);
+        for (int x = line_px * (border / line_px + 1); x < z.cols - border; x += line_px)
+            count_jump(z[y] + x, down, reach, count);
     }
+}
+
+/// Of all images, on all cores.
+JumpCounts jumps_of(std::span<const DepthImage> images) {
+    std::vector<JumpCount> each(images.size() * reaches.size());
+    tbb::this_task_arena::isolate([&] {
+        tbb::parallel_for(std::size_t(0), each.size(), [&](std::size_t i) {
+            count_jumps(images[i / reaches.size()].z_m, reaches[i % reaches.size()], each[i]);
+        });
+    });
+    JumpCounts sums;
+    for (std::size_t i = 0; i < each.size(); ++i) {
+        JumpCount& sum = sums[i % reaches.size()];
+        sum.all += each[i].all;
+        sum.sharp += each[i].sharp;
+        sum.smeared += each[i].smeared;
+    }
+    return sums;
 }
 
 /// floor + per_z2 z^2 through the bands by least squares of relative error, both terms at least zero.
@@ -282,11 +299,9 @@ bool tilts(double step_m, double focal_px, const std::vector<Measured>& points) 
 
 DepthNoise measure_noise(std::span<const DepthImage> images) {
     std::array<Band, bands> all;
-    JumpCounts jumps;
     double focal_px = 0;
     for (const DepthImage& image : images) {
         collect(image.z_m, all);
-        count_jumps(image.z_m, jumps);
         focal_px = std::max(focal_px, image.camera.fx);
     }
     std::array<std::optional<Measured>, bands> measured;
@@ -307,7 +322,7 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
     }
     DepthNoise steps;
     find_steps(steps, values_m);
-    steps.jumps = kind_of(jumps);
+    steps.jumps = kind_of(jumps_of(images));
     if (points.empty())
         return steps;
     const DepthNoise seen = law_through(points);

@@ -389,7 +389,8 @@ TEST(Neighbours, of_leaves_are_those_of_single_searches) {
     for (int i = 0; i < 3000; ++i)
         clouds[0].emplace_back(roll(), roll(), std::round(4 * roll())); // sheets
     for (int i = 0; i < 2500; ++i)
-        clouds[1].emplace_back(static_cast<float>(i % 50), static_cast<float>(i / 50), 0.0F); // ties everywhere
+        clouds[1].emplace_back(static_cast<float>(i % 50), std::floor(static_cast<float>(i) / 50),
+                               0.0F); // ties everywhere
     clouds[2].assign(2000, Eigen::Vector3f(1, 2, 3));
     for (int i = 0; i < 2000; ++i)
         clouds[3].emplace_back(std::pow(10.0F, 8 * roll()), roll(), 0.0F); // every density

@@ -132,10 +132,11 @@ TEST_F(RunsTest, outputs_that_cannot_be_written_are_misuse_with_the_systems_reas
     tests::write_file(folder / "file", "no folder");
     const std::string in_file = (folder / "file/out").string(), in = capture().string();
     for (const std::string& command :
-         {"run " + in + " -o " + in_file, "run " + in + " -o " + (folder / "file").string(),
-          "plan " + in + " -o " + in_file, "generate office --frames 1 --size 64x48 -o " + in_file,
-          "compare " + in + " " + in + " -o " + in_file, "refine " + in + " -o " + in_file + ".json",
-          "run " + in + " -o " + out().string() + " --cloud " + in_file + ".ply"}) {
+         {fmt::format("run {} -o {}", in, in_file), fmt::format("run {} -o {}", in, (folder / "file").string()),
+          fmt::format("plan {} -o {}", in, in_file),
+          fmt::format("generate office --frames 1 --size 64x48 -o {}", in_file),
+          fmt::format("compare {0} {0} -o {1}", in, in_file), fmt::format("refine {} -o {}.json", in, in_file),
+          fmt::format("run {} -o {} --cloud {}.ply", in, out().string(), in_file)}) {
         const Ran ran = run_program(command);
         EXPECT_EQ(ran.exit_code, misuse) << command << "\n" << ran.err;
         EXPECT_TRUE(says(ran.err, "file: Not a directory")) << command;

@@ -15,6 +15,7 @@
 #include "tests/support/small_capture.h"
 
 #include <array>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <gtest/gtest.h>
@@ -51,8 +52,8 @@ std::vector<BoardView> boards_seen_by(const Camera& camera, int views, double no
         BoardView view{"view " + std::to_string(all.size()), {}, {}};
         bool inside = true;
         for (int i = 0; i < corners.area(); ++i) {
-            const Eigen::Vector3d on_board((i % corners.width - 3.5) * square_m, (i / corners.width - 2.5) * square_m,
-                                           0);
+            const Eigen::Vector3d on_board((i % corners.width - 3.5) * square_m,
+                                           (std::floor(i / static_cast<double>(corners.width)) - 2.5) * square_m, 0);
             Eigen::Vector3d point;
             Eigen::Vector2d pixel;
             transform_point(pose, on_board.data(), point.data());
@@ -396,7 +397,7 @@ SeenChessboard chessboard_at(const double* pose, double k1, double outer, double
     const cv::Matx33d board_from = from_board.inv();
     SeenChessboard seen;
     for (int i = 0; i < 54; ++i) {
-        const cv::Vec3d ray = from_board * cv::Vec3d((i % 9 - 4) * square_m, (i / 9 - 2.5) * square_m, 1);
+        const cv::Vec3d ray = from_board * cv::Vec3d((i % 9 - 4) * square_m, (std::floor(i / 9.0) - 2.5) * square_m, 1);
         const double x = ray[0] / ray[2], y = ray[1] / ray[2], lens = 1 + k1 * (x * x + y * y);
         seen.corners.emplace_back(f * lens * x + cx, f * lens * y + cy);
     }
@@ -419,9 +420,9 @@ SeenChessboard chessboard_at(const double* pose, double k1, double outer, double
     for (int v = 0; v < image.height; ++v)
         for (int u = 0; u < image.width; ++u)
             for (int i = 0; i < samples * samples; ++i)
-                exact(v, u) +=
-                    brightness(u + (i % samples + 0.5) / samples - 0.5, v + (i / samples + 0.5) / samples - 0.5) /
-                    (samples * samples);
+                exact(v, u) += brightness(u + (i % samples + 0.5) / samples - 0.5,
+                                          v + (std::floor(i / static_cast<double>(samples)) + 0.5) / samples - 0.5) /
+                               (samples * samples);
     cv::GaussianBlur(exact, exact, {}, blur_px);
     for (double& value : exact)
         value += error(random);

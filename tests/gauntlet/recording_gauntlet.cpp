@@ -114,7 +114,8 @@ RecordingCopy copy_folder(const Capture& capture, const fs::path& folder) {
     const auto take = [&](const std::string& file) {
         if (file.empty())
             return fs::path();
-        const fs::path name = fs::relative(file, capture.path), to = folder / name;
+        const fs::path name = fs::relative(file, capture.path);
+        fs::path to = folder / name;
         fs::create_directories(to.parent_path());
         fs::copy_file(file, to);
         files.insert(name.string());

@@ -378,7 +378,7 @@ TEST(fit_plane, lateral_noise_does_not_tilt_a_floor) {
             if (z > 0)
                 z = static_cast<float>(seen.camera.fy / (y + 0.5 * normal(random) - seen.camera.cy));
     const std::vector<double> errors = normal_errors(fit.compute(noisy(seen, noise)).normals.normals, {0, -1, 0});
-    EXPECT_GT(errors.size(), 0.95 * 304 * (cv::countNonZero(seen.z_m) / 320 - 8));
+    EXPECT_GT(errors.size(), 0.95 * 304 * (cv::countNonZero(seen.z_m) / 320.0 - 8));
     EXPECT_LT(errors[errors.size() / 2], 2.5);
     EXPECT_LT(errors[errors.size() * 19 / 20], 13);
 }

@@ -6,6 +6,7 @@
 #include "tests/support/says.h"
 #include "tests/support/scenes.h"
 
+#include <cmath>
 #include <gtest/gtest.h>
 #include <random>
 #include <set>
@@ -232,7 +233,7 @@ TEST(ProjectCloud, TheCameraFoundMayBeKeptInTheFrame) {
     std::vector<Eigen::Vector3d>
         points; // a small dense thing 65 degrees to the side: the principal point lies far outside
     for (int i = 0; i < 40000; ++i)
-        points.emplace_back(2.1 + 0.0005 * (i % 200), 0.0005 * (i / 200), 1);
+        points.emplace_back(2.1 + 0.0005 * (i % 200), 0.0005 * std::floor(i / 200.0), 1);
     Frame frame = cloud_frame(std::move(points));
     const DepthImage before = project(frame);
     frame.camera = camera_of(frame);
