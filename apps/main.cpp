@@ -224,13 +224,13 @@ void parse(Command& command, std::vector<std::string> arguments) {
         refuse_unknown_flag(parser.remaining(), rows);
         throw Misuse(error.what());
     }
-    const auto rest =
-        std::ranges::stable_partition(given, [](const auto& each) { return each.first.name == preset_flag; });
-    std::for_each(given.begin(), rest.begin(), [](const auto& each) { set(each.first, each.second); });
-    if (rest.begin() != given.begin())
+    const auto take = [](const auto& each) { set(each.first, each.second); };
+    const auto rest = std::stable_partition(given.begin(), given.end(),
+                                            [](const auto& each) { return each.first.name == preset_flag; });
+    std::for_each(given.begin(), rest, take);
+    if (rest != given.begin())
         command.take_preset();
-    for (const auto& [row, text] : rest)
-        set(row, text);
+    std::for_each(rest, given.end(), take);
 }
 
 /// Refuses outputs that cannot be written before anything is computed for them.

@@ -19,7 +19,7 @@ struct DepthNoise {
     double per_z2 = 0;         ///< 1/m
     double correlation_px = 1; ///< correlation length along a row (integral of the correlation); 1 = independent pixels
 
-    /// Quantisation: recorded values are step_m + step_per_z2 z^2 apart; 0 = none found. Only reported.
+    /// Quantisation: recorded values are step_m + step_per_z2 z^2 apart; 0 = none found.
     double step_m = 0, step_per_z2 = 0;
 
     Jumps jumps = Jumps::unknown;

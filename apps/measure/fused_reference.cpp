@@ -119,6 +119,8 @@ FusedReference::Surface FusedReference::surface_of(const DepthImage& depth) {
     if (!fit_)
         return {depth, normals_of(depth)};
     FittedDepth fitted = fit_->compute(depth);
+    if (!fit_->planes())
+        return {fitted.depth, normals_of(fitted.depth)};
     return {std::move(fitted.depth), std::move(fitted.normals)};
 }
 

@@ -23,7 +23,8 @@ struct Sampling {
     cv::Size size;
 
     explicit Sampling(cv::Size whole)
-        : step(std::max(1, (std::max(whole.width, whole.height) + map_side - 1) / map_side)), first(step / 2),
+        : step(std::max(1, (std::max(whole.width, whole.height) + map_side - 1) / map_side)),
+          first(std::min(step / 2, std::min(whole.width, whole.height) - 1)),
           size((whole.width - first + step - 1) / step, (whole.height - first + step - 1) / step) {}
 };
 
@@ -82,7 +83,9 @@ cv::Mat3b small(const cv::Mat3b& picture) {
         return picture;
     cv::Mat3b result;
     const double scale = static_cast<double>(colour_side) / longer;
-    cv::resize(picture, result, {}, scale, scale, cv::INTER_AREA);
+    cv::resize(picture, result,
+               {std::max(1, cvRound(picture.cols * scale)), std::max(1, cvRound(picture.rows * scale))}, 0, 0,
+               cv::INTER_AREA);
     return result;
 }
 

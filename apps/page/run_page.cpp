@@ -129,7 +129,8 @@ void RunPage::add(const Row& row) {
     FileSet files;
     for (const std::string& file : row.files) {
         const std::size_t folder = file.find('/');
-        if (folder == std::string::npos || file.starts_with('.') || row.name.find('/') != std::string::npos)
+        if (folder == std::string::npos || file.find('/', folder + 1) != std::string::npos || file.starts_with('.') ||
+            row.name.find('/') != std::string::npos)
             continue; // of a manifest that was tampered with: nothing outside the page's folder is shown
         if (std::string_view(file).substr(folder + 1).starts_with(row.name))
             files.emplace_back(file.substr(0, folder), file.substr(folder + 1 + row.name.size()));
@@ -257,7 +258,8 @@ void write_from_manifests(const fs::path& folder, const std::vector<fs::path>& m
     if (first.is_null())
         throw Error(folder.string() + ": no manifest.json, so nothing says what was run");
     if (manifests.size() > 1)
-        first.erase("totals"); // of one block; several may have run at the same time
+        first.erase("totals");       // of one block; several may have run at the same time
+    first.erase("recording_points"); // a path of the manifest's own could lead out of the folder
     if (fs::exists(folder / fmt::format("{}.000.js", recording_stem)))
         first["recording_points"] = recording_stem;
     page.write(folder, reading_json(manifests.front().string(), [&] { return run_head(first); }));

@@ -88,6 +88,12 @@ std::string folder_name(const fs::path& path, std::set<std::string>& taken) {
     return name;
 }
 
+/// Somebody else's index.html: a page of ours has its data beside it.
+void refuse_foreign_page(const fs::path& folder) {
+    if (const fs::path page = folder / "index.html"; fs::exists(page) && !fs::exists(folder / "index.js"))
+        throw Misuse(page.string() + " exists already and is no page of a run: choose another -o");
+}
+
 /// Results of an earlier run are replaced only with --overwrite. The reports of a run that did nothing are no results.
 void refuse_to_overwrite(const Job& job) {
     const Outputs& outputs = job.batch.outputs;
@@ -101,6 +107,7 @@ void refuse_to_overwrite(const Job& job) {
     const fs::path journal = journal_file(outputs.folder, "");
     if (!fs::exists(journal) || has_results(outputs.folder))
         refuse({outputs.folder / "manifest.json", outputs.folder / "frames.csv", journal});
+    refuse_foreign_page(outputs.folder);
     for (const std::size_t index : job.batch.frames)
         refuse(files_of(job.capture.entries[index], outputs));
 }
@@ -269,6 +276,8 @@ class Run final : public Command {
         }
         if (jobs.empty())
             return tally.exit_code(unopened);
+        if (!asked_.overwrite)
+            refuse_foreign_page(asked_.out);
 
         cv::setNumThreads(1); // frames are the parallelism; threads inside a frame would only compete with them
         end_gracefully_on_signals();

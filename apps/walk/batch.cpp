@@ -122,15 +122,18 @@ void attach_and_write(Work& work, const BatchOptions& options) {
     take(work, &StageTimes::write, [&] {
         if (by_points) {
             std::vector<std::filesystem::path> picture, chunks;
-            tbb::parallel_invoke([&] { write_all(work, images, outputs); },
-                                 [&] {
-                                     if (options.outputs.shaded || options.outputs.panel)
-                                         picture = {write_cloud_picture(work, options.outputs)};
-                                 },
-                                 [&] {
-                                     if (options.outputs.preview)
-                                         chunks = write_page_points(work, options.outputs);
-                                 });
+            // Isolated: while it waits it must not begin another frame, whose time would count as this one's.
+            tbb::this_task_arena::isolate([&] {
+                tbb::parallel_invoke([&] { write_all(work, images, outputs); },
+                                     [&] {
+                                         if (options.outputs.shaded || options.outputs.panel)
+                                             picture = {write_cloud_picture(work, options.outputs)};
+                                     },
+                                     [&] {
+                                         if (options.outputs.preview)
+                                             chunks = write_page_points(work, options.outputs);
+                                     });
+            });
             std::ranges::move(picture, std::back_inserter(work.row.files));
             std::ranges::move(chunks, std::back_inserter(work.row.files));
         } else {

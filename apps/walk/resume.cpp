@@ -140,9 +140,9 @@ std::vector<FrameRow> run_one_by_one(const Capture& capture, MethodPool& pool, B
 } // namespace
 
 std::string settings_key(const RunReport& report, const Outputs& outputs, const DepthNoise& noise) {
-    std::vector<std::string> parts = {report.method, capture_text(report.capture), outputs_text(outputs),
-                                      std::string(name_of(report.registration)),
-                                      fmt::format("{} {} {}", noise.floor_m, noise.per_z2, noise.correlation_px)};
+    std::vector<std::string> parts = {
+        report.method, capture_text(report.capture), outputs_text(outputs), std::string(name_of(report.registration)),
+        fmt::format("{} {} {} {}", noise.floor_m, noise.per_z2, noise.correlation_px, noise.flies())};
     for (const Stage& stage : report.settings)
         for (const Parameter& row : stage.rows)
             if (!std::ranges::count(aside, row.name))

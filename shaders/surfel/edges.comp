@@ -24,7 +24,7 @@ float inverse(int i) {
     return uint(i) < uint(length_px) && z != 0.0 ? 1.0 / abs(z) : 0.0; // filled holes have a negative depth
 }
 
-// 3 sigma(z) / z^2, or 2 % of the depth.
+// 3 sigma(z) / z^2, or 1 % of the depth.
 float tolerance(float b, float c) {
     float w = min(b, c);
     return max(3.0 * (noise_floor * w * w + noise_per_z2), 0.01 * w);
@@ -75,7 +75,7 @@ void main() {
             on = goes_on(last, slope, c, gap) || (b > 0.0 && d > 0.0 && c > 0.0 && abs(b - (2.0 * c - d)) <= tolerance(b, c));
             beyond_is_nearer = last < c;
         }
-        edge |= on || first + i == 0 || (b == 0.0 && c == 0.0) ? 0u : bit;
+        edge |= on || first + i == 0 || first + i >= length_px || (b == 0.0 && c == 0.0) ? 0u : bit;
         farther |= beyond_is_nearer ? bit : 0u;
         slope = c > 0.0 ? (b > 0.0 ? c - b : 0.0) : slope;
         last = c > 0.0 ? c : gap < across ? last : 0.0;

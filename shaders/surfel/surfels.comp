@@ -1,5 +1,6 @@
-// Depth, normal and silhouette width -> surfels. A surface w pixels wide between two drops to farther ones is assumed to be
-// half as thick. A surface that continues behind a nearer one, or out of the image, is assumed to be thick.
+// Depth, normal and silhouette width -> surfels. A surface that is w wide between two drops to farther ones is assumed to reach
+// 0.65 w back. One that ends behind something narrower is at most as much wider as that hides it. One that goes on behind
+// something wide, or out of the image, or is seen again beyond, is assumed to be thick.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -21,7 +22,7 @@ layout(binding = 5, r32f) readonly uniform imageBuffer limits;
 layout(binding = 16, scalar) writeonly buffer Surfels { uvec2 surfels[]; };
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
-const int open = 1 << 20; // a run that ends behind something nearer, or at the border of the image
+const int open = 1 << 20; // a run with an end that is not known
 
 // A row or column: its pixels in `surfaces`, its words in `edges`.
 struct Line {
