@@ -342,8 +342,6 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
             return steps;
         noise.floor_m = steps.step_m / std::sqrt(12.0), noise.per_z2 = 0;
         noise.jumps = steps.jumps;
-    } else if (steps.jumps == Jumps::smeared) {
-        noise.jumps = Jumps::smeared;
     }
     noise.correlation_px = std::max(1.0, std::sqrt(2 * std::numbers::pi) * s);
     return noise;

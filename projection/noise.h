@@ -45,7 +45,7 @@ struct DepthNoise {
 /// depth in fine 16-bit steps (5000 per metre) has as much.
 /// Constant steps that explain sigma are no noise: values err by half a step at most, and jumps stay sharp. Then sigma
 /// is that of the steps where they tilt the surface between adjacent pixels by much, and none where they do not.
-/// Depth without noise can be smeared, too.
+/// Jumps are told of depth without other noise; with it, unknown: flying pixels are expected anyway.
 [[nodiscard]] DepthNoise measure_noise(std::span<const DepthImage> images);
 
 /// From "none", "kinect" (0.0015, 0.0018, 3 px), "tof" (0.0015, 0) or "floor,per_z2[,correlation]". The caller handles
