@@ -72,8 +72,8 @@ void collect(const cv::Mat1f& z, std::array<Band, bands>& all) {
 
 struct Measured {
     double z, sigma;
-    double adjacent; // the deviation by adjacent pixels, in that by distant ones
-    int lag_px;      // over which sigma was measured
+    double adjacent, distant; // the deviations by adjacent pixels, and over the shorter lag
+    int lag_px;               // over which sigma was measured
     double weight;
 };
 
@@ -114,7 +114,7 @@ Measured measured_in(Band& band) {
         return by_most ? sigma_of(differences, 0.8, 0.5586) : sigma_of(differences, 0.4, 0.2563);
     };
     const double count = static_cast<double>(band.spread_m.size()), distant = std::max(by_most ? most : few, 1e-6);
-    Measured measured{band.z_sum / count, distant, sigma_by(band.adjacent_m) / distant, lag_px, count};
+    Measured measured{band.z_sum / count, distant, sigma_by(band.adjacent_m), distant, lag_px, count};
     if (std::min(band.far_m.size(), band.farther_m.size()) >= enough) {
         const double far = sigma_by(band.far_m);
         if (far > 1.3 * distant && far < 1.9 * distant && sigma_by(band.farther_m) < 1.35 * far) {
@@ -280,7 +280,7 @@ bool explains(double step_m, const std::vector<Measured>& points) {
     double all = 0, adjacent = 0, distant = 0;
     for (const Measured& p : points) {
         all += p.weight;
-        adjacent += p.adjacent * p.sigma < most * step ? p.weight : 0;
+        adjacent += p.adjacent < most * step ? p.weight : 0;
         distant += p.sigma < most_distant * step ? p.weight : 0;
     }
     return adjacent > 0.5 * all && distant > 0.1 * all;
@@ -331,7 +331,7 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
         return steps;
     double ratios = 0, weights = 0;
     for (const Measured& p : points)
-        ratios += p.weight * p.adjacent, weights += p.weight;
+        ratios += p.weight * p.adjacent / p.distant, weights += p.weight;
     const double s = correlation_of(ratios / weights);
     for (Measured& p : points) // what correlates over the lag is missing in the differences
         p.sigma *= std::sqrt(6 / second_difference_variance(p.lag_px, s));
