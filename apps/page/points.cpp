@@ -164,11 +164,11 @@ std::uint8_t share_code(float share, int levels) {
                : std::uint8_t(0);
 }
 
-/// The octahedron unfolded (Cigolle et al. 2014), a byte an axis; no normal points along z.
+/// The octahedron unfolded (Cigolle et al. 2014), a byte an axis. {0, 0} is no normal: all four corners are -z.
 std::array<std::uint8_t, 2> normal_codes(const Eigen::Vector3f& normal) {
     const float sum = normal.cwiseAbs().sum();
-    if (!(sum > 0))
-        return {127, 127};
+    if (!(sum > 0 && std::isfinite(sum)))
+        return {0, 0};
     float x = normal.x() / sum, y = normal.y() / sum;
     if (normal.z() < 0) {
         const float across = x;
@@ -176,7 +176,8 @@ std::array<std::uint8_t, 2> normal_codes(const Eigen::Vector3f& normal) {
         y = (1 - std::abs(across)) * (y < 0 ? -1.0F : 1.0F);
     }
     const auto code = [](float value) { return static_cast<std::uint8_t>((value + 1) * 127.5F + 0.5F); };
-    return {code(x), code(y)};
+    const std::array codes{code(x), code(y)};
+    return codes == std::array<std::uint8_t, 2>{} ? std::array<std::uint8_t, 2>{255, 255} : codes;
 }
 
 /// The parts of a chunk; `chunk` holds indices of points, along the curve.
