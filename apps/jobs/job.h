@@ -2,7 +2,7 @@
 // tasks.jsonl lists the tasks, results/NAME holds a capture's results and the journals of its tasks.
 #pragma once
 
-#include "apps/walk/journal.h"
+#include "apps/results/journal.h"
 
 #include <cstdint>
 #include <filesystem>

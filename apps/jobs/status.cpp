@@ -2,10 +2,10 @@
 #include "apps/command.h"
 #include "apps/jobs/job.h"
 #include "apps/json.h"
-#include "apps/page/list_page.h"
 #include "apps/page/run_page.h"
+#include "apps/results/captures_page.h"
+#include "apps/results/report.h"
 #include "apps/walk/progress.h"
-#include "apps/walk/report.h"
 #include "io/output_file.h"
 #include "projection/base/error.h"
 
@@ -174,75 +174,37 @@ Plan plan_of(const std::vector<std::string>& words) {
 /// The list of a job's captures, and the pages of those that were computed in blocks.
 class Pages {
   public:
-    explicit Pages(fs::path job) : job_(std::move(job)) {}
+    explicit Pages(const fs::path& job) : job_(job), captures_(job) {}
 
     /// Tasks in their order: the blocks of a capture follow each other.
     void add(const Task& task, const std::vector<FrameRow>& rows) {
-        if (captures_.empty() || captures_.back().name() != task.name)
-            captures_.push_back({results_of(job_, task), {.name = task.name}, {}});
-        Capture& capture = captures_.back();
-        capture.row.frames += task.frames;
-        for (const FrameRow& row : rows)
-            capture.add(row);
+        const fs::path folder = results_of(job_, task);
+        captures_.take(captures_.add(task.name, folder, task.frames), rows);
         const std::string block = task.block();
-        if (!block.empty())
-            capture.manifests.push_back(capture.folder / ("manifest." + block + ".json"));
+        if (block.empty()) // a whole capture, whose run has written its page
+            return;
+        if (const fs::path manifest = folder / ("manifest." + block + ".json"); fs::exists(manifest))
+            manifests_[folder].push_back(manifest);
     }
 
-    void write(const Plan& plan, const Totals& totals) {
-        page::ListPage list{
-            .title = fs::weakly_canonical(job_).filename().string(),
-            .subtitle = fmt::format("{} tasks, {} of {} frames done", totals.tasks, settled(totals), totals.frames),
-            .notes = {},
-            .reasons = {},
-            .rows = {}};
+    void write(const Plan& plan, const Totals& totals) const {
+        for (const auto& [folder, manifests] : manifests_)
+            page::write_from_manifests(folder, manifests);
+        std::vector<std::string> notes;
         for (const std::string& refused : plan.refused)
-            list.notes.push_back("refused when the job was planned: " + refused);
+            notes.push_back("refused when the job was planned: " + refused);
+        std::vector<page::ListReason> reasons;
         for (const auto& [kind, groups] : {std::pair("failed", &totals.reasons), std::pair("doubtful", &totals.doubts)})
             for (const auto& [reason, group] : most_frequent_first(*groups))
-                list.reasons.push_back({kind, group.frames, reason, group.example});
-        for (Capture& capture : captures_)
-            list.rows.push_back(capture.finished(job_));
-        page::write_list(job_, list);
+                reasons.push_back({kind, group.frames, reason, group.example});
+        captures_.write(fmt::format("{} tasks, {} of {} frames done", totals.tasks, settled(totals), totals.frames),
+                        std::move(notes), std::move(reasons));
     }
 
   private:
-    struct Capture {
-        fs::path folder;
-        page::ListRow row;
-        std::vector<fs::path> manifests; ///< of blocks; none for a whole capture, whose run has written its page
-        std::size_t done = 0;
-
-        [[nodiscard]] const std::string& name() const { return row.name; }
-        void add(const FrameRow& frame) {
-            row.ok += frame.status == FrameStatus::ok;
-            row.doubtful += frame.status == FrameStatus::doubtful;
-            row.failed += frame.status == FrameStatus::failed && frame.fault != Fault::outage;
-            if (!is_done(frame.status))
-                return;
-            ++done;
-            row.coverage += frame.coverage;
-            row.visibility += std::isfinite(frame.mean_visibility) ? frame.mean_visibility : 0;
-            const StageTimes ms = frame.ms + StageTimes{};
-            row.ms += ms.load + ms.project + ms.compute + ms.attach + ms.write;
-        }
-        /// The row with means, once the capture has its page.
-        page::ListRow finished(const fs::path& job) {
-            std::erase_if(manifests, [](const fs::path& file) { return !fs::exists(file); });
-            if (!manifests.empty())
-                page::write_from_manifests(folder, manifests);
-            page::ListRow all = row;
-            all.left = row.frames - std::min(row.frames, row.ok + row.doubtful + row.failed);
-            for (double* mean : {&all.coverage, &all.visibility, &all.ms})
-                *mean = done > 0 ? *mean / static_cast<double>(done) : std::nan("");
-            if (page::has_page(folder))
-                all.page = (folder / "index.html").lexically_relative(job).generic_string();
-            return all;
-        }
-    };
-
     fs::path job_;
-    std::vector<Capture> captures_;
+    CapturesPage captures_;
+    std::map<fs::path, std::vector<fs::path>> manifests_; ///< of blocks, by the capture's folder
 };
 
 // ---------------------------------------------------------------------------------------------------- the commands

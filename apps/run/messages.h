@@ -1,8 +1,8 @@
 // Messages of `scanshade run` about a capture, before and after its frames.
 #pragma once
 
+#include "apps/results/report.h"
 #include "apps/run/settings.h"
-#include "apps/walk/report.h"
 
 #include <filesystem>
 #include <string>

@@ -2,8 +2,9 @@
 #include "apps/jobs/job_run.h"
 #include "apps/measure/front.h"
 #include "apps/measure/trial.h"
-#include "apps/page/list_page.h"
 #include "apps/page/run_page.h"
+#include "apps/results/captures_page.h"
+#include "apps/run/capture_job.h"
 #include "apps/run/messages.h"
 #include "apps/run/outlook.h"
 #include "apps/run/settings.h"
@@ -16,9 +17,7 @@
 #include "apps/walk/progress.h"
 #include "apps/walk/resume.h"
 #include "apps/walk/sequence_order.h"
-#include "io/images/format.h"
 #include "io/output_file.h"
-#include "io/text.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
 #include "projection/base/stopwatch.h"
@@ -26,7 +25,6 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <csignal>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -63,145 +61,9 @@ void end_gracefully_on_signals() {
         sigaction(SIGHUP, &action, nullptr);
 }
 
-// ---------------------------------------------------------------------------------------------------- jobs
-
-/// One capture, the frames to take of it, and where its results go.
-struct Job {
-    Capture capture;
-    BatchOptions batch;
-    std::vector<std::size_t> of = {}; ///< all frames of the capture to compute; batch.frames may be a block of them
-    std::string block = {};           ///< "" = all, else as Task::block() says
-    LoadedFrames loaded = {};         ///< decoded for the noise; the walk takes them
-
-    [[nodiscard]] const fs::path& folder() const { return batch.outputs.folder; }
-};
-
-/// "office" of captures/office/ and captures/office.pcd; "office-2" when another capture has that name.
-std::string folder_name(const fs::path& path, std::set<std::string>& taken) {
-    const fs::path whole = fs::weakly_canonical(path);
-    const fs::path last = whole.has_filename() ? whole.filename() : whole.parent_path().filename();
-    constexpr std::size_t longest = 200; // of the 255 bytes that file systems have
-    const std::string stem = shortened(fs::is_directory(path) ? last.string() : last.stem().string(), longest);
-    std::string name = stem.empty() ? "capture" : stem;
-    for (int n = 2; !taken.insert(name).second; ++n)
-        name = fmt::format("{}-{}", stem, n);
-    return name;
-}
-
-/// Somebody else's index.html: a page of ours has its data beside it.
-void refuse_foreign_page(const fs::path& folder) {
-    if (const fs::path page = folder / "index.html"; fs::exists(page) && !fs::exists(folder / "index.js"))
-        throw Misuse(page.string() + " exists already and is no page of a run: choose another -o");
-}
-
-/// Results of an earlier run are replaced only with --overwrite. The reports of a run that did nothing are no results.
-void refuse_to_overwrite(const Job& job) {
-    const Outputs& outputs = job.batch.outputs;
-    const auto refuse = [](const std::vector<fs::path>& files) {
-        const auto there = std::ranges::find_if(files, [](const fs::path& file) { return fs::exists(file); });
-        if (there != files.end())
-            throw Misuse(there->string() +
-                         " exists already: --resume goes on with an earlier run, --overwrite replaces its "
-                         "results, or choose another -o");
-    };
-    const fs::path journal = journal_file(outputs.folder, "");
-    if (!fs::exists(journal) || has_results(outputs.folder))
-        refuse({outputs.folder / "manifest.json", outputs.folder / "frames.csv", journal});
-    refuse_foreign_page(outputs.folder);
-    for (const std::size_t index : job.batch.frames)
-        refuse(files_of(job.capture.entries[index], outputs));
-}
-
-/// --resume continues a run of the same capture only: frames of two captures would share names and reports.
-void refuse_another_captures_results(const Job& job) {
-    if (const auto other = other_capture_in(job.folder(), job.capture))
-        throw Misuse(fmt::format("{} has results of {}, not of {}: choose another -o, or --overwrite replaces them",
-                                 job.folder().string(), *other, job.capture.path.string()));
-}
-
-/// "frames.csv" and "manifest.json", or "frames.0-500.csv" of a block.
-struct ReportFiles {
-    ReportFiles(const fs::path& folder, const std::string& block)
-        : table(folder / named("frames", block, ".csv")), manifest(folder / named("manifest", block, ".json")) {}
-    fs::path table, manifest;
-
-  private:
-    static std::string named(const std::string& stem, const std::string& block, const char* extension) {
-        return block.empty() ? stem + extension : stem + "." + block + extension;
-    }
-};
-
-/// Refuses a folder of results that cannot be written, or one in it that an earlier run has left.
-void require_folders(const fs::path& folder) {
-    require_folder(folder);
-    for (const char* part : result_folders)
-        if (std::error_code ignored; fs::exists(folder / part, ignored))
-            require_folder(folder / part);
-}
-
-/// Removes files of a killed run, and the report of an earlier one: a manifest means that the results next to it are
-/// complete. The caller holds the journal.
-void prepare_folder(const Job& job, const ReportFiles& reports) {
-    std::set<std::string, std::less<>> stems;
-    if (job.block.empty()) // of any frame: the earlier run may have taken others
-        for (const CaptureEntry& entry : job.capture.entries)
-            stems.insert(entry.name);
-    for (const std::size_t index : job.batch.frames) // of a block: others may be under work
-        stems.insert(job.capture.entries[index].name);
-    for (const fs::path& report : {reports.table, reports.manifest}) {
-        stems.insert(report.stem().string());
-        fs::remove(report);
-    }
-    stems.insert("index");
-    stems.insert(page::recording_stem);
-    page::remove_page(job.folder());
-    const auto ours = [&](std::string_view stem) { // "office", or "office.003" of a cloud's chunks
-        const std::size_t dot = stem.rfind('.');
-        return stems.contains(stem) || (dot != std::string_view::npos && whole_number(stem.substr(dot + 1)) &&
-                                        stems.contains(stem.substr(0, dot)));
-    };
-    remove_leftovers(job.folder(), ours);
-    for (const char* part : result_folders)
-        remove_leftovers(job.folder() / part, ours);
-}
-
-/// The size of a capture's depth images; empty for clouds, and where no header can be read.
-cv::Size depth_size_of(const Job& job) {
-    if (job.capture.camera && !job.capture.camera->pinhole.size.empty())
-        return job.capture.camera->pinhole.size;
-    const std::string first = job.batch.frames.empty() ? "" : job.capture.entries[job.batch.frames.front()].depth;
-    try {
-        return first.empty() ? cv::Size() : peek(first).size;
-    } catch (const Outage&) {
-        throw;
-    } catch (const Error&) { // loading that frame reports the error
-        return {};
-    }
-}
-
-/// Refuses frames too large for the memory, and takes fewer at once where not all fit that the cores could use.
-/// `on_cpu`: the device's images are in the same memory.
-void fit_into_memory(Job& job, bool on_cpu) {
-    // Per pixel: depth and visibility; confidence, clay and its cosines; CACAO's buffers.
-    constexpr std::uint64_t maps = 12, pictures = 13, device = 24;
-    const Outputs& outputs = job.batch.outputs;
-    const bool finished = outputs.confidence || outputs.shaded || outputs.panel;
-    const cv::Size size = depth_size_of(job);
-    const std::uint64_t bytes =
-        static_cast<std::uint64_t>(size.area()) * (maps + (finished ? pictures : 0) + (on_cpu ? device : 0));
-    require_memory(bytes,
-                   fmt::format("{}: a frame of {}x{} pixels", job.capture.path.string(), size.width, size.height));
-    constexpr std::uint64_t always_fits = 128 << 20;
-    const std::uint64_t usual = std::thread::hardware_concurrency() + 8;
-    if (bytes < always_fits)
-        return;
-    if (const std::uint64_t fit = free_memory() / bytes; fit < usual)
-        job.batch.frames_in_memory = std::max(1, static_cast<int>(fit));
-}
-
 /// Computes a capture's frames together, with one method leased for all of them.
 struct Together {
-    Together(Workers& workers, const Job& job, const RunSettings& asked)
+    Together(Workers& workers, const CaptureJob& job, const RunSettings& asked)
         : lease(workers.pool()), pool(*lease),
           sequence(lease->sequence(job.batch.radius_m, job.batch.noise,
                                    asked.in_sequence(job.capture)
@@ -268,8 +130,8 @@ class Run final : public Command {
         asked_.resolve(); // refuses before anything is opened
         int unopened = 0;
         Tally tally;
-        std::vector<Job> jobs = plan(unopened, tally);
-        for (const Job& job : jobs) {
+        std::vector<CaptureJob> jobs = plan(unopened, tally);
+        for (const CaptureJob& job : jobs) {
             require_folders(job.folder());
             if (!asked_.overwrite)
                 asked_.resume ? refuse_another_captures_results(job) : refuse_to_overwrite(job);
@@ -282,28 +144,33 @@ class Run final : public Command {
         cv::setNumThreads(1); // frames are the parallelism; threads inside a frame would only compete with them
         end_gracefully_on_signals();
         std::mutex counting;
-        std::vector<page::ListRow> list_rows(jobs.size());
+        CapturesPage captures(asked_.out);
+        for (const CaptureJob& job : jobs)
+            captures.add(job.folder().filename().string(), job.folder(), job.batch.frames.size());
         overlapped(jobs.size(), at_once(), [&](std::size_t i, OrderedOutput& output) {
             if (interrupted)
                 return;
             std::vector<FrameRow> rows;
             Fault fault = Fault::none;
             try {
-                const fs::path folder = jobs[i].folder();
                 rows = process(std::move(jobs[i]), output);
-                list_rows[i] = list_row(folder, rows);
+                captures.take(i, rows);
             } catch (const DeviceLost&) { // the other captures need it, too
                 throw;
             } catch (const Outage& failure) {
                 warn(fmt::format("failed: {}", failure.what()));
                 fault = Fault::outage;
+                const std::lock_guard alone(counting);
+                failures_.push_back(fmt::format("ended early: {}; --resume continues", failure.what()));
             }
             const std::lock_guard alone(counting);
             tally.add(rows);
             tally.add(fault);
         });
-        if (asked_.page && jobs.size() > 1)
-            write_list(std::move(list_rows));
+        if (asked_.page && asked_.paths.size() > 1) {
+            captures.write(fmt::format("{} captures, {}", jobs.size(), asked_.method), std::move(failures_));
+            say(fmt::format("page of all captures -> {}", (fs::path(asked_.out) / "index.html").string()));
+        }
         for (const std::string& sentence : outlook_)
             say(sentence);
         if (const std::string sentence = tally.doubt_sentence(); !sentence.empty())
@@ -312,47 +179,10 @@ class Run final : public Command {
     }
 
   private:
-    /// A capture's row in the page of all.
-    [[nodiscard]] page::ListRow list_row(const fs::path& folder, const std::vector<FrameRow>& rows) const {
-        page::ListRow all{.name = folder.filename().string(),
-                          .frames = rows.size(),
-                          .ok = count(rows, FrameStatus::ok),
-                          .doubtful = count(rows, FrameStatus::doubtful),
-                          .failed = count(rows, FrameStatus::failed),
-                          .left = count(rows, FrameStatus::skipped)};
-        const auto done = static_cast<double>(all.ok + all.doubtful);
-        for (const FrameRow& row : rows) {
-            if (!is_done(row.status))
-                continue;
-            const StageTimes ms = row.ms + StageTimes{};
-            all.coverage += row.coverage / done;
-            all.visibility += (std::isfinite(row.mean_visibility) ? row.mean_visibility : 0) / done;
-            all.ms += (ms.load + ms.project + ms.compute + ms.attach + ms.write) / done;
-        }
-        if (done == 0)
-            all.coverage = all.visibility = all.ms = std::nan("");
-        if (page::has_page(folder))
-            all.page = (folder / "index.html").lexically_relative(asked_.out).generic_string();
-        return all;
-    }
-
-    /// The page of all captures. One that an outage ended has no row.
-    void write_list(std::vector<page::ListRow> rows) const {
-        std::erase_if(rows, [](const page::ListRow& row) { return row.name.empty(); });
-        const fs::path out = fs::weakly_canonical(asked_.out);
-        const std::string subtitle = fmt::format("{} captures, {}", rows.size(), asked_.method);
-        page::write_list(asked_.out, {.title = (out.has_filename() ? out : out.parent_path()).filename().string(),
-                                      .subtitle = subtitle,
-                                      .notes = {},
-                                      .reasons = {},
-                                      .rows = std::move(rows)});
-        say(fmt::format("page of all captures -> {}", (fs::path(asked_.out) / "index.html").string()));
-    }
-
-    Job job_from(const fs::path& path, const fs::path& folder) const {
-        Job job{open_capture(
-                    path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s, asked_.poses, asked_.colour}),
-                {}};
+    CaptureJob job_from(const fs::path& path, const fs::path& folder) const {
+        CaptureJob job{open_capture(path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s, asked_.poses,
+                                           asked_.colour}),
+                       {}};
         refuse_absent_view(job.capture);
         job.batch.frames = job.of = slice(asked_.frames, job.capture.entries.size());
         job.batch.outputs = asked_.outputs();
@@ -366,8 +196,8 @@ class Run final : public Command {
     }
 
     /// Opens the captures. One that cannot be opened is reported and counted; it stops no other.
-    std::vector<Job> plan(int& unopened, Tally& tally) {
-        std::vector<Job> jobs;
+    std::vector<CaptureJob> plan(int& unopened, Tally& tally) {
+        std::vector<CaptureJob> jobs;
         std::set<std::string> taken;
         for (const std::string& path : asked_.paths) {
             const fs::path folder =
@@ -378,9 +208,11 @@ class Run final : public Command {
                 throw;
             } catch (const Outage& failure) {
                 warn(fmt::format("failed: {}", failure.what()));
+                failures_.push_back(fmt::format("not opened: {}", failure.what()));
                 tally.add(Fault::outage);
             } catch (const Error& failure) {
                 warn(fmt::format("failed: {}", failure.what()));
+                failures_.push_back(fmt::format("not opened: {}", failure.what()));
                 ++unopened;
             } catch (const std::exception& failure) {
                 const auto no_memory = failed_allocation(failure);
@@ -398,7 +230,7 @@ class Run final : public Command {
     }
 
     /// `workers`: null without a Vulkan device.
-    RunReport begun_report(const Job& job, Workers* workers) {
+    RunReport begun_report(const CaptureJob& job, Workers* workers) {
         const auto& said = job.batch.registration;
         const Registration registration = said.value_or(job.capture.registration);
         RunReport report{.started = std::chrono::system_clock::now(),
@@ -425,7 +257,7 @@ class Run final : public Command {
     }
 
     /// Picks method and settings for the capture, starting from the command line. Returns sentences about the choice.
-    std::vector<std::string> keep_to_budget(const Job& job, gpu::Device& device) {
+    std::vector<std::string> keep_to_budget(const CaptureJob& job, gpu::Device& device) {
         TrialRequest request;
         request.among = job.of;
         request.leave_bad_out = true;
@@ -465,11 +297,11 @@ class Run final : public Command {
         });
     }
 
-    Job job_of(const fs::path& folder, const Task& task) {
+    CaptureJob job_of(const fs::path& folder, const Task& task) {
         // The plan could open it, so the problem may be temporary.
         if (std::error_code ignored; !fs::exists(task.capture, ignored))
             throw Outage(task.capture.string() + ": not there any more");
-        Job job = job_from(task.capture, results_of(folder, task));
+        CaptureJob job = job_from(task.capture, results_of(folder, task));
         if (job.of.size() != task.of)
             throw Error(fmt::format("{}: planned with {} frames, has {} now: plan anew", task.capture.string(), task.of,
                                     job.of.size()));
@@ -517,7 +349,7 @@ class Run final : public Command {
     };
 
     /// One capture, from its journal to its report.
-    std::vector<FrameRow> process(Job job, OrderedOutput& output, const WorkerProcess& worker = {}) {
+    std::vector<FrameRow> process(CaptureJob job, OrderedOutput& output, const WorkerProcess& worker = {}) {
         output.set_capture(job.capture.path.string());
         Journal journal(job.folder(), job.block);
         journal.set_capture(job.capture);
@@ -553,13 +385,13 @@ class Run final : public Command {
         return std::move(ready.report.frames);
     }
 
-    [[nodiscard]] std::string task_of(const Job& job) {
+    [[nodiscard]] std::string task_of(const CaptureJob& job) {
         const std::lock_guard alone(alone_);
         return task_key(asked_.stages_in_use(), job.capture, job.of, asked_.in_sequence(job.capture));
     }
 
     /// The rows of a capture that an earlier run has finished.
-    [[nodiscard]] std::optional<std::vector<FrameRow>> rows_if_done(const Job& job, const Journal& journal,
+    [[nodiscard]] std::optional<std::vector<FrameRow>> rows_if_done(const CaptureJob& job, const Journal& journal,
                                                                     const std::string& task, const ReportFiles& files) {
         auto rows = rows_if_complete(journal, task, job.capture, job.batch.frames, asked_.retry);
         if (!rows || !fs::exists(files.manifest) || (writes_page(job) && !page::has_page(job.folder())))
@@ -570,7 +402,7 @@ class Run final : public Command {
     }
 
     /// Measures frames spread over the whole capture, so that its blocks agree. Frames of this block stay in memory.
-    void measure_noise_of(Job& job) const {
+    void measure_noise_of(CaptureJob& job) const {
         if (asked_.depth_noise != "auto") {
             job.batch.noise = noise_from_text(asked_.depth_noise);
             return;
@@ -593,7 +425,7 @@ class Run final : public Command {
 
     /// Makes the methods, or keeps those of the last capture. Without a Vulkan device, clouds are computed from their
     /// points on the processor.
-    [[nodiscard]] Prepared prepare(Job& job) {
+    [[nodiscard]] Prepared prepare(CaptureJob& job) {
         const std::lock_guard alone(alone_);
         MethodSetup& own = asked_.chosen_setup();
         job.batch.cloud_walk = own.make_for_points() ? CloudWalk::points : asked_.clouds;
@@ -628,7 +460,7 @@ class Run final : public Command {
 
     /// Whether the capture holds clouds that are computed from their points. Judged by the clouds in memory; those that
     /// were not kept have no grid, or the noise was not measured.
-    [[nodiscard]] static bool computes_points(const Job& job) {
+    [[nodiscard]] static bool computes_points(const CaptureJob& job) {
         const Capture& capture = job.capture;
         if (capture.camera && job.batch.cloud_walk != CloudWalk::points)
             return false;
@@ -652,7 +484,7 @@ class Run final : public Command {
     }
 
     /// Computes the frames that the journal does not have.
-    void walk(Job& job, RunReport& report, const Recording& recording) {
+    void walk(CaptureJob& job, RunReport& report, const Recording& recording) {
         Entrance entrance(entrance_);
         job.batch.all_begun = [&] { entrance.leave(); };
         std::optional<Together> together;
@@ -673,10 +505,13 @@ class Run final : public Command {
     }
 
     /// A capture's blocks are joined by `merge`, which writes their page.
-    [[nodiscard]] static bool writes_page(const Job& job) { return job.batch.outputs.preview && job.block.empty(); }
+    [[nodiscard]] static bool writes_page(const CaptureJob& job) {
+        return job.batch.outputs.preview && job.block.empty();
+    }
 
     /// `recorded`: a cloud of all frames is there for the page.
-    void report_on(const Job& job, RunReport& report, const Journal& journal, const ReportFiles& files, bool recorded) {
+    void report_on(const CaptureJob& job, RunReport& report, const Journal& journal, const ReportFiles& files,
+                   bool recorded) {
         {
             const std::lock_guard alone(alone_); // the report names settings
             if (count(report.frames, FrameStatus::ok) > 0)
@@ -714,7 +549,7 @@ class Run final : public Command {
     }
 
     /// Returns whether the page has the cloud, too.
-    bool write_recording(const RecordingCloud& cloud, const Job& job) const {
+    bool write_recording(const RecordingCloud& cloud, const CaptureJob& job) const {
         if (cloud.points() == 0) {
             say("  no frame had a pose: " + asked_.recording_cloud + " is not written");
             return false;
@@ -731,7 +566,8 @@ class Run final : public Command {
     std::mutex alone_; ///< held while a capture uses settings and devices, but not while its frames are computed
     std::counting_semaphore<> entrance_{1};
     std::unique_ptr<Workers> workers_;
-    std::vector<std::string> outlook_; ///< of all captures, each sentence once
+    std::vector<std::string> outlook_;  ///< of all captures, each sentence once
+    std::vector<std::string> failures_; ///< of whole captures, for the page of all
 };
 
 } // namespace

@@ -4,9 +4,8 @@
 #include "apps/page/points.h"
 #include "apps/page/preview.h"
 #include "apps/picture.h"
-#include "apps/walk/cloud_picture.h"
+#include "apps/results/cloud_picture.h"
 #include "io/clouds/cloud_file.h"
-#include "io/clouds/format.h"
 #include "io/images/npy_file.h"
 #include "io/output_file.h"
 #include "projection/colour_view.h"
@@ -121,27 +120,6 @@ void write_recorded_cloud(const std::filesystem::path& file, const Work& work, c
     write_cloud(file, cloud, fields, colours);
 }
 
-std::filesystem::path ao_file(const std::string& name, const Outputs& outputs) {
-    return std::filesystem::path("ao") / (name + extension(outputs.format));
-}
-std::filesystem::path confidence_file(const std::string& name, const Outputs& outputs) {
-    return std::filesystem::path("confidence") / (name + extension(outputs.format));
-}
-std::filesystem::path picture_file(const char* kind, const std::string& name) {
-    return std::filesystem::path(kind) / (name + ".png");
-}
-std::filesystem::path cloud_file(const std::string& name, const std::string& extension) {
-    return std::filesystem::path("clouds") / (name + extension);
-}
-
-std::filesystem::path preview_file(const std::string& name) {
-    return std::filesystem::path("previews") / (name + ".js");
-}
-
-std::filesystem::path points_file(const std::string& name, std::size_t part) {
-    return std::filesystem::path("points") / fmt::format("{}.{:03}.js", name, part);
-}
-
 /// The maps of what the pictures show. A colour image of other pixels is shown by itself.
 std::string preview_of(const Work& work, const FrameImages& images) {
     const Scene& scene = images.scene;
@@ -250,36 +228,6 @@ void add_to(RecordingCloud& cloud, const Work& work) {
     cloud.add({work.looked_at, work.ao.visibility, work.confidence_in_view,
                undistorted_image(scene.colour, work.frame.camera),
                undistorted_image(scene.colour_known, work.frame.camera), *work.frame.world_from_camera});
-}
-
-Outputs of_points(const Outputs& outputs) {
-    Outputs those = outputs;
-    those.cloud = outputs.cloud || outputs.ao || outputs.confidence;
-    those.ao = those.confidence = those.shaded = those.panel = false;
-    return those;
-}
-
-std::vector<std::filesystem::path> files_of(const CaptureEntry& entry, const Outputs& outputs) {
-    std::vector<std::filesystem::path> files;
-    const auto add = [&](const std::filesystem::path& file) { files.push_back(outputs.folder / file); };
-    if (outputs.ao)
-        add(ao_file(entry.name, outputs));
-    if (outputs.confidence)
-        add(confidence_file(entry.name, outputs));
-    if (outputs.shaded)
-        add(picture_file("shaded", entry.name));
-    if (outputs.panel)
-        add(picture_file("panel", entry.name));
-    if (outputs.preview)
-        add(preview_file(entry.name));
-    if (outputs.preview && !entry.cloud.empty())
-        add(points_file(entry.name, 0));
-    if (entry.cloud.empty() && outputs.depth_cloud)
-        add(cloud_file(entry.name, ".ply"));
-    if (!entry.cloud.empty() && of_points(outputs).cloud)
-        for (const std::string_view extension : written_cloud_extensions())
-            add(cloud_file(entry.name, std::string(extension)));
-    return files;
 }
 
 } // namespace scanshade

@@ -2,7 +2,7 @@
 #include "apps/walk/frame_images.h"
 
 #include "apps/picture.h"
-#include "apps/walk/cloud_picture.h"
+#include "apps/results/cloud_picture.h"
 #include "projection/colour_view.h"
 #include "projection/confidence.h"
 

@@ -1,9 +1,9 @@
 // A run with a journal: skips frames that are done already, and records each new one.
 #pragma once
 
+#include "apps/results/journal.h"
+#include "apps/results/report.h"
 #include "apps/walk/batch.h"
-#include "apps/walk/journal.h"
-#include "apps/walk/report.h"
 
 #include <functional>
 #include <optional>

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "ao/finish/finish.h"
+#include "apps/results/frame_row.h"
 #include "apps/walk/batch_options.h"
-#include "apps/walk/frame_row.h"
 #include "projection/attach.h"
 
 #include <memory>

@@ -1,7 +1,7 @@
 // The walk with a method that needs no GPU: order, failures, interruption, and what is written.
 #include "apps/walk/batch.h"
 
-#include "apps/walk/report.h"
+#include "apps/results/report.h"
 #include "io/clouds/cloud_file.h"
 #include "projection/base/error.h"
 #include "tests/support/small_capture.h"

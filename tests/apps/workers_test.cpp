@@ -2,8 +2,8 @@
 // validation layer to say.
 #include "apps/run/workers.h"
 
+#include "apps/results/report.h"
 #include "apps/walk/batch.h"
-#include "apps/walk/report.h"
 #include "tests/support/small_capture.h"
 
 #include <algorithm>

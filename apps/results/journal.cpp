@@ -1,5 +1,5 @@
 // Lines of JSON, one write and one sync each; the last line on a frame counts.
-#include "apps/walk/journal.h"
+#include "apps/results/journal.h"
 
 #include "apps/json.h"
 #include "io/content_hash.h"

@@ -1,5 +1,5 @@
 // A picture of a cloud without a camera: two views that show different parts of it.
-#include "apps/walk/cloud_picture.h"
+#include "apps/results/cloud_picture.h"
 
 #include "ao/cloud/surface/leaf_neighbours.h"
 #include "apps/picture.h"

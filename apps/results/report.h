@@ -5,7 +5,7 @@
 #include "apps/command.h"
 #include "apps/json.h"
 #include "apps/page/run_page.h"
-#include "apps/walk/frame_row.h"
+#include "apps/results/frame_row.h"
 #include "io/captures/capture.h"
 
 #include <chrono>

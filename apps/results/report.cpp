@@ -1,10 +1,10 @@
 // The reports of a run: frames.csv, a row per frame, and manifest.json, which is enough to run it again.
-#include "apps/walk/report.h"
+#include "apps/results/report.h"
 
 #include "apps/command_line.h"
 #include "apps/csv.h"
 #include "apps/json.h"
-#include "apps/walk/batch_options.h"
+#include "apps/results/outputs.h"
 #include "io/output_file.h"
 
 #include <algorithm>

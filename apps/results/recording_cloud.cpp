@@ -1,4 +1,4 @@
-#include "apps/walk/recording_cloud.h"
+#include "apps/results/recording_cloud.h"
 
 #include "apps/page/points.h"
 #include "io/clouds/cloud_file.h"

@@ -1,0 +1,56 @@
+#include "apps/results/outputs.h"
+
+#include "io/clouds/format.h"
+
+#include <fmt/format.h>
+
+namespace scanshade {
+
+namespace fs = std::filesystem;
+
+fs::path ao_file(const std::string& name, const Outputs& outputs) {
+    return fs::path("ao") / (name + extension(outputs.format));
+}
+fs::path confidence_file(const std::string& name, const Outputs& outputs) {
+    return fs::path("confidence") / (name + extension(outputs.format));
+}
+fs::path picture_file(const char* kind, const std::string& name) { return fs::path(kind) / (name + ".png"); }
+fs::path cloud_file(const std::string& name, const std::string& extension) {
+    return fs::path("clouds") / (name + extension);
+}
+fs::path preview_file(const std::string& name) { return fs::path("previews") / (name + ".js"); }
+fs::path points_file(const std::string& name, std::size_t part) {
+    return fs::path("points") / fmt::format("{}.{:03}.js", name, part);
+}
+
+Outputs of_points(const Outputs& outputs) {
+    Outputs those = outputs;
+    those.cloud = outputs.cloud || outputs.ao || outputs.confidence;
+    those.ao = those.confidence = those.shaded = those.panel = false;
+    return those;
+}
+
+std::vector<fs::path> files_of(const CaptureEntry& entry, const Outputs& outputs) {
+    std::vector<fs::path> files;
+    const auto add = [&](const fs::path& file) { files.push_back(outputs.folder / file); };
+    if (outputs.ao)
+        add(ao_file(entry.name, outputs));
+    if (outputs.confidence)
+        add(confidence_file(entry.name, outputs));
+    if (outputs.shaded)
+        add(picture_file("shaded", entry.name));
+    if (outputs.panel)
+        add(picture_file("panel", entry.name));
+    if (outputs.preview)
+        add(preview_file(entry.name));
+    if (outputs.preview && !entry.cloud.empty())
+        add(points_file(entry.name, 0));
+    if (entry.cloud.empty() && outputs.depth_cloud)
+        add(cloud_file(entry.name, ".ply"));
+    if (!entry.cloud.empty() && of_points(outputs).cloud)
+        for (const std::string_view extension : written_cloud_extensions())
+            add(cloud_file(entry.name, std::string(extension)));
+    return files;
+}
+
+} // namespace scanshade

@@ -1,0 +1,61 @@
+// Which files a run writes for each frame, and where.
+#pragma once
+
+#include "io/captures/capture.h"
+#include "io/images/image_file.h"
+
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace scanshade {
+
+/// What becomes of a cloud's colours: they stay; they are multiplied by visibility; or so, and clouds without colours
+/// of their own get visibility as grey.
+enum class CloudColours { kept, shaded, grey };
+
+/// The folders that Outputs fill.
+inline constexpr std::array result_folders = {"ao", "confidence", "shaded", "panel", "clouds", "previews", "points"};
+
+/// The files written for each frame, under `folder`: ao/NAME.png, confidence/NAME.png, shaded/NAME.png, panel/NAME.png,
+/// clouds/NAME.pcd or .ply; for the page previews/NAME.js, or points/NAME.000.js and on of a cloud computed from its
+/// points.
+struct Outputs {
+    std::filesystem::path folder;
+    bool ao = true;         ///< the visibility map
+    bool confidence = true; ///< how reliable the visibility is (confidence_of()), as 8 bits or floats
+    bool shaded = true; ///< colour times visibility; clay times visibility where colour is not known to fit the depth
+    bool panel = false; ///< colour | depth | AO | shaded
+    bool cloud = true; ///< a cloud input with the fields ambient_occlusion and ao_confidence, everything else as it was
+    bool depth_cloud = false; ///< a new PLY of a depth frame's points, in camera space
+    AoFormat format = AoFormat::png16;
+    double shade_strength = 1; ///< 0 leaves the colour, 1 multiplies by visibility
+    bool colour_view = false;  ///< maps and pictures of frames with a secondary camera use its pixels
+    CloudColours colour_cloud = CloudColours::kept;
+    bool preview = false;              ///< what the page shows of the frame beside the other files
+    std::size_t page_points = 1000000; ///< of a cloud, at most, on the page
+};
+
+/// A frame's files, relative to the folder. `kind` is "shaded" or "panel"; a cloud's points for the page have parts.
+[[nodiscard]] std::filesystem::path ao_file(const std::string& name, const Outputs& outputs);
+[[nodiscard]] std::filesystem::path confidence_file(const std::string& name, const Outputs& outputs);
+[[nodiscard]] std::filesystem::path picture_file(const char* kind, const std::string& name);
+[[nodiscard]] std::filesystem::path cloud_file(const std::string& name, const std::string& extension);
+[[nodiscard]] std::filesystem::path preview_file(const std::string& name);
+[[nodiscard]] std::filesystem::path points_file(const std::string& name, std::size_t part);
+
+/// What is written of a cloud computed from its points, which has no pixels: maps of visibility and confidence are its
+/// fields, so each of them asks for the cloud.
+[[nodiscard]] Outputs of_points(const Outputs& outputs);
+
+/// The files that `outputs` makes of a frame. A cloud has both possible names, since only its content has the format.
+[[nodiscard]] std::vector<std::filesystem::path> files_of(const CaptureEntry& entry, const Outputs& outputs);
+
+/// Whether any output shows the colour images.
+[[nodiscard]] inline bool shows_colour(const Outputs& outputs, bool recording_cloud) {
+    return outputs.shaded || outputs.panel || outputs.depth_cloud || outputs.colour_view || recording_cloud;
+}
+
+} // namespace scanshade
