@@ -11,12 +11,12 @@
 #include "apps/scenes/random_noise.h"
 #include "apps/scenes/scanner.h"
 #include "projection/base/hash.h"
+#include "projection/base/memory.h"
 #include "projection/base/statistics.h"
 #include "projection/base/stopwatch.h"
 
 #include <ctime>
 #include <fmt/format.h>
-#include <fstream>
 #include <numbers>
 #include <numeric>
 #include <optional>
@@ -27,15 +27,6 @@ namespace scanshade {
 namespace {
 
 using Eigen::Vector3d, Eigen::Vector3f;
-
-/// Peak memory of the process, in MiB.
-double peak_memory_mib() {
-    std::ifstream status("/proc/self/status");
-    for (std::string word; status >> word;)
-        if (double kib = 0; word == "VmHWM:" && status >> kib)
-            return kib / 1024;
-    return 0;
-}
 
 /// What a row of the table says besides its name.
 struct MeasuredCloud {

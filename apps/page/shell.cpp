@@ -36,20 +36,20 @@ std::string joined(std::initializer_list<std::string_view> scripts) {
     return all;
 }
 
+/// A page of the body's template; both have the same head.
+std::string shell(std::string_view body, std::string_view title, const std::string& script) {
+    const std::string head = filled(head_html, {{"title", escaped(title)}, {"style", style_css}});
+    return filled(body, {{"head", head}, {"script", script}});
+}
+
 } // namespace
 
 std::string run_shell(std::string_view title) {
-    return filled(
-        page_html,
-        {{"title", escaped(title)},
-         {"style", style_css},
-         {"script", joined({core_js, table_js, plots_js, maps_js, frames_js, camera_js, points_js, run_js})}});
+    return shell(page_html, title,
+                 joined({core_js, table_js, plots_js, maps_js, frames_js, camera_js, points_js, run_js}));
 }
 
-std::string list_shell(std::string_view title) {
-    return filled(list_html,
-                  {{"title", escaped(title)}, {"style", style_css}, {"script", joined({core_js, table_js, list_js})}});
-}
+std::string list_shell(std::string_view title) { return shell(list_html, title, joined({core_js, table_js, list_js})); }
 
 std::string_view shared_style() { return style_css; }
 std::string_view document_style() { return document_css; }

@@ -13,7 +13,6 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <tbb/info.h>
@@ -121,15 +120,6 @@ std::string indented(const std::string& text, const std::string& blanks) {
     return result;
 }
 
-/// The process's peak memory in MiB, as the kernel counts it; NaN without /proc.
-double peak_memory_mib() {
-    std::ifstream status("/proc/self/status");
-    for (std::string word; status >> word;)
-        if (double kib = 0; word == "VmHWM:" && status >> kib)
-            return kib / 1024;
-    return std::nan("");
-}
-
 json totals_json(const RunReport& report) {
     StageTimes sum;
     for (const FrameRow& row : report.frames)
@@ -149,7 +139,7 @@ json totals_json(const RunReport& report) {
             {"share_of_slowest_stage", known(rates.share_of_slowest)},
             {"device_busy_share", known(rates.device_busy)},
             {"stage_ms", stage_json(sum)},
-            {"peak_memory_mib", known(peak_memory_mib(), 1)}};
+            {"peak_memory_mib", known(report.peak_mib, 1)}};
 }
 
 /// The files in the folders of results without those in `own`, sorted.

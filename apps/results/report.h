@@ -35,6 +35,7 @@ struct RunReport {
     std::size_t done_now = 0;              ///< frames that this process computed; others were done before
     StageTimes ms_now{};                   ///< sums of their times in each stage
     double took_ms = 0;                    ///< from the first frame's begin to the last one's end
+    double peak_mib = 0;                   ///< the process's memory when the reports are written
     bool alone = true;                     ///< no other run writes to the same folder, as runs of a capture's blocks do
 };
 

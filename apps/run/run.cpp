@@ -519,6 +519,7 @@ class Run final : public Command {
             for (const std::string& sentence : report.outlook)
                 if (!std::ranges::count(outlook_, sentence))
                     outlook_.push_back(sentence);
+            report.peak_mib = peak_memory_mib();
             write_frames_csv(files.table, report.frames);
             page::RunPage page;
             say_left_alone(write_manifest(files.manifest, report, [&](const FrameRow& row) {

@@ -114,6 +114,14 @@ std::uint64_t free_memory() {
     return std::min({machine_kib ? *machine_kib * 1024 : unlimited, left_of_own_limit(), left_of_own_groups()});
 }
 
+double peak_memory_mib() {
+    std::ifstream status("/proc/self/status");
+    for (std::string word; status >> word;)
+        if (double kib = 0; word == "VmHWM:" && status >> kib)
+            return kib / 1024;
+    return std::numeric_limits<double>::quiet_NaN();
+}
+
 void require_memory(std::uint64_t bytes, const std::string& what) {
     constexpr std::uint64_t always_there = 64 << 20; // asking the system costs more than most frames' images
     if (bytes < always_there)

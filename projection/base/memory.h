@@ -12,6 +12,9 @@ namespace scanshade {
 /// Bytes that this process may still take: by the machine, by its control group (containers, Slurm), by its own limit.
 [[nodiscard]] std::uint64_t free_memory();
 
+/// The process's peak memory in MiB, as the kernel counts it; NaN without /proc.
+[[nodiscard]] double peak_memory_mib();
+
 /// Throws OutOfMemory, "`what` needs about 9.5 GiB of memory, 6.2 GiB are free", if that many bytes are not there.
 void require_memory(std::uint64_t bytes, const std::string& what);
 

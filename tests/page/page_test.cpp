@@ -5,6 +5,7 @@
 #include "apps/page/preview.h"
 #include "apps/page/run_page.h"
 #include "apps/page/text.h"
+#include "apps/results/captures_page.h"
 #include "io/captures/capture.h"
 #include "tests/support/files.h"
 #include "tests/support/points.h"
@@ -229,6 +230,33 @@ TEST_F(PageFilesTest, several_captures_have_a_list_with_links_to_their_pages) {
     EXPECT_EQ(rows[0][1], 2);
     EXPECT_EQ(rows[1].back(), "b/index.html");
     EXPECT_TRUE(fs::exists(out() / "b/index.html"));
+}
+
+TEST_F(PageFilesTest, the_list_of_captures_names_those_that_could_not_be_opened) {
+    tests::write_capture(folder / "a", 1);
+    fs::create_directories(folder / "empty");
+    ASSERT_EQ(run_program(fmt::format("run '{0}/a' '{0}/empty' -o '{0}/out'", folder.path().string())).exit_code, 2);
+    const auto [head, rows] = data_of(out());
+    EXPECT_EQ(rows.size(), 1u);
+    ASSERT_EQ(head["notes"].size(), 1u);
+    EXPECT_TRUE(says(head["notes"][0], "not opened: no frames found in " + (folder / "empty").string()));
+}
+
+TEST_F(PageFilesTest, a_list_counts_frames_that_an_interruption_left) {
+    CapturesPage page(folder.path());
+    const std::size_t first = page.add("a", folder / "a", 3);
+    EXPECT_EQ(page.add("a", folder / "a", 2), first) << "a second block of the same capture";
+    page.add("b", folder / "b", 4);
+    FrameRow done, ended;
+    done.status = FrameStatus::ok;
+    done.coverage = done.mean_visibility = 0.5;
+    ended.status = FrameStatus::failed;
+    ended.fault = Fault::outage;
+    page.take(first, {done, ended});
+    page.write("two", {});
+    const auto [head, rows] = data_of(folder.path());
+    EXPECT_EQ(rows[0], nlohmann::json({"a", 5, 1, 0, 0, 4, 0.5, 0.5, 0.0, ""}));
+    EXPECT_EQ(rows[1], nlohmann::json({"b", 4, 0, 0, 0, 4, nullptr, nullptr, nullptr, ""}));
 }
 
 TEST_F(PageFilesTest, merge_makes_one_page_of_a_capture_computed_in_blocks) {
