@@ -272,18 +272,18 @@ DepthNoise law_through(const std::vector<Measured>& points) {
 }
 
 /// Whether a value's error is that of rounding to a step, and hardly more: uniform over the step, whose deviation is
-/// step / sqrt(12). Noise would show between adjacent pixels at most depths. Noise that a sensor has smoothed would
-/// show over more pixels at all depths; a scene's relief, which looks like it, leaves some of them even.
+/// step / sqrt(12). Noise would show between adjacent pixels and over more of them, at most depths. Noise that a sensor
+/// has smoothed would show over more pixels at all depths; a scene's relief, which looks like it, leaves some even.
 bool explains(double step_m, const std::vector<Measured>& points) {
     constexpr double most = 1.6, most_distant = 3; // deviations of a step
     const double step = step_m / std::sqrt(12.0);
-    double all = 0, adjacent = 0, distant = 0;
+    double all = 0, even = 0, distant = 0;
     for (const Measured& p : points) {
         all += p.weight;
-        adjacent += p.adjacent < most * step ? p.weight : 0;
+        even += std::min(p.adjacent, p.distant) < most * step ? p.weight : 0;
         distant += p.sigma < most_distant * step ? p.weight : 0;
     }
-    return adjacent > 0.5 * all && distant > 0.1 * all;
+    return even > 0.5 * all && distant > 0.1 * all;
 }
 
 /// Whether a step between adjacent pixels tilts the surface by more than AO bears.
