@@ -18,6 +18,7 @@
 #include "apps/walk/resume.h"
 #include "apps/walk/sequence_order.h"
 #include "io/output_file.h"
+#include "io/text.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
 #include "projection/base/stopwatch.h"
