@@ -1,5 +1,8 @@
 #include "ao/frame.h"
 
+#include "ao/raycast/depth_surface.h"
+
+#include <algorithm>
 #include <cassert>
 
 namespace scanshade {
@@ -32,12 +35,28 @@ AoMap FrameAo::compute(const DepthImage& depth, const DepthNoise& noise) {
     return ao;
 }
 
-AoMap FrameAo::compute_prepared(const DepthImage& depth, const DepthNoise& noise) {
+FitPlane& FrameAo::fit_for(const DepthNoise& noise) {
     if (fit_)
         fit_->set_noise(noise);
     else
         fit_.emplace(*device_, noise, preparation_);
-    if (fit_->planes()) {
+    return *fit_;
+}
+
+NormalImage FrameAo::normals(const DepthImage& depth, const DepthNoise& noise) {
+    NormalImage found = normals_of(depth);
+    if (!noise.needs_preparation() || !device_ || !fit_for(noise).planes())
+        return found;
+    const cv::Mat3f fitted = fit_->compute(depth).normals.normals;
+    std::transform(fitted.begin(), fitted.end(), found.normals.begin(), found.normals.begin(),
+                   [](const cv::Vec3f& of_plane, const cv::Vec3f& of_pixels) {
+                       return of_plane == cv::Vec3f() ? of_pixels : of_plane;
+                   });
+    return found;
+}
+
+AoMap FrameAo::compute_prepared(const DepthImage& depth, const DepthNoise& noise) {
+    if (fit_for(noise).planes()) {
         const Surfaces fitted = fit_->compute_on_device(depth);
         fitted_depth_ = fitted.z_there;
         return method_.compute({.surfaces = fitted, .noise = noise, .smoothed = true});

@@ -33,6 +33,9 @@ class FrameAo {
     /// Visibility of each pixel of `depth`; NaN exactly where there is no surface. Depth with noise or flying pixels is
     /// prepared first.
     [[nodiscard]] AoMap compute(const DepthImage& depth, const DepthNoise& noise);
+    /// Normals of `depth` as methods see it: of the fitted planes where noise asks for them, else of adjacent pixels.
+    /// Unit length, facing the camera; (0, 0, 0) in holes.
+    [[nodiscard]] NormalImage normals(const DepthImage& depth, const DepthNoise& noise);
     /// For the frames of one recording, each computed together with those around it. Must not outlive this one.
     [[nodiscard]] SequenceAo sequence(double radius_m, const DepthNoise& noise,
                                       const SequenceAoOptions& options = alone());
@@ -50,6 +53,8 @@ class FrameAo {
     [[nodiscard]] std::vector<Intermediate> intermediates() { return method_.intermediates(); }
 
   private:
+    /// Made on first use.
+    [[nodiscard]] FitPlane& fit_for(const DepthNoise& noise);
     [[nodiscard]] AoMap compute_prepared(const DepthImage& depth, const DepthNoise& noise);
 
     gpu::Device* device_ = nullptr; ///< none: depth is never prepared

@@ -128,6 +128,8 @@ class Run final : public Command {
             be_quiet();
         if (std::ranges::any_of(asked_.paths, is_job))
             return run_planned();
+        if (asked_.out.empty())
+            throw Misuse("run needs -o FOLDER for its results");
         asked_.resolve(); // refuses before anything is opened
         int unopened = 0;
         Tally tally;

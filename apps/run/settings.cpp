@@ -341,8 +341,6 @@ void RunSettings::take_preset() {
 }
 
 void RunSettings::resolve() {
-    if (out.empty())
-        throw Misuse("run needs -o FOLDER for its results");
     outputs_ = outputs_from(*this);
     range_ = range_from(depth_range);
     if (depth_noise != "auto")

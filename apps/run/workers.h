@@ -16,12 +16,19 @@ namespace scanshade {
 /// waits for the host. Processor cores have no such gaps, and each frame in flight takes memory.
 class Workers {
   public:
+    /// Devices that several Workers may share; they live as long as any of these.
+    using Devices = std::shared_ptr<const std::vector<std::unique_ptr<gpu::Device>>>;
+
     /// Opens the devices that `choice` names (gpu::open_devices()); `in_flight` frames on each, 0 = three on a GPU, one
     /// on the processor's own cores.
-    Workers(const std::string& choice, int in_flight);
+    Workers(const std::string& choice, int in_flight)
+        : Workers(std::make_shared<const std::vector<std::unique_ptr<gpu::Device>>>(gpu::open_devices(choice)),
+                  in_flight) {}
+    /// The same on devices that are open already; at least one.
+    Workers(Devices devices, int in_flight);
 
     /// The device for work that computes one frame at a time.
-    [[nodiscard]] gpu::Device& device() { return *devices_.front(); }
+    [[nodiscard]] gpu::Device& device() { return *devices_->front(); }
     /// Makes the methods again if method or settings have changed, so that shaders are compiled once for all captures.
     /// None may be leased then. A method that uses all cores by itself exists once.
     void make(const std::string& method, MethodSetup& setup, const FitPlaneOptions& preparation);
@@ -29,10 +36,10 @@ class Workers {
 
     /// "NVIDIA H100 (NVIDIA 550.54)", "2 x NVIDIA ..., 6 frames at once"
     [[nodiscard]] std::string description() const;
-    [[nodiscard]] std::size_t devices() const { return devices_.size(); }
+    [[nodiscard]] std::size_t devices() const { return devices_->size(); }
 
   private:
-    std::vector<std::unique_ptr<gpu::Device>> devices_; ///< outlive what is made on them
+    Devices devices_; ///< outlive what is made on them
     std::size_t in_flight_;
     Configuration configuration_; ///< what made_ was made from, and
     FitPlaneOptions preparation_;

@@ -3,13 +3,12 @@
 
 #include "apps/walk/doubts.h"
 #include "apps/walk/frame_files.h"
+#include "apps/walk/frame_steps.h"
 #include "apps/walk/point_clouds.h"
 #include "apps/walk/sequence_order.h"
-#include "io/clouds/cloud_file.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
 #include "projection/base/stopwatch.h"
-#include "projection/project.h"
 
 #include <algorithm>
 #include <exception>
@@ -60,49 +59,9 @@ Frame load(const Capture& capture, std::size_t index, const BatchOptions& option
     return capture.load(index, shows_colour(options.outputs, options.cloud != nullptr));
 }
 
-double share(std::ptrdiff_t part, std::size_t whole) {
-    return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
-}
-
-/// Pixels or points that hold a depth / all of them.
-double valid_share(const Frame& frame) {
-    if (!frame.cloud)
-        return share(cv::countNonZero(frame.depth_m > 0), frame.depth_m.total());
-    const auto& points = frame.cloud->points;
-    return share(std::count_if(points.begin(), points.end(), [](const auto& p) { return p.allFinite(); }),
-                 points.size());
-}
-
-void describe_frame(Work& work) {
-    const Frame& frame = work.frame;
-    FrameRow& row = work.row;
-    row.size = frame.cloud ? frame.cloud->grid : frame.depth_m.size();
-    row.valid_share = valid_share(frame);
-    row.warnings = frame.warnings;
-    if (frame.registration == Registration::yes && !frame.cloud && !frame.colour.empty() &&
-        frame.colour.size() != frame.depth_m.size())
-        row.warnings.push_back(fmt::format("colour is {}x{}, depth {}x{}: shaded shows clay.", frame.colour.cols,
-                                           frame.colour.rows, frame.depth_m.cols, frame.depth_m.rows));
-}
-
-/// A camera that sees none of the points is an error, not an empty result. (No depth at all is a result.)
-void refuse_blind_view(const Work& work) {
-    if (work.row.valid_share > 0 && cv::countNonZero(work.depth.z_m) == 0)
-        throw Error(fmt::format("the camera sees none of the recorded points ({}; {})", describe(work.frame.camera),
-                                work.frame.camera.origin));
-}
-
 /// Computes a value for every point, without a camera's view.
 void compute_points(Work& work, const BatchOptions& options) {
-    constexpr std::uint64_t bytes_per_point = 300; // surface, tree, rays and picture, beyond the cloud itself
-    const std::size_t points = work.frame.cloud->points.size();
-    require_memory(points * bytes_per_point, fmt::format("visibility of {} points", points));
-    work.of_points = visibility_of_points(work.frame, *options.points);
-    std::ranges::copy(work.of_points.notes, std::back_inserter(work.row.notes));
-    std::ranges::copy(work.of_points.doubts, std::back_inserter(work.row.doubts));
-    work.confidence.per_point = work.of_points.confidence;
-    work.row.passes = work.of_points.timings;
-    work.attached = attached_points(*work.frame.cloud, work.of_points.visibility);
+    compute_points(work, *options.points);
     const std::vector<Intermediate> intermediates = options.points->intermediates();
     if (!options.dump.empty() && !intermediates.empty())
         write_intermediates(options.dump / work.entry.name, intermediates);
@@ -231,11 +190,7 @@ class Pipeline {
             work->row.ms.project = 0;
             return work;
         }
-        take(*work, &StageTimes::project, [&] {
-            work->frame.camera = work->row.camera = camera_of(work->frame);
-            work->depth = project(work->frame, options_.range);
-            refuse_blind_view(*work);
-        });
+        take(*work, &StageTimes::project, [&] { prepare_view(*work, options_.range); });
         return work;
     }
 
@@ -263,10 +218,7 @@ class Pipeline {
         if (options_.sequence) {
             compute_in_sequence(work, capture_, *options_.sequence);
         } else {
-            work.ao = method.compute(work.depth, options_.noise);
-            work.fitted = method.fitted_depth();
-            work.row.passes = method.timings();
-            std::ranges::copy(method.doubts(), std::back_inserter(work.row.doubts));
+            compute_alone(work, method, options_.noise);
         }
         if (options_.dump.empty())
             return;

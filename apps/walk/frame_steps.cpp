@@ -1,0 +1,74 @@
+#include "apps/walk/frame_steps.h"
+
+#include "apps/walk/point_clouds.h"
+#include "projection/base/error.h"
+#include "projection/base/memory.h"
+#include "projection/project.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <iterator>
+
+namespace scanshade {
+namespace {
+
+double share(std::ptrdiff_t part, std::size_t whole) {
+    return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+/// Pixels or points that hold a depth / all of them.
+double valid_share(const Frame& frame) {
+    if (!frame.cloud)
+        return share(cv::countNonZero(frame.depth_m > 0), frame.depth_m.total());
+    const auto& points = frame.cloud->points;
+    return share(std::count_if(points.begin(), points.end(), [](const auto& p) { return p.allFinite(); }),
+                 points.size());
+}
+
+/// A camera that sees none of the points is an error, not an empty result. (No depth at all is a result.)
+void refuse_blind_view(const Work& work) {
+    if (work.row.valid_share > 0 && cv::countNonZero(work.depth.z_m) == 0)
+        throw Error(fmt::format("the camera sees none of the recorded points ({}; {})", describe(work.frame.camera),
+                                work.frame.camera.origin));
+}
+
+} // namespace
+
+void describe_frame(Work& work) {
+    const Frame& frame = work.frame;
+    FrameRow& row = work.row;
+    row.size = frame.cloud ? frame.cloud->grid : frame.depth_m.size();
+    row.valid_share = valid_share(frame);
+    row.warnings = frame.warnings;
+    if (frame.registration == Registration::yes && !frame.cloud && !frame.colour.empty() &&
+        frame.colour.size() != frame.depth_m.size())
+        row.warnings.push_back(fmt::format("colour is {}x{}, depth {}x{}: shaded shows clay.", frame.colour.cols,
+                                           frame.colour.rows, frame.depth_m.cols, frame.depth_m.rows));
+}
+
+void prepare_view(Work& work, const ProjectOptions& range) {
+    work.frame.camera = work.row.camera = camera_of(work.frame);
+    work.depth = project(work.frame, range);
+    refuse_blind_view(work);
+}
+
+void compute_alone(Work& work, FrameAo& method, const DepthNoise& noise) {
+    work.ao = method.compute(work.depth, noise);
+    work.fitted = method.fitted_depth();
+    work.row.passes = method.timings();
+    std::ranges::copy(method.doubts(), std::back_inserter(work.row.doubts));
+}
+
+void compute_points(Work& work, PointMethod& points) {
+    constexpr std::uint64_t bytes_per_point = 300; // surface, tree, rays and picture, beyond the cloud itself
+    const std::size_t count = work.frame.cloud->points.size();
+    require_memory(count * bytes_per_point, fmt::format("visibility of {} points", count));
+    work.of_points = visibility_of_points(work.frame, points);
+    std::ranges::copy(work.of_points.notes, std::back_inserter(work.row.notes));
+    std::ranges::copy(work.of_points.doubts, std::back_inserter(work.row.doubts));
+    work.confidence.per_point = work.of_points.confidence;
+    work.row.passes = work.of_points.timings;
+    work.attached = attached_points(*work.frame.cloud, work.of_points.visibility);
+}
+
+} // namespace scanshade
