@@ -36,6 +36,19 @@ std::string_view name_of(Registration registration) {
     return "";
 }
 
+json value_json(const Parameter& row) {
+    return std::visit(
+        [&]<class Target>(const Target& target) -> json {
+            if constexpr (std::is_same_v<Target, float*>)
+                return parsed_json(value_text(row)); // the number as typed: 0.1, not 0.10000000149011612
+            else if constexpr (std::is_same_v<Target, OneOf> || std::is_same_v<Target, std::optional<double>*>)
+                return value_text(row);
+            else
+                return *target;
+        },
+        row.value);
+}
+
 std::size_t count_at(const json& object, const std::string& key) {
     const json& value = object.at(key);
     if (!value.is_number_unsigned())

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "projection/base/error.h"
+#include "projection/base/parameters.h"
 #include "projection/camera.h"
 #include "projection/frame.h"
 
@@ -24,6 +25,9 @@ using json = nlohmann::ordered_json;
 
 /// "yes", "no" or "unknown".
 [[nodiscard]] std::string_view name_of(Registration registration);
+
+/// The current value of a setting: a number, true, false, or text. Empty text where none is given.
+[[nodiscard]] json value_json(const Parameter& row);
 
 /// A member that counts something. Throws Error naming the key if it is not a whole number.
 [[nodiscard]] std::size_t count_at(const json& object, const std::string& key);

@@ -32,19 +32,6 @@ json known(double value, int digits = 4) {
     return std::isfinite(value) ? json(std::round(value * scale) / scale) : json();
 }
 
-json value_json(const Parameter& row) {
-    return std::visit(
-        [&]<class Target>(const Target& target) -> json {
-            if constexpr (std::is_same_v<Target, float*>)
-                return parsed_json(value_text(row)); // the number as typed: 0.1, not 0.10000000149011612
-            else if constexpr (std::is_same_v<Target, OneOf> || std::is_same_v<Target, std::optional<double>*>)
-                return value_text(row);
-            else
-                return *target;
-        },
-        row.value);
-}
-
 json settings_json(const std::vector<Stage>& stages) {
     json settings = json::object();
     for (const Stage& stage : stages)

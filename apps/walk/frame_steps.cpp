@@ -32,6 +32,21 @@ void refuse_blind_view(const Work& work) {
                                 work.frame.camera.origin));
 }
 
+void require_memory_for(const Cloud& cloud) {
+    constexpr std::uint64_t bytes_per_point = 300; // surface, tree, rays and picture, beyond the cloud itself
+    const std::size_t count = cloud.points.size();
+    require_memory(count * bytes_per_point, fmt::format("visibility of {} points", count));
+}
+
+void take_points(Work& work, PointVisibility found) {
+    work.of_points = std::move(found);
+    std::ranges::copy(work.of_points.notes, std::back_inserter(work.row.notes));
+    std::ranges::copy(work.of_points.doubts, std::back_inserter(work.row.doubts));
+    work.confidence.per_point = work.of_points.confidence;
+    work.row.passes = work.of_points.timings;
+    work.attached = attached_points(*work.frame.cloud, work.of_points.visibility);
+}
+
 } // namespace
 
 void describe_frame(Work& work) {
@@ -60,15 +75,14 @@ void compute_alone(Work& work, FrameAo& method, const DepthNoise& noise) {
 }
 
 void compute_points(Work& work, PointMethod& points) {
-    constexpr std::uint64_t bytes_per_point = 300; // surface, tree, rays and picture, beyond the cloud itself
-    const std::size_t count = work.frame.cloud->points.size();
-    require_memory(count * bytes_per_point, fmt::format("visibility of {} points", count));
-    work.of_points = visibility_of_points(work.frame, points);
-    std::ranges::copy(work.of_points.notes, std::back_inserter(work.row.notes));
-    std::ranges::copy(work.of_points.doubts, std::back_inserter(work.row.doubts));
-    work.confidence.per_point = work.of_points.confidence;
-    work.row.passes = work.of_points.timings;
-    work.attached = attached_points(*work.frame.cloud, work.of_points.visibility);
+    require_memory_for(*work.frame.cloud);
+    take_points(work, visibility_of_points(work.frame, points));
+}
+
+void compute_points(Work& work, PointMethod& points, const PointSet& set,
+                    const std::optional<Eigen::Vector3d>& scanner) {
+    require_memory_for(*work.frame.cloud);
+    take_points(work, points.compute(set, scanner));
 }
 
 } // namespace scanshade

@@ -18,5 +18,8 @@ void compute_alone(Work& work, FrameAo& method, const DepthNoise& noise);
 /// Computes a value for every point of the frame's cloud, without a camera's view, and attaches them. Throws
 /// OutOfMemory before it begins where there is too little.
 void compute_points(Work& work, PointMethod& points);
+/// The same where normals, faces and scanner are not those of the cloud's file. `set.points` are the cloud's.
+void compute_points(Work& work, PointMethod& points, const PointSet& set,
+                    const std::optional<Eigen::Vector3d>& scanner);
 
 } // namespace scanshade

@@ -1,0 +1,25 @@
+# libscanshade.so: the C interface over the rooms' objects, with C++ headers on it; how both are installed.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+set(library_dir ${PROJECT_SOURCE_DIR}/apps/library)
+
+file(GLOB library_sources CONFIGURE_DEPENDS ${library_dir}/*.cpp)
+add_library(library SHARED ${library_sources})
+target_link_libraries(library PRIVATE apps_run apps_refine)
+target_precompile_headers(library REUSE_FROM precompiled)
+target_include_directories(library INTERFACE $<BUILD_INTERFACE:${library_dir}/include>
+                                             $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+set_target_properties(library PROPERTIES OUTPUT_NAME scanshade VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}
+                                         EXPORT_NAME scanshade LINK_DEPENDS ${library_dir}/symbols.map)
+target_link_options(library PRIVATE -Wl,--version-script=${library_dir}/symbols.map -Wl,--gc-sections -Wl,--no-undefined)
+
+install(TARGETS scanshade RUNTIME)
+install(TARGETS library EXPORT scanshade LIBRARY)
+install(DIRECTORY ${library_dir}/include/scanshade DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/scanshade)
+install(EXPORT scanshade NAMESPACE scanshade:: FILE scanshadeConfig.cmake DESTINATION ${package_dir})
+write_basic_package_version_file(scanshadeConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/scanshadeConfigVersion.cmake DESTINATION ${package_dir})
+file(RELATIVE_PATH prefix_from_pc /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
+configure_file(${library_dir}/scanshade.pc.in scanshade.pc @ONLY)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/scanshade.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
