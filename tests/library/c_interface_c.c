@@ -31,7 +31,7 @@ int one_image_in_c(void) {
     REQUIRE(scanshade_result_arrays(result, &arrays) == SCANSHADE_OK)
     REQUIRE(arrays.count == 1 && arrays.width == width && arrays.height == height)
     REQUIRE(isnan(arrays.visibility[0]) && isnan(arrays.confidence[0]) && isnan(arrays.normals[0]))
-    REQUIRE(arrays.visibility[24 * width + 32] > 0.99F) /* a plane is open */
+    REQUIRE(arrays.visibility[24 * width + 32] > 0.99F)         /* a plane is open */
     REQUIRE(arrays.normals[3 * (24 * width + 32) + 2] < -0.99F) /* and faces the camera */
     scanshade_result_free(result);
     scanshade_session_close(session);

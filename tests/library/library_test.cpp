@@ -1,18 +1,180 @@
 // The library as its users see it: public headers alone, against what the program writes for the same input.
-#include "tests/support/says.h"
-#include "tests/support/small_capture.h"
-
-#include "io/images/image_file.h"
-
 #include <scanshade/capture.h>
 
+#include <cstdio>
+#include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <gtest/gtest.h>
 #include <limits>
+#include <opencv2/imgcodecs.hpp>
 #include <thread>
+#include <unistd.h>
 
 extern "C" int one_image_in_c(void);
 
 namespace {
 
 namespace fs = std::filesystem;
+using scanshade::Camera;
+using scanshade::Session;
+using scanshade::Settings;
+
+const Camera camera{525, 525, 319.5, 239.5};
+
+/// Two walls that meet in a vertical edge, with a hole; millimetres.
+cv::Mat1w corner() {
+    cv::Mat1w depth(480, 640);
+    for (int v = 0; v < depth.rows; ++v)
+        for (int u = 0; u < depth.cols; ++u)
+            depth(v, u) = static_cast<ushort>(2000 - 2 * std::abs(u - 320));
+    depth(cv::Rect(10, 10, 30, 20)) = 0;
+    return depth;
+}
+
+std::string why(const Settings& settings) {
+    try {
+        const Session session(settings);
+    } catch (const scanshade::Error& error) {
+        EXPECT_EQ(error.status(), SCANSHADE_MISUSE);
+        return error.what();
+    }
+    return "";
+}
+
+/// A folder for the program's results.
+class LibraryTest : public testing::Test {
+  protected:
+    LibraryTest() : folder(fs::temp_directory_path() / ("library_test_" + std::to_string(getpid()))) {
+        fs::remove_all(folder);
+        fs::create_directories(folder);
+    }
+    ~LibraryTest() override { fs::remove_all(folder); }
+
+    int run(const std::string& arguments) const {
+        const std::string command =
+            std::string(SCANSHADE_PROGRAM) + " " + arguments + " -q 2>" + (folder / "messages").string();
+        return std::system(command.c_str());
+    }
+    static void expect_same_bits(const cv::Mat1f& a, const cv::Mat1f& b) {
+        ASSERT_EQ(a.size(), b.size());
+        int different = 0;
+        for (int v = 0; v < a.rows; ++v)
+            for (int u = 0; u < a.cols; ++u) // any NaN is as good as another: a file has one of its own
+                different += std::isnan(a(v, u)) ? !std::isnan(b(v, u)) : std::memcmp(&a(v, u), &b(v, u), 4) != 0;
+        EXPECT_EQ(different, 0);
+    }
+    fs::path folder;
+};
+
+TEST_F(LibraryTest, values_have_the_bits_that_the_program_writes) {
+    const fs::path image = folder / "depth.png";
+    cv::imwrite(image.string(), corner());
+    for (const char* method : {"cacao", "surfel"})
+        for (const char* noise : {"none", "kinect", "auto"}) {
+            const fs::path out = folder / (std::string(method) + noise);
+            ASSERT_EQ(
+                run("run " + image.string() + " -o " + out.string() +
+                    " --camera 525,525,319.5,239.5 --depth-scale mm --format tiff --write ao,confidence --method " +
+                    method + " --depth-noise " + noise),
+                0);
+            const Session session({{"method", method}, {"depth-noise", noise}});
+            const scanshade::Result result = session.compute(corner(), camera, "mm");
+            const cv::Mat1f ao = cv::imread((out / "ao" / "depth.tiff").string(), cv::IMREAD_UNCHANGED);
+            const cv::Mat1f confidence = cv::imread((out / "confidence" / "depth.tiff").string(), cv::IMREAD_UNCHANGED);
+            expect_same_bits(result.visibility(), ao);
+            expect_same_bits(result.confidence(), confidence);
+        }
+}
+
+TEST_F(LibraryTest, frames_of_a_capture_have_the_bits_that_the_program_writes_together_too) {
+    ASSERT_EQ(run("generate office -o " + (folder / "capture").string() + " --frames 4 --width 160 --height 120"), 0);
+    for (const char* sequence : {"off", "on"}) {
+        const fs::path out = folder / sequence;
+        ASSERT_EQ(run("run " + (folder / "capture").string() + " -o " + out.string() +
+                      " --format tiff --write ao --method surfel --sequence " + sequence),
+                  0);
+        const Session session({{"method", "surfel"}, {"sequence", sequence}});
+        const scanshade::Capture capture((folder / "capture").string());
+        ASSERT_EQ(capture.size(), 4);
+        for (const int index : {0, 3, 1}) { // forwards, and back
+            const scanshade::Frame frame = capture[index];
+            const fs::path file = out / "ao" / (frame.name() + ".tiff");
+            expect_same_bits(frame.compute(session).visibility(),
+                             cv::Mat1f(cv::imread(file.string(), cv::IMREAD_UNCHANGED)));
+        }
+    }
+}
+
+TEST_F(LibraryTest, threads_share_a_session) {
+    const Session session({{"depth-noise", "none"}});
+    const cv::Mat1f alone = session.compute(corner(), camera).visibility();
+    std::vector<cv::Mat1f> found(4);
+    std::vector<std::thread> threads;
+    for (cv::Mat1f& one : found)
+        threads.emplace_back([&] { one = session.compute(corner(), camera).visibility(); });
+    for (std::thread& thread : threads)
+        thread.join();
+    for (const cv::Mat1f& one : found)
+        expect_same_bits(one, alone);
+}
+
+TEST_F(LibraryTest, rows_may_be_parts_of_a_larger_image) {
+    const Session session({{"depth-noise", "none"}});
+    const cv::Mat whole = corner(), part = whole(cv::Rect(100, 50, 320, 240));
+    const Camera other{525, 525, 219.5, 189.5};
+    expect_same_bits(session.compute(part, other).visibility(), session.compute(part.clone(), other).visibility());
+}
+
+/// Points of a floor under a wall: open far from it, half closed beside it.
+TEST_F(LibraryTest, points_are_darker_in_a_corner) {
+    std::vector<Eigen::Vector3f> points;
+    for (int i = 0; i < 100; ++i)
+        for (int j = 0; j < 100; ++j) {
+            points.emplace_back(0.01F * static_cast<float>(i), 0.01F * static_cast<float>(j), 0.0F);
+            points.emplace_back(0.0F, 0.01F * static_cast<float>(j), 0.01F * static_cast<float>(i));
+        }
+    const Session session({{"cloud.radius", "0.2"}, {"cloud.outside", "2,0.5,2"}});
+    const scanshade::Result result = session.compute(points, {}, false, scanshade::with_all);
+    const cv::Mat1f visibility = result.visibility();
+    ASSERT_EQ(visibility.size(), cv::Size(20000, 1));
+    const auto floor = [](int i, int j) { return 2 * (100 * i + j); };
+    EXPECT_GT(visibility(floor(60, 50)), 0.95F);
+    EXPECT_LT(visibility(floor(3, 50)), 0.75F);
+    EXPECT_GT(result.normals()(floor(60, 50))[2], 0.99F); // towards the scanner
+}
+
+TEST_F(LibraryTest, mistakes_get_the_programs_own_sentence) {
+    EXPECT_EQ(why({{"radiuss", "1"}}), "--radiuss: no such flag; did you mean --radius?");
+    EXPECT_EQ(why({{"out", "x"}}), "--out: is a setting of the program, not of a session");
+    EXPECT_NE(why({{"radius", "wide"}}).find("radius: 'wide' given"), std::string::npos);
+    EXPECT_NE(why({{"method", "surfels"}}).find("method: 'surfels' given"), std::string::npos);
+    const Session session;
+    EXPECT_THROW((void)session.compute(cv::Mat1b(4, 4), camera), scanshade::Error);
+    try {
+        (void)session.compute(corner(), Camera{525, 525, 319.5, 239.5, {320, 240}});
+        ADD_FAILURE() << "a camera of another size was taken";
+    } catch (const scanshade::Error& error) {
+        EXPECT_EQ(error.status(), SCANSHADE_BAD_INPUT);
+        EXPECT_NE(std::string(error.what()).find("320x240"), std::string::npos);
+    }
+    EXPECT_THROW(scanshade::Capture("/nowhere"), scanshade::Error);
+}
+
+TEST(CInterface, works_from_c) { EXPECT_EQ(one_image_in_c(), 0); }
+
+TEST(CInterface, refuses_null_and_structs_of_no_size) {
+    scanshade_session* session = nullptr;
+    EXPECT_EQ(scanshade_session_open(nullptr, 0, nullptr), SCANSHADE_MISUSE);
+    ASSERT_EQ(scanshade_session_open(nullptr, 0, &session), SCANSHADE_OK);
+    scanshade_result* result = nullptr;
+    EXPECT_EQ(scanshade_compute_depth(session, nullptr, 0, &result), SCANSHADE_MISUSE);
+    scanshade_depth depth{};
+    EXPECT_EQ(scanshade_compute_depth(session, &depth, 0, &result), SCANSHADE_MISUSE);
+    EXPECT_NE(std::string(scanshade_last_error()).find("size 0 given"), std::string::npos);
+    EXPECT_EQ(scanshade_result_info(nullptr), nullptr);
+    scanshade_session_close(session);
+    scanshade_result_free(nullptr);
+}
+
+} // namespace

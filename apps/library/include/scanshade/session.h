@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <initializer_list>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <string>
@@ -109,6 +110,8 @@ class Session {
         detail::check(scanshade_session_open(all.data(), all.size(), &handle));
         handle_.reset(handle, scanshade_session_close);
     }
+
+    Session(std::initializer_list<Settings::value_type> settings) : Session(Settings(settings)) {}
 
     /// Ambient occlusion of a depth image: CV_16UC1 (0 and 65535 = hole) or CV_32FC1. `depth_scale`: "mm", "tum", "m"
     /// or units per metre; empty = millimetres of integers, metres of floats.

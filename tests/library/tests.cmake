@@ -1,0 +1,18 @@
+# Tests of the library through its public headers, in C++ and in C, and of the Python module.
+enable_language(C)
+add_executable(library_test tests/library/library_test.cpp tests/library/c_interface_c.c)
+target_link_libraries(library_test library Eigen3::Eigen opencv_core opencv_imgcodecs GTest::gtest_main)
+target_include_directories(library_test SYSTEM PRIVATE ${OpenCV_INCLUDE_DIRS})
+target_compile_options(library_test PRIVATE -Wall -Wextra $<$<BOOL:${WERROR}>:-Werror>)
+target_compile_definitions(library_test PRIVATE SCANSHADE_PROGRAM="$<TARGET_FILE:scanshade>")
+add_dependencies(library_test scanshade)
+add_test(NAME library_test COMMAND library_test)
+set_tests_properties(library_test PROPERTIES TIMEOUT 600)
+
+# -DPython3_EXECUTABLE= names another Python, such as that of a virtual environment with numpy and pytest.
+find_package(Python3 COMPONENTS Interpreter)
+if(Python3_FOUND)
+  add_test(NAME python_test COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tests/python/run)
+  set_tests_properties(python_test PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600 ENVIRONMENT
+    "SCANSHADE_LIBRARY=$<TARGET_FILE:library>;SCANSHADE_PROGRAM=$<TARGET_FILE:scanshade>;PYTHONPATH=${PROJECT_SOURCE_DIR}/apps/python")
+endif()
