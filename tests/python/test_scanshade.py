@@ -1,0 +1,179 @@
+"""The Python module against what the program writes for the same input, bit for bit; and its refusals."""
+
+import os
+import pickle
+import resource
+import subprocess
+import threading
+
+import numpy as np
+import pytest
+
+import scanshade
+
+K = np.array([[525.0, 0, 319.5], [0, 525.0, 239.5], [0, 0, 1]])
+
+
+def corner(width=640, height=480):
+    """Two walls that meet in a vertical edge, and a hole; millimetres."""
+    depth = np.repeat((2000 - 2 * np.abs(np.arange(width) - width // 2))[None], height, 0).astype(np.uint16)
+    depth[10:30, 10:40] = 0
+    return depth
+
+
+def run(*words):
+    subprocess.run([os.environ["SCANSHADE_PROGRAM"], *map(str, words)], check=True, capture_output=True)
+
+
+def write_pgm(path, depth):
+    with open(path, "wb") as file:
+        file.write(b"P5 %d %d 65535\n" % depth.shape[::-1] + depth.astype(">u2").tobytes())
+
+
+def written(path):
+    """A float map that the program wrote, read as a depth image in metres: NaN becomes 0, other values keep their bits."""
+    return scanshade.open(path, camera="525,525,319.5,239.5", depth_scale="m")[0].depth
+
+
+def assert_same_bits(values, path):
+    assert np.array_equal(np.nan_to_num(values).view(np.uint32), written(path).view(np.uint32))
+
+
+@pytest.mark.parametrize("method", ["cacao", "surfel"])
+@pytest.mark.parametrize("noise", ["none", "kinect", "auto"])
+def test_values_have_the_bits_that_the_program_writes(tmp_path, method, noise):
+    write_pgm(tmp_path / "depth.pgm", corner())
+    run("run", tmp_path / "depth.pgm", "-o", tmp_path / "out", "--camera", "525,525,319.5,239.5", "--depth-scale", "mm",
+        "--format", "tiff", "--write", "ao,confidence", "--method", method, "--depth-noise", noise)  # fmt: skip
+    r = scanshade.ambient_occlusion(corner(), K, method=method, depth_noise=noise, depth_scale="mm")
+    assert_same_bits(r.ao, tmp_path / "out/ao/depth.tiff")
+    assert_same_bits(r.confidence, tmp_path / "out/confidence/depth.tiff")
+    assert np.isnan(r.ao[15, 15]) and r.ao.dtype == np.float32
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recording") / "capture"
+    run("generate", "office", "-o", folder, "--frames", 4, "--size", "160x120", "--truth=false")
+    return folder
+
+
+@pytest.mark.parametrize("sequence", ["off", "on"])
+def test_frames_and_stacks_have_the_bits_that_the_program_writes(recording, tmp_path, sequence):
+    run("run", recording, "-o", tmp_path, "--format", "tiff", "--write", "ao", "--method", "surfel",
+        "--sequence", sequence)  # fmt: skip
+    capture = scanshade.open(recording)
+    assert len(capture) == 4
+    given = {"method": "surfel", "sequence": sequence}
+    frames = list(capture)
+    stack = scanshade.ambient_occlusion(
+        np.stack([f.depth for f in frames]), frames[0].K, poses=np.stack([f.world_from_camera for f in frames]), **given)
+    assert stack.ao.shape == (4, 120, 160)
+    for i, frame in enumerate(frames):
+        file = tmp_path / "ao" / f"{frame.name}.tiff"
+        expected = scanshade.open(file, camera="100,100,79.5,59.5", depth_scale="m")[0].depth
+        for values in (scanshade.ambient_occlusion(frame, **given).ao, stack.ao[i]):
+            assert np.array_equal(np.nan_to_num(values).view(np.uint32), expected.view(np.uint32))
+
+
+def test_a_capture_can_be_pickled_and_sliced(recording):
+    capture = pickle.loads(pickle.dumps(scanshade.open(recording)))
+    assert [frame.name for frame in capture[1:3]] == [entry["name"] for entry in capture.info["frames"]][1:3]
+    assert capture[-1].colour.shape == (120, 160, 3)
+    with pytest.raises(IndexError):
+        capture[4]
+
+
+def test_arrays_outlive_their_result():
+    values = scanshade.ambient_occlusion(corner(), K, depth_noise="none").ao
+    again = scanshade.ambient_occlusion(corner(), K, depth_noise="none").ao
+    assert np.array_equal(values, again, equal_nan=True) and not values.flags.writeable
+
+
+def test_images_may_be_views_of_larger_ones():
+    whole = corner()
+    part, camera = whole[50:290, 100:420], (525, 525, 219.5, 189.5)
+    a = scanshade.ambient_occlusion(part, camera, depth_noise="none").ao
+    b = scanshade.ambient_occlusion(part.copy(), camera, depth_noise="none").ao
+    assert np.array_equal(a, b, equal_nan=True)
+    flipped = scanshade.ambient_occlusion(whole[:, ::-1], K, depth_noise="none").ao  # negative strides are copied
+    copied = scanshade.ambient_occlusion(whole[:, ::-1].copy(), K, depth_noise="none").ao
+    assert np.array_equal(flipped, copied, equal_nan=True)
+
+
+def test_points_are_darker_in_a_corner():
+    """A floor under a wall: open far from it, darker beside it; the same from float32 rows that lie apart."""
+    i, j = (axis.ravel() / 100 for axis in np.mgrid[0:100, 0:100])
+    points = np.concatenate([np.stack([i, j, 0 * i], 1), np.stack([0 * i, j, i], 1)])
+    given = {"radius": 0.2, "cloud.outside": "2,0.5,2"}
+    values = scanshade.point_ambient_occlusion(points, **given)
+    assert values.shape == (20000,) and values[6050] > 0.95 > 0.75 > values[350]
+    rows = np.zeros((20000, 5), np.float32)
+    rows[:, :3] = points
+    apart = scanshade.point_ambient_occlusion(rows[:, :3], **given)
+    packed = scanshade.point_ambient_occlusion(rows[:, :3].copy(), **given)
+    assert np.array_equal(apart, packed)
+
+
+@pytest.mark.parametrize(
+    "call, part",
+    [
+        (lambda: scanshade.Session(radiu=1), "--radiu: no such flag; did you mean --radius?"),
+        (lambda: scanshade.Session(method="surfels"), "method: 'surfels' given"),
+        (lambda: scanshade.Session(out="x"), "--out: is a setting of the program"),
+        (lambda: scanshade.ambient_occlusion(corner().astype(int), K), "int64 given, expected uint16 or float32"),
+        (lambda: scanshade.ambient_occlusion(corner(), np.eye(4)), "K: shape (4, 4) given"),
+        (lambda: scanshade.ambient_occlusion(corner(), K, depth_scale="miles"), "miles"),
+        (lambda: scanshade.ambient_occlusion(corner(), K, poses=np.eye(4)), "poses: shape (4, 4) given"),
+        (lambda: scanshade.ambient_occlusion(corner()[None], K, poses=2 * np.eye(4)[None]), "pose 0: expected"),
+        (lambda: scanshade.point_ambient_occlusion(np.zeros((3, 2))), "points: shape (3, 2) given"),
+        (lambda: scanshade.open("/nowhere"), "/nowhere: no such file or folder"),
+        (lambda: scanshade.refine_camera("/nowhere"), "/nowhere"),
+    ],
+)
+def test_mistakes_get_a_sentence(call, part):
+    with pytest.raises(scanshade.Error) as refused:
+        call()
+    assert part in str(refused.value)
+
+
+def test_a_closed_session_refuses():
+    with scanshade.Session() as session:
+        pass
+    with pytest.raises(scanshade.Error, match="closed"):
+        session.ambient_occlusion(corner(), K)
+
+
+def test_threads_share_a_session_and_the_gil_is_released():
+    with scanshade.Session(depth_noise="none") as session:
+        alone = session.ambient_occlusion(corner(), K).ao
+        found, turns, done = [], 0, threading.Event()
+
+        def work():
+            found.extend(session.ambient_occlusion(corner(), K).ao for _ in range(5))
+            done.set()
+
+        thread = threading.Thread(target=work)
+        thread.start()
+        while not done.wait(0.001):  # turns only while the other thread's call has let go of the interpreter
+            turns += 1
+        thread.join()
+        assert turns > 5
+        assert all(np.array_equal(values, alone, equal_nan=True) for values in found)
+
+
+def test_memory_is_flat():
+    small, camera = corner(64, 48), (50, 50, 31.5, 23.5)
+    with scanshade.Session(depth_noise="none") as session:
+        for _ in range(200):
+            session.ambient_occlusion(small, camera)
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        for _ in range(1000):
+            session.ambient_occlusion(small, camera)
+        assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 4096  # KiB; a lost image each would be 24000
+
+
+def test_settings_are_listed():
+    names = {row["name"] for row in scanshade.settings() if row["for"] == "session"}
+    assert {"method", "radius", "surfel.radius", "cloud.rays", "sequence.fuse", "device"} <= names
+    assert "out" not in names
