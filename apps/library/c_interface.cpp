@@ -426,12 +426,13 @@ scanshade_status scanshade_compute_frame(scanshade_session* session, const scans
         require(session, "session");
         require(frame, "frame");
         const Capture& capture = frame->opened->capture;
-        const library::Source source{frame->opened, capture,
-                                     [frame, opened = frame->opened](std::size_t index) {
-                                         return index == frame->index ? frame->frame
-                                                                      : opened->capture.load(index, false);
-                                     },
-                                     [opened = frame->opened] { return opened->noise(); }};
+        // A session may keep the source for frames to come, and this one may be freed by then.
+        const library::Source source{
+            frame->opened, capture,
+            [frame = frame->frame, own = frame->index, opened = frame->opened](std::size_t index) {
+                return index == own ? frame : opened->capture.load(index, false);
+            },
+            [opened = frame->opened] { return opened->noise(); }};
         *result = new scanshade_result{
             session->session.compute(source, std::span(&frame->index, 1), wanted_from(outputs)), {}, {}};
     });

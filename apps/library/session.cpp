@@ -128,8 +128,8 @@ class Session::Sequence {
         sequence_.forget_before(first);
         frames_.erase(frames_.begin(), frames_.lower_bound(first));
         lowest_ = first;
-        compute_in_sequence(computed.work, source_.listing, sequence_);
         computed.row.index = index;
+        compute_in_sequence(computed.work, source_.listing, sequence_);
         if (wanted.normals)
             computed.normals = lease_->normals(computed.work.depth, options.noise).normals;
     }
