@@ -88,7 +88,8 @@ TEST_F(LibraryTest, values_have_the_bits_that_the_program_writes) {
 }
 
 TEST_F(LibraryTest, frames_of_a_capture_have_the_bits_that_the_program_writes_together_too) {
-    ASSERT_EQ(run("generate office -o " + (folder / "capture").string() + " --frames 4 --size 160x120 --truth=false"), 0);
+    ASSERT_EQ(run("generate office -o " + (folder / "capture").string() + " --frames 4 --size 160x120 --truth=false"),
+              0);
     for (const char* sequence : {"off", "on"}) {
         const fs::path out = folder / sequence;
         ASSERT_EQ(run("run " + (folder / "capture").string() + " -o " + out.string() +

@@ -9,6 +9,11 @@ add_dependencies(library_test scanshade)
 add_test(NAME library_test COMMAND library_test)
 set_tests_properties(library_test PROPERTIES TIMEOUT 600)
 
+add_executable(pcl_header_test tests/library/pcl_header_test.cpp)
+target_link_libraries(pcl_header_test library Eigen3::Eigen opencv_core PkgConfig::PCL_IO GTest::gtest_main)
+target_include_directories(pcl_header_test SYSTEM PRIVATE ${OpenCV_INCLUDE_DIRS})
+add_test(NAME pcl_header_test COMMAND pcl_header_test)
+
 # -DPython3_EXECUTABLE= names another Python, such as that of a virtual environment with numpy and pytest.
 find_package(Python3 COMPONENTS Interpreter)
 if(Python3_FOUND)
