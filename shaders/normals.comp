@@ -2,6 +2,7 @@
 // continues straight. Output with the depth: unit, facing the camera; (0, 0, 0) only in holes.
 //
 // Normals supplied with the view are kept, normalised and flipped to the camera; zero and non-finite ones are derived here.
+// Where depth is noisy they come from a neighbouring plane instead, and the pixel moves onto it.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -90,6 +91,31 @@ vec3 derived_normal(ivec2 p, float z, bool hole) {
     return dot(n, point) > 0.0 ? -n : n;
 }
 
+vec3 given_at(int index) {
+    return vec3(imageLoad(given, 3 * index).x, imageLoad(given, 3 * index + 1).x, imageLoad(given, 3 * index + 2).x);
+}
+
+bool is_usable(vec3 n) { return dot(n, n) > 1e-6 && dot(n, n) < 1e6; } // false for NaN
+
+// Plane fits leave pixels without a normal at outlines, where a normal derived from noisy depth would be a random one. Such a
+// pixel joins that plane of the 5x5 pixels around which comes nearest to it, within 3 sigma; else it faces the camera.
+vec4 joined(ivec2 p, float z, bool wanted) {
+    vec3 ray = ray_of(vec2(p));
+    vec4 joined_ = vec4(-normalize(ray), z);
+    float least = 3.0 * sigma_of(z);
+    for (int i = 0; wanted && i < 25; ++i) {
+        ivec2 q = p + ivec2(i % 5, i / 5) - 2;
+        float zq = depth_at(q);
+        vec3 n = given_at(zq > 0.0 ? index_of(q) : 0);
+        float z_there = zq * dot(n, ray_of(vec2(q))) / dot(n, ray), apart = abs(z_there - z);
+        bool nearer = zq > 0.0 && is_usable(n) && apart < least && abs(z_there - zq) < 0.1 * zq;
+        n *= inversesqrt(dot(n, n)) * (dot(n, ray) > 0.0 ? -1.0 : 1.0);
+        joined_ = nearer ? vec4(n, z_there) : joined_;
+        least = nearer ? apart : least;
+    }
+    return joined_;
+}
+
 void main() {
     k = constants;
     ivec2 p = ivec2(gl_GlobalInvocationID.xy);
@@ -98,14 +124,13 @@ void main() {
     int here = index_of(p);
     float z = imageLoad(depth_in, here).x;
     bool hole = !(z > 0.0);
-    vec3 n = derived_normal(p, hole ? 1.0 : z, hole);
-    if (supplied != 0) {
-        vec3 own = vec3(imageLoad(given, 3 * here).x, imageLoad(given, 3 * here + 1).x, imageLoad(given, 3 * here + 2).x);
-        float length2 = dot(own, own);
-        bool usable = length2 > 1e-6 && length2 < 1e6; // false for NaN
-        own *= dot(own, ray_of(vec2(p))) > 0.0 ? -1.0 : 1.0;
-        n = usable ? own * inversesqrt(length2) : n;
-    }
-    n = hole ? vec3(0.0) : n;
-    surfaces[here] = vec4(n, z);
+    bool noisy = k.noise_floor > 0.0 || k.noise_per_z2 > 0.0;
+    vec3 own = supplied != 0 ? given_at(here) : vec3(0.0);
+    bool usable = supplied != 0 && is_usable(own);
+    vec4 surface;
+    if (supplied != 0 && noisy) surface = joined(p, hole ? 1.0 : z, !usable && !hole);
+    else surface = vec4(derived_normal(p, hole ? 1.0 : z, hole), z);
+    own *= dot(own, ray_of(vec2(p))) > 0.0 ? -1.0 : 1.0;
+    surface = usable ? vec4(own * inversesqrt(dot(own, own)), z) : surface;
+    surfaces[here] = hole ? vec4(0.0) : surface;
 }

@@ -188,15 +188,22 @@ struct SharedPasses {
     }
 };
 
-cv::Mat3f normals_of(const DepthImage& depth, const cv::Mat3f& supplied = {}) {
+/// Normal and depth of each pixel.
+cv::Mat4f surfaces_of(const DepthImage& depth, const cv::Mat3f& supplied = {}, const DepthNoise& noise = {}) {
     SharedPasses passes(depth.z_m.size(), !supplied.empty());
     passes.put(SharedPasses::depth, depth.z_m);
     if (!supplied.empty())
         passes.put(SharedPasses::given, supplied);
-    const shared::ScreenConstants k = constants_from(ScreenOptions{}, {depth});
+    const shared::ScreenConstants k = constants_from(ScreenOptions{}, {.surfaces = depth, .noise = noise});
     passes.program->run(std::as_bytes(std::span(&k, 1)));
+    cv::Mat4f surfaces(depth.z_m.size());
+    std::ranges::copy(passes.program->host_as<cv::Vec4f>(SharedPasses::surfaces), surfaces.begin());
+    return surfaces;
+}
+
+cv::Mat3f normals_of(const DepthImage& depth, const cv::Mat3f& supplied = {}) {
+    const cv::Mat4f surfaces = surfaces_of(depth, supplied);
     cv::Mat3f normals(depth.z_m.size());
-    const auto surfaces = passes.program->host_as<cv::Vec4f>(SharedPasses::surfaces);
     std::ranges::transform(surfaces, normals.begin(), [](const cv::Vec4f& s) { return cv::Vec3f(s[0], s[1], s[2]); });
     return normals;
 }
@@ -271,6 +278,31 @@ TEST_F(Classics, supplied_normals_are_kept_and_mended) {
     EXPECT_LT(degrees_between(normals(5, 6), derived), 0.1);
     EXPECT_LT(degrees_between(normals(7, 8), derived), 0.1);
     EXPECT_NEAR(cv::norm(normals(0, 0)), 1, 1e-5);
+}
+
+TEST_F(Classics, pixels_without_a_plane_join_one_within_three_sigma_and_else_face_the_camera) {
+    // Differences of noisy depth tell no normal. Two sigma from the neighbours' plane a pixel is of that plane; half a
+    // metre before it, a pixel is something of its own, and stays where it is.
+    const DepthImage clean = seen(room_camera({32, 24}), plane(30));
+    const cv::Vec3f plane_normal(0.5F, 0, static_cast<float>(-std::cos(pi / 6)));
+    cv::Mat3f given(clean.z_m.size(), plane_normal);
+    DepthImage depth{clean.camera, clean.z_m.clone(), {}};
+    depth.z_m(5, 6) += 0.02F;
+    depth.z_m(15, 20) -= 0.5F;
+    given(5, 6) = given(15, 20) = {0, 0, 0};
+    const cv::Mat4f surfaces = surfaces_of(depth, given, {.floor_m = 0.01});
+    const auto normal_of = [&](int v, int u) {
+        const cv::Vec4f& s = surfaces(v, u);
+        return cv::Vec3f(s[0], s[1], s[2]);
+    };
+    EXPECT_NEAR(surfaces(5, 6)[3], clean.z_m(5, 6), 1e-4);
+    EXPECT_LT(degrees_between(normal_of(5, 6), plane_normal), 0.1);
+    EXPECT_EQ(surfaces(15, 20)[3], depth.z_m(15, 20));
+    const Pinhole& camera = depth.camera;
+    const cv::Vec3f to_camera(static_cast<float>((camera.cx - 20) / camera.fx),
+                              static_cast<float>((camera.cy - 15) / camera.fy), -1);
+    EXPECT_LT(degrees_between(normal_of(15, 20), to_camera), 0.1);
+    EXPECT_EQ(surfaces(10, 10)[3], depth.z_m(10, 10)); // a pixel with a plane stays where its plane is
 }
 
 // ------------------------------------------------------------------------------------------------- denoise
