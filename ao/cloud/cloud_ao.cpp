@@ -227,6 +227,8 @@ class CloudAo::Work {
         const auto [points, normals] = picked(kept);
         CloudAoOptions options = options_;
         options.radius = result_.radius;
+        if (sides_.recorded_believed)
+            options.normals = CloudNormals::recorded;
         const PointSet part{points, normals, {}, cloud_.z_up};
         Work some(options, nullptr, up_, given_viewpoint_, part, scanner_);
         some.part_ = true;
@@ -253,7 +255,7 @@ class CloudAo::Work {
         if (some.empty())
             return;
         const double share = static_cast<double>(some.size()) / static_cast<double>(valid_.size());
-        result_.spacing = static_cast<double>(cloud_surface(LocalCloud(some), {}).spacing) * std::sqrt(share);
+        result_.spacing = static_cast<double>(spacing_of(LocalCloud(some))) * std::sqrt(share);
         const double extent = extent_.size;
         result_.radius = options_.radius > 0 ? options_.radius : default_radius(extent, result_.spacing);
         result_.notes.push_back(

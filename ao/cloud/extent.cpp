@@ -18,26 +18,29 @@ using Eigen::Vector3d;
 
 constexpr double lonely_share = 0.1; ///< distance of the sixth neighbour / distance from the centre
 
-Vector3d median_of(std::span<const Vector3d> points) {
-    Vector3d middle;
-    std::vector<double> along(points.size());
-    for (int axis = 0; axis < 3; ++axis) {
+/// `of(coordinates)` along each axis; it may reorder them.
+template <class Of>
+Vector3d along_axes(std::span<const Vector3d> points, Of&& of) {
+    Vector3d result;
+    tbb::parallel_for(0, 3, [&](int axis) {
+        std::vector<double> along(points.size());
         std::transform(points.begin(), points.end(), along.begin(), [&](const Vector3d& p) { return p[axis]; });
-        middle[axis] = ranked(along, along.size() / 2);
-    }
-    return middle;
+        result[axis] = of(along);
+    });
+    return result;
+}
+
+Vector3d median_of(std::span<const Vector3d> points) {
+    return along_axes(points, [](std::vector<double>& along) { return ranked(along, along.size() / 2); });
 }
 
 /// The diagonal of the box that holds all but the lowest and highest hundredth along each axis.
 double size_of(std::span<const Vector3d> points) {
-    Vector3d sizes;
-    std::vector<double> along(points.size());
-    for (int axis = 0; axis < 3; ++axis) {
-        std::transform(points.begin(), points.end(), along.begin(), [&](const Vector3d& p) { return p[axis]; });
-        std::sort(along.begin(), along.end());
+    const Vector3d sizes = along_axes(points, [](std::vector<double>& along) {
         const std::size_t cut = along.size() / 100;
-        sizes[axis] = along[along.size() - 1 - cut] - along[cut];
-    }
+        const double low = ranked(along, cut);
+        return ranked(along, along.size() - 1 - cut) - low;
+    });
     return sizes.norm();
 }
 
@@ -64,9 +67,10 @@ Extent extent_of(std::span<const Vector3d> sample) {
         for (std::uint32_t i = 0; i < sample.size(); ++i)
             far.emplace_back((sample[i] - extent.centre).norm(), i);
     }
-    std::sort(far.begin(), far.end());
     constexpr double surely = 0.98, step = 2;
     std::size_t last = static_cast<std::size_t>(surely * static_cast<double>(far.size() - 1));
+    (void)ranked(far, last);
+    std::sort(far.begin() + static_cast<std::ptrdiff_t>(last), far.end());
     while (last + 1 < far.size() && far[last + 1].first <= step * far[last].first)
         ++last;
     // The sample may have missed the farthest of the cloud; half of the step is left to them.

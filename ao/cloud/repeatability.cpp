@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+#include <Eigen/Core>
 #include <tbb/parallel_for.h>
 
 namespace scanshade {
@@ -29,14 +29,20 @@ void find_nearest(const NeighbourTree& tree, std::span<const Vector3f> positions
         apart = std::max(apart, (position - positions[0]).norm());
     }
     constexpr std::size_t most = 256;
+    using Row = Eigen::Array<float, Eigen::Dynamic, 1, Eigen::ColMajor, most, 1>;
     std::array<std::uint32_t, most> candidates;
+    std::array<Row, 3> along; // their coordinates
+    along.fill(Row(static_cast<Eigen::Index>(most)));
     std::size_t count = 0;
     bool fits = true;
     const float reach = (to_first + apart) * (1 + 1e-5F); // to the first one's nearest point at most
     tree.for_each_leaf_near(round, reach * reach, [&](std::size_t begin, std::size_t end) {
         fits = count + (end - begin) <= most;
-        for (std::size_t i = begin; fits && i < end; ++i)
-            candidates[count++] = static_cast<std::uint32_t>(i);
+        for (std::size_t i = begin; fits && i < end; ++i, ++count) {
+            candidates[count] = static_cast<std::uint32_t>(i);
+            for (int axis = 0; axis < 3; ++axis)
+                along[static_cast<std::size_t>(axis)][static_cast<Eigen::Index>(count)] = tree[i][axis];
+        }
         return fits;
     });
     for (std::size_t k = 0; k < positions.size(); ++k) {
@@ -45,13 +51,14 @@ void find_nearest(const NeighbourTree& tree, std::span<const Vector3f> positions
             nearest[k] = single.all()[0].point;
             continue;
         }
-        float least = std::numeric_limits<float>::infinity();
-        nearest[k] = candidates[0];
-        for (std::size_t c = 0; c < count; ++c)
-            if (const float distance2 = (tree[candidates[c]] - positions[k]).squaredNorm(); distance2 < least) {
-                least = distance2;
-                nearest[k] = candidates[c];
-            }
+        const auto off = [&](int axis) {
+            return (along[static_cast<std::size_t>(axis)].head(static_cast<Eigen::Index>(count)) - positions[k][axis])
+                .square();
+        };
+        const Row distance2 = off(0) + off(1) + off(2);
+        Eigen::Index least = 0;
+        distance2.minCoeff(&least);
+        nearest[k] = candidates[static_cast<std::size_t>(least)];
     }
 }
 

@@ -26,13 +26,13 @@ CloudSurface thinned(const CloudSurface& surface, std::size_t wanted) {
 } // namespace
 
 /// The sides that the cloud itself tells, or a person.
-Sides SettledSides::found_in(const CloudSurface& surface, std::optional<DiscRays>& rays,
+Sides SettledSides::found_in(const CloudSurface& surface, const Patches& patches, std::optional<DiscRays>& rays,
                              const SidesEffort& effort) const {
     using Kind = NormalOrientation::Kind;
     if (orientation.kind == Kind::viewpoint)
         return sides_to(surface, (orientation.point - surface.middle).cast<float>());
     if (orientation.kind == Kind::direction)
-        return sides_of(surface, nullptr, orientation.point.cast<float>().normalized(), SidesRule::up);
+        return sides_of(surface, patches, nullptr, orientation.point.cast<float>().normalized(), SidesRule::up);
     if (!rays)
         rays.emplace(surface);
     const std::optional<Vector3f> up =
@@ -41,13 +41,13 @@ Sides SettledSides::found_in(const CloudSurface& surface, std::optional<DiscRays
                            : orientation.kind == Kind::outward ? SidesRule::outward
                            : orientation.kind == Kind::inward  ? SidesRule::inward
                                                                : SidesRule::automatic;
-    return sides_of(surface, &*rays, up, rule, effort);
+    return sides_of(surface, patches, &*rays, up, rule, effort);
 }
 
 std::vector<float> SettledSides::settle(CloudSurface& surface, std::optional<DiscRays>& rays, bool recorded) {
     if (recorded)
         return settle_recorded(surface, rays);
-    Sides found = found_in(surface, rays);
+    Sides found = found_in(surface, patches_of(surface), rays);
     tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
         if (found.sign[i] < 0)
             surface.normals[i] = -surface.normals[i];
@@ -84,25 +84,28 @@ std::vector<float> SettledSides::settle_recorded(CloudSurface& surface, std::opt
         constexpr double enough = 0.3; // of the points: else nothing is said
         return all > enough * static_cast<double>(of.size()) ? opposed / all : 0;
     };
-    const auto all_is_well = [&](const CloudSurface& of, std::optional<DiscRays>& rays_of) {
+    const auto all_is_well = [&](const CloudSurface& of, const Patches& patches, std::optional<DiscRays>& rays_of) {
         constexpr SidesEffort quick{4000, 60, 300};
-        return recorded_sides(of).random <= hardly_random &&
-               opposed_share(of, found_in(of, rays_of, quick)) <= some_opposed;
+        recorded_believed = recorded_sides(of, patches).random <= hardly_random &&
+                            opposed_share(of, found_in(of, patches, rays_of, quick)) <= some_opposed;
+        return recorded_believed;
     };
-    if (constexpr std::size_t enough = 100000; !told && surface.size() > 2 * enough) {
+    constexpr std::size_t enough = 100000;
+    const bool large = surface.size() > 2 * enough;
+    if (!told && large) {
         const CloudSurface some = thinned(surface, enough);
-        if (std::optional<DiscRays> rays_of_some; all_is_well(some, rays_of_some))
+        if (std::optional<DiscRays> rays_of_some; all_is_well(some, patches_of(some), rays_of_some))
             return {};
-    } else if (!told && all_is_well(surface, rays)) {
-        return {};
     }
-    const RecordedSides order = recorded_sides(surface);
+    const Patches patches = patches_of(surface);
+    if (!told && !large && all_is_well(surface, patches, rays))
+        return {};
+    const RecordedSides order = recorded_sides(surface, patches);
     const bool in_order = order.random <= hardly_random;
-    Sides found;
-    double opposed = 0;
-    found = found_in(surface, rays);
-    opposed = opposed_share(surface, found);
-    if (in_order && !told && opposed <= some_opposed)
+    Sides found = found_in(surface, patches, rays);
+    const double opposed = opposed_share(surface, found);
+    recorded_believed = in_order && !told && opposed <= some_opposed;
+    if (recorded_believed)
         return {};
     if (constexpr double clearly = 0.3; in_order && !told && opposed > all_opposed && found.margin < clearly) {
         const bool viewed = orientation.kind == NormalOrientation::Kind::viewpoint;

@@ -22,6 +22,7 @@ class SettledSides {
     std::size_t turned_points = 0;   ///< whose recorded normals were turned
     std::size_t judged_points = 0;   ///< of the surfaces where some were
     std::string turned_why;
+    bool recorded_believed = false; ///< recorded sides were looked at, and are right
 
     /// Turns the normals to the sides that were scanned. Returns how sure that is, 0 .. 1, by index in the tree; empty
     /// where the recorded sides are taken. `rays` are made of the surface if they are needed. `recorded`: the normals
@@ -29,7 +30,7 @@ class SettledSides {
     std::vector<float> settle(CloudSurface& surface, std::optional<DiscRays>& rays, bool recorded);
 
   private:
-    [[nodiscard]] Sides found_in(const CloudSurface& surface, std::optional<DiscRays>& rays,
+    [[nodiscard]] Sides found_in(const CloudSurface& surface, const Patches& patches, std::optional<DiscRays>& rays,
                                  const SidesEffort& effort = {}) const;
     std::vector<float> settle_recorded(CloudSurface& surface, std::optional<DiscRays>& rays);
     void note(const Sides& found);

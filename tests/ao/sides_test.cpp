@@ -80,7 +80,7 @@ TEST(Patches, agree_within_themselves_and_end_at_corners) {
     for (Vector3f& normal : surface.normals)
         if (dice.roll() < 0.5)
             normal = -normal;
-    const Patches patches = patches_of(surface, SurePairs(surface));
+    const Patches patches = patches_of(surface);
     std::vector<Vector3f> sides(patches.count, Vector3f::Zero());
     std::size_t opposed = 0;
     for (std::size_t i = 0; i < surface.size(); ++i) {
@@ -100,7 +100,10 @@ TEST(RecordedSides, tell_random_signs_from_thin_boards) {
         board[i].z() = i % 2 ? 0.008 : 0;
         normals.emplace_back(0, 0, i % 2 ? 1 : -1);
     }
-    const auto random_share = [&] { return recorded_sides(cloud_surface(LocalCloud(board), normals)).random; };
+    const auto random_share = [&] {
+        const CloudSurface surface = cloud_surface(LocalCloud(board), normals);
+        return recorded_sides(surface, patches_of(surface)).random;
+    };
     EXPECT_LT(random_share(), 0.02) << "two sheets";
     Dice dice(7);
     for (Vector3d& normal : normals)

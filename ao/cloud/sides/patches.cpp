@@ -2,8 +2,10 @@
 #include "ao/cloud/sides/patches.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
+#include <tbb/parallel_for.h>
 #include <utility>
 
 namespace scanshade {
@@ -56,12 +58,28 @@ class Pieces {
     std::vector<std::uint32_t> size_;
 };
 
-} // namespace
+/// Pairs of neighbours, the surest ones first, whose planes are less than 75 degrees apart. Sure pairs have parallel
+/// planes, each point within the plane of the other.
+class SurePairs {
+  public:
+    using Pair = std::array<std::uint32_t, 2>;
+
+    explicit SurePairs(const CloudSurface& surface);
+    [[nodiscard]] const std::vector<Pair>& all() const { return pairs_; }
+    /// How sure all pairs from this one on are at most, 0 .. 1.
+    [[nodiscard]] float sureness(std::size_t pair) const;
+
+  private:
+    std::vector<Pair> pairs_;
+    std::vector<std::size_t> starts_; ///< of the classes of equal sureness
+};
 
 SurePairs::SurePairs(const CloudSurface& surface) : starts_(classes + 1, 0) {
     constexpr float least = 0.26F; // the cosine of 75 degrees
-    const auto for_each_pair = [&](auto&& visit) {
-        for (std::size_t i = 0; i < surface.size(); ++i) {
+    constexpr std::size_t at_once = 1 << 13;
+    const std::size_t blocks = (surface.size() + at_once - 1) / at_once;
+    const auto for_each_pair = [&](std::size_t block, auto&& visit) {
+        for (std::size_t i = block * at_once; i < std::min((block + 1) * at_once, surface.size()); ++i) {
             if (surface.normals[i].isZero())
                 continue;
             for (const std::uint32_t j : surface.near[i]) {
@@ -79,11 +97,23 @@ SurePairs::SurePairs(const CloudSurface& surface) : starts_(classes + 1, 0) {
             }
         }
     };
-    for_each_pair([&](std::uint32_t, std::uint32_t, std::size_t rank) { ++starts_[rank + 1]; });
-    std::partial_sum(starts_.begin(), starts_.end(), starts_.begin());
-    pairs_.resize(starts_.back());
-    std::vector<std::size_t> next = starts_;
-    for_each_pair([&](std::uint32_t i, std::uint32_t j, std::size_t rank) { pairs_[next[rank]++] = {i, j}; });
+    std::vector<std::array<std::size_t, classes>> next(blocks); // by block and class, where its pairs go
+    tbb::parallel_for(std::size_t(0), blocks, [&](std::size_t block) {
+        next[block].fill(0);
+        for_each_pair(block, [&](std::uint32_t, std::uint32_t, std::size_t rank) { ++next[block][rank]; });
+    });
+    std::size_t before = 0;
+    for (std::size_t rank = 0; rank < classes; ++rank) {
+        for (auto& block : next)
+            before += std::exchange(block[rank], before);
+        starts_[rank + 1] = before;
+    }
+    pairs_.resize(before);
+    tbb::parallel_for(std::size_t(0), blocks, [&](std::size_t block) {
+        for_each_pair(block, [&](std::uint32_t i, std::uint32_t j, std::size_t rank) {
+            pairs_[next[block][rank]++] = {i, j};
+        });
+    });
 }
 
 float SurePairs::sureness(std::size_t pair) const {
@@ -91,7 +121,27 @@ float SurePairs::sureness(std::size_t pair) const {
     return 1 - static_cast<float>(after - starts_.begin() - 1) / (classes - 1);
 }
 
-Patches patches_of(const CloudSurface& surface, const SurePairs& pairs) {
+/// As Patches::links says.
+std::vector<SignedGraph::Link> links_between(const Patches& patches, const CloudSurface& surface,
+                                             const SurePairs& pairs) {
+    std::vector<SignedGraph::Link> links;
+    const std::vector<SurePairs::Pair>& all = pairs.all();
+    for (std::size_t k = 0; k < all.size(); ++k) {
+        const auto& [i, j] = all[k];
+        const std::uint32_t a = patches.patch[i], b = patches.patch[j];
+        if (a == b)
+            continue;
+        const double sureness = static_cast<double>(pairs.sureness(k));
+        const int sign = (surface.normals[i].dot(surface.normals[j]) < 0 ? -1 : 1) * patches.sign(i) * patches.sign(j);
+        links.push_back({std::min(a, b), std::max(a, b), sign * sureness * sureness});
+    }
+    return summed(std::move(links));
+}
+
+} // namespace
+
+Patches patches_of(const CloudSurface& surface) {
+    const SurePairs pairs(surface);
     constexpr float sure = 0.85F, likely = 0.6F;
     constexpr std::uint32_t crumb = 8;
     const auto most = static_cast<std::uint32_t>(std::max<std::size_t>(32, surface.size() / 3000));
@@ -110,7 +160,7 @@ Patches patches_of(const CloudSurface& surface, const SurePairs& pairs) {
         if (small)
             pieces.join(one, other, surface.normals[i].dot(surface.normals[j]) < 0);
     }
-    Patches patches{std::vector<std::uint32_t>(surface.size()), std::vector<char>(surface.size()), 0};
+    Patches patches{std::vector<std::uint32_t>(surface.size()), std::vector<char>(surface.size()), 0, {}};
     constexpr auto nobody = static_cast<std::uint32_t>(-1);
     std::vector<std::uint32_t> number(surface.size(), nobody);
     for (std::size_t i = 0; i < surface.size(); ++i) {
@@ -120,12 +170,26 @@ Patches patches_of(const CloudSurface& surface, const SurePairs& pairs) {
         patches.patch[i] = number[piece];
         patches.turned[i] = turned;
     }
+    patches.links = links_between(patches, surface, pairs);
     return patches;
 }
 
 std::vector<SignedGraph::Link> summed(std::vector<SignedGraph::Link> links) {
-    std::stable_sort(links.begin(), links.end(), [](const SignedGraph::Link& one, const SignedGraph::Link& other) {
-        return one.a != other.a ? one.a < other.a : one.b < other.b;
+    std::vector<std::size_t> starts(2, 0); // by first node
+    for (const SignedGraph::Link& link : links) {
+        if (link.a + 2 >= starts.size())
+            starts.resize(2 * std::size_t(link.a) + 3, 0);
+        ++starts[link.a + 2];
+    }
+    std::partial_sum(starts.begin(), starts.end(), starts.begin());
+    std::vector<SignedGraph::Link> sorted(links.size());
+    for (const SignedGraph::Link& link : links)
+        sorted[starts[link.a + 1]++] = link;
+    links.swap(sorted);
+    tbb::parallel_for(std::size_t(0), starts.size() - 1, [&](std::size_t a) {
+        std::stable_sort(links.begin() + static_cast<std::ptrdiff_t>(starts[a]),
+                         links.begin() + static_cast<std::ptrdiff_t>(starts[a + 1]),
+                         [](const SignedGraph::Link& one, const SignedGraph::Link& other) { return one.b < other.b; });
     });
     std::size_t kept = 0;
     for (std::size_t k = 0; k < links.size(); ++k) {
@@ -136,22 +200,6 @@ std::vector<SignedGraph::Link> summed(std::vector<SignedGraph::Link> links) {
     }
     links.resize(kept);
     return links;
-}
-
-std::vector<SignedGraph::Link> surface_links(const CloudSurface& surface, const SurePairs& pairs,
-                                             const Patches& patches) {
-    std::vector<SignedGraph::Link> links;
-    const std::vector<SurePairs::Pair>& all = pairs.all();
-    for (std::size_t k = 0; k < all.size(); ++k) {
-        const auto& [i, j] = all[k];
-        const std::uint32_t a = patches.patch[i], b = patches.patch[j];
-        if (a == b)
-            continue;
-        const double sureness = static_cast<double>(pairs.sureness(k));
-        const int sign = (surface.normals[i].dot(surface.normals[j]) < 0 ? -1 : 1) * patches.sign(i) * patches.sign(j);
-        links.push_back({std::min(a, b), std::max(a, b), sign * sureness * sureness});
-    }
-    return summed(std::move(links));
 }
 
 } // namespace scanshade

@@ -1,5 +1,4 @@
 // Sides that are given: to a position, or recorded ones.
-#include "ao/cloud/sides/patches.h"
 #include "ao/cloud/sides/sides.h"
 
 #include <cmath>
@@ -25,8 +24,7 @@ Sides sides_to(const CloudSurface& surface, const Vector3f& position) {
     return sides;
 }
 
-RecordedSides recorded_sides(const CloudSurface& surface) {
-    const Patches patches = patches_of(surface, SurePairs(surface));
+RecordedSides recorded_sides(const CloudSurface& surface, const Patches& patches) {
     std::vector<std::array<std::uint32_t, 2>> kinds(patches.count, {0, 0});
     for (std::size_t i = 0; i < surface.size(); ++i)
         ++kinds[patches.patch[i]][patches.turned[i] ? 1 : 0];

@@ -1,7 +1,6 @@
 // Sides of planes by shared free space and by stations; see the header for the idea.
 #include "ao/cloud/sides/sides.h"
 
-#include "ao/cloud/sides/patches.h"
 #include "ao/cloud/sides/stations.h"
 
 #include <algorithm>
@@ -266,17 +265,15 @@ Judged judged(const CloudSurface& surface, const DiscRays& rays, const Patches& 
 
 } // namespace
 
-Sides sides_of(const CloudSurface& surface, const DiscRays* rays, const std::optional<Vector3f>& up, SidesRule rule,
-               const SidesEffort& effort) {
+Sides sides_of(const CloudSurface& surface, const Patches& patches, const DiscRays* rays,
+               const std::optional<Vector3f>& up, SidesRule rule, const SidesEffort& effort) {
     Sides sides{Signs(surface.size(), 1), std::vector<float>(surface.size(), 0.0F), {}, 0, {}};
     const Reach reach = reach_of(surface);
     if (!(reach.far > 0)) {
         sides.why = "as estimated: there are no surfaces to tell sides by";
         return sides;
     }
-    const SurePairs pairs(surface);
-    const Patches patches = patches_of(surface, pairs);
-    const std::vector<Link> near = surface_links(surface, pairs, patches);
+    const std::vector<Link>& near = patches.links;
     auto [label, evidence, decision] = [&]() -> Judged {
         if (rule != SidesRule::up)
             return judged(surface, *rays, patches, near, up, rule, effort, reach);

@@ -1,6 +1,7 @@
 // Which side of every plane of a cloud a scanner saw, without being told where it stood.
 #pragma once
 
+#include "ao/cloud/sides/patches.h"
 #include "ao/cloud/surface/disc_rays.h"
 
 #include <optional>
@@ -38,9 +39,10 @@ enum class SidesRule {
 /// Free space is shared: a ray that leaves one plane and meets another tells that both sides are scanned or neither is.
 /// And a scanner sees fronts only: places that see much and hardly any back are as good as the true ones. Both are put
 /// into signed graphs of patches: first the signs relative to each other, then those to
-/// the stations. `rays` must be made of the surface; null for SidesRule::up alone. With `up`, known to point to the
-/// sky, nobody looks from below, and where no station sees clean fronts (plants), planes face up.
-[[nodiscard]] Sides sides_of(const CloudSurface& surface, const DiscRays* rays,
+/// the stations. `patches` and `rays` must be made of the surface; `rays` may be null for SidesRule::up alone. With
+/// `up`, known to point to the sky, nobody looks from below, and where no station sees clean fronts (plants), planes
+/// face up.
+[[nodiscard]] Sides sides_of(const CloudSurface& surface, const Patches& patches, const DiscRays* rays,
                              const std::optional<Eigen::Vector3f>& up, SidesRule rule = SidesRule::automatic,
                              const SidesEffort& effort = {});
 
@@ -55,6 +57,6 @@ struct RecordedSides {
 };
 /// Of a surface whose normals are recorded ones. A patch of eight or more points is in order if fewer than a tenth
 /// oppose the others. So it is if those that do make a sheet of its own: they stand higher.
-[[nodiscard]] RecordedSides recorded_sides(const CloudSurface& surface);
+[[nodiscard]] RecordedSides recorded_sides(const CloudSurface& surface, const Patches& patches);
 
 } // namespace scanshade

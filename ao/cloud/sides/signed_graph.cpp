@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Dense>
+#include <limits>
 #include <tbb/parallel_for.h>
+#include <utility>
 
 namespace scanshade {
 namespace {
@@ -71,6 +73,12 @@ class Matrix {
   private:
     template <class Visit>
     void for_each(Visit&& visit) const {
+        constexpr std::size_t worth_tasks = 100000; // links: waking threads costs more than a product of fewer
+        if (rows_.links.size() < worth_tasks) {
+            for (std::size_t node = 0; node < rows_.size(); ++node)
+                visit(node);
+            return;
+        }
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rows_.size(), 256), [&](const auto& range) {
             for (std::size_t node = range.begin(); node < range.end(); ++node)
                 visit(node);
@@ -81,7 +89,8 @@ class Matrix {
     Eigen::VectorXd weight_, scale_, scaled_;
 };
 
-/// By Lanczos' iteration (1950), every new direction made orthogonal to all before.
+/// By Lanczos' iteration (1950), every new direction made orthogonal to all before. Once suffices unless that takes
+/// most of its length (Daniel, Gragg, Kaufman and Stewart 1976).
 Eigen::VectorXd leading_eigenvector(Matrix& matrix) {
     const Eigen::Index steps = std::min<Eigen::Index>(100, matrix.size());
     Eigen::MatrixXd basis(matrix.size(), steps);
@@ -100,9 +109,14 @@ Eigen::VectorXd leading_eigenvector(Matrix& matrix) {
         const Eigen::VectorXd direction = basis.col(done);
         matrix.multiply(direction, next);
         diagonal[done] = next.dot(direction);
-        for (int twice = 0; twice < 2; ++twice) {
-            const auto before = basis.leftCols(done + 1);
-            next -= before * (before.transpose() * next).eval();
+        next -= diagonal[done] * direction;
+        if (done > 0)
+            next -= beside[done - 1] * basis.col(done - 1);
+        constexpr double most = 0.5;
+        for (double before = std::numeric_limits<double>::infinity(), left = next.norm(); left < most * before;) {
+            const auto directions = basis.leftCols(done + 1);
+            next -= directions * (directions.transpose() * next).eval();
+            before = std::exchange(left, next.norm());
         }
     }
     if (done == 0)

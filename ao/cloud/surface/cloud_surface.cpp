@@ -93,6 +93,15 @@ void orient_like_given(CloudSurface& surface, std::span<const Vector3d> given) {
 
 } // namespace
 
+float spacing_of(const LocalCloud& points) {
+    constexpr std::size_t wanted = 6;
+    std::vector<float> sixth(points.size());
+    for_each_neighbourhood(points.tree, wanted, [&](std::size_t i, std::span<const Nearest::Neighbour> near) {
+        sixth[i] = near.empty() ? 0 : std::sqrt(near.back().distance2);
+    });
+    return median_of_lengths(sixth) / sixth_on_grid;
+}
+
 CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normals, CloudGpu* gpu,
                            std::span<const Vector3f> axes) {
     const std::size_t count = points.size();

@@ -56,6 +56,9 @@ struct CloudSurface {
     [[nodiscard]] std::uint32_t weight(std::size_t index) const { return stands_for.empty() ? 1 : stands_for[index]; }
 };
 
+/// The median distance of points, as CloudSurface::spacing has it.
+[[nodiscard]] float spacing_of(const LocalCloud& points);
+
 /// Finds neighbours and planes of `points`. `normals` is empty or holds one per point, in the order given; those of
 /// zero length are replaced by the normals of the planes. Planes are fitted to 16 neighbours, weighted by distance, and
 /// to 64 where the 16 are on a line, as on a scanner's rings. Estimated normals are not oriented yet. `axes` is empty

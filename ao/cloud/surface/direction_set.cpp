@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace scanshade {
 namespace {
@@ -42,11 +43,13 @@ DirectionSet::DirectionSet(int rays, int seed)
         all.emplace_back(static_cast<float>(std::sqrt(a) * std::cos(b)), static_cast<float>(std::sqrt(a) * std::sin(b)),
                          static_cast<float>(std::sqrt(1 - a)));
     }
-    for (std::size_t run = 0; run < runs_; ++run)
-        std::stable_sort(all.begin() + static_cast<std::ptrdiff_t>(run * rays_),
-                         all.begin() + static_cast<std::ptrdiff_t>((run + 1) * rays_),
-                         [&](const auto& one, const auto& two) { return order_of(one, rays_) < order_of(two, rays_); });
-    for (const Eigen::Vector3f& d : all) {
+    std::vector<std::pair<int, std::size_t>> order(all.size());
+    for (std::size_t i = 0; i < all.size(); ++i)
+        order[i] = {order_of(all[i], rays_), i};
+    for (auto run = order.begin(); run != order.end(); run += static_cast<std::ptrdiff_t>(rays_))
+        std::sort(run, run + static_cast<std::ptrdiff_t>(rays_));
+    for (const auto& [sector_and_height, i] : order) {
+        const Eigen::Vector3f& d = all[i];
         x_.push_back(d.x());
         y_.push_back(d.y());
         z_.push_back(d.z());

@@ -1,6 +1,6 @@
 // The orientation of a cloud's normals, guessed from where its points can be seen.
 #include "ao/cloud/surface/cloud_surface.h"
-#include "ao/cloud/surface/direction_set.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <limits>
 #include <numbers>
+#include <tbb/parallel_for.h>
 
 namespace scanshade {
 namespace {
@@ -16,12 +17,14 @@ using Eigen::Vector3d, Eigen::Vector3f;
 
 constexpr std::size_t enough_to_judge = 200000;
 
-template <class Visit>
-void for_some(std::span<const Vector3d> points, Visit&& visit) {
+/// Of these, so many that tell enough.
+std::vector<Vector3d> some_of(std::span<const Vector3d> points) {
     const std::size_t step = std::max<std::size_t>(1, points.size() / enough_to_judge);
+    std::vector<Vector3d> some;
     for (std::size_t i = 0; i < points.size(); i += step)
         if (points[i].allFinite())
-            visit(points[i]);
+            some.push_back(points[i]);
+    return some;
 }
 
 /// Measures of a cloud as seen from one position.
@@ -31,70 +34,81 @@ struct ViewFrom {
     double range_ratio = 1; ///< far points' distance / near points' distance (95 % and 5 %)
 };
 
-/// In cells that hold two points or more; nothing where hardly any points, or fewer than `fewest`, are in such cells.
-std::optional<ViewFrom> view_from(const Vector3d& position, std::span<const Vector3d> points, double cell_degrees,
-                                  std::size_t fewest) {
-    const auto columns = static_cast<int>(360 / cell_degrees), rows = static_cast<int>(180 / cell_degrees);
-    struct Direction {
-        float nearest = std::numeric_limits<float>::infinity();
-        int points = 0;
-    };
-    std::vector<Direction> cells(static_cast<std::size_t>(columns * rows));
-    const auto cell = [=](const Vector3d& p, double range) {
-        const double turn = std::atan2(p.y(), p.x()) / (2 * std::numbers::pi) + 0.5;
-        const double tilt = std::acos(std::clamp(p.z() / range, -1.0, 1.0)) / std::numbers::pi;
-        return std::min(static_cast<int>(tilt * rows), rows - 1) * columns +
-               std::min(static_cast<int>(turn * columns), columns - 1);
-    };
-    std::vector<float> ranges;
-    Vector3d sum = Vector3d::Zero();
-    for_some(points, [&](const Vector3d& at) {
-        const Vector3d point = at - position;
-        const double range = point.norm();
-        if (!(range > 0))
+/// A cloud in polar coordinates about a position, without points at the position itself.
+class PolarView {
+  public:
+    PolarView(const Vector3d& position, std::span<const Vector3d> points) : seen_(points.size()) {
+        tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
+            const Vector3d point = points[i] - position;
+            const double range = point.norm();
+            seen_[i] = {point, range, std::atan2(point.y(), point.x()) / (2 * std::numbers::pi) + 0.5,
+                        std::acos(std::clamp(point.z() / range, -1.0, 1.0)) / std::numbers::pi};
+        });
+        std::erase_if(seen_, [](const Seen& seen) { return !(seen.range > 0); });
+        if (seen_.empty())
             return;
-        Direction& here = cells[static_cast<std::size_t>(cell(point, range))];
-        here.nearest = std::min(here.nearest, static_cast<float>(range));
-        ++here.points;
-        ranges.push_back(static_cast<float>(range));
-        sum += point;
-    });
-    if (ranges.empty())
-        return std::nullopt;
-    const Vector3d middle = sum / static_cast<double>(ranges.size());
-    std::size_t first = 0, judged = 0, all = 0;
-    double radius2 = 0;
-    for_some(points, [&](const Vector3d& point) { radius2 += (point - position - middle).squaredNorm(); });
-    const double radius = std::sqrt(radius2 / static_cast<double>(ranges.size()));
-    for_some(points, [&](const Vector3d& at) {
-        const Vector3d point = at - position;
-        const double range = point.norm();
-        if (!(range > 0))
-            return;
-        if (const Direction& here = cells[static_cast<std::size_t>(cell(point, range))]; here.points > 1) {
-            // More means a second surface. The back of a small thing far away is hardly farther than its front.
-            const auto nearest = static_cast<double>(here.nearest);
-            first += range <= nearest + std::min(0.25 * nearest, 0.5 * radius);
-            ++judged;
+        Vector3d sum = Vector3d::Zero();
+        for (const Seen& seen : seen_)
+            sum += seen.point;
+        const auto count = static_cast<double>(seen_.size());
+        const Vector3d middle = sum / count;
+        double radius2 = 0;
+        for (const Seen& seen : seen_)
+            radius2 += (seen.point - middle).squaredNorm();
+        radius_ = std::sqrt(radius2 / count);
+        off_centre_ = radius_ > 0 ? middle.norm() / radius_ : 0;
+        std::vector<double> ranges(seen_.size());
+        std::transform(seen_.begin(), seen_.end(), ranges.begin(), [](const Seen& seen) { return seen.range; });
+        const double near = quantile(ranges, 0.05);
+        range_ratio_ = quantile(ranges, 0.95) / near;
+    }
+
+    /// In cells that hold two points or more; nothing where hardly any points, or fewer than `fewest`, are in such
+    /// cells.
+    [[nodiscard]] std::optional<ViewFrom> in_cells(double cell_degrees, std::size_t fewest) const {
+        const auto columns = static_cast<int>(360 / cell_degrees), rows = static_cast<int>(180 / cell_degrees);
+        struct Direction {
+            float nearest = std::numeric_limits<float>::infinity();
+            int points = 0;
+        };
+        std::vector<Direction> cells(static_cast<std::size_t>(columns * rows));
+        const auto cell = [=](const Seen& seen) {
+            return static_cast<std::size_t>(std::min(static_cast<int>(seen.tilt * rows), rows - 1) * columns +
+                                            std::min(static_cast<int>(seen.turn * columns), columns - 1));
+        };
+        for (const Seen& seen : seen_) {
+            Direction& here = cells[cell(seen)];
+            here.nearest = std::min(here.nearest, static_cast<float>(seen.range));
+            ++here.points;
         }
-        ++all;
-    });
-    std::sort(ranges.begin(), ranges.end());
-    const auto range_at = [&](double share) {
-        return static_cast<double>(ranges[static_cast<std::size_t>(share * static_cast<double>(ranges.size() - 1))]);
+        std::size_t first = 0, judged = 0;
+        for (const Seen& seen : seen_)
+            if (const Direction& here = cells[cell(seen)]; here.points > 1) {
+                // More means a second surface. The back of a small thing far away is hardly farther than its front.
+                const auto nearest = static_cast<double>(here.nearest);
+                first += seen.range <= nearest + std::min(0.25 * nearest, 0.5 * radius_);
+                ++judged;
+            }
+        if (10 * judged < seen_.size() || judged < fewest)
+            return std::nullopt;
+        return ViewFrom{static_cast<double>(first) / static_cast<double>(judged), off_centre_, range_ratio_};
+    }
+
+  private:
+    struct Seen {
+        Vector3d point; ///< from the position
+        double range, turn, tilt;
     };
-    if (10 * judged < all || judged < fewest)
-        return std::nullopt;
-    const double seen = static_cast<double>(first) / static_cast<double>(judged);
-    return ViewFrom{seen, radius > 0 ? middle.norm() / radius : 0,
-                    range_at(0.05) > 0 ? range_at(0.95) / range_at(0.05) : std::numeric_limits<double>::infinity()};
-}
+    std::vector<Seen> seen_;
+    double radius_ = 0, off_centre_ = 0, range_ratio_ = 1;
+};
 
 /// In the smallest cells that tell. Wider ones hold near and far surfaces of the same view, and a few points in them
 /// are seen first from anywhere.
 ViewFrom view_from(const Vector3d& position, std::span<const Vector3d> points) {
+    const PolarView polar(position, points);
     for (const double degrees : {0.5, 1.0, 1.5})
-        if (const std::optional<ViewFrom> view = view_from(position, points, degrees, degrees > 0.5 ? 1000 : 1))
+        if (const std::optional<ViewFrom> view = polar.in_cells(degrees, degrees > 0.5 ? 1000 : 1))
             return *view;
     return {};
 }
@@ -102,11 +116,9 @@ ViewFrom view_from(const Vector3d& position, std::span<const Vector3d> points) {
 /// Share of the points that are seen from straight above, in cells of about four.
 double seen_from_above(std::span<const Vector3d> points) {
     Eigen::AlignedBox3d box;
-    std::size_t count = 0;
-    for_some(points, [&](const Vector3d& point) {
+    for (const Vector3d& point : points)
         box.extend(point);
-        ++count;
-    });
+    const std::size_t count = points.size();
     if (count == 0 || !(box.sizes().x() > 0) || !(box.sizes().y() > 0))
         return 0;
     const double side = std::sqrt(4 * box.sizes().x() * box.sizes().y() / static_cast<double>(count));
@@ -119,16 +131,19 @@ double seen_from_above(std::span<const Vector3d> points) {
         return static_cast<std::size_t>((p.y() - box.min().y()) / side) * columns +
                static_cast<std::size_t>((p.x() - box.min().x()) / side);
     };
-    for_some(points, [&](const Vector3d& point) { top[cell(point)] = std::max(top[cell(point)], point.z()); });
+    for (const Vector3d& point : points)
+        top[cell(point)] = std::max(top[cell(point)], point.z());
     std::size_t seen = 0;
-    for_some(points, [&](const Vector3d& point) { seen += point.z() > top[cell(point)] - 3 * side; });
+    for (const Vector3d& point : points)
+        seen += point.z() > top[cell(point)] - 3 * side;
     return static_cast<double>(seen) / static_cast<double>(count);
 }
 
 } // namespace
 
-NormalOrientation guessed_orientation(std::span<const Vector3d> points, const std::optional<Vector3d>& recorded,
+NormalOrientation guessed_orientation(std::span<const Vector3d> all, const std::optional<Vector3d>& recorded,
                                       bool z_up) {
+    const std::vector<Vector3d> points = some_of(all);
     constexpr double nearly_all = 0.975, clearly_off = 0.5, many_ranges = 3;
     constexpr double too_far = 20; // radii of the cloud: from so far off, few points hide others anyway
     constexpr double most = 0.85;

@@ -6,6 +6,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 #include <tbb/parallel_reduce.h>
+#include <utility>
 
 namespace scanshade {
 
@@ -44,15 +45,73 @@ struct NeighbourTree::Placed {
     std::uint32_t index;
 };
 
+/// Points in the order along an axis; those side by side in the order given.
+struct NeighbourTree::Halving {
+    int axis;
+
+    bool operator()(const Placed& a, const Placed& b) const {
+        return a.point[axis] != b.point[axis] ? a.point[axis] < b.point[axis] : a.index < b.index;
+    }
+    /// So that none before the middle comes after it.
+    void in_place(std::span<Placed> points) const {
+        std::nth_element(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(points.size() / 2), points.end(),
+                         *this);
+    }
+    /// The same into another place, on all cores: a sample tells between which two points the middle lies, and only
+    /// what is between them needs to be looked at again.
+    void copy(std::span<const Placed> from, std::span<Placed> to) const {
+        constexpr std::size_t sampled = 4096, off = 96, at_once = 1 << 15; // off: three sigma of the middle's place
+        std::vector<Placed> sample(sampled);
+        for (std::size_t i = 0; i < sampled; ++i)
+            sample[i] = from[(2 * i + 1) * from.size() / (2 * sampled)];
+        std::sort(sample.begin(), sample.end(), *this);
+        const Placed low = sample[sampled / 2 - off], high = sample[sampled / 2 + off];
+        enum Part : std::size_t { below, between, above, parts };
+        const auto part_of = [&](const Placed& point) {
+            return (*this)(point, low) ? below : (*this)(high, point) ? above : between;
+        };
+        const std::size_t blocks = (from.size() + at_once - 1) / at_once;
+        std::vector<std::array<std::size_t, parts>> next(blocks, {0, 0, 0});
+        const auto for_each = [&](std::size_t block, auto&& visit) {
+            for (const Placed& point : from.subspan(block * at_once, std::min(at_once, from.size() - block * at_once)))
+                visit(point, next[block][part_of(point)]);
+        };
+        tbb::parallel_for(std::size_t(0), blocks, [&](std::size_t block) {
+            for_each(block, [](const Placed&, std::size_t& count) { ++count; });
+        });
+        std::array<std::size_t, parts + 1> starts{};
+        for (std::size_t part = 0, before = 0; part < parts; ++part) {
+            for (auto& block : next)
+                before += std::exchange(block[part], before);
+            starts[part + 1] = before;
+        }
+        tbb::parallel_for(std::size_t(0), blocks, [&](std::size_t block) {
+            for_each(block, [&](const Placed& point, std::size_t& place) { to[place++] = point; });
+        });
+        const std::size_t middle = from.size() / 2;
+        const bool bracketed = starts[between] <= middle && middle < starts[above];
+        const std::size_t first = bracketed ? starts[between] : 0, end = bracketed ? starts[above] : to.size();
+        std::nth_element(to.begin() + static_cast<std::ptrdiff_t>(first),
+                         to.begin() + static_cast<std::ptrdiff_t>(middle),
+                         to.begin() + static_cast<std::ptrdiff_t>(end), *this);
+    }
+};
+
 NeighbourTree::NeighbourTree(std::span<const Vector3f> points) {
-    Untouched<Placed> placed(points.size());
+    constexpr std::size_t worth_all_cores = 1 << 16;
+    int wide = 0; // levels whose nodes are halved by all cores
+    while ((points.size() >> wide) >= worth_all_cores)
+        ++wide;
+    Untouched<Placed> placed(points.size()), spare(wide > 0 ? points.size() : 0);
+    Untouched<Placed>& first = wide % 2 == 0 ? placed : spare; // every wide level moves the points to the other
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
-        placed[i] = {points[i], static_cast<std::uint32_t>(i)};
+        first[i] = {points[i], static_cast<std::uint32_t>(i)};
     });
     while ((points.size() >> levels_) >= leaf)
         ++levels_;
     boxes_.resize((std::size_t(2) << levels_) - 1);
-    build(placed, 0, levels_);
+    build(first, wide % 2 == 0 ? spare : placed, {0, levels_, wide});
+    spare = {};
     points_.resize(points.size());
     original_.resize(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
@@ -94,24 +153,31 @@ NeighbourTree::Box NeighbourTree::box_of(std::span<const Placed> points) {
     return points.size() < worth_tasks ? round(all, nothing) : tbb::parallel_reduce(all, nothing, round, join);
 }
 
-void NeighbourTree::build(std::span<Placed> points, std::size_t node, int levels) {
-    const Box& box = boxes_[node] = box_of(points);
-    if (levels == 0)
+void NeighbourTree::build(std::span<Placed> points, std::span<Placed> spare, const Subtree& at) {
+    const Box& box = boxes_[at.root] = box_of(points);
+    if (at.levels == 0)
         return;
-    const int axis = split_axis(points, box.high - box.low);
+    const Halving halving{split_axis(points, box.high - box.low)};
+    if (at.wide > 0) {
+        halving.copy(points, spare);
+        std::swap(points, spare);
+    } else {
+        halving.in_place(points);
+    }
     const std::size_t half = points.size() / 2;
-    std::nth_element(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(half), points.end(),
-                     [axis](const Placed& a, const Placed& b) {
-                         return a.point[axis] != b.point[axis] ? a.point[axis] < b.point[axis] : a.index < b.index;
-                     });
-    const auto left = [&] { build(points.first(half), 2 * node + 1, levels - 1); };
-    const auto right = [&] { build(points.subspan(half), 2 * node + 2, levels - 1); };
+    const auto half_of = [&](std::span<Placed> all, std::size_t side) {
+        return all.empty() ? all : side == 0 ? all.first(half) : all.subspan(half);
+    };
+    const auto build_half = [&](std::size_t side) {
+        build(half_of(points, side), half_of(spare, side),
+              {2 * at.root + 1 + side, at.levels - 1, std::max(at.wide - 1, 0)});
+    };
     constexpr std::size_t worth_a_task = 4096;
     if (points.size() > worth_a_task) {
-        tbb::parallel_invoke(left, right);
+        tbb::parallel_invoke([&] { build_half(0); }, [&] { build_half(1); });
     } else {
-        left();
-        right();
+        build_half(0);
+        build_half(1);
     }
 }
 

@@ -100,7 +100,13 @@ class NeighbourTree {
     struct Placed;
     void find(const Eigen::Vector3f& at, std::size_t but, std::size_t wanted, Nearest& found, float reach2) const;
     static int split_axis(std::span<const Placed> points, const Eigen::Vector3f& box);
-    void build(std::span<Placed> points, std::size_t node, int levels);
+    struct Halving;
+    struct Subtree {
+        std::size_t root;
+        int levels, wide; ///< above the leaves; those of them that all cores halve together
+    };
+    /// Wide levels move the points to `spare`, and back: after the last they must be where they stay.
+    void build(std::span<Placed> points, std::span<Placed> spare, const Subtree& at);
     [[nodiscard]] static Box box_of(std::span<const Placed> points);
 
     Untouched<Eigen::Vector3f> points_;
