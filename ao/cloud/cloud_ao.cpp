@@ -3,7 +3,6 @@
 
 #include "ao/base/watch.h"
 #include "ao/cloud/extent.h"
-#include "ao/cloud/indices_where.h"
 #include "ao/cloud/repeatability.h"
 #include "ao/cloud/settled_sides.h"
 #include "ao/cloud/surface/cloud_gpu.h"
@@ -14,6 +13,7 @@
 #include "ao/raycast/raycast.h"
 #include "projection/base/error.h"
 #include "projection/base/hash.h"
+#include "projection/base/indices_where.h"
 #include "projection/base/statistics.h"
 
 #include <algorithm>

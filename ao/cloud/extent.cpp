@@ -1,8 +1,8 @@
 // The extent of a cloud by order statistics, and strays by the distance of their neighbours.
 #include "ao/cloud/extent.h"
 
-#include "ao/cloud/indices_where.h"
 #include "ao/cloud/surface/leaf_neighbours.h"
+#include "projection/base/indices_where.h"
 #include "projection/base/statistics.h"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 // Points recorded twice, found by sorting coordinates.
 #include "ao/cloud/twins.h"
 
-#include "ao/cloud/indices_where.h"
+#include "projection/base/indices_where.h"
 
 #include <algorithm>
 #include <bit>

@@ -1,18 +1,22 @@
 // Points as the page draws them. points.js reads what is written here.
 #include "apps/page/points.h"
 
+#include "ao/raycast/low_discrepancy.h"
 #include "apps/page/text.h"
 #include "io/output_file.h"
+#include "projection/base/indices_where.h"
 
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
+#include <compare>
 #include <cstdint>
 #include <fmt/format.h>
 #include <limits>
 #include <string>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 namespace scanshade::page {
 namespace {
@@ -79,57 +83,38 @@ std::uint32_t spread(std::uint32_t bits) {
 /// A point's place on the Z-order curve (Morton 1966) and its index. Neighbours on the curve are neighbours in space.
 struct Place {
     std::uint32_t curve, index;
-};
 
-/// By place on the curve; three passes over 30 bits.
-void sort(std::vector<Place>& places) {
-    std::vector<Place> other(places.size());
-    for (const int shift : {0, 10, 20}) {
-        std::array<std::size_t, 1025> begin{};
-        for (const Place& place : places)
-            ++begin[(place.curve >> shift & 1023) + 1];
-        for (std::size_t i = 1; i < begin.size(); ++i)
-            begin[i] += begin[i - 1];
-        for (const Place& place : places)
-            other[begin[place.curve >> shift & 1023]++] = place;
-        places.swap(other);
-    }
-}
+    auto operator<=>(const Place&) const = default;
+};
 
 /// The points in the box along the curve, at most about 2 `most` of them.
 std::vector<Place> along_curve(const Points& cloud, const Box& box, std::size_t most, std::size_t& in_box) {
     const std::size_t step = std::max<std::size_t>(1, cloud.points.size() / (2 * std::max<std::size_t>(most, 1)));
-    std::vector<Place> places;
-    places.reserve(cloud.points.size() / step + 1);
-    for (std::size_t i = 0; i < cloud.points.size(); ++i) {
-        const Vector3d& point = cloud.points[i];
-        if (!point.allFinite() || !box.holds(point))
-            continue;
-        if (in_box++ % step != 0)
-            continue;
-        const double scale = box.size.maxCoeff() > 0 ? 1023 / box.size.maxCoeff() : 0;
+    const std::vector<std::uint32_t> within = indices_where(
+        cloud.points.size(), [&](std::size_t i) { return cloud.points[i].allFinite() && box.holds(cloud.points[i]); });
+    in_box = within.size();
+    const double scale = box.size.maxCoeff() > 0 ? 1023 / box.size.maxCoeff() : 0;
+    std::vector<Place> places((within.size() + step - 1) / step);
+    tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t i) {
+        const std::uint32_t index = within[i * step];
         const auto cell = [&](Eigen::Index axis) {
-            return spread(static_cast<std::uint32_t>((point[axis] - box.low[axis]) * scale));
+            return spread(static_cast<std::uint32_t>((cloud.points[index][axis] - box.low[axis]) * scale));
         };
-        places.push_back({cell(0) | cell(1) << 1 | cell(2) << 2, static_cast<std::uint32_t>(i)});
-    }
-    sort(places);
+        places[i] = {cell(0) | cell(1) << 1 | cell(2) << 2, index};
+    });
+    tbb::parallel_sort(places);
     return places;
 }
 
 /// 0 .. count - 1 such that each beginning is spread evenly: the numbers with their bits reversed.
 std::vector<std::uint32_t> even_order(std::size_t count) {
-    std::vector<std::uint32_t> order;
-    order.reserve(count);
-    const auto bits = static_cast<int>(std::bit_width(count > 0 ? count - 1 : 0));
-    for (std::uint64_t i = 0; i < std::uint64_t(1) << bits; ++i) {
-        std::uint64_t reversed = 0;
-        for (int bit = 0; bit < bits; ++bit)
-            reversed |= (i >> bit & 1) << (bits - 1 - bit);
-        if (reversed < count)
-            order.push_back(static_cast<std::uint32_t>(reversed));
-    }
-    return order;
+    const auto bits = static_cast<unsigned>(std::bit_width(count > 0 ? count - 1 : 0));
+    return indices_where(
+        count > 0 ? std::size_t(1) << bits : 0,
+        [&](std::size_t i) {
+            return static_cast<std::uint32_t>(bits_reversed(static_cast<std::uint32_t>(i)) >> 1 >> (31 - bits));
+        },
+        [&](std::uint32_t reversed) { return reversed < count; });
 }
 
 /// Differences of 16-bit numbers, folded so that small ones of either sign have a zero high byte, in two planes.
@@ -246,8 +231,8 @@ std::vector<fs::path> write_points(const fs::path& folder, const fs::path& stem,
     }
     if (shown.empty())
         return {};
-    const auto finite =
-        static_cast<std::size_t>(std::ranges::count_if(cloud.points, [](const auto& p) { return p.allFinite(); }));
+    const std::size_t finite =
+        indices_where(cloud.points.size(), [&](std::size_t i) { return cloud.points[i].allFinite(); }).size();
     std::vector<std::uint32_t> order = even_order(shown.size());
     const std::size_t parts = (order.size() + points_in_a_chunk - 1) / points_in_a_chunk;
     const std::string facts =

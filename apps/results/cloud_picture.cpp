@@ -6,6 +6,7 @@
 #include "io/clouds/cloud_file.h"
 #include "projection/attach.h"
 #include "projection/base/hash.h"
+#include "projection/base/indices_where.h"
 #include "projection/base/statistics.h"
 
 #include <algorithm>
@@ -16,6 +17,7 @@
 #include <numbers>
 #include <numeric>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 namespace scanshade {
 namespace {
@@ -36,11 +38,11 @@ struct Drawn {
 
 Vector3d median_of(const std::vector<Vector3d>& points) {
     Vector3d middle;
-    for (int axis = 0; axis < 3; ++axis) {
+    tbb::parallel_for(0, 3, [&](int axis) {
         std::vector<double> along(points.size());
         std::ranges::transform(points, along.begin(), [&](const Vector3d& point) { return point[axis]; });
         middle[axis] = median(std::move(along), 0.0);
-    }
+    });
     return middle;
 }
 
@@ -65,17 +67,15 @@ std::vector<float> spacing_of(const std::vector<Vector3d>& points) {
 /// At most about so many of the points, without their spacing.
 Drawn some_of(const Cloud& cloud, const PointVisibility& found, std::size_t most) {
     Drawn drawn;
-    std::size_t valid = 0;
-    for (const Vector3d& point : cloud.points)
-        valid += point.allFinite();
+    const std::vector<std::uint32_t> valid =
+        indices_where(cloud.points.size(), [&](std::size_t i) { return cloud.points[i].allFinite(); });
     const double share =
-        std::min(1.0, static_cast<double>(most) / static_cast<double>(std::max(valid, std::size_t(1))));
+        std::min(1.0, static_cast<double>(most) / static_cast<double>(std::max(valid.size(), std::size_t(1))));
     const auto chosen = static_cast<std::uint64_t>(share * 0x1p32);
-    for (std::size_t i = 0; i < cloud.points.size(); ++i)
-        if (cloud.points[i].allFinite() && hash(static_cast<std::uint32_t>(i)) < chosen) {
-            drawn.index.push_back(static_cast<std::uint32_t>(i));
-            drawn.at.push_back(cloud.points[i]);
-        }
+    drawn.index = indices_where(valid, [&](std::uint32_t i) { return hash(i) < chosen; });
+    drawn.at.resize(drawn.index.size());
+    tbb::parallel_for(std::size_t(0), drawn.at.size(),
+                      [&](std::size_t i) { drawn.at[i] = cloud.points[drawn.index[i]]; });
     drawn.middle = median_of(drawn.at);
     for (Vector3d& point : drawn.at)
         point -= drawn.middle;
@@ -103,17 +103,16 @@ struct Range {
     [[nodiscard]] double at(double share) const { return low + share * length(); }
 };
 
-/// The values without the lowest and highest hundredth.
-template <class Value>
-Range usual_range(const std::vector<Vector3d>& points, Value&& value) {
-    std::vector<double> values(points.size());
-    std::ranges::transform(points, values.begin(), value);
+/// The distances of a sample of the points along a direction, without the lowest and highest hundredth.
+Range range_along(const Drawn& drawn, const Vector3d& direction) {
+    constexpr std::size_t enough = 20000;
+    const std::size_t step = std::max<std::size_t>(1, drawn.at.size() / enough);
+    std::vector<double> values;
+    values.reserve(drawn.at.size() / step + 1);
+    for (std::size_t i = 0; i < drawn.at.size(); i += step)
+        values.push_back(drawn.at[i].dot(direction));
     const double low = quantile(values, 0.01);
     return {low, quantile(values, 0.99)};
-}
-
-Range range_along(const Drawn& drawn, const Vector3d& direction) {
-    return usual_range(drawn.at, [&](const Vector3d& point) { return point.dot(direction); });
 }
 
 /// Share of the points for which the predicate holds.
@@ -318,11 +317,11 @@ std::array<PictureView, 2> two_sides(const Drawn& drawn, const Ground& ground) {
     constexpr double tilt = 25 * pi / 180;
     std::array<PictureView, turns> views;
     std::array<double, turns> fronts{};
-    for (int turn = 0; turn < turns; ++turn) {
+    tbb::parallel_for(0, turns, [&](int turn) {
         views[turn] = oblique(ground, pi / 6 + 2 * pi * turn / turns, tilt);
         const Vector3f back = -views[turn].axes.row(2).transpose().cast<float>();
         fronts[turn] = share_of(drawn.normals.size(), [&](std::size_t i) { return drawn.normals[i].dot(back) > 0.2F; });
-    }
+    });
     const auto better_than = [&](double& most, double value) { return value > most + 0.02 && (most = value, true); };
     int first = 0, second = turns / 2;
     double most = fronts[0];
@@ -418,7 +417,8 @@ Raster raster_of(const std::vector<std::optional<Seen>>& seen, PictureView::Kind
         }
     if (x.empty())
         return {};
-    const Range across = framed(std::move(x)), down = framed(std::move(y));
+    Range across, down;
+    tbb::parallel_invoke([&] { across = framed(std::move(x)); }, [&] { down = framed(std::move(y)); });
     const bool panorama = kind == PictureView::Kind::panorama;
     const int widest = panorama ? 1800 : 900, highest = 900;
     const double largest = std::max({across.length(), down.length(), 1e-9});
@@ -468,6 +468,14 @@ double offset_px(int across, int down) {
     return known[static_cast<std::size_t>(std::abs(down))][static_cast<std::size_t>(std::abs(across))];
 }
 
+/// A point as it is drawn.
+struct Splat {
+    cv::Point centre;
+    double radius_px = 0, depth = 0, length_per_px = 0; ///< no radius: not drawn
+    cv::Vec3b colour;
+    float visibility = 0;
+};
+
 /// The picture of one view. The nearest splat wins; a splat is a cone, so that of two on one surface the pixel gets the
 /// closer one.
 struct Canvas {
@@ -475,19 +483,19 @@ struct Canvas {
         : colour(size, nothing_there), visibility(size, std::numeric_limits<float>::quiet_NaN()),
           depth(size, std::numeric_limits<float>::infinity()) {}
 
-    void splat(const Seen& seen, double u, double v, double radius_px, double length_per_px, const cv::Vec3b& of_point,
-               float value) {
-        const int reach = static_cast<int>(radius_px);
-        const cv::Point centre(static_cast<int>(std::floor(u)), static_cast<int>(std::floor(v)));
-        for (int y = std::max(centre.y - reach, 0); y <= std::min(centre.y + reach, depth.rows - 1); ++y)
+    /// Only what is within `rows`.
+    void draw(const Splat& splat, const cv::Range& rows) {
+        const auto reach = static_cast<int>(splat.radius_px);
+        const cv::Point centre = splat.centre;
+        for (int y = std::max(centre.y - reach, rows.start); y <= std::min(centre.y + reach, rows.end - 1); ++y)
             for (int x = std::max(centre.x - reach, 0); x <= std::min(centre.x + reach, depth.cols - 1); ++x) {
                 const double off = offset_px(x - centre.x, y - centre.y);
-                const auto z = static_cast<float>(seen.depth + off * length_per_px);
-                if (off > radius_px || z >= depth(y, x))
+                const auto z = static_cast<float>(splat.depth + off * splat.length_per_px);
+                if (off > splat.radius_px || z >= depth(y, x))
                     continue;
                 depth(y, x) = z;
-                colour(y, x) = std::isnan(value) ? nothing_there : of_point;
-                visibility(y, x) = value;
+                colour(y, x) = std::isnan(splat.visibility) ? nothing_there : splat.colour;
+                visibility(y, x) = splat.visibility;
             }
     }
 
@@ -498,45 +506,57 @@ struct Canvas {
 
 Canvas drawing_of(const Cloud& cloud, const PointVisibility& found, const Drawn& drawn, const PictureView& view) {
     constexpr double overlap = 0.9; // of the spacing: more than half a square's diagonal, since neighbours are uneven
-    std::vector<std::optional<Seen>> seen(drawn.at.size());
-    for (std::size_t i = 0; i < seen.size(); ++i)
+    const std::size_t count = drawn.at.size();
+    std::vector<std::optional<Seen>> seen(count);
+    tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
         if (view.shown(drawn.at[i]))
             seen[i] = view.seen(drawn.at[i]);
+    });
     const Raster raster = raster_of(seen, view.kind);
     if (raster.size.empty())
         return Canvas({32, 32});
-    Canvas canvas(raster.size);
+    std::vector<Splat> splats(count);
+    std::vector<double> own_px(count, 0.0); // radii from the distances in space
+    const cv::Point outside(-1, -1);
+    tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
+        splats[i].centre = outside;
+        if (!seen[i])
+            return;
+        own_px[i] = overlap * double{drawn.spacing[i]} * seen[i]->scale * raster.px_per_unit;
+        const double u = (seen[i]->x - raster.x) * raster.px_per_unit, v = (seen[i]->y - raster.y) * raster.px_per_unit;
+        if (u >= 0 && v >= 0 && u < raster.size.width && v < raster.size.height)
+            splats[i].centre = {static_cast<int>(u), static_cast<int>(v)};
+    });
     Density density(raster.size);
-    const auto pixel = [&](const Seen& each) {
-        return std::pair((each.x - raster.x) * raster.px_per_unit, (each.y - raster.y) * raster.px_per_unit);
-    };
-    const auto inside = [&](const std::pair<double, double>& at) {
-        return at.first >= 0 && at.second >= 0 && at.first < raster.size.width && at.second < raster.size.height;
-    };
-    for (const auto& each : seen)
-        if (each && inside(pixel(*each)))
-            density.add(static_cast<int>(pixel(*each).first), static_cast<int>(pixel(*each).second));
-    std::vector<double> own_px(seen.size(), 0.0); // radii from the distances in space
-    for (std::size_t i = 0; i < seen.size(); ++i)
-        if (seen[i])
-            own_px[i] = overlap * double{drawn.spacing[i]} * seen[i]->scale * raster.px_per_unit;
+    for (const Splat& splat : splats)
+        if (splat.centre != outside)
+            density.add(splat.centre.x, splat.centre.y);
     const double largest_px = std::clamp(2.5 * median(own_px, 0.0), 6.0, 40.0);
     const bool coloured = has_colours(cloud);
-    for (std::size_t i = 0; i < seen.size(); ++i) {
-        if (!seen[i] || !inside(pixel(*seen[i])))
-            continue;
-        const auto [u, v] = pixel(*seen[i]);
-        const double px_per_length = seen[i]->scale * raster.px_per_unit;
-        const double around = overlap * density.spacing(static_cast<int>(u), static_cast<int>(v));
-        const double radius_px = std::min(std::max(own_px[i], std::min(around, 3 * own_px[i] + 1)) + 0.5, largest_px);
-        cv::Vec3b colour = cv::Vec3b::all(205);
+    tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
+        Splat& splat = splats[i];
+        if (splat.centre == outside)
+            return;
+        const double around = overlap * density.spacing(splat.centre.x, splat.centre.y);
+        splat.radius_px = std::min(std::max(own_px[i], std::min(around, 3 * own_px[i] + 1)) + 0.5, largest_px);
+        splat.depth = seen[i]->depth;
+        splat.length_per_px = 1 / (seen[i]->scale * raster.px_per_unit);
+        splat.colour = cv::Vec3b::all(205);
         if (coloured)
-            colour = cloud.colours[drawn.index[i]];
+            splat.colour = cloud.colours[drawn.index[i]];
         else if (!drawn.normals.empty())
-            colour = cv::Vec3b::all(cv::saturate_cast<uchar>(
+            splat.colour = cv::Vec3b::all(cv::saturate_cast<uchar>(
                 70 + 165 * std::abs(drawn.normals[i].cast<double>().dot(view.back(drawn.at[i])))));
-        canvas.splat(*seen[i], u, v, radius_px, 1 / px_per_length, colour, found.visibility[drawn.index[i]]);
-    }
+        splat.visibility = found.visibility[drawn.index[i]];
+    });
+    Canvas canvas(raster.size);
+    constexpr int bands = 8; // each is drawn by one thread, in the order of the points
+    tbb::parallel_for(0, bands, [&](int band) {
+        const cv::Range rows(raster.size.height * band / bands, raster.size.height * (band + 1) / bands);
+        for (const Splat& splat : splats)
+            if (splat.radius_px > 0)
+                canvas.draw(splat, rows);
+    });
     return canvas;
 }
 

@@ -1,7 +1,7 @@
 // Passes over all points of a cloud on all cores: they give what one thread gives.
-#include "ao/cloud/indices_where.h"
 #include "ao/cloud/repeatability.h"
 #include "ao/cloud/surface/order_statistics.h"
+#include "projection/base/indices_where.h"
 #include "tests/support/points.h"
 
 #include <cmath>
