@@ -1,20 +1,23 @@
 #include "ao/gpu/program.h"
 
 #include "ao/gpu/bound_buffer.h"
+#include "ao/gpu/commands.h"
+#include "ao/gpu/part_stream.h"
 #include "ao/gpu/vulkan.h"
 #include "projection/base/error.h"
 
 #include <algorithm>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <functional>
+#include <optional>
+#include <utility>
 
 namespace scanshade::gpu {
 namespace {
 
 constexpr std::uint32_t first_write_binding = 16, constants_binding = 32;
 
-using Stage = vk::PipelineStageFlagBits2;
-using Access = vk::AccessFlagBits2;
 using Memory = vk::MemoryPropertyFlagBits;
 
 /// An image of float layers: a view of everything to sample from, and one of each mip to write to.
@@ -114,16 +117,6 @@ struct Hazards {
     }
 };
 
-void barrier(const vk::raii::CommandBuffer& commands, vk::PipelineStageFlags2 to_stage, vk::AccessFlags2 to_access) {
-    const vk::MemoryBarrier2 memory(Stage::eComputeShader | Stage::eTransfer,
-                                    Access::eMemoryRead | Access::eMemoryWrite, to_stage, to_access);
-    commands.pipelineBarrier2(vk::DependencyInfo({}, memory));
-}
-
-void compute_barrier(const vk::raii::CommandBuffer& commands) {
-    barrier(commands, Stage::eComputeShader | Stage::eTransfer, Access::eMemoryRead | Access::eMemoryWrite);
-}
-
 } // namespace
 
 std::size_t image_bytes(const BufferRow::Image& image) {
@@ -138,7 +131,7 @@ std::vector<std::string> problems(std::span<const BufferRow> buffers, std::span<
     std::vector<char> written(buffers.size());
     for (std::size_t i = 0; i < buffers.size(); ++i) {
         written[i] = buffers[i].host == BufferRow::Host::upload || buffers[i].host == BufferRow::Host::taken ||
-                     !buffers[i].initial.empty();
+                     buffers[i].host == BufferRow::Host::streamed || !buffers[i].initial.empty();
         if (buffers[i].bytes == 0)
             found.push_back(fmt::format("buffer {} is empty", buffers[i].name));
         if (buffers[i].image.width > 0 && buffers[i].bytes != image_bytes(buffers[i].image))
@@ -192,6 +185,8 @@ struct Program::State {
     };
     std::vector<Copy> taken, given;
 
+    std::optional<PartStream> parts; // of streamed buffers
+
     State(Device::State& gpu_, std::vector<BufferRow> rows_, std::vector<PassRow> passes_)
         : gpu(gpu_),
           pool(gpu.device.createCommandPool({vk::CommandPoolCreateFlagBits::eResetCommandBuffer, gpu.queue_family})),
@@ -220,7 +215,7 @@ struct Program::State {
                 buffers.back().view =
                     gpu.device.createBufferView({{}, *buffers.back().buffer, format_of(row.texels), 0, VK_WHOLE_SIZE});
             }
-            if (row.host == BufferRow::Host::none || row.host == BufferRow::Host::taken || buffers.back().mapped)
+            if ((row.host != BufferRow::Host::upload && row.host != BufferRow::Host::download) || buffers.back().mapped)
                 continue;
             const vk::MemoryPropertyFlags visible = Memory::eHostVisible | Memory::eHostCoherent;
             const bool upload = row.host == BufferRow::Host::upload;
@@ -367,7 +362,7 @@ struct Program::State {
         commands.end();
         end = new_commands();
         end.begin(vk::CommandBufferBeginInfo{});
-        barrier(end, Stage::eHost, Access::eHostRead);
+        host_barrier(end);
         stamp(end, query++);
         end.end();
     }
@@ -447,18 +442,14 @@ struct Program::State {
     }
 
     void submit(const std::vector<vk::CommandBuffer>& recorded) {
-        std::vector<vk::CommandBufferSubmitInfo> infos;
-        for (const vk::CommandBuffer each : recorded)
-            if (each)
-                infos.emplace_back(each);
-        constexpr std::uint64_t patience_ns = 120'000'000'000;
-        {
-            const std::lock_guard alone(gpu.submitting);
-            gpu.queue.submit2(vk::SubmitInfo2({}, {}, infos), *fence);
-        }
-        if (gpu.device.waitForFences(*fence, VK_TRUE, patience_ns) != vk::Result::eSuccess)
-            throw DeviceLost("did not finish within 120 s");
-        gpu.device.resetFences(*fence);
+        begin_submit(gpu, recorded, fence);
+        wait_for(gpu, fence);
+    }
+
+    void stream(int buffer, std::size_t item_bytes, PartStream::Way way, const PartStream::Visit& visit) {
+        if (!parts)
+            parts.emplace(gpu, pool);
+        asking_vulkan(gpu.info.name, [&] { parts->run(buffers.at(buffer), item_bytes, way, visit); });
     }
 };
 
@@ -505,6 +496,16 @@ void Program::give(int buffer, std::shared_ptr<DeviceBytes> to) {
     state_->given.push_back({buffer, 0, std::move(to)});
 }
 
+void Program::stream_in(int buffer, std::size_t item_bytes,
+                        const std::function<void(std::size_t first, std::span<std::byte> to)>& fill) {
+    state_->stream(buffer, item_bytes, PartStream::Way::in, fill);
+}
+
+void Program::stream_out(int buffer, std::size_t item_bytes,
+                         const std::function<void(std::size_t first, std::span<const std::byte> from)>& visit) {
+    state_->stream(buffer, item_bytes, PartStream::Way::out, visit);
+}
+
 void Program::run(std::span<const std::byte> constants, Results results) {
     State& s = *state_;
     std::copy_n(constants.data(), std::min(constants.size(), s.constants.bytes), s.constants.mapped);
@@ -535,7 +536,7 @@ std::vector<std::byte> Program::read_back(int buffer) {
     commands.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
     compute_barrier(commands);
     s.copy_out(commands, buffer, *copy.buffer);
-    barrier(commands, Stage::eHost, Access::eHostRead);
+    host_barrier(commands);
     commands.end();
     s.submit({*commands});
     return {copy.mapped, copy.mapped + bytes};

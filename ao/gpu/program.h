@@ -8,6 +8,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -18,9 +19,10 @@
 namespace scanshade::gpu {
 
 /// A buffer (or image) of the program, zero to begin with. Host buffers can be reached by Program::host() before
-/// (upload) or after (download) a run; Program::take() fills the others that are no pass's result.
+/// (upload) or after (download) a run. Others that are no pass's result are filled by Program::take() or, if they are
+/// large, Program::stream_in(): memory that the host shares takes long to make.
 struct BufferRow {
-    enum class Host { none, upload, download, taken }; // what is uploaded may be taken, too
+    enum class Host { none, upload, download, taken, streamed }; // what is uploaded may be taken, too
     std::string_view name;
     std::size_t bytes = 0;
     Host host = Host::none;
@@ -83,6 +85,14 @@ class Program {
     /// bytes into `to`, after them.
     void take(int buffer, std::size_t offset, std::shared_ptr<const DeviceBytes> from);
     void give(int buffer, std::shared_ptr<DeviceBytes> to);
+
+    /// Fills a `streamed` buffer before a run, part by part: `fill(first, to)` writes the items from number `first` on,
+    /// while the part before is copied.
+    void stream_in(int buffer, std::size_t item_bytes,
+                   const std::function<void(std::size_t first, std::span<std::byte> to)>& fill);
+    /// Reads a `streamed` buffer after a run, likewise.
+    void stream_out(int buffer, std::size_t item_bytes,
+                    const std::function<void(std::size_t first, std::span<const std::byte> from)>& visit);
 
     /// Uploads, runs all passes, downloads unless the results stay on the device; returns when all is done. Throws
     /// Error on device loss.

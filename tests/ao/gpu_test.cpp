@@ -2,7 +2,9 @@
 #include "ao/gpu/program.h"
 #include "projection/base/error.h"
 
+#include <array>
 #include <cstdlib>
+#include <cstring>
 #include <gtest/gtest.h>
 #include <numeric>
 
@@ -55,6 +57,39 @@ TEST(gpu, a_chain_of_passes_sees_each_others_results) {
             ASSERT_EQ(out[i], in[i] + 1111) << i; // four mirrorings: back in place
     }
     EXPECT_EQ(program.timings().size(), 6U) << "upload, four passes, download";
+    for (const std::string& message : device.validation_messages())
+        ADD_FAILURE() << message;
+}
+
+TEST(gpu, large_buffers_are_streamed_part_by_part) {
+    // Where the host does not reach the buffer itself: three parts and a bit, which items of twelve bytes do not fill.
+    gpu::Device device;
+    using Item = std::array<std::uint32_t, 3>;
+    constexpr std::size_t items = 9'000'001;
+    gpu::Program program(device,
+                         {{"in", items * sizeof(Item), Host::streamed, Texels::r32ui}, words("out", Host::download)},
+                         {add_one(0, 1)}, 4);
+    const auto item = [](std::size_t i) {
+        const auto n = static_cast<std::uint32_t>(i);
+        return Item{3 * n, 3 * n + 1, 3 * n + 2};
+    };
+    std::size_t filled = 0, seen = 0, wrong = 0;
+    program.stream_in(0, sizeof(Item), [&](std::size_t first, std::span<std::byte> to) {
+        EXPECT_EQ(first, filled);
+        for (std::size_t at = 0; at + sizeof(Item) <= to.size(); at += sizeof(Item), ++filled)
+            std::memcpy(&to[at], item(filled).data(), sizeof(Item));
+    });
+    EXPECT_EQ(filled, items);
+    const std::int32_t n = count;
+    program.run(std::as_bytes(std::span(&n, 1)));
+    EXPECT_EQ(program.host_as<std::uint32_t>(1)[0], static_cast<std::uint32_t>(count)); // the last word and one
+    program.stream_out(0, sizeof(Item), [&](std::size_t first, std::span<const std::byte> from) {
+        EXPECT_EQ(first, seen);
+        for (std::size_t at = 0; at + sizeof(Item) <= from.size(); at += sizeof(Item), ++seen)
+            wrong += std::memcmp(&from[at], item(seen).data(), sizeof(Item)) != 0;
+    });
+    EXPECT_EQ(seen, items);
+    EXPECT_EQ(wrong, 0U);
     for (const std::string& message : device.validation_messages())
         ADD_FAILURE() << message;
 }

@@ -33,19 +33,37 @@ enum Buffers : int { points, boxes, begins, others };
 
 std::vector<BufferRow> tree_buffers(const NeighbourTree& tree) {
     using Host = BufferRow::Host;
-    return {{"points", tree.size() * sizeof(vec4), Host::upload},
+    return {{"points", tree.size() * sizeof(vec4), Host::streamed},
             {"boxes", leaves_of(tree) * 12 * sizeof(float)},
             {"begins", (leaves_of(tree) + 1) * sizeof(std::uint32_t)}};
 }
 
-/// On all cores.
-template <class Value>
-void copy(std::span<const Value> from, std::span<Value> to) {
-    constexpr std::size_t at_once = 1 << 16;
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, from.size(), at_once), [&](const auto& range) {
-        std::copy(from.begin() + static_cast<std::ptrdiff_t>(range.begin()),
-                  from.begin() + static_cast<std::ptrdiff_t>(range.end()),
-                  to.begin() + static_cast<std::ptrdiff_t>(range.begin()));
+/// Fills a streamed buffer by `value(index)`, on all cores.
+template <class Item, class Value>
+void stream_in(gpu::Program& program, int buffer, Value&& value) {
+    program.stream_in(buffer, sizeof(Item), [&](std::size_t first, std::span<std::byte> to) {
+        const std::span items(reinterpret_cast<Item*>(to.data()), to.size() / sizeof(Item));
+        tbb::parallel_for(std::size_t(0), items.size(), [&](std::size_t i) { items[i] = value(first + i); });
+    });
+}
+
+/// Visits parts of a streamed buffer.
+template <class Item, class Visit>
+void stream_out(gpu::Program& program, int buffer, Visit&& visit) {
+    program.stream_out(buffer, sizeof(Item), [&](std::size_t first, std::span<const std::byte> from) {
+        visit(first, std::span(reinterpret_cast<const Item*>(from.data()), from.size() / sizeof(Item)));
+    });
+}
+
+/// Copies a streamed buffer, on all cores.
+template <class Item>
+void stream_out(gpu::Program& program, int buffer, std::span<Item> to) {
+    stream_out<Item>(program, buffer, [&](std::size_t first, std::span<const Item> from) {
+        constexpr std::size_t at_once = 1 << 16;
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, from.size(), at_once), [&](const auto& range) {
+            std::ranges::copy(from.subspan(range.begin(), range.size()),
+                              to.begin() + static_cast<std::ptrdiff_t>(first + range.begin()));
+        });
     });
 }
 
@@ -81,27 +99,23 @@ void CloudGpu::run(gpu::Program& program, const shared::CloudConstants& constant
         add(timings_, name, ms);
 }
 
-CloudGpu::Neighbourhoods CloudGpu::neighbourhoods(const NeighbourTree& tree) {
+void CloudGpu::neighbourhoods(const NeighbourTree& tree, std::span<CloudSurface::Near> near,
+                              const std::function<void(std::size_t, std::span<const shared::CloudRound>)>& visit) {
     const std::size_t count = tree.size();
-    const int near = others, rounds = others + 1;
+    const int nearest = others, rounds = others + 1;
     std::vector<BufferRow> buffers = tree_buffers(tree);
-    buffers.push_back({"near", count * shared::cloud_kept * sizeof(std::uint32_t), BufferRow::Host::download});
-    buffers.push_back({"rounds", count * sizeof(shared::CloudRound), BufferRow::Host::download});
+    buffers.push_back({"near", count * sizeof(CloudSurface::Near), BufferRow::Host::streamed});
+    buffers.push_back({"rounds", count * sizeof(shared::CloudRound), BufferRow::Host::streamed});
     std::vector<PassRow> passes = box_passes(tree, points);
-    passes.push_back({"nearest", "cloud/nearest", {points, boxes, begins}, {near, rounds}, groups_for(count), {}});
-    auto program =
-        std::make_unique<gpu::Program>(device_, std::move(buffers), std::move(passes), sizeof(shared::CloudConstants));
-    const auto to = program->host_as<vec4>(points);
-    tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
-        to[i] = {tree[i].x(), tree[i].y(), tree[i].z(), 0};
-    });
+    passes.push_back({"nearest", "cloud/nearest", {points, boxes, begins}, {nearest, rounds}, groups_for(count), {}});
+    gpu::Program program(device_, std::move(buffers), std::move(passes), sizeof(shared::CloudConstants));
+    stream_in<vec4>(program, points, [&](std::size_t i) { return vec4{tree[i].x(), tree[i].y(), tree[i].z(), 0}; });
     shared::CloudConstants constants{};
     constants.points = static_cast<std::uint32_t>(count);
     constants.levels = static_cast<std::uint32_t>(tree.levels());
-    run(*program, constants);
-    const auto found_near = program->host_as<CloudSurface::Near>(near);
-    const auto found_rounds = program->host_as<shared::CloudRound>(rounds);
-    return {std::move(program), found_near, found_rounds};
+    run(program, constants);
+    stream_out(program, nearest, near);
+    stream_out<shared::CloudRound>(program, rounds, visit);
 }
 
 Untouched<float> CloudGpu::visibility(const CloudSurface& surface, const DirectionSet& directions, const Task& task) {
@@ -109,14 +123,14 @@ Untouched<float> CloudGpu::visibility(const CloudSurface& surface, const Directi
     const std::size_t count = tree.size(), direction_count = directions.runs() * directions.rays();
     const int normals = others, directions_at = others + 1, near = others + 2, values = others + 3;
     std::vector<BufferRow> buffers = tree_buffers(tree);
-    buffers.push_back({"normals", count * sizeof(vec4), BufferRow::Host::upload});
+    buffers.push_back({"normals", count * sizeof(vec4), BufferRow::Host::streamed});
     buffers.push_back({"directions", direction_count * sizeof(vec4), BufferRow::Host::upload});
-    buffers.push_back(
-        {"near", task.means > 0 ? count * sizeof(surface.near[0]) : sizeof(surface.near[0]), BufferRow::Host::upload});
+    buffers.push_back({"near", task.means > 0 ? count * sizeof(surface.near[0]) : sizeof(surface.near[0]),
+                       BufferRow::Host::streamed});
     const int result = values + task.means % 2;
     for (int i = 0; i < (task.means > 0 ? 2 : 1); ++i)
         buffers.push_back({i == 0 ? "values" : "means", count * sizeof(float),
-                           values + i == result ? BufferRow::Host::download : BufferRow::Host::none});
+                           values + i == result ? BufferRow::Host::streamed : BufferRow::Host::none});
     std::vector<PassRow> passes = box_passes(tree, normals);
     passes.push_back(
         {"rays", "cloud/rays", {points, normals, boxes, begins, directions_at}, {values}, groups_for(count), {}});
@@ -129,7 +143,6 @@ Untouched<float> CloudGpu::visibility(const CloudSurface& surface, const Directi
                           {}});
     gpu::Program program(device_, std::move(buffers), std::move(passes), sizeof(shared::CloudConstants));
 
-    const auto to_points = program.host_as<vec4>(points), to_normals = program.host_as<vec4>(normals);
     using Box = Eigen::AlignedBox3f;
     const Box of_discs = tbb::parallel_reduce( // a far outlier has no disc, and must not coarsen the rounding
         tbb::blocked_range<std::size_t>(0, count), Box(),
@@ -142,13 +155,16 @@ Untouched<float> CloudGpu::visibility(const CloudSurface& surface, const Directi
         [](const Box& a, const Box& b) { return a.merged(b); });
     const Eigen::Vector3f middle = of_discs.isEmpty() ? Eigen::Vector3f(Eigen::Vector3f::Zero()) : of_discs.center();
     const float farthest = of_discs.isEmpty() ? 0 : of_discs.sizes().maxCoeff() / 2;
-    tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
-        const Eigen::Vector3f at = tree[i] - middle, &n = surface.normals[i];
-        to_points[i] = {at.x(), at.y(), at.z(), n.isZero() ? 0 : surface.disc_radius[i]};
-        to_normals[i] = {n.x(), n.y(), n.z(), surface.roughness[i]};
+    stream_in<vec4>(program, points, [&](std::size_t i) {
+        const Eigen::Vector3f at = tree[i] - middle;
+        return vec4{at.x(), at.y(), at.z(), surface.normals[i].isZero() ? 0 : surface.disc_radius[i]};
+    });
+    stream_in<vec4>(program, normals, [&](std::size_t i) {
+        const Eigen::Vector3f& n = surface.normals[i];
+        return vec4{n.x(), n.y(), n.z(), surface.roughness[i]};
     });
     if (task.means > 0)
-        copy(std::span<const CloudSurface::Near>(surface.near), program.host_as<CloudSurface::Near>(near));
+        stream_in<CloudSurface::Near>(program, near, [&](std::size_t i) { return surface.near[i]; });
     const auto to_directions = program.host_as<vec4>(directions_at);
     for (std::size_t i = 0; i < directions.runs(); ++i)
         for (int ray = 0; ray < static_cast<int>(directions.rays()); ++ray) {
@@ -167,7 +183,7 @@ Untouched<float> CloudGpu::visibility(const CloudSurface& surface, const Directi
                   .only_up = task.up.has_value(),
                   .up = {up.x(), up.y(), up.z()}});
     Untouched<float> found(count);
-    copy(std::span<const float>(program.host_as<float>(result)), std::span(found));
+    stream_out(program, result, std::span(found));
     return found;
 }
 

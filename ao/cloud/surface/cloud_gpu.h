@@ -6,7 +6,7 @@
 #include "ao/gpu/program.h"
 #include "shaders/shared/cloud.h"
 
-#include <memory>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -23,13 +23,10 @@ class CloudGpu {
     /// Most points of one call; the device's largest buffer and half of its memory set the limit.
     [[nodiscard]] std::size_t most_points() const;
 
-    /// The neighbours of each point, in the tree's order; views into the program's memory.
-    struct Neighbourhoods {
-        std::unique_ptr<gpu::Program> program;
-        std::span<const CloudSurface::Near> near;
-        std::span<const shared::CloudRound> rounds;
-    };
-    [[nodiscard]] Neighbourhoods neighbourhoods(const NeighbourTree& tree);
+    /// Fills in the neighbours of each point, in the tree's order. Then visits what was found round them, part by part;
+    /// `first` is the index of the first.
+    void neighbourhoods(const NeighbourTree& tree, std::span<CloudSurface::Near> near,
+                        const std::function<void(std::size_t first, std::span<const shared::CloudRound>)>& visit);
 
     /// The rays, and how often a value becomes the mean of its neighbours'.
     struct Task {
@@ -42,7 +39,7 @@ class CloudGpu {
     [[nodiscard]] Untouched<float> visibility(const CloudSurface& surface, const DirectionSet& directions,
                                               const Task& task);
 
-    /// Device milliseconds of all calls so far, by pass, transfers included.
+    /// Device milliseconds of all calls so far, by pass.
     [[nodiscard]] const Timings& timings() const { return timings_; }
     [[nodiscard]] const std::string& device_name() const { return device_.info().name; }
 

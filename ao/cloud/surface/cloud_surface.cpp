@@ -143,13 +143,14 @@ CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normal
         }
     };
     if (gpu) {
-        const CloudGpu::Neighbourhoods all = gpu->neighbourhoods(surface.tree);
-        tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
-            const auto& [normal, sixth_distance, variance, found] = all.rounds[i];
-            surface.near[i] = all.near[i];
-            sixth[i] = sixth_distance;
-            settle(i, found, {{normal.x, normal.y, normal.z}, variance.x, variance.y, variance.z});
-        });
+        gpu->neighbourhoods(
+            surface.tree, surface.near, [&](std::size_t first, std::span<const shared::CloudRound> rounds) {
+                tbb::parallel_for(std::size_t(0), rounds.size(), [&](std::size_t k) {
+                    const auto& [normal, sixth_distance, variance, found] = rounds[k];
+                    sixth[first + k] = sixth_distance;
+                    settle(first + k, found, {{normal.x, normal.y, normal.z}, variance.x, variance.y, variance.z});
+                });
+            });
     } else {
         for_each_neighbourhood(surface.tree, usual, [&](std::size_t i, std::span<const Nearest::Neighbour> near) {
             for (std::size_t k = 0; k < CloudSurface::kept; ++k)
