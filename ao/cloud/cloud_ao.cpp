@@ -92,17 +92,22 @@ double default_radius(double extent, double spacing) {
 class CloudAo::Work {
   public:
     Work(const CloudAoOptions& options, gpu::Device* device, const Vector3d& up,
-         const std::optional<Vector3d>& viewpoint, const PointSet& cloud, const std::optional<Vector3d>& scanner)
+         const std::optional<Vector3d>& viewpoint, const PointSet& cloud, const std::optional<Vector3d>& scanner,
+         const Work* whole = nullptr)
         : options_(options), up_(up), given_viewpoint_(viewpoint), scanner_(scanner), cloud_(cloud),
           watch_(result_.timings), sides_(options, up, cloud.z_up) {
         if (device)
             gpu_.emplace(*device);
         valid_ = finite(cloud.points);
         twins_ = take_out_twins(cloud.points, recorded() ? cloud.normals : std::span<const Vector3d>(), valid_);
-        std::vector<Vector3d> some = sampled(cloud.points, valid_, enough_to_judge);
-        settle_extent(some);
-        settle_orientation(viewpoint, scanner, some);
-        settle_radius(some);
+        if (whole) {
+            survey_like(*whole);
+        } else {
+            std::vector<Vector3d> some = sampled(cloud.points, valid_, enough_to_judge);
+            settle_extent(some);
+            settle_orientation(viewpoint, scanner, some);
+            settle_radius(some);
+        }
         settle_rays();
         watch_.lap("survey");
     }
@@ -167,6 +172,17 @@ class CloudAo::Work {
             sides_.orientation.point = up_;
     }
 
+    /// Of a part of it, evenly chosen.
+    void survey_like(const Work& whole) {
+        part_ = true;
+        extent_ = whole.extent_;
+        sides_.orientation = whole.sides_.orientation;
+        result_.radius = whole.result_.radius;
+        result_.spacing =
+            whole.result_.spacing * std::sqrt(static_cast<double>(whole.valid_.size()) /
+                                              static_cast<double>(std::max<std::size_t>(valid_.size(), 1)));
+    }
+
     /// Points that lie beyond the cloud are computed by themselves.
     void settle_extent(std::vector<Vector3d>& some) {
         extent_ = extent_of(some);
@@ -226,12 +242,10 @@ class CloudAo::Work {
         const Indices kept = indices_where(valid_, [&](std::uint32_t i) { return hash(i, 1U) < chosen; });
         const auto [points, normals] = picked(kept);
         CloudAoOptions options = options_;
-        options.radius = result_.radius;
         if (sides_.recorded_believed)
             options.normals = CloudNormals::recorded;
         const PointSet part{points, normals, {}, cloud_.z_up};
-        Work some(options, nullptr, up_, given_viewpoint_, part, scanner_);
-        some.part_ = true;
+        Work some(options, nullptr, up_, given_viewpoint_, part, scanner_, this);
         const Repeatability found = repeatability(cloud_.points, result_.visibility, kept, some.run().visibility, check,
                                                   order_.empty() ? valid_ : order_);
         order_.clear();

@@ -97,6 +97,8 @@ Eigen::VectorXd leading_eigenvector(Matrix& matrix) {
     Eigen::VectorXd diagonal(steps), beside(steps), next(matrix.size());
     for (Eigen::Index node = 0; node < next.size(); ++node)
         next[node] = (hash(static_cast<std::uint32_t>(node)) & 1 ? 1 : -1) * matrix.weight()[node];
+    Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> small;
+    constexpr double hardly = 1e-6; // the angle left to the eigenvector: residual / gap (Davis and Kahan 1970)
     Eigen::Index done = 0;
     for (; done < steps; ++done) {
         const double length = next.norm();
@@ -118,10 +120,17 @@ Eigen::VectorXd leading_eigenvector(Matrix& matrix) {
             next -= directions * (directions.transpose() * next).eval();
             before = std::exchange(left, next.norm());
         }
+        if (const Eigen::Index held = done + 1; held % 10 == 0 && held < steps) {
+            small.computeFromTridiagonal(diagonal.head(held), beside.head(done));
+            const double gap = small.eigenvalues()[done] - small.eigenvalues()[done - 1];
+            if (next.norm() * std::abs(small.eigenvectors()(done, done)) < hardly * gap) {
+                done = held;
+                break;
+            }
+        }
     }
     if (done == 0)
         return Eigen::VectorXd::Zero(matrix.size());
-    Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> small;
     small.computeFromTridiagonal(diagonal.head(done), beside.head(done - 1));
     return basis.leftCols(done) * small.eigenvectors().col(done - 1);
 }
