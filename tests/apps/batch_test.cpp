@@ -4,12 +4,14 @@
 #include "apps/results/report.h"
 #include "io/clouds/cloud_file.h"
 #include "projection/base/error.h"
+#include "projection/base/stopwatch.h"
 #include "tests/support/small_capture.h"
 
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <deque>
 #include <gtest/gtest.h>
 #include <limits>
 #include <numeric>
@@ -97,6 +99,34 @@ TEST_F(BatchTest, rows_keep_the_order_that_was_asked_for) {
     ASSERT_EQ(rows.size(), 3u);
     for (std::size_t i = 0; i < rows.size(); ++i)
         EXPECT_EQ(rows[i].index, options.frames[i]);
+}
+
+TEST_F(BatchTest, as_many_frames_are_computed_as_there_are_methods_however_few_cores) {
+    // Devices that take 20 ms a frame, whatever the host does meanwhile.
+    constexpr std::chrono::milliseconds device_time(20);
+    const Capture recorded = capture(4);
+    for (const std::size_t devices : {1, 4, 16})
+        for (const std::size_t frames : {std::size_t(40), 50 * devices}) {
+            std::deque<HalfOpen> methods;
+            std::deque<FrameAo> doors;
+            std::vector<FrameAo*> all;
+            for (std::size_t i = 0; i < devices; ++i)
+                all.push_back(
+                    &doors.emplace_back(methods.emplace_back([&](int) { std::this_thread::sleep_for(device_time); })));
+            MethodPool pool(all);
+            Capture many = recorded;
+            many.entries.clear();
+            for (std::size_t i = 0; i < frames; ++i)
+                many.entries.push_back(recorded.entries[i % 4]);
+            BatchOptions options = all_frames(many, folder / "out");
+            options.outputs.confidence = options.outputs.shaded = options.outputs.preview = false;
+            const Stopwatch stopwatch;
+            const auto rows = scanshade::run_batch(many, pool, options);
+            const auto turns = static_cast<double>((frames + devices - 1) / devices);
+            constexpr double nearly_all = 0.75; // 0.9 to 0.98 on two idle cores
+            EXPECT_GT(turns * 20 / stopwatch.ms(), nearly_all) << devices << " devices, " << frames << " frames";
+            EXPECT_EQ(count(rows, FrameStatus::ok), frames);
+        }
 }
 
 TEST_F(BatchTest, a_failed_frame_says_why_leaves_no_file_and_stops_no_other) {
