@@ -1,6 +1,7 @@
 // Values that both the manifest and `inspect --json` contain.
 #include "apps/json.h"
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 namespace scanshade {
@@ -47,6 +48,17 @@ json value_json(const Parameter& row) {
                 return *target;
         },
         row.value);
+}
+
+json parameter_json(const Parameter& row) {
+    json one{{"name", row.name}, {"help", row.help}, {"default", value_json(row)}, {"unit", row.unit}};
+    if (std::isfinite(row.low))
+        one["low"] = row.low;
+    if (std::isfinite(row.high))
+        one["high"] = row.high;
+    if (const std::vector<std::string> choices = choices_of(row); !choices.empty())
+        one["choices"] = choices;
+    return one;
 }
 
 std::size_t count_at(const json& object, const std::string& key) {

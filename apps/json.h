@@ -29,6 +29,9 @@ using json = nlohmann::ordered_json;
 /// The current value of a setting: a number, true, false, or text. Empty text where none is given.
 [[nodiscard]] json value_json(const Parameter& row);
 
+/// A setting: "name", "help", "default", "unit", and where there are any "low", "high", "choices".
+[[nodiscard]] json parameter_json(const Parameter& row);
+
 /// A member that counts something. Throws Error naming the key if it is not a whole number.
 [[nodiscard]] std::size_t count_at(const json& object, const std::string& key);
 

@@ -1,5 +1,6 @@
 // The program: the table of commands, their help, and the exit codes.
 #include "apps/command.h"
+#include "apps/help.h"
 #include "apps/settings_file.h"
 #include "io/output_file.h"
 #include "projection/base/error.h"
@@ -54,110 +55,6 @@ const CommandRow& command_named(const std::string& name) {
     for (const CommandRow& each : commands)
         known.emplace_back(each.name);
     throw Misuse(fmt::format("{}: no such command{}", name, suggestion(name, known)));
-}
-
-std::string flag_of(const Parameter& row) { return "--" + row.name; }
-
-/// The flag's name, with its short form if it has one.
-std::string flag_names(const Parameter& row) {
-    return row.name == "out" ? "-o,--out" : row.name == "quiet" ? "-q,--quiet" : flag_of(row);
-}
-
-bool is_switch(const Parameter& row) { return std::holds_alternative<bool*>(row.value); }
-
-// ---------------------------------------------------------------------------------------------------- help
-
-void print_overview() {
-    fmt::print("scanshade {}: ambient occlusion for recorded depth images and point clouds\n\n", SCANSHADE_VERSION);
-    for (const CommandRow& row : commands)
-        fmt::print("  scanshade {:<14} {}\n", row.name, row.summary);
-    fmt::print("  scanshade {:<14} {}\n  scanshade {:<14} {}\n", "help",
-               "this, or the flags of one command: help COMMAND", "--version", "the version");
-    fmt::print("\nExit code: 0 all well; 1 misuse; 2 some frames' input is bad or their result doubtful, the others "
-               "are done;\n"
-               "           3 nothing could be done;\n"
-               "           4 interrupted, device lost, disk or memory full, share gone: `run --resume` goes on;\n"
-               "           5 internal error.\n");
-}
-
-/// "[default 0.5; m, 0 .. 100]"
-std::string limits(const Parameter& row) {
-    const std::string value = value_text(row), range = range_text(row);
-    const std::string otherwise = value.empty() ? "" : "default " + value;
-    const std::string allowed = is_switch(row) ? "" : range;
-    if (otherwise.empty() && allowed.empty())
-        return "";
-    return fmt::format(" [{}{}{}]", otherwise, otherwise.empty() || allowed.empty() ? "" : "; ", allowed);
-}
-
-/// A name, followed by a text in lines of at most 110 columns.
-void print_entry(const std::string& name, std::size_t name_width, const std::string& text) {
-    const std::size_t width = 110 - name_width - 4;
-    fmt::print("  {:<{}}  ", name, name_width);
-    std::istringstream words(text);
-    std::size_t used = 0;
-    for (std::string word; words >> word; used += word.size()) {
-        if (used > 0 && used + 1 + word.size() > width) {
-            fmt::print("\n  {:<{}}  ", "", name_width);
-            used = 0;
-        }
-        fmt::print("{}{}", used > 0 ? " " : "", word);
-        used += used > 0 ? 1 : 0;
-    }
-    fmt::print("\n");
-}
-
-void print_stage(const Stage& stage) {
-    if (stage.rows.empty())
-        return;
-    std::size_t longest = 0;
-    for (const Parameter& row : stage.rows)
-        longest = std::max(longest, flag_names(row).size());
-    fmt::print("\n{}:\n", stage.title);
-    for (const Parameter& row : stage.rows)
-        print_entry(flag_names(row), longest, row.help + limits(row));
-}
-
-/// The flags that `help COMMAND` shows: the common ones, or if none is marked, all without a topic.
-std::vector<Stage> first_page(std::vector<Stage> stages) {
-    std::erase_if(stages, [](const Stage& stage) { return !stage.topic.empty(); });
-    const bool marked =
-        std::ranges::any_of(stages, [](const Stage& s) { return std::ranges::any_of(s.rows, &Parameter::common); });
-    for (Stage& stage : stages)
-        if (marked)
-            std::erase_if(stage.rows, [](const Parameter& row) { return !row.common; });
-    return stages;
-}
-
-/// `topic`: empty, "all", or that of a stage.
-void print_help(const CommandRow& row, const std::string& topic) {
-    const std::unique_ptr<Command> command = row.make();
-    const std::vector<Stage> all = command->stages();
-    std::vector<std::string> topics;
-    for (const Stage& stage : all)
-        if (!stage.topic.empty())
-            topics.push_back(stage.topic);
-    std::vector<Stage> shown = topic == "all" ? all : first_page(all);
-    if (!topic.empty() && topic != "all") {
-        shown = all;
-        std::erase_if(shown, [&](const Stage& stage) { return stage.topic != topic; });
-        if (shown.empty())
-            throw Misuse(fmt::format("help {}: no topic '{}'{}", row.name, topic, suggestion(topic, topics)));
-    }
-    const Words words = command->words();
-    fmt::print("scanshade {}{}{} [flags]\n  {}\n", row.name, words.values ? " " + words.name : "",
-               words.at_most > 1 ? "..." : "", row.summary);
-    if (words.values && (topic.empty() || topic == "all")) {
-        fmt::print("\n");
-        print_entry(words.name, words.name.size(), words.help);
-    }
-    for (const Stage& stage : shown)
-        print_stage(stage);
-    if (topic.empty() && !topics.empty()) {
-        fmt::print("\nmore:\n");
-        print_entry("every flag", 10, fmt::format("scanshade help {} all", row.name));
-        print_entry("one topic", 10, fmt::format("scanshade help {} TOPIC: {}", row.name, fmt::join(topics, ", ")));
-    }
 }
 
 // ---------------------------------------------------------------------------------------------------- flags
@@ -247,7 +144,7 @@ bool asks_for_help(const std::string& word) { return word == "help" || word == "
 
 int execute(const std::vector<std::string>& arguments) {
     if (arguments.empty()) {
-        print_overview();
+        print_overview(commands);
         return misuse;
     }
     const std::string& name = arguments[0];
@@ -256,10 +153,12 @@ int execute(const std::vector<std::string>& arguments) {
         return all_well;
     }
     if (asks_for_help(name)) {
-        if (arguments.size() > 1)
+        if (arguments.size() > 1 && arguments[1] == "--json")
+            print_json(commands);
+        else if (arguments.size() > 1)
             print_help(command_named(arguments[1]), arguments.size() > 2 ? arguments[2] : "");
         else
-            print_overview();
+            print_overview(commands);
         return all_well;
     }
     const CommandRow& row = command_named(name);

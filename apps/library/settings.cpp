@@ -5,7 +5,6 @@
 #include "projection/base/nearest_word.h"
 
 #include <algorithm>
-#include <cmath>
 #include <fmt/format.h>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -54,15 +53,8 @@ json listed(std::string_view owner, const std::vector<Stage>& stages) {
     json list = json::array();
     for (const Stage& stage : stages)
         for (const Parameter& row : stage.rows) {
-            json one{{"for", owner}, {"stage", stage.title}, {"name", row.name}, {"help", row.help}};
-            one["default"] = value_json(row);
-            one["unit"] = row.unit;
-            if (std::isfinite(row.low))
-                one["low"] = row.low;
-            if (std::isfinite(row.high))
-                one["high"] = row.high;
-            if (const std::vector<std::string> choices = choices_of(row); !choices.empty())
-                one["choices"] = choices;
+            json one{{"for", owner}, {"stage", stage.title}};
+            one.update(parameter_json(row));
             list.push_back(std::move(one));
         }
     return list;
