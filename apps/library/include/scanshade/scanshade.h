@@ -8,15 +8,24 @@
  *   poses       world_from_camera, camera to world, 4x4, row by row; metres
  *   visibility  1 = open, 0 = closed, NaN = no surface; float, row by row
  *
- * ERRORS      A function that can fail returns a status. scanshade_last_error() then has the sentence, with the value
- *             given and what was expected. No C++ exception leaves the library. Output handles are set to NULL on
- *             failure.
- * HANDLES     Each *_free or *_close function takes NULL, too. A NULL handle elsewhere is SCANSHADE_MISUSE, or NULL, or
- * 0. TEXT        UTF-8. Returned text belongs to the handle and lives as long as it, unless stated otherwise. STRUCTS
- * `size` is sizeof the struct as the caller was compiled; the SCANSHADE_*_INIT macros set it. Later versions append
- * members; those that a caller does not know keep their defaults (zero). THREADS     All functions may be called from
- * several threads at once, on the same handle, too. Only *_free and *_close must be the last call of a handle. A
- * session computes as many images at once as its setting `in-flight` says; further calls wait. */
+ * ERRORS
+ *   A function that can fail returns a status. scanshade_last_error() then has the sentence, with the value given and
+ *   what was expected. No C++ exception leaves the library. Output handles are set to NULL on failure.
+ *
+ * HANDLES
+ *   Each *_free or *_close function takes NULL, too. A NULL handle elsewhere is SCANSHADE_MISUSE, or NULL, or 0.
+ *
+ * TEXT
+ *   UTF-8. Returned text belongs to the handle and lives as long as it, unless stated otherwise.
+ *
+ * STRUCTS
+ *   `size` is sizeof the struct as the caller was compiled; the SCANSHADE_*_INIT macros set it. Later versions append
+ *   members; those that a caller does not know keep their defaults (zero).
+ *
+ * THREADS
+ *   All functions may be called from several threads at once, on the same handle, too. Only *_free and *_close must be
+ *   the last call of a handle. A session computes as many images at once as its setting `in-flight` says; further calls
+ *   wait. */
 #ifndef SCANSHADE_SCANSHADE_H
 #define SCANSHADE_SCANSHADE_H
 
