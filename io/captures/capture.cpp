@@ -14,8 +14,13 @@
 #include "projection/base/memory.h"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <opencv2/imgproc.hpp>
+#include <set>
 
 namespace scanshade {
 
@@ -25,23 +30,69 @@ namespace {
 
 // --- opening ---
 
+enum class Unused { silent, told }; ///< whether files that look like poses or cameras are named where they are not used
+struct FolderLayout {
+    const char* signature;
+    std::optional<Listing> (*list)(const fs::path& folder); ///< null: list_tum(), which takes options
+    Unused unused = Unused::silent;
+};
+
+/// The most specific first.
+constexpr std::array folder_layouts = {
+    FolderLayout{"transforms.json (nerfstudio, instant-ngp)", list_nerfstudio},
+    FolderLayout{"scene_camera.json (BOP)", list_bop},
+    FolderLayout{"keyframes/depth with keyframes/cameras (Polycam)", list_polycam},
+    FolderLayout{"camera_matrix.csv with depth/ (Stray Scanner)", list_stray_scanner},
+    FolderLayout{"lowres_depth/ (ARKitScenes)", list_arkit_scenes},
+    FolderLayout{"traj.txt with results/ (Replica)", list_replica},
+    FolderLayout{"intrinsic/intrinsic_depth.txt or pose/ with depth/ (ScanNet)", list_scannet},
+    FolderLayout{"*.gt.freiburg with associations.txt (ICL-NUIM)", list_icl_nuim},
+    FolderLayout{"depth.txt (TUM)", nullptr},
+    FolderLayout{"frame-NNNNNN.depth.png (7-Scenes)", list_seven_scenes},
+    FolderLayout{"TIME_depth.pclzf (PCL)", list_pcl_recording},
+    FolderLayout{"a folder depth/ (Redwood, RealSense)", list_image_folders, Unused::told},
+    FolderLayout{"16-bit or float depth images", list_depth_images, Unused::told},
+    FolderLayout{"clouds", list_clouds},
+};
+
+/// Names of what looks like poses or cameras in a folder that was read as a generic one.
+void tell_unused(const fs::path& folder, Listing& listing) {
+    static const std::set<std::string> folders{"pose",   "poses",       "intrinsic", "intrinsics",
+                                               "calib",  "calibration", "camera",    "cameras",
+                                               "sparse", "colmap",      "extrinsics"};
+    const auto name_speaks = [](std::string name) {
+        std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+        return std::ranges::any_of(
+            std::array{"pose", "traj", "odom", "transform", "intrinsic", "extrinsic", "calib", "camera", "groundtruth"},
+            [&](const char* word) { return name.find(word) != std::string::npos; });
+    };
+    listing.tell_unused = [folder, name_speaks](const Capture& capture) {
+        std::vector<std::string> unused;
+        std::error_code ignored;
+        for (fs::directory_iterator at(folder, ignored), end; !ignored && at != end; at.increment(ignored)) {
+            const std::string name = at->path().filename().string();
+            const bool used = (capture.camera && capture.camera->origin.find(name) != std::string::npos) ||
+                              name == "trajectory.log" || name == "pose.txt" || name == "rgbd.match";
+            if (!used && (at->is_directory(ignored) ? folders.contains(name) : name_speaks(name)))
+                unused.push_back(name);
+        }
+        std::ranges::sort(unused);
+        return unused;
+    };
+}
+
 Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
-    if (auto listing = list_tum(folder, options))
-        return *std::move(listing);
-    if (auto listing = list_seven_scenes(folder))
-        return *std::move(listing);
-    if (auto listing = list_pcl_recording(folder))
-        return *std::move(listing);
-    if (auto listing = list_image_folders(folder))
-        return *std::move(listing);
-    if (auto listing = list_depth_images(folder))
-        return *std::move(listing);
-    if (auto listing = list_clouds(folder))
-        return *std::move(listing);
-    throw NoFrames(fmt::format("no frames found in {}: looked for depth.txt (TUM), frame-NNNNNN.depth.png (7-Scenes), "
-                               "TIME_depth.pclzf (PCL), a folder depth/ "
-                               "(Redwood, RealSense), 16-bit or float depth images, and clouds ({})",
-                               folder.string(), listed(cloud_format_names(), "or")));
+    for (const FolderLayout& layout : folder_layouts)
+        if (auto listing = layout.list ? layout.list(folder) : list_tum(folder, options)) {
+            if (layout.unused == Unused::told)
+                tell_unused(folder, *listing);
+            return *std::move(listing);
+        }
+    std::vector<std::string> signatures;
+    for (const FolderLayout& layout : folder_layouts)
+        signatures.emplace_back(layout.signature);
+    throw NoFrames(fmt::format("no frames found in {}: looked for {} ({})", folder.string(),
+                               fmt::join(signatures, ", "), listed(cloud_format_names(), "or")));
 }
 
 Listing list_file(const fs::path& file) {
@@ -189,6 +240,12 @@ void load_colour(const Capture& capture, const fs::path& file, cv::Size depth_si
                    expected = frame.colour_camera ? frame.colour_camera->camera.pinhole.size : depth_size;
     if (colour == expected)
         return;
+    const auto shape = [](cv::Size size) { return static_cast<double>(size.width) / size.height; };
+    if (capture.colour_in_more_pixels && !frame.colour_camera && colour.width > expected.width &&
+        std::abs(shape(colour) / shape(expected) - 1) < 0.02) {
+        cv::resize(frame.colour, frame.colour, expected, 0, 0, cv::INTER_AREA);
+        return;
+    }
     frame.warnings.push_back(fmt::format("{}: colour is {}, {} is {}; processed without colour.", file.string(),
                                          text(colour), frame.colour_camera ? "its camera" : "depth", text(expected)));
     frame.colour = cv::Mat3b();
@@ -204,6 +261,11 @@ void correct(cv::Mat1f& depth_m, const DepthCorrection& correction) {
 
 void take_camera(const Capture& capture, const CaptureEntry& entry, cv::Size depth_size, Frame& frame) {
     frame.colour_camera = capture.colour_camera;
+    if (entry.camera) {
+        frame.camera = *entry.camera;
+        check_depth_size(frame, depth_size, entry.depth);
+        return;
+    }
     if (!capture.camera) { // anything that needs the camera refuses this one, and says its origin
         frame.camera.origin = "none is known; give --camera FILE or --camera fx,fy,cx,cy";
         return;
@@ -214,13 +276,42 @@ void take_camera(const Capture& capture, const CaptureEntry& entry, cv::Size dep
     check_depth_size(frame, depth_size, entry.depth);
 }
 
+DepthEncoding encoding_of(const Capture& capture, const CaptureEntry& entry) {
+    if (!(entry.depth_units_per_metre > 0))
+        return capture.depth;
+    return depth_encoding(fmt::format("{}", entry.depth_units_per_metre), capture.depth.origin);
+}
+
+/// Depth of the lowest confidence becomes holes.
+void leave_out_unsure(const CaptureEntry& entry, Frame& frame) {
+    cv::Mat3b levels;
+    try {
+        levels = read_colour(entry.confidence);
+    } catch (const Outage&) {
+        throw;
+    } catch (const Error& failure) {
+        frame.warnings.push_back(fmt::format("{}; all depth is believed.", failure.what()));
+        return;
+    }
+    if (levels.size() != frame.depth_m.size()) {
+        frame.warnings.push_back(fmt::format("{}: confidence is {}, depth is {}; all depth is believed.",
+                                             entry.confidence, text(levels.size()), text(frame.depth_m.size())));
+        return;
+    }
+    std::transform(frame.depth_m.begin(), frame.depth_m.end(), levels.begin(), frame.depth_m.begin(),
+                   [](float z, const cv::Vec3b& level) { return level[0] > 0 ? z : 0.0F; });
+}
+
 void load_depth(const Capture& capture, const CaptureEntry& entry, const cv::Mat& stored, Frame& frame,
                 bool with_colour) {
     require_memory(stored.total() * sizeof(float),
                    fmt::format("{}: a depth image of {} pixels", entry.depth, text(stored.size())));
-    frame.depth_m = during(entry.depth, [&] { return depth_in_metres(stored, capture.depth); });
+    const DepthEncoding encoding = encoding_of(capture, entry);
+    frame.depth_m = during(entry.depth, [&] { return depth_in_metres(stored, encoding); });
     take_camera(capture, entry, stored.size(), frame);
-    frame.doubts = doubts_about(frame.depth_m, stored, capture.depth);
+    frame.doubts = doubts_about(frame.depth_m, stored, encoding);
+    if (!entry.confidence.empty())
+        leave_out_unsure(entry, frame);
     correct(frame.depth_m, capture.depth_correction);
     if (with_colour && !entry.colour.empty())
         load_colour(capture, entry.colour, stored.size(), frame);
@@ -252,18 +343,19 @@ std::vector<std::uint32_t> counts_of(const cv::Mat1w& stored) {
 void examine_depth(const Capture& capture, const CaptureEntry& entry, ExaminedFrame& examined) {
     const cv::Mat stored = read_stored_depth(entry.depth);
     examined.depth_size = stored.size();
-    if (stored.type() != CV_16UC1) {
+    if (stored.type() != CV_16UC1 || !entry.confidence.empty()) {
         load_depth(capture, entry, stored, examined.frame, true);
         return;
     }
     take_camera(capture, entry, stored.size(), examined.frame);
-    DepthTable metres = during(entry.depth, [&] { return depth_table(capture.depth); });
+    const DepthEncoding encoding = encoding_of(capture, entry);
+    DepthTable metres = during(entry.depth, [&] { return depth_table(encoding); });
     const std::vector<std::uint32_t> counts = counts_of(stored);
     float largest_m = 0;
     for (int value = 0; value < metres.cols; ++value)
         if (counts[static_cast<std::size_t>(value)] > 0)
             largest_m = std::max(largest_m, metres(value));
-    examined.frame.doubts = doubts_about(stored, metres, largest_m, capture.depth);
+    examined.frame.doubts = doubts_about(stored, metres, largest_m, encoding);
     correct(metres, capture.depth_correction);
     for (int value = 0; value < metres.cols; ++value)
         if (const std::uint32_t count = counts[static_cast<std::size_t>(value)]; count > 0 && metres(value) != 0)
@@ -341,10 +433,20 @@ Capture open_capture(const fs::path& path, const CaptureOptions& options) {
         turn_poses_y_down(capture);
     if (!options.colour.empty())
         take_colour(capture, options.colour);
-    if (!options.depth_scale.empty())
+    if (!options.depth_scale.empty()) {
         capture.depth = depth_encoding(options.depth_scale, "--depth-scale");
+        for (CaptureEntry& entry : capture.entries)
+            entry.depth_units_per_metre = 0;
+    }
+    if (!options.camera.empty())
+        for (CaptureEntry& entry : capture.entries)
+            entry.camera = nullptr;
     if (!options.poses.empty())
         take_poses(capture, options);
+    else if (const auto unused = listing.tell_unused ? listing.tell_unused(capture) : std::vector<std::string>();
+             !unused.empty())
+        capture.warnings.push_back(fmt::format("{}: not used, though their names speak of poses or cameras: {}.",
+                                               path.string(), fmt::join(unused, ", ")));
     return std::move(capture);
 }
 

@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,6 +36,9 @@ struct CaptureEntry {
     std::optional<double> stamp_s;        ///< of the depth image
     std::optional<double> colour_stamp_s; ///< of the colour image paired with it
     Motion motion;                        ///< of the camera at that time, if the trajectory has it
+    std::shared_ptr<const Camera> camera; ///< its own; null = the capture's
+    double depth_units_per_metre = 0;     ///< its own; 0 = the capture's
+    std::string confidence;               ///< path of an image of depth's size, 0 where depth is not to be believed
     std::string problem; ///< why this frame cannot be loaded (names file and line); empty = it may be tried
     std::vector<std::string> warnings; ///< oddities in the listing of this frame
 };
@@ -71,8 +75,9 @@ struct Capture {
     double pose_time_offset_s = 0;             ///< from the camera's file; already in the poses
     Registration registration = Registration::unknown;
     std::string registration_reason;
-    std::vector<CaptureEntry> entries; ///< in recording order
-    std::vector<std::string> warnings; ///< about the capture as a whole
+    bool colour_in_more_pixels = false; ///< registered colour sees what depth sees, finer: load() reduces it
+    std::vector<CaptureEntry> entries;  ///< in recording order
+    std::vector<std::string> warnings;  ///< about the capture as a whole
 
     /// Decodes frame `index`; safe to call from several threads. Throws Error naming file and place, Outage where the
     /// capture cannot be reached any more; a damaged colour image is a warning, not a failure. Without colour, whose

@@ -3,13 +3,16 @@
 
 #include "io/images/format.h"
 #include "io/output_file.h"
+#include "io/shallow_json.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <fmt/format.h>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 
 namespace scanshade {
@@ -74,6 +77,70 @@ bool speaks_of(const fs::path& file, std::initializer_list<std::string_view> sub
 }
 
 } // namespace
+
+std::optional<fs::path> folder_named(const fs::path& parent, std::initializer_list<std::string_view> names) {
+    std::error_code ignored;
+    for (const std::string_view name : names)
+        if (fs::is_directory(parent / name, ignored))
+            return parent / name;
+    return std::nullopt;
+}
+
+namespace {
+
+std::vector<fs::path> images_in(const std::optional<fs::path>& folder, bool (*wanted)(const fs::path&)) {
+    if (!folder)
+        return {};
+    auto files = files_in(*folder);
+    std::erase_if(files, [&](const fs::path& file) { return !wanted(file); });
+    return files;
+}
+
+} // namespace
+
+std::vector<fs::path> depth_images_in(const std::optional<fs::path>& folder) {
+    return images_in(folder, &has_depth_extension);
+}
+
+std::vector<fs::path> colour_images_in(const std::optional<fs::path>& folder) {
+    return images_in(folder, &has_colour_extension);
+}
+
+std::string with_stem(const std::vector<fs::path>& images, const std::string& stem) {
+    const auto found = std::ranges::lower_bound(images, stem, &natural_less,
+                                                [](const fs::path& image) { return image.stem().string(); });
+    return found != images.end() && found->stem() == stem ? found->string() : std::string();
+}
+
+nlohmann::json json_in(const fs::path& file) {
+    const std::string text = read_list_file(file);
+    try {
+        return shallow_json<nlohmann::json>(text);
+    } catch (const nlohmann::json::parse_error& failure) {
+        const std::size_t offset = std::min(text.size(), failure.byte > 0 ? failure.byte - 1 : 0);
+        const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(offset), '\n');
+        throw Error(fmt::format("{}: not JSON, or NaN or infinity in it", at_line(file, static_cast<int>(line))));
+    } catch (const nlohmann::json::exception& failure) { // numbers beyond double
+        throw Error(fmt::format("{}: not usable JSON: {}", file.string(), failure.what()));
+    } catch (const Outage&) {
+        throw;
+    } catch (const Error& failure) {
+        throw Error(fmt::format("{}: {}", file.string(), failure.what()));
+    }
+}
+
+std::shared_ptr<const Camera> camera_for_depth(Camera camera, cv::Size size, cv::Size depth) {
+    camera.pinhole.size = size;
+    if (!depth.empty() && size != depth) {
+        const double shape = static_cast<double>(size.width) / size.height * depth.height / depth.width;
+        if (std::abs(shape - 1) > 0.01)
+            throw Error(fmt::format("{}: the camera is for {}x{}, depth is {}x{}, which is another shape",
+                                    camera.origin, size.width, size.height, depth.width, depth.height));
+        camera.pinhole = scaled(camera.pinhole, depth);
+    }
+    check(camera);
+    return std::make_shared<const Camera>(std::move(camera));
+}
 
 namespace {
 

@@ -116,22 +116,6 @@ std::optional<Listing> list_seven_scenes(const fs::path& folder) {
 
 namespace {
 
-std::optional<fs::path> folder_named(const fs::path& parent, std::initializer_list<std::string_view> names) {
-    std::error_code ignored;
-    for (const std::string_view name : names)
-        if (fs::is_directory(parent / name, ignored))
-            return parent / name;
-    return std::nullopt;
-}
-
-std::vector<fs::path> images_in(const std::optional<fs::path>& folder, bool (*wanted)(const fs::path&)) {
-    if (!folder)
-        return {};
-    auto files = files_in(*folder);
-    std::erase_if(files, [&](const fs::path& file) { return !wanted(file); });
-    return files;
-}
-
 /// rgbd.match: "depth/00000.png color/00000.jpg" per line, in either order.
 void entries_from_match(const fs::path& folder, const fs::path& depth_folder, Capture& capture) {
     const fs::path list = folder / "rgbd.match";
@@ -229,7 +213,7 @@ std::optional<Listing> list_image_folders(const fs::path& folder) {
     const auto depth_folder = folder_named(folder, {"depth", "depths", "Depth", "depth_images"});
     if (!depth_folder)
         return std::nullopt;
-    const auto depths = images_in(depth_folder, &has_depth_extension);
+    const auto depths = depth_images_in(depth_folder);
     if (depths.empty())
         return std::nullopt;
     const auto colour_folder = folder_named(folder, {"color", "colour", "rgb", "image", "images", "Color", "RGB"});
@@ -245,7 +229,7 @@ std::optional<Listing> list_image_folders(const fs::path& folder) {
     if (matched)
         entries_from_match(folder, *depth_folder, capture);
     else
-        entries_from_names(depths, images_in(colour_folder, &has_colour_extension), capture);
+        entries_from_names(depths, colour_images_in(colour_folder), capture);
     add_poses(folder, capture);
     listing.find_camera = [folder](cv::Size, std::vector<std::string>& warnings) {
         return camera_in(folder, warnings);

@@ -4,8 +4,12 @@
 #include "io/captures/capture.h"
 
 #include <functional>
+#include <initializer_list>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace scanshade {
@@ -19,10 +23,20 @@ struct Listing {
     /// Gives entries their poses by time; none where the layout ties poses to frames itself. Called once the camera is
     /// known, because its file may have the offset between the clocks.
     std::function<void(Capture& capture, double pose_time_offset_s)> find_poses = {};
+    /// Of a generic layout: names of files that look like poses or cameras and are neither. Called last.
+    std::function<std::vector<std::string>(const Capture& capture)> tell_unused = {};
 };
 
 // Each returns nothing when the folder is not in its layout, and throws Error when it is but cannot be used.
 [[nodiscard]] std::optional<Listing> list_tum(const std::filesystem::path& folder, const CaptureOptions& options);
+[[nodiscard]] std::optional<Listing> list_nerfstudio(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_bop(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_polycam(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_stray_scanner(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_arkit_scenes(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_replica(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_scannet(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_icl_nuim(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_seven_scenes(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_pcl_recording(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_image_folders(const std::filesystem::path& folder);
@@ -34,6 +48,19 @@ struct Listing {
 /// The folder's own files, hidden and foreign ones (._*, Thumbs.db) left out, in natural order: 2 before 10.
 [[nodiscard]] std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder);
 [[nodiscard]] bool natural_less(const std::string& a, const std::string& b);
+
+/// The child folder of the first of these names that is there.
+[[nodiscard]] std::optional<std::filesystem::path> folder_named(const std::filesystem::path& parent,
+                                                                std::initializer_list<std::string_view> names);
+/// A folder's depth, or colour, images in natural order; none of no folder.
+[[nodiscard]] std::vector<std::filesystem::path> depth_images_in(const std::optional<std::filesystem::path>& folder);
+[[nodiscard]] std::vector<std::filesystem::path> colour_images_in(const std::optional<std::filesystem::path>& folder);
+/// The image of that stem among those of a folder; empty where there is none.
+[[nodiscard]] std::string with_stem(const std::vector<std::filesystem::path>& images, const std::string& stem);
+/// A file's JSON. Throws Error naming file and place.
+[[nodiscard]] nlohmann::json json_in(const std::filesystem::path& file);
+/// An entry's own camera for its depth image: `camera` is for images of `size`, which see the same in other pixels.
+[[nodiscard]] std::shared_ptr<const Camera> camera_for_depth(Camera camera, cv::Size size, cv::Size depth);
 
 /// Why a listed file cannot be opened: it is missing, or outside the capture's folder, by name or through a link.
 /// Empty = it can be opened.

@@ -15,19 +15,19 @@ namespace scanshade {
 
 namespace fs = std::filesystem;
 
-namespace {
-
-/// Published rotations are rounded: 7-Scenes' are up to 4e-4 off orthonormal. Beyond this it is another kind of matrix.
-constexpr double rigid_tolerance = 1e-2;
-/// TUM prints quaternions with 4 digits, which moves their length by up to 1e-4.
-constexpr double unit_tolerance = 1e-3;
-
 Eigen::Isometry3d pose_from(const Eigen::Vector3d& translation, const Eigen::Quaterniond& rotation) {
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     pose.linear() = rotation.normalized().toRotationMatrix();
     pose.translation() = translation;
     return pose;
 }
+
+namespace {
+
+/// Published rotations are rounded: 7-Scenes' are up to 4e-4 off orthonormal. Beyond this it is another kind of matrix.
+constexpr double rigid_tolerance = 1e-2;
+/// TUM prints quaternions with 4 digits, which moves their length by up to 1e-4.
+constexpr double unit_tolerance = 1e-3;
 
 /// tx ty tz qx qy qz qw from seven words; errors go to `trouble`, corrections to `warning`.
 std::optional<Eigen::Isometry3d> quaternion_pose(const std::vector<std::string_view>& row, std::size_t first,
@@ -202,31 +202,43 @@ std::map<std::size_t, Eigen::Isometry3d> read_redwood_log(const fs::path& file, 
     return poses;
 }
 
-MatrixPose read_matrix_pose(const fs::path& file) {
+Eigen::Matrix4d from_opengl(const Eigen::Matrix4d& world_from_camera) {
+    return world_from_camera * Eigen::Vector4d(1, -1, -1, 1).asDiagonal();
+}
+
+MatrixPose checked_pose(const Eigen::Matrix4d& matrix, const std::string& where) {
     MatrixPose result;
+    if (!matrix.allFinite())
+        result.warning = where + ": the pose is infinite, which means that tracking was lost; pose not used.";
+    else if (!is_rigid(matrix))
+        result.warning = fmt::format("{}: {}; pose not used.", where, not_rigid(matrix));
+    else
+        result.world_from_camera = rigid(matrix);
+    return result;
+}
+
+std::string read_matrix(const fs::path& file, Eigen::Matrix4d& matrix, std::size_t* rows) {
     const std::string bytes = read_list_file(file);
     const auto lines = content_lines(bytes);
-    Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
-    if (lines.size() != 3 && lines.size() != 4) {
-        result.problem = fmt::format("{}: {}, expected a 4x4 pose", file.string(), counted(lines.size(), "row"));
-        return result;
-    }
-    for (std::size_t row = 0; row < lines.size(); ++row) {
-        const std::string trouble = read_row(lines[row], matrix, static_cast<int>(row));
-        if (trouble.empty())
-            continue;
-        result.problem = fmt::format("{}: {}", at_line(file, lines[row].number), trouble);
-        return result;
-    }
-    if (!matrix.allFinite()) {
-        result.warning = file.string() + ": the pose is infinite, which means that tracking was lost; pose not used.";
-    } else if (!is_rigid(matrix)) {
-        result.warning = fmt::format("{}: {}; pose not used.", file.string(), not_rigid(matrix));
-    } else {
-        result.world_from_camera = rigid(matrix);
-        if (lines.size() == 3)
-            result.warning = file.string() + ": 3 rows, expected 4; the last taken as 0 0 0 1.";
-    }
+    if (lines.size() != 3 && lines.size() != 4)
+        return fmt::format("{}: {}, expected a 4x4 pose", file.string(), counted(lines.size(), "row"));
+    if (rows)
+        *rows = lines.size();
+    matrix = Eigen::Matrix4d::Identity();
+    for (std::size_t row = 0; row < lines.size(); ++row)
+        if (const std::string trouble = read_row(lines[row], matrix, static_cast<int>(row)); !trouble.empty())
+            return fmt::format("{}: {}", at_line(file, lines[row].number), trouble);
+    return {};
+}
+
+MatrixPose read_matrix_pose(const fs::path& file) {
+    Eigen::Matrix4d matrix;
+    std::size_t rows = 0;
+    if (const std::string problem = read_matrix(file, matrix, &rows); !problem.empty())
+        return {std::nullopt, problem, {}};
+    MatrixPose result = checked_pose(matrix, file.string());
+    if (result.world_from_camera && rows == 3)
+        result.warning = file.string() + ": 3 rows, expected 4; the last taken as 0 0 0 1.";
     return result;
 }
 

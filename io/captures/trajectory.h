@@ -42,6 +42,16 @@ struct MatrixPose {
         warning; ///< why there is no pose though the file is sound (tracking lost, not rigid), or what was completed
 };
 
+/// A file's matrix, checked; `where` begins the sentences.
+[[nodiscard]] MatrixPose checked_pose(const Eigen::Matrix4d& world_from_camera, const std::string& where);
+/// Four rows of four numbers, or three; the rest is that of the identity. Empty, or why not. `rows`, if given, gets
+/// their number.
+[[nodiscard]] std::string read_matrix(const std::filesystem::path& file, Eigen::Matrix4d& matrix,
+                                      std::size_t* rows = nullptr);
+[[nodiscard]] Eigen::Isometry3d pose_from(const Eigen::Vector3d& translation, const Eigen::Quaterniond& rotation);
+/// OpenGL's and ARKit's cameras have y up and look along -z: the pose of ours, world_from_camera.
+[[nodiscard]] Eigen::Matrix4d from_opengl(const Eigen::Matrix4d& world_from_camera);
+
 /// 7-Scenes' and BundleFusion's pose.txt: 4x4, or 3x4 with the last row left out. Infinities mean that tracking was
 /// lost.
 [[nodiscard]] MatrixPose read_matrix_pose(const std::filesystem::path& file);

@@ -42,6 +42,9 @@ void check_png_chunks(std::string_view bytes, const ImageFacts& facts, const Pat
 [[nodiscard]] ImageFacts webp_header(std::string_view bytes, const Path& file);
 [[nodiscard]] cv::Mat3b colour_webp(std::string_view bytes, const ImageFacts& facts, const Path& file);
 
+[[nodiscard]] ImageFacts npy_header(std::string_view bytes, const Path& file);
+[[nodiscard]] cv::Mat stored_npy(std::string_view bytes, const ImageFacts& facts, const Path& file);
+
 [[nodiscard]] ImageFacts pclzf_header(std::string_view bytes, const Path& file);
 [[nodiscard]] cv::Mat stored_pclzf(std::string_view bytes, const ImageFacts& facts, const Path& file);
 [[nodiscard]] cv::Mat3b colour_pclzf(std::string_view bytes, const ImageFacts& facts, const Path& file);

@@ -57,6 +57,10 @@ void images() {
                  raw(static_cast<std::uint32_t>(packed.size())) + raw(static_cast<std::uint32_t>(32 * pixel_bytes)) +
                  packed);
     };
+    const std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (4, 8), }\n";
+    seed("image", "seed.npy",
+         "\x93NUMPY\x01" + std::string(1, '\0') + static_cast<char>(header.size()) + std::string(1, '\0') + header +
+             std::string(4 * 4 * 8, '?'));
     pclzf("depth16", 2);
     pclzf("rgb24", 3);
     pclzf("yuv422", 2);

@@ -1,0 +1,389 @@
+// Recordings of phones with a lidar, each with K per frame and a confidence image: Stray Scanner, Polycam, ARKitScenes.
+#include "io/captures/layouts.h"
+
+#include "io/captures/trajectory.h"
+#include "io/images/format.h"
+#include "io/text.h"
+#include "projection/base/error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+
+namespace scanshade {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+namespace {
+
+/// Phones make their depth on the colour camera's pixels, in fewer of them, in millimetres.
+Listing of_phone(const std::string& kind) {
+    Listing listing;
+    listing.capture.kind = kind;
+    listing.capture.depth = usual_encoding("mm", kind + " layout");
+    listing.capture.registration = Registration::yes;
+    listing.capture.registration_reason = "phones make depth on the colour camera's pixels";
+    listing.capture.colour_in_more_pixels = true;
+    return listing;
+}
+
+/// The first entry's camera stands for the capture.
+void use_own_cameras(Listing& listing) {
+    std::shared_ptr<const Camera> first;
+    for (const CaptureEntry& entry : listing.capture.entries)
+        first = first ? first : entry.camera;
+    listing.find_camera = [first](cv::Size, std::vector<std::string>&) {
+        return first ? std::optional(CameraFile{*first, {}, Registration::unknown, {}}) : std::nullopt;
+    };
+}
+
+cv::Size size_of(const fs::path& image) {
+    try {
+        return peek(image).size;
+    } catch (const Outage&) {
+        throw;
+    } catch (const Error&) { // loading it will say why
+        return {};
+    }
+}
+
+std::vector<std::string> cells_of(std::string_view line) {
+    std::vector<std::string> cells;
+    for (std::size_t at = 0; at <= line.size();) {
+        const std::size_t comma = std::min(line.find(',', at), line.size());
+        cells.emplace_back(trimmed(line.substr(at, comma - at)));
+        at = comma + 1;
+    }
+    return cells;
+}
+
+/// Width and height in the track header of an MPEG-4 file, its boxes walked without decoding: 0x0 where there is none.
+cv::Size video_size(const fs::path& file) {
+    std::ifstream stream(file, std::ios::binary);
+    const auto read_32 = [&] {
+        unsigned char b[4] = {};
+        stream.read(reinterpret_cast<char*>(b), 4);
+        return std::uint32_t(b[0]) << 24 | std::uint32_t(b[1]) << 16 | std::uint32_t(b[2]) << 8 | b[3];
+    };
+    stream.seekg(0, std::ios::end);
+    std::uint64_t end = static_cast<std::uint64_t>(std::max<std::streamoff>(stream.tellg(), 0)), at = 0;
+    constexpr int most_boxes = 10000;
+    for (int box = 0; box < most_boxes && stream && at + 8 <= end; ++box) {
+        stream.seekg(static_cast<std::streamoff>(at));
+        std::uint64_t size = read_32(), head = 8;
+        const std::uint32_t type = read_32();
+        if (size == 1) {
+            size = std::uint64_t(read_32()) << 32;
+            size |= read_32();
+            head = 16;
+        }
+        if (size == 0)
+            size = end - at;
+        if (size < head || at + size > end)
+            return {};
+        if (type == 0x6d6f6f76 || type == 0x7472616b) { // moov, trak: what is in them
+            at += head;
+            continue;
+        }
+        if (type == 0x746b6864 && size > 16) { // tkhd
+            stream.seekg(static_cast<std::streamoff>(at + size - 8));
+            const auto width = static_cast<int>(read_32() >> 16), height = static_cast<int>(read_32() >> 16);
+            const cv::Size found(width, height);
+            if (stream && !found.empty())
+                return found;
+        }
+        at += size;
+    }
+    return {};
+}
+
+/// 3 rows of 3 numbers with commas.
+Camera stray_camera(const fs::path& file) {
+    const std::string bytes = read_list_file(file);
+    std::vector<double> k;
+    for (const TextLine& line : text_lines(bytes)) {
+        if (trimmed(line.text).empty())
+            continue;
+        for (const std::string& cell : cells_of(line.text)) {
+            const auto value = number(cell);
+            if (!value || !std::isfinite(*value))
+                throw Error(fmt::format("{}: {}, expected a number", at_line(file, line.number), in_quotes(cell)));
+            k.push_back(*value);
+        }
+    }
+    if (k.size() != 9)
+        throw Error(fmt::format("{}: {}, expected 9 of a 3x3 matrix", file.string(), counted(k.size(), "number")));
+    return {{k[0], k[4], k[2], k[5], {}}, {}, file.string()};
+}
+
+struct OdometryRow {
+    double stamp_s = 0;
+    Eigen::Isometry3d pose;
+};
+
+/// timestamp, frame, x, y, z, qx, qy, qz, qw: by the frame's number. Camera to world, in our axes.
+std::map<std::uint64_t, OdometryRow> odometry_in(const fs::path& file, std::vector<std::string>& warnings) {
+    const std::string bytes = read_list_file(file);
+    std::map<std::uint64_t, OdometryRow> rows;
+    for (const TextLine& line : text_lines(bytes)) {
+        if (line.number == 1 || trimmed(line.text).empty())
+            continue;
+        const std::vector<std::string> cells = cells_of(line.text);
+        const auto frame = cells.size() == 9 ? whole_number(cells[1]) : std::nullopt;
+        std::vector<double> v;
+        for (std::size_t i = 0; frame && i < cells.size(); ++i)
+            if (const auto value = number(cells[i]); value && std::isfinite(*value))
+                v.push_back(*value);
+        const Eigen::Quaterniond q = v.size() == 9 ? Eigen::Quaterniond(v[8], v[5], v[6], v[7]) : Eigen::Quaterniond();
+        if (v.size() != 9 || !(q.norm() > 1e-6)) {
+            warnings.push_back(fmt::format("{}: expected 9 numbers (timestamp, frame, x, y, z, qx, qy, qz, qw); pose "
+                                           "not used.",
+                                           at_line(file, line.number)));
+            continue;
+        }
+        rows.insert_or_assign(*frame, OdometryRow{v[0], pose_from({v[2], v[3], v[4]}, q)});
+    }
+    return rows;
+}
+
+} // namespace
+
+std::optional<Listing> list_stray_scanner(const fs::path& folder) {
+    std::error_code ignored;
+    const auto depths = depth_images_in(folder_named(folder, {"depth"}));
+    if (depths.empty() || !fs::is_regular_file(folder / "camera_matrix.csv", ignored))
+        return std::nullopt;
+    Listing listing = of_phone("Stray Scanner");
+    Capture& capture = listing.capture;
+    const auto sure = colour_images_in(folder_named(folder, {"confidence"})),
+               colours = colour_images_in(folder_named(folder, {"rgb", "color"}));
+    std::map<std::uint64_t, OdometryRow> odometry;
+    if (fs::is_regular_file(folder / "odometry.csv", ignored))
+        odometry = odometry_in(folder / "odometry.csv", capture.warnings);
+    else
+        capture.warnings.push_back(fmt::format("{}: there is no odometry.csv; no poses.", folder.string()));
+    for (const fs::path& depth : depths) {
+        CaptureEntry entry;
+        entry.name = depth.stem().string();
+        entry.depth = depth;
+        entry.confidence = with_stem(sure, entry.name);
+        entry.colour = with_stem(colours, entry.name);
+        const auto frame = whole_number(entry.name);
+        if (const auto row = frame ? odometry.find(*frame) : odometry.end(); row != odometry.end()) {
+            entry.world_from_camera = row->second.pose;
+            entry.stamp_s = row->second.stamp_s;
+        } else if (!odometry.empty()) {
+            entry.warnings.push_back(fmt::format("odometry.csv has no row for {}.", entry.name));
+        }
+        capture.entries.push_back(std::move(entry));
+    }
+    if (colours.empty() && fs::is_regular_file(folder / "rgb.mp4", ignored))
+        capture.warnings.push_back(
+            fmt::format("{}: the video is not decoded; depth alone.", (folder / "rgb.mp4").string()));
+    listing.find_camera = [folder](cv::Size depth, std::vector<std::string>& warnings) -> std::optional<CameraFile> {
+        const Camera camera = stray_camera(folder / "camera_matrix.csv");
+        cv::Size size = video_size(folder / "rgb.mp4");
+        if (size.empty()) {
+            constexpr double usual = 7.5; // 1920x1440 for 256x192
+            size = {static_cast<int>(std::lround(usual * depth.width)),
+                    static_cast<int>(std::lround(usual * depth.height))};
+            warnings.push_back(fmt::format("{}: no rgb.mp4 tells which size it is for; {}x{} is assumed.",
+                                           camera.origin, size.width, size.height));
+        }
+        return CameraFile{*camera_for_depth(camera, size, depth), {}, Registration::unknown, {}};
+    };
+    return listing;
+}
+
+// --- Polycam: keyframes/{depth,cameras,corrected_cameras,images,corrected_images,confidence}/MICROSECONDS.* ---
+
+namespace {
+
+/// The camera and pose of a keyframe. Throws Error naming the file and key.
+std::pair<std::shared_ptr<const Camera>, MatrixPose> polycam_camera(const fs::path& file, cv::Size depth) {
+    const Json object = json_in(file);
+    const auto value = [&](const std::string& key) {
+        const auto found = object.is_object() ? object.find(key) : object.end();
+        if (found == object.end() || !found->is_number())
+            throw Error(fmt::format("{}: \"{}\" is missing or no number", file.string(), key));
+        return found->get<double>();
+    };
+    const Camera camera{{value("fx"), value("fy"), value("cx"), value("cy"), {}}, {}, file.string()};
+    const cv::Size size(static_cast<int>(value("width")), static_cast<int>(value("height")));
+    Eigen::Matrix4d pose = Eigen::Matrix4d::Identity();
+    for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 4; ++column)
+            pose(row, column) = value(fmt::format("t_{}{}", row, column));
+    return {camera_for_depth(camera, size, depth), checked_pose(from_opengl(pose), file.string())};
+}
+
+} // namespace
+
+std::optional<Listing> list_polycam(const fs::path& folder) {
+    std::error_code ignored;
+    const fs::path frames = fs::is_directory(folder / "keyframes", ignored) ? folder / "keyframes" : folder;
+    const auto depths = depth_images_in(folder_named(frames, {"depth"}));
+    if (depths.empty() || !fs::is_directory(frames / "cameras", ignored))
+        return std::nullopt;
+    Listing listing = of_phone("Polycam");
+    Capture& capture = listing.capture;
+    const auto images = colour_images_in(folder_named(frames, {"images"})),
+               corrected = colour_images_in(folder_named(frames, {"corrected_images"})),
+               sure = colour_images_in(folder_named(frames, {"confidence"}));
+    std::size_t uncorrected = 0;
+    for (const fs::path& depth : depths) {
+        CaptureEntry entry;
+        entry.name = depth.stem().string();
+        entry.depth = depth;
+        entry.confidence = with_stem(sure, entry.name);
+        if (const auto microseconds = whole_number(entry.name))
+            entry.stamp_s = static_cast<double>(*microseconds) * 1e-6;
+        const fs::path better = frames / "corrected_cameras" / (entry.name + ".json"),
+                       raw = frames / "cameras" / (entry.name + ".json");
+        entry.colour = with_stem(corrected, entry.name);
+        const bool is_corrected = !entry.colour.empty() && fs::is_regular_file(better, ignored);
+        uncorrected += !is_corrected;
+        if (!is_corrected)
+            entry.colour = with_stem(images, entry.name);
+        try {
+            const auto [camera, pose] = polycam_camera(is_corrected ? better : raw, size_of(depth));
+            entry.camera = camera;
+            entry.world_from_camera = pose.world_from_camera;
+            if (!pose.warning.empty())
+                entry.warnings.push_back(pose.warning);
+        } catch (const Outage&) {
+            throw;
+        } catch (const Error& failure) {
+            entry.problem = failure.what();
+        }
+        capture.entries.push_back(std::move(entry));
+    }
+    if (uncorrected > 0 && uncorrected < capture.entries.size())
+        capture.warnings.push_back(fmt::format("{} of {} frames have no corrected camera, and take the raw one: their "
+                                               "poses may be off by what was corrected.",
+                                               uncorrected, capture.entries.size()));
+    use_own_cameras(listing);
+    return listing;
+}
+
+// --- ARKitScenes: lowres_depth/VIDEO_SECONDS.png, lowres_wide_intrinsics/*.pincam, lowres_wide.traj ---
+
+namespace {
+
+/// "t rx ry rz tx ty tz": a rotation vector and a translation from world to camera.
+std::vector<StampedPose> arkit_trajectory(const fs::path& file, std::vector<std::string>& warnings) {
+    const std::string bytes = read_list_file(file);
+    std::vector<StampedPose> poses;
+    for (const TextLine& line : text_lines(bytes)) {
+        std::vector<double> v;
+        const auto all = words(line.text);
+        if (all.empty())
+            continue;
+        for (const std::string_view word : all)
+            if (const auto value = number(word); value && std::isfinite(*value))
+                v.push_back(*value);
+        if (v.size() != 7 || all.size() != 7) {
+            warnings.push_back(
+                fmt::format("{}: expected 7 numbers (time, rotation vector, translation); pose not used.",
+                            at_line(file, line.number)));
+            continue;
+        }
+        const Eigen::Vector3d turn(v[1], v[2], v[3]);
+        const Eigen::AngleAxisd rotation(turn.norm(), turn.norm() > 0 ? turn.normalized() : Eigen::Vector3d::UnitX());
+        poses.push_back({v[0], pose_from({v[4], v[5], v[6]}, Eigen::Quaterniond(rotation)).inverse()});
+    }
+    std::ranges::sort(poses, {}, &StampedPose::stamp_s);
+    return poses;
+}
+
+/// "w h fx fy cx cy"
+Camera pincam(const fs::path& file) {
+    const std::string bytes = read_list_file(file);
+    std::vector<double> v;
+    for (const std::string_view word : words(bytes))
+        if (const auto value = number(word); value && std::isfinite(*value))
+            v.push_back(*value);
+    if (v.size() != 6)
+        throw Error(fmt::format("{}: expected 6 numbers (width height fx fy cx cy)", file.string()));
+    return {{v[2], v[3], v[4], v[5], {static_cast<int>(v[0]), static_cast<int>(v[1])}}, {}, file.string()};
+}
+
+/// VIDEO_SECONDS -> VIDEO and SECONDS.
+std::optional<std::pair<std::string, double>> arkit_name(const std::string& stem) {
+    const std::size_t line = stem.rfind('_');
+    const auto seconds = line == std::string::npos ? std::nullopt : number(stem.substr(line + 1));
+    return seconds ? std::optional(std::pair(stem.substr(0, line), *seconds)) : std::nullopt;
+}
+
+} // namespace
+
+std::optional<Listing> list_arkit_scenes(const fs::path& given) {
+    std::error_code ignored;
+    fs::path folder = given;
+    if (!fs::is_directory(folder / "lowres_depth", ignored)) // VIDEO/VIDEO_frames/
+        folder = given / ((given.filename().empty() ? given.parent_path() : given).filename().string() + "_frames");
+    const auto depths = depth_images_in(folder_named(folder, {"lowres_depth"}));
+    if (depths.empty())
+        return std::nullopt;
+    Listing listing = of_phone("ARKitScenes");
+    Capture& capture = listing.capture;
+    const auto sure = colour_images_in(folder_named(folder, {"confidence"})),
+               colours = colour_images_in(folder_named(folder, {"lowres_wide", "color"}));
+    std::map<double, fs::path> pincams; // by seconds
+    if (const auto cameras = folder_named(folder, {"lowres_wide_intrinsics"}))
+        for (const fs::path& file : files_in(*cameras))
+            if (const auto name = arkit_name(file.stem().string()); name && lower_extension(file) == ".pincam")
+                pincams.emplace(name->second, file);
+    std::vector<StampedPose> poses;
+    if (fs::is_regular_file(folder / "lowres_wide.traj", ignored))
+        poses = arkit_trajectory(folder / "lowres_wide.traj", capture.warnings);
+    else
+        capture.warnings.push_back(fmt::format("{}: there is no lowres_wide.traj; no poses.", folder.string()));
+    constexpr double same_s = 0.005, apart_s = 0.2, of_image_s = 0.0015;
+    for (const fs::path& depth : depths) {
+        CaptureEntry entry;
+        entry.name = depth.stem().string();
+        entry.depth = depth;
+        entry.confidence = with_stem(sure, entry.name);
+        entry.colour = with_stem(colours, entry.name);
+        const auto name = arkit_name(entry.name);
+        if (name) {
+            entry.stamp_s = name->second;
+            const auto near = std::ranges::min_element(
+                poses, {}, [&](const StampedPose& pose) { return std::abs(pose.stamp_s - name->second); });
+            entry.world_from_camera = near != poses.end() && std::abs(near->stamp_s - name->second) <= same_s
+                                          ? std::optional(near->world_from_camera)
+                                          : pose_at(poses, name->second, apart_s);
+        }
+        if (!entry.world_from_camera && !poses.empty())
+            entry.warnings.push_back("lowres_wide.traj has no pose near its time.");
+        const auto after = pincams.lower_bound(name ? name->second : 0);
+        auto nearest = after;
+        if (after != pincams.begin() &&
+            (after == pincams.end() || name->second - std::prev(after)->first < after->first - name->second))
+            nearest = std::prev(after);
+        if (name && nearest != pincams.end()) {
+            if (std::abs(nearest->first - name->second) > of_image_s)
+                entry.warnings.push_back(
+                    fmt::format("it has no camera file; that of {} is taken.", nearest->second.filename().string()));
+            try {
+                const Camera camera = pincam(nearest->second);
+                entry.camera = camera_for_depth(camera, camera.pinhole.size, size_of(depth));
+            } catch (const Outage&) {
+                throw;
+            } catch (const Error& failure) {
+                entry.problem = failure.what();
+            }
+        }
+        capture.entries.push_back(std::move(entry));
+    }
+    use_own_cameras(listing);
+    return listing;
+}
+
+} // namespace scanshade
