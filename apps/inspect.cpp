@@ -87,7 +87,9 @@ void add_frame(const ExaminedFrame& examined, Samples& samples) {
         ++samples.depth_sizes[{examined.depth_size.width, examined.depth_size.height}];
     for (const auto* sentences : {&frame.warnings, &frame.doubts})
         for (const std::string& sentence : *sentences)
-            samples.warnings.push_back(frame.name + ": " + sentence);
+            if (const std::string whole = frame.name + ": " + sentence; // those of the listing are there already
+                std::ranges::find(samples.warnings, whole) == samples.warnings.end())
+                samples.warnings.push_back(whole);
     const bool without_camera = !frame.cloud && frame.camera.pinhole.fx == 0; // the capture's own warning says so
     if (samples.camera || without_camera)
         return;

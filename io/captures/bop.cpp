@@ -78,7 +78,6 @@ std::optional<Listing> list_bop(const fs::path& folder) {
     capture.depth = depth_encoding("mm", "each image's depth_scale in " + file.string());
     capture.registration = Registration::yes;
     capture.registration_reason = "BOP's colour and depth are registered";
-    std::shared_ptr<const Camera> first;
     for (const fs::path& depth : depths) {
         CaptureEntry entry;
         entry.name = depth.stem().string();
@@ -93,12 +92,9 @@ std::optional<Listing> list_bop(const fs::path& folder) {
         } catch (const Error& failure) {
             entry.problem = failure.what();
         }
-        first = first ? first : entry.camera;
         capture.entries.push_back(std::move(entry));
     }
-    listing.find_camera = [first](cv::Size, std::vector<std::string>&) {
-        return first ? std::optional(CameraFile{*first, {}, Registration::unknown, {}}) : std::nullopt;
-    };
+    settle_own_cameras(listing);
     return listing;
 }
 

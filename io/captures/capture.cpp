@@ -44,7 +44,7 @@ constexpr std::array folder_layouts = {
     FolderLayout{"keyframes/depth with keyframes/cameras (Polycam)", list_polycam},
     FolderLayout{"camera_matrix.csv with depth/ (Stray Scanner)", list_stray_scanner},
     FolderLayout{"lowres_depth/ (ARKitScenes)", list_arkit_scenes},
-    FolderLayout{"traj.txt with results/ (Replica)", list_replica},
+    FolderLayout{"results/depthNNNNNN.png (Replica)", list_replica},
     FolderLayout{"intrinsic/intrinsic_depth.txt or pose/ with depth/ (ScanNet)", list_scannet},
     FolderLayout{"*.gt.freiburg with associations.txt (ICL-NUIM)", list_icl_nuim},
     FolderLayout{"depth.txt (TUM)", nullptr},

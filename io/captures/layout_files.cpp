@@ -142,6 +142,21 @@ std::shared_ptr<const Camera> camera_for_depth(Camera camera, cv::Size size, cv:
     return std::make_shared<const Camera>(std::move(camera));
 }
 
+void settle_own_cameras(Listing& listing) {
+    std::shared_ptr<const Camera> first;
+    for (CaptureEntry& entry : listing.capture.entries) {
+        first = first ? first : entry.camera;
+        if (!entry.camera || entry.camera->pinhole.size == first->pinhole.size)
+            continue;
+        const cv::Size size = entry.camera->pinhole.size, usual = first->pinhole.size;
+        entry.problem = fmt::format("{}: depth is {}x{}, that of {} is {}x{}", entry.depth, size.width, size.height,
+                                    listing.capture.entries.front().name, usual.width, usual.height);
+    }
+    listing.find_camera = [first](cv::Size, std::vector<std::string>&) {
+        return first ? std::optional(CameraFile{*first, {}, Registration::unknown, {}}) : std::nullopt;
+    };
+}
+
 namespace {
 
 bool stays_inside(const fs::path& relative) {

@@ -62,6 +62,10 @@ struct Listing {
 /// An entry's own camera for its depth image: `camera` is for images of `size`, which see the same in other pixels.
 [[nodiscard]] std::shared_ptr<const Camera> camera_for_depth(Camera camera, cv::Size size, cv::Size depth);
 
+/// For entries with cameras of their own: the first stands for the capture. Depth of another size than the first's is a
+/// problem, since a recorder makes one size.
+void settle_own_cameras(Listing& listing);
+
 /// Why a listed file cannot be opened: it is missing, or outside the capture's folder, by name or through a link.
 /// Empty = it can be opened.
 [[nodiscard]] std::string trouble_with(const std::filesystem::path& folder, const std::string& name);

@@ -181,7 +181,8 @@ std::optional<Listing> list_nerfstudio(const fs::path& folder) {
         const Keys keys(file, top, frame);
         CaptureEntry entry;
         try {
-            const std::string image = keys.text("file_path");
+            std::string image = keys.text("file_path");
+            std::ranges::replace(image, '\\', '/');
             entry.name = fs::path(image).stem().string();
             const std::string where = fmt::format("{}: frame {}", file.string(), in_quotes(image));
             const bool ngp = !keys.find("depth_file_path") && keys.find("depth_path");
@@ -225,12 +226,7 @@ std::optional<Listing> list_nerfstudio(const fs::path& folder) {
     if (const auto scale = top.find("applied_scale"); scale != top.end() && scale->is_number() && *scale != 1)
         capture.warnings.push_back(
             fmt::format("{}: poses are divided by its applied_scale of {}.", file.string(), scale->get<double>()));
-    std::shared_ptr<const Camera> first;
-    for (const CaptureEntry& entry : capture.entries)
-        first = first ? first : entry.camera;
-    listing.find_camera = [first](cv::Size, std::vector<std::string>&) {
-        return first ? std::optional(CameraFile{*first, {}, Registration::unknown, {}}) : std::nullopt;
-    };
+    settle_own_cameras(listing);
     return listing;
 }
 

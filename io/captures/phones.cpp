@@ -32,16 +32,6 @@ Listing of_phone(const std::string& kind) {
     return listing;
 }
 
-/// The first entry's camera stands for the capture.
-void use_own_cameras(Listing& listing) {
-    std::shared_ptr<const Camera> first;
-    for (const CaptureEntry& entry : listing.capture.entries)
-        first = first ? first : entry.camera;
-    listing.find_camera = [first](cv::Size, std::vector<std::string>&) {
-        return first ? std::optional(CameraFile{*first, {}, Registration::unknown, {}}) : std::nullopt;
-    };
-}
-
 cv::Size size_of(const fs::path& image) {
     try {
         return peek(image).size;
@@ -267,7 +257,7 @@ std::optional<Listing> list_polycam(const fs::path& folder) {
         capture.warnings.push_back(fmt::format("{} of {} frames have no corrected camera, and take the raw one: their "
                                                "poses may be off by what was corrected.",
                                                uncorrected, capture.entries.size()));
-    use_own_cameras(listing);
+    settle_own_cameras(listing);
     return listing;
 }
 
@@ -382,7 +372,7 @@ std::optional<Listing> list_arkit_scenes(const fs::path& given) {
         }
         capture.entries.push_back(std::move(entry));
     }
-    use_own_cameras(listing);
+    settle_own_cameras(listing);
     return listing;
 }
 

@@ -73,10 +73,11 @@ std::optional<Listing> list_replica(const fs::path& folder) {
     std::error_code ignored;
     auto depths = depth_images_in(folder_named(folder, {"results"}));
     std::erase_if(depths, [](const fs::path& file) { return !has_prefix(file, "depth"); });
-    if (depths.empty() || !fs::is_regular_file(folder / "traj.txt", ignored))
+    if (depths.empty())
         return std::nullopt;
+    const bool has_poses = fs::is_regular_file(folder / "traj.txt", ignored);
     const auto colours = colour_images_in(folder / "results");
-    const std::vector<MatrixPose> poses = matrix_rows(folder / "traj.txt");
+    const std::vector<MatrixPose> poses = has_poses ? matrix_rows(folder / "traj.txt") : std::vector<MatrixPose>();
     const ReplicaCamera camera = replica_camera(folder);
     Listing listing;
     Capture& capture = listing.capture;
@@ -94,11 +95,13 @@ std::optional<Listing> list_replica(const fs::path& folder) {
             entry.world_from_camera = poses[i].world_from_camera;
             if (!poses[i].warning.empty())
                 entry.warnings.push_back(poses[i].warning);
-        } else {
+        } else if (has_poses) {
             entry.warnings.push_back(fmt::format("traj.txt has no row for frame {}.", i));
         }
         capture.entries.push_back(std::move(entry));
     }
+    if (!has_poses)
+        capture.warnings.push_back(fmt::format("{}: there is no traj.txt; no poses.", folder.string()));
     listing.find_camera = [camera](cv::Size size, std::vector<std::string>& warnings) -> std::optional<CameraFile> {
         if (camera.assumed && size != camera.camera.pinhole.size)
             return std::nullopt;

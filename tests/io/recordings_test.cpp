@@ -1,19 +1,275 @@
-// Recordings as datasets and phones leave them. Samples with known truth are read from the folder SCANSHADE_RECORDINGS
-// where it is given: NAME.truth.json beside each.
+// Recordings as datasets and phones leave them: small ones made here, and samples with known truth from the folder
+// SCANSHADE_RECORDINGS where it is given, NAME.truth.json beside each.
 #include "io/captures/capture.h"
+#include "tests/support/files.h"
+#include "tests/support/small_capture.h"
 
+#include <algorithm>
 #include <cstdlib>
+#include <cstring>
 #include <fmt/format.h>
 #include <fstream>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 namespace scanshade {
 namespace {
 
 using Json = nlohmann::json;
 namespace fs = std::filesystem;
+
+// ------------------------------------------------------------------------------------------------- made here
+
+using tests::warned;
+using tests::write_file;
+
+/// A recording of one or two frames: 8x6 pixels at 2 m, pixel (1, 1) at 3 m, pixel (0, 0) a hole.
+class Made : public testing::Test {
+  protected:
+    void depth(const std::string& name, double units_per_metre = 1000) {
+        cv::Mat1w image(6, 8, static_cast<ushort>(2 * units_per_metre));
+        image(0, 0) = 0;
+        image(1, 1) = static_cast<ushort>(3 * units_per_metre);
+        picture(name, image);
+    }
+    void colour(const std::string& name, cv::Size size) { picture(name, cv::Mat3b(size, {9, 99, 199})); }
+    /// Low at (2, 2), high elsewhere.
+    void confidence(const std::string& name) {
+        cv::Mat1b image(6, 8, uchar(2));
+        image(2, 2) = 0;
+        picture(name, image);
+    }
+    void picture(const std::string& name, const cv::Mat& image) {
+        fs::create_directories((folder / name).parent_path());
+        ASSERT_TRUE(cv::imwrite((folder / name).string(), image));
+    }
+    void text(const std::string& name, const std::string& bytes) {
+        fs::create_directories((folder / name).parent_path());
+        write_file(folder / name, bytes);
+    }
+    /// A camera at (1, 2, 3), turned by a quarter about z: its x is the world's y.
+    static constexpr const char* pose_rows = "0 -1 0 1\n1 0 0 2\n0 0 1 3\n0 0 0 1\n";
+    static void expect_pose(const Frame& frame) {
+        ASSERT_TRUE(frame.world_from_camera);
+        EXPECT_LT((*frame.world_from_camera * Eigen::Vector3d(1, 0, 0) - Eigen::Vector3d(1, 3, 3)).norm(), 1e-6);
+        EXPECT_LT((*frame.world_from_camera * Eigen::Vector3d(0, 0, 1) - Eigen::Vector3d(1, 2, 4)).norm(), 1e-6);
+    }
+    static void expect_depth(const Frame& frame) {
+        EXPECT_EQ(frame.depth_m(0, 0), 0);
+        EXPECT_NEAR(frame.depth_m(1, 1), 3, 1e-4);
+        EXPECT_NEAR(frame.depth_m(5, 7), 2, 1e-4);
+    }
+    static void expect_camera(const Frame& frame, double fx, double fy, double cx, double cy) {
+        const Pinhole& k = frame.camera.pinhole;
+        EXPECT_EQ(k.size, cv::Size(8, 6));
+        EXPECT_NEAR(k.fx, fx, 1e-6);
+        EXPECT_NEAR(k.fy, fy, 1e-6);
+        EXPECT_NEAR(k.cx, cx, 1e-6);
+        EXPECT_NEAR(k.cy, cy, 1e-6);
+    }
+    tests::TemporaryFolder folder;
+};
+
+TEST_F(Made, scannet_has_matrices_and_a_colour_camera) {
+    depth("depth/0.png");
+    depth("depth/10.png");
+    colour("color/0.jpg", {16, 12});
+    text("pose/0.txt", pose_rows);
+    text("pose/10.txt", "-inf -inf -inf -inf\n-inf -inf -inf -inf\n-inf -inf -inf -inf\n-inf -inf -inf -inf\n");
+    text("intrinsic/intrinsic_depth.txt", "10 0 3.4 0\n0 11 2.6 0\n0 0 1 0\n0 0 0 1\n");
+    text("intrinsic/intrinsic_color.txt", "20 0 7.5 0\n0 21 5.5 0\n0 0 1 0\n0 0 0 1\n");
+    const Capture capture = open_capture(folder.path());
+    EXPECT_EQ(capture.kind, "ScanNet");
+    const Frame frame = capture.load(0);
+    expect_camera(frame, 10, 11, 3.4, 2.6);
+    expect_pose(frame);
+    expect_depth(frame);
+    ASSERT_TRUE(frame.colour_camera);
+    EXPECT_EQ(frame.colour_camera->camera.pinhole.fy, 21);
+    EXPECT_EQ(frame.colour.size(), cv::Size(16, 12));
+    EXPECT_EQ(frame.registration, Registration::no);
+    const Frame lost = capture.load(1);
+    EXPECT_FALSE(lost.world_from_camera);
+    EXPECT_TRUE(warned(lost.warnings, "tracking was lost"));
+}
+
+TEST_F(Made, nerfstudio_counts_pixels_from_corners_and_looks_along_minus_z) {
+    depth("depths/b.png");
+    colour("images/b.jpg", {16, 12});
+    depth("depths/a.png");
+    // The same pose with OpenGL's axes: the second and third column change sign.
+    const std::string pose = R"("transform_matrix": [[0,1,0,1],[1,0,0,2],[0,0,-1,3],[0,0,0,1]])";
+    text("transforms.json",
+         R"({"camera_model": "OPENCV", "fl_x": 20, "fl_y": 22, "cx": 7.5, "cy": 6, "w": 16, "h": 12, "k1": 0.1,
+        "frames": [{"file_path": "images\\b.jpg", "depth_file_path": "depths/b.png", )" +
+             pose + R"(},
+                   {"file_path": "images/a.jpg", "depth_file_path": "depths/a.png", "depth_unit_scale_factor": 0.002, )" +
+             pose + R"(},
+                   {"file_path": "images/c.jpg", )" +
+             pose + R"(}]})");
+    const Capture capture = open_capture(folder.path());
+    ASSERT_EQ(capture.entries.size(), 2U);
+    EXPECT_TRUE(warned(capture.warnings, "without depth"));
+    const Frame frame = capture.load(1);
+    EXPECT_EQ(frame.name, "b");
+    expect_camera(frame, 10, 11, (7.5 - 0.5 + 0.5) / 2 - 0.5, (6 - 0.5 + 0.5) / 2 - 0.5);
+    EXPECT_EQ(frame.camera.distortion.k1, 0.1);
+    expect_pose(frame);
+    expect_depth(frame);
+    EXPECT_EQ(frame.colour.size(), cv::Size(8, 6)) << "finer colour is reduced to depth's pixels";
+    EXPECT_NEAR(capture.load(0).depth_m(5, 7), 4, 1e-4) << "its own depth unit";
+}
+
+TEST_F(Made, stray_scanner_takes_the_size_from_the_video_and_drops_unsure_depth) {
+    depth("depth/000000.png");
+    confidence("confidence/000000.png");
+    text("camera_matrix.csv", "20, 0, 7.5\n0, 22, 5.5\n0, 0, 1\n");
+    text("odometry.csv", "timestamp, frame, x, y, z, qx, qy, qz, qw\n5.5, 000000, 1, 2, 3, 0, 0, 0.7071067811865476, "
+                         "0.7071067811865476\n");
+    const auto box = [](const std::string& type, const std::string& content) {
+        const std::size_t size = content.size() + 8;
+        return std::string{static_cast<char>(size >> 24), static_cast<char>(size >> 16), static_cast<char>(size >> 8),
+                           static_cast<char>(size)} +
+               type + content;
+    };
+    const std::string size = std::string("\0\x10\0\0\0\x0c\0\0", 8); // 16x12 as 16.16
+    text("rgb.mp4", box("ftyp", "qt  ") +
+                        box("moov", box("mvhd", "....") + box("trak", box("tkhd", std::string(76, '.') + size))));
+    const Frame frame = open_capture(folder.path()).load(0);
+    expect_camera(frame, 10, 11, 3.5, 2.5);
+    expect_pose(frame);
+    expect_depth(frame);
+    EXPECT_EQ(frame.depth_m(2, 2), 0) << "of the lowest confidence";
+    EXPECT_EQ(open_capture(folder.path()).entries[0].stamp_s, 5.5);
+}
+
+TEST_F(Made, polycam_prefers_corrected_cameras) {
+    const auto camera = [](double fx) {
+        return fmt::format(
+            R"({{"fx": {}, "fy": 22, "cx": 7.5, "cy": 5.5, "width": 16, "height": 12, "t_00": 0, "t_01": 1, "t_02": 0,
+            "t_03": 1, "t_10": 1, "t_11": 0, "t_12": 0, "t_13": 2, "t_20": 0, "t_21": 0, "t_22": -1, "t_23": 3}})",
+            fx);
+    };
+    for (const char* name : {"1000000", "2000000"}) {
+        depth(fmt::format("keyframes/depth/{}.png", name));
+        confidence(fmt::format("keyframes/confidence/{}.png", name));
+        text(fmt::format("keyframes/cameras/{}.json", name), camera(30));
+    }
+    text("keyframes/corrected_cameras/1000000.json", camera(20));
+    colour("keyframes/corrected_images/1000000.jpg", {16, 12});
+    const Capture capture = open_capture(folder.path());
+    EXPECT_TRUE(warned(capture.warnings, "1 of 2 frames have no corrected camera"));
+    const Frame frame = capture.load(0);
+    expect_camera(frame, 10, 11, 3.5, 2.5);
+    expect_pose(frame);
+    expect_depth(frame);
+    EXPECT_EQ(frame.depth_m(2, 2), 0);
+    EXPECT_EQ(capture.entries[0].stamp_s, 1.0);
+    expect_camera(capture.load(1), 15, 11, 3.5, 2.5);
+}
+
+TEST_F(Made, arkit_scenes_turn_from_world_to_camera) {
+    depth("lowres_depth/42_1.000.png");
+    depth("lowres_depth/42_9.000.png");
+    text("lowres_wide_intrinsics/42_1.001.pincam", "8 6 10 11 3.5 2.5");
+    // The inverse of the pose: a quarter turn back about z, and -R^T t.
+    text("lowres_wide.traj", "1.002 0 0 -1.5707963267948966 -2 1 -3\n");
+    const Capture capture = open_capture(folder.path());
+    const Frame frame = capture.load(0);
+    expect_camera(frame, 10, 11, 3.5, 2.5);
+    expect_pose(frame);
+    expect_depth(frame);
+    const Frame later = capture.load(1);
+    EXPECT_FALSE(later.world_from_camera);
+    EXPECT_TRUE(warned(later.warnings, "no camera file")) << "the nearest one's is taken";
+}
+
+TEST_F(Made, bop_has_a_camera_and_a_unit_for_each_image) {
+    depth("depth/000001.png", 10000);
+    depth("depth/000002.png", 1000);
+    text("scene_camera.json", R"({"1": {"cam_K": [10,0,3.5,0,11,2.5,0,0,1], "depth_scale": 0.1,
+        "cam_R_w2c": [0,1,0,-1,0,0,0,0,1], "cam_t_w2c": [-2000,1000,-3000]},
+        "2": {"cam_K": [12,0,3.5,0,11,2.5,0,0,1], "depth_scale": 1}})");
+    const Capture capture = open_capture(folder.path());
+    const Frame frame = capture.load(0);
+    expect_camera(frame, 10, 11, 3.5, 2.5);
+    expect_pose(frame);
+    expect_depth(frame);
+    const Frame second = capture.load(1);
+    expect_camera(second, 12, 11, 3.5, 2.5);
+    expect_depth(second);
+    EXPECT_FALSE(second.world_from_camera);
+}
+
+TEST_F(Made, replica_counts_rows_and_states_its_unit) {
+    depth("room0/results/depth000000.png", 5000);
+    colour("room0/results/frame000000.jpg", {8, 6});
+    text("room0/traj.txt", "0 -1 0 1 1 0 0 2 0 0 1 3 0 0 0 1\n");
+    text("cam_params.json", R"({"camera": {"w": 8, "h": 6, "fx": 10, "fy": 11, "cx": 3.5, "cy": 2.5, "scale": 5000}})");
+    const Frame frame = open_capture(folder / "room0").load(0);
+    expect_camera(frame, 10, 11, 3.5, 2.5);
+    expect_pose(frame);
+    expect_depth(frame);
+    EXPECT_FALSE(frame.colour.empty());
+}
+
+TEST_F(Made, icl_nuim_is_mirrored_and_its_first_frame_has_no_pose) {
+    depth("depth/0.png", 5000);
+    depth("depth/1.png", 5000);
+    text("associations.txt", "0 depth/0.png 0 rgb/0.png\n1 depth/1.png 1 rgb/1.png\n");
+    // y mirrored in world and camera: t = (1, -2, 3), and a quarter turn back.
+    text("traj0.gt.freiburg", "1 1 -2 3 0 0 -0.7071067811865476 0.7071067811865476\n");
+    const Capture capture = open_capture(folder.path());
+    EXPECT_EQ(capture.kind, "ICL-NUIM");
+    EXPECT_FALSE(capture.load(0).world_from_camera);
+    const Frame frame = capture.load(1);
+    expect_pose(frame);
+    expect_depth(frame);
+    EXPECT_NEAR(frame.camera.pinhole.fy, 480.0 * 8 / 640, 1e-9);
+}
+
+TEST_F(Made, depth_in_npy_is_read_in_every_order_of_bytes_and_axes) {
+    const auto npy = [](const std::string& type, bool column_major, const std::string& data) {
+        const std::string header = fmt::format("{{'descr': '{}', 'fortran_order': {}, 'shape': (2, 3), }}\n", type,
+                                               column_major ? "True" : "False");
+        return "\x93NUMPY" + std::string("\1\0", 2) + static_cast<char>(header.size()) + std::string(1, '\0') + header +
+               data;
+    };
+    const auto raw = [](const auto& values, bool swapped) {
+        std::string bytes;
+        for (const auto value : values) {
+            std::string one(sizeof value, '\0');
+            std::memcpy(one.data(), &value, sizeof value);
+            if (swapped)
+                std::ranges::reverse(one);
+            bytes += one;
+        }
+        return bytes;
+    };
+    const std::vector<float> rows{1, 2, 3, 4, 5, 0}, columns{1, 4, 2, 5, 3, 0};
+    const std::vector<double> wide(rows.begin(), rows.end());
+    text("depth/0.npy", npy("<f4", false, raw(rows, false)));
+    text("depth/1.npy", npy(">f8", false, raw(wide, true)));
+    text("depth/2.npy", npy("<f4", true, raw(columns, false)));
+    text("depth/3.npy", npy("<u2", false, raw(std::vector<std::uint16_t>{1, 2, 3, 4, 5, 0}, false)));
+    text("depth/4.npy", npy("<f4", false, "short"));
+    const Capture capture = open_capture(folder.path());
+    for (std::size_t i = 0; i < 3; ++i)
+        EXPECT_EQ(cv::countNonZero(capture.load(i).depth_m != (cv::Mat1f(2, 3) << 1, 2, 3, 4, 5, 0)), 0) << i;
+    EXPECT_THROW((void)capture.load(4), Error);
+}
+
+TEST_F(Made, generic_folders_name_what_they_did_not_use) {
+    depth("depth/0.png");
+    text("pose/somewhere.xml", "<pose/>");
+    text("camera_poses.csv", "1,2,3");
+    const Capture capture = open_capture(folder.path());
+    EXPECT_TRUE(warned(capture.warnings, "camera_poses.csv, pose"));
+}
+
+// ------------------------------------------------------------------------------------------------- samples
 
 class Samples : public testing::TestWithParam<const char*> {};
 
