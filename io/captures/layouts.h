@@ -34,6 +34,9 @@ struct Listing {
 [[nodiscard]] std::optional<Listing> list_polycam(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_stray_scanner(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_arkit_scenes(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_scannetpp(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_sun_rgbd(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_nyu_raw(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_replica(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_scannet(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_icl_nuim(const std::filesystem::path& folder);

@@ -1,4 +1,4 @@
-// Recordings of phones with a lidar, each with K per frame and a confidence image: Stray Scanner, Polycam, ARKitScenes.
+// Recordings of phones with a lidar: Stray Scanner, Polycam, ARKitScenes, ScanNet++.
 #include "io/captures/layouts.h"
 
 #include "io/captures/trajectory.h"
@@ -371,6 +371,68 @@ std::optional<Listing> list_arkit_scenes(const fs::path& given) {
             }
         }
         capture.entries.push_back(std::move(entry));
+    }
+    settle_own_cameras(listing);
+    return listing;
+}
+
+// --- ScanNet++: rgb/, depth/, pose_intrinsic_imu.json ---
+
+namespace {
+
+Eigen::Matrix4d matrix_of(const Json& rows) {
+    Eigen::Matrix4d matrix = Eigen::Matrix4d::Constant(std::nan(""));
+    matrix.row(3) << 0, 0, 0, 1;
+    for (std::size_t row = 0; rows.is_array() && row < std::min<std::size_t>(rows.size(), 4); ++row)
+        for (std::size_t column = 0; rows[row].is_array() && column < std::min<std::size_t>(rows[row].size(), 4);
+             ++column)
+            if (rows[row][column].is_number())
+                matrix(static_cast<int>(row), static_cast<int>(column)) = rows[row][column].get<double>();
+    return matrix;
+}
+
+} // namespace
+
+std::optional<Listing> list_scannetpp(const fs::path& folder) {
+    std::error_code ignored;
+    const fs::path file = folder / "pose_intrinsic_imu.json";
+    const auto depths = depth_images_in(folder_named(folder, {"depth"}));
+    if (depths.empty() || !fs::is_regular_file(file, ignored))
+        return std::nullopt;
+    const Json all = json_in(file);
+    const auto colours = colour_images_in(folder_named(folder, {"rgb"}));
+    const cv::Size of_colour = colours.empty() ? cv::Size(1920, 1440) : size_of(colours.front());
+    Listing listing = of_phone("ScanNet++");
+    for (const fs::path& depth : depths) {
+        CaptureEntry entry;
+        entry.name = depth.stem().string();
+        entry.depth = depth;
+        entry.colour = with_stem(colours, entry.name);
+        const auto facts = all.find(entry.name);
+        if (facts == all.end() || !facts->is_object()) {
+            entry.problem =
+                fmt::format("{}: \"{}\" is missing, though its depth image exists", file.string(), entry.name);
+        } else {
+            const auto part = [&](const char* key) { return facts->contains(key) ? (*facts)[key] : Json(); };
+            const Eigen::Matrix4d k = matrix_of(part("intrinsic"));
+            try {
+                entry.camera = camera_for_depth({{k(0, 0), k(1, 1), k(0, 2), k(1, 2), {}},
+                                                 {},
+                                                 fmt::format("{}: \"{}\"", file.string(), entry.name)},
+                                                of_colour, size_of(depth));
+            } catch (const Error& failure) {
+                entry.problem = failure.what();
+            }
+            if (const Json stamp = part("timestamp"); stamp.is_number())
+                entry.stamp_s = stamp.get<double>();
+            // `pose` is the phone's own; `aligned_pose` is in the scan's space, and the camera's axes are ours.
+            const MatrixPose pose =
+                checked_pose(matrix_of(part("aligned_pose")), fmt::format("{}: \"{}\"", file.string(), entry.name));
+            entry.world_from_camera = pose.world_from_camera;
+            if (!pose.warning.empty())
+                entry.warnings.push_back(pose.warning);
+        }
+        listing.capture.entries.push_back(std::move(entry));
     }
     settle_own_cameras(listing);
     return listing;
