@@ -1,7 +1,7 @@
 // Collections of rooms: SUN RGB-D, a folder for each image, and NYU depth v2 as it was recorded.
 #include "io/captures/layouts.h"
 
-#include "io/cameras/known_cameras.h"
+#include "io/images/format.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 
@@ -33,7 +33,14 @@ std::optional<Listing> list_sun_rgbd(const fs::path& folder) {
     entry.depth = depths[0];
     entry.colour = images[0];
     capture.entries.push_back(std::move(entry));
-    listing.find_camera = [file](cv::Size size, std::vector<std::string>&) -> std::optional<CameraFile> {
+    listing.find_camera = [file, image = images[0]](cv::Size size,
+                                                    std::vector<std::string>&) -> std::optional<CameraFile> {
+        try { // it is for the image and its depth alike
+            size = peek(image).size;
+        } catch (const Outage&) {
+            throw;
+        } catch (const Error&) { // loading it will say why
+        }
         const std::string bytes = read_list_file(file); // nine numbers, in one line or three
         std::vector<double> k;
         for (const std::string_view word : words(bytes))
