@@ -3,6 +3,7 @@
 #include "apps/json.h"
 #include "io/captures/capture.h"
 #include "io/clouds/cloud_file.h"
+#include "io/images/format.h"
 #include "projection/base/error.h"
 #include "projection/project.h"
 
@@ -13,6 +14,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <span>
+#include <tbb/parallel_for.h>
 #include <utility>
 
 namespace scanshade {
@@ -317,6 +319,50 @@ json to_json(const Findings& found) {
     return text;
 }
 
+// ---------------------------------------------------------------------------------------------------- every frame
+
+/// The facts of one frame, whose depth is decoded for its holes; "why" where that fails.
+json frame_json(const Capture& capture, std::size_t index) {
+    const CaptureEntry& entry = capture.entries[index];
+    json text{{"name", entry.name}};
+    text["stamp_s"] = entry.stamp_s ? json(*entry.stamp_s) : json();
+    text["world_from_camera"] = json();
+    if (entry.world_from_camera)
+        for (int row = 0; row < 4; ++row)
+            for (int column = 0; column < 4; ++column)
+                text["world_from_camera"][static_cast<std::size_t>(row)].push_back(
+                    entry.world_from_camera->matrix()(row, column));
+    text["confidence"] = entry.confidence.empty() ? json() : json("an image; 0 is a hole");
+    try {
+        const Frame frame = capture.load(index);
+        const cv::Size size = frame.cloud ? frame.cloud->grid : frame.depth_m.size();
+        text["width"] = size.width;
+        text["height"] = size.height;
+        text["camera"] = frame.camera.pinhole.fx > 0 ? to_json(frame.camera) : json();
+        text["depth_encoding"] =
+            entry.depth_units_per_metre > 0 ? fmt::format("{}", entry.depth_units_per_metre) : capture.depth.name;
+        if (!frame.cloud)
+            text["holes"] = cv::countNonZero(frame.depth_m <= 0);
+        text["colour_size"] = json();
+        if (!entry.colour.empty() && !frame.colour.empty()) {
+            const cv::Size colour = peek(entry.colour).size;
+            text["colour_size"] = {colour.width, colour.height};
+        }
+    } catch (const OutOfMemory&) {
+        throw;
+    } catch (const Error& failure) {
+        text["why"] = failure.what();
+    }
+    return text;
+}
+
+/// In recording order, decoded on all cores.
+json frames_json(const Capture& capture) {
+    std::vector<json> frames(capture.entries.size());
+    tbb::parallel_for(std::size_t(0), frames.size(), [&](std::size_t i) { frames[i] = frame_json(capture, i); });
+    return frames;
+}
+
 // ---------------------------------------------------------------------------------------------------- the command
 
 class Inspect final : public Command {
@@ -337,10 +383,16 @@ class Inspect final : public Command {
                    .unit = "s",
                    .low = 0,
                    .high = 1e6}}},
-                {"output", {{.name = "json", .help = "prints the same as JSON", .value = &as_json_}}}};
+                {"output",
+                 {{.name = "json", .help = "prints the same as JSON: an object for each capture", .value = &as_json_},
+                  {.name = "all",
+                   .help = "adds every frame to the JSON: camera, pose, depth unit, sizes, holes",
+                   .value = &every_frame_}}}};
     }
 
     int run() override {
+        if (every_frame_ && !as_json_)
+            throw Misuse("all: it belongs to --json");
         json all = json::array();
         std::size_t usable = 0, problems = 0;
         for (const std::string& path : paths_) {
@@ -348,7 +400,13 @@ class Inspect final : public Command {
                 const Findings found = look_at(open_capture(path, options_));
                 usable += found.samples.frames;
                 problems += found.problems.size();
-                as_json_ ? all.push_back(to_json(found)) : print(found);
+                if (as_json_) {
+                    all.push_back(to_json(found));
+                    if (every_frame_)
+                        all.back()["every_frame"] = frames_json(found.capture);
+                } else {
+                    print(found);
+                }
             } catch (const Misuse&) {
                 throw;
             } catch (const OutOfMemory&) {
@@ -359,14 +417,14 @@ class Inspect final : public Command {
             }
         }
         if (as_json_)
-            fmt::print("{}\n", text_of(paths_.size() == 1 && !all.empty() ? all[0] : all));
+            fmt::print("{}\n", text_of(all));
         return usable == 0 ? nothing_done : problems > 0 ? some_failed : all_well;
     }
 
   private:
     std::vector<std::string> paths_;
     CaptureOptions options_;
-    bool as_json_ = false;
+    bool as_json_ = false, every_frame_ = false;
 };
 
 } // namespace

@@ -472,8 +472,12 @@ TEST_F(CliTest, inspect_says_what_is_there) {
     EXPECT_EQ(ran.exit_code, 0) << ran.err;
     for (const char* expected : {"64x48", "camera.json", "holes", "registered"})
         EXPECT_NE(ran.out.find(expected), std::string::npos) << expected << " in\n" << ran.out;
-    const json facts = json::parse(run_program("inspect --json " + capture().string()).out);
+    const json facts = json::parse(run_program("inspect --json --all " + capture().string()).out).at(0);
     EXPECT_EQ(facts["frames"], 4);
+    ASSERT_EQ(facts["every_frame"].size(), 4U);
+    EXPECT_EQ(facts["every_frame"][2]["holes"], 30);
+    EXPECT_EQ(facts["every_frame"][2]["camera"]["fx"], 52.0);
+    EXPECT_EQ(facts["every_frame"][2]["width"], 64);
     EXPECT_NEAR(facts["depth"]["holes"].get<double>(), 30.0 / (64 * 48), 1e-6);
     double smallest_step_m = 1;
     for (const json& band : facts["depth"]["steps"])
@@ -492,6 +496,24 @@ TEST_F(CliTest, inspect_reports_a_frame_that_cannot_be_read) {
 
 std::size_t lines_in(const std::string& text) {
     return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+TEST(CliHelpTest, help_for_programs_has_every_command_with_its_flags) {
+    const json all = json::parse(run_program("help --json").out);
+    const auto named = [](const json& list, const std::string& name) {
+        const auto found = std::ranges::find_if(list, [&](const json& one) { return one["name"] == name; });
+        return found == list.end() ? json() : *found;
+    };
+    const json run = named(all["commands"], "run");
+    EXPECT_EQ(run["words"]["name"], "PATH");
+    const json method = named(run["flags"], "method"), radius = named(run["flags"], "radius");
+    EXPECT_EQ(method["kind"], "choice");
+    EXPECT_NE(std::ranges::find(method["choices"], "surfel"), method["choices"].end());
+    EXPECT_EQ(radius["kind"], "number");
+    EXPECT_EQ(radius["unit"], "m");
+    EXPECT_EQ(named(run["flags"], "out")["short"], "o");
+    EXPECT_EQ(named(run["flags"], "quiet")["kind"], "switch");
+    EXPECT_EQ(all["exit_codes"].size(), 6U);
 }
 
 TEST(CliHelpTest, help_all_shows_every_flag_with_default_and_range) {

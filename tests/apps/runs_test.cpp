@@ -234,7 +234,7 @@ TEST_F(RunsTest, a_huge_depth_image_is_examined_in_little_more_than_its_pixels) 
     EXPECT_EQ(WEXITSTATUS(status), all_well);
     constexpr long kib_of_pixels = 16000L * 16000 * 2 / 1024;
     EXPECT_LT(used.ru_maxrss, kib_of_pixels + 180 * 1024);
-    const json facts = json::parse(run_program("inspect --json " + file.string()).out);
+    const json facts = json::parse(run_program("inspect --json " + file.string()).out).at(0);
     EXPECT_EQ(facts["depth"]["near_m"], 2.0);
     EXPECT_EQ(facts["depth"]["median_m"], 2.0);
     EXPECT_EQ(facts["depth"]["far_m"], 2.0);
