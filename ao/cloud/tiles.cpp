@@ -2,11 +2,13 @@
 #include "ao/cloud/tiles.h"
 
 #include "projection/base/hash.h"
+#include "projection/base/indices_where.h"
 #include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <Eigen/Geometry>
-#include <iterator>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
 #include <utility>
 
 namespace scanshade {
@@ -44,16 +46,15 @@ class Cutter {
         int axis = 0;
         all.sizes().maxCoeff(&axis);
         const double middle = middle_of(core, axis);
-        Indices low, high;
-        for (const std::uint32_t i : core)
-            (points_[i][axis] < middle ? low : high).push_back(i);
-        if (low.empty()) { // most of them at the lowest coordinate
-            const auto beyond = std::stable_partition(high.begin(), high.end(),
-                                                      [&](std::uint32_t i) { return points_[i][axis] <= middle; });
-            low.assign(high.begin(), beyond);
-            high.erase(high.begin(), beyond);
-        }
-        return {std::move(low), std::move(high)};
+        const auto those_that = [&](auto&& holds) {
+            return indices_where(core, [&](std::uint32_t i) { return holds(points_[i][axis]); });
+        };
+        Indices low = those_that([&](double at) { return at < middle; });
+        if (!low.empty())
+            return {std::move(low), those_that([&](double at) { return !(at < middle); })};
+        // Most of them are at the lowest coordinate.
+        return {those_that([&](double at) { return at <= middle; }),
+                those_that([&](double at) { return at > middle; })};
     }
 
     /// The points of `round` in the box of `core` widened by the reach.
@@ -61,17 +62,19 @@ class Cutter {
         Eigen::AlignedBox3d box = box_of(core);
         box.min().array() -= reach_;
         box.max().array() += reach_;
-        Indices near;
-        std::copy_if(round.begin(), round.end(), std::back_inserter(near),
-                     [&](std::uint32_t i) { return box.contains(points_[i]); });
-        return near;
+        return indices_where(round, [&](std::uint32_t i) { return box.contains(points_[i]); });
     }
 
     [[nodiscard]] Eigen::AlignedBox3d box_of(const Indices& indices) const {
-        Eigen::AlignedBox3d box;
-        for (const std::uint32_t i : indices)
-            box.extend(points_[i]);
-        return box;
+        using Box = Eigen::AlignedBox3d;
+        return tbb::parallel_reduce(
+            tbb::blocked_range<std::size_t>(0, indices.size()), Box(),
+            [&](const auto& range, Box box) {
+                for (std::size_t k = range.begin(); k < range.end(); ++k)
+                    box.extend(points_[indices[k]]);
+                return box;
+            },
+            [](const Box& a, const Box& b) { return a.merged(b); });
     }
 
     /// The median coordinate of a sample, chosen by a hash so that recording order has no influence.
@@ -80,9 +83,8 @@ class Cutter {
         const auto chosen =
             static_cast<std::uint64_t>(std::min(1.0, enough / static_cast<double>(indices.size())) * 0x1p32);
         std::vector<double> along;
-        for (const std::uint32_t i : indices)
-            if (hash(i) < chosen)
-                along.push_back(points_[i][axis]);
+        for (const std::uint32_t i : indices_where(indices, [&](std::uint32_t point) { return hash(point) < chosen; }))
+            along.push_back(points_[i][axis]);
         if (along.empty())
             return points_[indices.front()][axis];
         return median(std::move(along));
