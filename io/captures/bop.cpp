@@ -71,7 +71,7 @@ std::optional<Listing> list_bop(const fs::path& folder) {
     if (depths.empty() || !fs::is_regular_file(file, ignored))
         return std::nullopt;
     const Json all = json_in(file);
-    const auto colours = colour_images_in(folder_named(folder, {"rgb", "gray"}));
+    const ImagesByStem colours(colour_images_in(folder_named(folder, {"rgb", "gray"})));
     Listing listing;
     Capture& capture = listing.capture;
     capture.kind = "BOP";
@@ -82,7 +82,7 @@ std::optional<Listing> list_bop(const fs::path& folder) {
         CaptureEntry entry;
         entry.name = depth.stem().string();
         entry.depth = depth;
-        entry.colour = with_stem(colours, entry.name);
+        entry.colour = colours.of(entry.name);
         if (!whole_number(entry.name))
             continue;
         try {

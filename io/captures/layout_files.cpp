@@ -106,10 +106,21 @@ std::vector<fs::path> colour_images_in(const std::optional<fs::path>& folder) {
     return images_in(folder, &has_colour_extension);
 }
 
-std::string with_stem(const std::vector<fs::path>& images, const std::string& stem) {
-    const auto found = std::ranges::lower_bound(images, stem, &natural_less,
-                                                [](const fs::path& image) { return image.stem().string(); });
-    return found != images.end() && found->stem() == stem ? found->string() : std::string();
+ImagesByStem::ImagesByStem(const std::vector<fs::path>& images) {
+    for (const fs::path& image : images)
+        paths_.emplace(image.stem().string(), image.string());
+}
+
+std::string ImagesByStem::of(const std::string& stem) const {
+    const auto found = paths_.find(stem);
+    return found == paths_.end() ? std::string() : found->second;
+}
+
+cv::Size image_size(double width, double height, const std::string& where) {
+    constexpr double longest = 1 << 20;
+    if (!(width >= 1 && height >= 1 && width <= longest && height <= longest))
+        throw Error(fmt::format("{}: a size of {}x{}, expected pixels of an image", where, width, height));
+    return {static_cast<int>(width), static_cast<int>(height)};
 }
 
 nlohmann::json json_in(const fs::path& file) {

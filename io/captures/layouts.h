@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <vector>
 
 namespace scanshade {
@@ -58,10 +59,21 @@ struct Listing {
 /// A folder's depth, or colour, images in natural order; none of no folder.
 [[nodiscard]] std::vector<std::filesystem::path> depth_images_in(const std::optional<std::filesystem::path>& folder);
 [[nodiscard]] std::vector<std::filesystem::path> colour_images_in(const std::optional<std::filesystem::path>& folder);
-/// The image of that stem among those of a folder; empty where there is none.
-[[nodiscard]] std::string with_stem(const std::vector<std::filesystem::path>& images, const std::string& stem);
+/// The same by their names without the extension.
+class ImagesByStem {
+  public:
+    explicit ImagesByStem(const std::vector<std::filesystem::path>& images);
+    [[nodiscard]] bool empty() const { return paths_.empty(); }
+    /// Empty where there is none.
+    [[nodiscard]] std::string of(const std::string& stem) const;
+
+  private:
+    std::unordered_map<std::string, std::string> paths_;
+};
 /// A file's JSON. Throws Error naming file and place.
 [[nodiscard]] nlohmann::json json_in(const std::filesystem::path& file);
+/// Sides as a file gives them. Throws Error, beginning with `where`, for what is no image's size.
+[[nodiscard]] cv::Size image_size(double width, double height, const std::string& where);
 /// An entry's own camera for its depth image: `camera` is for images of `size`, which see the same in other pixels.
 [[nodiscard]] std::shared_ptr<const Camera> camera_for_depth(Camera camera, cv::Size size, cv::Size depth);
 

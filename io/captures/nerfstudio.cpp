@@ -98,10 +98,9 @@ Distortion lens_of(const Keys& keys, const fs::path& file) {
 /// Their pixels' corners are at whole numbers: the middle of the first is at 0.5.
 std::shared_ptr<const Camera> camera_of(const Keys& keys, const fs::path& file, cv::Size image, cv::Size depth,
                                         std::vector<std::string>& warnings) {
-    cv::Size size(static_cast<int>(keys.number("w").value_or(image.width)),
-                  static_cast<int>(keys.number("h").value_or(image.height)));
-    if (size.empty())
-        size = depth;
+    const cv::Size usual = image.empty() ? depth : image;
+    const cv::Size size =
+        image_size(keys.number("w").value_or(usual.width), keys.number("h").value_or(usual.height), file.string());
     const auto focal = focal_lengths(keys, size);
     if (!focal)
         return nullptr;

@@ -150,8 +150,8 @@ std::optional<Listing> list_stray_scanner(const fs::path& folder) {
         return std::nullopt;
     Listing listing = of_phone("Stray Scanner");
     Capture& capture = listing.capture;
-    const auto sure = colour_images_in(folder_named(folder, {"confidence"})),
-               colours = colour_images_in(folder_named(folder, {"rgb", "color"}));
+    const ImagesByStem sure(colour_images_in(folder_named(folder, {"confidence"}))),
+        colours(colour_images_in(folder_named(folder, {"rgb", "color"})));
     std::map<std::uint64_t, OdometryRow> odometry;
     if (fs::is_regular_file(folder / "odometry.csv", ignored))
         odometry = odometry_in(folder / "odometry.csv", capture.warnings);
@@ -161,8 +161,8 @@ std::optional<Listing> list_stray_scanner(const fs::path& folder) {
         CaptureEntry entry;
         entry.name = depth.stem().string();
         entry.depth = depth;
-        entry.confidence = with_stem(sure, entry.name);
-        entry.colour = with_stem(colours, entry.name);
+        entry.confidence = sure.of(entry.name);
+        entry.colour = colours.of(entry.name);
         const auto frame = whole_number(entry.name);
         if (const auto row = frame ? odometry.find(*frame) : odometry.end(); row != odometry.end()) {
             entry.world_from_camera = row->second.pose;
@@ -204,7 +204,7 @@ std::pair<std::shared_ptr<const Camera>, MatrixPose> polycam_camera(const fs::pa
         return found->get<double>();
     };
     const Camera camera{{value("fx"), value("fy"), value("cx"), value("cy"), {}}, {}, file.string()};
-    const cv::Size size(static_cast<int>(value("width")), static_cast<int>(value("height")));
+    const cv::Size size = image_size(value("width"), value("height"), file.string());
     Eigen::Matrix4d pose = Eigen::Matrix4d::Identity();
     for (int row = 0; row < 3; ++row)
         for (int column = 0; column < 4; ++column)
@@ -222,24 +222,24 @@ std::optional<Listing> list_polycam(const fs::path& folder) {
         return std::nullopt;
     Listing listing = of_phone("Polycam");
     Capture& capture = listing.capture;
-    const auto images = colour_images_in(folder_named(frames, {"images"})),
-               corrected = colour_images_in(folder_named(frames, {"corrected_images"})),
-               sure = colour_images_in(folder_named(frames, {"confidence"}));
+    const ImagesByStem images(colour_images_in(folder_named(frames, {"images"}))),
+        corrected(colour_images_in(folder_named(frames, {"corrected_images"}))),
+        sure(colour_images_in(folder_named(frames, {"confidence"})));
     std::size_t uncorrected = 0;
     for (const fs::path& depth : depths) {
         CaptureEntry entry;
         entry.name = depth.stem().string();
         entry.depth = depth;
-        entry.confidence = with_stem(sure, entry.name);
+        entry.confidence = sure.of(entry.name);
         if (const auto microseconds = whole_number(entry.name))
             entry.stamp_s = static_cast<double>(*microseconds) * 1e-6;
         const fs::path better = frames / "corrected_cameras" / (entry.name + ".json"),
                        raw = frames / "cameras" / (entry.name + ".json");
-        entry.colour = with_stem(corrected, entry.name);
+        entry.colour = corrected.of(entry.name);
         const bool is_corrected = !entry.colour.empty() && fs::is_regular_file(better, ignored);
         uncorrected += !is_corrected;
         if (!is_corrected)
-            entry.colour = with_stem(images, entry.name);
+            entry.colour = images.of(entry.name);
         try {
             const auto [camera, pose] = polycam_camera(is_corrected ? better : raw, size_of(depth));
             entry.camera = camera;
@@ -300,7 +300,7 @@ Camera pincam(const fs::path& file) {
             v.push_back(*value);
     if (v.size() != 6)
         throw Error(fmt::format("{}: expected 6 numbers (width height fx fy cx cy)", file.string()));
-    return {{v[2], v[3], v[4], v[5], {static_cast<int>(v[0]), static_cast<int>(v[1])}}, {}, file.string()};
+    return {{v[2], v[3], v[4], v[5], image_size(v[0], v[1], file.string())}, {}, file.string()};
 }
 
 /// VIDEO_SECONDS -> VIDEO and SECONDS.
@@ -322,8 +322,8 @@ std::optional<Listing> list_arkit_scenes(const fs::path& given) {
         return std::nullopt;
     Listing listing = of_phone("ARKitScenes");
     Capture& capture = listing.capture;
-    const auto sure = colour_images_in(folder_named(folder, {"confidence"})),
-               colours = colour_images_in(folder_named(folder, {"lowres_wide", "color"}));
+    const ImagesByStem sure(colour_images_in(folder_named(folder, {"confidence"}))),
+        colours(colour_images_in(folder_named(folder, {"lowres_wide", "color"})));
     std::map<double, fs::path> pincams; // by seconds
     if (const auto cameras = folder_named(folder, {"lowres_wide_intrinsics"}))
         for (const fs::path& file : files_in(*cameras))
@@ -339,8 +339,8 @@ std::optional<Listing> list_arkit_scenes(const fs::path& given) {
         CaptureEntry entry;
         entry.name = depth.stem().string();
         entry.depth = depth;
-        entry.confidence = with_stem(sure, entry.name);
-        entry.colour = with_stem(colours, entry.name);
+        entry.confidence = sure.of(entry.name);
+        entry.colour = colours.of(entry.name);
         const auto name = arkit_name(entry.name);
         if (name) {
             entry.stamp_s = name->second;
@@ -354,7 +354,7 @@ std::optional<Listing> list_arkit_scenes(const fs::path& given) {
             entry.warnings.push_back("lowres_wide.traj has no pose near its time.");
         const auto after = pincams.lower_bound(name ? name->second : 0);
         auto nearest = after;
-        if (after != pincams.begin() &&
+        if (name && after != pincams.begin() &&
             (after == pincams.end() || name->second - std::prev(after)->first < after->first - name->second))
             nearest = std::prev(after);
         if (name && nearest != pincams.end()) {
@@ -402,12 +402,13 @@ std::optional<Listing> list_scannetpp(const fs::path& folder) {
     const Json all = json_in(file);
     const auto colours = colour_images_in(folder_named(folder, {"rgb"}));
     const cv::Size of_colour = colours.empty() ? cv::Size(1920, 1440) : size_of(colours.front());
+    const ImagesByStem by_stem(colours);
     Listing listing = of_phone("ScanNet++");
     for (const fs::path& depth : depths) {
         CaptureEntry entry;
         entry.name = depth.stem().string();
         entry.depth = depth;
-        entry.colour = with_stem(colours, entry.name);
+        entry.colour = by_stem.of(entry.name);
         const auto facts = all.find(entry.name);
         if (facts == all.end() || !facts->is_object()) {
             entry.problem =

@@ -37,7 +37,7 @@ ReplicaCamera replica_camera(const fs::path& room) {
                 throw Error(fmt::format("{}: \"camera\": \"{}\" is missing or no number", file.string(), key));
             return (*camera)[key].get<double>();
         };
-        const cv::Size size(static_cast<int>(value("w")), static_cast<int>(value("h")));
+        const cv::Size size = image_size(value("w"), value("h"), file.string());
         return {{{value("fx"), value("fy"), value("cx"), value("cy"), size}, {}, file.lexically_normal().string()},
                 value("scale"),
                 false};
@@ -76,7 +76,7 @@ std::optional<Listing> list_replica(const fs::path& folder) {
     if (depths.empty())
         return std::nullopt;
     const bool has_poses = fs::is_regular_file(folder / "traj.txt", ignored);
-    const auto colours = colour_images_in(folder / "results");
+    const ImagesByStem colours(colour_images_in(folder / "results"));
     const std::vector<MatrixPose> poses = has_poses ? matrix_rows(folder / "traj.txt") : std::vector<MatrixPose>();
     const ReplicaCamera camera = replica_camera(folder);
     Listing listing;
@@ -90,7 +90,7 @@ std::optional<Listing> list_replica(const fs::path& folder) {
         CaptureEntry entry;
         entry.name = depths[i].stem().string();
         entry.depth = depths[i];
-        entry.colour = with_stem(colours, "frame" + entry.name.substr(5));
+        entry.colour = colours.of("frame" + entry.name.substr(5));
         if (i < poses.size()) {
             entry.world_from_camera = poses[i].world_from_camera;
             if (!poses[i].warning.empty())
@@ -137,7 +137,9 @@ std::optional<Listing> list_icl_nuim(const fs::path& folder) {
         Eigen::Isometry3d pose = row.world_from_camera;
         pose.linear() = (mirror * pose.linear() * mirror).eval();
         pose.translation() = (mirror * pose.translation()).eval();
-        poses.emplace(static_cast<std::uint64_t>(std::lround(std::max(row.stamp_s, 0.0))), pose);
+        constexpr double most_frames = 1 << 24;
+        if (row.stamp_s >= 0 && row.stamp_s < most_frames)
+            poses.emplace(static_cast<std::uint64_t>(std::lround(row.stamp_s)), pose);
     }
     const std::string bytes = read_list_file(list);
     for (const TextLine& line : text_lines(bytes)) {

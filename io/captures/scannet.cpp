@@ -77,6 +77,7 @@ std::optional<Listing> list_scannet(const fs::path& folder) {
     if (depths.empty() || (!intrinsic && !numbered))
         return std::nullopt;
     const std::vector<fs::path> colours = colour_images_in(folder_named(folder, {"color"}));
+    const ImagesByStem by_stem(colours);
     Listing listing;
     Capture& capture = listing.capture;
     capture.kind = "ScanNet";
@@ -87,7 +88,7 @@ std::optional<Listing> list_scannet(const fs::path& folder) {
         CaptureEntry entry;
         entry.name = depth.stem().string();
         entry.depth = depth;
-        entry.colour = with_stem(colours, entry.name);
+        entry.colour = by_stem.of(entry.name);
         if (entry.colour.empty() && !colours.empty())
             entry.warnings.push_back(fmt::format("{} has no colour image.", depth.filename().string()));
         if (const fs::path file = folder / "pose" / (entry.name + ".txt"); fs::is_regular_file(file, ignored)) {
