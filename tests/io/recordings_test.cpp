@@ -327,8 +327,9 @@ void expect_depth(const Frame& frame, const Json& truth, bool confidence, double
     }
     for (const Json& probe : truth["probes"]) {
         const float z = frame.depth_m(probe["v"].get<int>(), probe["u"].get<int>());
-        if (z > 0 || !confidence)
+        if (z > 0 || !confidence) {
             EXPECT_NEAR(static_cast<double>(z), probe["z_m"].get<double>(), tolerance) << probe.dump();
+        }
     }
 }
 
@@ -352,10 +353,12 @@ TEST_P(Samples, are_read_as_their_truth_says) {
             ASSERT_TRUE(capture.entries[i].stamp_s);
             EXPECT_NEAR(*capture.entries[i].stamp_s, stamp.get<double>(), 1e-4);
         }
-        if (const Json& registered = truth["registered"]; registered.is_boolean())
+        if (const Json& registered = truth["registered"]; registered.is_boolean()) {
             EXPECT_EQ(frame.registration == Registration::yes, registered.get<bool>());
-        if (!capture.entries[i].colour.empty() && (frame.registration == Registration::yes || frame.colour_camera))
+        }
+        if (!capture.entries[i].colour.empty() && (frame.registration == Registration::yes || frame.colour_camera)) {
             EXPECT_FALSE(frame.colour.empty());
+        }
         if (const Json& lens = truth["distortion"]; lens.is_object()) {
             EXPECT_NEAR(frame.camera.distortion.k1, lens["k1"].get<double>(), 1e-9);
             EXPECT_NEAR(frame.camera.distortion.p2, lens["p2"].get<double>(), 1e-9);
@@ -370,9 +373,10 @@ TEST_P(Samples, are_read_as_their_truth_says) {
         if (testing::Test::HasFailure())
             break;
     }
-    if (const Json& sure = truth["confidence"]; sure.is_object())
+    if (const Json& sure = truth["confidence"]; sure.is_object()) {
         EXPECT_EQ(cv::countNonZero(capture.load(0).depth_m == 0),
                   frames[0]["holes_without_lowest_confidence"].get<int>());
+    }
 }
 
 INSTANTIATE_TEST_SUITE_P(of, Samples,
