@@ -19,7 +19,8 @@ if(Python3_FOUND AND NOT SANITIZE)
   install(FILES ${documents}/zsh/_scanshade DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions
           COMPONENT program)
 endif()
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/apps/python/scanshade DESTINATION lib/python3/dist-packages COMPONENT python)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/apps/python/scanshade DESTINATION lib/python3/dist-packages COMPONENT python
+        PATTERN __pycache__ EXCLUDE)
 
 # Each package has its changes and its terms, where Debian looks for them.
 find_program(GZIP gzip)
