@@ -13,7 +13,7 @@
 namespace scanshade {
 
 /// Reads PCD (ascii, binary, binary_compressed), PLY (ascii, both endians; float or double; list properties walked) or
-/// LAS 1.0 to 1.4 (not LAZ), told by content; .xyz, .pts, .ptx and KITTI's .bin, told by name. Coordinates in the
+/// LAS 1.0 to 1.4 and LAZ, told by content; .xyz, .pts, .ptx and KITTI's .bin, told by name. Coordinates in the
 /// file's unit. Infinite or absurd (> 1e30) coordinates become NaN. Throws Error naming the file and the line or
 /// byte offset for every damage the header or body shows; nothing is allocated from an unchecked number. `warnings`
 /// receives oddities that do not prevent reading.

@@ -32,8 +32,8 @@ struct CloudField {
     [[nodiscard]] std::size_t bytes() const { return size_of(type) * count; }
 };
 
-/// The file, taken apart but not changed: header, before, points, after in this order are its bytes (a compressed PCD's
-/// points are unpacked and put point after point).
+/// The file, taken apart but not changed: header, before, points, after in this order are its bytes (the
+/// compressed points of PCD and LAZ are unpacked and put point after point).
 struct CloudRecords {
     enum class Encoding { ascii, binary, big_endian, compressed };
 
@@ -45,7 +45,7 @@ struct CloudRecords {
     cv::Size grid;
     std::string before;     ///< PLY elements that come before the vertices
     std::string points;     ///< the records, without the last one's line end
-    std::string packed;     ///< compressed PCD: the sizes and the block as the file has them
+    std::string packed;     ///< PCD, LAZ: the compressed block as the file has it
     std::size_t stride = 0; ///< bytes per record; 0 where records differ in length (text, lists)
     std::vector<std::size_t>
         ends;          ///< where each record ends in `points` (text: behind its last word), when stride is 0
@@ -127,8 +127,9 @@ class TextRecords {
                                     std::vector<std::string>& warnings);
 [[nodiscard]] CloudRecords read_ply(std::string_view bytes, const std::filesystem::path& file,
                                     std::vector<std::string>& warnings);
-/// LAS 1.0 to 1.4, uncompressed, every point format (ASPRS, "LAS Specification 1.4 - R15"); everything but the points
-/// is kept as it is. Fields are named after the specification; those of an extra bytes record keep their names.
+/// LAS 1.0 to 1.4, every point format, and LAZ of formats 0 .. 3 and 6 .. 8 (ASPRS, "LAS Specification 1.4 - R15");
+/// everything but the points is kept as it is. Fields are named after the specification; those of an extra bytes record
+/// keep their names.
 [[nodiscard]] CloudRecords read_las(std::string_view bytes, const std::filesystem::path& file,
                                     std::vector<std::string>& warnings);
 /// One point a line: .xyz (a line of names may come first) and .pts (the count comes first).

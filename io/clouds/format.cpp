@@ -14,6 +14,11 @@ namespace fs = std::filesystem;
 
 bool is_ply(std::string_view start) { return start.starts_with("ply\n") || start.starts_with("ply\r"); }
 bool is_las(std::string_view start) { return start.starts_with("LASF"); }
+/// A LAS file whose point format has the bit of compression.
+bool is_laz(std::string_view start) {
+    constexpr std::size_t at_point_format = 104;
+    return is_las(start) && start.size() > at_point_format && (start[at_point_format] & 0xc0) != 0;
+}
 bool is_e57(std::string_view start) { return start.starts_with("ASTM-E57"); }
 
 /// PCD's own comment, or the first line of its header behind others.
@@ -35,9 +40,16 @@ constexpr CloudFormat formats[] = {
      .triangles = &ply_triangles,
      .binary_encoding = "binary_little_endian",
      .new_colours = NewColours::bytes},
+    {.name = "LAZ",
+     .signature = &is_laz,
+     .extensions = {".laz"},
+     .read = &read_las,
+     .written = &las_bytes,
+     .wide_colours = true,
+     .z_up = true},
     {.name = "LAS",
      .signature = &is_las,
-     .extensions = {".las", ".laz"},
+     .extensions = {".las"},
      .read = &read_las,
      .written = &las_bytes,
      .wide_colours = true,

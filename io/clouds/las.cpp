@@ -1,6 +1,8 @@
-// LAS (ASPRS, "LAS Specification 1.4 - R15"): header and records checked, points kept as they are, AO as extra bytes.
+// LAS (ASPRS, "LAS Specification 1.4 - R15") and LAZ: header and records checked, points kept as they are, AO as extra
+// bytes.
 #include "io/clouds/cloud_records.h"
 
+#include "io/clouds/laz/laz.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 
@@ -24,7 +26,8 @@ constexpr std::size_t at_minor = 25, at_header_size = 94, at_points = 96, at_vlr
                       at_length = 105, at_count = 107, at_scale = 131, at_shift = 155, at_box = 179, at_waveform = 227,
                       at_evlrs = 235, at_evlr_count = 243, at_count_64 = 247;
 constexpr std::size_t least_header = 227, vlr_header = 54, descriptor_size = 192;
-constexpr std::uint64_t most_las_points = 0x7fffffff; // points are numbered with 32 bits
+constexpr std::uint8_t format_mask = 0x3f, compressed_bit = 0x80; // of the byte at_format
+constexpr std::uint64_t most_las_points = 0x7fffffff;             // points are numbered with 32 bits
 
 template <class Number>
 Number read_at(std::string_view bytes, std::size_t at) {
@@ -227,6 +230,32 @@ std::size_t point_count(std::string_view bytes, int minor) {
 
 } // namespace
 
+namespace {
+
+bool describes_laz(const Vlr& vlr) { return vlr.user == laz::record_user && vlr.id == laz::record_id; }
+bool is_copc(const std::vector<Vlr>& vlrs) {
+    return std::ranges::any_of(vlrs, [](const Vlr& vlr) { return vlr.user == "copc" && vlr.id == 1; });
+}
+
+/// The points of a LAZ file; returns where their block ends.
+std::size_t unpack(CloudRecords& records, std::string_view bytes, std::size_t points_at, const std::vector<Vlr>& vlrs) {
+    if (const auto found = std::ranges::count_if(vlrs, describes_laz); found != 1)
+        throw Error(fmt::format("LAZ with {} records that describe it (user id {}, {}), expected one",
+                                static_cast<std::size_t>(found), laz::record_user, laz::record_id));
+    std::size_t end = bytes.size();
+    if (read_at<std::uint8_t>(bytes, at_minor) >= 4 && read_at<std::uint32_t>(bytes, at_evlr_count) > 0)
+        if (const auto first = read_at<std::uint64_t>(bytes, at_evlrs); first >= points_at && first < end)
+            end = first;
+    const int format = read_at<std::uint8_t>(bytes, at_format) & format_mask;
+    const auto packing = laz::packing_of(std::ranges::find_if(vlrs, describes_laz)->data, format, records.stride);
+    laz::Unpacked unpacked = laz::unpacked(bytes, points_at, end, records.point_count, packing);
+    records.points = std::move(unpacked.points);
+    records.packed = bytes.substr(points_at, unpacked.end - points_at);
+    return unpacked.end;
+}
+
+} // namespace
+
 CloudRecords read_las(std::string_view bytes, const fs::path& file, std::vector<std::string>& warnings) {
     if (bytes.size() < least_header)
         refuse(file, fmt::format("a LAS header of {} bytes expected, found {}", least_header, bytes.size()));
@@ -239,11 +268,12 @@ CloudRecords read_las(std::string_view bytes, const fs::path& file, std::vector<
     if (header_size < needed || header_size > bytes.size())
         refuse(file, fmt::format("header size {} at byte {}, expected {} .. {}", header_size, at_header_size, needed,
                                  bytes.size()));
-    const int format = read_at<std::uint8_t>(bytes, at_format);
-    if (format & 0xc0)
-        refuse(file,
-               "compressed (LAZ), which is not read; `laszip -i IN.laz -o OUT.las` or `pdal translate IN.laz OUT.las` "
-               "unpacks it");
+    const int format_byte = read_at<std::uint8_t>(bytes, at_format), format = format_byte & format_mask;
+    const bool compressed = (format_byte & compressed_bit) != 0;
+    if (format_byte & 0x40)
+        refuse(file, fmt::format("early experimental LAZ (point format byte {}), which is not read; `laszip` of today "
+                                 "rewrites it",
+                                 format_byte));
     if (format > 10)
         refuse(file, fmt::format("point format {} at byte {}, expected 0 .. 10", format, at_format));
     const std::size_t points_at = read_at<std::uint32_t>(bytes, at_points);
@@ -259,7 +289,7 @@ CloudRecords read_las(std::string_view bytes, const fs::path& file, std::vector<
         refuse(file, fmt::format("record length {} at byte {}, but point format {} needs {}", records.stride, at_length,
                                  format, stride_of(records.fields)));
     const std::size_t count = point_count(bytes, minor), room = (bytes.size() - points_at) / records.stride;
-    if (count > room)
+    if (count > room && !compressed)
         refuse(file,
                fmt::format("the header says {} points of {} bytes, the file holds {}", count, records.stride, room));
     if (count > most_las_points)
@@ -280,8 +310,18 @@ CloudRecords read_las(std::string_view bytes, const fs::path& file, std::vector<
     }
     records.point_count = count;
     records.grid = {static_cast<int>(count), 1};
-    records.points = bytes.substr(points_at, count * records.stride);
-    records.after = bytes.substr(points_at + count * records.stride);
+    std::size_t end = points_at + count * records.stride;
+    if (compressed) {
+        records.encoding = CloudRecords::Encoding::compressed;
+        during(file.string(), [&] { end = unpack(records, bytes, points_at, vlrs); });
+        if (is_copc(vlrs))
+            warnings.push_back(file.string() +
+                               ": COPC is read as a whole, its octree is not used; with fields added it "
+                               "is written as plain LAZ.");
+    } else {
+        records.points = bytes.substr(points_at, count * records.stride);
+    }
+    records.after = bytes.substr(end);
     const std::string unit = unit_of(vlrs);
     records.unit = unit.empty() ? "an unknown unit (the file names none)" : unit;
     if (unit.starts_with("degrees"))
@@ -318,13 +358,13 @@ std::string descriptors_of_raw_bytes(std::size_t count) {
 }
 
 /// Adds the descriptors to the record that describes extra bytes, after its valid ones, or makes a new record after the
-/// last one. Returns by how much the header grew.
-std::size_t describe_extra_bytes(std::string& header, const std::string& descriptors, std::size_t stride) {
+/// last one.
+void describe_extra_bytes(std::string& header, const std::string& descriptors, std::size_t stride) {
     const std::size_t first = read_at<std::uint16_t>(header, at_header_size);
     const auto count = read_at<std::uint32_t>(header, at_vlr_count);
     const std::string copy = header;
     const auto vlrs = vlrs_of(copy, first, count);
-    auto fields = fields_of_format(read_at<std::uint8_t>(header, at_format));
+    auto fields = fields_of_format(read_at<std::uint8_t>(header, at_format) & format_mask);
     const std::size_t place = add_extra_fields(fields, vlrs, stride);
     for (const Vlr& vlr : vlrs) {
         const std::size_t begin = vlr.begin + vlr_header;
@@ -335,7 +375,7 @@ std::size_t describe_extra_bytes(std::string& header, const std::string& descrip
             throw Error("the LAS file describes more extra bytes than one record can hold");
         header.insert(place, descriptors);
         put(header, vlr.begin + 20, static_cast<std::uint16_t>(length));
-        return descriptors.size();
+        return;
     }
     if (descriptors.size() > 0xffff)
         throw Error("the LAS file has more extra bytes than one record can describe");
@@ -348,38 +388,103 @@ std::size_t describe_extra_bytes(std::string& header, const std::string& descrip
     const std::size_t end = vlrs.empty() ? first : vlrs.back().begin + vlr_header + vlrs.back().data.size();
     header.insert(end, record);
     put(header, at_vlr_count, static_cast<std::uint32_t>(vlrs.size() + 1));
-    return record.size();
+}
+
+} // namespace
+
+namespace {
+
+/// Puts other data in place of a record's.
+void replace_data(std::string& header, const Vlr& vlr, const std::string& data) {
+    header.replace(vlr.begin + vlr_header, vlr.data.size(), data);
+    put(header, vlr.begin + 20, static_cast<std::uint16_t>(data.size()));
+}
+
+/// The record that describes LAZ follows the longer records; the octree of COPC, which points into the old chunks,
+/// goes.
+laz::Packing describe_packing(std::string& header, std::size_t length) {
+    const std::size_t first = read_at<std::uint16_t>(header, at_header_size);
+    const auto packing = laz::usual_packing(read_at<std::uint8_t>(header, at_format) & format_mask, length);
+    const auto count = read_at<std::uint32_t>(header, at_vlr_count);
+    std::string copy = header;
+    for (const Vlr& vlr : vlrs_of(copy, first, count))
+        if (describes_laz(vlr))
+            replace_data(header, vlr, laz::described(packing));
+    copy = header;
+    for (const Vlr& vlr : vlrs_of(copy, first, count))
+        if (vlr.user == "copc") {
+            header.erase(vlr.begin, vlr_header + vlr.data.size());
+            put(header, at_vlr_count, count - 1);
+            break; // it has one, and it is the first
+        }
+    return packing;
+}
+
+/// Without the hierarchy of COPC among the records behind the points.
+std::string without_octree(std::string& header, std::string after, std::size_t block_end) {
+    constexpr std::size_t evlr_header = 60;
+    const auto first = read_at<std::uint64_t>(header, at_evlrs);
+    auto count = read_at<std::uint32_t>(header, at_evlr_count);
+    if (first < block_end)
+        return after;
+    std::uint64_t at = first - block_end;
+    for (std::uint32_t i = 0, all = count; i < all && at <= after.size() && after.size() - at >= evlr_header; ++i) {
+        const auto length = read_at<std::uint64_t>(after, at + 20);
+        if (length > after.size() - at - evlr_header)
+            break;
+        if (fixed_text(after, at + 2, 16) == "copc") {
+            after.erase(at, evlr_header + length);
+            --count;
+        } else {
+            at += evlr_header + length;
+        }
+    }
+    put(header, at_evlr_count, count);
+    return after;
 }
 
 } // namespace
 
 std::string las_bytes(const CloudRecords& records, std::string points, const std::vector<FieldAddition>& additions) {
-    if (additions.empty())
+    const bool compressed = records.encoding == CloudRecords::Encoding::compressed;
+    if (compressed && additions.empty() && points == records.points)
+        return between(records.header, records.packed, records.after);
+    if (!compressed && additions.empty())
         return between(records.header, std::move(points), records.after);
-    std::string descriptors;
-    const bool described = records.fields.back().name != "undocumented";
-    if (!described)
-        descriptors += descriptors_of_raw_bytes(records.fields.back().count);
-    for (const FieldAddition& addition : additions)
-        descriptors += descriptor(addition.name);
-    std::string header = records.header;
-    const std::size_t grown = describe_extra_bytes(header, descriptors, records.stride);
-    const std::size_t wider = additions.size() * sizeof(float) * records.point_count;
+    std::string header = records.header, after = records.after;
     const std::size_t length = records.stride + additions.size() * sizeof(float);
     if (length > 0xffff)
         throw Error("a LAS point record cannot grow beyond 65535 bytes");
+    if (!additions.empty()) {
+        std::string descriptors;
+        const bool described = records.fields.back().name != "undocumented";
+        if (!described)
+            descriptors += descriptors_of_raw_bytes(records.fields.back().count);
+        for (const FieldAddition& addition : additions)
+            descriptors += descriptor(addition.name);
+        describe_extra_bytes(header, descriptors, records.stride);
+    }
     put(header, at_length, static_cast<std::uint16_t>(length));
-    put(header, at_points, static_cast<std::uint32_t>(records.header.size() + grown));
+    const std::size_t old_end =
+        records.header.size() + (compressed ? records.packed.size() : records.stride * records.point_count);
     const int minor = read_at<std::uint8_t>(header, at_minor);
+    if (compressed) {
+        const laz::Packing packing = describe_packing(header, length);
+        if (minor >= 4)
+            after = without_octree(header, std::move(after), old_end);
+        points = laz::packed(points, header.size(), packing);
+    }
+    put(header, at_points, static_cast<std::uint32_t>(header.size()));
+    const std::size_t end = header.size() + points.size();
     const auto shift = [&](std::size_t at) { // an offset that follows the points
-        if (const auto place = read_at<std::uint64_t>(header, at); place >= records.header.size())
-            put(header, at, place + grown + wider);
+        if (const auto place = read_at<std::uint64_t>(header, at); place >= old_end)
+            put(header, at, place - old_end + end);
     };
     if (minor >= 3)
         shift(at_waveform);
     if (minor >= 4 && read_at<std::uint32_t>(header, at_evlr_count) > 0)
         shift(at_evlrs);
-    return header + points + records.after;
+    return header + points + after;
 }
 
 } // namespace scanshade
