@@ -37,8 +37,6 @@ CloudRecords read_records(const fs::path& file, std::vector<std::string>& warnin
     if (!format)
         throw Error(fmt::format("{}: begins with {}: neither {}", file.string(), in_quotes(bytes.substr(0, 4)),
                                 listed(cloud_format_names(), "nor")));
-    if (!format->read)
-        throw Error(fmt::format("{}: {}", file.string(), format->refusal));
     require_memory(2 * bytes.size(), // the records, and points as doubles
                    fmt::format("{}: a cloud of {} bytes", file.string(), bytes.size()));
     CloudRecords records = format->read(bytes, file, warnings);

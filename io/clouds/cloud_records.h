@@ -141,6 +141,10 @@ class TextRecords {
 /// KITTI's Velodyne sweeps: x y z reflectance as floats, no header. The records are those of a PLY.
 [[nodiscard]] CloudRecords read_kitti(std::string_view bytes, const std::filesystem::path& file,
                                       std::vector<std::string>& warnings);
+/// E57: all scans of a file, placed by their poses, as the records of a PLY: x y z, then every field of numbers. A scan
+/// alone keeps its grid, if every cell has one point.
+[[nodiscard]] CloudRecords read_e57(std::string_view bytes, const std::filesystem::path& file,
+                                    std::vector<std::string>& warnings);
 /// Faces as triangles, polygons fanned from their first corner; -1 for an index that names no vertex. Tristrips are not
 /// read.
 [[nodiscard]] std::vector<std::array<int, 3>> ply_triangles(const CloudRecords& records);

@@ -57,7 +57,12 @@ constexpr CloudFormat formats[] = {
     {.name = "E57",
      .signature = &is_e57,
      .extensions = {".e57"},
-     .refusal = "E57, which is not read; CloudCompare or `pdal translate IN.e57 OUT.las` makes LAS or PLY of it"},
+     .written_extension = ".ply", // with all fields
+     .read = &read_e57,
+     .written = &ply_bytes,
+     .binary_encoding = "binary_little_endian",
+     .new_colours = NewColours::bytes,
+     .z_up = true},
     {.name = "XYZ",
      .extensions = {".xyz"},
      .read = &read_xyz,
@@ -117,8 +122,7 @@ bool is_cloud(std::string_view start, const fs::path& file) {
 std::vector<std::string_view> cloud_format_names() {
     std::vector<std::string_view> names;
     for (const CloudFormat& format : formats)
-        if (format.read)
-            names.push_back(format.name);
+        names.push_back(format.name);
     return names;
 }
 

@@ -22,7 +22,6 @@ struct CloudFormat {
     bool (*signature)(std::string_view start) = nullptr;
     std::array<std::string_view, 2> extensions; ///< lower case, with the dot
     std::string_view written_extension = {};    ///< of files that `written` makes, if it is not the first one
-    std::string_view refusal = {};              ///< why it is not read, and what to do instead
 
     CloudRecords (*read)(std::string_view bytes, const std::filesystem::path& file,
                          std::vector<std::string>& warnings) = nullptr;

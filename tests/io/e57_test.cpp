@@ -1,0 +1,361 @@
+// E57: files made here with pages, packets and XML of every kind, read as clouds; damaged ones refused by name.
+#include "io/clouds/cloud_file.h"
+#include "io/clouds/cloud_records.h"
+#include "io/clouds/e57/e57.h"
+#include "tests/support/files.h"
+
+#include <cmath>
+#include <cstring>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <numbers>
+
+namespace scanshade {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace tests;
+
+template <class Number>
+std::string raw(Number value) {
+    std::string bytes(sizeof value, '\0');
+    std::memcpy(bytes.data(), &value, sizeof value);
+    return bytes;
+}
+
+/// Values of `bits` bits side by side, from the lowest bit of each byte on.
+class Bits {
+  public:
+    void add(std::uint64_t value, unsigned bits) {
+        for (unsigned k = 0; k < bits; ++k, ++count_) {
+            if (count_ % 8 == 0)
+                bytes_ += '\0';
+            bytes_.back() = static_cast<char>(bytes_.back() | static_cast<char>((value >> k & 1) << (count_ % 8)));
+        }
+    }
+    [[nodiscard]] const std::string& bytes() const { return bytes_; }
+
+  private:
+    std::string bytes_;
+    std::size_t count_ = 0;
+};
+
+std::uint64_t in_file(std::uint64_t offset) { return offset / 1020 * 1024 + offset % 1020; }
+
+/// A section with streams cut into uneven packets, an index packet and an empty one among them. `at`: in the contents.
+std::string section(std::uint64_t at, const std::vector<std::string>& streams) {
+    std::string packets;
+    std::vector<std::size_t> done(streams.size(), 0);
+    for (std::size_t round = 0;; ++round) {
+        std::string lengths, data;
+        for (std::size_t i = 0; i < streams.size(); ++i) {
+            const std::size_t size = std::min(streams[i].size() - done[i], 7 + 3 * i + 100 * round);
+            lengths += raw(static_cast<std::uint16_t>(size));
+            data += streams[i].substr(done[i], size);
+            done[i] += size;
+        }
+        if (data.empty())
+            break;
+        std::string packet =
+            std::string("\1\0\0\0", 4) + raw(static_cast<std::uint16_t>(streams.size())) + lengths + data;
+        packet.resize((packet.size() + 3) / 4 * 4);
+        packet.replace(2, 2, raw(static_cast<std::uint16_t>(packet.size() - 1)));
+        packets += packet;
+        if (round == 0)
+            packets += std::string("\0\0\x0f\0", 4) + std::string(12, '\0') + std::string("\2\0\3\0", 4);
+    }
+    std::string header(8, '\0');
+    header[0] = 1;
+    return header + raw(static_cast<std::uint64_t>(32 + packets.size())) + raw(in_file(at + 32)) +
+           raw(std::uint64_t(0)) + packets;
+}
+
+struct TestScan {
+    std::string before, prototype; ///< XML
+    std::vector<std::string> streams;
+    std::size_t count = 0;
+};
+
+std::string in_pages(std::string contents) {
+    contents.resize((contents.size() + 1019) / 1020 * 1020, ' ');
+    contents.replace(16, 8, raw(static_cast<std::uint64_t>(contents.size() / 1020 * 1024)));
+    std::string file;
+    for (std::size_t at = 0; at < contents.size(); at += 1020) {
+        const std::string page = contents.substr(at, 1020);
+        const std::string sum = raw(e57::checksum(page));
+        file += page + std::string(sum.rbegin(), sum.rend());
+    }
+    return file;
+}
+
+std::string e57_file(const std::vector<TestScan>& scans, const std::string& xml_head = "") {
+    std::string contents(48, '\0'), vector;
+    contents.replace(0, 8, "ASTM-E57");
+    contents[8] = 1;
+    for (const TestScan& scan : scans) {
+        const std::size_t at = contents.size();
+        contents += section(at, scan.streams);
+        vector += fmt::format("<vectorChild type=\"Structure\"><name type=\"String\"><![CDATA[a scan]]></name>{}"
+                              "<points type=\"CompressedVector\" fileOffset=\"{}\" recordCount=\"{}\"><prototype "
+                              "type=\"Structure\">{}</prototype><codecs type=\"Vector\"/></points></vectorChild>",
+                              scan.before, in_file(at), scan.count, scan.prototype);
+    }
+    const std::string xml =
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>" + xml_head +
+        "<e57Root type=\"Structure\" xmlns=\"http://www.astm.org/COMMIT/E57/2010-e57-v1.0\"><data3D "
+        "type=\"Vector\">" +
+        vector + "</data3D></e57Root>\n";
+    contents.replace(24, 8, raw(in_file(contents.size())));
+    contents.replace(32, 8, raw(static_cast<std::uint64_t>(xml.size())));
+    contents.replace(40, 8, raw(std::uint64_t(1024)));
+    return in_pages(contents + xml);
+}
+
+const std::string floats = "<cartesianX type=\"Float\" minimum=\"-1.5e+003\"/><cartesianY type=\"Float\"/>"
+                           "<cartesianZ type=\"Float\"/>";
+
+TestScan float_scan(std::size_t count, double shift = 0) {
+    TestScan scan{.before = "", .prototype = floats, .streams = std::vector<std::string>(3), .count = count};
+    for (std::size_t i = 0; i < count; ++i)
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            scan.streams[axis] += raw(shift + static_cast<double>(i) + 0.25 * static_cast<double>(axis));
+    return scan;
+}
+
+double value(const Cloud& cloud, std::size_t point, const std::string& field) {
+    const auto found = cloud.records->field_named(field);
+    EXPECT_TRUE(found) << field;
+    return found ? value_at(*cloud.records, cloud.records->record(point), *found) : 0;
+}
+
+Cloud read(const fs::path& file) {
+    std::vector<std::string> warnings;
+    Cloud cloud = read_cloud(file, warnings);
+    EXPECT_TRUE(warnings.empty()) << joined(warnings);
+    return cloud;
+}
+
+TEST(E57, the_checksum_is_castagnolis) {
+    EXPECT_EQ(e57::checksum("123456789"), 0xe3069283U); // the check value of catalogues
+}
+
+TEST(E57, integers_of_every_width_return) {
+    const TemporaryFolder folder;
+    for (const unsigned width : {0U, 1U, 3U, 7U, 8U, 11U, 17U, 33U, 46U, 53U, 63U, 64U}) {
+        SCOPED_TRACE(width);
+        TestScan scan = float_scan(400);
+        const std::int64_t minimum = width == 64 ? std::numeric_limits<std::int64_t>::min() : -5;
+        const std::uint64_t range = width == 64 ? ~std::uint64_t(0) : (std::uint64_t(1) << width) - 1;
+        const auto maximum = static_cast<std::int64_t>(static_cast<std::uint64_t>(minimum) + range);
+        scan.prototype += fmt::format("<timeStamp type=\"Integer\" minimum=\"{}\" maximum=\"{}\"/>", minimum, maximum);
+        Bits bits;
+        std::vector<double> expected;
+        for (std::uint64_t i = 0; i < scan.count; ++i) {
+            const std::uint64_t stored = i * 0x9e3779b97f4a7c15U & range;
+            bits.add(stored, width);
+            expected.push_back(
+                static_cast<double>(static_cast<std::int64_t>(static_cast<std::uint64_t>(minimum) + stored)));
+        }
+        scan.streams.push_back(bits.bytes());
+        const Cloud cloud = read(write_file(folder / "a.e57", e57_file({scan})));
+        ASSERT_EQ(cloud.points.size(), scan.count);
+        for (std::size_t i = 0; i < scan.count; ++i) {
+            ASSERT_EQ(value(cloud, i, "timeStamp"), expected[i]) << i;
+            const double x = static_cast<double>(i);
+            ASSERT_EQ(cloud.points[i], Eigen::Vector3d(x, x + 0.25, x + 0.5));
+        }
+    }
+}
+
+TEST(E57, points_are_scaled_placed_and_invalid_ones_are_holes) {
+    const TemporaryFolder folder;
+    TestScan scan;
+    // A quarter turn about z, given twice as long as a unit quaternion.
+    const double half = std::numbers::sqrt2;
+    scan.before = fmt::format("<pose type=\"Structure\"><rotation type=\"Structure\"><w type=\"Float\">{0}</w><z "
+                              "type=\"Float\">{0}</z></rotation><translation type=\"Structure\"><x "
+                              "type=\"Float\">5.0e+005</x></translation></pose><colorLimits type=\"Structure\">"
+                              "<colorRedMinimum type=\"Integer\">0</colorRedMinimum><colorRedMaximum "
+                              "type=\"Integer\">1023</colorRedMaximum></colorLimits>",
+                              half);
+    for (const char* axis : {"X", "Y", "Z"})
+        scan.prototype +=
+            fmt::format("<cartesian{} type=\"ScaledInteger\" minimum=\"-100\" maximum=\"155\" scale=\"0.5\" "
+                        "offset=\"2\"/>",
+                        axis);
+    scan.prototype += "<cartesianInvalidState type=\"Integer\" minimum=\"0\" maximum=\"2\"/>"
+                      "<colorRed type=\"Integer\" minimum=\"0\" maximum=\"1023\"/>"
+                      "<colorGreen type=\"Integer\" minimum=\"0\" maximum=\"255\"/><colorBlue type=\"Integer\" "
+                      "minimum=\"0\" maximum=\"65535\"/><intensity type=\"Float\" precision=\"single\"/>";
+    scan.count = 2;
+    scan.streams = {"\x66\x66",
+                    "\x68\x68",
+                    "\x64\x64",
+                    std::string(1, '\x08'),
+                    "",
+                    "\x11\x22",
+                    raw(std::uint32_t(0xffff0000)),
+                    raw(0.5F) + raw(0.75F)}; // x y z: 2 + 0.5 * (2, 4, 0); states 0 and 2
+    Bits red;
+    red.add(1023, 10), red.add(0, 10);
+    scan.streams[4] = red.bytes();
+    const Cloud cloud = read(write_file(folder / "a.e57", e57_file({scan})));
+    EXPECT_NEAR((cloud.points[0] - Eigen::Vector3d(500000 - 4, 3, 2)).norm(), 0, 1e-9);
+    EXPECT_TRUE(cloud.points[1].array().isNaN().all());
+    EXPECT_EQ(cloud.colours[0], cv::Vec3b(0, 0x11, 255));
+    EXPECT_EQ(cloud.colours[1], cv::Vec3b(255, 0x22, 0));
+    EXPECT_EQ(value(cloud, 1, "intensity"), 0.75);
+    EXPECT_EQ(cloud.records->viewpoint->translation(), Eigen::Vector3d(500000, 0, 0));
+
+    const std::array visibility{0.5F, 0.25F};
+    write_cloud(folder / "b.ply", cloud, {{"ambient_occlusion", visibility}});
+    std::vector<std::string> warnings;
+    const Cloud back = read_cloud(folder / "b.ply", warnings);
+    EXPECT_EQ(extension(*cloud.records), ".ply");
+    EXPECT_EQ(back.points[0], cloud.points[0]);
+    EXPECT_EQ(value(back, 1, "ambient_occlusion"), 0.25);
+    for (const CloudField& field : cloud.records->fields)
+        if (field.name.size() > 1) // the others may be NaN
+            EXPECT_EQ(value(back, 1, field.name), value(cloud, 1, field.name));
+}
+
+TEST(E57, spherical_coordinates_become_points) {
+    const TemporaryFolder folder;
+    TestScan scan;
+    for (const char* name : {"sphericalRange", "sphericalAzimuth", "sphericalElevation"})
+        scan.prototype += fmt::format("<{} type=\"Float\"/>", name);
+    const double quarter = std::numbers::pi / 2;
+    scan.streams = {raw(2.0) + raw(4.0), raw(quarter) + raw(0.0), raw(0.0) + raw(quarter / 3)};
+    scan.count = 2;
+    const Cloud cloud = read(write_file(folder / "a.e57", e57_file({scan})));
+    EXPECT_NEAR((cloud.points[0] - Eigen::Vector3d(0, 2, 0)).norm(), 0, 1e-12); // along y
+    EXPECT_NEAR((cloud.points[1] - Eigen::Vector3d(4 * std::cos(quarter / 3), 0, 2)).norm(), 0, 1e-12);
+    EXPECT_EQ(value(cloud, 1, "sphericalRange"), 4) << "what the file had stays";
+}
+
+TEST(E57, a_complete_grid_is_organised_and_others_stay_lists) {
+    const TemporaryFolder folder;
+    TestScan scan = float_scan(6);
+    scan.prototype += "<rowIndex type=\"Integer\" minimum=\"0\" maximum=\"255\"/><columnIndex type=\"Integer\" "
+                      "minimum=\"0\" maximum=\"255\"/>";
+    scan.streams.emplace_back("\4\5\4\5\4\5"); // column after column
+    scan.streams.emplace_back("\1\1\2\2\3\3");
+    const Cloud cloud = read(write_file(folder / "a.e57", e57_file({scan})));
+    EXPECT_EQ(cloud.grid, cv::Size(3, 2));
+    EXPECT_EQ(cloud.points[1].x(), 2) << "row 4, column 2 was the third";
+    EXPECT_EQ(cloud.points[3].x(), 1);
+    const std::vector<float> values(6, 0.5F);
+    write_cloud(folder / "b.ply", cloud, {{"ambient_occlusion", values}});
+    EXPECT_EQ(read(folder / "b.ply").grid, cv::Size(3, 2));
+
+    scan.streams.back() = "\1\1\2\2\3\2"; // a cell twice
+    std::vector<std::string> warnings;
+    EXPECT_EQ(read_cloud(write_file(folder / "c.e57", e57_file({scan})), warnings).grid, cv::Size(6, 1));
+    EXPECT_TRUE(warned(warnings, "two points are in row 5, column 2"));
+}
+
+TEST(E57, several_scans_are_one_cloud_with_a_field_that_tells_them_apart) {
+    const TemporaryFolder folder;
+    TestScan second = float_scan(2, 100);
+    second.before =
+        "<pose type=\"Structure\"><translation type=\"Structure\"><z type=\"Float\">7</z></translation></pose>";
+    second.prototype += "<intensity type=\"Integer\" minimum=\"0\" maximum=\"255\"/>";
+    second.streams.emplace_back("\7\x8");
+    std::vector<std::string> warnings;
+    const Cloud cloud =
+        read_cloud(write_file(folder / "a.e57", e57_file({float_scan(3), second, float_scan(0)})), warnings);
+    EXPECT_TRUE(warned(warnings, "3 scans are read as one cloud"));
+    ASSERT_EQ(cloud.points.size(), 5U);
+    EXPECT_EQ(cloud.points[3], Eigen::Vector3d(100, 100.25, 107.5));
+    EXPECT_EQ(value(cloud, 2, "scan"), 0);
+    EXPECT_EQ(value(cloud, 3, "scan"), 1);
+    EXPECT_EQ(value(cloud, 2, "intensity"), 0);
+    EXPECT_EQ(value(cloud, 4, "intensity"), 8);
+}
+
+std::string refused(const fs::path& file, const std::string& bytes) {
+    std::vector<std::string> warnings;
+    return refusal([&] { (void)read_cloud(write_file(file, bytes), warnings); });
+}
+
+TEST(E57, damage_is_refused_by_name_and_place) {
+    const TemporaryFolder folder;
+    const fs::path file = folder / "a.e57";
+    const std::string sound = e57_file({float_scan(200)});
+    std::string damaged = sound;
+    damaged[2500] ^= 4;
+    EXPECT_TRUE(says(refused(file, damaged), "a.e57: page 2 (byte 2048): checksum"));
+    for (std::size_t length = 8; length < sound.size(); length += 97)
+        EXPECT_TRUE(says(refused(file, sound.substr(0, length)), "the file is cut short"));
+    EXPECT_TRUE(says(refused(file, sound.substr(0, 2048)), "it is cut short"));
+    TestScan more = float_scan(200);
+    ++more.count;
+    EXPECT_TRUE(says(refused(file, e57_file({more})), "scan 0: cartesianX holds 200 values, 201 records"));
+    TestScan lost = float_scan(4);
+    lost.prototype = lost.prototype.substr(0, lost.prototype.find("<cartesianZ"));
+    lost.streams.pop_back();
+    EXPECT_TRUE(says(refused(file, e57_file({lost})), "scan 0: neither cartesianX Y Z nor spherical"));
+    TestScan narrow = float_scan(4);
+    narrow.prototype += "<rowIndex type=\"Integer\" minimum=\"0\" maximum=\"5\"/>";
+    narrow.streams.emplace_back("\xff\xff"); // 7 in three bits
+    EXPECT_TRUE(says(refused(file, e57_file({narrow})), "rowIndex of point 0 is 7 above its minimum"));
+    TestScan turned = float_scan(4);
+    turned.before = "<pose type=\"Structure\"><rotation type=\"Structure\"><w type=\"Float\">0</w></rotation></pose>";
+    EXPECT_TRUE(says(refused(file, e57_file({turned})), "scan 0: a rotation of length 0"));
+    EXPECT_TRUE(says(refused(file, e57_file({})), "no scan in this E57"));
+    EXPECT_TRUE(says(refused(file, e57_file({float_scan(4)}, "<!DOCTYPE e57Root>")), "document type"));
+    TestScan codec = float_scan(4);
+    codec.prototype += "</prototype><codecs><vectorChild/></codecs><prototype>";
+    EXPECT_TRUE(says(refused(file, e57_file({codec})), "uses codecs"));
+    TestScan constant{.before = "", .prototype = "", .streams = {"", "", ""}, .count = 2147483647};
+    for (const char* axis : {"X", "Y", "Z"})
+        constant.prototype += fmt::format("<cartesian{} type=\"Integer\" minimum=\"1\" maximum=\"1\"/>", axis);
+    EXPECT_TRUE(says(refused(file, e57_file({constant})), "for which nothing is stored"));
+}
+
+TEST(E57, any_changed_byte_under_a_sound_checksum_is_read_or_refused) {
+    const TemporaryFolder folder;
+    TestScan scan = float_scan(30);
+    scan.prototype += "<rowIndex type=\"Integer\" minimum=\"0\" maximum=\"5\"/>";
+    scan.streams.emplace_back(12, '\0');
+    const std::string sound = e57_file({scan});
+    for (std::size_t at = 8; at < sound.size(); ++at) {
+        if (at % 1024 >= 1020)
+            continue;
+        for (const char* change : {"\xff", "\x31"}) {
+            std::string damaged = sound, page;
+            damaged[at] = *change;
+            const std::size_t first = at / 1024 * 1024;
+            const std::string sum = raw(e57::checksum(std::string_view(damaged).substr(first, 1020)));
+            std::copy(sum.rbegin(), sum.rend(), damaged.begin() + static_cast<std::ptrdiff_t>(first + 1020));
+            std::vector<std::string> warnings;
+            Cloud cloud;
+            write_file(folder / "a.e57", damaged);
+            if (refusal([&] { cloud = read_cloud(folder / "a.e57", warnings); }).empty())
+                EXPECT_LE(cloud.points.size(), 30U) << at;
+        }
+    }
+}
+
+TEST(E57, a_recorded_cloud_has_the_known_sums) {
+    const char* data = std::getenv("SCANSHADE_DATA");
+    const fs::path folder = fs::path(data ? data : "") / "e57";
+    if (!data || !fs::exists(folder / "bunnyInt32.e57"))
+        GTEST_SKIP() << "no recorded E57; SCANSHADE_DATA names the folder of recorded data";
+    const Cloud cloud = read(folder / "bunnyInt32.e57");
+    ASSERT_EQ(cloud.points.size(), 30571U);
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero(), low = cloud.points[0], high = low;
+    for (const Eigen::Vector3d& point : cloud.points) {
+        sum += point;
+        low = low.cwiseMin(point), high = high.cwiseMax(point);
+    }
+    EXPECT_NEAR((sum - Eigen::Vector3d(-841.0933, 3151.19874, 264.24397)).norm(), 0, 1e-6);
+    EXPECT_NEAR((low - Eigen::Vector3d(-0.094689, 0.040011, -0.061873)).norm(), 0, 1e-12);
+    EXPECT_NEAR((high - Eigen::Vector3d(0.061009, 0.187321, 0.058799)).norm(), 0, 1e-12);
+    std::vector<std::string> warnings;
+    EXPECT_TRUE(says(refusal([&] { (void)read_cloud(folder / "PinholeImageWithDistortionParameters.e57", warnings); }),
+                     "no scan in this E57 (3 images)"));
+}
+
+} // namespace
+} // namespace scanshade
