@@ -345,7 +345,7 @@ json frame_json(const Capture& capture, std::size_t index) {
             text["holes"] = cv::countNonZero(frame.depth_m <= 0);
         text["colour_size"] = json();
         if (!entry.colour.empty() && !frame.colour.empty()) {
-            const cv::Size colour = peek(entry.colour).size;
+            const cv::Size colour = colour_size_of(entry);
             text["colour_size"] = {colour.width, colour.height};
         }
     } catch (const OutOfMemory&) {

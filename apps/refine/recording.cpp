@@ -43,7 +43,7 @@ Motion motion_of(const Capture& capture, std::size_t index) {
 }
 
 cv::Mat1b grey_of(const Frame& frame, const CaptureEntry& entry) {
-    const cv::Mat3b colour = frame.colour.empty() && !entry.colour.empty() ? read_colour(entry.colour) : frame.colour;
+    const cv::Mat3b colour = frame.colour.empty() && !entry.colour.empty() ? colour_of(entry) : frame.colour;
     if (colour.empty())
         throw Error(frame.name + ": no colour image");
     cv::Mat1b grey;

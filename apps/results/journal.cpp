@@ -193,18 +193,8 @@ std::string stamps_of(const CaptureEntry& entry) {
     return all;
 }
 
-/// An unreadable file counts as the content "unreadable": the frame fails again until the file can be read.
-std::string hashes_of(const CaptureEntry& entry) {
-    std::string all = listed(entry);
-    for (const fs::path& file : inputs_of(entry)) {
-        try {
-            all += hash_of_file(file) + "|";
-        } catch (const Error&) {
-            all += "unreadable|";
-        }
-    }
-    return all;
-}
+/// Unreadable content is a content of its own: the frame fails again until it can be read.
+std::string hashes_of(const CaptureEntry& entry) { return listed(entry) + content_hash_of(entry); }
 
 std::string host_name() {
     std::array<char, 256> name = {};

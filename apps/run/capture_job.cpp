@@ -20,12 +20,14 @@ namespace fs = std::filesystem;
 namespace {
 
 /// The size of a capture's depth images; empty for clouds, and where no header can be read.
-cv::Size depth_size_of(const CaptureJob& job) {
+cv::Size depth_size_in(const CaptureJob& job) {
     if (job.capture.camera && !job.capture.camera->pinhole.size.empty())
         return job.capture.camera->pinhole.size;
-    const std::string first = job.batch.frames.empty() ? "" : job.capture.entries[job.batch.frames.front()].depth;
+    if (job.batch.frames.empty())
+        return {};
+    const CaptureEntry& first = job.capture.entries[job.batch.frames.front()];
     try {
-        return first.empty() ? cv::Size() : peek(first).size;
+        return first.depth.empty() ? cv::Size() : depth_size_of(first);
     } catch (const Outage&) {
         throw;
     } catch (const Error&) { // loading that frame reports the error
@@ -110,7 +112,7 @@ void fit_into_memory(CaptureJob& job, bool on_cpu) {
     constexpr std::uint64_t maps = 12, pictures = 13, device = 24;
     const Outputs& outputs = job.batch.outputs;
     const bool finished = outputs.confidence || outputs.shaded || outputs.panel;
-    const cv::Size size = depth_size_of(job);
+    const cv::Size size = depth_size_in(job);
     const std::uint64_t bytes =
         static_cast<std::uint64_t>(size.area()) * (maps + (finished ? pictures : 0) + (on_cpu ? device : 0));
     require_memory(bytes,

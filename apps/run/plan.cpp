@@ -156,7 +156,7 @@ double megapixels(const Capture& capture) {
     for (const CaptureEntry& entry : capture.entries)
         if (entry.problem.empty() && !entry.depth.empty()) {
             try {
-                return peek(entry.depth).size.area() / 1e6;
+                return depth_size_of(entry).area() / 1e6;
             } catch (const Error&) {
                 return 0;
             }

@@ -84,6 +84,37 @@ void tell_unused(const fs::path& folder, Listing& listing) {
     };
 }
 
+/// Files that hold a recording, by their first bytes.
+struct FileLayout {
+    const char* signature;
+    bool (*begins)(std::string_view start);
+    Listing (*list)(const fs::path& file);
+};
+
+constexpr std::array file_layouts = {
+    FileLayout{"ScanNet's .sens", is_sens, list_sens},
+};
+
+/// Of a file with these first bytes; null where it holds no recording.
+const FileLayout* file_layout(std::string_view start) {
+    const auto* const found = std::ranges::find_if(file_layouts, [&](const auto& row) { return row.begins(start); });
+    return found == file_layouts.end() ? nullptr : found;
+}
+
+constexpr std::size_t enough_for_signatures = 1 << 12;
+
+/// A folder's only file that holds a recording; several are listed in an Error.
+std::optional<fs::path> recording_in(const fs::path& folder) {
+    std::vector<fs::path> recordings;
+    for (const fs::path& file : files_in(folder))
+        if (file_layout(read_bytes(file, enough_for_signatures)))
+            recordings.push_back(file);
+    if (recordings.size() > 1)
+        throw Error(fmt::format("{}: {} recordings, expected one: open {} or another by its name", folder.string(),
+                                recordings.size(), recordings.front().filename().string()));
+    return recordings.empty() ? std::nullopt : std::optional(recordings.front());
+}
+
 Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
     for (const FolderLayout& layout : folder_layouts)
         if (auto listing = layout.list ? layout.list(folder) : list_tum(folder, options)) {
@@ -91,20 +122,25 @@ Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
                 tell_unused(folder, *listing);
             return *std::move(listing);
         }
+    if (const auto file = recording_in(folder))
+        return file_layout(read_bytes(*file, enough_for_signatures))->list(*file);
     std::vector<std::string> signatures;
     for (const FolderLayout& layout : folder_layouts)
+        signatures.emplace_back(layout.signature);
+    for (const FileLayout& layout : file_layouts)
         signatures.emplace_back(layout.signature);
     throw NoFrames(fmt::format("no frames found in {}: looked for {} ({})", folder.string(),
                                fmt::join(signatures, ", "), listed(cloud_format_names(), "or")));
 }
 
 Listing list_file(const fs::path& file) {
+    const std::string start = read_bytes(file, enough_for_signatures);
+    if (const FileLayout* layout = file_layout(start))
+        return layout->list(file);
     CaptureEntry entry;
     entry.name = file.stem().string();
     Listing listing;
     listing.find_camera = [](cv::Size, std::vector<std::string>&) { return std::nullopt; };
-    constexpr std::size_t enough_for_signatures = 1 << 12;
-    const std::string start = read_bytes(file, enough_for_signatures);
     if (is_cloud(start, file)) {
         entry.cloud = file;
         listing.capture.kind = "cloud";
@@ -133,7 +169,7 @@ cv::Size depth_size(const std::vector<CaptureEntry>& entries) {
         if (tries-- == 0)
             break;
         try {
-            return peek(entry.depth).size;
+            return depth_size_of(entry);
         } catch (const Outage&) {
             throw;
         } catch (const Error&) {
@@ -229,9 +265,9 @@ void check_still_there(const Capture& capture) {
         throw Outage(capture.path.string() + ": not there any more");
 }
 
-void load_colour(const Capture& capture, const fs::path& file, cv::Size depth_size, Frame& frame) {
+void load_colour(const Capture& capture, const CaptureEntry& entry, cv::Size depth_size, Frame& frame) {
     try {
-        frame.colour = read_colour(file);
+        frame.colour = colour_of(entry);
     } catch (const Outage&) {
         throw;
     } catch (const Error& failure) {
@@ -249,7 +285,7 @@ void load_colour(const Capture& capture, const fs::path& file, cv::Size depth_si
         cv::resize(frame.colour, frame.colour, expected, 0, 0, cv::INTER_AREA);
         return;
     }
-    frame.warnings.push_back(fmt::format("{}: colour is {}, {} is {}; processed without colour.", file.string(),
+    frame.warnings.push_back(fmt::format("{}: colour is {}, {} is {}; processed without colour.", entry.colour,
                                          text(colour), frame.colour_camera ? "its camera" : "depth", text(expected)));
     frame.colour = cv::Mat3b();
 }
@@ -287,9 +323,9 @@ DepthEncoding encoding_of(const Capture& capture, const CaptureEntry& entry) {
 
 /// Depth of the lowest confidence becomes holes.
 void leave_out_unsure(const CaptureEntry& entry, Frame& frame) {
-    cv::Mat3b levels;
+    cv::Mat1b levels;
     try {
-        levels = read_colour(entry.confidence);
+        levels = confidence_of(entry);
     } catch (const Outage&) {
         throw;
     } catch (const Error& failure) {
@@ -302,7 +338,7 @@ void leave_out_unsure(const CaptureEntry& entry, Frame& frame) {
         return;
     }
     std::transform(frame.depth_m.begin(), frame.depth_m.end(), levels.begin(), frame.depth_m.begin(),
-                   [](float z, const cv::Vec3b& level) { return level[0] > 0 ? z : 0.0F; });
+                   [](float z, uchar level) { return level > 0 ? z : 0.0F; });
 }
 
 void load_depth(const Capture& capture, const CaptureEntry& entry, const cv::Mat& stored, Frame& frame,
@@ -317,7 +353,7 @@ void load_depth(const Capture& capture, const CaptureEntry& entry, const cv::Mat
         leave_out_unsure(entry, frame);
     correct(frame.depth_m, capture.depth_correction);
     if (with_colour && !entry.colour.empty())
-        load_colour(capture, entry.colour, stored.size(), frame);
+        load_colour(capture, entry, stored.size(), frame);
 }
 
 /// How many pixels have each value. In four tables, by turns: equal neighbours would wait for each other's sums.
@@ -344,7 +380,7 @@ std::vector<std::uint32_t> counts_of(const cv::Mat1w& stored) {
 }
 
 void examine_depth(const Capture& capture, const CaptureEntry& entry, ExaminedFrame& examined) {
-    const cv::Mat stored = read_stored_depth(entry.depth);
+    const cv::Mat stored = stored_depth_of(entry);
     examined.depth_size = stored.size();
     if (stored.type() != CV_16UC1 || !entry.confidence.empty()) {
         load_depth(capture, entry, stored, examined.frame, true);
@@ -365,7 +401,7 @@ void examine_depth(const Capture& capture, const CaptureEntry& entry, ExaminedFr
             examined.levels.push_back({metres(value), count});
     std::ranges::sort(examined.levels, {}, &DepthLevel::z_m);
     if (!entry.colour.empty())
-        load_colour(capture, entry.colour, stored.size(), examined.frame);
+        load_colour(capture, entry, stored.size(), examined.frame);
 }
 
 void load_cloud(const Capture& capture, const CaptureEntry& entry, Frame& frame) {
@@ -480,7 +516,7 @@ void read_frame(const Capture& capture, std::size_t index, Frame& frame, const R
 Frame Capture::load(std::size_t index, bool with_colour) const {
     Frame frame;
     read_frame(*this, index, frame, [&](const CaptureEntry& entry) {
-        entry.cloud.empty() ? load_depth(*this, entry, read_stored_depth(entry.depth), frame, with_colour)
+        entry.cloud.empty() ? load_depth(*this, entry, stored_depth_of(entry), frame, with_colour)
                             : load_cloud(*this, entry, frame);
     });
     return frame;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "io/cameras/camera_file.h"
+#include "io/captures/container.h"
 #include "io/images/image_file.h"
 #include "projection/base/error.h"
 #include "projection/frame.h"
@@ -32,6 +33,10 @@ struct CaptureEntry {
     /// Paths; empty where there is none. Not as std::filesystem::path, which stores every component separately: for
     /// thousands of frames these would take most of a capture's memory.
     std::string colour, depth, cloud;
+    /// Where the images are in one file with those of other frames: `colour`, `depth` and `confidence` name that file,
+    /// and stay empty for images that the frame lacks.
+    std::shared_ptr<const FrameContainer> container;
+    std::size_t place = 0; ///< in the container
     std::optional<Eigen::Isometry3d> world_from_camera;
     std::optional<double> stamp_s;        ///< of the depth image
     std::optional<double> colour_stamp_s; ///< of the colour image paired with it

@@ -47,6 +47,11 @@ struct Listing {
 [[nodiscard]] std::optional<Listing> list_depth_images(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_clouds(const std::filesystem::path& folder);
 
+// Files that hold a recording: whether one begins so, and what it holds. list_...() throws Error where it cannot be
+// used.
+[[nodiscard]] bool is_sens(std::string_view start);
+[[nodiscard]] Listing list_sens(const std::filesystem::path& file);
+
 // --- what layouts share ---
 
 /// The folder's own files, hidden and foreign ones (._*, Thumbs.db) left out, in natural order: 2 before 10.

@@ -79,8 +79,9 @@ DepthEncoding depth_encoding(const std::string& text, const std::string& origin)
     return {Kind::linear, *units, text, origin};
 }
 
-cv::Mat read_stored_depth(const fs::path& file) {
-    const std::string bytes = read_image_bytes(file);
+cv::Mat read_stored_depth(const fs::path& file) { return stored_depth_in(read_image_bytes(file), file); }
+
+cv::Mat stored_depth_in(const std::string& bytes, const fs::path& file) {
     // Check the header first: an image that cannot be depth is refused for that reason, whatever else is wrong.
     const ImageFacts facts = read_image_header(bytes, file);
     check_is_depth(facts, file);
@@ -132,8 +133,9 @@ cv::Mat1f depth_in_metres(const cv::Mat& stored, const DepthEncoding& encoding) 
     return metres;
 }
 
-cv::Mat3b read_colour(const fs::path& file) {
-    const std::string bytes = read_image_bytes(file);
+cv::Mat3b read_colour(const fs::path& file) { return colour_in(read_image_bytes(file), file); }
+
+cv::Mat3b colour_in(const std::string& bytes, const fs::path& file) {
     const ImageFacts facts = read_image_header(bytes, file);
     if (!facts.format)
         throw Error(fmt::format("{}: neither {}", file.string(), listed(colour_format_names(), "nor")));

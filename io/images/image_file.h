@@ -33,12 +33,18 @@ struct DepthEncoding {
 /// more than 2^28 pixels (before allocating), PGM size or maxval that do not fit the bytes.
 [[nodiscard]] cv::Mat read_stored_depth(const std::filesystem::path& file);
 
+/// The same of an image's bytes, from wherever they are; `name` stands for the file in messages.
+[[nodiscard]] cv::Mat stored_depth_in(const std::string& bytes, const std::filesystem::path& name);
+
 /// Stored numbers -> metres, 0 = hole. Throws Error when the encoding needs integers and the file holds floats, or the
 /// reverse.
 [[nodiscard]] cv::Mat1f depth_in_metres(const cv::Mat& stored, const DepthEncoding& encoding);
 
 /// 8-bit BGR; 16-bit and grey are converted. Throws Error naming the file when it is missing, damaged or truncated.
 [[nodiscard]] cv::Mat3b read_colour(const std::filesystem::path& file);
+
+/// The same of an image's bytes.
+[[nodiscard]] cv::Mat3b colour_in(const std::string& bytes, const std::filesystem::path& name);
 
 enum class AoFormat { png16, png8, tiff, exr };
 /// Throws Misuse listing the names.

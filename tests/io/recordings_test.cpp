@@ -382,7 +382,7 @@ TEST_P(Samples, are_read_as_their_truth_says) {
 INSTANTIATE_TEST_SUITE_P(of, Samples,
                          testing::Values("scannet-export", "nerfstudio", "nerfstudio-perframe", "instant-ngp", "stray",
                                          "polycam", "arkitscenes", "bop", "replica", "icl-nuim", "scannetpp-iphone",
-                                         "nyu-raw", "npy-folder"),
+                                         "nyu-raw", "npy-folder", "scannet-sens"),
                          [](const auto& layout) {
                              std::string name = layout.param;
                              std::ranges::replace(name, '-', '_');
