@@ -4,6 +4,7 @@
 
 #include "io/captures/layouts.h"
 #include "io/captures/plausibility.h"
+#include "io/captures/ros/bag.h"
 #include "io/captures/trajectory.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
@@ -33,8 +34,10 @@ namespace {
 enum class Unused { silent, told }; ///< whether files that look like poses or cameras are named where they are not used
 struct FolderLayout {
     const char* signature;
-    std::optional<Listing> (*list)(const fs::path& folder); ///< null: list_tum(), which takes options
+    std::optional<Listing> (*list)(const fs::path& folder);
     Unused unused = Unused::silent;
+    /// Instead of `list`, where the options matter.
+    std::optional<Listing> (*list_with)(const fs::path& folder, const CaptureOptions& options) = nullptr;
 };
 
 /// The most specific first.
@@ -50,7 +53,8 @@ constexpr std::array folder_layouts = {
     FolderLayout{"*.gt.freiburg with associations.txt (ICL-NUIM)", list_icl_nuim},
     FolderLayout{"intrinsics.txt with image/ and depth/ (SUN RGB-D)", list_sun_rgbd},
     FolderLayout{"d-SECONDS-TICKS.pgm (NYU)", list_nyu_raw},
-    FolderLayout{"depth.txt (TUM)", nullptr},
+    FolderLayout{"metadata.yaml of rosbag2", nullptr, Unused::silent, list_rosbag2_folder},
+    FolderLayout{"depth.txt (TUM)", nullptr, Unused::silent, list_tum},
     FolderLayout{"frame-NNNNNN.depth.png (7-Scenes)", list_seven_scenes},
     FolderLayout{"TIME_depth.pclzf (PCL)", list_pcl_recording},
     FolderLayout{"a folder depth/ (Redwood, RealSense)", list_image_folders, Unused::told},
@@ -88,11 +92,12 @@ void tell_unused(const fs::path& folder, Listing& listing) {
 struct FileLayout {
     const char* signature;
     bool (*begins)(std::string_view start);
-    Listing (*list)(const fs::path& file);
+    Listing (*list)(const fs::path& file, const CaptureOptions& options);
 };
 
 constexpr std::array file_layouts = {
-    FileLayout{"ScanNet's .sens", is_sens, list_sens},
+    FileLayout{"ScanNet's .sens", is_sens, [](const fs::path& file, const CaptureOptions&) { return list_sens(file); }},
+    FileLayout{"bags of ROS 1 and 2, MCAP", ros::is_bag, list_ros},
 };
 
 /// Of a file with these first bytes; null where it holds no recording.
@@ -117,13 +122,13 @@ std::optional<fs::path> recording_in(const fs::path& folder) {
 
 Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
     for (const FolderLayout& layout : folder_layouts)
-        if (auto listing = layout.list ? layout.list(folder) : list_tum(folder, options)) {
+        if (auto listing = layout.list ? layout.list(folder) : layout.list_with(folder, options)) {
             if (layout.unused == Unused::told)
                 tell_unused(folder, *listing);
             return *std::move(listing);
         }
     if (const auto file = recording_in(folder))
-        return file_layout(read_bytes(*file, enough_for_signatures))->list(*file);
+        return file_layout(read_bytes(*file, enough_for_signatures))->list(*file, options);
     std::vector<std::string> signatures;
     for (const FolderLayout& layout : folder_layouts)
         signatures.emplace_back(layout.signature);
@@ -133,10 +138,10 @@ Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
                                fmt::join(signatures, ", "), listed(cloud_format_names(), "or")));
 }
 
-Listing list_file(const fs::path& file) {
+Listing list_file(const fs::path& file, const CaptureOptions& options) {
     const std::string start = read_bytes(file, enough_for_signatures);
     if (const FileLayout* layout = file_layout(start))
-        return layout->list(file);
+        return layout->list(file, options);
     CaptureEntry entry;
     entry.name = file.stem().string();
     Listing listing;
@@ -461,7 +466,7 @@ Capture open_capture(const fs::path& path, const CaptureOptions& options) {
     std::error_code ignored;
     if (!fs::exists(path, ignored))
         throw Error(path.string() + ": no such file or folder");
-    Listing listing = fs::is_directory(path, ignored) ? list_folder(path, options) : list_file(path);
+    Listing listing = fs::is_directory(path, ignored) ? list_folder(path, options) : list_file(path, options);
     Capture& capture = listing.capture;
     capture.path = path;
     settle_names(capture.entries);

@@ -51,6 +51,12 @@ struct Listing {
 // used.
 [[nodiscard]] bool is_sens(std::string_view start);
 [[nodiscard]] Listing list_sens(const std::filesystem::path& file);
+/// Bags of ROS 1 and 2, MCAP, RealSense's recordings; is_bag() tells them (io/captures/ros/bag.h).
+[[nodiscard]] Listing list_ros(const std::filesystem::path& file, const CaptureOptions& options);
+[[nodiscard]] Listing list_ros(const std::filesystem::path& path, const std::vector<std::filesystem::path>& files,
+                               const CaptureOptions& options);
+[[nodiscard]] std::optional<Listing> list_rosbag2_folder(const std::filesystem::path& folder,
+                                                         const CaptureOptions& options);
 
 // --- what layouts share ---
 

@@ -382,7 +382,9 @@ TEST_P(Samples, are_read_as_their_truth_says) {
 INSTANTIATE_TEST_SUITE_P(of, Samples,
                          testing::Values("scannet-export", "nerfstudio", "nerfstudio-perframe", "instant-ngp", "stray",
                                          "polycam", "arkitscenes", "bop", "replica", "icl-nuim", "scannetpp-iphone",
-                                         "nyu-raw", "npy-folder", "scannet-sens"),
+                                         "nyu-raw", "npy-folder", "scannet-sens", "ros1-bag", "ros1-bag-bz2",
+                                         "ros1-bag-lz4", "ros2-db3", "mcap", "mcap-lz4", "mcap-zstd", "realsense-bag",
+                                         "realsense-db3"),
                          [](const auto& layout) {
                              std::string name = layout.param;
                              std::ranges::replace(name, '-', '_');

@@ -6,6 +6,7 @@
 #include "io/text.h"
 #include "projection/base/error.h"
 
+#include <algorithm>
 #include <cstring>
 #include <fmt/format.h>
 #include <unordered_map>
@@ -69,12 +70,14 @@ class Mcap final : public Bag {
         for (std::uint64_t at = magic_bytes;;) {
             const std::uint64_t begin = at;
             try {
-                Content start(scratch_ = file_.bytes(at, record_start));
+                const std::string head = file_.bytes(at, record_start);
+                Content start(head);
                 const auto op = static_cast<Op>(start.next<std::uint8_t>());
                 const auto size = start.next<std::uint64_t>();
                 at += record_start;
                 if (size > file_.size() - at)
-                    throw Error(fmt::format("{} of content, but {} are left", counted(size, "byte"), file_.size() - at));
+                    throw Error(
+                        fmt::format("{} of content, but {} are left", counted(size, "byte"), file_.size() - at));
                 if (op == Op::data_end || op == Op::footer)
                     return;
                 take(op, at, size);
@@ -97,7 +100,8 @@ class Mcap final : public Bag {
         else if (op == Op::channel)
             take_channel(file_.bytes(at, size));
         else if (op == Op::message)
-            take_message(file_.bytes(at, std::min<std::uint64_t>(size, message_start + stamp_bytes)), in_file, at, size);
+            take_message(file_.bytes(at, std::min<std::uint64_t>(size, message_start + stamp_bytes)), in_file, at,
+                         size);
         else if (op == Op::chunk)
             take_chunk(at, size);
     }
@@ -135,7 +139,8 @@ class Mcap final : public Bag {
 
     void take_chunk(std::uint64_t at, std::uint64_t size) {
         constexpr std::uint64_t longest_start = 64; // four numbers, the packer's name, the length
-        Content start(scratch_ = file_.bytes(at, std::min(size, longest_start)));
+        const std::string head = file_.bytes(at, std::min(size, longest_start));
+        Content start(head);
         start.take(2 * sizeof(std::uint64_t));
         const auto unpacked = start.next<std::uint64_t>();
         const auto checksum = start.next<std::uint32_t>();
@@ -147,8 +152,8 @@ class Mcap final : public Bag {
         if (!compression.empty() && compression != "zstd" && compression != "lz4")
             throw Error(fmt::format("a chunk packed by {}, expected zstd, lz4 or nothing", in_quotes(compression)));
         const auto records_of = [&](std::string_view records, std::uint32_t chunk, std::uint64_t base) {
-            const auto found = static_cast<std::uint32_t>(
-                crc32_z(0, reinterpret_cast<const Bytef*>(records.data()), records.size()));
+            const auto found =
+                static_cast<std::uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(records.data()), records.size()));
             if (checksum != 0 && found != checksum)
                 throw Error(fmt::format("{}: chunk at byte {}: checksum {:08x}, expected {:08x}", path.string(), at,
                                         found, checksum));
@@ -185,7 +190,6 @@ class Mcap final : public Bag {
 
     FileBytes file_;
     Chunks chunks_;
-    std::string scratch_;
     std::unordered_map<std::uint16_t, std::string> schemas_;
     std::unordered_map<std::uint16_t, std::uint32_t> channels_;
 };
