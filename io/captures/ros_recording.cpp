@@ -91,13 +91,16 @@ class RosFrames final : public FrameContainer {
   public:
     explicit RosFrames(std::shared_ptr<const Recording> recording) : recording_(std::move(recording)) {}
 
+    /// Integers are millimetres: given as metres where other frames of the topic are floats.
+    bool in_metres = false;
+
     [[nodiscard]] cv::Mat image(Part part, std::size_t place) const override {
         const Message& message = part == Part::depth ? frames.at(place).depth : frames.at(place).colour.value();
         const bool compressed = is_compressed(recording_->topics[message.topic]);
         return recording_->decoded(message, [&](std::string_view bytes, Encoding encoding) -> cv::Mat {
             if (part == Part::depth)
-                return compressed ? depth_in(compressed_image_in(bytes, encoding))
-                                  : depth_in(image_in(bytes, encoding));
+                return as_others(compressed ? depth_in(compressed_image_in(bytes, encoding))
+                                            : depth_in(image_in(bytes, encoding)));
             return compressed ? scanshade::colour_in(compressed_image_in(bytes, encoding).data, "a message's image")
                               : ros::colour_in(image_in(bytes, encoding));
         });
@@ -110,6 +113,12 @@ class RosFrames final : public FrameContainer {
     std::vector<Pair> frames;
 
   private:
+    [[nodiscard]] cv::Mat as_others(cv::Mat depth) const {
+        if (in_metres && depth.type() == CV_16UC1)
+            depth.convertTo(depth, CV_32F, 0.001);
+        return depth;
+    }
+
     std::shared_ptr<const Recording> recording_;
 };
 
@@ -388,20 +397,27 @@ Transforms transforms_of(const Recording& recording, std::vector<std::string>& w
     return transforms;
 }
 
-/// The first image that can be decoded; none of the first few means that depth cannot be read.
-cv::Mat first_depth(const RosFrames& frames, const fs::path& path) {
+/// The first image that can be decoded; none of the first few means that depth cannot be read. compressedDepth may mix
+/// integers and floats: then all become floats.
+cv::Mat first_depth(RosFrames& frames, bool may_mix, const fs::path& path) {
     std::string why = path.string() + ": no depth";
     constexpr std::size_t tries = 8;
-    for (std::size_t i = 0; i < std::min(tries, frames.frames.size()); ++i) {
+    cv::Mat first;
+    for (std::size_t i = 0; i < std::min(tries, frames.frames.size()) && (first.empty() || may_mix); ++i) {
         try {
-            return frames.image(FrameContainer::Part::depth, i);
+            const cv::Mat depth = frames.image(FrameContainer::Part::depth, i);
+            frames.in_metres = frames.in_metres || (may_mix && depth.type() == CV_32FC1);
+            if (first.empty() || depth.type() == CV_32FC1)
+                first = depth;
         } catch (const Outage&) {
             throw;
         } catch (const Error& failure) {
             why = failure.what();
         }
     }
-    throw Error(why);
+    if (first.empty())
+        throw Error(why);
+    return first;
 }
 
 std::string frame_of(const Recording& recording, std::uint32_t images) {
@@ -426,14 +442,6 @@ void settle_colour(const Recording& recording, std::uint32_t depth, std::uint32_
     const bool realsense = is_realsense(depth_name);
     const std::string depth_frame = frame_of(recording, depth), colour_frame = frame_of(recording, colour);
     const auto same = [](double a, double b) { return std::abs(a - b) < 0.01; };
-    const bool alike = camera && size == k.size && !realsense && depth_frame == colour_frame &&
-                       same(camera->camera.pinhole.fx, k.fx) && same(camera->camera.pinhole.cx, k.cx) &&
-                       same(camera->camera.pinhole.fy, k.fy) && same(camera->camera.pinhole.cy, k.cy);
-    if (alike || (holds(depth_name, {"aligned_depth_to_color", "depth_registered"}) && size == k.size)) {
-        file.registration = Registration::yes;
-        return;
-    }
-    file.registration = Registration::no;
     std::optional<Eigen::Isometry3d> apart;
     if (!realsense) {
         apart = transforms.between(colour_frame, depth_frame);
@@ -443,6 +451,15 @@ void settle_colour(const Recording& recording, std::uint32_t depth, std::uint32_
         if (depth_pose && colour_pose)
             apart = *colour_pose * depth_pose->inverse();
     }
+    const bool alike = camera && size == k.size && !realsense && apart &&
+                       apart->isApprox(Eigen::Isometry3d::Identity(), 1e-6) && same(camera->camera.pinhole.fx, k.fx) &&
+                       same(camera->camera.pinhole.cx, k.cx) && same(camera->camera.pinhole.fy, k.fy) &&
+                       same(camera->camera.pinhole.cy, k.cy);
+    if (alike || (holds(depth_name, {"aligned_depth_to_color", "depth_registered"}) && size == k.size)) {
+        file.registration = Registration::yes;
+        return;
+    }
+    file.registration = Registration::no;
     if (camera && apart)
         file.colour = ColourCamera{camera->camera, *apart};
     else if (camera)
@@ -505,7 +522,7 @@ Listing list_ros(const fs::path& path, const std::vector<fs::path>& files, const
                 capture.warnings.push_back(
                     fmt::format("{} ({}) is not used; poses come from /tf.", topic.name, topic.type));
 
-    const cv::Mat first = first_depth(*frames, path);
+    const cv::Mat first = first_depth(*frames, is_compressed(recording->topics[depth]), path);
     capture.depth = depth_unit(*recording, depth, first);
     capture.registration_reason = colour ? "nothing tells where the colour was taken" : "there is no colour";
     listing.find_camera = [=, size = first.size()](cv::Size,

@@ -66,6 +66,8 @@ std::shared_ptr<const Bag> open_bag(const std::filesystem::path& file) {
     const std::string start = read_bytes(file, sqlite_magic.size());
     if (earlier_format(start))
         throw Error(file.string() + ": a bag of an earlier format, expected 2.0; `rosbag fix` or `rosbag migrate` converts it");
+    if (!is_bag(start))
+        throw Error(file.string() + ": neither a bag of ROS 1 nor SQLite nor MCAP, by its first bytes");
     return start.starts_with(mcap_magic)     ? open_mcap(file)
            : start.starts_with(sqlite_magic) ? open_sqlite(file)
                                              : open_bag_of_ros1(file);

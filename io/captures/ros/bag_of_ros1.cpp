@@ -95,6 +95,9 @@ class BagOfRos1 final : public Bag {
         for (std::uint64_t at = magic_bytes; at < file_.size();) {
             const std::uint64_t begin = at;
             try {
+                constexpr std::uint64_t two_lengths = 8;
+                if (file_.size() - at < two_lengths)
+                    throw Error(fmt::format("{} are left, expected a record", counted(file_.size() - at, "byte")));
                 std::string header = part(at, longest_header);
                 const Fields fields(header);
                 const auto size = number_at<std::uint32_t>(file_.bytes(at, 4), 0);
@@ -133,7 +136,9 @@ class BagOfRos1 final : public Bag {
         const auto size = number_at<std::uint32_t>(file_.bytes(at, 4), 0);
         if (size > longest)
             throw Error(fmt::format("a header of {}, expected at most {}", counted(size, "byte"), longest));
-        at += 4 + size;
+        at += 4;
+        check_left(at, std::uint64_t(size) + 4);
+        at += size;
         return file_.bytes(at - size, size);
     }
 
@@ -145,9 +150,8 @@ class BagOfRos1 final : public Bag {
     void take_chunk(const Fields& fields, std::uint64_t at, std::uint32_t size) {
         const std::string compression(fields.text("compression"));
         if (compression == "none") {
-            const std::uint64_t whole = std::min<std::uint64_t>(size, file_.size() - std::min(at, file_.size()));
-            take_records(file_.bytes(at, whole), in_file, at);
             check_left(at, size);
+            take_records(file_.bytes(at, size), in_file, at);
             return;
         }
         if (compression != "bz2" && compression != "lz4")

@@ -61,7 +61,7 @@ cv::Mat1w rvl(std::string_view bytes) {
     constexpr std::uint64_t most_zeros_per_byte = std::uint64_t(1) << 20;
     if (static_cast<std::uint64_t>(size.area()) / most_zeros_per_byte > bytes.size())
         throw Error(fmt::format("RVL data of {} for {}x{} pixels", counted(bytes.size(), "byte"), width, height));
-    cv::Mat1w image = cv::Mat1w::zeros(size);
+    cv::Mat1w image(size, ushort(0));
     Groups groups(bytes.substr(8));
     const auto pixels = static_cast<std::uint64_t>(size.area());
     std::int64_t previous = 0;

@@ -66,10 +66,44 @@ class Mcap final : public Bag {
     }
 
   private:
+    /// Schemas and channels of the summary, where there is one: those of a damaged chunk are needed for the others.
+    void read_summary() {
+        constexpr std::uint64_t footer_bytes = record_start + 20 + magic_bytes, longest_summary = 1 << 26;
+        if (file_.size() < magic_bytes + footer_bytes)
+            return;
+        const std::uint64_t footer = file_.size() - footer_bytes;
+        const std::string end = file_.bytes(footer, footer_bytes);
+        Content content(end);
+        if (static_cast<Op>(content.next<std::uint8_t>()) != Op::footer || content.next<std::uint64_t>() != 20)
+            return;
+        const auto start = content.next<std::uint64_t>();
+        if (start < magic_bytes || start >= footer || footer - start > longest_summary)
+            return;
+        try {
+            const std::string records = file_.bytes(start, footer - start);
+            Content summary(records);
+            while (summary.at() < records.size()) {
+                const auto op = static_cast<Op>(summary.next<std::uint8_t>());
+                const std::string_view record = summary.take(summary.next<std::uint64_t>());
+                if (op == Op::schema)
+                    take_schema(record);
+                else if (op == Op::channel)
+                    take_channel(record);
+            }
+        } catch (const Outage&) {
+            throw;
+        } catch (const Error& failure) { // the records before it say the same
+            warnings.push_back(fmt::format("{}: summary at byte {}: {}.", path.string(), start, failure.what()));
+        }
+    }
+
     void read() {
+        read_summary();
         for (std::uint64_t at = magic_bytes;;) {
             const std::uint64_t begin = at;
             try {
+                if (file_.size() - std::min(at, file_.size()) < record_start)
+                    throw Error(fmt::format("{} are left, expected a record", counted(file_.size() - at, "byte")));
                 const std::string head = file_.bytes(at, record_start);
                 Content start(head);
                 const auto op = static_cast<Op>(start.next<std::uint8_t>());
