@@ -33,6 +33,7 @@ class RunSettings {
     bool drop_flying = true;
     double depth_smoothing = 1;
     double association_limit_s = 0.02;
+    std::string topic;
     Preset preset = Preset::fast;
     SequenceUse sequence = SequenceUse::off;
     std::string method = "cacao", device, settings;

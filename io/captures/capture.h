@@ -24,8 +24,8 @@ struct CaptureOptions {
     double association_limit_s = 0.02; ///< colour, depth and poses farther apart in time are not paired (TUM)
     std::filesystem::path poses =
         {};                 ///< TUM's rows, by time or, where frames have none, by index; empty = the capture's own
-    std::string topic = {}; ///< depth of a recording of ROS; empty = found by name and type
     std::filesystem::path colour = {}; ///< the colour image of a single depth image, registered to it; empty = none
+    std::string topic = {}; ///< of depth images in a recording of ROS; empty = found by name and type
 };
 
 /// One frame's listing: the paths of its parts. Nothing is decoded yet.
