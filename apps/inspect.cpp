@@ -400,7 +400,7 @@ class Inspect final : public Command {
         std::size_t usable = 0, problems = 0;
         for (const std::string& path : paths_) {
             try {
-                const Findings found = look_at(open_capture(path, options_));
+                const Findings found = look_at(open_capture_at_or_below(path, options_));
                 usable += found.samples.frames;
                 problems += found.problems.size();
                 if (as_json_) {

@@ -183,8 +183,8 @@ class Run final : public Command {
 
   private:
     CaptureJob job_from(const fs::path& path, const fs::path& folder) const {
-        CaptureJob job{open_capture(path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s, asked_.poses,
-                                           asked_.colour, asked_.topic}),
+        CaptureJob job{open_capture_at_or_below(path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s,
+                                                       asked_.poses, asked_.colour, asked_.topic}),
                        {}};
         refuse_absent_view(job.capture);
         job.batch.frames = job.of = slice(asked_.frames, job.capture.entries.size());

@@ -494,6 +494,40 @@ Capture open_capture(const fs::path& path, const CaptureOptions& options) {
     return std::move(capture);
 }
 
+Capture open_capture_at_or_below(const fs::path& path, const CaptureOptions& options) {
+    try {
+        return open_capture(path, options);
+    } catch (const NoFrames&) {
+        std::vector<fs::path> folders;
+        std::error_code ignored;
+        for (fs::directory_iterator at(path, ignored), end; !ignored && at != end; at.increment(ignored))
+            if (at->is_directory(ignored) && !at->path().filename().string().starts_with('.'))
+                folders.push_back(at->path());
+        std::ranges::sort(folders);
+        std::vector<fs::path> captures;
+        std::optional<Capture> found;
+        for (const fs::path& folder : folders) {
+            try {
+                Capture capture = open_capture(folder, options);
+                captures.push_back(folder);
+                found = std::move(capture);
+            } catch (const NoFrames&) {
+                continue;
+            }
+        }
+        if (captures.empty())
+            throw;
+        if (captures.size() > 1)
+            throw Error(fmt::format(
+                "{}: {} captures lie in it, among them {} and {}; name one, or let `plan` list them", path.string(),
+                captures.size(), captures[0].filename().string(), captures[1].filename().string()));
+        found->warnings.insert(found->warnings.begin(),
+                               fmt::format("{}: no frames of its own; its folder {} is opened.", path.string(),
+                                           captures[0].filename().string()));
+        return *std::move(found);
+    }
+}
+
 namespace {
 
 /// The frame with the listing's facts, to which `read` adds the files' content.

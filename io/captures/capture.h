@@ -23,9 +23,9 @@ struct CaptureOptions {
     std::string depth_scale;           ///< as depth_encoding() takes it; empty = from the layout
     double association_limit_s = 0.02; ///< colour, depth and poses farther apart in time are not paired (TUM)
     std::filesystem::path poses =
-        {};                 ///< TUM's rows, by time or, where frames have none, by index; empty = the capture's own
+        {}; ///< TUM's rows, by time or, where frames have none, by index; empty = the capture's own
     std::filesystem::path colour = {}; ///< the colour image of a single depth image, registered to it; empty = none
-    std::string topic = {}; ///< of depth images in a recording of ROS; empty = found by name and type
+    std::string topic = {};            ///< of depth images in a recording of ROS; empty = found by name and type
 };
 
 /// One frame's listing: the paths of its parts. Nothing is decoded yet.
@@ -96,5 +96,8 @@ struct Capture {
 /// Opens a folder (its content determines the layout), a single depth image, or a cloud file.
 /// Throws Error "no frames found in ..." if there are none, with the file names it looked for.
 [[nodiscard]] Capture open_capture(const std::filesystem::path& path, const CaptureOptions& options = {});
+/// The same; a folder without frames of its own, one of whose folders is a capture, stands for that one, with a
+/// warning. Throws Error naming them where several are.
+[[nodiscard]] Capture open_capture_at_or_below(const std::filesystem::path& path, const CaptureOptions& options = {});
 
 } // namespace scanshade

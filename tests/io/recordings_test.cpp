@@ -95,6 +95,19 @@ TEST_F(Made, scannet_has_matrices_and_a_colour_camera) {
     EXPECT_TRUE(warned(lost.warnings, "tracking was lost"));
 }
 
+TEST_F(Made, a_folder_stands_for_the_only_capture_in_it) {
+    depth("scene/frames/depth/0.png");
+    text("scene/notes.txt", "x");
+    EXPECT_THROW((void)open_capture(folder / "scene"), NoFrames);
+    const Capture capture = open_capture_at_or_below(folder / "scene");
+    expect_depth(capture.load(0));
+    EXPECT_TRUE(warned(capture.warnings, "its folder frames is opened"));
+    depth("scene/more/depth/0.png");
+    EXPECT_TRUE(tests::says(tests::refusal([&] { (void)open_capture_at_or_below(folder / "scene"); }),
+                            "2 captures lie in it, among them frames and more"));
+    EXPECT_THROW((void)open_capture_at_or_below(folder / "scene/frames/depth/none"), Error);
+}
+
 TEST_F(Made, nerfstudio_counts_pixels_from_corners_and_looks_along_minus_z) {
     depth("depths/b.png");
     colour("images/b.jpg", {16, 12});

@@ -13,7 +13,9 @@ namespace {
 constexpr std::string_view ros1_magic = "#ROSBAG V2.0\n", mcap_magic = "\x89MCAP0\r\n",
                            sqlite_magic{"SQLite format 3\0", 16};
 
-bool earlier_format(std::string_view start) { return start.starts_with("#ROSBAG V1") || start.starts_with("#ROSRECORD"); }
+bool earlier_format(std::string_view start) {
+    return start.starts_with("#ROSBAG V1") || start.starts_with("#ROSRECORD");
+}
 
 } // namespace
 
@@ -65,7 +67,8 @@ bool is_bag(std::string_view start) {
 std::shared_ptr<const Bag> open_bag(const std::filesystem::path& file) {
     const std::string start = read_bytes(file, sqlite_magic.size());
     if (earlier_format(start))
-        throw Error(file.string() + ": a bag of an earlier format, expected 2.0; `rosbag fix` or `rosbag migrate` converts it");
+        throw Error(file.string() +
+                    ": a bag of an earlier format, expected 2.0; `rosbag fix` or `rosbag migrate` converts it");
     if (!is_bag(start))
         throw Error(file.string() + ": neither a bag of ROS 1 nor SQLite nor MCAP, by its first bytes");
     return start.starts_with(mcap_magic)     ? open_mcap(file)

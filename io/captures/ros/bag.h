@@ -31,8 +31,8 @@ struct Message {
     std::uint32_t file = 0;  ///< index of the bag, where several are one recording
     std::uint32_t chunk = 0;
     std::uint64_t at = 0, size = 0;
-    std::int64_t recorded_ns = 0;       ///< when it was written
-    std::int64_t stamp_ns = no_stamp;   ///< of its header, for images
+    std::int64_t recorded_ns = 0;     ///< when it was written
+    std::int64_t stamp_ns = no_stamp; ///< of its header, for images
 };
 
 /// A file of messages. Several threads may ask for bytes at once.

@@ -105,7 +105,8 @@ class BagOfRos1 final : public Bag {
                 const Op op = fields.op();
                 if (op == Op::bag_header) {
                     if (fields.has("encryptor") && !fields.text("encryptor").empty())
-                        throw Error(fmt::format("encrypted by {}, which is not read", in_quotes(fields.text("encryptor"))));
+                        throw Error(
+                            fmt::format("encrypted by {}, which is not read", in_quotes(fields.text("encryptor"))));
                     closed = fields.number<std::uint64_t>("index_pos") != 0;
                 } else if (op == Op::chunk) {
                     take_chunk(fields, at, size);
@@ -113,7 +114,8 @@ class BagOfRos1 final : public Bag {
                     take_connection(fields, file_.bytes(at, size));
                 } else if (op == Op::message) {
                     check_left(at, size);
-                    take_message(fields, in_file, at, file_.bytes(at, std::min<std::uint64_t>(size, stamp_bytes)), size);
+                    take_message(fields, in_file, at, file_.bytes(at, std::min<std::uint64_t>(size, stamp_bytes)),
+                                 size);
                 } else if (op == Op::chunk_info) {
                     break; // the index at the end
                 }
@@ -176,8 +178,8 @@ class BagOfRos1 final : public Bag {
         for (std::size_t at = 0; at < records.size();) {
             const auto cut = [&](std::uint64_t size) {
                 if (size > records.size() - at)
-                    throw Error(fmt::format("{} in a chunk of which {} are left", counted(size, "byte"),
-                                            records.size() - at));
+                    throw Error(
+                        fmt::format("{} in a chunk of which {} are left", counted(size, "byte"), records.size() - at));
             };
             const auto header = number_at<std::uint32_t>(records, at);
             at += 4;
@@ -209,8 +211,8 @@ class BagOfRos1 final : public Bag {
                                     fields.number<std::uint32_t>("conn")));
         const auto time = fields.number<std::uint64_t>("time");
         Message message{found->second, 0, chunk, at, size};
-        message.recorded_ns = static_cast<std::int64_t>(time & 0xffffffff) * 1'000'000'000 +
-                              static_cast<std::int64_t>(time >> 32);
+        message.recorded_ns =
+            static_cast<std::int64_t>(time & 0xffffffff) * 1'000'000'000 + static_cast<std::int64_t>(time >> 32);
         add(message, first);
     }
 

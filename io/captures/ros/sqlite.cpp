@@ -21,9 +21,10 @@ constexpr std::string_view zstd_magic = "\x28\xb5\x2f\xfd";
 std::string uri_of(const fs::path& file) {
     std::string uri = "file:";
     for (const char c : fs::absolute(file).string())
-        uri += std::isalnum(static_cast<unsigned char>(c)) != 0 || std::string_view("/-_.~").find(c) != std::string::npos
-                   ? std::string(1, c)
-                   : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+        uri +=
+            std::isalnum(static_cast<unsigned char>(c)) != 0 || std::string_view("/-_.~").find(c) != std::string::npos
+                ? std::string(1, c)
+                : fmt::format("%{:02X}", static_cast<unsigned char>(c));
     return uri + "?immutable=1"; // nothing is written beside it
 }
 
@@ -32,7 +33,8 @@ class Sqlite final : public Bag {
     explicit Sqlite(const fs::path& file) {
         path = file;
         std::error_code ignored;
-        if (fs::path journal = file.string() + "-wal"; fs::exists(journal, ignored) && fs::file_size(journal, ignored) > 0)
+        if (fs::path journal = file.string() + "-wal";
+            fs::exists(journal, ignored) && fs::file_size(journal, ignored) > 0)
             throw Error(fmt::format("{}: the recording was not closed: {} holds a part of it; `sqlite3 FILE .tables` "
                                     "joins them",
                                     file.string(), journal.filename().string()));
@@ -90,8 +92,8 @@ class Sqlite final : public Bag {
     }
 
     void read() {
-        const Statement tables = prepared(
-            "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('topics', 'messages')");
+        const Statement tables =
+            prepared("SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('topics', 'messages')");
         if (!next(tables) || sqlite3_column_int(tables.get(), 0) != 2)
             throw Error(path.string() + ": an SQLite file without the tables \"topics\" and \"messages\" of rosbag2");
         std::map<std::int64_t, std::uint32_t> by_id;

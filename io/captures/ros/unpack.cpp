@@ -39,7 +39,7 @@ std::string unpacked_lz4(std::string_view packed, std::size_t size) {
     if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION)))
         throw std::bad_alloc();
     const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> owner(context,
-                                                                                    &LZ4F_freeDecompressionContext);
+                                                                                     &LZ4F_freeDecompressionContext);
     std::string bytes(size, '\0');
     std::size_t read = 0, written = 0;
     for (std::size_t hint = 1; hint != 0 && read < packed.size();) {
