@@ -40,32 +40,51 @@ void RecordingCloud::add(const CloudFrame& frame) {
             const double z = depth.z_m(v, u);
             if (!(z > 0) || std::isnan(visibility(v, u)))
                 continue;
-            const Vector3d point = pose * camera.point(u, v, z);
-            const Vector3d place = (point / resolution_m_).array().floor();
-            if (!(place.cwiseAbs().maxCoeff() < 2e9))
-                throw Error(
-                    fmt::format("a point {:.3g} m from the origin, in cubes of {:.3g} m: farther than can be counted",
-                                point.norm(), resolution_m_));
-            const auto whole = [&](Eigen::Index axis) { return static_cast<std::int32_t>(place[axis]); };
-            const auto [known, is_new] = index_.try_emplace(Key{whole(0), whole(1), whole(2)}, cells_.size());
-            if (is_new)
-                cells_.emplace_back();
-            Cell& cell = cells_[known->second];
             const float sure = std::isnan(confidence(v, u)) ? 0.0F : confidence(v, u);
-            const auto weight = static_cast<float>((0.05 + sure) / (z * z));
-            cell.weight += weight;
-            cell.point += static_cast<double>(weight) * point;
-            cell.visibility += weight * visibility(v, u);
-            cell.confidence = std::max(cell.confidence, sure);
-            cell.views += cell.last_frame != frames_;
-            cell.last_frame = frames_;
-            if (colour.empty() || (!colour_known.empty() && colour_known(v, u) == 0))
-                continue;
-            cell.colour_weight += weight;
-            const cv::Vec3b bgr = colour(v, u);
-            cell.colour += weight * Eigen::Vector3f(bgr[0], bgr[1], bgr[2]);
+            const bool coloured = !colour.empty() && (colour_known.empty() || colour_known(v, u) != 0);
+            const cv::Vec3b bgr = coloured ? colour(v, u) : cv::Vec3b();
+            add_point(pose * camera.point(u, v, z), static_cast<float>((0.05 + sure) / (z * z)), visibility(v, u), sure,
+                      coloured ? &bgr : nullptr);
         }
     ++frames_;
+}
+
+void RecordingCloud::add(const CloudSweep& sweep) {
+    if (resolution_m_ <= 0)
+        resolution_m_ = sweep.spacing_m;
+    if (resolution_m_ <= 0)
+        throw Error("the points' spacing is not known: give --cloud-resolution");
+    for (std::size_t i = 0; i < sweep.points.size(); ++i) {
+        if (!sweep.points[i].allFinite() || std::isnan(sweep.visibility[i]))
+            continue;
+        const float sure = sweep.confidence.empty() || std::isnan(sweep.confidence[i]) ? 0.0F : sweep.confidence[i];
+        add_point(sweep.world_from_scanner * sweep.points[i], 0.05F + sure, sweep.visibility[i], sure,
+                  sweep.colours.empty() ? nullptr : &sweep.colours[i]);
+    }
+    ++frames_;
+}
+
+void RecordingCloud::add_point(const Vector3d& point, float weight, float visibility, float confidence,
+                               const cv::Vec3b* bgr) {
+    const Vector3d place = (point / resolution_m_).array().floor();
+    if (!(place.cwiseAbs().maxCoeff() < 2e9))
+        throw Error(fmt::format("a point {:.3g} m from the origin, in cubes of {:.3g} m: farther than can be counted",
+                                point.norm(), resolution_m_));
+    const auto whole = [&](Eigen::Index axis) { return static_cast<std::int32_t>(place[axis]); };
+    const auto [known, is_new] = index_.try_emplace(Key{whole(0), whole(1), whole(2)}, cells_.size());
+    if (is_new)
+        cells_.emplace_back();
+    Cell& cell = cells_[known->second];
+    cell.weight += weight;
+    cell.point += static_cast<double>(weight) * point;
+    cell.visibility += weight * visibility;
+    cell.confidence = std::max(cell.confidence, confidence);
+    cell.views += cell.last_frame != frames_;
+    cell.last_frame = frames_;
+    if (!bgr)
+        return;
+    cell.colour_weight += weight;
+    cell.colour += weight * Eigen::Vector3f((*bgr)[0], (*bgr)[1], (*bgr)[2]);
 }
 
 RecordingCloud::Columns RecordingCloud::columns() const {

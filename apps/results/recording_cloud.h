@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <Eigen/Geometry>
 #include <filesystem>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
@@ -23,15 +24,27 @@ struct CloudFrame {
     Eigen::Isometry3d world_from_camera;
 };
 
+/// A cloud with a value per point, NaN where a point has none. `colours` and `confidence` may be empty.
+struct CloudSweep {
+    std::span<const Eigen::Vector3d> points;
+    std::span<const cv::Vec3b> colours;
+    std::span<const float> visibility, confidence;
+    Eigen::Isometry3d world_from_scanner;
+    double spacing_m = 0; ///< between neighbours; 0 = not known
+};
+
 /// Its memory grows with the recorded surface, not with the number of frames. Equal results need equal order of frames.
 class RecordingCloud {
   public:
     /// Points are merged within cubes of this side; 0 = one and a half times what a pixel covers at the first frame's
-    /// median depth.
+    /// median depth, or the spacing of the first sweep's points.
     explicit RecordingCloud(double resolution_m) : resolution_m_(resolution_m) {}
 
     /// Nearer and more confident views of a point have more weight. Pixels without visibility add nothing.
     void add(const CloudFrame& frame);
+    /// More confident points have more weight. Throws Error where no side of the cubes was given and the sweep's
+    /// spacing is not known.
+    void add(const CloudSweep& sweep);
     [[nodiscard]] std::size_t points() const { return cells_.size(); }
     [[nodiscard]] double resolution_m() const { return resolution_m_; }
     /// Binary PLY in world coordinates: ambient_occlusion, ao_confidence, ao_views. Atomic.
@@ -59,6 +72,9 @@ class RecordingCloud {
     struct KeyHash {
         std::size_t operator()(const Key& key) const;
     };
+    /// One point as it is seen in the current frame; `bgr` null = without colour.
+    void add_point(const Eigen::Vector3d& point, float weight, float visibility, float confidence,
+                   const cv::Vec3b* bgr);
     double resolution_m_;
     int frames_ = 0;
     std::vector<Cell> cells_; ///< in the order they were added

@@ -284,7 +284,7 @@ std::vector<Stage> RunSettings::common_stages() {
            .writes = Writes::file},
           {.name = "cloud-resolution",
            .help = "points of that cloud are merged within cubes of this side; 0 = one and a half times what a pixel "
-                   "covers",
+                   "covers, or the spacing of a cloud's points",
            .value = &s.cloud_resolution_m,
            .unit = "m",
            .low = 0,

@@ -5,6 +5,7 @@
 #include "apps/page/preview.h"
 #include "apps/picture.h"
 #include "apps/results/cloud_picture.h"
+#include "apps/walk/point_clouds.h"
 #include "io/clouds/cloud_file.h"
 #include "io/images/npy_file.h"
 #include "io/output_file.h"
@@ -180,9 +181,7 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
 
 std::filesystem::path write_cloud_picture(const Work& work, const Outputs& outputs) {
     const std::filesystem::path file = picture_file(outputs.shaded ? "shaded" : "panel", work.entry.name);
-    std::optional<Eigen::Vector3d> viewpoint;
-    if (work.frame.world_from_camera)
-        viewpoint = work.frame.world_from_camera->translation();
+    const std::optional<Eigen::Vector3d> viewpoint = scanner_of(work.frame);
     write_picture(outputs.folder / file,
                   cloud_picture(*work.frame.cloud, work.of_points, viewpoint, outputs.shade_strength));
     return file;
@@ -190,9 +189,7 @@ std::filesystem::path write_cloud_picture(const Work& work, const Outputs& outpu
 
 std::vector<std::filesystem::path> write_page_points(const Work& work, const Outputs& outputs) {
     const Cloud& cloud = *work.frame.cloud;
-    std::optional<Eigen::Vector3d> viewpoint;
-    if (work.frame.world_from_camera)
-        viewpoint = work.frame.world_from_camera->translation();
+    const std::optional<Eigen::Vector3d> viewpoint = scanner_of(work.frame);
     const page::Points points{.points = cloud.points,
                               .colours = has_colours(cloud) ? std::span(cloud.colours) : std::span<const cv::Vec3b>(),
                               .visibility = work.attached.per_point,
@@ -222,7 +219,14 @@ void write_intermediates(const std::filesystem::path& folder, const std::vector<
 }
 
 void add_to(RecordingCloud& cloud, const Work& work) {
-    if (!work.frame.world_from_camera || work.looked_at.z_m.empty())
+    if (!work.frame.world_from_camera)
+        return;
+    if (work.by_points && work.entry.world_from_camera) { // a viewpoint in the file does not say whose frame it uses
+        const Cloud& own = *work.frame.cloud;
+        cloud.add(CloudSweep{own.points, own.colours, work.attached.per_point, work.confidence.per_point,
+                             *work.entry.world_from_camera, work.of_points.spacing});
+    }
+    if (work.looked_at.z_m.empty())
         return;
     const Scene scene = scene_of(work, false);
     cloud.add({work.looked_at, work.ao.visibility, work.confidence_in_view,

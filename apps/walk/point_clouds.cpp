@@ -34,14 +34,18 @@ bool takes_points(const Frame& frame, CloudWalk walk, std::vector<std::string>& 
     }
 }
 
+std::optional<Vector3d> scanner_of(const Frame& frame) {
+    if (!frame.world_from_camera)
+        return std::nullopt;
+    const CloudRecords* records = frame.cloud->records.get();
+    return records && records->viewpoint ? Vector3d(records->viewpoint->translation()) : Vector3d(Vector3d::Zero());
+}
+
 PointVisibility visibility_of_points(const Frame& frame, PointMethod& method) {
     const Cloud& cloud = *frame.cloud;
     const auto normals = recorded_normals(cloud);
     const auto triangles = triangles_of(cloud);
-    std::optional<Vector3d> scanner;
-    if (frame.world_from_camera)
-        scanner = frame.world_from_camera->translation();
-    PointVisibility found = method.compute({cloud.points, normals, triangles, z_is_up(cloud)}, scanner);
+    PointVisibility found = method.compute({cloud.points, normals, triangles, z_is_up(cloud)}, scanner_of(frame));
     if (const std::string unit = cloud.records ? unit_of(*cloud.records) : ""; !unit.empty())
         found.notes.insert(found.notes.begin(), fmt::format("coordinates are in {}.", unit));
     return found;

@@ -6,6 +6,7 @@
 #include "projection/attach.h"
 #include "projection/frame.h"
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,10 @@ namespace scanshade {
 /// Whether this cloud is computed from its points. `automatic` means yes, unless the user named a camera or the cloud
 /// is the grid of a pinhole image. `notes` receives the reason.
 [[nodiscard]] bool takes_points(const Frame& frame, CloudWalk walk, std::vector<std::string>& notes);
+
+/// Where the scanner stood, in the cloud's own coordinates: as its file says, or the origin where a layout has the pose
+/// of a scanner whose clouds stay in its frame. None if neither is known.
+[[nodiscard]] std::optional<Eigen::Vector3d> scanner_of(const Frame& frame);
 
 /// Visibility of the cloud by `method`, with the file's own normals, faces and viewpoint.
 [[nodiscard]] PointVisibility visibility_of_points(const Frame& frame, PointMethod& method);

@@ -53,6 +53,8 @@ constexpr std::array folder_layouts = {
     FolderLayout{"*.gt.freiburg with associations.txt (ICL-NUIM)", list_icl_nuim},
     FolderLayout{"intrinsics.txt with image/ and depth/ (SUN RGB-D)", list_sun_rgbd},
     FolderLayout{"d-SECONDS-TICKS.pgm (NYU)", list_nyu_raw},
+    FolderLayout{"velodyne/*.bin with calib.txt (KITTI odometry)", list_kitti_odometry},
+    FolderLayout{"v1.0-*/sample_data.json (nuScenes)", list_nuscenes},
     FolderLayout{"metadata.yaml of rosbag2", nullptr, Unused::silent, list_rosbag2_folder},
     FolderLayout{"depth.txt (TUM)", nullptr, Unused::silent, list_tum},
     FolderLayout{"frame-NNNNNN.depth.png (7-Scenes)", list_seven_scenes},

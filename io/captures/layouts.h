@@ -42,6 +42,8 @@ struct Listing {
 [[nodiscard]] std::optional<Listing> list_scannet(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_icl_nuim(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_seven_scenes(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_kitti_odometry(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_nuscenes(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_pcl_recording(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_image_folders(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_depth_images(const std::filesystem::path& folder);

@@ -138,7 +138,8 @@ class TextRecords {
 /// One point a line, .ptx: one scan, sizes, pose, then the grid; "0 0 0" = nothing seen.
 [[nodiscard]] CloudRecords read_ptx(std::string_view bytes, const std::filesystem::path& file,
                                     std::vector<std::string>& warnings);
-/// KITTI's Velodyne sweeps: x y z reflectance as floats, no header. The records are those of a PLY.
+/// Sweeps of floats without a header, KITTI's x y z reflectance or nuScenes' x y z intensity ring. The records are
+/// those of a PLY.
 [[nodiscard]] CloudRecords read_kitti(std::string_view bytes, const std::filesystem::path& file,
                                       std::vector<std::string>& warnings);
 /// E57: all scans of a file, placed by their poses, as the records of a PLY: x y z, then every field of numbers. A scan

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <limits>
 
 namespace scanshade {
@@ -229,21 +230,45 @@ std::string text_bytes(const CloudRecords& records, std::string points, const st
     return between(header, std::move(points), records.after);
 }
 
-CloudRecords read_kitti(std::string_view bytes, const fs::path& file, std::vector<std::string>&) {
-    constexpr std::size_t stride = 16;
+namespace {
+
+/// nuScenes' points have a fifth number, the scanner's ring: a whole one below 64. It calls its files .pcd.bin.
+bool has_rings(std::string_view bytes, const fs::path& file) {
+    if (file.stem().extension() == ".pcd")
+        return true;
+    constexpr std::size_t stride = 20, ring = 16;
+    constexpr double rings = 64;
     if (bytes.size() % stride != 0)
-        throw Error(fmt::format("{}: {} bytes are not whole points of {} (x y z reflectance as floats)", file.string(),
-                                bytes.size(), stride));
+        return false;
+    for (std::size_t at = ring; at < bytes.size(); at += stride)
+        if (const double value = decoded(bytes.data() + at, Scalar::float32, false);
+            !(value >= 0 && value < rings && value == std::floor(value)))
+            return false;
+    return true;
+}
+
+} // namespace
+
+CloudRecords read_kitti(std::string_view bytes, const fs::path& file, std::vector<std::string>&) {
+    const bool rings = has_rings(bytes, file);
+    const std::vector<const char*> names =
+        rings ? std::vector{"x", "y", "z", "intensity", "ring"} : std::vector{"x", "y", "z", "reflectance"};
+    const std::size_t stride = names.size() * sizeof(float);
+    if (bytes.size() % stride != 0)
+        throw Error(fmt::format("{}: {} bytes are not whole points of {} ({} as floats)", file.string(), bytes.size(),
+                                stride, fmt::join(names, " ")));
     check_point_count(bytes.size() / stride, file);
     CloudRecords records;
     records.encoding = CloudRecords::Encoding::binary;
     records.point_count = bytes.size() / stride;
-    records.header = fmt::format("ply\nformat binary_little_endian 1.0\ncomment KITTI sweep: x forward, y left, z up, "
-                                 "metres\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
-                                 "property float reflectance\nend_header\n",
+    records.header = fmt::format("ply\nformat binary_little_endian 1.0\ncomment {}, z up, metres\nelement vertex {}\n",
+                                 rings ? "nuScenes sweep: x right, y forward" : "KITTI sweep: x forward, y left",
                                  records.point_count);
-    for (const auto* name : {"x", "y", "z", "reflectance"})
-        records.fields.push_back({name, Scalar::float32, 1, std::nullopt, 4 * records.fields.size()});
+    for (const char* name : names) {
+        records.header += fmt::format("property float {}\n", name);
+        records.fields.push_back({name, Scalar::float32, 1, std::nullopt, sizeof(float) * records.fields.size()});
+    }
+    records.header += "end_header\n";
     records.stride = stride;
     records.points = bytes;
     records.grid = {static_cast<int>(records.point_count), 1};

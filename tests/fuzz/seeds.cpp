@@ -98,6 +98,7 @@ void clouds() {
          "\x02"
          "2\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n5 6 7 1\n1 2 3 0.5\n0 0 0 0.5\n");
     seed("text_cloud", "bin", "\x03" + raw(1.0F) + raw(2.0F) + raw(3.0F) + raw(0.5F));
+    seed("text_cloud", "pcd.bin", "\x04" + raw(1.0F) + raw(2.0F) + raw(3.0F) + raw(9.0F) + raw(31.0F));
 }
 
 /// LAS 1.2, point format 2, with a record that describes extra bytes.
