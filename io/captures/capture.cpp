@@ -10,6 +10,7 @@
 #include "io/clouds/cloud_records.h"
 #include "io/clouds/format.h"
 #include "io/images/format.h"
+#include "io/images/zip_archive.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
@@ -47,7 +48,7 @@ constexpr std::array folder_layouts = {
     FolderLayout{"keyframes/depth with keyframes/cameras (Polycam)", list_polycam},
     FolderLayout{"camera_matrix.csv with depth/ (Stray Scanner)", list_stray_scanner},
     FolderLayout{"lowres_depth/ (ARKitScenes)", list_arkit_scenes},
-    FolderLayout{"pose_intrinsic_imu.json with depth/ (ScanNet++)", list_scannetpp},
+    FolderLayout{"pose_intrinsic_imu.json with depth/ or depth.bin (ScanNet++)", list_scannetpp},
     FolderLayout{"results/depthNNNNNN.png (Replica)", list_replica},
     FolderLayout{"intrinsic/intrinsic_depth.txt or pose/ with depth/ (ScanNet)", list_scannet},
     FolderLayout{"*.gt.freiburg with associations.txt (ICL-NUIM)", list_icl_nuim},
@@ -94,12 +95,20 @@ void tell_unused(const fs::path& folder, Listing& listing) {
 struct FileLayout {
     const char* signature;
     bool (*begins)(std::string_view start);
-    Listing (*list)(const fs::path& file, const CaptureOptions& options);
+    Listing (*list)(const fs::path& file);
+    /// Instead of `list`, where the options matter.
+    Listing (*list_with)(const fs::path& file, const CaptureOptions& options) = nullptr;
+
+    [[nodiscard]] Listing open(const fs::path& file, const CaptureOptions& options) const {
+        return list ? list(file) : list_with(file, options);
+    }
 };
 
 constexpr std::array file_layouts = {
-    FileLayout{"ScanNet's .sens", is_sens, [](const fs::path& file, const CaptureOptions&) { return list_sens(file); }},
-    FileLayout{"bags of ROS 1 and 2, MCAP", ros::is_bag, list_ros},
+    FileLayout{"ScanNet's .sens", is_sens, list_sens},
+    FileLayout{"a stack of NumPy's .npy", is_npy_stack, list_npy_stack},
+    FileLayout{"NumPy's .npz, Record3D's .r3d", is_zip, list_zip},
+    FileLayout{"bags of ROS 1 and 2, MCAP", ros::is_bag, nullptr, list_ros},
 };
 
 /// Of a file with these first bytes; null where it holds no recording.
@@ -130,7 +139,7 @@ Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
             return *std::move(listing);
         }
     if (const auto file = recording_in(folder))
-        return file_layout(read_bytes(*file, enough_for_signatures))->list(*file, options);
+        return file_layout(read_bytes(*file, enough_for_signatures))->open(*file, options);
     std::vector<std::string> signatures;
     for (const FolderLayout& layout : folder_layouts)
         signatures.emplace_back(layout.signature);
@@ -143,7 +152,7 @@ Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
 Listing list_file(const fs::path& file, const CaptureOptions& options) {
     const std::string start = read_bytes(file, enough_for_signatures);
     if (const FileLayout* layout = file_layout(start))
-        return layout->list(file, options);
+        return layout->open(file, options);
     CaptureEntry entry;
     entry.name = file.stem().string();
     Listing listing;

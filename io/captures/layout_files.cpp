@@ -123,8 +123,9 @@ cv::Size image_size(double width, double height, const std::string& where) {
     return {static_cast<int>(width), static_cast<int>(height)};
 }
 
-nlohmann::json json_in(const fs::path& file) {
-    const std::string text = read_list_file(file);
+nlohmann::json json_in(const fs::path& file) { return parsed_json(read_list_file(file), file); }
+
+nlohmann::json parsed_json(const std::string& text, const fs::path& file) {
     try {
         return shallow_json<nlohmann::json>(text);
     } catch (const nlohmann::json::parse_error& failure) {
@@ -241,6 +242,26 @@ DepthEncoding usual_encoding(const std::string& text, const std::string& origin)
     DepthEncoding encoding = depth_encoding(text, origin);
     encoding.stated = false;
     return encoding;
+}
+
+Listing listing_of_phone(const std::string& kind) {
+    Listing listing;
+    listing.capture.kind = kind;
+    listing.capture.depth = usual_encoding("mm", kind + " layout");
+    listing.capture.registration = Registration::yes;
+    listing.capture.registration_reason = "phones make depth on the colour camera's pixels";
+    listing.capture.colour_in_more_pixels = true;
+    return listing;
+}
+
+cv::Size peek_size(const fs::path& image) {
+    try {
+        return peek(image).size;
+    } catch (const Outage&) {
+        throw;
+    } catch (const Error&) { // loading it will say why
+        return {};
+    }
 }
 
 DepthEncoding assumed_encoding(const fs::path& first_depth) {

@@ -15,6 +15,8 @@
 
 namespace scanshade {
 
+class ZipArchive;
+
 /// A capture as its layout lists it, before camera and depth encoding are settled.
 struct Listing {
     Capture capture; ///< capture.depth is the layout's own encoding
@@ -59,6 +61,13 @@ struct Listing {
                                const CaptureOptions& options);
 [[nodiscard]] std::optional<Listing> list_rosbag2_folder(const std::filesystem::path& folder,
                                                          const CaptureOptions& options);
+/// (N,H,W) in an .npy file.
+[[nodiscard]] bool is_npy_stack(std::string_view start);
+[[nodiscard]] Listing list_npy_stack(const std::filesystem::path& file);
+/// NumPy's .npz, Record3D's .r3d: by the members. Throws NoFrames for other archives.
+[[nodiscard]] Listing list_zip(const std::filesystem::path& file);
+[[nodiscard]] Listing list_npz(const std::shared_ptr<const ZipArchive>& archive);
+[[nodiscard]] Listing list_record3d(const std::shared_ptr<const ZipArchive>& archive);
 
 // --- what layouts share ---
 
@@ -85,10 +94,17 @@ class ImagesByStem {
 };
 /// A file's JSON. Throws Error naming file and place.
 [[nodiscard]] nlohmann::json json_in(const std::filesystem::path& file);
+/// The same of a text; `file` stands for the file in messages.
+[[nodiscard]] nlohmann::json parsed_json(const std::string& text, const std::filesystem::path& file);
+/// An image's size by its header; 0x0 where that cannot be read: loading it will say why.
+[[nodiscard]] cv::Size peek_size(const std::filesystem::path& image);
 /// Sides as a file gives them. Throws Error, beginning with `where`, for what is no image's size.
 [[nodiscard]] cv::Size image_size(double width, double height, const std::string& where);
 /// An entry's own camera for its depth image: `camera` is for images of `size`, which see the same in other pixels.
 [[nodiscard]] std::shared_ptr<const Camera> camera_for_depth(Camera camera, cv::Size size, cv::Size depth);
+
+/// Phones make their depth on the colour camera's pixels, in fewer of them, mostly in millimetres.
+[[nodiscard]] Listing listing_of_phone(const std::string& kind);
 
 /// For entries with cameras of their own: the first stands for the capture. Depth of another size than the first's is a
 /// problem, since a recorder makes one size.

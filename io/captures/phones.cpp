@@ -1,4 +1,4 @@
-// Recordings of phones with a lidar: Stray Scanner, Polycam, ARKitScenes, ScanNet++.
+// Recordings of phones with a lidar: Stray Scanner, Polycam, ARKitScenes.
 #include "io/captures/layouts.h"
 
 #include "io/captures/trajectory.h"
@@ -20,27 +20,6 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 namespace {
-
-/// Phones make their depth on the colour camera's pixels, in fewer of them, in millimetres.
-Listing of_phone(const std::string& kind) {
-    Listing listing;
-    listing.capture.kind = kind;
-    listing.capture.depth = usual_encoding("mm", kind + " layout");
-    listing.capture.registration = Registration::yes;
-    listing.capture.registration_reason = "phones make depth on the colour camera's pixels";
-    listing.capture.colour_in_more_pixels = true;
-    return listing;
-}
-
-cv::Size size_of(const fs::path& image) {
-    try {
-        return peek(image).size;
-    } catch (const Outage&) {
-        throw;
-    } catch (const Error&) { // loading it will say why
-        return {};
-    }
-}
 
 std::vector<std::string> cells_of(std::string_view line) {
     std::vector<std::string> cells;
@@ -148,7 +127,7 @@ std::optional<Listing> list_stray_scanner(const fs::path& folder) {
     const auto depths = depth_images_in(folder_named(folder, {"depth"}));
     if (depths.empty() || !fs::is_regular_file(folder / "camera_matrix.csv", ignored))
         return std::nullopt;
-    Listing listing = of_phone("Stray Scanner");
+    Listing listing = listing_of_phone("Stray Scanner");
     Capture& capture = listing.capture;
     const ImagesByStem sure(colour_images_in(folder_named(folder, {"confidence"}))),
         colours(colour_images_in(folder_named(folder, {"rgb", "color"})));
@@ -220,7 +199,7 @@ std::optional<Listing> list_polycam(const fs::path& folder) {
     const auto depths = depth_images_in(folder_named(frames, {"depth"}));
     if (depths.empty() || !fs::is_directory(frames / "cameras", ignored))
         return std::nullopt;
-    Listing listing = of_phone("Polycam");
+    Listing listing = listing_of_phone("Polycam");
     Capture& capture = listing.capture;
     const ImagesByStem images(colour_images_in(folder_named(frames, {"images"}))),
         corrected(colour_images_in(folder_named(frames, {"corrected_images"}))),
@@ -241,7 +220,7 @@ std::optional<Listing> list_polycam(const fs::path& folder) {
         if (!is_corrected)
             entry.colour = images.of(entry.name);
         try {
-            const auto [camera, pose] = polycam_camera(is_corrected ? better : raw, size_of(depth));
+            const auto [camera, pose] = polycam_camera(is_corrected ? better : raw, peek_size(depth));
             entry.camera = camera;
             entry.world_from_camera = pose.world_from_camera;
             if (!pose.warning.empty())
@@ -320,7 +299,7 @@ std::optional<Listing> list_arkit_scenes(const fs::path& given) {
     const auto depths = depth_images_in(folder_named(folder, {"lowres_depth"}));
     if (depths.empty())
         return std::nullopt;
-    Listing listing = of_phone("ARKitScenes");
+    Listing listing = listing_of_phone("ARKitScenes");
     Capture& capture = listing.capture;
     const ImagesByStem sure(colour_images_in(folder_named(folder, {"confidence"}))),
         colours(colour_images_in(folder_named(folder, {"lowres_wide", "color"})));
@@ -363,7 +342,7 @@ std::optional<Listing> list_arkit_scenes(const fs::path& given) {
                     fmt::format("it has no camera file; that of {} is taken.", nearest->second.filename().string()));
             try {
                 const Camera camera = pincam(nearest->second);
-                entry.camera = camera_for_depth(camera, camera.pinhole.size, size_of(depth));
+                entry.camera = camera_for_depth(camera, camera.pinhole.size, peek_size(depth));
             } catch (const Outage&) {
                 throw;
             } catch (const Error& failure) {
@@ -371,69 +350,6 @@ std::optional<Listing> list_arkit_scenes(const fs::path& given) {
             }
         }
         capture.entries.push_back(std::move(entry));
-    }
-    settle_own_cameras(listing);
-    return listing;
-}
-
-// --- ScanNet++: rgb/, depth/, pose_intrinsic_imu.json ---
-
-namespace {
-
-Eigen::Matrix4d matrix_of(const Json& rows) {
-    Eigen::Matrix4d matrix = Eigen::Matrix4d::Constant(std::nan(""));
-    matrix.row(3) << 0, 0, 0, 1;
-    for (std::size_t row = 0; rows.is_array() && row < std::min<std::size_t>(rows.size(), 4); ++row)
-        for (std::size_t column = 0; rows[row].is_array() && column < std::min<std::size_t>(rows[row].size(), 4);
-             ++column)
-            if (rows[row][column].is_number())
-                matrix(static_cast<int>(row), static_cast<int>(column)) = rows[row][column].get<double>();
-    return matrix;
-}
-
-} // namespace
-
-std::optional<Listing> list_scannetpp(const fs::path& folder) {
-    std::error_code ignored;
-    const fs::path file = folder / "pose_intrinsic_imu.json";
-    const auto depths = depth_images_in(folder_named(folder, {"depth"}));
-    if (depths.empty() || !fs::is_regular_file(file, ignored))
-        return std::nullopt;
-    const Json all = json_in(file);
-    const auto colours = colour_images_in(folder_named(folder, {"rgb"}));
-    const cv::Size of_colour = colours.empty() ? cv::Size(1920, 1440) : size_of(colours.front());
-    const ImagesByStem by_stem(colours);
-    Listing listing = of_phone("ScanNet++");
-    for (const fs::path& depth : depths) {
-        CaptureEntry entry;
-        entry.name = depth.stem().string();
-        entry.depth = depth;
-        entry.colour = by_stem.of(entry.name);
-        const auto facts = all.find(entry.name);
-        if (facts == all.end() || !facts->is_object()) {
-            entry.problem =
-                fmt::format("{}: \"{}\" is missing, though its depth image exists", file.string(), entry.name);
-        } else {
-            const auto part = [&](const char* key) { return facts->contains(key) ? (*facts)[key] : Json(); };
-            const Eigen::Matrix4d k = matrix_of(part("intrinsic"));
-            try {
-                entry.camera = camera_for_depth({{k(0, 0), k(1, 1), k(0, 2), k(1, 2), {}},
-                                                 {},
-                                                 fmt::format("{}: \"{}\"", file.string(), entry.name)},
-                                                of_colour, size_of(depth));
-            } catch (const Error& failure) {
-                entry.problem = failure.what();
-            }
-            if (const Json stamp = part("timestamp"); stamp.is_number())
-                entry.stamp_s = stamp.get<double>();
-            // `pose` is the phone's own; `aligned_pose` is in the scan's space, and the camera's axes are ours.
-            const MatrixPose pose =
-                checked_pose(matrix_of(part("aligned_pose")), fmt::format("{}: \"{}\"", file.string(), entry.name));
-            entry.world_from_camera = pose.world_from_camera;
-            if (!pose.warning.empty())
-                entry.warnings.push_back(pose.warning);
-        }
-        listing.capture.entries.push_back(std::move(entry));
     }
     settle_own_cameras(listing);
     return listing;

@@ -90,8 +90,7 @@ std::string InflatedStream::bytes(std::uint64_t at, std::uint64_t count) const {
                                 at, at + count, at_,
                                 damage_.empty() ? fmt::format("it has {}", counted(size_, "byte")) : damage_));
     require_memory(count, fmt::format("{}: a part of it", file_.path().string()));
-    const auto next =
-        std::ranges::upper_bound(states_, at, {}, [](const State& state) { return state.unpacked; });
+    const auto next = std::ranges::upper_bound(states_, at, {}, [](const State& state) { return state.unpacked; });
     const State& before = *std::prev(next);
     const auto stream = copy_of(*before.stream);
     std::string bytes(count, '\0'), passed(std::min<std::uint64_t>(at - before.unpacked, first_apart), '\0');
@@ -114,8 +113,8 @@ std::string InflatedStream::bytes(std::uint64_t at, std::uint64_t count) const {
         place += came;
         const bool more_to_read = stream->avail_in == 0 && read < packed_bytes_;
         if (place < at + count && status != Z_OK && !(status == Z_BUF_ERROR && more_to_read))
-            throw Error(fmt::format("{}: the stream at byte {} has changed since it was opened", file_.path().string(),
-                                    at_));
+            throw Error(
+                fmt::format("{}: the stream at byte {} has changed since it was opened", file_.path().string(), at_));
     }
     return bytes;
 }

@@ -93,8 +93,8 @@ bool ZipArchive::list_by_directory() {
     if (!directory)
         return false;
     if (directory->members > most_members)
-        throw Error(fmt::format("{}: {} members, expected at most {}", path().string(), directory->members,
-                                most_members));
+        throw Error(
+            fmt::format("{}: {} members, expected at most {}", path().string(), directory->members, most_members));
     const std::string rows = file_.bytes(directory->at, directory->bytes);
     std::uint64_t at = 0;
     for (std::uint64_t i = 0; i < directory->members; ++i) {
@@ -163,21 +163,21 @@ std::uint64_t ZipArchive::data_at(const ZipMember& member) const {
     if (member.flags & encrypted)
         throw Error(where(member) + ": encrypted, expected a member that is not");
     if (member.method != stored && member.method != deflated)
-        throw Error(fmt::format("{}: packed by method {}, expected 0 (stored) or 8 (deflated)", where(member),
-                                member.method));
+        throw Error(
+            fmt::format("{}: packed by method {}, expected 0 (stored) or 8 (deflated)", where(member), member.method));
     if (file_.size() < member_header || member.header_at > file_.size() - member_header)
         throw Error(fmt::format("{}: the file ends at byte {}", where(member), file_.size()));
     const std::string header = file_.bytes(member.header_at, member_header);
     if (!header.starts_with("PK\3\4"))
         throw Error(where(member) + ": no member begins there");
-    const std::uint64_t at = member.header_at + member_header + number_at<std::uint16_t>(header, 26) +
-                             number_at<std::uint16_t>(header, 28);
+    const std::uint64_t at =
+        member.header_at + member_header + number_at<std::uint16_t>(header, 26) + number_at<std::uint16_t>(header, 28);
     if (at > file_.size() || member.packed_bytes > file_.size() - at)
         throw Error(fmt::format("{}: {} expected, the file ends at byte {}", where(member),
                                 counted(member.packed_bytes, "packed byte"), file_.size()));
     if (member.method == stored && member.packed_bytes != member.bytes)
-        throw Error(fmt::format("{}: stored as {} of {}", where(member), counted(member.packed_bytes, "byte"),
-                                member.bytes));
+        throw Error(
+            fmt::format("{}: stored as {} of {}", where(member), counted(member.packed_bytes, "byte"), member.bytes));
     return at;
 }
 
@@ -211,8 +211,8 @@ ZipMemberStream::ZipMemberStream(const ZipArchive& archive, const ZipMember& mem
     if (!unpacked_->damage().empty())
         throw Error(fmt::format("{}: {}", archive.where(member), unpacked_->damage()));
     if (unpacked_->crc() != member.crc)
-        throw Error(fmt::format("{}: checksum {:08x}, expected {:08x}", archive.where(member), unpacked_->crc(),
-                                member.crc));
+        throw Error(
+            fmt::format("{}: checksum {:08x}, expected {:08x}", archive.where(member), unpacked_->crc(), member.crc));
 }
 
 std::string ZipMemberStream::bytes(std::uint64_t at, std::uint64_t count) const {

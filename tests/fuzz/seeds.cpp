@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <opencv2/imgcodecs.hpp>
+#include <zlib.h>
 
 namespace {
 
@@ -203,6 +204,28 @@ void texts() {
          "\n");
 }
 
+void recordings() {
+    const std::string header = "{'descr': '<u2', 'fortran_order': False, 'shape': (2, 4, 8), }\n",
+                      array = std::string("\x93NUMPY\x01\x00", 8) + raw(static_cast<std::uint16_t>(header.size())) +
+                              header + std::string(128, '\7');
+    seed("recording", "stack.npy", '\0' + array);
+    const std::string name = "depth.npy",
+                      facts = raw<std::uint32_t>(20) + raw(0U) + raw(0U).substr(0, 2) +
+                              raw(static_cast<std::uint32_t>(crc32(0, reinterpret_cast<const Bytef*>(array.data()),
+                                                                   static_cast<uInt>(array.size())))) +
+                              raw(static_cast<std::uint32_t>(array.size())) +
+                              raw(static_cast<std::uint32_t>(array.size())) +
+                              raw(static_cast<std::uint32_t>(name.size()));
+    seed("recording", "stored.npz", std::string("\0PK\3\4", 5) + facts + name + array);
+    const std::string runs = "\xe3"
+                             "abc"
+                             "\x38\x03\xf2\x06" +
+                             std::string(7, '\0');
+    seed("recording", "raw.lzfse", "\2bvx-" + raw(3U) + "abcbvx$");
+    seed("recording", "lzvn.lzfse", "\2bvxn" + raw(15U) + raw(static_cast<std::uint32_t>(runs.size())) + runs + "bvx$");
+    seed("recording", "depth.bin", "\1" + raw(4U) + "\x1f\7\7\1");
+}
+
 } // namespace
 
 int main(int count, char** words) {
@@ -214,5 +237,6 @@ int main(int count, char** words) {
     las();
     cameras();
     texts();
+    recordings();
     return 0;
 }
