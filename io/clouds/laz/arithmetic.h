@@ -9,6 +9,7 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <cstring>
 #include <fmt/format.h>
 #include <string>
 #include <string_view>
@@ -164,11 +165,21 @@ class Decoder {
             throw Error(fmt::format("the stream ends inside the points (byte {})", position()));
         return static_cast<unsigned char>(bytes_[at_++]);
     }
+    /// Shifts whole bytes in until the interval is long enough: without a branch on how many, which cannot be foreseen.
     void renormalise() {
-        while (length_ < shortest_interval) {
-            value_ = value_ << 8 | next();
-            length_ <<= 8;
+        if (bytes_.size() - at_ < sizeof(std::uint32_t)) {
+            while (length_ < shortest_interval) {
+                value_ = value_ << 8 | next();
+                length_ <<= 8;
+            }
+            return;
         }
+        const unsigned shift = static_cast<unsigned>(std::countl_zero(length_)) & ~7U;
+        std::uint32_t coming;
+        std::memcpy(&coming, bytes_.data() + at_, sizeof coming);
+        value_ = static_cast<std::uint32_t>(((std::uint64_t(value_) << 32 | __builtin_bswap32(coming)) << shift) >> 32);
+        length_ <<= shift;
+        at_ += shift / 8;
     }
 
     std::string_view bytes_;
