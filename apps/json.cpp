@@ -10,9 +10,9 @@ json to_json(const Camera& camera) {
     const auto& [fx, fy, cx, cy, size] = camera.pinhole;
     json text{{"fx", fx}, {"fy", fy}, {"cx", cx}, {"cy", cy}, {"width", size.width}, {"height", size.height}};
     if (const Distortion& d = camera.distortion; d.model == LensModel::kannala_brandt)
-        text["fisheye"] = {d.k1, d.k2, d.k3, d.k4};
+        text["fisheye"] = coefficients(d);
     else if (d.any())
-        text["distortion"] = {d.k1, d.k2, d.p1, d.p2, d.k3};
+        text["distortion"] = coefficients(d);
     text["origin"] = camera.origin;
     return text;
 }

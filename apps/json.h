@@ -17,8 +17,8 @@ namespace scanshade {
 
 using json = nlohmann::ordered_json;
 
-/// fx, fy, cx, cy, width, height, distortion [k1, k2, p1, p2, k3] or fisheye [k1, k2, k3, k4] where there
-/// is any, origin.
+/// fx, fy, cx, cy, width, height, distortion [k1, k2, p1, p2, k3, maybe k4, k5, k6] or fisheye [k1, k2, k3, k4] where
+/// there is any, origin.
 [[nodiscard]] json to_json(const Camera& camera);
 /// The same with colour_from_depth, 4x4, row by row.
 [[nodiscard]] json to_json(const ColourCamera& colour);

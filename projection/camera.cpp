@@ -2,6 +2,8 @@
 
 #include "projection/base/error.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <fmt/format.h>
 
@@ -36,10 +38,36 @@ void check(const Camera& camera) {
     check_principal_point(camera, "cx", cx, fx, size.width);
     check_principal_point(camera, "cy", cy, fy, size.height);
     const Distortion& d = camera.distortion;
-    for (const auto& [name, value] :
-         {std::pair{"k1", d.k1}, {"k2", d.k2}, {"p1", d.p1}, {"p2", d.p2}, {"k3", d.k3}, {"k4", d.k4}})
+    for (const auto& [name, value] : {std::pair{"k1", d.k1},
+                                      {"k2", d.k2},
+                                      {"p1", d.p1},
+                                      {"p2", d.p2},
+                                      {"k3", d.k3},
+                                      {"k4", d.k4},
+                                      {"k5", d.k5},
+                                      {"k6", d.k6}})
         if (!std::isfinite(value))
             refuse(camera, fmt::format("{} is {}, a finite number expected", name, value));
+}
+
+std::vector<double> coefficients(const Distortion& d) {
+    if (d.model == LensModel::kannala_brandt)
+        return {d.k1, d.k2, d.k3, d.k4};
+    if (d.rational())
+        return {d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6};
+    return {d.k1, d.k2, d.p1, d.p2, d.k3};
+}
+
+Distortion brown_conrady(const std::vector<double>& coefficients) {
+    std::array<double, 8> k{};
+    std::copy_n(coefficients.begin(), std::min(coefficients.size(), k.size()), k.begin());
+    return {k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7]};
+}
+
+Distortion kannala_brandt(const std::vector<double>& coefficients) {
+    std::array<double, 4> k{};
+    std::copy_n(coefficients.begin(), std::min(coefficients.size(), k.size()), k.begin());
+    return {.k1 = k[0], .k2 = k[1], .k3 = k[2], .k4 = k[3], .model = LensModel::kannala_brandt};
 }
 
 Pinhole scaled(const Pinhole& camera, cv::Size size) {
@@ -56,6 +84,8 @@ std::string describe(const Camera& camera) {
         text += fmt::format(" fisheye k1 {:g} k2 {:g} k3 {:g} k4 {:g}", d.k1, d.k2, d.k3, d.k4);
     else if (d.any())
         text += fmt::format(" k1 {:g} k2 {:g} p1 {:g} p2 {:g} k3 {:g}", d.k1, d.k2, d.p1, d.p2, d.k3);
+    if (const Distortion& d = camera.distortion; d.rational())
+        text += fmt::format(" k4 {:g} k5 {:g} k6 {:g}", d.k4, d.k5, d.k6);
     return text;
 }
 

@@ -17,6 +17,7 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 #include <string>
+#include <vector>
 
 namespace scanshade {
 
@@ -44,20 +45,29 @@ struct Pinhole {
     }
 };
 
-/// How a lens bends a direction: a polynomial in the tangent (Brown 1966; most lenses) or in the angle (Kannala and
-/// Brandt 2006; fisheyes, where the tangent grows without bound).
+/// How a lens bends a direction: a polynomial, or a quotient of two, in the tangent (Brown 1966; most lenses), or a
+/// polynomial in the angle (Kannala and Brandt 2006; fisheyes, where the tangent grows without bound).
 enum class LensModel { brown_conrady, kannala_brandt };
 
-/// Distortion in OpenCV's order. Brown-Conrady has k1, k2, p1, p2, k3, all zero = none; Kannala-Brandt (OpenCV's
-/// `fisheye`, ROS's and Kalibr's `equidistant`) has k1, k2, k3, k4, and bends even when they are zero.
+/// Distortion in OpenCV's order. Brown-Conrady has k1, k2, p1, p2, k3, and k4, k5, k6 where it is rational (ROS's
+/// `rational_polynomial`, COLMAP's FULL_OPENCV, Azure Kinect), all zero = none; Kannala-Brandt (OpenCV's `fisheye`,
+/// ROS's and Kalibr's `equidistant`) has k1, k2, k3, k4, and bends even when they are zero.
 struct Distortion {
-    double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0, k4 = 0;
+    double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0, k4 = 0, k5 = 0, k6 = 0;
     LensModel model = LensModel::brown_conrady;
+    /// Whether Brown-Conrady's radius has a denominator.
+    [[nodiscard]] bool rational() const { return model == LensModel::brown_conrady && (k4 != 0 || k5 != 0 || k6 != 0); }
     [[nodiscard]] bool any() const {
-        return model == LensModel::kannala_brandt || k1 != 0 || k2 != 0 || p1 != 0 || p2 != 0 || k3 != 0;
+        return model == LensModel::kannala_brandt || k1 != 0 || k2 != 0 || p1 != 0 || p2 != 0 || k3 != 0 || rational();
     }
     friend bool operator==(const Distortion&, const Distortion&) = default;
 };
+
+/// Its numbers as files have them: k1, k2, p1, p2, k3, then k4, k5, k6 where it is rational; k1 .. k4 of a fisheye.
+[[nodiscard]] std::vector<double> coefficients(const Distortion& distortion);
+/// The same backwards: up to 8 numbers, or up to 4 of a fisheye; missing ones are 0.
+[[nodiscard]] Distortion brown_conrady(const std::vector<double>& coefficients);
+[[nodiscard]] Distortion kannala_brandt(const std::vector<double>& coefficients);
 
 /// A recorded camera: pinhole, lens distortion, and where the numbers came from ("camera.json", "--camera", ...).
 struct Camera {
@@ -67,14 +77,14 @@ struct Camera {
 };
 
 /// Moves normalised image coordinates (x = X/Z, y = Y/Z) to where the lens bends them
-/// (Brown 1966 as written in OpenCV's calib3d documentation); `coefficients` are k1, k2, p1, p2, k3.
-/// A template on its number so that solvers can differentiate it.
+/// (Brown 1966 as written in OpenCV's calib3d documentation); `coefficients` are k1, k2, p1, p2, k3, k4, k5, k6.
+/// A template on its number so that solvers can differentiate it. With k4 = k5 = k6 = 0 it divides by exactly 1.
 template <class Number>
 void distort(const Number* coefficients, const Number& x, const Number& y, Number& x_bent, Number& y_bent) {
     const Number &k1 = coefficients[0], &k2 = coefficients[1], &p1 = coefficients[2], &p2 = coefficients[3];
-    const Number& k3 = coefficients[4];
+    const Number &k3 = coefficients[4], &k4 = coefficients[5], &k5 = coefficients[6], &k6 = coefficients[7];
     const Number r2 = x * x + y * y;
-    const Number radial = Number(1) + r2 * (k1 + r2 * (k2 + r2 * k3));
+    const Number radial = (Number(1) + r2 * (k1 + r2 * (k2 + r2 * k3))) / (Number(1) + r2 * (k4 + r2 * (k5 + r2 * k6)));
     x_bent = x * radial + Number(2) * p1 * x * y + p2 * (r2 + Number(2) * x * x);
     y_bent = y * radial + p1 * (r2 + Number(2) * y * y) + Number(2) * p2 * x * y;
 }

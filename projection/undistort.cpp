@@ -17,9 +17,11 @@ constexpr double converged_at = 1e-10;
 
 Eigen::Matrix2d jacobian(const Distortion& d, const Eigen::Vector2d& p) {
     const double x = p.x(), y = p.y(), r2 = p.squaredNorm();
-    const double radial = 1 + r2 * (d.k1 + r2 * (d.k2 + r2 * d.k3));
-    const double slope =
-        2 * (d.k1 + r2 * (2 * d.k2 + r2 * 3 * d.k3)); // d radial / d (r2), times the 2 of d (r2) / dx = 2x
+    const double upper = 1 + r2 * (d.k1 + r2 * (d.k2 + r2 * d.k3)), lower = 1 + r2 * (d.k4 + r2 * (d.k5 + r2 * d.k6));
+    const double upper_slope = d.k1 + r2 * (2 * d.k2 + r2 * 3 * d.k3),
+                 lower_slope = d.k4 + r2 * (2 * d.k5 + r2 * 3 * d.k6);
+    const double radial = upper / lower;
+    const double slope = 2 * (upper_slope - radial * lower_slope) / lower; // d radial / d (r2) by d (r2) / dx = 2x
     Eigen::Matrix2d j;
     j(0, 0) = radial + x * x * slope + 2 * d.p1 * y + 6 * d.p2 * x;
     j(1, 1) = radial + y * y * slope + 6 * d.p1 * y + 2 * d.p2 * x;
@@ -27,22 +29,56 @@ Eigen::Matrix2d jacobian(const Distortion& d, const Eigen::Vector2d& p) {
     return j;
 }
 
-/// The smallest positive root of 1 + c1 t + c2 t^2 + ..., infinity where there is none.
+double value_at(const std::vector<double>& polynomial, double t) {
+    double value = 0;
+    for (auto c = polynomial.rbegin(); c != polynomial.rend(); ++c)
+        value = value * t + *c;
+    return value;
+}
+
+/// The rising roots of c0 + c1 t + c2 t^2 + ... between 0 and `end` at which it changes its sign: between neighbouring
+/// roots of the derivative there is at most one.
+std::vector<double> sign_changes(const std::vector<double>& polynomial, double end) {
+    if (polynomial.size() < 2)
+        return {};
+    std::vector<double> derivative;
+    for (std::size_t i = 1; i < polynomial.size(); ++i)
+        derivative.push_back(static_cast<double>(i) * polynomial[i]);
+    std::vector<double> borders = sign_changes(derivative, end), roots;
+    borders.push_back(end);
+    double low = 0;
+    for (const double high : borders) {
+        const bool positive = value_at(polynomial, low) > 0;
+        if (positive != (value_at(polynomial, high) > 0)) {
+            double a = low, b = high;
+            for (double middle = a + (b - a) / 2; middle > a && middle < b; middle = a + (b - a) / 2)
+                (positive == (value_at(polynomial, middle) > 0) ? a : b) = middle;
+            roots.push_back(b);
+        }
+        low = high;
+    }
+    return roots;
+}
+
+/// The smallest positive root of 1 + c1 t + c2 t^2 + ..., infinity where there is none up to an angle of 89.9 degrees.
 double first_root(const std::vector<double>& higher) {
-    cv::Mat1d coefficients(1, static_cast<int>(higher.size()) + 1, 0.0);
-    coefficients(0) = 1;
-    std::copy(higher.begin(), higher.end(), coefficients.begin() + 1);
-    while (coefficients.cols > 1 && coefficients(coefficients.cols - 1) == 0)
-        coefficients = coefficients.colRange(0, coefficients.cols - 1).clone();
-    double nearest = std::numeric_limits<double>::infinity();
-    if (coefficients.cols == 1)
-        return nearest;
-    std::vector<cv::Vec2d> roots;
-    cv::solvePoly(coefficients, roots);
-    for (const cv::Vec2d& root : roots)
-        if (root[0] > 0 && std::abs(root[1]) <= 1e-9 * std::max(1.0, root[0]))
-            nearest = std::min(nearest, root[0]);
-    return nearest;
+    constexpr double farthest = 3e5; // squared tangent
+    std::vector<double> polynomial{1};
+    polynomial.insert(polynomial.end(), higher.begin(), higher.end());
+    const std::vector<double> roots = sign_changes(polynomial, farthest);
+    return roots.empty() ? std::numeric_limits<double>::infinity() : roots.front();
+}
+
+/// Of r (1 + k1 r^2 + ...) / (1 + k4 r^2 + ...) with t = r^2: where its derivative's numerator N D + 2 t (N' D - N D')
+/// or its denominator D is 0 first.
+double rational_fold_r2(const Distortion& d) {
+    const std::array n{1.0, d.k1, d.k2, d.k3}, below{1.0, d.k4, d.k5, d.k6};
+    std::vector<double> higher(6, 0.0); // of t^1 .. t^6
+    for (std::size_t i = 0; i < n.size(); ++i)
+        for (std::size_t j = 0; j < below.size(); ++j)
+            if (i + j > 0)
+                higher[i + j - 1] += n[i] * below[j] * (1 + 2 * static_cast<double>(i) - 2 * static_cast<double>(j));
+    return std::min(first_root(higher), first_root({d.k4, d.k5, d.k6}));
 }
 
 /// The angle at which theta (1 + k1 theta^2 + ...) stops growing; just under 90 degrees at most, where a pinhole ends.
@@ -75,11 +111,35 @@ std::optional<Eigen::Vector2d> undistorted_fisheye(const Distortion& d, const Ei
     return Eigen::Vector2d(bent * (std::tan(theta) / wanted));
 }
 
+/// Where the radial part alone would have come from: a start for Newton's method in two dimensions, which would leap
+/// across the poles of a rational lens. Newton's method again, kept in the bracket where the lens grows.
+Eigen::Vector2d radial_guess(const Distortion& d, const Eigen::Vector2d& bent, double limit_r2) {
+    const double wanted = bent.norm();
+    if (wanted < 1e-8)
+        return bent;
+    constexpr double widest = 50, close = 1e-6; // tangent
+    double low = 0, high = std::min(widest, std::sqrt(limit_r2)), r = std::min(wanted, high / 2);
+    for (int i = 0; i < 60 && high - low > close; ++i) {
+        const double r2 = r * r, upper = 1 + r2 * (d.k1 + r2 * (d.k2 + r2 * d.k3)),
+                     lower = 1 + r2 * (d.k4 + r2 * (d.k5 + r2 * d.k6)), radial = upper / lower;
+        const double miss = r * radial - wanted;
+        if (std::abs(miss) < close)
+            break;
+        (miss > 0 ? high : low) = r;
+        const double upper_slope = d.k1 + r2 * (2 * d.k2 + r2 * 3 * d.k3),
+                     lower_slope = d.k4 + r2 * (2 * d.k5 + r2 * 3 * d.k6);
+        r -= miss / (radial + 2 * r2 * (upper_slope - radial * lower_slope) / lower);
+        if (!(r > low && r < high))
+            r = (low + high) / 2;
+    }
+    return bent * (r / wanted);
+}
+
 std::optional<Eigen::Vector2d> undistorted_within(const Distortion& distortion, const Eigen::Vector2d& bent,
                                                   double limit_r2) {
     if (distortion.model == LensModel::kannala_brandt)
         return undistorted_fisheye(distortion, bent);
-    Eigen::Vector2d straight = bent;
+    Eigen::Vector2d straight = distortion.rational() ? radial_guess(distortion, bent, limit_r2) : bent;
     for (int i = 0; i < 50; ++i) {
         const Eigen::Vector2d miss = distorted(distortion, straight) - bent;
         if (miss.squaredNorm() < converged_at * converged_at)
@@ -162,13 +222,13 @@ cv::Mat1i map_to_undistorted(const Pinhole& pinhole, const cv::Mat2f& direction,
     return map;
 }
 
-using Key = std::array<double, 13>;
+using Key = std::array<double, 15>;
 
 Key key_of(const Camera& camera) {
     const auto& [fx, fy, cx, cy, size] = camera.pinhole;
     const Distortion& d = camera.distortion;
-    return {fx,   fy,   cx,   cy,   double(size.width), double(size.height), d.k1, d.k2,
-            d.p1, d.p2, d.k3, d.k4, double(d.model)};
+    return {fx,   fy,   cx,   cy,   double(size.width), double(size.height), d.k1, d.k2, d.p1, d.p2,
+            d.k3, d.k4, d.k5, d.k6, double(d.model)};
 }
 
 } // namespace
@@ -176,7 +236,7 @@ Key key_of(const Camera& camera) {
 double fold_r2(const Distortion& d) {
     if (d.model == LensModel::kannala_brandt)
         return std::pow(std::tan(fold_angle(d)), 2);
-    return first_root({3 * d.k1, 5 * d.k2, 7 * d.k3});
+    return d.rational() ? rational_fold_r2(d) : first_root({3 * d.k1, 5 * d.k2, 7 * d.k3});
 }
 
 Eigen::Vector2d distorted(const Distortion& d, const Eigen::Vector2d& straight) {
@@ -184,7 +244,8 @@ Eigen::Vector2d distorted(const Distortion& d, const Eigen::Vector2d& straight) 
     if (d.model == LensModel::kannala_brandt)
         distort_fisheye(std::array{d.k1, d.k2, d.k3, d.k4}.data(), straight.x(), straight.y(), bent.x(), bent.y());
     else
-        distort(std::array{d.k1, d.k2, d.p1, d.p2, d.k3}.data(), straight.x(), straight.y(), bent.x(), bent.y());
+        distort(std::array{d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6}.data(), straight.x(), straight.y(), bent.x(),
+                bent.y());
     return bent;
 }
 

@@ -13,11 +13,12 @@ namespace scanshade {
 [[nodiscard]] Eigen::Vector2d distorted(const Distortion& distortion, const Eigen::Vector2d& straight);
 
 /// Squared radius (x^2 + y^2 of straight coordinates) at which the lens model stops growing and folds back on itself;
-/// infinity where it never does. A fisheye ends just under 90 degrees, where a pinhole does.
+/// infinity where it never does. A rational lens ends at its denominator's first zero, too. A fisheye ends just under
+/// 90 degrees, where a pinhole does.
 [[nodiscard]] double fold_r2(const Distortion& distortion);
 
 /// The reverse, by Newton's method to 1e-10 (under 1e-6 px at any focal length in use). None where it does not converge
-/// or where the polynomial folds back, so that two directions share one pixel.
+/// or where the lens folds back (fold_r2), so that two directions share one pixel.
 [[nodiscard]] std::optional<Eigen::Vector2d> undistorted(const Distortion& distortion, const Eigen::Vector2d& bent);
 
 /// The mapping between pixels of the recorded and the undistorted image. Both images have the same intrinsics and size.

@@ -151,23 +151,25 @@ library::Wanted wanted_from(std::uint32_t outputs) {
 
 // ---------------------------------------------------------------------------------------------------- cameras
 
+constexpr std::size_t first_camera = offsetof(scanshade_camera, denominator); ///< without a rational lens
+
 Camera camera_from(const scanshade_camera* given, cv::Size size) {
-    const scanshade_camera c = taken(given, sizeof(scanshade_camera), "camera");
-    if (c.lens != SCANSHADE_BROWN && c.lens != SCANSHADE_FISHEYE)
-        throw Misuse(fmt::format("lens: {} given, expected SCANSHADE_BROWN or SCANSHADE_FISHEYE", c.lens));
+    const scanshade_camera c = taken(given, first_camera, "camera");
+    if (c.lens != SCANSHADE_BROWN && c.lens != SCANSHADE_FISHEYE && c.lens != SCANSHADE_RATIONAL)
+        throw Misuse(
+            fmt::format("lens: {} given, expected SCANSHADE_BROWN, SCANSHADE_FISHEYE or SCANSHADE_RATIONAL", c.lens));
     if (!(c.fx != 0))
         throw Error("the depth image has no camera: fx, fy, cx and cy are needed");
     Camera camera{{c.fx, c.fy, c.cx, c.cy, {c.width, c.height}}, {}, "given"};
     if (c.width == 0 && c.height == 0)
         camera.pinhole.size = size;
-    const double* d = c.distortion;
-    for (int i = 0; i < 5; ++i)
-        if (!std::isfinite(d[i]))
-            throw Error(fmt::format("distortion: {} given, expected finite numbers", d[i]));
-    if (c.lens == SCANSHADE_FISHEYE)
-        camera.distortion = {.k1 = d[0], .k2 = d[1], .k3 = d[2], .k4 = d[3], .model = LensModel::kannala_brandt};
-    else
-        camera.distortion = {.k1 = d[0], .k2 = d[1], .p1 = d[2], .p2 = d[3], .k3 = d[4]};
+    std::vector<double> lens(c.distortion, c.distortion + std::size(c.distortion));
+    if (c.lens == SCANSHADE_RATIONAL)
+        lens.insert(lens.end(), c.denominator, c.denominator + std::size(c.denominator));
+    for (const double number : lens)
+        if (!std::isfinite(number))
+            throw Error(fmt::format("distortion: {} given, expected finite numbers", number));
+    camera.distortion = c.lens == SCANSHADE_FISHEYE ? kannala_brandt(lens) : brown_conrady(lens);
     return camera;
 }
 
@@ -175,10 +177,18 @@ scanshade_camera to_c(const Camera& camera) {
     const auto& [fx, fy, cx, cy, size] = camera.pinhole;
     const Distortion& d = camera.distortion;
     if (d.model == LensModel::kannala_brandt)
-        return {sizeof(scanshade_camera),   fx, fy, cx, cy, size.width, size.height, SCANSHADE_FISHEYE,
-                {d.k1, d.k2, d.k3, d.k4, 0}};
-    return {sizeof(scanshade_camera),      fx, fy, cx, cy, size.width, size.height, SCANSHADE_BROWN,
-            {d.k1, d.k2, d.p1, d.p2, d.k3}};
+        return {sizeof(scanshade_camera),    fx, fy, cx, cy, size.width, size.height, SCANSHADE_FISHEYE,
+                {d.k1, d.k2, d.k3, d.k4, 0}, {}};
+    return {sizeof(scanshade_camera),
+            fx,
+            fy,
+            cx,
+            cy,
+            size.width,
+            size.height,
+            d.rational() ? SCANSHADE_RATIONAL : SCANSHADE_BROWN,
+            {d.k1, d.k2, d.p1, d.p2, d.k3},
+            {d.k4, d.k5, d.k6}};
 }
 
 // ---------------------------------------------------------------------------------------------------- arrays
@@ -564,7 +574,7 @@ scanshade_status scanshade_refine(const char* path, const scanshade_setting* set
 scanshade_status scanshade_refinement_camera(const scanshade_refinement* refinement, scanshade_camera* camera) {
     return guarded([&] {
         require(refinement, "refinement");
-        give(camera, refinement->camera, sizeof(scanshade_camera), "camera");
+        give(camera, refinement->camera, first_camera, "camera");
     });
 }
 

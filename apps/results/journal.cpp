@@ -70,15 +70,10 @@ Camera camera_from(const json& text) {
     Camera camera;
     camera.pinhole = {text.at("fx"), text.at("fy"), text.at("cx"), text.at("cy"),
                       cv::Size(text.at("width").get<int>(), text.at("height").get<int>())};
-    Distortion& d = camera.distortion;
-    if (text.contains("fisheye")) {
-        const auto k = text["fisheye"].get<std::array<double, 4>>();
-        d.model = LensModel::kannala_brandt;
-        std::tie(d.k1, d.k2, d.k3, d.k4) = std::tie(k[0], k[1], k[2], k[3]);
-    } else if (text.contains("distortion")) {
-        const auto k = text["distortion"].get<std::array<double, 5>>();
-        std::tie(d.k1, d.k2, d.p1, d.p2, d.k3) = std::tie(k[0], k[1], k[2], k[3], k[4]);
-    }
+    if (text.contains("fisheye"))
+        camera.distortion = kannala_brandt(text["fisheye"].get<std::vector<double>>());
+    else if (text.contains("distortion"))
+        camera.distortion = brown_conrady(text["distortion"].get<std::vector<double>>());
     camera.origin = text.at("origin");
     return camera;
 }

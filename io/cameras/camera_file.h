@@ -27,14 +27,15 @@ struct CameraFile {
 };
 
 /// Reads, told apart by content:
-/// - ours: {"fx","fy","cx","cy","width","height", optional "distortion":[k1,k2,p1,p2,k3], "depth_units_per_metre",
-/// "registered", "depth_correction":{"scale","offset_m","curve_per_m"}, "pose_time_offset_s", "colour": a camera of the
-/// same keys with "colour_from_depth":[[4 numbers] x 4], row by row}; a fisheye has "fisheye":[k1,k2,k3,k4] instead of
+/// - ours: {"fx","fy","cx","cy","width","height", optional "distortion":[k1,k2,p1,p2,k3] or, rational,
+/// [k1,k2,p1,p2,k3,k4,k5,k6], "depth_units_per_metre", "registered",
+/// "depth_correction":{"scale","offset_m","curve_per_m"}, "pose_time_offset_s", "colour": a camera of the same keys
+/// with "colour_from_depth":[[4 numbers] x 4], row by row}; a fisheye has "fisheye":[k1,k2,k3,k4] instead of
 /// "distortion"
 /// - Open3D: {"width","height","intrinsic_matrix":[9 numbers, column-major]}
 /// - OpenCV's yml (camera_matrix, distortion_coefficients; `fisheye_model: 1` for a fisheye), ROS's camera_info yaml
-///   (plumb_bob, equidistant), Kalibr's camchain yaml (pinhole with radtan, equidistant or none; cam0, and cam1 with
-///   its T_cn_cnm1 as the colour camera)
+///   (plumb_bob, rational_polynomial, equidistant), Kalibr's camchain yaml (pinhole with radtan, equidistant or none;
+///   cam0, and cam1 with its T_cn_cnm1 as the colour camera)
 /// - COLMAP's cameras.txt (its first camera; SIMPLE_PINHOLE to FULL_OPENCV and OPENCV_FISHEYE)
 /// - a 3x3 row-major text matrix (7-Scenes, BundleFusion), BundleFusion's info.txt, PCL's XML beside .pclzf
 /// Throws Error naming the file, and the key, line or column, for: JSON syntax, missing keys, wrong counts, non-finite,
@@ -59,7 +60,7 @@ struct CameraQuality {
 };
 
 /// Writes atomically. Throws Error naming the file where the format cannot hold the whole camera (a lens for Open3D,
-/// k3 for Kalibr, a colour camera for all but ours and Kalibr's, a depth correction for all but ours): nothing is
+/// k3 to k6 for Kalibr, a colour camera for all but ours and Kalibr's, a depth correction for all but ours): nothing is
 /// dropped.
 void write_camera_file(const std::filesystem::path& file, const CameraFile& camera,
                        CameraFormat format = CameraFormat::scanshade, const CameraQuality& quality = {});

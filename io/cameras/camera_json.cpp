@@ -130,14 +130,14 @@ Camera one_camera(const fs::path& file, const Json& object) {
                          : from_keys(file, object);
     camera.pinhole.size = {size_of(file, object, "width"), size_of(file, object, "height")};
     if (object.contains("distortion")) {
-        const auto d = numbers_of(file, object, "distortion", 5);
-        camera.distortion = {d[0], d[1], d[2], d[3], d[4]};
+        const Json& list = object["distortion"];
+        const bool rational = list.is_array() && list.size() == 8; // else 5 are expected
+        camera.distortion = brown_conrady(numbers_of(file, object, "distortion", rational ? 8 : 5));
     }
     if (object.contains("fisheye")) {
         if (object.contains("distortion"))
             refuse_camera(file, "\"distortion\" and \"fisheye\" are both there, one lens expected");
-        const auto k = numbers_of(file, object, "fisheye", 4);
-        camera.distortion = {k[0], k[1], 0, 0, k[2], k[3], LensModel::kannala_brandt};
+        camera.distortion = kannala_brandt(numbers_of(file, object, "fisheye", 4));
     }
     return camera;
 }
@@ -210,9 +210,9 @@ nlohmann::ordered_json as_object(const Camera& camera) {
         {"fx", fx}, {"fy", fy}, {"cx", cx}, {"cy", cy}, {"width", size.width}, {"height", size.height}};
     const Distortion& d = camera.distortion;
     if (d.model == LensModel::kannala_brandt)
-        object["fisheye"] = {d.k1, d.k2, d.k3, d.k4};
+        object["fisheye"] = coefficients(d);
     else if (d.any())
-        object["distortion"] = {d.k1, d.k2, d.p1, d.p2, d.k3};
+        object["distortion"] = coefficients(d);
     return object;
 }
 

@@ -121,11 +121,11 @@ const ColmapModel colmap_models[] = {
      }},
     {"FULL_OPENCV", 12,
      [](const auto& p) {
-         return oblong(p, {p[4], p[5], p[6], p[7], p[8]});
+         return oblong(p, brown_conrady({p.begin() + 4, p.end()}));
      }},
     {"OPENCV_FISHEYE", 8,
      [](const auto& p) {
-         return oblong(p, {p[4], p[5], 0, 0, p[6], p[7], LensModel::kannala_brandt});
+         return oblong(p, kannala_brandt({p.begin() + 4, p.end()}));
      }},
 };
 
@@ -169,8 +169,6 @@ CameraFile camera_from_colmap(const fs::path& file, const std::vector<TextLine>&
         if (numbers.size() != model->numbers)
             throw Error(fmt::format("{}: {} has {}, expected {}", place, model->name, counted(numbers.size(), "number"),
                                     model->numbers));
-        if (model->name == "FULL_OPENCV" && (numbers[9] != 0 || numbers[10] != 0 || numbers[11] != 0))
-            throw Error(place + ": k4, k5, k6 of a rational lens are not supported");
         result.camera = model->read(numbers);
         Pinhole& pinhole = result.camera.pinhole;
         pinhole.cx -= 0.5; // our pixel centres are integers
@@ -198,9 +196,10 @@ std::string camera_as_colmap(const Camera& camera) {
         return fmt::format("{} {} {} {} {}\n", line("OPENCV_FISHEYE"), d.k1, d.k2, d.k3, d.k4);
     if (!d.any())
         return line("PINHOLE") + "\n";
-    if (d.k3 == 0)
+    if (d.k3 == 0 && !d.rational())
         return fmt::format("{} {} {} {} {}\n", line("OPENCV"), d.k1, d.k2, d.p1, d.p2);
-    return fmt::format("{} {} {} {} {} {} 0 0 0\n", line("FULL_OPENCV"), d.k1, d.k2, d.p1, d.p2, d.k3);
+    return fmt::format("{} {} {} {} {} {} {} {} {}\n", line("FULL_OPENCV"), d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5,
+                       d.k6);
 }
 
 } // namespace scanshade

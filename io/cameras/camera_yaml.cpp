@@ -80,21 +80,19 @@ Pinhole from_matrix(const fs::path& file, const std::vector<double>& m) {
 Distortion fisheye(const fs::path& file, const std::string& key, const std::vector<double>& k) {
     if (k.size() != 4)
         refuse_camera(file, fmt::format("\"{}\" has {}, expected 4 of a fisheye", key, counted(k.size(), "number")));
-    return {k[0], k[1], 0, 0, k[2], k[3], LensModel::kannala_brandt};
+    return kannala_brandt(k);
 }
 
-/// k1 k2 p1 p2 [k3 [k4 k5 k6 ...]]: coefficients after k3 must be zero.
-Distortion polynomial(const fs::path& file, const std::string& key, std::vector<double> k) {
-    for (std::size_t i = 5; i < k.size(); ++i)
+/// k1 k2 p1 p2 [k3 [k4 k5 k6 ...]]: coefficients after k6 must be zero.
+Distortion polynomial(const fs::path& file, const std::string& key, const std::vector<double>& k) {
+    for (std::size_t i = 8; i < k.size(); ++i)
         if (k[i] != 0)
-            refuse_camera(
-                file, fmt::format("\"{}\" number {} is {}: rational, thin-prism and tilted lenses are not supported",
-                                  key, i + 1, k[i]));
+            refuse_camera(file, fmt::format("\"{}\" number {} is {}: thin-prism and tilted lenses are not supported",
+                                            key, i + 1, k[i]));
     if (k.size() != 4 && k.size() != 5 && k.size() != 8 && k.size() != 12 && k.size() != 14 && !k.empty())
-        refuse_camera(file,
-                      fmt::format("\"{}\" has {}, expected 4 or 5 (k1 k2 p1 p2 k3)", key, counted(k.size(), "number")));
-    k.resize(5);
-    return {k[0], k[1], k[2], k[3], k[4]};
+        refuse_camera(file, fmt::format("\"{}\" has {}, expected 4, 5 or 8 (k1 k2 p1 p2 k3 k4 k5 k6)", key,
+                                        counted(k.size(), "number")));
+    return brown_conrady(k);
 }
 
 /// OpenCV's and ROS's: both say camera_matrix and distortion_coefficients.
@@ -111,7 +109,8 @@ CameraFile from_matrices(const fs::path& file, const YAML::Node& root) {
     const bool flagged = number(word_of(root, "fisheye_model")).value_or(0) != 0;
     if (model != "plumb_bob" && model != "rational_polynomial" && model != "equidistant" && model != "fisheye")
         refuse_camera(file,
-                      fmt::format("\"distortion_model\" is {}, expected plumb_bob or equidistant", in_quotes(model)));
+                      fmt::format("\"distortion_model\" is {}, expected plumb_bob, rational_polynomial or equidistant",
+                                  in_quotes(model)));
     const auto numbers = numbers_of(file, root, key);
     const bool is_fisheye = flagged || model == "equidistant" || model == "fisheye";
     result.camera.distortion = is_fisheye ? fisheye(file, key, numbers) : polynomial(file, key, numbers);
@@ -174,12 +173,6 @@ CameraFile from_camchain(const fs::path& file, const YAML::Node& root) {
 
 // --- writing ---
 
-std::vector<double> coefficients(const Distortion& d) {
-    if (d.model == LensModel::kannala_brandt)
-        return {d.k1, d.k2, d.k3, d.k4};
-    return {d.k1, d.k2, d.p1, d.p2, d.k3};
-}
-
 std::string list(const std::vector<double>& values) { return fmt::format("[{}]", fmt::join(values, ", ")); }
 
 std::string matrix(const char* name, const char* type, int rows, int columns, const std::vector<double>& values) {
@@ -225,11 +218,12 @@ std::string camera_as_opencv(const Camera& camera, const CameraQuality& quality)
 
 std::string camera_as_ros(const Camera& camera) {
     const Pinhole& p = camera.pinhole;
-    const bool fisheye_lens = camera.distortion.model == LensModel::kannala_brandt;
+    const char* model = camera.distortion.model == LensModel::kannala_brandt ? "equidistant"
+                        : camera.distortion.rational()                       ? "rational_polynomial"
+                                                                             : "plumb_bob";
     const auto k = coefficients(camera.distortion);
     return fmt::format("image_width: {}\nimage_height: {}\ncamera_name: camera\n", p.size.width, p.size.height) +
-           matrix("camera_matrix", "", 3, 3, camera_matrix(p)) +
-           fmt::format("distortion_model: {}\n", fisheye_lens ? "equidistant" : "plumb_bob") +
+           matrix("camera_matrix", "", 3, 3, camera_matrix(p)) + fmt::format("distortion_model: {}\n", model) +
            matrix("distortion_coefficients", "", 1, static_cast<int>(k.size()), k) +
            matrix("rectification_matrix", "", 3, 3, {1, 0, 0, 0, 1, 0, 0, 0, 1}) +
            matrix("projection_matrix", "", 3, 4, {p.fx, 0, p.cx, 0, 0, p.fy, p.cy, 0, 0, 0, 1, 0});
@@ -241,8 +235,10 @@ std::string in_chain(const char* name, const Camera& camera) {
     const Pinhole& p = camera.pinhole;
     const Distortion& d = camera.distortion;
     const bool fisheye_lens = d.model == LensModel::kannala_brandt;
-    if (!fisheye_lens && d.k3 != 0)
-        throw Error(fmt::format("Kalibr's radtan lens has no k3, and this camera's is {}; write another format", d.k3));
+    if (!fisheye_lens && (d.k3 != 0 || d.rational()))
+        throw Error(fmt::format("Kalibr's radtan lens has no k3 to k6, and this camera has them (k3 {:g}, k4 {:g}, k5 "
+                                "{:g}, k6 {:g}); write another format",
+                                d.k3, d.k4, d.k5, d.k6));
     auto k = coefficients(d);
     k.resize(4);
     return fmt::format(

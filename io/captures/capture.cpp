@@ -3,6 +3,7 @@
 #include "io/captures/capture.h"
 
 #include "io/captures/layouts.h"
+#include "io/captures/matroska/matroska.h"
 #include "io/captures/plausibility.h"
 #include "io/captures/ros/bag.h"
 #include "io/captures/trajectory.h"
@@ -109,6 +110,7 @@ constexpr std::array file_layouts = {
     FileLayout{"a stack of NumPy's .npy", is_npy_stack, list_npy_stack},
     FileLayout{"NumPy's .npz, Record3D's .r3d", is_zip, list_zip},
     FileLayout{"bags of ROS 1 and 2, MCAP", ros::is_bag, nullptr, list_ros},
+    FileLayout{"Azure Kinect's .mkv", matroska::is_matroska, list_azure_kinect},
 };
 
 /// Of a file with these first bytes; null where it holds no recording.

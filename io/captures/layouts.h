@@ -61,6 +61,8 @@ struct Listing {
                                const CaptureOptions& options);
 [[nodiscard]] std::optional<Listing> list_rosbag2_folder(const std::filesystem::path& folder,
                                                          const CaptureOptions& options);
+/// Matroska with a depth track; matroska::is_matroska() tells it. Throws NoFrames for ordinary videos.
+[[nodiscard]] Listing list_azure_kinect(const std::filesystem::path& file);
 /// (N,H,W) in an .npy file.
 [[nodiscard]] bool is_npy_stack(std::string_view start);
 [[nodiscard]] Listing list_npy_stack(const std::filesystem::path& file);

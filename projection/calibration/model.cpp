@@ -14,6 +14,8 @@ std::string_view name_of(Unknown unknown) {
                                                                    "p2",
                                                                    "k3",
                                                                    "k4",
+                                                                   "k5",
+                                                                   "k6",
                                                                    "depth scale",
                                                                    "depth offset",
                                                                    "depth curve",
@@ -40,13 +42,15 @@ Model model_of(const Camera& camera) {
     model[p2] = d.p2;
     model[k3] = d.k3;
     model[k4] = d.k4;
+    model[k5] = d.k5;
+    model[k6] = d.k6;
     model[depth_scale] = 1;
     return model;
 }
 
 Camera camera_of(const Model& m, std::string origin) {
     return {{m[f], m[f] * m[aspect], m[cx], m[cy], m.size},
-            {m[k1], m[k2], m[p1], m[p2], m[k3], m[k4], m.lens},
+            {m[k1], m[k2], m[p1], m[p2], m[k3], m[k4], m[k5], m[k6], m.lens},
             std::move(origin)};
 }
 

@@ -21,7 +21,9 @@ enum Unknown : int {
     p1,
     p2,
     k3,
-    k4, // the camera
+    k4,
+    k5,
+    k6, // the camera; k4 to k6 of a rational lens stay as they are
     depth_scale,
     depth_offset,
     depth_curve, // true depth = scale z + offset + curve z^2, metres
@@ -67,7 +69,8 @@ struct ParameterGroup {
     /// A number that the data may confuse with these: they must be significant while it is free, too.
     std::optional<Unknown> rival = {};
 };
-/// f, fx fy, cx cy, k1, k2, p1 p2, k3; for a fisheye f, fx fy, cx cy, k1, k2, k3, k4.
+/// f, fx fy, cx cy, k1, k2, p1 p2, k3; for a fisheye f, fx fy, cx cy, k1, k2, k3, k4. The denominator of a rational
+/// lens (k4, k5, k6) is in no group: it can hardly be told from the numerator.
 [[nodiscard]] std::vector<ParameterGroup> camera_groups(LensModel lens);
 /// The pose of the colour camera relative to the depth camera.
 [[nodiscard]] ParameterGroup extrinsics_group();
@@ -88,6 +91,8 @@ void pixel_of(LensModel lens, const Number* camera, const Number* point, Number*
     pixel[0] = camera[f] * x_bent + camera[cx];
     pixel[1] = camera[f] * camera[aspect] * y_bent + camera[cy];
 }
-static_assert(k2 == k1 + 1 && p1 == k1 + 2 && p2 == k1 + 3 && k3 == k1 + 4, "the order that distort() takes");
+static_assert(k2 == k1 + 1 && p1 == k1 + 2 && p2 == k1 + 3 && k3 == k1 + 4 && k4 == k1 + 5 && k5 == k1 + 6 &&
+                  k6 == k1 + 7,
+              "the order that distort() takes");
 
 } // namespace scanshade::calibration

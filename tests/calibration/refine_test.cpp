@@ -206,7 +206,8 @@ TEST(Boards, AutomaticDerivativesAgreeWithNumericOnes) {
     for (const LensModel lens : {LensModel::brown_conrady, LensModel::kannala_brandt}) {
         const ceres::AutoDiffCostFunction<Pixel, 2, camera_unknowns, 3> automatic(new Pixel{lens});
         const ceres::NumericDiffCostFunction<Pixel, ceres::CENTRAL, 2, camera_unknowns, 3> numeric(new Pixel{lens});
-        const double camera[camera_unknowns] = {530, 0.99, 322, 238, -0.2, 0.07, 0.002, -0.001, 0.03, -0.01};
+        const double camera[camera_unknowns] = {530,   0.99,   322,  238,   -0.2, 0.07,
+                                                0.002, -0.001, 0.03, -0.01, 0.02, 0.005};
         const double point[3] = {0.4, -0.3, 1.1};
         const double* parameters[] = {camera, point};
         double pixel[2], by_camera[2][2 * camera_unknowns], by_point[2][2 * 3];
@@ -219,6 +220,23 @@ TEST(Boards, AutomaticDerivativesAgreeWithNumericOnes) {
         for (int i = 0; i < 6; ++i)
             EXPECT_NEAR(by_point[0][i], by_point[1][i], 1e-5 * std::max(1.0, std::abs(by_point[0][i]))) << i;
     }
+}
+
+TEST(Boards, ARationalLensKeepsItsDenominator) {
+    const Camera truth{{531, 527, 327, 236, image}, {0.45, 0.02, 0.001, -0.0015, 0.001, 0.75, 0.12, 0.006}, "truth"};
+    Camera before = truth;
+    before.pinhole.fx *= 1.02;
+    before.pinhole.fy *= 1.02;
+    before.distortion.k1 += 0.01;
+    std::mt19937 random(5);
+    const std::vector<BoardView> views = boards_seen_by(truth, 15, 0.05, random);
+    Boards boards(views);
+    const Refinement result = refine(boards, before, camera_groups(before.distortion.model), {}, "");
+    EXPECT_NEAR(result.after.pinhole.fx, truth.pinhole.fx, 1);
+    EXPECT_EQ(result.after.distortion.k4, truth.distortion.k4);
+    EXPECT_EQ(result.after.distortion.k5, truth.distortion.k5);
+    EXPECT_EQ(result.after.distortion.k6, truth.distortion.k6);
+    EXPECT_LT(result.selection.train_px, 0.08);
 }
 
 // ---------------------------------------------------------------------------------------------------- degenerate views
@@ -260,7 +278,7 @@ TEST(Boards, TheRightCameraIsLeftUnchanged) {
 
 TEST(Boards, AFisheyeIsRecoveredWithItsOwnModel) {
     // 150 degrees across the diagonal: a polynomial in the tangent cannot model that, one in the angle can.
-    const Camera fisheye{{300, 300, 322, 241, image}, {0.05, 0, 0, 0, 0, 0, LensModel::kannala_brandt}, "fisheye"};
+    const Camera fisheye{{300, 300, 322, 241, image}, kannala_brandt({0.05}), "fisheye"};
     std::mt19937 random(8);
     Boards boards(boards_seen_by(fisheye, 14, 0.15, random));
     Camera first{{280, 280, 319.5, 239.5, image}, {}, "first"};

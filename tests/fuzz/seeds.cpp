@@ -224,6 +224,15 @@ void recordings() {
     seed("recording", "raw.lzfse", "\2bvx-" + raw(3U) + "abcbvx$");
     seed("recording", "lzvn.lzfse", "\2bvxn" + raw(15U) + raw(static_cast<std::uint32_t>(runs.size())) + runs + "bvx$");
     seed("recording", "depth.bin", "\1" + raw(4U) + "\x1f\7\7\1");
+    const std::string depth(16, '\5'), time("\xE7\x81\x07", 3),
+        block = "\xA3\x94\x82" + std::string("\0\1\x80", 3) + depth,
+        group = "\xA0\x96\xA1\x94\x82" + std::string("\0\2\0", 3) + depth;
+    seed("matroska", "sized", std::string(1, '\0') + "\x1F\x43\xB6\x75\xB1" + time + block + group);
+    seed("matroska", "unsized",
+         std::string(1, '\0') + "\x1F\x43\xB6\x75\xFF" + time + block + "\x1F\x43\xB6\x75\xFF" + time + group);
+    seed("matroska", "attached",
+         std::string(1, '\0') + "\x19\x41\xA4\x69\x9C\x61\xA7\x99\x46\x6E\x90" + "calibration.json" + "\x46\x5C\x82{}" +
+             "\x1F\x43\xB6\x75\x99" + time + block);
 }
 
 } // namespace

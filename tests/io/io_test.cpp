@@ -525,18 +525,19 @@ TEST(camera_files, every_format_comes_back_as_it_was_written) {
     const TemporaryFolder folder;
     const Pinhole pinhole{525.1234567890123, 524.9, 319.5, 239.25, {640, 480}};
     const Distortion none{}, brown{0.1, -0.2, 1e-4, 2e-5, 0.03}, four{0.1, -0.2, 1e-4, 2e-5, 0};
-    const Distortion fisheye{0.1, -0.2, 0, 0, 0.03, -0.004, LensModel::kannala_brandt};
+    const Distortion fisheye = kannala_brandt({0.1, -0.2, 0.03, -0.004});
+    const Distortion rational{0.4321, 0.0187, -8.9e-5, -5.2e-5, 0, 0.7718, 0.1184, 0.0064};
     struct Row {
         CameraFormat format;
         const char* name;
         std::vector<Distortion> lenses;
     };
-    for (const Row& row :
-         {Row{CameraFormat::scanshade, "a.json", {none, brown, fisheye}}, Row{CameraFormat::open3d, "b.json", {none}},
-          Row{CameraFormat::opencv, "c.yml", {none, brown, fisheye}},
-          Row{CameraFormat::ros, "d.yaml", {none, brown, fisheye}},
-          Row{CameraFormat::kalibr, "e.yaml", {none, four, fisheye}},
-          Row{CameraFormat::colmap, "f.txt", {none, four, brown, fisheye}}})
+    for (const Row& row : {Row{CameraFormat::scanshade, "a.json", {none, brown, rational, fisheye}},
+                           Row{CameraFormat::open3d, "b.json", {none}},
+                           Row{CameraFormat::opencv, "c.yml", {none, brown, rational, fisheye}},
+                           Row{CameraFormat::ros, "d.yaml", {none, brown, rational, fisheye}},
+                           Row{CameraFormat::kalibr, "e.yaml", {none, four, fisheye}},
+                           Row{CameraFormat::colmap, "f.txt", {none, four, brown, rational, fisheye}}})
         for (const Distortion& lens : row.lenses) {
             const fs::path file = folder / row.name;
             write_camera_file(file, {.camera = {pinhole, lens, ""}, .depth_units_per_metre = {}, .warnings = {}},
@@ -560,6 +561,9 @@ TEST(camera_files, what_a_format_cannot_say_is_refused_not_dropped) {
         says(refusal([&] { write_camera_file(folder / "a.json", bent, CameraFormat::open3d); }), "no lens distortion"));
     EXPECT_TRUE(says(refusal([&] { write_camera_file(folder / "a.yaml", bent, CameraFormat::kalibr); }), "k3"));
     EXPECT_FALSE(fs::exists(folder / "a.json"));
+    CameraFile rational = bent;
+    rational.camera.distortion = {.k1 = 0.1, .k6 = 0.2};
+    EXPECT_TRUE(says(refusal([&] { write_camera_file(folder / "a.yaml", rational, CameraFormat::kalibr); }), "k6 0.2"));
 }
 
 TEST(camera_files, yaml_and_colmap_of_the_wrong_shape_name_the_place) {
@@ -573,7 +577,9 @@ TEST(camera_files, yaml_and_colmap_of_the_wrong_shape_name_the_place) {
     EXPECT_TRUE(says(message("image_width: 640\n"), "\"camera_matrix\""));
     const std::string fine = "camera_matrix:\n  rows: 3\n  cols: 3\n  data: [5., 0., 1., 0., 5., 1., 0., 0., 1.]\n";
     EXPECT_TRUE(says(message(fine + "distortion_coefficients: [1., 2.]\n"), "has 2 numbers"));
-    EXPECT_TRUE(says(message(fine + "distortion_coefficients: [1., 0., 0., 0., 0., 2., 0., 0.]\n"), "rational"));
+    EXPECT_TRUE(says(message(fine + "distortion_coefficients: [1., 0., 0., 0., 0., 2., 0.]\n"), "4, 5 or 8"));
+    EXPECT_TRUE(says(message(fine + "distortion_coefficients: [1., 0., 0., 0., 0., 2., 0., 0., 3., 0., 0., 0.]\n"),
+                     "number 9 is 3: thin-prism"));
     EXPECT_TRUE(says(message("%YAML:1.0\n---\na: [1, 2\nb: 3\n"), "line"));
     EXPECT_TRUE(says(message("1 PINHOLE 640 480 500 500 320\n"), "line 1: PINHOLE has 3 numbers, expected 4"));
     EXPECT_TRUE(says(message("1 FOV 640 480 500 500 320 240 1\n"), "line 1: the camera model \"FOV\""));
@@ -616,7 +622,10 @@ TEST(camera_files, json_of_the_wrong_shape_names_the_key) {
     EXPECT_TRUE(says(message(R"({"fx": 1, "fy": 1, "cx": 1, "cy": "x", "width": 4, "height": 4})"), "\"cy\""));
     EXPECT_TRUE(says(message(R"({"fx": 1, "fy": 1, "cx": 1, "cy": 1, "width": 0, "height": 4})"), "\"width\""));
     EXPECT_TRUE(says(message(R"({"fx": 1, "fy": 1, "cx": 1, "cy": 1, "width": 4, "height": 4, "distortion": [1]})"),
-                     "\"distortion\""));
+                     "\"distortion\" has 1 number, expected 5"));
+    EXPECT_TRUE(says(message(R"({"fx": 1, "fy": 1, "cx": 1, "cy": 1, "width": 4, "height": 4,
+                                 "distortion": [1, 2, 3, 4, 5, 6, 7, "x"]})"),
+                     "\"distortion\" is"));
     EXPECT_TRUE(says(message(R"({"fx": 1e999, "fy": 1, "cx": 1, "cy": 1, "width": 4, "height": 4})"), "c.json"));
     EXPECT_TRUE(says(message("[1, 2]"), "object"));
     EXPECT_TRUE(says(message(""), "empty"));

@@ -456,8 +456,13 @@ TEST_P(Samples, are_read_as_their_truth_says) {
             EXPECT_FALSE(frame.colour.empty());
         }
         if (const Json& lens = truth["distortion"]; lens.is_object()) {
-            EXPECT_NEAR(frame.camera.distortion.k1, lens["k1"].get<double>(), 1e-9);
-            EXPECT_NEAR(frame.camera.distortion.p2, lens["p2"].get<double>(), 1e-9);
+            const Distortion& d = frame.camera.distortion;
+            EXPECT_NEAR(d.k1, lens["k1"].get<double>(), 1e-9);
+            EXPECT_NEAR(d.p2, lens["p2"].get<double>(), 1e-9);
+            for (const auto& [key, found] : {std::pair{"p1", d.p1}, {"k3", d.k3}, {"k4", d.k4}, {"k6", d.k6}})
+                if (lens.contains(key)) {
+                    EXPECT_NEAR(found, lens[key].get<double>(), 1e-9) << key;
+                }
         }
         if (const Json& colour = truth["colour_camera"]; colour.is_object()) {
             ASSERT_TRUE(frame.colour_camera);
@@ -481,7 +486,7 @@ INSTANTIATE_TEST_SUITE_P(of, Samples,
                                          "nyu-raw", "npy-folder", "scannet-sens", "ros1-bag", "ros1-bag-bz2",
                                          "ros1-bag-lz4", "ros2-db3", "mcap", "mcap-lz4", "mcap-zstd", "realsense-bag",
                                          "realsense-db3", "kitti-odometry", "nuscenes", "npz", "scannetpp-raw",
-                                         "scannetpp-raw-lz4", "record3d"),
+                                         "scannetpp-raw-lz4", "record3d", "azure-mkv"),
                          [](const auto& layout) {
                              std::string name = layout.param;
                              std::ranges::replace(name, '-', '_');

@@ -243,10 +243,12 @@ class Ros : public testing::TestWithParam<Container> {
         Fields image = fields().header(stamp_s, "colour_optical").add(12U).add(16U).add(std::string("rgb8"));
         return image.add(std::uint8_t(0)).add(48U).bytes(pixels).text();
     }
-    [[nodiscard]] static std::string camera(cv::Size size, double fx, const std::string& frame) {
-        Fields info = fields().header(0.5, frame).add(size.height).add(size.width).add(std::string("plumb_bob"));
-        info.add(5U);
-        for (const double k : {0.1, 0.0, 0.0, 0.0, 0.0})
+    [[nodiscard]] static std::string camera(cv::Size size, double fx, const std::string& frame,
+                                            const std::string& model = "plumb_bob",
+                                            const std::vector<double>& lens = {0.1, 0, 0, 0, 0}) {
+        Fields info = fields().header(0.5, frame).add(size.height).add(size.width).add(model);
+        info.add(static_cast<std::uint32_t>(lens.size()));
+        for (const double k : lens)
             info.add(k);
         for (const double k : {fx, 0.0, 3.5, 0.0, 11.0, 2.5, 0.0, 0.0, 1.0})
             info.add(k);
@@ -335,6 +337,21 @@ TEST_P(Ros, floats_are_metres_and_images_without_times_take_the_recorders) {
     EXPECT_EQ(capture.load(0).depth_m(1, 1), 3);
     EXPECT_EQ(capture.entries[0].stamp_s, 4);
     EXPECT_TRUE(warned(capture.warnings, "no header has a time"));
+}
+
+TEST_P(Ros, rational_lenses_have_eight_numbers) {
+    const auto opened = [&](const std::vector<double>& lens) {
+        return open_capture(
+            recording({{"/depth/image", image_type, 4, depth(1)},
+                       {"/depth/camera_info", info_type, 4, camera({8, 6}, 10, "x", "rational_polynomial", lens)}}));
+    };
+    const Capture capture = opened({0.4, 0.02, 0.001, -0.002, 0.003, 0.7, 0.1, 0.006});
+    ASSERT_TRUE(capture.camera);
+    EXPECT_EQ(capture.camera->distortion, (Distortion{0.4, 0.02, 0.001, -0.002, 0.003, 0.7, 0.1, 0.006}));
+    EXPECT_TRUE(says(refusal([&] {
+                         (void)opened({0.4, 0, 0, 0, 0, 0.7, 0.1, 0.006, 0.5, 0, 0, 0});
+                     }),
+                     "\"rational_polynomial\" with 12 coefficients"));
 }
 
 /// RVL's groups of 4 bits, from the top of each word.

@@ -145,6 +145,23 @@ TEST_F(LibraryTest, points_are_darker_in_a_corner) {
     EXPECT_GT(result.normals()(floor(60, 50))[2], 0.99F); // towards the scanner
 }
 
+TEST_F(LibraryTest, a_lens_goes_in_with_all_its_numbers) {
+    const Camera rational{525, 525, 319.5, 239.5, {}, false, {0.43, 0.02, 0, 0, 0.001, 0.77, 0.12, 0.006}};
+    EXPECT_EQ(rational.to_c().lens, SCANSHADE_RATIONAL);
+    const Camera back = Camera::from_c(rational.to_c());
+    EXPECT_TRUE(std::equal(std::begin(back.distortion), std::end(back.distortion), rational.distortion));
+    Camera polynomial = rational;
+    std::fill(polynomial.distortion + 5, polynomial.distortion + 8, 0.0);
+    EXPECT_EQ(polynomial.to_c().lens, SCANSHADE_BROWN);
+    const Session session({{"depth-noise", "none"}});
+    const cv::Mat1f with = session.compute(corner(), rational).visibility(),
+                    without = session.compute(corner(), polynomial).visibility();
+    EXPECT_GT(cv::countNonZero(with != without), 1000) << "the denominator is used";
+    scanshade_camera odd = rational.to_c();
+    odd.denominator[2] = INFINITY;
+    EXPECT_THROW((void)session.compute(corner(), Camera::from_c(odd)), scanshade::Error);
+}
+
 TEST_F(LibraryTest, mistakes_get_the_programs_own_sentence) {
     EXPECT_EQ(why({{"radiuss", "1"}}), "--radiuss: no such flag; did you mean --radius?");
     EXPECT_EQ(why({{"out", "x"}}), "--out: is a setting of the program, not of a session");

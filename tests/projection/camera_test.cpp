@@ -8,6 +8,7 @@
 #include "tests/support/scenes.h"
 
 #include <gtest/gtest.h>
+#include <opencv2/calib3d.hpp>
 #include <random>
 #include <thread>
 
@@ -119,7 +120,7 @@ TEST(Camera, RecordedPixelsFindTheUndistortedPixelThatShowsThem) {
 }
 
 TEST(Camera, AFisheyeBendsAnglesAndIsUndoneUpToItsEdge) {
-    const Distortion fisheye{0.05, -0.01, 0, 0, 0.002, -0.0003, LensModel::kannala_brandt};
+    const Distortion fisheye = kannala_brandt({0.05, -0.01, 0.002, -0.0003});
     // By hand at 45 degrees: theta = pi / 4, theta^2 = 0.61685; theta (1 + 0.05 t - 0.01 t^2 + 0.002 t^3 - 0.0003 t^4).
     const double t = CV_PI * CV_PI / 16;
     const double bent = CV_PI / 4 * (1 + t * (0.05 + t * (-0.01 + t * (0.002 + t * -0.0003))));
@@ -134,6 +135,118 @@ TEST(Camera, AFisheyeBendsAnglesAndIsUndoneUpToItsEdge) {
             EXPECT_LT((*back - straight).norm(), 1e-8 * (1 + r * r)) << degrees;
         }
     EXPECT_FALSE(undistorted(fisheye, {1.7, 0})); // 1.7 rad is behind a pinhole's image
+}
+
+// Azure Kinect's depth camera, a colour camera of it (k4 .. k6 without sign in common), a wide lens by OpenCV.
+const Distortion rational_lenses[] = {
+    {0.4321, 0.0187, -0.0000893, -0.0000521, 0.00098, 0.7718, 0.1184, 0.0064},
+    {0.5142, -2.6613, 0.0007, -0.0002, 1.5243, 0.3967, -2.4834, 1.4516},
+    {5.83, 3.89, 0.0002, -0.0004, 0.21, 6.15, 5.38, 1.02},
+};
+
+TEST(Camera, ARationalLensIsOpenCvsBothWays) {
+    const cv::Matx33d k(525, 0, 310.5, 0, 520, 245.25, 0, 0, 1);
+    for (const Distortion& lens : rational_lenses) {
+        const std::vector<double> eight = coefficients(lens);
+        ASSERT_EQ(eight.size(), 8U);
+        const double edge = std::min(1.2, 0.95 * std::sqrt(fold_r2(lens)));
+        std::vector<cv::Point3d> points;
+        for (double x = -edge; x <= edge; x += edge / 12)
+            for (double y = -edge; y <= edge; y += edge / 12)
+                if (std::hypot(x, y) < edge)
+                    points.emplace_back(3 * x, 3 * y, 3);
+        std::vector<cv::Point2d> pixels;
+        cv::projectPoints(points, cv::Vec3d(), cv::Vec3d(), k, eight, pixels);
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            const Eigen::Vector2d straight(points[i].x / 3, points[i].y / 3), bent = distorted(lens, straight);
+            EXPECT_NEAR(525 * bent.x() + 310.5, pixels[i].x, 1e-9);
+            EXPECT_NEAR(520 * bent.y() + 245.25, pixels[i].y, 1e-9);
+            const auto back = undistorted(lens, bent);
+            ASSERT_TRUE(back) << straight.transpose();
+            EXPECT_LT((*back - straight).norm(), 1e-7) << straight.transpose();
+        }
+        // OpenCV's fixed-point iteration, where it converges: in the inner half.
+        std::vector<cv::Point2d> straight;
+        cv::undistortPoints(pixels, straight, k, eight, cv::noArray(), cv::noArray(),
+                            cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 200, 1e-12));
+        for (std::size_t i = 0; i < points.size(); ++i)
+            if (std::hypot(points[i].x, points[i].y) < 3 * edge / 2) {
+                const Eigen::Vector2d bent((pixels[i].x - 310.5) / 525, (pixels[i].y - 245.25) / 520);
+                const auto found = undistorted(lens, bent);
+                ASSERT_TRUE(found);
+                EXPECT_NEAR(found->x(), straight[i].x, 1e-7);
+                EXPECT_NEAR(found->y(), straight[i].y, 1e-7);
+            }
+    }
+}
+
+TEST(Camera, WithoutADenominatorARationalLensIsThePolynomialToTheBit) {
+    for (const Distortion& lens : lenses) {
+        const double x = 0.31, y = -0.27, r2 = x * x + y * y;
+        const double radial = 1 + r2 * (lens.k1 + r2 * (lens.k2 + r2 * lens.k3));
+        const Eigen::Vector2d bent = distorted(lens, {x, y});
+        EXPECT_EQ(bent.x(), x * radial + 2 * lens.p1 * x * y + lens.p2 * (r2 + 2 * x * x));
+        EXPECT_FALSE(lens.rational());
+        EXPECT_EQ(coefficients(lens).size(), 5U);
+        EXPECT_EQ(brown_conrady(coefficients(lens)), lens);
+    }
+    for (const Distortion& lens : rational_lenses)
+        EXPECT_EQ(brown_conrady(coefficients(lens)), lens);
+    const Distortion lower{.k5 = 0.1};
+    EXPECT_TRUE(lower.any());
+    EXPECT_TRUE(lower.rational());
+}
+
+TEST(Camera, ARationalLensEndsWhereItFoldsOrHasAPole) {
+    // r / (1 + r^2) grows up to r = 1, where it is 1/2.
+    const Distortion folding{.k4 = 1};
+    EXPECT_NEAR(fold_r2(folding), 1, 1e-12);
+    EXPECT_TRUE(undistorted(folding, {0.499, 0}));
+    EXPECT_FALSE(undistorted(folding, {0.501, 0}));
+    // r / (1 - r^2 / 4) grows without bound towards r = 2: every pixel sees a direction before it.
+    const Distortion pole{.k4 = -0.25};
+    EXPECT_NEAR(fold_r2(pole), 4, 1e-12);
+    const auto far = undistorted(pole, {100, 0});
+    ASSERT_TRUE(far);
+    EXPECT_NEAR(far->x() / (1 - far->x() * far->x() / 4), 100, 1e-6);
+    EXPECT_LT(far->x(), 2);
+    // Numerator and denominator alike: no lens, up to the sign change of both, where a quotient has no value.
+    EXPECT_NEAR(fold_r2({.k1 = -0.5, .k4 = -0.5}), 2, 1e-6);
+    // Azure's wide modes see 60 degrees off the axis.
+    EXPECT_GT(fold_r2(rational_lenses[0]), 3);
+    for (const Distortion& lens : rational_lenses) {
+        const double end = std::min(fold_r2(lens), 100.0);
+        double last = 0;
+        for (double r = 0.01; r * r < end; r += 0.01) {
+            const double bent = distorted({lens.k1, lens.k2, 0, 0, lens.k3, lens.k4, lens.k5, lens.k6}, {r, 0}).x();
+            EXPECT_GT(bent, last) << "grows up to its fold, at " << r << " of " << std::sqrt(end);
+            last = bent;
+        }
+        const double beyond = std::sqrt(end) + 1e-3;
+        if (end < 100) {
+            EXPECT_LT(distorted({lens.k1, lens.k2, 0, 0, lens.k3, lens.k4, lens.k5, lens.k6}, {beyond + 1e-3, 0}).x(),
+                      distorted({lens.k1, lens.k2, 0, 0, lens.k3, lens.k4, lens.k5, lens.k6}, {beyond, 0}).x());
+        }
+    }
+}
+
+TEST(Camera, ARationalLensMapsWholeImages) {
+    const Camera camera{{252, 252, 255.5, 255.5, {512, 512}}, rational_lenses[0], "Azure Kinect, wide"};
+    const Undistortion maps(camera);
+    std::vector<double> eight = coefficients(camera.distortion);
+    const cv::Matx33d k(252, 0, 255.5, 0, 252, 255.5, 0, 0, 1);
+    cv::Mat1f map_x, map_y;
+    cv::initUndistortRectifyMap(k, eight, cv::noArray(), k, {512, 512}, CV_32FC1, map_x, map_y);
+    for (int v = 0; v < 512; v += 5)
+        for (int u = 0; u < 512; u += 5)
+            if (const cv::Vec2f at = maps.recorded_at()(v, u); !std::isnan(at[0])) {
+                EXPECT_NEAR(at[0], map_x(v, u), 1e-3);
+                EXPECT_NEAR(at[1], map_y(v, u), 1e-3);
+            }
+    EXPECT_NE(Undistortion::of(camera), Undistortion::of({camera.pinhole, {.k1 = 0.4321}, ""}));
+    Camera other = camera;
+    other.distortion.k6 += 1e-3;
+    EXPECT_NE(Undistortion::of(camera), Undistortion::of(other)) << "all numbers tell lenses apart";
 }
 
 TEST(Camera, ThreadsShareOneCamerasMaps) {

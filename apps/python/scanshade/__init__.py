@@ -51,10 +51,12 @@ def _camera(K: Any, distortion: Optional[Sequence[float]], fisheye: bool) -> _c.
     else:
         raise Error(f"K: shape {matrix.shape} given, expected (3, 3), or (4,): fx, fy, cx, cy")
     bends = [float(value) for value in (() if distortion is None else distortion)]
-    if len(bends) > (4 if fisheye else 5):
-        raise Error(f"distortion: {len(bends)} numbers given, expected k1, k2, {'k3, k4' if fisheye else 'p1, p2, k3'}")
-    camera = _c.Camera(fx=fx, fy=fy, cx=cx, cy=cy, lens=int(fisheye))
-    camera.distortion[: len(bends)] = bends
+    if len(bends) > (4 if fisheye else 8):
+        names = "k3, k4" if fisheye else "p1, p2, k3, k4, k5, k6"
+        raise Error(f"distortion: {len(bends)} numbers given, expected k1, k2, {names}")
+    camera = _c.Camera(fx=fx, fy=fy, cx=cx, cy=cy, lens=1 if fisheye else 2 if len(bends) > 5 else 0)
+    camera.distortion[: len(bends[:5])] = bends[:5]
+    camera.denominator[: len(bends[5:])] = bends[5:]
     return camera
 
 
@@ -175,7 +177,7 @@ class Session:
         K:           (3, 3) intrinsics, or fx, fy, cx, cy; None for a frame
         depth_scale: units per metre, or mm, tum, sun, nyu, m; default millimetres of uint16, metres of float32
         poses:       (N, 4, 4) world_from_camera, for the setting sequence="on"; a pose with a NaN is none
-        distortion:  k1, k2, p1, p2, k3; of a fisheye k1, k2, k3, k4
+        distortion:  k1, k2, p1, p2, k3, maybe k4, k5, k6; of a fisheye k1, k2, k3, k4
         """
         outputs, out = _outputs(confidence, normals), ("result_free",)
         if isinstance(depth, Frame):
@@ -309,7 +311,7 @@ class Frame:
     depth:             (H, W) float32 metres, 0 = hole
     points:            (N, 3), or (H, W, 3) of an organised cloud, float64, NaN = invalid
     colour:            (H, W, 3) uint8 red, green, blue, or one per point
-    K, distortion:     (3, 3) intrinsics and the lens: k1, k2, p1, p2, k3, or four of a fisheye
+    K, distortion:     (3, 3) intrinsics and the lens: k1, k2, p1, p2, k3, maybe k4, k5, k6, or four of a fisheye
     world_from_camera: (4, 4) float64
     """
 
@@ -331,8 +333,9 @@ class Frame:
         self.fisheye = False
         if data.camera:
             camera = data.camera.contents
-            self.K, self.fisheye = _matrix(camera), bool(camera.lens)
-            self.distortion = np.array(camera.distortion[: 4 if self.fisheye else 5])
+            self.K, self.fisheye = _matrix(camera), camera.lens == 1
+            denominator = camera.denominator[:] if camera.lens == 2 else []
+            self.distortion = np.array(camera.distortion[: 4 if self.fisheye else 5] + denominator)
         self.world_from_camera = _view(data.world_from_camera, (4, 4), np.float64, handle)
 
 

@@ -37,6 +37,7 @@ class Camera(Sized):
         *[(name, c.c_double) for name in ("fx", "fy", "cx", "cy")],
         *[(name, c.c_int32) for name in ("width", "height", "lens")],
         ("distortion", c.c_double * 5),
+        ("denominator", c.c_double * 3),
     ]
 
 

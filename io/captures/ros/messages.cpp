@@ -300,22 +300,17 @@ std::optional<Camera> camera_of(const CameraInfo& info, bool rectified, cv::Size
     const std::vector<double>& d = info.lens;
     if (by_projection || std::ranges::all_of(d, [](double v) { return v == 0; }))
         return camera;
-    const auto coefficient = [&](std::size_t i) { return i < d.size() ? d[i] : 0; };
     if (info.model == "equidistant" || info.model == "fisheye" || info.model == "Kannala Brandt4") {
-        camera.distortion = {.k1 = coefficient(0),
-                             .k2 = coefficient(1),
-                             .k3 = coefficient(2),
-                             .k4 = coefficient(3),
-                             .model = LensModel::kannala_brandt};
+        camera.distortion = kannala_brandt(d);
         return camera;
     }
-    const bool rational =
-        std::any_of(d.begin() + std::min<std::ptrdiff_t>(5, std::ssize(d)), d.end(), [](double v) { return v != 0; });
-    if (rational || info.model == "Ftheta" || d.size() < 4)
+    // Whatever the model's name, OpenCV's eight numbers are OpenCV's model; behind them are thin prisms and tilts.
+    const bool more =
+        std::any_of(d.begin() + std::min<std::ptrdiff_t>(8, std::ssize(d)), d.end(), [](double v) { return v != 0; });
+    if (more || info.model == "Ftheta" || d.size() < 4)
         throw Error(fmt::format("a lens of the model {} with {}, which is not known; give --camera",
                                 in_quotes(info.model), counted(d.size(), "coefficient")));
-    camera.distortion = {
-        .k1 = coefficient(0), .k2 = coefficient(1), .p1 = coefficient(2), .p2 = coefficient(3), .k3 = coefficient(4)};
+    camera.distortion = brown_conrady(d);
     return camera;
 }
 

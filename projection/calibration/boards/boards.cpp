@@ -53,8 +53,9 @@ void guess_pose(const Model& model, const BoardView& view, double* pose) {
         cv::fisheye::undistortPoints(observed, undistorted_pixels, matrix,
                                      cv::Vec4d(model[k1], model[k2], model[k3], model[k4]));
     else
-        cv::undistortPoints(observed, undistorted_pixels, matrix,
-                            cv::Vec<double, 5>(model[k1], model[k2], model[p1], model[p2], model[k3]));
+        cv::undistortPoints(
+            observed, undistorted_pixels, matrix,
+            cv::Vec<double, 8>(model[k1], model[k2], model[p1], model[p2], model[k3], model[k4], model[k5], model[k6]));
     cv::Vec3d rotation, translation;
     cv::solvePnP(points, undistorted_pixels, cv::Matx33d::eye(), cv::noArray(), rotation, translation, false,
                  cv::SOLVEPNP_ITERATIVE);

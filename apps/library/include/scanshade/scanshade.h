@@ -91,8 +91,9 @@ SCANSHADE_API const char* scanshade_session_settings(const scanshade_session* se
 /* ------------------------------------------------------------------------------------------------------ input */
 
 typedef enum scanshade_lens {
-    SCANSHADE_BROWN = 0,  /* k1, k2, p1, p2, k3 (Brown 1966, as in OpenCV); all zero = none */
-    SCANSHADE_FISHEYE = 1 /* k1, k2, k3, k4 (Kannala and Brandt 2006; OpenCV's fisheye) */
+    SCANSHADE_BROWN = 0,   /* k1, k2, p1, p2, k3 (Brown 1966, as in OpenCV); all zero = none */
+    SCANSHADE_FISHEYE = 1, /* k1, k2, k3, k4 (Kannala and Brandt 2006; OpenCV's fisheye) */
+    SCANSHADE_RATIONAL = 2 /* SCANSHADE_BROWN with k4, k5, k6 in `denominator` (OpenCV's 8 numbers; Azure Kinect) */
 } scanshade_lens;
 
 /* A camera, in pixels. */
@@ -102,10 +103,11 @@ typedef struct scanshade_camera {
     int32_t width, height; /* 0 = those of the depth image */
     int32_t lens;          /* scanshade_lens */
     double distortion[5];
+    double denominator[3]; /* of SCANSHADE_RATIONAL */
 } scanshade_camera;
 #define SCANSHADE_CAMERA_INIT                                                                                          \
     {                                                                                                                  \
-        sizeof(scanshade_camera), 0, 0, 0, 0, 0, 0, 0, { 0, 0, 0, 0, 0 }                                               \
+        sizeof(scanshade_camera), 0, 0, 0, 0, 0, 0, 0, {0, 0, 0, 0, 0}, { 0, 0, 0 }                                    \
     }
 
 typedef enum scanshade_type { SCANSHADE_UINT16 = 1, SCANSHADE_FLOAT32 = 2, SCANSHADE_FLOAT64 = 3 } scanshade_type;

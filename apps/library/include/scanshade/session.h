@@ -23,22 +23,27 @@ using Settings = std::vector<std::pair<std::string, std::string>>;
 struct Camera {
     double fx = 0, fy = 0, cx = 0, cy = 0;
     cv::Size size = {};   ///< 0x0 = that of the depth image
-    bool fisheye = false; ///< distortion is k1, k2, k3, k4, else k1, k2, p1, p2, k3
-    double distortion[5] = {0, 0, 0, 0, 0};
+    bool fisheye = false; ///< distortion is k1, k2, k3, k4, else k1, k2, p1, p2, k3, k4, k5, k6
+    double distortion[8] = {0, 0, 0, 0, 0, 0, 0, 0};
 
     [[nodiscard]] scanshade_camera to_c() const {
         scanshade_camera c = SCANSHADE_CAMERA_INIT;
         c.fx = fx, c.fy = fy, c.cx = cx, c.cy = cy;
         c.width = size.width, c.height = size.height;
-        c.lens = fisheye ? SCANSHADE_FISHEYE : SCANSHADE_BROWN;
+        const bool rational = !fisheye && (distortion[5] != 0 || distortion[6] != 0 || distortion[7] != 0);
+        c.lens = fisheye ? SCANSHADE_FISHEYE : rational ? SCANSHADE_RATIONAL : SCANSHADE_BROWN;
         for (int i = 0; i < 5; ++i)
             c.distortion[i] = distortion[i];
+        for (int i = 0; i < 3 && rational; ++i)
+            c.denominator[i] = distortion[5 + i];
         return c;
     }
     [[nodiscard]] static Camera from_c(const scanshade_camera& c) {
         Camera camera{c.fx, c.fy, c.cx, c.cy, {c.width, c.height}, c.lens == SCANSHADE_FISHEYE, {}};
         for (int i = 0; i < 5; ++i)
             camera.distortion[i] = c.distortion[i];
+        for (int i = 0; i < 3 && c.lens == SCANSHADE_RATIONAL; ++i)
+            camera.distortion[5 + i] = c.denominator[i];
         return camera;
     }
 };
