@@ -1,6 +1,7 @@
 #include "apps/help.h"
 
 #include "apps/json.h"
+#include "io/captures/formats.h"
 #include "projection/base/error.h"
 #include "projection/base/nearest_word.h"
 
@@ -77,6 +78,25 @@ std::vector<Stage> first_page(std::vector<Stage> stages) {
     return stages;
 }
 
+/// Without Markdown's marks of code.
+std::string plain(std::string text) {
+    std::erase(text, '`');
+    return text;
+}
+
+/// "recognised by ...; 16-bit PNG; camera: ...", of what there is.
+std::string facts_of(const Format& format) {
+    std::vector<std::string> facts{format.recognised};
+    if (!format.extensions.empty())
+        facts.push_back(fmt::format("{}", fmt::join(format.extensions, " ")));
+    if (!format.content.empty())
+        facts.push_back(format.content);
+    if (!format.camera.empty())
+        facts.push_back("camera: " + format.camera);
+    facts.emplace_back(format.read && format.written ? "read and written" : format.read ? "read" : "written");
+    return plain(fmt::format("{}", fmt::join(facts, " | ")));
+}
+
 /// What a value is, as in `help --json`.
 const char* kind_of(const Parameter& row) {
     if (is_switch(row))
@@ -100,6 +120,19 @@ json flag_json(const Stage& stage, const Parameter& row) {
     if (row.writes != Writes::nothing)
         flag["writes"] = row.writes == Writes::file ? "file" : "folder";
     return flag;
+}
+
+json format_json(const Format& format) {
+    json about{{"kind", name_of(format.kind)},
+               {"name", format.name},
+               {"recognised", plain(format.recognised)},
+               {"extensions", format.extensions},
+               {"content", plain(format.content)},
+               {"read", format.read},
+               {"written", format.written}};
+    if (!format.camera.empty())
+        about["camera"] = plain(format.camera);
+    return about;
 }
 
 json command_json(const CommandRow& row) {
@@ -131,7 +164,8 @@ void print_overview(std::span<const CommandRow> commands) {
     for (const CommandRow& row : commands)
         fmt::print("  scanshade {:<14} {}\n", row.name, row.summary);
     fmt::print("  scanshade {:<14} {}\n  scanshade {:<14} {}\n", "help",
-               "this, or the flags of one command: help COMMAND", "--version", "the version");
+               "this, or the flags of one command: help COMMAND; help formats: what is read and written", "--version",
+               "the version");
     fmt::print("\n");
     for (const auto& [code, meaning] : exit_codes)
         fmt::print("{} {} {}\n", code == all_well ? "Exit code:" : "          ", static_cast<int>(code), meaning);
@@ -167,11 +201,30 @@ void print_help(const CommandRow& row, const std::string& topic) {
     }
 }
 
+void print_formats(bool as_markdown) {
+    if (as_markdown) {
+        fmt::print("{}\n{}", formats_in_short(), formats_in_full());
+        return;
+    }
+    const std::vector<Format> all = formats();
+    std::size_t longest = 0;
+    for (const Format& format : all)
+        longest = std::max(longest, format.name.size());
+    for (auto format = all.begin(); format != all.end(); ++format) {
+        if (format == all.begin() || format->kind != std::prev(format)->kind)
+            fmt::print("{}{}:\n", format == all.begin() ? "" : "\n", name_of(format->kind));
+        print_entry(format->name, longest, facts_of(*format));
+    }
+}
+
 void print_json(std::span<const CommandRow> commands) {
     json all{{"program", "scanshade"}, {"version", SCANSHADE_VERSION}, {"summary", program_summary}};
     all["commands"] = json::array();
     for (const CommandRow& row : commands)
         all["commands"].push_back(command_json(row));
+    all["formats"] = json::array();
+    for (const Format& format : formats())
+        all["formats"].push_back(format_json(format));
     all["exit_codes"] = json::array();
     for (const auto& [code, meaning] : exit_codes)
         all["exit_codes"].push_back({{"code", static_cast<int>(code)}, {"meaning", meaning}});

@@ -18,7 +18,9 @@ namespace scanshade {
 void print_overview(std::span<const CommandRow> commands);
 /// `topic`: empty, "all", or that of a stage. Throws Misuse for any other.
 void print_help(const CommandRow& row, const std::string& topic);
-/// All commands, words, flags and exit codes as one JSON document; man pages and completions are made of it.
+/// All formats that are read and written, as tables; as Markdown, those of the READMEs.
+void print_formats(bool as_markdown);
+/// All commands, words, flags, formats and exit codes as one JSON document; man pages and completions are made of it.
 void print_json(std::span<const CommandRow> commands);
 
 } // namespace scanshade

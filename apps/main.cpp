@@ -155,6 +155,8 @@ int execute(const std::vector<std::string>& arguments) {
     if (asks_for_help(name)) {
         if (arguments.size() > 1 && arguments[1] == "--json")
             print_json(commands);
+        else if (arguments.size() > 1 && arguments[1] == "formats")
+            print_formats(arguments.size() > 2 && arguments[2] == "--markdown");
         else if (arguments.size() > 1)
             print_help(command_named(arguments[1]), arguments.size() > 2 ? arguments[2] : "");
         else

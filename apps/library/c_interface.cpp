@@ -4,6 +4,7 @@
 #include "apps/library/session.h"
 #include "apps/refine/report.h"
 #include "io/cameras/camera_formats.h"
+#include "io/captures/formats.h"
 #include "io/captures/plausibility.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
@@ -254,7 +255,7 @@ class DepthFrames {
                                    depth_.depth_scale ? "--depth-scale" : "assumed");
         encoding_.stated = depth_.depth_scale != nullptr;
         camera_ = camera_from(depth_.camera, size());
-        listing_.kind = "depth image";
+        listing_.kind = name_of(FormatKind::depth_image);
         listing_.camera = camera_;
         for (std::int64_t i = 0; i < depth_.count; ++i) {
             CaptureEntry& entry = listing_.entries.emplace_back();

@@ -25,8 +25,11 @@ constexpr std::array cloud_words{Named{"auto", CloudWalk::automatic}, Named{"poi
                                  Named{"view", CloudWalk::view}};
 constexpr std::array sequence_words{Named{"off", SequenceUse::off}, Named{"on", SequenceUse::on},
                                     Named{"auto", SequenceUse::automatic}};
-constexpr std::array format_words{Named{"png16", AoFormat::png16}, Named{"png8", AoFormat::png8},
-                                  Named{"tiff", AoFormat::tiff}, Named{"exr", AoFormat::exr}};
+constexpr auto format_words = [] {
+    std::array<Named<AoFormat>, ao_formats.size()> words{};
+    std::ranges::transform(ao_formats, words.begin(), [](const auto& row) { return Named{row.name, row.format}; });
+    return words;
+}();
 constexpr std::array view_words{Named{"depth", false}, Named{"colour", true}};
 constexpr std::array colour_words{Named{"kept", CloudColours::kept}, Named{"shaded", CloudColours::shaded},
                                   Named{"grey", CloudColours::grey}};

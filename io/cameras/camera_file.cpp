@@ -5,6 +5,7 @@
 #include "io/text.h"
 #include "projection/base/error.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
@@ -46,38 +47,101 @@ namespace {
 
 constexpr std::size_t largest_file = 1 << 20; // a camera is a page of text; larger files are given by mistake
 
-struct FormatRow {
-    const char* name;
-    CameraFormat format;
-    const char* extension; ///< the first row of an extension is what it means without --format
-};
-constexpr FormatRow formats[] = {
-    {"scanshade", CameraFormat::scanshade, ".json"}, {"open3d", CameraFormat::open3d, ".json"},
-    {"opencv", CameraFormat::opencv, ".yml"},        {"ros", CameraFormat::ros, ".yaml"},
-    {"kalibr", CameraFormat::kalibr, ".yaml"},       {"colmap", CameraFormat::colmap, ".txt"}};
-
-/// YAML has keys at the start of lines. A file with such a key that is not JSON counts as YAML.
-bool is_yaml(const std::string& bytes) {
-    if (bytes.starts_with("%YAML") || bytes.starts_with("---"))
-        return true;
-    for (const char* key : {"camera_matrix:", "cam0:", "image_width:", "distortion_model:"})
-        if (bytes.find(key) != std::string::npos)
-            return true;
-    return false;
+/// The first character that is not white space; 0 in none.
+char first_in(const CameraText& text) {
+    const auto first = text.bytes.find_first_not_of("\xEF\xBB\xBF \t\r\n");
+    return first == std::string::npos ? '\0' : text.bytes[first];
 }
+bool is_json(const CameraText& text) { return first_in(text) == '{' || first_in(text) == '['; }
+bool is_xml(const CameraText& text) { return first_in(text) == '<'; }
+/// YAML has keys at the start of lines. A file with such a key that is not JSON counts as YAML.
+bool is_yaml(const CameraText& text) {
+    if (text.bytes.starts_with("%YAML") || text.bytes.starts_with("---"))
+        return true;
+    return std::ranges::any_of(std::array{"camera_matrix:", "cam0:", "image_width:", "distortion_model:"},
+                               [&](const char* key) { return text.bytes.find(key) != std::string::npos; });
+}
+bool is_info(const CameraText& text) { return text.bytes.find("m_calibration") != std::string::npos; }
+bool is_cameras_txt(const CameraText& text) { return is_colmap(text.lines); }
+bool is_anything(const CameraText&) { return true; }
+
+CameraFile read_json(const CameraText& text) { return camera_from_json(text.file, text.bytes); }
+CameraFile read_xml(const CameraText& text) { return camera_from_xml(text.file, text.bytes); }
+CameraFile read_yaml(const CameraText& text) { return camera_from_yaml(text.file, text.bytes); }
+CameraFile read_info(const CameraText& text) { return camera_from_info(text.file, text.lines); }
+CameraFile read_colmap(const CameraText& text) { return camera_from_colmap(text.file, text.lines); }
+CameraFile read_matrix(const CameraText& text) { return camera_from_matrix(text.file, text.lines); }
+
+using Quality = CameraQuality;
+constexpr CameraFormatRow formats[] = {
+    {.name = "scanshade",
+     .recognised = "JSON with `fx`",
+     .content = "lens, fisheye, depth unit and correction, registration, a colour camera",
+     .is = is_json,
+     .read = read_json,
+     .extension = ".json",
+     .format = CameraFormat::scanshade,
+     .written = [](const CameraFile& file, const Quality& quality) { return camera_as_json(file, quality.details); }},
+    {.name = "open3d",
+     .recognised = "JSON with `intrinsic_matrix`",
+     .content = "a pinhole",
+     .is = is_json,
+     .read = read_json,
+     .extension = ".json",
+     .format = CameraFormat::open3d,
+     .written = [](const CameraFile& file, const Quality&) { return camera_as_open3d(file.camera); }},
+    {.name = "pcl",
+     .recognised = "XML",
+     .content = "a pinhole and the depth unit, beside `.pclzf`",
+     .is = is_xml,
+     .read = read_xml},
+    {.name = "opencv",
+     .recognised = "YAML with `camera_matrix` and `distortion_coefficients`",
+     .content = "lens, fisheye",
+     .is = is_yaml,
+     .read = read_yaml,
+     .extension = ".yml",
+     .format = CameraFormat::opencv,
+     .written = [](const CameraFile& file, const Quality& quality) { return camera_as_opencv(file.camera, quality); }},
+    {.name = "ros",
+     .recognised = "YAML with `distortion_model`",
+     .content = "lens (plumb_bob), fisheye (equidistant)",
+     .is = is_yaml,
+     .read = read_yaml,
+     .extension = ".yaml",
+     .format = CameraFormat::ros,
+     .written = [](const CameraFile& file, const Quality&) { return camera_as_ros(file.camera); }},
+    {.name = "kalibr",
+     .recognised = "YAML with `cam0`",
+     .content = "lens (radtan), fisheye (equidistant); `cam1` as the colour camera",
+     .is = is_yaml,
+     .read = read_yaml,
+     .extension = ".yaml",
+     .format = CameraFormat::kalibr,
+     .written = [](const CameraFile& file, const Quality&) { return camera_as_kalibr(file); }},
+    {.name = "bundlefusion",
+     .recognised = "lines with `m_calibration`",
+     .content = "a pinhole, in `info.txt`",
+     .is = is_info,
+     .read = read_info},
+    {.name = "colmap",
+     .recognised = "lines of `ID MODEL WIDTH HEIGHT` and numbers",
+     .content = "the first camera of `cameras.txt`: lens, fisheye",
+     .is = is_cameras_txt,
+     .read = read_colmap,
+     .extension = ".txt",
+     .format = CameraFormat::colmap,
+     .written = [](const CameraFile& file, const Quality&) { return camera_as_colmap(file.camera); }},
+    {.name = "matrix",
+     .recognised = "lines of numbers",
+     .content = "a 3x3 matrix, row by row",
+     .is = is_anything,
+     .read = read_matrix},
+};
 
 CameraFile read_any(const fs::path& file, const std::string& bytes) {
-    const auto lines = text_lines(bytes);
-    const auto first = bytes.find_first_not_of("\xEF\xBB\xBF \t\r\n");
-    if (first != std::string::npos && (bytes[first] == '{' || bytes[first] == '['))
-        return camera_from_json(file, bytes);
-    if (first != std::string::npos && bytes[first] == '<')
-        return camera_from_xml(file, bytes);
-    if (is_yaml(bytes))
-        return camera_from_yaml(file, bytes);
-    if (bytes.find("m_calibration") != std::string::npos)
-        return camera_from_info(file, lines);
-    return is_colmap(lines) ? camera_from_colmap(file, lines) : camera_from_matrix(file, lines);
+    const CameraText text{file, bytes, text_lines(bytes)};
+    return std::ranges::find_if(formats, [&](const CameraFormatRow& row) { return row.is(text); })->read(text);
 }
 
 /// With fy < 0, y is upwards and rows still go down. Turned downwards, the camera sees the same: a pixel's row does not
@@ -166,21 +230,29 @@ CameraFile camera_from_argument(const std::string& text) {
     return result;
 }
 
+std::span<const CameraFormatRow> camera_formats() { return formats; }
+
 std::vector<std::string> camera_format_names() {
     std::vector<std::string> names;
-    for (const FormatRow& row : formats)
-        names.emplace_back(row.name);
+    for (const CameraFormatRow& row : formats)
+        if (row.format)
+            names.emplace_back(row.name);
     return names;
 }
 
 CameraFormat camera_format(const fs::path& file, const std::string& name) {
-    for (const FormatRow& row : formats)
+    std::vector<std::string> meanings; // of extensions
+    for (const CameraFormatRow& row : formats) {
+        if (!row.format)
+            continue;
         if (name.empty() ? file.extension() == row.extension : name == row.name)
-            return row.format;
+            return *row.format;
+        if (meanings.empty() || !meanings.back().starts_with(fmt::format("{} ", row.extension)))
+            meanings.push_back(fmt::format("{} ({})", row.extension, row.name));
+    }
     throw Misuse(name.empty()
-                     ? fmt::format("{}: which camera format? Known are .json (ours), .yml (OpenCV), .yaml (ROS), "
-                                   ".txt (COLMAP), or name one of {} with --format",
-                                   file.string(), fmt::join(camera_format_names(), ", "))
+                     ? fmt::format("{}: which camera format? Known are {}, or name one of {} with --format",
+                                   file.string(), fmt::join(meanings, ", "), fmt::join(camera_format_names(), ", "))
                      : fmt::format("'{}' is no camera format, expected one of {}", name,
                                    fmt::join(camera_format_names(), ", ")));
 }
@@ -192,21 +264,7 @@ void write_camera_file(const fs::path& file, const CameraFile& camera, CameraFor
         check(camera.colour->camera);
     const std::string text = during(file.string(), [&] {
         refuse_what_is_only_ours(camera, format);
-        switch (format) {
-        case CameraFormat::open3d:
-            return camera_as_open3d(camera.camera);
-        case CameraFormat::opencv:
-            return camera_as_opencv(camera.camera, quality);
-        case CameraFormat::ros:
-            return camera_as_ros(camera.camera);
-        case CameraFormat::kalibr:
-            return camera_as_kalibr(camera);
-        case CameraFormat::colmap:
-            return camera_as_colmap(camera.camera);
-        case CameraFormat::scanshade:
-            break;
-        }
-        return camera_as_json(camera, quality.details);
+        return std::ranges::find(formats, std::optional(format), &CameraFormatRow::format)->written(camera, quality);
     });
     write_atomically(file, text);
 }

@@ -48,6 +48,7 @@ struct CameraFile {
 [[nodiscard]] CameraFile camera_from_argument(const std::string& text);
 
 enum class CameraFormat { scanshade, open3d, opencv, ros, kalibr, colmap };
+/// Of those that are written.
 [[nodiscard]] std::vector<std::string> camera_format_names();
 /// By name, or where that is empty by the file's extension. Throws Misuse listing what there is.
 [[nodiscard]] CameraFormat camera_format(const std::filesystem::path& file, const std::string& name);

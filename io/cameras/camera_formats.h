@@ -1,10 +1,11 @@
-// The formats of camera files, one function each way: what read_camera_file() and write_camera_file() choose from.
+// The table of camera formats, and one function each way: what read_camera_file() and write_camera_file() choose from.
 #pragma once
 
 #include "io/cameras/camera_file.h"
 #include "io/text.h"
 
 #include <array>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -38,5 +39,29 @@ void check_numbers(const std::filesystem::path& file, const Pinhole& camera, con
 [[nodiscard]] std::string camera_as_ros(const Camera& camera);
 [[nodiscard]] std::string camera_as_kalibr(const CameraFile& camera);
 [[nodiscard]] std::string camera_as_colmap(const Camera& camera);
+
+// --- the table ---
+
+/// A camera file's content.
+struct CameraText {
+    const std::filesystem::path& file;
+    const std::string& bytes;
+    std::vector<TextLine> lines;
+};
+
+/// A new format is a row in camera_file.cpp and its functions.
+struct CameraFormatRow {
+    const char* name; ///< of --format, if it is written
+    const char* recognised;
+    const char* content; ///< what of the format is read
+    /// The first row whose `is` holds reads the file; formats of one syntax share a reader, which goes by their keys.
+    bool (*is)(const CameraText& text);
+    CameraFile (*read)(const CameraText& text);
+    std::string_view extension =
+        {}; ///< of files that are written; the first row of one is what it means without --format
+    std::optional<CameraFormat> format = {}; ///< none: not written
+    std::string (*written)(const CameraFile& camera, const CameraQuality& quality) = nullptr;
+};
+[[nodiscard]] std::span<const CameraFormatRow> camera_formats();
 
 } // namespace scanshade

@@ -74,7 +74,6 @@ std::optional<Listing> list_bop(const fs::path& folder) {
     const ImagesByStem colours(colour_images_in(folder_named(folder, {"rgb", "gray"})));
     Listing listing;
     Capture& capture = listing.capture;
-    capture.kind = "BOP";
     capture.depth = depth_encoding("mm", "each image's depth_scale in " + file.string());
     capture.registration = Registration::yes;
     capture.registration_reason = "BOP's colour and depth are registered";

@@ -2,16 +2,15 @@
 // other.
 #include "io/captures/capture.h"
 
+#include "io/captures/formats.h"
 #include "io/captures/layouts.h"
-#include "io/captures/matroska/matroska.h"
 #include "io/captures/plausibility.h"
-#include "io/captures/ros/bag.h"
+#include "io/captures/recording_formats.h"
 #include "io/captures/trajectory.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
 #include "io/clouds/format.h"
 #include "io/images/format.h"
-#include "io/images/zip_archive.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
@@ -32,39 +31,6 @@ namespace fs = std::filesystem;
 namespace {
 
 // --- opening ---
-
-enum class Unused { silent, told }; ///< whether files that look like poses or cameras are named where they are not used
-struct FolderLayout {
-    const char* signature;
-    std::optional<Listing> (*list)(const fs::path& folder);
-    Unused unused = Unused::silent;
-    /// Instead of `list`, where the options matter.
-    std::optional<Listing> (*list_with)(const fs::path& folder, const CaptureOptions& options) = nullptr;
-};
-
-/// The most specific first.
-constexpr std::array folder_layouts = {
-    FolderLayout{"transforms.json (nerfstudio, instant-ngp)", list_nerfstudio},
-    FolderLayout{"scene_camera.json (BOP)", list_bop},
-    FolderLayout{"keyframes/depth with keyframes/cameras (Polycam)", list_polycam},
-    FolderLayout{"camera_matrix.csv with depth/ (Stray Scanner)", list_stray_scanner},
-    FolderLayout{"lowres_depth/ (ARKitScenes)", list_arkit_scenes},
-    FolderLayout{"pose_intrinsic_imu.json with depth/ or depth.bin (ScanNet++)", list_scannetpp},
-    FolderLayout{"results/depthNNNNNN.png (Replica)", list_replica},
-    FolderLayout{"intrinsic/intrinsic_depth.txt or pose/ with depth/ (ScanNet)", list_scannet},
-    FolderLayout{"*.gt.freiburg with associations.txt (ICL-NUIM)", list_icl_nuim},
-    FolderLayout{"intrinsics.txt with image/ and depth/ (SUN RGB-D)", list_sun_rgbd},
-    FolderLayout{"d-SECONDS-TICKS.pgm (NYU)", list_nyu_raw},
-    FolderLayout{"velodyne/*.bin with calib.txt (KITTI odometry)", list_kitti_odometry},
-    FolderLayout{"v1.0-*/sample_data.json (nuScenes)", list_nuscenes},
-    FolderLayout{"metadata.yaml of rosbag2", nullptr, Unused::silent, list_rosbag2_folder},
-    FolderLayout{"depth.txt (TUM)", nullptr, Unused::silent, list_tum},
-    FolderLayout{"frame-NNNNNN.depth.png (7-Scenes)", list_seven_scenes},
-    FolderLayout{"TIME_depth.pclzf (PCL)", list_pcl_recording},
-    FolderLayout{"a folder depth/ (Redwood, RealSense)", list_image_folders, Unused::told},
-    FolderLayout{"16-bit or float depth images", list_depth_images, Unused::told},
-    FolderLayout{"clouds", list_clouds},
-};
 
 /// Names of what looks like poses or cameras in a folder that was read as a generic one.
 void tell_unused(const fs::path& folder, Listing& listing) {
@@ -92,40 +58,26 @@ void tell_unused(const fs::path& folder, Listing& listing) {
     };
 }
 
-/// Files that hold a recording, by their first bytes.
-struct FileLayout {
-    const char* signature;
-    bool (*begins)(std::string_view start);
-    Listing (*list)(const fs::path& file);
-    /// Instead of `list`, where the options matter.
-    Listing (*list_with)(const fs::path& file, const CaptureOptions& options) = nullptr;
+constexpr std::size_t enough_for_signatures = 1 << 12;
 
-    [[nodiscard]] Listing open(const fs::path& file, const CaptureOptions& options) const {
-        return list ? list(file) : list_with(file, options);
-    }
-};
-
-constexpr std::array file_layouts = {
-    FileLayout{"ScanNet's .sens", is_sens, list_sens},
-    FileLayout{"a stack of NumPy's .npy", is_npy_stack, list_npy_stack},
-    FileLayout{"NumPy's .npz, Record3D's .r3d", is_zip, list_zip},
-    FileLayout{"bags of ROS 1 and 2, MCAP", ros::is_bag, nullptr, list_ros},
-    FileLayout{"Azure Kinect's .mkv", matroska::is_matroska, list_azure_kinect},
-};
-
-/// Of a file with these first bytes; null where it holds no recording.
-const FileLayout* file_layout(std::string_view start) {
-    const auto* const found = std::ranges::find_if(file_layouts, [&](const auto& row) { return row.begins(start); });
-    return found == file_layouts.end() ? nullptr : found;
+/// Of a file that begins so; null where it holds no recording.
+const RecordingFormat* recording_format(std::string_view start) {
+    const auto rows = recording_formats();
+    const auto found = std::ranges::find_if(rows, [&](const auto& row) { return row.begins && row.begins(start); });
+    return found == rows.end() ? nullptr : &*found;
 }
 
-constexpr std::size_t enough_for_signatures = 1 << 12;
+Listing named(Listing listing, const RecordingFormat& format) {
+    if (listing.capture.kind.empty())
+        listing.capture.kind = format.name;
+    return listing;
+}
 
 /// A folder's only file that holds a recording; several are listed in an Error.
 std::optional<fs::path> recording_in(const fs::path& folder) {
     std::vector<fs::path> recordings;
     for (const fs::path& file : files_in(folder))
-        if (file_layout(read_bytes(file, enough_for_signatures)))
+        if (recording_format(read_bytes(file, enough_for_signatures)))
             recordings.push_back(file);
     if (recordings.size() > 1)
         throw Error(fmt::format("{}: {} recordings, expected one: open {} or another by its name", folder.string(),
@@ -133,43 +85,65 @@ std::optional<fs::path> recording_in(const fs::path& folder) {
     return recordings.empty() ? std::nullopt : std::optional(recordings.front());
 }
 
-Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
-    for (const FolderLayout& layout : folder_layouts)
-        if (auto listing = layout.list ? layout.list(folder) : layout.list_with(folder, options)) {
-            if (layout.unused == Unused::told)
-                tell_unused(folder, *listing);
-            return *std::move(listing);
-        }
-    if (const auto file = recording_in(folder))
-        return file_layout(read_bytes(*file, enough_for_signatures))->open(*file, options);
+/// The names of recordings that are files.
+std::string recording_files() {
+    std::vector<std::string_view> names;
+    for (const RecordingFormat& format : recording_formats())
+        if (*format.extensions)
+            names.emplace_back(format.name);
+    return listed(names, "or");
+}
+
+[[noreturn]] void refuse_folder(const fs::path& folder) {
     std::vector<std::string> signatures;
-    for (const FolderLayout& layout : folder_layouts)
-        signatures.emplace_back(layout.signature);
-    for (const FileLayout& layout : file_layouts)
-        signatures.emplace_back(layout.signature);
-    throw NoFrames(fmt::format("no frames found in {}: looked for {} ({})", folder.string(),
-                               fmt::join(signatures, ", "), listed(cloud_format_names(), "or")));
+    for (const RecordingFormat& format : recording_formats())
+        if (format.folder)
+            signatures.push_back(fmt::format("{} ({})", format.recognised, format.name));
+    std::string looked_for = fmt::format("{}", fmt::join(signatures, ", "));
+    std::erase(looked_for, '`');
+    throw NoFrames(fmt::format("no frames found in {}: looked for {}, and for one file that is a recording ({}); "
+                               "clouds are {}",
+                               folder.string(), looked_for, recording_files(), listed(cloud_format_names(), "or")));
+}
+
+Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
+    for (const RecordingFormat& format : recording_formats())
+        if (auto listing = format.folder ? format.folder(folder, options) : std::nullopt) {
+            if (format.generic)
+                tell_unused(folder, *listing);
+            return named(*std::move(listing), format);
+        }
+    const auto file = recording_in(folder);
+    if (!file)
+        refuse_folder(folder);
+    const RecordingFormat& format = *recording_format(read_bytes(*file, enough_for_signatures));
+    return named(format.file(*file, options), format);
+}
+
+[[noreturn]] void refuse_file(const fs::path& file) {
+    throw Error(fmt::format("{}: neither a folder, a recording ({}), a depth image ({}) nor a cloud ({})",
+                            file.string(), recording_files(), listed(depth_format_names(), "or"),
+                            listed(cloud_format_names(), "or")));
 }
 
 Listing list_file(const fs::path& file, const CaptureOptions& options) {
     const std::string start = read_bytes(file, enough_for_signatures);
-    if (const FileLayout* layout = file_layout(start))
-        return layout->open(file, options);
+    if (const RecordingFormat* format = recording_format(start))
+        return named(format->file(file, options), *format);
     CaptureEntry entry;
     entry.name = file.stem().string();
     Listing listing;
     listing.find_camera = [](cv::Size, std::vector<std::string>&) { return std::nullopt; };
     if (is_cloud(start, file)) {
         entry.cloud = file;
-        listing.capture.kind = "cloud";
+        listing.capture.kind = name_of(FormatKind::cloud);
         listing.capture.depth = depth_encoding("m", "of clouds: metres by custom, or the unit that the file names");
         listing.capture.registration_reason = "colours belong to the points";
     } else {
         if (!image_format(start) && !has_depth_extension(file))
-            throw Error(fmt::format("{}: neither a folder, a depth image ({}) nor a cloud ({})", file.string(),
-                                    listed(depth_format_names(), "or"), listed(cloud_format_names(), "or")));
+            refuse_file(file);
         entry.depth = file;
-        listing.capture.kind = "depth image";
+        listing.capture.kind = name_of(FormatKind::depth_image);
         listing.capture.depth = assumed_encoding(file);
         listing.capture.registration_reason = "there is no colour";
         listing.find_camera = [file](cv::Size, std::vector<std::string>&) { return camera_beside_pclzf(file); };
@@ -199,7 +173,7 @@ cv::Size depth_size(const std::vector<CaptureEntry>& entries) {
 
 /// Gives a single depth image its colour, which the user says belongs to it.
 void take_colour(Capture& capture, const fs::path& colour) {
-    if (capture.kind != "depth image")
+    if (capture.kind != name_of(FormatKind::depth_image))
         throw Misuse(fmt::format("colour: {} is for a single depth image, and {} is a capture of the kind '{}', which "
                                  "has its own colour images",
                                  colour.string(), capture.path.string(), capture.kind));

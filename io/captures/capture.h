@@ -72,8 +72,7 @@ class NoFrames : public Error {
 /// A recording, listed. Opening is cheap; frames are decoded by load().
 struct Capture {
     std::filesystem::path path;
-    std::string kind; ///< "TUM RGB-D", "7-Scenes", "PCL recording", "Redwood / Open3D", "colour and depth folders",
-                      ///< "depth image", "cloud"
+    std::string kind;             ///< the format's name in the table (formats.h): "TUM RGB-D", "BOP", "depth image" ...
     std::optional<Camera> camera; ///< none: clouds recover theirs; depth images need --camera
     DepthEncoding depth;
     DepthCorrection depth_correction;          ///< from the camera's file; load() applies it

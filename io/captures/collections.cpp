@@ -24,7 +24,6 @@ std::optional<Listing> list_sun_rgbd(const fs::path& folder) {
         return std::nullopt;
     Listing listing;
     Capture& capture = listing.capture;
-    capture.kind = "SUN RGB-D";
     capture.depth = usual_encoding("sun", "SUN RGB-D layout");
     capture.registration = Registration::yes;
     capture.registration_reason = "SUN RGB-D's colour and depth are registered";
@@ -83,7 +82,6 @@ std::optional<Listing> list_nyu_raw(const fs::path& folder) {
     constexpr double together_s = 0.05;
     Listing listing;
     Capture& capture = listing.capture;
-    capture.kind = "NYU depth v2, raw";
     capture.depth = usual_encoding("nyu", "NYU layout");
     capture.registration = Registration::no;
     capture.registration_reason = "a camera of its own took the colour";

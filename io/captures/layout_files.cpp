@@ -244,10 +244,9 @@ DepthEncoding usual_encoding(const std::string& text, const std::string& origin)
     return encoding;
 }
 
-Listing listing_of_phone(const std::string& kind) {
+Listing listing_of_phone(const std::string& layout) {
     Listing listing;
-    listing.capture.kind = kind;
-    listing.capture.depth = usual_encoding("mm", kind + " layout");
+    listing.capture.depth = usual_encoding("mm", layout + " layout");
     listing.capture.registration = Registration::yes;
     listing.capture.registration_reason = "phones make depth on the colour camera's pixels";
     listing.capture.colour_in_more_pixels = true;

@@ -100,7 +100,6 @@ std::optional<Listing> list_seven_scenes(const fs::path& folder) {
         return std::nullopt;
     Listing listing;
     Capture& capture = listing.capture;
-    capture.kind = "7-Scenes";
     capture.depth = usual_encoding("mm", "7-Scenes layout");
     capture.registration = Registration::no;
     capture.registration_reason = "7-Scenes colour and depth are unregistered in this layout";
@@ -222,8 +221,6 @@ std::optional<Listing> list_image_folders(const fs::path& folder) {
     Capture& capture = listing.capture;
     std::error_code ignored;
     const bool matched = fs::is_regular_file(folder / "rgbd.match", ignored);
-    const bool redwood = matched || fs::is_regular_file(folder / "trajectory.log", ignored);
-    capture.kind = redwood ? "Redwood / Open3D" : "colour and depth folders";
     capture.depth = assumed_encoding(depths.front());
     capture.registration_reason = "nothing in the capture says whether colour and depth are registered";
     if (matched)
@@ -235,6 +232,13 @@ std::optional<Listing> list_image_folders(const fs::path& folder) {
         return camera_in(folder, warnings);
     };
     return listing;
+}
+
+std::optional<Listing> list_redwood(const fs::path& folder) {
+    std::error_code ignored;
+    const bool redwood =
+        fs::is_regular_file(folder / "rgbd.match", ignored) || fs::is_regular_file(folder / "trajectory.log", ignored);
+    return redwood ? list_image_folders(folder) : std::nullopt;
 }
 
 // --- images or clouds directly in the folder ---
@@ -273,7 +277,6 @@ std::optional<Listing> list_depth_images(const fs::path& folder) {
     }
     if (capture.entries.empty())
         return std::nullopt;
-    capture.kind = "depth images";
     capture.depth = assumed_encoding(capture.entries.front().depth);
     capture.registration_reason = "there is no colour";
     if (others > 0)
@@ -297,7 +300,6 @@ std::optional<Listing> list_clouds(const fs::path& folder) {
     }
     if (listing.capture.entries.empty())
         return std::nullopt;
-    listing.capture.kind = "clouds";
     listing.capture.depth = depth_encoding("m", "of clouds: metres by custom, or the unit that the file names");
     listing.capture.registration_reason = "colours belong to the points";
     listing.find_camera = [](cv::Size, std::vector<std::string>&) { return std::nullopt; };

@@ -1,4 +1,4 @@
-// The layouts of captures on disk, one function each, in the order in which open_capture() tries them.
+// The layouts of captures on disk, one function each; the table of recordings (recording_formats.h) has their order.
 #pragma once
 
 #include "io/captures/capture.h"
@@ -19,7 +19,7 @@ class ZipArchive;
 
 /// A capture as its layout lists it, before camera and depth encoding are settled.
 struct Listing {
-    Capture capture; ///< capture.depth is the layout's own encoding
+    Capture capture; ///< capture.depth is the layout's own encoding; an empty kind is that of its row in the table
     /// The layout's camera for depth images of this size (0x0 where no image could be read); may add to the warnings.
     /// Called only when the user named no camera.
     std::function<std::optional<CameraFile>(cv::Size depth_size, std::vector<std::string>& warnings)> find_camera;
@@ -47,6 +47,7 @@ struct Listing {
 [[nodiscard]] std::optional<Listing> list_kitti_odometry(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_nuscenes(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_pcl_recording(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_redwood(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_image_folders(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_depth_images(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_clouds(const std::filesystem::path& folder);
@@ -106,7 +107,7 @@ class ImagesByStem {
 [[nodiscard]] std::shared_ptr<const Camera> camera_for_depth(Camera camera, cv::Size size, cv::Size depth);
 
 /// Phones make their depth on the colour camera's pixels, in fewer of them, mostly in millimetres.
-[[nodiscard]] Listing listing_of_phone(const std::string& kind);
+[[nodiscard]] Listing listing_of_phone(const std::string& layout);
 
 /// For entries with cameras of their own: the first stands for the capture. Depth of another size than the first's is a
 /// problem, since a recorder makes one size.

@@ -169,7 +169,6 @@ std::optional<Listing> list_nerfstudio(const fs::path& folder) {
         return std::nullopt;
     Listing listing;
     Capture& capture = listing.capture;
-    capture.kind = "nerfstudio";
     capture.registration = Registration::yes;
     capture.registration_reason = "depth belongs to the image of its frame";
     capture.colour_in_more_pixels = true;

@@ -142,10 +142,9 @@ DepthEncoding encoding_of(const NpyArray& depth) {
                : usual_encoding("1000", "assumed: integers are millimetres");
 }
 
-Listing listing_of(const std::shared_ptr<Arrays>& arrays, const fs::path& path, const std::string& kind) {
+Listing listing_of(const std::shared_ptr<Arrays>& arrays, const fs::path& path) {
     Listing listing;
     Capture& capture = listing.capture;
-    capture.kind = kind;
     capture.depth = encoding_of(arrays->depth.array->array());
     capture.registration_reason = arrays->colour.array ? "arrays do not say" : "there is no colour";
     for (std::size_t i = 0; i < arrays->depth.frames; ++i) {
@@ -263,7 +262,7 @@ bool is_npy_stack(std::string_view start) {
 Listing list_npy_stack(const fs::path& file) {
     auto arrays = std::make_shared<Arrays>();
     arrays->depth = stack_of(std::make_unique<ArrayBytes>(std::make_shared<FileBytes>(file)), false);
-    Listing listing = listing_of(arrays, file, "NumPy stack");
+    Listing listing = listing_of(arrays, file);
     listing.find_camera = [file](cv::Size, std::vector<std::string>& warnings) {
         return camera_in(fs::absolute(file).parent_path(), warnings);
     };
@@ -293,7 +292,7 @@ Listing list_npz(const std::shared_ptr<const ZipArchive>& archive) {
     } catch (const Error& failure) {
         warnings.push_back(fmt::format("{}; no colour.", failure.what()));
     }
-    Listing listing = listing_of(arrays, path, "NumPy archive");
+    Listing listing = listing_of(arrays, path);
     Capture& capture = listing.capture;
     if (!archive->damage().empty())
         capture.warnings.push_back(archive->damage() + ".");

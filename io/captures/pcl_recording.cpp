@@ -125,7 +125,6 @@ std::optional<Listing> list_pcl_recording(const fs::path& folder) {
         return std::nullopt;
     Listing listing;
     Capture& capture = listing.capture;
-    capture.kind = "PCL recording";
     capture.depth = usual_encoding("mm", "PCL's default");
     capture.registration_reason = "PCL's files do not say whether depth was registered to colour";
     for (const auto& [name, shot] : shots)

@@ -81,7 +81,6 @@ std::optional<Listing> list_replica(const fs::path& folder) {
     const ReplicaCamera camera = replica_camera(folder);
     Listing listing;
     Capture& capture = listing.capture;
-    capture.kind = "Replica";
     capture.depth = depth_encoding(fmt::format("{}", camera.units_per_metre), camera.camera.origin);
     capture.depth.stated = !camera.assumed;
     capture.registration = Registration::yes;
@@ -126,7 +125,6 @@ std::optional<Listing> list_icl_nuim(const fs::path& folder) {
         return std::nullopt;
     Listing listing;
     Capture& capture = listing.capture;
-    capture.kind = "ICL-NUIM";
     capture.depth = usual_encoding("tum", "ICL-NUIM layout");
     capture.registration = Registration::yes;
     capture.registration_reason = "rendered by one camera";

@@ -480,7 +480,8 @@ Listing list_ros(const fs::path& path, const std::vector<fs::path>& files, const
     capture.warnings = recording->warnings;
     const std::uint32_t depth = depth_topic(*recording, options.topic, path, capture.warnings);
     const std::optional<std::uint32_t> colour = colour_topic(*recording, depth);
-    capture.kind = is_realsense(recording->topics[depth].name) ? "RealSense recording" : "ROS recording";
+    if (is_realsense(recording->topics[depth].name))
+        capture.kind = "RealSense recording";
 
     const auto frames = std::make_shared<RosFrames>(recording);
     const std::vector<Message> depths = messages_of(*recording, depth, capture.warnings);

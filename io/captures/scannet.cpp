@@ -80,7 +80,6 @@ std::optional<Listing> list_scannet(const fs::path& folder) {
     const ImagesByStem by_stem(colours);
     Listing listing;
     Capture& capture = listing.capture;
-    capture.kind = "ScanNet";
     capture.depth = usual_encoding("mm", "ScanNet layout");
     capture.registration = Registration::no;
     capture.registration_reason = "a camera of its own took the colour";

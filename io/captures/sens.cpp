@@ -151,7 +151,6 @@ Listing list_sens(const fs::path& path) {
 
     Listing listing;
     Capture& capture = listing.capture;
-    capture.kind = "ScanNet .sens";
     capture.depth = depth_encoding(fmt::format("{}", units_per_metre), "the file's depth shift");
     capture.registration = Registration::no;
     capture.registration_reason = "a camera of its own took the colour";

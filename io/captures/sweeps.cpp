@@ -19,9 +19,8 @@ using Json = nlohmann::json;
 
 namespace {
 
-Listing listing_of_sweeps(const std::string& kind) {
+Listing listing_of_sweeps() {
     Listing listing;
-    listing.capture.kind = kind;
     listing.capture.depth = depth_encoding("m", "of the layout's clouds: metres");
     listing.capture.registration_reason = "there is no colour";
     listing.find_camera = [](cv::Size, std::vector<std::string>&) { return std::nullopt; };
@@ -131,7 +130,7 @@ std::optional<Listing> list_kitti_odometry(const fs::path& folder) {
     std::erase_if(sweeps, [](const fs::path& file) { return lower_extension(file) != ".bin"; });
     if (sweeps.empty())
         return std::nullopt;
-    Listing listing = listing_of_sweeps("KITTI odometry");
+    Listing listing = listing_of_sweeps();
     Capture& capture = listing.capture;
     const auto camera_from =
         unless_damaged(capture.warnings, [&] { return camera_from_scanner(folder / "calib.txt"); });
@@ -244,7 +243,7 @@ std::optional<Listing> list_nuscenes(const fs::path& folder) {
     const auto tables = folders_of_tables(folder);
     if (tables.empty())
         return std::nullopt;
-    Listing listing = listing_of_sweeps("nuScenes");
+    Listing listing = listing_of_sweeps();
     Capture& capture = listing.capture;
     if (tables.size() > 1)
         capture.warnings.push_back(fmt::format("{}: {} folders of tables; {} is used.", folder.string(), tables.size(),

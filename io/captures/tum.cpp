@@ -285,7 +285,6 @@ std::optional<Listing> list_tum(const fs::path& folder, const CaptureOptions& op
     }
     Listing listing;
     Capture& capture = listing.capture;
-    capture.kind = "TUM RGB-D";
     capture.depth = usual_encoding("tum", "TUM layout");
     capture.registration_reason =
         "TUM's own recordings are registered, but nothing in this folder says that it is one of them";

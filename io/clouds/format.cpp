@@ -33,6 +33,7 @@ bool is_pcd(std::string_view start) {
 // Names come before PCD's signature: lists of points may begin with comments and names of columns, too.
 constexpr CloudFormat formats[] = {
     {.name = "PLY",
+     .content = "ascii, both byte orders; meshes, too",
      .signature = &is_ply,
      .extensions = {".ply"},
      .read = &read_ply,
@@ -41,6 +42,7 @@ constexpr CloudFormat formats[] = {
      .binary_encoding = "binary_little_endian",
      .new_colours = NewColours::bytes},
     {.name = "LAZ",
+     .content = "1.0-1.4 compressed, and COPC",
      .signature = &is_laz,
      .extensions = {".laz"},
      .read = &read_las,
@@ -48,6 +50,7 @@ constexpr CloudFormat formats[] = {
      .wide_colours = true,
      .z_up = true},
     {.name = "LAS",
+     .content = "1.0-1.4",
      .signature = &is_las,
      .extensions = {".las"},
      .read = &read_las,
@@ -55,6 +58,7 @@ constexpr CloudFormat formats[] = {
      .wide_colours = true,
      .z_up = true},
     {.name = "E57",
+     .content = "all scans, each placed by its pose",
      .signature = &is_e57,
      .extensions = {".e57"},
      .written_extension = ".ply", // with all fields
@@ -64,24 +68,28 @@ constexpr CloudFormat formats[] = {
      .new_colours = NewColours::bytes,
      .z_up = true},
     {.name = "XYZ",
+     .content = "lines of numbers",
      .extensions = {".xyz"},
      .read = &read_xyz,
      .written = &text_bytes,
      .new_colours = NewColours::bytes,
      .z_up = true},
     {.name = "PTS",
+     .content = "lines of numbers",
      .extensions = {".pts"},
      .read = &read_xyz,
      .written = &text_bytes,
      .new_colours = NewColours::bytes,
      .z_up = true},
     {.name = "PTX",
+     .content = "an organised scan with its pose",
      .extensions = {".ptx"},
      .read = &read_ptx,
      .written = &text_bytes,
      .new_colours = NewColours::bytes,
      .z_up = true},
     {.name = "KITTI's .bin",
+     .content = "floats x y z intensity; nuScenes' `.pcd.bin` with a ring",
      .extensions = {".bin"},
      .written_extension = ".ply", // with a header
      .read = &read_kitti,
@@ -90,6 +98,7 @@ constexpr CloudFormat formats[] = {
      .new_colours = NewColours::bytes,
      .z_up = true},
     {.name = "PCD",
+     .content = "ascii, binary, compressed",
      .signature = &is_pcd,
      .extensions = {".pcd"},
      .read = &read_pcd,
@@ -110,6 +119,8 @@ const CloudFormat* cloud_format(std::string_view bytes, const fs::path& file) {
     });
     return found == std::end(formats) ? nullptr : found;
 }
+
+std::span<const CloudFormat> cloud_formats() { return formats; }
 
 bool has_cloud_extension(const fs::path& file) {
     return std::ranges::any_of(formats, [&](const CloudFormat& format) { return named_so(format, file); });

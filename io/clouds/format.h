@@ -17,7 +17,8 @@ namespace scanshade {
 enum class NewColours { none, bytes, packed };
 
 struct CloudFormat {
-    std::string_view name; ///< "PLY"
+    std::string_view name;    ///< "PLY"
+    std::string_view content; ///< what of the format is read
     /// Whether a file that begins so is of this format. None: only the name says so.
     bool (*signature)(std::string_view start) = nullptr;
     std::array<std::string_view, 2> extensions; ///< lower case, with the dot
@@ -41,7 +42,8 @@ struct CloudFormat {
 [[nodiscard]] bool has_cloud_extension(const std::filesystem::path& file);
 /// Whether a file that begins so is a cloud, or a damaged one by its name.
 [[nodiscard]] bool is_cloud(std::string_view start, const std::filesystem::path& file);
-/// The formats that are read.
+[[nodiscard]] std::span<const CloudFormat> cloud_formats();
+/// The names of all.
 [[nodiscard]] std::vector<std::string_view> cloud_format_names();
 /// Of the file that write_cloud() makes of a cloud in this format.
 [[nodiscard]] std::string_view written_extension(const CloudFormat& format);

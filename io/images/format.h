@@ -19,6 +19,7 @@ struct ImageFormat {
     bool (*signature)(std::string_view start);  ///< whether a file that begins so is of this format
     std::array<std::string_view, 2> extensions; ///< lower case, with the dot; empty: none
     std::size_t header_bytes;                   ///< the header is in this many first bytes
+    std::string_view depth = {};                ///< the numbers that stand for depth, where it holds any
     std::string_view no_depth = {};             ///< why the format cannot hold depth, where its header does not tell
 
     // Each throws Error, which names `file` and what is wrong, for anything that is damaged or cut short.

@@ -3,9 +3,11 @@
 
 #include "io/images/image_check.h"
 
+#include <array>
 #include <filesystem>
 #include <opencv2/core.hpp>
 #include <string>
+#include <string_view>
 
 namespace scanshade {
 
@@ -47,6 +49,19 @@ struct DepthEncoding {
 [[nodiscard]] cv::Mat3b colour_in(const std::string& bytes, const std::filesystem::path& name);
 
 enum class AoFormat { png16, png8, tiff, exr };
+struct AoFormatRow {
+    const char* name; ///< of --format
+    AoFormat format;
+    int depth; ///< OpenCV's, of the samples
+    std::string_view extension;
+    std::string_view content; ///< the numbers that stand for visibility
+};
+inline constexpr std::array ao_formats = {
+    AoFormatRow{"png16", AoFormat::png16, CV_16U, ".png", "16-bit integers, 0 = no surface"},
+    AoFormatRow{"png8", AoFormat::png8, CV_8U, ".png", "8-bit integers, 0 = no surface"},
+    AoFormatRow{"tiff", AoFormat::tiff, CV_32F, ".tiff", "floats, NaN = no surface"},
+    AoFormatRow{"exr", AoFormat::exr, CV_32F, ".exr", "floats, NaN = no surface"},
+};
 /// Throws Misuse listing the names.
 [[nodiscard]] AoFormat ao_format(const std::string& name);
 /// ".png", ".tiff" or ".exr".

@@ -17,20 +17,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
-struct AoRow {
-    std::string_view name; ///< of --format
-    AoFormat format;
-    int depth; ///< OpenCV's, of the samples
-    std::string_view extension;
+const ImageFormat& image_of(const AoFormatRow& row) { return *image_format_by_extension(row.extension); }
 
-    [[nodiscard]] const ImageFormat& image() const { return *image_format_by_extension(extension); }
-};
-constexpr AoRow ao_rows[] = {{"png16", AoFormat::png16, CV_16U, ".png"},
-                             {"png8", AoFormat::png8, CV_8U, ".png"},
-                             {"tiff", AoFormat::tiff, CV_32F, ".tiff"},
-                             {"exr", AoFormat::exr, CV_32F, ".exr"}};
-
-const AoRow& row_of(AoFormat format) { return *std::ranges::find(ao_rows, format, &AoRow::format); }
+const AoFormatRow& row_of(AoFormat format) { return *std::ranges::find(ao_formats, format, &AoFormatRow::format); }
 
 void write_image(const fs::path& file, const cv::Mat& image, const ImageFormat& format) {
     write_atomically(file, during(file.string(), [&] { return format.written(image); }));
@@ -55,35 +44,35 @@ cv::Mat_<Integer> as_integers(const cv::Mat1f& visibility) {
 } // namespace
 
 AoFormat ao_format(const std::string& name) {
-    const auto row = std::ranges::find(ao_rows, name, &AoRow::name);
-    if (row != std::end(ao_rows))
+    const auto row = std::ranges::find(ao_formats, name, &AoFormatRow::name);
+    if (row != ao_formats.end())
         return row->format;
     std::vector<std::string_view> names;
-    for (const AoRow& each : ao_rows)
-        names.push_back(each.name);
+    for (const AoFormatRow& each : ao_formats)
+        names.emplace_back(each.name);
     throw Misuse(fmt::format("--format {}: expected {}", in_quotes(name), listed(names, "or")));
 }
 
 std::string extension(AoFormat format) { return std::string(row_of(format).extension); }
 
 bool is_ao_map(const ImageFacts& facts) {
-    return facts.channels == 1 && std::ranges::any_of(ao_rows, [&](const AoRow& row) {
-               return &row.image() == facts.format && CV_ELEM_SIZE1(row.depth) * 8 == facts.bits &&
+    return facts.channels == 1 && std::ranges::any_of(ao_formats, [&](const AoFormatRow& row) {
+               return &image_of(row) == facts.format && CV_ELEM_SIZE1(row.depth) * 8 == facts.bits &&
                       (row.depth == CV_32F) == facts.floats;
            });
 }
 
 bool has_ao_extension(const fs::path& file) {
     const ImageFormat* format = image_format_by_extension(lower_extension(file));
-    return format && std::ranges::any_of(ao_rows, [&](const AoRow& row) { return &row.image() == format; });
+    return format && std::ranges::any_of(ao_formats, [&](const AoFormatRow& row) { return &image_of(row) == format; });
 }
 
 void write_ao(const fs::path& file, const cv::Mat1f& visibility, AoFormat format) {
-    const AoRow& row = row_of(format);
+    const AoFormatRow& row = row_of(format);
     const cv::Mat image = row.depth == CV_16U  ? cv::Mat(as_integers<ushort>(visibility))
                           : row.depth == CV_8U ? cv::Mat(as_integers<uchar>(visibility))
                                                : cv::Mat(visibility);
-    write_image(file, image, row.image());
+    write_image(file, image, image_of(row));
 }
 
 void write_ao_integers(const fs::path& file, const cv::Mat& integers) {
@@ -96,7 +85,7 @@ void write_picture(const fs::path& file, const cv::Mat3b& picture) {
         std::vector<std::string_view> names;
         for (const ImageFormat& each : image_formats())
             if (each.written && each.read_colour)
-                names.push_back(each.name);
+                names.emplace_back(each.name);
         throw Error(fmt::format("{}: pictures are written as {}", file.string(), listed(names, "or")));
     }
     write_image(file, picture, *format);

@@ -834,7 +834,7 @@ TEST(captures, seven_scenes_reads_matrices_and_never_claims_registration) {
     write_file(folder / "Thumbs.db", "foreign");
     write_file(folder / "._frame-000009.depth.png", "foreign");
     const Capture capture = open_capture(folder.path());
-    EXPECT_EQ(capture.kind, "7-Scenes");
+    EXPECT_EQ(capture.kind, "7-Scenes / BundleFusion");
     EXPECT_EQ(capture.registration, Registration::no);
     ASSERT_EQ(capture.entries.size(), 2);
     const Frame frame = capture.load(1);
