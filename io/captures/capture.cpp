@@ -9,6 +9,7 @@
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
 #include "io/clouds/format.h"
+#include "io/files.h"
 #include "io/images/format.h"
 #include "io/images/zip_archive.h"
 #include "io/text.h"
@@ -79,11 +80,10 @@ void tell_unused(const fs::path& folder, Listing& listing) {
     listing.tell_unused = [folder, name_speaks](const Capture& capture) {
         std::vector<std::string> unused;
         std::error_code ignored;
-        for (fs::directory_iterator at(folder, ignored), end; !ignored && at != end; at.increment(ignored)) {
-            const std::string name = at->path().filename().string();
+        for (const auto& [name, kind] : items_in(folder, ignored)) {
             const bool used = (capture.camera && capture.camera->origin.find(name) != std::string::npos) ||
                               name == "trajectory.log" || name == "pose.txt" || name == "rgbd.match";
-            if (!used && (at->is_directory(ignored) ? folders.contains(name) : name_speaks(name)))
+            if (!used && (kind == FolderItem::Kind::folder ? folders.contains(name) : name_speaks(name)))
                 unused.push_back(name);
         }
         std::ranges::sort(unused);
@@ -201,7 +201,7 @@ void take_colour(Capture& capture, const fs::path& colour) {
         throw Misuse(fmt::format("colour: {} is for a single depth image, and {} is a capture of the kind '{}', which "
                                  "has its own colour images",
                                  colour.string(), capture.path.string(), capture.kind));
-    if (std::error_code ignored; !fs::is_regular_file(colour, ignored))
+    if (!is_file(colour))
         throw Error(
             fmt::format("{}: no such file, expected the colour image of {}", colour.string(), capture.path.string()));
     capture.entries.front().colour = colour;
@@ -277,7 +277,7 @@ void check_depth_size(const Frame& frame, cv::Size found, const fs::path& depth)
 
 /// A network share that disappears while frames are read is not their fault.
 void check_still_there(const Capture& capture) {
-    if (std::error_code trouble; !fs::exists(capture.path, trouble))
+    if (!is_there(capture.path))
         throw Outage(capture.path.string() + ": not there any more");
 }
 
@@ -474,12 +474,12 @@ void take_poses(Capture& capture, const CaptureOptions& options) {
 } // namespace
 
 Capture open_capture(const fs::path& path, const CaptureOptions& options) {
-    std::error_code ignored;
-    if (!fs::exists(path, ignored))
+    if (!is_there(path))
         throw Error(path.string() + ": no such file or folder");
-    Listing listing = fs::is_directory(path, ignored) ? list_folder(path, options) : list_file(path, options);
+    Listing listing = is_folder(path) ? list_folder(path, options) : list_file(path, options);
     Capture& capture = listing.capture;
     capture.path = path;
+    std::ranges::move(oddities_of_tar(path), std::back_inserter(capture.warnings));
     settle_names(capture.entries);
     const bool y_was_up = settle_camera(listing, options);
     if (listing.find_poses)
@@ -511,9 +511,10 @@ Capture open_capture_at_or_below(const fs::path& path, const CaptureOptions& opt
     } catch (const NoFrames&) {
         std::vector<fs::path> folders;
         std::error_code ignored;
-        for (fs::directory_iterator at(path, ignored), end; !ignored && at != end; at.increment(ignored))
-            if (at->is_directory(ignored) && !at->path().filename().string().starts_with('.'))
-                folders.push_back(at->path());
+        for (const auto& [name, kind] : items_in(path, ignored))
+            if (!name.starts_with('.') &&
+                (kind == FolderItem::Kind::folder || (lower_extension(name) == ".tar" && is_tar(path / name))))
+                folders.push_back(path / name);
         std::ranges::sort(folders);
         std::vector<fs::path> captures;
         std::optional<Capture> found;
