@@ -54,6 +54,7 @@ constexpr std::array folder_layouts = {
     FolderLayout{"intrinsic/intrinsic_depth.txt or pose/ with depth/ (ScanNet)", list_scannet},
     FolderLayout{"*.gt.freiburg with associations.txt (ICL-NUIM)", list_icl_nuim},
     FolderLayout{"intrinsics.txt with image/ and depth/ (SUN RGB-D)", list_sun_rgbd},
+    FolderLayout{"KEY.depth.png with KEY.json or KEY.rgb.jpg (WebDataset)", list_webdataset},
     FolderLayout{"d-SECONDS-TICKS.pgm (NYU)", list_nyu_raw},
     FolderLayout{"velodyne/*.bin with calib.txt (KITTI odometry)", list_kitti_odometry},
     FolderLayout{"v1.0-*/sample_data.json (nuScenes)", list_nuscenes},
@@ -149,6 +150,46 @@ Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
                                fmt::join(signatures, ", "), listed(cloud_format_names(), "or")));
 }
 
+/// As a shell takes it.
+std::string quoted(const std::string& word) {
+    const auto plain = [](unsigned char c) {
+        return std::isalnum(c) != 0 || std::string_view("/._-+:").find(static_cast<char>(c)) != std::string::npos;
+    };
+    if (std::ranges::all_of(word, plain))
+        return word;
+    std::string text = "'";
+    for (const char c : word)
+        text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    return text + "'";
+}
+
+/// Files that are packed as a whole are not read: no frame could be reached without unpacking all before it, and every
+/// command and every process of a job would unpack them anew.
+void refuse_packed(std::string_view start, const fs::path& file) {
+    struct Packer {
+        std::string_view magic;
+        const char* program;
+    };
+    constexpr std::array packers = {Packer{"\x1f\x8b", "gzip"}, Packer{"BZh", "bzip2"},
+                                    Packer{std::string_view("\xfd"
+                                                            "7zXZ\0",
+                                                            6),
+                                           "xz"},
+                                    Packer{"\x28\xb5\x2f\xfd", "zstd"}, Packer{"\x04\x22\x4d\x18", "lz4"}};
+    for (const Packer& packer : packers) {
+        if (!start.starts_with(packer.magic))
+            continue;
+        const std::string extension = lower_extension(file);
+        const bool tar = extension.starts_with(".t"); // .tgz, .tbz2, .txz, .tzst
+        const fs::path stem = file.has_extension() ? file.parent_path() / file.stem() : file;
+        const std::string whole = tar || !file.has_extension() ? stem.string() + ".tar" : stem.string();
+        throw Error(
+            fmt::format("{}: packed as a whole by {}, so that no frame can be reached by itself; unpack it once: "
+                        "`{} -dc {} > {}`",
+                        file.string(), packer.program, packer.program, quoted(file.string()), quoted(whole)));
+    }
+}
+
 Listing list_file(const fs::path& file, const CaptureOptions& options) {
     const std::string start = read_bytes(file, enough_for_signatures);
     if (const FileLayout* layout = file_layout(start))
@@ -163,6 +204,8 @@ Listing list_file(const fs::path& file, const CaptureOptions& options) {
         listing.capture.depth = depth_encoding("m", "of clouds: metres by custom, or the unit that the file names");
         listing.capture.registration_reason = "colours belong to the points";
     } else {
+        if (!image_format(start))
+            refuse_packed(start, file);
         if (!image_format(start) && !has_depth_extension(file))
             throw Error(fmt::format("{}: neither a folder, a depth image ({}) nor a cloud ({})", file.string(),
                                     listed(depth_format_names(), "or"), listed(cloud_format_names(), "or")));
