@@ -1,6 +1,7 @@
 // Files as bytes, lines and numbers: strict where std::stod and operator>> are forgiving.
 #include "io/text.h"
 
+#include "io/files.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
 
@@ -41,8 +42,13 @@ void fail_to_read(const std::filesystem::path& path, const std::error_code& trou
 std::string read_bytes(const std::filesystem::path& file, std::size_t limit) {
     std::error_code trouble;
     const auto status = std::filesystem::status(file, trouble);
-    if (status.type() == std::filesystem::file_type::not_found)
-        throw Error(file.string() + ": no such file");
+    if (status.type() == std::filesystem::file_type::not_found) {
+        auto member = stored_in_tar(file);
+        if (!member)
+            throw Error(file.string() + ": no such file");
+        const FileBytes bytes(file, *std::move(member));
+        return bytes.bytes(0, std::min<std::uintmax_t>(bytes.size(), limit));
+    }
     if (trouble)
         fail_to_read(file, trouble);
     if (!std::filesystem::is_regular_file(status))
@@ -67,9 +73,8 @@ std::string read_bytes(const std::filesystem::path& file, std::size_t limit) {
 }
 
 std::string read_at_most(std::uintmax_t most, const std::filesystem::path& file, std::string_view what) {
-    std::error_code trouble; // read_bytes() reports it
-    if (const auto size = std::filesystem::file_size(file, trouble); !trouble && size > most)
-        throw Error(fmt::format("{}: {} bytes, too large for {} (at most {})", file.string(), size, what, most));
+    if (const auto size = size_of_file(file); size && *size > most) // read_bytes() reports that it is not there
+        throw Error(fmt::format("{}: {} bytes, too large for {} (at most {})", file.string(), *size, what, most));
     return read_bytes(file);
 }
 

@@ -3,6 +3,7 @@
 #include "apps/page/run_page.h"
 #include "apps/results/journal.h"
 #include "apps/walk/resume.h"
+#include "io/files.h"
 #include "io/images/format.h"
 #include "io/output_file.h"
 #include "io/text.h"
@@ -41,7 +42,8 @@ std::string folder_name(const fs::path& path, std::set<std::string>& taken) {
     const fs::path whole = fs::weakly_canonical(path);
     const fs::path last = whole.has_filename() ? whole.filename() : whole.parent_path().filename();
     constexpr std::size_t longest = 200; // of the 255 bytes that file systems have
-    const std::string stem = shortened(fs::is_directory(path) ? last.string() : last.stem().string(), longest);
+    const std::string stem =
+        shortened(is_folder(path) && !is_tar(path) ? last.string() : last.stem().string(), longest);
     std::string name = stem.empty() ? "capture" : stem;
     for (int n = 2; !taken.insert(name).second; ++n)
         name = fmt::format("{}-{}", stem, n);

@@ -5,6 +5,7 @@
 #include "apps/slice.h"
 #include "io/captures/capture.h"
 #include "io/captures/layouts.h"
+#include "io/files.h"
 #include "io/images/format.h"
 #include "io/output_file.h"
 #include "io/text.h"
@@ -44,8 +45,15 @@ struct Found {
 
 Found passed_over(const fs::path& path, const std::string& why) { return {path, "", std::nullopt, "", why}; }
 
+/// Without links. Those of archives are not followed.
+fs::path whole_path(const fs::path& path) {
+    std::error_code not_on_disk;
+    fs::path whole = fs::canonical(path, not_on_disk);
+    return not_on_disk ? fs::absolute(path).lexically_normal() : whole;
+}
+
 struct Content {
-    std::vector<fs::path> folders; ///< sorted, without hidden ones
+    std::vector<fs::path> folders; ///< sorted, without hidden ones; archives, too
     std::vector<fs::path> hidden;  ///< folders whose names begin with '.'
     std::size_t files = 0;
     std::set<std::string> kinds; ///< extensions of the files, at most a few
@@ -55,16 +63,15 @@ struct Content {
 Content content_of(const fs::path& folder) {
     Content content;
     constexpr std::size_t most_kinds = 5;
-    for (fs::directory_iterator entry(folder, content.unreadable), end; !content.unreadable && entry != end;
-         entry.increment(content.unreadable)) {
-        if (std::error_code ignored; entry->is_directory(ignored)) {
-            const bool hidden = entry->path().filename().string()[0] == '.';
-            (hidden ? content.hidden : content.folders).push_back(entry->path());
+    for (const auto& [name, kind] : items_in(folder, content.unreadable)) {
+        const fs::path path = folder / name;
+        if (kind == FolderItem::Kind::folder || (lower_extension(path) == ".tar" && is_tar(path))) {
+            (name[0] == '.' ? content.hidden : content.folders).push_back(path);
             continue;
         }
         ++content.files;
         if (content.kinds.size() < most_kinds)
-            content.kinds.insert(entry->path().has_extension() ? lower_extension(entry->path()) : "no extension");
+            content.kinds.insert(path.has_extension() ? lower_extension(path) : "no extension");
     }
     std::ranges::sort(content.folders, natural_less, [](const fs::path& path) { return path.filename().string(); });
     return content;
@@ -103,8 +110,7 @@ void find_in(const fs::path& folder, const std::string& name, const CaptureOptio
         found({folder, name, std::nullopt, failure.what()});
         return;
     }
-    std::error_code unreadable;
-    if (!walked.insert(fs::canonical(folder, unreadable)).second)
+    if (!walked.insert(whole_path(folder)).second)
         return found(passed_over(folder, "a link to a folder that was searched already"));
     const Content content = content_of(folder);
     if (content.unreadable)
@@ -123,15 +129,16 @@ void find_in(const fs::path& folder, const std::string& name, const CaptureOptio
 std::string own_name(const fs::path& path) {
     const fs::path whole = fs::weakly_canonical(path);
     const fs::path last = whole.has_filename() ? whole.filename() : whole.parent_path().filename();
-    return (fs::is_directory(path) ? last : last.stem()).string();
+    return (is_folder(path) && !is_tar(path) ? last : last.stem()).string();
 }
 
 void find_captures(const fs::path& dataset, const CaptureOptions& options, const std::function<void(Found)>& found) {
     std::error_code trouble;
-    const fs::path path = fs::canonical(dataset, trouble);
-    if (trouble)
-        fail_to_read(dataset, trouble);
-    if (fs::is_directory(path)) {
+    const bool there = is_there(dataset);
+    if (!there && !fs::exists(dataset, trouble))
+        fail_to_read(dataset, trouble ? trouble : std::make_error_code(std::errc::no_such_file_or_directory));
+    const fs::path path = whole_path(dataset);
+    if (is_folder(path)) {
         std::set<fs::path> walked;
         find_in(path, own_name(path), options, walked, found);
         return;
@@ -170,9 +177,8 @@ std::vector<double> costs_of(const Capture& capture, const std::vector<std::size
     std::vector<double> costs;
     for (const std::size_t frame : frames) {
         const CaptureEntry& entry = capture.entries[frame];
-        std::error_code missing;
-        const auto bytes = entry.cloud.empty() ? 0 : fs::file_size(entry.cloud, missing);
-        costs.push_back(fixed_cost + (entry.cloud.empty() ? image : missing ? 0 : static_cast<double>(bytes) / 32e6));
+        const auto bytes = entry.cloud.empty() ? 0 : size_of_file(entry.cloud).value_or(0);
+        costs.push_back(fixed_cost + (entry.cloud.empty() ? image : static_cast<double>(bytes) / 32e6));
     }
     return costs;
 }

@@ -17,6 +17,7 @@
 #include "apps/walk/progress.h"
 #include "apps/walk/resume.h"
 #include "apps/walk/sequence_order.h"
+#include "io/files.h"
 #include "io/output_file.h"
 #include "io/text.h"
 #include "projection/base/error.h"
@@ -302,7 +303,7 @@ class Run final : public Command {
 
     CaptureJob job_of(const fs::path& folder, const Task& task) {
         // The plan could open it, so the problem may be temporary.
-        if (std::error_code ignored; !fs::exists(task.capture, ignored))
+        if (!is_there(task.capture))
             throw Outage(task.capture.string() + ": not there any more");
         CaptureJob job = job_from(task.capture, results_of(folder, task));
         if (job.of.size() != task.of)

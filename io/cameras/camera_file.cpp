@@ -1,6 +1,7 @@
 // Cameras on disk: finds a file's format by its content, and the format to write by its name.
 #include "io/cameras/camera_formats.h"
 #include "io/cameras/known_cameras.h"
+#include "io/files.h"
 #include "io/output_file.h"
 #include "io/text.h"
 #include "projection/base/error.h"
@@ -201,9 +202,8 @@ CameraFile camera_from_argument(const std::string& text) {
             break;
         rest.remove_prefix(comma + 1);
     }
-    std::error_code ignored;
-    if (parts.size() != 4 || fs::exists(text, ignored)) {
-        if (!fs::exists(text, ignored)) {
+    if (parts.size() != 4 || is_there(text)) {
+        if (!is_there(text)) {
             if (const auto known = known_camera(text))
                 return {.camera = *known, .depth_units_per_metre = {}, .warnings = {}};
             throw Misuse(fmt::format("--camera {}: neither a file, nor fx,fy,cx,cy, nor one of {}", in_quotes(text),

@@ -448,7 +448,6 @@ Listing list_azure_kinect(const fs::path& path) {
     const auto contents = std::make_shared<const Contents>(matroska::read(recording->file));
     Listing listing;
     Capture& capture = listing.capture;
-    capture.kind = "Azure Kinect recording";
     capture.warnings = contents->warnings;
     const Track& depth = depth_track(*contents, path);
     recording->depth_bytes = depth_bytes_of(depth, path);

@@ -2,6 +2,7 @@
 #include "io/captures/layouts.h"
 
 #include "io/captures/trajectory.h"
+#include "io/files.h"
 #include "io/images/format.h"
 #include "io/text.h"
 #include "projection/base/error.h"
@@ -66,9 +67,8 @@ void take_facts(const fs::path& file, const Json& all, CaptureEntry& entry) {
 
 std::optional<Listing> list_bop(const fs::path& folder) {
     const fs::path file = folder / "scene_camera.json";
-    std::error_code ignored;
     const auto depths = depth_images_in(folder_named(folder, {"depth"}));
-    if (depths.empty() || !fs::is_regular_file(file, ignored))
+    if (depths.empty() || !is_file(file))
         return std::nullopt;
     const Json all = json_in(file);
     const ImagesByStem colours(colour_images_in(folder_named(folder, {"rgb", "gray"})));

@@ -10,6 +10,7 @@
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
 #include "io/clouds/format.h"
+#include "io/files.h"
 #include "io/images/format.h"
 #include "io/text.h"
 #include "projection/base/error.h"
@@ -46,11 +47,10 @@ void tell_unused(const fs::path& folder, Listing& listing) {
     listing.tell_unused = [folder, name_speaks](const Capture& capture) {
         std::vector<std::string> unused;
         std::error_code ignored;
-        for (fs::directory_iterator at(folder, ignored), end; !ignored && at != end; at.increment(ignored)) {
-            const std::string name = at->path().filename().string();
+        for (const auto& [name, kind] : items_in(folder, ignored)) {
             const bool used = (capture.camera && capture.camera->origin.find(name) != std::string::npos) ||
                               name == "trajectory.log" || name == "pose.txt" || name == "rgbd.match";
-            if (!used && (at->is_directory(ignored) ? folders.contains(name) : name_speaks(name)))
+            if (!used && (kind == FolderItem::Kind::folder ? folders.contains(name) : name_speaks(name)))
                 unused.push_back(name);
         }
         std::ranges::sort(unused);
@@ -126,6 +126,46 @@ Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
                             listed(cloud_format_names(), "or")));
 }
 
+/// As a shell takes it.
+std::string quoted(const std::string& word) {
+    const auto plain = [](unsigned char c) {
+        return std::isalnum(c) != 0 || std::string_view("/._-+:").find(static_cast<char>(c)) != std::string::npos;
+    };
+    if (std::ranges::all_of(word, plain))
+        return word;
+    std::string text = "'";
+    for (const char c : word)
+        text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    return text + "'";
+}
+
+/// Files that are packed as a whole are not read: no frame could be reached without unpacking all before it, and every
+/// command and every process of a job would unpack them anew.
+void refuse_packed(std::string_view start, const fs::path& file) {
+    struct Packer {
+        std::string_view magic;
+        const char* program;
+    };
+    constexpr std::array packers = {Packer{"\x1f\x8b", "gzip"}, Packer{"BZh", "bzip2"},
+                                    Packer{std::string_view("\xfd"
+                                                            "7zXZ\0",
+                                                            6),
+                                           "xz"},
+                                    Packer{"\x28\xb5\x2f\xfd", "zstd"}, Packer{"\x04\x22\x4d\x18", "lz4"}};
+    for (const Packer& packer : packers) {
+        if (!start.starts_with(packer.magic))
+            continue;
+        const std::string extension = lower_extension(file);
+        const bool tar = extension.starts_with(".t"); // .tgz, .tbz2, .txz, .tzst
+        const fs::path stem = file.has_extension() ? file.parent_path() / file.stem() : file;
+        const std::string whole = tar || !file.has_extension() ? stem.string() + ".tar" : stem.string();
+        throw Error(
+            fmt::format("{}: packed as a whole by {}, so that no frame can be reached by itself; unpack it once: "
+                        "`{} -dc {} > {}`",
+                        file.string(), packer.program, packer.program, quoted(file.string()), quoted(whole)));
+    }
+}
+
 Listing list_file(const fs::path& file, const CaptureOptions& options) {
     const std::string start = read_bytes(file, enough_for_signatures);
     if (const RecordingFormat* format = recording_format(start))
@@ -140,6 +180,8 @@ Listing list_file(const fs::path& file, const CaptureOptions& options) {
         listing.capture.depth = depth_encoding("m", "of clouds: metres by custom, or the unit that the file names");
         listing.capture.registration_reason = "colours belong to the points";
     } else {
+        if (!image_format(start))
+            refuse_packed(start, file);
         if (!image_format(start) && !has_depth_extension(file))
             refuse_file(file);
         entry.depth = file;
@@ -177,7 +219,7 @@ void take_colour(Capture& capture, const fs::path& colour) {
         throw Misuse(fmt::format("colour: {} is for a single depth image, and {} is a capture of the kind '{}', which "
                                  "has its own colour images",
                                  colour.string(), capture.path.string(), capture.kind));
-    if (std::error_code ignored; !fs::is_regular_file(colour, ignored))
+    if (!is_file(colour))
         throw Error(
             fmt::format("{}: no such file, expected the colour image of {}", colour.string(), capture.path.string()));
     capture.entries.front().colour = colour;
@@ -253,7 +295,7 @@ void check_depth_size(const Frame& frame, cv::Size found, const fs::path& depth)
 
 /// A network share that disappears while frames are read is not their fault.
 void check_still_there(const Capture& capture) {
-    if (std::error_code trouble; !fs::exists(capture.path, trouble))
+    if (!is_there(capture.path))
         throw Outage(capture.path.string() + ": not there any more");
 }
 
@@ -450,12 +492,12 @@ void take_poses(Capture& capture, const CaptureOptions& options) {
 } // namespace
 
 Capture open_capture(const fs::path& path, const CaptureOptions& options) {
-    std::error_code ignored;
-    if (!fs::exists(path, ignored))
+    if (!is_there(path))
         throw Error(path.string() + ": no such file or folder");
-    Listing listing = fs::is_directory(path, ignored) ? list_folder(path, options) : list_file(path, options);
+    Listing listing = is_folder(path) ? list_folder(path, options) : list_file(path, options);
     Capture& capture = listing.capture;
     capture.path = path;
+    std::ranges::move(oddities_of_tar(path), std::back_inserter(capture.warnings));
     settle_names(capture.entries);
     const bool y_was_up = settle_camera(listing, options);
     if (listing.find_poses)
@@ -487,9 +529,10 @@ Capture open_capture_at_or_below(const fs::path& path, const CaptureOptions& opt
     } catch (const NoFrames&) {
         std::vector<fs::path> folders;
         std::error_code ignored;
-        for (fs::directory_iterator at(path, ignored), end; !ignored && at != end; at.increment(ignored))
-            if (at->is_directory(ignored) && !at->path().filename().string().starts_with('.'))
-                folders.push_back(at->path());
+        for (const auto& [name, kind] : items_in(path, ignored))
+            if (!name.starts_with('.') &&
+                (kind == FolderItem::Kind::folder || (lower_extension(name) == ".tar" && is_tar(path / name))))
+                folders.push_back(path / name);
         std::ranges::sort(folders);
         std::vector<fs::path> captures;
         std::optional<Capture> found;

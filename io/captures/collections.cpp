@@ -1,6 +1,7 @@
 // Collections of rooms: SUN RGB-D, a folder for each image, and NYU depth v2 as it was recorded.
 #include "io/captures/layouts.h"
 
+#include "io/files.h"
 #include "io/images/format.h"
 #include "io/text.h"
 #include "projection/base/error.h"
@@ -16,11 +17,10 @@ namespace fs = std::filesystem;
 // --- SUN RGB-D: image/, depth/, intrinsics.txt ---
 
 std::optional<Listing> list_sun_rgbd(const fs::path& folder) {
-    std::error_code ignored;
     const fs::path file = folder / "intrinsics.txt";
     const auto depths = depth_images_in(folder_named(folder, {"depth"})),
                images = colour_images_in(folder_named(folder, {"image"}));
-    if (depths.size() != 1 || images.size() != 1 || !fs::is_regular_file(file, ignored))
+    if (depths.size() != 1 || images.size() != 1 || !is_file(file))
         return std::nullopt;
     Listing listing;
     Capture& capture = listing.capture;

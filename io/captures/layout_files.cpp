@@ -1,6 +1,7 @@
 // A capture folder's files: their order and kinds, the camera among them, and fit names for frames.
 #include "io/captures/layouts.h"
 
+#include "io/files.h"
 #include "io/images/format.h"
 #include "io/output_file.h"
 #include "io/shallow_json.h"
@@ -49,20 +50,19 @@ bool natural_less(const std::string& a, const std::string& b) {
 }
 
 std::vector<fs::path> files_in(const fs::path& folder) {
-    std::vector<fs::path> files;
     std::error_code trouble;
-    for (fs::directory_iterator entry(folder, trouble), end; !trouble && entry != end; entry.increment(trouble)) {
-        const std::string name = entry->path().filename().string();
-        std::error_code ignored;
-        if (name.starts_with('.') || name == "Thumbs.db" || name == "desktop.ini" || !entry->is_regular_file(ignored))
-            continue;
-        files.push_back(entry->path());
-    }
+    std::vector<FolderItem> items = items_in(folder, trouble);
     if (trouble)
         fail_to_read(folder, trouble);
-    std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
-        return natural_less(a.filename().string(), b.filename().string());
+    std::erase_if(items, [](const FolderItem& item) {
+        return item.kind != FolderItem::Kind::file || item.name.starts_with('.') || item.name == "Thumbs.db" ||
+               item.name == "desktop.ini";
     });
+    std::ranges::sort(items, natural_less, &FolderItem::name);
+    std::vector<fs::path> files;
+    files.reserve(items.size());
+    for (const FolderItem& item : items)
+        files.push_back(folder / item.name);
     return files;
 }
 
@@ -79,9 +79,8 @@ bool speaks_of(const fs::path& file, std::initializer_list<std::string_view> sub
 } // namespace
 
 std::optional<fs::path> folder_named(const fs::path& parent, std::initializer_list<std::string_view> names) {
-    std::error_code ignored;
     for (const std::string_view name : names)
-        if (fs::is_directory(parent / name, ignored))
+        if (is_folder(parent / name))
             return parent / name;
     return std::nullopt;
 }
@@ -189,11 +188,11 @@ std::string trouble_with(const fs::path& folder, const std::string& name) {
     const fs::path relative = fs::path(name).lexically_normal();
     if (!stays_inside(relative) || name.find('\0') != std::string::npos)
         return fmt::format("{} leaves the capture's folder; not opened", in_quotes(name));
-    std::error_code missing;
-    if (!fs::is_regular_file(folder / relative, missing))
+    if (!is_file(folder / relative))
         return fmt::format("{} does not exist", in_quotes(name));
     if (!through_a_link(folder, relative))
         return {};
+    std::error_code missing;
     const fs::path file = fs::canonical(folder / relative, missing);
     if (!stays_inside(file.lexically_relative(fs::canonical(folder, missing))))
         return fmt::format("{} is a link out of the capture's folder, to {}; not opened", in_quotes(name),

@@ -3,6 +3,7 @@
 
 #include "io/captures/trajectory.h"
 #include "io/clouds/format.h"
+#include "io/files.h"
 #include "io/images/format.h"
 #include "io/text.h"
 #include "projection/base/error.h"
@@ -180,8 +181,7 @@ void entries_from_names(const std::vector<fs::path>& depths, const std::vector<f
 /// trajectory.log by index in recording order; pose.txt by the number in the depth image's name (row N, from 1; from 0
 /// where an image is numbered 0).
 void add_poses(const fs::path& folder, Capture& capture) {
-    std::error_code ignored;
-    if (fs::is_regular_file(folder / "trajectory.log", ignored)) {
+    if (is_file(folder / "trajectory.log")) {
         const auto poses = read_redwood_log(folder / "trajectory.log", capture.warnings);
         for (std::size_t i = 0; i < capture.entries.size(); ++i)
             if (const auto pose = poses.find(i); pose != poses.end())
@@ -190,7 +190,7 @@ void add_poses(const fs::path& folder, Capture& capture) {
                 capture.entries[i].warnings.push_back(fmt::format("trajectory.log has no pose for frame {}.", i));
         return;
     }
-    if (!fs::is_regular_file(folder / "pose.txt", ignored))
+    if (!is_file(folder / "pose.txt"))
         return;
     const auto poses = read_pose_rows(folder / "pose.txt", capture.warnings);
     const auto number_in = [](const CaptureEntry& entry) { return whole_number(entry.name); };
@@ -219,8 +219,7 @@ std::optional<Listing> list_image_folders(const fs::path& folder) {
 
     Listing listing;
     Capture& capture = listing.capture;
-    std::error_code ignored;
-    const bool matched = fs::is_regular_file(folder / "rgbd.match", ignored);
+    const bool matched = is_file(folder / "rgbd.match");
     capture.depth = assumed_encoding(depths.front());
     capture.registration_reason = "nothing in the capture says whether colour and depth are registered";
     if (matched)
@@ -235,9 +234,7 @@ std::optional<Listing> list_image_folders(const fs::path& folder) {
 }
 
 std::optional<Listing> list_redwood(const fs::path& folder) {
-    std::error_code ignored;
-    const bool redwood =
-        fs::is_regular_file(folder / "rgbd.match", ignored) || fs::is_regular_file(folder / "trajectory.log", ignored);
+    const bool redwood = is_file(folder / "rgbd.match") || is_file(folder / "trajectory.log");
     return redwood ? list_image_folders(folder) : std::nullopt;
 }
 

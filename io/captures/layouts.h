@@ -43,6 +43,7 @@ struct Listing {
 [[nodiscard]] std::optional<Listing> list_replica(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_scannet(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_icl_nuim(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_webdataset(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_seven_scenes(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_kitti_odometry(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_nuscenes(const std::filesystem::path& folder);

@@ -2,6 +2,7 @@
 #include "io/captures/layouts.h"
 
 #include "io/captures/trajectory.h"
+#include "io/files.h"
 #include "io/images/format.h"
 #include "io/text.h"
 #include "projection/base/error.h"
@@ -157,11 +158,10 @@ void take_pose(const Keys& keys, const std::string& where, CaptureEntry& entry) 
 } // namespace
 
 std::optional<Listing> list_nerfstudio(const fs::path& folder) {
-    std::error_code ignored;
     fs::path file = folder / "transforms.json";
-    if (!fs::is_regular_file(file, ignored))
+    if (!is_file(file))
         file = folder / "transforms_train.json";
-    if (!fs::is_regular_file(file, ignored))
+    if (!is_file(file))
         return std::nullopt;
     const Json top = json_in(file);
     const auto frames = top.is_object() ? top.find("frames") : top.end();

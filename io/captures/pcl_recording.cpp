@@ -2,6 +2,7 @@
 // write them and its ImageGrabber reads them.
 #include "io/captures/layouts.h"
 
+#include "io/files.h"
 #include "io/images/format.h"
 #include "io/text.h"
 #include "projection/base/error.h"
@@ -104,8 +105,7 @@ std::optional<CameraFile> camera_beside_pclzf(const fs::path& depth) {
     if (!name_and_part || name_and_part->second != "depth")
         return std::nullopt;
     const fs::path file = depth.parent_path() / (name_and_part->first + ".xml");
-    std::error_code ignored;
-    return fs::is_regular_file(file, ignored) ? std::optional(read_camera_file(file)) : std::nullopt;
+    return is_file(file) ? std::optional(read_camera_file(file)) : std::nullopt;
 }
 
 std::optional<Listing> list_pcl_recording(const fs::path& folder) {

@@ -2,6 +2,7 @@
 #include "io/captures/layouts.h"
 
 #include "io/captures/trajectory.h"
+#include "io/files.h"
 #include "io/images/format.h"
 #include "io/text.h"
 #include "projection/base/error.h"
@@ -10,7 +11,6 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -32,38 +32,35 @@ std::vector<std::string> cells_of(std::string_view line) {
 }
 
 /// Width and height in the track header of an MPEG-4 file, its boxes walked without decoding: 0x0 where there is none.
-cv::Size video_size(const fs::path& file) {
-    std::ifstream stream(file, std::ios::binary);
-    const auto read_32 = [&] {
-        unsigned char b[4] = {};
-        stream.read(reinterpret_cast<char*>(b), 4);
-        return std::uint32_t(b[0]) << 24 | std::uint32_t(b[1]) << 16 | std::uint32_t(b[2]) << 8 | b[3];
+cv::Size video_size(const FileBytes& bytes) {
+    const auto read_32 = [&](std::uint64_t at) {
+        std::uint32_t value = 0;
+        for (const char c : bytes.bytes(at, 4))
+            value = value << 8 | static_cast<unsigned char>(c);
+        return value;
     };
-    stream.seekg(0, std::ios::end);
-    std::uint64_t end = static_cast<std::uint64_t>(std::max<std::streamoff>(stream.tellg(), 0)), at = 0;
+    const std::uint64_t end = bytes.size();
     constexpr int most_boxes = 10000;
-    for (int box = 0; box < most_boxes && stream && at + 8 <= end; ++box) {
-        stream.seekg(static_cast<std::streamoff>(at));
-        std::uint64_t size = read_32(), head = 8;
-        const std::uint32_t type = read_32();
-        if (size == 1) {
-            size = std::uint64_t(read_32()) << 32;
-            size |= read_32();
+    std::uint64_t at = 0;
+    for (int box = 0; box < most_boxes && end - at >= 8; ++box) {
+        std::uint64_t size = read_32(at), head = 8;
+        const std::uint32_t type = read_32(at + 4);
+        if (size == 1 && end - at >= 16) {
+            size = std::uint64_t(read_32(at + 8)) << 32 | read_32(at + 12);
             head = 16;
         }
         if (size == 0)
             size = end - at;
-        if (size < head || at + size > end)
+        if (size < head || size > end - at)
             return {};
         if (type == 0x6d6f6f76 || type == 0x7472616b) { // moov, trak: what is in them
             at += head;
             continue;
         }
         if (type == 0x746b6864 && size > 16) { // tkhd
-            stream.seekg(static_cast<std::streamoff>(at + size - 8));
-            const auto width = static_cast<int>(read_32() >> 16), height = static_cast<int>(read_32() >> 16);
-            const cv::Size found(width, height);
-            if (stream && !found.empty())
+            const cv::Size found(static_cast<int>(read_32(at + size - 8) >> 16),
+                                 static_cast<int>(read_32(at + size - 4) >> 16));
+            if (!found.empty())
                 return found;
         }
         at += size;
@@ -123,16 +120,15 @@ std::map<std::uint64_t, OdometryRow> odometry_in(const fs::path& file, std::vect
 } // namespace
 
 std::optional<Listing> list_stray_scanner(const fs::path& folder) {
-    std::error_code ignored;
     const auto depths = depth_images_in(folder_named(folder, {"depth"}));
-    if (depths.empty() || !fs::is_regular_file(folder / "camera_matrix.csv", ignored))
+    if (depths.empty() || !is_file(folder / "camera_matrix.csv"))
         return std::nullopt;
     Listing listing = listing_of_phone("Stray Scanner");
     Capture& capture = listing.capture;
     const ImagesByStem sure(colour_images_in(folder_named(folder, {"confidence"}))),
         colours(colour_images_in(folder_named(folder, {"rgb", "color"})));
     std::map<std::uint64_t, OdometryRow> odometry;
-    if (fs::is_regular_file(folder / "odometry.csv", ignored))
+    if (is_file(folder / "odometry.csv"))
         odometry = odometry_in(folder / "odometry.csv", capture.warnings);
     else
         capture.warnings.push_back(fmt::format("{}: there is no odometry.csv; no poses.", folder.string()));
@@ -151,12 +147,12 @@ std::optional<Listing> list_stray_scanner(const fs::path& folder) {
         }
         capture.entries.push_back(std::move(entry));
     }
-    if (colours.empty() && fs::is_regular_file(folder / "rgb.mp4", ignored))
+    if (colours.empty() && is_file(folder / "rgb.mp4"))
         capture.warnings.push_back(
             fmt::format("{}: the video is not decoded; depth alone.", (folder / "rgb.mp4").string()));
     listing.find_camera = [folder](cv::Size depth, std::vector<std::string>& warnings) -> std::optional<CameraFile> {
         const Camera camera = stray_camera(folder / "camera_matrix.csv");
-        cv::Size size = video_size(folder / "rgb.mp4");
+        cv::Size size = is_file(folder / "rgb.mp4") ? video_size(FileBytes(folder / "rgb.mp4")) : cv::Size();
         if (size.empty()) {
             constexpr double usual = 7.5; // 1920x1440 for 256x192
             size = {static_cast<int>(std::lround(usual * depth.width)),
@@ -194,10 +190,9 @@ std::pair<std::shared_ptr<const Camera>, MatrixPose> polycam_camera(const fs::pa
 } // namespace
 
 std::optional<Listing> list_polycam(const fs::path& folder) {
-    std::error_code ignored;
-    const fs::path frames = fs::is_directory(folder / "keyframes", ignored) ? folder / "keyframes" : folder;
+    const fs::path frames = is_folder(folder / "keyframes") ? folder / "keyframes" : folder;
     const auto depths = depth_images_in(folder_named(frames, {"depth"}));
-    if (depths.empty() || !fs::is_directory(frames / "cameras", ignored))
+    if (depths.empty() || !is_folder(frames / "cameras"))
         return std::nullopt;
     Listing listing = listing_of_phone("Polycam");
     Capture& capture = listing.capture;
@@ -215,7 +210,7 @@ std::optional<Listing> list_polycam(const fs::path& folder) {
         const fs::path better = frames / "corrected_cameras" / (entry.name + ".json"),
                        raw = frames / "cameras" / (entry.name + ".json");
         entry.colour = corrected.of(entry.name);
-        const bool is_corrected = !entry.colour.empty() && fs::is_regular_file(better, ignored);
+        const bool is_corrected = !entry.colour.empty() && is_file(better);
         uncorrected += !is_corrected;
         if (!is_corrected)
             entry.colour = images.of(entry.name);
@@ -292,9 +287,8 @@ std::optional<std::pair<std::string, double>> arkit_name(const std::string& stem
 } // namespace
 
 std::optional<Listing> list_arkit_scenes(const fs::path& given) {
-    std::error_code ignored;
     fs::path folder = given;
-    if (!fs::is_directory(folder / "lowres_depth", ignored)) // VIDEO/VIDEO_frames/
+    if (!is_folder(folder / "lowres_depth")) // VIDEO/VIDEO_frames/
         folder = given / ((given.filename().empty() ? given.parent_path() : given).filename().string() + "_frames");
     const auto depths = depth_images_in(folder_named(folder, {"lowres_depth"}));
     if (depths.empty())
@@ -309,7 +303,7 @@ std::optional<Listing> list_arkit_scenes(const fs::path& given) {
             if (const auto name = arkit_name(file.stem().string()); name && lower_extension(file) == ".pincam")
                 pincams.emplace(name->second, file);
     std::vector<StampedPose> poses;
-    if (fs::is_regular_file(folder / "lowres_wide.traj", ignored))
+    if (is_file(folder / "lowres_wide.traj"))
         poses = arkit_trajectory(folder / "lowres_wide.traj", capture.warnings);
     else
         capture.warnings.push_back(fmt::format("{}: there is no lowres_wide.traj; no poses.", folder.string()));

@@ -2,6 +2,7 @@
 #include "io/captures/layouts.h"
 
 #include "io/captures/trajectory.h"
+#include "io/files.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 
@@ -26,9 +27,8 @@ struct ReplicaCamera {
 
 /// {"camera": {w h fx fy cx cy scale}} beside the room's folder, or in it.
 ReplicaCamera replica_camera(const fs::path& room) {
-    std::error_code ignored;
     for (const fs::path& file : {room / "cam_params.json", room / ".." / "cam_params.json"}) {
-        if (!fs::is_regular_file(file, ignored))
+        if (!is_file(file))
             continue;
         const Json all = json_in(file);
         const auto camera = all.find("camera");
@@ -70,12 +70,11 @@ bool has_prefix(const fs::path& file, std::string_view prefix) { return file.ste
 } // namespace
 
 std::optional<Listing> list_replica(const fs::path& folder) {
-    std::error_code ignored;
     auto depths = depth_images_in(folder_named(folder, {"results"}));
     std::erase_if(depths, [](const fs::path& file) { return !has_prefix(file, "depth"); });
     if (depths.empty())
         return std::nullopt;
-    const bool has_poses = fs::is_regular_file(folder / "traj.txt", ignored);
+    const bool has_poses = is_file(folder / "traj.txt");
     const ImagesByStem colours(colour_images_in(folder / "results"));
     const std::vector<MatrixPose> poses = has_poses ? matrix_rows(folder / "traj.txt") : std::vector<MatrixPose>();
     const ReplicaCamera camera = replica_camera(folder);
@@ -115,13 +114,12 @@ std::optional<Listing> list_replica(const fs::path& folder) {
 // --- ICL-NUIM: associations.txt (depth first, frame numbers), *.gt.freiburg; its renderer's y is up ---
 
 std::optional<Listing> list_icl_nuim(const fs::path& folder) {
-    std::error_code ignored;
     std::optional<fs::path> truth;
     for (const fs::path& file : files_in(folder))
         if (file.filename().string().ends_with(".gt.freiburg"))
             truth = file;
     const fs::path list = folder / "associations.txt";
-    if (!truth || !fs::is_regular_file(list, ignored))
+    if (!truth || !is_file(list))
         return std::nullopt;
     Listing listing;
     Capture& capture = listing.capture;

@@ -3,6 +3,7 @@
 #include "io/captures/layouts.h"
 #include "io/captures/ros/messages.h"
 #include "io/captures/ros/transforms.h"
+#include "io/files.h"
 #include "io/images/format.h"
 #include "io/images/image_file.h"
 #include "io/text.h"
@@ -541,10 +542,9 @@ Listing list_ros(const fs::path& path, const std::vector<fs::path>& files, const
 }
 
 std::optional<Listing> list_rosbag2_folder(const fs::path& folder, const CaptureOptions& options) {
-    std::error_code ignored;
     const fs::path metadata = folder / "metadata.yaml";
     std::vector<fs::path> files;
-    if (fs::is_regular_file(metadata, ignored)) {
+    if (is_file(metadata)) {
         const std::string bytes = read_list_file(metadata);
         if (!bytes.starts_with("rosbag2_bagfile_information:"))
             return std::nullopt;
@@ -578,7 +578,7 @@ std::optional<Listing> list_rosbag2_folder(const fs::path& folder, const Capture
         if (lower_extension(file) == ".zstd")
             throw Error(file.string() + ": packed as a whole; `zstd -d FILE` unpacks it");
     Listing listing = list_ros(folder, files, options);
-    if (!fs::is_regular_file(metadata, ignored))
+    if (!is_file(metadata))
         listing.capture.warnings.push_back(fmt::format("{}: no metadata.yaml; {} are taken as one recording.",
                                                        folder.string(), counted(files.size(), "file")));
     return listing;

@@ -2,6 +2,7 @@
 #include "io/captures/layouts.h"
 
 #include "io/captures/trajectory.h"
+#include "io/files.h"
 #include "io/images/format.h"
 #include "io/text.h"
 #include "projection/base/error.h"
@@ -17,9 +18,8 @@ namespace fs = std::filesystem;
 namespace {
 
 std::optional<fs::path> first_file(const fs::path& folder, std::initializer_list<const char*> names) {
-    std::error_code ignored;
     for (const char* name : names)
-        if (fs::is_regular_file(folder / name, ignored))
+        if (is_file(folder / name))
             return folder / name;
     return std::nullopt;
 }
@@ -67,13 +67,12 @@ std::optional<ColourCamera> colour_camera_in(const fs::path& folder, const fs::p
 } // namespace
 
 std::optional<Listing> list_scannet(const fs::path& folder) {
-    std::error_code ignored;
     const auto intrinsic =
         first_file(folder, {"intrinsic/intrinsic_depth.txt", "intrinsic_depth.txt", "intrinsics_depth.txt"});
     const std::vector<fs::path> depths = depth_images_in(folder_named(folder, {"depth"}));
-    const bool poses = fs::is_directory(folder / "pose", ignored);
+    const bool poses = is_folder(folder / "pose");
     const bool numbered = !depths.empty() && whole_number(depths.front().stem().string()) &&
-                          fs::is_regular_file(folder / "pose" / (depths.front().stem().string() + ".txt"), ignored);
+                          is_file(folder / "pose" / (depths.front().stem().string() + ".txt"));
     if (depths.empty() || (!intrinsic && !numbered))
         return std::nullopt;
     const std::vector<fs::path> colours = colour_images_in(folder_named(folder, {"color"}));
@@ -90,7 +89,7 @@ std::optional<Listing> list_scannet(const fs::path& folder) {
         entry.colour = by_stem.of(entry.name);
         if (entry.colour.empty() && !colours.empty())
             entry.warnings.push_back(fmt::format("{} has no colour image.", depth.filename().string()));
-        if (const fs::path file = folder / "pose" / (entry.name + ".txt"); fs::is_regular_file(file, ignored)) {
+        if (const fs::path file = folder / "pose" / (entry.name + ".txt"); is_file(file)) {
             const MatrixPose pose = read_matrix_pose(file);
             entry.world_from_camera = pose.world_from_camera;
             for (const std::string& sentence : {pose.warning, pose.problem.empty() ? "" : pose.problem + "; no pose."})

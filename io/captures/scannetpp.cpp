@@ -4,6 +4,7 @@
 
 #include "io/captures/trajectory.h"
 #include "io/file_bytes.h"
+#include "io/files.h"
 #include "io/images/format.h"
 #include "io/images/inflate.h"
 #include "io/images/inflated_stream.h"
@@ -191,10 +192,9 @@ class DepthBin final : public FrameContainer {
 };
 
 std::optional<Listing> list_depth_bin(const fs::path& folder) {
-    std::error_code ignored;
     const fs::path bin = folder / "depth.bin", facts = folder / "pose_intrinsic_imu.json", video = folder / "rgb.mkv";
-    const bool with_facts = fs::is_regular_file(facts, ignored), with_video = fs::is_regular_file(video, ignored);
-    if (!fs::is_regular_file(bin, ignored) || !(with_facts || with_video))
+    const bool with_facts = is_file(facts), with_video = is_file(video);
+    if (!is_file(bin) || !(with_facts || with_video))
         return std::nullopt;
     const auto depths = std::make_shared<DepthBin>(bin);
     if (depths->frames() == 0)
@@ -236,12 +236,11 @@ std::optional<Listing> list_depth_bin(const fs::path& folder) {
 } // namespace
 
 std::optional<Listing> list_scannetpp(const fs::path& folder) {
-    std::error_code ignored;
     const fs::path file = folder / "pose_intrinsic_imu.json";
     const auto depths = depth_images_in(folder_named(folder, {"depth"}));
     if (depths.empty())
         return list_depth_bin(folder);
-    if (!fs::is_regular_file(file, ignored))
+    if (!is_file(file))
         return std::nullopt;
     const Json all = json_in(file);
     const auto colours = colour_images_in(folder_named(folder, {"rgb"}));

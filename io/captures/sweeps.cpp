@@ -3,6 +3,7 @@
 #include "io/captures/layouts.h"
 
 #include "io/captures/trajectory.h"
+#include "io/files.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 
@@ -90,8 +91,7 @@ std::vector<MatrixPose> poses_in_rows(const fs::path& file) {
 }
 
 std::vector<double> stamps_in(const fs::path& file, std::vector<std::string>& warnings) {
-    std::error_code ignored;
-    if (!fs::is_regular_file(file, ignored))
+    if (!is_file(file))
         return {};
     const std::string bytes = read_list_file(file);
     std::vector<double> stamps;
@@ -112,7 +112,7 @@ std::vector<double> stamps_in(const fs::path& file, std::vector<std::string>& wa
 /// SemanticKITTI's poses.txt lies in the sequence, KITTI's own poses/NN.txt two levels up.
 fs::path file_of_poses(const fs::path& sequence) {
     std::error_code ignored;
-    if (fs::path own = sequence / "poses.txt"; fs::is_regular_file(own, ignored))
+    if (fs::path own = sequence / "poses.txt"; is_file(own))
         return own;
     const fs::path whole = fs::absolute(sequence, ignored).lexically_normal();
     const fs::path named = whole.filename().empty() ? whole.parent_path() : whole; // "00/" ends with an empty name
@@ -123,8 +123,7 @@ fs::path file_of_poses(const fs::path& sequence) {
 
 std::optional<Listing> list_kitti_odometry(const fs::path& folder) {
     const auto velodyne = folder_named(folder, {"velodyne"});
-    std::error_code ignored;
-    if (!velodyne || !fs::is_regular_file(folder / "calib.txt", ignored))
+    if (!velodyne || !is_file(folder / "calib.txt"))
         return std::nullopt;
     auto sweeps = files_in(*velodyne);
     std::erase_if(sweeps, [](const fs::path& file) { return lower_extension(file) != ".bin"; });
@@ -224,10 +223,9 @@ MatrixPose pose_of(const PosesByToken& poses, const std::string& token, const fs
 std::vector<fs::path> folders_of_tables(const fs::path& folder) {
     std::vector<fs::path> found;
     std::error_code ignored;
-    for (fs::directory_iterator at(folder, ignored), end; !ignored && at != end; at.increment(ignored))
-        if (at->path().filename().string().starts_with("v1.0-") &&
-            fs::is_regular_file(at->path() / "sample_data.json", ignored))
-            found.push_back(at->path());
+    for (const auto& [name, kind] : items_in(folder, ignored))
+        if (name.starts_with("v1.0-") && is_file(folder / name / "sample_data.json"))
+            found.push_back(folder / name);
     std::ranges::sort(found);
     return found;
 }

@@ -2,6 +2,7 @@
 #include "io/captures/layouts.h"
 
 #include "io/captures/trajectory.h"
+#include "io/files.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 
@@ -137,9 +138,8 @@ void add_colour(const fs::path& folder, const ListedImage& colour, CaptureEntry&
 }
 
 void add_colours(const fs::path& folder, const std::vector<ListedImage>& depths, double limit_s, Capture& capture) {
-    std::error_code ignored;
     const fs::path list = folder / "rgb.txt";
-    if (!fs::is_regular_file(list, ignored)) {
+    if (!is_file(list)) {
         capture.warnings.push_back(folder.string() + ": no rgb.txt; depth alone is processed.");
         return;
     }
@@ -170,9 +170,8 @@ void add_colours(const fs::path& folder, const std::vector<ListedImage>& depths,
 }
 
 void add_poses(const fs::path& folder, double limit_s, double offset_s, Capture& capture) {
-    std::error_code ignored;
     const fs::path list = folder / "groundtruth.txt";
-    if (!fs::is_regular_file(list, ignored))
+    if (!is_file(list))
         return;
     const auto poses = read_tum_trajectory(list, capture.warnings);
     if (poses.empty()) {
@@ -217,7 +216,7 @@ std::optional<int> freiburg_in(std::string_view text) {
 std::optional<int> freiburg_number(const fs::path& folder) {
     for (const char* list : {"rgb.txt", "depth.txt", "groundtruth.txt"}) {
         std::error_code ignored;
-        if (!fs::is_regular_file(folder / list, ignored))
+        if (!is_file(folder / list))
             continue;
         const std::string start = read_bytes(folder / list, 4096);
         for (const TextLine& line : text_lines(start))
@@ -265,10 +264,9 @@ std::optional<CameraFile> tum_camera(const fs::path& folder, cv::Size size, std:
 
 /// The other lists tell a TUM recording. Read as a plain folder of images, its depth would be taken for millimetres.
 void refuse_without_depth_list(const fs::path& folder) {
-    std::error_code ignored;
-    const bool colours = fs::is_regular_file(folder / "rgb.txt", ignored);
-    const bool poses = fs::is_regular_file(folder / "groundtruth.txt", ignored);
-    if (colours && (poses || fs::is_directory(folder / "depth", ignored)))
+    const bool colours = is_file(folder / "rgb.txt");
+    const bool poses = is_file(folder / "groundtruth.txt");
+    if (colours && (poses || is_folder(folder / "depth")))
         throw Error(fmt::format("{}: missing, though {} a TUM recording: expected a list of \"time depth/FILE\" lines",
                                 (folder / "depth.txt").string(),
                                 poses ? "rgb.txt and groundtruth.txt say that this is"
@@ -278,8 +276,7 @@ void refuse_without_depth_list(const fs::path& folder) {
 } // namespace
 
 std::optional<Listing> list_tum(const fs::path& folder, const CaptureOptions& options) {
-    std::error_code ignored;
-    if (!fs::is_regular_file(folder / "depth.txt", ignored)) {
+    if (!is_file(folder / "depth.txt")) {
         refuse_without_depth_list(folder);
         return std::nullopt;
     }

@@ -1,6 +1,7 @@
 // SQLite files of rosbag2 and of RealSense's recorder. Messages may each be a zstd frame.
 #include "io/captures/ros/bag.h"
 #include "io/captures/ros/unpack.h"
+#include "io/files.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 
@@ -32,9 +33,10 @@ class Sqlite final : public Bag {
   public:
     explicit Sqlite(const fs::path& file) {
         path = file;
-        std::error_code ignored;
-        if (fs::path journal = file.string() + "-wal";
-            fs::exists(journal, ignored) && fs::file_size(journal, ignored) > 0)
+        if (stored_in_tar(file))
+            throw Error(file.string() + ": a database of SQLite is not read from within a tar: unpack it with "
+                                        "`tar -xf`");
+        if (fs::path journal = file.string() + "-wal"; size_of_file(journal).value_or(0) > 0)
             throw Error(fmt::format("{}: the recording was not closed: {} holds a part of it; `sqlite3 FILE .tables` "
                                     "joins them",
                                     file.string(), journal.filename().string()));
