@@ -80,10 +80,10 @@ json passes_json(const Timings& passes) {
 }
 
 /// The upper three rows of world_from_camera, row by row.
-json pose_json(const Eigen::Isometry3d& pose) {
+json pose_json(const Eigen::Isometry3d& pose, int digits) {
     json numbers = json::array();
     for (int i = 0; i < 12; ++i)
-        numbers.push_back(known(pose.matrix()(i / 4, i % 4), 6));
+        numbers.push_back(known(pose.matrix()(i / 4, i % 4), digits));
     return numbers;
 }
 
@@ -100,7 +100,7 @@ json frame_json(const FrameRow& row, bool with_camera, const CaptureEntry& entry
     if (row.fault != Fault::none)
         text["fault"] = name_of(row.fault);
     if (entry.world_from_camera)
-        text["world_from_camera"] = pose_json(told(*entry.world_from_camera, unit));
+        text["world_from_camera"] = pose_json(told(*entry.world_from_camera, unit), unit.arbitrary() ? 9 : 6);
     text["valid_share"] = known(row.valid_share);
     text["coverage"] = known(row.coverage);
     text["mean_visibility"] = known(row.mean_visibility);

@@ -433,8 +433,8 @@ std::vector<std::string> RunSettings::given_in_metres() {
 }
 
 double RunSettings::median_depth() const {
-    const double radius = radius_m();
-    return radius > 0 ? radius / relative_radius : usual_median_depth;
+    const double of_method = radius_m();
+    return of_method > 0 ? of_method / relative_radius : usual_median_depth;
 }
 
 bool RunSettings::in_sequence(const Capture& capture) const {

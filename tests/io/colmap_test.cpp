@@ -87,12 +87,12 @@ TEST_F(Colmap, depth_is_measured_by_the_scene_so_the_unit_cancels) {
 
 TEST_F(Colmap, a_given_unit_makes_metres_of_depths_and_poses) {
     write_colmap(folder.path(), {.unit = 4});
-    const Capture capture = open({.depth_scale = "4"});
+    const Capture capture = open({"", "4"});
     EXPECT_FALSE(capture.unit.arbitrary());
     const Frame frame = capture.load(2);
     EXPECT_NEAR(frame.depth_m(20, 30), corner_depth(0)(20, 30), 1e-6F);
     EXPECT_NEAR(frame.world_from_camera->translation().x(), -0.02, 1e-12);
-    const Capture metres = open({.depth_scale = "m"});
+    const Capture metres = open({"", "m"});
     EXPECT_NEAR(metres.load(2).world_from_camera->translation().x(), -0.08, 1e-12);
     require_metres(capture, "this");
     EXPECT_TRUE(says(refusal([&] { require_metres(open(), "refine"); }), "refine needs lengths in metres"));
@@ -133,7 +133,7 @@ TEST_F(Colmap, cameras_may_differ_in_size_and_one_bad_camera_spoils_its_frames_o
     ASSERT_EQ(capture.entries.size(), 3U);
     EXPECT_EQ(capture.load(0).camera.pinhole.size, cv::Size(64, 48));
     EXPECT_EQ(capture.load(1).camera.pinhole.size, cv::Size(32, 48));
-    EXPECT_TRUE(says(refusal([&] { (void)capture.load(2); }), "cameras.txt line 3: the camera model 'FOV'"));
+    EXPECT_TRUE(says(refusal([&] { (void)capture.load(2); }), "cameras.txt line 3: the camera model \"FOV\""));
     EXPECT_TRUE(warned(capture.warnings, "depth maps of several sizes"));
 }
 
@@ -191,7 +191,7 @@ TEST_F(Colmap, damaged_lists_keep_what_was_whole) {
     EXPECT_TRUE(warned(open().warnings, "an unknown camera model 99 at offset 12"));
     bytes[12] = 1, bytes[8] = 6; // another id
     write_file(folder / "sparse/cameras.bin", bytes);
-    EXPECT_TRUE(says(refusal([&] { (void)open().load(0); }), "camera 7 of '0.jpg' is not among the cameras"));
+    EXPECT_TRUE(says(refusal([&] { (void)open().load(0); }), "camera 7 of \"0.jpg\" is not among the cameras"));
 }
 
 TEST_F(Colmap, damaged_lines_and_poses_are_named) {
@@ -235,12 +235,12 @@ TEST_F(Colmap, a_workspace_without_depth_maps_says_what_makes_them) {
 }
 
 TEST_F(Colmap, a_single_depth_map_has_no_unit_either) {
-    const fs::path file = write_file(folder / "a.geometric.bin", colmap_map(corner_depth(0) * 50));
-    const Capture capture = open_capture(file, {.camera = "50,50,31.5,23.5"});
+    const fs::path file = write_file(folder / "a.geometric.bin", colmap_map(cv::Mat1f(cv::Mat(corner_depth(0) * 50))));
+    const Capture capture = open_capture(file, {"50,50,31.5,23.5", ""});
     EXPECT_EQ(capture.kind, "depth image");
     EXPECT_TRUE(capture.unit.arbitrary());
     EXPECT_NEAR(depth(capture, capture.load(0), 20, 30), 50 * static_cast<double>(corner_depth(0)(20, 30)), 1e-4);
-    const Capture metric = open_capture(file, {.camera = "50,50,31.5,23.5", .depth_scale = "50"});
+    const Capture metric = open_capture(file, {"50,50,31.5,23.5", "50"});
     EXPECT_NEAR(metric.load(0).depth_m(20, 30), corner_depth(0)(20, 30), 1e-6F);
     EXPECT_EQ(open_capture(folder.path()).kind, "depth images");
 }

@@ -32,7 +32,7 @@ void write_colmap(const std::filesystem::path& folder, const ColmapWorkspace& wo
     for (int i = 0; i < workspace.frames; ++i) {
         const std::string name = fmt::format("{}{}.jpg", workspace.images_in, i);
         write_file(folder / ("stereo/depth_maps/" + name + workspace.kind),
-                   colmap_map(corner_depth(0) * workspace.unit));
+                   colmap_map(cv::Mat1f(cv::Mat(corner_depth(0) * workspace.unit))));
         std::filesystem::create_directories((folder / "images" / name).parent_path());
         write_picture(folder / "images" / name, cv::Mat3b(height, width, cv::Vec3b(40, 120, 200)));
         const double x = 0.01 * i * workspace.unit; // of the world in the camera
