@@ -130,7 +130,9 @@ std::string preview_of(const Work& work, const FrameImages& images, const Length
     const cv::Mat1f& confidence = scene.confidence.empty() ? work.confidence.visibility : scene.confidence;
     page::Preview preview{.z_m = scene.z_m, .visibility = scene.visibility, .camera = scene.camera};
     if (unit.arbitrary()) {
-        preview.z_m = scene.z_m * unit.units_per_length;
+        cv::Mat1f own; // an expression assigned to preview.z_m would write into the scene's pixels
+        scene.z_m.convertTo(own, CV_32F, unit.units_per_length);
+        preview.z_m = own;
         preview.unit = unit.name();
     }
     if (images.confidence_map.size() == scene.z_m.size())
