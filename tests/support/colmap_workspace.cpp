@@ -31,8 +31,11 @@ void write_colmap(const std::filesystem::path& folder, const ColmapWorkspace& wo
     std::string images = raw(std::uint64_t(workspace.frames)), lines = "# images\n";
     for (int i = 0; i < workspace.frames; ++i) {
         const std::string name = fmt::format("{}{}.jpg", workspace.images_in, i);
-        write_file(folder / ("stereo/depth_maps/" + name + workspace.kind),
-                   colmap_map(cv::Mat1f(cv::Mat(corner_depth(0) * workspace.unit))));
+        cv::Mat1f depth = corner_depth(0), noise(depth.size());
+        cv::RNG random(static_cast<std::uint64_t>(i) + 1);
+        random.fill(noise, cv::RNG::NORMAL, 1, workspace.noise);
+        cv::multiply(depth, noise, depth, workspace.unit);
+        write_file(folder / ("stereo/depth_maps/" + name + workspace.kind), colmap_map(depth));
         std::filesystem::create_directories((folder / "images" / name).parent_path());
         write_picture(folder / "images" / name, cv::Mat3b(height, width, cv::Vec3b(40, 120, 200)));
         const double x = 0.01 * i * workspace.unit; // of the world in the camera

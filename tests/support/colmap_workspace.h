@@ -14,6 +14,7 @@ struct ColmapWorkspace {
     int frames = 3;
     double unit = 1;                     ///< units for a metre of corner_depth()
     bool text = false;                   ///< lists as text; else binary
+    double noise = 0;                    ///< sigma of depth, as a share of it
     int image_scale = 1;                 ///< images have so many times the depth maps' sides
     std::string images_in = {};          ///< "left/": the images' folder below images/
     const char* kind = ".geometric.bin"; ///< of the depth maps
