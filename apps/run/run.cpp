@@ -236,9 +236,13 @@ class Run final : public Command {
     }
 
     /// Settings in metres mean nothing in a capture whose unit is arbitrary.
-    void refuse_metres(const Capture& capture) {
-        if (!capture.unit.arbitrary())
+    void refuse_metres(Capture& capture) {
+        if (!capture.unit.arbitrary()) {
+            if (asked_.relative_radius != RunSettings().relative_radius)
+                capture.warnings.emplace_back("--relative-radius is not used: lengths are not in an arbitrary unit, so "
+                                              "--radius sets the radius.");
             return;
+        }
         if (const std::vector<std::string> given = asked_.given_in_metres(); !given.empty())
             throw Error(
                 fmt::format("{}: {} {} in metres, and its unit is arbitrary ({}): leave {} out (--relative-radius "

@@ -131,6 +131,8 @@ TEST_F(ArbitraryUnit, settings_in_metres_are_refused_unless_the_unit_is_given) {
         EXPECT_TRUE(says(refused.err, "in metres, and its unit is arbitrary"));
         EXPECT_TRUE(says(refused.err, "--depth-scale UNITS_PER_METRE"));
     }
+    const Ran unused = run(4, "--depth-scale 4 --relative-radius 0.3", "unused");
+    EXPECT_TRUE(says(unused.err, "--relative-radius is not used"));
     const Ran metric = run(4, "--radius 0.4 --depth-scale 4", "metric");
     EXPECT_EQ(metric.exit_code, 0) << metric.err;
     EXPECT_EQ(metric.err.find("arbitrary"), std::string::npos) << metric.err;
