@@ -241,6 +241,10 @@ class Workspace {
 
     /// Geometric wins over photometric. Whether there is one.
     bool find_depth(const std::string& name, CaptureEntry& entry) {
+        if (name.starts_with('/')) {
+            entry.problem = fmt::format("{}: {}", sparse_.string(), trouble_with(folder_, name));
+            return true;
+        }
         std::error_code ignored;
         for (std::size_t kind = 0; kind < kinds.size(); ++kind) {
             const std::string file = depth_folder + name + kinds[kind];
@@ -258,7 +262,7 @@ class Workspace {
 
     void find_colour(const std::string& name, CaptureEntry& entry) const {
         if (const auto trouble = trouble_with(folder_, "images/" + name); trouble.empty())
-            entry.colour = (folder_ / "images" / name).lexically_normal();
+            entry.colour = (folder_ / ("images/" + name)).lexically_normal();
         else
             entry.warnings.push_back(fmt::format("{}: {}; processed without colour.", sparse_.string(), trouble));
     }

@@ -153,16 +153,16 @@ TEST_F(Colmap, names_lead_nowhere_outside) {
     write_colmap(folder / "dense", {.text = true});
     write_file(folder / "secret.jpg.geometric.bin", colmap_map(corner_depth(0)));
     write_file(folder / "dense/sparse/images.txt",
-               "1 1 0 0 0 0 0 0 7 ../../../secret.jpg\n\n2 1 0 0 0 0 0 0 7 .\\0.jpg\n\n");
+               "1 1 0 0 0 0 0 0 7 ../../../secret.jpg\n\n2 1 0 0 0 0 0 0 7 .\\0.jpg\n\n3 1 0 0 0 0 0 0 7 /0.jpg\n\n");
     const Capture capture = open_capture(folder / "dense");
-    ASSERT_EQ(capture.entries.size(), 2U);
+    ASSERT_EQ(capture.entries.size(), 3U);
     int refused = 0;
-    for (std::size_t i = 0; i < 2; ++i)
+    for (std::size_t i = 0; i < 3; ++i)
         if (const std::string why = refusal([&] { (void)capture.load(i); }); !why.empty()) {
             EXPECT_TRUE(says(why, "leaves the capture's folder"));
             ++refused;
         }
-    EXPECT_EQ(refused, 1);
+    EXPECT_EQ(refused, 2);
 }
 
 TEST_F(Colmap, damaged_lists_keep_what_was_whole) {
