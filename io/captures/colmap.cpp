@@ -37,8 +37,8 @@ struct ColmapImage {
 void take_pose(const std::array<double, 7>& rows, const std::string& place, ColmapImage& image) {
     const Eigen::Quaterniond q(rows[0], rows[1], rows[2], rows[3]);
     const Eigen::Vector3d t(rows[4], rows[5], rows[6]);
-    constexpr double longest = 1e30;
-    if (!(std::abs(q.norm() - 1) < 0.02) || !(t.cwiseAbs().maxCoeff() < longest)) { // NaN, too
+    constexpr double longest = 1e30; // of which squares are finite
+    if (!(std::abs(q.norm() - 1) < 0.02) || !t.allFinite() || t.cwiseAbs().maxCoeff() > longest) {
         image.warning = place + ": no unit quaternion and translation; no pose.";
         return;
     }

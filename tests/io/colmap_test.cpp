@@ -197,7 +197,7 @@ TEST_F(Colmap, damaged_lists_keep_what_was_whole) {
 TEST_F(Colmap, damaged_lines_and_poses_are_named) {
     write_colmap(folder.path(), {.text = true});
     write_file(folder / "sparse/images.txt",
-               "1 0 0 0 0 0 0 0 7 0.jpg\n\n2 1 0 0 0 nan 0 0 7 1.jpg\n\n3 1 0 0 7 2.jpg\n\n");
+               "1 0 0 0 0 0 0 0 7 0.jpg\n\n2 1 0 0 0 0 nan 0 7 1.jpg\n\n3 1 0 0 7 2.jpg\n\n");
     const Capture capture = open();
     EXPECT_EQ(capture.entries.size(), 2U);
     EXPECT_TRUE(warned(capture.warnings, "images.txt line 5: expected ID QW QX QY QZ TX TY TZ CAMERA NAME"));
