@@ -197,7 +197,8 @@ Findings look_at(Capture capture) {
         levels, [&](const DepthLevel& level) { return (below += level.count) > findings.samples.seen / 2; });
     findings.median_m = middle->z_m;
     findings.farthest_m = levels.back().z_m;
-    findings.steps = depth_steps(levels);
+    if (!findings.capture.unit.arbitrary()) // its numbers are computed, not sensed
+        findings.steps = depth_steps(levels);
     return findings;
 }
 
@@ -225,6 +226,12 @@ void print_depth(const Findings& found) {
         return;
     }
     line("depth unit", fmt::format("{} ({})", depth.name, depth.origin));
+    if (const LengthUnit& unit = found.capture.unit; unit.arbitrary()) {
+        line("depth range", fmt::format("{} .. {}, median {}", unit.text(found.nearest_m, 4),
+                                        unit.text(found.farthest_m, 4), unit.text(found.median_m, 4)));
+        line("holes", fmt::format("{:.1f} %", 100 * hole_share(found.samples)));
+        return;
+    }
     line("depth range",
          fmt::format("{:.3f} .. {:.3f} m, median {:.3f} m", found.nearest_m, found.farthest_m, found.median_m));
     line("holes", fmt::format("{:.1f} %", 100 * hole_share(found.samples)));
@@ -264,7 +271,9 @@ void print(const Findings& found) {
         line("camera", fmt::format("{} ({})", describe(*camera), camera->origin));
     else
         line("camera", samples.clouds.empty() ? "none: --camera gives one" : "none: run casts rays from every point");
-    line("poses", found.poses == 0 ? "none" : fmt::format("{}, path {:.2f} m", found.poses, found.path_length_m));
+    const std::string path = capture.unit.arbitrary() ? capture.unit.text(found.path_length_m)
+                                                      : fmt::format("{:.2f} m", found.path_length_m);
+    line("poses", found.poses == 0 ? "none" : fmt::format("{}, path {}", found.poses, path));
     const std::string registered(samples.clouds.empty() ? name_of(capture.registration) : "by its nature");
     line("registered",
          registered + (capture.registration_reason.empty() ? "" : " (" + capture.registration_reason + ")"));
@@ -285,6 +294,14 @@ json sizes_json(const std::map<std::pair<int, int>, int>& sizes) {
 
 json depth_json(const Findings& found) {
     const DepthEncoding& depth = found.capture.depth;
+    if (const LengthUnit& unit = found.capture.unit; unit.arbitrary())
+        return {{"encoding", depth.name},
+                {"origin", depth.origin},
+                {"unit", unit.name()},
+                {"near", unit.told(found.nearest_m)},
+                {"median", unit.told(found.median_m)},
+                {"far", unit.told(found.farthest_m)},
+                {"holes", hole_share(found.samples)}};
     json text{{"encoding", depth.name},     {"origin", depth.origin},    {"near_m", found.nearest_m},
               {"median_m", found.median_m}, {"far_m", found.farthest_m}, {"holes", hole_share(found.samples)},
               {"steps", json::array()}};
@@ -308,7 +325,9 @@ json to_json(const Findings& found) {
         {"clouds", json::array()},
         {"depth", depth_json(found)},
         {"camera", camera ? to_json(*camera) : json()},
-        {"poses", {{"count", found.poses}, {"path_m", found.path_length_m}}},
+        {"poses",
+         {{"count", found.poses},
+          {capture.unit.arbitrary() ? "path_units" : "path_m", capture.unit.told(found.path_length_m)}}},
         {"registration", {{"registered", name_of(capture.registration)}, {"reason", capture.registration_reason}}},
         {"warnings", warnings},
         {"unusable", json::array()}};
@@ -331,7 +350,8 @@ json frame_json(const Capture& capture, std::size_t index) {
         for (int row = 0; row < 4; ++row)
             for (int column = 0; column < 4; ++column)
                 text["world_from_camera"][static_cast<std::size_t>(row)].push_back(
-                    entry.world_from_camera->matrix()(row, column));
+                    column == 3 ? capture.unit.told(entry.world_from_camera->matrix()(row, column))
+                                : entry.world_from_camera->matrix()(row, column));
     text["confidence"] = entry.confidence.empty() ? json() : json("an image; 0 is a hole");
     try {
         const Frame frame = capture.load(index);

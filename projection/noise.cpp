@@ -371,15 +371,19 @@ DepthNoise noise_from_text(const std::string& text) {
     return noise;
 }
 
-std::string describe(const DepthNoise& noise) {
+std::string describe(const DepthNoise& noise, const LengthUnit& unit) {
+    const auto factor = [&](double per_z2) { return unit.arbitrary() ? per_z2 / unit.units_per_length : per_z2; };
     std::string text = "none";
-    if (noise.any())
+    if (noise.any() && unit.arbitrary())
+        text = fmt::format("sigma {:.3g} + {:.3g} z^2 units, correlation length {:.1f} px", unit.told(noise.floor_m),
+                           factor(noise.per_z2), noise.correlation_px);
+    else if (noise.any())
         text = fmt::format("sigma {:.5f} + {:.5f} z^2 m, correlation length {:.1f} px", noise.floor_m, noise.per_z2,
                            noise.correlation_px);
     if (noise.step_m > 0)
-        text += fmt::format(", steps of {:.2g} m", noise.step_m);
+        text += fmt::format(", steps of {}", unit.text(noise.step_m, 2));
     if (noise.step_per_z2 > 0)
-        text += fmt::format(", steps of {:.2g} z^2 m", noise.step_per_z2);
+        text += fmt::format(", steps of {:.2g} z^2 {}", factor(noise.step_per_z2), unit.name());
     if (noise.jumps == Jumps::smeared)
         text += ", edges smeared over several pixels";
     return text;

@@ -1,6 +1,7 @@
 // The noise of recorded depth: sigma(z), measured from the data.
 #pragma once
 
+#include "projection/length_unit.h"
 #include "projection/maps.h"
 
 #include <span>
@@ -52,7 +53,8 @@ struct DepthNoise {
 /// "auto". Throws Misuse.
 [[nodiscard]] DepthNoise noise_from_text(const std::string& text);
 
-/// "sigma 0.0014 + 0.0018 z^2 m, correlation length 3.1 px, steps of 0.0029 z^2 m", or "none, steps of 0.0002 m".
-[[nodiscard]] std::string describe(const DepthNoise& noise);
+/// "sigma 0.0014 + 0.0018 z^2 m, correlation length 3.1 px, steps of 0.0029 z^2 m", or "none, steps of 0.0002 m"; of a
+/// recording in an arbitrary unit, z and sigma are in that unit.
+[[nodiscard]] std::string describe(const DepthNoise& noise, const LengthUnit& unit = {});
 
 } // namespace scanshade

@@ -172,6 +172,8 @@ std::optional<SequenceAo::Fitting> SequenceAo::fitting(std::size_t here, std::si
     const auto own = slots_.find(here), other = slots_.find(there);
     if (other == slots_.end() || !own->second.world_from_camera || !other->second.world_from_camera)
         return std::nullopt;
+    if (other->second.depth.camera.size != own->second.depth.camera.size) // averages need the same pixels
+        return std::nullopt;
     register_with(here, {&there, 1});
     const PairRegistration& met = slots_.at(std::min(here, there)).registrations.at(std::max(here, there));
     if (met.agreement.fits())

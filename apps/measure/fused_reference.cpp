@@ -76,6 +76,7 @@ FusedReference::FusedReference(gpu::Device& device, const std::filesystem::path&
     if (noise_.needs_preparation())
         fit_.emplace(device, noise_);
     const Capture capture = open_capture(path, options);
+    require_metres(capture, "a reference");
     const std::vector<std::size_t> frames = posed(capture);
     if (frames.size() < 2)
         throw Error(

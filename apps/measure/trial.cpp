@@ -103,6 +103,7 @@ std::vector<std::size_t> indices_in(const Capture& capture, const TrialRequest& 
 
 TrialCapture load_trial(const fs::path& path, const TrialRequest& request) {
     const Capture capture = open_capture(path, request.capture);
+    require_metres(capture, "a comparison of methods");
     const bool measured = request.depth_noise == "auto";
     const DepthNoise noise =
         measured ? noise_of(capture, indices_in(capture, request)) : noise_from_text(request.depth_noise);

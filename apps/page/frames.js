@@ -98,6 +98,8 @@
     };
 
     const tell = (text) => { readout.textContent = text; };
+    /** Metres; or an arbitrary unit, which may be of any size. */
+    const length = (z, digits) => preview.unit ? `${Number(z.toPrecision(3))} ${preview.unit}` : fixed(z, digits) + " m";
 
     const draw = () => {
       const empty = by_id("empty");
@@ -112,8 +114,8 @@
       const legend = by_id("legend");
       legend.hidden = !(preview?.z_m && [left, right].some((kind) => kind?.key === "depth"));
       if (!legend.hidden) {
-        by_id("near").textContent = fixed(preview.range[0], 2) + " m";
-        by_id("far").textContent = fixed(preview.range[1], 2) + " m";
+        by_id("near").textContent = length(preview.range[0], 2);
+        by_id("far").textContent = length(preview.range[1], 2);
       }
       mix();
       place();
@@ -209,7 +211,7 @@
       const v = Math.floor((y - (box.height - shown[1]) / 2) / shown[1] * height);
       if (u < 0 || v < 0 || u >= width || v >= height) return tell("");
       const i = v * width + u, parts = [`pixel ${preview.first + u * preview.step}, ${preview.first + v * preview.step}`];
-      if (preview.z_m) parts.push(preview.z_m[i] > 0 ? `depth ${fixed(preview.z_m[i], 3)} m` : "no depth");
+      if (preview.z_m) parts.push(preview.z_m[i] > 0 ? `depth ${length(preview.z_m[i], 3)}` : "no depth");
       if (preview.ao) parts.push(preview.ao[i] ? `AO ${fixed(scanshade.share_of(preview.ao[i], 128), 2)}` : "no AO");
       if (preview.reference && preview.reference[i]) parts.push(`reference ${fixed(scanshade.share_of(preview.reference[i], 128), 2)}`);
       if (preview.confidence && preview.confidence[i]) parts.push(`confidence ${fixed(scanshade.share_of(preview.confidence[i], 32), 2)}`);

@@ -137,6 +137,8 @@ std::string preview_script(const Preview& preview) {
         const std::vector<float> depths_m = sampled(preview.z_m, sampling);
         const auto [near, far] = range_of(depths_m);
         text += fmt::format(",\"range\":[{:.5g},{:.5g}]", near, far);
+        if (!preview.unit.empty())
+            text += fmt::format(",\"unit\":\"{}\"", preview.unit);
         append_depth(bytes, depths_m);
         add("depth");
     }

@@ -13,13 +13,14 @@ namespace scanshade::page {
 
 /// What a preview is made of. Maps may be empty; those that are not have one size.
 struct Preview {
-    cv::Mat1f z_m;                 ///< metres, 0 = hole
+    cv::Mat1f z_m;                 ///< metres or `unit`, 0 = hole
     cv::Mat1f visibility;          ///< 0 .. 1, NaN = none
     cv::Mat1f confidence = {};     ///< likewise
     cv::Mat1b confidence_map = {}; ///< in place of `confidence`: 0 = none, 1 .. 255 = 0 .. 1
     Pinhole camera = {};           ///< of the maps
     cv::Mat3b colour = {};         ///< may have another size than the maps
     bool colour_fits = false;      ///< it lies on the maps' pixels
+    std::string unit = {};         ///< of depth; empty = metres
     cv::Mat1f reference = {};      ///< visibility that `visibility` is compared with
 };
 

@@ -206,9 +206,10 @@ json run_head(const json& manifest) {
     std::ranges::move(texts_at(manifest, "outlook"), std::back_inserter(first));
     for (const std::string& sentence : first) // what to expect comes first
         head.contains("lead") ? notes.push_back(sentence) : void(head["lead"] = sentence);
-    for (const char* key : {"depth_noise", "shading"})
+    for (const auto& [key, title] :
+         {std::pair{"radius", "radius: "}, std::pair{"depth_noise", "depth noise: "}, std::pair{"shading", ""}})
         if (const std::string sentence = text_at(manifest, key); !sentence.empty())
-            notes.push_back((std::string(key) == "depth_noise" ? "depth noise: " : "") + sentence);
+            notes.push_back(title + sentence);
     for (const std::string& warning : texts_at(capture, "warnings"))
         notes.push_back("warning: " + warning);
     head["notes"] = notes;

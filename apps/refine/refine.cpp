@@ -113,6 +113,7 @@ Refinement RefineSettings::from_boards(const fs::path& folder) const {
 
 RecordingResult RefineSettings::from_capture(const fs::path& path) const {
     Capture capture = open_capture(path, {first_.camera, depth_scale_, 0.02});
+    require_metres(capture, "refine");
     std::vector<std::size_t> frames(capture.entries.size());
     std::iota(frames.begin(), frames.end(), std::size_t{0});
     if (!capture.entries.front().cloud.empty())

@@ -24,6 +24,7 @@ inline constexpr std::array result_folders = {"ao", "confidence", "shaded", "pan
 /// points.
 struct Outputs {
     std::filesystem::path folder;
+    LengthUnit unit = {};   ///< of the capture: lengths are written in it
     bool ao = true;         ///< the visibility map
     bool confidence = true; ///< how reliable the visibility is (confidence_of()), as 8 bits or floats
     bool shaded = true; ///< colour times visibility; clay times visibility where colour is not known to fit the depth

@@ -68,8 +68,8 @@ void RecordingCloud::add_point(const Vector3d& point, float weight, float visibi
                                const cv::Vec3b* bgr) {
     const Vector3d place = (point / resolution_m_).array().floor();
     if (!(place.cwiseAbs().maxCoeff() < 2e9))
-        throw Error(fmt::format("a point {:.3g} m from the origin, in cubes of {:.3g} m: farther than can be counted",
-                                point.norm(), resolution_m_));
+        throw Error(fmt::format("a point {} from the origin, in cubes of {}: farther than can be counted",
+                                unit_.text(point.norm()), unit_.text(resolution_m_)));
     const auto whole = [&](Eigen::Index axis) { return static_cast<std::int32_t>(place[axis]); };
     const auto [known, is_new] = index_.try_emplace(Key{whole(0), whole(1), whole(2)}, cells_.size());
     if (is_new)
@@ -92,7 +92,7 @@ RecordingCloud::Columns RecordingCloud::columns() const {
     auto& [points, colours, visibility, confidence, views] = all;
     const bool coloured = std::ranges::any_of(cells_, [](const Cell& cell) { return cell.colour_weight > 0; });
     for (const Cell& cell : cells_) {
-        points.push_back(cell.point / cell.weight);
+        points.push_back(cell.point * (unit_.told(1) / cell.weight));
         visibility.push_back(cell.visibility / static_cast<float>(cell.weight));
         confidence.push_back(cell.confidence);
         views.push_back(static_cast<float>(cell.views));
@@ -104,6 +104,10 @@ RecordingCloud::Columns RecordingCloud::columns() const {
                              cv::saturate_cast<uchar>(bgr[2]));
     }
     return all;
+}
+
+std::string RecordingCloud::merged_within() const {
+    return unit_.arbitrary() ? unit_.text(resolution_m_) : fmt::format("{:.6f} m", resolution_m_);
 }
 
 void RecordingCloud::write_for_page(const std::filesystem::path& folder, const std::string& stem,
@@ -119,7 +123,7 @@ void RecordingCloud::write(const std::filesystem::path& file) const {
     const auto [points, colours, visibility, confidence, views] = columns();
     write_new_ply(file, points, colours,
                   {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}, {"ao_views", views}},
-                  {fmt::format("one cloud of {} frames, merged within {:.6f} m", frames_, resolution_m_)});
+                  {fmt::format("one cloud of {} frames, merged within {}", frames_, merged_within())});
 }
 
 } // namespace scanshade

@@ -1,6 +1,7 @@
 // One cloud of a whole recording: points that several frames saw at the same position become one.
 #pragma once
 
+#include "projection/length_unit.h"
 #include "projection/maps.h"
 
 #include <array>
@@ -8,6 +9,7 @@
 #include <Eigen/Geometry>
 #include <filesystem>
 #include <span>
+#include <string>
 #include <unordered_map>
 #include <vector>
 
@@ -38,7 +40,8 @@ class RecordingCloud {
   public:
     /// Points are merged within cubes of this side; 0 = one and a half times what a pixel covers at the first frame's
     /// median depth, or the spacing of the first sweep's points.
-    explicit RecordingCloud(double resolution_m) : resolution_m_(resolution_m) {}
+    /// `unit`: of the recording, in which the points are written.
+    explicit RecordingCloud(double resolution_m, LengthUnit unit = {}) : resolution_m_(resolution_m), unit_(unit) {}
 
     /// Nearer and more confident views of a point have more weight. Pixels without visibility add nothing.
     void add(const CloudFrame& frame);
@@ -47,6 +50,8 @@ class RecordingCloud {
     void add(const CloudSweep& sweep);
     [[nodiscard]] std::size_t points() const { return cells_.size(); }
     [[nodiscard]] double resolution_m() const { return resolution_m_; }
+    /// "0.0043 m": the side of the cubes.
+    [[nodiscard]] std::string merged_within() const;
     /// Binary PLY in world coordinates: ambient_occlusion, ao_confidence, ao_views. Atomic.
     void write(const std::filesystem::path& file) const;
     /// The same for a page: FOLDER/STEM.000.js and on, at most so many points.
@@ -76,6 +81,7 @@ class RecordingCloud {
     void add_point(const Eigen::Vector3d& point, float weight, float visibility, float confidence,
                    const cv::Vec3b* bgr);
     double resolution_m_;
+    LengthUnit unit_;
     int frames_ = 0;
     std::vector<Cell> cells_; ///< in the order they were added
     std::unordered_map<Key, std::size_t, KeyHash> index_;

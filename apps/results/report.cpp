@@ -32,12 +32,21 @@ json known(double value, int digits = 4) {
     return std::isfinite(value) ? json(std::round(value * scale) / scale) : json();
 }
 
-json settings_json(const std::vector<Stage>& stages) {
+/// Of a capture in an arbitrary unit, settings in metres are left out: they are not in metres there.
+json settings_json(const std::vector<Stage>& stages, const LengthUnit& unit) {
     json settings = json::object();
     for (const Stage& stage : stages)
         for (const Parameter& row : stage.rows)
-            settings[stage.title][row.name] = value_json(row);
+            if (!unit.arbitrary() || row.unit != "m")
+                settings[stage.title][row.name] = value_json(row);
     return settings;
+}
+
+/// In the recording's own unit, or metres.
+Eigen::Isometry3d told(Eigen::Isometry3d pose, const LengthUnit& unit) {
+    if (unit.arbitrary())
+        pose.translation() *= unit.units_per_length;
+    return pose;
 }
 
 json capture_json(const RunReport& report) {
@@ -48,6 +57,12 @@ json capture_json(const RunReport& report) {
     text["depth"] = {{"encoding", capture.depth.name},
                      {"units_per_metre", capture.depth.units_per_metre},
                      {"origin", capture.depth.origin}};
+    if (capture.unit.arbitrary()) {
+        text["depth"].erase("units_per_metre");
+        text["length_unit"] = {{"name", capture.unit.name()},
+                               {"arbitrary", true},
+                               {"median_depth_units", known(capture.unit.told(capture.median_depth), 9)}};
+    }
     if (const DepthCorrection& c = capture.depth_correction; c.any())
         text["depth"]["correction"] = {{"scale", c.scale}, {"offset_m", c.offset_m}, {"curve_per_m", c.curve_per_m}};
     if (capture.colour_camera)
@@ -65,14 +80,14 @@ json passes_json(const Timings& passes) {
 }
 
 /// The upper three rows of world_from_camera, row by row.
-json pose_json(const Eigen::Isometry3d& pose) {
+json pose_json(const Eigen::Isometry3d& pose, int digits) {
     json numbers = json::array();
     for (int i = 0; i < 12; ++i)
-        numbers.push_back(known(pose.matrix()(i / 4, i % 4), 6));
+        numbers.push_back(known(pose.matrix()(i / 4, i % 4), digits));
     return numbers;
 }
 
-json frame_json(const FrameRow& row, bool with_camera, const CaptureEntry& entry) {
+json frame_json(const FrameRow& row, bool with_camera, const CaptureEntry& entry, const LengthUnit& unit) {
     json text{{"index", row.index}, {"name", row.name}, {"status", name_of(row.status)}};
     if (!row.why.empty())
         text["why"] = row.why;
@@ -85,7 +100,7 @@ json frame_json(const FrameRow& row, bool with_camera, const CaptureEntry& entry
     if (row.fault != Fault::none)
         text["fault"] = name_of(row.fault);
     if (entry.world_from_camera)
-        text["world_from_camera"] = pose_json(*entry.world_from_camera);
+        text["world_from_camera"] = pose_json(told(*entry.world_from_camera, unit), unit.arbitrary() ? 9 : 6);
     text["valid_share"] = known(row.valid_share);
     text["coverage"] = known(row.coverage);
     text["mean_visibility"] = known(row.mean_visibility);
@@ -225,28 +240,31 @@ void write_frames_csv(const std::filesystem::path& file, const std::vector<Frame
 }
 
 json manifest_head(const RunReport& report) {
-    return {{"program", "scanshade"},
-            {"version", SCANSHADE_VERSION},
-            {"command_line", command_line()},
-            {"started", utc(report.started)},
-            {"device",
-             {{"name", report.device.name},
-              {"kind", report.device.kind},
-              {"driver", report.device.driver},
-              {"api", report.device.api},
-              {"count", report.devices},
-              {"frames_at_once", report.at_once}}},
-            {"method", report.method},
-            {"settings", settings_json(report.settings)},
-            {"capture", capture_json(report)},
-            {"depth_noise", report.depth_noise},
-            {"budget", report.budget},
-            {"outlook", report.outlook},
-            {"shading", report.shading},
-            {"totals", totals_json(report)}};
+    json head{{"program", "scanshade"},
+              {"version", SCANSHADE_VERSION},
+              {"command_line", command_line()},
+              {"started", utc(report.started)},
+              {"device",
+               {{"name", report.device.name},
+                {"kind", report.device.kind},
+                {"driver", report.device.driver},
+                {"api", report.device.api},
+                {"count", report.devices},
+                {"frames_at_once", report.at_once}}},
+              {"method", report.method},
+              {"settings", settings_json(report.settings, report.capture.unit)},
+              {"capture", capture_json(report)},
+              {"depth_noise", report.depth_noise},
+              {"budget", report.budget},
+              {"outlook", report.outlook},
+              {"shading", report.shading},
+              {"totals", totals_json(report)}};
+    if (!report.radius.empty())
+        head["radius"] = report.radius;
+    return head;
 }
 
-page::Row page_row(const FrameRow& row, const CaptureEntry& entry) {
+page::Row page_row(const FrameRow& row, const CaptureEntry& entry, const LengthUnit& unit) {
     page::Row shown{.index = row.index,
                     .name = row.name,
                     .status = std::string(name_of(row.status)),
@@ -261,7 +279,9 @@ page::Row page_row(const FrameRow& row, const CaptureEntry& entry) {
                     .warnings = row.warnings,
                     .notes = row.notes,
                     .files = {},
-                    .world_from_camera = entry.world_from_camera};
+                    .world_from_camera = {}};
+    if (entry.world_from_camera)
+        shown.world_from_camera = told(*entry.world_from_camera, unit);
     for (const auto& file : row.files)
         shown.files.push_back(file.generic_string());
     return shown;
@@ -283,9 +303,9 @@ std::vector<std::string> write_manifest(const std::filesystem::path& file, const
             for (const auto& each : all_of_row.files)
                 own.insert(each.generic_string());
             stream << std::exchange(between, ",") << "\n    "
-                   << indented(
-                          text_of(frame_json(all_of_row, !report.capture.camera, report.capture.entries.at(row.index))),
-                          "    ");
+                   << indented(text_of(frame_json(all_of_row, !report.capture.camera || report.capture.unit.arbitrary(),
+                                                  report.capture.entries.at(row.index), report.capture.unit)),
+                               "    ");
         }
         stream << (report.frames.empty() ? "]" : "\n  ]");
         left_alone = report.alone ? files_of_others(file.parent_path(), own) : std::vector<std::string>();

@@ -27,6 +27,7 @@ struct RunReport {
     const Capture& capture;
     Registration registration = Registration::unknown; ///< as used
     std::string registration_reason;
+    std::string radius = {};         ///< of a capture in an arbitrary unit: the radius in it, and what it is a part of
     std::string depth_noise;         ///< the noise, its origin, and how the depth is prepared
     std::vector<std::string> budget; ///< what an error or time budget chose, expected and found; empty without one
     std::string shading;             ///< what the shaded pictures show, and why
@@ -66,7 +67,7 @@ void write_frames_csv(const std::filesystem::path& file, const std::vector<Frame
 /// The manifest's members before "frames".
 [[nodiscard]] json manifest_head(const RunReport& report);
 /// A frame as its page lists it.
-[[nodiscard]] page::Row page_row(const FrameRow& row, const CaptureEntry& entry);
+[[nodiscard]] page::Row page_row(const FrameRow& row, const CaptureEntry& entry, const LengthUnit& unit = {});
 
 /// Written last, so that its presence means that the run has ended. `whole` restores what shorten() removed from a row.
 /// Atomic. Returns the files in the folders of results that are not of this run; the manifest lists them as such.

@@ -47,13 +47,24 @@ std::string noise_origin(const RunSettings& settings) {
     return settings.depth_noise == "auto" ? "measured" : "--depth-noise";
 }
 
-std::string noise_sentence(const DepthNoise& noise, const RunSettings& settings) {
+std::string radius_sentence(const RunSettings& settings, const Capture& capture) {
+    if (!capture.unit.arbitrary())
+        return "";
+    if (!(capture.median_depth > 0))
+        return "not known: no depth could be read; the recording's unit is arbitrary";
+    const double radius = settings.radius_m();
+    return fmt::format("{}, {:.3g} of the median depth of {}; the recording's unit is arbitrary",
+                       capture.unit.text(radius), radius / capture.median_depth,
+                       capture.unit.text(capture.median_depth));
+}
+
+std::string noise_sentence(const DepthNoise& noise, const RunSettings& settings, const LengthUnit& unit) {
     const std::string origin = noise_origin(settings);
     const std::string flying = !noise.flies()         ? ""
                                : settings.drop_flying ? "flying pixels are dropped; "
                                                       : "flying pixels are kept; ";
     const bool planes = noise.any() && settings.depth_smoothing > 0;
-    return fmt::format("{} ({}); {}{}", describe(noise), origin, flying,
+    return fmt::format("{} ({}); {}{}", describe(noise, unit), origin, flying,
                        planes ? "depth and normals come from plane fits" : "depth is used as recorded");
 }
 
@@ -66,6 +77,8 @@ void introduce(const RunReport& report, std::size_t frames, bool by_points) {
         say(fmt::format("  camera: {} ({})", describe(*capture.camera), capture.camera->origin));
     if (capture.depth_correction.any())
         say(fmt::format("  depth correction: {} ({})", describe(capture.depth_correction), capture.camera->origin));
+    if (!report.radius.empty())
+        say("  radius: " + report.radius);
     if (!by_points)
         say("  depth noise: " + report.depth_noise);
     for (const std::string& warning : capture.warnings)

@@ -13,8 +13,11 @@ namespace scanshade {
 [[nodiscard]] std::string shading_sentence(const Capture& capture, Registration registration);
 /// Who gave the noise of the depth: "measured", or the flag.
 [[nodiscard]] std::string noise_origin(const RunSettings& settings);
-/// The depth's noise, and how the depth is prepared.
-[[nodiscard]] std::string noise_sentence(const DepthNoise& noise, const RunSettings& settings);
+/// "0.23 units, 0.1 of the median depth of 2.3 units; the recording's unit is arbitrary"; empty where it is metres.
+[[nodiscard]] std::string radius_sentence(const RunSettings& settings, const Capture& capture);
+/// The depth's noise, in metres or the capture's unit, and how the depth is prepared.
+[[nodiscard]] std::string noise_sentence(const DepthNoise& noise, const RunSettings& settings,
+                                         const LengthUnit& unit = {});
 
 /// Prints what the capture holds, how many frames are used, and the settings chosen for them. `by_points`: its clouds
 /// are computed from their points, so that depth images do not matter.

@@ -183,14 +183,17 @@ class Run final : public Command {
     }
 
   private:
-    CaptureJob job_from(const fs::path& path, const fs::path& folder) const {
-        CaptureJob job{open_capture_at_or_below(path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s,
-                                                       asked_.poses, asked_.colour, asked_.topic}),
-                       {}};
+    CaptureJob job_from(const fs::path& path, const fs::path& folder) {
+        CaptureJob job{
+            open_capture_at_or_below(path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s, asked_.poses,
+                                            asked_.colour, asked_.topic, asked_.median_depth()}),
+            {}};
+        refuse_metres(job.capture);
         refuse_absent_view(job.capture);
         job.batch.frames = job.of = slice(asked_.frames, job.capture.entries.size());
         job.batch.outputs = asked_.outputs();
         job.batch.outputs.folder = folder;
+        job.batch.outputs.unit = job.capture.unit;
         if (!asked_.dump.empty())
             job.batch.dump = fs::path(asked_.dump) / folder.lexically_relative(asked_.out);
         job.batch.registration = asked_.registration();
@@ -233,6 +236,22 @@ class Run final : public Command {
                         ": --view colour needs the pose of a secondary camera for colour; refine finds it");
     }
 
+    /// Settings in metres mean nothing in a capture whose unit is arbitrary.
+    void refuse_metres(Capture& capture) {
+        if (!capture.unit.arbitrary()) {
+            if (asked_.relative_radius != RunSettings().relative_radius)
+                capture.warnings.emplace_back("--relative-radius is not used: lengths are not in an arbitrary unit, so "
+                                              "--radius sets the radius.");
+            return;
+        }
+        if (const std::vector<std::string> given = asked_.given_in_metres(); !given.empty())
+            throw Error(
+                fmt::format("{}: {} {} in metres, and its unit is arbitrary ({}): leave {} out (--relative-radius "
+                            "sets the radius), or give the unit as --depth-scale UNITS_PER_METRE",
+                            capture.path.string(), fmt::join(given, ", "), given.size() > 1 ? "are" : "is",
+                            capture.depth.origin, given.size() > 1 ? "them" : "it"));
+    }
+
     /// `workers`: null without a Vulkan device.
     RunReport begun_report(const CaptureJob& job, Workers* workers) {
         const auto& said = job.batch.registration;
@@ -244,7 +263,8 @@ class Run final : public Command {
                          .capture = job.capture,
                          .registration = registration,
                          .registration_reason = said ? "--registered" : job.capture.registration_reason,
-                         .depth_noise = noise_sentence(job.batch.noise, asked_),
+                         .radius = radius_sentence(asked_, job.capture),
+                         .depth_noise = noise_sentence(job.batch.noise, asked_, job.capture.unit),
                          .budget = {},
                          .shading = shading_sentence(job.capture, registration),
                          .frames = {}};
@@ -370,7 +390,7 @@ class Run final : public Command {
         Prepared ready = prepare(job);
         std::optional<RecordingCloud> cloud;
         if (!asked_.recording_cloud.empty())
-            job.batch.cloud = &cloud.emplace(asked_.cloud_resolution_m);
+            job.batch.cloud = &cloud.emplace(asked_.cloud_resolution_m, job.capture.unit);
         if (!ready.by_points)
             fit_into_memory(job, ready.report.device.kind == "CPU");
         say(ready.at_work);
@@ -529,7 +549,7 @@ class Run final : public Command {
             say_left_alone(write_manifest(files.manifest, report, [&](const FrameRow& row) {
                 FrameRow whole = journal.whole(row);
                 if (writes_page(job))
-                    page.add(page_row(whole, job.capture.entries.at(row.index)));
+                    page.add(page_row(whole, job.capture.entries.at(row.index), job.capture.unit));
                 return whole;
             }));
             if (writes_page(job)) {
@@ -562,7 +582,7 @@ class Run final : public Command {
         if (writes_page(job))
             cloud.write_for_page(job.folder(), page::recording_stem, job.batch.outputs.page_points);
         cloud.write(asked_.recording_cloud);
-        say(fmt::format("  {} points, merged within {:.4f} m -> {}", cloud.points(), cloud.resolution_m(),
+        say(fmt::format("  {} points, merged within {} -> {}", cloud.points(), cloud.merged_within(),
                         asked_.recording_cloud));
         return writes_page(job);
     }

@@ -226,6 +226,11 @@ std::vector<Stage> RunSettings::common_stages() {
            .unit = "m",
            .low = 0,
            .common = true},
+          {.name = "relative-radius",
+           .help = "the radius in a capture whose unit is arbitrary (COLMAP): a share of the scene's median depth",
+           .value = &s.relative_radius,
+           .low = 1e-3,
+           .high = 10},
           {.name = "quality",
            .help = "the method's quality level; otherwise " + defaults_of("quality"),
            .value = OneOf(&s.quality, maybe_quality_words),
@@ -401,6 +406,38 @@ MethodSetup& RunSettings::setup_of(std::string_view name) const {
 double RunSettings::radius_m() const {
     const std::vector<Parameter> rows = chosen_setup().parameters();
     return number_of(*row_named(rows, "radius"));
+}
+
+std::vector<std::string> RunSettings::given_in_metres() {
+    std::vector<std::string> given;
+    RunSettings usual;
+    usual.method = method;
+    const std::vector<Stage> defaults = usual.stages_in_use();
+    const auto is_default = [&](const Parameter& row) {
+        return std::ranges::any_of(defaults, [&](const Stage& stage) {
+            const Parameter* other = row_named(stage.rows, row.name);
+            return other && value_text(*other) == value_text(row);
+        });
+    };
+    for (const Stage& stage : stages_in_use())
+        for (const Parameter& row : stage.rows)
+            if (const bool follows = radius && row.name.ends_with(".radius"); // from --radius
+                row.unit == "m" && !follows && !is_default(row))
+                given.push_back(fmt::format("--{} {}", row.name, value_text(row)));
+    if (!depth_range.empty())
+        given.push_back("--depth-range " + depth_range);
+    if (depth_noise != "auto" && depth_noise != "none")
+        given.push_back("--depth-noise " + depth_noise);
+    if (budget.max_error > 0)
+        given.emplace_back("--max-error");
+    if (budget.max_ms > 0)
+        given.emplace_back("--max-ms");
+    return given;
+}
+
+double RunSettings::median_depth() const {
+    const double of_method = radius_m();
+    return of_method > 0 ? of_method / relative_radius : usual_median_depth;
 }
 
 bool RunSettings::in_sequence(const Capture& capture) const {

@@ -38,6 +38,7 @@ class RunSettings {
     SequenceUse sequence = SequenceUse::off;
     std::string method = "cacao", device, settings;
     std::optional<double> radius;
+    double relative_radius = 0.1; ///< of the median depth, where the unit is arbitrary
     std::optional<Quality> quality;
     CloudWalk clouds = CloudWalk::automatic;
     int in_flight = 0;
@@ -79,6 +80,11 @@ class RunSettings {
     [[nodiscard]] const CloudAoOptions& cloud_ao() const { return cloud_options_; }
     [[nodiscard]] MethodSetup& chosen_setup() const { return setup_of(method); }
     [[nodiscard]] double radius_m() const; ///< the chosen method's
+    /// "--radius 0.5": what was set in metres, or is chosen by sensors' noise in metres. None of it can be used for a
+    /// capture in an arbitrary unit.
+    [[nodiscard]] std::vector<std::string> given_in_metres();
+    /// Of such a capture, in the walk's lengths: the method's radius is then the asked part of it.
+    [[nodiscard]] double median_depth() const;
     [[nodiscard]] bool in_sequence(const Capture& capture) const;
     /// Whether the capture needs a Vulkan device even if its clouds are computed from their points.
     [[nodiscard]] bool asks_for_device(const Capture& capture) const;

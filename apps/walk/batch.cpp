@@ -76,7 +76,8 @@ void attach_and_write(Work& work, const BatchOptions& options) {
             images = finish(work, options, outputs);
         work.row.coverage = work.attached.coverage;
         work.row.mean_visibility = work.attached.mean_visibility;
-        std::ranges::move(doubts_about(work, options.radius_m, options.noise), std::back_inserter(work.row.doubts));
+        std::ranges::move(doubts_about(work, options.radius_m, options.noise, options.outputs.unit),
+                          std::back_inserter(work.row.doubts));
     });
     take(work, &StageTimes::write, [&] {
         if (by_points) {

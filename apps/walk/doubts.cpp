@@ -89,7 +89,7 @@ std::vector<double> depths_of(const cv::Mat1f& z_m) {
     return depths;
 }
 
-void doubt_radius_in_view(const Work& work, double radius_m, Doubts& doubts) {
+void doubt_radius_in_view(const Work& work, double radius_m, const LengthUnit& unit, Doubts& doubts) {
     std::vector<double> depths = depths_of(work.depth.z_m);
     if (depths.size() < 3 || !(radius_m > 0)) // a method without a radius
         return;
@@ -98,18 +98,21 @@ void doubt_radius_in_view(const Work& work, double radius_m, Doubts& doubts) {
     const double radius_px = radius_m * std::min(camera.fx, camera.fy) / middle;
     const double width = middle * camera.size.width / camera.fx, height = middle * camera.size.height / camera.fy;
     const double scene_m = std::hypot(width, height, far - near);
+    const char* const advice = unit.arbitrary() ? "Give" : "Check the depth unit, or give";
+    const char* const flag = unit.arbitrary() ? "--relative-radius" : "--radius";
     add_if(radius_px < least_radius_px, doubts,
-           fmt::format("the radius of {:.3g} m spans {:.2g} pixels at the median depth of {:.3g} m: nothing within it "
-                       "can be seen. Check the depth unit, or give a larger --radius.",
-                       radius_m, radius_px, middle));
+           fmt::format("the radius of {} spans {:.2g} pixels at the median depth of {}: nothing within it can be seen. "
+                       "{} a larger {}.",
+                       unit.text(radius_m), radius_px, unit.text(middle), advice, flag));
     add_if(
         radius_m * least_scene_radii > scene_m, doubts,
-        fmt::format("the radius of {:.3g} m is larger than {} scene of {:.3g} m, so most of what is within it was not "
-                    "seen: check the depth unit, or give a smaller --radius.",
-                    radius_m, radius_m > scene_m ? "the" : "half the", scene_m));
+        fmt::format("the radius of {} is larger than {} scene of {}, so most of what is within it was not seen. {} a "
+                    "smaller {}.",
+                    unit.text(radius_m), radius_m > scene_m ? "the" : "half the", unit.text(scene_m), advice, flag));
 }
 
-void doubt_noise_in_view(const Work& work, double radius_m, const DepthNoise& noise, Doubts& doubts) {
+void doubt_noise_in_view(const Work& work, double radius_m, const DepthNoise& noise, const LengthUnit& unit,
+                         Doubts& doubts) {
     std::vector<double> depths = depths_of(work.depth.z_m);
     if (depths.empty() || !(radius_m > 0) || !noise.any())
         return;
@@ -117,9 +120,11 @@ void doubt_noise_in_view(const Work& work, double radius_m, const DepthNoise& no
         std::ranges::count_if(depths, [&](double z) { return noise.at(z) > largest_sigma * radius_m; }));
     const double share = noisy / static_cast<double>(depths.size()), far = quantile(depths, 0.9);
     add_if(share > most_noisy, doubts,
-           fmt::format("noise is above a quarter of the radius at {:.0f} % of the pixels (sigma {:.2g} m at {:.2g} m): "
-                       "their values say little. Give a larger --radius, or leave them out with --depth-range.",
-                       100 * share, noise.at(far), far));
+           fmt::format("noise is above a quarter of the radius at {:.0f} % of the pixels (sigma {} at {}): their "
+                       "values say little. {}",
+                       100 * share, unit.text(noise.at(far), 2), unit.text(far, 2),
+                       unit.arbitrary() ? "Give a larger --relative-radius."
+                                        : "Give a larger --radius, or leave them out with --depth-range."));
 }
 
 /// The diagonal of the box without the lowest and highest hundredth of the points along each axis.
@@ -198,7 +203,8 @@ void doubt_camera(const Camera& camera, Doubts& doubts) {
 
 } // namespace
 
-std::vector<std::string> doubts_about(const Work& work, double radius_m, const DepthNoise& noise) {
+std::vector<std::string> doubts_about(const Work& work, double radius_m, const DepthNoise& noise,
+                                      const LengthUnit& unit) {
     Doubts doubts = work.frame.doubts;
     doubt_shares(work, doubts);
     if (work.by_points) {
@@ -210,8 +216,8 @@ std::vector<std::string> doubts_about(const Work& work, double radius_m, const D
     const cv::Mat1f& visibility = work.ao.visibility;
     if (visibility.isContinuous())
         doubt_values({visibility.ptr<float>(), visibility.total()}, doubts);
-    doubt_radius_in_view(work, radius_m, doubts);
-    doubt_noise_in_view(work, radius_m, noise, doubts);
+    doubt_radius_in_view(work, radius_m, unit, doubts);
+    doubt_noise_in_view(work, radius_m, noise, unit, doubts);
     if (!work.frame.cloud) // a cloud's camera is recovered or chosen, not given, unless --camera names it
         doubt_camera(work.row.camera, doubts);
     return doubts;

@@ -90,7 +90,7 @@ void write_depth_cloud(const std::filesystem::path& file, const Work& work, cons
             const double z = z_m(v, u);
             if (z <= 0)
                 continue;
-            points.push_back(camera.point(u, v, z));
+            points.push_back(camera.point(u, v, outputs.unit.told(z)));
             visibility.push_back(work.ao.visibility(v, u));
             confidence.push_back(known_or_none(work.confidence_in_view(v, u)));
             if (!colour.empty())
@@ -104,7 +104,10 @@ void write_depth_cloud(const std::filesystem::path& file, const Work& work, cons
     std::vector<AddedField> added = {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}};
     if (warped)
         added.push_back({"colour_known", known});
-    write_new_ply(file, points, colours, added, {"camera space: x right, y down, z forward, metres"});
+    write_new_ply(file, points, colours, added,
+                  {outputs.unit.arbitrary()
+                       ? "camera space: x right, y down, z forward, in the recording's arbitrary unit"
+                       : "camera space: x right, y down, z forward, metres"});
 }
 
 void write_recorded_cloud(const std::filesystem::path& file, const Work& work, const Outputs& outputs) {
@@ -122,10 +125,16 @@ void write_recorded_cloud(const std::filesystem::path& file, const Work& work, c
 }
 
 /// The maps of what the pictures show. A colour image of other pixels is shown by itself.
-std::string preview_of(const Work& work, const FrameImages& images) {
+std::string preview_of(const Work& work, const FrameImages& images, const LengthUnit& unit) {
     const Scene& scene = images.scene;
     const cv::Mat1f& confidence = scene.confidence.empty() ? work.confidence.visibility : scene.confidence;
     page::Preview preview{.z_m = scene.z_m, .visibility = scene.visibility, .camera = scene.camera};
+    if (unit.arbitrary()) {
+        cv::Mat1f own; // an expression assigned to preview.z_m would write into the scene's pixels
+        scene.z_m.convertTo(own, CV_32F, unit.units_per_length);
+        preview.z_m = own;
+        preview.unit = unit.name();
+    }
     if (images.confidence_map.size() == scene.z_m.size())
         preview.confidence_map = images.confidence_map;
     else if (confidence.size() == scene.z_m.size())
@@ -167,7 +176,8 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
         wrote(picture_file("panel", name),
               [&](const auto& file) { write_picture(file, panel_picture(work.frame, scene, images.shaded)); });
     if (outputs.preview && !scene.z_m.empty())
-        wrote(preview_file(name), [&](const auto& file) { write_atomically(file, preview_of(work, images)); });
+        wrote(preview_file(name),
+              [&](const auto& file) { write_atomically(file, preview_of(work, images, outputs.unit)); });
     if (work.frame.cloud && outputs.cloud && outputs.colour_cloud == CloudColours::grey &&
         !takes_colours(*work.frame.cloud))
         work.row.warnings.push_back("the file's point format has no colour, so grey is not written; the field "

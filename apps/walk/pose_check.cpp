@@ -78,6 +78,11 @@ std::string pose_warning(const Capture& capture, const std::vector<std::size_t>&
     const double factor = std::sqrt(low * high);
     if (low == 1 || high == 1 || high > alike * low)
         return {};
+    if (capture.unit.arbitrary())
+        return fmt::format(
+            "depths fit the poses only if they are multiplied by {:.2g}: depth maps and poses are not of "
+            "the same reconstruction.",
+            factor);
     return fmt::format("depths fit the poses only if they are multiplied by {:.2g}: the depth unit is wrong, or the "
                        "poses are not in metres.",
                        factor);

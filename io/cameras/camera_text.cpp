@@ -1,8 +1,7 @@
-// Cameras as text: 3x3 matrices, BundleFusion's info.txt, and COLMAP's cameras.txt.
+// Cameras as text: 3x3 matrices and BundleFusion's info.txt.
 #include "io/cameras/camera_formats.h"
 #include "projection/base/error.h"
 
-#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 
@@ -89,117 +88,6 @@ CameraFile camera_from_matrix(const fs::path& file, const std::vector<TextLine>&
     result.camera.pinhole = {m[0], m[4], m[2], m[5], {}};
     check_numbers(file, result.camera.pinhole, {"fx", "fy", "cx", "cy"});
     return result;
-}
-
-// --- COLMAP: "CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]", pixel centres at 0.5 ---
-
-namespace {
-
-struct ColmapModel {
-    std::string_view name;
-    std::size_t numbers;
-    Camera (*read)(const std::vector<double>& p);
-};
-
-Camera square(const std::vector<double>& p, Distortion lens) { return {{p[0], p[0], p[1], p[2], {}}, lens, {}}; }
-Camera oblong(const std::vector<double>& p, Distortion lens) { return {{p[0], p[1], p[2], p[3], {}}, lens, {}}; }
-
-const ColmapModel colmap_models[] = {
-    {"SIMPLE_PINHOLE", 3, [](const auto& p) { return square(p, {}); }},
-    {"PINHOLE", 4, [](const auto& p) { return oblong(p, {}); }},
-    {"SIMPLE_RADIAL", 4,
-     [](const auto& p) {
-         return square(p, {p[3], 0, 0, 0, 0});
-     }},
-    {"RADIAL", 5,
-     [](const auto& p) {
-         return square(p, {p[3], p[4], 0, 0, 0});
-     }},
-    {"OPENCV", 8,
-     [](const auto& p) {
-         return oblong(p, {p[4], p[5], p[6], p[7], 0});
-     }},
-    {"FULL_OPENCV", 12,
-     [](const auto& p) {
-         return oblong(p, brown_conrady({p.begin() + 4, p.end()}));
-     }},
-    {"OPENCV_FISHEYE", 8,
-     [](const auto& p) {
-         return oblong(p, kannala_brandt({p.begin() + 4, p.end()}));
-     }},
-};
-
-bool is_colmap_line(const std::vector<std::string_view>& all) {
-    return all.size() >= 5 && whole_number(all[0]) && std::isupper(static_cast<unsigned char>(all[1][0])) &&
-           whole_number(all[2]) && whole_number(all[3]);
-}
-
-} // namespace
-
-bool is_colmap(const std::vector<TextLine>& lines) {
-    return std::any_of(lines.begin(), lines.end(),
-                       [](const TextLine& line) { return is_colmap_line(words(line.text)); });
-}
-
-CameraFile camera_from_colmap(const fs::path& file, const std::vector<TextLine>& lines) {
-    CameraFile result;
-    bool found = false;
-    for (const TextLine& line : lines) {
-        const auto all = words(line.text);
-        if (all.empty() || all[0].starts_with('#'))
-            continue;
-        const std::string place = at_line(file, line.number);
-        if (!is_colmap_line(all))
-            throw Error(place + ": expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS");
-        if (found) {
-            result.warnings.push_back(place + ": more than one camera; the first is used.");
-            break;
-        }
-        const auto model = std::find_if(std::begin(colmap_models), std::end(colmap_models),
-                                        [&](const ColmapModel& known) { return known.name == all[1]; });
-        if (model == std::end(colmap_models))
-            throw Error(fmt::format("{}: the camera model {} is not supported", place, in_quotes(all[1])));
-        std::vector<double> numbers;
-        for (std::size_t i = 4; i < all.size(); ++i) {
-            const auto value = number(all[i]);
-            if (!value || !std::isfinite(*value))
-                throw Error(fmt::format("{}: {} is not a finite number", place, in_quotes(all[i])));
-            numbers.push_back(*value);
-        }
-        if (numbers.size() != model->numbers)
-            throw Error(fmt::format("{}: {} has {}, expected {}", place, model->name, counted(numbers.size(), "number"),
-                                    model->numbers));
-        result.camera = model->read(numbers);
-        Pinhole& pinhole = result.camera.pinhole;
-        pinhole.cx -= 0.5; // our pixel centres are integers
-        pinhole.cy -= 0.5;
-        const auto width = *whole_number(all[2]), height = *whole_number(all[3]);
-        if (width < 1 || height < 1 || width > widest_image || height > widest_image)
-            throw Error(fmt::format("{}: {}x{} is no image size", place, width, height));
-        pinhole.size = {static_cast<int>(width), static_cast<int>(height)};
-        check_numbers(file, pinhole, {"fx", "fy", "cx", "cy"});
-        found = true;
-    }
-    if (!found)
-        refuse_camera(file, "no camera in it");
-    return result;
-}
-
-std::string camera_as_colmap(const Camera& camera) {
-    const auto& [fx, fy, cx, cy, size] = camera.pinhole;
-    const Distortion& d = camera.distortion;
-    const std::string start =
-        fmt::format("# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]; pixel centres at 0.5\n1 {{}} {} {} {} {} {} {}",
-                    size.width, size.height, fx, fy, cx + 0.5, cy + 0.5);
-    const auto line = [&](const char* model) { return fmt::format(fmt::runtime(start), model); };
-    if (d.model == LensModel::kannala_brandt)
-        return fmt::format("{} {} {} {} {}\n", line("OPENCV_FISHEYE"), d.k1, d.k2, d.k3, d.k4);
-    if (!d.any())
-        return line("PINHOLE") + "\n";
-    if (d.k3 == 0 && !d.rational())
-        return fmt::format("{} {} {} {} {}\n", line("OPENCV"), d.k1, d.k2, d.p1, d.p2);
-    return fmt::format("{} {} {} {} {} {} {} {} {}\n", line("FULL_OPENCV"), d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5,
-                       d.k6);
 }
 
 } // namespace scanshade

@@ -6,6 +6,7 @@
 #include "io/images/image_file.h"
 #include "projection/base/error.h"
 #include "projection/frame.h"
+#include "projection/length_unit.h"
 #include "projection/motion.h"
 
 #include <cstdint>
@@ -17,6 +18,9 @@
 
 namespace scanshade {
 
+/// Of a capture in an arbitrary unit. The usual radius of 0.5 is then a tenth of the median depth.
+constexpr double usual_median_depth = 5;
+
 /// Settings of the user for facts that a capture's files may lack.
 struct CaptureOptions {
     std::string camera;                ///< file or "fx,fy,cx,cy"; empty = from the capture
@@ -26,6 +30,7 @@ struct CaptureOptions {
         {}; ///< TUM's rows, by time or, where frames have none, by index; empty = the capture's own
     std::filesystem::path colour = {}; ///< the colour image of a single depth image, registered to it; empty = none
     std::string topic = {};            ///< of depth images in a recording of ROS; empty = found by name and type
+    double median_depth = usual_median_depth; ///< of a capture in an arbitrary unit: in the walk's lengths
 };
 
 /// One frame's listing: the paths of its parts. Nothing is decoded yet.
@@ -75,6 +80,8 @@ struct Capture {
     std::string kind;             ///< the format's name in the table (formats.h): "TUM RGB-D", "BOP", "depth image" ...
     std::optional<Camera> camera; ///< none: clouds recover theirs; depth images need --camera
     DepthEncoding depth;
+    LengthUnit unit;         ///< arbitrary: depths and poses are no metres but parts of the scene, see settle_unit()
+    double median_depth = 0; ///< of such a capture, in the walk's lengths; 0 = no depth was readable
     DepthCorrection depth_correction;          ///< from the camera's file; load() applies it
     std::optional<ColourCamera> colour_camera; ///< the secondary camera, if one took the colour images and is known
     double pose_time_offset_s = 0;             ///< from the camera's file; already in the poses
@@ -98,5 +105,7 @@ struct Capture {
 /// The same; a folder without frames of its own, one of whose folders is a capture, stands for that one, with a
 /// warning. Throws Error naming them where several are.
 [[nodiscard]] Capture open_capture_at_or_below(const std::filesystem::path& path, const CaptureOptions& options = {});
+/// For what measures in metres. Throws Error, which names `what`, where the capture's unit is arbitrary.
+void require_metres(const Capture& capture, const std::string& what);
 
 } // namespace scanshade

@@ -265,7 +265,10 @@ cv::Size peek_size(const fs::path& image) {
 DepthEncoding assumed_encoding(const fs::path& first_depth) {
     bool floats = false;
     try {
-        floats = !first_depth.empty() && peek(first_depth).floats;
+        const ImageFacts facts = first_depth.empty() ? ImageFacts() : peek(first_depth);
+        if (facts.format && facts.format->unit_is_arbitrary)
+            return arbitrary_encoding(fmt::format("{} has no unit of length", facts.format->name));
+        floats = facts.floats;
     } catch (const Outage&) {
         throw;
     } catch (const Error&) { // loading that frame reports the error

@@ -42,6 +42,7 @@ struct Listing {
 [[nodiscard]] std::optional<Listing> list_nyu_raw(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_replica(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_scannet(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_colmap(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_icl_nuim(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_webdataset(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_seven_scenes(const std::filesystem::path& folder);

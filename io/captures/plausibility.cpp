@@ -185,6 +185,14 @@ std::vector<std::string> doubts_about(const Statistics& depth, const cv::Mat& im
             return {}; // a few pixels between those sampled
         return {"no valid depth in this frame: every pixel is a hole."};
     }
+    if (encoding.arbitrary) { // any range may be right, and noise is no sign of another unit
+        std::vector<std::string> doubts;
+        if (depth.jumps > 0.2)
+            doubts.push_back(fmt::format("{:.0f} % of neighbouring depths differ by more than a fifth, which is noise "
+                                         "rather than surfaces.",
+                                         100 * depth.jumps));
+        return doubts;
+    }
     const bool assumed = !encoding.stated;
     const float farthest_likely_m = assumed ? assumed_farthest_median_m : farthest_median_m;
     const std::string stated = fmt::format("encoding {} ({})", encoding.name, encoding.origin);

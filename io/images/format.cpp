@@ -92,6 +92,14 @@ constexpr ImageFormat formats[] = {
      .depth = "integers, floats",
      .header = &images::npy_header,
      .read_stored = &images::stored_npy},
+    {.name = "COLMAP's depth map",
+     .signature = &images::is_colmap_map,
+     .extensions = {".geometric.bin", ".photometric.bin"},
+     .header_bytes = short_header,
+     .depth = "floats in the reconstruction's own unit",
+     .unit_is_arbitrary = true,
+     .header = &images::colmap_map_header,
+     .read_stored = &images::stored_colmap_map},
     {.name = "JPEG",
      .signature = &begins_with<'\xff', '\xd8', '\xff'>,
      .extensions = {".jpg", ".jpeg"},
@@ -127,6 +135,9 @@ constexpr ImageFormat formats[] = {
      .read_colour = &images::colour_webp},
 };
 
+/// ".geometric.bin"
+std::string two_extensions(const fs::path& file) { return lower_extension(file.stem()) + lower_extension(file); }
+
 bool holds_depth(const ImageFormat& format) { return format.read_stored != nullptr; }
 bool holds_colour(const ImageFormat& format) { return format.read_colour != nullptr; }
 
@@ -159,6 +170,7 @@ const ImageFormat* image_format_by_extension(std::string_view extension) {
 
 bool has_depth_extension(const fs::path& file) {
     const ImageFormat* format = image_format_by_extension(lower_extension(file));
+    format = format ? format : image_format_by_extension(two_extensions(file));
     return format && holds_depth(*format);
 }
 bool has_colour_extension(const fs::path& file) {

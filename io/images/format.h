@@ -21,6 +21,7 @@ struct ImageFormat {
     std::size_t header_bytes;                   ///< the header is in this many first bytes
     std::string_view depth = {};                ///< the numbers that stand for depth, where it holds any
     std::string_view no_depth = {};             ///< why the format cannot hold depth, where its header does not tell
+    bool unit_is_arbitrary = false;             ///< its depth is in the unit of a reconstruction from images
 
     // Each throws Error, which names `file` and what is wrong, for anything that is damaged or cut short.
     ImageFacts (*header)(std::string_view bytes, const std::filesystem::path& file);

@@ -58,6 +58,12 @@ cv::Mat1f from_integers(const cv::Mat_<Integer>& image) {
 
 } // namespace
 
+DepthEncoding arbitrary_encoding(const std::string& origin, double units_per_length) {
+    DepthEncoding encoding{DepthEncoding::Kind::linear, units_per_length, "an arbitrary unit", origin};
+    encoding.arbitrary = true;
+    return encoding;
+}
+
 DepthEncoding depth_encoding(const std::string& text, const std::string& origin) {
     using Kind = DepthEncoding::Kind;
     if (text == "mm")

@@ -23,7 +23,13 @@ struct DepthEncoding {
     std::string name;   ///< "mm", "tum", "sun", "nyu", "m" or the number
     std::string origin; ///< "TUM layout", "--depth-scale", "assumed: 16-bit integers are millimetres" ...
     bool stated = true; ///< by the user or a file; otherwise it is what the layout's recordings usually have
+    /// Nothing says how long a unit is, as in a reconstruction from images. Then the walk's lengths are no metres, but
+    /// parts of the scene: see Capture::unit.
+    bool arbitrary = false;
 };
+
+/// Of stored numbers in an arbitrary unit, of which so many are one of the walk's lengths.
+[[nodiscard]] DepthEncoding arbitrary_encoding(const std::string& origin, double units_per_length = 1);
 
 /// "mm" (1000), "tum" (5000), "sun", "nyu", "m" (1, float files), or a positive number of units per metre.
 /// Throws Misuse listing these.

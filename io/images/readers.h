@@ -49,4 +49,8 @@ void check_png_chunks(std::string_view bytes, const ImageFacts& facts, const Pat
 [[nodiscard]] cv::Mat stored_pclzf(std::string_view bytes, const ImageFacts& facts, const Path& file);
 [[nodiscard]] cv::Mat3b colour_pclzf(std::string_view bytes, const ImageFacts& facts, const Path& file);
 
+[[nodiscard]] bool is_colmap_map(std::string_view start);
+[[nodiscard]] ImageFacts colmap_map_header(std::string_view bytes, const Path& file);
+[[nodiscard]] cv::Mat stored_colmap_map(std::string_view bytes, const ImageFacts& facts, const Path& file);
+
 } // namespace scanshade::images

@@ -235,6 +235,27 @@ void recordings() {
              "\x1F\x43\xB6\x75\x99" + time + block);
 }
 
+void colmap() {
+    const auto pose = [](double x) {
+        return raw(1.0) + raw(0.0) + raw(0.0) + raw(0.0) + raw(x) + raw(0.0) + raw(0.0) + raw(1U);
+    };
+    seed("colmap", "images.txt",
+         std::string(1, '\0') + "# list\n1 1 0 0 0 0 0 0 1 a.pgm\n0.5 0.5 -1\n2 1 0 0 0 0 0 1 1 "
+                                "../../../outside.pgm\n\n");
+    seed("colmap", "cameras.txt", "\1# list\n1 OPENCV 2 2 2 2 1 1 0.1 0 0 0\n2 SIMPLE_PINHOLE 2 2 2 1 1\n");
+    seed("colmap", "depth",
+         "\2"
+         "2&2&1&" +
+             raw(1.0F) + raw(2.0F) + raw(0.0F) + raw(-1.0F));
+    seed("colmap", "images.bin",
+         '\3' + raw(std::uint64_t(2)) + raw(1U) + pose(0) + "a.pgm" + '\0' + raw(std::uint64_t(1)) +
+             std::string(24, '\1') + raw(2U) + pose(1) + "b/c.pgm" + '\0' + raw(std::uint64_t(0)));
+    seed("colmap", "cameras.bin",
+         '\4' + raw(std::uint64_t(1)) + raw(1U) + raw(1U) + raw(std::uint64_t(2)) + raw(std::uint64_t(2)) + raw(2.0) +
+             raw(2.0) + raw(1.0) + raw(1.0));
+    seed("image", "seed.geometric.bin", "2&2&1&" + raw(1.0F) + raw(2.0F) + raw(0.0F) + raw(-1.0F));
+}
+
 } // namespace
 
 int main(int count, char** words) {
@@ -247,5 +268,6 @@ int main(int count, char** words) {
     cameras();
     texts();
     recordings();
+    colmap();
     return 0;
 }
