@@ -52,6 +52,7 @@ constexpr std::array folder_layouts = {
     FolderLayout{"results/depthNNNNNN.png (Replica)", list_replica},
     FolderLayout{"intrinsic/intrinsic_depth.txt or pose/ with depth/ (ScanNet)", list_scannet},
     FolderLayout{"*.gt.freiburg with associations.txt (ICL-NUIM)", list_icl_nuim},
+    FolderLayout{"_detail/metadata_scene.csv with images/ (Hypersim)", nullptr, Unused::silent, list_hypersim},
     FolderLayout{"intrinsics.txt with image/ and depth/ (SUN RGB-D)", list_sun_rgbd},
     FolderLayout{"d-SECONDS-TICKS.pgm (NYU)", list_nyu_raw},
     FolderLayout{"velodyne/*.bin with calib.txt (KITTI odometry)", list_kitti_odometry},
@@ -108,6 +109,7 @@ constexpr std::array file_layouts = {
     FileLayout{"ScanNet's .sens", is_sens, list_sens},
     FileLayout{"a stack of NumPy's .npy", is_npy_stack, list_npy_stack},
     FileLayout{"NumPy's .npz, Record3D's .r3d", is_zip, list_zip},
+    FileLayout{"NYU depth v2's labelled .mat", is_matlab_hdf5, list_nyu_labelled},
     FileLayout{"bags of ROS 1 and 2, MCAP", ros::is_bag, nullptr, list_ros},
 };
 

@@ -481,7 +481,7 @@ INSTANTIATE_TEST_SUITE_P(of, Samples,
                                          "nyu-raw", "npy-folder", "scannet-sens", "ros1-bag", "ros1-bag-bz2",
                                          "ros1-bag-lz4", "ros2-db3", "mcap", "mcap-lz4", "mcap-zstd", "realsense-bag",
                                          "realsense-db3", "kitti-odometry", "nuscenes", "npz", "scannetpp-raw",
-                                         "scannetpp-raw-lz4", "record3d"),
+                                         "scannetpp-raw-lz4", "record3d", "hypersim"),
                          [](const auto& layout) {
                              std::string name = layout.param;
                              std::ranges::replace(name, '-', '_');
