@@ -23,8 +23,6 @@ constexpr std::uint64_t most_bytes = std::uint64_t(1) << 48;
 /// libhdf5's own limit is 4 GiB.
 constexpr std::uint64_t most_chunk_bytes = std::uint64_t(1) << 30;
 
-constexpr const char* repack = "`h5repack --low=0 --high=0` makes a file that is read";
-
 std::vector<std::uint64_t> shape_in(Fields fields) {
     const std::uint8_t version = fields.u8();
     if (version != 1 && version != 2)
@@ -222,7 +220,7 @@ Layout chunked_layout(Fields& fields, std::uint8_t version, std::size_t dimensio
     constexpr int single_chunk = 1, packed = 2;
     if (const std::uint8_t index = fields.u8(); index != single_chunk)
         throw Error(
-            fmt::format("{}: an index of chunks of kind {} (libver='latest'); {}", fields.where(), index, repack));
+            fmt::format("{}: an index of chunks of kind {} (libver='latest'), expected a tree", fields.where(), index));
     layout.tree = false;
     if ((flags & packed) != 0) {
         layout.stored = fields.u64();
@@ -235,7 +233,7 @@ Layout chunked_layout(Fields& fields, std::uint8_t version, std::size_t dimensio
 Layout layout_in(Fields fields, std::size_t dimensions) {
     const std::uint8_t version = fields.u8();
     if (version != 3 && version != 4)
-        throw Error(fmt::format("{}: a layout of version {}, expected 3 or 4; {}", fields.where(), version, repack));
+        throw Error(fmt::format("{}: a layout of version {}, expected 3 or 4", fields.where(), version));
     Layout layout;
     const std::uint8_t kind = fields.u8();
     if (kind == 0) {

@@ -118,8 +118,7 @@ std::vector<Link> links_of(const Source& source, std::uint64_t group) {
             const std::uint8_t flags = fields.u8();
             fields.skip((flags & 1) != 0 ? 8 : 0);
             if (fields.u64() != nowhere)
-                source.refuse(message.at, "a group whose links lie in a heap (of many names, libver='latest'); "
-                                          "`h5repack --low=0 --high=0` makes a file that is read");
+                source.refuse(message.at, "a group whose links lie in a heap (of many names, libver='latest')");
         }
     }
     return links;
