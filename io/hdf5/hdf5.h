@@ -1,5 +1,5 @@
 // Numbers out of HDF5 files, as h5py, libhdf5 and MATLAB (v7.3) write them: what is needed of the format, and no more.
-// Own code, because libhdf5 as Debian builds it brings 31 more libraries (curl, Kerberos, LDAP ...), which adds 3 ms to
+// Own code, because libhdf5 as Debian builds it brings 31 more libraries (curl, Kerberos, LDAP ...), which adds 7 ms to
 // every start of the program; it is not made for several threads, nor for files of strangers.
 #pragma once
 
