@@ -40,6 +40,7 @@ struct Samples {
     std::map<std::string, int> clouds;                            ///< description -> how many
     std::optional<Camera> camera;                                 ///< of the first frame that has one
     std::vector<std::string> warnings;
+    std::vector<std::string> without_camera; ///< clouds that none could have taken, each with the reason
 };
 
 /// One frame's findings; for a bad frame, the reason.
@@ -100,7 +101,7 @@ void add_frame(const ExaminedFrame& examined, Samples& samples) {
             check(frame.camera);
         samples.camera = frame.cloud ? camera_of(frame) : frame.camera;
     } catch (const Error& none) {
-        samples.warnings.push_back(frame.name + ": " + none.what());
+        (frame.cloud ? samples.without_camera : samples.warnings).push_back(frame.name + ": " + none.what());
     }
 }
 
@@ -166,6 +167,10 @@ void measure_samples(Findings& findings) {
             findings.problems.push_back({findings.capture.entries[loadable[place]].name, failure.what()});
         }
     }
+    if (auto& all = findings.samples.without_camera; all.size() > 1) // sweeps of a scanner: all of them
+        all = {fmt::format("{} of {} examined clouds have no single camera. The first of them: {}", all.size(),
+                           findings.samples.frames, all.front())};
+    std::ranges::copy(findings.samples.without_camera, std::back_inserter(findings.samples.warnings));
 }
 
 /// All sampled depths, rising.

@@ -48,6 +48,7 @@ struct Listing {
 [[nodiscard]] std::optional<Listing> list_seven_scenes(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_kitti_odometry(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_nuscenes(const std::filesystem::path& folder);
+[[nodiscard]] std::optional<Listing> list_hypersim(const std::filesystem::path& folder, const CaptureOptions& options);
 [[nodiscard]] std::optional<Listing> list_pcl_recording(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_redwood(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<Listing> list_image_folders(const std::filesystem::path& folder);
@@ -66,6 +67,9 @@ struct Listing {
                                                          const CaptureOptions& options);
 /// Matroska with a depth track; matroska::is_matroska() tells it. Throws NoFrames for ordinary videos.
 [[nodiscard]] Listing list_azure_kinect(const std::filesystem::path& file);
+/// NYU depth v2's labelled images, a .mat of version 7.3. Throws NoFrames for other ones.
+[[nodiscard]] bool is_matlab_hdf5(std::string_view start);
+[[nodiscard]] Listing list_nyu_labelled(const std::filesystem::path& file);
 /// (N,H,W) in an .npy file.
 [[nodiscard]] bool is_npy_stack(std::string_view start);
 [[nodiscard]] Listing list_npy_stack(const std::filesystem::path& file);

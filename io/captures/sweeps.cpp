@@ -2,6 +2,7 @@
 // has the pose world_from_scanner.
 #include "io/captures/layouts.h"
 
+#include "io/captures/json_table.h"
 #include "io/captures/trajectory.h"
 #include "io/files.h"
 #include "io/text.h"
@@ -10,13 +11,12 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 #include <span>
+#include <unordered_set>
 
 namespace scanshade {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
 
 namespace {
 
@@ -166,32 +166,9 @@ std::optional<Listing> list_kitti_odometry(const fs::path& folder) {
 
 namespace {
 
-/// The rows of a table: a list of objects. Throws Error naming the file.
-Json table_in(const fs::path& file) {
-    Json rows = json_in(file);
-    if (!rows.is_array() || !std::ranges::all_of(rows, [](const Json& row) { return row.is_object(); }))
-        throw Error(file.string() + ": expected a list of objects");
-    return rows;
-}
-
-/// A row's text; empty where it has none.
-std::string text_at(const Json& row, const char* key) {
-    const auto found = row.find(key);
-    return found != row.end() && found->is_string() ? found->get<std::string>() : std::string();
-}
-
 /// A row's "translation" and "rotation", a quaternion with w first.
-MatrixPose pose_in(const Json& row, const std::string& where) {
-    const auto numbers = [&](const char* key, std::size_t count) {
-        std::vector<double> values;
-        if (const auto found = row.find(key); found != row.end() && found->is_array())
-            for (const Json& value : *found)
-                if (value.is_number())
-                    values.push_back(value.get<double>());
-        return values.size() == count ? values : std::vector<double>();
-    };
-    const auto t = numbers("translation", 3), q = numbers("rotation", 4);
-    if (t.empty() || q.empty())
+MatrixPose pose_in(const std::vector<double>& t, const std::vector<double>& q, const std::string& where) {
+    if (t.size() != 3 || q.size() != 4)
         return {std::nullopt, {}, where + ": expected a \"translation\" of 3 and a \"rotation\" of 4 numbers"};
     const Eigen::Quaterniond rotation(q[0], q[1], q[2], q[3]);
     constexpr double unit_tolerance = 1e-2;
@@ -202,12 +179,15 @@ MatrixPose pose_in(const Json& row, const std::string& where) {
 
 using PosesByToken = std::unordered_map<std::string, MatrixPose>;
 
-PosesByToken poses_by_token(const fs::path& file) {
+/// Of the tokens that `wanted` has.
+PosesByToken poses_by_token(const fs::path& file, const std::unordered_set<std::string>& wanted) {
     PosesByToken poses;
-    for (const Json& row : table_in(file)) {
-        const std::string token = text_at(row, "token");
-        poses.emplace(token, pose_in(row, fmt::format("{}: token {}", file.string(), in_quotes(token))));
-    }
+    for_each_row(file, {"token", "translation", "rotation"}, [&](TableRow& row) {
+        const std::string& token = row.texts[0];
+        if (wanted.contains(token))
+            poses.emplace(token, pose_in(row.numbers[1], row.numbers[2],
+                                         fmt::format("{}: token {}", file.string(), in_quotes(token))));
+    });
     return poses;
 }
 
@@ -235,6 +215,48 @@ struct Sweep {
     std::int64_t stamp_us = 0;
 };
 
+/// Those of a table whose files are there, by time; images and radar are none.
+std::vector<Sweep> sweeps_in(const fs::path& table, const fs::path& folder, std::vector<std::string>& warnings) {
+    std::vector<Sweep> sweeps;
+    std::size_t missing = 0, scenes = 0;
+    const auto read = [&](RepeatedWarning& outside) {
+        for_each_row(table, {"filename", "ego_pose_token", "calibrated_sensor_token", "prev", "timestamp"},
+                     [&](TableRow& row) {
+                         const std::string& file = row.texts[0];
+                         if (!file.ends_with(".pcd.bin"))
+                             return;
+                         if (const std::string trouble = trouble_with(folder, file); !trouble.empty()) {
+                             if (trouble.find("does not exist") == std::string::npos)
+                                 outside.add(fmt::format("{}: {}.", table.string(), trouble));
+                             else
+                                 ++missing;
+                             return;
+                         }
+                         constexpr double most_us = 1e17; // some 3000 years
+                         const std::vector<double>& stamp = row.numbers[4];
+                         if (stamp.size() != 1 || !(std::abs(stamp[0]) < most_us))
+                             throw Error(fmt::format("{}: {}: \"timestamp\" is missing, expected microseconds",
+                                                     table.string(), in_quotes(file)));
+                         constexpr std::size_t most_sweeps = 1 << 22;
+                         if (sweeps.size() == most_sweeps)
+                             throw Error(fmt::format("{}: more than {} sweeps", table.string(), most_sweeps));
+                         scenes += row.texts[3].empty();
+                         sweeps.push_back({file, row.texts[1], row.texts[2], static_cast<std::int64_t>(stamp[0])});
+                     });
+    };
+    {
+        RepeatedWarning outside(warnings); // ends with their count
+        read(outside);
+    }
+    if (missing > 0)
+        warnings.push_back(
+            fmt::format("{}: {} named there that do not exist; left out.", table.string(), counted(missing, "sweep")));
+    if (scenes > 1)
+        warnings.push_back(fmt::format("{} scenes, by time; each has its own world (--frames picks sweeps).", scenes));
+    std::ranges::stable_sort(sweeps, {}, &Sweep::stamp_us);
+    return sweeps;
+}
+
 } // namespace
 
 std::optional<Listing> list_nuscenes(const fs::path& folder) {
@@ -248,38 +270,16 @@ std::optional<Listing> list_nuscenes(const fs::path& folder) {
                                                tables.front().filename().string()));
     const fs::path ego_file = tables.front() / "ego_pose.json", sensor_file = tables.front() / "calibrated_sensor.json",
                    sweep_file = tables.front() / "sample_data.json";
-    std::vector<Sweep> sweeps;
-    std::size_t missing = 0, scenes = 0;
-    for (const Json& row : table_in(sweep_file)) {
-        Sweep sweep{text_at(row, "filename"), text_at(row, "ego_pose_token"), text_at(row, "calibrated_sensor_token")};
-        if (!sweep.file.ends_with(".pcd.bin")) // images and radar
-            continue;
-        if (const std::string trouble = trouble_with(folder, sweep.file); !trouble.empty()) {
-            if (trouble.find("does not exist") == std::string::npos)
-                capture.warnings.push_back(fmt::format("{}: {}.", sweep_file.string(), trouble));
-            else
-                ++missing;
-            continue;
-        }
-        const auto stamp = row.find("timestamp");
-        if (stamp == row.end() || !stamp->is_number_integer())
-            throw Error(fmt::format("{}: {}: \"timestamp\" is missing, expected microseconds", sweep_file.string(),
-                                    in_quotes(sweep.file)));
-        sweep.stamp_us = stamp->get<std::int64_t>();
-        scenes += text_at(row, "prev").empty();
-        sweeps.push_back(std::move(sweep));
-    }
-    if (missing > 0)
-        capture.warnings.push_back(fmt::format("{}: {} named there that do not exist; left out.", sweep_file.string(),
-                                               counted(missing, "sweep")));
+    const std::vector<Sweep> sweeps = sweeps_in(sweep_file, folder, capture.warnings);
     if (sweeps.empty())
         throw NoFrames(sweep_file.string() + ": none of its LIDAR_TOP/*.pcd.bin is here");
-    if (scenes > 1)
-        capture.warnings.push_back(
-            fmt::format("{} scenes, by time; each has its own world (--frames picks sweeps).", scenes));
-    std::ranges::stable_sort(sweeps, {}, &Sweep::stamp_us);
-    const auto world_from_ego = unless_damaged(capture.warnings, [&] { return poses_by_token(ego_file); });
-    const auto ego_from_sensor = unless_damaged(capture.warnings, [&] { return poses_by_token(sensor_file); });
+    std::unordered_set<std::string> egos, sensors;
+    for (const Sweep& sweep : sweeps) {
+        egos.insert(sweep.ego_pose);
+        sensors.insert(sweep.sensor);
+    }
+    const auto world_from_ego = unless_damaged(capture.warnings, [&] { return poses_by_token(ego_file, egos); });
+    const auto ego_from_sensor = unless_damaged(capture.warnings, [&] { return poses_by_token(sensor_file, sensors); });
     for (const Sweep& sweep : sweeps) {
         CaptureEntry entry;
         const std::string name = fs::path(sweep.file).filename().string();

@@ -209,7 +209,8 @@ Eigen::Matrix4d from_opengl(const Eigen::Matrix4d& world_from_camera) {
 MatrixPose checked_pose(const Eigen::Matrix4d& matrix, const std::string& where) {
     MatrixPose result;
     if (!matrix.allFinite())
-        result.warning = where + ": the pose is infinite, which means that tracking was lost; pose not used.";
+        result.warning = fmt::format("{}: the pose {}, which means that tracking was lost; pose not used.", where,
+                                     matrix.hasNaN() ? "has NaN" : "is infinite");
     else if (!is_rigid(matrix))
         result.warning = fmt::format("{}: {}; pose not used.", where, not_rigid(matrix));
     else

@@ -238,6 +238,8 @@ void append_edited(std::string& result, const CloudRecords& records, std::size_t
                    const std::vector<FieldReplacement>& replacements, const std::vector<FieldAddition>& additions) {
     const bool big_endian = records.encoding == CloudRecords::Encoding::big_endian;
     const std::string_view record = records.record(point);
+    if (const auto found = records.inserted.find(point); found != records.inserted.end())
+        result += found->second;
     std::size_t copied = 0;
     for (const FieldReplacement& replacement : replacements) {
         const FieldPlace place = locate(records, record, replacement.field);

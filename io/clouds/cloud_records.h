@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <span>
@@ -48,7 +49,9 @@ struct CloudRecords {
     std::string packed;     ///< PCD, LAZ: the compressed block as the file has it
     std::size_t stride = 0; ///< bytes per record; 0 where records differ in length (text, lists)
     std::vector<std::size_t>
-        ends;          ///< where each record ends in `points` (text: behind its last word), when stride is 0
+        ends; ///< where each record ends in `points` (text: behind its last word), when stride is 0
+    std::map<std::size_t, std::string>
+        inserted;      ///< text: what stands before a point's record and is no part of it, PTX's headers of more scans
     std::string after; ///< faces, other elements, left-over lines
     std::array<double, 3> scale{1, 1, 1}, shift{0, 0, 0}; ///< coordinates are field values times scale plus shift
     std::vector<Eigen::Vector3d> placed;                  ///< the points, if fields alone do not give them
@@ -135,7 +138,8 @@ class TextRecords {
 /// One point a line: .xyz (a line of names may come first) and .pts (the count comes first).
 [[nodiscard]] CloudRecords read_xyz(std::string_view bytes, const std::filesystem::path& file,
                                     std::vector<std::string>& warnings);
-/// One point a line, .ptx: one scan, sizes, pose, then the grid; "0 0 0" = nothing seen.
+/// One point a line, .ptx: each scan has sizes, pose, then the grid; "0 0 0" = nothing seen. A scan alone keeps its
+/// grid.
 [[nodiscard]] CloudRecords read_ptx(std::string_view bytes, const std::filesystem::path& file,
                                     std::vector<std::string>& warnings);
 /// Sweeps of floats without a header, KITTI's x y z reflectance or nuScenes' x y z intensity ring. The records are

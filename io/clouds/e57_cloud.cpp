@@ -303,7 +303,9 @@ CloudRecords read_contents(std::string_view bytes, const fs::path& file, std::ve
     const e57::Description description = e57::described(contents);
     const std::vector<Scan>& scans = description.scans;
     if (scans.empty())
-        throw Error(fmt::format("no scan in this E57 ({})", counted(description.images, "image")));
+        throw Error(fmt::format("no scan in this E57 ({}{}{})", counted(description.images.size(), "image"),
+                                description.images.empty() ? "" : "; ",
+                                description.images.empty() ? "" : description.images.front()));
     CloudRecords records;
     records.encoding = CloudRecords::Encoding::binary;
     add_fields(records, scans, file, warnings);
@@ -346,8 +348,9 @@ CloudRecords read_contents(std::string_view bytes, const fs::path& file, std::ve
         warnings.push_back(fmt::format("{}: {} scans are read as one cloud; the field scan tells them apart.",
                                        file.string(), scans.size()));
     }
-    if (description.images > 0)
-        warnings.push_back(fmt::format("{}: {} left out.", file.string(), counted(description.images, "image")));
+    RepeatedWarning unused(warnings);
+    for (const std::string& image : description.images)
+        unused.add(fmt::format("{}: {}; not used: colours are those of the points.", file.string(), image));
     records.header = ply_header(records, scans);
     return records;
 }

@@ -83,18 +83,23 @@ void check_point_count(std::uint64_t count, const fs::path& file) {
         throw Error(fmt::format("{}: {} points, at most {} are read", file.string(), count, most_points));
 }
 
+/// Throws Error unless the line has as many words, all numbers.
+void check_numbers(const TextRecords& lines, std::size_t expected, const fs::path& file) {
+    if (lines.words().size() != expected)
+        throw Error(fmt::format("{}: {}, expected {} as in the first", at_line(file, lines.line()),
+                                counted(lines.words().size(), "value"), expected));
+    for (const auto word : lines.words())
+        if (!number(word))
+            throw Error(fmt::format("{}: {} is not a number", at_line(file, lines.line()), in_quotes(word)));
+}
+
 /// The lines of `body` as records of equally many words.
 void read_lines(CloudRecords& records, std::string_view body, int first_line, const fs::path& file) {
     TextRecords lines(body, first_line);
     while (lines.next()) {
         if (records.fields.empty())
             records.fields = fields_named(usual_names(lines.words().size()));
-        if (lines.words().size() != records.fields.size())
-            throw Error(fmt::format("{}: {}, expected {} as in the first", at_line(file, lines.line()),
-                                    counted(lines.words().size(), "value"), records.fields.size()));
-        for (const auto word : lines.words())
-            if (!number(word))
-                throw Error(fmt::format("{}: {} is not a number", at_line(file, lines.line()), in_quotes(word)));
+        check_numbers(lines, records.fields.size(), file);
         records.ends.push_back(lines.end());
     }
     records.point_count = records.ends.size();
@@ -107,12 +112,13 @@ void read_lines(CloudRecords& records, std::string_view body, int first_line, co
 
 /// Cuts the first `count` lines off: they are the header.
 std::vector<std::vector<std::string_view>> header_lines(std::string_view bytes, std::size_t count, std::size_t& length,
-                                                        const fs::path& file) {
+                                                        const fs::path& file, int first_line = 1) {
     std::vector<std::vector<std::string_view>> lines;
     length = 0;
     for (std::size_t i = 0; i < count; ++i) {
         if (length >= bytes.size())
-            throw Error(fmt::format("{}: ends at line {}, expected a header of {} lines", file.string(), i, count));
+            throw Error(fmt::format("{}: ends at line {}, expected a header of {} lines", file.string(),
+                                    first_line - 1 + static_cast<int>(i), count));
         const std::size_t end = std::min(bytes.find('\n', length), bytes.size());
         lines.push_back(words(bytes.substr(length, end - length)));
         length = std::min(end + 1, bytes.size());
@@ -133,60 +139,109 @@ std::vector<double> numbers_of(const std::vector<std::string_view>& words, std::
 
 } // namespace
 
-/// Leica's PTX: columns, rows, the scanner's position and three axes, a 4x4 for row vectors; then the grid, column by
-/// column.
-CloudRecords read_ptx(std::string_view bytes, const fs::path& file, std::vector<std::string>&) {
-    CloudRecords records;
-    std::size_t length = 0;
-    const auto lines = header_lines(bytes, 10, length, file);
-    std::array<std::uint64_t, 2> sizes{};
+namespace {
+
+/// Before each scan of a PTX file: columns, rows, the scanner's position and three axes, a 4x4 for row vectors.
+struct PtxHeader {
+    static constexpr std::size_t lines = 10;
+    std::uint64_t columns = 0, rows = 0;
+    Eigen::Matrix4d world_from_scan;
+    std::size_t length = 0; ///< in bytes
+
+    [[nodiscard]] std::uint64_t points() const { return columns * rows; }
+};
+
+/// The header that `bytes` begin with, in line `first_line` of the file.
+PtxHeader ptx_header(std::string_view bytes, int first_line, const fs::path& file) {
+    PtxHeader header;
+    const auto lines = header_lines(bytes, PtxHeader::lines, header.length, file, first_line);
     for (std::size_t i = 0; i < 2; ++i) {
         const auto size = lines[i].size() == 1 ? whole_number(lines[i][0]) : std::nullopt;
         if (!size || *size == 0 || *size > 1U << 20)
-            throw Error(fmt::format("{}: expected the number of {}", at_line(file, static_cast<int>(i) + 1),
+            throw Error(fmt::format("{}: expected the number of {}", at_line(file, first_line + static_cast<int>(i)),
                                     i == 0 ? "columns" : "rows"));
-        sizes[i] = *size;
+        (i == 0 ? header.columns : header.rows) = *size;
     }
     for (std::size_t i = 2; i < 6; ++i)
-        (void)numbers_of(lines[i], 3, static_cast<int>(i) + 1, file);
-    Eigen::Matrix4d world_from_scan;
+        (void)numbers_of(lines[i], 3, first_line + static_cast<int>(i), file);
     for (int i = 0; i < 4; ++i) {
-        const auto row = numbers_of(lines[static_cast<std::size_t>(i) + 6], 4, i + 7, file);
+        const auto row = numbers_of(lines[static_cast<std::size_t>(i) + 6], 4, first_line + 6 + i, file);
         for (int j = 0; j < 4; ++j)
-            world_from_scan(j, i) = row[static_cast<std::size_t>(j)];
+            header.world_from_scan(j, i) = row[static_cast<std::size_t>(j)];
     }
+    return header;
+}
+
+/// "0 0 0" means that nothing was seen.
+Eigen::Vector3d ptx_point(std::string_view record, const Eigen::Matrix4d& world_from_scan) {
+    const auto at = words(record);
+    const Eigen::Vector3d point(*number(at[0]), *number(at[1]), *number(at[2]));
+    if (point.isZero())
+        return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+    return (world_from_scan * point.homogeneous()).head<3>();
+}
+
+} // namespace
+
+/// Leica's PTX: one scan after the other, each with its header and its grid, column by column. Points keep their order.
+CloudRecords read_ptx(std::string_view bytes, const fs::path& file, std::vector<std::string>& warnings) {
+    CloudRecords records;
     records.encoding = CloudRecords::Encoding::ascii;
-    records.header = bytes.substr(0, length);
-    const std::uint64_t expected = sizes[0] * sizes[1];
-    TextRecords peek(bytes.substr(length), 11);
-    std::size_t columns = 0;
-    for (std::uint64_t i = 0; i <= expected && peek.next(); ++i) {
-        if (i == expected)
-            throw Error(
-                fmt::format("{}: a second scan begins; files of one scan are read", at_line(file, peek.line())));
-        if (i == 0)
-            columns = peek.words().size();
-    }
-    if (columns < 4)
-        throw Error(fmt::format("{}: {} a point, expected x y z intensity [red green blue]", at_line(file, 11),
-                                counted(columns, "value")));
-    records.fields = fields_named(ptx_names(columns));
-    read_lines(records, bytes.substr(length), 11, file);
-    if (records.point_count != expected)
-        throw Error(fmt::format("{}: {} columns of {} rows are {} points, the file holds {}", file.string(), sizes[0],
-                                sizes[1], expected, records.point_count));
-    records.grid = {static_cast<int>(sizes[1]), static_cast<int>(sizes[0])};
-    records.placed.resize(records.point_count);
-    for (std::size_t i = 0; i < records.point_count; ++i) {
-        const auto at = words(records.record(i));
-        const Eigen::Vector3d point(*number(at[0]), *number(at[1]), *number(at[2]));
-        records.placed[i] = point.isZero()
-                                ? Eigen::Vector3d(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()))
-                                : Eigen::Vector3d((world_from_scan * point.homogeneous()).head<3>());
-    }
+    PtxHeader header = ptx_header(bytes, 1, file);
+    records.header = bytes.substr(0, header.length);
+    records.points.reserve(bytes.size() - header.length);
+    std::size_t scans = 0, at = header.length, behind = header.length; // `behind` the last word that was read
+    int line = 1 + static_cast<int>(PtxHeader::lines);
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    pose.translation() = world_from_scan.topRightCorner<3, 1>();
-    records.viewpoint = pose;
+    pose.translation() = header.world_from_scan.topRightCorner<3, 1>();
+    for (cv::Size grid;; ++scans) {
+        const std::string scan = scans == 0 ? "" : fmt::format("scan {}: ", scans + 1);
+        TextRecords lines(bytes.substr(at), line);
+        const std::uint64_t expected = header.points(), before = records.point_count;
+        check_point_count(before + expected, file);
+        std::uint64_t found = 0;
+        for (; found < expected && lines.next(); ++found) {
+            const std::size_t columns = lines.words().size();
+            if (records.fields.empty() && columns < 4)
+                throw Error(fmt::format("{}: {} a point, expected x y z intensity [red green blue]",
+                                        at_line(file, lines.line()), counted(columns, "value")));
+            if (records.fields.empty())
+                records.fields = fields_named(ptx_names(columns));
+            check_numbers(lines, records.fields.size(), file);
+            const std::size_t end = at + lines.end();
+            if (found == 0 && scans > 0) { // the header between scans is no part of the records
+                const auto start = static_cast<std::size_t>(lines.words().front().data() - bytes.data());
+                records.inserted.emplace(before, bytes.substr(behind, start - behind));
+                behind = start;
+            }
+            records.points += bytes.substr(behind, end - behind);
+            records.ends.push_back(records.points.size());
+            records.placed.push_back(ptx_point(bytes.substr(behind, end - behind), header.world_from_scan));
+            behind = end;
+        }
+        records.point_count += found;
+        if (found != expected)
+            throw Error(fmt::format("{}: {}{} columns of {} rows are {} points, the file holds {}", file.string(), scan,
+                                    header.columns, header.rows, expected, found));
+        grid = {static_cast<int>(header.rows), static_cast<int>(header.columns)};
+        const std::size_t rest = bytes.find_first_not_of(" \t\r\n", behind);
+        if (rest == std::string_view::npos) {
+            records.grid = scans == 0 ? grid : cv::Size(static_cast<int>(records.point_count), 1);
+            break;
+        }
+        at = bytes.rfind('\n', rest) + 1;
+        line = lines.line() + static_cast<int>(std::count(bytes.begin() + static_cast<std::ptrdiff_t>(behind),
+                                                          bytes.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
+        header = ptx_header(bytes.substr(at), line, file);
+        at += header.length;
+        line += static_cast<int>(PtxHeader::lines);
+    }
+    records.after = bytes.substr(behind);
+    if (scans == 0)
+        records.viewpoint = pose;
+    else
+        warnings.push_back(fmt::format("{}: {} scans are read as one cloud; where each scanner stood is not used.",
+                                       file.string(), scans + 1));
     return records;
 }
 

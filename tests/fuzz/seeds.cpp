@@ -256,6 +256,51 @@ void colmap() {
     seed("image", "seed.geometric.bin", "2&2&1&" + raw(1.0F) + raw(2.0F) + raw(0.0F) + raw(-1.0F));
 }
 
+/// HDF5 of one data set, 2x3 floats: as they are, and deflated in a chunk of a tree. Checksums are not looked at.
+void hdf5() {
+    const std::string nowhere = raw(~std::uint64_t(0));
+    const auto message = [](int type, const std::string& data) {
+        return static_cast<char>(type) + raw(static_cast<std::uint16_t>(data.size())) + '\0' + data;
+    };
+    const auto object = [](const std::string& messages) {
+        return std::string("OHDR\2\0", 6) + static_cast<char>(messages.size()) + messages + raw(0U);
+    };
+    const std::string data = raw(1.F) + raw(2.F) + raw(3.F) + raw(4.F) + raw(5.F) + raw(6.F);
+    std::string packed(compressBound(data.size()), '\0');
+    uLongf size = packed.size();
+    compress(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(data.data()), data.size());
+    packed.resize(size);
+    const std::string shape = std::string("\2\2\0\1", 4) + raw(std::uint64_t(2)) + raw(std::uint64_t(3)),
+                      type = std::string("\x11\x20\x1f\0", 4) + raw(4U) + std::string("\0\0\x20\0\x17\x08\0\x17", 8) +
+                             raw(127U);
+    const auto file = [&](const std::string& filters, const auto& layout_at, const auto& elements_at) {
+        constexpr std::size_t superblock = 48;
+        const auto link = [](std::uint64_t at) { return std::string("\1\0\7dataset", 10) + raw(at); };
+        const std::uint64_t header = superblock + object(message(6, link(0))).size();
+        const auto set = [&](std::uint64_t at) {
+            return object(message(1, shape) + message(3, type) + filters + message(8, layout_at(at)));
+        };
+        const std::uint64_t elements = header + set(0).size();
+        return std::string("\x89HDF\r\n\x1a\n\2\x08\x08\0", 12) + raw(std::uint64_t(0)) + nowhere + nowhere +
+               raw(std::uint64_t(superblock)) + raw(0U) + object(message(6, link(header))) + set(elements) +
+               elements_at(elements);
+    };
+    seed("hdf5", "contiguous.h5",
+         file(
+             "", [&](std::uint64_t at) { return "\3\1" + raw(at) + raw(std::uint64_t(data.size())); },
+             [&](std::uint64_t) { return data; }));
+    const std::uint64_t node = 24 + 40 + 32; // header, a key with its child, the last key
+    seed("hdf5", "deflated.h5",
+         file(
+             message(11, std::string("\2\1\1\0\0\0\0\0", 8)),
+             [&](std::uint64_t at) { return "\3\2\3" + raw(at) + raw(2U) + raw(3U) + raw(4U); },
+             [&](std::uint64_t at) {
+                 return "TREE" + std::string("\1\0\1\0", 4) + nowhere + nowhere +
+                        raw(static_cast<std::uint32_t>(size)) + raw(0U) + std::string(24, '\0') + raw(at + node) +
+                        std::string(32, '\0') + packed;
+             }));
+}
+
 } // namespace
 
 int main(int count, char** words) {
@@ -269,5 +314,6 @@ int main(int count, char** words) {
     texts();
     recordings();
     colmap();
+    hdf5();
     return 0;
 }

@@ -88,7 +88,8 @@ std::string in_pages(std::string contents) {
     return file;
 }
 
-std::string e57_file(const std::vector<TestScan>& scans, const std::string& xml_head = "") {
+std::string e57_file(const std::vector<TestScan>& scans, const std::string& xml_head = "",
+                     const std::string& images = "") {
     std::string contents(48, '\0'), vector;
     contents.replace(0, 8, "ASTM-E57");
     contents[8] = 1;
@@ -104,7 +105,7 @@ std::string e57_file(const std::vector<TestScan>& scans, const std::string& xml_
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>" + xml_head +
         "<e57Root type=\"Structure\" xmlns=\"http://www.astm.org/COMMIT/E57/2010-e57-v1.0\"><data3D "
         "type=\"Vector\">" +
-        vector + "</data3D></e57Root>\n";
+        vector + "</data3D><images2D type=\"Vector\">" + images + "</images2D></e57Root>\n";
     contents.replace(24, 8, raw(in_file(contents.size())));
     contents.replace(32, 8, raw(static_cast<std::uint64_t>(xml.size())));
     contents.replace(40, 8, raw(std::uint64_t(1024)));
@@ -133,6 +134,36 @@ Cloud read(const fs::path& file) {
     Cloud cloud = read_cloud(file, warnings);
     EXPECT_TRUE(warnings.empty()) << joined(warnings);
     return cloud;
+}
+
+TEST(E57, images_are_named_with_their_cameras_and_not_used) {
+    const TemporaryFolder folder;
+    const auto image = [](const std::string& name, const std::string& content) {
+        return "<vectorChild type=\"Structure\"><name type=\"String\">" + name + "</name>" + content + "</vectorChild>";
+    };
+    const std::string pose = "<pose type=\"Structure\"><translation type=\"Structure\"><x type=\"Float\">1</x><y "
+                             "type=\"Float\">2.5</y></translation></pose>",
+                      pinhole =
+                          "<pinholeRepresentation type=\"Structure\"><imageWidth>1600</imageWidth><imageHeight>1200"
+                          "</imageHeight><focalLength>0.015</focalLength><pixelWidth>1e-5</pixelWidth><pixelHeight>"
+                          "2e-5</pixelHeight><principalPointX>800</principalPointX><principalPointY>600.5"
+                          "</principalPointY></pinholeRepresentation>";
+    const std::string images =
+        image("front", pose + pinhole) +
+        image("back", "<pinholeRepresentation><imageWidth>8</imageWidth><imageHeight>6</imageHeight>"
+                      "</pinholeRepresentation>") +
+        image("", "<sphericalRepresentation><imageWidth>x</imageWidth></sphericalRepresentation>") + image("odd", "");
+    std::vector<std::string> warnings;
+    const Cloud cloud = read_cloud(write_file(folder / "a.e57", e57_file({float_scan(5)}, "", images)), warnings);
+    EXPECT_EQ(cloud.points.size(), 5U);
+    EXPECT_TRUE(warned(warnings, "image 0 \"front\": pinhole, 1600x1200, fx 1500 fy 750 cx 800 cy 600.5, at 1.00 2.50 "
+                                 "0.00; not used"));
+    EXPECT_TRUE(warned(warnings, "image 1 \"back\": pinhole, 8x6, no usable camera (focal length 0 m); not used"));
+    EXPECT_TRUE(warned(warnings, "image 2: spherical; damaged: imageWidth is \"x\", expected a number"));
+    EXPECT_TRUE(warned(warnings, "image 3 \"odd\": of an unknown kind"));
+    EXPECT_TRUE(
+        says(refusal([&] { (void)read_cloud(write_file(folder / "b.e57", e57_file({}, "", images)), warnings); }),
+             "no scan in this E57 (4 images; image 0 \"front\": pinhole, 1600x1200"));
 }
 
 TEST(E57, the_checksum_is_castagnolis) {
@@ -357,7 +388,7 @@ TEST(E57, a_recorded_cloud_has_the_known_sums) {
     EXPECT_NEAR((high - Eigen::Vector3d(0.061009, 0.187321, 0.058799)).norm(), 0, 1e-12);
     std::vector<std::string> warnings;
     EXPECT_TRUE(says(refusal([&] { (void)read_cloud(folder / "PinholeImageWithDistortionParameters.e57", warnings); }),
-                     "no scan in this E57 (3 images)"));
+                     "no scan in this E57 (3 images; image 0"));
 }
 
 } // namespace

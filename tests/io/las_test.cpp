@@ -272,11 +272,44 @@ TEST(TextClouds, ptx_is_a_grid_placed_by_its_matrix) {
     EXPECT_EQ(again.points[0], cloud.points[0]);
     EXPECT_TRUE(again.colours.empty()) << "six columns, but no colours";
     std::vector<std::string> warnings;
-    EXPECT_TRUE(
-        says(refusal([&] { (void)read_cloud(write_file(folder / "c.ptx", head + body + head + body), warnings); }),
-             "a second scan"));
     EXPECT_TRUE(says(refusal([&] { (void)read_cloud(write_file(folder / "d.ptx", head + "1 0 0 1\n"), warnings); }),
                      "4 points, the file holds 1"));
+}
+
+TEST(TextClouds, scans_of_a_ptx_file_are_one_cloud_and_come_back_line_by_line) {
+    const TemporaryFolder folder;
+    const std::string
+        first = "2\r\n1\r\n0 0 0\r\n1 0 0\r\n0 1 0\r\n0 0 1\r\n1 0 0 0\r\n0 1 0 0\r\n0 0 1 0\r\n10 20 30 1\r\n",
+        second = "1\n3\n5 6 7\n1 0 0\n0 1 0\n0 0 1\n0 1 0 0\n-1 0 0 0\n0 0 1 0\n5 6 7 1\n";
+    const std::string all = first + "1 0 0 0.5\r\n0 0 0 0.5\r\n" + second +
+                            "1 2 3 0.25\n\n0 0 0 0.5\n 4 5 6 0.75\n \n" + second + "1 0 0 1\n2 0 0 1\n3 0 0 1";
+    std::vector<std::string> warnings;
+    const Cloud cloud = read_cloud(write_file(folder / "a.ptx", all), warnings);
+    EXPECT_TRUE(warned(warnings, "3 scans are read as one cloud"));
+    ASSERT_EQ(cloud.points.size(), 8U);
+    EXPECT_FALSE(cloud.organised());
+    EXPECT_EQ(cloud.points[0], Eigen::Vector3d(11, 20, 30));
+    EXPECT_TRUE(cloud.points[1].array().isNaN().all());
+    EXPECT_EQ(cloud.points[2], Eigen::Vector3d(5 - 2, 6 + 1, 7 + 3));
+    EXPECT_EQ(cloud.points[7], Eigen::Vector3d(5, 9, 7));
+    EXPECT_FALSE(cloud.records->viewpoint) << "each scan has its own";
+    const std::vector<float> values{1, 2, 3, 4, 5, 6, 7, 8};
+    write_cloud(folder / "b.ptx", cloud, {});
+    EXPECT_EQ(file_bytes(folder / "b.ptx"), all);
+    write_cloud(folder / "b.ptx", cloud, {{"ambient_occlusion", values}});
+    EXPECT_EQ(file_bytes(folder / "b.ptx"), first + "1 0 0 0.5 1\r\n0 0 0 0.5 2\r\n" + second +
+                                                "1 2 3 0.25 3\n\n0 0 0 0.5 4\n 4 5 6 0.75 5\n \n" + second +
+                                                "1 0 0 1 6\n2 0 0 1 7\n3 0 0 1 8");
+    EXPECT_EQ(read_cloud(folder / "b.ptx", warnings).points[7], cloud.points[7]);
+    const auto said = [&](const std::string& bytes) {
+        return refusal([&] { (void)read_cloud(write_file(folder / "c.ptx", bytes), warnings); });
+    };
+    const std::string one = first + "1 0 0 0.5\n0 0 0 0.5\n";
+    EXPECT_TRUE(says(said(one + "1 0 0 0.5\n" + second), "line 13: expected the number of columns"));
+    EXPECT_TRUE(says(said(one + "1\n3\n5 6 7\n"), "ends at line 15, expected a header of 10 lines"));
+    EXPECT_TRUE(says(said(one + second + "1 2 3 4\n"), "scan 2: 1 columns of 3 rows are 3 points, the file holds 1"));
+    EXPECT_TRUE(says(said(one + "\n\n" + second + "1 2 3\n"), "line 25: 3 values, expected 4"));
+    EXPECT_TRUE(says(said(one + second.substr(0, 4) + "x" + second.substr(5) + "1 2 3 4\n"), "line 15"));
 }
 
 TEST(Kitti, sweeps_become_ply) {

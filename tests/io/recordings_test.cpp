@@ -290,7 +290,7 @@ TEST_F(Made, kitti_sweeps_have_the_pose_of_their_scanner) {
     EXPECT_LT((*frame.world_from_camera * frame.cloud->points[0] - Eigen::Vector3d(1, 2, 4.5)).norm(), 1e-9);
     EXPECT_EQ(capture.entries[1].stamp_s, 1.0) << "rows are sweeps by number";
     EXPECT_FALSE(capture.load(1).world_from_camera);
-    EXPECT_TRUE(warned(capture.load(1).warnings, "07.txt line 3"));
+    EXPECT_TRUE(warned(capture.load(1).warnings, "07.txt line 3: the pose has NaN"));
     EXPECT_TRUE(warned(capture.warnings, "3 poses, velodyne/ has 2 sweeps"));
 }
 
@@ -330,6 +330,39 @@ TEST_F(Made, nuscenes_poses_multiply_and_points_have_rings) {
     EXPECT_FALSE(capture.entries[1].world_from_camera);
     EXPECT_TRUE(warned(capture.entries[1].warnings, "no token"));
     EXPECT_THROW((void)capture.load(1), Error);
+}
+
+TEST_F(Made, nuscenes_tables_are_read_in_blocks_and_their_damage_is_named) {
+    text("samples/LIDAR_TOP/a.pcd.bin", floats({1, 2, 3, 4, 5}));
+    const std::string lidar =
+        R"({"token": "t", "filename": "samples/LIDAR_TOP/a.pcd.bin", "timestamp": 7, "ego_pose_token": "e", "calibrated_sensor_token": "c", "prev": "", "x": [[1, {"filename": "y"}], null]})";
+    const std::string pose = R"("translation": [1, 2, 3], "rotation": [1, 0, 0, 0])";
+    std::string table = "[";
+    while (table.size() < (3U << 20)) // the row that counts lies behind some blocks
+        table += R"({"token": "0", "filename": "samples/CAM_FRONT/a.jpg", "prev": "", "timestamp": 1}, )";
+    text("v1.0-trainval/sample_data.json", table + lidar + "]");
+    text("v1.0-trainval/ego_pose.json", R"([{"token": "other", )" + pose + R"(}, {)" + pose + R"(, "token": "e"}])");
+    text("v1.0-trainval/calibrated_sensor.json", R"([{"token": "c", )" + pose + R"(, "camera_intrinsic": [[1]]}])");
+    const Capture capture = open_capture(folder.path());
+    ASSERT_EQ(capture.entries.size(), 1U);
+    EXPECT_EQ(capture.entries[0].stamp_s, 7e-6);
+    ASSERT_TRUE(capture.entries[0].world_from_camera);
+    EXPECT_EQ(capture.entries[0].world_from_camera->translation(), Eigen::Vector3d(2, 4, 6));
+    for (const auto& [damaged, said] :
+         {std::pair<std::string, const char*>{table + lidar, "not JSON"},
+          {"{\"a\": 1}", "expected a list of objects"},
+          {"[[1]]", "expected a list of objects"},
+          {"[1]", "expected a list of objects"},
+          {"", "byte 0: not JSON"},
+          {"[{\"a\": NaN}]", "byte 7: not JSON"},
+          {"[{\"a\": " + std::string(100, '['), "nested deeper than 64"},
+          {"[{\"a\": \"" + std::string(5 << 20, 'a'), "a word of more than"},
+          {"[" + lidar + ", {\"filename\": \"samples/LIDAR_TOP/a.pcd.bin\"}]", "\"timestamp\" is missing"}}) {
+        text("v1.0-trainval/sample_data.json", damaged);
+        const std::string refused = tests::refusal([&] { (void)open_capture(folder.path()); });
+        EXPECT_TRUE(tests::says(refused, said));
+        EXPECT_TRUE(tests::says(refused, "sample_data.json"));
+    }
 }
 
 TEST_F(Made, depth_in_npy_is_read_in_every_order_of_bytes_and_axes) {
@@ -492,7 +525,7 @@ INSTANTIATE_TEST_SUITE_P(of, Samples,
                                          "ros1-bag-lz4", "ros2-db3", "mcap", "mcap-lz4", "mcap-zstd", "realsense-bag",
                                          "realsense-db3", "kitti-odometry", "nuscenes", "npz", "scannetpp-raw",
                                          "scannetpp-raw-lz4", "record3d", "azure-mkv", "colmap-dense",
-                                         "colmap-dense-text"),
+                                         "colmap-dense-text", "hypersim"),
                          [](const auto& layout) {
                              std::string name = layout.param;
                              std::ranges::replace(name, '-', '_');

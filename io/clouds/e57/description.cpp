@@ -4,6 +4,7 @@
 #include "io/text.h"
 #include "projection/base/error.h"
 
+#include <array>
 #include <bit>
 #include <charconv>
 #include <cmath>
@@ -144,6 +145,43 @@ Scan scan_of(pugi::xml_node node, std::size_t index) {
     return scan;
 }
 
+/// "image 0 "front": pinhole, 1600x1200, fx 1500 fy 1500 cx 800 cy 600, at 1.00 2.00 3.00". What is damaged of it does
+/// not matter to the scans.
+std::string image_text(pugi::xml_node node, std::size_t index) {
+    const std::string what = fmt::format("image {}", index);
+    std::string text = what;
+    if (const std::string name = node.child_value("name"); !name.empty())
+        text += " " + in_quotes(name);
+    static constexpr std::array kinds{"pinhole", "spherical", "cylindrical", "visualReference"};
+    pugi::xml_node image;
+    for (const char* kind : kinds)
+        if (!image && (image = node.child((std::string(kind) + "Representation").c_str())))
+            text += fmt::format(": {}", kind == kinds[3] ? "without a camera" : kind);
+    if (!image)
+        return text + ": of an unknown kind";
+    try {
+        text += fmt::format(", {}x{}", number_of<std::uint64_t>(image.child_value("imageWidth"), 0, "imageWidth"),
+                            number_of<std::uint64_t>(image.child_value("imageHeight"), 0, "imageHeight"));
+        if (std::string_view(image.name()).starts_with(kinds[0])) {
+            const double focal_m = finite(image, "focalLength", 0, what),
+                         width_m = finite(image, "pixelWidth", 0, what),
+                         height_m = finite(image, "pixelHeight", 0, what);
+            text +=
+                focal_m > 0 && width_m > 0 && height_m > 0
+                    ? fmt::format(", fx {:.6g} fy {:.6g} cx {:.6g} cy {:.6g}", focal_m / width_m, focal_m / height_m,
+                                  finite(image, "principalPointX", 0, what), finite(image, "principalPointY", 0, what))
+                    : fmt::format(", no usable camera (focal length {} m)", focal_m);
+        }
+        if (const auto pose = node.child("pose")) {
+            const Eigen::Vector3d at = pose_of(pose, what).translation();
+            text += fmt::format(", at {:.2f} {:.2f} {:.2f}", at.x(), at.y(), at.z());
+        }
+    } catch (const Error& failure) {
+        text += fmt::format("; damaged: {}", failure.what());
+    }
+    return text;
+}
+
 } // namespace
 
 unsigned Field::bits() const {
@@ -198,7 +236,8 @@ Description described(std::string_view contents) {
         throw Error("the XML has no e57Root");
     Description found;
     for (const pugi::xml_node image : root.child("images2D").children())
-        found.images += image.type() == pugi::node_element ? 1 : 0;
+        if (image.type() == pugi::node_element)
+            found.images.push_back(image_text(image, found.images.size()));
     for (const pugi::xml_node scan : root.child("data3D").children()) {
         if (scan.type() != pugi::node_element)
             continue;

@@ -50,7 +50,7 @@ struct Scan {
 
 struct Description {
     std::vector<Scan> scans;
-    std::size_t images = 0;
+    std::vector<std::string> images; ///< what each is, in words: name, size, camera, place
 };
 /// From the header and the XML. `contents` is without_pages().
 [[nodiscard]] Description described(std::string_view contents);
