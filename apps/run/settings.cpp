@@ -43,7 +43,7 @@ constexpr auto maybe_quality_words = [] {
 }();
 
 std::set<std::string> words_of(const std::string& list) {
-    const std::vector<std::string> known{"ao", "confidence", "shaded", "cloud", "panel"};
+    const std::vector<std::string> known{"ao", "confidence", "shaded", "cloud", "panel", "glb", "mcap"};
     std::set<std::string> words;
     std::istringstream stream(list);
     for (std::string word; std::getline(stream, word, ',');) {
@@ -69,6 +69,8 @@ Outputs outputs_from(const RunSettings& asked) {
         wanted.confidence = words.contains("confidence");
         wanted.shaded = words.contains("shaded");
         wanted.panel = words.contains("panel");
+        wanted.glb = words.contains("glb");
+        wanted.mcap = words.contains("mcap");
         wanted.cloud = wanted.depth_cloud = words.contains("cloud");
     }
     return wanted;
@@ -262,7 +264,10 @@ std::vector<Stage> RunSettings::common_stages() {
            .common = true,
            .writes = Writes::folder},
           {.name = "write",
-           .help = "any of ao,confidence,shaded,cloud,panel; auto = ao,confidence,shaded, and cloud for clouds",
+           .help =
+               "any of ao,confidence,shaded,cloud,panel,glb,mcap; auto = ao,confidence,shaded, and cloud for clouds. "
+               "glb: each frame's points or mesh as binary glTF; mcap: run.mcap, one recording of all frames for "
+               "Foxglove, Rerun and ROS",
            .value = &s.write,
            .common = true},
           {.name = "format",
