@@ -283,7 +283,9 @@ std::vector<Stage> RunSettings::common_stages() {
            .low = 0,
            .high = 1},
           {.name = "cloud",
-           .help = "a PLY file: one cloud of all frames with poses, points of the same place merged",
+           .help = "a PLY file, or binary glTF if its name ends in .glb: one cloud of all frames with poses, points of "
+                   "the same "
+                   "place merged",
            .value = &s.recording_cloud,
            .common = true,
            .writes = Writes::file},
