@@ -169,6 +169,14 @@ cv::Mat1f facing_camera(const cv::Mat1f& z_m, const Pinhole& camera) {
     return cosine;
 }
 
+std::vector<cv::Vec3b> greys(const std::vector<float>& visibility) {
+    std::vector<cv::Vec3b> colours(visibility.size());
+    std::ranges::transform(visibility, colours.begin(), [](float value) {
+        return cv::Vec3b::all(std::isnan(value) ? uchar(0) : cv::saturate_cast<uchar>(255 * value));
+    });
+    return colours;
+}
+
 cv::Mat3b clay(const cv::Mat1f& z_m, const Pinhole& camera) { return clay_of(facing_camera(z_m, camera), z_m); }
 
 cv::Mat3b panel(const std::vector<Tile>& tiles) {

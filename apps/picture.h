@@ -16,6 +16,9 @@ namespace scanshade {
 /// Visibility as grey, 1 = white; where there is no surface a dim blue that no visibility has.
 [[nodiscard]] cv::Mat3b visibility_picture(const cv::Mat1f& visibility);
 
+/// Values of points as grey, so that 255 is open; black where they are not known.
+[[nodiscard]] std::vector<cv::Vec3b> greys(const std::vector<float>& visibility);
+
 /// The surface as grey clay lit from the camera: the shape that depth alone shows. Holes get the same dim blue.
 /// `camera` is the pinhole of `z_m`, same size; lens distortion may be ignored, it only bends the light a little.
 [[nodiscard]] cv::Mat3b clay(const cv::Mat1f& z_m, const Pinhole& camera);

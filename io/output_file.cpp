@@ -44,6 +44,14 @@ void sync(const fs::path& path, int flags) {
         throw std::system_error(failed, std::generic_category(), "cannot be synced");
 }
 
+fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
+
+void sync_and_rename(const fs::path& temporary, const fs::path& target) {
+    sync(temporary, O_RDONLY);
+    fs::rename(temporary, target);
+    sync(folder_of(target), O_RDONLY | O_DIRECTORY);
+}
+
 void write_bytes(const fs::path& file, std::string_view bytes) {
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "wb"), &std::fclose);
     if (!stream)
@@ -118,8 +126,17 @@ std::optional<std::string_view> target_of(std::string_view name) {
 
 } // namespace
 
+void publish(const fs::path& temporary, const fs::path& target) {
+    during(target.string(), [&] {
+        try {
+            sync_and_rename(temporary, target);
+        } catch (const std::system_error& failure) {
+            throw Outage(std::string("not written: ") + failure.what());
+        }
+    });
+}
+
 void write_atomically(const fs::path& target, const std::function<void(const fs::path&)>& write) {
-    const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
     const fs::path temporary = temporary_name(target);
     const auto clean_up = [&] {
         std::error_code ignored;
@@ -128,11 +145,9 @@ void write_atomically(const fs::path& target, const std::function<void(const fs:
     try {
         during(target.string(), [&] {
             try {
-                fs::create_directories(folder);
+                fs::create_directories(folder_of(target));
                 write(temporary);
-                sync(temporary, O_RDONLY);
-                fs::rename(temporary, target);
-                sync(folder, O_RDONLY | O_DIRECTORY);
+                sync_and_rename(temporary, target);
             } catch (const std::system_error& failure) { // the file system's answer; streams throw it, too
                 throw Outage(std::string("not written: ") + failure.what());
             }

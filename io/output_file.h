@@ -16,6 +16,10 @@ void write_atomically(const std::filesystem::path& target,
 /// The same for bytes already in memory.
 void write_atomically(const std::filesystem::path& target, std::string_view bytes);
 
+/// The last step of it, for a file that takes long to write: syncs `temporary` and renames it to `target`, which is in
+/// the same folder.
+void publish(const std::filesystem::path& temporary, const std::filesystem::path& target);
+
 /// Throws Misuse, with the system's reason, where no file can be made in `folder`, or in the nearest folder above it
 /// that exists. Throws Outage for a full disk and other trouble that passes. Leaves nothing behind.
 void require_folder(const std::filesystem::path& folder);

@@ -47,6 +47,8 @@ std::vector<fs::path> files_of(const CaptureEntry& entry, const Outputs& outputs
         add(points_file(entry.name, 0));
     if (entry.cloud.empty() && outputs.depth_cloud)
         add(cloud_file(entry.name, ".ply"));
+    if (outputs.glb)
+        add(cloud_file(entry.name, ".glb"));
     if (!entry.cloud.empty() && of_points(outputs).cloud)
         for (const std::string_view extension : written_cloud_extensions())
             add(cloud_file(entry.name, std::string(extension)));

@@ -31,6 +31,8 @@ struct Outputs {
     bool panel = false; ///< colour | depth | AO | shaded
     bool cloud = true; ///< a cloud input with the fields ambient_occlusion and ao_confidence, everything else as it was
     bool depth_cloud = false; ///< a new PLY of a depth frame's points, in camera space
+    bool glb = false;         ///< the points of either as binary glTF
+    bool mcap = false;        ///< all frames as one recording, run.mcap; not a file of a frame
     AoFormat format = AoFormat::png16;
     double shade_strength = 1; ///< 0 leaves the colour, 1 multiplies by visibility
     bool colour_view = false;  ///< maps and pictures of frames with a secondary camera use its pixels
@@ -56,7 +58,8 @@ struct Outputs {
 
 /// Whether any output shows the colour images.
 [[nodiscard]] inline bool shows_colour(const Outputs& outputs, bool recording_cloud) {
-    return outputs.shaded || outputs.panel || outputs.depth_cloud || outputs.colour_view || recording_cloud;
+    return outputs.shaded || outputs.panel || outputs.depth_cloud || outputs.glb || outputs.colour_view ||
+           recording_cloud;
 }
 
 } // namespace scanshade

@@ -1,7 +1,10 @@
 #include "apps/results/recording_cloud.h"
 
 #include "apps/page/points.h"
+#include "apps/picture.h"
 #include "io/clouds/cloud_file.h"
+#include "io/clouds/glb.h"
+#include "io/text.h"
 #include "projection/base/error.h"
 #include "projection/base/hash.h"
 #include "projection/base/statistics.h"
@@ -121,6 +124,18 @@ void RecordingCloud::write_for_page(const std::filesystem::path& folder, const s
 
 void RecordingCloud::write(const std::filesystem::path& file) const {
     const auto [points, colours, visibility, confidence, views] = columns();
+    if (lower_extension(file) == ".glb") {
+        const std::vector<cv::Vec3b> grey = colours.empty() ? greys(visibility) : std::vector<cv::Vec3b>();
+        (void)write_glb(
+            file,
+            {.name = file.stem().string(),
+             .points = points,
+             .triangles = {},
+             .normals = {},
+             .colours = colours.empty() ? grey : colours,
+             .fields = {{"_AMBIENT_OCCLUSION", visibility}, {"_AO_CONFIDENCE", confidence}, {"_AO_VIEWS", views}}});
+        return;
+    }
     write_new_ply(file, points, colours,
                   {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}, {"ao_views", views}},
                   {fmt::format("one cloud of {} frames, merged within {}", frames_, merged_within())});

@@ -52,7 +52,8 @@ class RecordingCloud {
     [[nodiscard]] double resolution_m() const { return resolution_m_; }
     /// "0.0043 m": the side of the cubes.
     [[nodiscard]] std::string merged_within() const;
-    /// Binary PLY in world coordinates: ambient_occlusion, ao_confidence, ao_views. Atomic.
+    /// Binary PLY in world coordinates: ambient_occlusion, ao_confidence, ao_views; binary glTF where the name ends in
+    /// .glb, with grey visibility where no frame had colours. Atomic.
     void write(const std::filesystem::path& file) const;
     /// The same for a page: FOLDER/STEM.000.js and on, at most so many points.
     void write_for_page(const std::filesystem::path& folder, const std::string& stem, std::size_t most) const;

@@ -145,6 +145,8 @@ json totals_json(const RunReport& report) {
             {"peak_memory_mib", known(report.peak_mib, 1)}};
 }
 
+constexpr const char* whole_recording = "run.mcap"; ///< of a capture, not of a block of it
+
 /// The files in the folders of results without those in `own`, sorted.
 std::vector<std::string> files_of_others(const std::filesystem::path& folder,
                                          const std::unordered_set<std::string>& own) {
@@ -157,6 +159,9 @@ std::vector<std::string> files_of_others(const std::filesystem::path& folder,
                 others.push_back(whole);
         }
     }
+    if (std::error_code ignored;
+        !own.contains(whole_recording) && std::filesystem::exists(folder / whole_recording, ignored))
+        others.emplace_back(whole_recording);
     std::ranges::sort(others);
     return others;
 }
@@ -258,6 +263,7 @@ json manifest_head(const RunReport& report) {
               {"budget", report.budget},
               {"outlook", report.outlook},
               {"shading", report.shading},
+              {"recording", report.recording.empty() ? json() : json(report.recording)},
               {"totals", totals_json(report)}};
     if (!report.radius.empty())
         head["radius"] = report.radius;
@@ -297,7 +303,7 @@ std::vector<std::string> write_manifest(const std::filesystem::path& file, const
         stream << head
                << ",\n  \"frames\": ["; // one by one: thousands in one value would take most of the run's memory
         const char* between = "";
-        std::unordered_set<std::string> own;
+        std::unordered_set<std::string> own{report.recording};
         for (const FrameRow& row : report.frames) {
             const FrameRow all_of_row = whole(row);
             for (const auto& each : all_of_row.files)

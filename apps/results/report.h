@@ -37,6 +37,7 @@ struct RunReport {
     StageTimes ms_now{};                   ///< sums of their times in each stage
     double took_ms = 0;                    ///< from the first frame's begin to the last one's end
     double peak_mib = 0;                   ///< the process's memory when the reports are written
+    std::string recording = {};            ///< "run.mcap", where this run has written it
     bool alone = true;                     ///< no other run writes to the same folder, as runs of a capture's blocks do
 };
 

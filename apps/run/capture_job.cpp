@@ -2,6 +2,7 @@
 
 #include "apps/page/run_page.h"
 #include "apps/results/journal.h"
+#include "apps/results/mcap_recording.h"
 #include "apps/walk/resume.h"
 #include "io/files.h"
 #include "io/images/format.h"
@@ -67,6 +68,8 @@ void refuse_to_overwrite(const CaptureJob& job) {
     const fs::path journal = journal_file(outputs.folder, "");
     if (!fs::exists(journal) || has_results(outputs.folder))
         refuse({outputs.folder / "manifest.json", outputs.folder / "frames.csv", journal});
+    if (outputs.mcap)
+        refuse({mcap_file(outputs.folder, job.block)});
     refuse_foreign_page(outputs.folder);
     for (const std::size_t index : job.batch.frames)
         refuse(files_of(job.capture.entries[index], outputs));
@@ -110,13 +113,15 @@ void prepare_folder(const CaptureJob& job, const ReportFiles& reports) {
 }
 
 void fit_into_memory(CaptureJob& job, bool on_cpu) {
-    // Per pixel: depth and visibility; confidence, clay and its cosines; CACAO's buffers.
-    constexpr std::uint64_t maps = 12, pictures = 13, device = 24;
+    // Per pixel: depth and visibility; confidence, clay and its cosines; points, a message or file of them, and that
+    // packed; CACAO's buffers.
+    constexpr std::uint64_t maps = 12, pictures = 13, points = 100, device = 24;
     const Outputs& outputs = job.batch.outputs;
-    const bool finished = outputs.confidence || outputs.shaded || outputs.panel;
+    const bool finished = outputs.confidence || outputs.shaded || outputs.panel || outputs.mcap;
     const cv::Size size = depth_size_in(job);
     const std::uint64_t bytes =
-        static_cast<std::uint64_t>(size.area()) * (maps + (finished ? pictures : 0) + (on_cpu ? device : 0));
+        static_cast<std::uint64_t>(size.area()) *
+        (maps + (finished ? pictures : 0) + (outputs.mcap || outputs.glb ? points : 0) + (on_cpu ? device : 0));
     require_memory(bytes,
                    fmt::format("{}: a frame of {}x{} pixels", job.capture.path.string(), size.width, size.height));
     constexpr std::uint64_t always_fits = 128 << 20;

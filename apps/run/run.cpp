@@ -4,6 +4,7 @@
 #include "apps/measure/trial.h"
 #include "apps/page/run_page.h"
 #include "apps/results/captures_page.h"
+#include "apps/results/mcap_recording.h"
 #include "apps/run/capture_job.h"
 #include "apps/run/messages.h"
 #include "apps/run/outlook.h"
@@ -396,6 +397,9 @@ class Run final : public Command {
         say(ready.at_work);
         introduce(ready.report, job.batch.frames.size(), ready.by_points);
         prepare_folder(job, files);
+        std::optional<McapRecording> mcap;
+        if (job.batch.outputs.mcap)
+            job.batch.recording = &mcap.emplace(mcap_file(job.folder(), job.block), job.capture, asked_.resume);
         const Recording recording{.journal = journal,
                                   .settings = ready.settings,
                                   .task = task,
@@ -404,6 +408,10 @@ class Run final : public Command {
                                   .carefully = worker.carefully,
                                   .finished = worker.finished};
         walk(job, ready.report, recording);
+        if (mcap) {
+            finish_mcap(*mcap, job.capture);
+            ready.report.recording = mcap->path().filename().string();
+        }
         const bool recorded = cloud && !interrupted && write_recording(*cloud, job);
         report_on(job, ready.report, journal, files, recorded);
         return std::move(ready.report.frames);
@@ -418,7 +426,9 @@ class Run final : public Command {
     [[nodiscard]] std::optional<std::vector<FrameRow>> rows_if_done(const CaptureJob& job, const Journal& journal,
                                                                     const std::string& task, const ReportFiles& files) {
         auto rows = rows_if_complete(journal, task, job.capture, job.batch.frames, asked_.retry);
-        if (!rows || !fs::exists(files.manifest) || (writes_page(job) && !page::has_page(job.folder())))
+        if (!rows || !fs::exists(files.manifest) ||
+            (job.batch.outputs.mcap && !fs::exists(mcap_file(job.folder(), job.block))) ||
+            (writes_page(job) && !page::has_page(job.folder())))
             return std::nullopt;
         say(fmt::format("{}: done already, {} frames -> {}", job.capture.path.string(), rows->size(),
                         job.folder().string()));
@@ -431,7 +441,7 @@ class Run final : public Command {
             job.batch.noise = noise_from_text(asked_.depth_noise);
             return;
         }
-        const bool colour = shows_colour(job.batch.outputs, !asked_.recording_cloud.empty());
+        const bool colour = shows_colour(job.batch.outputs, !asked_.recording_cloud.empty() || job.batch.outputs.mcap);
         job.batch.noise = noise_of(job.capture, job.of, &job.loaded, colour);
         const std::set<std::size_t> wanted(job.batch.frames.begin(), job.batch.frames.end());
         std::erase_if(job.loaded, [&](const auto& each) { return !wanted.contains(each.first); });
@@ -585,6 +595,13 @@ class Run final : public Command {
         say(fmt::format("  {} points, merged within {} -> {}", cloud.points(), cloud.merged_within(),
                         asked_.recording_cloud));
         return writes_page(job);
+    }
+
+    static void finish_mcap(McapRecording& recording, const Capture& capture) {
+        recording.finish();
+        const bool apart = !recording.has_own_stamps() && capture.entries.size() > 1;
+        say(fmt::format("  {} -> {}{}", recording.summary(), recording.path().string(),
+                        apart ? " (frames are put 1/30 s apart: not all have a time stamp)" : ""));
     }
 
     RunSettings asked_;

@@ -46,7 +46,7 @@ constexpr auto maybe_quality_words = [] {
 }();
 
 std::set<std::string> words_of(const std::string& list) {
-    const std::vector<std::string> known{"ao", "confidence", "shaded", "cloud", "panel"};
+    const std::vector<std::string> known{"ao", "confidence", "shaded", "cloud", "panel", "glb", "mcap"};
     std::set<std::string> words;
     std::istringstream stream(list);
     for (std::string word; std::getline(stream, word, ',');) {
@@ -72,6 +72,8 @@ Outputs outputs_from(const RunSettings& asked) {
         wanted.confidence = words.contains("confidence");
         wanted.shaded = words.contains("shaded");
         wanted.panel = words.contains("panel");
+        wanted.glb = words.contains("glb");
+        wanted.mcap = words.contains("mcap");
         wanted.cloud = wanted.depth_cloud = words.contains("cloud");
     }
     return wanted;
@@ -270,7 +272,10 @@ std::vector<Stage> RunSettings::common_stages() {
            .common = true,
            .writes = Writes::folder},
           {.name = "write",
-           .help = "any of ao,confidence,shaded,cloud,panel; auto = ao,confidence,shaded, and cloud for clouds",
+           .help =
+               "any of ao,confidence,shaded,cloud,panel,glb,mcap; auto = ao,confidence,shaded, and cloud for clouds. "
+               "glb: each frame's points or mesh as binary glTF; mcap: run.mcap, one recording of all frames for "
+               "Foxglove, Rerun and ROS",
            .value = &s.write,
            .common = true},
           {.name = "format",
@@ -286,7 +291,9 @@ std::vector<Stage> RunSettings::common_stages() {
            .low = 0,
            .high = 1},
           {.name = "cloud",
-           .help = "a PLY file: one cloud of all frames with poses, points of the same place merged",
+           .help = "a PLY file, or binary glTF if its name ends in .glb: one cloud of all frames with poses, points of "
+                   "the same "
+                   "place merged",
            .value = &s.recording_cloud,
            .common = true,
            .writes = Writes::file},

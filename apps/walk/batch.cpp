@@ -3,6 +3,7 @@
 
 #include "apps/walk/doubts.h"
 #include "apps/walk/frame_files.h"
+#include "apps/walk/frame_messages.h"
 #include "apps/walk/frame_steps.h"
 #include "apps/walk/point_clouds.h"
 #include "apps/walk/sequence_order.h"
@@ -56,7 +57,7 @@ void take(Work& work, double StageTimes::*stage, Step&& step) {
 Frame load(const Capture& capture, std::size_t index, const BatchOptions& options) {
     if (const std::string& problem = capture.entries[index].problem; !problem.empty())
         throw Error(problem);
-    return capture.load(index, shows_colour(options.outputs, options.cloud != nullptr));
+    return capture.load(index, shows_colour(options.outputs, options.cloud || options.recording));
 }
 
 /// Computes a value for every point, without a camera's view.
@@ -73,7 +74,7 @@ void attach_and_write(Work& work, const BatchOptions& options) {
     FrameImages images;
     take(work, &StageTimes::attach, [&] {
         if (!by_points)
-            images = finish(work, options, outputs);
+            images = finish(work, options, options.recording ? with_messages(outputs) : outputs);
         work.row.coverage = work.attached.coverage;
         work.row.mean_visibility = work.attached.mean_visibility;
         std::ranges::move(doubts_about(work, options.radius_m, options.noise, options.outputs.unit),
@@ -99,6 +100,8 @@ void attach_and_write(Work& work, const BatchOptions& options) {
         } else {
             write_all(work, images, outputs);
         }
+        if (options.recording)
+            work.messages = frame_messages(work, images, outputs, *options.recording);
     });
     if (!work.row.why.empty())
         remove_files(work, options.outputs);
@@ -251,6 +254,8 @@ class Pipeline {
     void add_to_report(Work& work) {
         if (options_.cloud && is_done(work.row.status))
             add_to(*options_.cloud, work);
+        if (options_.recording && is_done(work.row.status))
+            options_.recording->add(work.row.index, work.messages);
         outages_ = work.row.fault == Fault::outage ? outages_ + 1 : 0;
         given_up_ = given_up_ || outages_ >= 4;
         if (on_frame_)

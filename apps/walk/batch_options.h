@@ -3,6 +3,7 @@
 
 #include "ao/base/method.h"
 #include "ao/sequence/sequence_ao.h"
+#include "apps/results/mcap_recording.h"
 #include "apps/results/outputs.h"
 #include "apps/results/recording_cloud.h"
 #include "apps/walk/measured_noise.h"
@@ -30,14 +31,15 @@ struct BatchOptions {
     std::optional<Registration> registration; ///< as the user set it; none: as the capture says
     PointMethod* points = nullptr;            ///< computes clouds and meshes where `cloud_walk` asks for points
     CloudWalk cloud_walk = CloudWalk::automatic;
-    std::string no_method;           ///< why there is no method for views, if the pool is empty; clouds need none
-    RecordingCloud* cloud = nullptr; ///< receives the frames with a pose
-    SequenceAo* sequence = nullptr;  ///< computes each frame with its neighbours, in place of the method;
-                                     ///< neighbours are loaded even if `frames` does not list them
-    LoadedFrames* loaded = nullptr;  ///< frames that are in memory already; the walk takes them from there
-    std::filesystem::path dump;      ///< folder for the method's intermediates, frame by frame; empty = none
-    bool short_rows = false;         ///< rows come back shortened, once on_frame has seen them
-    int frames_in_memory = 0;        ///< 0 = cores, and two for each method
+    std::string no_method;              ///< why there is no method for views, if the pool is empty; clouds need none
+    RecordingCloud* cloud = nullptr;    ///< receives the frames with a pose
+    McapRecording* recording = nullptr; ///< receives all frames, in their order
+    SequenceAo* sequence = nullptr;     ///< computes each frame with its neighbours, in place of the method;
+                                        ///< neighbours are loaded even if `frames` does not list them
+    LoadedFrames* loaded = nullptr;     ///< frames that are in memory already; the walk takes them from there
+    std::filesystem::path dump;         ///< folder for the method's intermediates, frame by frame; empty = none
+    bool short_rows = false;            ///< rows come back shortened, once on_frame has seen them
+    int frames_in_memory = 0;           ///< 0 = cores, and two for each method
     const std::atomic<bool>* stop = nullptr; ///< set = begin no further frame
     std::function<void()> all_begun;         ///< called once no further frame will begin: another batch may
 };

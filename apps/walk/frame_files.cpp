@@ -5,12 +5,12 @@
 #include "apps/page/preview.h"
 #include "apps/picture.h"
 #include "apps/results/cloud_picture.h"
+#include "apps/walk/frame_points.h"
 #include "apps/walk/point_clouds.h"
 #include "io/clouds/cloud_file.h"
+#include "io/clouds/glb.h"
 #include "io/images/npy_file.h"
 #include "io/output_file.h"
-#include "projection/colour_view.h"
-#include "projection/undistort.h"
 
 #include <algorithm>
 #include <cmath>
@@ -32,96 +32,54 @@ cv::Mat3b panel_picture(const Frame& frame, const Scene& scene, const cv::Mat3b&
                   {fits ? "colour x AO" : "clay x AO", shaded}});
 }
 
-std::vector<cv::Vec3b> shaded_colours(const std::vector<cv::Vec3b>& colours, const std::vector<float>& visibility,
-                                      double strength) {
-    const cv::Size row(static_cast<int>(colours.size()), 1);
-    if (row.empty())
-        return {};
-    const cv::Mat3b shaded = shade(on_grid(colours, row), on_grid(visibility, row), strength);
-    return {shaded.begin(), shaded.end()};
+/// The depth frame's surface as points in camera space.
+void write_depth_cloud(const std::filesystem::path& file, const Work& work, const FramePoints& all,
+                       const LengthUnit& unit) {
+    std::vector<AddedField> added = {{"ambient_occlusion", all.visibility}, {"ao_confidence", all.confidence}};
+    if (has_secondary_camera(work.frame))
+        added.push_back({"colour_known", all.colour_known});
+    write_new_ply(file, all.made, all.colours, added, {fmt::format("camera space: x right, y down, z forward, {}",
+                               unit.arbitrary() ? "in the recording's arbitrary unit" : "metres")});
 }
 
-/// Visibility as grey, so that 255 is open; black where it is not known.
-std::vector<cv::Vec3b> greys(const std::vector<float>& visibility) {
-    std::vector<cv::Vec3b> colours(visibility.size());
-    std::ranges::transform(visibility, colours.begin(), [](float value) {
-        return cv::Vec3b::all(std::isnan(value) ? uchar(0) : cv::saturate_cast<uchar>(255 * value));
-    });
-    return colours;
-}
-
-/// The colours of a written cloud; empty = none, or as they were.
-std::vector<cv::Vec3b> colours_of(const std::vector<cv::Vec3b>& own, const std::vector<float>& visibility,
-                                  const Outputs& outputs) {
-    if (own.empty())
-        return outputs.colour_cloud == CloudColours::grey ? greys(visibility) : std::vector<cv::Vec3b>();
-    return shaded_colours(own, visibility, outputs.shade_strength);
-}
-
-/// The image without lens distortion. Zero where the camera saw nothing.
-template <class Pixel>
-cv::Mat_<Pixel> undistorted_image(const cv::Mat_<Pixel>& image, const Camera& camera) {
-    if (image.empty() || !camera.distortion.any())
-        return image;
-    const auto maps = Undistortion::of(camera);
-    cv::Mat_<Pixel> straight(image.size());
-    std::transform(maps->recorded_pixel().begin(), maps->recorded_pixel().end(), straight.begin(),
-                   [&](int pixel) { return pixel < 0 ? Pixel() : image(pixel / image.cols, pixel % image.cols); });
-    return straight;
-}
-
-/// Clouds store confidence 0 where it is not known.
-float known_or_none(float confidence) { return std::isnan(confidence) ? 0.0F : confidence; }
-
-/// The depth frame's surface as points in camera space, coloured where the colour fits. Points that the colour camera
-/// did not see are black, and colour_known says 0.
-void write_depth_cloud(const std::filesystem::path& file, const Work& work, const Scene& shown,
-                       const Outputs& outputs) {
-    const auto& [camera, z_m, source] = work.depth;
-    const bool warped = has_secondary_camera(work.frame);
-    const Scene scene = warped && outputs.colour_view ? scene_of(work, false) : shown;
-    const cv::Mat3b colour = undistorted_image(scene.colour, work.frame.camera);
-    const cv::Mat1b colour_known = undistorted_image(scene.colour_known, work.frame.camera);
-    std::vector<Eigen::Vector3d> points;
-    std::vector<cv::Vec3b> colours;
-    std::vector<float> visibility, confidence, known;
-    for (int v = 0; v < z_m.rows; ++v) {
-        for (int u = 0; u < z_m.cols; ++u) {
-            const double z = z_m(v, u);
-            if (z <= 0)
-                continue;
-            points.push_back(camera.point(u, v, outputs.unit.told(z)));
-            visibility.push_back(work.ao.visibility(v, u));
-            confidence.push_back(known_or_none(work.confidence_in_view(v, u)));
-            if (!colour.empty())
-                colours.push_back(colour(v, u));
-            if (!colour_known.empty())
-                known.push_back(colour_known(v, u) > 0 ? 1.0F : 0.0F);
-        }
-    }
-    if (outputs.colour_cloud != CloudColours::kept)
-        colours = colours_of(colours, visibility, outputs);
-    std::vector<AddedField> added = {{"ambient_occlusion", visibility}, {"ao_confidence", confidence}};
-    if (warped)
-        added.push_back({"colour_known", known});
-    write_new_ply(file, points, colours, added,
-                  {outputs.unit.arbitrary()
-                       ? "camera space: x right, y down, z forward, in the recording's arbitrary unit"
-                       : "camera space: x right, y down, z forward, metres"});
-}
-
-void write_recorded_cloud(const std::filesystem::path& file, const Work& work, const Outputs& outputs) {
+void write_recorded_cloud(const std::filesystem::path& file, const Work& work, const FramePoints& all,
+                          const Outputs& outputs) {
     const Cloud& cloud = *work.frame.cloud;
-    std::vector<cv::Vec3b> colours;
-    if (outputs.colour_cloud != CloudColours::kept && takes_colours(cloud))
-        colours =
-            colours_of(has_colours(cloud) ? cloud.colours : std::vector<cv::Vec3b>(), work.attached.per_point, outputs);
-    std::vector<AddedField> fields{{"ambient_occlusion", work.attached.per_point}};
-    std::vector<float> confidence = work.confidence.per_point;
-    std::ranges::transform(confidence, confidence.begin(), known_or_none);
-    if (!confidence.empty())
-        fields.push_back({"ao_confidence", confidence});
-    write_cloud(file, cloud, fields, colours);
+    const bool changed = outputs.colour_cloud != CloudColours::kept && takes_colours(cloud);
+    std::vector<AddedField> fields{{"ambient_occlusion", all.visibility}};
+    if (!all.confidence.empty())
+        fields.push_back({"ao_confidence", all.confidence});
+    write_cloud(file, cloud, fields, changed ? std::span(all.colours) : std::span<const cv::Vec3b>());
+}
+
+/// The points or the mesh as glTF, which has colours: visibility as grey where the frame has none.
+void write_points_glb(const std::filesystem::path& file, Work& work, FramePoints all) {
+    GlbScene scene{.name = work.entry.name,
+                   .points = all.points,
+                   .triangles = {},
+                   .normals = {},
+                   .colours = {},
+                   .fields = {{"_AMBIENT_OCCLUSION", all.visibility}},
+                   .up = UpAxis::unknown};
+    std::vector<std::array<int, 3>> triangles;
+    std::vector<Eigen::Vector3d> normals;
+    if (work.frame.cloud) {
+        scene.triangles = triangles = triangles_of(*work.frame.cloud);
+        scene.normals = normals = recorded_normals(*work.frame.cloud);
+    }
+    if (work.frame.cloud && z_is_up(*work.frame.cloud))
+        scene.up = UpAxis::z;
+    else if (!work.by_points)
+        scene.up = UpAxis::minus_y;
+    if (all.colours.empty())
+        all.colours = greys(all.visibility);
+    scene.colours = all.colours;
+    if (!all.confidence.empty())
+        scene.fields.push_back({"_AO_CONFIDENCE", all.confidence});
+    const GlbWritten written = write_glb(file, scene);
+    if (work.frame.cloud) // depth images have holes and pixels without a value: no news
+        std::ranges::move(describe(written, scene.up, cloud_file(work.entry.name, ".glb").generic_string()),
+                          std::back_inserter(work.row.notes));
 }
 
 /// The maps of what the pictures show. A colour image of other pixels is shown by itself.
@@ -184,9 +142,15 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
                                     "ambient_occlusion has the values.");
     if (work.frame.cloud && outputs.cloud)
         wrote(cloud_file(name, extension(*work.frame.cloud->records)),
-              [&](const auto& file) { write_recorded_cloud(file, work, outputs); });
+              [&](const auto& file) { write_recorded_cloud(file, work, points_of_cloud(work, outputs), outputs); });
     if (!work.frame.cloud && outputs.depth_cloud)
-        wrote(cloud_file(name, ".ply"), [&](const auto& file) { write_depth_cloud(file, work, scene, outputs); });
+        wrote(cloud_file(name, ".ply"),
+              [&](const auto& file) { write_depth_cloud(file, work, points_of_depth(work, scene, outputs), outputs.unit); });
+    if (outputs.glb)
+        wrote(cloud_file(name, ".glb"), [&](const auto& file) {
+            write_points_glb(file, work,
+                             work.frame.cloud ? points_of_cloud(work, outputs) : points_of_depth(work, scene, outputs));
+        });
 }
 
 std::filesystem::path write_cloud_picture(const Work& work, const Outputs& outputs) {

@@ -61,7 +61,8 @@ Finished finished(Work& work, const FinishInput& input, const FinishOutputs& out
 bool is_float(AoFormat format) { return format == AoFormat::tiff || format == AoFormat::exr; }
 
 bool wants_confidence(const Work& work, const BatchOptions& options, const Outputs& outputs) {
-    return options.cloud || outputs.confidence || (work.frame.cloud ? outputs.cloud : outputs.depth_cloud);
+    return options.cloud || outputs.confidence || (work.frame.cloud ? outputs.cloud : outputs.depth_cloud) ||
+           outputs.glb;
 }
 
 /// Whether the view has the recorded pixels: nothing needs to be attached.
@@ -112,7 +113,8 @@ FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outpu
         input.colour = images.scene.colour;
         input.strength = outputs.shade_strength;
         made.confidence_bits = outputs.confidence && !is_float(outputs.format) ? 8 : 0;
-        made.confidence = confidence && (made.confidence_bits == 0 || options.cloud || outputs.depth_cloud);
+        made.confidence =
+            confidence && (made.confidence_bits == 0 || options.cloud || outputs.depth_cloud || outputs.glb);
         Finished all = finished(work, input, made);
         work.confidence_in_view = work.confidence.visibility = all.confidence;
         images.map = all.map;

@@ -12,6 +12,7 @@
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 namespace scanshade {
 namespace {
@@ -61,6 +62,11 @@ std::string outputs_text(const Outputs& outputs) {
         text += colours + "depth cloud;";
     if (outputs.shaded || outputs.panel || outputs.colour_cloud != CloudColours::kept)
         text += fmt::format("strength {};", outputs.shade_strength);
+    if (outputs.glb)
+        text += colours + "glb;";
+    if (outputs.mcap) // whatever it holds follows from these
+        text += fmt::format("mcap {} {} {} {};", static_cast<int>(outputs.format), colours, outputs.shade_strength,
+                            outputs.colour_view);
     if (outputs.preview)
         text += fmt::format("page {};", outputs.page_points);
     return text;
@@ -188,11 +194,20 @@ std::vector<FrameRow> run_recorded(const Capture& capture, MethodPool& pool, con
         return others.empty() ? recording.settings : key_of({recording.settings, others});
     };
     std::map<std::size_t, FrameRow> rows; // by index
+    std::set<std::size_t> kept;           // in options.recording already
     BatchOptions left = options;
     left.frames.clear();
     left.short_rows = true;
     for (const std::size_t index : options.frames) {
-        if (auto row = journal.done(capture.entries[index], settings_of(index), recording.retry)) {
+        auto row = journal.done(capture.entries[index], settings_of(index), recording.retry);
+        if (row && options.recording && is_done(row->status)) {
+            // Killed before the file had the frame, or the file is gone.
+            if (options.recording->has(capture.entries[index].name))
+                kept.insert(index);
+            else
+                row.reset();
+        }
+        if (row) {
             shorten(*row);
             rows.emplace(index, *std::move(row)).first->second.index = index;
         } else {
@@ -200,6 +215,8 @@ std::vector<FrameRow> run_recorded(const Capture& capture, MethodPool& pool, con
         }
     }
     journal.forget(capture, left.frames);
+    if (options.recording)
+        options.recording->begin(options.frames, std::move(kept));
     const auto record = [&](const FrameRow& row) {
         journal.add(row, capture.entries[row.index], settings_of(row.index), recording.device);
         if (recording.finished && row.status != FrameStatus::skipped && row.fault != Fault::outage)

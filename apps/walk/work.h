@@ -25,6 +25,7 @@ struct Work {
     bool wanted = true;             ///< false: loaded for the frames around it
     bool by_points = false;         ///< no view: values come from rays at every point
     PointVisibility of_points = {}; ///< those values
+    std::string messages = {};      ///< frame_messages(), for run.mcap
 };
 
 using WorkPtr = std::shared_ptr<Work>;

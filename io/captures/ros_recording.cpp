@@ -220,7 +220,7 @@ std::optional<std::uint32_t> colour_topic(const Recording& recording, std::uint3
     for (std::uint32_t i = 0; i < recording.topics.size(); ++i) {
         const Topic& topic = recording.topics[i];
         if (i == depth || !has_image_header(topic) || topic.messages == 0 || topic.encoding == Encoding::unknown ||
-            holds(topic.name, {"depth", "infra", "confidence", "/ir/", "theora"}))
+            holds(topic.name, {"depth", "infra", "confidence", "/ir/", "theora", "/scanshade/ao", "/scanshade/shaded"}))
             continue;
         const std::string encoding = encoding_of(recording, i);
         if (encoding.empty() || depth_encoded(encoding))

@@ -79,6 +79,8 @@ inline constexpr std::array ao_formats = {
 /// Writes visibility. Integers: 0 = no surface, 1 .. max = visibility 0 .. 1 (so 1 + round(v (max - 1))); floats keep
 /// NaN. Atomic; fast compression.
 void write_ao(const std::filesystem::path& file, const cv::Mat1f& visibility, AoFormat format);
+/// The integers of png16 or png8.
+[[nodiscard]] cv::Mat ao_integers(const cv::Mat1f& visibility, AoFormat format);
 /// The same where they are integers already, 8 or 16 bits: a PNG.
 void write_ao_integers(const std::filesystem::path& file, const cv::Mat& integers);
 /// The reverse of write_ao (format told by signature and bit depth): NaN = no surface.

@@ -67,12 +67,14 @@ bool has_ao_extension(const fs::path& file) {
     return format && std::ranges::any_of(ao_formats, [&](const AoFormatRow& row) { return &image_of(row) == format; });
 }
 
+cv::Mat ao_integers(const cv::Mat1f& visibility, AoFormat format) {
+    return format == AoFormat::png8 ? cv::Mat(as_integers<uchar>(visibility))
+                                    : cv::Mat(as_integers<ushort>(visibility));
+}
+
 void write_ao(const fs::path& file, const cv::Mat1f& visibility, AoFormat format) {
     const AoFormatRow& row = row_of(format);
-    const cv::Mat image = row.depth == CV_16U  ? cv::Mat(as_integers<ushort>(visibility))
-                          : row.depth == CV_8U ? cv::Mat(as_integers<uchar>(visibility))
-                                               : cv::Mat(visibility);
-    write_image(file, image, image_of(row));
+    write_image(file, row.depth == CV_32F ? cv::Mat(visibility) : ao_integers(visibility, format), image_of(row));
 }
 
 void write_ao_integers(const fs::path& file, const cv::Mat& integers) {

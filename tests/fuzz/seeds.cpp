@@ -1,5 +1,7 @@
 // Small sound files of every format, for the fuzz targets to start from: fuzz_seeds FOLDER writes FOLDER/TARGET/NAME.
 #include "io/cameras/camera_file.h"
+#include "io/captures/ros/mcap_output.h"
+#include "io/captures/ros/message_output.h"
 #include "io/clouds/cloud_file.h"
 #include "io/images/image_file.h"
 #include "tests/fuzz/fuzz.h"
@@ -301,6 +303,17 @@ void hdf5() {
              }));
 }
 
+/// A recording of an earlier run, and a group of it by itself.
+void groups() {
+    const std::string type = "std_msgs/msg/String", group = ros::packed_group("frame", {{1, 1, 5, "message"}});
+    const fs::path file = root / "groups" / "run.mcap";
+    fs::create_directories(file.parent_path());
+    ros::McapOutput output(file, "seed", {{"/a", type, ros::definition_of(type)}});
+    output.add(group);
+    output.finish();
+    seed("groups", "group", group);
+}
+
 } // namespace
 
 int main(int count, char** words) {
@@ -315,5 +328,6 @@ int main(int count, char** words) {
     recordings();
     colmap();
     hdf5();
+    groups();
     return 0;
 }
