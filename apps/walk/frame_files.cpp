@@ -38,7 +38,8 @@ void write_depth_cloud(const std::filesystem::path& file, const Work& work, cons
     std::vector<AddedField> added = {{"ambient_occlusion", all.visibility}, {"ao_confidence", all.confidence}};
     if (has_secondary_camera(work.frame))
         added.push_back({"colour_known", all.colour_known});
-    write_new_ply(file, all.made, all.colours, added, {fmt::format("camera space: x right, y down, z forward, {}",
+    write_new_ply(file, all.made, all.colours, added,
+                  {fmt::format("camera space: x right, y down, z forward, {}",
                                unit.arbitrary() ? "in the recording's arbitrary unit" : "metres")});
 }
 
@@ -144,8 +145,9 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
         wrote(cloud_file(name, extension(*work.frame.cloud->records)),
               [&](const auto& file) { write_recorded_cloud(file, work, points_of_cloud(work, outputs), outputs); });
     if (!work.frame.cloud && outputs.depth_cloud)
-        wrote(cloud_file(name, ".ply"),
-              [&](const auto& file) { write_depth_cloud(file, work, points_of_depth(work, scene, outputs), outputs.unit); });
+        wrote(cloud_file(name, ".ply"), [&](const auto& file) {
+            write_depth_cloud(file, work, points_of_depth(work, scene, outputs), outputs.unit);
+        });
     if (outputs.glb)
         wrote(cloud_file(name, ".glb"), [&](const auto& file) {
             write_points_glb(file, work,

@@ -1,5 +1,6 @@
 // Scenes of Hypersim: rendered images in HDF5 files, of one or more cameras; each camera is a capture.
 #include "io/captures/layouts.h"
+#include "io/files.h"
 
 #include "io/captures/trajectory.h"
 #include "io/content_hash.h"
@@ -97,9 +98,8 @@ std::optional<Projection> projection_in(const fs::path& file, const std::string&
 
 /// In the scene's folder or any that it lies in.
 Projection projection_of(const fs::path& scene) {
-    std::error_code ignored;
     for (fs::path folder = scene;; folder = folder.parent_path()) {
-        if (const fs::path file = folder / "metadata_camera_parameters.csv"; fs::is_regular_file(file, ignored))
+        if (const fs::path file = folder / "metadata_camera_parameters.csv"; is_file(file))
             if (auto found = projection_in(file, scene.filename().string()))
                 return *std::move(found);
         if (folder == folder.parent_path())
@@ -266,9 +266,10 @@ std::vector<fs::path> depths_in(const fs::path& folder) {
 std::vector<fs::path> folders_with_depth(const fs::path& scene) {
     std::vector<fs::path> found;
     std::error_code ignored;
-    for (fs::directory_iterator at(scene / "images", ignored), end; !ignored && at != end; at.increment(ignored))
-        if (camera_of_folder(at->path()) && fs::is_directory(at->path(), ignored) && !depths_in(at->path()).empty())
-            found.push_back(at->path());
+    for (const auto& [name, kind] : items_in(scene / "images", ignored))
+        if (const fs::path folder = scene / "images" / name;
+            kind == FolderItem::Kind::folder && camera_of_folder(folder) && !depths_in(folder).empty())
+            found.push_back(folder);
     std::ranges::sort(found);
     return found;
 }
@@ -323,10 +324,8 @@ Listing listing_of(const fs::path& scene, const fs::path& folder, const CaptureO
         CaptureEntry entry;
         entry.name = camera + "." + stem;
         entry.depth = depth.string();
-        std::error_code ignored;
         for (const char* extension : {".tonemap.jpg", ".color.jpg"})
-            if (const fs::path colour = previews / (stem + extension);
-                entry.colour.empty() && fs::is_regular_file(colour, ignored))
+            if (const fs::path colour = previews / (stem + extension); entry.colour.empty() && is_file(colour))
                 entry.colour = colour.string();
         without_colour += entry.colour.empty();
         entry.container = images;
@@ -363,9 +362,7 @@ std::optional<Listing> list_hypersim(const fs::path& folder, const CaptureOption
         whole = whole.parent_path();
     if (camera_of_folder(whole) && !depths_in(whole).empty())
         return listing_of(whole.parent_path().parent_path(), whole, options);
-    const auto is_scene = [&](const fs::path& scene) {
-        return fs::is_regular_file(scene / "_detail" / "metadata_scene.csv", ignored);
-    };
+    const auto is_scene = [&](const fs::path& scene) { return is_file(scene / "_detail" / "metadata_scene.csv"); };
     if (whole.filename().string().starts_with(folder_prefix) && is_scene(whole.parent_path().parent_path()))
         throw NoFrames(fmt::format("no frames found in {}: Hypersim's distances are in {}CAMERA{}", folder.string(),
                                    folder_prefix, folder_suffix));
