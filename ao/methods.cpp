@@ -1,4 +1,5 @@
 // The table of methods.
+#include "ao/alchemy/alchemy.h"
 #include "ao/base/method.h"
 #include "ao/cacao/cacao.h"
 #include "ao/gtao/bitmask.h"
@@ -46,8 +47,10 @@ const std::vector<MethodRow>& methods() {
          1.6},
         {"hemisphere", "points in the half ball above the surface, tested against what is seen",
          "tutorials on SSAO with a hemisphere kernel", SetupOf<HemisphereOptions, Hemisphere>::start, 1.6},
-        {"hbao", "horizons above the tangent plane, attenuated by distance", "Bavoil, Sainz, Dimitrov 2008",
-         SetupOf<HbaoOptions, Hbao>::start},
+        {"hbao", "horizons above the tangent plane, attenuated by distance", "Bavoil, Sainz, Dimitrov 2008", SetupOf<HbaoOptions, Hbao>::start},
+        {"alchemy", "taps in a disc of the image, each weighed by its height above the surface and its distance",
+         "McGuire et al. 2011; Scalable Ambient Obscurance (McGuire, Mara, Luebke 2012)",
+         SetupOf<AlchemyOptions, Alchemy>::start},
         {"gtao", "open arc between two horizons, slice by slice", "Jimenez et al. 2016; XeGTAO (Strugar, McCalla 2021)",
          SetupOf<GtaoOptions, Gtao>::start},
         {"bitmask", "gtao's slices with 32 sectors, so that what is seen has a thickness",
