@@ -1,4 +1,5 @@
 // The table of methods.
+#include "ao/abao/abao.h"
 #include "ao/alchemy/alchemy.h"
 #include "ao/base/method.h"
 #include "ao/cacao/cacao.h"
@@ -51,6 +52,8 @@ const std::vector<MethodRow>& methods() {
         {"alchemy", "taps in a disc of the image, each weighed by its height above the surface and its distance",
          "McGuire et al. 2011; Scalable Ambient Obscurance (McGuire, Mara, Luebke 2012)",
          SetupOf<AlchemyOptions, Alchemy>::start},
+        {"abao", "the angle left open between the highest elevations on both sides of lines",
+         "Mittring 2012; Yeung 2012", SetupOf<AbaoOptions, Abao>::start},
         {"gtao", "open arc between two horizons, slice by slice", "Jimenez et al. 2016; XeGTAO (Strugar, McCalla 2021)",
          SetupOf<GtaoOptions, Gtao>::start},
         {"bitmask", "gtao's slices with 32 sectors, so that what is seen has a thickness",
