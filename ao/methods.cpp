@@ -6,6 +6,7 @@
 #include "ao/gtao/bitmask.h"
 #include "ao/gtao/gtao.h"
 #include "ao/hbao/hbao.h"
+#include "ao/hdao/hdao.h"
 #include "ao/hemisphere/hemisphere.h"
 #include "ao/luna/luna.h"
 #include "ao/raycast/raycast.h"
@@ -54,6 +55,8 @@ const std::vector<MethodRow>& methods() {
          SetupOf<AlchemyOptions, Alchemy>::start},
         {"abao", "the angle left open between the highest elevations on both sides of lines",
          "Mittring 2012; Yeung 2012", SetupOf<AbaoOptions, Abao>::start},
+        {"hdao", "pairs of opposite taps, counted where they stand above the surface",
+         "AMD's HDAO sample, Radeon SDK 2009-2010", SetupOf<HdaoOptions, Hdao>::start},
         {"gtao", "open arc between two horizons, slice by slice", "Jimenez et al. 2016; XeGTAO (Strugar, McCalla 2021)",
          SetupOf<GtaoOptions, Gtao>::start},
         {"bitmask", "gtao's slices with 32 sectors, so that what is seen has a thickness",
