@@ -10,6 +10,7 @@
 #include "ao/hemisphere/hemisphere.h"
 #include "ao/luna/luna.h"
 #include "ao/raycast/raycast.h"
+#include "ao/ssdo/ssdo.h"
 #include "ao/surfel/surfel.h"
 #include "projection/base/named.h"
 
@@ -58,6 +59,8 @@ const std::vector<MethodRow>& methods() {
          "Mittring 2012; Yeung 2012", SetupOf<AbaoOptions, Abao>::start},
         {"hdao", "pairs of opposite taps, counted where they stand above the surface",
          "AMD's HDAO sample, Radeon SDK 2009-2010", SetupOf<HdaoOptions, Hdao>::start},
+        {"ssdo", "one point at a random distance along each direction, blocked by what lies in front of it",
+         "Ritschel, Grosch, Seidel 2009", SetupOf<SsdoOptions, Ssdo>::start},
         {"gtao", "open arc between two horizons, slice by slice", "Jimenez et al. 2016; XeGTAO (Strugar, McCalla 2021)",
          SetupOf<GtaoOptions, Gtao>::start},
         {"bitmask", "gtao's slices with 32 sectors, so that what is seen has a thickness",
