@@ -18,7 +18,7 @@ constexpr std::array counts{Count{Quality::lowest, 2, 2}, Count{Quality::low, 4,
 constexpr Count count_of_published{Quality::medium, 6, 1};
 
 /// Tone curves fitted to scenes with truth: see ao/README.md.
-constexpr float curve_of_faded = 3.0F, curve_of_hard = 1.5F;
+constexpr float curve_of_faded = 3.6F, curve_of_hard = 2.4F;
 
 /// The quality's values, except those given.
 AbaoOptions resolved(AbaoOptions options) {

@@ -21,7 +21,7 @@ constexpr std::array counts{Count{Quality::lowest, 5, 5}, Count{Quality::low, 8,
                             Count{Quality::high, 32, 16}, Count{Quality::highest, 128, 32}};
 
 /// Tone curves fitted to scenes with truth: see ao/README.md.
-constexpr float curve_of_metric = 1.2F, curve_of_sao = 1.0F;
+constexpr float curve_of_metric = 1.4F, curve_of_sao = 1.2F;
 
 constexpr float contact = 0.02F;     // epsilon, in radii
 constexpr float bias_of_sao = 0.01F; // b, in radii
@@ -46,6 +46,10 @@ AlchemyOptions resolved(AlchemyOptions options) {
 
 /// Five buffers in one: the levels of the pyramid above the depth image, each made of the one below.
 int add_pyramid(ScreenTables& tables, int unused) {
+    constexpr int widest = 0xffff; // texels hold a pixel's column and row in 16 bits each
+    if (tables.size.width > widest || tables.size.height > widest)
+        throw Error(fmt::format("image of {}x{}: a pyramid of depths has {} pixels a side at most", tables.size.width,
+                                tables.size.height, widest));
     const shared::ivec2 size(tables.size.width, tables.size.height);
     const auto texels = static_cast<std::size_t>(shared::pyramid_start(size, shared::pyramid_levels + 1));
     const int levels =

@@ -27,7 +27,7 @@ Count count_of(const HbaoOptions& options) {
 }
 
 /// Of `plus`, fitted to scenes with truth: see ao/README.md. Horizons do without.
-constexpr float curve_of_plus = 3.0F;
+constexpr float curve_of_plus = 3.5F;
 
 constexpr float bias_of_plus = 5.739F; // degrees: a sine of 0.1, as published
 

@@ -22,7 +22,7 @@ constexpr std::array test_words{Named{"plane", HdaoTest::plane}, Named{"angle", 
 constexpr float accept = 0.006F; // a, in radii
 
 /// Tone curves fitted to scenes with truth: see ao/README.md.
-constexpr float curve_of_plane = 1.8F;
+constexpr float curve_of_plane = 2.1F;
 
 HdaoOptions resolved(HdaoOptions options) {
     options = checked(std::move(options));

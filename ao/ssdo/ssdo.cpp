@@ -15,7 +15,7 @@ constexpr std::array counts{Count{Quality::lowest, 4}, Count{Quality::low, 8}, C
                             Count{Quality::high, 32}, Count{Quality::highest, 128}};
 
 /// The tone curve fitted to scenes with truth: see ao/README.md.
-constexpr float curve = 3.0F;
+constexpr float curve = 3.6F;
 
 SsdoOptions resolved(SsdoOptions options) {
     options = checked(std::move(options));
