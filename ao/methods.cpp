@@ -1,12 +1,16 @@
 // The table of methods.
+#include "ao/abao/abao.h"
+#include "ao/alchemy/alchemy.h"
 #include "ao/base/method.h"
 #include "ao/cacao/cacao.h"
 #include "ao/gtao/bitmask.h"
 #include "ao/gtao/gtao.h"
 #include "ao/hbao/hbao.h"
+#include "ao/hdao/hdao.h"
 #include "ao/hemisphere/hemisphere.h"
 #include "ao/luna/luna.h"
 #include "ao/raycast/raycast.h"
+#include "ao/ssdo/ssdo.h"
 #include "ao/surfel/surfel.h"
 #include "projection/base/named.h"
 
@@ -46,8 +50,17 @@ const std::vector<MethodRow>& methods() {
          1.6},
         {"hemisphere", "points in the half ball above the surface, tested against what is seen",
          "tutorials on SSAO with a hemisphere kernel", SetupOf<HemisphereOptions, Hemisphere>::start, 1.6},
-        {"hbao", "horizons above the tangent plane, attenuated by distance", "Bavoil, Sainz, Dimitrov 2008",
-         SetupOf<HbaoOptions, Hbao>::start},
+        {"hbao", "horizons above the tangent plane, attenuated by distance; HBAO+ as a profile",
+         "Bavoil, Sainz, Dimitrov 2008; Bavoil 2014", SetupOf<HbaoOptions, Hbao>::start},
+        {"alchemy", "taps in a disc of the image, each weighed by its height above the surface and its distance",
+         "McGuire et al. 2011; Scalable Ambient Obscurance (McGuire, Mara, Luebke 2012)",
+         SetupOf<AlchemyOptions, Alchemy>::start},
+        {"abao", "the angle left open between the highest elevations on both sides of lines",
+         "Mittring 2012; Yeung 2012", SetupOf<AbaoOptions, Abao>::start},
+        {"hdao", "pairs of opposite taps, counted where they stand above the surface",
+         "AMD's HDAO sample, Radeon SDK 2009-2010", SetupOf<HdaoOptions, Hdao>::start},
+        {"ssdo", "one point at a random distance along each direction, blocked by what lies in front of it",
+         "Ritschel, Grosch, Seidel 2009", SetupOf<SsdoOptions, Ssdo>::start},
         {"gtao", "open arc between two horizons, slice by slice", "Jimenez et al. 2016; XeGTAO (Strugar, McCalla 2021)",
          SetupOf<GtaoOptions, Gtao>::start},
         {"bitmask", "gtao's slices with 32 sectors, so that what is seen has a thickness",

@@ -26,24 +26,59 @@ Count count_of(const HbaoOptions& options) {
     return count;
 }
 
+/// Of `plus`, fitted to scenes with truth: see ao/README.md. Horizons do without.
+constexpr float curve_of_plus = 3.5F;
+
+constexpr float bias_of_plus = 5.739F; // degrees: a sine of 0.1, as published
+
+constexpr std::array hbao_profile_words{Named{"metric", HbaoProfile::metric},
+                                        Named{"published", HbaoProfile::published}, Named{"plus", HbaoProfile::plus}};
+
 HbaoOptions resolved(HbaoOptions options) {
     options = checked(std::move(options));
-    if (options.profile == Profile::metric)
+    const bool plus = options.profile == HbaoProfile::plus;
+    if (options.interleaved && !plus)
+        throw Misuse("interleaved is of profile plus only");
+    if (options.screen.curve == fitted_curve)
+        options.screen.curve = plus ? curve_of_plus : 0.0F;
+    if (options.profile == HbaoProfile::metric)
         return options;
-    options.bias_degrees = 30;
+    options.bias_degrees = plus ? bias_of_plus : 30;
     options.attenuated = true;
     return options;
+}
+
+/// The pass of HBAO+, before it that of its layers where there are any.
+void add_plus(ScreenTables& tables, bool interleaved) {
+    int depth = screen_depth;
+    const shared::ivec2 plane = shared::layer_size({tables.size.width, tables.size.height});
+    const cv::Size over = interleaved ? cv::Size(plane.x, plane.y) : tables.size;
+    if (interleaved) {
+        depth = tables.add_buffer({"layers", 16 * static_cast<std::size_t>(over.area()) * 4, gpu::BufferRow::Host::none,
+                                   gpu::BufferRow::Texels::r32f});
+        tables.add_pass_over(over, "layers", "hbao/layers", {screen_depth}, {depth});
+        tables.passes.back().groups[2] = 16;
+    }
+    tables.add_pass_over(over, "generate", "hbao/plus", {depth, screen_surfaces, screen_noise}, {screen_raw},
+                         {{shared::spec_interleaved, interleaved}});
+    tables.passes.back().groups[2] = interleaved ? 16 : 1;
+}
+
+float contrast_of(HbaoProfile profile) {
+    if (profile == HbaoProfile::published)
+        return 1.25F;
+    return profile == HbaoProfile::plus ? 2.0F : 1.0F;
 }
 
 } // namespace
 
 std::vector<Parameter> HbaoOptions::parameters() {
-    return joined(screen.parameters(),
+    return joined(joined(screen.parameters(), {screen.curve_row()}),
                   {
                       {.name = "profile",
                        .help = "metric weighs all samples within the radius alike; published uses bias 30, attenuated, "
-                               "contrast 1.25",
-                       .value = OneOf(&profile, profile_words)},
+                               "contrast 1.25; plus is HBAO+, a sum of attenuated samples without a horizon",
+                       .value = OneOf(&profile, hbao_profile_words)},
                       {.name = "quality",
                        .help = "directions x steps: lowest 4x2, low 4x4, medium 8x4, high 8x8, highest 32x16",
                        .value = OneOf(&quality, quality_words)},
@@ -67,6 +102,10 @@ std::vector<Parameter> HbaoOptions::parameters() {
                        .help = "samples count less with the square of their distance; otherwise all within the radius "
                                "count alike",
                        .value = &attenuated},
+                      {.name = "interleaved",
+                       .help = "of profile plus: a pixel looks only at pixels a multiple of four away, which suits "
+                               "devices with small caches",
+                       .value = &interleaved},
                   });
 }
 
@@ -74,7 +113,10 @@ Hbao::Hbao(gpu::Device& device, const HbaoOptions& options)
     : ScreenMethod(device, resolved(options).screen), options_(resolved(options)) {}
 
 void Hbao::add_passes(ScreenTables& tables) const {
-    tables.add_pass("generate", "hbao/generate", {screen_depth, screen_surfaces, screen_noise}, {screen_raw});
+    if (options_.profile == HbaoProfile::plus)
+        add_plus(tables, options_.interleaved);
+    else
+        tables.add_pass("generate", "hbao/generate", {screen_depth, screen_surfaces, screen_noise}, {screen_raw});
 }
 
 std::vector<std::byte> Hbao::constants(const shared::ScreenConstants& screen) const {
@@ -83,7 +125,7 @@ std::vector<std::byte> Hbao::constants(const shared::ScreenConstants& screen) co
     return bytes_of(shared::HbaoConstants{screen, count.directions, count.steps, static_cast<float>(std::cos(turn)),
                                           static_cast<float>(std::sin(turn)), static_cast<float>(std::cos(bias)),
                                           static_cast<float>(std::sin(bias)), options_.attenuated ? 1.0F : 0.0F,
-                                          options_.profile == Profile::published ? 1.25F : 1.0F});
+                                          contrast_of(options_.profile)});
 }
 
 } // namespace scanshade

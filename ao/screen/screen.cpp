@@ -64,6 +64,15 @@ std::vector<Parameter> ScreenOptions::parameters() {
     };
 }
 
+Parameter ScreenOptions::curve_row() {
+    return {.name = "curve",
+            .help = "k of the tone curve exp(-k (1 - V)), before strength and power: -1 the one fitted to scenes with "
+                    "truth, 0 none",
+            .value = &curve,
+            .low = -1,
+            .high = 20};
+}
+
 int ScreenTables::add_buffer(gpu::BufferRow row) {
     buffers.push_back(std::move(row));
     return static_cast<int>(buffers.size()) - 1;
@@ -129,6 +138,7 @@ shared::ScreenConstants constants_from(const ScreenOptions& options, const View&
     k.noise_per_z2 = static_cast<float>(view.noise.per_z2);
     k.tangent_sine = options.tangent_sine;
     k.tangent_sigmas = view.smoothed ? 0.0F : options.tangent_sigmas;
+    k.curve = options.curve;
     k.strength = options.strength;
     k.power = options.power;
     return k;

@@ -20,10 +20,15 @@ namespace scanshade {
 enum class Profile { metric, published };
 inline constexpr std::array profile_words{Named{"metric", Profile::metric}, Named{"published", Profile::published}};
 
+/// As ScreenOptions::curve: the constant that was fitted to scenes with truth, which a room puts in its place.
+inline constexpr float fitted_curve = -1;
+
 /// The settings all these rooms have. A room keeps one in its own Options and appends its rows.
 struct ScreenOptions {
     float radius = 0.5F;
     float strength = 1, power = 1;
+    float curve = 0; ///< k of the tone curve exp(-k (1 - V)), before the two above; 0: none. Rooms that have one of
+                     ///< their own append curve_row()
     bool denoise = true;
     int seed = 0;
     // A surface must not occlude itself. The method, not a person, says how that is kept from happening:
@@ -31,6 +36,7 @@ struct ScreenOptions {
     float tangent_sigmas = 4.24F; ///< kappa, 3 sqrt 2: nor does a difference of two depths below three deviations
 
     [[nodiscard]] std::vector<Parameter> parameters();
+    [[nodiscard]] Parameter curve_row();
 };
 
 /// The buffers every room has, in this order; a room's own follow from screen_own.

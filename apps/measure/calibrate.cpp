@@ -93,7 +93,8 @@ class Search final : public cv::MinProblemSolver::Function {
                 fixed_.settings.emplace_back(row, "1");
     }
 
-    [[nodiscard]] int getDims() const override { return static_cast<int>(free_.size()); }
+    /// OpenCV's simplex needs two dimensions: beside a single setting, one that changes nothing.
+    [[nodiscard]] int getDims() const override { return std::max(2, static_cast<int>(free_.size())); }
 
     double calc(const double* at) const override {
         Settings values;

@@ -18,6 +18,10 @@ const std::vector<Configuration>& more() {
         {"surfel", "lowest downsampled", {{"quality", "lowest"}, {"downsampled", "true"}}},
         {"surfel", "low downsampled", {{"quality", "low"}, {"downsampled", "true"}}},
         {"surfel", "high downsampled", {{"quality", "high"}, {"downsampled", "true"}}},
+        {"alchemy", "medium, sao", {{"quality", "medium"}, {"profile", "sao"}}},
+        {"hbao", "low, plus", {{"quality", "low"}, {"profile", "plus"}}},
+        {"hbao", "medium, plus", {{"quality", "medium"}, {"profile", "plus"}}},
+        {"hbao", "medium, plus, interleaved", {{"quality", "medium"}, {"profile", "plus"}, {"interleaved", "true"}}},
         {"raycast", "depth surface, 16 rays", {{"rays", "16"}}},
         {"raycast", "depth surface, thickness 0.1 m", {{"rays", "64"}, {"thickness", "0.1"}}},
     };

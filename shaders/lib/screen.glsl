@@ -17,6 +17,7 @@ const uint not_a_number = 0x7fc00000u;
 
 // The tone curve: visibility as shown.
 float shown(float v) {
+    if (k.curve > 0.0) v = exp(-k.curve * (1.0 - v));
     float v1 = clamp(1.0 - k.strength * (1.0 - v), 0.0, 1.0);
     return k.power == 1.0 ? v1 : pow(v1, k.power);
 }

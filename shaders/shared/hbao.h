@@ -13,5 +13,10 @@ struct HbaoConstants {
     float contrast;
 };
 
+const int spec_interleaved = 10; // of HBAO+: 1: depth is in layers
+
+// Size of a layer of every fourth pixel of every fourth row.
+SHARED_FN ivec2 layer_size(ivec2 image) { return ivec2((image.x + 3) >> 2, (image.y + 3) >> 2); }
+
 SHARED_END
 #endif

@@ -16,7 +16,8 @@ struct ScreenConstants {
     float noise_floor, noise_per_z2; // sigma(z) = floor + per_z2 z^2 of the depth looked at, metres
     float tangent_sine;              // beta_t: samples lower above the tangent plane than this do not count (sine)
     float tangent_sigmas;            // kappa: nor do those within so many sigma(z) of it
-    float strength, power;           // of what is shown: (1 - strength (1 - V))^power
+    float curve;                     // k of exp(-k (1 - V)), which is shown in place of V; 0: V itself
+    float strength, power;           // of what is shown of that: (1 - strength (1 - V))^power
     int neighbours;                  // other views there are of this one
     float alignment_error;           // metres that their surfaces may lie off
     NeighbourPlace places[most_neighbours];

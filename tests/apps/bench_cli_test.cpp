@@ -535,6 +535,17 @@ TEST_F(MeasureTest, a_fit_is_no_worse_on_its_captures_and_run_takes_it) {
         << "a manifest serves, too";
 }
 
+TEST_F(MeasureTest, a_single_setting_can_be_fitted) {
+    const std::string file = (folder / "curve.json").string();
+    const Ran ran = run_program(fmt::format("calibrate-look {} --method ssdo --free curve --ssdo.curve 0.5 "
+                                            "--depth-noise none --evaluations 12 --frames 1 -o {}",
+                                            capture(), file));
+    ASSERT_EQ(ran.exit_code, 0) << ran.err;
+    const json fitted = read(file), all = fitted["training"].back();
+    EXPECT_LT(all["rms_after"].get<double>(), all["rms_before"].get<double>());
+    EXPECT_GT(fitted["settings"]["method ssdo"]["ssdo.curve"].get<double>(), 0.6);
+}
+
 TEST_F(MeasureTest, a_fit_refuses_what_it_cannot_do) {
     const std::string file = (folder / "look.json").string();
     for (const char* flags : {"--free quality", "--free beauty", "", "--free shadow-power --held-out"})
