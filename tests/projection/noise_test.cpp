@@ -285,6 +285,19 @@ TEST(fit_plane, edges_stay_within_a_pixel) {
             ASSERT_NEAR(z(y, x), x < 160 ? 2.0 : 2.3, 0.06) << x << ", " << y;
 }
 
+TEST(fit_plane, another_surface_counts_for_less_the_farther_it_is) {
+    // Two walls 2 sigma apart, exact: within the 3 sigma that a window takes in. By Tukey's biweight the other wall has
+    // (1 - (2/3)^2)^2 = 0.31 of a vote; were all votes alike, the last column of a wall would stand half way.
+    const Pinhole camera = test_camera({320, 240});
+    const DepthNoise even{0.005, 0};
+    DepthImage step{camera, cv::Mat1f(camera.size, 1.0F), {}};
+    step.z_m.colRange(160, 320) = 1.01F;
+    FitPlane fit(device(), even);
+    const cv::Mat1f z = fit.compute(step).depth.z_m;
+    for (int u = 150; u < 170; ++u)
+        std::printf("%d: %.2f mm\n", u, 1000 * (z(120, u) - 1));
+}
+
 TEST(fit_plane, depth_gains_from_the_fit) {
     const Pinhole camera = test_camera({320, 240});
     const DepthImage plane = tilted_plane(camera, 20);
