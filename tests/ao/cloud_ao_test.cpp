@@ -81,35 +81,15 @@ TEST(CloudAo, scale_changes_nothing) {
     EXPECT_LT(rms_between(small_values.visibility, large_values.visibility), 0.01);
 }
 
-/// The floor under a plate that lies 15 mm above it is dark, and open a hand away.
-TEST(CloudAo, a_sharp_edge_of_light_stays_one) {
-    scene::Scene scene{.name = "plate", .summary = ""};
-    scene.bodies = {{scene::Plane{{0, 0, 0}, {0, 0, 1}}, {}}, {scene::Box{{0, 0, 0.025}, {0.4, 0.4, 0.01}}, {}}};
-    const scene::World world(scene);
-    scene::SceneCloud cloud;
-    Dice dice;
-    for (int i = 0; i < 80000; ++i) {
-        cloud.points.emplace_back(2 * dice.roll() - 1, 2 * dice.roll() - 1, 0);
-        cloud.normals.emplace_back(0, 0, 1);
-    }
-    const std::size_t floor = cloud.points.size();
-    for (int i = 0; i < 26000; ++i) {
-        const double x = 0.8 * dice.roll() - 0.4, y = 0.8 * dice.roll() - 0.4;
-        cloud.points.emplace_back(x, y, i % 2 ? 0.015 : 0.035);
-        cloud.normals.emplace_back(0, 0, i % 2 ? -1 : 1);
-    }
-    const auto found = visibility(cloud.points, {.radius = 0.3}, cloud.normals);
-    const auto truth = scene::true_visibility(world, cloud, {.radius_m = 0.3, .rays = 512});
-    double squares = 0;
-    int count = 0;
-    for (std::size_t i = 0; i < floor; ++i) {
-        const double from_rim = std::abs(std::max(std::abs(cloud.points[i].x()), std::abs(cloud.points[i].y())) - 0.4);
-        if (from_rim > 0.05)
-            continue;
-        squares += std::pow(static_cast<double>(found.visibility[i] - truth[i]), 2);
-        ++count;
-    }
-    std::printf("at the rim: RMS %.4f of %d\n", std::sqrt(squares / count), count);
+/// Leaves lie side by side in one plane, one in the open and the next one in the shade. Means over both, whatever their
+/// difference, would leave an error of 0.153 here; in rooms, where light changes slowly, the rule costs 0.001 at most.
+TEST(CloudAo, leaves_in_the_open_and_in_the_shade_stay_apart) {
+    const scene::World world(scene::scene_named("outdoor"));
+    const auto cloud = scene::scene_cloud(world, 100000);
+    const auto found = visibility(cloud.points, {.radius = 2, .rays = 16}, cloud.normals);
+    const auto truth = scene::true_visibility(world, cloud, {.radius_m = 2, .rays = 256}, 4);
+    std::printf("outdoor: RMS %.4f\n", rms_between(found.visibility, truth));
+    EXPECT_LT(rms_between(found.visibility, truth), 0.15);
 }
 
 /// Halving a cloud must not change what its points see: the first half of a scene's points are a scene's points.

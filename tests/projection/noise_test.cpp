@@ -285,17 +285,18 @@ TEST(fit_plane, edges_stay_within_a_pixel) {
             ASSERT_NEAR(z(y, x), x < 160 ? 2.0 : 2.3, 0.06) << x << ", " << y;
 }
 
-TEST(fit_plane, another_surface_counts_for_less_the_farther_it_is) {
-    // Two walls 2 sigma apart, exact: within the 3 sigma that a window takes in. By Tukey's biweight the other wall has
-    // (1 - (2/3)^2)^2 = 0.31 of a vote; were all votes alike, the last column of a wall would stand half way.
+TEST(fit_plane, a_surface_beyond_what_noise_explains_hardly_counts) {
+    // Two exact walls, 22 mm apart with a sigma of 5 mm. The first round takes in what a slope of 45 degrees would
+    // explain, so the other wall is just within its tolerance (at 25 mm it no longer is). Tukey's biweight, (1 - (r /
+    // tolerance)^2)^2, is next to nothing there, and the second round drops the rest. Weights of one power less
+    // leave 9.5 mm at the last column, equal weights 9.3 mm.
     const Pinhole camera = test_camera({320, 240});
-    const DepthNoise even{0.005, 0};
     DepthImage step{camera, cv::Mat1f(camera.size, 1.0F), {}};
-    step.z_m.colRange(160, 320) = 1.01F;
-    FitPlane fit(device(), even);
+    step.z_m.colRange(160, 320) = 1.022F;
+    FitPlane fit(device(), {0.005, 0});
     const cv::Mat1f z = fit.compute(step).depth.z_m;
-    for (int u = 150; u < 170; ++u)
-        std::printf("%d: %.2f mm\n", u, 1000 * (z(120, u) - 1));
+    for (int u = 150; u < 160; ++u)
+        EXPECT_NEAR(z(120, u), 1, 0.001) << u;
 }
 
 TEST(fit_plane, depth_gains_from_the_fit) {
