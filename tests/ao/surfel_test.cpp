@@ -130,6 +130,13 @@ TEST(Surfel, light_passes_behind_rods_and_not_through_pillars) {
     const WallError of_rods = error_on_wall(rods), of_pillars = error_on_wall(pillars);
     std::printf("rods: RMS %.4f, bias %.4f; pillars: RMS %.4f, bias %.4f\n", of_rods.rms, of_rods.bias, of_pillars.rms,
                 of_pillars.bias);
+    // A wire before the left edge of each rod hides where the rod ends: it is at most as much wider as the wire hides.
+    std::vector<scene::Body> behind_wires = rods;
+    for (int i = -4; i <= 4; ++i)
+        behind_wires.push_back({scene::Cylinder{{(0.2 * i - 0.01) / 1.85, 1, -2}, 0.004, 4}, {}});
+    const WallError of_wires = error_on_wall(behind_wires);
+    std::printf("rods behind wires: RMS %.4f, bias %.4f\n", of_wires.rms, of_wires.bias);
+    EXPECT_LT(of_wires.rms, 0.04);
     EXPECT_LT(of_rods.rms, 0.029);    // 0.27 were all as thick as can be, 0.032 were all as thin
     EXPECT_LT(of_pillars.rms, 0.045); // 0.13 were all as thin
 }

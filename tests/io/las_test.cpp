@@ -328,6 +328,9 @@ TEST(TextClouds, ptx_is_a_grid_placed_by_its_matrix) {
              "a second scan"));
     EXPECT_TRUE(says(refusal([&] { (void)read_cloud(write_file(folder / "d.ptx", head + "1 0 0 1\n"), warnings); }),
                      "4 points, the file holds 1"));
+    // Two columns of three rows each, column by column: neighbours in the file are above each other.
+    const Cloud oblong = read(write_file(folder / "e.ptx", "2\n3" + head.substr(3) + body + "0 0 2 0.5\n0 0 3 0.5\n"));
+    EXPECT_EQ(oblong.grid, cv::Size(3, 2));
 }
 
 TEST(Kitti, sweeps_become_ply) {
