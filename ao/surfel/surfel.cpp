@@ -43,14 +43,12 @@ constexpr float alike = 0.25F;
 /// Half the thickness of surfaces that only other views saw, in radii.
 constexpr float hidden_layer = 0.05F;
 
-/// Two buffers: the surfaces that other views saw behind this view's and outside its image, and limits of thickness.
-std::pair<int, int> add_layers(ScreenTables& tables) {
+/// A buffer: the surfaces that other views saw behind this view's and outside its image.
+int add_layers(ScreenTables& tables) {
     using Texels = gpu::BufferRow::Texels;
     const auto halved = [](cv::Size size) { return cv::Size(divided_up(size.width, 2), divided_up(size.height, 2)); };
-    const cv::Size blocks = halved(tables.size);
-    const auto bytes = static_cast<std::size_t>(blocks.area()) * 4;
+    const auto bytes = static_cast<std::size_t>(halved(tables.size).area()) * 4;
     const int behind = tables.add_buffer({"behind", 2 * bytes, gpu::BufferRow::Host::none, Texels::r32ui});
-    const int limits = tables.add_buffer({"limits", bytes, gpu::BufferRow::Host::none, Texels::r32f});
     tables.passes.push_back({"clear layers", "", {}, {behind}, {1, 1, 1}, {}});
     for (int round = 0; round < 2; ++round) {
         tables.add_pass_over(halved(tables.window.size()), fmt::format("reproject {}", round + 1), "surfel/reproject",
@@ -58,9 +56,7 @@ std::pair<int, int> add_layers(ScreenTables& tables) {
         tables.passes.back().groups[2] = static_cast<std::uint32_t>(tables.neighbours);
     }
     tables.add_pass("widen", "surfel/widen", {screen_depth, behind, screen_surfaces}, {screen_surfaces});
-    tables.add_pass_over(halved(tables.window.size()), "carve", "surfel/carve", {screen_neighbours, screen_surfaces},
-                         {limits});
-    return {behind, limits};
+    return behind;
 }
 
 /// Words of edges: along a row, along a column.
@@ -105,13 +101,13 @@ int add_surfels(ScreenTables& tables, int layers) {
     const int runs = tables.add_buffer({"runs", bytes_of_texels(words), none, Texels::r32ui});
     const int surfels =
         tables.add_buffer({"surfels", bytes_of_texels(layers * 16 * plane_of(size).area()), none, Texels::rg32ui});
-    // Without neighbours nothing reads what fills the slots of their layers.
-    const auto [behind, limits] = layers > 1 ? add_layers(tables) : std::pair(runs, screen_depth);
+    // Without neighbours nothing reads what fills the slot of their layers.
+    const int behind = layers > 1 ? add_layers(tables) : runs;
     add_fill(tables);
     tables.passes.push_back({"edges", "surfel/edges", {screen_surfaces}, {edges}, groups_of(words), {}});
     tables.passes.push_back({"runs", "surfel/runs", {edges}, {runs}, groups_of(size.width + size.height), {}});
-    tables.add_pass("surfels", "surfel/surfels", {screen_surfaces, edges, runs, screen_depth, behind, limits},
-                    {surfels}, {{shared::spec_layers, layers}});
+    tables.add_pass("surfels", "surfel/surfels", {screen_surfaces, edges, runs, screen_depth, behind}, {surfels},
+                    {{shared::spec_layers, layers}});
     return surfels;
 }
 

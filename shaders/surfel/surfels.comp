@@ -18,7 +18,6 @@ layout(binding = 1, rg32ui) readonly uniform uimageBuffer edges;
 layout(binding = 2, r32ui) readonly uniform uimageBuffer runs;
 layout(binding = 3, r32f) readonly uniform imageBuffer depth_in;
 layout(binding = 4, r32ui) readonly uniform uimageBuffer behind;
-layout(binding = 5, r32f) readonly uniform imageBuffer limits;
 layout(binding = 16, scalar) writeonly buffer Surfels { uvec2 surfels[]; };
 layout(binding = 32, scalar) uniform Constants { SurfelConstants constants; };
 
@@ -116,12 +115,8 @@ void main() {
     // A layer behind the nearest pixel of the block need not be behind this pixel.
     bool behind_this = own && layer_depth_at(one, p) > z + layer_gap(z, s);
     uint second = behind_this ? one : two, third = behind_this ? two : 0u;
-    // No surface is thicker than the distance to the layer behind it, or to where other views saw through.
-    ivec2 tested = p & ~1;
-    float other = imageLoad(surfaces, index_of(tested)).w;
-    float limit = imageLoad(limits, block).x;
-    limit = own && abs(other - z) < 0.1 * k.radius ? limit : s.thickest;
-    thickness = max(min(thickness, min(limit, 0.7 * (layer_depth_at(second, p) - abs(z)))), s.thinnest);
+    // No surface is thicker than the distance to the layer behind it.
+    thickness = max(min(thickness, 0.7 * (layer_depth_at(second, p) - abs(z))), s.thinnest);
     uvec2 word = surfel(z, surface.xyz, thickness / s.thickest);
     int at = surfel_index(p, s.plane), layer = 16 * s.plane.x * s.plane.y;
     surfels[at] = uvec2((word.x & ~place_mask) | place_of(second, p, abs(z)) | (own ? 0u : foreign), word.y);

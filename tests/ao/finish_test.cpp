@@ -22,7 +22,9 @@ const DepthNoise noise{.floor_m = 0.001, .per_z2 = 0.002};
 /// A step with a slanted wall behind it, holes, and pixels of which the visibility is not known.
 FinishInput scene(cv::Size size) {
     cv::RNG random(7);
-    DepthImage depth = with_holes(tilted_plane(test_camera(size), 50, 2), 0.02);
+    Pinhole camera = test_camera(size);
+    camera.fy *= 0.7; // pixels need not be square
+    DepthImage depth = with_holes(tilted_plane(camera, 50, 2), 0.02);
     cv::Mat1f near = depth.z_m.colRange(0, std::max(1, size.width / 3));
     near.setTo(1.2F, near > 0);
     cv::Mat1f visibility(size);

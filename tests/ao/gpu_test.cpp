@@ -18,6 +18,9 @@ using Texels = BufferRow::Texels;
 
 constexpr int count = 1000;
 
+/// The runner's own tests always validate, where the layer is installed.
+const bool validated = setenv("SCANSHADE_VALIDATE", "1", 1) == 0;
+
 BufferRow words(std::string_view name, Host host = Host::none) { return {name, count * 4, host, Texels::r32ui}; }
 PassRow add_one(int from, int to, int step = 1) {
     return {"add", "test/add_one", {from}, {to}, {(count + 63) / 64, 1, 1}, {{0, step}}};
@@ -59,6 +62,32 @@ TEST(gpu, a_chain_of_passes_sees_each_others_results) {
     EXPECT_EQ(program.timings().size(), 6U) << "upload, four passes, download";
     for (const std::string& message : device.validation_messages())
         ADD_FAILURE() << message;
+}
+
+TEST(gpu, passes_wait_for_those_that_read_or_write_before_them) {
+    // Results alone tell little: pixels may come out right without any barrier. The validation layer tells each hazard.
+    // One after the other: read after write, write after read, write after write, a cleared buffer that is read.
+    ASSERT_TRUE(validated);
+    if (!gpu::Device().validating())
+        GTEST_SKIP() << "the validation layer is not installed";
+    const std::vector<BufferRow> buffers{words("in", Host::upload), words("a"), words("b"),
+                                         words("out", Host::download)};
+    const PassRow clear_a{"clear", "", {}, {1}, {1, 1, 1}, {}};
+    for (const std::vector<PassRow>& passes : {std::vector{add_one(0, 1), add_one(1, 3)},
+                                               {add_one(0, 1), add_one(1, 3), add_one(2, 1)},
+                                               {add_one(0, 1), add_one(2, 1), add_one(0, 3)},
+                                               {add_one(0, 3), clear_a, add_one(1, 3)}}) {
+        gpu::Device device;
+        std::vector<BufferRow> rows = buffers;
+        rows[2].host = Host::upload; // so that every row of `passes` reads something
+        gpu::Program program(device, rows, passes, 4);
+        const std::int32_t n = count;
+        for (int repeat = 0; repeat < 2; ++repeat)
+            program.run(std::as_bytes(std::span(&n, 1)));
+        (void)program.read_back(1);
+        for (const std::string& message : device.validation_messages())
+            ADD_FAILURE() << message;
+    }
 }
 
 TEST(gpu, large_buffers_are_streamed_part_by_part) {
@@ -133,7 +162,6 @@ TEST(gpu, a_broken_table_is_refused_before_anything_runs) {
 
 TEST(gpu, validation_reports_a_wrong_program) {
     // More work groups than any device allows, recorded but never run: the layer must report it, or it is not active.
-    setenv("SCANSHADE_VALIDATE", "1", 1);
     gpu::Device device;
     if (!device.validating())
         GTEST_SKIP() << "the validation layer is not installed";

@@ -10,6 +10,7 @@
 #include "apps/walk/sequence_order.h"
 #include "io/clouds/cloud_file.h"
 #include "tests/support/small_capture.h"
+#include "tests/support/watched.h"
 
 #include <cmath>
 #include <cstdio>
@@ -25,10 +26,7 @@ using Eigen::Vector3d;
 
 constexpr double radius_m = 0.5;
 
-gpu::Device& device() {
-    static gpu::Device the_device;
-    return the_device;
-}
+gpu::Device& device() { return tests::watched_device(); }
 
 Pinhole small_camera() { return {262.5, 262.5, 159.5, 119.5, {320, 240}}; }
 

@@ -449,6 +449,21 @@ TEST_F(CliTest, what_a_killed_run_left_is_cleared_by_the_next) {
             EXPECT_NE(file.path().filename().string()[0], '.') << file;
 }
 
+TEST_F(CliTest, leftovers_of_frames_that_are_not_chosen_are_cleared_too) {
+    // The killed run may have taken other frames than this one does. What is no frame's stays: it is the user's.
+    ASSERT_EQ(run("--frames 3").exit_code, 0);
+    const std::vector<fs::path> ours{out() / "ao/.003.tmp-999999999-0.png", out() / "shaded/.000.tmp-999999999-1.png",
+                                     out() / ".frames.tmp-999999999-2.csv", out() / ".manifest.tmp-999999999-3.json"};
+    const fs::path not_ours = out() / "ao/.other.tmp-999999999-0.png";
+    for (const fs::path& file : ours)
+        std::ofstream(file) << "half";
+    std::ofstream(not_ours) << "the user's";
+    ASSERT_EQ(run("--overwrite --frames 1").exit_code, 0);
+    for (const fs::path& file : ours)
+        EXPECT_FALSE(fs::exists(file)) << file;
+    EXPECT_TRUE(fs::exists(not_ours));
+}
+
 TEST_F(CliTest, an_interrupted_run_records_what_is_done) {
     tests::write_capture(capture(), 400);
     const pid_t child = tests::start_program({"run", capture().string(), "-o", out().string()});

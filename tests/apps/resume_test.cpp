@@ -278,6 +278,38 @@ TEST_F(ResumeTest, a_second_run_does_nothing_and_what_has_changed_is_done_again)
     EXPECT_EQ(resumed(""), 1u);
 }
 
+TEST_F(ResumeTest, frames_computed_together_are_done_again_where_a_neighbours_pose_has_changed) {
+    // Frame 0's pose is corrected by 5 mm. With two frames of reach, frames 0, 1 and 2 used it, and 3 to 6 did not.
+    const fs::path recording = folder / "recording", poses = recording / "groundtruth.txt";
+    ASSERT_EQ(
+        run_program(fmt::format("generate office -o {} --frames 7 --size 64x48 --truth=false", recording.string()))
+            .exit_code,
+        0);
+    const auto run_together = [&](const std::string& flags) {
+        const std::size_t had = fs::exists(out()) ? done_frames() : 0;
+        const Ran ran = run_program(fmt::format("run {} -o {} --write ao --depth-noise none --method surfel "
+                                                "--surfel.quality lowest --sequence on --sequence.reach 2 "
+                                                "--sequence.layers 2 --sequence.average 0 {}",
+                                                recording.string(), out().string(), flags));
+        EXPECT_EQ(ran.exit_code, 0) << ran.err;
+        return done_frames() - had;
+    };
+    ASSERT_EQ(run_together(""), 7U);
+    EXPECT_EQ(run_together("--resume"), 0U);
+    std::string first; // frame 0's time, as the names of its files tell it
+    for (const auto& file : fs::directory_iterator(recording / "depth"))
+        if (const std::string stem = file.path().stem().string(); first.empty() || stem < first)
+            first = stem;
+    std::string rows = read_bytes(poses);
+    const auto row = rows.find("\n" + first + " ");
+    ASSERT_NE(row, std::string::npos) << first;
+    const auto x = row + first.size() + 2, end = rows.find(' ', x);
+    rows.replace(x, end - x, fmt::format("{:.6f}", std::stod(rows.substr(x, end - x)) + 0.005));
+    tests::write_file(poses, rows);
+    EXPECT_EQ(run_together("--resume"), 3U);
+    EXPECT_EQ(run_together("--resume"), 0U);
+}
+
 TEST_F(ResumeTest, a_resumed_report_holds_all_frames) {
     record(6);
     fs::resize_file(capture() / "depth/002.png", 60);

@@ -189,6 +189,35 @@ TEST(pcd, padding_fields_and_counts_above_one_keep_their_places) {
     EXPECT_TRUE(with_ao(file, folder / "out.pcd").ends_with(record + bytes_of(nan)));
 }
 
+TEST(pcd, counts_above_one_are_compressed_value_by_value) {
+    // A compressed body holds a field of all points after the other; a field of two values stays together in it, as PCL
+    // writes it. So `normal` of both points lies behind z of both points.
+    const TemporaryFolder folder;
+    const std::string columns =
+        bytes_of(1.0F, 2.0F, 3.0F, 4.0F) + "abcdef" + bytes_of(5.0F, 6.0F, 10.0F, 11.0F, 20.0F, 21.0F);
+    std::string packed; // literal runs of 32 bytes at most
+    for (std::size_t at = 0; at < columns.size(); at += 32) {
+        const std::string run = columns.substr(at, 32);
+        packed += static_cast<char>(run.size() - 1) + run;
+    }
+    const auto file = write_file(folder / "c.pcd",
+                                 "VERSION .7\nFIELDS x y _ z normal\nSIZE 4 4 1 4 4\nTYPE F F U F F\nCOUNT 1 1 3 1 2\n"
+                                 "WIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA binary_compressed\n" +
+                                     bytes_of(std::uint32_t(packed.size()), std::uint32_t(columns.size())) + packed);
+    const Cloud cloud = read(file);
+    EXPECT_EQ(cloud.points[0], Eigen::Vector3d(1, 3, 5));
+    EXPECT_EQ(cloud.points[1], Eigen::Vector3d(2, 4, 6));
+    const std::array rows{bytes_of(1.0F, 3.0F) + "abc" + bytes_of(5.0F, 10.0F, 11.0F),
+                          bytes_of(2.0F, 4.0F) + "def" + bytes_of(6.0F, 20.0F, 21.0F)};
+    for (std::size_t i = 0; i < rows.size(); ++i)
+        EXPECT_EQ(cloud.records->record(i), rows[i]);
+    expect_same_bytes(file);
+    (void)with_ao(file, folder / "out.pcd");
+    const Cloud back = read(folder / "out.pcd");
+    for (std::size_t i = 0; i < rows.size(); ++i)
+        EXPECT_EQ(back.records->record(i).substr(0, rows[i].size()), rows[i]);
+}
+
 TEST(pcd, a_field_of_that_name_is_replaced_not_doubled) {
     const TemporaryFolder folder;
     for (const char* data : {"ascii", "binary", "binary_compressed"}) {
@@ -325,6 +354,36 @@ TEST(ply, doubles_stay_doubles) {
     expect_same_bytes(file);
     EXPECT_EQ(read(file).points[0].y(), 4918348.9876543210);
     EXPECT_TRUE(with_ao(file, folder / "out.ply").ends_with(record + bytes_of(nan)));
+}
+
+TEST(ply, every_type_has_its_value_in_either_byte_order) {
+    // Doubles and 16-bit numbers in big-endian bytes, not floats alone: coordinates far from the origin need them.
+    const TemporaryFolder folder;
+    const std::string properties = "property char a\nproperty uchar b\nproperty short c\nproperty ushort d\n"
+                                   "property int e\nproperty uint f\nproperty double x\nproperty double y\n"
+                                   "property double z\nproperty float g\n";
+    const auto record = [](const auto& bytes) {
+        return bytes(std::int8_t(-5), std::uint8_t(200), std::int16_t(-300), std::uint16_t(40000), -70000, 3000000000U,
+                     515396.12345678901, 4918348.9876543210, -2324.000244140625, 0.15625F);
+    };
+    const std::string little = record([](auto... values) { return bytes_of(values...); }),
+                      big = record([](auto... values) { return swapped_bytes_of(values...); });
+    for (const auto& [format, bytes] : {std::pair("binary_little_endian", little), {"binary_big_endian", big}}) {
+        const auto file = write_file(folder / "c.ply", ply_header(format, 1, properties) + bytes);
+        expect_same_bytes(file);
+        const Cloud cloud = read(file);
+        EXPECT_EQ(cloud.points[0], Eigen::Vector3d(515396.12345678901, 4918348.9876543210, -2324.000244140625))
+            << format;
+        for (const auto& [name, value] : {std::pair("a", -5.0),
+                                          {"b", 200},
+                                          {"c", -300},
+                                          {"d", 40000},
+                                          {"e", -70000},
+                                          {"f", 3000000000},
+                                          {"g", 0.15625}})
+            EXPECT_EQ(value_at(*cloud.records, cloud.records->record(0), *cloud.records->field_named(name)), value)
+                << format << " " << name;
+    }
 }
 
 TEST(ply, lists_inside_vertices_are_walked) {

@@ -5,6 +5,7 @@
 #include "io/images/inflated_stream.h"
 #include "tests/support/files.h"
 
+#include <cmath>
 #include <cstring>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -52,6 +53,7 @@ std::string deflated(const std::string& bytes) {
 struct Member {
     std::string name, bytes;
     bool packed = true;
+    bool zip64 = false; ///< sizes and place stand in an extra field, as above 4 GiB
 };
 
 std::string zip(const std::vector<Member>& members) {
@@ -60,10 +62,19 @@ std::string zip(const std::vector<Member>& members) {
         const std::string data = member.packed ? deflated(member.bytes) : member.bytes;
         const auto crc =
             crc32(0, reinterpret_cast<const Bytef*>(member.bytes.data()), static_cast<uInt>(member.bytes.size()));
-        const std::string facts = u16(20) + u16(0) + u16(member.packed ? 8 : 0) + u32(0) + u32(crc) + u32(data.size()) +
-                                  u32(member.bytes.size()) + u16(unsigned(member.name.size())) + u16(0);
-        rows += "PK\1\2" + u16(20) + facts + u16(0) + u16(0) + u16(0) + u32(0) + u32(file.size()) + member.name;
-        file += "PK\3\4" + facts + member.name + data;
+        const std::size_t ones = 0xffffffff;
+        const std::string facts = u16(20) + u16(0) + u16(member.packed ? 8 : 0) + u32(0) + u32(crc) +
+                                  u32(member.zip64 ? ones : data.size()) +
+                                  u32(member.zip64 ? ones : member.bytes.size()) + u16(unsigned(member.name.size()));
+        std::string sizes, all; // the size, the packed size, and in the list the place
+        if (member.zip64) {
+            const std::string both = raw(std::uint64_t(member.bytes.size())) + raw(std::uint64_t(data.size()));
+            sizes = u16(1) + u16(16) + both;
+            all = u16(7) + u16(2) + "xx" + u16(1) + u16(24) + both + raw(std::uint64_t(file.size()));
+        }
+        rows += "PK\1\2" + u16(20) + facts + u16(unsigned(all.size())) + u16(0) + u16(0) + u16(0) + u32(0) +
+                u32(member.zip64 ? ones : file.size()) + member.name + all;
+        file += "PK\3\4" + facts + u16(unsigned(sizes.size())) + member.name + sizes + data;
     }
     const auto count = static_cast<unsigned>(members.size());
     return file + rows + "PK\5\6" + u16(0) + u16(0) + u16(count) + u16(count) + u32(rows.size()) + u32(file.size()) +
@@ -129,6 +140,91 @@ TEST_F(ContainerFiles, damage_in_an_archive_names_member_and_checksum) {
     const std::string message = refusal([&] { (void)open_capture(file("a.npz", bytes)); });
     EXPECT_TRUE(says(message, "K.npy"));
     EXPECT_TRUE(says(message, "checksum"));
+}
+
+TEST_F(ContainerFiles, sizes_above_4_gib_have_a_field_of_their_own) {
+    // Behind the field of another program. Packed, so that the two sizes differ.
+    const std::string bytes = zip({{"K.npy", k}, {"depth.npy", two_frames(), true, true}});
+    EXPECT_FLOAT_EQ(open_capture(file("a.npz", bytes)).load(1).depth_m(5, 7), 3);
+    const Capture cut = open_capture(file("a.npz", bytes.substr(0, bytes.find("PK\1\2"))));
+    EXPECT_FLOAT_EQ(cut.load(1).depth_m(5, 7), 3) << "members have one, too";
+}
+
+TEST_F(ContainerFiles, half_floats_are_metres_down_to_the_smallest) {
+    // 2.5; the smallest normal number, 2^-14; the smallest of all, 2^-24, without a leading one; infinity and NaN are
+    // holes.
+    const Capture capture = open_capture(
+        file("a.npz", zip({{"depth.npy", npy("<f2", "1, 6",
+                                             raw_all<std::uint16_t>({0x4100, 0x0400, 0x0001, 0x7c00, 0x7e00, 0xc000}))},
+                           {"K.npy", k}})));
+    const cv::Mat1f depth_m = capture.load(0).depth_m;
+    EXPECT_EQ(depth_m(0, 0), 2.5F);
+    EXPECT_EQ(depth_m(0, 1), std::ldexp(1.0F, -14));
+    EXPECT_EQ(depth_m(0, 2), std::ldexp(1.0F, -24));
+    for (int u = 3; u < 6; ++u)
+        EXPECT_EQ(depth_m(0, u), 0) << u;
+}
+
+// --- ScanNet's .sens ---
+
+std::string matrix_of(float f, float cx, float cy, float x) {
+    return raw_all<float>({f, 0, cx, x, 0, f, cy, 0, 0, 0, 1, 0, 0, 0, 0, 1});
+}
+
+/// Two frames of 3x2 pixels, 1 m and 2 m, with colours of 2x1; the colour camera stands 5 cm along the body's x.
+std::string sens(bool packed, std::uint64_t frames_said = 2) {
+    std::string bytes = u32(4) + raw(std::uint64_t(4)) + "test" + matrix_of(20, 0.5F, 0, 0) +
+                        matrix_of(1, 0, 0, 0.05F) + matrix_of(10, 1, 0.5F, 0) + matrix_of(1, 0, 0, 0);
+    bytes += raw(std::int32_t(0)) + raw(std::int32_t(packed ? 1 : 0)) + u32(2) + u32(1) + u32(3) + u32(2) +
+             raw(1000.0F) + raw(frames_said);
+    for (const unsigned metres : {1U, 2U}) {
+        const std::string stored = raw_all(std::vector<std::uint16_t>(6, static_cast<std::uint16_t>(1000 * metres)));
+        std::string depth = stored;
+        if (packed) {
+            uLongf size = compressBound(stored.size());
+            depth.resize(size);
+            EXPECT_EQ(compress(reinterpret_cast<Bytef*>(depth.data()), &size,
+                               reinterpret_cast<const Bytef*>(stored.data()), stored.size()),
+                      Z_OK);
+            depth.resize(size);
+        }
+        const std::string colour = "\x0a\x14\x1e\x28\x32\x3c"; // red, green, blue
+        bytes += matrix_of(1, 0, 0, static_cast<float>(metres)) + raw(std::uint64_t(1000000 * metres)) +
+                 raw(std::uint64_t(1000000 * metres + 4000)) + raw(std::uint64_t(colour.size())) +
+                 raw(std::uint64_t(depth.size())) + colour + depth;
+    }
+    return bytes;
+}
+
+TEST_F(ContainerFiles, sens_has_two_cameras_two_clocks_and_poses) {
+    for (const bool packed : {false, true}) {
+        const Capture capture = open_capture(file("a.sens", sens(packed)));
+        ASSERT_EQ(capture.entries.size(), 2U);
+        EXPECT_DOUBLE_EQ(*capture.entries[1].stamp_s, 2.004) << "of depth";
+        EXPECT_DOUBLE_EQ(*capture.entries[1].colour_stamp_s, 2);
+        const Frame frame = capture.load(1);
+        ASSERT_EQ(frame.depth_m.size(), cv::Size(3, 2)) << packed;
+        EXPECT_EQ(cv::countNonZero(frame.depth_m == 2), 6) << packed;
+        EXPECT_EQ(frame.camera.pinhole, (Pinhole{10, 10, 1, 0.5, {3, 2}}));
+        ASSERT_TRUE(frame.world_from_camera);
+        EXPECT_EQ(frame.world_from_camera->translation().x(), 2);
+        ASSERT_TRUE(frame.colour_camera);
+        EXPECT_EQ(frame.colour_camera->camera.pinhole.fx, 20);
+        // A point before the depth camera is 5 cm to the left of the colour camera.
+        EXPECT_NEAR(frame.colour_camera->colour_from_depth.translation().x(), -0.05, 1e-7);
+        ASSERT_EQ(frame.colour.size(), cv::Size(2, 1));
+        EXPECT_EQ(frame.colour(0, 1), cv::Vec3b(60, 50, 40));
+    }
+}
+
+TEST_F(ContainerFiles, sens_that_ends_early_keeps_what_is_whole) {
+    const std::string bytes = sens(false);
+    const Capture cut = open_capture(file("a.sens", bytes.substr(0, bytes.size() - 1)));
+    EXPECT_EQ(cut.entries.size(), 1U);
+    EXPECT_TRUE(warned(cut.warnings, "frame 1 at byte"));
+    EXPECT_EQ(open_capture(file("a.sens", sens(false, 0))).entries.size(), 2U) << "a writer that died says 0";
+    EXPECT_TRUE(says(refusal([&] { (void)open_capture(file("a.sens", sens(false, std::uint64_t(1) << 60))); }),
+                     "frames according to byte"));
 }
 
 TEST_F(ContainerFiles, an_archive_cut_at_its_end_keeps_what_is_whole) {
@@ -257,6 +353,10 @@ TEST_F(ContainerFiles, record3d_has_its_cameras_in_the_metadata) {
     const std::string message = refusal([&] { (void)capture.load(1); });
     EXPECT_TRUE(says(message, "rgbd/1.depth"));
     EXPECT_TRUE(says(message, "bvxz"));
+    std::string damaged = zip(members); // of a pixel, which LZFSE would not notice: the archive's checksum does
+    damaged[damaged.find("PK\1\2", damaged.find("PK\1\2") + 1) + 16] ^= 1;
+    const Capture changed = open_capture(file("c.r3d", damaged));
+    EXPECT_TRUE(says(refusal([&] { (void)changed.load(0); }), "checksum"));
     members.erase(members.begin());
     EXPECT_TRUE(says(refusal([&] { (void)open_capture(file("b.r3d", zip(members))); }), "metadata"));
 }

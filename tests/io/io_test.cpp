@@ -780,6 +780,24 @@ TEST(captures, tum_limit_is_obeyed) {
     EXPECT_TRUE(says(refusal([&] { (void)open_capture(folder.path(), strict); }), "0.010 s after rgb.txt"));
 }
 
+TEST(captures, tum_poses_end_with_the_trajectory) {
+    // Depth at 10.01, 10.11, ..., 10.61; one pose each at 10.2 and 10.3. A frame takes a pose within 20 ms on either
+    // side, also before the first and behind the last one, and none beyond that.
+    const TemporaryFolder folder;
+    write_tum(folder.path(), 7);
+    write_camera(folder / "camera.json");
+    write_file(folder / "groundtruth.txt", "10.2 1 0 0 0 0 0 1\n10.3 2 0 0 0 0 0 1\n");
+    const Capture capture = open_capture(folder.path());
+    ASSERT_EQ(capture.entries.size(), 7);
+    for (std::size_t i = 0; i < 7; ++i) {
+        const bool near = i == 2 || i == 3;
+        EXPECT_EQ(capture.entries[i].world_from_camera.has_value(), near) << capture.entries[i].name;
+        EXPECT_EQ(capture.entries[i].warnings.empty(), near) << joined(capture.entries[i].warnings);
+    }
+    EXPECT_EQ(capture.entries[2].world_from_camera->translation().x(), 1);
+    EXPECT_EQ(capture.entries[3].world_from_camera->translation().x(), 2);
+}
+
 TEST(captures, tum_uses_each_colour_once) {
     const TemporaryFolder folder;
     write_pair(folder / "rgb/1.png", folder / "depth/1.png", 5000);

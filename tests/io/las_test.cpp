@@ -155,6 +155,57 @@ TEST(Las, described_extra_bytes_keep_their_names) {
     EXPECT_EQ(get<std::uint32_t>(file_bytes(folder / "b.las"), 100), 2u); // one record describes both
 }
 
+TEST(Las, descriptions_of_every_type_take_the_bytes_of_their_type) {
+    // Types 1 .. 10 are scalars, 11 .. 20 two of them each, 21 .. 30 three (LAS 1.4 R13, table 24). The field behind
+    // such a one is found only if its bytes are counted right, and its own first value must be the record's.
+    const TemporaryFolder folder;
+    constexpr std::array<std::size_t, 10> sizes{1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
+    for (std::size_t type = 1; type <= 30; ++type) {
+        SCOPED_TRACE(type);
+        std::string first(192, '\0'), last(192, '\0');
+        first[2] = static_cast<char>(type);
+        std::string_view("first").copy(first.data() + 4, 32);
+        last[2] = 5; // 32 bits without a sign
+        std::string_view("last").copy(last.data() + 4, 32);
+        const std::size_t size = sizes[(type - 1) % 10], values = (type + 9) / 10;
+        const Cloud cloud =
+            read(write_file(folder / "a.las", las(2, 0, size * values + 4, vlr("LASF_Spec", 4, first + last), 2)));
+        const auto found = cloud.records->field_named("first");
+        ASSERT_TRUE(found && *found + 2 == cloud.records->fields.size()) << "two fields and nothing undocumented";
+        EXPECT_EQ(cloud.records->fields[*found].count, values);
+        EXPECT_EQ(cloud.records->fields[*found].bytes(), size * values);
+        for (std::size_t point = 0; point < 3; ++point) {
+            const std::string record(cloud.records->record(point));
+            EXPECT_EQ(value(cloud, point, "last"), get<std::uint32_t>(record, 20 + size * values));
+            const auto scalar = [&]() -> double {
+                switch ((type - 1) % 10 + 1) {
+                case 1:
+                    return get<std::uint8_t>(record, 20);
+                case 2:
+                    return get<std::int8_t>(record, 20);
+                case 3:
+                    return get<std::uint16_t>(record, 20);
+                case 4:
+                    return get<std::int16_t>(record, 20);
+                case 5:
+                    return get<std::uint32_t>(record, 20);
+                case 6:
+                    return get<std::int32_t>(record, 20);
+                case 7:
+                    return static_cast<double>(get<std::uint64_t>(record, 20));
+                case 8:
+                    return static_cast<double>(get<std::int64_t>(record, 20));
+                case 9:
+                    return static_cast<double>(get<float>(record, 20));
+                default:
+                    return get<double>(record, 20);
+                }
+            }();
+            EXPECT_EQ(value(cloud, point, "first"), scalar);
+        }
+    }
+}
+
 TEST(Las, invalid_descriptions_do_not_hide_our_fields) {
     // A description of no bytes, and one of more than a record holds: what comes behind them is not understood.
     const TemporaryFolder folder;
@@ -274,6 +325,9 @@ TEST(TextClouds, ptx_is_a_grid_placed_by_its_matrix) {
     std::vector<std::string> warnings;
     EXPECT_TRUE(says(refusal([&] { (void)read_cloud(write_file(folder / "d.ptx", head + "1 0 0 1\n"), warnings); }),
                      "4 points, the file holds 1"));
+    // Two columns of three rows each, column by column: neighbours in the file are above each other.
+    const Cloud oblong = read(write_file(folder / "e.ptx", "2\n3" + head.substr(3) + body + "0 0 2 0.5\n0 0 3 0.5\n"));
+    EXPECT_EQ(oblong.grid, cv::Size(3, 2));
 }
 
 TEST(TextClouds, scans_of_a_ptx_file_are_one_cloud_and_come_back_line_by_line) {

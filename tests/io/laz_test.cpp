@@ -111,6 +111,25 @@ TEST(LazCoder, times_have_a_known_stream) {
     });
 }
 
+TEST(LazCoder, blue_is_predicted_from_the_steps_of_red_and_green) {
+    // Red steps by 10, green by 16: green is predicted 10 higher than it was, blue (10 + 16) / 2 = 13. What is coded
+    // is how far each is off, behind a symbol that tells which bytes change, 1 + 4 + 16 for the lower ones and 64 for a
+    // colour that is not grey.
+    laz::Encoder encoder;
+    laz::SymbolModel used(128), red(256), green(256), blue(256);
+    encoder.symbol(used, 85);
+    encoder.symbol(red, 10);
+    encoder.symbol(green, 216 - (200 + 10));
+    encoder.symbol(blue, 70 - (50 + 13));
+    const std::string bytes = encoder.finish();
+    const laz::Colours::Colour last{100, 200, 50}, value{110, 216, 70};
+    laz::Decoder decoder(bytes, 0);
+    EXPECT_EQ(laz::Colours().code(decoder, last, {}), value);
+    laz::Encoder again;
+    (void)laz::Colours().code(again, last, value);
+    EXPECT_EQ(hex(again.finish()), hex(bytes));
+}
+
 TEST(LazCoder, the_running_median_drops_largest_and_smallest_in_turn) {
     laz::Median median;
     std::vector<std::int32_t> found;

@@ -332,10 +332,10 @@ TEST_P(Ros, a_topic_can_be_named_and_what_is_there_is_listed) {
 }
 
 TEST_P(Ros, floats_are_metres_and_images_without_times_take_the_recorders) {
-    const Capture capture = open_capture(recording({{"/depth/image", image_type, 4, depth(0, "32FC1")},
-                                                    {"/depth/camera_info", info_type, 4, camera({8, 6}, 10, "x")}}));
+    const Capture capture = open_capture(recording({{"/depth/image", image_type, 4.25, depth(0, "32FC1")},
+                                                    {"/depth/camera_info", info_type, 4.25, camera({8, 6}, 10, "x")}}));
     EXPECT_EQ(capture.load(0).depth_m(1, 1), 3);
-    EXPECT_EQ(capture.entries[0].stamp_s, 4);
+    EXPECT_EQ(capture.entries[0].stamp_s, 4.25);
     EXPECT_TRUE(warned(capture.warnings, "no header has a time"));
 }
 
@@ -402,6 +402,66 @@ TEST_P(Ros, compressed_depth_is_png_or_rvl_and_inverse_depth_becomes_metres) {
     const Capture cut = open_capture(recording(all));
     EXPECT_TRUE(says(refusal([&] { (void)cut.load(0); }), "RVL data"));
     EXPECT_EQ(cut.load(1).depth_m(1, 2), 2);
+}
+
+TEST_P(Ros, rvl_codes_steps_of_either_sign_and_inverse_depth_has_an_offset) {
+    // Runs of zeros and of values in turn; a value is its step from the value before, doubled, and -1 less if it falls:
+    // in groups of three bits, the lowest first, with a fourth bit where more follow (Wilson 2017).
+    std::vector<unsigned> groups;
+    const auto number = [&](unsigned value) {
+        for (; value > 7; value >>= 3)
+            groups.push_back((value & 7) | 8);
+        groups.push_back(value);
+    };
+    for (const unsigned value : {1U, 3U, 2U * 2000, 2U * 1, 2U * 2 - 1, 1U, 1U, 2U * 1699 - 1})
+        number(value);
+    std::string rvl = raw(3U) + raw(2U);
+    for (std::size_t at = 0; at < groups.size(); at += 8) {
+        std::uint32_t word = 0;
+        for (std::size_t i = at; i < std::min(at + 8, groups.size()); ++i)
+            word |= groups[i] << (28 - 4 * (i - at));
+        rvl += raw(word);
+    }
+    std::vector<uchar> encoded;
+    ASSERT_TRUE(cv::imencode(".png", cv::Mat1w(2, 3, ushort(2000)), encoded));
+    const std::string inverse = raw(0) + raw(4000.0F) + raw(1000.0F); // metres = 4000 / (v - 1000)
+    const auto message = [&](double stamp, const std::string& format, const std::string& data) {
+        return TestMessage{"/depth/image_raw/compressedDepth", "sensor_msgs/CompressedImage", stamp,
+                           fields().header(stamp, "depth_optical").add(format).bytes(data).text()};
+    };
+    const Capture capture = open_capture(
+        recording({message(1, "16UC1; compressedDepth rvl", inverse + rvl),
+                   message(2, "32FC1; compressedDepth png", inverse + std::string(encoded.begin(), encoded.end()))}));
+    const cv::Mat1f stepped = capture.load(0).depth_m;
+    const float expected[] = {0, 2, 2.001F, 1.999F, 0, 0.3F};
+    for (int i = 0; i < 6; ++i)
+        EXPECT_FLOAT_EQ(stepped(i / 3, i % 3), expected[i]) << i;
+    EXPECT_FLOAT_EQ(capture.load(1).depth_m(1, 1), 4);
+}
+
+TEST(RosMcap, a_damaged_chunk_loses_its_own_frames_and_no_other) {
+    // Three chunks hold a depth image each. In the middle one a pixel is changed: its checksum tells.
+    for (const std::string compression : {"", "lz4"}) {
+        const tests::TemporaryFolder folder;
+        std::vector<TestMessage> all;
+        for (const double stamp : {1.0, 2.0, 3.0}) {
+            Fields image =
+                Fields(true).header(stamp, "x").add(1U).add(2U).add(std::string("16UC1")).add(std::uint8_t(0));
+            const std::string pixels = raw(static_cast<std::uint16_t>(1000 * stamp)) + "!?";
+            all.push_back({"/depth/image_raw", image_type, stamp, image.add(4U).bytes(pixels).text()});
+            for (int i = 0; i < 2; ++i)
+                all.push_back({"/other", "std_msgs/String", stamp, Fields(true).add(std::string("x")).text()});
+        }
+        std::string bytes = mcap(all, compression, {});
+        const std::size_t pixel = bytes.find(raw(std::uint16_t(2000)) + "!?");
+        ASSERT_NE(pixel, std::string::npos);
+        bytes[pixel] = static_cast<char>(bytes[pixel] ^ 1);
+        const Capture capture = open_capture(write_file(folder / "a.mcap", bytes));
+        ASSERT_EQ(capture.entries.size(), 2U) << compression;
+        EXPECT_EQ(capture.load(0).depth_m(0, 0), 1);
+        EXPECT_EQ(capture.load(1).depth_m(0, 0), 3);
+        EXPECT_TRUE(warned(capture.warnings, "its messages are left out"));
+    }
 }
 
 TEST_P(Ros, damage_is_refused_or_leaves_what_is_whole) {

@@ -173,6 +173,25 @@ TEST(SurfaceInColour, NothingIsSpannedOverHolesAndEdges) {
         }
 }
 
+TEST(SurfaceInColour, OfTwoSurfacesTheNearerIsSeen) {
+    // A strip a metre away before a wall at two: 60 mm to the side, the strip moves by 17.5 pixels and the wall by 8.8,
+    // so that the strip covers 8.8 columns of wall which the depth camera saw. It is drawn before that wall or after
+    // it, depending on the side.
+    cv::Mat1f depth(depth_camera.pinhole.size, 2.0F);
+    depth.colRange(140, 181).setTo(1);
+    for (const double aside_m : {-0.06, 0.06}) {
+        Eigen::Isometry3d colour_from_depth = Eigen::Isometry3d::Identity();
+        colour_from_depth.translation().x() = aside_m;
+        const SurfaceInColour surface = surface_in_colour(depth, depth_camera, {depth_camera, colour_from_depth});
+        const double moved = 292.5 * aside_m;
+        for (int v = 1; v < 239; ++v)
+            for (int u = static_cast<int>(std::ceil(140 + moved)); u <= static_cast<int>(180 + moved); ++u) {
+                ASSERT_EQ(surface.z_m(v, u), 1) << u << ", " << v;
+                ASSERT_NEAR(surface.seen_at(v, u)[0], u - moved, 1e-3);
+            }
+    }
+}
+
 TEST(ColourOnDepth, ImagesOfOtherSizesAreRefused) {
     const cv::Mat1f depth(depth_camera.pinhole.size, 2.0F);
     const SurfaceInColour surface = surface_in_colour(depth, depth_camera, colour_camera);

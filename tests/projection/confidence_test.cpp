@@ -52,6 +52,17 @@ TEST(Confidence, IsHalfBesideWhatHidesHalfOfTheBall) {
     EXPECT_EQ(confidence(step)(120, 161), 1);
 }
 
+TEST(Confidence, TakesTheBallForAsWideAndHighAsItsPixelsMakeIt) {
+    // Pixels twice as high as wide: a ball of 0.2 m before a wall at 1 m is 80 pixels to either side and 40 up and
+    // down. Of the 16 places the outermost are at 0.98 of the radius.
+    const DepthImage wide{{400, 200, 160, 120, {320, 240}}, cv::Mat1f(240, 320, 1.0F), {}};
+    const cv::Mat1f c = confidence(wide);
+    EXPECT_EQ(c(120, 80), 1);
+    EXPECT_LT(c(120, 60), 1);
+    EXPECT_EQ(c(40, 160), 1);
+    EXPECT_LT(c(20, 160), 1);
+}
+
 TEST(Confidence, EndsWhereTheRadiusIsAPixelOrLostInNoise) {
     const DepthImage near = wall(1);
     const double f = std::sqrt(near.camera.fx * near.camera.fy);

@@ -285,6 +285,20 @@ TEST(fit_plane, edges_stay_within_a_pixel) {
             ASSERT_NEAR(z(y, x), x < 160 ? 2.0 : 2.3, 0.06) << x << ", " << y;
 }
 
+TEST(fit_plane, a_surface_beyond_what_noise_explains_hardly_counts) {
+    // Two exact walls, 22 mm apart with a sigma of 5 mm. The first round takes in what a slope of 45 degrees would
+    // explain, so the other wall is just within its tolerance (at 25 mm it no longer is). Tukey's biweight, (1 - (r /
+    // tolerance)^2)^2, is next to nothing there, and the second round drops the rest. Weights of one power less
+    // leave 9.5 mm at the last column, equal weights 9.3 mm.
+    const Pinhole camera = test_camera({320, 240});
+    DepthImage step{camera, cv::Mat1f(camera.size, 1.0F), {}};
+    step.z_m.colRange(160, 320) = 1.022F;
+    FitPlane fit(device(), {0.005, 0});
+    const cv::Mat1f z = fit.compute(step).depth.z_m;
+    for (int u = 150; u < 160; ++u)
+        EXPECT_NEAR(z(120, u), 1, 0.001) << u;
+}
+
 TEST(fit_plane, depth_gains_from_the_fit) {
     const Pinhole camera = test_camera({320, 240});
     const DepthImage plane = tilted_plane(camera, 20);
