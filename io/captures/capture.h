@@ -81,6 +81,8 @@ struct Capture {
     Registration registration = Registration::unknown;
     std::string registration_reason;
     bool colour_in_more_pixels = false; ///< registered colour sees what depth sees, finer: load() reduces it
+    std::string confidence_levels;      ///< of confidence images, the lowest a hole: "0 low, 1 medium, 2 high"
+    double guessed_beyond_m = 0;        ///< the recorder made up most depths beyond; 0 = none
     std::vector<CaptureEntry> entries;  ///< in recording order
     std::vector<std::string> warnings;  ///< about the capture as a whole
 
@@ -98,5 +100,9 @@ struct Capture {
 /// The same; a folder without frames of its own, one of whose folders is a capture, stands for that one, with a
 /// warning. Throws Error naming them where several are.
 [[nodiscard]] Capture open_capture_at_or_below(const std::filesystem::path& path, const CaptureOptions& options = {});
+
+/// The folders in `path` that are captures by themselves; empty where there are none.
+[[nodiscard]] std::vector<std::filesystem::path> captures_below(const std::filesystem::path& path,
+                                                                const CaptureOptions& options = {});
 
 } // namespace scanshade
