@@ -184,7 +184,8 @@ DepthEncoding unit_of(const CaptureEntry& first) {
         std::vector<float> depths;
         std::ranges::copy_if(stored, std::back_inserter(depths), [](float z) { return std::isfinite(z) && z > 0; });
         if (const float middle = depths.empty() ? 0 : median(std::move(depths)); middle > farthest_m)
-            return usual_encoding("mm", fmt::format("assumed: floats with a median of {:.4g} are millimetres", middle));
+            return usual_encoding("1000",
+                                  fmt::format("assumed: floats with a median of {:.4g} are millimetres", middle));
     } catch (const Outage&) {
         throw;
     } catch (const Error&) { // loading it will say why

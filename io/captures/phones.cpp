@@ -132,6 +132,8 @@ std::optional<Listing> list_stray_scanner(const fs::path& folder) {
     Listing listing = listing_of_phone("Stray Scanner");
     Capture& capture = listing.capture;
     capture.confidence_levels = lidar_confidence;
+    if (assumed_encoding(depths.front()).name == "m") // older ones have .npy, of millimetres as well
+        capture.depth = usual_encoding("1000", "Stray Scanner layout");
     const ImagesByStem sure(colour_images_in(folder_named(folder, {"confidence"}))),
         colours(colour_images_in(folder_named(folder, {"rgb", "color"})));
     std::map<std::uint64_t, OdometryRow> odometry;
@@ -200,7 +202,11 @@ std::optional<Listing> list_polycam(const fs::path& folder) {
     std::error_code ignored;
     const fs::path frames = fs::is_directory(folder / "keyframes", ignored) ? folder / "keyframes" : folder;
     const auto depths = depth_images_in(folder_named(frames, {"depth"}));
-    if (depths.empty() || !fs::is_directory(frames / "cameras", ignored))
+    const bool cameras_fit = std::ranges::any_of(depths, [&](const fs::path& depth) {
+        return fs::is_regular_file(frames / "cameras" / (depth.stem().string() + ".json"), ignored);
+    });
+    // Other recordings have folders depth/ and cameras/, too.
+    if (depths.empty() || !fs::is_directory(frames / "cameras", ignored) || (frames == folder && !cameras_fit))
         return std::nullopt;
     Listing listing = listing_of_phone("Polycam");
     Capture& capture = listing.capture;

@@ -2,6 +2,7 @@
 #include "io/cameras/camera_file.h"
 #include "io/clouds/cloud_file.h"
 #include "io/images/image_file.h"
+#include "tests/support/files.h"
 #include "tests/support/small_capture.h"
 
 #include <chrono>

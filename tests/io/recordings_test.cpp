@@ -533,8 +533,14 @@ TEST_F(Made, stray_scanner_without_video_says_which_size_it_assumes) {
     text("camera_matrix.csv", "75, 0, 29.5\n0, 75, 22\n0, 0, 1\n");
     const Capture capture = open_capture(folder.path());
     EXPECT_TRUE(warned(capture.warnings, "60x45 is assumed"));
+    expect_depth(capture.load(0));
     EXPECT_TRUE(warned(capture.warnings, "no odometry.csv"));
     expect_camera(capture.load(0), 10, 10, 3.5, 2.5);
+    fs::remove(folder / "depth/000000.png");
+    const std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (6, 8), }\n";
+    text("depth/000000.npy", "\x93NUMPY" + std::string("\1\0", 2) + static_cast<char>(header.size()) +
+                                 std::string(1, '\0') + header + floats(std::vector<float>(48, 2000)));
+    EXPECT_NEAR(open_capture(folder.path()).load(0).depth_m(5, 7), 2, 1e-5) << "older ones: floats of millimetres";
 }
 
 TEST_F(Made, polycam_says_where_depths_are_guesses_and_poses_raw) {
