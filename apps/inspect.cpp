@@ -345,34 +345,57 @@ json to_json(const Findings& found) {
 
 // ---------------------------------------------------------------------------------------------------- every frame
 
-/// The facts of one frame, whose depth is decoded for its holes; "why" where that fails.
+/// In the recording's unit.
+json pose_json(const std::optional<Eigen::Isometry3d>& pose, const LengthUnit& unit) {
+    if (!pose)
+        return {};
+    json rows = json::array();
+    for (int row = 0; row < 4; ++row)
+        for (int column = 0; column < 4; ++column)
+            rows[static_cast<std::size_t>(row)].push_back(
+                column == 3 && row < 3 ? unit.told(pose->matrix()(row, column)) : pose->matrix()(row, column));
+    return rows;
+}
+
+json size_json(cv::Size size) { return {size.width, size.height}; }
+
+std::size_t holes_in(const Frame& frame) {
+    if (!frame.cloud)
+        return static_cast<std::size_t>(cv::countNonZero(frame.depth_m <= 0));
+    return static_cast<std::size_t>(
+        std::ranges::count_if(frame.cloud->points, [](const Eigen::Vector3d& point) { return !point.allFinite(); }));
+}
+
+/// The facts of one frame, whose depth is decoded for its holes. What is not known is null; "why" says what failed.
 json frame_json(const Capture& capture, std::size_t index) {
     const CaptureEntry& entry = capture.entries[index];
-    json text{{"name", entry.name}};
-    text["stamp_s"] = entry.stamp_s ? json(*entry.stamp_s) : json();
-    text["world_from_camera"] = json();
-    if (entry.world_from_camera)
-        for (int row = 0; row < 4; ++row)
-            for (int column = 0; column < 4; ++column)
-                text["world_from_camera"][static_cast<std::size_t>(row)].push_back(
-                    column == 3 ? capture.unit.told(entry.world_from_camera->matrix()(row, column))
-                                : entry.world_from_camera->matrix()(row, column));
-    text["confidence"] = entry.confidence.empty() ? json() : json("an image; 0 is a hole");
+    json text{{"name", entry.name},
+              {"stamp_s", entry.stamp_s ? json(*entry.stamp_s) : json()},
+              {"world_from_camera", pose_json(entry.world_from_camera, capture.unit)},
+              {"confidence", json()},
+              {"depth_encoding", json()},
+              {"warnings", entry.warnings}};
+    for (const char* of_content : {"width", "height", "camera", "holes", "colour_size", "colour_camera", "why"})
+        text[of_content] = json();
+    if (!entry.confidence.empty())
+        text["confidence"] = {{"image", entry.confidence}, {"levels", capture.confidence_levels}, {"holes", 0}};
+    if (!entry.depth.empty())
+        text["depth_encoding"] =
+            entry.depth_units_per_metre > 0 ? fmt::format("{}", entry.depth_units_per_metre) : capture.depth.name;
     try {
         const Frame frame = capture.load(index);
         const cv::Size size = frame.cloud ? frame.cloud->grid : frame.depth_m.size();
         text["width"] = size.width;
         text["height"] = size.height;
-        text["camera"] = frame.camera.pinhole.fx > 0 ? to_json(frame.camera) : json();
-        text["depth_encoding"] =
-            entry.depth_units_per_metre > 0 ? fmt::format("{}", entry.depth_units_per_metre) : capture.depth.name;
-        if (!frame.cloud)
-            text["holes"] = cv::countNonZero(frame.depth_m <= 0);
-        text["colour_size"] = json();
-        if (!entry.colour.empty() && !frame.colour.empty()) {
-            const cv::Size colour = colour_size_of(entry);
-            text["colour_size"] = {colour.width, colour.height};
-        }
+        if (frame.camera.pinhole.fx > 0)
+            text["camera"] = to_json(frame.camera);
+        if (frame.colour_camera)
+            text["colour_camera"] = to_json(*frame.colour_camera);
+        text["world_from_camera"] = pose_json(frame.world_from_camera, capture.unit); // a cloud's file may have it
+        text["holes"] = holes_in(frame);
+        text["warnings"] = frame.warnings;
+        if (!frame.colour.empty())
+            text["colour_size"] = size_json(colour_size_of(entry)); // as recorded
     } catch (const OutOfMemory&) {
         throw;
     } catch (const Error& failure) {
@@ -395,64 +418,96 @@ class Inspect final : public Command {
     Words words() override { return {"PATH", "captures: folders, depth images or clouds", &paths_, 1, 1 << 20}; }
 
     std::vector<Stage> stages() override {
-        return {{"input",
-                 {{.name = "camera",
-                   .help = "a camera file, or fx,fy,cx,cy; replaces the capture's own",
-                   .value = &options_.camera},
-                  {.name = "depth-scale",
-                   .help = "mm, tum, sun, nyu, m, or units per metre; replaces the capture's own",
-                   .value = &options_.depth_scale},
-                  {.name = "topic",
-                   .help = "the topic of depth images in a recording of ROS; empty = found by name and type",
-                   .value = &options_.topic},
-                  {.name = "association-limit",
-                   .help = "colour, depth and poses that are farther apart in time are not paired",
-                   .value = &options_.association_limit_s,
-                   .unit = "s",
-                   .low = 0,
-                   .high = 1e6}}},
-                {"output",
-                 {{.name = "json", .help = "prints the same as JSON: an object for each capture", .value = &as_json_},
-                  {.name = "all",
-                   .help = "adds every frame to the JSON: camera, pose, depth unit, sizes, holes",
-                   .value = &every_frame_}}}};
+        return {
+            {"input",
+             {{.name = "camera",
+               .help = "a camera file, or fx,fy,cx,cy; replaces the capture's own",
+               .value = &options_.camera},
+              {.name = "depth-scale",
+               .help = "mm, tum, sun, nyu, m, or units per metre; replaces the capture's own",
+               .value = &options_.depth_scale},
+              {.name = "topic",
+               .help = "the topic of depth images in a recording of ROS; empty = found by name and type",
+               .value = &options_.topic},
+              {.name = "association-limit",
+               .help = "colour, depth and poses that are farther apart in time are not paired",
+               .value = &options_.association_limit_s,
+               .unit = "s",
+               .low = 0,
+               .high = 1e6}}},
+            {"output",
+             {{.name = "json",
+               .help = "prints the same as JSON: an array with an object for each capture",
+               .value = &as_json_},
+              {.name = "all",
+               .help = "adds every frame to the JSON: time, camera, lens, pose, depth unit, sizes, holes, confidence",
+               .value = &every_frame_}}}};
     }
 
     int run() override {
         if (every_frame_ && !as_json_)
             throw Misuse("all: it belongs to --json");
-        json all = json::array();
-        std::size_t usable = 0, problems = 0;
-        for (const std::string& path : paths_) {
-            try {
-                const Findings found = look_at(open_capture_at_or_below(path, options_));
-                usable += found.samples.frames;
-                problems += found.problems.size();
-                if (as_json_) {
-                    all.push_back(to_json(found));
-                    if (every_frame_)
-                        all.back()["every_frame"] = frames_json(found.capture);
-                } else {
-                    print(found);
-                }
-            } catch (const Misuse&) {
-                throw;
-            } catch (const OutOfMemory&) {
-                throw;
-            } catch (const Error& failure) {
-                fmt::print(stderr, "scanshade: {}\n", failure.what());
-                ++problems;
-            }
-        }
+        for (const std::string& path : paths_)
+            inspect(path);
         if (as_json_)
-            fmt::print("{}\n", text_of(all));
-        return usable == 0 ? nothing_done : problems > 0 ? some_failed : all_well;
+            fmt::print("{}\n", text_of(all_));
+        return usable_ == 0 ? nothing_done : problems_ > 0 ? some_failed : all_well;
     }
 
   private:
+    /// A folder that is no capture and has several stands for all of them.
+    void inspect(const std::filesystem::path& path) {
+        tell_of(path, [&] {
+            std::vector<std::filesystem::path> below;
+            try {
+                tell(open_capture(path, options_));
+                return;
+            } catch (const NoFrames&) {
+                below = captures_below(path, options_);
+            }
+            if (below.size() < 2)
+                tell(open_capture_at_or_below(path, options_));
+            else
+                for (const std::filesystem::path& each : below)
+                    tell_of(each, [&] { tell(open_capture(each, options_)); });
+        });
+    }
+
+    /// What cannot be inspected is told, and the others go on.
+    template <class Inspect>
+    void tell_of(const std::filesystem::path& path, const Inspect& inspect_it) {
+        try {
+            inspect_it();
+        } catch (const Misuse&) {
+            throw;
+        } catch (const OutOfMemory&) {
+            throw;
+        } catch (const Error& failure) {
+            fmt::print(stderr, "scanshade: {}\n", failure.what());
+            if (as_json_)
+                all_.push_back({{"path", path.string()}, {"why", failure.what()}});
+            ++problems_;
+        }
+    }
+
+    void tell(Capture capture) {
+        const Findings found = look_at(std::move(capture));
+        usable_ += found.samples.frames;
+        problems_ += found.problems.size();
+        if (!as_json_) {
+            print(found);
+            return;
+        }
+        all_.push_back(to_json(found));
+        if (every_frame_)
+            all_.back()["every_frame"] = frames_json(found.capture);
+    }
+
     std::vector<std::string> paths_;
     CaptureOptions options_;
     bool as_json_ = false, every_frame_ = false;
+    json all_ = json::array();
+    std::size_t usable_ = 0, problems_ = 0;
 };
 
 } // namespace

@@ -63,6 +63,7 @@ bool is_yaml(const CameraText& text) {
                                [&](const char* key) { return text.bytes.find(key) != std::string::npos; });
 }
 bool is_info(const CameraText& text) { return text.bytes.find("m_calibration") != std::string::npos; }
+bool is_scan(const CameraText& text) { return text.bytes.find("fx_depth") != std::string::npos; }
 bool is_cameras_txt(const CameraText& text) { return is_colmap(text.lines); }
 bool is_anything(const CameraText&) { return true; }
 
@@ -70,6 +71,7 @@ CameraFile read_json(const CameraText& text) { return camera_from_json(text.file
 CameraFile read_xml(const CameraText& text) { return camera_from_xml(text.file, text.bytes); }
 CameraFile read_yaml(const CameraText& text) { return camera_from_yaml(text.file, text.bytes); }
 CameraFile read_info(const CameraText& text) { return camera_from_info(text.file, text.lines); }
+CameraFile read_scan(const CameraText& text) { return camera_from_scan(text.file, text.lines); }
 CameraFile read_colmap(const CameraText& text) { return camera_from_colmap(text.file, text.lines); }
 CameraFile read_matrix(const CameraText& text) { return camera_from_matrix(text.file, text.lines); }
 
@@ -122,9 +124,14 @@ constexpr CameraFormatRow formats[] = {
      .written = [](const CameraFile& file, const Quality&) { return camera_as_kalibr(file); }},
     {.name = "bundlefusion",
      .recognised = "lines with `m_calibration`",
-     .content = "a pinhole, in `info.txt`",
+     .content = "a pinhole and the depth unit, in `info.txt` or `_info.txt`",
      .is = is_info,
      .read = read_info},
+    {.name = "scannet",
+     .recognised = "lines with `fx_depth`",
+     .content = "pinholes of depth and colour, in `SCAN.txt`",
+     .is = is_scan,
+     .read = read_scan},
     {.name = "colmap",
      .recognised = "lines of `ID MODEL WIDTH HEIGHT` and numbers",
      .content = "the first camera of `cameras.txt`: lens, fisheye",

@@ -27,6 +27,8 @@ void check_numbers(const std::filesystem::path& file, const Pinhole& camera, con
 [[nodiscard]] CameraFile camera_from_yaml(const std::filesystem::path& file, const std::string& text);
 [[nodiscard]] CameraFile camera_from_xml(const std::filesystem::path& file, const std::string& text);
 [[nodiscard]] CameraFile camera_from_info(const std::filesystem::path& file, const std::vector<TextLine>& lines);
+/// ScanNet's SCAN.txt: depth's camera, and colour's where it is there.
+[[nodiscard]] CameraFile camera_from_scan(const std::filesystem::path& file, const std::vector<TextLine>& lines);
 [[nodiscard]] CameraFile camera_from_matrix(const std::filesystem::path& file, const std::vector<TextLine>& lines);
 [[nodiscard]] CameraFile camera_from_colmap(const std::filesystem::path& file, const std::vector<TextLine>& lines);
 /// Whether a line reads "ID MODEL WIDTH HEIGHT numbers", as COLMAP's cameras.txt does.

@@ -56,6 +56,29 @@ CameraFile camera_from_info(const fs::path& file, const std::vector<TextLine>& l
     return result;
 }
 
+/// Lines of "key = value": fx_depth fy_depth mx_depth my_depth depthWidth depthHeight, and the same of color.
+CameraFile camera_from_scan(const fs::path& file, const std::vector<TextLine>& lines) {
+    const auto camera_of = [&](const std::string& image) {
+        const auto value = [&](const std::string& key) { return info_number(file, lines, key, 1, 0); };
+        Camera camera;
+        Pinhole& pinhole = camera.pinhole;
+        pinhole = {value("fx_" + image), value("fy_" + image), value("mx_" + image), value("my_" + image), {}};
+        check_numbers(file, pinhole, {"fx_" + image, "fy_" + image, "mx_" + image, "my_" + image});
+        const double width = value(image + "Width"), height = value(image + "Height");
+        if (!(width >= 1 && width <= widest_image && height >= 1 && height <= widest_image))
+            refuse_camera(file,
+                          fmt::format("{}Width {} and {}Height {} are not an image size", image, width, image, height));
+        pinhole.size = {static_cast<int>(width), static_cast<int>(height)};
+        return camera;
+    };
+    CameraFile result;
+    result.camera = camera_of("depth");
+    int line = 1;
+    if (!info_value(lines, "fx_color", line).empty())
+        result.colour = ColourCamera{camera_of("color"), Eigen::Isometry3d::Identity()};
+    return result;
+}
+
 CameraFile camera_from_matrix(const fs::path& file, const std::vector<TextLine>& lines) {
     std::array<double, 9> m{};
     int rows = 0;

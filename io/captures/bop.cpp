@@ -7,6 +7,7 @@
 #include "io/text.h"
 #include "projection/base/error.h"
 
+#include <algorithm>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -30,6 +31,23 @@ std::vector<double> numbers_at(const fs::path& file, const std::string& image, c
     if (numbers.size() != count || found->size() != count)
         throw Error(fmt::format("{}: \"{}\": \"{}\": expected {} numbers", file.string(), image, key, count));
     return numbers;
+}
+
+/// A scene's folder, and what is behind the names of one sensor's files and folders.
+struct Sensor {
+    fs::path scene;
+    std::string suffix;
+};
+
+/// Of several sensors each has scene_camera_CAM.json, depth_CAM/ and rgb_CAM/, and is opened by its depth_CAM/.
+Sensor sensor_at(const fs::path& folder) {
+    const fs::path whole = folder.filename().empty() ? folder.parent_path() : folder;
+    const std::string name = whole.filename().string(), depth = "depth_";
+    if (name.starts_with(depth))
+        if (const std::string suffix = name.substr(depth.size() - 1);
+            is_file(whole.parent_path() / ("scene_camera" + suffix + ".json")))
+            return {whole.parent_path(), suffix};
+    return {folder, {}};
 }
 
 void take_facts(const fs::path& file, const Json& all, CaptureEntry& entry) {
@@ -66,12 +84,13 @@ void take_facts(const fs::path& file, const Json& all, CaptureEntry& entry) {
 } // namespace
 
 std::optional<Listing> list_bop(const fs::path& folder) {
-    const fs::path file = folder / "scene_camera.json";
-    const auto depths = depth_images_in(folder_named(folder, {"depth"}));
+    const auto& [scene, suffix] = sensor_at(folder);
+    const fs::path file = scene / ("scene_camera" + suffix + ".json");
+    const auto depths = depth_images_in(folder_named(scene, {"depth" + suffix}));
     if (depths.empty() || !is_file(file))
         return std::nullopt;
     const Json all = json_in(file);
-    const ImagesByStem colours(colour_images_in(folder_named(folder, {"rgb", "gray"})));
+    const ImagesByStem colours(colour_images_in(folder_named(scene, {"rgb" + suffix, "gray" + suffix})));
     Listing listing;
     Capture& capture = listing.capture;
     capture.depth = depth_encoding("mm", "each image's depth_scale in " + file.string());
@@ -93,6 +112,11 @@ std::optional<Listing> list_bop(const fs::path& folder) {
         }
         capture.entries.push_back(std::move(entry));
     }
+    const auto without = static_cast<std::size_t>(std::ranges::count_if(
+        capture.entries, [](const CaptureEntry& entry) { return entry.problem.empty() && !entry.world_from_camera; }));
+    if (without > 0)
+        capture.warnings.push_back(fmt::format("{}: {} of {} have no pose.", file.string(), without,
+                                               counted(capture.entries.size(), "image")));
     settle_own_cameras(listing);
     return listing;
 }

@@ -34,31 +34,6 @@ namespace {
 
 // --- opening ---
 
-/// Names of what looks like poses or cameras in a folder that was read as a generic one.
-void tell_unused(const fs::path& folder, Listing& listing) {
-    static const std::set<std::string> folders{"pose",   "poses",       "intrinsic", "intrinsics",
-                                               "calib",  "calibration", "camera",    "cameras",
-                                               "sparse", "colmap",      "extrinsics"};
-    const auto name_speaks = [](std::string name) {
-        std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-        return std::ranges::any_of(
-            std::array{"pose", "traj", "odom", "transform", "intrinsic", "extrinsic", "calib", "camera", "groundtruth"},
-            [&](const char* word) { return name.find(word) != std::string::npos; });
-    };
-    listing.tell_unused = [folder, name_speaks](const Capture& capture) {
-        std::vector<std::string> unused;
-        std::error_code ignored;
-        for (const auto& [name, kind] : items_in(folder, ignored)) {
-            const bool used = (capture.camera && capture.camera->origin.find(name) != std::string::npos) ||
-                              name == "trajectory.log" || name == "pose.txt" || name == "rgbd.match";
-            if (!used && (kind == FolderItem::Kind::folder ? folders.contains(name) : name_speaks(name)))
-                unused.push_back(name);
-        }
-        std::ranges::sort(unused);
-        return unused;
-    };
-}
-
 constexpr std::size_t enough_for_signatures = 1 << 12;
 
 /// Of a file that begins so; null where it holds no recording.
@@ -69,6 +44,7 @@ const RecordingFormat* recording_format(std::string_view start) {
 }
 
 Listing named(Listing listing, const RecordingFormat& format) {
+    listing.generic = format.generic;
     if (listing.capture.kind.empty())
         listing.capture.kind = format.name;
     return listing;
@@ -109,11 +85,8 @@ std::string recording_files() {
 
 Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
     for (const RecordingFormat& format : recording_formats())
-        if (auto listing = format.folder ? format.folder(folder, options) : std::nullopt) {
-            if (format.generic)
-                tell_unused(folder, *listing);
+        if (auto listing = format.folder ? format.folder(folder, options) : std::nullopt)
             return named(*std::move(listing), format);
-        }
     const auto file = recording_in(folder);
     if (!file)
         refuse_folder(folder);
@@ -282,6 +255,33 @@ bool settle_camera(Listing& listing, const CaptureOptions& options) {
     return found->y_was_up;
 }
 
+/// Names of what looks like poses or cameras in a folder that was read as a generic one.
+std::vector<std::string> unused_in(const fs::path& folder, const Listing& listing) {
+    static const std::set<std::string> folders{"pose",   "poses",       "intrinsic", "intrinsics",
+                                               "calib",  "calibration", "camera",    "cameras",
+                                               "sparse", "colmap",      "extrinsics"};
+    constexpr std::array words{"pose",      "traj",  "odom",   "transform",  "intrinsic",
+                               "extrinsic", "calib", "camera", "groundtruth"};
+    constexpr std::array endings{".pincam", ".traj", ".log", ".npz"};
+    const auto speaks = [&](std::string name) {
+        std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+        return std::ranges::any_of(words, [&](const char* word) { return name.find(word) != std::string::npos; }) ||
+               std::ranges::any_of(endings, [&](const char* ending) { return name.ends_with(ending); });
+    };
+    std::set<std::string> used(listing.used.begin(), listing.used.end());
+    if (listing.capture.camera)
+        used.insert(fs::path(listing.capture.camera->origin).filename().string());
+    for (const CaptureEntry& entry : listing.capture.entries) // images may be called so
+        used.insert(fs::path(entry.depth).filename().string());
+    std::vector<std::string> unused;
+    std::error_code ignored;
+    for (const auto& [name, kind] : items_in(folder, ignored))
+        if (!used.contains(name) && (kind == FolderItem::Kind::folder ? folders.contains(name) : speaks(name)))
+            unused.push_back(name);
+    std::ranges::sort(unused);
+    return unused;
+}
+
 // --- loading ---
 
 std::string text(cv::Size size) { return fmt::format("{}x{}", size.width, size.height); }
@@ -356,6 +356,15 @@ DepthEncoding encoding_of(const Capture& capture, const CaptureEntry& entry) {
     return depth_encoding(fmt::format("{}", entry.depth_units_per_metre), capture.depth.origin);
 }
 
+/// A share of guesses that is worth a word.
+void tell_guesses(const Capture& capture, double beyond, double all, Frame& frame) {
+    constexpr double many = 0.05;
+    if (beyond > many * all)
+        frame.warnings.push_back(fmt::format("{:.0f} % of the depths lie beyond {:g} m, where they are the recorder's "
+                                             "guesses.",
+                                             100 * beyond / all, capture.guessed_beyond_m));
+}
+
 /// Depth of the lowest confidence becomes holes.
 void leave_out_unsure(const CaptureEntry& entry, Frame& frame) {
     cv::Mat1b levels;
@@ -386,6 +395,9 @@ void load_depth(const Capture& capture, const CaptureEntry& entry, const cv::Mat
     frame.doubts = doubts_about(frame.depth_m, stored, encoding);
     if (!entry.confidence.empty())
         leave_out_unsure(entry, frame);
+    if (capture.guessed_beyond_m > 0)
+        tell_guesses(capture, cv::countNonZero(frame.depth_m > capture.guessed_beyond_m),
+                     cv::countNonZero(frame.depth_m), frame);
     correct(frame.depth_m, capture.depth_correction);
     if (with_colour && !entry.colour.empty())
         load_colour(capture, entry, stored.size(), frame);
@@ -435,6 +447,14 @@ void examine_depth(const Capture& capture, const CaptureEntry& entry, ExaminedFr
         if (const std::uint32_t count = counts[static_cast<std::size_t>(value)]; count > 0 && metres(value) != 0)
             examined.levels.push_back({metres(value), count});
     std::ranges::sort(examined.levels, {}, &DepthLevel::z_m);
+    if (capture.guessed_beyond_m > 0) {
+        double beyond = 0, all = 0;
+        for (const DepthLevel& level : examined.levels) {
+            all += level.count;
+            beyond += level.z_m > capture.guessed_beyond_m ? level.count : 0;
+        }
+        tell_guesses(capture, beyond, all, examined.frame);
+    }
     if (!entry.colour.empty())
         load_colour(capture, entry, stored.size(), examined.frame);
 }
@@ -580,7 +600,7 @@ Capture open_capture(const fs::path& path, const CaptureOptions& options) {
             entry.camera = nullptr;
     if (!options.poses.empty())
         take_poses(capture, options);
-    else if (const auto unused = listing.tell_unused ? listing.tell_unused(capture) : std::vector<std::string>();
+    else if (const auto unused = listing.generic ? unused_in(path, listing) : std::vector<std::string>();
              !unused.empty())
         capture.warnings.push_back(fmt::format("{}: not used, though their names speak of poses or cameras: {}.",
                                                path.string(), fmt::join(unused, ", ")));
@@ -596,38 +616,39 @@ void require_metres(const Capture& capture, const std::string& what) {
                         capture.path.string(), what, capture.depth.origin));
 }
 
+std::vector<fs::path> captures_below(const fs::path& path, const CaptureOptions& options) {
+    std::vector<fs::path> captures;
+    std::error_code ignored;
+    for (const auto& [name, kind] : items_in(path, ignored)) {
+        const bool tar = kind != FolderItem::Kind::folder && lower_extension(name) == ".tar" && is_tar(path / name);
+        if (name.starts_with('.') || (kind != FolderItem::Kind::folder && !tar))
+            continue;
+        try {
+            (void)open_capture(path / name, options);
+            captures.push_back(path / name);
+        } catch (const NoFrames&) {
+            continue;
+        }
+    }
+    std::ranges::sort(captures);
+    return captures;
+}
+
 Capture open_capture_at_or_below(const fs::path& path, const CaptureOptions& options) {
     try {
         return open_capture(path, options);
     } catch (const NoFrames&) {
-        std::vector<fs::path> folders;
-        std::error_code ignored;
-        for (const auto& [name, kind] : items_in(path, ignored))
-            if (!name.starts_with('.') &&
-                (kind == FolderItem::Kind::folder || (lower_extension(name) == ".tar" && is_tar(path / name))))
-                folders.push_back(path / name);
-        std::ranges::sort(folders);
-        std::vector<fs::path> captures;
-        std::optional<Capture> found;
-        for (const fs::path& folder : folders) {
-            try {
-                Capture capture = open_capture(folder, options);
-                captures.push_back(folder);
-                found = std::move(capture);
-            } catch (const NoFrames&) {
-                continue;
-            }
-        }
+        const std::vector<fs::path> captures = captures_below(path, options);
         if (captures.empty())
             throw;
         if (captures.size() > 1)
             throw Error(fmt::format(
                 "{}: {} captures lie in it, among them {} and {}; name one, or let `plan` list them", path.string(),
                 captures.size(), captures[0].filename().string(), captures[1].filename().string()));
-        found->warnings.insert(found->warnings.begin(),
-                               fmt::format("{}: no frames of its own; its folder {} is opened.", path.string(),
-                                           captures[0].filename().string()));
-        return *std::move(found);
+        Capture found = open_capture(captures[0], options);
+        found.warnings.insert(found.warnings.begin(), fmt::format("{}: no frames of its own; its folder {} is opened.",
+                                                                  path.string(), captures[0].filename().string()));
+        return found;
     }
 }
 

@@ -88,6 +88,8 @@ struct Capture {
     Registration registration = Registration::unknown;
     std::string registration_reason;
     bool colour_in_more_pixels = false; ///< registered colour sees what depth sees, finer: load() reduces it
+    std::string confidence_levels;      ///< of confidence images, the lowest a hole: "0 low, 1 medium, 2 high"
+    double guessed_beyond_m = 0;        ///< the recorder made up most depths beyond; 0 = none
     std::vector<CaptureEntry> entries;  ///< in recording order
     std::vector<std::string> warnings;  ///< about the capture as a whole
 
@@ -107,5 +109,9 @@ struct Capture {
 [[nodiscard]] Capture open_capture_at_or_below(const std::filesystem::path& path, const CaptureOptions& options = {});
 /// For what measures in metres. Throws Error, which names `what`, where the capture's unit is arbitrary.
 void require_metres(const Capture& capture, const std::string& what);
+
+/// The folders in `path` that are captures by themselves; empty where there are none.
+[[nodiscard]] std::vector<std::filesystem::path> captures_below(const std::filesystem::path& path,
+                                                                const CaptureOptions& options = {});
 
 } // namespace scanshade

@@ -12,6 +12,7 @@
 #include <cctype>
 #include <cmath>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -168,6 +169,15 @@ void settle_own_cameras(Listing& listing) {
     };
 }
 
+void tell_ignored(const fs::path& folder, std::initializer_list<std::string_view> names,
+                  std::vector<std::string>& warnings) {
+    std::vector<std::string_view> ignored;
+    std::ranges::copy_if(names, std::back_inserter(ignored),
+                         [&](std::string_view name) { return is_there(folder / name); });
+    if (!ignored.empty())
+        warnings.push_back(fmt::format("{}: not used: {}.", folder.string(), fmt::join(ignored, ", ")));
+}
+
 namespace {
 
 bool stays_inside(const fs::path& relative) {
@@ -213,7 +223,7 @@ std::optional<CameraFile> camera_in(const fs::path& folder, std::vector<std::str
             candidates.insert(candidates.begin(), file);
         else if (promising)
             candidates.push_back(file);
-        else if (json || name == "info.txt")
+        else if (json || name == "info.txt" || name == "_info.txt")
             others.push_back(file);
     }
     std::optional<CameraFile> found;

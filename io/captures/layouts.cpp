@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <map>
+#include <set>
 
 namespace scanshade {
 
@@ -180,8 +181,9 @@ void entries_from_names(const std::vector<fs::path>& depths, const std::vector<f
 
 /// trajectory.log by index in recording order; pose.txt by the number in the depth image's name (row N, from 1; from 0
 /// where an image is numbered 0).
-void add_poses(const fs::path& folder, Capture& capture) {
+void add_poses(const fs::path& folder, Capture& capture, std::vector<std::string>& used) {
     if (is_file(folder / "trajectory.log")) {
+        used.emplace_back("trajectory.log");
         const auto poses = read_redwood_log(folder / "trajectory.log", capture.warnings);
         for (std::size_t i = 0; i < capture.entries.size(); ++i)
             if (const auto pose = poses.find(i); pose != poses.end())
@@ -192,6 +194,7 @@ void add_poses(const fs::path& folder, Capture& capture) {
     }
     if (!is_file(folder / "pose.txt"))
         return;
+    used.emplace_back("pose.txt");
     const auto poses = read_pose_rows(folder / "pose.txt", capture.warnings);
     const auto number_in = [](const CaptureEntry& entry) { return whole_number(entry.name); };
     const bool from_zero = std::any_of(capture.entries.begin(), capture.entries.end(),
@@ -226,7 +229,7 @@ std::optional<Listing> list_image_folders(const fs::path& folder) {
         entries_from_match(folder, *depth_folder, capture);
     else
         entries_from_names(depths, colour_images_in(colour_folder), capture);
-    add_poses(folder, capture);
+    add_poses(folder, capture, listing.used);
     listing.find_camera = [folder](cv::Size, std::vector<std::string>& warnings) {
         return camera_in(folder, warnings);
     };
@@ -285,10 +288,20 @@ std::optional<Listing> list_depth_images(const fs::path& folder) {
     return listing;
 }
 
+namespace {
+
+/// COLMAP's own .bin files hold no bare floats.
+bool is_colmap_model(const fs::path& file) {
+    return std::set<std::string>{"cameras.bin", "images.bin", "points3D.bin", "frames.bin", "rigs.bin"}.contains(
+        file.filename().string());
+}
+
+} // namespace
+
 std::optional<Listing> list_clouds(const fs::path& folder) {
     Listing listing;
     for (const fs::path& file : files_in(folder)) {
-        if (!has_cloud_extension(file))
+        if (!has_cloud_extension(file) || is_colmap_model(file))
             continue;
         CaptureEntry entry;
         entry.name = file.stem().string();

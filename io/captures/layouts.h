@@ -26,8 +26,10 @@ struct Listing {
     /// Gives entries their poses by time; none where the layout ties poses to frames itself. Called once the camera is
     /// known, because its file may have the offset between the clocks.
     std::function<void(Capture& capture, double pose_time_offset_s)> find_poses = {};
-    /// Of a generic layout: names of files that look like poses or cameras and are neither. Called last.
-    std::function<std::vector<std::string>(const Capture& capture)> tell_unused = {};
+    /// Of a generic layout: names of files beside the images that the reader took something from. What else looks like
+    /// poses or cameras there is named in a warning.
+    std::vector<std::string> used = {};
+    bool generic = false; ///< that it is one; from the table
 };
 
 // Each returns nothing when the folder is not in its layout, and throws Error when it is but cannot be used.
@@ -119,13 +121,17 @@ class ImagesByStem {
 /// problem, since a recorder makes one size.
 void settle_own_cameras(Listing& listing);
 
+/// One warning that names those of a layout's parts that are there and are not used, such as masks.
+void tell_ignored(const std::filesystem::path& folder, std::initializer_list<std::string_view> names,
+                  std::vector<std::string>& warnings);
+
 /// Why a listed file cannot be opened: it is missing, or outside the capture's folder, by name or through a link.
 /// Empty = it can be opened.
 [[nodiscard]] std::string trouble_with(const std::filesystem::path& folder, const std::string& name);
 
 /// The camera among a folder's files: camera.json, any JSON or text file whose name speaks of a camera or intrinsics,
-/// info.txt. A file that speaks of a camera and cannot be read is an Error; of several, the first is used and the
-/// others are named.
+/// info.txt or _info.txt. A file that speaks of a camera and cannot be read is an Error; of several, the first is used
+/// and the others are named.
 [[nodiscard]] std::optional<CameraFile> camera_in(const std::filesystem::path& folder,
                                                   std::vector<std::string>& warnings);
 

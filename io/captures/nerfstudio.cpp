@@ -6,6 +6,7 @@
 #include "io/images/format.h"
 #include "io/text.h"
 #include "projection/base/error.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <cmath>
@@ -76,6 +77,17 @@ std::optional<std::pair<double, double>> focal_lengths(const Keys& keys, cv::Siz
 Distortion lens_of(const Keys& keys, const fs::path& file) {
     const std::string model = keys.text("camera_model");
     const Json* fisheye = keys.find("is_fisheye");
+    const Json* listed = keys.find("distortion_params"); // k1 k2 k3 k4 p1 p2
+    const auto coefficient = [&](const char* name, std::size_t place) {
+        if (const auto value = keys.number(name))
+            return *value;
+        if (!listed)
+            return 0.0;
+        if (!listed->is_array() || listed->size() != 6 || !(*listed)[place].is_number())
+            throw Error(fmt::format("{}: \"distortion_params\" is {}, expected 6 numbers (k1, k2, k3, k4, p1, p2)",
+                                    file.string(), in_quotes(listed->dump())));
+        return (*listed)[place].get<double>();
+    };
     Distortion lens;
     if (model == "OPENCV_FISHEYE" || (fisheye && fisheye->is_boolean() && fisheye->get<bool>()))
         lens.model = LensModel::kannala_brandt;
@@ -84,14 +96,14 @@ Distortion lens_of(const Keys& keys, const fs::path& file) {
         throw Error(fmt::format("{}: \"camera_model\" is {}, expected PINHOLE, OPENCV, OPENCV_FISHEYE or their simpler "
                                 "kinds",
                                 file.string(), in_quotes(model)));
-    lens.k1 = keys.number("k1").value_or(0);
-    lens.k2 = keys.number("k2").value_or(0);
-    lens.k3 = keys.number("k3").value_or(0);
+    lens.k1 = coefficient("k1", 0);
+    lens.k2 = coefficient("k2", 1);
+    lens.k3 = coefficient("k3", 2);
     if (lens.model == LensModel::kannala_brandt) {
-        lens.k4 = keys.number("k4").value_or(0);
+        lens.k4 = coefficient("k4", 3);
     } else {
-        lens.p1 = keys.number("p1").value_or(0);
-        lens.p2 = keys.number("p2").value_or(0);
+        lens.p1 = coefficient("p1", 4);
+        lens.p2 = coefficient("p2", 5);
     }
     return lens;
 }
@@ -155,6 +167,42 @@ void take_pose(const Keys& keys, const std::string& where, CaptureEntry& entry) 
         entry.warnings.push_back(pose.warning);
 }
 
+/// instant-ngp loads depth only if it is told the unit, and not told otherwise.
+bool has_ngp_depth(const Keys& keys) {
+    const Json* loading = keys.find("enable_depth_loading");
+    return keys.number("integer_depth_scale") && !(loading && loading->is_boolean() && !loading->get<bool>());
+}
+
+/// Of depths of which nothing says the unit: floats far beyond a room's metres are millimetres, as nerfstudio takes
+/// all.
+DepthEncoding unit_of(const CaptureEntry& first) {
+    constexpr float farthest_m = 50;
+    const DepthEncoding assumed = assumed_encoding(first.depth);
+    if (assumed.name != "m")
+        return assumed;
+    try {
+        const cv::Mat1f stored = read_stored_depth(first.depth);
+        std::vector<float> depths;
+        std::ranges::copy_if(stored, std::back_inserter(depths), [](float z) { return std::isfinite(z) && z > 0; });
+        if (const float middle = depths.empty() ? 0 : median(std::move(depths)); middle > farthest_m)
+            return usual_encoding("1000",
+                                  fmt::format("assumed: floats with a median of {:.4g} are millimetres", middle));
+    } catch (const Outage&) {
+        throw;
+    } catch (const Error&) { // loading it will say why
+    }
+    return assumed;
+}
+
+/// The unit that all frames have in common stands for the capture.
+DepthEncoding unit_of(const std::vector<CaptureEntry>& entries, const fs::path& file) {
+    const double units = entries.front().depth_units_per_metre;
+    const bool common = units > 0 && std::ranges::all_of(entries, [&](const CaptureEntry& entry) {
+                            return entry.depth_units_per_metre == units;
+                        });
+    return common ? depth_encoding(fmt::format("{}", units), file.string()) : unit_of(entries.front());
+}
+
 } // namespace
 
 std::optional<Listing> list_nerfstudio(const fs::path& folder) {
@@ -181,11 +229,11 @@ std::optional<Listing> list_nerfstudio(const fs::path& folder) {
         try {
             std::string image = keys.text("file_path");
             std::ranges::replace(image, '\\', '/');
-            entry.name = fs::path(image).stem().string();
+            entry.name = image; // for now: their order is that of the paths
             const std::string where = fmt::format("{}: frame {}", file.string(), in_quotes(image));
             const bool ngp = !keys.find("depth_file_path") && keys.find("depth_path");
             const std::string depth = keys.text(ngp ? "depth_path" : "depth_file_path");
-            if (depth.empty()) {
+            if (depth.empty() || (ngp && !has_ngp_depth(keys))) {
                 ++without_depth;
                 continue;
             }
@@ -215,7 +263,9 @@ std::optional<Listing> list_nerfstudio(const fs::path& folder) {
     if (capture.entries.empty())
         return std::nullopt;
     std::ranges::stable_sort(capture.entries, &natural_less, &CaptureEntry::name);
-    capture.depth = assumed_encoding(capture.entries.front().depth);
+    for (CaptureEntry& entry : capture.entries)
+        entry.name = fs::path(entry.name).stem().string();
+    capture.depth = unit_of(capture.entries, file);
     if (without_depth > 0)
         capture.warnings.push_back(
             fmt::format("{}: {} left out, without depth.", file.string(), counted(without_depth, "frame")));

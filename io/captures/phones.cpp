@@ -21,6 +21,8 @@ using Json = nlohmann::json;
 
 namespace {
 
+constexpr const char* lidar_confidence = "0 low, 1 medium, 2 high";
+
 std::vector<std::string> cells_of(std::string_view line) {
     std::vector<std::string> cells;
     for (std::size_t at = 0; at <= line.size();) {
@@ -125,6 +127,9 @@ std::optional<Listing> list_stray_scanner(const fs::path& folder) {
         return std::nullopt;
     Listing listing = listing_of_phone("Stray Scanner");
     Capture& capture = listing.capture;
+    capture.confidence_levels = lidar_confidence;
+    if (assumed_encoding(depths.front()).name == "m") // older ones have .npy, of millimetres as well
+        capture.depth = usual_encoding("1000", "Stray Scanner layout");
     const ImagesByStem sure(colour_images_in(folder_named(folder, {"confidence"}))),
         colours(colour_images_in(folder_named(folder, {"rgb", "color"})));
     std::map<std::uint64_t, OdometryRow> odometry;
@@ -192,10 +197,15 @@ std::pair<std::shared_ptr<const Camera>, MatrixPose> polycam_camera(const fs::pa
 std::optional<Listing> list_polycam(const fs::path& folder) {
     const fs::path frames = is_folder(folder / "keyframes") ? folder / "keyframes" : folder;
     const auto depths = depth_images_in(folder_named(frames, {"depth"}));
-    if (depths.empty() || !is_folder(frames / "cameras"))
+    const bool cameras_fit = std::ranges::any_of(
+        depths, [&](const fs::path& depth) { return is_file(frames / "cameras" / (depth.stem().string() + ".json")); });
+    // Other recordings have folders depth/ and cameras/, too.
+    if (depths.empty() || !is_folder(frames / "cameras") || (frames == folder && !cameras_fit))
         return std::nullopt;
     Listing listing = listing_of_phone("Polycam");
     Capture& capture = listing.capture;
+    capture.confidence_levels = "0 low, 127 and 255 high";
+    capture.guessed_beyond_m = 5;
     const ImagesByStem images(colour_images_in(folder_named(frames, {"images"}))),
         corrected(colour_images_in(folder_named(frames, {"corrected_images"}))),
         sure(colour_images_in(folder_named(frames, {"confidence"})));
@@ -227,7 +237,11 @@ std::optional<Listing> list_polycam(const fs::path& folder) {
         }
         capture.entries.push_back(std::move(entry));
     }
-    if (uncorrected > 0 && uncorrected < capture.entries.size())
+    if (uncorrected == capture.entries.size())
+        capture.warnings.push_back(fmt::format("{}: no corrected_cameras/ with corrected_images/; the raw poses are "
+                                               "used, which drift.",
+                                               frames.string()));
+    else if (uncorrected > 0)
         capture.warnings.push_back(fmt::format("{} of {} frames have no corrected camera, and take the raw one: their "
                                                "poses may be off by what was corrected.",
                                                uncorrected, capture.entries.size()));
@@ -265,6 +279,22 @@ std::vector<StampedPose> arkit_trajectory(const fs::path& file, std::vector<std:
     return poses;
 }
 
+/// Ten rows a second against sixty images: a row within 5 ms, or between two that are at most 0.2 s apart.
+std::optional<Eigen::Isometry3d> arkit_pose(const std::vector<StampedPose>& poses, double stamp_s) {
+    constexpr double same_s = 0.005, apart_s = 0.2, rounding_s = 1e-6;
+    const auto after = std::ranges::lower_bound(poses, stamp_s, {}, &StampedPose::stamp_s);
+    const auto near = [&](auto row) { return std::abs(row->stamp_s - stamp_s) <= same_s; };
+    const bool first = after == poses.begin(), last = after == poses.end();
+    const bool after_near = !last && near(after), before_near = !first && near(std::prev(after));
+    if (before_near && (!after_near || stamp_s - std::prev(after)->stamp_s < after->stamp_s - stamp_s))
+        return std::prev(after)->world_from_camera;
+    if (after_near)
+        return after->world_from_camera;
+    if (first || last || after->stamp_s - std::prev(after)->stamp_s > apart_s + rounding_s)
+        return std::nullopt;
+    return pose_at(poses, stamp_s, apart_s);
+}
+
 /// "w h fx fy cx cy"
 Camera pincam(const fs::path& file) {
     const std::string bytes = read_list_file(file);
@@ -295,10 +325,12 @@ std::optional<Listing> list_arkit_scenes(const fs::path& given) {
         return std::nullopt;
     Listing listing = listing_of_phone("ARKitScenes");
     Capture& capture = listing.capture;
+    capture.confidence_levels = lidar_confidence;
+    tell_ignored(folder, {"highres_depth"}, capture.warnings);
     const ImagesByStem sure(colour_images_in(folder_named(folder, {"confidence"}))),
         colours(colour_images_in(folder_named(folder, {"lowres_wide", "color"})));
     std::map<double, fs::path> pincams; // by seconds
-    if (const auto cameras = folder_named(folder, {"lowres_wide_intrinsics"}))
+    if (const auto cameras = folder_named(folder, {"lowres_wide_intrinsics", "wide_intrinsics"}))
         for (const fs::path& file : files_in(*cameras))
             if (const auto name = arkit_name(file.stem().string()); name && lower_extension(file) == ".pincam")
                 pincams.emplace(name->second, file);
@@ -307,7 +339,7 @@ std::optional<Listing> list_arkit_scenes(const fs::path& given) {
         poses = arkit_trajectory(folder / "lowres_wide.traj", capture.warnings);
     else
         capture.warnings.push_back(fmt::format("{}: there is no lowres_wide.traj; no poses.", folder.string()));
-    constexpr double same_s = 0.005, apart_s = 0.2, of_image_s = 0.0015;
+    constexpr double of_image_s = 0.0015;
     for (const fs::path& depth : depths) {
         CaptureEntry entry;
         entry.name = depth.stem().string();
@@ -317,11 +349,7 @@ std::optional<Listing> list_arkit_scenes(const fs::path& given) {
         const auto name = arkit_name(entry.name);
         if (name) {
             entry.stamp_s = name->second;
-            const auto near = std::ranges::min_element(
-                poses, {}, [&](const StampedPose& pose) { return std::abs(pose.stamp_s - name->second); });
-            entry.world_from_camera = near != poses.end() && std::abs(near->stamp_s - name->second) <= same_s
-                                          ? std::optional(near->world_from_camera)
-                                          : pose_at(poses, name->second, apart_s);
+            entry.world_from_camera = arkit_pose(poses, name->second);
         }
         if (!entry.world_from_camera && !poses.empty())
             entry.warnings.push_back("lowres_wide.traj has no pose near its time.");

@@ -143,6 +143,7 @@ Listing list_record3d(const std::shared_ptr<const ZipArchive>& archive) {
     auto recording = std::make_shared<Record3d>(archive);
     Listing listing = listing_of_phone("Record3D");
     listing.capture.kind = "Record3D";
+    listing.capture.confidence_levels = "0 low, 1 medium, 2 high";
     Capture& capture = listing.capture;
     capture.depth = usual_encoding("m", "Record3D layout");
     if (!archive->damage().empty())

@@ -113,12 +113,26 @@ std::optional<Listing> list_replica(const fs::path& folder) {
 
 // --- ICL-NUIM: associations.txt (depth first, frame numbers), *.gt.freiburg; its renderer's y is up ---
 
+namespace {
+
+/// The other download: ray lengths as text, and POV-Ray's cameras.
+void refuse_povray(const fs::path& folder) {
+    for (const fs::path& file : files_in(folder))
+        if (const std::string name = file.filename().string(); name.starts_with("scene_") && name.ends_with(".depth"))
+            throw Error(fmt::format("{}: ICL-NUIM's files for POV-Ray are not read; its download for TUM's tools is",
+                                    file.string()));
+}
+
+} // namespace
+
 std::optional<Listing> list_icl_nuim(const fs::path& folder) {
     std::optional<fs::path> truth;
     for (const fs::path& file : files_in(folder))
         if (file.filename().string().ends_with(".gt.freiburg"))
             truth = file;
     const fs::path list = folder / "associations.txt";
+    if (!truth)
+        refuse_povray(folder);
     if (!truth || !is_file(list))
         return std::nullopt;
     Listing listing;

@@ -32,6 +32,18 @@ Camera camera_from_matrix(const fs::path& file) {
     return {{k(0, 0), k(1, 1), k(0, 2), k(1, 2), {}}, {}, file.string()};
 }
 
+/// SCAN.txt, which ScanNet has beside its recordings: in the folder, or beside it with its name.
+std::optional<CameraFile> camera_of_scan(const fs::path& folder) {
+    std::vector<fs::path> files = files_in(folder);
+    std::erase_if(files, [](const fs::path& file) { return lower_extension(file) != ".txt"; });
+    const fs::path whole = folder.filename().empty() ? folder.parent_path() : folder;
+    files.push_back(whole.parent_path() / (whole.filename().string() + ".txt"));
+    for (const fs::path& file : files)
+        if (is_file(file) && read_bytes(file, 1 << 16).find("fx_depth") != std::string::npos)
+            return read_camera_file(file);
+    return std::nullopt;
+}
+
 /// Exporters may have made colour images smaller than those that the matrix is for.
 std::optional<ColourCamera> colour_camera_in(const fs::path& folder, const fs::path& first_colour,
                                              std::vector<std::string>& warnings) {
@@ -101,8 +113,17 @@ std::optional<Listing> list_scannet(const fs::path& folder) {
         capture.entries.push_back(std::move(entry));
     }
     listing.find_camera = [=](cv::Size, std::vector<std::string>& warnings) -> std::optional<CameraFile> {
-        if (!intrinsic)
-            return camera_in(folder, warnings);
+        if (!intrinsic) {
+            auto scan = camera_of_scan(folder);
+            if (!scan)
+                return camera_in(folder, warnings);
+            if (colours.empty())
+                scan->colour.reset();
+            else if (const cv::Size size = peek_size(colours.front()); scan->colour && !size.empty())
+                scan->colour->camera = *camera_for_depth(scan->colour->camera, scan->colour->camera.pinhole.size, size);
+            scan->registration = Registration::no;
+            return scan;
+        }
         CameraFile file;
         file.camera = camera_from_matrix(*intrinsic);
         file.registration = Registration::no;

@@ -56,7 +56,7 @@ void take_facts(CaptureEntry& entry, const Json& all, const fs::path& file, cv::
     const auto facts = all.find(entry.name);
     const std::string where = fmt::format("{}: \"{}\"", file.string(), entry.name);
     if (facts == all.end() || !facts->is_object()) {
-        entry.problem = where + " is missing, though its depth image exists";
+        entry.warnings.push_back(where + " is missing; no pose, and the camera of the first frame.");
         return;
     }
     const auto part = [&](const char* key) { return facts->contains(key) ? (*facts)[key] : Json(); };
@@ -202,6 +202,7 @@ std::optional<Listing> list_depth_bin(const fs::path& folder) {
                                 depths->damage().empty() ? "it is empty" : depths->damage()));
     Listing listing = listing_of_phone("ScanNet++");
     Capture& capture = listing.capture;
+    tell_ignored(folder, {"rgb_mask.mkv", "rgb_masks"}, capture.warnings);
     if (!depths->millimetres())
         capture.depth = usual_encoding("m", "ScanNet++ layout");
     if (!depths->damage().empty())
@@ -247,6 +248,9 @@ std::optional<Listing> list_scannetpp(const fs::path& folder) {
     const cv::Size of_colour = colours.empty() ? cv::Size(1920, 1440) : peek_size(colours.front());
     const ImagesByStem by_stem(colours);
     Listing listing = listing_of_phone("ScanNet++");
+    tell_ignored(folder, {"rgb_mask.mkv", "rgb_masks"}, listing.capture.warnings);
+    if (colours.empty())
+        listing.capture.warnings.push_back(folder.string() + ": there is no rgb/; no colour.");
     for (const fs::path& depth : depths) {
         CaptureEntry entry;
         entry.name = depth.stem().string();

@@ -131,6 +131,7 @@ std::optional<Listing> list_kitti_odometry(const fs::path& folder) {
         return std::nullopt;
     Listing listing = listing_of_sweeps();
     Capture& capture = listing.capture;
+    tell_ignored(folder, {"image_0", "image_1", "image_2", "image_3"}, capture.warnings);
     const auto camera_from =
         unless_damaged(capture.warnings, [&] { return camera_from_scanner(folder / "calib.txt"); });
     const fs::path file = file_of_poses(folder);

@@ -2,6 +2,7 @@
 #include "io/cameras/camera_file.h"
 #include "io/clouds/cloud_file.h"
 #include "io/images/image_file.h"
+#include "tests/support/files.h"
 #include "tests/support/small_capture.h"
 
 #include <chrono>
@@ -12,6 +13,7 @@
 #include <fstream>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <sys/wait.h>
 #include <thread>
 #include <unistd.h>
@@ -500,6 +502,63 @@ TEST_F(CliTest, inspect_says_what_is_there) {
     EXPECT_GE(smallest_step_m, 0.00099); // stored in millimetres: no step is smaller, all are whole ones
     EXPECT_NEAR(std::remainder(smallest_step_m, 0.001), 0, 1e-5);
     EXPECT_EQ(facts["camera"]["fx"], 52.0);
+}
+
+TEST_F(CliTest, inspect_lists_every_fact_of_every_frame) {
+    const fs::path stray = folder / "stray";
+    for (const char* part : {"depth", "confidence", "rgb"})
+        fs::create_directories(stray / part);
+    cv::imwrite((stray / "depth/000000.png").string(), cv::Mat1w(6, 8, ushort(2000)));
+    cv::Mat1b levels(6, 8, uchar(2));
+    levels(0, 0) = 0;
+    cv::imwrite((stray / "confidence/000000.png").string(), levels);
+    cv::imwrite((stray / "rgb/000000.png").string(), cv::Mat3b(45, 60, {9, 99, 199}));
+    tests::write_file(stray / "camera_matrix.csv", "75, 0, 29.5\n0, 75, 22\n0, 0, 1\n");
+    tests::write_file(stray / "odometry.csv",
+                      "timestamp, frame, x, y, z, qx, qy, qz, qw\n5.5, 000000, 1, 2, 3, 0, 0, 0, 1\n");
+    const json all = json::parse(run_program("inspect --json --all " + stray.string() + " " + capture().string()).out);
+    ASSERT_EQ(all.size(), 2U) << "an object for each";
+    EXPECT_EQ(all[0]["kind"], "Stray Scanner");
+    const json frame = all[0]["every_frame"][0];
+    EXPECT_EQ(frame["name"], "000000");
+    EXPECT_EQ(frame["stamp_s"], 5.5);
+    EXPECT_NEAR(frame["camera"]["fx"].get<double>(), 10, 1e-9);
+    EXPECT_EQ(frame["width"], 8);
+    EXPECT_EQ(frame["height"], 6);
+    EXPECT_EQ(frame["depth_encoding"], "mm");
+    EXPECT_EQ(frame["world_from_camera"], (json{{1, 0, 0, 1}, {0, 1, 0, 2}, {0, 0, 1, 3}, {0, 0, 0, 1}}));
+    EXPECT_EQ(frame["colour_size"], (json{60, 45})) << "as recorded";
+    EXPECT_EQ(frame["holes"], 1);
+    EXPECT_EQ(frame["confidence"]["levels"], "0 low, 1 medium, 2 high");
+    EXPECT_EQ(frame["confidence"]["holes"], 0) << "the level whose depth is left out";
+    EXPECT_TRUE(frame["why"].is_null());
+    const json other = all[1]["every_frame"][0];
+    for (const auto& [key, value] : frame.items())
+        EXPECT_TRUE(other.contains(key)) << key << " is null where nothing is known";
+    EXPECT_TRUE(other["confidence"].is_null());
+}
+
+TEST_F(CliTest, inspect_of_a_folder_of_captures_lists_each_and_says_what_cannot_be_read) {
+    const fs::path set = folder / "set";
+    fs::create_directories(set);
+    fs::copy(capture(), set / "a", fs::copy_options::recursive);
+    fs::copy(capture(), set / "b", fs::copy_options::recursive);
+    const Ran ran = run_program("inspect --json " + set.string() + " " + (folder / "none").string());
+    EXPECT_EQ(ran.exit_code, 2);
+    const json all = json::parse(ran.out);
+    ASSERT_EQ(all.size(), 3U);
+    EXPECT_EQ(all[0]["frames"], 4);
+    EXPECT_EQ(all[1]["path"], (set / "b").string());
+    EXPECT_NE(all[2]["why"].get<std::string>().find("no such file"), std::string::npos);
+}
+
+TEST_F(CliTest, help_lists_the_formats_for_people_readmes_and_programs) {
+    const Ran people = run_program("help formats");
+    EXPECT_EQ(people.exit_code, 0) << people.err;
+    const json formats = json::parse(run_program("help --json").out)["formats"];
+    for (const json& format : formats)
+        EXPECT_NE(people.out.find(format["name"].get<std::string>()), std::string::npos) << format;
+    EXPECT_NE(run_program("help formats --markdown").out.find("| TUM RGB-D | `depth.txt`"), std::string::npos);
 }
 
 TEST_F(CliTest, inspect_reports_a_frame_that_cannot_be_read) {

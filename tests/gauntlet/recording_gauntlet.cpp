@@ -128,7 +128,7 @@ RecordingCopy copy_folder(const Capture& capture, const fs::path& folder) {
         const CaptureEntry& entry = capture.entries[index];
         copy.depth.push_back(take(entry.depth));
         take(entry.colour);
-        if (capture.kind == "7-Scenes") {
+        if (capture.kind == "7-Scenes / BundleFusion") {
             const std::string pose = entry.depth.substr(0, entry.depth.rfind(".depth")) + ".pose.txt";
             take(fs::exists(pose) ? pose : "");
         }

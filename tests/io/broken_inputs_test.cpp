@@ -627,18 +627,21 @@ TEST_P(GoodCapture, holds_what_its_readme_says) {
         EXPECT_LE(farthest, good.farthest_m) << frame.name;
     }
 }
-INSTANTIATE_TEST_SUITE_P(
-    readme, GoodCapture,
-    ::testing::Values(
-        Good{"rgbd_7scenes", "7-Scenes", 40, 585, 0.0775, 0.1075, 0.9649, 3.1151, true, Registration::no},
-        Good{"rgbd_7scenes_sentinel", "7-Scenes", 3, 585, 0.123, 0.165, 0.9, 4.5, true, Registration::no},
-        Good{"rgbd_redwood", "Redwood / Open3D", 5, 525, 0.1235, 0.1305, 0.9549, 2.7021, true, Registration::unknown},
-        Good{"rgbd_tum_fr1_desk", "TUM RGB-D", 6, 517.3, 0.1685, 0.1835, 0.735, 2.1151, true, Registration::yes},
-        Good{"rgbd_tum_converted", "TUM RGB-D", 20, 525, 0.078, 0.108, 0.9649, 3.1151, true, Registration::unknown},
-        Good{"rgbd_realsense", "colour and depth folders", 5, 617.25, 0.0044, 0.0651, 0.2799, 3.1851, false,
-             Registration::unknown},
-        Good{"rgbd_kinect_pgm", "colour and depth folders", 2, 0, 0.3065, 0.3195, 0.945, 9.8251, true,
-             Registration::unknown}));
+INSTANTIATE_TEST_SUITE_P(readme, GoodCapture,
+                         ::testing::Values(Good{"rgbd_7scenes", "7-Scenes / BundleFusion", 40, 585, 0.0775, 0.1075,
+                                                0.9649, 3.1151, true, Registration::no},
+                                           Good{"rgbd_7scenes_sentinel", "7-Scenes / BundleFusion", 3, 585, 0.123,
+                                                0.165, 0.9, 4.5, true, Registration::no},
+                                           Good{"rgbd_redwood", "Redwood / Open3D", 5, 525, 0.1235, 0.1305, 0.9549,
+                                                2.7021, true, Registration::unknown},
+                                           Good{"rgbd_tum_fr1_desk", "TUM RGB-D", 6, 517.3, 0.1685, 0.1835, 0.735,
+                                                2.1151, true, Registration::yes},
+                                           Good{"rgbd_tum_converted", "TUM RGB-D", 20, 525, 0.078, 0.108, 0.9649,
+                                                3.1151, true, Registration::unknown},
+                                           Good{"rgbd_realsense", "colour and depth folders", 5, 617.25, 0.0044, 0.0651,
+                                                0.2799, 3.1851, false, Registration::unknown},
+                                           Good{"rgbd_kinect_pgm", "colour and depth folders", 2, 0, 0.3065, 0.3195,
+                                                0.945, 9.8251, true, Registration::unknown}));
 
 TEST(good_data, single_depth_images_need_their_encoding_and_doubt_the_wrong_one) {
     const fs::path folder = data_folder() / "single_frames";

@@ -404,6 +404,254 @@ TEST_F(Made, generic_folders_name_what_they_did_not_use) {
     EXPECT_TRUE(warned(capture.warnings, "camera_poses.csv, pose"));
 }
 
+TEST_F(Made, generic_folders_name_every_kind_of_unused_file) {
+    depth("depth/0.png");
+    for (const char* name : {"pose", "poses", "intrinsic", "intrinsics", "calib", "calibration", "camera", "cameras",
+                             "sparse", "colmap", "extrinsics"}) {
+        fs::create_directories(folder / name);
+        EXPECT_TRUE(warned(open_capture(folder.path()).warnings, std::string(": ") + name + ".")) << name;
+        fs::remove(folder / name);
+    }
+    for (const char* name :
+         {"my_Pose.bin", "traj.csv", "odometry.csv", "transforms_all.txt", "Intrinsic.csv", "extrinsic.xml",
+          "calib.csv", "camera.csv", "groundtruth.txt", "42.pincam", "lowres_wide.traj", "mesh.log", "data.npz"}) {
+        text(name, "1 2 3");
+        EXPECT_TRUE(warned(open_capture(folder.path()).warnings, std::string(": ") + name + ".")) << name;
+        fs::remove(folder / name);
+    }
+    text("notes.txt", "x");
+    EXPECT_FALSE(warned(open_capture(folder.path()).warnings, "not used"));
+}
+
+TEST_F(Made, a_trajectory_counts_as_used_only_where_its_layout_reads_it) {
+    text("trajectory.log", "0 0 1\n" + std::string(pose_rows));
+    depth("scan.png");
+    const Capture flat = open_capture(folder.path());
+    EXPECT_EQ(flat.kind, "depth images");
+    EXPECT_TRUE(warned(flat.warnings, "trajectory.log")) << "beside plain images nothing reads it";
+    depth("depth/0.png");
+    const Capture redwood = open_capture(folder.path());
+    EXPECT_EQ(redwood.kind, "Redwood / Open3D");
+    EXPECT_FALSE(warned(redwood.warnings, "trajectory.log"));
+    EXPECT_TRUE(redwood.entries[0].world_from_camera);
+}
+
+TEST_F(Made, known_layouts_name_the_parts_that_they_ignore) {
+    depth("iphone/depth/frame_000000.png");
+    text("iphone/pose_intrinsic_imu.json",
+         R"({"frame_000000": {"intrinsic": [[1440,0,959.5],[0,1440,719.5],[0,0,1]]}})");
+    fs::create_directories(folder / "iphone/rgb_masks");
+    EXPECT_TRUE(warned(open_capture(folder / "iphone").warnings, "not used: rgb_masks."));
+    EXPECT_TRUE(warned(open_capture(folder / "iphone").warnings, "no colour"));
+    depth("arkit/lowres_depth/42_1.000.png");
+    fs::create_directories(folder / "arkit/highres_depth");
+    EXPECT_TRUE(warned(open_capture(folder / "arkit").warnings, "not used: highres_depth."));
+    text("kitti/velodyne/000000.bin", floats({1, 0, 0, 0.5F}));
+    text("kitti/calib.txt", "P0: 1 0 0 0 0 1 0 0 0 0 1 0\n");
+    fs::create_directories(folder / "kitti/image_2");
+    EXPECT_TRUE(warned(open_capture(folder / "kitti").warnings, "not used: image_2."));
+}
+
+TEST_F(Made, scannet_takes_scan_txt_where_intrinsic_is_missing) {
+    depth("scene0000_00/depth/0.png");
+    colour("scene0000_00/color/0.jpg", {16, 12});
+    text("scene0000_00/pose/0.txt", pose_rows);
+    text("scene0000_00/scene0000_00.txt", "axisAlignment = 1 0 0 0\nfx_depth = 10\nfy_depth = 11\nmx_depth = 3.4\n"
+                                          "my_depth = 2.6\ndepthWidth = 8\ndepthHeight = 6\nfx_color = 40\nfy_color = "
+                                          "44\nmx_color = 15.5\nmy_color = 11.5\ncolorWidth = 32\ncolorHeight = 24\n");
+    const Frame frame = open_capture(folder / "scene0000_00").load(0);
+    expect_camera(frame, 10, 11, 3.4, 2.6);
+    expect_pose(frame);
+    ASSERT_TRUE(frame.colour_camera);
+    EXPECT_NEAR(frame.colour_camera->camera.pinhole.fx, 20, 1e-9) << "colour images are half as large";
+    EXPECT_EQ(frame.registration, Registration::no);
+    fs::rename(folder / "scene0000_00/scene0000_00.txt", folder / "scene0000_00.txt");
+    expect_camera(open_capture(folder / "scene0000_00").load(0), 10, 11, 3.4, 2.6);
+}
+
+TEST_F(Made, scannet_frames_25k_has_its_intrinsics_without_a_folder) {
+    depth("depth/000100.png");
+    colour("color/000100.jpg", {8, 6});
+    text("pose/000100.txt", pose_rows);
+    text("intrinsics_depth.txt", "10 0 3.5 0\n0 11 2.5 0\n0 0 1 0\n0 0 0 1\n");
+    text("intrinsics_color.txt", "20 0 7.5 0\n0 22 5.5 0\n0 0 1 0\n0 0 0 1\n"); // of twice the size
+    const Capture capture = open_capture(folder.path());
+    EXPECT_EQ(capture.kind, "ScanNet");
+    const Frame frame = capture.load(0);
+    expect_camera(frame, 10, 11, 3.5, 2.5);
+    expect_pose(frame);
+    ASSERT_TRUE(frame.colour_camera);
+    EXPECT_NEAR(frame.colour_camera->camera.pinhole.fx, 10, 1e-9);
+    EXPECT_TRUE(warned(capture.warnings, "scaled to 8x6"));
+}
+
+TEST_F(Made, nice_slams_copy_of_scannet_has_frames_between) {
+    depth("scene0000_00/frames/depth/0.png");
+    text("scene0000_00/frames/pose/0.txt", pose_rows);
+    text("scene0000_00/frames/intrinsic/intrinsic_depth.txt", "10 0 3.5 0\n0 11 2.5 0\n0 0 1 0\n0 0 0 1\n");
+    const Capture capture = open_capture_at_or_below(folder / "scene0000_00");
+    EXPECT_EQ(capture.kind, "ScanNet");
+    expect_pose(capture.load(0));
+    EXPECT_EQ(captures_below(folder.path()), std::vector<fs::path>()) << "one level, no more";
+}
+
+TEST_F(Made, sens_readers_cpp_exporter_writes_big_endian_pgm_and_info_with_an_underscore) {
+    std::string pixels;
+    for (int i = 0; i < 48; ++i)
+        pixels += i == 0   ? std::string(2, '\0')
+                  : i == 9 ? std::string("\x0b\xb8")
+                           : std::string("\x07\xd0"); // 3000, 2000
+    text("frame-000000.depth.pgm", "P5\n8 6\n65535\n" + pixels);
+    text("frame-000000.pose.txt", pose_rows);
+    text("_info.txt",
+         "m_depthWidth = 8\nm_depthHeight = 6\nm_depthShift = 1000\nm_calibrationDepthIntrinsic = 10 0 3.5 "
+         "0 0 11 2.5 0 0 0 1 0 0 0 0 1\n");
+    const Frame frame = open_capture(folder.path()).load(0);
+    expect_camera(frame, 10, 11, 3.5, 2.5);
+    expect_pose(frame);
+    expect_depth(frame);
+}
+
+TEST_F(Made, nerfstudio_takes_lists_of_distortion_and_orders_frames_by_their_paths) {
+    depth("b/1.png");
+    depth("a/2.png");
+    text("transforms.json", R"({"fl_x": 10, "cx": 4, "cy": 3, "w": 8, "h": 6, "applied_scale": 0.5,
+        "distortion_params": [0.1, 0.02, 0, 0, 0.003, 0.004], "frames": [
+        {"file_path": "b/1.png", "depth_file_path": "b/1.png", "transform_matrix": [[1,0,0,2],[0,1,0,0],[0,0,1,0]]},
+        {"file_path": "a/2.png", "depth_file_path": "a/2.png", "transform_matrix": [[1,0,0,1],[0,1,0,0],[0,0,1,0]]}]})");
+    const Capture capture = open_capture(folder.path());
+    ASSERT_EQ(capture.entries.size(), 2U);
+    EXPECT_EQ(capture.entries[0].name, "2") << "a/2 is before b/1";
+    const Frame frame = capture.load(0);
+    EXPECT_EQ(frame.camera.distortion.k1, 0.1);
+    EXPECT_EQ(frame.camera.distortion.p2, 0.004);
+    EXPECT_NEAR(frame.world_from_camera->translation().x(), 2, 1e-9) << "divided by applied_scale";
+    EXPECT_TRUE(warned(capture.warnings, "applied_scale of 0.5"));
+    text("transforms.json", R"({"fl_x": 10, "distortion_params": [1], "frames": [
+        {"file_path": "b/1.png", "depth_file_path": "b/1.png"}]})");
+    EXPECT_TRUE(tests::says(open_capture(folder.path()).entries[0].problem, "distortion_params"));
+}
+
+TEST_F(Made, instant_ngp_has_depth_only_with_its_scale) {
+    depth("depth/1.png");
+    const auto opened = [&](const std::string& keys) {
+        text("transforms.json",
+             "{\"fl_x\": 10, " + keys + R"("frames": [{"file_path": "images/1", "depth_path": "depth/1.png"}]})");
+        return open_capture(folder.path());
+    };
+    const Capture with = opened("\"integer_depth_scale\": 0.002, ");
+    EXPECT_EQ(with.kind, "nerfstudio / instant-ngp");
+    EXPECT_EQ(with.depth.units_per_metre, 500);
+    EXPECT_NEAR(with.load(0).depth_m(5, 7), 4, 1e-4);
+    for (const char* keys : {"", "\"integer_depth_scale\": 0.002, \"enable_depth_loading\": false, "}) {
+        const Capture without = opened(keys);
+        EXPECT_EQ(without.kind, "colour and depth folders");
+        EXPECT_TRUE(warned(without.warnings, "transforms.json")) << "told, since it was not used";
+    }
+}
+
+TEST_F(Made, nerfstudios_floats_are_millimetres_where_metres_would_be_absurd) {
+    for (const float unit : {1.0F, 1000.0F}) {
+        const cv::Mat1f image(6, 8, 2 * unit);
+        picture("1.tiff", image);
+        text("transforms.json", R"({"fl_x": 10, "frames": [{"file_path": "1.jpg", "depth_file_path": "1.tiff"}]})");
+        const Capture capture = open_capture(folder.path());
+        EXPECT_NEAR(capture.load(0).depth_m(0, 0), 2, 1e-5);
+        EXPECT_TRUE(tests::says(capture.depth.origin, unit > 1 ? "median of 2000" : "floats are metres"));
+    }
+}
+
+TEST_F(Made, stray_scanner_without_video_says_which_size_it_assumes) {
+    depth("depth/000000.png");
+    text("camera_matrix.csv", "75, 0, 29.5\n0, 75, 22\n0, 0, 1\n");
+    const Capture capture = open_capture(folder.path());
+    EXPECT_TRUE(warned(capture.warnings, "60x45 is assumed"));
+    expect_depth(capture.load(0));
+    EXPECT_TRUE(warned(capture.warnings, "no odometry.csv"));
+    expect_camera(capture.load(0), 10, 10, 3.5, 2.5);
+    fs::remove(folder / "depth/000000.png");
+    const std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (6, 8), }\n";
+    text("depth/000000.npy", "\x93NUMPY" + std::string("\1\0", 2) + static_cast<char>(header.size()) +
+                                 std::string(1, '\0') + header + floats(std::vector<float>(48, 2000)));
+    EXPECT_NEAR(open_capture(folder.path()).load(0).depth_m(5, 7), 2, 1e-5) << "older ones: floats of millimetres";
+}
+
+TEST_F(Made, polycam_says_where_depths_are_guesses_and_poses_raw) {
+    cv::Mat1w image(6, 8, ushort(2000));
+    image.rowRange(3, 6) = 6000;
+    picture("keyframes/depth/1.png", image);
+    text("keyframes/cameras/1.json", R"({"fx": 10, "fy": 11, "cx": 3.5, "cy": 2.5, "width": 8, "height": 6, "t_00": 1,
+        "t_01": 0, "t_02": 0, "t_03": 0, "t_10": 0, "t_11": 1, "t_12": 0, "t_13": 0, "t_20": 0, "t_21": 0, "t_22": 1,
+        "t_23": 0})");
+    const Capture capture = open_capture(folder.path());
+    EXPECT_TRUE(warned(capture.warnings, "no corrected_cameras/"));
+    EXPECT_TRUE(warned(capture.load(0).warnings, "50 % of the depths lie beyond 5 m"));
+    EXPECT_TRUE(warned(capture.examine(0).frame.warnings, "50 % of the depths lie beyond 5 m"));
+    image.rowRange(3, 6) = 4000;
+    picture("keyframes/depth/1.png", image);
+    EXPECT_FALSE(warned(open_capture(folder.path()).load(0).warnings, "beyond"));
+}
+
+TEST_F(Made, arkit_scenes_interpolates_between_rows_that_are_near_each_other) {
+    for (const char* name : {"42_1.004", "42_1.050", "42_1.200", "42_2.100", "42_0.900"})
+        depth(fmt::format("lowres_depth/{}.png", name));
+    text("wide_intrinsics/42_1.000.pincam", "80 60 100 110 39.5 29.5"); // of an image ten times as large
+    text("lowres_wide.traj", "1.0 0 0 0 0 0 0\n1.1 0 0 0 -1 0 0\n1.3 0 0 0 -3 0 0\n2.0 0 0 0 0 0 0\n2.5 0 0 0 0 0 0\n");
+    const Capture capture = open_capture(folder.path());
+    const auto x = [&](std::size_t i) {
+        const auto& pose = capture.entries[i].world_from_camera;
+        return pose ? std::optional(pose->translation().x()) : std::nullopt;
+    };
+    EXPECT_EQ(x(0), std::nullopt) << "before the first row";
+    EXPECT_NEAR(x(1).value_or(-1), 0, 1e-12) << "within 5 ms a row is taken as it is";
+    EXPECT_NEAR(x(2).value_or(-1), 0.5, 1e-9);
+    EXPECT_NEAR(x(3).value_or(-1), 2, 1e-9) << "rows 0.2 s apart";
+    EXPECT_EQ(x(4), std::nullopt) << "rows half a second apart";
+    expect_camera(capture.load(1), 10, 11, 3.5, 2.5);
+}
+
+TEST_F(Made, bop_scenes_of_several_sensors_are_a_capture_each) {
+    const auto scene = [&](const std::string& camera, double fx) {
+        depth("000001/depth" + camera + "/000003.png");
+        text("000001/scene_camera" + camera + ".json",
+             fmt::format(R"({{"3": {{"cam_K": [{},0,3.5,0,11,2.5,0,0,1], "depth_scale": 1}}}})", fx));
+    };
+    scene("_left", 10);
+    const Capture only = open_capture_at_or_below(folder / "000001");
+    EXPECT_EQ(only.kind, "BOP");
+    expect_camera(only.load(0), 10, 11, 3.5, 2.5);
+    EXPECT_TRUE(warned(only.warnings, "1 of 1 image have no pose"));
+    scene("_right", 12);
+    EXPECT_EQ(captures_below(folder / "000001"),
+              (std::vector<fs::path>{folder / "000001/depth_left", folder / "000001/depth_right"}));
+    expect_camera(open_capture(folder / "000001/depth_right/").load(0), 12, 11, 3.5, 2.5);
+    EXPECT_THROW((void)open_capture_at_or_below(folder / "000001"), Error);
+}
+
+TEST_F(Made, icl_nuims_files_for_povray_are_refused_by_name) {
+    text("scene_00_0000.depth", "1 2 3");
+    EXPECT_TRUE(tests::says(tests::refusal([&] { (void)open_capture(folder.path()); }), "POV-Ray"));
+}
+
+TEST_F(Made, scannetpp_keeps_frames_that_the_list_of_cameras_lacks) {
+    depth("depth/frame_000000.png");
+    depth("depth/frame_000001.png");
+    text("pose_intrinsic_imu.json", R"({"frame_000000": {"intrinsic": [[2400,0,959.5],[0,2640,719.5],[0,0,1]],
+        "aligned_pose": [[0,-1,0,1],[1,0,0,2],[0,0,1,3],[0,0,0,1]]}})");
+    const Capture capture = open_capture(folder.path());
+    expect_camera(capture.load(0), 10, 11, 3.5, 2.5);
+    const Frame second = capture.load(1);
+    expect_camera(second, 10, 11, 3.5, 2.5);
+    EXPECT_FALSE(second.world_from_camera);
+    EXPECT_TRUE(warned(second.warnings, "\"frame_000001\" is missing"));
+}
+
+TEST_F(Made, colmaps_models_are_no_clouds) {
+    for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"})
+        text(name, std::string(32, '\0'));
+    EXPECT_THROW((void)open_capture(folder.path()), NoFrames);
+}
+
 // ------------------------------------------------------------------------------------------------- samples
 
 class Samples : public testing::TestWithParam<const char*> {};
@@ -515,6 +763,48 @@ TEST_P(Samples, are_read_as_their_truth_says) {
     if (const Json& sure = truth["confidence"]; sure.is_object()) {
         EXPECT_EQ(cv::countNonZero(capture.load(0).depth_m == 0),
                   frames[0]["holes_without_lowest_confidence"].get<int>());
+    }
+}
+
+std::optional<Json> truth_of(const std::string& layout) {
+    const char* const folder = std::getenv("SCANSHADE_RECORDINGS");
+    if (!folder || !fs::exists(fs::path(folder) / (layout + ".truth.json")))
+        return std::nullopt;
+    std::ifstream stream(fs::path(folder) / (layout + ".truth.json"));
+    return Json::parse(stream);
+}
+
+TEST(SampleFolders, sun_rgbd_is_a_capture_for_each_image) {
+    const std::optional<Json> truth = truth_of("sunrgbd");
+    if (!truth)
+        GTEST_SKIP() << "no sample of sunrgbd in SCANSHADE_RECORDINGS";
+    const fs::path folder = std::getenv("SCANSHADE_RECORDINGS");
+    EXPECT_EQ(captures_below(folder / (*truth)["open"].get<std::string>()).size(), (*truth)["frames"].size());
+    for (const Json& each : (*truth)["frames"]) {
+        const Capture capture = open_capture(folder / each["open"].get<std::string>());
+        EXPECT_EQ(capture.kind, "SUN RGB-D");
+        ASSERT_EQ(capture.entries.size(), 1U);
+        const Frame frame = capture.load(0);
+        expect_camera(frame, each, (*truth)["tolerance"]["k_px"]);
+        expect_depth(frame, each, false, (*truth)["tolerance"]["depth_m"]);
+        EXPECT_EQ(frame.registration, Registration::yes);
+        EXPECT_FALSE(frame.colour.empty());
+    }
+}
+
+TEST(SampleFolders, a_generic_folder_names_what_it_did_not_use) {
+    const std::optional<Json> truth = truth_of("generic-unused");
+    if (!truth)
+        GTEST_SKIP() << "no sample of generic-unused in SCANSHADE_RECORDINGS";
+    const Capture capture =
+        open_capture(fs::path(std::getenv("SCANSHADE_RECORDINGS")) / (*truth)["open"].get<std::string>());
+    EXPECT_TRUE(warned(capture.warnings, "not used, though their names speak of poses or cameras: calibration.npz, "
+                                         "camera_poses.csv, pose."));
+    ASSERT_EQ(capture.entries.size(), (*truth)["frames"].size());
+    for (std::size_t i = 0; i < capture.entries.size(); ++i) {
+        const Frame frame = capture.load(i);
+        expect_depth(frame, (*truth)["frames"][i], false, (*truth)["tolerance"]["depth_m"]);
+        EXPECT_FALSE(frame.world_from_camera);
     }
 }
 
