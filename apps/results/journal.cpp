@@ -3,6 +3,7 @@
 
 #include "apps/json.h"
 #include "io/content_hash.h"
+#include "io/files.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 
@@ -365,8 +366,7 @@ void Journal::clear() {
 
 bool Journal::files_are_there(const Record& record) const {
     for (std::size_t i = 0; i < record.row.files.size(); ++i) {
-        std::error_code missing;
-        if (fs::file_size(folder_ / record.row.files[i], missing) != record.sizes.at(i) || missing)
+        if (size_of_file(folder_ / record.row.files[i]) != record.sizes.at(i))
             return false;
     }
     return true;
@@ -414,7 +414,7 @@ std::int64_t Journal::append(const std::string& line, Sync sync) {
 void Journal::set_capture(const Capture& capture) { capture_ = path_of(capture); }
 
 void Journal::add(const FrameRow& row, const CaptureEntry& entry, const std::string& settings,
-                  const std::string& device) {
+                  const std::string& device, const std::vector<std::uintmax_t>* sizes) {
     if (row.status == FrameStatus::skipped)
         return;
     if (!std::exchange(introduced_, true)) {
@@ -424,8 +424,11 @@ void Journal::add(const FrameRow& row, const CaptureEntry& entry, const std::str
         append(json_line(json{{"process", process}}));
     }
     Record record{row, settings, stamps_of(entry), hashes_of(entry), {}};
-    for (const fs::path& file : row.files)
-        record.sizes.push_back(fs::file_size(folder_ / file));
+    if (sizes)
+        record.sizes = *sizes;
+    else
+        for (const fs::path& file : row.files)
+            record.sizes.push_back(fs::file_size(folder_ / file));
     const json line{{"frame", row_json(row)},
                     {"settings", record.settings},
                     {"stamp", record.stamp},

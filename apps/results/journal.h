@@ -84,7 +84,9 @@ class Journal {
     /// Writes one line. When this returns the kernel has it, so it outlives the process. The disk has it a second
     /// later; a frame whose line is lost in a power cut is done again. Skipped frames are not recorded. Throws Outage
     /// if the line cannot be written.
-    void add(const FrameRow& row, const CaptureEntry& entry, const std::string& settings, const std::string& device);
+    /// `sizes`: bytes of row.files, where these are not in the folder yet.
+    void add(const FrameRow& row, const CaptureEntry& entry, const std::string& settings, const std::string& device,
+             const std::vector<std::uintmax_t>* sizes = nullptr);
     /// Drops the records of frames that are about to be computed again: their files will change.
     void forget(const Capture& capture, const std::vector<std::size_t>& frames);
     /// Records that a frame is tried alone, because it or another one killed an earlier process.

@@ -32,7 +32,7 @@ Outputs of_points(const Outputs& outputs) {
 
 std::vector<fs::path> files_of(const CaptureEntry& entry, const Outputs& outputs) {
     std::vector<fs::path> files;
-    const auto add = [&](const fs::path& file) { files.push_back(outputs.folder / file); };
+    const auto add = [&](const fs::path& file) { files.push_back(outputs.files_folder() / file); };
     if (outputs.ao)
         add(ao_file(entry.name, outputs));
     if (outputs.confidence)

@@ -18,6 +18,8 @@ enum class CloudColours { kept, shaded, grey };
 
 /// The folders that Outputs fill.
 inline constexpr std::array result_folders = {"ao", "confidence", "shaded", "panel", "clouds", "previews", "points"};
+/// That of tars of results (result_tars.h).
+inline constexpr const char* tar_folder = "tars";
 
 /// The files written for each frame, under `folder`: ao/NAME.png, confidence/NAME.png, shaded/NAME.png, panel/NAME.png,
 /// clouds/NAME.pcd or .ply; for the page previews/NAME.js, or points/NAME.000.js and on of a cloud computed from its
@@ -39,6 +41,11 @@ struct Outputs {
     CloudColours colour_cloud = CloudColours::kept;
     bool preview = false;              ///< what the page shows of the frame beside the other files
     std::size_t page_points = 1000000; ///< of a cloud, at most, on the page
+    std::size_t frames_in_tar = 0;     ///< 0 = single files; else they go into tars of so many frames
+    std::filesystem::path waiting;     ///< where files for a tar wait until it takes them; empty = none do
+
+    /// Where the walk writes a frame's files.
+    [[nodiscard]] const std::filesystem::path& files_folder() const { return waiting.empty() ? folder : waiting; }
 };
 
 /// A frame's files, relative to the folder. `kind` is "shaded" or "panel"; a cloud's points for the page have parts.

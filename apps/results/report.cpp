@@ -87,7 +87,7 @@ json pose_json(const Eigen::Isometry3d& pose, int digits) {
     return numbers;
 }
 
-json frame_json(const FrameRow& row, bool with_camera, const CaptureEntry& entry, const LengthUnit& unit) {
+json result_json(const FrameRow& row, bool with_camera, const CaptureEntry& entry, const LengthUnit& unit) {
     json text{{"index", row.index}, {"name", row.name}, {"status", name_of(row.status)}};
     if (!row.why.empty())
         text["why"] = row.why;
@@ -104,9 +104,14 @@ json frame_json(const FrameRow& row, bool with_camera, const CaptureEntry& entry
     text["valid_share"] = known(row.valid_share);
     text["coverage"] = known(row.coverage);
     text["mean_visibility"] = known(row.mean_visibility);
+    text["warnings"] = row.warnings;
+    return text;
+}
+
+json frame_json(const FrameRow& row, bool with_camera, const CaptureEntry& entry, const LengthUnit& unit) {
+    json text = result_json(row, with_camera, entry, unit);
     text["ms"] = stage_json(row.ms);
     text["passes"] = passes_json(row.passes);
-    text["warnings"] = row.warnings;
     if (!row.notes.empty())
         text["notes"] = row.notes;
     text["files"] = json::array();
@@ -151,10 +156,12 @@ constexpr const char* whole_recording = "run.mcap"; ///< of a capture, not of a 
 std::vector<std::string> files_of_others(const std::filesystem::path& folder,
                                          const std::unordered_set<std::string>& own) {
     std::vector<std::string> others;
-    for (const char* part : result_folders) {
+    std::vector<std::string> parts(result_folders.begin(), result_folders.end());
+    parts.emplace_back(tar_folder);
+    for (const std::string& part : parts) {
         std::error_code none_there;
         for (const auto& entry : std::filesystem::directory_iterator(folder / part, none_there)) {
-            const std::string name = entry.path().filename().string(), whole = std::string(part) + "/" + name;
+            const std::string name = entry.path().filename().string(), whole = part + "/" + name;
             if (!name.starts_with('.') && !own.contains(whole))
                 others.push_back(whole);
         }
@@ -293,6 +300,13 @@ page::Row page_row(const FrameRow& row, const CaptureEntry& entry, const LengthU
     return shown;
 }
 
+json sample_json(const FrameRow& row, const CaptureEntry& entry, const LengthUnit& unit) {
+    json text = result_json(row, true, entry, unit);
+    if (entry.stamp_s)
+        text["stamp_s"] = *entry.stamp_s;
+    return text;
+}
+
 std::vector<std::string> write_manifest(const std::filesystem::path& file, const RunReport& report,
                                         const std::function<FrameRow(const FrameRow&)>& whole) {
     std::vector<std::string> left_alone;
@@ -307,7 +321,8 @@ std::vector<std::string> write_manifest(const std::filesystem::path& file, const
         for (const FrameRow& row : report.frames) {
             const FrameRow all_of_row = whole(row);
             for (const auto& each : all_of_row.files)
-                own.insert(each.generic_string());
+                own.insert(each.begin()->string() == tar_folder ? each.parent_path().generic_string()
+                                                                : each.generic_string());
             stream << std::exchange(between, ",") << "\n    "
                    << indented(text_of(frame_json(all_of_row, !report.capture.camera || report.capture.unit.arbitrary(),
                                                   report.capture.entries.at(row.index), report.capture.unit)),

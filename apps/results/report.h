@@ -70,6 +70,9 @@ void write_frames_csv(const std::filesystem::path& file, const std::vector<Frame
 /// A frame as its page lists it.
 [[nodiscard]] page::Row page_row(const FrameRow& row, const CaptureEntry& entry, const LengthUnit& unit = {});
 
+/// A frame's row with camera, pose and time, but without what differs from run to run: times and files.
+[[nodiscard]] json sample_json(const FrameRow& row, const CaptureEntry& entry, const LengthUnit& unit);
+
 /// Written last, so that its presence means that the run has ended. `whole` restores what shorten() removed from a row.
 /// Atomic. Returns the files in the folders of results that are not of this run; the manifest lists them as such.
 std::vector<std::string> write_manifest(const std::filesystem::path& file, const RunReport& report,

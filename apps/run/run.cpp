@@ -400,18 +400,27 @@ class Run final : public Command {
         std::optional<McapRecording> mcap;
         if (job.batch.outputs.mcap)
             job.batch.recording = &mcap.emplace(mcap_file(job.folder(), job.block), job.capture, asked_.resume);
+        std::optional<ResultTars> tars;
+        if (job.batch.outputs.frames_in_tar > 0) {
+            Outputs& outputs = job.batch.outputs;
+            outputs.waiting = job.folder() / tar_folder / (job.block.empty() ? ".frames" : ".frames-" + job.block);
+            tars.emplace(job.capture, outputs, job.batch.frames, job.block);
+        }
         const Recording recording{.journal = journal,
                                   .settings = ready.settings,
                                   .task = task,
                                   .device = ready.report.device.name,
                                   .retry = asked_.retry,
                                   .carefully = worker.carefully,
-                                  .finished = worker.finished};
+                                  .finished = worker.finished,
+                                  .tars = tars ? &*tars : nullptr};
         walk(job, ready.report, recording);
         if (mcap) {
             finish_mcap(*mcap, job.capture);
             ready.report.recording = mcap->path().filename().string();
         }
+        if (tars)
+            tars->clean_up();
         const bool recorded = cloud && !interrupted && write_recording(*cloud, job);
         report_on(job, ready.report, journal, files, recorded);
         return std::move(ready.report.frames);
@@ -539,9 +548,7 @@ class Run final : public Command {
     }
 
     /// A capture's blocks are joined by `merge`, which writes their page.
-    [[nodiscard]] static bool writes_page(const CaptureJob& job) {
-        return job.batch.outputs.preview && job.block.empty();
-    }
+    [[nodiscard]] bool writes_page(const CaptureJob& job) const { return asked_.page && job.block.empty(); }
 
     /// `recorded`: a cloud of all frames is there for the page.
     void report_on(const CaptureJob& job, RunReport& report, const Journal& journal, const ReportFiles& files,
@@ -553,6 +560,9 @@ class Run final : public Command {
             for (const std::string& sentence : report.outlook)
                 if (!std::ranges::count(outlook_, sentence))
                     outlook_.push_back(sentence);
+            if (job.batch.outputs.frames_in_tar > 0)
+                report.outlook.push_back(
+                    fmt::format("The results are in {}/: the page has numbers, no images.", tar_folder));
             report.peak_mib = peak_memory_mib();
             write_frames_csv(files.table, report.frames);
             page::RunPage page;

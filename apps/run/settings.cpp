@@ -64,7 +64,8 @@ Outputs outputs_from(const RunSettings& asked) {
     wanted.shade_strength = asked.shade_strength;
     wanted.colour_cloud = asked.colour_cloud;
     wanted.colour_view = asked.colour_view;
-    wanted.preview = asked.page;
+    wanted.frames_in_tar = static_cast<std::size_t>(asked.frames_in_tar);
+    wanted.preview = asked.page && asked.frames_in_tar == 0;
     wanted.page_points = static_cast<std::size_t>(asked.page_points);
     if (asked.write != "auto") {
         const std::set<std::string> words = words_of(asked.write);
@@ -76,6 +77,8 @@ Outputs outputs_from(const RunSettings& asked) {
         wanted.mcap = words.contains("mcap");
         wanted.cloud = wanted.depth_cloud = words.contains("cloud");
     }
+    if (wanted.mcap && wanted.frames_in_tar > 0)
+        throw Misuse("tar: --write mcap puts all frames into one file, which no tar can hold in parts; leave one out");
     return wanted;
 }
 
@@ -317,6 +320,13 @@ std::vector<Stage> RunSettings::common_stages() {
            .value = &s.page_points,
            .low = 1000,
            .high = 20e6},
+          {.name = "tar",
+           .help = "results of so many frames go into one tar, tars/000000.tar and on, as WebDataset reads them; 0 = "
+                   "single files",
+           .value = &s.frames_in_tar,
+           .low = 0,
+           .high = 1e6,
+           .common = true},
           {.name = "overwrite",
            .help = "replaces the results of an earlier run",
            .value = &s.overwrite,

@@ -52,6 +52,7 @@ class RunSettings {
     CloudColours colour_cloud = CloudColours::kept;
     bool page = true;
     int page_points = 1000000;
+    int frames_in_tar = 0;
     bool overwrite = false, resume = false, retry = false;
     std::string shard;
     bool quiet = false, log_json = false;

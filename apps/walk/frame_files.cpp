@@ -109,7 +109,7 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
     const std::string& name = work.entry.name;
     const Scene& scene = images.scene;
     const auto wrote = [&](const std::filesystem::path& file, const auto& write) {
-        write(outputs.folder / file);
+        write(outputs.files_folder() / file);
         work.row.files.push_back(file);
     };
     const auto write_map = [](const std::filesystem::path& file, const cv::Mat& integers, const cv::Mat1f& values,
@@ -158,7 +158,7 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
 std::filesystem::path write_cloud_picture(const Work& work, const Outputs& outputs) {
     const std::filesystem::path file = picture_file(outputs.shaded ? "shaded" : "panel", work.entry.name);
     const std::optional<Eigen::Vector3d> viewpoint = scanner_of(work.frame);
-    write_picture(outputs.folder / file,
+    write_picture(outputs.files_folder() / file,
                   cloud_picture(*work.frame.cloud, work.of_points, viewpoint, outputs.shade_strength));
     return file;
 }
@@ -172,7 +172,7 @@ std::vector<std::filesystem::path> write_page_points(const Work& work, const Out
                               .confidence = work.confidence.per_point,
                               .normals = work.of_points.normals,
                               .up = up_of(cloud, work.of_points, viewpoint)};
-    return page::write_points(outputs.folder, std::filesystem::path("points") / work.entry.name, points,
+    return page::write_points(outputs.files_folder(), std::filesystem::path("points") / work.entry.name, points,
                               outputs.page_points);
 }
 
@@ -182,7 +182,7 @@ void remove_files(Work& work, const Outputs& outputs) {
     for (const auto& file : files_of(work.entry, outputs))
         std::filesystem::remove(file, gone_already);
     for (std::size_t part = 0; outputs.preview && part * page::points_in_a_chunk < outputs.page_points; ++part)
-        std::filesystem::remove(outputs.folder / points_file(work.entry.name, part), gone_already);
+        std::filesystem::remove(outputs.files_folder() / points_file(work.entry.name, part), gone_already);
 }
 
 void write_intermediates(const std::filesystem::path& folder, const std::vector<Intermediate>& all) {

@@ -34,7 +34,7 @@ constexpr std::array aside = {"frames",         "camera",
                               "poses",          "in-flight",
                               "preset",         "quiet",
                               "colour",         "page",
-                              "page-points"};
+                              "page-points",    "tar"};
 
 /// Settings that change no results when they are typed differently.
 constexpr std::array elsewhere = {"out", "overwrite", "dump",      "resume", "retry", "shard",
@@ -67,6 +67,8 @@ std::string outputs_text(const Outputs& outputs) {
     if (outputs.mcap) // whatever it holds follows from these
         text += fmt::format("mcap {} {} {} {};", static_cast<int>(outputs.format), colours, outputs.shade_strength,
                             outputs.colour_view);
+    if (outputs.frames_in_tar > 0)
+        text += fmt::format("tars of {};", outputs.frames_in_tar);
     if (outputs.preview)
         text += fmt::format("page {};", outputs.page_points);
     return text;
@@ -214,11 +216,22 @@ std::vector<FrameRow> run_recorded(const Capture& capture, MethodPool& pool, con
             left.frames.push_back(index);
         }
     }
+    if (recording.tars) {
+        left.frames = recording.tars->with_neighbours(left.frames);
+        for (const std::size_t index : left.frames)
+            rows.erase(index);
+    }
     journal.forget(capture, left.frames);
     if (options.recording)
         options.recording->begin(options.frames, std::move(kept));
     const auto record = [&](const FrameRow& row) {
-        journal.add(row, capture.entries[row.index], settings_of(row.index), recording.device);
+        if (recording.tars) {
+            FrameRow moved = row;
+            const std::vector<std::uintmax_t> sizes = recording.tars->add(moved);
+            journal.add(moved, capture.entries[row.index], settings_of(row.index), recording.device, &sizes);
+        } else {
+            journal.add(row, capture.entries[row.index], settings_of(row.index), recording.device);
+        }
         if (recording.finished && row.status != FrameStatus::skipped && row.fault != Fault::outage)
             ++*recording.finished;
         if (on_frame)
@@ -227,6 +240,13 @@ std::vector<FrameRow> run_recorded(const Capture& capture, MethodPool& pool, con
     for (FrameRow& row : recording.carefully ? run_one_by_one(capture, pool, left, journal, record)
                                              : run_batch(capture, pool, left, record))
         rows.insert_or_assign(row.index, std::move(row));
+    if (recording.tars)
+        for (const std::size_t index : left.frames)
+            if (const auto row = rows.find(index);
+                row != rows.end() && row->second.fault != Fault::outage && !recording.tars->has(index)) {
+                row->second = skipped_row(capture, index);
+                row->second.why = "the other frames of its tar are not done; --resume computes all of them";
+            }
     std::vector<FrameRow> all;
     all.reserve(options.frames.size());
     bool finished = true;

@@ -3,6 +3,7 @@
 
 #include "apps/results/journal.h"
 #include "apps/results/report.h"
+#include "apps/results/result_tars.h"
 #include "apps/walk/batch.h"
 
 #include <functional>
@@ -37,6 +38,7 @@ struct Recording {
     bool carefully = false;
     /// Goes up by one for each settled frame, computed or failed, but not for an outage.
     std::atomic<std::uint64_t>* finished = nullptr;
+    ResultTars* tars = nullptr; ///< takes the frames' files; null = they stay
 };
 
 /// Calls run_batch() for the frames that the journal does not have. Rows of all frames come back shortened, in the

@@ -5,6 +5,7 @@
 #include "io/clouds/cloud_file.h"
 #include "io/images/image_file.h"
 #include "tests/fuzz/fuzz.h"
+#include "tests/support/tar.h"
 
 #include <array>
 #include <cstdlib>
@@ -314,6 +315,17 @@ void groups() {
     seed("groups", "group", group);
 }
 
+void tars() {
+    using namespace tests;
+    seed("tar", "plain", tar_member("camera.json", "{}") + tar_member("a.depth.png", "x") + tar_end());
+    seed("tar", "long",
+         tar_member("L", "long/name", 'L') + tar_member("l", "x") + tar_pax({{"path", "pax/name"}, {"size", "1"}}) +
+             tar_member("p", "y") + tar_end());
+    seed("tar", "links",
+         tar_member("a/real", "x") + tar_header("soft", 0, '2', "a/real") + tar_header("hard", 0, '1', "a/real") +
+             tar_header("d/", 0, '5') + tar_header("huge", std::uint64_t(1) << 60));
+}
+
 } // namespace
 
 int main(int count, char** words) {
@@ -329,5 +341,6 @@ int main(int count, char** words) {
     colmap();
     hdf5();
     groups();
+    tars();
     return 0;
 }

@@ -27,7 +27,8 @@ void walk(const std::filesystem::path& folder, std::size_t whole, int levels) {
 } // namespace
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-    const auto file = as_file(text_of(data, size), "input.tar");
+    static int count = 0; // an index is kept for a file that looks unchanged
+    const auto file = as_file(text_of(data, size), "input" + std::to_string(count++) + ".tar");
     (void)accepted([&] {
         if (is_folder(file))
             walk(file, size, 6);
@@ -37,5 +38,6 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
         for (std::size_t i = 0; i < std::min<std::size_t>(capture.entries.size(), 2); ++i)
             (void)accepted([&] { (void)capture.load(i); });
     });
+    std::filesystem::remove(file);
     return 0;
 }
