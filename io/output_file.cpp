@@ -12,9 +12,12 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <shared_mutex>
 #include <system_error>
 #include <unistd.h>
+#include <vector>
 
 namespace scanshade {
 
@@ -42,6 +45,22 @@ void sync(const fs::path& path, int flags) {
     // EINVAL: a file system without fsync, which offers nothing better.
     if (failed != 0 && failed != EINVAL)
         throw std::system_error(failed, std::generic_category(), "cannot be synced");
+}
+
+/// The folders that UnsyncedFolder names.
+struct Unsynced {
+    std::shared_mutex mutex;
+    std::vector<std::string> folders; ///< with a slash at the end
+};
+Unsynced& unsynced() {
+    static Unsynced all;
+    return all;
+}
+
+bool is_synced(const fs::path& file) {
+    std::shared_lock reading(unsynced().mutex);
+    return std::ranges::none_of(unsynced().folders,
+                                [&](const std::string& folder) { return file.native().starts_with(folder); });
 }
 
 void write_bytes(const fs::path& file, std::string_view bytes) {
@@ -130,9 +149,12 @@ void write_atomically(const fs::path& target, const std::function<void(const fs:
             try {
                 fs::create_directories(folder);
                 write(temporary);
-                sync(temporary, O_RDONLY);
+                const bool synced = is_synced(target);
+                if (synced)
+                    sync(temporary, O_RDONLY);
                 fs::rename(temporary, target);
-                sync(folder, O_RDONLY | O_DIRECTORY);
+                if (synced)
+                    sync(folder, O_RDONLY | O_DIRECTORY);
             } catch (const std::system_error& failure) { // the file system's answer; streams throw it, too
                 throw Outage(std::string("not written: ") + failure.what());
             }
@@ -145,6 +167,17 @@ void write_atomically(const fs::path& target, const std::function<void(const fs:
 
 void write_atomically(const fs::path& target, std::string_view bytes) {
     write_atomically(target, [&](const fs::path& temporary) { write_bytes(temporary, bytes); });
+}
+
+UnsyncedFolder::UnsyncedFolder(fs::path folder) : folder_(std::move(folder)) {
+    const std::unique_lock writing(unsynced().mutex);
+    unsynced().folders.push_back((folder_ / "").string());
+}
+
+UnsyncedFolder::~UnsyncedFolder() {
+    const std::unique_lock writing(unsynced().mutex);
+    auto& folders = unsynced().folders;
+    folders.erase(std::ranges::find(folders, (folder_ / "").string()));
 }
 
 void require_folder(const fs::path& folder) { require_folder(folder, folder); }
