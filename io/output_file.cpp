@@ -12,9 +12,12 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <shared_mutex>
 #include <system_error>
 #include <unistd.h>
+#include <vector>
 
 namespace scanshade {
 
@@ -44,12 +47,31 @@ void sync(const fs::path& path, int flags) {
         throw std::system_error(failed, std::generic_category(), "cannot be synced");
 }
 
+/// The folders that UnsyncedFolder names.
+struct Unsynced {
+    std::shared_mutex mutex;
+    std::vector<std::string> folders; ///< with a slash at the end
+};
+Unsynced& unsynced() {
+    static Unsynced all;
+    return all;
+}
+
+bool is_synced(const fs::path& file) {
+    std::shared_lock reading(unsynced().mutex);
+    return std::ranges::none_of(unsynced().folders,
+                                [&](const std::string& folder) { return file.native().starts_with(folder); });
+}
+
 fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
 
 void sync_and_rename(const fs::path& temporary, const fs::path& target) {
-    sync(temporary, O_RDONLY);
+    const bool synced = is_synced(target);
+    if (synced)
+        sync(temporary, O_RDONLY);
     fs::rename(temporary, target);
-    sync(folder_of(target), O_RDONLY | O_DIRECTORY);
+    if (synced)
+        sync(folder_of(target), O_RDONLY | O_DIRECTORY);
 }
 
 void write_bytes(const fs::path& file, std::string_view bytes) {
@@ -160,6 +182,17 @@ void write_atomically(const fs::path& target, const std::function<void(const fs:
 
 void write_atomically(const fs::path& target, std::string_view bytes) {
     write_atomically(target, [&](const fs::path& temporary) { write_bytes(temporary, bytes); });
+}
+
+UnsyncedFolder::UnsyncedFolder(fs::path folder) : folder_(std::move(folder)) {
+    const std::unique_lock writing(unsynced().mutex);
+    unsynced().folders.push_back((folder_ / "").string());
+}
+
+UnsyncedFolder::~UnsyncedFolder() {
+    const std::unique_lock writing(unsynced().mutex);
+    auto& folders = unsynced().folders;
+    folders.erase(std::ranges::find(folders, (folder_ / "").string()));
 }
 
 void require_folder(const fs::path& folder) { require_folder(folder, folder); }

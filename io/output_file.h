@@ -20,6 +20,19 @@ void write_atomically(const std::filesystem::path& target, std::string_view byte
 /// the same folder.
 void publish(const std::filesystem::path& temporary, const std::filesystem::path& target);
 
+/// While this lives, write_atomically() does not sync files below its folder: the same process passes them on, and
+/// after a power cut nobody looks for them.
+class UnsyncedFolder {
+  public:
+    explicit UnsyncedFolder(std::filesystem::path folder);
+    ~UnsyncedFolder();
+    UnsyncedFolder(const UnsyncedFolder&) = delete;
+    UnsyncedFolder& operator=(const UnsyncedFolder&) = delete;
+
+  private:
+    std::filesystem::path folder_;
+};
+
 /// Throws Misuse, with the system's reason, where no file can be made in `folder`, or in the nearest folder above it
 /// that exists. Throws Outage for a full disk and other trouble that passes. Leaves nothing behind.
 void require_folder(const std::filesystem::path& folder);

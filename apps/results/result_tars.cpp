@@ -41,7 +41,7 @@ std::string part_of(const fs::path& file, const std::string& name) {
 ResultTars::ResultTars(const Capture& capture, const Outputs& outputs, const std::vector<std::size_t>& frames,
                        const std::string& block)
     : capture_(capture), outputs_(outputs), frames_(frames), block_(block), in_each_(outputs.frames_in_tar),
-      keys_(keys_for(capture.entries)), whole_(frames.size() / in_each_ + 1) {
+      keys_(keys_for(capture.entries)), waiting_(outputs.files_folder()), whole_(frames.size() / in_each_ + 1) {
     for (std::size_t i = 0; i < frames.size(); ++i)
         position_.emplace(frames[i], i);
     std::error_code trouble;

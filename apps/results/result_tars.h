@@ -3,6 +3,7 @@
 
 #include "apps/results/frame_row.h"
 #include "apps/results/outputs.h"
+#include "io/output_file.h"
 #include "io/tar_output.h"
 
 #include <cstdint>
@@ -49,6 +50,7 @@ class ResultTars {
     std::size_t in_each_;
     std::vector<std::string> keys_;
     std::unordered_map<std::size_t, std::size_t> position_; ///< of a frame in the task
+    UnsyncedFolder waiting_;                                ///< files there are moved into a tar, which is synced
     std::unique_ptr<TarOutput> open_;
     std::size_t next_ = 0; ///< the position that the open tar needs
     std::vector<bool> whole_;

@@ -123,7 +123,8 @@ void find_in(const fs::path& folder, const std::string& name, const CaptureOptio
     for (const fs::path& each : content.hidden)
         found(passed_over(each, "hidden, as its name begins with '.'"));
     for (const fs::path& each : content.folders)
-        find_in(each, (fs::path(name) / each.filename()).string(), options, walked, found);
+        find_in(each, (fs::path(name) / (is_tar(each) ? each.stem() : each.filename())).string(), options, walked,
+                found);
 }
 
 std::string own_name(const fs::path& path) {
