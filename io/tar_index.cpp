@@ -15,7 +15,7 @@ namespace scanshade {
 namespace {
 
 constexpr std::uint64_t block_bytes = 512;
-constexpr std::size_t longest_name = 4096;
+constexpr std::size_t longest_member_name = 4096;
 constexpr std::uint64_t longest_extension = 1 << 20; // of a pax header or a long name
 constexpr std::size_t most_members = 1 << 24;
 
@@ -101,7 +101,7 @@ std::optional<std::string> clean_name(std::string_view name) {
             clean += '/';
         clean += part;
     }
-    if (clean.size() > longest_name)
+    if (clean.size() > longest_member_name)
         return std::nullopt;
     return clean;
 }
@@ -318,7 +318,7 @@ class TarIndex::Reader {
         else if (!link.starts_with('/'))
             target = (std::filesystem::path(name).parent_path() / link).lexically_normal().string();
         if (!target || target->empty() || *target == ".." || target->starts_with("../") ||
-            target->size() > longest_name) {
+            target->size() > longest_member_name) {
             links_out_.add(name);
             return;
         }

@@ -13,20 +13,20 @@ namespace scanshade {
 
 namespace {
 
-constexpr std::size_t block_bytes = 512, record_bytes = 20 * block_bytes;
+constexpr std::size_t tar_block = 512, record_bytes = 20 * tar_block;
 
-[[noreturn]] void fail(const std::filesystem::path& file, const char* what) {
+[[noreturn]] void fail_to_write(const std::filesystem::path& file, const char* what) {
     throw Outage(fmt::format("{}: {}: {}", file.string(), what, std::generic_category().message(errno)));
 }
 
-void sync(const std::filesystem::path& file, int handle) {
+void sync_tar(const std::filesystem::path& file, int handle) {
     if (::fsync(handle) != 0 && errno != EINVAL) // EINVAL: a file system without fsync
-        fail(file, "cannot be synced");
+        fail_to_write(file, "cannot be synced");
 }
 
 /// A header of POSIX.1-2001. Fields end with a NUL.
 std::string header_of(std::string_view name, std::uint64_t size, char kind) {
-    std::string header(block_bytes, '\0');
+    std::string header(tar_block, '\0');
     const auto put = [&](std::size_t at, std::string_view text) { header.replace(at, text.size(), text); };
     put(0, name.substr(0, 100));
     put(100, "0000644");
@@ -66,7 +66,7 @@ std::string padding_for(std::uint64_t bytes, std::size_t unit) {
 TarOutput::TarOutput(std::filesystem::path file)
     : file_(std::move(file)), handle_(::open(file_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)) {
     if (handle_ < 0)
-        fail(file_, "cannot be created");
+        fail_to_write(file_, "cannot be created");
 }
 
 TarOutput::~TarOutput() {
@@ -81,7 +81,7 @@ void TarOutput::write(std::string_view bytes) {
         if (took < 0 && errno == EINTR)
             continue;
         if (took < 0)
-            fail(file_, "cannot be written");
+            fail_to_write(file_, "cannot be written");
         bytes.remove_prefix(static_cast<std::size_t>(took));
     }
 }
@@ -93,28 +93,28 @@ void TarOutput::add(std::string_view name, std::string_view bytes) {
     if (name.size() > longest || bytes.size() > largest) {
         const std::string records =
             pax_record("path", name) + (bytes.size() > largest ? pax_record("size", std::to_string(bytes.size())) : "");
-        head = header_of("PaxHeader", records.size(), 'x') + records + padding_for(records.size(), block_bytes);
+        head = header_of("PaxHeader", records.size(), 'x') + records + padding_for(records.size(), tar_block);
     }
     head += header_of(name, std::min<std::uint64_t>(bytes.size(), largest), '0');
     write(head);
     write(bytes);
-    write(padding_for(bytes.size(), block_bytes));
+    write(padding_for(bytes.size(), tar_block));
 }
 
 void TarOutput::finish(const std::filesystem::path& target) {
-    write(std::string(2 * block_bytes, '\0'));
+    write(std::string(2 * tar_block, '\0'));
     write(padding_for(written_, record_bytes));
-    sync(file_, handle_);
+    sync_tar(file_, handle_);
     if (::rename(file_.c_str(), target.c_str()) != 0)
-        fail(target, "cannot be written");
+        fail_to_write(target, "cannot be written");
     const int folder = ::open(target.parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (folder < 0)
-        fail(target.parent_path(), "cannot be opened");
+        fail_to_write(target.parent_path(), "cannot be opened");
     const int failed = ::fsync(folder) == 0 || errno == EINVAL ? 0 : errno;
     ::close(folder);
     errno = failed;
     if (failed != 0)
-        fail(target, "cannot be synced");
+        fail_to_write(target, "cannot be synced");
 }
 
 } // namespace scanshade

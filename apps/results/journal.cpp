@@ -378,7 +378,8 @@ std::optional<FrameRow> Journal::done(const CaptureEntry& entry, const std::opti
     if (!record)
         return std::nullopt;
     const bool again = record->row.fault == Fault::outage || (retry && record->row.status == FrameStatus::failed);
-    if (again || record->settings != settings.value_or(record->settings) || !files_are_there(*record))
+    const bool there = record->row.fault == Fault::crash || files_are_there(*record); // a crash leaves at most its row
+    if (again || record->settings != settings.value_or(record->settings) || !there)
         return std::nullopt;
     if (record->stamp != stamps_of(entry) && record->input != hashes_of(entry))
         return std::nullopt;

@@ -120,13 +120,14 @@ FrameRow crash_row(const Capture& capture, std::size_t index) {
     return row;
 }
 
-/// Runs each frame by itself, so that a crash names its frame.
+/// Runs each frame by itself, so that a crash names its frame. `killers` are known already and not tried.
 std::vector<FrameRow> run_one_by_one(const Capture& capture, MethodPool& pool, BatchOptions options, Journal& journal,
+                                     const std::set<std::size_t>& killers,
                                      const std::function<void(const FrameRow&)>& on_frame) {
     const std::string killer = journal.facts().begun;
     std::vector<FrameRow> rows;
     for (const std::size_t index : std::exchange(options.frames, {})) {
-        if (capture.entries[index].name == killer) {
+        if (capture.entries[index].name == killer || killers.contains(index)) {
             rows.push_back(crash_row(capture, index));
             for (const auto& file : files_of(capture.entries[index], options.outputs)) {
                 std::error_code gone_already;
@@ -216,10 +217,12 @@ std::vector<FrameRow> run_recorded(const Capture& capture, MethodPool& pool, con
             left.frames.push_back(index);
         }
     }
+    std::set<std::size_t> killers; // that share a tar with a frame that is left
     if (recording.tars) {
         left.frames = recording.tars->with_neighbours(left.frames);
         for (const std::size_t index : left.frames)
-            rows.erase(index);
+            if (const auto row = rows.extract(index); !row.empty() && row.mapped().fault == Fault::crash)
+                killers.insert(index);
     }
     journal.forget(capture, left.frames);
     if (options.recording)
@@ -237,8 +240,9 @@ std::vector<FrameRow> run_recorded(const Capture& capture, MethodPool& pool, con
         if (on_frame)
             on_frame(row);
     };
-    for (FrameRow& row : recording.carefully ? run_one_by_one(capture, pool, left, journal, record)
-                                             : run_batch(capture, pool, left, record))
+    const bool one_by_one = recording.carefully || !killers.empty();
+    for (FrameRow& row : one_by_one ? run_one_by_one(capture, pool, left, journal, killers, record)
+                                    : run_batch(capture, pool, left, record))
         rows.insert_or_assign(row.index, std::move(row));
     if (recording.tars)
         for (const std::size_t index : left.frames)

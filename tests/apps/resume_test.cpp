@@ -4,6 +4,7 @@
 #include "apps/jobs/job_run.h"
 #include "apps/json.h"
 #include "apps/walk/resume.h"
+#include "io/files.h"
 #include "projection/base/error.h"
 #include "tests/support/files.h"
 #include "tests/support/small_capture.h"
@@ -418,7 +419,7 @@ class HalfOpen final : public Method {
 
 /// A worker's task for one capture, with a method that can be made to fail.
 int work(const fs::path& path, const fs::path& out, const WorkerProcess& worker,
-         const std::function<void(const View&)>& before) {
+         const std::function<void(const View&)>& before, std::size_t frames_in_tar = 0) {
     const Capture capture = open_capture(path);
     HalfOpen method(before);
     Journal journal(out, "");
@@ -426,7 +427,13 @@ int work(const fs::path& path, const fs::path& out, const WorkerProcess& worker,
     options.frames.resize(capture.entries.size());
     std::iota(options.frames.begin(), options.frames.end(), 0);
     options.outputs.folder = out;
-    const Recording recording{journal, "settings", "task", "test", false, worker.carefully, worker.finished};
+    std::optional<ResultTars> tars;
+    if ((options.outputs.frames_in_tar = frames_in_tar) > 0) {
+        options.outputs.waiting = out / tar_folder / ".frames";
+        tars.emplace(capture, options.outputs, options.frames, "");
+    }
+    const Recording recording{journal, "settings",       "task",          "test",
+                              false,   worker.carefully, worker.finished, tars ? &*tars : nullptr};
     FrameAo door(method);
     MethodPool pool(door);
     const auto rows = run_recorded(capture, pool, options, recording);
@@ -456,6 +463,28 @@ TEST_F(ResumeTest, a_frame_that_crashes_the_process_is_marked_and_the_others_are
     }
     EXPECT_EQ(facts.records.at("005").row.fault, Fault::crash);
     EXPECT_FALSE(facts.complete.empty());
+}
+
+TEST_F(ResumeTest, several_frames_of_a_tar_that_crash_the_process_are_marked_in_it) {
+    record(8);
+    const int code = supervise(1, [&](const WorkerProcess& worker) {
+        return work(
+            capture(), out(), worker,
+            [](const View& view) {
+                if (is_frame(view, 2) || is_frame(view, 5) || is_frame(view, 6))
+                    raise(SIGSEGV);
+            },
+            8);
+    });
+    EXPECT_EQ(code, internal_error);
+    const JournalFacts facts = read_journal(journal_file(out(), ""));
+    ASSERT_EQ(facts.records.size(), 8u);
+    EXPECT_EQ(facts.records.at("005").row.fault, Fault::crash);
+    EXPECT_EQ(facts.records.at("007").row.status, FrameStatus::ok);
+    EXPECT_TRUE(is_file(out() / "tars/000000.tar/006.json"));
+    EXPECT_TRUE(is_file(out() / "tars/000000.tar/007.ao.png"));
+    EXPECT_FALSE(is_file(out() / "tars/000000.tar/005.ao.png"));
+    EXPECT_TRUE(strays_in(out()).empty());
 }
 
 TEST_F(ResumeTest, a_lost_device_gets_a_fresh_process_and_no_frame_is_lost) {
