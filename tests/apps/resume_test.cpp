@@ -343,6 +343,8 @@ TEST_F(ResumeTest, a_torn_line_costs_one_frame) {
     EXPECT_EQ(read_journal(journal).records.size(), 4u);
     EXPECT_TRUE(is_complete(journal));
     EXPECT_EQ(count_in(out(), "\"name\":\"003\""), 1u);
+    EXPECT_EQ(count_in(out(), "\n{\"process\":"), 1u)
+        << "the second process' line begins anew, not behind the torn one";
 }
 
 TEST_F(ResumeTest, a_line_that_contradicts_itself_costs_one_frame) {
