@@ -66,9 +66,6 @@ Untouched<float> smoothed(const CloudSurface& surface, const Untouched<float>& v
             if (j == i || std::isnan(values[j]) || !(alike > 0.9F))
                 continue;
             const Vector3f apart = surface.tree[j] - surface.tree[i];
-            const float off_plane = std::abs(apart.dot(surface.normals[i]));
-            if (off_plane > 0.5F * surface.disc_radius[i] + 2 * surface.roughness[i])
-                continue;
             const float off = (values[i] - values[j]) / shared::mean_apart;
             const float weight = std::exp(falloff * apart.squaredNorm()) * std::max(1 - off * off, 0.0F);
             sum += weight * values[j];

@@ -404,6 +404,9 @@ TEST_F(CliTest, misuse_is_exit_code_1) {
 }
 
 TEST_F(CliTest, nothing_usable_is_exit_code_3) {
+    const std::string nowhere = (folder / "nowhere").string();
+    for (const char* command : {"inspect", "refine", "view"})
+        EXPECT_EQ(run_program(fmt::format("{} {}", command, nowhere)).exit_code, 3) << command;
     fs::create_directories(folder / "empty");
     const Ran empty = run_program(fmt::format("run {} -o {}", (folder / "empty").string(), out().string()));
     EXPECT_EQ(empty.exit_code, 3);

@@ -9,6 +9,7 @@
 #include "tests/support/files.h"
 #include "tests/support/small_capture.h"
 
+#include <array>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -344,6 +345,8 @@ TEST_F(ResumeTest, a_torn_line_costs_one_frame) {
     EXPECT_EQ(read_journal(journal).records.size(), 4u);
     EXPECT_TRUE(is_complete(journal));
     EXPECT_EQ(count_in(out(), "\"name\":\"003\""), 1u);
+    EXPECT_EQ(count_in(out(), "\n{\"process\":"), 1u)
+        << "the second process' line begins anew, not behind the torn one";
 }
 
 TEST_F(ResumeTest, a_line_that_contradicts_itself_costs_one_frame) {
@@ -658,6 +661,17 @@ TEST(CutTest, every_task_is_in_one_shard_and_the_slowest_is_near_the_mean) {
     }
     EXPECT_EQ(seen, std::vector<int>(tasks.size(), 1));
     EXPECT_LE(slowest, 1.01 * all / 16); // greedy dealing errs by at most the smallest tasks
+}
+
+TEST(ExitCodeTest, of_several_captures_the_worse_one_tells_and_well_with_nothing_is_partly_done) {
+    EXPECT_EQ(worse(all_well, all_well), all_well);
+    EXPECT_EQ(worse(nothing_done, nothing_done), nothing_done);
+    EXPECT_EQ(worse(all_well, nothing_done), some_failed);
+    EXPECT_EQ(worse(nothing_done, all_well), some_failed);
+    const std::array mildest_first{all_well, some_failed, internal_error, unfinished, misuse};
+    for (std::size_t i = 0; i < mildest_first.size(); ++i)
+        for (std::size_t j = 0; j < mildest_first.size(); ++j)
+            EXPECT_EQ(worse(mildest_first[i], mildest_first[j]), mildest_first[std::max(i, j)]);
 }
 
 TEST(ShardTest, schedulers_number_their_tasks_in_their_own_ways) {

@@ -218,6 +218,17 @@ TEST(pcd, counts_above_one_are_compressed_value_by_value) {
         EXPECT_EQ(back.records->record(i).substr(0, rows[i].size()), rows[i]);
 }
 
+TEST(pcd, few_compressed_bytes_cannot_ask_for_much_memory) {
+    // Three bytes of LZF make 264 at most; these ten are said to be 24 million points.
+    const TemporaryFolder folder;
+    const std::string packed(10, '\0');
+    const auto file =
+        write_file(folder / "c.pcd", pcd_header("x y z", "4 4 4", "F F F", {6000, 4000}, "binary_compressed") +
+                                         bytes_of(std::uint32_t(packed.size()), 288'000'000U) + packed);
+    std::vector<std::string> warnings;
+    EXPECT_TRUE(says(refusal([&] { (void)read_cloud(file, warnings); }), "10 compressed bytes at byte"));
+}
+
 TEST(pcd, a_field_of_that_name_is_replaced_not_doubled) {
     const TemporaryFolder folder;
     for (const char* data : {"ascii", "binary", "binary_compressed"}) {

@@ -401,6 +401,14 @@ TEST_P(Ros, compressed_depth_is_png_or_rvl_and_inverse_depth_becomes_metres) {
     all[0] = message(1, "16UC1; compressedDepth rvl", settings + size + words_of({1, 5, 15, 15, 15, 15, 15, 15}));
     const Capture cut = open_capture(recording(all));
     EXPECT_TRUE(says(refusal([&] { (void)cut.load(0); }), "RVL data"));
+    for (const auto& [groups, said] :
+         {std::pair(words_of({0, 15, 7}), "0 zeros and 63 values at pixel 0 of 6"), // none may go behind the image
+          {words_of({15, 7, 0}), "63 zeros and 0 values at pixel 0 of 6"},
+          {words_of({0, 0}), "0 zeros and 0 values at pixel 0 of 6"}}) {
+        all[0] = message(1, "16UC1; compressedDepth rvl", settings + size + groups);
+        const Capture wrong = open_capture(recording(all));
+        EXPECT_TRUE(says(refusal([&] { (void)wrong.load(0); }), said));
+    }
     EXPECT_EQ(cut.load(1).depth_m(1, 2), 2);
 }
 

@@ -57,6 +57,28 @@ TEST(AttachToDepth, CoverageIsTheShareOfDepthsWithAValue) {
     EXPECT_TRUE(std::isnan(nothing.mean_visibility));
 }
 
+TEST(AttachToDepth, ThroughALensNoPixelGetsTheValueOfAnotherSurface) {
+    // A pane at 1 m before a wall at 3 m. Through a lens, pixels at the outline fall beside those that were computed.
+    Frame frame;
+    const Pinhole pinhole = test_camera({320, 240});
+    frame.camera = {pinhole, {-0.2, 0.05, 0.001, -0.002, 0}, "test"};
+    frame.depth_m = cv::Mat1f(pinhole.size, 3.0F);
+    frame.depth_m(cv::Rect(60, 50, 201, 141)).setTo(1);
+    const DepthImage depth = project(frame);
+    AoMap ao{cv::Mat1f(depth.z_m.size(), unknown)};
+    ao.visibility.setTo(0.25, depth.z_m == 1);
+    ao.visibility.setTo(0.75, depth.z_m == 3);
+    const Attached attached = attach(frame, depth, ao);
+    int known = 0;
+    for (int v = 0; v < 240; ++v)
+        for (int u = 0; u < 320; ++u)
+            if (const float found = attached.visibility(v, u); !std::isnan(found)) {
+                ++known;
+                ASSERT_EQ(found, frame.depth_m(v, u) == 1 ? 0.25F : 0.75F) << u << ", " << v;
+            }
+    EXPECT_GT(known, 0.8 * 320 * 240); // the border is bent out of view
+}
+
 TEST(AttachToDepth, ThroughALensEachRecordedPixelGetsItsOwnBack) {
     Frame frame;
     const Pinhole pinhole = test_camera({320, 240});

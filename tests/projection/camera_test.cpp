@@ -99,6 +99,20 @@ TEST(Camera, NothingIsSeenBeyondWhereTheLensModelFoldsBack) {
     EXPECT_NE(maps.recorded_pixel()(120, 160 + 70), -1);
 }
 
+TEST(Camera, DirectionsBeyondTheFoldAreNoAnswer) {
+    // r (1 - 0.3 r^2) grows up to r = 1.054, where it is 0.703: no direction bends farther out. The polynomial has such
+    // values again at r = -2 and beyond, where Newton's method ends; they are no directions of a lens.
+    const Distortion barrel{-0.3, 0, 0, 0, 0};
+    for (double bent = 0; bent < 1.5; bent += 0.01) {
+        const auto straight = undistorted(barrel, {bent, 0});
+        EXPECT_EQ(straight.has_value(), bent < 0.7027) << bent;
+        if (straight) {
+            EXPECT_LT(straight->norm(), 1.055) << bent;
+            EXPECT_GE(straight->x(), bent);
+        }
+    }
+}
+
 TEST(Camera, RecordedPixelsFindTheUndistortedPixelThatShowsThem) {
     for (const Distortion& lens : lenses) {
         const Undistortion maps(camera_with(lens));
