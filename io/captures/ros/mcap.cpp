@@ -1,6 +1,7 @@
 // MCAP (mcap.dev/spec), as rosbag2 and Foxglove write it: records of an operation code, a length and content. Read from
 // front to back, so the summary at the end is not needed.
 #include "io/captures/ros/bag.h"
+#include "io/captures/ros/mcap_records.h"
 #include "io/captures/ros/unpack.h"
 #include "io/file_bytes.h"
 #include "io/text.h"
@@ -17,32 +18,6 @@ namespace scanshade::ros {
 namespace fs = std::filesystem;
 
 namespace {
-
-enum class Op : std::uint8_t { footer = 2, schema = 3, channel = 4, message = 5, chunk = 6, data_end = 15 };
-
-/// The numbers and strings of a record, one after the other.
-class Content {
-  public:
-    explicit Content(std::string_view bytes) : bytes_(bytes) {}
-    template <class Number>
-    Number next() {
-        Number value{};
-        std::memcpy(&value, take(sizeof value).data(), sizeof value);
-        return value;
-    }
-    std::string_view text() { return take(next<std::uint32_t>()); }
-    std::string_view take(std::uint64_t count) {
-        if (count > bytes_.size() - at_)
-            throw Error(fmt::format("{} at byte {} of a record of {}", counted(count, "byte"), at_, bytes_.size()));
-        at_ += count;
-        return bytes_.substr(at_ - count, count);
-    }
-    [[nodiscard]] std::size_t at() const { return at_; }
-
-  private:
-    std::string_view bytes_;
-    std::size_t at_ = 0;
-};
 
 std::string unpack(std::string_view packed, const Chunk& chunk) {
     return chunk.compression == "zstd" ? unpacked_zstd(packed, chunk.size) : unpacked_lz4(packed, chunk.size);
@@ -73,7 +48,7 @@ class Mcap final : public Bag {
             return;
         const std::uint64_t footer = file_.size() - footer_bytes;
         const std::string end = file_.bytes(footer, footer_bytes);
-        Content content(end);
+        RecordContent content(end);
         if (static_cast<Op>(content.next<std::uint8_t>()) != Op::footer || content.next<std::uint64_t>() != 20)
             return;
         const auto start = content.next<std::uint64_t>();
@@ -81,7 +56,7 @@ class Mcap final : public Bag {
             return;
         try {
             const std::string records = file_.bytes(start, footer - start);
-            Content summary(records);
+            RecordContent summary(records);
             while (summary.at() < records.size()) {
                 const auto op = static_cast<Op>(summary.next<std::uint8_t>());
                 const std::string_view record = summary.take(summary.next<std::uint64_t>());
@@ -105,7 +80,7 @@ class Mcap final : public Bag {
                 if (file_.size() - std::min(at, file_.size()) < record_start)
                     throw Error(fmt::format("{} are left, expected a record", counted(file_.size() - at, "byte")));
                 const std::string head = file_.bytes(at, record_start);
-                Content start(head);
+                RecordContent start(head);
                 const auto op = static_cast<Op>(start.next<std::uint8_t>());
                 const auto size = start.next<std::uint64_t>();
                 at += record_start;
@@ -141,13 +116,13 @@ class Mcap final : public Bag {
     }
 
     void take_schema(std::string_view content) {
-        Content schema(content);
+        RecordContent schema(content);
         const auto id = schema.next<std::uint16_t>();
         schemas_[id] = schema.text();
     }
 
     void take_channel(std::string_view content) {
-        Content channel(content);
+        RecordContent channel(content);
         const auto id = channel.next<std::uint16_t>(), schema = channel.next<std::uint16_t>();
         const std::string topic(channel.text()), encoding(channel.text());
         channels_[id] = topic_named(topic, schemas_[schema],
@@ -158,7 +133,7 @@ class Mcap final : public Bag {
     }
 
     void take_message(std::string_view first, std::uint32_t chunk, std::uint64_t at, std::uint64_t size) {
-        Content content(first);
+        RecordContent content(first);
         const auto id = content.next<std::uint16_t>();
         content.take(sizeof(std::uint32_t));
         const auto recorded = content.next<std::uint64_t>();
@@ -174,7 +149,7 @@ class Mcap final : public Bag {
     void take_chunk(std::uint64_t at, std::uint64_t size) {
         constexpr std::uint64_t longest_start = 64; // four numbers, the packer's name, the length
         const std::string head = file_.bytes(at, std::min(size, longest_start));
-        Content start(head);
+        RecordContent start(head);
         start.take(2 * sizeof(std::uint64_t));
         const auto unpacked = start.next<std::uint64_t>();
         const auto checksum = start.next<std::uint32_t>();
@@ -207,7 +182,7 @@ class Mcap final : public Bag {
     }
 
     void take_records(std::string_view records, std::uint32_t chunk, std::uint64_t base) {
-        Content content(records);
+        RecordContent content(records);
         while (content.at() < records.size()) {
             const auto op = static_cast<Op>(content.next<std::uint8_t>());
             const auto size = content.next<std::uint64_t>();

@@ -1,4 +1,5 @@
 #include "io/captures/ros/mcap_output.h"
+#include "io/captures/ros/mcap_records.h"
 
 #include "io/file_bytes.h"
 #include "io/text.h"
@@ -27,22 +28,6 @@ namespace fs = std::filesystem;
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "MCAP's numbers are little-endian");
-
-enum class Op : std::uint8_t {
-    header = 1,
-    footer = 2,
-    schema = 3,
-    channel = 4,
-    message = 5,
-    chunk = 6,
-    message_index = 7,
-    chunk_index = 8,
-    statistics = 11,
-    metadata = 12,
-    metadata_index = 13,
-    summary_offset = 14,
-    data_end = 15
-};
 
 constexpr std::string_view magic = "\x89MCAP0\r\n";
 constexpr std::string_view group_name = "scanshade/frame"; ///< of the metadata record that begins a group
@@ -83,31 +68,6 @@ std::uint32_t checksum(std::string_view bytes, std::uint32_t before = 0) {
     return static_cast<std::uint32_t>(
         crc32_z(before, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<z_size_t>(bytes.size())));
 }
-
-/// Numbers and texts of bytes that this file's own functions made or checked, one after the other.
-class Parts {
-  public:
-    explicit Parts(std::string_view bytes) : bytes_(bytes) {}
-    template <class Number>
-    Number next() {
-        Number value{};
-        std::memcpy(&value, take(sizeof value).data(), sizeof value);
-        return value;
-    }
-    std::string_view text() { return take(next<std::uint32_t>()); }
-    std::string_view take(std::uint64_t count) {
-        if (count > bytes_.size() - at_)
-            throw Error(fmt::format("{} at byte {} of {}", counted(count, "byte"), at_, bytes_.size()));
-        at_ += count;
-        return bytes_.substr(at_ - count, count);
-    }
-    [[nodiscard]] bool more() const { return at_ < bytes_.size(); }
-    [[nodiscard]] std::size_t at() const { return at_; }
-
-  private:
-    std::string_view bytes_;
-    std::size_t at_ = 0;
-};
 
 template <class Number>
 void put(std::string& bytes, std::size_t at, Number value) {
@@ -246,11 +206,11 @@ struct GroupHead {
 
 /// Nothing where a metadata record is another one.
 std::optional<GroupHead> group_head_in(std::string_view content) {
-    Parts parts(content);
+    RecordContent parts(content);
     if (parts.text() != group_name)
         return std::nullopt;
     GroupHead head;
-    for (Parts rows(parts.text()); rows.more();) {
+    for (RecordContent rows(parts.text()); rows.more();) {
         const std::string_view key = rows.text(), value = rows.text();
         if (key == "name")
             head.name = value;
@@ -289,7 +249,7 @@ std::vector<GroupPlace> groups_in(const fs::path& path) {
     constexpr std::uint64_t longest_head = 1 << 20;
     for (std::uint64_t at = magic.size(); left(at) >= record_start;) {
         const std::string start = file.bytes(at, record_start);
-        Parts parts(start);
+        RecordContent parts(start);
         const auto op = static_cast<Op>(parts.next<std::uint8_t>());
         const auto size = parts.next<std::uint64_t>();
         const std::uint64_t content_at = at + record_start;
@@ -390,10 +350,10 @@ void McapOutput::add(std::string_view group) {
     std::vector<Found> chunks;
     std::vector<MetadataFacts> metadata;
     std::map<std::uint16_t, std::uint64_t> counts;
-    for (Parts parts(group); parts.more();) {
+    for (RecordContent parts(group); parts.more();) {
         const std::size_t begin = parts.at();
         const auto op = static_cast<Op>(parts.next<std::uint8_t>());
-        Parts content(parts.take(parts.next<std::uint64_t>()));
+        RecordContent content(parts.take(parts.next<std::uint64_t>()));
         const std::uint64_t length = parts.at() - begin;
         if (op == Op::metadata) {
             metadata.push_back({begin, length});
