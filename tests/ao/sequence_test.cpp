@@ -346,6 +346,37 @@ TEST(Sequence, what_was_removed_is_gone_beyond_the_window) {
     EXPECT_LT(ghost / uncovered, 0.02);
 }
 
+TEST(Sequence, a_thin_board_has_two_sides) {
+    // A board of 5 mm, with fins behind it: its back is dark between them, its front is open. Both lie within the
+    // tolerance of what counts as the same surface, so that normals alone tell them apart.
+    scene::Scene scene{.name = "board", .summary = ""};
+    scene.bodies = {{scene::Plane{{0, 0, -1}, {0, 0, 1}}, {}}, {scene::Box{{0, 0, -0.6}, {0.3, 0.0025, 0.4}}, {}}};
+    for (const double x : {-0.24, -0.12, 0.0, 0.12, 0.24})
+        scene.bodies.push_back({scene::Box{{x, 0.06, -0.6}, {0.005, 0.06, 0.4}}, {}});
+    const scene::World world(scene);
+    std::vector<Recorded> frames;
+    for (const double y : {-1.6, 1.6}) {
+        const Isometry3d pose = scene::looking_at({0, y, 0.6}, {0, 0, -0.7});
+        const auto geometry = render_geometry(world, small_camera(), pose);
+        frames.push_back({{small_camera(), geometry.z_m, {}}, geometry.z_m, pose});
+    }
+    const cv::Mat1f own = together(frames, alone(), 0).ao.visibility;
+    const SequenceAoResult both = together(frames, only(0, 0, 2), 0);
+    ASSERT_EQ(both.averaged.size(), 1U) << "the floor fits";
+    double apart = 0;
+    int front = 0;
+    for (int v = 0; v < 240; ++v)
+        for (int u = 0; u < 320; ++u) {
+            const Vector3d point = frames[0].pose * small_camera().point(u, v, frames[0].exact_m(v, u));
+            if (frames[0].exact_m(v, u) > 0 && std::abs(point.y() + 0.0025) < 1e-3 && point.z() > -0.9) {
+                apart += std::abs(both.ao.visibility(v, u) - own(v, u));
+                ++front;
+            }
+        }
+    ASSERT_GT(front, 3000);
+    EXPECT_LT(apart / front, 0.005); // 0.11 were the back averaged with it
+}
+
 TEST(Sequence, what_an_outage_keeps_away_is_waited_for_by_its_neighbours) {
     Surfel surfel(device(), {});
     SequenceAo sequence(device(), surfel, radius_m, {}, {}, only(0, 0, 1));
