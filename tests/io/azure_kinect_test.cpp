@@ -140,7 +140,7 @@ TEST_F(AzureKinect, depth_both_cameras_and_times_are_found) {
         segment(start(tag("K4A_START_OFFSET_NS", "5000000000") + tag("K4A_CALIBRATION_FILE", "calibration.json")) +
                 cluster(100, block(1, 0, jpeg(hd, {9, 99, 199})) + block(2, 0, depth(narrow, 1234))) +
                 cluster(133, block(2, 1, depth(narrow, 4321)))));
-    EXPECT_EQ(capture.kind, "Azure Kinect recording");
+    EXPECT_EQ(capture.kind, "Azure Kinect");
     ASSERT_EQ(capture.entries.size(), 2U);
     EXPECT_TRUE(capture.warnings.empty()) << tests::joined(capture.warnings);
     const Frame frame = capture.load(0);

@@ -338,7 +338,7 @@ TEST_F(Hdf5, labelled_images_of_nyu_are_turned_from_columns) {
     const std::string title = "MATLAB 7.3 MAT-file, Platform: GLNXA64";
     tests::write_file(file, bytes.replace(0, title.size(), title));
     const Capture capture = open_capture(file);
-    EXPECT_EQ(capture.kind, "NYU depth v2, labelled");
+    EXPECT_EQ(capture.kind, "NYU depth v2 labelled");
     ASSERT_EQ(capture.entries.size(), 2U);
     const Frame frame = capture.load(1);
     EXPECT_NEAR(frame.depth_m(2, 3), 2.32, 1e-6);
