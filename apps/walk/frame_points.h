@@ -25,8 +25,8 @@ struct FramePoints {
     std::vector<Eigen::Vector3d> made; ///< from depth
 };
 
-/// A depth frame's surface in camera space and the recording's unit, without lens distortion, coloured where the colour fits. Points that the
-/// secondary camera did not see are black. `shown` is the frame's scene.
+/// A depth frame's surface in camera space and the recording's unit, without lens distortion, coloured where the colour
+/// fits. Points that the secondary camera did not see are black. `shown` is the frame's scene.
 [[nodiscard]] FramePoints points_of_depth(const Work& work, const Scene& shown, const Outputs& outputs);
 /// A cloud's points, all of them, in file order. The colours are the cloud's own, changed as `outputs` asks.
 [[nodiscard]] FramePoints points_of_cloud(const Work& work, const Outputs& outputs);
