@@ -612,6 +612,9 @@ class Run final : public Command {
         const bool apart = !recording.has_own_stamps() && capture.entries.size() > 1;
         say(fmt::format("  {} -> {}{}", recording.summary(), recording.path().string(),
                         apart ? " (frames are put 1/30 s apart: not all have a time stamp)" : ""));
+        if (capture.unit.arbitrary())
+            say(fmt::format("  {} is in the recording's arbitrary unit, which players and readers take for metres.",
+                            recording.path().filename().string()));
     }
 
     RunSettings asked_;

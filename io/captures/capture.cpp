@@ -71,16 +71,23 @@ std::string recording_files() {
     return listed(names, "or");
 }
 
+/// "`camera_matrix.csv` with `depth/`" -> "camera_matrix.csv": what a row is told by first.
+std::string first_sign(const RecordingFormat& format) {
+    std::string sign = format.recognised;
+    for (const std::string_view end : {";", ":", " with", " beside"})
+        sign = sign.substr(0, sign.find(end));
+    std::erase(sign, '`');
+    return sign;
+}
+
 [[noreturn]] void refuse_folder(const fs::path& folder) {
-    std::vector<std::string> signatures;
+    std::vector<std::string> signs;
     for (const RecordingFormat& format : recording_formats())
-        if (format.folder)
-            signatures.push_back(fmt::format("{} ({})", format.recognised, format.name));
-    std::string looked_for = fmt::format("{}", fmt::join(signatures, ", "));
-    std::erase(looked_for, '`');
+        if (format.folder && !format.begins)
+            signs.push_back(first_sign(format));
     throw NoFrames(fmt::format("no frames found in {}: looked for {}, and for one file that is a recording ({}); "
-                               "clouds are {}",
-                               folder.string(), looked_for, recording_files(), listed(cloud_format_names(), "or")));
+                               "`scanshade help formats` tells more of each",
+                               folder.string(), fmt::join(signs, ", "), recording_files()));
 }
 
 Listing list_folder(const fs::path& folder, const CaptureOptions& options) {
