@@ -70,7 +70,7 @@ void RecordingCloud::add(const CloudSweep& sweep) {
 void RecordingCloud::add_point(const Vector3d& point, float weight, float visibility, float confidence,
                                const cv::Vec3b* bgr) {
     const Vector3d place = (point / resolution_m_).array().floor();
-    if (!(place.cwiseAbs().maxCoeff() < 2e9))
+    if (!(place.array().abs() < 2e9).all()) // unlike maxCoeff(), also for NaN
         throw Error(fmt::format("a point {} from the origin, in cubes of {}: farther than can be counted",
                                 unit_.text(point.norm()), unit_.text(resolution_m_)));
     const auto whole = [&](Eigen::Index axis) { return static_cast<std::int32_t>(place[axis]); };

@@ -187,7 +187,7 @@ class Run final : public Command {
     CaptureJob job_from(const fs::path& path, const fs::path& folder) {
         CaptureJob job{
             open_capture_at_or_below(path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s, asked_.poses,
-                                            asked_.colour, asked_.topic, asked_.median_depth()}),
+                                            asked_.colour, asked_.topic, asked_.median_depth(), asked_.confidence_min}),
             {}};
         refuse_metres(job.capture);
         refuse_absent_view(job.capture);

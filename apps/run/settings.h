@@ -34,6 +34,7 @@ class RunSettings {
     double depth_smoothing = 1;
     double association_limit_s = 0.02;
     std::string topic;
+    int confidence_min = 1;
     Preset preset = Preset::fast;
     SequenceUse sequence = SequenceUse::off;
     std::string method = "cacao", device, settings;

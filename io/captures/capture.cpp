@@ -372,8 +372,15 @@ void tell_guesses(const Capture& capture, double beyond, double all, Frame& fram
                                              100 * beyond / all, capture.guessed_beyond_m));
 }
 
-/// Depth of the lowest confidence becomes holes.
-void leave_out_unsure(const CaptureEntry& entry, Frame& frame) {
+/// Apple's 0 low, 1 medium, 2 high; also of what is spread over a byte: 0, 127 (or 54), 255.
+int confidence_level(uchar value) {
+    if (value <= 2)
+        return value;
+    return value == 255 ? 2 : 1;
+}
+
+/// Depth of too low a confidence becomes holes.
+void leave_out_unsure(const CaptureEntry& entry, int lowest, Frame& frame) {
     cv::Mat1b levels;
     try {
         levels = confidence_of(entry);
@@ -389,7 +396,7 @@ void leave_out_unsure(const CaptureEntry& entry, Frame& frame) {
         return;
     }
     std::transform(frame.depth_m.begin(), frame.depth_m.end(), levels.begin(), frame.depth_m.begin(),
-                   [](float z, uchar level) { return level > 0 ? z : 0.0F; });
+                   [&](float z, uchar value) { return confidence_level(value) >= lowest ? z : 0.0F; });
 }
 
 void load_depth(const Capture& capture, const CaptureEntry& entry, const cv::Mat& stored, Frame& frame,
@@ -401,7 +408,7 @@ void load_depth(const Capture& capture, const CaptureEntry& entry, const cv::Mat
     take_camera(capture, entry, stored.size(), frame);
     frame.doubts = doubts_about(frame.depth_m, stored, encoding);
     if (!entry.confidence.empty())
-        leave_out_unsure(entry, frame);
+        leave_out_unsure(entry, capture.confidence_min, frame);
     if (capture.guessed_beyond_m > 0)
         tell_guesses(capture, cv::countNonZero(frame.depth_m > capture.guessed_beyond_m),
                      cv::countNonZero(frame.depth_m), frame);
@@ -587,6 +594,7 @@ Capture open_capture(const fs::path& path, const CaptureOptions& options) {
     Listing listing = is_folder(path) ? list_folder(path, options) : list_file(path, options);
     Capture& capture = listing.capture;
     capture.path = path;
+    capture.confidence_min = options.confidence_min;
     std::ranges::move(oddities_of_tar(path), std::back_inserter(capture.warnings));
     settle_names(capture.entries);
     const bool arbitrary = capture.depth.arbitrary;

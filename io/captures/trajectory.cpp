@@ -56,7 +56,7 @@ std::optional<Eigen::Isometry3d> quaternion_pose(const std::vector<std::string_v
 bool is_rigid(const Eigen::Matrix4d& m) {
     const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
     const double off = (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-    return off < rigid_tolerance && r.determinant() > 0 &&
+    return m.allFinite() && off < rigid_tolerance && r.determinant() > 0 &&
            (m.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff() < 1e-6;
 }
 

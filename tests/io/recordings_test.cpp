@@ -39,6 +39,7 @@ class Made : public testing::Test {
     void confidence(const std::string& name) {
         cv::Mat1b image(6, 8, uchar(2));
         image(2, 2) = 0;
+        image(3, 3) = 1;
         picture(name, image);
     }
     void picture(const std::string& name, const cv::Mat& image) {
@@ -156,6 +157,13 @@ TEST_F(Made, stray_scanner_takes_the_size_from_the_video_and_drops_unsure_depth)
     expect_depth(frame);
     EXPECT_EQ(frame.depth_m(2, 2), 0) << "of the lowest confidence";
     EXPECT_EQ(open_capture(folder.path()).entries[0].stamp_s, 5.5);
+    const auto z_with = [&](int lowest) {
+        CaptureOptions options;
+        options.confidence_min = lowest;
+        return open_capture(folder.path(), options).load(0).depth_m.clone();
+    };
+    EXPECT_GT(z_with(0)(2, 2), 0) << "whatever its confidence";
+    EXPECT_LT(cv::countNonZero(z_with(2)), cv::countNonZero(z_with(1))) << "of high confidence alone";
 }
 
 TEST_F(Made, polycam_prefers_corrected_cameras) {

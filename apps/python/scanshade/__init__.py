@@ -342,7 +342,7 @@ class Frame:
 class Capture(Sequence[Frame]):
     """A recording: a folder, a depth image or a cloud file. `len()` and `[]` make it a torch Dataset.
 
-    Settings: camera, depth_scale, poses, colour, registered, association_limit, topic. Nothing is decoded until a frame is
+    Settings: camera, depth_scale, poses, colour, registered, association_limit, topic, confidence_min. Nothing is decoded until a frame is
     taken. It can be pickled, so that worker processes open it again.
     """
 

@@ -54,7 +54,7 @@ class Frame {
 /// A folder, a depth image or a cloud file. Opening lists the frames and decodes none.
 class Capture {
   public:
-    /// Settings: camera, depth-scale, poses, colour, registered, association-limit, topic.
+    /// Settings: camera, depth-scale, poses, colour, registered, association-limit, topic, confidence-min.
     explicit Capture(const std::string& path, const Settings& settings = {}) {
         const std::vector<scanshade_setting> all = detail::to_c(settings);
         scanshade_capture* handle = nullptr;
