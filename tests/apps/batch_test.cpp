@@ -122,8 +122,8 @@ TEST_F(BatchTest, as_many_frames_are_computed_as_there_are_methods_however_few_c
         options.outputs.confidence = options.outputs.shaded = options.outputs.preview = false;
         const Stopwatch stopwatch;
         const auto rows = scanshade::run_batch(many, pool, options);
-        const auto turns = static_cast<double>((frames + devices - 1) / devices);
-        const double used = turns * 20 / stopwatch.ms();
+        const std::size_t turns = (frames + devices - 1) / devices;
+        const double used = static_cast<double>(turns * device_time.count()) / stopwatch.ms();
         EXPECT_EQ(count(rows, FrameStatus::ok), frames);
         return used;
     };
