@@ -289,7 +289,8 @@ class IntegerCoder {
     [[nodiscard]] unsigned width() const { return width_; }
 
   private:
-    static std::uint32_t mask(unsigned bits) { return (std::uint32_t(1) << bits) - 1; }
+    /// Of up to 32 bits.
+    static std::uint32_t mask(unsigned bits) { return static_cast<std::uint32_t>((std::uint64_t(1) << bits) - 1); }
     [[nodiscard]] std::uint32_t wrapped(std::uint32_t value) const { return bits_ == 32 ? value : value & mask(bits_); }
 
     unsigned bits_, width_ = 0;
