@@ -193,7 +193,8 @@ typedef struct scanshade_capture scanshade_capture;
 typedef struct scanshade_frame scanshade_frame;
 
 /* Opening lists the frames and decodes none. Settings: camera, depth-scale, poses, colour, association-limit,
-   topic, confidence-min. A recording in an arbitrary unit (COLMAP) is refused without depth-scale, since lengths here are metres. */
+   topic, confidence-min. A recording in an arbitrary unit (COLMAP) is refused without depth-scale, since lengths here
+   are metres. */
 SCANSHADE_API scanshade_status scanshade_capture_open(const char* path, const scanshade_setting* settings, size_t count,
                                                       scanshade_capture** capture);
 SCANSHADE_API void scanshade_capture_close(scanshade_capture* capture);
