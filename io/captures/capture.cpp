@@ -74,7 +74,7 @@ std::string recording_files() {
 /// "`camera_matrix.csv` with `depth/`" -> "camera_matrix.csv": what a row is told by first.
 std::string first_sign(const RecordingFormat& format) {
     std::string sign = format.recognised;
-    for (const std::string_view end : {";", ":", " with", " beside"})
+    for (const std::string_view end : {";", ":", ",", " with", " beside"})
         sign = sign.substr(0, sign.find(end));
     std::erase(sign, '`');
     return sign;
@@ -83,7 +83,7 @@ std::string first_sign(const RecordingFormat& format) {
 [[noreturn]] void refuse_folder(const fs::path& folder) {
     std::vector<std::string> signs;
     for (const RecordingFormat& format : recording_formats())
-        if (format.folder && !format.begins)
+        if (format.folder && !format.begins && std::ranges::count(signs, first_sign(format)) == 0)
             signs.push_back(first_sign(format));
     throw NoFrames(fmt::format("no frames found in {}: looked for {}, and for one file that is a recording ({}); "
                                "`scanshade help formats` tells more of each",
