@@ -631,7 +631,11 @@ void require_metres(const Capture& capture, const std::string& what) {
                         capture.path.string(), what, capture.depth.origin));
 }
 
-std::vector<fs::path> captures_below(const fs::path& path, const CaptureOptions& options) {
+namespace {
+
+/// The captures in the folder's own folders and tars, and the last one opened: opening may read a whole recording.
+std::vector<fs::path> captures_below(const fs::path& path, const CaptureOptions& options,
+                                     std::optional<Capture>& last) {
     std::vector<fs::path> captures;
     std::error_code ignored;
     for (const auto& [name, kind] : items_in(path, ignored)) {
@@ -639,7 +643,7 @@ std::vector<fs::path> captures_below(const fs::path& path, const CaptureOptions&
         if (name.starts_with('.') || (kind != FolderItem::Kind::folder && !tar))
             continue;
         try {
-            (void)open_capture(path / name, options);
+            last = open_capture(path / name, options);
             captures.push_back(path / name);
         } catch (const NoFrames&) {
             continue;
@@ -649,21 +653,28 @@ std::vector<fs::path> captures_below(const fs::path& path, const CaptureOptions&
     return captures;
 }
 
+} // namespace
+
+std::vector<fs::path> captures_below(const fs::path& path, const CaptureOptions& options) {
+    std::optional<Capture> last;
+    return captures_below(path, options, last);
+}
+
 Capture open_capture_at_or_below(const fs::path& path, const CaptureOptions& options) {
     try {
         return open_capture(path, options);
     } catch (const NoFrames&) {
-        const std::vector<fs::path> captures = captures_below(path, options);
+        std::optional<Capture> last;
+        const std::vector<fs::path> captures = captures_below(path, options, last);
         if (captures.empty())
             throw;
         if (captures.size() > 1)
             throw Error(fmt::format(
                 "{}: {} captures lie in it, among them {} and {}; name one, or let `plan` list them", path.string(),
                 captures.size(), captures[0].filename().string(), captures[1].filename().string()));
-        Capture found = open_capture(captures[0], options);
-        found.warnings.insert(found.warnings.begin(), fmt::format("{}: no frames of its own; its folder {} is opened.",
+        last->warnings.insert(last->warnings.begin(), fmt::format("{}: no frames of its own; its folder {} is opened.",
                                                                   path.string(), captures[0].filename().string()));
-        return found;
+        return *std::move(last);
     }
 }
 
