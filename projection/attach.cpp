@@ -66,6 +66,12 @@ void check_sizes(const DepthImage& depth, const AoMap& ao) {
                                 depth.z_m.cols, depth.z_m.rows));
 }
 
+void require_size(const DepthImage& depth, cv::Size wanted) {
+    if (depth.z_m.size() != wanted)
+        throw Error(fmt::format("the projected depth is {}x{}, that of this frame {}x{}", depth.z_m.cols,
+                                depth.z_m.rows, wanted.width, wanted.height));
+}
+
 /// Visibility of a surface at depth z_m seen near `pixel`: of the 3x3 pixel on the same surface whose depth is closest,
 /// the pixel itself winning ties. NaN where none of them shows that surface.
 float visibility_near(const DepthImage& depth, const AoMap& ao, cv::Point pixel, double z_m) {
@@ -85,22 +91,25 @@ float visibility_near(const DepthImage& depth, const AoMap& ao, cv::Point pixel,
 
 cv::Mat1f bent_back(const Frame& frame, const Camera& camera, const DepthImage& depth, const AoMap& ao) {
     const auto maps = Undistortion::of(camera);
+    require_size(depth, maps->straight_camera().size);
+    const int width = depth.z_m.cols;
     cv::Mat1f visibility(frame.depth_m.size(), unknown);
     for (int v = 0; v < visibility.rows; ++v)
         for (int u = 0; u < visibility.cols; ++u)
             if (const int index = maps->undistorted_pixel()(v, u); index >= 0 && is_depth(frame.depth_m(v, u)))
-                visibility(v, u) =
-                    visibility_near(depth, ao, {index % visibility.cols, index / visibility.cols}, frame.depth_m(v, u));
+                visibility(v, u) = visibility_near(depth, ao, {index % width, index / width}, frame.depth_m(v, u));
     return visibility;
 }
 
 Attached attach_to_image(const Frame& frame, const DepthImage& depth, const AoMap& ao) {
-    if (frame.depth_m.size() != depth.z_m.size())
-        throw Error(fmt::format("the recorded depth is {}x{}, the projected one {}x{}", frame.depth_m.cols,
-                                frame.depth_m.rows, depth.z_m.cols, depth.z_m.rows));
+    const Camera camera = camera_of(frame);
     Attached result;
-    const Camera camera{depth.camera, frame.camera.distortion, frame.camera.origin};
-    result.visibility = camera.distortion.any() ? bent_back(frame, camera, depth, ao) : ao.visibility;
+    if (camera.distortion.any()) {
+        result.visibility = bent_back(frame, camera, depth, ao);
+    } else {
+        require_size(depth, frame.depth_m.size());
+        result.visibility = ao.visibility;
+    }
     Tally tally;
     for (int v = 0; v < result.visibility.rows; ++v)
         tally.add_row(frame.depth_m[v], result.visibility[v], result.visibility.cols);

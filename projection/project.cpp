@@ -170,22 +170,22 @@ float depth_between(const cv::Mat1f& depth_m, const cv::Vec2f& at, float nearest
 
 /// Interpolated depth within a surface, since repeated and skipped pixels would make terraces; the nearest pixel's
 /// depth at the border of a surface.
-cv::Mat1f without_distortion(const cv::Mat1f& depth_m, const Camera& camera, const ProjectOptions& options) {
+DepthImage without_distortion(const cv::Mat1f& depth_m, const Camera& camera, const ProjectOptions& options) {
     const auto maps = Undistortion::of(camera);
-    cv::Mat1f z_m(depth_m.size(), 0.0F);
+    cv::Mat1f z_m(maps->straight_camera().size, 0.0F);
     for (int v = 0; v < z_m.rows; ++v)
         for (int u = 0; u < z_m.cols; ++u) {
             const int pixel = maps->recorded_pixel()(v, u);
             if (pixel < 0)
                 continue;
-            const float nearest_m = depth_m(pixel / z_m.cols, pixel % z_m.cols);
+            const float nearest_m = depth_m(pixel / depth_m.cols, pixel % depth_m.cols);
             if (!in_range(nearest_m, options))
                 continue;
             const float between_m =
                 depth_between(depth_m, maps->recorded_at()(v, u), nearest_m, same_surface_m(camera.pinhole, nearest_m));
             z_m(v, u) = between_m > 0 ? between_m : nearest_m;
         }
-    return z_m;
+    return {maps->straight_camera(), z_m, {}};
 }
 
 // ---------------------------------------------------------------------------------------------------- clouds
@@ -299,7 +299,7 @@ DepthImage project(const Frame& frame, const ProjectOptions& options) {
     if (frame.cloud)
         return project_cloud(*frame.cloud, camera.pinhole, options);
     if (camera.distortion.any())
-        return {camera.pinhole, without_distortion(frame.depth_m, camera, options), {}};
+        return without_distortion(frame.depth_m, camera, options);
     return {camera.pinhole, without_invalid(frame.depth_m, options), {}};
 }
 

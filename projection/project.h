@@ -25,7 +25,8 @@ struct ProjectOptions {
 /// Also for a cloud around or beside its origin, which has no single camera.
 [[nodiscard]] Camera camera_of(const Frame& frame);
 
-/// The depth image the methods work on, seen by camera_of(frame).
+/// The depth image the methods work on, seen by camera_of(frame); of a lens, by its straight camera
+/// (Undistortion::straight_camera).
 /// - Depth frames without distortion keep their pixels (the very same cv::Mat where nothing had to become a hole); with
 ///   distortion each pixel takes the depth between the recorded pixels around it where they are of one surface, else
 ///   the nearest one's (never an average of two surfaces: that would invent points between them).

@@ -165,16 +165,38 @@ std::optional<cv::Point> pixel_at(const Pinhole& camera, const Eigen::Vector2d& 
     return cv::Point(static_cast<int>(u), static_cast<int>(v));
 }
 
-cv::Mat2f places_in_recorded(const Camera& camera, double limit_r2) {
+/// The recorded camera, widened to show all these directions of recorded pixels. A side grows by half the image's
+/// length at most: near 90 degrees a pinhole image has no end.
+Pinhole widened(Pinhole camera, const cv::Mat2f& direction) {
+    double left = 0, top = 0, right = camera.size.width - 1, bottom = camera.size.height - 1;
+    for (const cv::Vec2f& ray : direction)
+        if (!std::isnan(ray[0])) {
+            const double u = camera.fx * ray[0] + camera.cx, v = camera.fy * ray[1] + camera.cy;
+            left = std::min(left, u), right = std::max(right, u);
+            top = std::min(top, v), bottom = std::max(bottom, v);
+        }
+    const auto pixels_beyond = [](double distance, int length) {
+        return std::min(static_cast<int>(std::lround(std::min(distance, double(length)))), length / 2);
+    };
+    const int more_left = pixels_beyond(-left, camera.size.width), more_top = pixels_beyond(-top, camera.size.height);
+    const int more_right = pixels_beyond(right - (camera.size.width - 1), camera.size.width),
+              more_bottom = pixels_beyond(bottom - (camera.size.height - 1), camera.size.height);
+    camera.cx += more_left;
+    camera.cy += more_top;
+    camera.size += cv::Size(more_left + more_right, more_top + more_bottom);
+    return camera;
+}
+
+cv::Mat2f places_in_recorded(const Camera& recorded, const Pinhole& straight, double limit_r2) {
     constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
-    const Pinhole& pinhole = camera.pinhole;
-    cv::Mat2f map(pinhole.size, cv::Vec2f(nowhere, nowhere));
+    const Pinhole& pinhole = recorded.pinhole;
+    cv::Mat2f map(straight.size, cv::Vec2f(nowhere, nowhere));
     for (int v = 0; v < map.rows; ++v)
         for (int u = 0; u < map.cols; ++u) {
-            const Eigen::Vector2d straight = normalised(pinhole, u, v);
-            if (straight.squaredNorm() >= limit_r2)
+            const Eigen::Vector2d ray = normalised(straight, u, v);
+            if (ray.squaredNorm() >= limit_r2)
                 continue;
-            const Eigen::Vector2d bent = distorted(camera.distortion, straight);
+            const Eigen::Vector2d bent = distorted(recorded.distortion, ray);
             if (pixel_at(pinhole, bent))
                 map(v, u) = {static_cast<float>(pinhole.fx * bent.x() + pinhole.cx),
                              static_cast<float>(pinhole.fy * bent.y() + pinhole.cy)};
@@ -182,14 +204,15 @@ cv::Mat2f places_in_recorded(const Camera& camera, double limit_r2) {
     return map;
 }
 
-cv::Mat1i nearest_pixels(const cv::Mat2f& places) {
+/// Indices in an image of `size`.
+cv::Mat1i nearest_pixels(const cv::Mat2f& places, cv::Size size) {
     cv::Mat1i map(places.size(), -1);
     std::transform(places.begin(), places.end(), map.begin(), [&](const cv::Vec2f& at) {
         if (std::isnan(at[0]))
             return -1;
-        const int u = std::clamp(static_cast<int>(std::lround(at[0])), 0, places.cols - 1);
-        const int v = std::clamp(static_cast<int>(std::lround(at[1])), 0, places.rows - 1);
-        return v * places.cols + u;
+        const int u = std::clamp(static_cast<int>(std::lround(at[0])), 0, size.width - 1);
+        const int v = std::clamp(static_cast<int>(std::lround(at[1])), 0, size.height - 1);
+        return v * size.width + u;
     });
     return map;
 }
@@ -213,11 +236,11 @@ cv::Mat2f directions(const Camera& camera, double limit_r2) {
     return map;
 }
 
-cv::Mat1i map_to_undistorted(const Pinhole& pinhole, const cv::Mat2f& direction, const cv::Mat1i& recorded_pixel) {
-    cv::Mat1i map(pinhole.size, -1);
+cv::Mat1i map_to_undistorted(const Pinhole& straight, const cv::Mat2f& direction, const cv::Mat1i& recorded_pixel) {
+    cv::Mat1i map(direction.size(), -1);
     for (int v = 0; v < map.rows; ++v)
         for (int u = 0; u < map.cols; ++u)
-            if (const auto pixel = pixel_at(pinhole, {direction(v, u)[0], direction(v, u)[1]})) // none for NaN
+            if (const auto pixel = pixel_at(straight, {direction(v, u)[0], direction(v, u)[1]})) // none for NaN
                 map(v, u) = same_pixel_near(recorded_pixel, *pixel, v * map.cols + u);
     return map;
 }
@@ -255,10 +278,11 @@ std::optional<Eigen::Vector2d> undistorted(const Distortion& distortion, const E
 
 Undistortion::Undistortion(const Camera& camera) {
     const double limit_r2 = fold_r2(camera.distortion);
-    recorded_at_ = places_in_recorded(camera, limit_r2);
-    recorded_pixel_ = nearest_pixels(recorded_at_);
     direction_ = directions(camera, limit_r2);
-    undistorted_pixel_ = map_to_undistorted(camera.pinhole, direction_, recorded_pixel_);
+    straight_camera_ = widened(camera.pinhole, direction_);
+    recorded_at_ = places_in_recorded(camera, straight_camera_, limit_r2);
+    recorded_pixel_ = nearest_pixels(recorded_at_, camera.pinhole.size);
+    undistorted_pixel_ = map_to_undistorted(straight_camera_, direction_, recorded_pixel_);
 }
 
 std::shared_ptr<const Undistortion> Undistortion::of(const Camera& camera) {

@@ -21,7 +21,8 @@ namespace scanshade {
 /// or where the lens folds back (fold_r2), so that two directions share one pixel.
 [[nodiscard]] std::optional<Eigen::Vector2d> undistorted(const Distortion& distortion, const Eigen::Vector2d& bent);
 
-/// The mapping between pixels of the recorded and the undistorted image. Both images have the same intrinsics and size.
+/// The mapping between pixels of the recorded and the undistorted image. The undistorted image has the recorded one's
+/// focal lengths. It is widened on each side to show the whole recorded image, by half the image's length at most.
 /// Immutable: frames and threads share it.
 class Undistortion {
   public:
@@ -30,6 +31,8 @@ class Undistortion {
     /// Cached for the few cameras used last; safe from several threads.
     [[nodiscard]] static std::shared_ptr<const Undistortion> of(const Camera& camera);
 
+    /// The undistorted image's camera.
+    [[nodiscard]] const Pinhole& straight_camera() const { return straight_camera_; }
     /// For each undistorted pixel the index (row-major) of the recorded pixel; -1 where the lens saw nothing.
     [[nodiscard]] const cv::Mat1i& recorded_pixel() const { return recorded_pixel_; }
     /// For each undistorted pixel the position (column, row) of its centre in the recorded image; NaN where the lens
@@ -42,7 +45,8 @@ class Undistortion {
     [[nodiscard]] const cv::Mat2f& direction() const { return direction_; }
 
   private:
-    cv::Mat2f recorded_at_, direction_;
+    cv::Mat2f direction_, recorded_at_;
+    Pinhole straight_camera_;
     cv::Mat1i recorded_pixel_, undistorted_pixel_;
 };
 

@@ -28,7 +28,7 @@ cv::Mat_<Pixel> undistorted(const cv::Mat_<Pixel>& image, const Camera& camera) 
     if (image.empty() || !camera.distortion.any())
         return image;
     const auto maps = Undistortion::of(camera);
-    cv::Mat_<Pixel> straight(image.size());
+    cv::Mat_<Pixel> straight(maps->straight_camera().size);
     std::transform(maps->recorded_pixel().begin(), maps->recorded_pixel().end(), straight.begin(),
                    [&](int pixel) { return pixel < 0 ? Pixel() : image(pixel / image.cols, pixel % image.cols); });
     return straight;

@@ -95,8 +95,9 @@ TEST(Camera, NothingIsSeenBeyondWhereTheLensModelFoldsBack) {
     // The target pixel at r = 1.2 would bend to 0.336, into the image: a ghost unless it is left out.
     const Camera wide{{100, 100, 160, 120, {320, 240}}, folding, "test"};
     const Undistortion maps(wide);
-    EXPECT_EQ(maps.recorded_pixel()(120, 160 + 120), -1);
-    EXPECT_NE(maps.recorded_pixel()(120, 160 + 70), -1);
+    const int row = cvRound(maps.straight_camera().cy), middle = cvRound(maps.straight_camera().cx);
+    EXPECT_EQ(maps.recorded_pixel()(row, middle + 120), -1);
+    EXPECT_NE(maps.recorded_pixel()(row, middle + 70), -1);
 }
 
 TEST(Camera, DirectionsBeyondTheFoldAreNoAnswer) {
@@ -120,11 +121,12 @@ TEST(Camera, DirectionsBeyondTheFoldAreNoAnswer) {
 TEST(Camera, RecordedPixelsFindTheUndistortedPixelThatShowsThem) {
     for (const Distortion& lens : lenses) {
         const Undistortion maps(camera_with(lens));
+        const int width = maps.straight_camera().size.width;
         int shown = 0, same = 0;
         for (int v = 0; v < 480; ++v)
             for (int u = 0; u < 640; ++u)
                 if (const int target = maps.undistorted_pixel()(v, u); target >= 0) {
-                    const int back = maps.recorded_pixel()(target / 640, target % 640);
+                    const int back = maps.recorded_pixel()(target / width, target % width);
                     if (back < 0)
                         continue; // at the rim rounding may leave the image
                     ++shown;
@@ -133,8 +135,42 @@ TEST(Camera, RecordedPixelsFindTheUndistortedPixelThatShowsThem) {
                     EXPECT_LE(std::abs(back / 640 - v), 2);
                 }
         EXPECT_GT(same, 0.75 * shown); // where the lens shrinks the image, some recorded pixels are shown by none
-        EXPECT_GT(shown, 0.75 * 640 * 480);
+        EXPECT_GT(shown, 0.99 * 640 * 480);
     }
+}
+
+TEST(Camera, TheUndistortedImageShowsTheWholeRecordedOne) {
+    for (const Distortion& lens : lenses) {
+        const Undistortion maps(camera_with(lens));
+        EXPECT_EQ(cv::countNonZero(maps.undistorted_pixel() < 0), 0);
+    }
+    // A Kinect's colour image is a pincushion: the straight image lies within it, and needs no more pixels.
+    EXPECT_EQ(Undistortion(camera_with({0.1, 0, 0, 0, 0})).straight_camera().size, cv::Size(640, 480));
+    const Undistortion barrel(camera_with(lenses[2]));
+    const Pinhole& straight = barrel.straight_camera();
+    EXPECT_EQ(straight.fx, 525);
+    for (const cv::Point corner : {cv::Point(0, 0), cv::Point(639, 0), cv::Point(0, 479), cv::Point(639, 479)}) {
+        const cv::Vec2f ray = barrel.direction()(corner);
+        const int index = barrel.undistorted_pixel()(corner);
+        EXPECT_NEAR(straight.fx * ray[0] + straight.cx, index % straight.size.width, 1.5);
+        EXPECT_NEAR(straight.fy * ray[1] + straight.cy, index / straight.size.width, 1.5);
+    }
+}
+
+TEST(Camera, AFisheyesUndistortedImageEndsSomewhere) {
+    const Camera wide{{160, 160, 255.5, 255.5, {512, 512}}, kannala_brandt({0, 0, 0, 0}), "92 degrees at the rim"};
+    const Undistortion maps(wide);
+    EXPECT_EQ(maps.straight_camera().size, cv::Size(1024, 1024));
+    EXPECT_NEAR(maps.straight_camera().cx, 255.5 + 256, 1e-12);
+    int beyond = 0;
+    for (int v = 0; v < 512; ++v)
+        for (int u = 0; u < 512; ++u) {
+            const cv::Vec2f ray = maps.direction()(v, u);
+            const bool in_reach = std::max(std::abs(ray[0]), std::abs(ray[1])) < 511 / 160.0; // not for NaN
+            beyond += maps.undistorted_pixel()(v, u) < 0;
+            EXPECT_TRUE(!in_reach || maps.undistorted_pixel()(v, u) >= 0) << u << ", " << v;
+        }
+    EXPECT_GT(beyond, 0);
 }
 
 TEST(Camera, AFisheyeBendsAnglesAndIsUndoneUpToItsEdge) {
@@ -254,9 +290,11 @@ TEST(Camera, ARationalLensMapsWholeImages) {
     std::vector<double> eight = coefficients(camera.distortion);
     const cv::Matx33d k(252, 0, 255.5, 0, 252, 255.5, 0, 0, 1);
     cv::Mat1f map_x, map_y;
-    cv::initUndistortRectifyMap(k, eight, cv::noArray(), k, {512, 512}, CV_32FC1, map_x, map_y);
-    for (int v = 0; v < 512; v += 5)
-        for (int u = 0; u < 512; u += 5)
+    const Pinhole& to = maps.straight_camera();
+    const cv::Matx33d straight(to.fx, 0, to.cx, 0, to.fy, to.cy, 0, 0, 1);
+    cv::initUndistortRectifyMap(k, eight, cv::noArray(), straight, to.size, CV_32FC1, map_x, map_y);
+    for (int v = 0; v < to.size.height; v += 5)
+        for (int u = 0; u < to.size.width; u += 5)
             if (const cv::Vec2f at = maps.recorded_at()(v, u); !std::isnan(at[0])) {
                 EXPECT_NEAR(at[0], map_x(v, u), 1e-3);
                 EXPECT_NEAR(at[1], map_y(v, u), 1e-3);

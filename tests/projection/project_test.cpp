@@ -87,17 +87,17 @@ TEST(ProjectDepth, UndistortedDepthIsThatOfTheStraightCamera) {
                 frame.depth_m(v, u) = static_cast<float>(depth_along(*p));
 
     const DepthImage depth = project(frame);
+    EXPECT_EQ(depth.camera.fx, pinhole.fx);
     int seen = 0, exactly = 0;
-    for (int v = 0; v < pinhole.size.height; ++v)
-        for (int u = 0; u < pinhole.size.width; ++u)
+    for (int v = 0; v < depth.z_m.rows; ++v)
+        for (int u = 0; u < depth.z_m.cols; ++u)
             if (const float z = depth.z_m(v, u); z > 0) {
                 ++seen;
-                const double exact = depth_along(pinhole.ray(u, v).head<2>());
+                const double exact = depth_along(depth.camera.ray(u, v).head<2>());
                 EXPECT_NEAR(z, exact, exact * 1.0 / pinhole.fx) << "nearest pixel: at most the slope over 0.7 px off";
-                exactly +=
-                    std::abs(z - exact) < 1e-5 * exact; // between pixels 1/z is linear, the lens hardly bends it there
+                exactly += std::abs(z - exact) < 1e-4 * exact; // 1/z is linear between pixels but for the lens
             }
-    EXPECT_GT(seen, 0.85 * static_cast<double>(pinhole.size.area()));
+    EXPECT_GT(seen, static_cast<double>(pinhole.size.area())) << "a barrel's image is wider when straight";
     EXPECT_GT(exactly, 0.98 * seen) << "all but the image's rim: repeated pixels would be terraces";
 }
 
