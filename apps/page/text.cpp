@@ -1,7 +1,7 @@
 // Bytes and names as pages and their scripts hold them.
 #include "apps/page/text.h"
 
-#include "io/images/deflate.h"
+#include "io/compression/deflate.h"
 
 #include <cstddef>
 

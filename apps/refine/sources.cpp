@@ -2,7 +2,7 @@
 #include "apps/refine/sources.h"
 
 #include "io/cameras/camera_file.h"
-#include "io/captures/layouts.h"
+#include "io/captures/listing/layouts.h"
 #include "io/images/exif.h"
 #include "io/images/format.h"
 #include "io/images/image_file.h"

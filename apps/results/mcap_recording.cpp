@@ -1,6 +1,6 @@
 #include "apps/results/mcap_recording.h"
 
-#include "io/captures/ros/message_output.h"
+#include "io/captures/recordings/ros/message_output.h"
 #include "io/file_bytes.h"
 #include "io/output_file.h"
 #include "io/text.h"

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "io/captures/capture.h"
-#include "io/captures/ros/mcap_output.h"
+#include "io/captures/recordings/ros/mcap_output.h"
 
 #include <cstdint>
 #include <filesystem>

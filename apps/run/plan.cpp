@@ -4,7 +4,7 @@
 #include "apps/method_settings.h"
 #include "apps/slice.h"
 #include "io/captures/capture.h"
-#include "io/captures/layouts.h"
+#include "io/captures/listing/layouts.h"
 #include "io/files.h"
 #include "io/images/format.h"
 #include "io/output_file.h"

@@ -3,7 +3,7 @@
 #include "apps/json.h"
 #include "apps/results/outputs.h"
 #include "apps/walk/frame_points.h"
-#include "io/captures/ros/message_output.h"
+#include "io/captures/recordings/ros/message_output.h"
 #include "io/images/image_file.h"
 #include "io/images/png_output.h"
 #include "io/text.h"

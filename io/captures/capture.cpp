@@ -3,10 +3,10 @@
 #include "io/captures/capture.h"
 
 #include "io/captures/formats.h"
-#include "io/captures/layouts.h"
+#include "io/captures/listing/layouts.h"
+#include "io/captures/listing/trajectory.h"
 #include "io/captures/plausibility.h"
 #include "io/captures/recording_formats.h"
-#include "io/captures/trajectory.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
 #include "io/clouds/format.h"

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "io/cameras/camera_file.h"
-#include "io/captures/container.h"
+#include "io/captures/listing/container.h"
 #include "io/images/image_file.h"
 #include "projection/base/error.h"
 #include "projection/frame.h"

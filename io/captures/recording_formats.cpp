@@ -1,9 +1,9 @@
 // The table of recordings.
 #include "io/captures/recording_formats.h"
 
-#include "io/captures/matroska/matroska.h"
-#include "io/captures/ros/bag.h"
-#include "io/images/zip_archive.h"
+#include "io/captures/recordings/matroska/matroska.h"
+#include "io/captures/recordings/ros/bag.h"
+#include "io/compression/zip_archive.h"
 
 namespace scanshade {
 

@@ -2,7 +2,7 @@
 // recording_formats.cpp and a file beside it.
 #pragma once
 
-#include "io/captures/layouts.h"
+#include "io/captures/listing/layouts.h"
 
 #include <span>
 #include <string_view>

@@ -1,6 +1,6 @@
 // A data set's elements: chunks unpacked and put in rows.
+#include "io/compression/inflate.h"
 #include "io/hdf5/hdf5.h"
-#include "io/images/inflate.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"

@@ -1,7 +1,7 @@
 // Images as PNG files, the most common output.
 #include "io/images/png_output.h"
 
-#include "io/images/deflate.h"
+#include "io/compression/deflate.h"
 #include "projection/base/error.h"
 
 #include <algorithm>

@@ -2,7 +2,7 @@
 #include "apps/walk/batch.h"
 #include "io/cameras/camera_file.h"
 #include "io/captures/capture.h"
-#include "io/captures/ros/mcap_output.h"
+#include "io/captures/recordings/ros/mcap_output.h"
 #include "io/images/image_file.h"
 #include "tests/support/small_capture.h"
 

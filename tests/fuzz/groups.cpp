@@ -1,6 +1,6 @@
 // Fuzz target: the recording of an earlier run, whose groups a resumed run copies.
-#include "io/captures/ros/mcap_output.h"
-#include "io/captures/ros/message_output.h"
+#include "io/captures/recordings/ros/mcap_output.h"
+#include "io/captures/recordings/ros/message_output.h"
 #include "tests/fuzz/fuzz.h"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

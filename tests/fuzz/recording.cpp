@@ -1,7 +1,7 @@
 // Fuzz target: files that hold a recording. The first byte chooses the kind: by its own first bytes (zip archives,
 // .npy, .sens), ScanNet++'s depth.bin, or LZFSE alone.
 #include "io/captures/capture.h"
-#include "io/captures/lzfse.h"
+#include "io/compression/lzfse.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace {

@@ -1,7 +1,7 @@
 // Small sound files of every format, for the fuzz targets to start from: fuzz_seeds FOLDER writes FOLDER/TARGET/NAME.
 #include "io/cameras/camera_file.h"
-#include "io/captures/ros/mcap_output.h"
-#include "io/captures/ros/message_output.h"
+#include "io/captures/recordings/ros/mcap_output.h"
+#include "io/captures/recordings/ros/message_output.h"
 #include "io/clouds/cloud_file.h"
 #include "io/images/image_file.h"
 #include "tests/fuzz/fuzz.h"

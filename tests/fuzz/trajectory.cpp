@@ -1,5 +1,5 @@
 // Fuzz target: poses; the first byte chooses the format.
-#include "io/captures/trajectory.h"
+#include "io/captures/listing/trajectory.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace {

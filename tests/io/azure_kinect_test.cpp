@@ -1,6 +1,6 @@
 // Azure Kinect's recordings, made here byte by byte: what is read, and what damage costs.
 #include "io/captures/capture.h"
-#include "io/captures/matroska/matroska.h"
+#include "io/captures/recordings/matroska/matroska.h"
 #include "tests/support/files.h"
 #include "tests/support/small_capture.h"
 

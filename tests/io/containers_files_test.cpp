@@ -1,8 +1,8 @@
 // Recordings in one file, made here byte by byte: NumPy's archives and stacks, Record3D's, ScanNet++'s depth.bin; and
 // LZFSE, in which Record3D packs.
 #include "io/captures/capture.h"
-#include "io/captures/lzfse.h"
-#include "io/images/inflated_stream.h"
+#include "io/compression/inflated_stream.h"
+#include "io/compression/lzfse.h"
 #include "tests/support/files.h"
 
 #include <cmath>

@@ -2,8 +2,8 @@
 // targets (tests/fuzz) found stays here as rows.
 #include "io/cameras/camera_file.h"
 #include "io/captures/capture.h"
-#include "io/captures/layouts.h"
-#include "io/captures/trajectory.h"
+#include "io/captures/listing/layouts.h"
+#include "io/captures/listing/trajectory.h"
 #include "io/clouds/cloud_file.h"
 #include "io/images/image_file.h"
 #include "io/text.h"

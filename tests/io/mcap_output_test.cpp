@@ -1,7 +1,7 @@
 // MCAP files and messages of ROS 2 as they are written: read back by the reader, and against the specification.
-#include "io/captures/ros/bag.h"
-#include "io/captures/ros/mcap_output.h"
-#include "io/captures/ros/message_output.h"
+#include "io/captures/recordings/ros/bag.h"
+#include "io/captures/recordings/ros/mcap_output.h"
+#include "io/captures/recordings/ros/message_output.h"
 #include "projection/base/error.h"
 #include "tests/support/files.h"
 

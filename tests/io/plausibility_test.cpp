@@ -1,5 +1,5 @@
 // What a depth image alone tells of a wrong unit, or of rows that were copied.
-#include "io/captures/layouts.h"
+#include "io/captures/listing/layouts.h"
 #include "io/captures/plausibility.h"
 #include "tests/support/files.h"
 
