@@ -2,11 +2,11 @@
 
 #include "shaders/shared/vxao.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 
 namespace scanshade {
@@ -40,10 +40,10 @@ VxaoOptions resolved(VxaoOptions options) {
     return options;
 }
 
-/// V of an open plane with so many voxels a radius, measured over tilts and offsets of the grid: the own surface's voxels
-/// are not quite out of the cones' way.
+/// V of an open plane with so many voxels a radius, measured over tilts and offsets of the grid: the own surface's
+/// voxels are not quite out of the cones' way.
 float open_of_plane(double voxels) {
-    constexpr std::array measured{1.0, 1.0, 0.995, 0.989, 0.981, 0.970};
+    constexpr std::array measured{1.0, 1.0, 0.994, 0.988, 0.980, 0.970};
     const double at = std::clamp(std::log2(voxels), 0.0, measured.size() - 1.001);
     const auto below = static_cast<std::size_t>(at);
     return static_cast<float>(std::lerp(measured[below], measured[below + 1], at - static_cast<double>(below)));
@@ -65,35 +65,37 @@ int slots_log2(int bricks) { return std::bit_width(2 * static_cast<unsigned>(bri
 } // namespace
 
 std::vector<Parameter> VxaoOptions::parameters() {
-    return joined(joined(screen.parameters(), {screen.curve_row()}),
-                  {
-                      {.name = "quality",
-                       .help = "cones and voxels a radius: lowest 6 of 8, low 6 of 16, medium 16 of 16, high 16 of 32, "
-                               "highest 32 of 32",
-                       .value = OneOf(&quality, quality_words)},
-                      {.name = "cones",
-                       .help = "cones over the surface; 0 = as the quality says",
-                       .value = &cones,
-                       .low = 0,
-                       .high = 256},
-                      {.name = "voxel",
-                       .help = "edge of a voxel, from 1/32 to 1/4 of the radius; 0 = as the quality says. Farther away, "
-                               "where a pixel is wider than half of it, voxels are larger",
-                       .value = &voxel_m,
-                       .unit = "m",
-                       .low = 0,
-                       .high = 1e6},
-                      {.name = "memory",
-                       .help = "for voxels; where surfaces need more, larger voxels are taken",
-                       .value = &memory_mib,
-                       .unit = "MiB",
-                       .low = 16,
-                       .high = 4096},
-                  });
+    return joined(
+        joined(screen.parameters(), {screen.curve_row()}),
+        {
+            {.name = "quality",
+             .help = "cones and voxels a radius: lowest 6 of 8, low 6 of 16, medium 16 of 16, high 16 of 32, "
+                     "highest 32 of 32",
+             .value = OneOf(&quality, quality_words)},
+            {.name = "cones",
+             .help = "cones over the surface; 0 = as the quality says",
+             .value = &cones,
+             .low = 0,
+             .high = 256},
+            {.name = "voxel",
+             .help = "edge of a voxel, from 1/32 to 1/4 of the radius; 0 = as the quality says. Farther away, "
+                     "where a pixel is wider than half of it, voxels are larger",
+             .value = &voxel_m,
+             .unit = "m",
+             .low = 0,
+             .high = 1e6},
+            {.name = "memory",
+             .help = "for voxels; where surfaces need more, larger voxels are taken",
+             .value = &memory_mib,
+             .unit = "MiB",
+             .low = 1,
+             .high = 4096},
+        });
 }
 
 Vxao::Vxao(gpu::Device& device, const VxaoOptions& options)
-    : ScreenMethod(device, resolved(options).screen), options_(resolved(options)), bricks_(bricks_on(device, options)) {}
+    : ScreenMethod(device, resolved(options).screen), options_(resolved(options)), bricks_(bricks_on(device, options)) {
+}
 
 void Vxao::add_passes(ScreenTables& tables) const {
     using Texels = gpu::BufferRow::Texels;
@@ -141,10 +143,10 @@ std::vector<std::byte> Vxao::constants(const shared::ScreenConstants& screen) co
     shared::VxaoConstants c{};
     c.screen = screen;
     // No surface is likely to lie along this grid: those that do differ from all others.
-    const Eigen::Matrix3d grid = (Eigen::AngleAxisd(0.6, Eigen::Vector3d::UnitX()) *
-                                  Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitY()) *
-                                  Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()))
-                                     .toRotationMatrix();
+    const Eigen::Matrix3d grid =
+        (Eigen::AngleAxisd(0.6, Eigen::Vector3d::UnitX()) * Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitY()) *
+         Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()))
+            .toRotationMatrix();
     const auto row = [&](int i) {
         return shared::vec3(static_cast<float>(grid(i, 0)), static_cast<float>(grid(i, 1)),
                             static_cast<float>(grid(i, 2)));
@@ -163,7 +165,7 @@ std::vector<std::byte> Vxao::constants(const shared::ScreenConstants& screen) co
     c.slots_log2 = slots_log2(c.bricks);
     c.cones = options_.cones;
     c.tangent = static_cast<float>(std::tan(std::acos(1 - 1.0 / options_.cones)));
-    c.gain = 2.0F;
+    c.gain = 1.5F;
     for (int level = 0; level < shared::vxao_levels; ++level)
         c.open[level] = open_of_plane(options_.screen.radius / options_.voxel_m / (1 << level));
     return bytes_of(c);

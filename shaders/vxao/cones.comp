@@ -67,7 +67,7 @@ void main() {
     int here = index_of(p);
     float z = imageLoad(depth_in, here).x;
     Surface s = surface_at(p, z, here);
-    vec2 noise = noise_at(p);
+    vec2 noise = noise_at(p - k.origin); // the same with a guard band as without
     number_levels(c);
 
     // In voxels of level 0, along the grid's axes.
@@ -76,7 +76,7 @@ void main() {
     bool none = !(z > 0.0) || own_level >= c.levels;
     vec3 n = vec3(dot(c.grid_x, s.normal), dot(c.grid_y, s.normal), dot(c.grid_z, s.normal));
     // Above the surface by one voxel, and by what other views may lie off.
-    float lift = max(1.5 * voxel, k.alignment_error * c.per_voxel);
+    float lift = max(voxel, k.alignment_error * c.per_voxel);
     vec3 start = in_grid(s.point, c) + lift * n;
     vec3 axis = abs(n.x) < 0.6 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0);
     vec3 e1 = normalize(axis - n * dot(axis, n)), e2 = cross(n, e1);
@@ -86,7 +86,7 @@ void main() {
         float sine2 = (float(i) + 0.5) * inverse, cosine = sqrt(1.0 - sine2), sine = sqrt(sine2);
         vec3 d = sine * (direction.x * e1 + direction.y * e2) + cosine * n, w = d * d;
         direction = mat2(golden_cosine, golden_sine, -golden_sine, golden_cosine) * direction;
-        float passes = 1.0, t = 0.0;
+        float passes = 1.0, t = voxel;
         while (t < radius && passes > dark) {
             float height = lift + t * cosine;
             float wide = max(voxel, min(2.0 * t * c.tangent, (height - 0.5 * voxel) * (1.0 / 1.5)));

@@ -323,26 +323,25 @@ TEST_F(ClosedForms, hbao_plus) {
                           {.890, .019}}}));
 }
 
-TEST_F(ClosedForms, vxao_scratch) {
-    for (const auto& [cones, voxel] : std::vector<std::pair<std::string, std::string>>{
-             {"6", "0.125"}, {"6", "0.03125"}, {"16", "0.125"}, {"16", "0.03125"}, {"16", "0.015625"}, {"32", "0.015625"}}) {
-        const Settings s{{"cones", cones}, {"voxel", voxel}};
-        double sum = 0, low = 1;
-        for (const double degrees : {0.0, 40.0, 70.0}) {
-            const Place place = plane(degrees);
-            const DepthImage depth = image_of(place);
-            const auto n = place.normal.cast<float>();
-            const NormalImage normals{cv::Mat3f(depth.z_m.size(), cv::Vec3f(n.x(), n.y(), n.z()))};
-            const cv::Mat1f v = method_with("vxao", s).compute({{depth, normals}}).visibility(cv::Rect(60, 60, 161, 161)).clone();
-            double mean = 0, sq = 0, least = 1;
-            for (float x : v) { mean += x; sq += x * x; least = std::min<double>(least, x); }
-            const double all_ = static_cast<double>(v.total()); mean /= all_; sq = std::sqrt(std::max(0.0, sq / all_ - mean * mean));
-            fmt::print("cones {} voxel {} plane {}: {:.4f} ({:.4f}) least {:.4f}\n", cones, voxel, degrees, mean, sq, least);
-            sum += mean / 3;
-            low = std::min(low, mean);
-        }
-        fmt::print("mean {:.4f} least {:.4f}\n", sum, low);
-        fflush(stdout);
+TEST_F(ClosedForms, vxao) {
+    // One view: the wall that is seen edge-on hardly counts. Voxels are too thick for low and for round things. The
+    // values are this method's own, over offsets of its grid; its tilt is always the same.
+    const Expected expected{{{.941, 0},
+                             {.747, 0},
+                             {.534, 0},
+                             {.946, 0},
+                             {.892, 0},
+                             {.759, 0},
+                             {.882, 0},
+                             {.734, 0},
+                             {NAN, 0},
+                             {NAN, 0},
+                             {NAN, 0}}};
+    for (const Row& row : rows_of(expected)) {
+        const Spread found = spread_at("vxao", {}, row.place, 4);
+        fmt::print("{:14} {:.3f} ({:.3f}), expected {:.3f}\n", row.name, found.mean, found.deviation, row.mean);
+        EXPECT_NEAR(found.mean, row.mean, 0.03) << row.name;
+        std::fflush(stdout);
     }
 }
 
