@@ -12,6 +12,7 @@
 #include "ao/raycast/raycast.h"
 #include "ao/ssdo/ssdo.h"
 #include "ao/surfel/surfel.h"
+#include "ao/vxao/vxao.h"
 #include "projection/base/named.h"
 
 #include <type_traits>
@@ -67,6 +68,8 @@ const std::vector<MethodRow>& methods() {
          "Therrien, Levesque, Gilet 2023", SetupOf<BitmaskOptions, Bitmask>::start},
         {"surfel", "bitmask over pixels that have a direction and a thickness: the most accurate",
          "own, after Therrien et al. 2023 and Jimenez et al. 2016", SetupOf<SurfelOptions, Surfel>::start},
+        {"vxao", "cones through voxels of all that is seen, also by other views of a recording",
+         "Crassin et al. 2011; VXAO (NVIDIA 2016)", SetupOf<VxaoOptions, Vxao>::start},
         {"raycast",
          "rays against the depth surface, the cloud's discs or the mesh itself; on the CPU, with standard errors",
          "cosine-weighted ambient occlusion by its definition; Embree 3", SetupOf<RaycastOptions, Raycast>::start},
