@@ -118,7 +118,7 @@ int work_through(const std::filesystem::path& job, const Plan& plan, const Shard
                 return worse(attempts.code(), unfinished);
             const Task& task = plan.tasks[*index];
             const std::filesystem::path journal = journal_file(results_of(job, task), task.block());
-            if (is_complete(journal) || in_use(journal))
+            if (is_complete(journal, plan.hooks.any() ? "ended" : "complete") || in_use(journal))
                 continue;
             OrderedOutput output;
             if (attempts.attempt(task, output) != Attempts::Result::held && next > 0)

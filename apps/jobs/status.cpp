@@ -32,11 +32,14 @@ struct Reading {
     Standing standing = Standing::waiting;
     std::vector<FrameRow> rows; ///< in recording order
     std::string host, device, since;
+    std::size_t frames = 0; ///< planned, or found in what was fetched
+    StoredFacts stored;     ///< of a job with hooks
 };
 
-Reading read_task(const fs::path& job, const Task& task) {
+Reading read_task(const fs::path& job, const Task& task, bool hooks) {
     const fs::path file = journal_file(results_of(job, task), task.block());
     Reading reading;
+    reading.frames = task.frames;
     if (std::error_code ignored; !fs::exists(file, ignored))
         return reading;
     JournalFacts facts = read_journal(file);
@@ -46,25 +49,36 @@ Reading read_task(const fs::path& job, const Task& task) {
     reading.host = facts.host;
     reading.device = facts.device;
     reading.since = facts.started;
-    reading.standing = in_use(file)              ? Standing::running
-                       : !facts.complete.empty() ? Standing::done
-                       : !reading.rows.empty()   ? Standing::begun
-                                                 : Standing::waiting;
+    reading.stored = std::move(facts.stored);
+    if (task.frames == 0)
+        reading.frames = std::max(reading.stored.frames, reading.rows.size());
+    const bool done = hooks ? !reading.stored.ended.empty() : !facts.complete.empty();
+    const bool begun = !reading.rows.empty() || !reading.stored.in.empty();
+    reading.standing = in_use(file) ? Standing::running
+                       : done       ? Standing::done
+                       : begun      ? Standing::begun
+                                    : Standing::waiting;
     return reading;
 }
 
-/// A frame's failure or doubts without its name, so that those of many frames are one: digits become '#', the folder is
-/// left out.
-std::string reason_of(const FrameRow& row, const Task& task) {
-    std::string text = scanshade::reason_of(row);
-    for (std::string folder = task.capture.string() + "/"; text.find(folder) != std::string::npos;)
-        text.erase(text.find(folder), folder.size());
-    if (const auto at = text.find(row.name); at != std::string::npos)
-        text.replace(at, row.name.size(), "FRAME");
+/// '#' for each row of digits, so that texts about many frames are one.
+std::string without_numbers(const std::string& text) {
     std::string reason;
     for (const char c : text)
         if (const bool digit = c >= '0' && c <= '9'; !digit || reason.empty() || reason.back() != '#')
             reason += digit ? '#' : c;
+    return reason;
+}
+
+/// A frame's failure or doubts without its name, its folder and numbers.
+std::string reason_of(const FrameRow& row, const Task& task, const std::string& fetched_to) {
+    std::string text = scanshade::reason_of(row);
+    for (const std::string& folder : {task.capture.string() + "/", fetched_to + "/"})
+        while (folder.size() > 1 && text.find(folder) != std::string::npos)
+            text.erase(text.find(folder), folder.size());
+    if (const auto at = text.find(row.name); at != std::string::npos)
+        text.replace(at, row.name.size(), "FRAME");
+    const std::string reason = without_numbers(text);
     return row.status == FrameStatus::doubtful ? reason : fmt::format("{}: {}", name_of(row.fault), reason);
 }
 
@@ -81,6 +95,8 @@ struct Totals {
     using Groups = std::map<std::string, Group>;
     Groups reasons, doubts; ///< of failed frames, of doubtful ones
     std::map<std::string, std::size_t> frames_by_host;
+    std::size_t refused = 0, delivered = 0; ///< tasks: input that cannot be computed; results where they belong
+    Groups troubles;                        ///< of hooks, by reason; `frames` counts tasks
 
     [[nodiscard]] std::size_t in(Standing which) const {
         const auto found = standing.find(which);
@@ -90,43 +106,54 @@ struct Totals {
     void add(const Task& task, const Reading& reading) {
         ++tasks;
         ++standing[reading.standing];
-        frames += task.frames;
+        frames += reading.frames;
         cost += task.cost;
         for (const FrameRow& row : reading.rows)
-            add(task, row);
+            add(task, row, reading);
+        const bool ended = !reading.stored.ended.empty();
+        if (ended && !reading.stored.refused.empty()) {
+            ++refused;
+            done_cost += task.cost;
+            add(troubles, "refused: " + without_numbers(reading.stored.refused), task.name);
+        } else {
+            delivered += ended;
+        }
+        if (!reading.stored.trouble.empty())
+            add(troubles, without_numbers(reading.stored.trouble), task.name);
         if (!reading.rows.empty())
             frames_by_host[reading.host + ", " + reading.device] += reading.rows.size();
     }
 
   private:
-    void add(const Task& task, const FrameRow& row) {
+    void add(const Task& task, const FrameRow& row, const Reading& reading) {
+        const auto group = [&](Groups& groups) {
+            add(groups, reason_of(row, task, reading.stored.in), task.name + " " + row.name);
+        };
         ms = ms + row.ms;
-        if (row.fault == Fault::outage) { // tried again by the next run
-            add(reasons, task, row);
-            return;
-        }
-        done_cost += task.cost / static_cast<double>(task.frames);
+        if (row.fault == Fault::outage) // tried again by the next run
+            return group(reasons);
+        done_cost += task.cost / static_cast<double>(std::max<std::size_t>(reading.frames, 1));
         if (row.status == FrameStatus::ok) {
             ++ok;
             return;
         }
         const bool is_doubtful = row.status == FrameStatus::doubtful;
         ++(is_doubtful ? doubtful : failed);
-        add(is_doubtful ? doubts : reasons, task, row);
+        group(is_doubtful ? doubts : reasons);
     }
-    static void add(Groups& groups, const Task& task, const FrameRow& row) {
-        Group& group = groups[reason_of(row, task)];
+    static void add(Groups& groups, const std::string& reason, const std::string& example) {
+        Group& group = groups[reason];
         if (group.frames++ == 0)
-            group.example = task.name + " " + row.name;
+            group.example = example;
     }
 };
 
 std::size_t settled(const Totals& totals) { return totals.ok + totals.doubtful + totals.failed; }
 
-int code_of(const Totals& totals) {
-    if (settled(totals) < totals.frames)
+int code_of(const Totals& totals, bool hooks) {
+    if (settled(totals) < totals.frames || (hooks && totals.delivered + totals.refused < totals.tasks))
         return unfinished;
-    if (totals.failed + totals.doubtful == 0)
+    if (totals.failed + totals.doubtful + totals.refused == 0)
         return all_well;
     return totals.ok + totals.doubtful == 0 ? nothing_done : some_failed;
 }
@@ -147,14 +174,18 @@ json reasons_json(const Totals::Groups& reasons) {
     return all;
 }
 
-void print(const Totals& totals, std::size_t refused) {
+void print(const Totals& totals, const Plan& plan) {
     fmt::print("tasks   {} done, {} running, {} begun, {} waiting, of {}\n", totals.in(Standing::done),
                totals.in(Standing::running), totals.in(Standing::begun), totals.in(Standing::waiting), totals.tasks);
     fmt::print("frames  {} ok, {} doubtful, {} failed, {} left, of {}\n", totals.ok, totals.doubtful, totals.failed,
                left_of(totals), totals.frames);
     fmt::print("work    {} %\n", percent_text(work_done(totals), left_of(totals) > 0, 1));
-    if (refused > 0)
-        fmt::print("refused {} captures, when the job was planned\n", refused);
+    if (!plan.hooks.deliver.empty())
+        fmt::print("results {} of {} tasks delivered\n", totals.delivered, totals.tasks);
+    if (!plan.refused.empty())
+        fmt::print("refused {} captures, when the job was planned\n", plan.refused.size());
+    for (const auto& [reason, group] : most_frequent_first(totals.troubles))
+        fmt::print("  {:>8} tasks: {} (first: {})\n", group.frames, reason, group.example);
     for (const auto& [host, frames] : totals.frames_by_host)
         fmt::print("  {:>8} frames by {}\n", frames, host);
     for (const auto& [reason, group] : most_frequent_first(totals.doubts))
@@ -177,9 +208,9 @@ class Pages {
     explicit Pages(const fs::path& job) : job_(job), captures_(job) {}
 
     /// Tasks in their order: the blocks of a capture follow each other.
-    void add(const Task& task, const std::vector<FrameRow>& rows) {
+    void add(const Task& task, const Reading& reading) {
         const fs::path folder = results_of(job_, task);
-        captures_.take(captures_.add(task.name, folder, task.frames), rows);
+        captures_.take(captures_.add(task.name, folder, reading.frames), reading.rows);
         const std::string block = task.block();
         if (block.empty()) // a whole capture, whose run has written its page
             return;
@@ -222,16 +253,16 @@ class Status final : public Command {
         Totals totals;
         std::vector<Running> running;
         for (const Task& task : plan.tasks) {
-            const Reading reading = read_task(job_.front(), task);
+            const Reading reading = read_task(job_.front(), task, plan.hooks.any());
             totals.add(task, reading);
             if (reading.standing == Standing::running)
-                running.push_back({&task, reading.rows.size(), reading.host, reading.since});
+                running.push_back({&task, reading.rows.size(), reading.frames, reading.host, reading.since});
         }
         if (as_json_)
             fmt::print("{}\n", text_of(status_json(totals, running, plan)));
         else
             print_all(totals, running, plan);
-        return code_of(totals);
+        return code_of(totals, plan.hooks.any());
     }
 
   private:
@@ -239,14 +270,15 @@ class Status final : public Command {
     struct Running {
         const Task* task;
         std::size_t frames; ///< done
+        std::size_t of;
         std::string host, since;
     };
 
     static void print_all(const Totals& totals, const std::vector<Running>& running, const Plan& plan) {
-        print(totals, plan.refused.size());
+        print(totals, plan);
         for (const Running& each : running)
             fmt::print("  running {} {}: {} of {} frames, {} since {}\n", each.task->name, each.task->block(),
-                       each.frames, each.task->frames, each.host, each.since);
+                       each.frames, each.of, each.host, each.since);
     }
 
     static json status_json(const Totals& totals, const std::vector<Running>& running, const Plan& plan) {
@@ -255,7 +287,7 @@ class Status final : public Command {
             tasks.push_back({{"task", each.task->name},
                              {"block", each.task->block()},
                              {"frames", each.frames},
-                             {"of", each.task->frames},
+                             {"of", each.of},
                              {"host", each.host},
                              {"since", each.since}});
         return {{"tasks",
@@ -274,6 +306,8 @@ class Status final : public Command {
                 {"frames_by_host", totals.frames_by_host},
                 {"doubts", reasons_json(totals.doubts)},
                 {"failures", reasons_json(totals.reasons)},
+                {"delivered", totals.delivered},
+                {"hooks", reasons_json(totals.troubles)},
                 {"running", tasks},
                 {"refused", plan.refused}};
     }
@@ -304,9 +338,9 @@ class Merge final : public Command {
             stream.exceptions(std::ios::failbit | std::ios::badbit);
             stream << "capture," << csv_head();
             for (const Task& task : plan.tasks) {
-                const Reading reading = read_task(job, task);
+                const Reading reading = read_task(job, task, plan.hooks.any());
                 totals.add(task, reading);
-                pages.add(task, reading.rows);
+                pages.add(task, reading);
                 for (const FrameRow& row : reading.rows)
                     stream << csv_line(task.name, row);
             }
@@ -315,8 +349,8 @@ class Merge final : public Command {
         write_manifest(job, plan, totals);
         if (page_)
             pages.write(plan, totals);
-        print(totals, plan.refused.size());
-        return code_of(totals);
+        print(totals, plan);
+        return code_of(totals, plan.hooks.any());
     }
 
   private:

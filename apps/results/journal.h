@@ -23,11 +23,23 @@ struct Record {
     std::vector<std::uintmax_t> sizes; ///< bytes of row.files
 };
 
+/// The progress of a task whose input is fetched, or whose results are delivered, by hooks.
+struct StoredFacts {
+    std::string in;         ///< where the input was last; messages about frames name files in it
+    std::size_t frames = 0; ///< in the fetched input; 0 = not known yet
+    std::string computed;   ///< key of the task whose results were complete, unless frames were added since
+    int code = 0;           ///< its exit code
+    std::string refused;    ///< why the input cannot be computed
+    std::string ended;      ///< key of the task after which nothing is left to do
+    std::string trouble;    ///< the last failure of a hook, if nothing went well since
+};
+
 /// The last process that wrote to a journal, and the progress of its task.
 struct JournalFacts {
     std::string complete;                       ///< Journal::complete()'s key, unless frames were added since
     std::string host, device, started;          ///< of the last process that worked here
     std::string begun;                          ///< a frame that was begun alone and did not end
+    StoredFacts stored = {};                    ///< where hooks fetch and deliver
     std::map<std::string, Record> records = {}; ///< by frame name; the latest of each
 };
 
@@ -47,8 +59,9 @@ struct JournalFacts {
 /// Whether a process holds the journal now.
 [[nodiscard]] bool in_use(const std::filesystem::path& file);
 
-/// Whether the journal's last line says that its task is complete, with whatever settings. Reads a few bytes only.
-[[nodiscard]] bool is_complete(const std::filesystem::path& file);
+/// Whether the journal's last line says that its task is complete, with whatever settings; or "ended", where hooks
+/// deliver. Reads a few bytes only.
+[[nodiscard]] bool is_complete(const std::filesystem::path& file, std::string_view kind = "complete");
 
 /// "settings" of a Record, or the key of a task: parts joined in order and hashed, the program's version among them.
 [[nodiscard]] std::string key_of(const std::vector<std::string>& parts);
@@ -66,7 +79,8 @@ class Journal {
     /// Makes the folder and the file if missing. Throws Busy at once if another process holds the journal, and
     /// Misuse if it may not be written. Also reads
     /// the folder's other journals (blocks of another plan).
-    Journal(std::filesystem::path folder, const std::string& block);
+    /// `results`: where the frames' files are; empty = in the folder.
+    Journal(std::filesystem::path folder, const std::string& block, std::filesystem::path results = {});
     ~Journal();
     Journal(const Journal&) = delete;
     Journal& operator=(const Journal&) = delete;
@@ -93,6 +107,18 @@ class Journal {
     void begin_alone(const std::string& frame);
     /// Records that all frames of the task are done; `key` is the task's task_key().
     void complete(const std::string& key);
+    /// The input lies in the folder, and has so many frames (0: not looked at yet).
+    void fetched(const std::filesystem::path& in, std::size_t frames);
+    /// A hook failed: which, on which of its tries, why, and the end of what it said.
+    void hook_failed(const std::string& hook, int attempt, const std::string& reason, const std::string& said);
+    /// The results under this key are complete; what the run's exit code would be.
+    void computed(const std::string& key, int code);
+    /// Nothing is left to do for the task: its results are where they belong, or its input is refused.
+    void ended(const std::string& key, const std::string& refused = "");
+    /// Whether all recorded frames' files are complete.
+    [[nodiscard]] bool all_files_are_there() const;
+    /// The handle that holds the lock.
+    [[nodiscard]] int lock() const { return handle_; }
     /// The facts of this journal, without the records.
     [[nodiscard]] const JournalFacts& facts() const { return facts_; }
 
@@ -109,7 +135,7 @@ class Journal {
     [[nodiscard]] std::optional<Record> record_of(const std::string& frame) const;
     [[nodiscard]] bool files_are_there(const Record& record) const;
 
-    std::filesystem::path folder_, file_;
+    std::filesystem::path folder_, file_, results_;
     int handle_ = -1;
     std::string capture_;
     bool introduced_ = false;

@@ -1,5 +1,6 @@
 // `scanshade run`: ambient occlusion for every frame of one or more captures.
 #include "apps/jobs/job_run.h"
+#include "apps/jobs/stored_tasks.h"
 #include "apps/measure/front.h"
 #include "apps/measure/trial.h"
 #include "apps/page/run_page.h"
@@ -313,20 +314,41 @@ class Run final : public Command {
         return supervise(1, [&](const WorkerProcess& worker) {
             cv::setNumThreads(1);
             end_gracefully_on_signals();
-            return work_through(job, plan, shard, interrupted, worker.carefully ? 1 : at_once(),
-                                [&](const Task& task, OrderedOutput& output) {
-                                    Tally tally;
-                                    tally.add(process(job_of(job, task), output, worker));
-                                    return tally.exit_code(0);
-                                });
+            std::optional<StoredTasks> stored;
+            if (plan.hooks.any())
+                stored.emplace(job, plan, asked_.scratch, asked_.scratch_limit_gb, asked_.retry, interrupted);
+            const auto tally_of = [](const std::vector<FrameRow>& rows) {
+                Tally tally;
+                tally.add(rows);
+                return tally.exit_code(0);
+            };
+            return work_through(
+                job, plan, shard, interrupted, worker.carefully ? 1 : at_once(stored.has_value()),
+                [&](const Task& task, OrderedOutput& output) {
+                    if (!stored)
+                        return tally_of(process(job_of(task, {task.capture, results_of(job, task)}), output, worker));
+                    return stored->run(task, [&](const TaskFolders& folders, Journal& journal) {
+                        return tally_of(process_stored(task, folders, journal, output, worker));
+                    });
+                });
         });
     }
 
-    CaptureJob job_of(const fs::path& folder, const Task& task) {
+    std::vector<FrameRow> process_stored(const Task& task, const TaskFolders& folders, Journal& journal,
+                                         OrderedOutput& output, const WorkerProcess& worker) {
+        CaptureJob job = job_of(task, folders);
+        journal.fetched(folders.capture, job.batch.frames.size());
+        job.capture.path = task.capture; // for people: where it was fetched to tells them nothing
+        return process(std::move(job), output, worker, &journal);
+    }
+
+    CaptureJob job_of(const Task& task, const TaskFolders& folders) {
         // The plan could open it, so the problem may be temporary.
-        if (!is_there(task.capture))
-            throw Outage(task.capture.string() + ": not there any more");
-        CaptureJob job = job_from(task.capture, results_of(folder, task));
+        if (!is_there(folders.capture))
+            throw Outage(folders.capture.string() + ": not there any more");
+        CaptureJob job = job_from(folders.capture, folders.results);
+        if (task.of == 0) // a source, of which nothing was known
+            return job;
         if (job.of.size() != task.of)
             throw Error(fmt::format("{}: planned with {} frames, has {} now: plan anew", task.capture.string(), task.of,
                                     job.of.size()));
@@ -339,14 +361,15 @@ class Run final : public Command {
     /// How many captures are open at once: those whose frames enter the walk (one per sixteen cores), two being opened
     /// before them, and two being finished after them. On a GPU, 40 frames take no longer than opening their capture.
     /// With a budget it is one: nothing may disturb its measurements, and each capture gets other settings.
-    [[nodiscard]] std::size_t at_once() {
+    /// `stored`: input is fetched for one task and results are delivered for another, both in bounded space.
+    [[nodiscard]] std::size_t at_once(bool stored = false) {
         if (asked_.budget.any())
             return 1;
         std::size_t entering = std::max(1U, std::thread::hardware_concurrency() / 16);
         if (asked_.sequence != SequenceUse::off) // keeps one device busy
             entering = asked_.device == "all" ? workers().devices() : 1;
         entrance_.release(static_cast<std::ptrdiff_t>(entering - 1));
-        return entering + 4;
+        return entering + (stored ? 2 : 4);
     }
 
     /// Opens the devices when the first frame needs them, so a run with nothing left to do opens none.
@@ -374,9 +397,12 @@ class Run final : public Command {
     };
 
     /// One capture, from its journal to its report.
-    std::vector<FrameRow> process(CaptureJob job, OrderedOutput& output, const WorkerProcess& worker = {}) {
+    /// `held`: its journal, where that is not in the folder of its results.
+    std::vector<FrameRow> process(CaptureJob job, OrderedOutput& output, const WorkerProcess& worker = {},
+                                  Journal* held = nullptr) {
         output.set_capture(job.capture.path.string());
-        Journal journal(job.folder(), job.block);
+        std::optional<Journal> own;
+        Journal& journal = held ? *held : own.emplace(job.folder(), job.block);
         journal.set_capture(job.capture);
         if (asked_.overwrite || !asked_.resume)
             journal.clear();

@@ -18,27 +18,19 @@ namespace scanshade {
 namespace {
 
 /// Settings that do not go into the key as typed: they change no results, or the key has them as used.
-constexpr std::array aside = {"frames",         "camera",
-                              "depth-scale",    "association-limit",
-                              "registered",     "depth-noise",
-                              "method",         "radius",
-                              "quality",        "max-error",
-                              "max-ms",         "settings",
-                              "device",         "out",
-                              "write",          "format",
-                              "overwrite",      "dump",
-                              "resume",         "retry",
-                              "shard",          "log",
-                              "shade-strength", "colour-cloud",
-                              "cloud",          "cloud-resolution",
-                              "poses",          "in-flight",
-                              "preset",         "quiet",
-                              "colour",         "page",
-                              "page-points",    "tar"};
+constexpr std::array aside = {"frames",         "camera",       "depth-scale",   "association-limit",
+                              "registered",     "depth-noise",  "method",        "radius",
+                              "quality",        "max-error",    "max-ms",        "settings",
+                              "device",         "out",          "write",         "format",
+                              "overwrite",      "dump",         "resume",        "retry",
+                              "shard",          "scratch",      "scratch-limit", "log",
+                              "shade-strength", "colour-cloud", "cloud",         "cloud-resolution",
+                              "poses",          "in-flight",    "preset",        "quiet",
+                              "colour",         "page",         "page-points",   "tar"};
 
 /// Settings that change no results when they are typed differently.
-constexpr std::array elsewhere = {"out", "overwrite", "dump",      "resume", "retry", "shard",
-                                  "log", "device",    "in-flight", "preset", "quiet"};
+constexpr std::array elsewhere = {"out",           "overwrite", "dump",   "resume",    "retry",  "shard", "scratch",
+                                  "scratch-limit", "log",       "device", "in-flight", "preset", "quiet"};
 
 std::string row_text(const Parameter& row) { return row.name + "=" + value_text(row); }
 
