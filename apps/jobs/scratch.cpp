@@ -26,6 +26,7 @@ namespace {
 
 constexpr auto poll_every = std::chrono::milliseconds(100);
 constexpr const char* journal_name = "journal-of-this-task";
+constexpr const char* removed_mark = ".removed-";
 
 /// A folder of ours alone: its path can be guessed, and others may write to /tmp.
 void make_private(const fs::path& folder) {
@@ -81,19 +82,26 @@ fs::path Scratch::path_of(const std::string& task) const {
 
 fs::path Scratch::folder_of(const std::string& task, const fs::path& journal) const {
     fs::path folder = path_of(task);
-    std::error_code trouble;
-    fs::create_directory(folder, trouble);
-    std::ofstream stream(folder / journal_name, std::ios::binary);
-    stream << fs::absolute(journal).string();
-    stream.close();
-    if (!stream)
-        throw Outage(fmt::format("--scratch: {}: cannot be written: {}", folder.string(), std::strerror(errno)));
-    return folder;
+    constexpr int tries = 3; // another process may take an empty folder for remains
+    for (int attempt = 1; attempt <= tries; ++attempt) {
+        std::error_code trouble;
+        fs::create_directory(folder, trouble);
+        std::ofstream stream(folder / journal_name, std::ios::binary);
+        stream << fs::absolute(journal).string();
+        stream.close();
+        if (stream)
+            return folder;
+    }
+    throw Outage(fmt::format("--scratch: {}: cannot be written: {}", folder.string(), std::strerror(errno)));
 }
 
 void Scratch::remove(const fs::path& folder) {
+    // Under another name, so that one killed amid this leaves no task's folder that lacks its parts.
+    const fs::path removed = folder.parent_path() / fmt::format("{}{}", removed_mark, folder.filename().string());
     std::error_code trouble;
-    fs::remove_all(folder, trouble);
+    fs::remove_all(removed, trouble);
+    fs::rename(folder, removed, trouble);
+    fs::remove_all(removed, trouble);
     if (trouble)
         warn(fmt::format("{}: cannot be removed: {}", folder.string(), trouble.message()));
 }
@@ -116,6 +124,11 @@ void Scratch::remove_remains(bool ended_only, const fs::path& own) const {
         if (folder == own)
             continue;
         const fs::path journal = journal_of(folder);
+        std::error_code in_use_after_all;
+        if (folder.filename().string().starts_with(removed_mark))
+            fs::remove_all(folder, in_use_after_all);
+        else if (journal.empty())
+            fs::remove(folder, in_use_after_all); // only where it is empty
         if (journal.empty() || (ended_only && !is_complete(journal, "ended")))
             continue;
         const int handle = ::open(journal.c_str(), O_RDONLY | O_CLOEXEC);
@@ -132,7 +145,8 @@ void Scratch::remove_remains(bool ended_only, const fs::path& own) const {
 bool Scratch::others_at_work(const fs::path& own) const {
     for (const fs::path& folder : task_folders(folder_)) {
         std::error_code gone;
-        if (folder != own && fs::exists(input_in(folder), gone) && in_use(journal_of(folder)))
+        if (folder != own && !journal_of(folder).empty() && fs::exists(input_in(folder), gone) &&
+            in_use(journal_of(folder)))
             return true;
     }
     return false;

@@ -154,7 +154,6 @@ void StoredTasks::fetch(Work& work) {
         }
         if (end.well() && !over) {
             fs::rename(part, work.in);
-            work.journal.fetched(work.in, 0);
             expect(Scratch::used_by(work.folder));
             return;
         }

@@ -487,7 +487,7 @@ void Journal::complete(const std::string& key) {
 }
 
 void Journal::fetched(const fs::path& in, std::size_t frames) {
-    append(json_line(json{{"fetched", as_utf8(in.string())}, {"frames", frames}}));
+    append(json_line(json{{"fetched", as_utf8(in.string())}, {"frames", frames}}), Sync::soon);
     facts_.stored.frames = frames;
     facts_.stored.trouble.clear();
 }
@@ -499,7 +499,7 @@ void Journal::hook_failed(const std::string& hook, int attempt, const std::strin
 }
 
 void Journal::computed(const std::string& key, int code) {
-    append(json_line(json{{"computed", key}, {"code", code}}));
+    append(json_line(json{{"computed", key}, {"code", code}}), Sync::soon);
     facts_.stored.computed = key;
     facts_.stored.code = code;
 }

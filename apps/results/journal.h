@@ -107,7 +107,7 @@ class Journal {
     void begin_alone(const std::string& frame);
     /// Records that all frames of the task are done; `key` is the task's task_key().
     void complete(const std::string& key);
-    /// The input lies in the folder, and has so many frames (0: not looked at yet).
+    /// The input lies in the folder, and has so many frames.
     void fetched(const std::filesystem::path& in, std::size_t frames);
     /// A hook failed: which, on which of its tries, why, and the end of what it said.
     void hook_failed(const std::string& hook, int attempt, const std::string& reason, const std::string& said);
