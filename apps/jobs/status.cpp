@@ -30,18 +30,34 @@ enum class Standing { waiting, running, begun, done };
 /// One task, as its journal records it.
 struct Reading {
     Standing standing = Standing::waiting;
-    std::vector<FrameRow> rows; ///< in recording order
+    std::vector<FrameRow> rows; ///< in recording order; empty where only sums were asked for
+    TaskSums sums;
     std::string host, device, since;
     std::size_t frames = 0; ///< planned, or found in what was fetched
     StoredFacts stored;     ///< of a job with hooks
 };
 
-Reading read_task(const fs::path& job, const Task& task, bool hooks) {
+/// Whether rows are wanted as well: a complete task's sums are at its journal's end, while a million rows take a
+/// minute.
+enum class Wanted { sums, rows };
+
+Reading read_task(const fs::path& job, const Task& task, bool hooks, Wanted wanted) {
     const fs::path file = journal_file(results_of(job, task), task.block());
     Reading reading;
     reading.frames = task.frames;
     if (std::error_code ignored; !fs::exists(file, ignored))
         return reading;
+    if (wanted == Wanted::sums)
+        if (auto end = read_journal_end(file); end && end->sums.rows() >= task.frames && !in_use(file)) {
+            reading.sums = std::move(end->sums);
+            reading.host = std::move(end->host);
+            reading.device = std::move(end->device);
+            reading.stored = std::move(end->stored);
+            if (task.frames == 0)
+                reading.frames = reading.sums.rows();
+            reading.standing = hooks && reading.stored.ended.empty() ? Standing::begun : Standing::done;
+            return reading;
+        }
     JournalFacts facts = read_journal(file);
     for (auto& [name, record] : facts.records)
         reading.rows.push_back(std::move(record.row));
@@ -50,6 +66,8 @@ Reading read_task(const fs::path& job, const Task& task, bool hooks) {
     reading.device = facts.device;
     reading.since = facts.started;
     reading.stored = std::move(facts.stored);
+    for (const FrameRow& row : reading.rows)
+        reading.sums.add(row, {task.capture.string(), reading.stored.in});
     if (task.frames == 0)
         reading.frames = std::max(reading.stored.frames, reading.rows.size());
     const bool done = hooks ? !reading.stored.ended.empty() : !facts.complete.empty();
@@ -61,38 +79,14 @@ Reading read_task(const fs::path& job, const Task& task, bool hooks) {
     return reading;
 }
 
-/// '#' for each row of digits, so that texts about many frames are one.
-std::string without_numbers(const std::string& text) {
-    std::string reason;
-    for (const char c : text)
-        if (const bool digit = c >= '0' && c <= '9'; !digit || reason.empty() || reason.back() != '#')
-            reason += digit ? '#' : c;
-    return reason;
-}
-
-/// A frame's failure or doubts without its name, its folder and numbers.
-std::string reason_of(const FrameRow& row, const Task& task, const std::string& fetched_to) {
-    std::string text = scanshade::reason_of(row);
-    for (const std::string& folder : {task.capture.string() + "/", fetched_to + "/"})
-        while (folder.size() > 1 && text.find(folder) != std::string::npos)
-            text.erase(text.find(folder), folder.size());
-    if (const auto at = text.find(row.name); at != std::string::npos)
-        text.replace(at, row.name.size(), "FRAME");
-    const std::string reason = without_numbers(text);
-    return row.status == FrameStatus::doubtful ? reason : fmt::format("{}: {}", name_of(row.fault), reason);
-}
-
 /// Sums over a job, task by task, so that memory does not grow with their number.
 struct Totals {
     std::size_t tasks = 0, frames = 0, ok = 0, doubtful = 0, failed = 0;
     std::map<Standing, std::size_t> standing;
     double cost = 0, done_cost = 0;
     StageTimes ms{};
-    struct Group {
-        std::size_t frames = 0;
-        std::string example;
-    };
-    using Groups = std::map<std::string, Group>;
+    using Group = ReasonGroup;
+    using Groups = ReasonGroups;
     Groups reasons, doubts; ///< of failed frames, of doubtful ones
     std::map<std::string, std::size_t> frames_by_host;
     std::size_t refused = 0, delivered = 0; ///< tasks: input that cannot be computed; results where they belong
@@ -108,8 +102,15 @@ struct Totals {
         ++standing[reading.standing];
         frames += reading.frames;
         cost += task.cost;
-        for (const FrameRow& row : reading.rows)
-            add(task, row, reading);
+        const TaskSums& sums = reading.sums;
+        ok += sums.ok;
+        doubtful += sums.doubtful;
+        failed += sums.failed;
+        ms = ms + sums.ms;
+        done_cost += task.cost * static_cast<double>(sums.settled()) /
+                     static_cast<double>(std::max<std::size_t>(reading.frames, 1));
+        join(reasons, sums.reasons, task);
+        join(doubts, sums.doubts, task);
         const bool ended = !reading.stored.ended.empty();
         if (ended && !reading.stored.refused.empty()) {
             ++refused;
@@ -120,26 +121,18 @@ struct Totals {
         }
         if (!reading.stored.trouble.empty())
             add(troubles, without_numbers(reading.stored.trouble), task.name);
-        if (!reading.rows.empty())
-            frames_by_host[reading.host + ", " + reading.device] += reading.rows.size();
+        if (sums.rows() > 0)
+            frames_by_host[reading.host + ", " + reading.device] += sums.rows();
     }
 
   private:
-    void add(const Task& task, const FrameRow& row, const Reading& reading) {
-        const auto group = [&](Groups& groups) {
-            add(groups, reason_of(row, task, reading.stored.in), task.name + " " + row.name);
-        };
-        ms = ms + row.ms;
-        if (row.fault == Fault::outage) // tried again by the next run
-            return group(reasons);
-        done_cost += task.cost / static_cast<double>(std::max<std::size_t>(reading.frames, 1));
-        if (row.status == FrameStatus::ok) {
-            ++ok;
-            return;
+    static void join(Groups& groups, const Groups& more, const Task& task) {
+        for (const auto& [reason, group] : more) {
+            Group& one = groups[reason];
+            if (one.frames == 0)
+                one.example = task.name + " " + group.example;
+            one.frames += group.frames;
         }
-        const bool is_doubtful = row.status == FrameStatus::doubtful;
-        ++(is_doubtful ? doubtful : failed);
-        group(is_doubtful ? doubts : reasons);
     }
     static void add(Groups& groups, const std::string& reason, const std::string& example) {
         Group& group = groups[reason];
@@ -253,10 +246,10 @@ class Status final : public Command {
         Totals totals;
         std::vector<Running> running;
         for (const Task& task : plan.tasks) {
-            const Reading reading = read_task(job_.front(), task, plan.hooks.any());
+            const Reading reading = read_task(job_.front(), task, plan.hooks.any(), Wanted::sums);
             totals.add(task, reading);
             if (reading.standing == Standing::running)
-                running.push_back({&task, reading.rows.size(), reading.frames, reading.host, reading.since});
+                running.push_back({&task, reading.sums.rows(), reading.frames, reading.host, reading.since});
         }
         if (as_json_)
             fmt::print("{}\n", text_of(status_json(totals, running, plan)));
@@ -338,7 +331,7 @@ class Merge final : public Command {
             stream.exceptions(std::ios::failbit | std::ios::badbit);
             stream << "capture," << csv_head();
             for (const Task& task : plan.tasks) {
-                const Reading reading = read_task(job, task, plan.hooks.any());
+                const Reading reading = read_task(job, task, plan.hooks.any(), Wanted::rows);
                 totals.add(task, reading);
                 pages.add(task, reading);
                 for (const FrameRow& row : reading.rows)

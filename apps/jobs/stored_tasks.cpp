@@ -49,9 +49,9 @@ struct StoredTasks::Work {
     Journal& journal;
 };
 
-StoredTasks::StoredTasks(fs::path job, const Plan& plan, const std::string& scratch, double limit_gb, bool retry,
-                         const std::atomic<bool>& stop)
-    : job_(std::move(job)), plan_(plan), retry_(retry), stop_(stop),
+StoredTasks::StoredTasks(fs::path job, const Plan& plan, const std::map<fs::path, std::set<std::string>>& siblings,
+                         const std::string& scratch, double limit_gb, bool retry, const std::atomic<bool>& stop)
+    : job_(std::move(job)), plan_(plan), siblings_(siblings), retry_(retry), stop_(stop),
       scratch_(scratch, job_, static_cast<std::uint64_t>((limit_gb > 0 ? limit_gb : plan.hooks.scratch_limit) * 1e9)) {}
 
 int StoredTasks::run(const Task& task, const std::function<int(const TaskFolders&, Journal&)>& compute) {
@@ -61,7 +61,8 @@ int StoredTasks::run(const Task& task, const std::function<int(const TaskFolders
     fs::path out = results;
     if (!plan_.hooks.deliver.empty())
         out = scratch_.path_of(name) / "out";
-    Journal journal(results, task.block(), out);
+    const auto siblings = siblings_.find(results);
+    Journal journal(results, task.block(), out, siblings == siblings_.end() ? nullptr : &siblings->second);
     const std::string key = key_for(plan_, task);
     const StoredFacts before = journal.facts().stored;
     const int ended_with = before.refused.empty() ? before.code : int(nothing_done);

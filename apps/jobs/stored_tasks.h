@@ -8,6 +8,9 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
+#include <set>
+#include <string>
 
 namespace scanshade {
 
@@ -19,10 +22,11 @@ struct TaskFolders {
 /// What the steps of this machine's tasks need. Safe to use from several threads, a task in each.
 class StoredTasks {
   public:
-    /// `scratch`, `limit_gb`: as typed, "" and 0 where not. `retry`: tasks that ended without all their frames are done
-    /// again.
-    StoredTasks(std::filesystem::path job, const Plan& plan, const std::string& scratch, double limit_gb, bool retry,
-                const std::atomic<bool>& stop);
+    /// `siblings`: names of the journals of a capture's blocks, by its folder. `scratch`, `limit_gb`: as typed, "" and
+    /// 0 where not. `retry`: tasks that ended without all their frames are done again.
+    StoredTasks(std::filesystem::path job, const Plan& plan,
+                const std::map<std::filesystem::path, std::set<std::string>>& siblings, const std::string& scratch,
+                double limit_gb, bool retry, const std::atomic<bool>& stop);
 
     /// Does the task and returns its exit code; does nothing for one that has ended. `compute` writes all results of
     /// the capture and returns an exit code; it throws Error where the capture cannot be computed at all.
@@ -43,6 +47,7 @@ class StoredTasks {
 
     std::filesystem::path job_;
     const Plan& plan_;
+    const std::map<std::filesystem::path, std::set<std::string>>& siblings_;
     bool retry_;
     const std::atomic<bool>& stop_;
     Scratch scratch_;

@@ -216,6 +216,9 @@ std::string stamps_of(const CaptureEntry& entry) {
 /// Unreadable content is a content of its own: the frame fails again until it can be read.
 std::string hashes_of(const CaptureEntry& entry) { return listed(entry) + content_hash_of(entry); }
 
+/// Of a journal that ends with its task's sums, enough for these and what hooks add.
+constexpr std::streamoff journal_end_bytes = 1 << 15;
+
 std::string host_name() {
     std::array<char, 256> name = {};
     ::gethostname(name.data(), name.size() - 1);
@@ -260,6 +263,42 @@ JournalFacts read_journal(const fs::path& file) {
     JournalFacts facts;
     for_each_line(file, [&](const json& line, std::int64_t) { take_line(line, facts); });
     return facts;
+}
+
+std::optional<JournalEnd> read_journal_end(const fs::path& file) {
+    std::ifstream stream(file, std::ios::binary | std::ios::ate);
+    if (!stream)
+        return std::nullopt;
+    stream.seekg(-std::min<std::streamoff>(journal_end_bytes, stream.tellg()), std::ios::end);
+    std::string line;
+    std::optional<JournalEnd> end;
+    bool complete = false;
+    while (std::getline(stream, line)) {
+        // The first line is mostly cut off. Lines of frames begin anew what the sums had ended.
+        if (line.starts_with("{\"frame\":")) {
+            end.reset();
+            continue;
+        }
+        const json text = parsed_or_discarded(line);
+        if (!text.is_object())
+            continue;
+        try {
+            const std::string kind = kind_of(text);
+            if (kind == "sums") {
+                complete = false;
+                end = JournalEnd{sums_from(text["sums"]), text.at("host"), text.at("device"), {}};
+            } else if (kind == "complete") {
+                complete = true;
+            } else if (kind == "again" || kind == "begun" || kind == "process") {
+                end.reset();
+            } else if (end) {
+                take_stored(kind, text, end->stored);
+            }
+        } catch (const std::exception&) { // another version's line
+            end.reset();
+        }
+    }
+    return complete ? end : std::nullopt;
 }
 
 bool has_results(const fs::path& folder) {
@@ -324,12 +363,16 @@ std::string key_of(const std::vector<std::string>& parts) {
     return hash_of(all);
 }
 
-Journal::Journal(fs::path folder, const std::string& block, fs::path results)
+Journal::Journal(fs::path folder, const std::string& block, fs::path results, const std::set<std::string>* siblings)
     : folder_(std::move(folder)), file_(journal_file(folder_, block)),
       results_(results.empty() ? folder_ : std::move(results)) {
     std::error_code trouble;
     fs::create_directories(folder_, trouble);
-    handle_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+    constexpr int flags = O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC;
+    handle_ = ::open(file_.c_str(), flags | O_EXCL, 0666);
+    made_ = handle_ >= 0;
+    if (handle_ < 0 && errno == EEXIST)
+        handle_ = ::open(file_.c_str(), flags, 0666);
     for (const int needs_another_folder : {EACCES, EPERM, EROFS, EISDIR})
         if (handle_ < 0 && errno == needs_another_folder)
             throw Misuse(fmt::format("{}: cannot be written: {}", file_.string(), std::strerror(errno)));
@@ -344,7 +387,9 @@ Journal::Journal(fs::path folder, const std::string& block, fs::path results)
         fail(file_, "cannot be locked");
     }
     journals_ = journals_in(folder_);
-    std::erase(journals_, file_);
+    std::erase_if(journals_, [&](const fs::path& file) {
+        return file == file_ || (siblings && siblings->contains(file.filename().string()));
+    });
     journals_.push_back(file_); // last, since its lines override the others'
     for (std::size_t journal = 0; journal < journals_.size(); ++journal)
         read_positions(journal);
@@ -449,6 +494,8 @@ void Journal::add(const FrameRow& row, const CaptureEntry& entry, const std::str
         const json process{{"host", host_name()}, {"pid", ::getpid()}, {"device", device},
                            {"capture", capture_}, {"started", now},    {"version", SCANSHADE_VERSION}};
         append(json_line(json{{"process", process}}));
+        facts_.host = host_name();
+        facts_.device = device;
     }
     Record record{row, settings, stamps_of(entry), hashes_of(entry), {}};
     if (sizes)
@@ -479,15 +526,19 @@ void Journal::forget(const Capture& capture, const std::vector<std::size_t>& fra
 
 void Journal::begin_alone(const std::string& frame) { append(json{{"begun", frame}}.dump()); }
 
-void Journal::complete(const std::string& key) {
+void Journal::complete(const std::string& key, const TaskSums& sums) {
     if (facts_.complete == key)
         return;
+    const std::string line = json_line(json{{"sums", to_json(sums)}, {"host", facts_.host}, {"device", facts_.device}});
+    if (line.size() < journal_end_bytes / 2) // else they are counted anew each time
+        append(line, Sync::soon);
     append(json{{"complete", key}}.dump());
     facts_.complete = key;
 }
 
 void Journal::fetched(const fs::path& in, std::size_t frames) {
     append(json_line(json{{"fetched", as_utf8(in.string())}, {"frames", frames}}), Sync::soon);
+    facts_.stored.in = as_utf8(in.string());
     facts_.stored.frames = frames;
     facts_.stored.trouble.clear();
 }

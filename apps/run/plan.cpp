@@ -1,5 +1,6 @@
 // `scanshade plan`: finds the captures of a dataset, whatever their layouts, and cuts them into tasks.
 #include "apps/command.h"
+#include "apps/jobs/folder_probe.h"
 #include "apps/jobs/job.h"
 #include "apps/jobs/sources.h"
 #include "apps/method_settings.h"
@@ -188,8 +189,8 @@ std::vector<double> costs_of(const Capture& capture, const std::vector<std::size
 // ---------------------------------------------------------------------------------------------------- the command
 
 /// Settings of `run` that a plan leaves out: where and how it runs, and budgets, which depend on measured times.
-constexpr std::array not_planned = {"out",  "overwrite", "resume", "retry",     "shard",  "scratch", "scratch-limit",
-                                    "dump", "device",    "log",    "max-error", "max-ms", "quiet"};
+constexpr std::array not_planned = {"out",      "overwrite", "resume", "retry", "shard",     "scratch", "scratch-limit",
+                                    "no-locks", "dump",      "device", "log",   "max-error", "max-ms",  "quiet"};
 
 class PlanCommand final : public Command {
   public:
@@ -215,7 +216,10 @@ class PlanCommand final : public Command {
                                     {.name = "overwrite",
                                      .help = "replaces an earlier plan; results that stay valid are kept",
                                      .value = &overwrite_,
-                                     .common = true}}},
+                                     .common = true},
+                                    {.name = "no-locks",
+                                     .help = "takes a folder whose storage has no locks; run needs it, too",
+                                     .value = &without_locks_}}},
                                   {"stores",
                                    {{.name = "fetch",
                                      .help = "a shell's command that fills the folder {dir} with {source}, for each "
@@ -277,6 +281,7 @@ class PlanCommand final : public Command {
             throw Misuse("plan needs a DATASET, or --sources with --fetch");
         if (!sources_.empty() && hooks_.fetch.empty())
             throw Misuse("--sources needs --fetch, a command that fetches them");
+        require_job_folder(out_, !without_locks_);
         Plan plan;
         plan.settings = settings();
         plan.hooks = hooks_;
@@ -412,7 +417,7 @@ class PlanCommand final : public Command {
     std::string out_, sources_;
     Hooks hooks_;
     int block_ = 500;
-    bool overwrite_ = false;
+    bool overwrite_ = false, without_locks_ = false;
     std::unique_ptr<Command> run_ = run_command();
     std::map<std::string, std::string> defaults_ = values_of(*run_);
     std::set<std::string> taken_;

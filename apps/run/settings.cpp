@@ -348,6 +348,10 @@ std::vector<Stage> RunSettings::common_stages() {
           {.name = "shard",
            .help = "of a job, the I-th of N parts: I/N; empty = as Slurm or Kubernetes number this task, else all",
            .value = &s.shard},
+          {.name = "no-locks",
+           .help = "of a job in a folder without working locks: runs this shard alone, takes over no other's tasks; no "
+                   "shard may run twice at a time",
+           .value = &s.no_locks},
           {.name = "scratch",
            .help = "of a job with hooks: folder on this machine for what is fetched and not yet delivered; empty = in "
                    "the system's temporary folder",

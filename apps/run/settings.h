@@ -56,6 +56,7 @@ class RunSettings {
     int frames_in_tar = 0;
     bool overwrite = false, resume = false, retry = false;
     std::string shard, scratch;
+    bool no_locks = false;
     double scratch_limit_gb = 0;
     bool quiet = false, log_json = false;
     CloudAoOptions clouds_by_points;
