@@ -22,12 +22,34 @@ namespace fs = std::filesystem;
 namespace {
 
 json task_json(const Task& task) {
-    return {{"capture", task.capture.string()},
-            {"name", task.name},
-            {"first", task.first},
-            {"frames", task.frames},
-            {"of", task.of},
-            {"cost", task.cost}};
+    json text{{"capture", task.capture.string()},
+              {"name", task.name},
+              {"first", task.first},
+              {"frames", task.frames},
+              {"of", task.of},
+              {"cost", task.cost}};
+    if (task.listed_bytes > 0)
+        text["bytes"] = task.listed_bytes;
+    return text;
+}
+
+json hooks_json(const Hooks& hooks) {
+    return {{"fetch", hooks.fetch}, {"deliver", hooks.deliver}, {"limit_s", hooks.limit_s},
+            {"tries", hooks.tries}, {"wait_s", hooks.wait_s},   {"scratch_limit_gb", hooks.scratch_limit}};
+}
+
+Hooks hooks_from(const json& text) {
+    const Hooks hooks{.fetch = text.at("fetch"),
+                      .deliver = text.at("deliver"),
+                      .limit_s = text.at("limit_s"),
+                      .tries = text.at("tries"),
+                      .wait_s = text.at("wait_s"),
+                      .scratch_limit = text.at("scratch_limit_gb")};
+    if (hooks.limit_s < 1 || hooks.tries < 1 || !(hooks.wait_s >= 0 && hooks.wait_s <= most_wait_s) ||
+        !(hooks.scratch_limit >= 0 && hooks.scratch_limit <= most_scratch_gb))
+        throw Error("hooks: a limit is out of range");
+    check_hooks(hooks);
+    return hooks;
 }
 
 /// A name that stays inside results/, whatever a plan edited by hand says.
@@ -38,13 +60,17 @@ std::string checked_name(const std::string& name) {
     return name;
 }
 
-Task task_from(const json& text) {
+Task task_from(const json& text, bool fetched) {
     Task task{text.at("capture").get<std::string>(),
               checked_name(text.at("name")),
               count_at(text, "first"),
               count_at(text, "frames"),
               count_at(text, "of"),
               text.at("cost").get<double>()};
+    if (text.contains("bytes"))
+        task.listed_bytes = count_at(text, "bytes");
+    if (fetched && task.frames == 0 && task.first == 0 && task.of == 0)
+        return task;
     if (task.frames == 0 || task.first > task.of || task.frames > task.of - task.first)
         throw Error(fmt::format("frames {} + {} of {} cannot be", task.first, task.frames, task.of));
     return task;
@@ -88,13 +114,15 @@ void write_plan(const fs::path& job, const Plan& plan) {
         settings[name] = value;
     const double cost = std::accumulate(plan.tasks.begin(), plan.tasks.end(), 0.0,
                                         [](double sum, const Task& task) { return sum + task.cost; });
-    const json head{{"program", "scanshade"},
-                    {"version", SCANSHADE_VERSION},
-                    {"settings", settings},
-                    {"tasks", plan.tasks.size()},
-                    {"cost", cost},
-                    {"refused", plan.refused},
-                    {"passed_over", plan.passed_over}};
+    json head{{"program", "scanshade"},
+              {"version", SCANSHADE_VERSION},
+              {"settings", settings},
+              {"tasks", plan.tasks.size()},
+              {"cost", cost},
+              {"refused", plan.refused},
+              {"passed_over", plan.passed_over}};
+    if (plan.hooks.any())
+        head["hooks"] = hooks_json(plan.hooks);
     write_atomically(job / "plan.json", text_of(head) + "\n");
 }
 
@@ -105,12 +133,14 @@ Plan read_plan(const fs::path& job) {
         for (const auto& [name, value] : head.at("settings").items())
             plan.settings.emplace_back(name, value.get<std::string>());
         plan.refused = head.at("refused").get<std::vector<std::string>>();
+        if (head.contains("hooks"))
+            plan.hooks = hooks_from(head["hooks"]);
     });
     std::ifstream stream(job / "tasks.jsonl");
     int number = 0;
     for (std::string line; std::getline(stream, line);)
         reading_json(at_line(job / "tasks.jsonl", ++number),
-                     [&] { plan.tasks.push_back(task_from(parsed_json(line))); });
+                     [&] { plan.tasks.push_back(task_from(parsed_json(line), !plan.hooks.fetch.empty())); });
     return plan;
 }
 

@@ -2,6 +2,7 @@
 // tasks.jsonl lists the tasks, results/NAME holds a capture's results and the journals of its tasks.
 #pragma once
 
+#include "apps/jobs/hook.h"
 #include "apps/results/journal.h"
 
 #include <cstdint>
@@ -15,12 +16,13 @@ namespace scanshade {
 
 /// A capture, or a block of its frames.
 struct Task {
-    std::filesystem::path capture;
-    std::string name;       ///< unique in the job: results/NAME
-    std::size_t first = 0;  ///< index among the capture's frames in the plan
-    std::size_t frames = 0; ///< number of frames
-    std::size_t of = 0;     ///< all frames of the capture in the plan
-    double cost = 0;        ///< about megapixels or million points; shards get equal sums of it
+    std::filesystem::path capture;  ///< or a source, as the fetching hook knows it
+    std::string name;               ///< unique in the job: results/NAME
+    std::size_t first = 0;          ///< index among the capture's frames in the plan
+    std::size_t frames = 0;         ///< number of frames; 0 = not known before it is fetched
+    std::size_t of = 0;             ///< all frames of the capture in the plan
+    double cost = 0;                ///< about megapixels or million points; shards get equal sums of it
+    std::uint64_t listed_bytes = 0; ///< of a source, if its list has them
 
     /// "" for a whole capture, else "0-500": the end is not included.
     [[nodiscard]] std::string block() const;
@@ -32,6 +34,7 @@ struct Plan {
     std::vector<Task> tasks;
     std::vector<std::string> refused;          ///< captures that could not be opened, and why
     std::vector<std::string> passed_over = {}; ///< folders that hold no capture to compute, and why; not read back
+    Hooks hooks = {};
 };
 
 /// Which of N equal parts of a job: 1 .. of.

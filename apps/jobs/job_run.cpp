@@ -96,7 +96,8 @@ class Attempts {
 } // namespace
 
 int work_through(const std::filesystem::path& job, const Plan& plan, const Shard& shard, const std::atomic<bool>& stop,
-                 std::size_t at_once, const std::function<int(const Task&, OrderedOutput&)>& run_task) {
+                 std::size_t at_once, bool takes_over,
+                 const std::function<int(const Task&, OrderedOutput&)>& run_task) {
     const auto parts = cut(plan.tasks, shard.of);
     const auto& own = parts[static_cast<std::size_t>(shard.index - 1)];
     say(fmt::format("{}: shard {} of {}, {} of {} tasks", job.string(), shard.index, shard.of, own.size(),
@@ -111,14 +112,14 @@ int work_through(const std::filesystem::path& job, const Plan& plan, const Shard
     });
     // Other shards begin with their costliest tasks, so unfinished ones are at their ends. Our own shard comes first:
     // tasks that another run held may be free by now.
-    for (int next = 0; next < shard.of; ++next) {
+    for (int next = 0; next < (takes_over ? shard.of : 1); ++next) {
         const auto& part = parts[static_cast<std::size_t>((shard.index - 1 + next) % shard.of)];
         for (auto index = part.rbegin(); index != part.rend(); ++index) {
             if (stop)
                 return worse(attempts.code(), unfinished);
             const Task& task = plan.tasks[*index];
             const std::filesystem::path journal = journal_file(results_of(job, task), task.block());
-            if (is_complete(journal) || in_use(journal))
+            if (is_complete(journal, plan.hooks.any() ? "ended" : "complete") || in_use(journal))
                 continue;
             OrderedOutput output;
             if (attempts.attempt(task, output) != Attempts::Result::held && next > 0)

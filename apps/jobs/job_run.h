@@ -12,10 +12,11 @@ namespace scanshade {
 
 /// Calls `run_task` for every task of the shard, `at_once` at a time. Then it calls it for tasks of other shards that
 /// are neither complete nor held, so that a dead machine's tasks are done. `run_task` returns an exit code and throws
-/// Busy for a task that another process holds. Other failures are printed and count as nothing_done (an Outage as
-/// unfinished). Prints progress and remaining time after each task. Returns the worst exit code.
+/// Busy for a task that another process holds. Without `takes_over`, tasks of other shards are left alone. Other
+/// failures are printed and count as nothing_done (an Outage as unfinished). Prints progress and remaining time after
+/// each task. Returns the worst exit code.
 [[nodiscard]] int work_through(const std::filesystem::path& job, const Plan& plan, const Shard& shard,
-                               const std::atomic<bool>& stop, std::size_t at_once,
+                               const std::atomic<bool>& stop, std::size_t at_once, bool takes_over,
                                const std::function<int(const Task&, OrderedOutput&)>& run_task);
 
 } // namespace scanshade

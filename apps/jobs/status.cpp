@@ -30,15 +30,34 @@ enum class Standing { waiting, running, begun, done };
 /// One task, as its journal records it.
 struct Reading {
     Standing standing = Standing::waiting;
-    std::vector<FrameRow> rows; ///< in recording order
+    std::vector<FrameRow> rows; ///< in recording order; empty where only sums were asked for
+    TaskSums sums;
     std::string host, device, since;
+    std::size_t frames = 0; ///< planned, or found in what was fetched
+    StoredFacts stored;     ///< of a job with hooks
 };
 
-Reading read_task(const fs::path& job, const Task& task) {
+/// Whether rows are wanted as well: a complete task's sums are at its journal's end, while a million rows take a
+/// minute.
+enum class Wanted { sums, rows };
+
+Reading read_task(const fs::path& job, const Task& task, bool hooks, Wanted wanted) {
     const fs::path file = journal_file(results_of(job, task), task.block());
     Reading reading;
+    reading.frames = task.frames;
     if (std::error_code ignored; !fs::exists(file, ignored))
         return reading;
+    if (wanted == Wanted::sums)
+        if (auto end = read_journal_end(file); end && end->sums.rows() >= task.frames && !in_use(file)) {
+            reading.sums = std::move(end->sums);
+            reading.host = std::move(end->host);
+            reading.device = std::move(end->device);
+            reading.stored = std::move(end->stored);
+            if (task.frames == 0)
+                reading.frames = reading.sums.rows();
+            reading.standing = hooks && reading.stored.ended.empty() ? Standing::begun : Standing::done;
+            return reading;
+        }
     JournalFacts facts = read_journal(file);
     for (auto& [name, record] : facts.records)
         reading.rows.push_back(std::move(record.row));
@@ -46,26 +65,18 @@ Reading read_task(const fs::path& job, const Task& task) {
     reading.host = facts.host;
     reading.device = facts.device;
     reading.since = facts.started;
-    reading.standing = in_use(file)              ? Standing::running
-                       : !facts.complete.empty() ? Standing::done
-                       : !reading.rows.empty()   ? Standing::begun
-                                                 : Standing::waiting;
+    reading.stored = std::move(facts.stored);
+    for (const FrameRow& row : reading.rows)
+        reading.sums.add(row, {task.capture.string(), reading.stored.in});
+    if (task.frames == 0)
+        reading.frames = std::max(reading.stored.frames, reading.rows.size());
+    const bool done = hooks ? !reading.stored.ended.empty() : !facts.complete.empty();
+    const bool begun = !reading.rows.empty() || !reading.stored.in.empty();
+    reading.standing = in_use(file) ? Standing::running
+                       : done       ? Standing::done
+                       : begun      ? Standing::begun
+                                    : Standing::waiting;
     return reading;
-}
-
-/// A frame's failure or doubts without its name, so that those of many frames are one: digits become '#', the folder is
-/// left out.
-std::string reason_of(const FrameRow& row, const Task& task) {
-    std::string text = scanshade::reason_of(row);
-    for (std::string folder = task.capture.string() + "/"; text.find(folder) != std::string::npos;)
-        text.erase(text.find(folder), folder.size());
-    if (const auto at = text.find(row.name); at != std::string::npos)
-        text.replace(at, row.name.size(), "FRAME");
-    std::string reason;
-    for (const char c : text)
-        if (const bool digit = c >= '0' && c <= '9'; !digit || reason.empty() || reason.back() != '#')
-            reason += digit ? '#' : c;
-    return row.status == FrameStatus::doubtful ? reason : fmt::format("{}: {}", name_of(row.fault), reason);
 }
 
 /// Sums over a job, task by task, so that memory does not grow with their number.
@@ -74,13 +85,12 @@ struct Totals {
     std::map<Standing, std::size_t> standing;
     double cost = 0, done_cost = 0;
     StageTimes ms{};
-    struct Group {
-        std::size_t frames = 0;
-        std::string example;
-    };
-    using Groups = std::map<std::string, Group>;
+    using Group = ReasonGroup;
+    using Groups = ReasonGroups;
     Groups reasons, doubts; ///< of failed frames, of doubtful ones
     std::map<std::string, std::size_t> frames_by_host;
+    std::size_t refused = 0, delivered = 0; ///< tasks: input that cannot be computed; results where they belong
+    Groups troubles;                        ///< of hooks, by reason; `frames` counts tasks
 
     [[nodiscard]] std::size_t in(Standing which) const {
         const auto found = standing.find(which);
@@ -90,43 +100,53 @@ struct Totals {
     void add(const Task& task, const Reading& reading) {
         ++tasks;
         ++standing[reading.standing];
-        frames += task.frames;
+        frames += reading.frames;
         cost += task.cost;
-        for (const FrameRow& row : reading.rows)
-            add(task, row);
-        if (!reading.rows.empty())
-            frames_by_host[reading.host + ", " + reading.device] += reading.rows.size();
+        const TaskSums& sums = reading.sums;
+        ok += sums.ok;
+        doubtful += sums.doubtful;
+        failed += sums.failed;
+        ms = ms + sums.ms;
+        done_cost += task.cost * static_cast<double>(sums.settled()) /
+                     static_cast<double>(std::max<std::size_t>(reading.frames, 1));
+        join(reasons, sums.reasons, task);
+        join(doubts, sums.doubts, task);
+        const bool ended = !reading.stored.ended.empty();
+        if (ended && !reading.stored.refused.empty()) {
+            ++refused;
+            done_cost += task.cost;
+            add(troubles, "refused: " + without_numbers(reading.stored.refused), task.name);
+        } else {
+            delivered += ended;
+        }
+        if (!reading.stored.trouble.empty())
+            add(troubles, without_numbers(reading.stored.trouble), task.name);
+        if (sums.rows() > 0)
+            frames_by_host[reading.host + ", " + reading.device] += sums.rows();
     }
 
   private:
-    void add(const Task& task, const FrameRow& row) {
-        ms = ms + row.ms;
-        if (row.fault == Fault::outage) { // tried again by the next run
-            add(reasons, task, row);
-            return;
+    static void join(Groups& groups, const Groups& more, const Task& task) {
+        for (const auto& [reason, group] : more) {
+            Group& one = groups[reason];
+            if (one.frames == 0)
+                one.example = task.name + " " + group.example;
+            one.frames += group.frames;
         }
-        done_cost += task.cost / static_cast<double>(task.frames);
-        if (row.status == FrameStatus::ok) {
-            ++ok;
-            return;
-        }
-        const bool is_doubtful = row.status == FrameStatus::doubtful;
-        ++(is_doubtful ? doubtful : failed);
-        add(is_doubtful ? doubts : reasons, task, row);
     }
-    static void add(Groups& groups, const Task& task, const FrameRow& row) {
-        Group& group = groups[reason_of(row, task)];
+    static void add(Groups& groups, const std::string& reason, const std::string& example) {
+        Group& group = groups[reason];
         if (group.frames++ == 0)
-            group.example = task.name + " " + row.name;
+            group.example = example;
     }
 };
 
 std::size_t settled(const Totals& totals) { return totals.ok + totals.doubtful + totals.failed; }
 
-int code_of(const Totals& totals) {
-    if (settled(totals) < totals.frames)
+int code_of(const Totals& totals, bool hooks) {
+    if (settled(totals) < totals.frames || (hooks && totals.delivered + totals.refused < totals.tasks))
         return unfinished;
-    if (totals.failed + totals.doubtful == 0)
+    if (totals.failed + totals.doubtful + totals.refused == 0)
         return all_well;
     return totals.ok + totals.doubtful == 0 ? nothing_done : some_failed;
 }
@@ -147,14 +167,18 @@ json reasons_json(const Totals::Groups& reasons) {
     return all;
 }
 
-void print(const Totals& totals, std::size_t refused) {
+void print(const Totals& totals, const Plan& plan) {
     fmt::print("tasks   {} done, {} running, {} begun, {} waiting, of {}\n", totals.in(Standing::done),
                totals.in(Standing::running), totals.in(Standing::begun), totals.in(Standing::waiting), totals.tasks);
     fmt::print("frames  {} ok, {} doubtful, {} failed, {} left, of {}\n", totals.ok, totals.doubtful, totals.failed,
                left_of(totals), totals.frames);
     fmt::print("work    {} %\n", percent_text(work_done(totals), left_of(totals) > 0, 1));
-    if (refused > 0)
-        fmt::print("refused {} captures, when the job was planned\n", refused);
+    if (!plan.hooks.deliver.empty())
+        fmt::print("results {} of {} tasks delivered\n", totals.delivered, totals.tasks);
+    if (!plan.refused.empty())
+        fmt::print("refused {} captures, when the job was planned\n", plan.refused.size());
+    for (const auto& [reason, group] : most_frequent_first(totals.troubles))
+        fmt::print("  {:>8} tasks: {} (first: {})\n", group.frames, reason, group.example);
     for (const auto& [host, frames] : totals.frames_by_host)
         fmt::print("  {:>8} frames by {}\n", frames, host);
     for (const auto& [reason, group] : most_frequent_first(totals.doubts))
@@ -177,9 +201,9 @@ class Pages {
     explicit Pages(const fs::path& job) : job_(job), captures_(job) {}
 
     /// Tasks in their order: the blocks of a capture follow each other.
-    void add(const Task& task, const std::vector<FrameRow>& rows) {
+    void add(const Task& task, const Reading& reading) {
         const fs::path folder = results_of(job_, task);
-        captures_.take(captures_.add(task.name, folder, task.frames), rows);
+        captures_.take(captures_.add(task.name, folder, reading.frames), reading.rows);
         const std::string block = task.block();
         if (block.empty()) // a whole capture, whose run has written its page
             return;
@@ -222,16 +246,16 @@ class Status final : public Command {
         Totals totals;
         std::vector<Running> running;
         for (const Task& task : plan.tasks) {
-            const Reading reading = read_task(job_.front(), task);
+            const Reading reading = read_task(job_.front(), task, plan.hooks.any(), Wanted::sums);
             totals.add(task, reading);
             if (reading.standing == Standing::running)
-                running.push_back({&task, reading.rows.size(), reading.host, reading.since});
+                running.push_back({&task, reading.sums.rows(), reading.frames, reading.host, reading.since});
         }
         if (as_json_)
             fmt::print("{}\n", text_of(status_json(totals, running, plan)));
         else
             print_all(totals, running, plan);
-        return code_of(totals);
+        return code_of(totals, plan.hooks.any());
     }
 
   private:
@@ -239,14 +263,15 @@ class Status final : public Command {
     struct Running {
         const Task* task;
         std::size_t frames; ///< done
+        std::size_t of;
         std::string host, since;
     };
 
     static void print_all(const Totals& totals, const std::vector<Running>& running, const Plan& plan) {
-        print(totals, plan.refused.size());
+        print(totals, plan);
         for (const Running& each : running)
             fmt::print("  running {} {}: {} of {} frames, {} since {}\n", each.task->name, each.task->block(),
-                       each.frames, each.task->frames, each.host, each.since);
+                       each.frames, each.of, each.host, each.since);
     }
 
     static json status_json(const Totals& totals, const std::vector<Running>& running, const Plan& plan) {
@@ -255,7 +280,7 @@ class Status final : public Command {
             tasks.push_back({{"task", each.task->name},
                              {"block", each.task->block()},
                              {"frames", each.frames},
-                             {"of", each.task->frames},
+                             {"of", each.of},
                              {"host", each.host},
                              {"since", each.since}});
         return {{"tasks",
@@ -274,6 +299,8 @@ class Status final : public Command {
                 {"frames_by_host", totals.frames_by_host},
                 {"doubts", reasons_json(totals.doubts)},
                 {"failures", reasons_json(totals.reasons)},
+                {"delivered", totals.delivered},
+                {"hooks", reasons_json(totals.troubles)},
                 {"running", tasks},
                 {"refused", plan.refused}};
     }
@@ -304,9 +331,9 @@ class Merge final : public Command {
             stream.exceptions(std::ios::failbit | std::ios::badbit);
             stream << "capture," << csv_head();
             for (const Task& task : plan.tasks) {
-                const Reading reading = read_task(job, task);
+                const Reading reading = read_task(job, task, plan.hooks.any(), Wanted::rows);
                 totals.add(task, reading);
-                pages.add(task, reading.rows);
+                pages.add(task, reading);
                 for (const FrameRow& row : reading.rows)
                     stream << csv_line(task.name, row);
             }
@@ -315,8 +342,8 @@ class Merge final : public Command {
         write_manifest(job, plan, totals);
         if (page_)
             pages.write(plan, totals);
-        print(totals, plan.refused.size());
-        return code_of(totals);
+        print(totals, plan);
+        return code_of(totals, plan.hooks.any());
     }
 
   private:

@@ -125,6 +125,24 @@ Record record_from(const json& line) {
 /// The kind of a line: its first key.
 std::string kind_of(const json& line) { return line.empty() ? "" : line.begin().key(); }
 
+void take_stored(const std::string& kind, const json& line, StoredFacts& stored) {
+    if (kind == "fetched") {
+        stored.in = line["fetched"];
+        stored.frames = count_at(line, "frames");
+        stored.trouble.clear();
+    } else if (kind == "hook") {
+        stored.trouble = line["hook"].get<std::string>() + ": " + line.at("why").get<std::string>();
+    } else if (kind == "computed") {
+        stored.computed = line["computed"];
+        stored.code = line.at("code");
+    } else if (kind == "refused") {
+        stored.refused = line["refused"];
+    } else if (kind == "ended") {
+        stored.ended = line["ended"];
+        stored.trouble.clear();
+    }
+}
+
 void take_line(const json& line, JournalFacts& facts) {
     const std::string kind = kind_of(line);
     if (kind == "frame") {
@@ -132,6 +150,8 @@ void take_line(const json& line, JournalFacts& facts) {
         if (facts.begun == record.row.name)
             facts.begun.clear();
         facts.complete.clear();
+        facts.stored.computed.clear();
+        facts.stored.ended.clear();
         facts.records.insert_or_assign(record.row.name, std::move(record));
     } else if (kind == "process") {
         facts.host = line["process"].at("host");
@@ -142,10 +162,14 @@ void take_line(const json& line, JournalFacts& facts) {
         for (const std::string& name : line["again"].get<std::vector<std::string>>())
             facts.records.erase(name);
         facts.complete.clear();
+        facts.stored.computed.clear();
+        facts.stored.ended.clear();
     } else if (kind == "begun") {
         facts.begun = line["begun"];
     } else if (kind == "complete") {
         facts.complete = line["complete"];
+    } else {
+        take_stored(kind, line, facts.stored);
     }
 }
 
@@ -191,6 +215,9 @@ std::string stamps_of(const CaptureEntry& entry) {
 
 /// Unreadable content is a content of its own: the frame fails again until it can be read.
 std::string hashes_of(const CaptureEntry& entry) { return listed(entry) + content_hash_of(entry); }
+
+/// Of a journal that ends with its task's sums, enough for these and what hooks add.
+constexpr std::streamoff journal_end_bytes = 1 << 15;
 
 std::string host_name() {
     std::array<char, 256> name = {};
@@ -238,6 +265,42 @@ JournalFacts read_journal(const fs::path& file) {
     return facts;
 }
 
+std::optional<JournalEnd> read_journal_end(const fs::path& file) {
+    std::ifstream stream(file, std::ios::binary | std::ios::ate);
+    if (!stream)
+        return std::nullopt;
+    stream.seekg(-std::min<std::streamoff>(journal_end_bytes, stream.tellg()), std::ios::end);
+    std::string line;
+    std::optional<JournalEnd> end;
+    bool complete = false;
+    while (std::getline(stream, line)) {
+        // The first line is mostly cut off. Lines of frames begin anew what the sums had ended.
+        if (line.starts_with("{\"frame\":")) {
+            end.reset();
+            continue;
+        }
+        const json text = parsed_or_discarded(line);
+        if (!text.is_object())
+            continue;
+        try {
+            const std::string kind = kind_of(text);
+            if (kind == "sums") {
+                complete = false;
+                end = JournalEnd{sums_from(text["sums"]), text.at("host"), text.at("device"), {}};
+            } else if (kind == "complete") {
+                complete = true;
+            } else if (kind == "again" || kind == "begun" || kind == "process") {
+                end.reset();
+            } else if (end) {
+                take_stored(kind, text, end->stored);
+            }
+        } catch (const std::exception&) { // another version's line
+            end.reset();
+        }
+    }
+    return complete ? end : std::nullopt;
+}
+
 bool has_results(const fs::path& folder) {
     bool any = false;
     for (const fs::path& file : journals_in(folder))
@@ -281,7 +344,7 @@ bool in_use(const fs::path& file) {
     return held;
 }
 
-bool is_complete(const fs::path& file) {
+bool is_complete(const fs::path& file, std::string_view kind) {
     constexpr std::streamoff enough = 128;
     std::ifstream stream(file, std::ios::binary | std::ios::ate);
     if (!stream)
@@ -289,7 +352,8 @@ bool is_complete(const fs::path& file) {
     stream.seekg(-std::min<std::streamoff>(enough, stream.tellg()), std::ios::end);
     const std::string end{std::istreambuf_iterator<char>(stream), {}};
     const auto last = end.rfind('\n', end.size() < 2 ? 0 : end.size() - 2);
-    return end.ends_with("}\n") && end.substr(last == std::string::npos ? 0 : last + 1).starts_with("{\"complete\":");
+    return end.ends_with("}\n") &&
+           end.substr(last == std::string::npos ? 0 : last + 1).starts_with(fmt::format("{{\"{}\":", kind));
 }
 
 std::string key_of(const std::vector<std::string>& parts) {
@@ -299,11 +363,16 @@ std::string key_of(const std::vector<std::string>& parts) {
     return hash_of(all);
 }
 
-Journal::Journal(fs::path folder, const std::string& block)
-    : folder_(std::move(folder)), file_(journal_file(folder_, block)) {
+Journal::Journal(fs::path folder, const std::string& block, fs::path results, const std::set<std::string>* siblings)
+    : folder_(std::move(folder)), file_(journal_file(folder_, block)),
+      results_(results.empty() ? folder_ : std::move(results)) {
     std::error_code trouble;
     fs::create_directories(folder_, trouble);
-    handle_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+    constexpr int flags = O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC;
+    handle_ = ::open(file_.c_str(), flags | O_EXCL, 0666);
+    made_ = handle_ >= 0;
+    if (handle_ < 0 && errno == EEXIST)
+        handle_ = ::open(file_.c_str(), flags, 0666);
     for (const int needs_another_folder : {EACCES, EPERM, EROFS, EISDIR})
         if (handle_ < 0 && errno == needs_another_folder)
             throw Misuse(fmt::format("{}: cannot be written: {}", file_.string(), std::strerror(errno)));
@@ -318,7 +387,9 @@ Journal::Journal(fs::path folder, const std::string& block)
         fail(file_, "cannot be locked");
     }
     journals_ = journals_in(folder_);
-    std::erase(journals_, file_);
+    std::erase_if(journals_, [&](const fs::path& file) {
+        return file == file_ || (siblings && siblings->contains(file.filename().string()));
+    });
     journals_.push_back(file_); // last, since its lines override the others'
     for (std::size_t journal = 0; journal < journals_.size(); ++journal)
         read_positions(journal);
@@ -366,7 +437,7 @@ void Journal::clear() {
 
 bool Journal::files_are_there(const Record& record) const {
     for (std::size_t i = 0; i < record.row.files.size(); ++i) {
-        if (size_of_file(folder_ / record.row.files[i]) != record.sizes.at(i))
+        if (size_of_file(results_ / record.row.files[i]) != record.sizes.at(i))
             return false;
     }
     return true;
@@ -423,13 +494,15 @@ void Journal::add(const FrameRow& row, const CaptureEntry& entry, const std::str
         const json process{{"host", host_name()}, {"pid", ::getpid()}, {"device", device},
                            {"capture", capture_}, {"started", now},    {"version", SCANSHADE_VERSION}};
         append(json_line(json{{"process", process}}));
+        facts_.host = host_name();
+        facts_.device = device;
     }
     Record record{row, settings, stamps_of(entry), hashes_of(entry), {}};
     if (sizes)
         record.sizes = *sizes;
     else
         for (const fs::path& file : row.files)
-            record.sizes.push_back(fs::file_size(folder_ / file));
+            record.sizes.push_back(fs::file_size(results_ / file));
     const json line{{"frame", row_json(row)},
                     {"settings", record.settings},
                     {"stamp", record.stamp},
@@ -438,6 +511,8 @@ void Journal::add(const FrameRow& row, const CaptureEntry& entry, const std::str
     const std::int64_t at = append(json_line(line), Sync::soon);
     positions_.insert_or_assign(row.name, Position{journals_.size() - 1, at});
     facts_.complete.clear();
+    facts_.stored.computed.clear();
+    facts_.stored.ended.clear();
 }
 
 void Journal::forget(const Capture& capture, const std::vector<std::size_t>& frames) {
@@ -451,11 +526,48 @@ void Journal::forget(const Capture& capture, const std::vector<std::size_t>& fra
 
 void Journal::begin_alone(const std::string& frame) { append(json{{"begun", frame}}.dump()); }
 
-void Journal::complete(const std::string& key) {
+void Journal::complete(const std::string& key, const TaskSums& sums) {
     if (facts_.complete == key)
         return;
+    const std::string line = json_line(json{{"sums", to_json(sums)}, {"host", facts_.host}, {"device", facts_.device}});
+    if (line.size() < journal_end_bytes / 2) // else they are counted anew each time
+        append(line, Sync::soon);
     append(json{{"complete", key}}.dump());
     facts_.complete = key;
+}
+
+void Journal::fetched(const fs::path& in, std::size_t frames) {
+    append(json_line(json{{"fetched", as_utf8(in.string())}, {"frames", frames}}), Sync::soon);
+    facts_.stored.in = as_utf8(in.string());
+    facts_.stored.frames = frames;
+    facts_.stored.trouble.clear();
+}
+
+void Journal::hook_failed(const std::string& hook, int attempt, const std::string& reason, const std::string& said) {
+    const auto now = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+    append(json_line(
+        json{{"hook", hook}, {"try", attempt}, {"why", reason}, {"stderr", said}, {"host", host_name()}, {"at", now}}));
+}
+
+void Journal::computed(const std::string& key, int code) {
+    append(json_line(json{{"computed", key}, {"code", code}}), Sync::soon);
+    facts_.stored.computed = key;
+    facts_.stored.code = code;
+}
+
+void Journal::ended(const std::string& key, const std::string& refused) {
+    if (refused != facts_.stored.refused)
+        append(json_line(json{{"refused", refused}}));
+    append(json_line(json{{"ended", key}}));
+    facts_.stored.ended = key;
+    facts_.stored.refused = refused;
+}
+
+bool Journal::all_files_are_there() const {
+    return std::ranges::all_of(positions_, [&](const auto& each) {
+        const auto record = record_of(each.first);
+        return record && (record->row.fault == Fault::crash || files_are_there(*record));
+    });
 }
 
 } // namespace scanshade

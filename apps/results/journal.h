@@ -2,6 +2,7 @@
 #pragma once
 
 #include "apps/results/frame_row.h"
+#include "apps/results/task_sums.h"
 #include "projection/base/error.h"
 
 #include <chrono>
@@ -9,6 +10,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -23,13 +25,35 @@ struct Record {
     std::vector<std::uintmax_t> sizes; ///< bytes of row.files
 };
 
+/// The progress of a task whose input is fetched, or whose results are delivered, by hooks.
+struct StoredFacts {
+    std::string in;         ///< where the input was last; messages about frames name files in it
+    std::size_t frames = 0; ///< in the fetched input; 0 = not known yet
+    std::string computed;   ///< key of the task whose results were complete, unless frames were added since
+    int code = 0;           ///< its exit code
+    std::string refused;    ///< why the input cannot be computed
+    std::string ended;      ///< key of the task after which nothing is left to do
+    std::string trouble;    ///< the last failure of a hook, if nothing went well since
+};
+
 /// The last process that wrote to a journal, and the progress of its task.
 struct JournalFacts {
     std::string complete;                       ///< Journal::complete()'s key, unless frames were added since
     std::string host, device, started;          ///< of the last process that worked here
     std::string begun;                          ///< a frame that was begun alone and did not end
+    StoredFacts stored = {};                    ///< where hooks fetch and deliver
     std::map<std::string, Record> records = {}; ///< by frame name; the latest of each
 };
+
+/// The end of a complete task's journal, without its frames.
+struct JournalEnd {
+    TaskSums sums;
+    std::string host, device; ///< of the last process that computed frames
+    StoredFacts stored;       ///< as far as lines after the frames tell
+};
+/// Reads the last kilobytes of a journal. Nothing where its task is not complete, or an earlier version wrote it: then
+/// read_journal() knows.
+[[nodiscard]] std::optional<JournalEnd> read_journal_end(const std::filesystem::path& file);
 
 /// The journal of a whole capture ("") or of a block of its frames ("0-500") in the folder of its results.
 [[nodiscard]] std::filesystem::path journal_file(const std::filesystem::path& folder, const std::string& block);
@@ -47,8 +71,9 @@ struct JournalFacts {
 /// Whether a process holds the journal now.
 [[nodiscard]] bool in_use(const std::filesystem::path& file);
 
-/// Whether the journal's last line says that its task is complete, with whatever settings. Reads a few bytes only.
-[[nodiscard]] bool is_complete(const std::filesystem::path& file);
+/// Whether the journal's last line says that its task is complete, with whatever settings; or "ended", where hooks
+/// deliver. Reads a few bytes only.
+[[nodiscard]] bool is_complete(const std::filesystem::path& file, std::string_view kind = "complete");
 
 /// "settings" of a Record, or the key of a task: parts joined in order and hashed, the program's version among them.
 [[nodiscard]] std::string key_of(const std::vector<std::string>& parts);
@@ -66,7 +91,10 @@ class Journal {
     /// Makes the folder and the file if missing. Throws Busy at once if another process holds the journal, and
     /// Misuse if it may not be written. Also reads
     /// the folder's other journals (blocks of another plan).
-    Journal(std::filesystem::path folder, const std::string& block);
+    /// `results`: where the frames' files are; empty = in the folder. `siblings`: names of journals of the same plan's
+    /// blocks, which hold other frames and are not read.
+    Journal(std::filesystem::path folder, const std::string& block, std::filesystem::path results = {},
+            const std::set<std::string>* siblings = nullptr);
     ~Journal();
     Journal(const Journal&) = delete;
     Journal& operator=(const Journal&) = delete;
@@ -91,8 +119,22 @@ class Journal {
     void forget(const Capture& capture, const std::vector<std::size_t>& frames);
     /// Records that a frame is tried alone, because it or another one killed an earlier process.
     void begin_alone(const std::string& frame);
-    /// Records that all frames of the task are done; `key` is the task's task_key().
-    void complete(const std::string& key);
+    /// Records that all frames of the task are done; `key` is the task's task_key(), `sums` are of its frames.
+    void complete(const std::string& key, const TaskSums& sums);
+    /// The input lies in the folder, and has so many frames.
+    void fetched(const std::filesystem::path& in, std::size_t frames);
+    /// A hook failed: which, on which of its tries, why, and the end of what it said.
+    void hook_failed(const std::string& hook, int attempt, const std::string& reason, const std::string& said);
+    /// The results under this key are complete; what the run's exit code would be.
+    void computed(const std::string& key, int code);
+    /// Nothing is left to do for the task: its results are where they belong, or its input is refused.
+    void ended(const std::string& key, const std::string& refused = "");
+    /// Whether all recorded frames' files are complete.
+    [[nodiscard]] bool all_files_are_there() const;
+    /// Whether this made the file, and no other journal was read: no process was at work on these frames before.
+    [[nodiscard]] bool is_first() const { return made_ && journals_.size() == 1; }
+    /// The handle that holds the lock.
+    [[nodiscard]] int lock() const { return handle_; }
     /// The facts of this journal, without the records.
     [[nodiscard]] const JournalFacts& facts() const { return facts_; }
 
@@ -109,10 +151,10 @@ class Journal {
     [[nodiscard]] std::optional<Record> record_of(const std::string& frame) const;
     [[nodiscard]] bool files_are_there(const Record& record) const;
 
-    std::filesystem::path folder_, file_;
+    std::filesystem::path folder_, file_, results_;
     int handle_ = -1;
     std::string capture_;
-    bool introduced_ = false;
+    bool introduced_ = false, made_ = false;
     std::chrono::steady_clock::time_point synced_; ///< when the disk last had every line
     JournalFacts facts_;
     std::vector<std::filesystem::path> journals_;         ///< of the folder, this one last

@@ -88,7 +88,7 @@ void require_folders(const fs::path& folder) {
             require_folder(folder / part);
 }
 
-void prepare_folder(const CaptureJob& job, const ReportFiles& reports) {
+void prepare_folder(const CaptureJob& job, const ReportFiles& reports, bool first) {
     std::set<std::string, std::less<>> stems;
     if (job.block.empty()) // of any frame: the earlier run may have taken others
         for (const CaptureEntry& entry : job.capture.entries)
@@ -102,6 +102,8 @@ void prepare_folder(const CaptureJob& job, const ReportFiles& reports) {
     stems.insert("index");
     stems.insert(page::recording_stem);
     page::remove_page(job.folder());
+    if (first && !job.block.empty())
+        return;
     const auto ours = [&](std::string_view stem) { // "office", or "office.003" of a cloud's chunks
         const std::size_t dot = stem.rfind('.');
         return stems.contains(stem) || (dot != std::string_view::npos && whole_number(stem.substr(dot + 1)) &&

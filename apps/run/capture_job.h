@@ -6,19 +6,34 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <memory>
+#include <mutex>
 #include <set>
 #include <string>
 #include <vector>
 
 namespace scanshade {
 
+/// A capture, opened once for all blocks of it that a process computes: a listing of a million frames takes a minute.
+struct OpenedCapture {
+    Capture capture;
+    std::vector<std::size_t> of; ///< all its frames to compute
+    /// Made by the first block that needs them.
+    std::once_flag check_poses, make_key;
+    std::string task_key = {};
+};
+
 /// One capture, the frames to take of it, and where its results go.
 struct CaptureJob {
-    Capture capture;
-    BatchOptions batch;
-    std::vector<std::size_t> of = {}; ///< all frames of the capture to compute; batch.frames may be a block of them
-    std::string block = {};           ///< "" = all, else as Task::block() says
-    LoadedFrames loaded = {};         ///< decoded for the noise; the walk takes them
+    explicit CaptureJob(std::shared_ptr<OpenedCapture> capture_of_blocks)
+        : opened(std::move(capture_of_blocks)), capture(opened->capture), of(opened->of) {}
+
+    std::shared_ptr<OpenedCapture> opened;
+    Capture& capture; ///< of `opened`, as is
+    const std::vector<std::size_t>& of;
+    BatchOptions batch = {};  ///< batch.frames may be a block of `of`
+    std::string block = {};   ///< "" = all, else as Task::block() says
+    LoadedFrames loaded = {}; ///< decoded for the noise; the walk takes them
 
     [[nodiscard]] const std::filesystem::path& folder() const { return batch.outputs.folder; }
 };
@@ -46,8 +61,9 @@ void refuse_another_captures_results(const CaptureJob& job);
 /// Refuses a folder of results that cannot be written, or one in it that an earlier run has left.
 void require_folders(const std::filesystem::path& folder);
 /// Removes files of a killed run, and the report of an earlier one: a manifest means that the results next to it are
-/// complete. The caller holds the journal.
-void prepare_folder(const CaptureJob& job, const ReportFiles& reports);
+/// complete. The caller holds the journal. `first`: no process was at work on these frames before, so that the folder
+/// of a million files is not searched for every block.
+void prepare_folder(const CaptureJob& job, const ReportFiles& reports, bool first);
 /// Refuses frames too large for the memory, and takes fewer at once where not all fit that the cores could use.
 /// `on_cpu`: the device's images are in the same memory.
 void fit_into_memory(CaptureJob& job, bool on_cpu);

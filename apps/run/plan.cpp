@@ -1,6 +1,8 @@
 // `scanshade plan`: finds the captures of a dataset, whatever their layouts, and cuts them into tasks.
 #include "apps/command.h"
+#include "apps/jobs/folder_probe.h"
 #include "apps/jobs/job.h"
+#include "apps/jobs/sources.h"
 #include "apps/method_settings.h"
 #include "apps/slice.h"
 #include "io/captures/capture.h"
@@ -187,12 +189,16 @@ std::vector<double> costs_of(const Capture& capture, const std::vector<std::size
 // ---------------------------------------------------------------------------------------------------- the command
 
 /// Settings of `run` that a plan leaves out: where and how it runs, and budgets, which depend on measured times.
-constexpr std::array not_planned = {"out",    "overwrite", "resume",    "retry",  "shard", "dump",
-                                    "device", "log",       "max-error", "max-ms", "quiet"};
+constexpr std::array not_planned = {"out",      "overwrite", "resume", "retry", "shard",     "scratch", "scratch-limit",
+                                    "no-locks", "dump",      "device", "log",   "max-error", "max-ms",  "quiet"};
 
 class PlanCommand final : public Command {
   public:
-    Words words() override { return {"DATASET", "folders searched for captures, or captures", &datasets_, 1, 1 << 20}; }
+    Words words() override {
+        return {"DATASET",
+                "folders searched for captures, or captures; with --fetch, sources as that command knows them",
+                &datasets_, 0, 1 << 20};
+    }
 
     std::vector<Stage> stages() override {
         std::vector<Stage> all = {{"job",
@@ -210,7 +216,52 @@ class PlanCommand final : public Command {
                                     {.name = "overwrite",
                                      .help = "replaces an earlier plan; results that stay valid are kept",
                                      .value = &overwrite_,
-                                     .common = true}}}};
+                                     .common = true},
+                                    {.name = "no-locks",
+                                     .help = "takes a folder whose storage has no locks; run needs it, too",
+                                     .value = &without_locks_}}},
+                                  {"stores",
+                                   {{.name = "fetch",
+                                     .help = "a shell's command that fills the folder {dir} with {source}, for each "
+                                             "task before it is computed; exit code 3: there is no such source",
+                                     .value = &hooks_.fetch,
+                                     .common = true},
+                                    {.name = "deliver",
+                                     .help = "a shell's command that copies the folder {out} to where the results of "
+                                             "{task} belong; it may run twice",
+                                     .value = &hooks_.deliver,
+                                     .common = true},
+                                    {.name = "sources",
+                                     .help = "with --fetch: a file of sources, one a line, or - for standard input; a "
+                                             "tab and the size in bytes may follow",
+                                     .value = &sources_,
+                                     .common = true},
+                                    {.name = "scratch-limit",
+                                     .help = "space on each machine for what is fetched and not yet delivered; 0 = "
+                                             "half of what is free",
+                                     .value = &hooks_.scratch_limit,
+                                     .unit = "GB",
+                                     .low = 0,
+                                     .high = most_scratch_gb,
+                                     .common = true},
+                                    {.name = "hook-limit",
+                                     .help = "a command that takes longer is ended and counts as failed",
+                                     .value = &hooks_.limit_s,
+                                     .unit = "s",
+                                     .low = 1,
+                                     .high = 1e6},
+                                    {.name = "hook-tries",
+                                     .help = "how often a command may fail before its task is left to the next run",
+                                     .value = &hooks_.tries,
+                                     .low = 1,
+                                     .high = 100},
+                                    {.name = "hook-wait",
+                                     .help = "wait before the second try, doubled before each further one, at most "
+                                             "60 s",
+                                     .value = &hooks_.wait_s,
+                                     .unit = "s",
+                                     .low = 0,
+                                     .high = most_wait_s}}}};
         for (Stage& stage : run_->stages()) {
             std::erase_if(stage.rows, [](const Parameter& row) { return std::ranges::count(not_planned, row.name); });
             all.push_back(std::move(stage));
@@ -225,8 +276,17 @@ class PlanCommand final : public Command {
             throw Misuse("plan needs -o FOLDER for the job");
         if (is_job(out_) && !overwrite_)
             throw Misuse(out_ + " is a job already: --overwrite plans it anew and keeps its results");
+        check_hooks(hooks_);
+        if (datasets_.empty() && sources_.empty())
+            throw Misuse("plan needs a DATASET, or --sources with --fetch");
+        if (!sources_.empty() && hooks_.fetch.empty())
+            throw Misuse("--sources needs --fetch, a command that fetches them");
+        require_job_folder(out_, !without_locks_);
         Plan plan;
         plan.settings = settings();
+        plan.hooks = hooks_;
+        if (!hooks_.fetch.empty())
+            return plan_sources(std::move(plan));
         const CaptureOptions options{value("camera"), value("depth-scale"), number_of(row_of("association-limit"))};
         for (const std::string& dataset : datasets_)
             find_captures(dataset, options, [&](Found found) { add(std::move(found), plan); });
@@ -241,6 +301,23 @@ class PlanCommand final : public Command {
     }
 
   private:
+    /// Sources are not opened: that would fetch everything twice.
+    int plan_sources(Plan plan) {
+        SourceNames names;
+        for (const auto& [source, bytes] : sources_from(datasets_, sources_)) {
+            constexpr double bytes_per_cost = 1e6, unknown = 1; // a compressed megapixel takes about a megabyte
+            Task task{.capture = source, .name = names.name_of(source)};
+            task.listed_bytes = bytes;
+            task.cost = bytes > 0 ? static_cast<double>(bytes) / bytes_per_cost : unknown;
+            plan.tasks.push_back(std::move(task));
+        }
+        if (plan.tasks.empty())
+            throw Error("no sources listed");
+        write_plan(out_, plan);
+        fmt::print("{:>8}  sources -> {}\n", plan.tasks.size(), out_);
+        return all_well;
+    }
+
     Parameter row_of(std::string_view name) {
         for (const Stage& stage : run_->stages())
             if (const Parameter* row = row_named(stage.rows, name))
@@ -337,9 +414,10 @@ class PlanCommand final : public Command {
     }
 
     std::vector<std::string> datasets_;
-    std::string out_;
+    std::string out_, sources_;
+    Hooks hooks_;
     int block_ = 500;
-    bool overwrite_ = false;
+    bool overwrite_ = false, without_locks_ = false;
     std::unique_ptr<Command> run_ = run_command();
     std::map<std::string, std::string> defaults_ = values_of(*run_);
     std::set<std::string> taken_;

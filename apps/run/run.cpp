@@ -1,5 +1,7 @@
 // `scanshade run`: ambient occlusion for every frame of one or more captures.
+#include "apps/jobs/folder_probe.h"
 #include "apps/jobs/job_run.h"
+#include "apps/jobs/stored_tasks.h"
 #include "apps/measure/front.h"
 #include "apps/measure/trial.h"
 #include "apps/page/run_page.h"
@@ -31,6 +33,7 @@
 #include <csignal>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <opencv2/core/utility.hpp>
@@ -184,14 +187,33 @@ class Run final : public Command {
     }
 
   private:
-    CaptureJob job_from(const fs::path& path, const fs::path& folder) {
-        CaptureJob job{
+    [[nodiscard]] std::shared_ptr<OpenedCapture> opened(const fs::path& path) {
+        Capture capture =
             open_capture_at_or_below(path, {asked_.camera, asked_.depth_scale, asked_.association_limit_s, asked_.poses,
-                                            asked_.colour, asked_.topic, asked_.median_depth(), asked_.confidence_min}),
-            {}};
-        refuse_metres(job.capture);
-        refuse_absent_view(job.capture);
-        job.batch.frames = job.of = slice(asked_.frames, job.capture.entries.size());
+                                            asked_.colour, asked_.topic, asked_.median_depth(), asked_.confidence_min});
+        refuse_metres(capture);
+        refuse_absent_view(capture);
+        std::vector<std::size_t> frames = slice(asked_.frames, capture.entries.size());
+        auto opened = std::make_shared<OpenedCapture>();
+        opened->capture = std::move(capture);
+        opened->of = std::move(frames);
+        return opened;
+    }
+
+    /// The capture of a block that another block is at work on, or has been last, stays open. Others wait meanwhile.
+    std::shared_ptr<OpenedCapture> opened_for_blocks(const fs::path& path) {
+        const std::lock_guard alone(opening_);
+        if (last_opened_path_ != path || !last_opened_) {
+            last_opened_.reset(); // before the next one takes its memory
+            last_opened_ = opened(path);
+            last_opened_path_ = path;
+        }
+        return last_opened_;
+    }
+
+    CaptureJob job_from(std::shared_ptr<OpenedCapture> capture, const fs::path& folder) const {
+        CaptureJob job(std::move(capture));
+        job.batch.frames = job.of;
         job.batch.outputs = asked_.outputs();
         job.batch.outputs.folder = folder;
         job.batch.outputs.unit = job.capture.unit;
@@ -211,7 +233,7 @@ class Run final : public Command {
             const fs::path folder =
                 asked_.paths.size() == 1 ? fs::path(asked_.out) : asked_.out / fs::path(folder_name(path, taken));
             try {
-                jobs.push_back(job_from(path, folder));
+                jobs.push_back(job_from(opened(path), folder));
             } catch (const Misuse&) {
                 throw;
             } catch (const Outage& failure) {
@@ -301,6 +323,7 @@ class Run final : public Command {
                          "--overwrite");
         const fs::path job = asked_.paths.front();
         require_folder(job / "results");
+        require_job_folder(job, !asked_.no_locks);
         const Plan plan = read_plan(job);
         const Shard shard = shard_from(asked_.shard);
         for (const Stage& stage : stages())
@@ -310,23 +333,50 @@ class Run final : public Command {
         asked_.out = (job / "results").string();
         asked_.resume = true;
         asked_.resolve();
+        for (const Task& task : plan.tasks)
+            if (const std::string block = task.block(); !block.empty())
+                siblings_[results_of(job, task)].insert(journal_file("", block).string());
         return supervise(1, [&](const WorkerProcess& worker) {
             cv::setNumThreads(1);
             end_gracefully_on_signals();
-            return work_through(job, plan, shard, interrupted, worker.carefully ? 1 : at_once(),
-                                [&](const Task& task, OrderedOutput& output) {
-                                    Tally tally;
-                                    tally.add(process(job_of(job, task), output, worker));
-                                    return tally.exit_code(0);
-                                });
+            std::optional<StoredTasks> stored;
+            if (plan.hooks.any())
+                stored.emplace(job, plan, siblings_, asked_.scratch, asked_.scratch_limit_gb, asked_.retry,
+                               interrupted);
+            const auto tally_of = [](const std::vector<FrameRow>& rows) {
+                Tally tally;
+                tally.add(rows);
+                return tally.exit_code(0);
+            };
+            return work_through(
+                job, plan, shard, interrupted, worker.carefully ? 1 : at_once(stored.has_value()), !asked_.no_locks,
+                [&](const Task& task, OrderedOutput& output) {
+                    if (!stored)
+                        return tally_of(process(job_of(task, {task.capture, results_of(job, task)}), output, worker));
+                    return stored->run(task, [&](const TaskFolders& folders, Journal& journal) {
+                        return tally_of(process_stored(task, folders, journal, output, worker));
+                    });
+                });
         });
     }
 
-    CaptureJob job_of(const fs::path& folder, const Task& task) {
+    std::vector<FrameRow> process_stored(const Task& task, const TaskFolders& folders, Journal& journal,
+                                         OrderedOutput& output, const WorkerProcess& worker) {
+        CaptureJob job = job_of(task, folders);
+        journal.fetched(folders.capture, job.batch.frames.size());
+        job.capture.path = task.capture; // for people: where it was fetched to tells them nothing
+        return process(std::move(job), output, worker, &journal);
+    }
+
+    CaptureJob job_of(const Task& task, const TaskFolders& folders) {
         // The plan could open it, so the problem may be temporary.
-        if (!is_there(task.capture))
-            throw Outage(task.capture.string() + ": not there any more");
-        CaptureJob job = job_from(task.capture, results_of(folder, task));
+        if (!is_there(folders.capture))
+            throw Outage(folders.capture.string() + ": not there any more");
+        const bool whole = task.frames == task.of;
+        CaptureJob job =
+            job_from(whole ? opened(folders.capture) : opened_for_blocks(folders.capture), folders.results);
+        if (task.of == 0) // a source, of which nothing was known
+            return job;
         if (job.of.size() != task.of)
             throw Error(fmt::format("{}: planned with {} frames, has {} now: plan anew", task.capture.string(), task.of,
                                     job.of.size()));
@@ -339,14 +389,15 @@ class Run final : public Command {
     /// How many captures are open at once: those whose frames enter the walk (one per sixteen cores), two being opened
     /// before them, and two being finished after them. On a GPU, 40 frames take no longer than opening their capture.
     /// With a budget it is one: nothing may disturb its measurements, and each capture gets other settings.
-    [[nodiscard]] std::size_t at_once() {
+    /// `stored`: input is fetched for one task and results are delivered for another, both in bounded space.
+    [[nodiscard]] std::size_t at_once(bool stored = false) {
         if (asked_.budget.any())
             return 1;
         std::size_t entering = std::max(1U, std::thread::hardware_concurrency() / 16);
         if (asked_.sequence != SequenceUse::off) // keeps one device busy
             entering = asked_.device == "all" ? workers().devices() : 1;
         entrance_.release(static_cast<std::ptrdiff_t>(entering - 1));
-        return entering + 4;
+        return entering + (stored ? 2 : 4);
     }
 
     /// Opens the devices when the first frame needs them, so a run with nothing left to do opens none.
@@ -374,9 +425,15 @@ class Run final : public Command {
     };
 
     /// One capture, from its journal to its report.
-    std::vector<FrameRow> process(CaptureJob job, OrderedOutput& output, const WorkerProcess& worker = {}) {
+    /// `held`: its journal, where that is not in the folder of its results.
+    std::vector<FrameRow> process(CaptureJob job, OrderedOutput& output, const WorkerProcess& worker = {},
+                                  Journal* held = nullptr) {
         output.set_capture(job.capture.path.string());
-        Journal journal(job.folder(), job.block);
+        std::optional<Journal> own;
+        const auto siblings = siblings_.find(job.folder());
+        Journal& journal = held ? *held
+                                : own.emplace(job.folder(), job.block, fs::path(),
+                                              siblings == siblings_.end() ? nullptr : &siblings->second);
         journal.set_capture(job.capture);
         if (asked_.overwrite || !asked_.resume)
             journal.clear();
@@ -385,8 +442,10 @@ class Run final : public Command {
         if (auto rows = rows_if_done(job, journal, task, files))
             return *std::move(rows);
         measure_noise_of(job);
-        if (std::string warning = pose_warning(job.capture, job.of); !warning.empty())
-            job.capture.warnings.push_back(std::move(warning));
+        std::call_once(job.opened->check_poses, [&] {
+            if (std::string warning = pose_warning(job.capture, job.of); !warning.empty())
+                job.capture.warnings.push_back(std::move(warning));
+        });
 
         Prepared ready = prepare(job);
         std::optional<RecordingCloud> cloud;
@@ -396,7 +455,7 @@ class Run final : public Command {
             fit_into_memory(job, ready.report.device.kind == "CPU");
         say(ready.at_work);
         introduce(ready.report, job.batch.frames.size(), ready.by_points);
-        prepare_folder(job, files);
+        prepare_folder(job, files, journal.is_first());
         std::optional<McapRecording> mcap;
         if (job.batch.outputs.mcap)
             job.batch.recording = &mcap.emplace(mcap_file(job.folder(), job.block), job.capture, asked_.resume);
@@ -427,8 +486,12 @@ class Run final : public Command {
     }
 
     [[nodiscard]] std::string task_of(const CaptureJob& job) {
-        const std::lock_guard alone(alone_);
-        return task_key(asked_.stages_in_use(), job.capture, job.of, asked_.in_sequence(job.capture));
+        std::call_once(job.opened->make_key, [&] {
+            const std::lock_guard alone(alone_);
+            job.opened->task_key =
+                task_key(asked_.stages_in_use(), job.capture, job.of, asked_.in_sequence(job.capture));
+        });
+        return job.opened->task_key;
     }
 
     /// The rows of a capture that an earlier run has finished.
@@ -618,6 +681,10 @@ class Run final : public Command {
     }
 
     RunSettings asked_;
+    std::mutex opening_; ///< of captures that are computed in blocks
+    std::shared_ptr<OpenedCapture> last_opened_;
+    fs::path last_opened_path_;
+    std::map<fs::path, std::set<std::string>> siblings_; ///< names of the journals of a capture's blocks, by folder
     std::mutex alone_; ///< held while a capture uses settings and devices, but not while its frames are computed
     std::counting_semaphore<> entrance_{1};
     std::unique_ptr<Workers> workers_;

@@ -55,7 +55,9 @@ class RunSettings {
     int page_points = 1000000;
     int frames_in_tar = 0;
     bool overwrite = false, resume = false, retry = false;
-    std::string shard;
+    std::string shard, scratch;
+    bool no_locks = false;
+    double scratch_limit_gb = 0;
     bool quiet = false, log_json = false;
     CloudAoOptions clouds_by_points;
     SequenceAoOptions sequences;

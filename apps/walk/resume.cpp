@@ -18,27 +18,47 @@ namespace scanshade {
 namespace {
 
 /// Settings that do not go into the key as typed: they change no results, or the key has them as used.
-constexpr std::array aside = {"frames",         "camera",
-                              "depth-scale",    "association-limit",
-                              "registered",     "depth-noise",
-                              "method",         "radius",
-                              "quality",        "max-error",
-                              "max-ms",         "settings",
-                              "device",         "out",
-                              "write",          "format",
-                              "overwrite",      "dump",
-                              "resume",         "retry",
-                              "shard",          "log",
-                              "shade-strength", "colour-cloud",
-                              "cloud",          "cloud-resolution",
-                              "poses",          "in-flight",
-                              "preset",         "quiet",
-                              "colour",         "page",
-                              "page-points",    "tar"};
+constexpr std::array aside = {"frames",
+                              "camera",
+                              "depth-scale",
+                              "association-limit",
+                              "registered",
+                              "depth-noise",
+                              "method",
+                              "radius",
+                              "quality",
+                              "max-error",
+                              "max-ms",
+                              "settings",
+                              "device",
+                              "out",
+                              "write",
+                              "format",
+                              "overwrite",
+                              "dump",
+                              "resume",
+                              "retry",
+                              "shard",
+                              "scratch",
+                              "scratch-limit",
+                              "no-locks",
+                              "log",
+                              "shade-strength",
+                              "colour-cloud",
+                              "cloud",
+                              "cloud-resolution",
+                              "poses",
+                              "in-flight",
+                              "preset",
+                              "quiet",
+                              "colour",
+                              "page",
+                              "page-points",
+                              "tar"};
 
 /// Settings that change no results when they are typed differently.
-constexpr std::array elsewhere = {"out", "overwrite", "dump",      "resume", "retry", "shard",
-                                  "log", "device",    "in-flight", "preset", "quiet"};
+constexpr std::array elsewhere = {"out",           "overwrite", "dump", "resume", "retry",     "shard",  "scratch",
+                                  "scratch-limit", "no-locks",  "log",  "device", "in-flight", "preset", "quiet"};
 
 std::string row_text(const Parameter& row) { return row.name + "=" + value_text(row); }
 
@@ -254,13 +274,16 @@ std::vector<FrameRow> run_recorded(const Capture& capture, MethodPool& pool, con
     std::vector<FrameRow> all;
     all.reserve(options.frames.size());
     bool finished = true;
+    TaskSums sums;
+    const std::vector<std::string> folders{capture.path.string(), journal.facts().stored.in};
     for (const std::size_t index : options.frames) {
         FrameRow row = rows.contains(index) ? std::move(rows.at(index)) : skipped_row(capture, index);
         finished = finished && row.status != FrameStatus::skipped && row.fault != Fault::outage;
+        sums.add(row, folders);
         all.push_back(std::move(row));
     }
     if (finished)
-        journal.complete(recording.task);
+        journal.complete(recording.task, sums);
     return all;
 }
 

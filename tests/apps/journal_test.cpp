@@ -59,16 +59,16 @@ TEST_F(JournalTest, frames_share_a_sync_and_the_last_line_has_its_own) {
     }
     EXPECT_LT(syncs, 20) << "a sync takes milliseconds: no frame needs one of its own";
     const int before = syncs;
-    journal.complete("key");
+    journal.complete("key", {});
     EXPECT_EQ(syncs, before + 1) << "who reads that a task is complete must find its frames after a power cut, too";
-    journal.complete("key");
+    journal.complete("key", {});
     EXPECT_EQ(syncs, before + 1) << "it says so already";
 }
 
 TEST_F(JournalTest, a_line_that_does_not_reach_the_disk_is_an_outage) {
     Journal journal(folder.path(), "");
     error_of_sync = EIO;
-    EXPECT_THROW(journal.complete("key"), Outage);
+    EXPECT_THROW(journal.complete("key", {}), Outage);
 }
 
 TEST_F(JournalTest, of_two_lines_on_a_frame_the_last_one_counts_and_forgotten_ones_do_not) {

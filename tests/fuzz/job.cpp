@@ -15,6 +15,7 @@ using namespace scanshade::fuzz;
 void keep_a_journal(std::string_view bytes) {
     const auto file = as_file(bytes, "journal/journal.jsonl");
     (void)is_complete(file);
+    (void)read_journal_end(file);
     Journal journal(file.parent_path(), "");
     CaptureEntry entry;
     FrameRow row;
@@ -31,7 +32,11 @@ void keep_a_journal(std::string_view bytes) {
     journal.add(row, entry, "settings", "device");
     must_hold(journal.done(entry, "settings", true).has_value() && journal.whole(row).notes == row.notes);
     must_hold(read_journal(file).records.at("added").row.notes == row.notes);
-    journal.complete("key");
+    TaskSums sums;
+    sums.add(row, {});
+    journal.complete("key", sums);
+    const auto end = read_journal_end(file);
+    must_hold(end && end->sums.ok == 1 && end->sums.rows() == 1);
     must_hold(is_complete(file) && read_journal(file).complete == "key");
 }
 
