@@ -45,7 +45,6 @@ class CloudAo final : public PointMethod {
     PointVisibility compute(const PointSet& cloud, const std::optional<Eigen::Vector3d>& scanner = {}) override;
 
   private:
-    class Work;
     [[nodiscard]] PointVisibility of_mesh(const PointSet& mesh) const;
 
     CloudAoOptions options_;
