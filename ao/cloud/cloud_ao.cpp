@@ -3,6 +3,7 @@
 
 #include "ao/cloud/cloud_work.h"
 #include "ao/cloud/large_cloud.h"
+#include "ao/gpu/device.h"
 #include "ao/raycast/raycast.h"
 #include "projection/base/error.h"
 #include "projection/base/statistics.h"
@@ -10,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <limits>
 
 namespace scanshade {
 
@@ -26,6 +28,26 @@ PointVisibility CloudAo::compute(const PointSet& cloud, const std::optional<Vect
     if (!options_.sky && cloud.points.size() > points_at_once(setup))
         return in_tiles(setup, cloud, scanner);
     return CloudWork(setup, cloud, scanner).run();
+}
+
+/// The sky is seen at any distance, past all tiles.
+std::size_t CloudAo::most_at_once() const {
+    return options_.sky ? std::numeric_limits<std::size_t>::max()
+                        : points_at_once({options_, device_, up_, viewpoint_});
+}
+
+std::string CloudAo::fingerprint() const {
+    CloudAoOptions options = options_;
+    std::string all = device_ ? device_->info().name : "processor";
+    for (const Parameter& row : options.parameters())
+        all += fmt::format(" {}={}", row.name, value_text(row));
+    return all;
+}
+
+PointVisibility CloudAo::compute_large(PointSource& source, TileStore& store, double shown,
+                                       const std::function<bool()>& stop) {
+    const CloudSetup setup{options_, device_, up_, viewpoint_};
+    return scanshade::compute_large(setup, source, store, shown, stop);
 }
 
 /// Rays against the faces are exact: no mean over neighbours is needed, but more rays.

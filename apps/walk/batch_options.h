@@ -40,8 +40,9 @@ struct BatchOptions {
     std::filesystem::path dump;         ///< folder for the method's intermediates, frame by frame; empty = none
     bool short_rows = false;            ///< rows come back shortened, once on_frame has seen them
     int frames_in_memory = 0;           ///< 0 = cores, and two for each method
-    const std::atomic<bool>* stop = nullptr; ///< set = begin no further frame
-    std::function<void()> all_begun;         ///< called once no further frame will begin: another batch may
+    const std::atomic<bool>* stop = nullptr;     ///< set = begin no further frame
+    std::function<void(const std::string&)> say; ///< gets sentences for people while frames are computed
+    std::function<void()> all_begun;             ///< called once no further frame will begin: another batch may
 };
 
 } // namespace scanshade

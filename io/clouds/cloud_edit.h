@@ -36,6 +36,17 @@ struct NormalCounts {
     [[nodiscard]] bool are_normals() const { return 10 * unit >= 9 * valid; }
 };
 
+/// Whether coordinates are those of a map, from every step(points)-th of them.
+struct MapCounts {
+    std::size_t there = 0, all = 0;
+    [[nodiscard]] static std::size_t step(std::size_t points) {
+        constexpr std::size_t some = 1000;
+        return points < some ? 1 : points / some;
+    }
+    void add(const Eigen::Vector3d& point);
+    [[nodiscard]] bool on_a_map() const { return there > all / 2; }
+};
+
 /// What is done to each record. Keeps what it points to, except the values and colours given.
 struct CloudEdit {
     std::vector<FieldReplacement> replacements;

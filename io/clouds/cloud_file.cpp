@@ -441,17 +441,19 @@ bool takes_colours(const Cloud& cloud) {
            (cloud.records->format->new_colours != NewColours::none || has_colour_fields(*cloud.records));
 }
 
-/// Eastings and northings of maps have six digits or more.
+void MapCounts::add(const Eigen::Vector3d& point) {
+    constexpr double from = 1e5; // eastings and northings have six digits or more
+    if (!point.allFinite())
+        return;
+    ++all;
+    there += point.head<2>().cwiseAbs().maxCoeff() > from && std::abs(point.z()) < from;
+}
+
 bool is_on_a_map(const Cloud& cloud) {
-    constexpr double from = 1e5;
-    constexpr std::size_t some = 1000;
-    std::size_t there = 0, all = 0;
-    for (std::size_t i = 0; i < cloud.points.size(); i += std::max<std::size_t>(1, cloud.points.size() / some))
-        if (const auto& point = cloud.points[i]; point.allFinite()) {
-            ++all;
-            there += point.head<2>().cwiseAbs().maxCoeff() > from && std::abs(point.z()) < from;
-        }
-    return there > all / 2;
+    MapCounts counts;
+    for (std::size_t i = 0; i < cloud.points.size(); i += MapCounts::step(cloud.points.size()))
+        counts.add(cloud.points[i]);
+    return counts.on_a_map();
 }
 
 bool z_is_up(const Cloud& cloud) { return (cloud.records && cloud.records->format->z_up) || is_on_a_map(cloud); }

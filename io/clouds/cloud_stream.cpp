@@ -136,10 +136,4 @@ void CloudStream::write(const fs::path& target, const std::vector<std::string>& 
     write_atomically(target, write_to);
 }
 
-void CloudStream::find_colour_step() {
-    unsigned step = 0;
-    pass([&](std::size_t, const CloudRecords& block) { step = std::max(step, colour_step_of(block)); });
-    shape_.records.colour_step = step;
-}
-
 } // namespace scanshade

@@ -43,8 +43,8 @@ class CloudStream {
     void write(const std::filesystem::path& target, const std::vector<std::string>& names,
                const std::function<BlockValues(std::size_t first, const CloudRecords& block)>& values) const;
 
-    /// LAS: looks for the divisor of colours, which blocks then have. Takes a pass.
-    void find_colour_step();
+    /// LAS: the divisor of colours, found by colour_step_of() in all blocks; they have it from then on.
+    void set_colour_step(unsigned step) { shape_.records.colour_step = step; }
 
   private:
     std::filesystem::path file_;
