@@ -475,6 +475,7 @@ class Run final : public Command {
     [[nodiscard]] Prepared prepare(CaptureJob& job) {
         const std::lock_guard alone(alone_);
         MethodSetup& own = asked_.chosen_setup();
+        job.batch.cloud_tiles = asked_.cloud_tiles;
         job.batch.cloud_walk = own.make_for_points() ? CloudWalk::points : asked_.clouds;
         const bool by_points = computes_points(job);
         Workers* workers =

@@ -222,7 +222,7 @@ class Pipeline {
         if (work->by_points) { // takes all cores and much memory: one at a time, and no other starts while it waits
             const std::lock_guard alone(pool_.alone());
             tbb::this_task_arena::isolate(
-                [&] { take(*work, &StageTimes::compute, [&] { compute_points(*work, options_); }); });
+                [&] { take(*work, &StageTimes::compute, [&] { compute_points_of(*work); }); });
             if (work->large && work->row.fault == Fault::outage && options_.stop && *options_.stop) {
                 work->large.reset();
                 work->row = skipped_row(capture_, work->row.index);
@@ -239,10 +239,32 @@ class Pipeline {
         return work;
     }
 
+    /// A damaged file of a survey must not lose the others.
+    void compute_points_of(Work& work) const {
+        if (work.large && work.large->files() > 1) {
+            try {
+                return compute_large(work, *options_.points);
+            } catch (const Outage&) {
+                throw;
+            } catch (const Error& failure) {
+                work.large.reset();
+                work.row.warnings.push_back(fmt::format(
+                    "the survey could not be computed together, so this file is by itself: {}.", failure.what()));
+                std::vector<std::string> warnings = std::move(work.row.warnings);
+                work.frame = load(capture_, work.row.index, options_);
+                describe_frame(work);
+                std::ranges::move(warnings, std::back_inserter(work.row.warnings));
+            }
+        }
+        compute_points(work, options_);
+    }
+
     /// A cloud that is computed from disk is not loaded.
     void begin_large(Work& work) {
         std::vector<std::string> warnings = work.entry.warnings, notes;
-        work.large = large_.run_of(work.row.index, warnings, notes);
+        const auto [run, file] = large_.part_of(work.row.index, warnings, notes);
+        work.large = run;
+        work.large_file = file;
         std::ranges::move(notes, std::back_inserter(work.row.notes));
         if (!work.large)
             return;

@@ -1,12 +1,16 @@
 #include "apps/walk/large_frames.h"
 
+#include "apps/large/survey.h"
 #include "apps/walk/frame_points.h"
 #include "io/clouds/cloud_file.h"
+#include "io/clouds/format.h"
 #include "projection/base/error.h"
 
 #include <algorithm>
 #include <fmt/format.h>
 #include <iterator>
+#include <limits>
+#include <tbb/parallel_for.h>
 
 namespace scanshade {
 
@@ -47,12 +51,84 @@ LargeSettings LargeFrames::settings(const std::string& name) const {
     return settings;
 }
 
-std::shared_ptr<LargeCloudRun> LargeFrames::run_of(std::size_t index, std::vector<std::string>& warnings,
-                                                   std::vector<std::string>& notes) {
+bool LargeFrames::by_points() const {
+    return options_.points && options_.points->most_at_once() != std::numeric_limits<std::size_t>::max() &&
+           options_.cloud_walk != CloudWalk::view && !(capture_.camera && options_.cloud_walk != CloudWalk::points);
+}
+
+void LargeFrames::find_surveys() {
+    const std::size_t count = capture_.entries.size();
+    if (count < 2 || !by_points() || options_.cloud_tiles == CloudTiles::separate)
+        return;
+    std::vector<std::optional<CloudStream>> streams(count);
+    std::vector<std::optional<SurveyTile>> tiles(count);
+    tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
+        const CaptureEntry& entry = capture_.entries[i];
+        if (entry.cloud.empty() || entry.world_from_camera || !entry.problem.empty())
+            return;
+        try {
+            std::vector<std::string> unused;
+            std::optional<CloudShape> shape = cloud_shape(entry.cloud, unused);
+            if (!shape || !shape->whole_since.empty() || shape->records.grid.height > 1 || shape->records.viewpoint)
+                return;
+            CloudStream stream(entry.cloud, *std::move(shape));
+            const std::optional<Eigen::AlignedBox3d> box = stream.box();
+            if (!box)
+                return;
+            tiles[i] = {*box,
+                        fmt::format("{} {} {}", stream.records().format->z_up ? "LAS" : stream.records().format->name,
+                                    normal_fields(stream.records()).has_value(), stream.reference())};
+            streams[i] = std::move(stream);
+        } catch (const Outage&) {
+            throw;
+        } catch (const Error&) { // computing the frame reports the error
+        }
+    });
+    std::vector<std::vector<std::size_t>> surveys;
+    if (options_.cloud_tiles == CloudTiles::automatic) {
+        surveys = surveys_in(tiles);
+    } else {
+        surveys.emplace_back();
+        for (std::size_t i = 0; i < count; ++i)
+            if (streams[i])
+                surveys.back().push_back(i);
+    }
+    for (const std::vector<std::size_t>& survey : surveys) {
+        constexpr std::size_t most_points = 0x7fffffff; // points are numbered with 32 bits
+        std::size_t points = 0;
+        for (const std::size_t i : survey)
+            points += streams[i]->size();
+        if (survey.size() < 2 || points > most_points)
+            continue;
+        const std::string sentence = fmt::format(
+            "{} of {} clouds are tiles of one survey{}: points near borders see those of the neighbours. --tiles "
+            "separate computes each by itself.",
+            survey.size(), count,
+            options_.cloud_tiles == CloudTiles::join ? ", as --tiles join says" : ", since their boxes adjoin");
+        if (options_.say)
+            options_.say(sentence);
+        std::vector<CloudStream> files;
+        for (const std::size_t i : survey)
+            files.push_back(*streams[i]);
+        const auto run = std::make_shared<LargeCloudRun>(
+            std::move(files), settings(fmt::format("survey-{}", capture_.entries[survey.front()].name)));
+        for (std::size_t k = 0; k < survey.size(); ++k) {
+            parts_[survey[k]] = {run, k};
+            notes_[survey[k]] = sentence;
+        }
+    }
+}
+
+LargeFrames::Part LargeFrames::part_of(std::size_t index, std::vector<std::string>& warnings,
+                                       std::vector<std::string>& notes) {
     const CaptureEntry& entry = capture_.entries[index];
-    if (entry.cloud.empty() || !options_.points || options_.cloud_walk == CloudWalk::view ||
-        (capture_.camera && options_.cloud_walk != CloudWalk::points))
-        return nullptr;
+    if (entry.cloud.empty() || !by_points())
+        return {};
+    std::call_once(looked_, [&] { find_surveys(); });
+    if (const auto survey = parts_.find(index); survey != parts_.end()) {
+        notes.push_back(notes_.at(index));
+        return survey->second;
+    }
     std::vector<std::string> about_file;
     std::string why_not;
     std::optional<CloudShape> shape = large_shape(entry.cloud, options_.points->most_at_once(), about_file, why_not);
@@ -61,14 +137,14 @@ std::shared_ptr<LargeCloudRun> LargeFrames::run_of(std::size_t index, std::vecto
         if (!why_not.empty())
             notes.push_back(
                 fmt::format("more points than --cloud.memory holds; the file is read as a whole, since {}.", why_not));
-        return nullptr;
+        return {};
     }
     std::ranges::move(about_file, std::back_inserter(warnings));
     notes.push_back(fmt::format("{} points, more than --cloud.memory holds: computed from disk, in tiles.",
                                 shape->records.point_count));
     std::vector<CloudStream> files;
     files.emplace_back(entry.cloud, *std::move(shape));
-    return std::make_shared<LargeCloudRun>(std::move(files), settings(entry.name));
+    return {std::make_shared<LargeCloudRun>(std::move(files), settings(entry.name)), 0};
 }
 
 void compute_large(Work& work, PointMethod& method) {

@@ -17,16 +17,25 @@ class LargeFrames {
   public:
     LargeFrames(const Capture& capture, const BatchOptions& options) : capture_(capture), options_(options) {}
 
-    /// What computes this frame's cloud from disk; null where it is computed in memory. `warnings` are about its file,
-    /// `notes` say why. What an earlier run left for a frame that is computed in memory is removed.
-    [[nodiscard]] std::shared_ptr<LargeCloudRun> run_of(std::size_t index, std::vector<std::string>& warnings,
-                                                        std::vector<std::string>& notes);
+    /// What computes a frame's cloud from disk, alone or with the others of its survey.
+    struct Part {
+        std::shared_ptr<LargeCloudRun> run; ///< null: the frame is computed in memory
+        std::size_t file = 0;               ///< which of the run's files it is
+    };
+    /// `warnings` are about the frame's file, `notes` say why. What an earlier run left for a frame that is computed in
+    /// memory is removed.
+    [[nodiscard]] Part part_of(std::size_t index, std::vector<std::string>& warnings, std::vector<std::string>& notes);
 
   private:
     [[nodiscard]] LargeSettings settings(const std::string& name) const;
+    [[nodiscard]] bool by_points() const;
+    void find_surveys();
 
     const Capture& capture_;
     const BatchOptions& options_;
+    std::once_flag looked_;
+    std::map<std::size_t, Part> parts_; ///< of surveys, by frame
+    std::map<std::size_t, std::string> notes_;
 };
 
 /// Whether a cloud in `file` is computed from its points, has more of them than `most_at_once`, and can be read in

@@ -1,6 +1,8 @@
 // A cloud file as its own records: header text, fields, and the bytes or words of every point, kept to be written back.
 #pragma once
 
+#include "io/clouds/laz/laz.h"
+
 #include <array>
 #include <cstdint>
 #include <Eigen/Geometry>
@@ -157,10 +159,14 @@ class TextRecords {
 [[nodiscard]] std::vector<std::array<int, 3>> ply_triangles(const CloudRecords& records);
 /// Where the records of a file lie that can be read in blocks.
 struct CloudShape {
-    CloudRecords records;    ///< header, fields and number of points; the points and what follows are not there
-    std::uint64_t at = 0;    ///< where the points begin in the file
-    std::uint64_t end = 0;   ///< behind the points; what follows is kept as it is
-    std::string whole_since; ///< not empty: why the file has to be read as a whole
+    CloudRecords records;  ///< header, fields and number of points; the points and what follows are not there
+    std::uint64_t at = 0;  ///< where the points begin in the file
+    std::uint64_t end = 0; ///< behind the points; what follows is kept as it is
+    std::optional<Eigen::AlignedBox3d> box; ///< that the points are said to lie in, in the cloud's unit
+    std::string reference;          ///< LAS: the records that name the coordinates' reference system, as they are
+    laz::Packing packing;           ///< LAZ: how points are packed, and where. What follows is in `records`, since it
+    std::vector<laz::Chunk> chunks; ///< may change
+    std::string whole_since;        ///< not empty: why the file has to be read as a whole
 };
 // From the beginning of a file, with the checks of its reader.
 [[nodiscard]] CloudShape ply_shape(const FileBytes& file, std::vector<std::string>& warnings);
@@ -180,5 +186,15 @@ struct CloudShape {
 /// What comes before the points in a LAS file whose points ended at `old_end`.
 [[nodiscard]] std::string las_head(const CloudRecords& records, const std::vector<FieldAddition>& additions,
                                    std::uint64_t old_end);
+/// What stands round the points of a LAZ file whose block of points ended at `old_end`.
+struct LazHead {
+    std::string header, after;
+    laz::Packing packing;
+    std::uint64_t old_end;
+};
+[[nodiscard]] LazHead laz_head(const CloudRecords& records, const std::vector<FieldAddition>& additions,
+                               std::uint64_t old_end);
+/// The header, once it is known where the new block ends.
+[[nodiscard]] std::string finished(LazHead head, std::uint64_t end);
 
 } // namespace scanshade

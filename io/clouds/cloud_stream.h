@@ -33,6 +33,10 @@ class CloudStream {
     /// Visits all points. Throws Error naming file and place.
     void pass(const Visit& visit) const;
 
+    /// The box that the file names, or of points here and there in it; nothing where none is valid.
+    [[nodiscard]] std::optional<Eigen::AlignedBox3d> box() const;
+    [[nodiscard]] const std::string& reference() const { return shape_.reference; }
+
     /// For the points from `first` on: one list of values per name, NaN = unknown; and colours, if they change.
     struct BlockValues {
         std::vector<std::vector<float>> fields;
@@ -47,6 +51,9 @@ class CloudStream {
     void set_colour_step(unsigned step) { shape_.records.colour_step = step; }
 
   private:
+    [[nodiscard]] CloudRecords empty_block() const;
+    void pass_chunks(const FileBytes& file, CloudRecords& block, const Visit& visit) const;
+
     std::filesystem::path file_;
     CloudShape shape_;
 };

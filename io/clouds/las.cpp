@@ -238,17 +238,26 @@ bool is_copc(const std::vector<Vlr>& vlrs) {
     return std::ranges::any_of(vlrs, [](const Vlr& vlr) { return vlr.user == "copc" && vlr.id == 1; });
 }
 
-/// The points of a LAZ file; returns where their block ends.
-std::size_t unpack(CloudRecords& records, std::string_view bytes, std::size_t points_at, const std::vector<Vlr>& vlrs) {
+/// Where the block of points of a LAZ file ends at the latest.
+std::uint64_t points_end(std::string_view header, std::uint64_t points_at, std::uint64_t end) {
+    if (read_at<std::uint8_t>(header, at_minor) >= 4 && read_at<std::uint32_t>(header, at_evlr_count) > 0)
+        if (const auto first = read_at<std::uint64_t>(header, at_evlrs); first >= points_at && first < end)
+            return first;
+    return end;
+}
+
+laz::Packing packing_of(const CloudRecords& records, const std::vector<Vlr>& vlrs) {
     if (const auto found = std::ranges::count_if(vlrs, describes_laz); found != 1)
         throw Error(fmt::format("LAZ with {} records that describe it (user id {}, {}), expected one",
                                 static_cast<std::size_t>(found), laz::record_user, laz::record_id));
-    std::size_t end = bytes.size();
-    if (read_at<std::uint8_t>(bytes, at_minor) >= 4 && read_at<std::uint32_t>(bytes, at_evlr_count) > 0)
-        if (const auto first = read_at<std::uint64_t>(bytes, at_evlrs); first >= points_at && first < end)
-            end = first;
-    const int format = read_at<std::uint8_t>(bytes, at_format) & format_mask;
-    const auto packing = laz::packing_of(std::ranges::find_if(vlrs, describes_laz)->data, format, records.stride);
+    const int format = read_at<std::uint8_t>(records.header, at_format) & format_mask;
+    return laz::packing_of(std::ranges::find_if(vlrs, describes_laz)->data, format, records.stride);
+}
+
+/// The points of a LAZ file; returns where their block ends.
+std::size_t unpack(CloudRecords& records, std::string_view bytes, std::size_t points_at, const std::vector<Vlr>& vlrs) {
+    const laz::Packing packing = packing_of(records, vlrs);
+    const std::size_t end = points_end(records.header, points_at, bytes.size());
     laz::Unpacked unpacked = laz::unpacked(bytes, points_at, end, records.point_count, packing);
     records.points = std::move(unpacked.points);
     records.packed = bytes.substr(points_at, unpacked.end - points_at);
@@ -358,6 +367,34 @@ CloudRecords read_las(std::string_view bytes, const fs::path& file, std::vector<
     return std::move(records);
 }
 
+namespace {
+
+/// The chunks of a LAZ file, and what follows them, which is short.
+void find_chunks(CloudShape& shape, const FileBytes& file) {
+    constexpr std::uint64_t most_after = 64 << 20, largest_chunk = 4 << 20; // points
+    CloudRecords& records = shape.records;
+    records.encoding = CloudRecords::Encoding::compressed;
+    const auto vlrs = vlrs_of(records);
+    std::uint64_t end = points_end(records.header, shape.at, file.size());
+    const laz::Packing packing = packing_of(records, vlrs);
+    if (packing.compressor == 1) {
+        shape.whole_since = "it is compressed without chunks";
+        return;
+    }
+    shape.chunks = laz::chunks_of([&](std::uint64_t at, std::uint64_t count) { return file.bytes(at, count); },
+                                  file.size(), shape.at, end, records.point_count, packing);
+    shape.packing = packing;
+    shape.end = end;
+    if (std::ranges::any_of(shape.chunks, [](const laz::Chunk& chunk) { return chunk.count > largest_chunk; }))
+        shape.whole_since = "its compressed chunks are large";
+    else if (file.size() - end > most_after)
+        shape.whole_since = "long records follow its compressed points";
+    else
+        records.after = file.bytes(end, file.size() - end);
+}
+
+} // namespace
+
 CloudShape las_shape(const FileBytes& file, std::vector<std::string>& warnings) {
     constexpr std::uint64_t longest_header = 64 << 20;
     const std::string start = file.bytes(0, std::min<std::uint64_t>(file.size(), longest_header));
@@ -366,8 +403,21 @@ CloudShape las_shape(const FileBytes& file, std::vector<std::string>& warnings) 
     shape.records = std::move(head.records);
     shape.at = head.points_at;
     shape.end = shape.at + std::uint64_t(shape.records.point_count) * shape.records.stride;
+    Eigen::AlignedBox3d box;
+    for (int axis = 0; axis < 3; ++axis) {
+        const std::size_t at = at_box + 16 * static_cast<std::size_t>(axis);
+        box.max()[axis] = read_at<double>(start, at), box.min()[axis] = read_at<double>(start, at + 8);
+    }
+    if (box.min().allFinite() && box.max().allFinite() && !box.isEmpty())
+        shape.box = box;
+    for (const Vlr& vlr : vlrs_of(shape.records))
+        if (vlr.user == "LASF_Projection")
+            shape.reference += vlr.data;
     if (head.compressed)
-        shape.whole_since = "it is compressed";
+        during(file.path().string(), [&] { find_chunks(shape, file); });
+    if (is_copc(vlrs_of(shape.records)))
+        warnings.push_back(file.path().string() +
+                           ": COPC's octree is not used; with fields added it is written as plain LAZ.");
     return shape;
 }
 
@@ -530,6 +580,20 @@ std::string las_head(const CloudRecords& records, const std::vector<FieldAdditio
     return header;
 }
 
+LazHead laz_head(const CloudRecords& records, const std::vector<FieldAddition>& additions, std::uint64_t old_end) {
+    LazHead head{described_header(records, additions), records.after, {}, old_end};
+    head.packing = describe_packing(head.header, read_at<std::uint16_t>(head.header, at_length));
+    if (read_at<std::uint8_t>(head.header, at_minor) >= 4)
+        head.after = without_octree(head.header, std::move(head.after), old_end);
+    put(head.header, at_points, static_cast<std::uint32_t>(head.header.size()));
+    return head;
+}
+
+std::string finished(LazHead head, std::uint64_t end) {
+    shift_offsets(head.header, head.old_end, end);
+    return std::move(head.header);
+}
+
 std::string las_bytes(const CloudRecords& records, std::string points, const std::vector<FieldAddition>& additions) {
     const bool compressed = records.encoding == CloudRecords::Encoding::compressed;
     if (compressed && additions.empty() && points == records.points)
@@ -539,15 +603,10 @@ std::string las_bytes(const CloudRecords& records, std::string points, const std
     if (!compressed)
         return las_head(records, additions, records.header.size() + records.stride * records.point_count) + points +
                records.after;
-    std::string header = described_header(records, additions), after = records.after;
-    const std::size_t old_end = records.header.size() + records.packed.size();
-    const laz::Packing packing = describe_packing(header, read_at<std::uint16_t>(header, at_length));
-    if (read_at<std::uint8_t>(header, at_minor) >= 4)
-        after = without_octree(header, std::move(after), old_end);
-    points = laz::packed(points, header.size(), packing);
-    put(header, at_points, static_cast<std::uint32_t>(header.size()));
-    shift_offsets(header, old_end, header.size() + points.size());
-    return header + points + after;
+    LazHead head = laz_head(records, additions, records.header.size() + records.packed.size());
+    points = laz::packed(points, head.header.size(), head.packing);
+    shift_offsets(head.header, head.old_end, head.header.size() + points.size());
+    return head.header + points + head.after;
 }
 
 } // namespace scanshade
