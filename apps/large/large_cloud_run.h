@@ -20,11 +20,11 @@ class TilesOnDisk;
 
 /// What is needed of a run to compute a large cloud.
 struct LargeSettings {
-    std::filesystem::path folder; ///< of the temporary files; made, and removed afterwards
-    std::size_t shown = 1000000;  ///< points of each file that pictures and pages show, about
+    std::filesystem::path folder = {}; ///< of the temporary files; made, and removed afterwards
+    std::size_t shown = 1000000;       ///< points of each file that pictures and pages show, about
     std::size_t buffers = 64 << 20;
-    std::function<bool()> stop;                  ///< asked now and then
-    std::function<void(const std::string&)> say; ///< what is about to be done
+    std::function<bool()> stop = {};                  ///< asked now and then
+    std::function<void(const std::string&)> say = {}; ///< what is about to be done
 };
 
 /// Made once for files that belong together. Temporary files are removed with it, unless keep() was called.
