@@ -9,6 +9,8 @@
 #include <array>
 #include <Eigen/Geometry>
 #include <fmt/format.h>
+#include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -136,6 +138,9 @@ struct PointVisibility {
     Timings timings;
 };
 
+class PointSource;
+class TileStore;
+
 /// Computes points without a view: it looks from the points themselves. Not thread-safe: one cloud at a time.
 class PointMethod {
   public:
@@ -144,6 +149,17 @@ class PointMethod {
     virtual PointVisibility compute(const PointSet& points, const std::optional<Eigen::Vector3d>& scanner = {}) = 0;
     /// What the last compute() found besides, for study.
     [[nodiscard]] virtual std::vector<Intermediate> intermediates() { return {}; }
+
+    /// Points that it computes at once. Where a cloud has more, compute_large() needs no more memory than for these.
+    [[nodiscard]] virtual std::size_t most_at_once() const { return std::numeric_limits<std::size_t>::max(); }
+    /// All settings and the device, as text: equal ones give equal values.
+    [[nodiscard]] virtual std::string fingerprint() const { return {}; }
+    /// A cloud that is never in memory as a whole (ao/cloud/large_cloud.h). `shown`: of so many points normals are
+    /// kept. `stop`: asked now and then; true ends it with an Outage. The values are in the store.
+    virtual PointVisibility compute_large(PointSource&, TileStore&, double /*shown*/,
+                                          const std::function<bool()>& /*stop*/) {
+        throw Error("this method needs all points at once");
+    }
 };
 
 /// A method's settings before it is made: rows to fill, then make().

@@ -44,8 +44,12 @@ class CloudAo final : public PointMethod {
     /// For a mesh, rays are cast from the vertices against its faces.
     PointVisibility compute(const PointSet& cloud, const std::optional<Eigen::Vector3d>& scanner = {}) override;
 
+    [[nodiscard]] std::size_t most_at_once() const override;
+    [[nodiscard]] std::string fingerprint() const override;
+    PointVisibility compute_large(PointSource& source, TileStore& store, double shown,
+                                  const std::function<bool()>& stop) override;
+
   private:
-    class Work;
     [[nodiscard]] PointVisibility of_mesh(const PointSet& mesh) const;
 
     CloudAoOptions options_;

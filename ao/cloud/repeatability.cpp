@@ -78,53 +78,72 @@ ThinnedCheck thinned_check(std::size_t points, double radius_in_spacings) {
     return {1 / std::max(4.0, thinner)};
 }
 
-Repeatability repeatability(std::span<const Vector3d> points, std::span<const float> whole,
-                            std::span<const std::uint32_t> kept, std::span<const float> thinned,
-                            const ThinnedCheck& check, std::span<const std::uint32_t> order) {
+CheckedPart::CheckedPart(std::span<const Vector3d> points, std::span<const float> whole, std::span<const float> thinned,
+                         const ThinnedCheck& check) {
     constexpr std::size_t surroundings = 12; // kept points
     constexpr float half_at = 0.15F;
     std::vector<Vector3d> compared;
     std::vector<float> squares;
-    for (std::size_t k = 0; k < kept.size(); ++k)
-        if (const float off = thinned[k] - whole[kept[k]]; !std::isnan(off)) {
-            compared.push_back(points[kept[k]]);
+    for (std::size_t k = 0; k < points.size(); ++k)
+        if (const float off = thinned[k] - whole[k]; !std::isnan(off)) {
+            compared.push_back(points[k]);
             squares.push_back(off * off);
         }
-    Repeatability found;
-    found.confidence.assign(points.size(), 1.0F);
     if (compared.empty())
-        return found;
+        return;
     double sum = 0;
     for (const float square : squares)
         sum += square;
-    found.error = check.error_per_difference() * std::sqrt(sum / static_cast<double>(squares.size()));
+    error_ = check.error_per_difference() * std::sqrt(sum / static_cast<double>(squares.size()));
 
-    const LocalCloud cloud(compared);
+    const NeighbourTree& tree = cloud_.emplace(compared).tree;
     const auto scale = static_cast<float>(std::pow(check.error_per_difference(), 2) / (half_at * half_at));
-    std::vector<float> factor(cloud.size()); // by index in the tree
-    for_each_neighbourhood(cloud.tree, surroundings, [&](std::size_t index, std::span<const Nearest::Neighbour> near) {
-        float mean = squares[cloud.tree.original(index)];
+    factor_.resize(tree.size());
+    for_each_neighbourhood(tree, surroundings, [&](std::size_t index, std::span<const Nearest::Neighbour> near) {
+        float mean = squares[tree.original(index)];
         for (const Nearest::Neighbour& neighbour : near)
-            mean += squares[cloud.tree.original(neighbour.point)];
+            mean += squares[tree.original(neighbour.point)];
         mean /= static_cast<float>(near.size() + 1);
-        factor[index] = 1 / (1 + scale * mean);
+        factor_[index] = 1 / (1 + scale * mean);
     });
+}
+
+std::vector<float> CheckedPart::factors(std::span<const Vector3d> points, std::span<const float> whole,
+                                        std::span<const std::uint32_t> order) const {
+    std::vector<float> factors(points.size(), 1.0F);
+    if (!cloud_)
+        return factors;
     constexpr std::size_t at_once = 16;
-    tbb::parallel_for(std::size_t(0), (order.size() + at_once - 1) / at_once, [&](std::size_t block) {
-        const auto some = order.subspan(at_once * block, std::min(at_once, order.size() - at_once * block));
+    const std::size_t all = order.empty() ? points.size() : order.size();
+    tbb::parallel_for(std::size_t(0), (all + at_once - 1) / at_once, [&](std::size_t block) {
         std::array<Vector3f, at_once> positions;
         std::array<std::uint32_t, at_once> index, nearest;
         std::size_t count = 0;
-        for (const std::uint32_t i : some)
+        for (std::size_t k = at_once * block; k < std::min(all, at_once * (block + 1)); ++k) {
+            const std::uint32_t i = order.empty() ? static_cast<std::uint32_t>(k) : order[k];
             if (!std::isnan(whole[i])) {
                 index[count] = i;
-                positions[count++] = (points[i] - cloud.middle).cast<float>();
+                positions[count++] = (points[i] - cloud_->middle).cast<float>();
             }
-        find_nearest(cloud.tree, std::span(positions.data(), count), nearest);
+        }
+        find_nearest(cloud_->tree, std::span(positions.data(), count), nearest);
         for (std::size_t k = 0; k < count; ++k)
-            found.confidence[index[k]] = factor[nearest[k]];
+            factors[index[k]] = factor_[nearest[k]];
     });
-    return found;
+    return factors;
+}
+
+Repeatability repeatability(std::span<const Vector3d> points, std::span<const float> whole,
+                            std::span<const std::uint32_t> kept, std::span<const float> thinned,
+                            const ThinnedCheck& check, std::span<const std::uint32_t> order) {
+    std::vector<Vector3d> kept_points;
+    std::vector<float> kept_whole;
+    for (const std::uint32_t i : kept) {
+        kept_points.push_back(points[i]);
+        kept_whole.push_back(whole[i]);
+    }
+    const CheckedPart part(kept_points, kept_whole, thinned, check);
+    return {part.error(), part.factors(points, whole, order)};
 }
 
 } // namespace scanshade

@@ -1,6 +1,8 @@
 // How far values depend on which points were recorded: the same cloud, thinned, gives others.
 #pragma once
 
+#include "ao/cloud/surface/neighbours.h"
+
 #include <cstddef>
 #include <cstdint>
 #include <Eigen/Core>
@@ -19,6 +21,27 @@ struct ThinnedCheck {
 };
 /// For so many points, and a radius that spans so many of their spacings.
 [[nodiscard]] ThinnedCheck thinned_check(std::size_t points, double radius_in_spacings);
+
+/// The values of the part by itself beside those of the whole, and what they tell of places near by.
+class CheckedPart {
+  public:
+    /// `whole` are the values of these points among all, `thinned` those of them by themselves; NaN where unknown.
+    CheckedPart(std::span<const Eigen::Vector3d> points, std::span<const float> whole, std::span<const float> thinned,
+                const ThinnedCheck& check);
+
+    /// Expected RMS error of visibility; nothing where no point has both values.
+    [[nodiscard]] std::optional<double> error() const { return error_; }
+    /// A factor of confidence for each point of the cloud, from the error expected of its surroundings: 1 = none, 1/2 =
+    /// 0.15. `whole`: their values. `order` holds every index once, or is empty for the order given: the time is short
+    /// where its neighbours are neighbours in space.
+    [[nodiscard]] std::vector<float> factors(std::span<const Eigen::Vector3d> points, std::span<const float> whole,
+                                             std::span<const std::uint32_t> order = {}) const;
+
+  private:
+    std::optional<LocalCloud> cloud_; ///< of the points that have both values
+    std::vector<float> factor_;       ///< by index in the tree
+    std::optional<double> error_;
+};
 
 /// What the check found.
 struct Repeatability {

@@ -1,106 +1,115 @@
-// Tiles of a cloud. Their points keep the order of the file: any other order takes several times as long.
+// Tiles of a cloud, planned on a sample: what is planned depends neither on the order of the points nor on where they
+// are kept.
 #include "ao/cloud/tiles.h"
 
-#include "projection/base/hash.h"
-#include "projection/base/indices_where.h"
 #include "projection/base/statistics.h"
 
 #include <algorithm>
+#include <bit>
 #include <Eigen/Geometry>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
 #include <utility>
 
 namespace scanshade {
 namespace {
 
 using Eigen::Vector3d;
+using Points = std::vector<Vector3d>;
 
 class Cutter {
   public:
-    Cutter(std::span<const Vector3d> points, double reach, std::size_t at_once,
-           const std::function<void(const Indices&, const Indices&)>& tile)
-        : points_(points), reach_(reach), at_once_(at_once), tile_(tile) {}
+    Cutter(std::vector<TilePlan::Node>& nodes, double share, double reach, std::size_t at_once)
+        : nodes_(nodes), share_(share), reach_(reach), at_once_(at_once) {}
 
-    void cut(const Indices& core, const Indices& round) {
-        constexpr std::size_t least = 10000;
-        if (round.size() <= at_once_ || core.size() <= least)
-            return tile_(core, round);
-        auto [low, high] = halves(core);
-        if (high.empty()) // all points coincide
-            return tile_(core, round);
-        Indices near_low = within_reach(low, round), near_high = within_reach(high, round);
-        constexpr double hardly_fewer = 0.9;
+    std::uint32_t cut(const Points& core, const Points& round) {
+        const auto number = static_cast<std::uint32_t>(nodes_.size());
+        nodes_.emplace_back();
+        constexpr double least = 10000, hardly_fewer = 0.9;
+        constexpr std::size_t fewest = 16; // of the sample: fewer tell nothing
+        if (in_all(round) <= static_cast<double>(at_once_) || in_all(core) <= least || core.size() < fewest)
+            return tile(number, round);
+        int axis = 0;
+        const double at = middle_of(core, axis);
+        const auto those = [&](const Points& of, auto&& holds) {
+            Points some;
+            std::ranges::copy_if(of, std::back_inserter(some), [&](const Vector3d& p) { return holds(p[axis]); });
+            return some;
+        };
+        Points low = those(core, [&](double along) { return along < at; });
+        Points high = those(core, [&](double along) { return !(along < at); });
+        if (low.empty() || high.empty()) // all points coincide
+            return tile(number, round);
+        Points near_low = those(round, [&](double along) { return along < at + reach_; });
+        Points near_high = those(round, [&](double along) { return along >= at - reach_; });
         if (static_cast<double>(std::min(near_low.size(), near_high.size())) >
             hardly_fewer * static_cast<double>(round.size())) // all within reach of all
-            return tile_(core, round);
-        cut(low, near_low);
-        low = near_low = {};
-        cut(high, near_high);
+            return tile(number, round);
+        const std::uint32_t below = cut(std::exchange(low, {}), std::exchange(near_low, {}));
+        const std::uint32_t above = cut(std::exchange(high, {}), std::exchange(near_high, {}));
+        nodes_[number] = {axis, at, below, above, 0};
+        return number;
     }
+
+    std::uint32_t tiles = 0;
+    std::size_t stored = 0, largest = 0; ///< of the sample
 
   private:
-    /// The second is empty where all points coincide.
-    [[nodiscard]] std::pair<Indices, Indices> halves(const Indices& core) const {
-        const Eigen::AlignedBox3d all = box_of(core);
-        int axis = 0;
-        all.sizes().maxCoeff(&axis);
-        const double middle = middle_of(core, axis);
-        const auto those_that = [&](auto&& holds) {
-            return indices_where(core, [&](std::uint32_t i) { return holds(points_[i][axis]); });
-        };
-        Indices low = those_that([&](double at) { return at < middle; });
-        if (!low.empty())
-            return {std::move(low), those_that([&](double at) { return !(at < middle); })};
-        // Most of them are at the lowest coordinate.
-        return {those_that([&](double at) { return at <= middle; }),
-                those_that([&](double at) { return at > middle; })};
+    [[nodiscard]] double in_all(const Points& points) const { return static_cast<double>(points.size()) / share_; }
+
+    std::uint32_t tile(std::uint32_t number, const Points& round) {
+        nodes_[number].tile = tiles++;
+        stored += round.size();
+        largest = std::max(largest, round.size());
+        return number;
     }
 
-    /// The points of `round` in the box of `core` widened by the reach.
-    [[nodiscard]] Indices within_reach(const Indices& core, const Indices& round) const {
-        Eigen::AlignedBox3d box = box_of(core);
-        box.min().array() -= reach_;
-        box.max().array() += reach_;
-        return indices_where(round, [&](std::uint32_t i) { return box.contains(points_[i]); });
+    /// The median along the longest axis; above the lowest coordinate where most are there.
+    [[nodiscard]] static double middle_of(const Points& points, int& axis) {
+        Eigen::AlignedBox3d box;
+        for (const Vector3d& point : points)
+            box.extend(point);
+        box.sizes().maxCoeff(&axis);
+        std::vector<double> along(points.size());
+        std::ranges::transform(points, along.begin(), [&](const Vector3d& point) { return point[axis]; });
+        const double middle = ranked(along, along.size() / 2), lowest = box.min()[axis];
+        if (middle > lowest)
+            return middle;
+        double next = box.max()[axis];
+        for (const double each : along)
+            if (each > lowest)
+                next = std::min(next, each);
+        return next;
     }
 
-    [[nodiscard]] Eigen::AlignedBox3d box_of(const Indices& indices) const {
-        using Box = Eigen::AlignedBox3d;
-        return tbb::parallel_reduce(
-            tbb::blocked_range<std::size_t>(0, indices.size()), Box(),
-            [&](const auto& range, Box box) {
-                for (std::size_t k = range.begin(); k < range.end(); ++k)
-                    box.extend(points_[indices[k]]);
-                return box;
-            },
-            [](const Box& a, const Box& b) { return a.merged(b); });
-    }
-
-    /// The median coordinate of a sample, chosen by a hash so that recording order has no influence.
-    [[nodiscard]] double middle_of(const Indices& indices, int axis) const {
-        constexpr double enough = 60000;
-        const auto chosen =
-            static_cast<std::uint64_t>(std::min(1.0, enough / static_cast<double>(indices.size())) * 0x1p32);
-        std::vector<double> along;
-        for (const std::uint32_t i : indices_where(indices, [&](std::uint32_t point) { return hash(point) < chosen; }))
-            along.push_back(points_[i][axis]);
-        if (along.empty())
-            return points_[indices.front()][axis];
-        return median(std::move(along));
-    }
-
-    std::span<const Vector3d> points_;
-    double reach_;
+    std::vector<TilePlan::Node>& nodes_;
+    double share_, reach_;
     std::size_t at_once_;
-    const std::function<void(const Indices&, const Indices&)>& tile_;
 };
 
 } // namespace
 
-void cut_into_tiles(std::span<const Vector3d> points, const Indices& core, double reach, std::size_t at_once,
-                    const std::function<void(const Indices&, const Indices&)>& tile) {
-    Cutter(points, reach, at_once, tile).cut(core, core);
+TilePlan::TilePlan(std::span<const Vector3d> sample, double share, double reach, std::size_t at_once) : reach_(reach) {
+    Cutter cutter(nodes_, share, reach, at_once);
+    const Points all(sample.begin(), sample.end());
+    cutter.cut(all, all);
+    tiles_ = cutter.tiles;
+    if (!all.empty())
+        copies_ = static_cast<double>(cutter.stored) / static_cast<double>(all.size());
+    largest_ = static_cast<std::size_t>(static_cast<double>(cutter.largest) / share);
+}
+
+std::uint64_t TilePlan::fingerprint() const {
+    std::uint64_t all = 0x9e3779b97f4a7c15ULL;
+    const auto mix = [&](std::uint64_t value) {
+        all = (all ^ value) * 0xff51afd7ed558ccdULL;
+        all ^= all >> 32;
+    };
+    mix(std::bit_cast<std::uint64_t>(reach_));
+    for (const Node& node : nodes_) {
+        mix(static_cast<std::uint64_t>(node.axis + 1));
+        mix(std::bit_cast<std::uint64_t>(node.at));
+        mix(std::uint64_t(node.low) << 32 | node.high);
+    }
+    return all;
 }
 
 } // namespace scanshade

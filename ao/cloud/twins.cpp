@@ -22,10 +22,11 @@ std::uint64_t hash_of(const Vector3d& point) {
     return all;
 }
 
+constexpr double hardly_any = 0.001; ///< copies / points
+
 /// Copies have the same hash, so choosing points by it chooses all copies of a point or none.
 bool any_twins(std::span<const Vector3d> points, const Indices& indices) {
     constexpr std::size_t enough = 4096;
-    constexpr double hardly_any = 0.001;
     const std::uint64_t every = std::max<std::size_t>(1, indices.size() / enough);
     std::vector<std::uint64_t> hashes;
     for (const std::uint32_t i :
@@ -41,8 +42,10 @@ bool any_twins(std::span<const Vector3d> points, const Indices& indices) {
 
 std::vector<Twin> take_out_twins(std::span<const Vector3d> points, std::span<const Vector3d> normals,
                                  Indices& indices) {
-    if (!any_twins(points, indices))
-        return {};
+    return any_twins(points, indices) ? all_twins(points, normals, indices) : std::vector<Twin>();
+}
+
+std::vector<Twin> all_twins(std::span<const Vector3d> points, std::span<const Vector3d> normals, Indices& indices) {
     Indices order = indices;
     tbb::parallel_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
         for (int axis = 0; axis < 3; ++axis)
@@ -68,5 +71,30 @@ std::vector<Twin> take_out_twins(std::span<const Vector3d> points, std::span<con
     std::erase_if(indices, [&](std::uint32_t index) { return is_twin[index]; });
     return twins;
 }
+
+void TwinLook::add(const Vector3d& point) {
+    constexpr std::size_t enough = 8192;
+    const std::uint64_t hash = hash_of(point);
+    if (hash >= below_)
+        return;
+    ++counts_[hash];
+    if (counts_.size() <= 2 * enough)
+        return;
+    std::vector<std::uint64_t> hashes;
+    for (const auto& [each, count] : counts_)
+        hashes.push_back(each);
+    std::nth_element(hashes.begin(), hashes.begin() + enough, hashes.end());
+    below_ = hashes[enough];
+    std::erase_if(counts_, [&](const auto& each) { return each.first >= below_; });
+}
+
+double TwinLook::distinct() const {
+    std::uint64_t all = 0;
+    for (const auto& [hash, count] : counts_)
+        all += count;
+    return all > 0 ? static_cast<double>(counts_.size()) / static_cast<double>(all) : 1;
+}
+
+bool TwinLook::many() const { return 1 - distinct() > hardly_any; }
 
 } // namespace scanshade

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <Eigen/Core>
 #include <span>
+#include <unordered_map>
 #include <vector>
 
 namespace scanshade {
@@ -19,5 +20,23 @@ struct Twin {
 [[nodiscard]] std::vector<Twin> take_out_twins(std::span<const Eigen::Vector3d> points,
                                                std::span<const Eigen::Vector3d> normals,
                                                std::vector<std::uint32_t>& indices);
+/// The same without that look, where it is known that there are many.
+[[nodiscard]] std::vector<Twin> all_twins(std::span<const Eigen::Vector3d> points,
+                                          std::span<const Eigen::Vector3d> normals,
+                                          std::vector<std::uint32_t>& indices);
+
+/// Tells how many points are copies, from those that pass by: those whose coordinates have the lowest hashes.
+class TwinLook {
+  public:
+    void add(const Eigen::Vector3d& point);
+    /// Different positions / points.
+    [[nodiscard]] double distinct() const;
+    /// Whether copies count, as take_out_twins() decides.
+    [[nodiscard]] bool many() const;
+
+  private:
+    std::unordered_map<std::uint64_t, std::uint32_t> counts_; ///< by hash
+    std::uint64_t below_ = ~std::uint64_t(0);                 ///< hashes from there on are left out
+};
 
 } // namespace scanshade

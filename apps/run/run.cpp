@@ -222,6 +222,7 @@ class Run final : public Command {
         job.batch.registration = asked_.registration();
         job.batch.range = asked_.range();
         job.batch.stop = &interrupted;
+        job.batch.say = [](const std::string& sentence) { say("  " + sentence); };
         return job;
     }
 
@@ -514,7 +515,10 @@ class Run final : public Command {
             return;
         }
         const bool colour = shows_colour(job.batch.outputs, !asked_.recording_cloud.empty() || job.batch.outputs.mcap);
-        job.batch.noise = noise_of(job.capture, job.of, &job.loaded, colour);
+        const bool by_points = asked_.clouds != CloudWalk::view && !job.capture.camera;
+        job.batch.noise =
+            noise_of(job.capture, job.of, &job.loaded, colour,
+                     by_points ? CloudAo(asked_.cloud_ao()).most_at_once() : std::numeric_limits<std::size_t>::max());
         const std::set<std::size_t> wanted(job.batch.frames.begin(), job.batch.frames.end());
         std::erase_if(job.loaded, [&](const auto& each) { return !wanted.contains(each.first); });
         job.batch.loaded = &job.loaded;
@@ -534,6 +538,7 @@ class Run final : public Command {
     [[nodiscard]] Prepared prepare(CaptureJob& job) {
         const std::lock_guard alone(alone_);
         MethodSetup& own = asked_.chosen_setup();
+        job.batch.cloud_tiles = asked_.cloud_tiles;
         job.batch.cloud_walk = own.make_for_points() ? CloudWalk::points : asked_.clouds;
         const bool by_points = computes_points(job);
         Workers* workers =

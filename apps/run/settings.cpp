@@ -21,6 +21,8 @@ namespace {
 constexpr std::array registered_words{Named{"auto", Registration::unknown}, Named{"yes", Registration::yes},
                                       Named{"no", Registration::no}};
 constexpr std::array flying_words{Named{"drop", true}, Named{"keep", false}};
+constexpr std::array tile_words{Named{"auto", CloudTiles::automatic}, Named{"join", CloudTiles::join},
+                                Named{"separate", CloudTiles::separate}};
 constexpr std::array cloud_words{Named{"auto", CloudWalk::automatic}, Named{"points", CloudWalk::points},
                                  Named{"view", CloudWalk::view}};
 constexpr std::array sequence_words{Named{"off", SequenceUse::off}, Named{"on", SequenceUse::on},
@@ -222,6 +224,10 @@ std::vector<Stage> RunSettings::common_stages() {
            .value = &s.method,
            .choices = method_names(),
            .common = true},
+          {.name = "tiles",
+           .help = "clouds of one folder: join = tiles of one survey, whose points near borders see those of the "
+                   "neighbours; separate = each by itself; auto = joined where their boxes adjoin",
+           .value = OneOf(&s.cloud_tiles, tile_words)},
           {.name = "clouds",
            .help = "points: rays from every point of a cloud; view: the cloud as one camera sees it; auto = points, "
                    "unless the cloud has a grid or --camera is given",

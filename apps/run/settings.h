@@ -41,6 +41,7 @@ class RunSettings {
     std::optional<double> radius;
     double relative_radius = 0.1; ///< of the median depth, where the unit is arbitrary
     std::optional<Quality> quality;
+    CloudTiles cloud_tiles = CloudTiles::automatic;
     CloudWalk clouds = CloudWalk::automatic;
     int in_flight = 0;
     Budget budget;

@@ -5,6 +5,7 @@
 #include "apps/walk/frame_files.h"
 #include "apps/walk/frame_messages.h"
 #include "apps/walk/frame_steps.h"
+#include "apps/walk/large_frames.h"
 #include "apps/walk/point_clouds.h"
 #include "apps/walk/sequence_order.h"
 #include "projection/base/error.h"
@@ -62,6 +63,8 @@ Frame load(const Capture& capture, std::size_t index, const BatchOptions& option
 
 /// Computes a value for every point, without a camera's view.
 void compute_points(Work& work, const BatchOptions& options) {
+    if (work.large)
+        return compute_large(work, *options.points);
     compute_points(work, *options.points);
     const std::vector<Intermediate> intermediates = options.points->intermediates();
     if (!options.dump.empty() && !intermediates.empty())
@@ -70,8 +73,14 @@ void compute_points(Work& work, const BatchOptions& options) {
 
 void attach_and_write(Work& work, const BatchOptions& options) {
     const bool by_points = work.by_points;
-    const Outputs outputs = by_points ? of_points(options.outputs) : options.outputs;
+    Outputs outputs = by_points ? of_points(options.outputs) : options.outputs;
     FrameImages images;
+    double written_ms = 0;
+    if (work.large) {
+        take(work, &StageTimes::write, [&] { write_large(work, outputs); });
+        written_ms = work.row.ms.write;
+        outputs.cloud = false; // what follows shows a part of it
+    }
     take(work, &StageTimes::attach, [&] {
         if (!by_points)
             images = finish(work, options, options.recording ? with_messages(outputs) : outputs);
@@ -103,6 +112,8 @@ void attach_and_write(Work& work, const BatchOptions& options) {
         if (options.recording)
             work.messages = frame_messages(work, images, outputs, *options.recording);
     });
+    work.row.ms.write += written_ms;
+    work.large.reset();
     if (!work.row.why.empty())
         remove_files(work, options.outputs);
     else
@@ -124,8 +135,8 @@ class Pipeline {
              const std::function<void(const FrameRow&)>& on_frame)
         : capture_(capture), pool_(pool), at_once_(options.sequence ? 1 : std::max(1, static_cast<int>(pool.size()))),
           options_(options), on_frame_(on_frame), rows_(planned_rows(capture, options.frames)),
-          order_(capture, rows_, options.sequence ? options.sequence->reach() : 0), sequence_buffer_(options.sequence) {
-    }
+          order_(capture, rows_, options.sequence ? options.sequence->reach() : 0), sequence_buffer_(options.sequence),
+          large_(capture, options) {}
 
     [[nodiscard]] std::vector<FrameRow> run() {
         using tbb::filter_mode;
@@ -177,16 +188,22 @@ class Pipeline {
         return work;
     }
 
-    WorkPtr prepared(WorkPtr work) const {
+    WorkPtr prepared(WorkPtr work) {
         if (!work)
             return work;
         take(*work, &StageTimes::load, [&] {
+            if (work->loaded_in_ms == 0 && capture_.entries[work->row.index].problem.empty())
+                begin_large(*work);
+            if (work->large)
+                return;
             if (work->loaded_in_ms == 0)
                 work->frame = load(capture_, work->row.index, options_);
             if (options_.registration)
                 work->frame.registration = *options_.registration;
             describe_frame(*work);
         });
+        if (work->large)
+            return work;
         work->row.ms.load += work->loaded_in_ms;
         if (work->row.status != FrameStatus::failed && work->frame.cloud && options_.points)
             work->by_points = takes_points(work->frame, options_.cloud_walk, work->row.notes);
@@ -205,7 +222,12 @@ class Pipeline {
         if (work->by_points) { // takes all cores and much memory: one at a time, and no other starts while it waits
             const std::lock_guard alone(pool_.alone());
             tbb::this_task_arena::isolate(
-                [&] { take(*work, &StageTimes::compute, [&] { compute_points(*work, options_); }); });
+                [&] { take(*work, &StageTimes::compute, [&] { compute_points_of(*work); }); });
+            if (work->large && work->row.fault == Fault::outage && options_.stop && *options_.stop) {
+                work->large.reset();
+                work->row = skipped_row(capture_, work->row.index);
+                work->row.why = "interrupted";
+            }
         } else if (pool_.size() == 0) {
             take(*work, &StageTimes::compute, [&] { throw Outage(options_.no_method); });
         } else {
@@ -215,6 +237,41 @@ class Pipeline {
         if (work->row.status == FrameStatus::skipped && work->row.fault == Fault::outage)
             given_up_ = true;
         return work;
+    }
+
+    /// A damaged file of a survey must not lose the others.
+    void compute_points_of(Work& work) const {
+        if (work.large && work.large->files() > 1) {
+            try {
+                return compute_large(work, *options_.points);
+            } catch (const Outage&) {
+                throw;
+            } catch (const Error& failure) {
+                work.large.reset();
+                work.row.warnings.push_back(fmt::format(
+                    "the survey could not be computed together, so this file is by itself: {}.", failure.what()));
+                std::vector<std::string> warnings = std::move(work.row.warnings);
+                work.frame = load(capture_, work.row.index, options_);
+                describe_frame(work);
+                std::ranges::move(warnings, std::back_inserter(work.row.warnings));
+            }
+        }
+        compute_points(work, options_);
+    }
+
+    /// A cloud that is computed from disk is not loaded.
+    void begin_large(Work& work) {
+        std::vector<std::string> warnings = work.entry.warnings, notes;
+        const auto [run, file] = large_.part_of(work.row.index, warnings, notes);
+        work.large = run;
+        work.large_file = file;
+        std::ranges::move(notes, std::back_inserter(work.row.notes));
+        if (!work.large)
+            return;
+        work.by_points = true;
+        work.row.ms.project = 0;
+        work.row.size = work.large->file(work.large_file).records().grid;
+        work.row.warnings = std::move(warnings);
     }
 
     void compute_view(Work& work, FrameAo& method) const {
@@ -272,6 +329,7 @@ class Pipeline {
     std::vector<FrameRow> rows_;
     FrameOrder order_;
     SequenceBuffer sequence_buffer_;
+    LargeFrames large_;
     std::atomic<bool> given_up_ = false;
     std::exception_ptr failure_; ///< the first while reporting
     int outages_ = 0;            ///< in a row: a full disk stays full, so the run ends

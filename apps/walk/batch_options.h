@@ -22,6 +22,10 @@ namespace scanshade {
 /// How clouds are computed: rays from each point, one camera's view, or points unless one camera saw them all.
 enum class CloudWalk { automatic, points, view };
 
+/// Whether cloud files of one capture are tiles of one survey, whose points see each other: as their boxes tell, all of
+/// them, or none.
+enum class CloudTiles { automatic, join, separate };
+
 struct BatchOptions {
     std::vector<std::size_t> frames; ///< indices into capture.entries; the report keeps this order
     Outputs outputs;
@@ -31,6 +35,7 @@ struct BatchOptions {
     std::optional<Registration> registration; ///< as the user set it; none: as the capture says
     PointMethod* points = nullptr;            ///< computes clouds and meshes where `cloud_walk` asks for points
     CloudWalk cloud_walk = CloudWalk::automatic;
+    CloudTiles cloud_tiles = CloudTiles::automatic;
     std::string no_method;              ///< why there is no method for views, if the pool is empty; clouds need none
     RecordingCloud* cloud = nullptr;    ///< receives the frames with a pose
     McapRecording* recording = nullptr; ///< receives all frames, in their order
@@ -40,8 +45,9 @@ struct BatchOptions {
     std::filesystem::path dump;         ///< folder for the method's intermediates, frame by frame; empty = none
     bool short_rows = false;            ///< rows come back shortened, once on_frame has seen them
     int frames_in_memory = 0;           ///< 0 = cores, and two for each method
-    const std::atomic<bool>* stop = nullptr; ///< set = begin no further frame
-    std::function<void()> all_begun;         ///< called once no further frame will begin: another batch may
+    const std::atomic<bool>* stop = nullptr;     ///< set = begin no further frame
+    std::function<void(const std::string&)> say; ///< gets sentences for people while frames are computed
+    std::function<void()> all_begun;             ///< called once no further frame will begin: another batch may
 };
 
 } // namespace scanshade

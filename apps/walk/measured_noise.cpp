@@ -1,5 +1,6 @@
 #include "apps/walk/measured_noise.h"
 
+#include "apps/walk/large_frames.h"
 #include "projection/base/error.h"
 #include "projection/base/stopwatch.h"
 #include "projection/project.h"
@@ -12,7 +13,7 @@
 namespace scanshade {
 
 DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& frames, LoadedFrames* kept,
-                    bool with_colour) {
+                    bool with_colour, std::size_t most_points) {
     constexpr std::size_t most = 5;
     const std::vector<std::size_t> chosen = spread(most, frames.size());
     std::vector<DepthImage> images(chosen.size());
@@ -20,6 +21,9 @@ DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& fram
     tbb::this_task_arena::isolate([&] {
         tbb::parallel_for(std::size_t(0), chosen.size(), [&](std::size_t i) {
             try {
+                if (const std::string& cloud = capture.entries[frames[chosen[i]]].cloud;
+                    !cloud.empty() && is_large_cloud(cloud, most_points))
+                    return;
                 const Stopwatch stopwatch;
                 Frame frame = capture.load(frames[chosen[i]], with_colour);
                 const double ms = stopwatch.ms();

@@ -5,6 +5,7 @@
 #include "projection/noise.h"
 
 #include <cstddef>
+#include <limits>
 #include <map>
 #include <string>
 #include <vector>
@@ -21,8 +22,10 @@ using LoadedFrames = std::map<std::size_t, LoadedFrame>; ///< by index in the ca
 /// sigma(z) of a capture, measured on up to five of the frames. Clouds without a grid are not a sensor's image, and
 /// have no noise. Frames that cannot be loaded are left out. `kept`, if given, receives the frames, with their colour
 /// if `with_colour`. Of several clouds without a grid it keeps none, since they may be large.
+/// Clouds without a grid of more than `most_points` are not looked at, if they are computed from disk.
 [[nodiscard]] DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& frames,
-                                  LoadedFrames* kept = nullptr, bool with_colour = false);
+                                  LoadedFrames* kept = nullptr, bool with_colour = false,
+                                  std::size_t most_points = std::numeric_limits<std::size_t>::max());
 
 /// `count` of `total` indices, spread evenly from the first on.
 [[nodiscard]] std::vector<std::size_t> spread(std::size_t count, std::size_t total);

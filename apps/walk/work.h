@@ -10,6 +10,8 @@
 
 namespace scanshade {
 
+class LargeCloudRun;
+
 struct Work {
     const CaptureEntry& entry;
     FrameRow& row;
@@ -22,10 +24,12 @@ struct Work {
     std::shared_ptr<const gpu::DeviceBytes> fitted = nullptr; ///< depth of plane fits, on that device; null = none
     cv::Mat1f confidence_in_view = {};                        ///< of `ao`, pixel by pixel
     Attached attached = {}, confidence = {};
-    bool wanted = true;             ///< false: loaded for the frames around it
-    bool by_points = false;         ///< no view: values come from rays at every point
-    PointVisibility of_points = {}; ///< those values
-    std::string messages = {};      ///< frame_messages(), for run.mcap
+    bool wanted = true;                             ///< false: loaded for the frames around it
+    bool by_points = false;                         ///< no view: values come from rays at every point
+    PointVisibility of_points = {};                 ///< those values
+    std::shared_ptr<LargeCloudRun> large = nullptr; ///< computes the cloud from disk; null = `frame` has it
+    std::size_t large_file = 0;                     ///< which of its files the frame is
+    std::string messages = {};                      ///< frame_messages(), for run.mcap
 };
 
 using WorkPtr = std::shared_ptr<Work>;

@@ -1,6 +1,7 @@
 // Clouds in and out: finds the format by content, reads points and colours from the records, adds fields to them.
 #include "io/clouds/cloud_file.h"
 
+#include "io/clouds/cloud_edit.h"
 #include "io/clouds/cloud_records.h"
 #include "io/clouds/format.h"
 #include "io/output_file.h"
@@ -67,8 +68,9 @@ void place_coordinate(const CloudRecords& records, const char* name, int axis, s
                       [&](std::size_t i) { points[i][axis] = points[i][axis] * scale + shift; });
 }
 
-std::vector<Eigen::Vector3d> points_of(const CloudRecords& records, const fs::path& file,
-                                       std::vector<std::string>& warnings) {
+} // namespace
+
+std::vector<Eigen::Vector3d> points_of(const CloudRecords& records, PointOddities& odd) {
     std::vector<Eigen::Vector3d> points = records.placed;
     if (points.empty()) {
         points.resize(records.point_count);
@@ -85,15 +87,23 @@ std::vector<Eigen::Vector3d> points_of(const CloudRecords& records, const fs::pa
         absurd += !point.array().isNaN().any();
         point.setConstant(std::numeric_limits<double>::quiet_NaN());
     });
-    if (absurd > 0)
-        warnings.push_back(fmt::format("{}: {} with infinite or absurd coordinates (beyond 1e30), treated as invalid.",
-                                       file.string(), counted(absurd.load(), "point")));
-    if (points.empty())
-        warnings.push_back(file.string() + ": no points.");
-    else if (unusable == points.size())
-        warnings.push_back(fmt::format("{}: no valid points among {}.", file.string(), points.size()));
+    odd.all += points.size();
+    odd.absurd += absurd;
+    odd.unusable += unusable;
     return points;
 }
+
+void warn_of(const PointOddities& odd, const fs::path& file, std::vector<std::string>& warnings) {
+    if (odd.absurd > 0)
+        warnings.push_back(fmt::format("{}: {} with infinite or absurd coordinates (beyond 1e30), treated as invalid.",
+                                       file.string(), counted(odd.absurd, "point")));
+    if (odd.all == 0)
+        warnings.push_back(file.string() + ": no points.");
+    else if (odd.unusable == odd.all)
+        warnings.push_back(fmt::format("{}: no valid points among {}.", file.string(), odd.all));
+}
+
+namespace {
 
 cv::Vec3b bgr_of(std::uint32_t bits) {
     return {static_cast<uchar>(bits), static_cast<uchar>(bits >> 8), static_cast<uchar>(bits >> 16)};
@@ -101,6 +111,8 @@ cv::Vec3b bgr_of(std::uint32_t bits) {
 
 /// The divisor of colour values: LAS has 16 bits per channel, but many writers store 8-bit values in them.
 unsigned las_colour_step(const CloudRecords& records, const std::array<std::size_t, 3>& bgr) {
+    if (records.colour_step > 0)
+        return records.colour_step;
     for (std::size_t i = 0; i < records.point_count; ++i)
         for (const std::size_t channel : bgr)
             if (value_at(records, records.record(i), channel) > 255)
@@ -115,6 +127,8 @@ std::optional<std::array<std::size_t, 3>> las_colours(const CloudRecords& record
         return std::nullopt;
     return std::array{*blue, *green, *red};
 }
+
+} // namespace
 
 std::vector<cv::Vec3b> colours_of(const CloudRecords& records) {
     if (const auto bgr = las_colours(records)) {
@@ -146,13 +160,15 @@ std::vector<cv::Vec3b> colours_of(const CloudRecords& records) {
     return colours;
 }
 
-void check_added(const Cloud& cloud, const AddedField& field) {
+namespace {
+
+void check_added(std::size_t points, const AddedField& field) {
     const bool word = !field.name.empty() && field.name.find_first_of(" \t\r\n") == std::string::npos;
     if (!word)
         throw Error(fmt::format("added field {}: expected a name without blanks", in_quotes(field.name)));
-    if (field.values.size() != cloud.points.size())
+    if (field.values.size() != points)
         throw Error(fmt::format("added field {}: {}, expected one for each of {}", field.name,
-                                counted(field.values.size(), "value"), counted(cloud.points.size(), "point")));
+                                counted(field.values.size(), "value"), counted(points, "point")));
 }
 
 /// Splits the added fields into those that the file already has and new ones.
@@ -227,6 +243,33 @@ bool has_colour_fields(const CloudRecords& records) {
     return fields.packed || fields.bgr || las_colours(records);
 }
 
+} // namespace
+
+CloudEdit edit_of(const CloudRecords& records, const std::vector<AddedField>& added,
+                  std::span<const cv::Vec3b> colours) {
+    CloudEdit edit;
+    const std::size_t points = records.point_count;
+    for (const AddedField& field : added)
+        check_added(points, field);
+    if (!colours.empty() && colours.size() != points)
+        throw Error(fmt::format("{} for {}", counted(colours.size(), "colour"), counted(points, "point")));
+    if (!colours.empty() && !has_colour_fields(records) && records.format->new_colours != NewColours::none)
+        edit.additions = new_colour_fields(records, colours, edit.channels);
+    else if (!colours.empty())
+        replace_colours(records, colours, edit.replacements);
+    sort_out(records, added, edit.replacements, edit.additions);
+    std::sort(edit.replacements.begin(), edit.replacements.end(),
+              [](const FieldReplacement& a, const FieldReplacement& b) { return a.field < b.field; });
+    return edit;
+}
+
+unsigned colour_step_of(const CloudRecords& records) {
+    const auto bgr = las_colours(records);
+    return bgr ? las_colour_step(records, *bgr) : 0;
+}
+
+namespace {
+
 template <class Number>
 void append(std::string& bytes, Number value) {
     const auto raw = std::bit_cast<std::array<char, sizeof(Number)>>(value);
@@ -239,7 +282,9 @@ Cloud read_cloud(const fs::path& file, std::vector<std::string>& warnings) {
     auto records = std::make_shared<CloudRecords>(read_records(file, warnings));
     Cloud cloud;
     cloud.grid = records->grid;
-    cloud.points = points_of(*records, file, warnings);
+    PointOddities odd;
+    cloud.points = points_of(*records, odd);
+    warn_of(odd, file, warnings);
     cloud.colours = colours_of(*records);
     cloud.records = std::move(records);
     return cloud;
@@ -250,33 +295,47 @@ std::vector<std::array<int, 3>> triangles_of(const Cloud& cloud) {
     return mesh ? cloud.records->format->triangles(*cloud.records) : std::vector<std::array<int, 3>>();
 }
 
-std::vector<Eigen::Vector3d> recorded_normals(const Cloud& cloud) {
-    if (!cloud.records)
-        return {};
-    std::vector<Eigen::Vector3d> normals(cloud.points.size());
+std::optional<std::array<std::size_t, 3>> normal_fields(const CloudRecords& records) {
     for (const auto& names : {std::array{"nx", "ny", "nz"}, {"normal_x", "normal_y", "normal_z"}}) {
-        std::size_t found = 0;
-        for (int axis = 0; axis < 3; ++axis)
-            if (const auto field = cloud.records->field_named(names[static_cast<std::size_t>(axis)])) {
-                read_coordinate(*cloud.records, *field, axis, normals);
-                ++found;
-            }
-        if (found < 3)
-            continue;
-        using Counts = std::pair<std::size_t, std::size_t>;
-        const auto [valid, unit] = tbb::parallel_reduce(
-            tbb::blocked_range<std::size_t>(0, normals.size()), Counts(0, 0),
-            [&](const auto& range, Counts counts) {
-                for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                    counts.first += cloud.points[i].allFinite();
-                    counts.second += cloud.points[i].allFinite() && std::abs(normals[i].norm() - 1) < 0.01;
-                }
-                return counts;
-            },
-            [](const Counts& a, const Counts& b) { return Counts(a.first + b.first, a.second + b.second); });
-        return 10 * unit >= 9 * valid ? normals : std::vector<Eigen::Vector3d>();
+        const auto x = records.field_named(names[0]), y = records.field_named(names[1]),
+                   z = records.field_named(names[2]);
+        if (x && y && z)
+            return std::array{*x, *y, *z};
     }
-    return {};
+    return std::nullopt;
+}
+
+std::vector<Eigen::Vector3d> normals_of(const CloudRecords& records, const std::array<std::size_t, 3>& fields) {
+    std::vector<Eigen::Vector3d> normals(records.point_count);
+    for (int axis = 0; axis < 3; ++axis)
+        read_coordinate(records, fields[static_cast<std::size_t>(axis)], axis, normals);
+    return normals;
+}
+
+void NormalCounts::add(std::span<const Eigen::Vector3d> points, std::span<const Eigen::Vector3d> normals) {
+    using Counts = std::pair<std::size_t, std::size_t>;
+    const auto [more_valid, more_unit] = tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, normals.size()), Counts(0, 0),
+        [&](const auto& range, Counts counts) {
+            for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                counts.first += points[i].allFinite();
+                counts.second += points[i].allFinite() && std::abs(normals[i].norm() - 1) < 0.01;
+            }
+            return counts;
+        },
+        [](const Counts& a, const Counts& b) { return Counts(a.first + b.first, a.second + b.second); });
+    valid += more_valid;
+    unit += more_unit;
+}
+
+std::vector<Eigen::Vector3d> recorded_normals(const Cloud& cloud) {
+    const auto fields = cloud.records ? normal_fields(*cloud.records) : std::nullopt;
+    if (!fields)
+        return {};
+    std::vector<Eigen::Vector3d> normals = normals_of(*cloud.records, *fields);
+    NormalCounts counts;
+    counts.add(cloud.points, normals);
+    return counts.are_normals() ? normals : std::vector<Eigen::Vector3d>();
 }
 
 std::vector<float> recorded_field(const Cloud& cloud, const std::string& name, const fs::path& file) {
@@ -295,23 +354,9 @@ void write_cloud(const fs::path& file, const Cloud& cloud, const std::vector<Add
         throw Error(file.string() + ": this cloud was not read from a file");
     const CloudRecords& records = *cloud.records;
     std::string bytes = during(file.string(), [&] {
-        for (const AddedField& field : added)
-            check_added(cloud, field);
-        if (!colours.empty() && colours.size() != cloud.points.size())
-            throw Error(
-                fmt::format("{} for {}", counted(colours.size(), "colour"), counted(cloud.points.size(), "point")));
-        std::vector<FieldReplacement> replacements;
-        std::vector<FieldAddition> additions;
-        std::vector<std::vector<float>> channels;
-        const bool replaces = has_colour_fields(records);
-        if (!colours.empty() && !replaces && records.format->new_colours != NewColours::none)
-            additions = new_colour_fields(records, colours, channels);
-        else if (!colours.empty())
-            replace_colours(records, colours, replacements);
-        sort_out(records, added, replacements, additions);
-        std::sort(replacements.begin(), replacements.end(),
-                  [](const FieldReplacement& a, const FieldReplacement& b) { return a.field < b.field; });
-        return records.format->written(records, edited_points(records, replacements, additions), additions);
+        const CloudEdit edit = edit_of(records, added, colours);
+        return records.format->written(records, edited_points(records, edit.replacements, edit.additions),
+                                       edit.additions);
     });
     write_atomically(file, bytes);
 }
@@ -396,17 +441,19 @@ bool takes_colours(const Cloud& cloud) {
            (cloud.records->format->new_colours != NewColours::none || has_colour_fields(*cloud.records));
 }
 
-/// Eastings and northings of maps have six digits or more.
+void MapCounts::add(const Eigen::Vector3d& point) {
+    constexpr double from = 1e5; // eastings and northings have six digits or more
+    if (!point.allFinite())
+        return;
+    ++all;
+    there += point.head<2>().cwiseAbs().maxCoeff() > from && std::abs(point.z()) < from;
+}
+
 bool is_on_a_map(const Cloud& cloud) {
-    constexpr double from = 1e5;
-    constexpr std::size_t some = 1000;
-    std::size_t there = 0, all = 0;
-    for (std::size_t i = 0; i < cloud.points.size(); i += std::max<std::size_t>(1, cloud.points.size() / some))
-        if (const auto& point = cloud.points[i]; point.allFinite()) {
-            ++all;
-            there += point.head<2>().cwiseAbs().maxCoeff() > from && std::abs(point.z()) < from;
-        }
-    return there > all / 2;
+    MapCounts counts;
+    for (std::size_t i = 0; i < cloud.points.size(); i += MapCounts::step(cloud.points.size()))
+        counts.add(cloud.points[i]);
+    return counts.on_a_map();
 }
 
 bool z_is_up(const Cloud& cloud) { return (cloud.records && cloud.records->format->z_up) || is_on_a_map(cloud); }

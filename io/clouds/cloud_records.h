@@ -1,6 +1,8 @@
 // A cloud file as its own records: header text, fields, and the bytes or words of every point, kept to be written back.
 #pragma once
 
+#include "io/clouds/laz/laz.h"
+
 #include <array>
 #include <cstdint>
 #include <Eigen/Geometry>
@@ -21,6 +23,7 @@ enum class Scalar { int8, uint8, int16, uint16, int32, uint32, int64, uint64, fl
 [[nodiscard]] std::size_t size_of(Scalar type);
 
 struct CloudFormat;
+class FileBytes;
 
 /// A PCD field or a PLY vertex property.
 struct CloudField {
@@ -55,7 +58,8 @@ struct CloudRecords {
     std::string after; ///< faces, other elements, left-over lines
     std::array<double, 3> scale{1, 1, 1}, shift{0, 0, 0}; ///< coordinates are field values times scale plus shift
     std::vector<Eigen::Vector3d> placed;                  ///< the points, if fields alone do not give them
-    std::string unit;                           ///< of the coordinates, and its source; empty: metres, by convention
+    std::string unit;         ///< of the coordinates, and its source; empty: metres, by convention
+    unsigned colour_step = 0; ///< LAS: the divisor of colours, where these are a part of the file; 0 = they tell it
     std::optional<Eigen::Isometry3d> viewpoint; ///< world_from_camera, if the PCD has one
 
     [[nodiscard]] bool text() const { return encoding == Encoding::ascii; }
@@ -153,6 +157,22 @@ class TextRecords {
 /// Faces as triangles, polygons fanned from their first corner; -1 for an index that names no vertex. Tristrips are not
 /// read.
 [[nodiscard]] std::vector<std::array<int, 3>> ply_triangles(const CloudRecords& records);
+/// Where the records of a file lie that can be read in blocks.
+struct CloudShape {
+    CloudRecords records;  ///< header, fields and number of points; the points and what follows are not there
+    std::uint64_t at = 0;  ///< where the points begin in the file
+    std::uint64_t end = 0; ///< behind the points; what follows is kept as it is
+    std::optional<Eigen::AlignedBox3d> box; ///< that the points are said to lie in, in the cloud's unit
+    std::string reference;          ///< LAS: the records that name the coordinates' reference system, as they are
+    laz::Packing packing;           ///< LAZ: how points are packed, and where. What follows is in `records`, since it
+    std::vector<laz::Chunk> chunks; ///< may change
+    std::string whole_since;        ///< not empty: why the file has to be read as a whole
+};
+// From the beginning of a file, with the checks of its reader.
+[[nodiscard]] CloudShape ply_shape(const FileBytes& file, std::vector<std::string>& warnings);
+[[nodiscard]] CloudShape pcd_shape(const FileBytes& file, std::vector<std::string>& warnings);
+[[nodiscard]] CloudShape las_shape(const FileBytes& file, std::vector<std::string>& warnings);
+
 /// The file again with `points` (from edited_points) and the header naming `additions`.
 [[nodiscard]] std::string pcd_bytes(const CloudRecords& records, std::string points,
                                     const std::vector<FieldAddition>& additions);
@@ -163,5 +183,18 @@ class TextRecords {
                                      const std::vector<FieldAddition>& additions);
 [[nodiscard]] std::string ply_bytes(const CloudRecords& records, std::string points,
                                     const std::vector<FieldAddition>& additions);
+/// What comes before the points in a LAS file whose points ended at `old_end`.
+[[nodiscard]] std::string las_head(const CloudRecords& records, const std::vector<FieldAddition>& additions,
+                                   std::uint64_t old_end);
+/// What stands round the points of a LAZ file whose block of points ended at `old_end`.
+struct LazHead {
+    std::string header, after;
+    laz::Packing packing;
+    std::uint64_t old_end;
+};
+[[nodiscard]] LazHead laz_head(const CloudRecords& records, const std::vector<FieldAddition>& additions,
+                               std::uint64_t old_end);
+/// The header, once it is known where the new block ends.
+[[nodiscard]] std::string finished(LazHead head, std::uint64_t end);
 
 } // namespace scanshade

@@ -29,7 +29,8 @@ struct CloudFormat {
     /// The file again with `points` (from edited_points) and a header that names `additions`.
     std::string (*written)(const CloudRecords& records, std::string points,
                            const std::vector<FieldAddition>& additions) = nullptr;
-    std::vector<std::array<int, 3>> (*triangles)(const CloudRecords& records) = nullptr; ///< none: no meshes
+    CloudShape (*shape)(const FileBytes& file, std::vector<std::string>& warnings) = nullptr; ///< none: read as a whole
+    std::vector<std::array<int, 3>> (*triangles)(const CloudRecords& records) = nullptr;      ///< none: no meshes
     std::string_view binary_encoding = "binary"; ///< what the format calls little-endian numbers
     bool wide_colours = false;                   ///< red, green and blue may have 16 bits
     NewColours new_colours = NewColours::none;   ///< of a file that has none

@@ -3,6 +3,7 @@
 #include "io/clouds/cloud_records.h"
 
 #include "io/clouds/laz/laz.h"
+#include "io/file_bytes.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 
@@ -237,17 +238,26 @@ bool is_copc(const std::vector<Vlr>& vlrs) {
     return std::ranges::any_of(vlrs, [](const Vlr& vlr) { return vlr.user == "copc" && vlr.id == 1; });
 }
 
-/// The points of a LAZ file; returns where their block ends.
-std::size_t unpack(CloudRecords& records, std::string_view bytes, std::size_t points_at, const std::vector<Vlr>& vlrs) {
+/// Where the block of points of a LAZ file ends at the latest.
+std::uint64_t points_end(std::string_view header, std::uint64_t points_at, std::uint64_t end) {
+    if (read_at<std::uint8_t>(header, at_minor) >= 4 && read_at<std::uint32_t>(header, at_evlr_count) > 0)
+        if (const auto first = read_at<std::uint64_t>(header, at_evlrs); first >= points_at && first < end)
+            return first;
+    return end;
+}
+
+laz::Packing packing_of(const CloudRecords& records, const std::vector<Vlr>& vlrs) {
     if (const auto found = std::ranges::count_if(vlrs, describes_laz); found != 1)
         throw Error(fmt::format("LAZ with {} records that describe it (user id {}, {}), expected one",
                                 static_cast<std::size_t>(found), laz::record_user, laz::record_id));
-    std::size_t end = bytes.size();
-    if (read_at<std::uint8_t>(bytes, at_minor) >= 4 && read_at<std::uint32_t>(bytes, at_evlr_count) > 0)
-        if (const auto first = read_at<std::uint64_t>(bytes, at_evlrs); first >= points_at && first < end)
-            end = first;
-    const int format = read_at<std::uint8_t>(bytes, at_format) & format_mask;
-    const auto packing = laz::packing_of(std::ranges::find_if(vlrs, describes_laz)->data, format, records.stride);
+    const int format = read_at<std::uint8_t>(records.header, at_format) & format_mask;
+    return laz::packing_of(std::ranges::find_if(vlrs, describes_laz)->data, format, records.stride);
+}
+
+/// The points of a LAZ file; returns where their block ends.
+std::size_t unpack(CloudRecords& records, std::string_view bytes, std::size_t points_at, const std::vector<Vlr>& vlrs) {
+    const laz::Packing packing = packing_of(records, vlrs);
+    const std::size_t end = points_end(records.header, points_at, bytes.size());
     laz::Unpacked unpacked = laz::unpacked(bytes, points_at, end, records.point_count, packing);
     records.points = std::move(unpacked.points);
     records.packed = bytes.substr(points_at, unpacked.end - points_at);
@@ -256,47 +266,59 @@ std::size_t unpack(CloudRecords& records, std::string_view bytes, std::size_t po
 
 } // namespace
 
-CloudRecords read_las(std::string_view bytes, const fs::path& file, std::vector<std::string>& warnings) {
-    if (bytes.size() < least_header)
-        refuse(file, fmt::format("a LAS header of {} bytes expected, found {}", least_header, bytes.size()));
-    const int minor = read_at<std::uint8_t>(bytes, at_minor);
-    if (read_at<std::uint8_t>(bytes, at_minor - 1) != 1 || minor > 4)
-        refuse(file, fmt::format("LAS version {}.{}, expected 1.0 .. 1.4", read_at<std::uint8_t>(bytes, at_minor - 1),
+namespace {
+
+struct LasHead {
+    CloudRecords records; ///< without the points
+    bool compressed = false;
+    std::uint64_t points_at = 0;
+};
+
+/// `start` is the file up to its points at least; `size` is that of the whole.
+LasHead head_of(std::string_view start, std::uint64_t size, const fs::path& file, std::vector<std::string>& warnings) {
+    if (start.size() < least_header)
+        refuse(file, fmt::format("a LAS header of {} bytes expected, found {}", least_header, start.size()));
+    const int minor = read_at<std::uint8_t>(start, at_minor);
+    if (read_at<std::uint8_t>(start, at_minor - 1) != 1 || minor > 4)
+        refuse(file, fmt::format("LAS version {}.{}, expected 1.0 .. 1.4", read_at<std::uint8_t>(start, at_minor - 1),
                                  minor));
-    const std::size_t header_size = read_at<std::uint16_t>(bytes, at_header_size);
+    const std::size_t header_size = read_at<std::uint16_t>(start, at_header_size);
     const std::size_t needed = minor >= 4 ? 375 : minor == 3 ? 235 : least_header;
-    if (header_size < needed || header_size > bytes.size())
-        refuse(file, fmt::format("header size {} at byte {}, expected {} .. {}", header_size, at_header_size, needed,
-                                 bytes.size()));
-    const int format_byte = read_at<std::uint8_t>(bytes, at_format), format = format_byte & format_mask;
-    const bool compressed = (format_byte & compressed_bit) != 0;
+    if (header_size < needed || header_size > size)
+        refuse(file,
+               fmt::format("header size {} at byte {}, expected {} .. {}", header_size, at_header_size, needed, size));
+    const int format_byte = read_at<std::uint8_t>(start, at_format), format = format_byte & format_mask;
+    LasHead head;
+    head.compressed = (format_byte & compressed_bit) != 0;
     if (format_byte & 0x40)
         refuse(file, fmt::format("early experimental LAZ (point format byte {}), which is not read; `laszip` of today "
                                  "rewrites it",
                                  format_byte));
     if (format > 10)
         refuse(file, fmt::format("point format {} at byte {}, expected 0 .. 10", format, at_format));
-    const std::size_t points_at = read_at<std::uint32_t>(bytes, at_points);
-    if (points_at < header_size || points_at > bytes.size())
+    head.points_at = read_at<std::uint32_t>(start, at_points);
+    if (head.points_at < header_size || head.points_at > size)
         refuse(file, fmt::format("points are said to begin at byte {}, but the file has {} bytes and a header of {}",
-                                 points_at, bytes.size(), header_size));
-    CloudRecords records;
+                                 head.points_at, size, header_size));
+    if (head.points_at > start.size())
+        refuse(file, fmt::format("a header of {} bytes, {} expected at most", head.points_at, start.size()));
+    CloudRecords& records = head.records;
     records.encoding = CloudRecords::Encoding::binary;
-    records.header = bytes.substr(0, points_at);
-    records.stride = read_at<std::uint16_t>(bytes, at_length);
+    records.header = start.substr(0, head.points_at);
+    records.stride = read_at<std::uint16_t>(start, at_length);
     records.fields = fields_of_format(format);
     if (records.stride < stride_of(records.fields))
         refuse(file, fmt::format("record length {} at byte {}, but point format {} needs {}", records.stride, at_length,
                                  format, stride_of(records.fields)));
-    const std::size_t count = point_count(bytes, minor), room = (bytes.size() - points_at) / records.stride;
-    if (count > room && !compressed)
+    const std::size_t count = point_count(start, minor), room = (size - head.points_at) / records.stride;
+    if (count > room && !head.compressed)
         refuse(file,
                fmt::format("the header says {} points of {} bytes, the file holds {}", count, records.stride, room));
     if (count > most_las_points)
         refuse(file, fmt::format("{} points, at most {} are read", count, most_las_points));
-    check_scales(records, bytes, file);
+    check_scales(records, start, file);
 
-    const auto said_vlrs = read_at<std::uint32_t>(bytes, at_vlr_count);
+    const auto said_vlrs = read_at<std::uint32_t>(start, at_vlr_count);
     const auto vlrs = vlrs_of(records.header, header_size, said_vlrs);
     if (vlrs.size() != said_vlrs)
         warnings.push_back(fmt::format("{}: the header says {} variable length records, {} are there; they are kept as "
@@ -310,26 +332,93 @@ CloudRecords read_las(std::string_view bytes, const fs::path& file, std::vector<
     }
     records.point_count = count;
     records.grid = {static_cast<int>(count), 1};
-    std::size_t end = points_at + count * records.stride;
-    if (compressed) {
-        records.encoding = CloudRecords::Encoding::compressed;
-        during(file.string(), [&] { end = unpack(records, bytes, points_at, vlrs); });
-        if (is_copc(vlrs))
-            warnings.push_back(file.string() +
-                               ": COPC is read as a whole, its octree is not used; with fields added it "
-                               "is written as plain LAZ.");
-    } else {
-        records.points = bytes.substr(points_at, count * records.stride);
-    }
-    records.after = bytes.substr(end);
     const std::string unit = unit_of(vlrs);
     records.unit = unit.empty() ? "an unknown unit (the file names none)" : unit;
     if (unit.starts_with("degrees"))
         warnings.push_back(fmt::format("{}: coordinates are in {}: neither distances nor angles between points mean "
                                        "anything; project them first.",
                                        file.string(), unit));
+    return head;
+}
+
+std::vector<Vlr> vlrs_of(const CloudRecords& records) {
+    return vlrs_of(records.header, read_at<std::uint16_t>(records.header, at_header_size),
+                   read_at<std::uint32_t>(records.header, at_vlr_count));
+}
+
+} // namespace
+
+CloudRecords read_las(std::string_view bytes, const fs::path& file, std::vector<std::string>& warnings) {
+    auto [records, compressed, points_at] = head_of(bytes, bytes.size(), file, warnings);
+    const auto vlrs = vlrs_of(records);
+    std::size_t end = points_at + records.point_count * records.stride;
+    if (compressed) {
+        records.encoding = CloudRecords::Encoding::compressed;
+        during(file.string(), [&, at = points_at, &to = records] { end = unpack(to, bytes, at, vlrs); });
+        if (is_copc(vlrs))
+            warnings.push_back(file.string() +
+                               ": COPC is read as a whole, its octree is not used; with fields added it "
+                               "is written as plain LAZ.");
+    } else {
+        records.points = bytes.substr(points_at, records.point_count * records.stride);
+    }
+    records.after = bytes.substr(end);
     doubt_box(records, records.header, file, warnings);
-    return records;
+    return std::move(records);
+}
+
+namespace {
+
+/// The chunks of a LAZ file, and what follows them, which is short.
+void find_chunks(CloudShape& shape, const FileBytes& file) {
+    constexpr std::uint64_t most_after = 64 << 20, largest_chunk = 4 << 20; // points
+    CloudRecords& records = shape.records;
+    records.encoding = CloudRecords::Encoding::compressed;
+    const auto vlrs = vlrs_of(records);
+    std::uint64_t end = points_end(records.header, shape.at, file.size());
+    const laz::Packing packing = packing_of(records, vlrs);
+    if (packing.compressor == 1) {
+        shape.whole_since = "it is compressed without chunks";
+        return;
+    }
+    shape.chunks = laz::chunks_of([&](std::uint64_t at, std::uint64_t count) { return file.bytes(at, count); },
+                                  file.size(), shape.at, end, records.point_count, packing);
+    shape.packing = packing;
+    shape.end = end;
+    if (std::ranges::any_of(shape.chunks, [](const laz::Chunk& chunk) { return chunk.count > largest_chunk; }))
+        shape.whole_since = "its compressed chunks are large";
+    else if (file.size() - end > most_after)
+        shape.whole_since = "long records follow its compressed points";
+    else
+        records.after = file.bytes(end, file.size() - end);
+}
+
+} // namespace
+
+CloudShape las_shape(const FileBytes& file, std::vector<std::string>& warnings) {
+    constexpr std::uint64_t longest_header = 64 << 20;
+    const std::string start = file.bytes(0, std::min<std::uint64_t>(file.size(), longest_header));
+    LasHead head = head_of(start, file.size(), file.path(), warnings);
+    CloudShape shape;
+    shape.records = std::move(head.records);
+    shape.at = head.points_at;
+    shape.end = shape.at + std::uint64_t(shape.records.point_count) * shape.records.stride;
+    Eigen::AlignedBox3d box;
+    for (int axis = 0; axis < 3; ++axis) {
+        const std::size_t at = at_box + 16 * static_cast<std::size_t>(axis);
+        box.max()[axis] = read_at<double>(start, at), box.min()[axis] = read_at<double>(start, at + 8);
+    }
+    if (box.min().allFinite() && box.max().allFinite() && !box.isEmpty())
+        shape.box = box;
+    for (const Vlr& vlr : vlrs_of(shape.records))
+        if (vlr.user == "LASF_Projection")
+            shape.reference += vlr.data;
+    if (head.compressed)
+        during(file.path().string(), [&] { find_chunks(shape, file); });
+    if (is_copc(vlrs_of(shape.records)))
+        warnings.push_back(file.path().string() +
+                           ": COPC's octree is not used; with fields added it is written as plain LAZ.");
+    return shape;
 }
 
 namespace {
@@ -445,13 +534,11 @@ std::string without_octree(std::string& header, std::string after, std::size_t b
 
 } // namespace
 
-std::string las_bytes(const CloudRecords& records, std::string points, const std::vector<FieldAddition>& additions) {
-    const bool compressed = records.encoding == CloudRecords::Encoding::compressed;
-    if (compressed && additions.empty() && points == records.points)
-        return between(records.header, records.packed, records.after);
-    if (!compressed && additions.empty())
-        return between(records.header, std::move(points), records.after);
-    std::string header = records.header, after = records.after;
+namespace {
+
+/// The header with the additions described, and the new length of a record.
+std::string described_header(const CloudRecords& records, const std::vector<FieldAddition>& additions) {
+    std::string header = records.header;
     const std::size_t length = records.stride + additions.size() * sizeof(float);
     if (length > 0xffff)
         throw Error("a LAS point record cannot grow beyond 65535 bytes");
@@ -465,18 +552,13 @@ std::string las_bytes(const CloudRecords& records, std::string points, const std
         describe_extra_bytes(header, descriptors, records.stride);
     }
     put(header, at_length, static_cast<std::uint16_t>(length));
-    const std::size_t old_end =
-        records.header.size() + (compressed ? records.packed.size() : records.stride * records.point_count);
+    return header;
+}
+
+/// Offsets that follow the points, which ended at `old_end`, and now end at `end`.
+void shift_offsets(std::string& header, std::uint64_t old_end, std::uint64_t end) {
     const int minor = read_at<std::uint8_t>(header, at_minor);
-    if (compressed) {
-        const laz::Packing packing = describe_packing(header, length);
-        if (minor >= 4)
-            after = without_octree(header, std::move(after), old_end);
-        points = laz::packed(points, header.size(), packing);
-    }
-    put(header, at_points, static_cast<std::uint32_t>(header.size()));
-    const std::size_t end = header.size() + points.size();
-    const auto shift = [&](std::size_t at) { // an offset that follows the points
+    const auto shift = [&](std::size_t at) {
         if (const auto place = read_at<std::uint64_t>(header, at); place >= old_end)
             put(header, at, place - old_end + end);
     };
@@ -484,7 +566,47 @@ std::string las_bytes(const CloudRecords& records, std::string points, const std
         shift(at_waveform);
     if (minor >= 4 && read_at<std::uint32_t>(header, at_evlr_count) > 0)
         shift(at_evlrs);
-    return header + points + after;
+}
+
+} // namespace
+
+std::string las_head(const CloudRecords& records, const std::vector<FieldAddition>& additions, std::uint64_t old_end) {
+    if (additions.empty())
+        return records.header;
+    std::string header = described_header(records, additions);
+    put(header, at_points, static_cast<std::uint32_t>(header.size()));
+    const std::uint64_t length = read_at<std::uint16_t>(header, at_length);
+    shift_offsets(header, old_end, header.size() + length * records.point_count);
+    return header;
+}
+
+LazHead laz_head(const CloudRecords& records, const std::vector<FieldAddition>& additions, std::uint64_t old_end) {
+    LazHead head{described_header(records, additions), records.after, {}, old_end};
+    head.packing = describe_packing(head.header, read_at<std::uint16_t>(head.header, at_length));
+    if (read_at<std::uint8_t>(head.header, at_minor) >= 4)
+        head.after = without_octree(head.header, std::move(head.after), old_end);
+    put(head.header, at_points, static_cast<std::uint32_t>(head.header.size()));
+    return head;
+}
+
+std::string finished(LazHead head, std::uint64_t end) {
+    shift_offsets(head.header, head.old_end, end);
+    return std::move(head.header);
+}
+
+std::string las_bytes(const CloudRecords& records, std::string points, const std::vector<FieldAddition>& additions) {
+    const bool compressed = records.encoding == CloudRecords::Encoding::compressed;
+    if (compressed && additions.empty() && points == records.points)
+        return between(records.header, records.packed, records.after);
+    if (!compressed && additions.empty())
+        return between(records.header, std::move(points), records.after);
+    if (!compressed)
+        return las_head(records, additions, records.header.size() + records.stride * records.point_count) + points +
+               records.after;
+    LazHead head = laz_head(records, additions, records.header.size() + records.packed.size());
+    points = laz::packed(points, head.header.size(), head.packing);
+    shift_offsets(head.header, head.old_end, head.header.size() + points.size());
+    return head.header + points + head.after;
 }
 
 } // namespace scanshade

@@ -1,6 +1,7 @@
 // PCD 0.7 (pointclouds.org, "The PCD file format"): header checked line by line, bodies kept as they are.
 #include "io/clouds/cloud_records.h"
 
+#include "io/file_bytes.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 
@@ -388,6 +389,33 @@ CloudRecords read_pcd(std::string_view bytes, const fs::path& file, std::vector<
                                 in_quotes(data.values[0])));
     }
     return records;
+}
+
+CloudShape pcd_shape(const FileBytes& file, std::vector<std::string>& warnings) {
+    CloudShape shape;
+    const fs::path& path = file.path();
+    const std::string start = file.bytes(0, std::min<std::uint64_t>(file.size(), longest_pcd_header));
+    const PcdHeader header = split_header(start, path);
+    CloudRecords& records = shape.records;
+    records.header = start.substr(0, header.length);
+    records.fields = fields_of(header, path, records.stride);
+    records.grid = grid_of(header, path);
+    records.point_count = static_cast<std::size_t>(records.grid.width) * static_cast<std::size_t>(records.grid.height);
+    const HeaderLine& data = required(header, "DATA", 1, path);
+    if (data.values[0] != "binary") {
+        shape.whole_since = fmt::format("its data are {}", data.values[0]);
+        return shape;
+    }
+    records.viewpoint = viewpoint_of(header, path, warnings);
+    records.encoding = Encoding::binary;
+    shape.at = header.length;
+    const std::uint64_t left = file.size() - shape.at, needed = std::uint64_t(records.point_count) * records.stride;
+    check_length(left, needed, records, path);
+    shape.end = shape.at + needed;
+    if (left > needed)
+        warnings.push_back(fmt::format("{}: {} after the last point; written back as they are.", path.string(),
+                                       counted(left - needed, "byte")));
+    return shape;
 }
 
 std::string pcd_bytes(const CloudRecords& records, std::string points, const std::vector<FieldAddition>& additions) {

@@ -1,6 +1,7 @@
 // PLY 1.0 (Turk 1994): header checked line by line, the vertices walked, everything else kept as the file's own bytes.
 #include "io/clouds/cloud_records.h"
 
+#include "io/file_bytes.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 
@@ -411,6 +412,57 @@ CloudRecords read_ply(std::string_view bytes, const fs::path& file, std::vector<
         warnings.push_back(fmt::format("{}: {} after the last element; written back as they are.", file.string(),
                                        counted(left, "byte")));
     return records;
+}
+
+CloudShape ply_shape(const FileBytes& file, std::vector<std::string>& warnings) {
+    CloudShape shape;
+    const fs::path& path = file.path();
+    const std::string start = file.bytes(0, std::min<std::uint64_t>(file.size(), longest_ply_header));
+    const PlyHeader header = parse_header(start, path);
+    const Element& vertex = vertex_element(header, path);
+    CloudRecords& records = shape.records;
+    records.encoding = header.encoding;
+    records.header = start.substr(0, header.length);
+    records.fields = vertex.properties;
+    records.point_count = vertex.count;
+    records.grid = grid_of(header, vertex.count);
+    for (CloudField& field : records.fields) {
+        field.offset = records.stride;
+        records.stride += field.bytes();
+    }
+    if (records.text() || vertex.lists()) {
+        shape.whole_since = records.text() ? "it is text" : "its points hold lists";
+        return shape;
+    }
+    constexpr std::uint64_t most_before = 16 << 20;
+    std::uint64_t at = header.length;
+    bool behind = false, last = false;
+    for (const Element& element : header.elements) {
+        last = &element == &vertex;
+        if (element.name == "face" && index_list(element) && element.count > 0)
+            shape.whole_since = "it has faces";
+        else if (!last && !behind && (element.lists() || element.count * element.least_bytes() > most_before))
+            shape.whole_since = fmt::format("element {} comes before the points", element.name);
+        if (!shape.whole_since.empty())
+            return shape;
+        const std::uint64_t left = file.size() - at, stride = element.least_bytes();
+        if (behind)
+            continue;
+        if (element.count > 0 && (stride == 0 || element.count > left / stride))
+            throw Error(fmt::format("{}: the header says {} of element {}, the file holds {}", path.string(),
+                                    element.count, element.name, stride == 0 ? 0 : left / stride));
+        if (last)
+            shape.at = at;
+        else
+            records.before += file.bytes(at, element.count * stride);
+        at += element.count * stride;
+        behind = last;
+    }
+    shape.end = at;
+    if (last && file.size() > at)
+        warnings.push_back(fmt::format("{}: {} after the last element; written back as they are.", path.string(),
+                                       counted(file.size() - at, "byte")));
+    return shape;
 }
 
 std::vector<std::array<int, 3>> ply_triangles(const CloudRecords& records) {

@@ -117,28 +117,59 @@ std::optional<float> sigma_round(const Facing& facing, std::size_t index, float 
 
 } // namespace
 
-CloudNoise::CloudNoise(const NeighbourTree& tree, float widest, std::span<const Eigen::Vector3d> normals) {
+namespace {
+
+/// So many of the tree's points, evenly spread over it.
+std::vector<std::size_t> spread_over(const NeighbourTree& tree) {
+    std::vector<std::size_t> places(std::min(sample, tree.size()));
+    for (std::size_t i = 0; i < places.size(); ++i)
+        places[i] = (2 * i + 1) * tree.size() / (2 * places.size());
+    return places;
+}
+
+} // namespace
+
+CloudNoise::CloudNoise(const NeighbourTree& tree, float widest, std::span<const Eigen::Vector3d> normals)
+    : CloudNoise(tree, widest, normals, spread_over(tree)) {}
+
+CloudNoise::CloudNoise(const NeighbourTree& tree, float widest, std::span<const Eigen::Vector3d> normals,
+                       std::span<const std::size_t> places) {
     const Facing facing{tree, normals};
-    const std::size_t asked = std::min(sample, tree.size());
-    std::vector<std::optional<float>> found(asked);
-    const auto index_of = [&](std::size_t i) { return (2 * i + 1) * tree.size() / (2 * asked); };
-    tbb::parallel_for(std::size_t(0), asked,
-                      [&](std::size_t i) { found[i] = sigma_round(facing, index_of(i), widest); });
-    for (std::size_t i = 0; i < asked; ++i)
+    std::vector<std::optional<float>> found(places.size());
+    tbb::parallel_for(std::size_t(0), places.size(),
+                      [&](std::size_t i) { found[i] = sigma_round(facing, places[i], widest); });
+    for (std::size_t i = 0; i < places.size(); ++i)
         if (found[i]) {
-            positions_.push_back(tree[index_of(i)]);
+            positions_.push_back(tree[places[i]]);
             sigmas_.push_back(*found[i]);
         }
     constexpr std::size_t fewest_share = 5; // a fifth
-    if (sigmas_.empty() || fewest_share * sigmas_.size() < asked) {
+    if (sigmas_.empty() || fewest_share * sigmas_.size() < places.size()) {
         sigmas_.clear();
         positions_.clear();
         return;
     }
+    summarize();
+}
+
+CloudNoise::CloudNoise(std::vector<Vector3f> positions, std::vector<float> sigmas)
+    : positions_(std::move(positions)), sigmas_(std::move(sigmas)) {
+    if (!sigmas_.empty())
+        summarize();
+}
+
+void CloudNoise::summarize() {
     median_ = scanshade::median(sigmas_);
     constexpr float varies_by = 4;
     std::vector<float> sorted = sigmas_;
     largest_ = varies_by * quantile(sorted, 0.25);
+}
+
+CloudNoise CloudNoise::moved(const Eigen::Vector3d& apart) const {
+    CloudNoise other = *this;
+    for (Vector3f& position : other.positions_)
+        position = (position.cast<double>() - apart).cast<float>();
+    return other;
 }
 
 float CloudNoise::at(const Vector3f& point) const {

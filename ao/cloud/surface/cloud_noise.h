@@ -20,6 +20,17 @@ class CloudNoise {
     /// points that face away are another surface then. Without them, two sheets of equal weight are no noise.
     CloudNoise(const NeighbourTree& tree, float widest, std::span<const Eigen::Vector3d> normals = {});
 
+    /// The same round these points of the tree only.
+    CloudNoise(const NeighbourTree& tree, float widest, std::span<const Eigen::Vector3d> normals,
+               std::span<const std::size_t> places);
+    /// As it was found: positions are relative to the same middle.
+    CloudNoise(std::vector<Eigen::Vector3f> positions, std::vector<float> sigmas);
+
+    [[nodiscard]] const std::vector<Eigen::Vector3f>& positions() const { return positions_; }
+    [[nodiscard]] const std::vector<float>& sigmas() const { return sigmas_; }
+    /// The same for positions relative to another middle, which lies `apart` from the old one.
+    [[nodiscard]] CloudNoise moved(const Eigen::Vector3d& apart) const;
+
     /// Whether enough points tell it: a fifth of the sample.
     [[nodiscard]] bool known() const { return !sigmas_.empty(); }
     /// The median of the points that tell it; 0 if unknown.
@@ -29,8 +40,10 @@ class CloudNoise {
     [[nodiscard]] float at(const Eigen::Vector3f& point) const;
 
   private:
+    void summarize();
+
     std::vector<Eigen::Vector3f> positions_;
-    std::vector<float> sigmas_; ///< by index in the tree
+    std::vector<float> sigmas_; ///< at these positions
     float median_ = 0, largest_ = 0;
 };
 

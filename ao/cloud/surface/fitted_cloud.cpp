@@ -17,10 +17,11 @@ namespace {
 using Eigen::Vector3d, Eigen::Vector3f;
 using Indices = std::vector<std::uint32_t>;
 
-constexpr float felt_from = 0.02F;  ///< sigma / spacing from which noise is felt
-constexpr float thinned_to = 6;     ///< the diagonal of a cell, in sigma
-constexpr float least_alike = 0.8F; ///< cosine between planes of one surface, at least
-constexpr float outlying = 3;       ///< sigma off the surface that no noise explains
+constexpr float felt_from = 0.02F;        ///< sigma / spacing from which noise is felt
+constexpr float thinned_to = 6;           ///< the diagonal of a cell, in sigma
+constexpr float least_alike = 0.8F;       ///< cosine between planes of one surface, at least
+constexpr std::size_t fewest_fitted = 64; ///< points: fewer tell nothing
+constexpr float outlying = 3;             ///< sigma off the surface that no noise explains
 
 /// Some points taken together.
 struct Cell {
@@ -42,24 +43,6 @@ struct Cells {
 Vector3f unit_normal(const Vector3d& normal) {
     return normal.allFinite() && normal.norm() > 0.1 ? Vector3f(normal.normalized().cast<float>())
                                                      : Vector3f(Vector3f::Zero());
-}
-
-/// Recorded signs may be random; then both sides of a plane are one.
-bool sides_agree(const NeighbourTree& tree, std::span<const Vector3d> normals) {
-    constexpr std::size_t sample = 2000;
-    constexpr double random_from = 0.1;
-    std::size_t opposed = 0, pairs = 0;
-    for (std::size_t k = 0; k < sample; ++k) {
-        const std::size_t index = (2 * k + 1) * tree.size() / (2 * sample);
-        Nearest nearest;
-        tree.find_round(index, 1, nearest);
-        if (nearest.all().empty())
-            continue;
-        ++pairs;
-        opposed += unit_normal(normals[tree.original(index)])
-                       .dot(unit_normal(normals[tree.original(nearest.all()[0].point)])) < -0.7F;
-    }
-    return static_cast<double>(opposed) < random_from * static_cast<double>(pairs);
 }
 
 /// Halves runs of the tree until each part is a cell.
@@ -411,16 +394,30 @@ class Fit {
 
 } // namespace
 
-FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> points, std::span<const Vector3d> normals,
-                         double radius) {
+bool sides_agree(const NeighbourTree& tree, std::span<const Vector3d> normals) {
+    constexpr std::size_t sample = 2000;
+    constexpr double random_from = 0.1;
+    std::size_t opposed = 0, pairs = 0;
+    for (std::size_t k = 0; k < sample; ++k) {
+        const std::size_t index = (2 * k + 1) * tree.size() / (2 * sample);
+        Nearest nearest;
+        tree.find_round(index, 1, nearest);
+        if (nearest.all().empty())
+            continue;
+        ++pairs;
+        opposed += unit_normal(normals[tree.original(index)])
+                       .dot(unit_normal(normals[tree.original(nearest.all()[0].point)])) < -0.7F;
+    }
+    return static_cast<double>(opposed) < random_from * static_cast<double>(pairs);
+}
+
+namespace {
+
+/// `fewest`: of the points must move, else none does.
+FittedCloud fitted_by(const CloudNoise& noise, bool sides, const LocalCloud& local, std::span<const Vector3d> points,
+                      std::span<const Vector3d> normals, std::size_t fewest) {
     FittedCloud fitted;
-    if (points.size() < 64)
-        return fitted;
     const NeighbourTree& tree = local.tree;
-    const bool sides = !normals.empty() && sides_agree(tree, normals);
-    const CloudNoise noise(tree, static_cast<float>(radius) / 3, sides ? normals : std::span<const Vector3d>());
-    if (!noise.known())
-        return fitted;
     Cells cells = Thinning(tree, normals, noise, sides).run();
     if (cells.all.empty())
         return fitted;
@@ -428,7 +425,7 @@ FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> poin
     for (std::size_t i = 0; i < cells.all.size(); ++i)
         if (cells.all[i].count > 1 || !fitted.axes[i].isZero())
             fitted.moved += cells.all[i].count;
-    if (100 * fitted.moved < points.size())
+    if (fitted.moved < fewest)
         return {};
     fitted.noise = noise.median();
     fitted.fitted_of.resize(points.size());
@@ -449,6 +446,25 @@ FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> poin
             fitted.fitted_of[tree.original(cells.members[k])] = static_cast<std::uint32_t>(i);
     });
     return fitted;
+}
+
+} // namespace
+
+FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> points, std::span<const Vector3d> normals,
+                         double radius) {
+    if (points.size() < fewest_fitted)
+        return {};
+    const bool sides = !normals.empty() && sides_agree(local.tree, normals);
+    const CloudNoise noise(local.tree, static_cast<float>(radius) / 3, sides ? normals : std::span<const Vector3d>());
+    return noise.known() ? fitted_by(noise, sides, local, points, normals, (points.size() + 99) / 100) : FittedCloud();
+}
+
+FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> points, std::span<const Vector3d> normals,
+                         const SharedNoise& noise) {
+    if (points.size() < fewest_fitted)
+        return {};
+    return fitted_by(noise.noise.moved(local.middle - noise.middle), noise.sides && !normals.empty(), local, points,
+                     normals, 1);
 }
 
 } // namespace scanshade

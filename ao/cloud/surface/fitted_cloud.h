@@ -2,6 +2,7 @@
 #pragma once
 
 #include "ao/cloud/surface/neighbours.h"
+#include "ao/cloud/surface/shared_noise.h"
 
 #include <cstdint>
 #include <Eigen/Core>
@@ -32,5 +33,12 @@ struct FittedCloud {
 /// third of `radius`.
 [[nodiscard]] FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Eigen::Vector3d> points,
                                        std::span<const Eigen::Vector3d> normals, double radius);
+/// The same for a part of a cloud with the noise of the whole. However few points noise concerns, they are moved, since
+/// other parts may hold more.
+[[nodiscard]] FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Eigen::Vector3d> points,
+                                       std::span<const Eigen::Vector3d> normals, const SharedNoise& noise);
+
+/// Whether the signs of recorded normals are more than chance; else both sides of a plane are one.
+[[nodiscard]] bool sides_agree(const NeighbourTree& tree, std::span<const Eigen::Vector3d> normals);
 
 } // namespace scanshade

@@ -48,10 +48,6 @@ std::vector<Item> items_of(const Packing& packing) {
     return items;
 }
 
-struct Chunk {
-    std::uint64_t begin = 0, bytes = 0, first = 0, count = 0; ///< in the file; points
-};
-
 /// Decodes a chunk part by part.
 class ChunkReader {
   public:
@@ -174,28 +170,30 @@ void read_chunk(std::string_view file, std::size_t index, const Chunk& chunk, co
 }
 
 /// Byte of the file where the table of chunks begins.
-std::uint64_t table_of(std::string_view file, std::size_t begin, std::size_t end) {
+std::uint64_t table_of(const ReadBytes& read, std::uint64_t size, std::uint64_t begin, std::uint64_t end) {
     if (end - begin < 8)
         throw Error(
             fmt::format("the position of the chunk table needs 8 bytes at byte {}, {} are there", begin, end - begin));
-    auto table = load<std::uint64_t>(file.data() + begin);
+    auto table = load<std::uint64_t>(read(begin, 8).data());
     if (table == ~std::uint64_t(0)) // the writer could not go back
-        table = load<std::uint64_t>(file.data() + file.size() - 8);
+        table = load<std::uint64_t>(read(size - 8, 8).data());
     if (table == begin)
         throw Error(fmt::format("written by a stopped program: no chunk table (byte {})", begin));
-    if (table > file.size() - 8)
+    if (table > size - 8)
         throw Error(fmt::format("the chunk table is said to begin at byte {}, the file has {}: the file is cut short",
-                                table, file.size()));
+                                table, size));
     if (table < begin + 8)
         throw Error(fmt::format("the chunk table is said to begin at byte {}, the points begin at {}", table, begin));
     return table;
 }
 
-/// The chunks as the table has them, checked against each other and the number of points. `end` moves behind the table.
-std::vector<Chunk> chunks_of(std::string_view file, std::size_t begin, std::size_t& end, std::size_t count,
-                             const Packing& packing) {
-    const std::uint64_t table = table_of(file, begin, end);
-    const auto version = load<std::uint32_t>(file.data() + table), said = load<std::uint32_t>(file.data() + table + 4);
+} // namespace
+
+std::vector<Chunk> chunks_of(const ReadBytes& read, std::uint64_t file_size, std::uint64_t begin, std::uint64_t& end,
+                             std::uint64_t count, const Packing& packing) {
+    const std::uint64_t table = table_of(read, file_size, begin, end);
+    const std::string head = read(table, 8);
+    const auto version = load<std::uint32_t>(head.data()), said = load<std::uint32_t>(head.data() + 4);
     if (version != 0)
         throw Error(fmt::format("chunk table of version {} at byte {}, expected 0", version, table));
     const bool varying = packing.chunk_points == varying_chunks;
@@ -204,11 +202,14 @@ std::vector<Chunk> chunks_of(std::string_view file, std::size_t begin, std::size
     if (said != expected || said > (table - begin - 8) / packing.length)
         throw Error(fmt::format("the chunk table at byte {} says {} chunks, {} points in {} bytes need {}", table, said,
                                 count, table - begin - 8, expected));
-    end = std::max<std::size_t>(end, table + 8);
+    end = std::max<std::uint64_t>(end, table + 8);
     std::vector<Chunk> chunks;
     Chunk chunk{.begin = begin + 8, .bytes = 0, .first = 0, .count = 0};
     if (said > 0) {
-        Decoder decoder(file.substr(table + 8, end - table - 8), table + 8);
+        // A number takes less than eight bytes, and a chunk has two.
+        const std::string numbers_packed =
+            read(table + 8, std::min<std::uint64_t>(end - table - 8, 16 * std::uint64_t(said) + 64));
+        Decoder decoder(numbers_packed, table + 8);
         IntegerCoder numbers(32, 2);
         for (std::uint32_t i = 0; i < said; ++i) {
             const auto before = static_cast<std::uint32_t>(chunk.count);
@@ -234,6 +235,8 @@ std::vector<Chunk> chunks_of(std::string_view file, std::size_t begin, std::size
         throw Error(fmt::format("the chunks hold {} points, the header says {}", chunk.first, count));
     return chunks;
 }
+
+namespace {
 
 std::string packed_chunk(std::string_view points, const Packing& packing) {
     const std::size_t length = packing.length;
@@ -344,7 +347,10 @@ Unpacked unpacked(std::string_view file, std::size_t begin, std::size_t end, std
         if (count > 0)
             chunks.push_back({begin, end - begin, 0, count});
     } else {
-        chunks = chunks_of(file, begin, end, count, packing);
+        std::uint64_t behind = end;
+        chunks = chunks_of([&](std::uint64_t at, std::uint64_t bytes) { return std::string(file.substr(at, bytes)); },
+                           file.size(), begin, behind, count, packing);
+        end = behind;
     }
     result.end = end;
     // Chunks of equal points become thousands of times larger; so does what is damaged. Such files are believed bit by
@@ -364,30 +370,64 @@ Unpacked unpacked(std::string_view file, std::size_t begin, std::size_t end, std
     return result;
 }
 
-std::string packed(std::string_view points, std::size_t begin, const Packing& packing) {
-    const std::size_t step = std::size_t(packing.chunk_points) * packing.length;
-    std::vector<std::string> chunks((points.size() + step - 1) / step);
+std::string unpacked_chunk(std::string_view bytes, const Chunk& chunk, std::size_t number, const Packing& packing) {
+    std::string points;
+    const Chunk here{0, chunk.bytes, chunk.first, chunk.count};
+    try {
+        read_chunk(bytes, number, here, packing, nullptr, &points);
+    } catch (const Error& failure) {
+        throw Error(fmt::format("in the chunk from byte {} on: {}", chunk.begin, failure.what()));
+    }
+    return points;
+}
+
+std::string Packer::add(std::string_view points) {
+    waiting_ += points;
+    const std::size_t step = std::size_t(packing_.chunk_points) * packing_.length;
+    return pack(waiting_.size() / step * step);
+}
+
+/// So many of the waiting bytes.
+std::string Packer::pack(std::size_t bytes) {
+    const std::size_t step = std::size_t(packing_.chunk_points) * packing_.length;
+    const std::string_view points = std::string_view(waiting_).substr(0, bytes);
+    std::vector<std::string> chunks((bytes + step - 1) / step);
     tbb::parallel_for(std::size_t(0), chunks.size(),
-                      [&](std::size_t i) { chunks[i] = packed_chunk(points.substr(i * step, step), packing); });
-    std::size_t size = 8;
-    for (const std::string& chunk : chunks)
-        size += chunk.size();
-    std::string result(8, '\0');
-    result.reserve(size + 8 + 8 * chunks.size());
-    store(result.data(), static_cast<std::uint64_t>(begin + size));
+                      [&](std::size_t i) { chunks[i] = packed_chunk(points.substr(i * step, step), packing_); });
+    std::string result;
+    for (const std::string& chunk : chunks) {
+        sizes_.push_back(static_cast<std::uint32_t>(chunk.size()));
+        result += chunk;
+    }
+    packed_ += result.size();
+    waiting_.erase(0, bytes);
+    return result;
+}
+
+std::string Packer::finish() {
+    std::string result = pack(waiting_.size());
     std::string table(8, '\0');
-    store(table.data() + 4, static_cast<std::uint32_t>(chunks.size()));
+    store(table.data() + 4, static_cast<std::uint32_t>(sizes_.size()));
     Encoder encoder;
     IntegerCoder numbers(32, 2);
     std::uint32_t before = 0;
-    for (std::string& chunk : chunks) {
-        const auto length = static_cast<std::uint32_t>(chunk.size());
-        numbers.code(encoder, before, length, 1);
-        before = length;
-        result += chunk;
-        chunk = {};
+    for (const std::uint32_t size : sizes_) {
+        numbers.code(encoder, before, size, 1);
+        before = size;
     }
-    return result + table + (chunks.empty() ? "" : encoder.finish());
+    return result + table + (sizes_.empty() ? "" : encoder.finish());
+}
+
+std::string Packer::table(std::uint64_t begin) const {
+    std::string bytes(8, '\0');
+    store(bytes.data(), begin + 8 + packed_);
+    return bytes;
+}
+
+std::string packed(std::string_view points, std::size_t begin, const Packing& packing) {
+    Packer packer(packing);
+    const std::string chunks = packer.add(points), rest = packer.finish();
+    return packer.table(begin) + chunks + rest;
 }
 
 } // namespace scanshade::laz

@@ -4,8 +4,10 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace scanshade::laz {
 
@@ -31,6 +33,42 @@ constexpr std::uint32_t varying_chunks = 0xffffffff;
 [[nodiscard]] Packing usual_packing(int point_format, std::size_t record_length);
 /// The body of the describing record.
 [[nodiscard]] std::string described(const Packing& packing);
+
+/// Where a chunk lies in its file, and which points it holds.
+struct Chunk {
+    std::uint64_t begin = 0, bytes = 0, first = 0, count = 0;
+};
+/// Reads so many bytes of the file from a place that is in it.
+using ReadBytes = std::function<std::string(std::uint64_t at, std::uint64_t count)>;
+/// The chunks as the table has them, checked against each other and the number of points. The block of points begins
+/// at `begin`; `end`, where it ends at the latest, moves behind the table. Not for compressor 1, which has no chunks.
+[[nodiscard]] std::vector<Chunk> chunks_of(const ReadBytes& read, std::uint64_t file_size, std::uint64_t begin,
+                                           std::uint64_t& end, std::uint64_t count, const Packing& packing);
+/// The points of a chunk from its bytes. `number`: its place in the table.
+[[nodiscard]] std::string unpacked_chunk(std::string_view bytes, const Chunk& chunk, std::size_t number,
+                                         const Packing& packing);
+
+/// Packs points that come in any portions; the bytes are those of packed().
+class Packer {
+  public:
+    explicit Packer(const Packing& packing) : packing_(packing) {}
+    /// What can be written of the block's chunks so far.
+    [[nodiscard]] std::string add(std::string_view points);
+    /// The rest: the last chunk and the table. The block's first eight bytes, which come before all chunks, are
+    /// table().
+    [[nodiscard]] std::string finish();
+    /// Where the table begins in a file whose block begins at `begin`, as the block's first eight bytes. After
+    /// finish().
+    [[nodiscard]] std::string table(std::uint64_t begin) const;
+
+  private:
+    [[nodiscard]] std::string pack(std::size_t bytes);
+
+    Packing packing_;
+    std::string waiting_;
+    std::vector<std::uint32_t> sizes_; ///< of chunks
+    std::uint64_t packed_ = 0;
+};
 
 struct Unpacked {
     std::string points;  ///< record after record, as an uncompressed file has them

@@ -1,0 +1,596 @@
+// Visibility of the points of a cloud or of a tile: neighbours, planes, sides, discs, rays, and means over neighbours.
+#include "ao/cloud/cloud_work.h"
+
+#include "ao/cloud/repeatability.h"
+#include "projection/base/error.h"
+#include "projection/base/hash.h"
+#include "projection/base/indices_where.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+#include <iterator>
+#include <limits>
+#include <numbers>
+#include <numeric>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+
+namespace scanshade {
+namespace {
+
+using Eigen::Vector3d, Eigen::Vector3f;
+constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
+
+/// A neighbour's weight in the mean is e^(this distance^2): visibility hardly changes over a tenth of the radius.
+float mean_falloff(float radius) { return -1 / (2 * 0.01F * radius * radius); }
+
+/// The mean of a value and its neighbours' on the same surface: parallel planes, distances small against the radius.
+Untouched<float> smoothed(const CloudSurface& surface, const Untouched<float>& values, float radius) {
+    Untouched<float> means(values.size());
+    const float falloff = mean_falloff(radius);
+    tbb::parallel_for(std::size_t(0), values.size(), [&](std::size_t i) {
+        means[i] = nothing;
+        if (std::isnan(values[i]))
+            return;
+        float sum = values[i], weights = 1;
+        for (const std::uint32_t j : surface.near[i]) {
+            const float alike = surface.normals[i].dot(surface.normals[j]);
+            if (j == i || std::isnan(values[j]) || !(alike > 0.9F))
+                continue;
+            const Vector3f apart = surface.tree[j] - surface.tree[i];
+            const float off = (values[i] - values[j]) / shared::mean_apart;
+            const float weight = std::exp(falloff * apart.squaredNorm()) * std::max(1 - off * off, 0.0F);
+            sum += weight * values[j];
+            weights += weight;
+        }
+        means[i] = sum / weights;
+    });
+    return means;
+}
+
+/// Discs that span the radius: 0 for one, 1 for four or more.
+float resolution(float radius, float disc) { return disc > 0 ? std::clamp((radius / disc - 1) / 3, 0.0F, 1.0F) : 0.0F; }
+
+/// 1 for each point whose value the means of the wanted points need.
+template <class IsWanted>
+std::vector<char> asked_by_means(const CloudSurface& surface, const IsWanted& is_wanted, int passes) {
+    std::vector<char> asked(surface.size());
+    tbb::parallel_for(std::size_t(0), asked.size(), [&](std::size_t i) { asked[i] = is_wanted(i); });
+    for (int pass = 0; pass < passes; ++pass) {
+        std::vector<char> further = asked;
+        tbb::parallel_for(std::size_t(0), asked.size(), [&](std::size_t i) {
+            if (asked[i])
+                for (const std::uint32_t j : surface.near[i])
+                    std::atomic_ref(further[j]).store(1, std::memory_order_relaxed);
+        });
+        asked = std::move(further);
+    }
+    return asked;
+}
+
+} // namespace
+
+std::size_t points_at_once(const CloudSetup& setup) {
+    constexpr double bytes_per_point = 420; // the file's records among them; with a GPU it is less
+    const auto fitting = static_cast<std::size_t>(setup.options.memory_mib * 1048576.0 / bytes_per_point);
+    return setup.device ? std::min(fitting, CloudGpu(*setup.device).most_points()) : fitting;
+}
+
+CloudWork::CloudWork(const CloudSetup& setup, const PointSet& cloud, const std::optional<Vector3d>& scanner)
+    : setup_(setup), options_(setup.options), scanner_(scanner), cloud_(cloud), watch_(result_.timings),
+      sides_(setup.options, setup.up, cloud.z_up) {
+    if (setup.device)
+        gpu_.emplace(*setup.device);
+    valid_ = finite(cloud.points);
+    twins_ = take_out_twins(cloud.points, recorded() ? cloud.normals : std::span<const Vector3d>(), valid_);
+    std::vector<Vector3d> some = sampled(cloud.points, valid_, enough_to_judge);
+    settle_extent(some);
+    settle_orientation(some);
+    settle_radius(some, static_cast<double>(some.size()) / static_cast<double>(valid_.size()));
+    settle_rays();
+    watch_.lap("survey");
+}
+
+CloudWork::CloudWork(const CloudSetup& setup, const PointSet& sample, const std::optional<Vector3d>& scanner,
+                     const WholeSize& whole)
+    : setup_(setup), options_(setup.options), scanner_(scanner), cloud_(sample), watch_(result_.timings),
+      sides_(setup.options, setup.up, sample.z_up) {
+    if (setup.device) // settle_rays() asks
+        gpu_.emplace(*setup.device);
+    valid_ = finite(sample.points);
+    std::vector<Vector3d> some(sample.points.begin(), sample.points.end());
+    settle_extent(some);
+    settle_orientation(some);
+    settle_radius(some, std::min(1.0, static_cast<double>(sample.points.size()) / std::max(whole.points, 1.0)));
+    settle_rays();
+}
+
+CloudWork::CloudWork(const CloudSetup& setup, const PointSet& cloud, const std::optional<Vector3d>& scanner,
+                     const CloudDecisions& whole)
+    : setup_(setup), options_(setup.options), scanner_(scanner), cloud_(cloud), part_(true), watch_(result_.timings),
+      sides_(setup.options, setup.up, cloud.z_up), extent_(whole.extent) {
+    valid_ = finite(cloud.points);
+    twins_ = take_out_twins(cloud.points, recorded() ? cloud.normals : std::span<const Vector3d>(), valid_);
+    sides_.orientation = whole.orientation;
+    result_.radius = whole.radius;
+    result_.spacing =
+        whole.spacing * std::sqrt(whole.points / static_cast<double>(std::max<std::size_t>(valid_.size(), 1)));
+    settle_rays();
+    watch_.lap("survey");
+}
+
+CloudWork::CloudWork(const CloudSetup& setup, const PointSet& tile, const OfWhole& whole)
+    : setup_(setup), options_(setup.options), cloud_(tile), whole_(&whole), part_(true), watch_(result_.timings),
+      sides_(setup.options, setup.up, tile.z_up), extent_(whole.decisions.extent),
+      normals_refused_(whole.normals_refused) {
+    if (setup.device)
+        gpu_.emplace(*setup.device);
+    valid_.resize(tile.points.size());
+    std::iota(valid_.begin(), valid_.end(), 0U);
+    if (whole.twins)
+        twins_ = all_twins(tile.points, recorded() ? tile.normals : std::span<const Vector3d>(), valid_);
+    sides_.orientation = whole.decisions.orientation;
+    result_.radius = whole.decisions.radius;
+    result_.spacing = whole.decisions.spacing;
+    settle_rays();
+}
+
+PointVisibility CloudWork::run() {
+    tile(valid_, valid_);
+    require_results();
+    for (const std::string& sentence : sides_.doubts)
+        doubt(sentence);
+    compute_thinned();
+    compute_strays();
+    for (const auto& [point, same_as] : twins_) {
+        result_.visibility[point] = result_.visibility[same_as];
+        result_.confidence[point] = result_.confidence[same_as];
+        result_.normals[point] = result_.normals[same_as];
+    }
+    tell();
+    if (gpu_)
+        for (const auto& [pass, ms] : gpu_->timings())
+            result_.timings.emplace_back("on the device: " + pass, ms);
+    return std::move(result_);
+}
+
+CloudWork::TileResult CloudWork::run_tile(std::span<const char> in_core) {
+    std::vector<char> needed(in_core.begin(), in_core.end()); // copies stand for each other
+    std::size_t twins = 0;
+    for (const auto& [point, same_as] : twins_) {
+        needed[same_as] |= in_core[point];
+        twins += in_core[point] != 0;
+    }
+    const Indices core = indices_where(valid_, [&](std::uint32_t i) { return needed[i] != 0; });
+    tile(core, valid_);
+    require_results();
+    for (const auto& [point, same_as] : twins_) {
+        result_.visibility[point] = result_.visibility[same_as];
+        result_.confidence[point] = result_.confidence[same_as];
+        result_.normals[point] = result_.normals[same_as];
+    }
+    if (gpu_)
+        for (const auto& [pass, ms] : gpu_->timings())
+            result_.timings.emplace_back("on the device: " + pass, ms);
+    return {std::move(result_), fitted_, twins, gpu_tiles_ > 0};
+}
+
+WholeSides CloudWork::settle_sides() {
+    CloudSurface surface = planes_of(valid_, nullptr).surface;
+    fitted_ = {}; // tiles tell of themselves
+    drop_strays(surface, extent_.centre, static_cast<double>(surface.spacing));
+    std::optional<DiscRays> rays;
+    std::vector<float> known = sides_.settle(surface, rays, recorded());
+    return {std::move(surface), std::move(known)};
+}
+
+CloudDecisions CloudWork::decisions() const {
+    return {extent_, sides_.orientation, result_.radius, result_.spacing, static_cast<double>(valid_.size())};
+}
+
+PointVisibility CloudWork::of_strays(const CloudSetup& setup, const PointSet& strays,
+                                     const std::optional<Vector3d>& scanner, double radius, double spacing) {
+    CloudAoOptions options = setup.options;
+    options.radius = radius;
+    const CloudSetup alone_setup{options, nullptr, setup.up, setup.viewpoint};
+    CloudWork alone(alone_setup, strays, scanner);
+    alone.part_ = true;
+    alone.result_.spacing = std::min(alone.result_.spacing, spacing);
+    return alone.run();
+}
+
+/// Made as late as possible: the rays need the memory.
+void CloudWork::require_results() {
+    const std::size_t count = cloud_.points.size();
+    if (result_.visibility.size() != count)
+        tbb::parallel_invoke([&] { result_.visibility.assign(count, nothing); },
+                             [&] { result_.confidence.assign(count, 0.0F); },
+                             [&] { result_.normals.assign(count, Vector3f::Zero()); });
+}
+
+void CloudWork::settle_orientation(const std::vector<Vector3d>& some) {
+    using Kind = NormalOrientation::Kind;
+    if (setup_.viewpoint)
+        sides_.orientation = {Kind::viewpoint, *setup_.viewpoint, "the position given by --cloud.outside"};
+    else if (options_.outside == "auto")
+        sides_.orientation = guessed_orientation(some, scanner_, cloud_.z_up);
+    else
+        sides_.orientation = {options_.outside == "up"        ? Kind::direction
+                              : options_.outside == "outward" ? Kind::outward
+                                                              : Kind::inward,
+                              setup_.up, options_.outside + ", as given"};
+    if (sides_.orientation.kind == Kind::direction || sides_.orientation.kind == Kind::terrain)
+        sides_.orientation.point = setup_.up;
+}
+
+/// Points that lie beyond the cloud are computed by themselves.
+void CloudWork::settle_extent(std::vector<Vector3d>& some) {
+    extent_ = extent_of(some);
+    std::erase_if(some, [&](const Vector3d& point) { return beyond(point); });
+    strays_ = indices_where(valid_, [&](std::uint32_t i) { return beyond(cloud_.points[i]); });
+    if (!strays_.empty())
+        valid_ = indices_where(valid_, [&](std::uint32_t i) { return !beyond(cloud_.points[i]); });
+}
+
+bool CloudWork::beyond(const Vector3d& point) const { return (point - extent_.centre).norm() > extent_.farthest; }
+
+/// These points, with the normals that they have.
+CloudWork::Picked CloudWork::picked(const Indices& indices) const {
+    Picked some;
+    some.points.resize(indices.size());
+    some.normals.resize(cloud_.normals.empty() ? 0 : indices.size());
+    tbb::parallel_for(std::size_t(0), indices.size(), [&](std::size_t k) {
+        some.points[k] = cloud_.points[indices[k]];
+        if (!some.normals.empty())
+            some.normals[k] = cloud_.normals[indices[k]];
+    });
+    return some;
+}
+
+/// Strays by themselves, as a cloud of its own about its own middle: what they say of normals and sides must not
+/// concern the others. A few of them make no surface; so do strays of strays.
+void CloudWork::compute_strays() {
+    if (strays_.size() < fewest_strays || part_)
+        return;
+    const auto [points, normals] = picked(strays_);
+    const PointVisibility found = of_strays(setup_, {points, normals}, scanner_, result_.radius, result_.spacing);
+    for (std::size_t k = 0; k < strays_.size(); ++k) {
+        result_.visibility[strays_[k]] = found.visibility[k];
+        result_.confidence[strays_[k]] = found.confidence[k];
+        result_.normals[strays_[k]] = found.normals[k];
+    }
+}
+
+/// Again with a part of the points: where that gives other values, these are not to be relied on.
+void CloudWork::compute_thinned() {
+    const ThinnedCheck check = thinned_check(valid_.size(), result_.radius / result_.spacing);
+    if (part_ || options_.sky || !(check.keep > 0))
+        return;
+    const auto chosen = static_cast<std::uint64_t>(check.keep * 0x1p32);
+    const Indices kept = indices_where(valid_, [&](std::uint32_t i) { return hash(i, 1U) < chosen; });
+    const auto [points, normals] = picked(kept);
+    CloudAoOptions options = options_;
+    if (sides_.recorded_believed)
+        options.normals = CloudNormals::recorded;
+    const PointSet part{points, normals, {}, cloud_.z_up};
+    const CloudSetup setup{options, nullptr, setup_.up, setup_.viewpoint};
+    CloudWork some(setup, part, scanner_, decisions());
+    const Repeatability found = repeatability(cloud_.points, result_.visibility, kept, some.run().visibility, check,
+                                              order_.empty() ? valid_ : order_);
+    order_.clear();
+    watch_.lap("check on a part");
+    result_.expected_error = found.error;
+    if (!found.error)
+        return;
+    tbb::parallel_for(std::size_t(0), result_.confidence.size(),
+                      [&](std::size_t i) { result_.confidence[i] *= found.confidence[i]; });
+    const ToldError told = told_error(check.keep, *found.error);
+    result_.notes.push_back(told.note);
+    if (told.doubt)
+        doubt(*told.doubt);
+}
+
+ToldError told_error(double keep, double error) {
+    constexpr double largest_error = 0.12;
+    ToldError told{fmt::format("{:.2g} % of the points by themselves give values from which an error of {:.2f} RMS is "
+                               "expected.",
+                               100 * keep, error),
+                   {}};
+    if (error > largest_error)
+        told.doubt = fmt::format("an error of {:.2f} RMS is expected: {:.2g} % of the points by themselves give quite "
+                                 "other values. A larger --radius spans more points; ao_confidence tells where",
+                                 error, 100 * keep);
+    return told;
+}
+
+/// The spacing of a sample is larger by the root of its share: points are on surfaces.
+void CloudWork::settle_radius(const std::vector<Vector3d>& some, double share) {
+    if (some.empty())
+        return;
+    result_.spacing = static_cast<double>(spacing_of(LocalCloud(some))) * std::sqrt(share);
+    const double extent = extent_.size;
+    result_.radius = options_.radius > 0 ? options_.radius : default_radius(extent, result_.spacing);
+    result_.notes.push_back(fmt::format("points stand {:.4g} apart (median), over {:.4g}.", result_.spacing, extent));
+    if (options_.sky)
+        result_.notes.push_back("visibility is the share of the sky, at any distance.");
+    else
+        result_.notes.push_back(
+            fmt::format("radius {:.4g} ({}).", result_.radius,
+                        options_.radius > 0 ? "as given" : "a twentieth of the extent, within 10 .. 200 spacings"));
+}
+
+/// Visibility changes slowly against the radius: the more points the radius spans, the more may share their rays.
+void CloudWork::settle_rays() {
+    const double spacings = options_.sky || !(result_.spacing > 0) ? 0 : result_.radius / result_.spacing;
+    const int level = spacings > 120 ? 2 : spacings > 60 ? 1 : 0;
+    constexpr int on_gpu = 64; // costs a GPU less time than the other stages cost the host
+    const int rays = options_.rays > 0 ? options_.rays
+                     : gpu_            ? on_gpu
+                                       : std::array{16, 8, 4}[static_cast<std::size_t>(level)];
+    passes_ = options_.smooth >= 0 ? options_.smooth : std::array{2, 3, 5}[static_cast<std::size_t>(level)];
+    directions_.emplace(rays, options_.seed);
+    if (!whole_) // which says so
+        result_.notes.push_back(fmt::format("{} rays a point, {} times the mean over neighbours.", rays, passes_));
+}
+
+/// Values for `core`, a part of `round`; on the GPU if its memory suffices.
+void CloudWork::tile(const Indices& core, const Indices& round) {
+    if (round.empty())
+        return;
+    if (gpu_ && round.size() <= gpu_->most_points()) {
+        try {
+            tile(core, round, &*gpu_);
+            ++gpu_tiles_;
+            return;
+        } catch (const Outage&) { // concerns more than this cloud
+            throw;
+        } catch (const Error& failure) { // most likely out of memory, since other programs use the device, too
+            result_.notes.push_back(fmt::format("{}: {}", gpu_->device_name(), failure.what()));
+        }
+    }
+    tile(core, round, nullptr);
+}
+
+void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
+    Fitted planes = planes_of(round, gpu);
+    CloudSurface& surface = planes.surface;
+    FittedCloud& fitted = planes.points;
+    const std::vector<std::uint32_t> lonely = drop_strays(surface, extent_.centre, result_.spacing);
+    std::optional<DiscRays> rays;
+    const std::vector<float> side_known =
+        whole_ ? sides_as_in_whole(surface) : sides_.settle(surface, rays, recorded());
+    for (const std::uint32_t index : lonely)
+        surface.normals[index].setZero();
+    watch_.lap("sides");
+    // Both orders are ascending. A point of the surface is wanted if it stands for one of the core.
+    std::vector<char> in_core(core.size() == round.size() ? 0 : round.size(), 0), wanted;
+    for (std::size_t k = 0, c = 0; k < in_core.size() && c < core.size(); ++k)
+        if (round[k] == core[c]) {
+            in_core[k] = 1;
+            ++c;
+        }
+    if (!in_core.empty() && !fitted.empty()) {
+        wanted.resize(fitted.points.size(), 0);
+        for (std::size_t k = 0; k < round.size(); ++k)
+            wanted[fitted.fitted_of[k]] |= in_core[k];
+    } else {
+        wanted = in_core;
+    }
+    const auto is_wanted = [&, &tree = surface.tree](std::size_t index) {
+        return wanted.empty() || wanted[tree.original(index)];
+    };
+    const float radius = options_.sky ? std::numeric_limits<float>::max() : static_cast<float>(result_.radius);
+    const std::optional<Vector3f> up = options_.sky ? std::optional<Vector3f>(setup_.up.cast<float>()) : std::nullopt;
+    Untouched<float> values;
+    if (gpu) {
+        rays.reset();
+        values = gpu->visibility(surface, *directions_, {radius, up, mean_falloff(radius), passes_});
+        watch_.lap("rays and means");
+    } else {
+        if (!rays)
+            rays.emplace(surface);
+        watch_.lap("tree");
+        values.resize(surface.size());
+        tbb::parallel_for(std::size_t(0), values.size(), [&](std::size_t i) { values[i] = nothing; });
+        const std::vector<char> asked =
+            wanted.empty() ? std::vector<char>(surface.size(), 1) : asked_by_means(surface, is_wanted, passes_);
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, surface.tree.leaves(), 8), [&](const auto& range) {
+            for (std::size_t leaf = range.begin(); leaf < range.end(); ++leaf)
+                rays->open(leaf, *directions_, radius, up, asked, values);
+        });
+        rays.reset();
+        watch_.lap("rays");
+        for (int pass = 0; pass < passes_; ++pass)
+            values = smoothed(surface, values, radius);
+        watch_.lap("means");
+    }
+    require_results();
+    const auto give = [&](std::size_t index, std::size_t point) {
+        result_.visibility[point] = values[index];
+        result_.normals[point] = surface.normals[index];
+        result_.confidence[point] = surface.flatness[index] * resolution(radius, surface.disc_radius[index]) *
+                                    (side_known.empty() ? 1.0F : side_known[index]);
+    };
+    if (fitted.empty()) {
+        tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
+            if (is_wanted(i) && !std::isnan(values[i]))
+                give(i, round[surface.tree.original(i)]);
+        });
+    } else {
+        std::vector<std::uint32_t> index_of(surface.size());
+        for (std::size_t i = 0; i < surface.size(); ++i)
+            index_of[surface.tree.original(i)] = static_cast<std::uint32_t>(i);
+        tbb::parallel_for(std::size_t(0), round.size(), [&](std::size_t k) {
+            const std::size_t index = index_of[fitted.fitted_of[k]];
+            if ((in_core.empty() || in_core[k]) && !std::isnan(values[index]))
+                give(index, round[k]);
+        });
+    }
+    if (!part_ && fitted.empty()) {
+        order_.resize(round.size());
+        tbb::parallel_for(std::size_t(0), order_.size(),
+                          [&](std::size_t i) { order_[i] = round[surface.tree.original(i)]; });
+    }
+    watch_.lap("gather");
+}
+
+/// Turns normals like those of the whole's nearest point in the same plane. Returns how sure that is by index in
+/// the tree.
+std::vector<float> CloudWork::sides_as_in_whole(CloudSurface& surface) const {
+    const CloudSurface& whole = whole_->sides->surface;
+    const std::vector<float>& whole_known = whole_->sides->known;
+    const Vector3f apart = (surface.middle - whole.middle).cast<float>();
+    std::vector<float> known(whole_known.empty() ? 0 : surface.size(), 0.0F);
+    tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
+        Vector3f& normal = surface.normals[i];
+        const Vector3f at = surface.tree[i] + apart;
+        const float reach = 3 * std::max(whole.spacing, surface.disc_radius[i]);
+        constexpr float alike = 0.7F;
+        float nearest = std::numeric_limits<float>::infinity(), cosine = 0;
+        whole.tree.for_each_within(at, reach, [&](std::size_t index) {
+            const float turn = normal.isZero() ? 1.0F : normal.dot(whole.normals[index]);
+            const Vector3f offset = whole.tree[index] - at;
+            const float off_plane = 2 * offset.dot(normal); // the other side of a board is near, too
+            const float distance = offset.squaredNorm() + off_plane * off_plane;
+            if (std::abs(turn) < alike || distance >= nearest)
+                return;
+            nearest = distance;
+            cosine = turn;
+            if (!known.empty())
+                known[i] = whole_known[index];
+        });
+        if (cosine < 0)
+            normal = -normal;
+    });
+    return known;
+}
+
+void CloudWork::doubt(const std::string& sentence) {
+    if (std::find(result_.doubts.begin(), result_.doubts.end(), sentence) == result_.doubts.end())
+        result_.doubts.push_back(sentence);
+}
+
+/// Neighbours and planes of these points, without their noise.
+CloudWork::Fitted CloudWork::planes_of(const Indices& which, CloudGpu* gpu) {
+    std::vector<Vector3d> some_points, some_normals;
+    const auto pick = [&](std::span<const Vector3d> from, std::vector<Vector3d>& to) {
+        if (which.size() == from.size())
+            return from;
+        to.resize(which.size());
+        tbb::parallel_for(std::size_t(0), to.size(), [&](std::size_t i) { to[i] = from[which[i]]; });
+        return std::span<const Vector3d>(to);
+    };
+    const std::span<const Vector3d> points = pick(cloud_.points, some_points);
+    std::span<const Vector3d> normals;
+    if (recorded())
+        normals = pick(cloud_.normals, some_normals);
+    FittedCloud fitted;
+    const auto surface_of = [&] {
+        LocalCloud local(points);
+        watch_.lap("points in order");
+        if (!whole_)
+            fitted = fitted_cloud(local, points, normals, options_.sky ? 10 * result_.spacing : result_.radius);
+        else if (whole_->noise)
+            fitted = fitted_cloud(local, points, normals, *whole_->noise);
+        watch_.lap("noise");
+        return fitted.empty() ? cloud_surface(std::move(local), normals, gpu)
+                              : cloud_surface(LocalCloud(fitted.points), fitted.normals, gpu, fitted.axes);
+    };
+    CloudSurface surface = surface_of();
+    constexpr double same_planes = 0.8;
+    if (!normals.empty() && !whole_ && options_.normals == CloudNormals::automatic && surface.agreement < same_planes) {
+        normals_refused_ = true;
+        result_.notes.push_back(
+            fmt::format("recorded normals are not used: the median angle between them and the planes of the points is "
+                        "{:.0f} degrees; --cloud.normals recorded uses them anyway.",
+                        std::acos(surface.agreement) * 180 / std::numbers::pi));
+        normals = {};
+        surface = surface_of();
+    }
+    watch_.lap("planes");
+    fitted_.noise = std::max(fitted_.noise, fitted.noise);
+    fitted_.moved += fitted.moved;
+    fitted_.kept += fitted.points.size();
+    fitted_.from += which.size();
+    if (!fitted.empty()) {
+        std::vector<std::uint32_t> count(fitted.points.size(), 0);
+        for (const std::uint32_t point : fitted.fitted_of)
+            ++count[point];
+        surface.stands_for.resize(surface.size());
+        for (std::size_t i = 0; i < surface.size(); ++i) {
+            surface.stands_for[i] = count[surface.tree.original(i)];
+            if (fitted.alone[surface.tree.original(i)])
+                surface.disc_radius[i] = 0;
+        }
+    }
+    return {std::move(surface), std::move(fitted)};
+}
+
+/// Whether recorded normals are used.
+bool CloudWork::recorded() const {
+    return !cloud_.normals.empty() && options_.normals != CloudNormals::estimated && !normals_refused_;
+}
+
+std::optional<std::string> told_noise(const FittedCounts& fitted) {
+    if (fitted.moved == 0)
+        return std::nullopt;
+    return fmt::format("noise of {:.2g} (sigma across surfaces): {:.0f} % of the points were moved onto fitted planes; "
+                       "{} discs stand for them.",
+                       fitted.noise, 100.0 * static_cast<double>(fitted.moved) / static_cast<double>(fitted.from),
+                       fitted.kept);
+}
+
+std::string told_sides(const SettledSides& sides, bool recorded) {
+    const std::string facing = sides.orientation.kind == NormalOrientation::Kind::viewpoint ? "turned to " : "turned ";
+    if (recorded && sides.turned_points > 0)
+        return fmt::format("normals: recorded; {:.2g} % of them were turned, since {}; {}{}.",
+                           100.0 * static_cast<double>(sides.turned_points) / static_cast<double>(sides.judged_points),
+                           sides.turned_why, facing, sides.orientation.why);
+    return recorded ? "normals: recorded."
+                    : "normals: from planes through 16 neighbours, " + facing + sides.orientation.why + ".";
+}
+
+void CloudWork::tell() {
+    if (const auto told = told_noise(fitted_))
+        result_.notes.push_back(*told);
+    result_.notes.push_back(told_sides(sides_, recorded()));
+    if (gpu_ && gpu_tiles_ > 0)
+        result_.notes.push_back(fmt::format("neighbours, rays and means on {}.", gpu_->device_name()));
+    if (gpu_ && gpu_tiles_ == 0)
+        result_.notes.push_back(
+            fmt::format("the cloud is too large for {}; the processor computed it.", gpu_->device_name()));
+    if (!twins_.empty())
+        result_.notes.push_back(
+            fmt::format("{} points are at the coordinates of others: they count once.", twins_.size()));
+    if (!strays_.empty())
+        result_.notes.push_back(fmt::format("{} points lie more than {:.4g} from the middle of the cloud, far from all "
+                                            "others: they are taken for strays and occlude nothing else.",
+                                            strays_.size(), extent_.farthest));
+    std::size_t unknown = 0;
+    for (const Indices* indices : {&valid_, &strays_})
+        for (const std::uint32_t i : *indices)
+            unknown += std::isnan(result_.visibility[i]);
+    if (unknown > 0)
+        result_.notes.push_back(fmt::format("{} of {} points have no surface round them; their visibility is unknown.",
+                                            unknown, valid_.size() + strays_.size()));
+}
+
+std::vector<Vector3d> sampled(std::span<const Vector3d> points, const Indices& indices, std::size_t wanted) {
+    const double share =
+        std::min(1.0, static_cast<double>(wanted) / static_cast<double>(std::max<std::size_t>(indices.size(), 1)));
+    const auto chosen = static_cast<std::uint64_t>(share * 0x1p32);
+    std::vector<Vector3d> some;
+    for (const std::uint32_t i : indices_where(indices, [&](std::uint32_t point) { return hash(point) < chosen; }))
+        some.push_back(points[i]);
+    return some;
+}
+
+Indices finite(std::span<const Vector3d> points) {
+    return indices_where(points.size(), [&](std::size_t i) { return points[i].allFinite(); });
+}
+
+} // namespace scanshade

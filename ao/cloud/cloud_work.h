@@ -1,0 +1,177 @@
+// One cloud, or a part of one, being computed: what is decided once for the whole, and the steps on these points.
+#pragma once
+
+#include "ao/base/watch.h"
+#include "ao/cloud/cloud_ao.h"
+#include "ao/cloud/extent.h"
+#include "ao/cloud/settled_sides.h"
+#include "ao/cloud/surface/cloud_gpu.h"
+#include "ao/cloud/surface/disc_rays.h"
+#include "ao/cloud/surface/fitted_cloud.h"
+#include "ao/cloud/twins.h"
+
+#include <cstdint>
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace scanshade {
+
+/// Indices of points, ascending.
+using Indices = std::vector<std::uint32_t>;
+
+/// What a person asked for, and where it is computed.
+struct CloudSetup {
+    const CloudAoOptions& options;
+    gpu::Device* device; ///< null = the processor
+    Eigen::Vector3d up;
+    std::optional<Eigen::Vector3d> viewpoint; ///< given by the user
+};
+
+/// Points in work at once.
+[[nodiscard]] std::size_t points_at_once(const CloudSetup& setup);
+
+/// What is decided once for a cloud, and holds for every part of it.
+struct CloudDecisions {
+    Extent extent;
+    NormalOrientation orientation;
+    double radius = 0, spacing = 0;
+    double points = 0; ///< of the whole, copies of points counted once
+};
+
+/// The number of points in a cloud, of which those given are a sample.
+struct WholeSize {
+    double points;
+};
+
+/// The sides of a cloud of several tiles, settled once on a part of it, so that tiles agree.
+struct WholeSides {
+    CloudSurface surface;
+    std::vector<float> known; ///< by index in the tree; empty where recorded sides are taken
+};
+
+/// What a tile takes from the cloud that it is a part of.
+struct OfWhole {
+    CloudDecisions decisions;
+    std::optional<WholeSides> sides;
+    std::optional<SharedNoise> noise; ///< none: it is not known, and nothing is smoothed
+    bool normals_refused = false;     ///< recorded ones
+    bool twins = false;               ///< there are copies of points
+};
+
+/// What fitting did to the points of a tile, its rim included.
+struct FittedCounts {
+    float noise = 0;
+    std::uint64_t moved = 0, kept = 0, from = 0;
+};
+
+class CloudWork {
+  public:
+    /// A cloud by itself.
+    CloudWork(const CloudSetup& setup, const PointSet& cloud, const std::optional<Eigen::Vector3d>& scanner);
+    /// A sample of a larger cloud, for its decisions().
+    CloudWork(const CloudSetup& setup, const PointSet& sample, const std::optional<Eigen::Vector3d>& scanner,
+              const WholeSize& whole);
+    /// A thinned part of another cloud, which computes and checks what is beyond.
+    CloudWork(const CloudSetup& setup, const PointSet& cloud, const std::optional<Eigen::Vector3d>& scanner,
+              const CloudDecisions& whole);
+    /// A tile with its rim, all of them finite and no strays. `whole` must outlive it.
+    CloudWork(const CloudSetup& setup, const PointSet& tile, const OfWhole& whole);
+    CloudWork(const CloudWork&) = delete;
+    CloudWork& operator=(const CloudWork&) = delete;
+
+    [[nodiscard]] PointVisibility run();
+
+    struct TileResult {
+        PointVisibility values; ///< NaN for the rim
+        FittedCounts fitted;
+        std::size_t twins = 0; ///< in the core
+        bool on_gpu = false;
+    };
+    /// Values of the core: those points whose byte in `in_core` is not 0.
+    [[nodiscard]] TileResult run_tile(std::span<const char> in_core);
+
+    /// The cloud is a sample of another one: its sides. The rest of what they tell is in sides(), normals_refused().
+    [[nodiscard]] WholeSides settle_sides();
+
+    [[nodiscard]] CloudDecisions decisions() const;
+    [[nodiscard]] const SettledSides& sides() const { return sides_; }
+    [[nodiscard]] bool normals_refused() const { return normals_refused_; }
+    /// Sentences so far: what was chosen before the computing.
+    [[nodiscard]] const std::vector<std::string>& notes() const { return result_.notes; }
+
+    /// Strays by themselves, with the radius of the cloud that they lie beyond.
+    [[nodiscard]] static PointVisibility of_strays(const CloudSetup& setup, const PointSet& strays,
+                                                   const std::optional<Eigen::Vector3d>& scanner, double radius,
+                                                   double spacing);
+    static constexpr std::size_t fewest_strays = 64; ///< fewer make no surface
+
+  private:
+    struct Picked {
+        std::vector<Eigen::Vector3d> points, normals;
+    };
+    struct Fitted {
+        CloudSurface surface;
+        FittedCloud points; ///< empty where the surface's points are those of the cloud
+    };
+
+    void require_results();
+    void settle_orientation(const std::vector<Eigen::Vector3d>& some);
+    void settle_extent(std::vector<Eigen::Vector3d>& some);
+    [[nodiscard]] bool beyond(const Eigen::Vector3d& point) const;
+    [[nodiscard]] Picked picked(const Indices& indices) const;
+    void compute_strays();
+    void compute_thinned();
+    void settle_radius(const std::vector<Eigen::Vector3d>& some, double share);
+    void settle_rays();
+    void tile(const Indices& core, const Indices& round);
+    void tile(const Indices& core, const Indices& round, CloudGpu* gpu);
+    [[nodiscard]] std::vector<float> sides_as_in_whole(CloudSurface& surface) const;
+    void doubt(const std::string& sentence);
+    [[nodiscard]] Fitted planes_of(const Indices& which, CloudGpu* gpu);
+    [[nodiscard]] bool recorded() const;
+    void tell();
+
+    const CloudSetup& setup_;
+    const CloudAoOptions& options_;
+    std::optional<Eigen::Vector3d> scanner_;
+    const PointSet& cloud_;
+    const OfWhole* whole_ = nullptr; ///< of a tile
+    bool part_ = false;              ///< of another cloud
+    PointVisibility result_;
+    Watch watch_;
+    std::optional<CloudGpu> gpu_;
+    std::optional<DirectionSet> directions_;
+    SettledSides sides_;
+    Extent extent_;
+    Indices valid_, strays_;  ///< strays lie beyond the cloud
+    Indices order_;           ///< the points in the order of the tree; empty where they were fitted
+    std::vector<Twin> twins_; ///< copies of points, in neither
+    bool normals_refused_ = false;
+    FittedCounts fitted_;
+    int gpu_tiles_ = 0, passes_ = 2;
+};
+
+/// About the points that a cloud's sides are of, in words: for notes. `recorded`: the normals were.
+[[nodiscard]] std::string told_sides(const SettledSides& sides, bool recorded);
+/// The same about noise; none where no point was moved.
+[[nodiscard]] std::optional<std::string> told_noise(const FittedCounts& fitted);
+
+/// About `wanted` of these points, chosen by a hash: every n-th point in recording order would skip whole scan lines.
+[[nodiscard]] std::vector<Eigen::Vector3d> sampled(std::span<const Eigen::Vector3d> points, const Indices& indices,
+                                                   std::size_t wanted);
+[[nodiscard]] Indices finite(std::span<const Eigen::Vector3d> points);
+
+/// Sentences about an error that a check on a share `keep` of the points expects. `doubt` is there if it is large.
+struct ToldError {
+    std::string note;
+    std::optional<std::string> doubt;
+};
+[[nodiscard]] ToldError told_error(double keep, double error);
+
+constexpr std::size_t enough_to_judge = 60000; ///< points of a sample
+
+} // namespace scanshade

@@ -1,0 +1,78 @@
+// Cloud files that are computed without being in memory as a whole: one large file, or all files of a survey together.
+#pragma once
+
+#include "ao/base/method.h"
+#include "io/clouds/cloud_stream.h"
+#include "projection/frame.h"
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace scanshade {
+
+class CloudFiles;
+class TilesOnDisk;
+
+/// What is needed of a run to compute a large cloud.
+struct LargeSettings {
+    std::filesystem::path folder = {}; ///< of the temporary files; made, and removed afterwards
+    std::size_t shown = 1000000;       ///< points of each file that pictures and pages show, about
+    std::size_t buffers = 64 << 20;
+    std::function<bool()> stop = {};                  ///< asked now and then
+    std::function<void(const std::string&)> say = {}; ///< what is about to be done
+};
+
+/// Made once for files that belong together. Temporary files are removed with it, unless keep() was called.
+class LargeCloudRun {
+  public:
+    /// Files that stream, in the order of their frames.
+    LargeCloudRun(std::vector<CloudStream> files, LargeSettings settings);
+    ~LargeCloudRun();
+    LargeCloudRun(const LargeCloudRun&) = delete;
+    LargeCloudRun& operator=(const LargeCloudRun&) = delete;
+
+    [[nodiscard]] std::size_t files() const;
+    [[nodiscard]] const CloudStream& file(std::size_t index) const;
+    /// Computes all files; the second time there is nothing to do.
+    void compute(PointMethod& method);
+    /// Notes, doubts, radius; no values. After compute().
+    [[nodiscard]] const PointVisibility& found() const { return found_; }
+
+    /// Colours of written points, by their own (empty = none) and their visibility; empty = as they were.
+    using Colours =
+        std::function<std::vector<cv::Vec3b>(const std::vector<cv::Vec3b>& own, const std::vector<float>& visibility)>;
+    /// One file after it was computed: some of its points with their values, and figures of all.
+    struct Result {
+        Cloud shown;
+        PointVisibility of_shown; ///< with found()'s figures
+        std::size_t points = 0, valid = 0, known = 0;
+        double mean = 0; ///< visibility; NaN where none is known
+        std::vector<std::string> warnings;
+    };
+    /// Passes over the file once more. Writes it with values to `target`, where one is given.
+    [[nodiscard]] Result result(std::size_t file, const std::optional<std::filesystem::path>& target,
+                                const Colours& colours) const;
+
+    /// The temporary files stay: another run goes on.
+    void keep() { kept_ = true; }
+
+  private:
+    std::unique_ptr<CloudFiles> source_;
+    LargeSettings settings_;
+    std::unique_ptr<TilesOnDisk> tiles_;
+    PointVisibility found_;
+    bool computed_ = false, kept_ = false;
+    std::mutex mutex_;
+};
+
+/// Removes what an earlier run left in the folder of temporary files.
+void remove_left_tiles(const std::filesystem::path& folder);
+/// The folder of a frame's, or of a survey's, temporary files below that of its results.
+[[nodiscard]] std::filesystem::path tiles_folder(const std::filesystem::path& results, const std::string& name);
+
+} // namespace scanshade

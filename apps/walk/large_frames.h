@@ -1,0 +1,51 @@
+// Which clouds of a capture are computed without being in memory as a whole, and their steps of the walk.
+#pragma once
+
+#include "apps/large/large_cloud_run.h"
+#include "apps/walk/work.h"
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+namespace scanshade {
+
+/// Of one capture. Safe to use from several threads.
+class LargeFrames {
+  public:
+    LargeFrames(const Capture& capture, const BatchOptions& options) : capture_(capture), options_(options) {}
+
+    /// What computes a frame's cloud from disk, alone or with the others of its survey.
+    struct Part {
+        std::shared_ptr<LargeCloudRun> run; ///< null: the frame is computed in memory
+        std::size_t file = 0;               ///< which of the run's files it is
+    };
+    /// `warnings` are about the frame's file, `notes` say why. What an earlier run left for a frame that is computed in
+    /// memory is removed.
+    [[nodiscard]] Part part_of(std::size_t index, std::vector<std::string>& warnings, std::vector<std::string>& notes);
+
+  private:
+    [[nodiscard]] LargeSettings settings(const std::string& name) const;
+    [[nodiscard]] bool by_points() const;
+    void find_surveys();
+
+    const Capture& capture_;
+    const BatchOptions& options_;
+    std::once_flag looked_;
+    std::map<std::size_t, Part> parts_; ///< of surveys, by frame
+    std::map<std::size_t, std::string> notes_;
+};
+
+/// Whether a cloud in `file` is computed from its points, has more of them than `most_at_once`, and can be read in
+/// blocks. False for what cannot be read: loading it says why.
+[[nodiscard]] bool is_large_cloud(const std::filesystem::path& file, std::size_t most_at_once);
+
+/// Computes the values, which stay on disk.
+void compute_large(Work& work, PointMethod& method);
+/// Writes the frame's file, and fills in the work with some of its points for pictures and pages, and with figures of
+/// all. After LargeCloudRun::compute().
+void write_large(Work& work, const Outputs& outputs);
+
+} // namespace scanshade

@@ -1,0 +1,312 @@
+// Clouds computed from disk: the same values and bytes as in memory, no seams, and nothing left behind.
+#include "ao/cloud/cloud_ao.h"
+#include "ao/cloud/large_cloud.h"
+#include "ao/cloud/surface/neighbours.h"
+#include "apps/large/large_cloud_run.h"
+#include "apps/large/tiles_on_disk.h"
+#include "io/clouds/cloud_file.h"
+#include "projection/base/error.h"
+#include "tests/support/files.h"
+#include "tests/support/points.h"
+
+#include <cmath>
+#include <cstring>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <limits>
+
+namespace scanshade {
+namespace {
+
+namespace fs = std::filesystem;
+using Eigen::Vector3d, Eigen::Vector3f;
+using tests::Points, tests::file_bytes;
+
+constexpr int little_memory_mib = 64; // for 160,000 points
+CloudAoOptions quick(double radius = 0.1) {
+    return {.radius = radius, .rays = 4, .outside = "1,1,1", .memory_mib = little_memory_mib};
+}
+
+template <class Number>
+void put(std::string& bytes, std::size_t at, Number value) {
+    std::memcpy(bytes.data() + at, &value, sizeof value);
+}
+
+/// A corner with copies of points, holes and strays.
+Points odd_corner(std::size_t count) {
+    Points points = tests::corner(count);
+    for (std::size_t i = 0; i < count; i += 50)
+        points[i] = points[count - 1 - i];
+    for (std::size_t i = 7; i < count; i += 5000)
+        points[i].setConstant(std::numeric_limits<double>::quiet_NaN());
+    for (std::size_t i = 11; i < count; i += count / 20)
+        points[i] = {500 + static_cast<double>(i % 17), 300, -400};
+    return points;
+}
+
+fs::path write_ply(const fs::path& file, const Points& points) {
+    std::vector<float> numbers(points.size());
+    for (std::size_t i = 0; i < numbers.size(); ++i)
+        numbers[i] = static_cast<float>(i);
+    write_new_ply(file, points, std::vector<cv::Vec3b>(points.size(), {1, 2, 3}), {{"number", numbers}}, {"a comment"});
+    return file;
+}
+
+fs::path write_pcd(const fs::path& file, const Points& points) {
+    std::string bytes =
+        fmt::format("# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\nWIDTH "
+                    "{}\nHEIGHT 1\nVIEWPOINT 1 1 1 1 0 0 0\nPOINTS {}\nDATA binary\n",
+                    points.size(), points.size());
+    bytes.append(reinterpret_cast<const char*>(points.data()), points.size() * sizeof(Vector3d));
+    return tests::write_file(file, bytes + "trailing");
+}
+
+fs::path write_las(const fs::path& file, const Points& points) {
+    std::string bytes(227 + 20 * points.size(), '\0');
+    std::memcpy(bytes.data(), "LASF", 4);
+    bytes[24] = 1, bytes[25] = 2;
+    put(bytes, 94, std::uint16_t(227)), put(bytes, 96, std::uint32_t(227)), put(bytes, 105, std::uint16_t(20));
+    put(bytes, 107, static_cast<std::uint32_t>(points.size()));
+    std::array<double, 3> low{0, 0, 0}, high{0, 0, 0};
+    for (std::size_t axis = 0; axis < 3; ++axis)
+        put(bytes, 131 + 8 * axis, 1e-5);
+    for (std::size_t i = 0; i < points.size(); ++i)
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const double along = points[i].allFinite() ? points[i][static_cast<int>(axis)] : 0;
+            const auto whole = static_cast<std::int32_t>(std::lround(along * 1e5));
+            put(bytes, 227 + 20 * i + 4 * axis, whole);
+            low[axis] = std::min(low[axis], whole * 1e-5), high[axis] = std::max(high[axis], whole * 1e-5);
+        }
+    for (std::size_t axis = 0; axis < 3; ++axis)
+        put(bytes, 179 + 16 * axis, high[axis]), put(bytes, 187 + 16 * axis, low[axis]);
+    return tests::write_file(file, bytes);
+}
+
+CloudStream stream_of(const fs::path& file) {
+    std::vector<std::string> warnings;
+    CloudShape shape = cloud_shape(file, warnings).value();
+    EXPECT_EQ(shape.whole_since, "");
+    return {file, std::move(shape)};
+}
+
+/// Computes and writes a file from disk.
+LargeCloudRun::Result from_disk(const fs::path& file, const fs::path& target, const CloudAoOptions& options,
+                                LargeSettings settings) {
+    CloudAo method(options);
+    std::vector<CloudStream> files{stream_of(file)};
+    LargeCloudRun run(std::move(files), std::move(settings));
+    run.compute(method);
+    EXPECT_GT(run.found().tiles, 1);
+    return run.result(0, target, {});
+}
+
+/// Computes and writes a file that is read as a whole.
+void in_memory(const fs::path& file, const fs::path& target, const CloudAoOptions& options) {
+    std::vector<std::string> warnings;
+    const Cloud cloud = read_cloud(file, warnings);
+    std::optional<Vector3d> scanner;
+    if (cloud.records->viewpoint)
+        scanner = cloud.records->viewpoint->translation();
+    const auto normals = recorded_normals(cloud);
+    const PointVisibility found = CloudAo(options).compute({cloud.points, normals, {}, z_is_up(cloud)}, scanner);
+    EXPECT_GT(found.tiles, 1);
+    write_cloud(target, cloud, {{"ambient_occlusion", found.visibility}, {"ao_confidence", found.confidence}});
+}
+
+TEST(LargeCloud, files_from_disk_have_the_bytes_of_those_computed_in_memory) {
+    const tests::TemporaryFolder folder;
+    const Points points = odd_corner(200000);
+    for (const fs::path& file : {write_ply(folder / "a.ply", points), write_pcd(folder / "a.pcd", points),
+                                 write_las(folder / "a.las", points)}) {
+        const fs::path one = folder / ("one" + file.extension().string()),
+                       other = folder / ("other" + file.extension().string());
+        in_memory(file, one, quick());
+        const auto result = from_disk(file, other, quick(), {.folder = folder / "tiles", .shown = 1000});
+        EXPECT_TRUE(file_bytes(one) == file_bytes(other)) << file;
+        EXPECT_FALSE(fs::exists(folder / "tiles")) << "temporary files are removed";
+        EXPECT_NEAR(static_cast<double>(result.shown.points.size()), 1000, 150) << file;
+        EXPECT_EQ(result.points, points.size());
+        EXPECT_GT(static_cast<double>(result.known), 0.99 * static_cast<double>(result.valid)) << file;
+    }
+}
+
+TEST(LargeCloud, an_interrupted_run_goes_on_to_equal_bytes) {
+    const tests::TemporaryFolder folder;
+    const fs::path file = write_ply(folder / "a.ply", tests::corner(200000));
+    (void)from_disk(file, folder / "once.ply", quick(), {.folder = folder / "tiles"});
+    int asked = 0, resumed = 0;
+    bool done = false;
+    for (int stops = 3; !done && stops < 1000; stops += 3) { // later each time, from the first pass to the last tile
+        asked = 0;
+        const auto stop = [&] { return ++asked > stops; };
+        try {
+            (void)from_disk(file, folder / "twice.ply", quick(),
+                            {.folder = folder / "tiles", .stop = stop, .say = [&](const std::string& sentence) {
+                                 resumed += sentence.find("of an earlier run") != std::string::npos;
+                             }});
+            done = true;
+        } catch (const Outage&) {
+        }
+    }
+    EXPECT_TRUE(done);
+    EXPECT_GT(resumed, 0);
+    EXPECT_TRUE(file_bytes(folder / "once.ply") == file_bytes(folder / "twice.ply"));
+    EXPECT_FALSE(fs::exists(folder / "tiles"));
+}
+
+TEST(LargeCloud, tiles_of_other_settings_are_not_taken) {
+    const tests::TemporaryFolder folder;
+    const fs::path file = write_ply(folder / "a.ply", tests::corner(200000));
+    int asked = 0;
+    const auto late = [&] { return ++asked > 6; };
+    EXPECT_THROW((void)from_disk(file, folder / "b.ply", quick(0.1), {.folder = folder / "tiles", .stop = late}),
+                 Outage);
+    std::string said;
+    (void)from_disk(file, folder / "b.ply", quick(0.12),
+                    {.folder = folder / "tiles", .say = [&](const std::string& sentence) { said += sentence; }});
+    EXPECT_EQ(said.find("of an earlier run"), std::string::npos) << said;
+    EXPECT_NE(said.find("of temporary files in"), std::string::npos) << said;
+    (void)from_disk(file, folder / "c.ply", quick(0.12), {.folder = folder / "other"});
+    EXPECT_TRUE(file_bytes(folder / "b.ply") == file_bytes(folder / "c.ply"));
+}
+
+TEST(LargeCloud, tiles_that_do_not_fit_on_the_disk_are_refused_before_they_are_written) {
+    const tests::TemporaryFolder folder;
+    TilesOnDisk tiles(folder / "tiles", "key", std::size_t(1) << 50, 0, 1 << 20, {});
+    std::string decided;
+    try {
+        (void)tiles.begin("plan", 4, false, 1.5, decided);
+        FAIL() << "a petabyte fits";
+    } catch (const Error& failure) {
+        EXPECT_NE(std::string(failure.what()).find("too little"), std::string::npos) << failure.what();
+    }
+    EXPECT_FALSE(fs::exists(folder / "tiles"));
+}
+
+TEST(LargeCloud, cut_files_are_refused_by_name) {
+    const tests::TemporaryFolder folder;
+    const Points points = tests::corner(1000);
+    for (const fs::path& file : {write_ply(folder / "a.ply", points), write_pcd(folder / "a.pcd", points),
+                                 write_las(folder / "a.las", points)}) {
+        fs::resize_file(file, fs::file_size(file) / 2);
+        std::vector<std::string> warnings;
+        try {
+            (void)cloud_shape(file, warnings);
+            ADD_FAILURE() << file << " is taken";
+        } catch (const Error& failure) {
+            EXPECT_NE(std::string(failure.what()).find(file.filename().string()), std::string::npos) << failure.what();
+        }
+    }
+}
+
+/// Points in memory.
+class Source final : public PointSource {
+  public:
+    explicit Source(const Points& points) : points_(points) {}
+    [[nodiscard]] std::size_t size() const override { return points_.size(); }
+    void pass(const Visit& visit) override { visit(0, points_, {}); }
+    [[nodiscard]] bool has_normals() const override { return false; }
+    [[nodiscard]] bool z_up() const override { return false; }
+    [[nodiscard]] std::optional<Vector3d> scanner() const override { return std::nullopt; }
+
+  private:
+    const Points& points_;
+};
+
+/// Remembers which tile computes each point.
+class Observed final : public TileStore {
+  public:
+    Observed(const fs::path& folder, std::size_t points)
+        : tile_of(points), visibility(points, std::numeric_limits<float>::quiet_NaN()),
+          tiles_(folder, "", points, 0, 1 << 20, {}) {}
+    bool begin(const std::string& plan, std::size_t tiles, bool normals, double copies, std::string& decided) override {
+        last_ = tiles - 2;
+        return tiles_.begin(plan, tiles, normals, copies, decided);
+    }
+    void add(std::size_t tile, std::uint32_t number, const Vector3d& point, const Vector3f& normal,
+             bool core) override {
+        if (core && tile < last_)
+            tile_of[number] = tile;
+        tiles_.add(tile, number, point, normal, core);
+    }
+    void decide(const std::string& decided) override { tiles_.decide(decided); }
+    [[nodiscard]] std::size_t count(std::size_t tile) const override { return tiles_.count(tile); }
+    [[nodiscard]] TilePoints points(std::size_t tile) override { return tiles_.points(tile); }
+    [[nodiscard]] std::optional<TileValues> values(std::size_t tile) override { return tiles_.values(tile); }
+    void keep(std::size_t tile, TileValues values) override {
+        for (std::size_t k = 0; k < values.numbers.size(); ++k)
+            visibility[values.numbers[k]] = values.visibility[k];
+        tiles_.keep(tile, std::move(values));
+    }
+    std::vector<std::size_t> tile_of;
+    std::vector<float> visibility;
+
+  private:
+    std::size_t last_ = 0;
+    TilesOnDisk tiles_;
+};
+
+/// RMS of the differences between one tile and many, beside borders of tiles and elsewhere.
+struct Seams {
+    double beside = 0, elsewhere = 0, mean_beside = 0, mean_elsewhere = 0;
+    std::size_t points_beside = 0;
+};
+Seams seams_of(const Points& points, CloudAoOptions options) {
+    const tests::TemporaryFolder folder;
+    Source source(points);
+    Observed store(folder / "tiles", points.size());
+    const PointVisibility told = CloudAo(options).compute_large(source, store, 1000, {});
+    EXPECT_GT(told.tiles, 1);
+    options.memory_mib = 4096;
+    const PointVisibility whole = CloudAo(options).compute({points});
+    EXPECT_EQ(whole.tiles, 1);
+    const LocalCloud cloud(points);
+    Seams seams;
+    std::array<std::array<double, 3>, 2> sums{};
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        bool border = false;
+        const std::size_t number = cloud.tree.original(i);
+        cloud.tree.for_each_within(cloud.tree[i], static_cast<float>(told.spacing), [&](std::size_t other) {
+            border |= store.tile_of[cloud.tree.original(other)] != store.tile_of[number];
+        });
+        const double off =
+            static_cast<double>(store.visibility[number]) - static_cast<double>(whole.visibility[number]);
+        if (std::isnan(off))
+            continue;
+        sums[border][0] += 1, sums[border][1] += off, sums[border][2] += off * off;
+    }
+    seams.points_beside = static_cast<std::size_t>(sums[1][0]);
+    seams.beside = std::sqrt(sums[1][2] / sums[1][0]), seams.elsewhere = std::sqrt(sums[0][2] / sums[0][0]);
+    seams.mean_beside = sums[1][1] / sums[1][0], seams.mean_elsewhere = sums[0][1] / sums[0][0];
+    fmt::print("seams: {} tiles, {} of {} points within a spacing of a border: RMS of differences {:.5f} there, {:.5f} "
+               "elsewhere; mean {:.5f}, {:.5f}\n",
+               told.tiles, seams.points_beside, points.size(), seams.beside, seams.elsewhere, seams.mean_beside,
+               seams.mean_elsewhere);
+    return seams;
+}
+
+/// Rays differ, since their directions follow from the tree of a tile; that is so everywhere.
+TEST(LargeCloud, values_differ_no_more_beside_borders_of_tiles_than_elsewhere) {
+    for (const double sigma : {0.0, 0.002}) {
+        const Seams seams =
+            seams_of(tests::corner(400000, sigma), {.radius = 0.2, .outside = "1,1,1", .memory_mib = 64});
+        EXPECT_GT(seams.points_beside, 500U);
+        EXPECT_LT(seams.elsewhere, 0.02);
+        EXPECT_LT(seams.beside, 1.5 * seams.elsewhere + 0.001);
+        EXPECT_LT(std::abs(seams.mean_beside - seams.mean_elsewhere), 0.003);
+    }
+}
+
+/// Without recorded normals, and from all sides: a part of a ball by itself could be seen from either.
+TEST(LargeCloud, tiles_agree_about_sides_and_noise) {
+    Points points = tests::sphere(300000, {10, 20, 30});
+    tests::Dice dice;
+    for (Vector3d& point : points)
+        point += 0.004 * dice.gauss() * (point - Vector3d(10, 20, 30)).normalized();
+    const Seams seams = seams_of(points, {.radius = 0.2, .memory_mib = 64});
+    EXPECT_LT(seams.elsewhere, 0.02);
+    EXPECT_LT(seams.beside, 1.5 * seams.elsewhere + 0.001);
+}
+
+} // namespace
+} // namespace scanshade
