@@ -1,5 +1,6 @@
 #include "ao/abao/abao.h"
 
+#include "ao/screen/fitted_curves.h"
 #include "shaders/shared/abao.h"
 
 #include <array>
@@ -17,9 +18,6 @@ constexpr std::array counts{Count{Quality::lowest, 2, 2}, Count{Quality::low, 4,
                             Count{Quality::high, 8, 8}, Count{Quality::highest, 16, 16}};
 constexpr Count count_of_published{Quality::medium, 6, 1};
 
-/// Tone curves fitted to scenes with truth: see ao/README.md.
-constexpr float curve_of_faded = 3.6F, curve_of_hard = 2.4F;
-
 /// The quality's values, except those given.
 AbaoOptions resolved(AbaoOptions options) {
     options = checked(std::move(options));
@@ -30,7 +28,7 @@ AbaoOptions resolved(AbaoOptions options) {
     if (options.steps == 0 || published)
         options.steps = count.steps;
     if (options.screen.curve == fitted_curve)
-        options.screen.curve = published ? 0.0F : options.hard ? curve_of_hard : curve_of_faded;
+        options.screen.curve = published ? 0.0F : fitted_curve_of(options.hard ? "abao hard" : "abao", options.quality);
     return options;
 }
 
