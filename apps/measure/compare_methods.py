@@ -20,9 +20,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.dont_write_bytecode = True  # the folder is one of sources
 import comparison_page  # noqa: E402  beside this file
 
 BEGIN, END = "<!-- compare_methods: begin -->", "<!-- compare_methods: end -->"
+PLACE_COLUMNS = ["pixels", "rms", "bias", "held_out_rms"]  # of each place of a row
 SENSORS = ["clean", "structured light", "time of flight"]  # names of groups in bench.json, in the table's order
 
 
@@ -120,21 +122,23 @@ def read_report(path):
     return report
 
 
+def short(value):
+    return None if value is None else round(value, 5)
+
+
 def row_of(sensor, row):
     difference = row["difference"]
-    place = {c["class"]: {"pixels": c["pixels"], "rms": c["rms"], "bias": c["bias"], "held_out_rms": c.get("held_out_rms")}
-             for c in row["errors"]["place"]}
-    return {"sensor": sensor, "method": row["method"], "name": row["name"], "rms": difference["rms"],
-            "held_out_rms": row["held_out"]["rms"], "bias": difference["bias"], "ssim": difference["ssim"],
-            "correlation": difference["correlation"], "why": row.get("why", ""), "place": place, "ms": {}}
+    place = {c["class"]: [int(c["pixels"]), *(short(c.get(name)) for name in PLACE_COLUMNS[1:])] for c in row["errors"]["place"]}
+    return {"sensor": sensor, "method": row["method"], "name": row["name"], "rms": short(difference["rms"]),
+            "held_out_rms": short(row["held_out"]["rms"]), "bias": short(difference["bias"]),
+            "ssim": short(difference["ssim"]), "correlation": short(difference["correlation"]), "why": row.get("why", ""), "place": place, "ms": {}}
 
 
 def settings_of(report):
     """What was measured, without the folders of one machine."""
     captures = report["captures"]
-    rays = re.search(r"--truth-rays[ =](\d+)", report["command_line"])
     return {"version": report["version"], "size": captures[0]["size"], "frames": len(captures[0]["frames"]),
-            "captures": [c["name"] for c in captures], "rays": int(rays[1]) if rays else None}
+            "captures": [c["name"] for c in captures], "place": PLACE_COLUMNS}
 
 
 def merged(reports):
@@ -152,7 +156,7 @@ def merged(reports):
             for row in group["configurations"]:
                 known = rows.get((group["sensor"], row["method"], row["name"]))
                 if known is not None and not row.get("why"):
-                    known["ms"][device] = row["device_ms"]["median"]
+                    known["ms"][device] = row["device_ms"]["median"] and round(row["device_ms"]["median"], 4)
     result["rows"] = list(rows.values())
     return result
 
@@ -191,12 +195,10 @@ def places_together(rows):
     """RMSE with the curve, by place, over the pixels of all sensors."""
     sums = {}
     for row in rows:
-        for name, place in row["place"].items():
+        for name, (pixels, _, _, held_out_rms) in row["place"].items():
             n, squares = sums.get(name, (0, 0))
-            if place["pixels"] and place["held_out_rms"] is not None:
-                sums[name] = n + place["pixels"], squares + place["pixels"] * place["held_out_rms"] ** 2
-            else:
-                sums[name] = n, squares
+            known = 0 if held_out_rms is None else pixels
+            sums[name] = n + known, squares + known * (held_out_rms or 0) ** 2
     return {name: (squares / n) ** 0.5 if n else None for name, (n, squares) in sums.items()}
 
 
@@ -207,7 +209,7 @@ def markdown(result):
     heads = ["method and quality", *sensors, "bias", "SSIM", *places, *(f"ms, {short_name(d)}" for d in devices)]
     lines = ["| " + " | ".join(heads) + " |", "|" + " --- |" * len(heads)]
     for (method, name), rows in by_configuration(result).items():
-        errors = [f"{cell(rows[s]['rms'], 3)} {cell(rows[s]['held_out_rms'], 3)}" if s in rows else "" for s in sensors]
+        errors = [f"{cell(rows[s]['rms'], 3)}, {cell(rows[s]['held_out_rms'], 3)}" if s in rows else "" for s in sensors]
         together = places_together(rows.values())
         first = rows[sensors[0]] if sensors[0] in rows else next(iter(rows.values()))
         cells = [f"{method} {name}", *errors, cell(first["bias"], 3, "+"), cell(first["ssim"], 2)]

@@ -39,7 +39,7 @@ for (const table of document.querySelectorAll("table.sorted"))
 
 STYLE = """
 .document { max-width: 1400px; }
-.document th button { border: 0; background: none; padding: 0; font: inherit; font-weight: 600; min-height: 0; white-space: nowrap; }
+.document th button { border: 0; background: none; padding: 0; font: inherit; font-weight: 600; min-height: 0; text-align: inherit; }
 .document th[aria-sort="ascending"] button::after { content: " \\2191"; }
 .document th[aria-sort="descending"] button::after { content: " \\2193"; }
 .document th { position: sticky; top: 0; background: var(--paper); }
@@ -50,7 +50,7 @@ STYLE = """
 .document .views figure { margin: 0; }
 .document .views figure img { width: 100%; height: auto; }
 .document .views img + img { margin-top: 3px; }
-.document .scale { width: 260px; height: 14px; display: block; }
+.document .legend-of-differences img { width: 260px; height: 14px; }
 """
 
 
@@ -75,7 +75,7 @@ def mark(x, y, kind, label):
 
 
 def plot(rows, device, heading, methods):
-    """Error with the curve against time; the qualities of a method in order of time, joined by a line."""
+    """Error with the curve against time. A line joins the qualities of one profile, in order of time."""
     points = {}
     for row in rows:
         ms, error = row["ms"].get(device), row["held_out_rms"]
@@ -83,7 +83,7 @@ def plot(rows, device, heading, methods):
             points.setdefault(row["method"], []).append((ms, error, row["name"]))
     if not points:
         return ""
-    every = [p for series in points.values() for p in series]
+    every = [p for of_method in points.values() for p in of_method]
     low, high = min(p[0] for p in every) / 1.2, max(p[0] for p in every) * 1.2
     least, most = min(p[1] for p in every) - 0.005, max(p[1] for p in every) + 0.005
     x_of = lambda ms: LEFT + (WIDTH - LEFT - RIGHT) * math.log(ms / low) / math.log(high / low)
@@ -102,14 +102,17 @@ def plot(rows, device, heading, methods):
     lines.append(f'<text x="{(LEFT + WIDTH - RIGHT) / 2:.0f}" y="{HEIGHT - 6}" text-anchor="middle">'
                  "device milliseconds a frame (median), logarithmic</text>")
     for kind, method in enumerate(methods):
-        series = sorted(points.get(method, []))
-        if not series:
+        of_method = sorted(points.get(method, []))
+        if not of_method:
             continue
-        path = " ".join(f"{x_of(ms):.1f},{y_of(error):.1f}" for ms, error, _ in series)
+        profiles = {}
+        for ms, error, name in of_method:
+            profiles.setdefault(name.partition(" ")[2], []).append(f"{x_of(ms):.1f},{y_of(error):.1f}")
+        path = "".join(f'<polyline class="line" opacity="0.35" points="{" ".join(p)}"/>' for p in profiles.values())
         marks = "".join(mark(x_of(ms), y_of(error), kind, f"{method} {name}: {ms:.3g} ms, RMSE {error:.4f}")
-                        for ms, error, name in series)
+                        for ms, error, name in of_method)
         y = TOP + 8 + 17 * kind
-        lines.append(f'<g class="series-{kind % 8}"><polyline class="line" opacity="0.35" points="{path}"/>{marks}'
+        lines.append(f'<g class="series-{kind % 8}">{path}{marks}'
                      f'{mark(WIDTH - RIGHT + 18, y, kind, method)}</g>'
                      f'<text x="{WIDTH - RIGHT + 29}" y="{y + 4}">{escape(method)}</text>')
     return "\n".join(lines + ["</svg>"])
@@ -134,7 +137,7 @@ def table(rows, devices, short_name):
         cells = [f'<td{why}>{escape(row["method"])} {escape(row["name"])}{" (failed)" if why else ""}</td>',
                  number_cell(row["rms"], 4), number_cell(row["held_out_rms"], 4), number_cell(row["bias"], 4, "+"),
                  number_cell(row["ssim"], 3), number_cell(row["correlation"], 3)]
-        cells += [number_cell(row["place"][p]["held_out_rms"], 3) for p in places]
+        cells += [number_cell(row["place"][p][3], 3) for p in places]
         cells += [number_cell(row["ms"].get(d), 2) for d in devices]
         lines.append("<tr>" + "".join(cells) + "</tr>")
     return "\n".join(lines + ["</tbody></table></div>"])
@@ -194,7 +197,7 @@ def views(report, folder, count):
             figures.append(f"<figure>{pictures}<figcaption>{escape(caption)}</figcaption></figure>")
         html.append(f"<h3>{escape(name)}</h3>\n" + '<div class="views">\n' + "\n".join(figures) + "\n</div>")
     scale = picture(folder, "pictures/scale.jpg", "Scale of differences: blue -0.5, white 0, red +0.5")
-    return ('<figure class="legend-of-differences">' + scale.replace("<img ", '<img class="scale" ', 1) +
+    return ('<figure class="legend-of-differences">' + scale +
             "<figcaption>Differences to truth: -0.5 (too dark) .. 0 .. +0.5 (too bright)</figcaption></figure>\n" + "\n".join(html))
 
 
