@@ -67,7 +67,9 @@ struct Score {
     double rms = 0;
 };
 
-Score score(gpu::Device& device, const std::vector<TrialCapture>& captures, const Configuration& configuration) {
+/// Without `figures` only the pairs are gathered: figures take longer than maps.
+Score score(gpu::Device& device, const std::vector<TrialCapture>& captures, const Configuration& configuration,
+            bool figures = true) {
     Score all;
     for (const TrialCapture& capture : captures) {
         Trial trial(device, configuration, capture.noise, capture.radius_m);
@@ -75,12 +77,15 @@ Score score(gpu::Device& device, const std::vector<TrialCapture>& captures, cons
         std::vector<Difference> images;
         for (const TrialFrame& frame : capture.frames) {
             const cv::Mat1f map = trial.compute(frame);
-            images.push_back(compare(map, frame.truth));
+            if (figures)
+                images.push_back(compare(map, frame.truth));
             pairs.add(pair_sums(map, frame.truth));
         }
-        all.captures.push_back(total(images, pairs));
         all.pairs.add(pairs);
         all.pairs_of_captures.push_back(pairs);
+        if (!figures)
+            continue;
+        all.captures.push_back(total(images, pairs));
         all.rms += all.captures.back().rms * all.captures.back().rms / static_cast<double>(captures.size());
     }
     all.rms = std::sqrt(all.rms);
@@ -157,7 +162,8 @@ class Search final : public cv::MinProblemSolver::Function {
     double tried(Settings values) const {
         Configuration configuration = fixed_;
         std::ranges::copy(values, std::back_inserter(configuration.settings));
-        Score now = score(device_, captures_, configuration);
+        // The best curve alone decides where one is fitted.
+        Score now = score(device_, captures_, configuration, !curve_ && !most_exponent_);
         if (curve_) {
             const ToneCurve best = now.pairs.best_curve(curve_->least, curve_->most);
             now.rms = now.pairs.rms(best);

@@ -16,6 +16,7 @@
 #include <fmt/format.h>
 #include <fstream>
 #include <gtest/gtest.h>
+#include <map>
 #include <numbers>
 #include <set>
 #include <sstream>
@@ -417,6 +418,41 @@ TEST_F(MeasureTest, bench_leaves_one_page_with_everything_in_it) {
             squares += part["pixels"].get<double>() * part["rms"].get<double>() * part["rms"].get<double>();
         }
     EXPECT_NEAR(std::sqrt(squares / pixels), row["difference"]["rms"].get<double>(), 2e-4);
+}
+
+/// Whether the method shows its visibility by a curve that was fitted at each quality.
+bool has_fitted_curve(const MethodRow& method) {
+    const auto setup = method.setup();
+    return row_named(setup->parameters(), "curve") != nullptr;
+}
+
+// Views that no curve was fitted to. With one curve for all qualities abao at high and highest was too dark, and worse
+// than at medium.
+TEST_F(MeasureTest, a_higher_quality_is_no_worse_with_the_curve_of_each) {
+    std::string names;
+    for (const MethodRow& method : methods())
+        if (has_fitted_curve(method))
+            names += fmt::format("{}{}", names.empty() ? "" : ",", method.name);
+    ASSERT_EQ(
+        run_program(
+            fmt::format("bench --generated --scenes office,clutter,columns,thin --frames 1 --first 33 --size 320x240 "
+                        "--truth-rays 64 --rounds 1 --methods {} -o {}",
+                        names, out()))
+            .exit_code,
+        0);
+    std::map<std::string, std::vector<double>> errors; // by method and profile, the cheapest quality first
+    for (const json& row : read(folder / "out/bench.json")["groups"][0]["configurations"]) {
+        const std::string name = row["name"].get<std::string>(),
+                          profile = name.substr(std::min(name.find(','), name.size()));
+        if (name.find("interleaved") == std::string::npos)
+            errors[row["method"].get<std::string>() + profile].push_back(row["difference"]["rms"].get<double>());
+    }
+    EXPECT_GE(errors.size(), 6u);
+    for (const auto& [name, rms] : errors) {
+        ASSERT_EQ(rms.size(), 5u) << name;
+        for (std::size_t i = 1; i < rms.size(); ++i)
+            EXPECT_LT(rms[i], rms[i - 1] + 0.003) << name << ", quality " << i << " of 0 .. 4";
+    }
 }
 
 TEST(FusedReferenceTest, comes_closer_to_truth_than_rays_against_one_depth_image) {
