@@ -106,6 +106,8 @@ double root_mean_square_of(const std::vector<Difference>& images, double Differe
 } // namespace
 
 double ToneCurve::operator()(double visibility) const {
+    if (k > 0)
+        visibility = std::exp(-k * (1 - visibility));
     return std::pow(std::clamp(1 - strength * (1 - visibility), 0.0, 1.0), power);
 }
 
@@ -137,6 +139,14 @@ double PairSums::rms(const ToneCurve& curve) const {
         sum += bin.n * shown * shown - 2 * shown * bin.truth + bin.truth_squared;
     }
     return count_ > 0 ? std::sqrt(std::max(sum, 0.0) / static_cast<double>(count_)) : unknown;
+}
+
+double PairSums::bias(const ToneCurve& curve) const {
+    double sum = 0;
+    for (const Bin& bin : bins_)
+        if (bin.n > 0)
+            sum += bin.n * curve(bin.ours / bin.n) - bin.truth;
+    return count_ > 0 ? sum / static_cast<double>(count_) : unknown;
 }
 
 ToneCurve PairSums::best_curve(const ToneCurve& least, const ToneCurve& most) const {

@@ -8,9 +8,10 @@
 
 namespace scanshade {
 
-/// The tone curve applied to visibility for presentation: V' = clamp(1 - strength (1 - V), 0, 1)^power.
+/// The tone curve applied to visibility for presentation: V' = clamp(1 - strength (1 - V), 0, 1)^power, of
+/// exp(-k (1 - V)) in place of V where k is above 0.
 struct ToneCurve {
-    double strength = 1, power = 1;
+    double strength = 1, power = 1, k = 0;
     [[nodiscard]] double operator()(double visibility) const;
 };
 
@@ -27,6 +28,8 @@ class PairSums {
     /// RMSE of curve(ours) to truth, with the mean of its bin for `ours` (an error below 1/512 in each value). NaN
     /// without pairs.
     [[nodiscard]] double rms(const ToneCurve& curve) const;
+    /// Mean of curve(ours) - truth, likewise.
+    [[nodiscard]] double bias(const ToneCurve& curve) const;
     /// The curve of least rms between two bounds: Ceres' least squares over the bins from several starts, the identity
     /// among them. The identity where there are no pairs.
     [[nodiscard]] ToneCurve best_curve(const ToneCurve& least = {0, 0.1}, const ToneCurve& most = {5, 10}) const;

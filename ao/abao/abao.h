@@ -12,7 +12,7 @@ namespace scanshade {
 struct AbaoOptions {
     ScreenOptions screen{.curve = fitted_curve};
     Profile profile = Profile::metric;
-    Quality quality = Quality::medium; ///< lowest 8 reads, low 16, medium 32, high 128, highest 512
+    Quality quality = Quality::medium; ///< lowest 8 reads, low 16, medium 32, high 64, highest 128
     int lines = 0, steps = 0;          ///< above 0: instead of the quality's
     bool hard = false;                 ///< all elevations within the radius count alike
 

@@ -1,5 +1,6 @@
 #include "ao/alchemy/alchemy.h"
 
+#include "ao/screen/fitted_curves.h"
 #include "shaders/shared/alchemy.h"
 
 #include <algorithm>
@@ -20,9 +21,6 @@ struct Count {
 constexpr std::array counts{Count{Quality::lowest, 5, 5}, Count{Quality::low, 8, 8}, Count{Quality::medium, 16, 11},
                             Count{Quality::high, 32, 16}, Count{Quality::highest, 128, 32}};
 
-/// Tone curves fitted to scenes with truth: see ao/README.md.
-constexpr float curve_of_metric = 1.4F, curve_of_sao = 1.2F;
-
 constexpr float contact = 0.02F;     // epsilon, in radii
 constexpr float bias_of_sao = 0.01F; // b, in radii
 constexpr float pyramid_px = 64;     // radii up to which caches hold the disc anyway
@@ -38,7 +36,7 @@ AlchemyOptions resolved(AlchemyOptions options) {
     if (options.taps == 0)
         options.taps = sao ? count.taps_of_sao : count.taps;
     if (options.screen.curve == fitted_curve)
-        options.screen.curve = sao ? curve_of_sao : curve_of_metric;
+        options.screen.curve = fitted_curve_of(sao ? "alchemy sao" : "alchemy", options.quality);
     if (options.pyramid == DepthPyramid::automatic)
         options.pyramid = sao ? DepthPyramid::on : DepthPyramid::off;
     return options;

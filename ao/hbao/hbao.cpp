@@ -1,5 +1,6 @@
 #include "ao/hbao/hbao.h"
 
+#include "ao/screen/fitted_curves.h"
 #include "shaders/shared/hbao.h"
 
 #include <array>
@@ -26,9 +27,6 @@ Count count_of(const HbaoOptions& options) {
     return count;
 }
 
-/// Of `plus`, fitted to scenes with truth: see ao/README.md. Horizons do without.
-constexpr float curve_of_plus = 3.5F;
-
 constexpr float bias_of_plus = 5.739F; // degrees: a sine of 0.1, as published
 
 constexpr std::array hbao_profile_words{Named{"metric", HbaoProfile::metric},
@@ -40,7 +38,7 @@ HbaoOptions resolved(HbaoOptions options) {
     if (options.interleaved && !plus)
         throw Misuse("interleaved is of profile plus only");
     if (options.screen.curve == fitted_curve)
-        options.screen.curve = plus ? curve_of_plus : 0.0F;
+        options.screen.curve = plus ? fitted_curve_of("hbao plus", options.quality) : 0.0F; // horizons do without
     if (options.profile == HbaoProfile::metric)
         return options;
     options.bias_degrees = plus ? bias_of_plus : 30;

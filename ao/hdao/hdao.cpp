@@ -1,5 +1,6 @@
 #include "ao/hdao/hdao.h"
 
+#include "ao/screen/fitted_curves.h"
 #include "shaders/shared/hdao.h"
 
 #include <array>
@@ -21,9 +22,6 @@ constexpr std::array test_words{Named{"plane", HdaoTest::plane}, Named{"angle", 
 
 constexpr float accept = 0.006F; // a, in radii
 
-/// Tone curves fitted to scenes with truth: see ao/README.md.
-constexpr float curve_of_plane = 2.1F;
-
 HdaoOptions resolved(HdaoOptions options) {
     options = checked(std::move(options));
     if (options.normal_rejection && options.test != HdaoTest::z)
@@ -31,7 +29,7 @@ HdaoOptions resolved(HdaoOptions options) {
     if (options.pairs == 0)
         options.pairs = level_of(counts, options.quality).pairs;
     if (options.screen.curve == fitted_curve)
-        options.screen.curve = options.test == HdaoTest::plane ? curve_of_plane : 0.0F;
+        options.screen.curve = options.test == HdaoTest::plane ? fitted_curve_of("hdao", options.quality) : 0.0F;
     return options;
 }
 

@@ -1,5 +1,6 @@
 #include "ao/ssdo/ssdo.h"
 
+#include "ao/screen/fitted_curves.h"
 #include "shaders/shared/ssdo.h"
 
 #include <array>
@@ -14,15 +15,12 @@ struct Count {
 constexpr std::array counts{Count{Quality::lowest, 4}, Count{Quality::low, 8}, Count{Quality::medium, 16},
                             Count{Quality::high, 32}, Count{Quality::highest, 128}};
 
-/// The tone curve fitted to scenes with truth: see ao/README.md.
-constexpr float curve = 3.6F;
-
 SsdoOptions resolved(SsdoOptions options) {
     options = checked(std::move(options));
     if (options.directions == 0)
         options.directions = level_of(counts, options.quality).directions;
     if (options.screen.curve == fitted_curve)
-        options.screen.curve = curve;
+        options.screen.curve = fitted_curve_of("ssdo", options.quality);
     return options;
 }
 

@@ -7,10 +7,12 @@
 #include "apps/measure/bench_results.h"
 #include "apps/measure/configurations.h"
 #include "apps/measure/fused_reference.h"
+#include "apps/picture.h"
 #include "apps/scenes/generate.h"
 #include "apps/scenes/scene.h"
 #include "apps/scenes/sensor.h"
 #include "apps/walk/progress.h"
+#include "io/images/jpeg_output.h"
 #include "io/output_file.h"
 #include "io/text.h"
 #include "projection/base/error.h"
@@ -19,11 +21,14 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgproc.hpp>
 #include <sstream>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_for_each.h>
+#include <thread>
 
 namespace scanshade {
 namespace {
@@ -99,11 +104,14 @@ class CaptureBench {
                    capture.frames.front().depth.z_m.size(),
                    {},
                    capture.frames.front().truth,
+                   {},
                    {}};
         for (const TrialFrame& frame : capture.frames) {
             result_.frames.push_back(frame.name);
             const Pinhole& camera = frame.frame.camera.pinhole;
-            classes_.push_back({by_edge_distance(frame.exact_z_m), by_grazing_angle(frame.exact_z_m, camera),
+            const cv::Mat1f& recorded = frame.frame.depth_m.empty() ? frame.depth.z_m : frame.frame.depth_m;
+            classes_.push_back({by_place(frame.exact_z_m, recorded, frame.truth, camera),
+                                by_edge_distance(frame.exact_z_m), by_grazing_angle(frame.exact_z_m, camera),
                                 by_range(frame.exact_z_m)});
         }
         for (const Configuration& configuration : all)
@@ -161,9 +169,16 @@ class CaptureBench {
 
     void judge(std::size_t i, const std::vector<cv::Mat1f>& maps) {
         Measured& measured = result_.measured[i];
+        PlacePairs& places = measured.places.emplace_back();
         for (std::size_t n = 0; n < capture_.frames.size(); ++n) {
             const TrialFrame& frame = capture_.frames[n];
             const cv::Mat1f& map = maps[n];
+            const cv::Mat1b& place_of = classes_[n][place].of;
+            for (std::size_t p = 0; p < place_count; ++p) {
+                cv::Mat1f truth_there(frame.truth.size(), std::numeric_limits<float>::quiet_NaN());
+                frame.truth.copyTo(truth_there, place_of == static_cast<int>(p));
+                places[p].add(pair_sums(map, truth_there));
+            }
             measured.images.push_back(compare(map, frame.truth));
             measured.pairs.add(pair_sums(map, frame.truth));
             for (std::size_t by = 0; by < error_by_count; ++by)
@@ -254,6 +269,13 @@ class Bench final : public Command {
                .help = "folder of the report: index.html, bench.csv, bench.json, a plot of each sensor class as .svg",
                .value = &out_,
                .writes = Writes::folder},
+              {.name = "pictures",
+               .help = "width of small pictures of each capture's first frame, REPORT/pictures/*.jpg: truth, every "
+                       "configuration and its difference, full colour at 0.5; 0 = none",
+               .value = &pictures_,
+               .unit = "pixels",
+               .low = 0,
+               .high = 8192},
               {.name = "front",
                .help = "file for the measured Pareto front, as `run --max-error` takes it; parts of other sensors stay",
                .value = &front_,
@@ -293,6 +315,7 @@ class Bench final : public Command {
                            SCANSHADE_VERSION,
                            fmt::format("{:%Y-%m-%d}", fmt::gmtime(std::time(nullptr))),
                            rounds_,
+                           std::thread::hardware_concurrency(),
                            {},
                            {}};
         Trials trials(device);
@@ -302,6 +325,7 @@ class Bench final : public Command {
                             name_of(capture.sensor), describe(capture.noise), capture.noise_origin));
             report.captures.push_back(CaptureBench(trials, capture, all).run(rounds_));
         }
+        draw_pictures(report);
         report.groups = grouped(report);
         write(report);
         fmt::print("{}", bench_table(report));
@@ -356,6 +380,38 @@ class Bench final : public Command {
         return folder;
     }
 
+    /// Files of the first frames, small enough to be put side by side by the dozen.
+    void draw_pictures(BenchReport& report) const {
+        if (pictures_ == 0)
+            return;
+        constexpr double scale = 0.5;
+        const auto draw = [&](const std::string& name, const cv::Mat3b& picture) {
+            cv::Mat3b small = picture;
+            if (picture.cols > pictures_)
+                cv::resize(picture, small, {pictures_, std::max(1, picture.rows * pictures_ / picture.cols)}, 0, 0,
+                           cv::INTER_AREA);
+            write_atomically(fs::path(out_) / name, encoded_jpeg(small, 85));
+        };
+        cv::Mat1f ramp(14, 260);
+        for (int x = 0; x < ramp.cols; ++x)
+            ramp.col(x).setTo((2.0 * x / (ramp.cols - 1) - 1) * scale);
+        write_atomically(fs::path(out_) / "pictures/scale.jpg", encoded_jpeg(difference_picture(ramp, scale), 95));
+        for (std::size_t c = 0; c < report.captures.size(); ++c) {
+            BenchCapture& capture = report.captures[c];
+            capture.picture = fmt::format("pictures/{}-truth.jpg", c);
+            draw(capture.picture, visibility_picture(capture.truth));
+            for (std::size_t i = 0; i < capture.measured.size(); ++i) {
+                const cv::Mat1f& map = capture.visibilities[i];
+                if (map.empty())
+                    continue;
+                const std::string name = fmt::format("pictures/{}-{}", c, i);
+                capture.measured[i].picture = name + ".jpg";
+                draw(name + ".jpg", visibility_picture(map));
+                draw(name + "-difference.jpg", difference_picture(cv::Mat1f(map - capture.truth), scale));
+            }
+        }
+    }
+
     static std::string plot_name(SensorClass sensor) {
         std::string name = fmt::format("{}.svg", name_of(sensor));
         std::ranges::replace(name, ' ', '-');
@@ -398,7 +454,7 @@ class Bench final : public Command {
     GenerateOptions generate_{.step = 25, .truth_rays = 256}; // views that differ
     TrialRequest request_;
     std::string scenes_ = "all", sensors_ = "ideal", methods_ = "all", device_, out_, front_;
-    int rounds_ = 3;
+    int rounds_ = 3, pictures_ = 0;
     bool generated_ = false, overwrite_ = false;
     /// Each is measured instead of captures where its flag asks for it.
     std::array<std::unique_ptr<BenchPart>, 6> parts_{cacao_times(),     cacao_maps(),         cloud_errors(),

@@ -5,14 +5,27 @@
 #include "apps/measure/front.h"
 #include "apps/measure/trial.h"
 
+#include <array>
+#include <limits>
 #include <string>
 #include <vector>
 
 namespace scanshade {
 
 /// The ways to classify errors, in the order of Measured::errors.
-enum ErrorBy : std::size_t { edge_distance, grazing_angle, range, error_by_count };
+enum ErrorBy : std::size_t { place, edge_distance, grazing_angle, range, error_by_count };
 [[nodiscard]] std::string_view name_of(ErrorBy by);
+
+/// Errors with the tone curve that is best for the other captures of the sensor class: how good a curve is on views it
+/// was not fitted to. NaN where there is no other capture.
+struct HeldOut {
+    ToneCurve curve; ///< of one capture
+    double rms = std::numeric_limits<double>::quiet_NaN(), bias = rms;
+    std::vector<double> rms_by_place = {}; ///< in the order of Place; empty where not known
+};
+
+/// Pairs with truth on one capture, by place.
+using PlacePairs = std::array<PairSums, place_count>;
 
 /// One configuration on one capture, or on many.
 struct Measured {
@@ -23,6 +36,9 @@ struct Measured {
     std::array<ErrorByClass, error_by_count> errors;
     std::vector<double> device_ms, wall_ms; ///< of each frame in each round
     std::vector<double> ns_per_pixel;       ///< the same of the device, per pixel of the image
+    std::vector<PlacePairs> places;         ///< of each capture
+    HeldOut held_out;                       ///< set by grouped()
+    std::string picture;                    ///< below the report's folder, of the first frame; empty = none was made
     std::string why;                        ///< what failed; empty = nothing
 
     Difference sum; ///< of the images, after sum_up(): the best tone curve takes a solver
@@ -41,6 +57,7 @@ struct BenchCapture {
     cv::Size size;
     std::vector<Measured> measured;      ///< in the order of the configurations
     cv::Mat1f truth;                     ///< of the first frame
+    std::string picture;                 ///< of it, as Measured::picture
     std::vector<cv::Mat1f> visibilities; ///< of the first frame by each configuration; empty where it failed
 };
 
@@ -55,11 +72,13 @@ struct BenchGroup {
 struct BenchReport {
     std::string command, device, driver, version, date;
     int rounds = 0;
+    unsigned processors = 0;
     std::vector<BenchCapture> captures;
     std::vector<BenchGroup> groups; ///< grouped(*this), made once the captures are complete; points into them
 };
 
-[[nodiscard]] std::vector<BenchGroup> grouped(const BenchReport& report);
+/// Sets `held_out` of the captures' rows, too.
+[[nodiscard]] std::vector<BenchGroup> grouped(BenchReport& report);
 
 /// NaN without values.
 [[nodiscard]] double least(const std::vector<double>& values);

@@ -14,6 +14,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <opencv2/core/optim.hpp>
 #include <optional>
@@ -55,14 +56,20 @@ struct FreeToneCurve {
     ToneCurve least, most;
 };
 
+/// k of exp(-k (1 - V)), where it is fitted and strength and power are not both.
+constexpr std::string_view exponent_row = "curve";
+
 /// Errors of one configuration: of each capture, and over all (root mean square over captures).
 struct Score {
     std::vector<Difference> captures;
+    std::vector<PairSums> pairs_of_captures;
     PairSums pairs;
     double rms = 0;
 };
 
-Score score(gpu::Device& device, const std::vector<TrialCapture>& captures, const Configuration& configuration) {
+/// Without `figures` only the pairs are gathered: figures take longer than maps.
+Score score(gpu::Device& device, const std::vector<TrialCapture>& captures, const Configuration& configuration,
+            bool figures = true) {
     Score all;
     for (const TrialCapture& capture : captures) {
         Trial trial(device, configuration, capture.noise, capture.radius_m);
@@ -70,15 +77,40 @@ Score score(gpu::Device& device, const std::vector<TrialCapture>& captures, cons
         std::vector<Difference> images;
         for (const TrialFrame& frame : capture.frames) {
             const cv::Mat1f map = trial.compute(frame);
-            images.push_back(compare(map, frame.truth));
+            if (figures)
+                images.push_back(compare(map, frame.truth));
             pairs.add(pair_sums(map, frame.truth));
         }
-        all.captures.push_back(total(images, pairs));
         all.pairs.add(pairs);
+        all.pairs_of_captures.push_back(pairs);
+        if (!figures)
+            continue;
+        all.captures.push_back(total(images, pairs));
         all.rms += all.captures.back().rms * all.captures.back().rms / static_cast<double>(captures.size());
     }
     all.rms = std::sqrt(all.rms);
     return all;
+}
+
+/// Root mean square over captures with exp(-k (1 - V)) in place of V.
+double rms_with(double k, const std::vector<PairSums>& captures) {
+    double sum = 0;
+    for (const PairSums& pairs : captures)
+        sum += std::pow(pairs.rms({1, 1, k}), 2);
+    return std::sqrt(sum / static_cast<double>(captures.size()));
+}
+
+/// The best k to 0.01: the error has one valley.
+double best_exponent(const std::vector<PairSums>& captures, double most) {
+    constexpr double step = 0.01;
+    int best = 0;
+    double least = std::numeric_limits<double>::infinity();
+    for (int i = 0; i * step <= most; ++i)
+        if (const double rms = rms_with(i * step, captures); rms < least) {
+            least = rms;
+            best = i;
+        }
+    return best * step;
 }
 
 /// Nelder and Mead's simplex (1965) over the free settings, in units of their first steps. Beyond a limit the nearest
@@ -86,8 +118,11 @@ Score score(gpu::Device& device, const std::vector<TrialCapture>& captures, cons
 class Search final : public cv::MinProblemSolver::Function {
   public:
     Search(gpu::Device& device, const std::vector<TrialCapture>& captures, Configuration fixed, std::vector<Free> free,
-           std::optional<FreeToneCurve> curve)
-        : device_(device), captures_(captures), fixed_(std::move(fixed)), free_(std::move(free)), curve_(curve) {
+           std::optional<FreeToneCurve> curve, std::optional<double> most_exponent)
+        : device_(device), captures_(captures), fixed_(std::move(fixed)), free_(std::move(free)), curve_(curve),
+          most_exponent_(most_exponent) {
+        if (most_exponent_)
+            fixed_.settings.emplace_back(exponent_row, "0");
         if (curve_)
             for (const std::string_view row : {curve_->rows.strength, curve_->rows.power})
                 fixed_.settings.emplace_back(row, "1");
@@ -127,12 +162,18 @@ class Search final : public cv::MinProblemSolver::Function {
     double tried(Settings values) const {
         Configuration configuration = fixed_;
         std::ranges::copy(values, std::back_inserter(configuration.settings));
-        Score now = score(device_, captures_, configuration);
+        // The best curve alone decides where one is fitted.
+        Score now = score(device_, captures_, configuration, !curve_ && !most_exponent_);
         if (curve_) {
             const ToneCurve best = now.pairs.best_curve(curve_->least, curve_->most);
             now.rms = now.pairs.rms(best);
             values.emplace_back(curve_->rows.strength, fmt::format("{:.4g}", best.strength));
             values.emplace_back(curve_->rows.power, fmt::format("{:.4g}", best.power));
+        }
+        if (most_exponent_) {
+            const double k = best_exponent(now.pairs_of_captures, *most_exponent_);
+            now.rms = rms_with(k, now.pairs_of_captures);
+            values.emplace_back(exponent_row, fmt::format("{:.2f}", k));
         }
         std::string line;
         for (const auto& [name, value] : values)
@@ -150,7 +191,8 @@ class Search final : public cv::MinProblemSolver::Function {
     Configuration fixed_;
     std::vector<Free> free_;
     std::optional<FreeToneCurve> curve_;
-    mutable int tried_ = 0; // mutable, since the solver's interface is const
+    std::optional<double> most_exponent_; ///< where k follows from maps made without it
+    mutable int tried_ = 0;               // mutable, since the solver's interface is const
     mutable Settings best_;
     mutable double best_rms_ = 0;
 };
@@ -219,7 +261,8 @@ class Calibrate final : public Command {
         for (const std::string& name : comma_separated(free_))
             free.push_back(free_setting(rows, method_, name));
         const std::optional<FreeToneCurve> curve = taken_out(free);
-        const Settings found = Search(device, training, start, free, curve).run(evaluations_);
+        const std::optional<double> most_exponent = curve ? std::nullopt : exponent_taken_out(free, start);
+        const Settings found = Search(device, training, start, free, curve, most_exponent).run(evaluations_);
         Configuration fitted = start;
         std::ranges::copy(found, std::back_inserter(fitted.settings));
         report(device, start, fitted, found, training, others);
@@ -252,6 +295,21 @@ class Calibrate final : public Command {
             return curve;
         }
         return std::nullopt;
+    }
+
+    /// Takes k out of the search: it follows from maps without a curve, as long as strength and power leave them alone.
+    static std::optional<double> exponent_taken_out(std::vector<Free>& free, const Configuration& given) {
+        const auto exponent = std::ranges::find(free, exponent_row, &Free::name);
+        const auto changed = [&](std::string_view row) {
+            const auto other = std::ranges::find(given.settings, row, &Settings::value_type::first);
+            return std::ranges::find(free, row, &Free::name) != free.end() ||
+                   (other != given.settings.end() && other->second != "1");
+        };
+        if (exponent == free.end() || changed("strength") || changed("power"))
+            return std::nullopt;
+        const double most = exponent->high;
+        free.erase(exponent);
+        return most;
     }
 
     MethodSetup& setup() {

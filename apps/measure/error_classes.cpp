@@ -3,6 +3,7 @@
 #include "apps/picture.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fmt/format.h>
 #include <limits>
@@ -47,6 +48,48 @@ bool jumps(const float* z, std::ptrdiff_t stride, int count, int i) {
     return !from_a && !from_b;
 }
 
+/// Distance of each pixel from the nearest one that is 0 in `away`.
+cv::Mat1f distance_from(const cv::Mat1b& away) {
+    cv::Mat1f distance;
+    cv::distanceTransform(away, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE);
+    return distance;
+}
+
+constexpr double thin_m = 0.04;
+constexpr float hole_px = 4, edge_px = 8;
+constexpr float deep = 0.2F, open = 0.95F;
+
+/// Steps from `at` along `step` until depth is more than `thin_m` farther away, or ends; -1 where neither happens
+/// within `most` steps.
+int steps_to_background(const cv::Mat1f& z_m, cv::Point at, cv::Point step, int most) {
+    const float limit = z_m(at) + static_cast<float>(thin_m);
+    const cv::Rect image({}, z_m.size());
+    for (int i = 1; i <= most; ++i) {
+        at += step;
+        if (!image.contains(at))
+            return -1;
+        if (!(z_m(at) > 0) || z_m(at) > limit)
+            return i;
+    }
+    return -1;
+}
+
+/// Whether the pixel's surface falls off to both sides within thin_m along one of four lines.
+bool is_thin(const cv::Mat1f& z_m, cv::Point at, const Pinhole& camera) {
+    const std::array lines{cv::Point(1, 0), cv::Point(0, 1), cv::Point(1, 1), cv::Point(1, -1)};
+    const double z = z_m(at);
+    return std::ranges::any_of(lines, [&](const cv::Point& line) {
+        const double m_per_step = z * std::hypot(line.x / camera.fx, line.y / camera.fy);
+        const double steps = thin_m / m_per_step; // the whole width; below one no pixel can be told to be thin
+        const int most = static_cast<int>(std::clamp(std::ceil(steps), 1.0, double(z_m.cols)));
+        const int before = steps_to_background(z_m, at, -line, most);
+        if (before < 0)
+            return false;
+        const int after = steps_to_background(z_m, at, line, most);
+        return after > 0 && before + after - 1 <= most;
+    });
+}
+
 /// 0 at a jump, 255 elsewhere.
 cv::Mat1b edges(const cv::Mat1f& z_m) {
     cv::Mat1b away(z_m.size(), uchar(255));
@@ -66,9 +109,7 @@ cv::Mat1b edges(const cv::Mat1f& z_m) {
 
 PixelClasses by_edge_distance(const cv::Mat1f& z_m) {
     const cv::Mat1f whole = z_m.isContinuous() ? z_m : z_m.clone();
-    cv::Mat1f distance;
-    cv::distanceTransform(edges(whole), distance, cv::DIST_L2, cv::DIST_MASK_PRECISE);
-    return classified(distance, whole, {1, 2, 4, 8, 16, 32}, " px");
+    return classified(distance_from(edges(whole)), whole, {1, 2, 4, 8, 16, 32}, " px");
 }
 
 PixelClasses by_grazing_angle(const cv::Mat1f& z_m, const Pinhole& camera) {
@@ -79,6 +120,36 @@ PixelClasses by_grazing_angle(const cv::Mat1f& z_m, const Pinhole& camera) {
 }
 
 PixelClasses by_range(const cv::Mat1f& z_m) { return classified(z_m, z_m, {1, 2, 3, 4, 6, 10, 20, 50}, " m"); }
+
+PixelClasses by_place(const cv::Mat1f& exact_z_m, const cv::Mat1f& recorded_z_m, const cv::Mat1f& truth,
+                      const Pinhole& camera) {
+    PixelClasses classes{
+        {"thin things", "deep corners", "near holes", "near depth edges", "open and flat", "between them"},
+        cv::Mat1b(exact_z_m.size(), PixelClasses::none)};
+    const cv::Mat1f whole = exact_z_m.isContinuous() ? exact_z_m : exact_z_m.clone();
+    const cv::Mat1f from_edge = distance_from(edges(whole));
+    // Far from any hole everywhere, where there is none: the transform of an image without zeros is not defined.
+    const cv::Mat1b recorded(recorded_z_m > 0);
+    const cv::Mat1f from_hole = cv::countNonZero(recorded) < static_cast<int>(recorded.total())
+                                    ? distance_from(recorded)
+                                    : cv::Mat1f(recorded.size(), std::numeric_limits<float>::max());
+    const auto place_of = [&](const cv::Point& at) {
+        if (is_thin(whole, at, camera))
+            return thin_thing;
+        if (truth(at) < deep)
+            return deep_corner;
+        if (from_hole(at) <= hole_px)
+            return near_hole;
+        if (from_edge(at) <= edge_px)
+            return near_edge;
+        return truth(at) >= open ? open_flat : between_them;
+    };
+    for (int y = 0; y < whole.rows; ++y)
+        for (int x = 0; x < whole.cols; ++x)
+            if (whole(y, x) > 0 && std::isfinite(truth(y, x)))
+                classes.of(y, x) = place_of({x, y});
+    return classes;
+}
 
 PixelClasses by_confidence(const cv::Mat1f& confidence) {
     const cv::Mat1f known(confidence + 1); // 0 and NaN are no surface to classified()
@@ -95,6 +166,7 @@ void ErrorByClass::add(const cv::Mat1f& a, const cv::Mat1f& b, const PixelClasse
                 continue;
             Sum& sum = sums_[classes.of(y, x)];
             sum.n += 1;
+            sum.apart += apart;
             sum.squares += apart * apart;
         }
 }
@@ -106,12 +178,17 @@ void ErrorByClass::add(const ErrorByClass& other) {
     sums_.resize(names_.size());
     for (std::size_t i = 0; i < sums_.size(); ++i) {
         sums_[i].n += other.sums_[i].n;
+        sums_[i].apart += other.sums_[i].apart;
         sums_[i].squares += other.sums_[i].squares;
     }
 }
 
 double ErrorByClass::rms(std::size_t i) const {
     return sums_[i].n > 0 ? std::sqrt(sums_[i].squares / sums_[i].n) : std::numeric_limits<double>::quiet_NaN();
+}
+
+double ErrorByClass::bias(std::size_t i) const {
+    return sums_[i].n > 0 ? sums_[i].apart / sums_[i].n : std::numeric_limits<double>::quiet_NaN();
 }
 
 } // namespace scanshade

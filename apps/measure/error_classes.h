@@ -1,4 +1,5 @@
-// Classes of pixels whose errors differ: by distance from depth edges, by viewing angle, by range, by confidence.
+// Classes of pixels whose errors differ: by place, by distance from depth edges, by viewing angle, by range, by
+// confidence.
 #pragma once
 
 #include "projection/camera.h"
@@ -24,10 +25,25 @@ struct PixelClasses {
 /// By depth.
 [[nodiscard]] PixelClasses by_range(const cv::Mat1f& z_m);
 
+/// What by_place() tells apart, in the order of its classes. A pixel belongs to the first that fits.
+enum Place : unsigned char {
+    thin_thing,   ///< falls off to both sides within 4 cm, along one of four lines in the image
+    deep_corner,  ///< true visibility below 0.2
+    near_hole,    ///< the recorded depth has a hole within 4 pixels
+    near_edge,    ///< a jump of depth within 8 pixels
+    open_flat,    ///< true visibility of at least 0.95
+    between_them, ///< all others: folds, contacts, and what lies around them
+    place_count
+};
+/// By what a pixel shows and what is near it. `exact_z_m` and `truth` say what is there, `recorded_z_m` what the sensor
+/// saw of it; all of one size.
+[[nodiscard]] PixelClasses by_place(const cv::Mat1f& exact_z_m, const cv::Mat1f& recorded_z_m, const cv::Mat1f& truth,
+                                    const Pinhole& camera);
+
 /// By confidence (projection/confidence.h); pixels without one (NaN) have no class.
 [[nodiscard]] PixelClasses by_confidence(const cv::Mat1f& confidence);
 
-/// Squared differences of two maps, gathered by class over any number of images.
+/// Differences of two maps, gathered by class over any number of images.
 class ErrorByClass {
   public:
     /// The class names must be the same for all images.
@@ -37,10 +53,12 @@ class ErrorByClass {
     [[nodiscard]] double pixels(std::size_t i) const { return sums_[i].n; }
     /// Root mean square of the class; NaN where it has no pixel.
     [[nodiscard]] double rms(std::size_t i) const;
+    /// Mean of a - b; NaN likewise.
+    [[nodiscard]] double bias(std::size_t i) const;
 
   private:
     struct Sum {
-        double n = 0, squares = 0;
+        double n = 0, apart = 0, squares = 0;
     };
     std::vector<std::string> names_;
     std::vector<Sum> sums_;

@@ -16,6 +16,7 @@
 #include <fmt/format.h>
 #include <fstream>
 #include <gtest/gtest.h>
+#include <map>
 #include <numbers>
 #include <set>
 #include <sstream>
@@ -286,7 +287,95 @@ TEST(SensorClassTest, follows_the_noise) {
     EXPECT_EQ(class_of({0, 0.0001}), SensorClass::clean);
 }
 
+// ---------------------------------------------------------------------------------------------------- places
+
+/// A wall at 3 m, and before it at 2 m a board from column 20 to column 59 and a pole 3 pixels wide: at 525 pixels of
+/// focal length 1.1 cm.
+struct WallWithPole {
+    Pinhole camera{525, 525, 59.5, 39.5, {120, 80}};
+    cv::Mat1f z_m = cv::Mat1f(80, 120, 3.0F), truth = cv::Mat1f(80, 120, 1.0F);
+    WallWithPole() {
+        z_m.colRange(20, 60).setTo(2);
+        z_m.colRange(90, 93).setTo(2);
+    }
+    [[nodiscard]] cv::Mat1b places(const cv::Mat1f& recorded) const {
+        return by_place(z_m, recorded, truth, camera).of;
+    }
+};
+
+TEST(PlaceTest, a_pole_is_thin_and_a_board_is_not) {
+    const WallWithPole scene;
+    const cv::Mat1b of = scene.places(scene.z_m);
+    EXPECT_EQ(cv::countNonZero(of == thin_thing), 3 * 80) << "the pole, and nothing else";
+    EXPECT_EQ(of(40, 91), thin_thing);
+    EXPECT_EQ(of(40, 22), near_edge);
+    EXPECT_EQ(of(40, 40), open_flat) << "20 pixels from the board's edges";
+}
+
+TEST(PlaceTest, the_first_class_that_fits_counts) {
+    WallWithPole scene;
+    cv::Mat1f recorded = scene.z_m.clone();
+    recorded(cv::Rect(38, 38, 2, 2)).setTo(0);
+    scene.truth(42, 41) = 0.1F; // in a corner beside the hole
+    scene.truth(42, 36) = std::nanf("");
+    const cv::Mat1b of = scene.places(recorded);
+    EXPECT_EQ(of(40, 36), near_hole);
+    EXPECT_EQ(of(42, 41), deep_corner);
+    EXPECT_EQ(of(42, 36), PixelClasses::none) << "nothing to compare with";
+    EXPECT_EQ(of(40, 45), open_flat) << "6 pixels from the hole";
+    scene.truth.setTo(0.5);
+    EXPECT_EQ(scene.places(scene.z_m)(40, 40), between_them);
+    EXPECT_EQ(cv::countNonZero(scene.places(scene.z_m) == near_hole), 0)
+        << "where there is no hole, nothing is near one";
+}
+
+TEST(PairSumsTest, knows_the_bias_that_a_curve_leaves) {
+    PairSums pairs;
+    for (int i = 0; i < 100; ++i)
+        pairs.add(0.5F, 0.2F);
+    EXPECT_NEAR(pairs.bias({}), 0.3, 1e-6);
+    EXPECT_NEAR(pairs.bias({1, 2}), 0.25 - 0.2, 1e-6);
+    EXPECT_TRUE(std::isnan(PairSums().bias({})));
+}
+
 // ---------------------------------------------------------------------------------------------------- bench
+
+TEST_F(MeasureTest, a_curve_of_the_other_captures_is_judged_on_each) {
+    const std::string other = (folder / "other").string();
+    ASSERT_EQ(
+        run_program(fmt::format("generate thin -o {} --sensor ideal --frames 2 --size 64x48 --truth-rays 16", other))
+            .exit_code,
+        0);
+    ASSERT_EQ(run_program(fmt::format("bench {} {} -o {} --frames 2 --rounds 1 --depth-noise none --methods luna "
+                                      "--pictures 32",
+                                      capture(), other, out()))
+                  .exit_code,
+              0);
+    const json report = read(folder / "out/bench.json");
+    double squares = 0, pixels = 0;
+    for (int k : {0, 1}) {
+        const json &own = report["captures"][k]["configurations"][0],
+                   &rest = report["captures"][1 - k]["configurations"][0];
+        EXPECT_NEAR(own["held_out"]["strength"].get<double>(), rest["difference"]["strength"].get<double>(), 1e-4)
+            << "of two captures each has the best curve of the other";
+        EXPECT_GE(own["held_out"]["rms"].get<double>(), own["difference"]["calibrated_rms"].get<double>() - 1e-6);
+        const double n = own["difference"]["pixels"].get<double>();
+        squares += n * std::pow(own["held_out"]["rms"].get<double>(), 2), pixels += n;
+        EXPECT_TRUE(fs::exists(folder / "out" / own["picture"].get<std::string>()));
+    }
+    const json& all = report["groups"][0]["configurations"][0];
+    EXPECT_NEAR(all["held_out"]["rms"].get<double>(), std::sqrt(squares / pixels), 1e-5);
+    double placed = 0, placed_squares = 0;
+    for (const json& part : all["errors"]["place"])
+        if (part["pixels"] > 0) {
+            placed += part["pixels"].get<double>();
+            placed_squares += part["pixels"].get<double>() * std::pow(part["held_out_rms"].get<double>(), 2);
+        }
+    EXPECT_EQ(placed, pixels) << "every pixel has one place";
+    EXPECT_NEAR(placed_squares, squares, 1e-3 * squares) << "to within the steps of the sums";
+    EXPECT_TRUE(fs::exists(folder / "out/pictures/1-truth.jpg"));
+    EXPECT_TRUE(fs::exists(folder / "out/pictures/1-0-difference.jpg"));
+}
 
 TEST_F(MeasureTest, bench_leaves_one_page_with_everything_in_it) {
     const Ran ran =
@@ -329,6 +418,41 @@ TEST_F(MeasureTest, bench_leaves_one_page_with_everything_in_it) {
             squares += part["pixels"].get<double>() * part["rms"].get<double>() * part["rms"].get<double>();
         }
     EXPECT_NEAR(std::sqrt(squares / pixels), row["difference"]["rms"].get<double>(), 2e-4);
+}
+
+/// Whether the method shows its visibility by a curve that was fitted at each quality.
+bool has_fitted_curve(const MethodRow& method) {
+    const auto setup = method.setup();
+    return row_named(setup->parameters(), "curve") != nullptr;
+}
+
+// Views that no curve was fitted to. With one curve for all qualities abao at high and highest was too dark, and worse
+// than at medium.
+TEST_F(MeasureTest, a_higher_quality_is_no_worse_with_the_curve_of_each) {
+    std::string names;
+    for (const MethodRow& method : methods())
+        if (has_fitted_curve(method))
+            names += fmt::format("{}{}", names.empty() ? "" : ",", method.name);
+    ASSERT_EQ(
+        run_program(
+            fmt::format("bench --generated --scenes office,clutter,columns,thin --frames 1 --first 33 --size 320x240 "
+                        "--truth-rays 64 --rounds 1 --methods {} -o {}",
+                        names, out()))
+            .exit_code,
+        0);
+    std::map<std::string, std::vector<double>> errors; // by method and profile, the cheapest quality first
+    for (const json& row : read(folder / "out/bench.json")["groups"][0]["configurations"]) {
+        const std::string name = row["name"].get<std::string>(),
+                          profile = name.substr(std::min(name.find(','), name.size()));
+        if (name.find("interleaved") == std::string::npos)
+            errors[row["method"].get<std::string>() + profile].push_back(row["difference"]["rms"].get<double>());
+    }
+    EXPECT_GE(errors.size(), 6u);
+    for (const auto& [name, rms] : errors) {
+        ASSERT_EQ(rms.size(), 5u) << name;
+        for (std::size_t i = 1; i < rms.size(); ++i)
+            EXPECT_LT(rms[i], rms[i - 1] + 0.003) << name << ", quality " << i << " of 0 .. 4";
+    }
 }
 
 TEST(FusedReferenceTest, comes_closer_to_truth_than_rays_against_one_depth_image) {
