@@ -24,6 +24,7 @@ AoMap FrameAo::compute(const DepthImage& depth, const DepthNoise& noise) {
     timings_.clear();
     doubts_.clear();
     fitted_depth_.reset();
+    fitted_normals_.reset();
     AoMap ao;
     if (noise.needs_preparation() && device_) {
         ao = compute_prepared(depth, noise);
@@ -59,6 +60,7 @@ AoMap FrameAo::compute_prepared(const DepthImage& depth, const DepthNoise& noise
     if (fit_for(noise).planes()) {
         const Surfaces fitted = fit_->compute_on_device(depth);
         fitted_depth_ = fitted.z_there;
+        fitted_normals_ = fitted.normals_there;
         return method_.compute({.surfaces = fitted, .noise = noise, .smoothed = true});
     }
     return method_.compute({.surfaces = fit_->compute(depth).depth, .noise = noise});

@@ -42,6 +42,8 @@ class FrameAo {
 
     /// Plane fits' depth of the last compute(), on the device; null where none were made.
     [[nodiscard]] const std::shared_ptr<const gpu::DeviceBytes>& fitted_depth() const { return fitted_depth_; }
+    /// The normals of these fits, likewise.
+    [[nodiscard]] const std::shared_ptr<const gpu::DeviceBytes>& fitted_normals() const { return fitted_normals_; }
     /// What makes confidence and pictures of frames on this device; null where there is none.
     [[nodiscard]] Finishers* finishers() const { return finishers_.get(); }
 
@@ -62,7 +64,7 @@ class FrameAo {
     Method& method_;
     FitPlaneOptions preparation_;
     std::shared_ptr<Finishers> finishers_;
-    std::shared_ptr<const gpu::DeviceBytes> fitted_depth_;
+    std::shared_ptr<const gpu::DeviceBytes> fitted_depth_, fitted_normals_;
     std::optional<FitPlane> fit_; ///< made when noise first asks for it; its pipelines stay for other noise
     Timings timings_;
     std::vector<std::string> doubts_;

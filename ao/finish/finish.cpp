@@ -29,7 +29,12 @@ enum Buffers : int {
     cosine,
     map_out,
     confidence_out,
-    picture_out
+    picture_out,
+    normals, // of plane fits
+    direct,  // over ambient light
+    unshaded_out,
+    ambient_out,
+    direct_out
 };
 
 std::size_t words_of(cv::Size size) { return (static_cast<std::size_t>(size.area()) + 3) / 4; }
@@ -48,7 +53,7 @@ void check_sizes(const FinishInput& input) {
         return image.size() != size && !(may_be_empty && image.empty());
     };
     if (size.empty() || differs(input.visibility, false) || differs(input.colour, true) ||
-        differs(input.colour_known, true) || differs(input.fitted_m, true))
+        differs(input.colour_known, true) || differs(input.fitted_m, true) || differs(input.fitted_normals_host, true))
         throw Error(fmt::format("depth is {}x{}, visibility {}x{}, colour {}x{}: nothing says which pixel belongs to "
                                 "which",
                                 size.width, size.height, input.visibility.cols, input.visibility.rows,
@@ -78,19 +83,36 @@ bool shows_colour(int picture) { return picture == shared::picture_colour || pic
 } // namespace
 
 bool Finish::Shape::clay() const { return shows_clay(picture); }
+bool Finish::Shape::colours() const {
+    return on_device && (shows_colour(picture) || outputs.unshaded || outputs.split);
+}
+bool Finish::Shape::packed() const {
+    return on_device && (outputs.map_bits > 0 || outputs.confidence_bits > 0 || outputs.pictures());
+}
 
 Finish::Finish(gpu::Device& device)
     : device_(device), packing_(gpu::is_cpu(device.info()) ? Packing::on_host : Packing::on_device) {}
 
 Finish::Shape Finish::shape_of(const FinishInput& input, const FinishOutputs& outputs) const {
     Shape shape{input.z_m.size(), outputs, shared::picture_none};
+    const bool colour = !input.colour.empty();
     if (outputs.picture)
-        shape.picture = input.colour.empty()         ? shared::picture_clay
-                        : input.colour_known.empty() ? shared::picture_colour
-                                                     : shared::picture_both;
-    shape.fitted = shape.clay() && input.fitted;
-    shape.smoothed = shape.clay() && !input.fitted && input.fitted_m.empty();
-    if (packing_ == Packing::on_host) {
+        shape.picture = !colour || input.shade == Shade::clay ? shared::picture_clay
+                        : input.colour_known.empty()          ? shared::picture_colour
+                                                              : shared::picture_both;
+    shape.outputs.unshaded = outputs.unshaded && colour;
+    shape.outputs.split = outputs.split && colour;
+    const bool shades_ambient = input.shade == Shade::ambient && shows_colour(shape.picture);
+    const bool by_light = shades_ambient || (shape.outputs.unshaded && input.shade == Shade::ambient);
+    const shared::vec3 from = input.light ? input.light->direct : shared::vec3();
+    shape.ambient_alone = by_light && shared::dotted(from, from) > 0;
+    shape.light = (by_light || shape.outputs.split) && shared::dotted(from, from) > 0;
+    const bool looks_at_surface = shape.clay() || shape.light;
+    shape.fitted = looks_at_surface && input.fitted;
+    shape.smoothed = looks_at_surface && !input.fitted && input.fitted_m.empty();
+    shape.normals = looks_at_surface && (input.fitted_normals || !input.fitted_normals_host.empty());
+    shape.on_device = packing_ == Packing::on_device || shape.light || shape.outputs.unshaded || shape.outputs.split;
+    if (!shape.on_device) {
         shape.outputs.confidence = shape.confidence();
         shape.outputs.confidence_bits = shape.outputs.map_bits = 0;
     }
@@ -108,9 +130,8 @@ gpu::Program& Finish::program_for(const Shape& shape) {
     constexpr auto floats = gpu::BufferRow::Texels::r32f, words = gpu::BufferRow::Texels::r32ui;
     const auto pixels = static_cast<std::size_t>(shape.size.area()), packs = words_of(shape.size);
     const FinishOutputs& outputs = shape.outputs;
-    const bool on_device = packing_ == Packing::on_device;
-    const bool packed = on_device && (outputs.map_bits > 0 || outputs.confidence_bits > 0 || outputs.picture);
-    const bool colours = on_device && shows_colour(shape.picture), clay = shape.clay();
+    const bool on_device = shape.on_device, packed = shape.packed(), colours = shape.colours(), clay = shape.clay();
+    const bool surfaced = clay || shape.light;
     // What these outputs do not need has one texel.
     const auto image = [&](std::string_view name, bool needed, Host host = Host::none) {
         return gpu::BufferRow{.name = name,
@@ -129,7 +150,7 @@ gpu::Program& Finish::program_for(const Shape& shape) {
     const SrgbTables& light = srgb_tables();
     std::vector<gpu::BufferRow> buffers{
         image("seen", true, Host::upload),
-        image("surface", clay, Host::upload),
+        image("surface", surfaced, Host::upload),
         image("visibility", packed, Host::upload),
         bytes("colour", colours ? 3 : 0, Host::upload),
         bytes("colour known", colours && shape.picture == shared::picture_both ? 1 : 0, Host::upload),
@@ -142,6 +163,15 @@ gpu::Program& Finish::program_for(const Shape& shape) {
         bytes("map", on_device ? outputs.map_bits / 8 : 0, Host::download),
         bytes("confidence map", on_device && outputs.confidence_bits > 0 ? 1 : 0, Host::download),
         bytes("picture", on_device && outputs.picture ? 3 : 0, Host::download),
+        {.name = "normals",
+         .bytes = shape.normals ? pixels * 12 : 4,
+         .host = shape.normals ? Host::upload : Host::none,
+         .texels = floats,
+         .plain_writes = true},
+        image("direct light", shape.light),
+        bytes("unshaded", outputs.unshaded ? 3 : 0, Host::download),
+        bytes("ambient part", outputs.split ? 3 : 0, Host::download),
+        bytes("direct part", outputs.split ? 3 : 0, Host::download),
     };
     const auto groups_of = [](std::size_t n) {
         return static_cast<std::uint32_t>((n + shared::finish_row - 1) / shared::finish_row);
@@ -156,22 +186,31 @@ gpu::Program& Finish::program_for(const Shape& shape) {
         passes.push_back({"smooth down", "finish/smooth", {across}, {smooth}, rows, {{shared::spec_down, 1}}});
     }
     const int shown = shape.smoothed ? smooth : surface;
+    const std::vector<std::pair<int, int>> of_surface{{shared::spec_is_depth, shape.fitted},
+                                                      {shared::spec_normals, shape.normals}};
+    const int fitted_normals = shape.normals ? normals : shown; // unread without
     if (clay)
-        passes.push_back({"clay", "finish/facing", {shown}, {cosine}, rows, {{shared::spec_is_depth, shape.fitted}}});
+        passes.push_back({"clay", "finish/facing", {shown, fitted_normals}, {cosine}, rows, of_surface});
+    if (shape.light)
+        passes.push_back({"light", "finish/light", {shown, fitted_normals, visibility}, {direct}, rows, of_surface});
     constexpr std::uint32_t most_groups = 1 << 15;
     const std::uint32_t groups = groups_of(packs);
     if (packed)
-        passes.push_back(
-            {"pack",
-             "finish/pack",
-             {visibility, shape.confidence() ? confidence : visibility, clay ? surface : visibility,
-              clay ? cosine : visibility, colours ? colour : stored_light,
-              shape.picture == shared::picture_both ? colour_known : stored_light, linear_light, stored_light},
-             {map_out, confidence_out, picture_out},
-             {std::min(groups, most_groups), (groups + most_groups - 1) / most_groups, 1},
-             {{shared::spec_map_bits, outputs.map_bits},
-              {shared::spec_confidence_bits, outputs.confidence_bits},
-              {shared::spec_picture, shape.picture}}});
+        passes.push_back({"pack",
+                          "finish/pack",
+                          {visibility, shape.confidence() ? confidence : visibility, clay ? surface : visibility,
+                           clay ? cosine : visibility, colours ? colour : stored_light,
+                           shape.picture == shared::picture_both ? colour_known : stored_light, linear_light,
+                           stored_light, shape.light ? direct : visibility},
+                          {map_out, confidence_out, picture_out, unshaded_out, ambient_out, direct_out},
+                          {std::min(groups, most_groups), (groups + most_groups - 1) / most_groups, 1},
+                          {{shared::spec_map_bits, outputs.map_bits},
+                           {shared::spec_confidence_bits, outputs.confidence_bits},
+                           {shared::spec_picture, shape.picture},
+                           {shared::spec_light, shape.light},
+                           {shared::spec_ambient, shape.ambient_alone},
+                           {shared::spec_unshaded, outputs.unshaded},
+                           {shared::spec_split, outputs.split}}});
     auto program =
         std::make_unique<gpu::Program>(device_, std::move(buffers), std::move(passes), sizeof(shared::FinishConstants));
     return *programs_.emplace_back(shape, std::move(program)).second;
@@ -183,9 +222,13 @@ void Finish::upload(gpu::Program& program, const Shape& shape, const FinishInput
     if (shape.confidence())
         combine(input.z_m, input.visibility, image_of(seen),
                 [&](float z, float value) { return value == value && is_depth(z) ? z : -1e30F; });
+    if (shape.normals && input.fitted_normals)
+        program.take(normals, 0, input.fitted_normals);
+    else if (shape.normals)
+        std::memcpy(program.host(normals).data(), input.fitted_normals_host.data, input.z_m.total() * 12);
     if (shape.fitted)
         program.take(surface, 0, input.fitted);
-    else if (shape.clay()) {
+    else if (shape.clay() || shape.light) {
         const cv::Mat1f& z_m = input.fitted_m.empty() ? input.z_m : input.fitted_m;
         combine(z_m, z_m, image_of(surface), [&](float z, float) { return is_depth(z) ? 1 / z : 0.0F; });
     }
@@ -196,11 +239,11 @@ Finished Finish::compute(const FinishInput& input, const FinishOutputs& outputs)
     if (!outputs.any())
         return {};
     check_sizes(input);
-    if (!outputs.picture && !outputs.confidence && outputs.confidence_bits == 0)
+    if (!outputs.pictures() && !outputs.confidence && outputs.confidence_bits == 0)
         return {}; // a map alone would cost more to send than to pack
     const Shape shape = shape_of(input, outputs);
     const cv::Size size = shape.size;
-    const bool on_device = packing_ == Packing::on_device;
+    const bool on_device = shape.on_device;
     if (!on_device && !shape.confidence() && !shape.clay())
         return {.picture = outputs.picture ? picture_on_host(input, {}) : cv::Mat3b()};
     gpu::Program& program = program_for(shape);
@@ -212,14 +255,15 @@ Finished Finish::compute(const FinishInput& input, const FinishOutputs& outputs)
     k.noise_floor = static_cast<float>(input.noise.floor_m);
     k.noise_per_z2 = static_cast<float>(input.noise.per_z2);
     k.strength = static_cast<float>(input.strength);
+    k.light = input.light.value_or(shared::LightConstants{});
     k.words = static_cast<int>(words_of(size));
     std::ranges::transform(confidence_seeds(), k.seeds,
                            [](const cv::Point2f& seed) { return shared::vec2(seed.x, seed.y); });
 
     upload(program, shape, input);
-    if (on_device && (outputs.map_bits > 0 || outputs.confidence_bits > 0 || outputs.picture))
+    if (shape.packed())
         gpu::upload(input.visibility, program.host(visibility));
-    if (on_device && shows_colour(shape.picture))
+    if (shape.colours())
         gpu::upload(input.colour, program.host(colour));
     if (on_device && shape.picture == shared::picture_both)
         gpu::upload(input.colour_known, program.host(colour_known));
@@ -245,6 +289,12 @@ Finished Finish::compute(const FinishInput& input, const FinishOutputs& outputs)
         finished.map = copied<uchar>(program, map_out, size);
     if (outputs.picture)
         finished.picture = copied<cv::Vec3b>(program, picture_out, size);
+    if (shape.outputs.unshaded)
+        finished.unshaded = copied<cv::Vec3b>(program, unshaded_out, size);
+    if (shape.outputs.split) {
+        finished.ambient = copied<cv::Vec3b>(program, ambient_out, size);
+        finished.direct = copied<cv::Vec3b>(program, direct_out, size);
+    }
     return finished;
 }
 
@@ -270,7 +320,7 @@ Finished Finishers::compute(const FinishInput& input, const FinishOutputs& outpu
 cv::Mat3b picture_on_host(const FinishInput& input, const cv::Mat3b& clay) {
     // Clay has no colours to keep where there is no surface, so both kinds go through the same multiplication.
     cv::Mat3b base = clay.empty() ? input.colour : clay.clone();
-    if (!clay.empty() && !input.colour.empty())
+    if (!clay.empty() && !input.colour.empty() && input.shade != Shade::clay)
         input.colour.copyTo(base, input.colour_known);
     return shade(base, input.visibility, input.strength);
 }

@@ -4,6 +4,7 @@
 
 #include "ao/base/method.h"
 #include "ao/gpu/program.h"
+#include "ao/light/light.h"
 #include "projection/camera.h"
 #include "projection/noise.h"
 
@@ -23,10 +24,17 @@ struct FinishOutputs {
     int confidence_bits = 0; ///< as a map of 8 bits; 0 = no map
     int map_bits = 0;        ///< of visibility, 16 or 8; 0 = no map
     bool picture = false;    ///< colour, or clay where there is none, times visibility in linear light
+    bool unshaded = false;   ///< colour divided by visibility, where there is colour
+    bool split = false;      ///< the ambient and the direct part of colour, where there is colour
 
-    [[nodiscard]] bool any() const { return confidence || confidence_bits > 0 || map_bits > 0 || picture; }
+    [[nodiscard]] bool any() const { return confidence || confidence_bits > 0 || map_bits > 0 || pictures(); }
+    [[nodiscard]] bool pictures() const { return picture || unshaded || split; }
     bool operator==(const FinishOutputs&) const = default;
 };
+
+/// What a picture shows: colour (clay where there is none) times visibility; colour of which visibility multiplies the
+/// ambient part alone; clay times visibility.
+enum class Shade { multiply, ambient, clay };
 
 /// A frame with its visibility, all on one pixel grid. Images may share memory with others; they are only read.
 struct FinishInput {
@@ -35,12 +43,17 @@ struct FinishInput {
     cv::Mat1f visibility;                                     ///< NaN = no surface
     std::shared_ptr<const gpu::DeviceBytes> fitted = nullptr; ///< z of plane fits on this device: clay shows it in
                                                               ///< place of z_m
-    cv::Mat1f fitted_m = {};                                  ///< the same on the host; empty = none
-    double radius_m = 1;                                      ///< the method's; confidence depends on it and on
-    DepthNoise noise = {};                                    ///< that of z_m
-    cv::Mat3b colour = {};                                    ///< blue, green, red; empty = clay
-    cv::Mat1b colour_known = {};                              ///< 0 where colour has none; empty = known everywhere
-    double strength = 1;                                      ///< of the visibility in the picture
+    std::shared_ptr<const gpu::DeviceBytes> fitted_normals =
+        nullptr;                        ///< of plane fits, where AO was computed from them
+    cv::Mat3f fitted_normals_host = {}; ///< the same on the host; empty = none
+    cv::Mat1f fitted_m = {};            ///< the same on the host; empty = none
+    double radius_m = 1;                ///< the method's; confidence depends on it and on
+    DepthNoise noise = {};              ///< that of z_m
+    cv::Mat3b colour = {};              ///< blue, green, red; empty = clay
+    cv::Mat1b colour_known = {};        ///< 0 where colour has none; empty = known everywhere
+    double strength = 1;                ///< of the visibility in the picture
+    Shade shade = Shade::multiply;
+    std::optional<shared::LightConstants> light = {}; ///< in camera space; none = all light is ambient
 };
 
 /// Empty images were not asked for. Maps are empty, too, and confidence has floats, where the host packs: on
@@ -49,11 +62,13 @@ struct Finished {
     cv::Mat1f confidence = {};     ///< 0 .. 1, NaN where there is no visibility
     cv::Mat1b confidence_map = {}; ///< 0 = none, 1 .. 255 = 0 .. 1
     cv::Mat map = {};              ///< of visibility: 0 = no surface, 1 .. 255 or 65535 = 0 .. 1
-    cv::Mat3b picture = {};        ///< blue, green, red
+    cv::Mat3b picture = {};        ///< blue, green, red, as all pictures
+    cv::Mat3b unshaded = {}, ambient = {}, direct = {};
 };
 
 /// Whether the device turns values into the bytes of maps and pictures. A GPU then has less to download. Where the
-/// device is the processor, the host's own loops take half the time.
+/// device is the processor, the host's own loops take half the time. Split and divided colours are always made on the
+/// device.
 enum class Packing { on_device, on_host };
 
 /// Not thread-safe: one frame at a time.
@@ -73,10 +88,17 @@ class Finish {
         cv::Size size;
         FinishOutputs outputs;
         int picture = 0;
-        bool fitted = false, smoothed = false; ///< of clay: which depth it shows
+        bool light = false;         ///< there is direct light to tell apart
+        bool ambient_alone = false; ///< visibility has a say in ambient light alone
+        bool fitted = false, smoothed = false, normals = false; ///< of clay and light: which depth they show
+        bool on_device = false;                                 ///< packs there
         bool operator==(const Shape&) const = default;
         [[nodiscard]] bool clay() const;
-        [[nodiscard]] bool confidence() const { return outputs.confidence || outputs.confidence_bits > 0; }
+        [[nodiscard]] bool colours() const;
+        [[nodiscard]] bool packed() const;
+        [[nodiscard]] bool confidence() const {
+            return outputs.confidence || outputs.confidence_bits > 0 || outputs.unshaded;
+        }
     };
     [[nodiscard]] Shape shape_of(const FinishInput& input, const FinishOutputs& outputs) const;
     gpu::Program& program_for(const Shape& shape);

@@ -206,8 +206,8 @@ json run_head(const json& manifest) {
     std::ranges::move(texts_at(manifest, "outlook"), std::back_inserter(first));
     for (const std::string& sentence : first) // what to expect comes first
         head.contains("lead") ? notes.push_back(sentence) : void(head["lead"] = sentence);
-    for (const auto& [key, title] :
-         {std::pair{"radius", "radius: "}, std::pair{"depth_noise", "depth noise: "}, std::pair{"shading", ""}})
+    for (const auto& [key, title] : {std::pair{"radius", "radius: "}, std::pair{"depth_noise", "depth noise: "},
+                                     std::pair{"shading", ""}, std::pair{"light", ""}})
         if (const std::string sentence = text_at(manifest, key); !sentence.empty())
             notes.push_back(title + sentence);
     for (const std::string& warning : texts_at(capture, "warnings"))

@@ -26,7 +26,7 @@ fs::path points_file(const std::string& name, std::size_t part) {
 Outputs of_points(const Outputs& outputs) {
     Outputs those = outputs;
     those.cloud = outputs.cloud || outputs.ao || outputs.confidence;
-    those.ao = those.confidence = those.shaded = those.panel = false;
+    those.ao = those.confidence = those.shaded = those.unshaded = those.light = those.panel = false;
     return those;
 }
 
@@ -39,6 +39,11 @@ std::vector<fs::path> files_of(const CaptureEntry& entry, const Outputs& outputs
         add(confidence_file(entry.name, outputs));
     if (outputs.shaded)
         add(picture_file("shaded", entry.name));
+    if (outputs.unshaded)
+        add(picture_file("unshaded", entry.name));
+    for (const char* part : {"ambient", "direct"})
+        if (outputs.light)
+            add(picture_file(part, entry.name));
     if (outputs.panel)
         add(picture_file("panel", entry.name));
     if (outputs.preview)

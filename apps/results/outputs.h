@@ -1,6 +1,7 @@
 // Which files a run writes for each frame, and where.
 #pragma once
 
+#include "ao/finish/finish.h"
 #include "io/captures/capture.h"
 #include "io/images/image_file.h"
 
@@ -17,7 +18,8 @@ namespace scanshade {
 enum class CloudColours { kept, shaded, grey };
 
 /// The folders that Outputs fill.
-inline constexpr std::array result_folders = {"ao", "confidence", "shaded", "panel", "clouds", "previews", "points"};
+inline constexpr std::array result_folders = {"ao",     "confidence", "shaded", "unshaded", "ambient",
+                                              "direct", "panel",      "clouds", "previews", "points"};
 /// That of tars of results (result_tars.h).
 inline constexpr const char* tar_folder = "tars";
 
@@ -30,14 +32,17 @@ struct Outputs {
     bool ao = true;         ///< the visibility map
     bool confidence = true; ///< how reliable the visibility is (confidence_of()), as 8 bits or floats
     bool shaded = true; ///< colour times visibility; clay times visibility where colour is not known to fit the depth
-    bool panel = false; ///< colour | depth | AO | shaded
+    bool unshaded = false; ///< colour divided by visibility, where there is colour
+    bool light = false;    ///< colour's ambient and direct part, where there is colour
+    bool panel = false;    ///< colour | depth | AO | shaded
     bool cloud = true; ///< a cloud input with the fields ambient_occlusion and ao_confidence, everything else as it was
     bool depth_cloud = false; ///< a new PLY of a depth frame's points, in camera space
     bool glb = false;         ///< the points of either as binary glTF
     bool mcap = false;        ///< all frames as one recording, run.mcap; not a file of a frame
     AoFormat format = AoFormat::png16;
-    double shade_strength = 1; ///< 0 leaves the colour, 1 multiplies by visibility
-    bool colour_view = false;  ///< maps and pictures of frames with a secondary camera use its pixels
+    Shade shade = Shade::multiply; ///< what visibility multiplies in pictures
+    double shade_strength = 1;     ///< 0 leaves the colour, 1 multiplies by visibility
+    bool colour_view = false;      ///< maps and pictures of frames with a secondary camera use its pixels
     CloudColours colour_cloud = CloudColours::kept;
     bool preview = false;              ///< what the page shows of the frame beside the other files
     std::size_t page_points = 1000000; ///< of a cloud, at most, on the page
@@ -63,10 +68,15 @@ struct Outputs {
 /// The files that `outputs` makes of a frame. A cloud has both possible names, since only its content has the format.
 [[nodiscard]] std::vector<std::filesystem::path> files_of(const CaptureEntry& entry, const Outputs& outputs);
 
+/// Whether the light of the colour images has to be known.
+[[nodiscard]] inline bool needs_light(const Outputs& outputs) {
+    return outputs.light || (outputs.shade == Shade::ambient && (outputs.shaded || outputs.unshaded || outputs.panel));
+}
+
 /// Whether any output shows the colour images.
 [[nodiscard]] inline bool shows_colour(const Outputs& outputs, bool recording_cloud) {
-    return outputs.shaded || outputs.panel || outputs.depth_cloud || outputs.glb || outputs.colour_view ||
-           recording_cloud;
+    return outputs.shaded || outputs.unshaded || outputs.light || outputs.panel || outputs.depth_cloud || outputs.glb ||
+           outputs.colour_view || recording_cloud;
 }
 
 } // namespace scanshade

@@ -274,6 +274,8 @@ json manifest_head(const RunReport& report) {
               {"totals", totals_json(report)}};
     if (!report.radius.empty())
         head["radius"] = report.radius;
+    if (!report.light.empty())
+        head["light"] = report.light;
     return head;
 }
 

@@ -24,11 +24,13 @@ std::string names_of(const std::vector<FrameRow>& rows, FrameStatus status) {
 
 } // namespace
 
-std::string shading_sentence(const Capture& capture, Registration registration) {
+std::string shading_sentence(const Capture& capture, Registration registration, Shade shade) {
     const bool clouds = std::ranges::none_of(capture.entries, [](const auto& entry) { return entry.cloud.empty(); });
     const bool colour = std::ranges::any_of(capture.entries, [](const auto& entry) { return !entry.colour.empty(); });
     if (clouds)
         return "shaded pictures show the points' own colours, or grey clay where they have none.";
+    if (shade == Shade::clay)
+        return "shaded pictures show grey clay made from depth, as asked.";
     if (!colour)
         return "shaded pictures show grey clay made from depth: the capture has no colour images.";
     if (registration == Registration::yes)
@@ -86,6 +88,8 @@ void introduce(const RunReport& report, std::size_t frames, bool by_points) {
     for (const std::string& sentence : report.budget)
         say("  " + sentence);
     say("  " + report.shading);
+    if (!report.light.empty())
+        say("  " + report.light);
 }
 
 void conclude(const RunReport& report, const std::filesystem::path& table) {

@@ -10,7 +10,8 @@
 namespace scanshade {
 
 /// What the shaded pictures show, and which flag changes that.
-[[nodiscard]] std::string shading_sentence(const Capture& capture, Registration registration);
+[[nodiscard]] std::string shading_sentence(const Capture& capture, Registration registration,
+                                           Shade shade = Shade::multiply);
 /// Who gave the noise of the depth: "measured", or the flag.
 [[nodiscard]] std::string noise_origin(const RunSettings& settings);
 /// "0.23 units, 0.1 of the median depth of 2.3 units; the recording's unit is arbitrary"; empty where it is metres.

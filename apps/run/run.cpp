@@ -14,6 +14,7 @@
 #include "apps/run/workers.h"
 #include "apps/slice.h"
 #include "apps/walk/batch.h"
+#include "apps/walk/capture_light.h"
 #include "apps/walk/overlap.h"
 #include "apps/walk/point_clouds.h"
 #include "apps/walk/pose_check.h"
@@ -165,6 +166,13 @@ class Run final : public Command {
                 captures.take(i, rows);
             } catch (const DeviceLost&) { // the other captures need it, too
                 throw;
+            } catch (const Misuse&) {
+                throw;
+            } catch (const NoLight& failure) {
+                warn(fmt::format("failed: {}", failure.what()));
+                const std::lock_guard alone(counting);
+                failures_.push_back(failure.what());
+                ++unopened;
             } catch (const Outage& failure) {
                 warn(fmt::format("failed: {}", failure.what()));
                 fault = Fault::outage;
@@ -290,7 +298,7 @@ class Run final : public Command {
                          .radius = radius_sentence(asked_, job.capture),
                          .depth_noise = noise_sentence(job.batch.noise, asked_, job.capture.unit),
                          .budget = {},
-                         .shading = shading_sentence(job.capture, registration),
+                         .shading = shading_sentence(job.capture, registration, job.batch.outputs.shade),
                          .frames = {}};
         report.devices = workers ? workers->devices() : 1;
         report.alone = job.block.empty();
@@ -555,7 +563,8 @@ class Run final : public Command {
         job.batch.points = points.get();
         RunReport report = begun_report(job, workers);
         report.budget = budget;
-        std::string settings = settings_key(report, job.batch.outputs, job.batch.noise);
+        const std::string light = take_light(job, report, by_points);
+        std::string settings = settings_key(report, job.batch.outputs, job.batch.noise, light);
         std::string at_work;
         if (by_points) {
             if (!own.make_for_points())
@@ -567,6 +576,29 @@ class Run final : public Command {
             at_work = fmt::format("{} on {}", asked_.method, workers->description());
         }
         return {std::move(report), std::move(settings), std::move(points), by_points, std::move(at_work)};
+    }
+
+    /// The light of the colours, where outputs need it: what an earlier run of the same task has found, else estimated
+    /// anew and written beside the results. Returns its text, which belongs to what results were made from.
+    std::string take_light(CaptureJob& job, RunReport& report, bool by_points) {
+        if (!needs_light(job.batch.outputs))
+            return "";
+        if (by_points) {
+            job.capture.warnings.emplace_back(
+                "--shade ambient and --write light need images: clouds computed from their points are multiplied.");
+            return "";
+        }
+        const fs::path file = job.folder() / "light.json";
+        const std::string task = task_key(asked_.stages_in_use(), job.capture, job.of, asked_.in_sequence(job.capture));
+        auto found = asked_.resume ? light_in(file, task) : std::nullopt;
+        if (!found) {
+            const MethodPool::Lease method = workers().pool().lease();
+            found = light_of(job.capture, job.of, *method, job.batch, light_request(asked_.light));
+            write_atomically(file, text_of(*found, task));
+        }
+        job.batch.light = found->light;
+        report.light = found->sentence;
+        return text_of(*light_in(file, task), "");
     }
 
     /// Whether the capture holds clouds that are computed from their points. Judged by the clouds in memory; those that

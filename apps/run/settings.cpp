@@ -4,6 +4,7 @@
 #include "ao/cloud/cloud_ao.h"
 #include "apps/method_settings.h"
 #include "apps/settings_file.h"
+#include "apps/walk/capture_light.h"
 #include "projection/base/error.h"
 #include "projection/base/nearest_word.h"
 
@@ -35,6 +36,8 @@ constexpr auto format_words = [] {
 constexpr std::array view_words{Named{"depth", false}, Named{"colour", true}};
 constexpr std::array colour_words{Named{"kept", CloudColours::kept}, Named{"shaded", CloudColours::shaded},
                                   Named{"grey", CloudColours::grey}};
+constexpr std::array shade_words{Named{"multiply", Shade::multiply}, Named{"ambient", Shade::ambient},
+                                 Named{"clay", Shade::clay}};
 constexpr std::array page_words{Named{"yes", true}, Named{"no", false}};
 constexpr std::array log_words{Named{"text", false}, Named{"json", true}};
 
@@ -48,7 +51,8 @@ constexpr auto maybe_quality_words = [] {
 }();
 
 std::set<std::string> words_of(const std::string& list) {
-    const std::vector<std::string> known{"ao", "confidence", "shaded", "cloud", "panel", "glb", "mcap"};
+    const std::vector<std::string> known{"ao",    "confidence", "shaded", "unshaded", "light",
+                                         "cloud", "panel",      "glb",    "mcap"};
     std::set<std::string> words;
     std::istringstream stream(list);
     for (std::string word; std::getline(stream, word, ',');) {
@@ -63,6 +67,7 @@ std::set<std::string> words_of(const std::string& list) {
 Outputs outputs_from(const RunSettings& asked) {
     Outputs wanted;
     wanted.format = asked.format;
+    wanted.shade = asked.shade;
     wanted.shade_strength = asked.shade_strength;
     wanted.colour_cloud = asked.colour_cloud;
     wanted.colour_view = asked.colour_view;
@@ -74,6 +79,8 @@ Outputs outputs_from(const RunSettings& asked) {
         wanted.ao = words.contains("ao");
         wanted.confidence = words.contains("confidence");
         wanted.shaded = words.contains("shaded");
+        wanted.unshaded = words.contains("unshaded");
+        wanted.light = words.contains("light");
         wanted.panel = words.contains("panel");
         wanted.glb = words.contains("glb");
         wanted.mcap = words.contains("mcap");
@@ -286,10 +293,12 @@ std::vector<Stage> RunSettings::common_stages() {
            .common = true,
            .writes = Writes::folder},
           {.name = "write",
-           .help =
-               "any of ao,confidence,shaded,cloud,panel,glb,mcap; auto = ao,confidence,shaded, and cloud for clouds. "
-               "glb: each frame's points or mesh as binary glTF; mcap: run.mcap, one recording of all frames for "
-               "Foxglove, Rerun and ROS",
+           .help = "any of ao,confidence,shaded,unshaded,light,cloud,panel,glb,mcap; auto = ao,confidence,shaded, and "
+                   "cloud for clouds. "
+                   "unshaded: colour divided by visibility, where confidence allows it; "
+                   "light: ambient and direct, the two parts of colour; glb: each frame's points or mesh as binary "
+                   "glTF; mcap: run.mcap, one recording of all frames for "
+                   "Foxglove, Rerun and ROS",
            .value = &s.write,
            .common = true},
           {.name = "format",
@@ -299,6 +308,16 @@ std::vector<Stage> RunSettings::common_stages() {
           {.name = "view",
            .help = "camera whose pixels maps and pictures use, if a secondary camera took the colour images",
            .value = OneOf(&s.colour_view, view_words)},
+          {.name = "shade",
+           .help = "what visibility multiplies in pictures: multiply = all of the colour (clay where there is none); "
+                   "ambient = its ambient light alone; clay = grey clay made from depth",
+           .value = OneOf(&s.shade, shade_words)},
+          {.name = "light",
+           .help =
+               "direct light in the colours, for --shade ambient and --write light: auto = estimated over the whole "
+               "capture; none = all light is ambient; X,Y,Z = towards it, in the recording's world where frames have "
+               "poses, else in camera space (x right, y down, z forward)",
+           .value = &s.light},
           {.name = "shade-strength",
            .help = "0 leaves the colour, 1 multiplies it by visibility",
            .value = &s.shade_strength,
@@ -398,6 +417,7 @@ void RunSettings::resolve() {
     range_ = range_from(depth_range);
     if (depth_noise != "auto")
         (void)noise_from_text(depth_noise);
+    (void)light_request(light);
     if (!recording_cloud.empty() && (resume || paths.size() > 1))
         throw Misuse("cloud: is made of all frames of one capture in one run, without --resume");
     if (budget.any() && (quality || preset != Preset::fast))

@@ -48,6 +48,8 @@ class RunSettings {
     std::string out, write = "auto", dump;
     AoFormat format = AoFormat::png16;
     bool colour_view = false;
+    Shade shade = Shade::multiply;
+    std::string light = "auto";
     double shade_strength = 1;
     std::string recording_cloud;
     double cloud_resolution_m = 0;

@@ -1,6 +1,7 @@
 // Captures with known truth: frames along the scene's walk, rendered, recorded, written.
 #include "apps/scenes/generate.h"
 
+#include "apps/scenes/light.h"
 #include "apps/scenes/random_noise.h"
 #include "apps/scenes/scene.h"
 #include "apps/scenes/scene_cloud.h"
@@ -191,6 +192,11 @@ std::string truth_note(const GenerateOptions& options, const scene::Scene& scene
          "the whole scene; NaN = no surface. ao_quad, ao_lin: the same, weighted by 1 - t^2 / R^2 and by "
          "(R - t) / (0.615 R)"},
         {"falloffs", options.truth_falloff},
+        {"light",
+         {{"kind", word_for(options.light, scene::light_words)},
+          {"towards", options.light_towards},
+          {"direct_over_ambient", options.light == scene::LightKind::sun ? options.light_ratio : 0},
+          {"ambient_is_occluded", options.light_occluded}}},
         {"radius_m", truth_radius_m(options, scene)},
         {"rays_per_pixel", options.truth_rays},
     };
@@ -225,6 +231,39 @@ TruthError write_truth(const GenerateOptions& options, const Sight& sight, const
     return summary_of(truth.standard_error);
 }
 
+scene::SceneLight light_from(const GenerateOptions& options) {
+    scene::SceneLight light;
+    light.kind = options.light;
+    int used = 0;
+    Eigen::Vector3d& l = light.towards;
+    if (std::sscanf(options.light_towards.c_str(), "%lf,%lf,%lf%n", &l.x(), &l.y(), &l.z(), &used) != 3 ||
+        used != static_cast<int>(options.light_towards.size()) || !l.allFinite() || !(l.norm() > 1e-9))
+        throw Misuse("light-towards: '" + options.light_towards + "' given, expected X,Y,Z such as 0.45,-0.35,0.82");
+    light.ratio = options.light_ratio;
+    light.occluded = options.light_occluded;
+    return light;
+}
+
+/// Colour and its parts, as seen from where the depth image is.
+void write_lit(const GenerateOptions& options, const Sight& sight, const std::string& colour_stamp,
+               const std::string& depth_stamp, const fs::path& out) {
+    const scene::SceneLight light = light_from(options);
+    const scene::LitImages lit = scene::render_lit(sight.world, sight.camera, sight.world_from_camera, light);
+    cv::Mat1f visibility;
+    if (light.occluded)
+        visibility =
+            true_visibility(sight.world, sight.camera, sight.world_from_camera,
+                            {truth_radius_m(options, sight.world.scene()), options.truth_rays, options.seed, false})
+                .visibility[0];
+    write_picture(out / "rgb" / (colour_stamp + ".png"), scene::photograph(lit, visibility));
+    if (!options.truth)
+        return;
+    const fs::path truth = out / "truth";
+    write_float_tiff(truth / "albedo" / (depth_stamp + ".tiff"), as_written(lit.albedo));
+    write_float_tiff(truth / "ambient" / (depth_stamp + ".tiff"), as_written(lit.ambient));
+    write_float_tiff(truth / "direct" / (depth_stamp + ".tiff"), as_written(lit.direct));
+}
+
 /// The truth's errors, where truth is written.
 std::optional<TruthError> write_frame(const GenerateOptions& options, const scene::World& world,
                                       const scene::Optics& camera, int frame, const fs::path& out) {
@@ -233,8 +272,11 @@ std::optional<TruthError> write_frame(const GenerateOptions& options, const scen
     const Eigen::Isometry3d depth_pose = scene::world_from_camera(walk, seconds(depth_time(frame)));
     const std::string depth_stamp = stamp(depth_time(frame));
 
-    write_picture(out / "rgb" / (stamp(colour_time(frame)) + ".png"), render_colour(world, camera, colour_pose));
     const Sight sight{world, camera, depth_pose, render_geometry(world, camera, depth_pose), options.seed, frame};
+    if (options.light == scene::LightKind::soft)
+        write_picture(out / "rgb" / (stamp(colour_time(frame)) + ".png"), render_colour(world, camera, colour_pose));
+    else
+        write_lit(options, sight, stamp(colour_time(frame)), depth_stamp, out);
     const cv::Mat1f recorded = sensor_named(options.sensor).record(sight);
     if (const double units = units_per_metre(options, world.scene()); units > 0)
         write_depth_png(out / "depth" / (depth_stamp + ".png"), recorded, units);
@@ -346,6 +388,19 @@ std::vector<Parameter> GenerateOptions::parameters() {
         {.name = "truth-falloff",
          .help = "any of hard,quad,lin: how an occluder's weight falls with its distance",
          .value = &truth_falloff},
+        {.name = "light",
+         .help = "of the colour images: soft (no shadows, parts unknown), or light whose parts are written as truth: "
+                 "ambient, overcast (brighter from above), sun (ambient, and direct light with shadows)",
+         .value = OneOf(&light, scene::light_words)},
+        {.name = "light-towards",
+         .help = "where the sun is: X,Y,Z in the scene's world, z up",
+         .value = &light_towards},
+        {.name = "light-ratio",
+         .help = "the sun's light over ambient light, of a surface that faces the sun",
+         .value = &light_ratio,
+         .low = 0,
+         .high = 100},
+        {.name = "light-occluded", .help = "multiplies ambient light by true visibility", .value = &light_occluded},
         {.name = "cloud",
          .help = "a cloud of this many points on the scene's surfaces, instead of a recording; 0 = a recording",
          .value = &cloud,
@@ -366,6 +421,7 @@ void generate(const GenerateOptions& options, const fs::path& out, const Generat
     for (const Parameter& row : checked.parameters())
         check(row);
     (void)parsed_falloffs(options.truth_falloff);
+    (void)light_from(options);
     const scene::Scene& scene = scene::scene_named(options.scene);
     const Pinhole camera = camera_of_size(parsed_size(options.size));
     const std::vector<int> frames = frames_of(options);

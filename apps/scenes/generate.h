@@ -1,6 +1,7 @@
 // Captures with known truth: a synthetic scene seen by a simulated depth sensor, written in TUM's layout.
 #pragma once
 
+#include "apps/scenes/light.h"
 #include "apps/scenes/scanner.h"
 #include "projection/base/parameters.h"
 
@@ -28,9 +29,13 @@ struct GenerateOptions {
     double truth_radius_m = 0;          ///< occluders farther than this do not count; 0 = the scene's own
     int truth_rays = 256;               ///< per pixel
     std::string truth_falloff = "hard"; ///< any of hard,quad,lin
-    int cloud = 0;                      ///< points; 0 = a recording
-    bool cloud_normals = true;          ///< whether the cloud has them
-    scene::ScannerOptions scanner = {}; ///< of the cloud
+    scene::LightKind light = scene::LightKind::soft;
+    std::string light_towards = "0.45,-0.35,0.82"; ///< a sun's, in the scene's world, z up
+    double light_ratio = 1.5;                      ///< direct / ambient light
+    bool light_occluded = true;                    ///< ambient light is multiplied by true visibility
+    int cloud = 0;                                 ///< points; 0 = a recording
+    bool cloud_normals = true;                     ///< whether the cloud has them
+    scene::ScannerOptions scanner = {};            ///< of the cloud
     bool overwrite = false;
 
     /// Every setting but the scene, which is a word of the command line.
@@ -48,6 +53,8 @@ using GenerateProgress = std::function<void(int done, int total)>;
 /// - rgb.txt, depth.txt, groundtruth.txt (camera to world), camera.json, truth/truth.json
 /// - truth/depth/<stamp>.tiff: exact z in metres; truth/normals/<stamp>.tiff: exact, x y z
 /// - truth/ao/<stamp>.tiff: cosine-weighted visibility within truth_radius_m; ao_quad and ao_lin for those falloffs
+/// - with a light whose parts are known: truth/ambient, truth/direct and truth/albedo/<stamp>.tiff, linear red, green,
+///   blue; a colour image is then taken from where the depth image is, and is ambient * visibility + direct
 /// - with `cloud` set, in place of images: NAME.ply, points of equal density on all that can be seen of the scene, or
 ///   what the scanner records; and truth/NAME.ply, the same with the field ambient_occlusion
 /// Same options, same bytes, however many threads there are. A frame is the same whatever first and step lead to it.

@@ -395,6 +395,8 @@ Eigen::Vector2d Optics::direction(double u, double v) const {
     return *straight;
 }
 
+Vector3d albedo_at(const Hit& hit, const Vector3d& point) { return albedo(hit.body->material, point, hit.normal); }
+
 Geometry render_geometry(const World& world, const Optics& camera, const Eigen::Isometry3d& world_from_camera) {
     Geometry geometry{cv::Mat1f(camera.pinhole.size, 0.0F), cv::Mat3f(camera.pinhole.size, cv::Vec3f(0, 0, 0))};
     for_each_pixel(camera, [&](int u, int v) {

@@ -141,6 +141,9 @@ struct Geometry {
 [[nodiscard]] cv::Mat3b render_colour(const World& world, const Optics& camera,
                                       const Eigen::Isometry3d& world_from_camera);
 
+/// Linear red, green, blue of the surface that was hit, at the point of the hit.
+[[nodiscard]] Eigen::Vector3d albedo_at(const Hit& hit, const Eigen::Vector3d& point);
+
 struct TruthOptions {
     double radius_m = 0.5;
     int rays = 256; ///< per pixel

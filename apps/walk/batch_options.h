@@ -32,6 +32,7 @@ struct BatchOptions {
     ProjectOptions range;                     ///< depth outside counts as a hole
     double radius_m = 0;                      ///< the method's, and
     DepthNoise noise;                         ///< the depth's: what confidence depends on
+    std::optional<Light> light;               ///< of the colour images, where outputs need it
     std::optional<Registration> registration; ///< as the user set it; none: as the capture says
     PointMethod* points = nullptr;            ///< computes clouds and meshes where `cloud_walk` asks for points
     CloudWalk cloud_walk = CloudWalk::automatic;

@@ -21,7 +21,7 @@
 namespace scanshade {
 namespace {
 
-cv::Mat3b panel_picture(const Frame& frame, const Scene& scene, const cv::Mat3b& shaded) {
+cv::Mat3b panel_picture(const Frame& frame, const Scene& scene, const cv::Mat3b& shaded, Shade shade) {
     const bool fits = !scene.colour.empty();
     const std::string colour = fits                   ? "colour"
                                : frame.colour.empty() ? "no colour"
@@ -29,7 +29,10 @@ cv::Mat3b panel_picture(const Frame& frame, const Scene& scene, const cv::Mat3b&
     return panel({{colour, fits ? scene.colour : frame.colour},
                   {"depth", depth_picture(scene.z_m)},
                   {"ambient occlusion", visibility_picture(scene.visibility)},
-                  {fits ? "colour x AO" : "clay x AO", shaded}});
+                  {!fits || shade == Shade::clay ? "clay x AO"
+                   : shade == Shade::ambient     ? "ambient part x AO"
+                                                 : "colour x AO",
+                   shaded}});
 }
 
 /// The depth frame's surface as points in camera space.
@@ -131,9 +134,14 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
         });
     if (outputs.shaded)
         wrote(picture_file("shaded", name), [&](const auto& file) { write_picture(file, images.shaded); });
+    for (const auto& [kind, picture] :
+         {std::pair{"unshaded", &images.unshaded}, {"ambient", &images.ambient}, {"direct", &images.direct}})
+        if (!picture->empty())
+            wrote(picture_file(kind, name), [&](const auto& file) { write_picture(file, *picture); });
     if (outputs.panel)
-        wrote(picture_file("panel", name),
-              [&](const auto& file) { write_picture(file, panel_picture(work.frame, scene, images.shaded)); });
+        wrote(picture_file("panel", name), [&](const auto& file) {
+            write_picture(file, panel_picture(work.frame, scene, images.shaded, outputs.shade));
+        });
     if (outputs.preview && !scene.z_m.empty())
         wrote(preview_file(name),
               [&](const auto& file) { write_atomically(file, preview_of(work, images, outputs.unit)); });

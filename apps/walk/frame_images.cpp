@@ -7,6 +7,7 @@
 #include "projection/confidence.h"
 
 #include <algorithm>
+#include <fmt/format.h>
 
 namespace scanshade {
 namespace {
@@ -51,8 +52,11 @@ Finished finished(Work& work, const FinishInput& input, const FinishOutputs& out
     Finished made;
     if (outputs.confidence || outputs.confidence_bits > 0)
         made.confidence = confidence_of({input.camera, input.z_m, {}}, input.visibility, input.radius_m, input.noise);
+    if (outputs.unshaded || outputs.split || (outputs.picture && input.shade == Shade::ambient))
+        work.row.warnings.push_back("the image is too large for the device: colours are not split into ambient and "
+                                    "direct light, and shaded multiplies all of them.");
     if (outputs.picture) {
-        const bool has_gaps = input.colour.empty() || !input.colour_known.empty();
+        const bool has_gaps = input.colour.empty() || !input.colour_known.empty() || input.shade == Shade::clay;
         made.picture = picture_on_host(input, has_gaps ? clay(input.z_m, input.camera) : cv::Mat3b());
     }
     return made;
@@ -63,6 +67,37 @@ bool is_float(AoFormat format) { return format == AoFormat::tiff || format == Ao
 bool wants_confidence(const Work& work, const BatchOptions& options, const Outputs& outputs) {
     return options.cloud || outputs.confidence || (work.frame.cloud ? outputs.cloud : outputs.depth_cloud) ||
            outputs.glb;
+}
+
+/// The light as the camera of that scene sees it.
+std::optional<shared::LightConstants> light_on(const Work& work, const BatchOptions& options, bool colour_view) {
+    if (!options.light)
+        return std::nullopt;
+    Eigen::Isometry3d world_from_camera = work.frame.world_from_camera.value_or(Eigen::Isometry3d::Identity());
+    Light light = *options.light;
+    if (light.in_world && !work.frame.world_from_camera)
+        return std::nullopt; // nobody knows where this camera looks
+    if (colour_view && has_secondary_camera(work.frame)) {
+        world_from_camera = world_from_camera * work.frame.colour_camera->colour_from_depth.inverse();
+        if (!light.in_world) { // in the depth camera's space
+            light.in_world = true;
+            world_from_camera = work.frame.colour_camera->colour_from_depth.inverse();
+        }
+    }
+    return light.on_gpu(world_from_camera.linear());
+}
+
+/// Sentences for what a frame could not be given.
+void warn_of_light(Work& work, const BatchOptions& options, const Outputs& outputs, const Scene& scene) {
+    const bool divided = outputs.unshaded || outputs.light;
+    if (scene.colour.empty() && (divided || (outputs.shade == Shade::ambient && (outputs.shaded || outputs.panel))))
+        work.row.warnings.push_back(
+            fmt::format("no colour that fits the depth: {}",
+                        divided ? "it has no unshaded, ambient or direct image." : "shaded shows clay."));
+    else if (options.light && options.light->in_world && options.light->has_direct() && needs_light(outputs) &&
+             !work.frame.world_from_camera)
+        work.row.warnings.emplace_back("the frame has no pose, so nobody knows where the light comes from: all of it "
+                                       "is taken for ambient.");
 }
 
 /// Whether the view has the recorded pixels: nothing needs to be attached.
@@ -99,19 +134,25 @@ FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outpu
                            .z_m = work.depth.z_m,
                            .visibility = work.ao.visibility,
                            .fitted = work.fitted,
+                           .fitted_normals = work.fitted_normals,
                            .fitted_m = work.looked_at.z_m,
                            .radius_m = options.radius_m,
                            .noise = options.noise};
     FinishOutputs made{.map_bits = !outputs.ao || is_float(outputs.format) ? 0
                                    : outputs.format == AoFormat::png8      ? 8
                                                                            : 16,
-                       .picture = outputs.shaded || outputs.panel};
+                       .picture = outputs.shaded || outputs.panel,
+                       .unshaded = outputs.unshaded,
+                       .split = outputs.light};
     FrameImages images;
     if (is_as_recorded(work.frame)) {
         images.scene = scene_of(work, outputs.colour_view);
         FinishInput input = view;
         input.colour = images.scene.colour;
         input.strength = outputs.shade_strength;
+        input.shade = outputs.shade;
+        input.light = light_on(work, options, outputs.colour_view);
+        warn_of_light(work, options, outputs, images.scene);
         made.confidence_bits = outputs.confidence && !is_float(outputs.format) ? 8 : 0;
         made.confidence =
             confidence && (made.confidence_bits == 0 || options.cloud || outputs.depth_cloud || outputs.glb);
@@ -120,6 +161,9 @@ FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outpu
         images.map = all.map;
         images.confidence_map = all.confidence_map;
         images.shaded = all.picture;
+        images.unshaded = all.unshaded;
+        images.ambient = all.ambient;
+        images.direct = all.direct;
         return images;
     }
     if (confidence) {
@@ -127,16 +171,24 @@ FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outpu
         work.confidence = attach(work.frame, work.depth, {work.confidence_in_view});
     }
     const Scene scene = images.scene = scene_of(work, outputs.colour_view);
+    warn_of_light(work, options, outputs, scene);
     const Finished all = finished(work,
                                   {.camera = scene.camera,
                                    .z_m = scene.z_m,
                                    .visibility = scene.visibility,
+                                   .radius_m = options.radius_m,
+                                   .noise = options.noise,
                                    .colour = scene.colour,
                                    .colour_known = scene.colour_known,
-                                   .strength = outputs.shade_strength},
+                                   .strength = outputs.shade_strength,
+                                   .shade = outputs.shade,
+                                   .light = light_on(work, options, outputs.colour_view)},
                                   made);
     images.map = all.map;
     images.shaded = all.picture;
+    images.unshaded = all.unshaded;
+    images.ambient = all.ambient;
+    images.direct = all.direct;
     return images;
 }
 

@@ -70,6 +70,7 @@ void prepare_view(Work& work, const ProjectOptions& range) {
 void compute_alone(Work& work, FrameAo& method, const DepthNoise& noise) {
     work.ao = method.compute(work.depth, noise);
     work.fitted = method.fitted_depth();
+    work.fitted_normals = method.fitted_normals();
     work.row.passes = method.timings();
     std::ranges::copy(method.doubts(), std::back_inserter(work.row.doubts));
 }

@@ -54,7 +54,9 @@ constexpr std::array aside = {"frames",
                               "colour",
                               "page",
                               "page-points",
-                              "tar"};
+                              "tar",
+                              "shade",
+                              "light"};
 
 /// Settings that change no results when they are typed differently.
 constexpr std::array elsewhere = {"out",           "overwrite", "dump", "resume", "retry",     "shard",  "scratch",
@@ -76,10 +78,16 @@ std::string outputs_text(const Outputs& outputs) {
         text += "shaded;";
     if (outputs.panel)
         text += "panel;";
+    if (outputs.unshaded)
+        text += fmt::format("unshaded {};", outputs.shade_strength);
+    if (outputs.light)
+        text += "light;";
     if (outputs.cloud)
         text += colours + "cloud;";
     if (outputs.depth_cloud)
         text += colours + "depth cloud;";
+    if (outputs.shade != Shade::multiply && (outputs.shaded || outputs.panel || outputs.unshaded))
+        text += fmt::format("shade {};", static_cast<int>(outputs.shade));
     if (outputs.shaded || outputs.panel || outputs.colour_cloud != CloudColours::kept)
         text += fmt::format("strength {};", outputs.shade_strength);
     if (outputs.glb)
@@ -168,10 +176,13 @@ std::vector<FrameRow> run_one_by_one(const Capture& capture, MethodPool& pool, B
 
 } // namespace
 
-std::string settings_key(const RunReport& report, const Outputs& outputs, const DepthNoise& noise) {
+std::string settings_key(const RunReport& report, const Outputs& outputs, const DepthNoise& noise,
+                         const std::string& light) {
     std::vector<std::string> parts = {
         report.method, capture_text(report.capture), outputs_text(outputs), std::string(name_of(report.registration)),
         fmt::format("{} {} {} {}", noise.floor_m, noise.per_z2, noise.correlation_px, noise.flies())};
+    if (!light.empty())
+        parts.push_back(light);
     for (const Stage& stage : report.settings)
         for (const Parameter& row : stage.rows)
             if (!std::ranges::count(aside, row.name))

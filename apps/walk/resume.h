@@ -15,7 +15,8 @@ namespace scanshade {
 
 /// Everything that results depend on except the frames' own files, as used, not as typed. Leaves out settings that only
 /// affect outputs that are not written.
-[[nodiscard]] std::string settings_key(const RunReport& report, const Outputs& outputs, const DepthNoise& noise);
+[[nodiscard]] std::string settings_key(const RunReport& report, const Outputs& outputs, const DepthNoise& noise,
+                                       const std::string& light = {});
 
 /// Settings as typed, and stamps of every input. Equal keys mean that nothing has changed; no frame has to be decoded.
 /// `together`: results depend on other frames and on poses, too.

@@ -22,7 +22,8 @@ struct Work {
     AoMap ao = {};
     Finishers* finishers = nullptr;                           ///< of the device that computed `ao`; null = none
     std::shared_ptr<const gpu::DeviceBytes> fitted = nullptr; ///< depth of plane fits, on that device; null = none
-    cv::Mat1f confidence_in_view = {};                        ///< of `ao`, pixel by pixel
+    std::shared_ptr<const gpu::DeviceBytes> fitted_normals = nullptr; ///< theirs
+    cv::Mat1f confidence_in_view = {};                                ///< of `ao`, pixel by pixel
     Attached attached = {}, confidence = {};
     bool wanted = true;                             ///< false: loaded for the frames around it
     bool by_points = false;                         ///< no view: values come from rays at every point

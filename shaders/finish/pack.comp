@@ -9,6 +9,10 @@ layout(local_size_x = finish_row) in;
 layout(constant_id = spec_map_bits) const int map_bits = 0;
 layout(constant_id = spec_confidence_bits) const int confidence_bits = 0;
 layout(constant_id = spec_picture) const int picture = picture_none;
+layout(constant_id = spec_light) const int has_light = 0;
+layout(constant_id = spec_ambient) const int ambient_alone = 0;
+layout(constant_id = spec_unshaded) const int unshaded = 0;
+layout(constant_id = spec_split) const int split = 0;
 layout(binding = 0, r32f) readonly uniform imageBuffer visibility;
 layout(binding = 1, r32f) readonly uniform imageBuffer confidence;
 layout(binding = 2, r32f) readonly uniform imageBuffer surface; // 0 in holes
@@ -17,9 +21,13 @@ layout(binding = 4, r32ui) readonly uniform uimageBuffer colour;       // bytes:
 layout(binding = 5, r32ui) readonly uniform uimageBuffer colour_known; // bytes: 0 = not
 layout(binding = 6, r32f) readonly uniform imageBuffer linear_light;   // of the 256 stored values, in steps
 layout(binding = 7, r32ui) readonly uniform uimageBuffer stored_light; // of every step
+layout(binding = 8, r32f) readonly uniform imageBuffer direct;         // light over ambient light
 layout(binding = 16, scalar) writeonly buffer MapOut { uint map_out[]; };
 layout(binding = 17, scalar) writeonly buffer ConfidenceOut { uint confidence_out[]; };
 layout(binding = 18, scalar) writeonly buffer PictureOut { uint picture_out[]; };
+layout(binding = 19, scalar) writeonly buffer UnshadedOut { uint unshaded_out[]; };
+layout(binding = 20, scalar) writeonly buffer AmbientOut { uint ambient_out[]; };
+layout(binding = 21, scalar) writeonly buffer DirectOut { uint direct_out[]; };
 layout(binding = 32, scalar) uniform Constants { FinishConstants k; };
 
 const uvec3 no_surface = uvec3(no_surface_blue, no_surface_green, no_surface_red);
@@ -31,20 +39,47 @@ uint as_integer(float value, float most) {
 
 uint byte_of(uint word, int i) { return word >> (8 * i) & 0xffu; }
 
-// Of light that is stored as in sRGB, so much.
-uint dimmed(uint stored, float light) {
-    return imageLoad(stored_light, int(imageLoad(linear_light, int(stored)).x * light + 0.5)).x;
+float steps_of(uint stored) { return imageLoad(linear_light, int(stored)).x; }
+uint stored_from(float steps) { return imageLoad(stored_light, int(min(steps, 4095.0) + 0.5)).x; }
+vec3 steps_of(uvec3 stored) { return vec3(steps_of(stored.x), steps_of(stored.y), steps_of(stored.z)); }
+uvec3 stored_from(vec3 steps) { return uvec3(stored_from(steps.x), stored_from(steps.y), stored_from(steps.z)); }
+
+// The share of ambient light in blue, green and red.
+vec3 ambient_part(int at) {
+    if (has_light == 0) return vec3(1.0);
+    float ratio = imageLoad(direct, at).x;
+    return vec3(ambient_share(ratio, k.light.tint.z), ambient_share(ratio, k.light.tint.y),
+                ambient_share(ratio, k.light.tint.x));
 }
 
-uvec3 pixel_of(int at, uvec3 own_colour, uint known, float visible) {
-    float light = isnan(visible) ? 1.0 : clamp(1.0 - k.strength + k.strength * visible, 0.0, 1.0);
-    uvec3 base = own_colour;
-    if (picture != picture_colour) {
-        bool surface = imageLoad(surface, at).x > 0.0;
-        uint grey = uint(roundEven(clay_edge_on + clay_facing * imageLoad(cosine, at).x));
-        base = picture == picture_both && known != 0u ? own_colour : surface ? uvec3(grey) : no_surface;
-    }
-    return uvec3(dimmed(base.x, light), dimmed(base.y, light), dimmed(base.z, light));
+// What visibility has a say in.
+vec3 shaded_part(int at) { return ambient_alone == 0 ? vec3(1.0) : ambient_part(at); }
+
+float strong(float visible) { return isnan(visible) ? 1.0 : clamp(1.0 - k.strength + k.strength * visible, 0.0, 1.0); }
+
+uvec3 shaded_pixel(int at, uvec3 own_colour, uint known, float visible) {
+    float light = strong(visible);
+    if (picture == picture_colour || (picture == picture_both && known != 0u))
+        return stored_from(steps_of(own_colour) * (ambient_alone == 0 ? vec3(light) : 1.0 - shaded_part(at) * (1.0 - light)));
+    bool surface = imageLoad(surface, at).x > 0.0;
+    uint grey = uint(roundEven(clay_edge_on + clay_facing * imageLoad(cosine, at).x));
+    return stored_from(steps_of(surface ? uvec3(grey) : no_surface) * light);
+}
+
+// Colour without what visibility took from its ambient part. No channel may exceed what can be stored, so that hues stay:
+// a clipped pixel stays as it is.
+uvec3 unshaded_pixel(int at, uvec3 own_colour, float visible) {
+    vec3 light = steps_of(own_colour), share = shaded_part(at);
+    float by = divisor(strong(visible), imageLoad(confidence, at).x);
+    // Of a photograph that holds its occlusion, the ambient part is what visibility has left: that alone is divided.
+    vec3 more = light * (1.0 - share + share / by);
+    float most = max(more.x, max(more.y, more.z));
+    return stored_from(most > 4095.0 ? max(light, more * (4095.0 / most)) : more);
+}
+
+uvec3 packed(uvec3 a, uvec3 b, uvec3 d, uvec3 e) {
+    return uvec3(a.x | a.y << 8 | a.z << 16 | b.x << 24, b.y | b.z << 8 | d.x << 16 | d.y << 24,
+                       d.z | e.x << 8 | e.y << 16 | e.z << 24);
 }
 
 void main() {
@@ -70,17 +105,45 @@ void main() {
                         as_integer(imageLoad(confidence, at.z).x, 255.0), as_integer(imageLoad(confidence, at.w).x, 255.0));
         confidence_out[word] = v.x | v.y << 8 | v.z << 16 | v.w << 24;
     }
-    if (picture == picture_none) return;
+    bool has_colour = picture == picture_colour || picture == picture_both || unshaded != 0 || split != 0;
+    if (picture == picture_none && !has_colour) return;
     uvec3 c = uvec3(0u);
     uint known = 0u;
-    if (picture != picture_clay)
+    if (has_colour)
         c = uvec3(imageLoad(colour, 3 * word).x, imageLoad(colour, 3 * word + 1).x, imageLoad(colour, 3 * word + 2).x);
     if (picture == picture_both) known = imageLoad(colour_known, word).x;
-    uvec3 a = pixel_of(at.x, uvec3(byte_of(c.x, 0), byte_of(c.x, 1), byte_of(c.x, 2)), byte_of(known, 0), visible.x);
-    uvec3 b = pixel_of(at.y, uvec3(byte_of(c.x, 3), byte_of(c.y, 0), byte_of(c.y, 1)), byte_of(known, 1), visible.y);
-    uvec3 d = pixel_of(at.z, uvec3(byte_of(c.y, 2), byte_of(c.y, 3), byte_of(c.z, 0)), byte_of(known, 2), visible.z);
-    uvec3 e = pixel_of(at.w, uvec3(byte_of(c.z, 1), byte_of(c.z, 2), byte_of(c.z, 3)), byte_of(known, 3), visible.w);
-    picture_out[3 * word] = a.x | a.y << 8 | a.z << 16 | b.x << 24;
-    picture_out[3 * word + 1] = b.y | b.z << 8 | d.x << 16 | d.y << 24;
-    picture_out[3 * word + 2] = d.z | e.x << 8 | e.y << 16 | e.z << 24;
+    uvec3 first = uvec3(byte_of(c.x, 0), byte_of(c.x, 1), byte_of(c.x, 2));
+    uvec3 second = uvec3(byte_of(c.x, 3), byte_of(c.y, 0), byte_of(c.y, 1));
+    uvec3 third = uvec3(byte_of(c.y, 2), byte_of(c.y, 3), byte_of(c.z, 0));
+    uvec3 fourth = uvec3(byte_of(c.z, 1), byte_of(c.z, 2), byte_of(c.z, 3));
+    uvec3 words;
+    if (picture != picture_none) {
+        words = packed(shaded_pixel(at.x, first, byte_of(known, 0), visible.x),
+                       shaded_pixel(at.y, second, byte_of(known, 1), visible.y),
+                       shaded_pixel(at.z, third, byte_of(known, 2), visible.z),
+                       shaded_pixel(at.w, fourth, byte_of(known, 3), visible.w));
+        picture_out[3 * word] = words.x;
+        picture_out[3 * word + 1] = words.y;
+        picture_out[3 * word + 2] = words.z;
+    }
+    if (unshaded != 0) {
+        words = packed(unshaded_pixel(at.x, first, visible.x), unshaded_pixel(at.y, second, visible.y),
+                       unshaded_pixel(at.z, third, visible.z), unshaded_pixel(at.w, fourth, visible.w));
+        unshaded_out[3 * word] = words.x;
+        unshaded_out[3 * word + 1] = words.y;
+        unshaded_out[3 * word + 2] = words.z;
+    }
+    if (split != 0) {
+        mat4x3 light = mat4x3(steps_of(first), steps_of(second), steps_of(third), steps_of(fourth));
+        mat4x3 share = mat4x3(ambient_part(at.x), ambient_part(at.y), ambient_part(at.z), ambient_part(at.w));
+        mat4x3 ambient = matrixCompMult(light, share), rest = light - ambient;
+        words = packed(stored_from(ambient[0]), stored_from(ambient[1]), stored_from(ambient[2]), stored_from(ambient[3]));
+        ambient_out[3 * word] = words.x;
+        ambient_out[3 * word + 1] = words.y;
+        ambient_out[3 * word + 2] = words.z;
+        words = packed(stored_from(rest[0]), stored_from(rest[1]), stored_from(rest[2]), stored_from(rest[3]));
+        direct_out[3 * word] = words.x;
+        direct_out[3 * word + 1] = words.y;
+        direct_out[3 * word + 2] = words.z;
+    }
 }

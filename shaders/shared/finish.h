@@ -2,6 +2,7 @@
 #ifndef SCANSHADE_SHARED_FINISH_H
 #define SCANSHADE_SHARED_FINISH_H
 #include "camera.h"
+#include "light.h"
 #include "types.h"
 SHARED_BEGIN
 
@@ -15,6 +16,7 @@ struct FinishConstants {
     float noise_floor, noise_per_z2; // sigma(z) = floor + per_z2 z^2, metres
     float strength;                  // of the visibility in pictures
     int words;                       // of four pixels each
+    LightConstants light;            // that pictures are split by
     vec2 seeds[confidence_seeds];    // evenly over the unit disc
 };
 
@@ -32,6 +34,11 @@ const int spec_down = 1;            // smooth: 1 = along columns, 0 = along rows
 const int spec_map_bits = 2;        // pack: of a value in the map, 16, 8 or 0 = no map
 const int spec_confidence_bits = 3; // pack: 8 or 0
 const int spec_picture = 4;         // pack: what the picture shows
+const int spec_normals = 5;         // clay, light: 1 = there are normals of plane fits
+const int spec_light = 6;           // pack: 1 = there is direct light
+const int spec_ambient = 9;         // pack: 1 = visibility multiplies, or divides, ambient light alone
+const int spec_unshaded = 7;        // pack: 1 = colour divided by visibility is made
+const int spec_split = 8;           // pack: 1 = images of ambient and of direct light are made
 const int picture_none = 0;
 const int picture_colour = 1;
 const int picture_clay = 2;

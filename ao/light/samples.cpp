@@ -1,0 +1,199 @@
+#include "ao/light/light.h"
+#include "projection/base/error.h"
+#include "projection/base/hash.h"
+#include "projection/srgb.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+namespace scanshade {
+namespace {
+
+/// The number of a normal's bin: six faces of a cube, each in seven parts by where on the face it is.
+int bin_of(const Eigen::Vector3d& normal) {
+    Eigen::Index axis = 0;
+    normal.cwiseAbs().maxCoeff(&axis);
+    const double scale = 1 / std::abs(normal[axis]);
+    const double x = normal[(axis + 1) % 3] * scale, y = normal[(axis + 2) % 3] * scale;
+    const int face = 2 * static_cast<int>(axis) + (normal[axis] > 0 ? 1 : 0);
+    const double aside = std::hypot(x, y);
+    const int part =
+        aside < 0.3 ? 0 : 1 + std::min(5, static_cast<int>((std::atan2(y, x) / (2 * std::numbers::pi) + 0.5) * 6));
+    return 7 * face + part;
+}
+
+/// Whether the surface goes on around the pixel, so that colour and depth show the same.
+bool is_within(const cv::Mat1f& z_m, int u, int v) {
+    constexpr int reach = 2;
+    constexpr float jump = 0.03F; // of depth
+    if (u < reach || v < reach || u + reach >= z_m.cols || v + reach >= z_m.rows)
+        return false;
+    const float here = z_m(v, u);
+    for (int y = v - reach; y <= v + reach; ++y)
+        for (int x = u - reach; x <= u + reach; ++x)
+            if (!(std::abs(z_m(y, x) - here) <= jump * here))
+                return false;
+    return true;
+}
+
+/// Darker values have few steps, brighter ones may be clipped.
+bool is_exposed(const cv::Vec3b& colour) {
+    constexpr uchar darkest = 24, brightest = 242;
+    return std::ranges::all_of(colour.val, [](uchar c) { return c >= darkest && c <= brightest; });
+}
+
+Eigen::Vector3d linear(const cv::Vec3b& stored) {
+    return {linear_from_srgb(stored[2] / 255.0), linear_from_srgb(stored[1] / 255.0),
+            linear_from_srgb(stored[0] / 255.0)};
+}
+
+shared::vec3 as_shared(const Eigen::Vector3d& v) {
+    return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
+}
+
+} // namespace
+
+shared::LightConstants Light::on_gpu(const Eigen::Matrix3d& world_from_camera) const {
+    const Eigen::Matrix3d camera_from_light =
+        in_world ? Eigen::Matrix3d(world_from_camera.transpose()) : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
+    return {as_shared(camera_from_light * direct), as_shared(tint), as_shared(camera_from_light * gradient),
+            static_cast<float>(power), shadows ? 1 : 0};
+}
+
+void LightSamples::add(const LightFrame& frame) {
+    const cv::Mat1f& z_m = frame.depth.z_m;
+    if (frame.visibility.size() != z_m.size() || frame.colour.size() != z_m.size() ||
+        frame.normals.normals.size() != z_m.size())
+        throw Error("the light of a frame needs depth, normals, visibility and colour of one size");
+    constexpr int visibilities = 8;
+    constexpr double grazing = 0.2, darkest = 0.05;
+    const Eigen::Matrix3d turn =
+        in_world_ ? Eigen::Matrix3d(frame.world_from_camera.linear()) : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
+    const int index = static_cast<int>(frames_.size());
+    std::map<int, std::vector<std::pair<std::uint32_t, LightSample>>> bins;
+    // Every so many pixels: there are many more of them than samples.
+    const int step = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(z_m.total()) / 60000)));
+    for (int v = 0; v < z_m.rows; v += step)
+        for (int u = 0; u < z_m.cols; u += step) {
+            const double visible = static_cast<double>(frame.visibility(v, u));
+            const cv::Vec3f n = frame.normals.normals(v, u);
+            if (!(z_m(v, u) > 0) || !(visible >= darkest) || !is_exposed(frame.colour(v, u)) ||
+                (!frame.colour_known.empty() && frame.colour_known(v, u) == 0))
+                continue;
+            const Eigen::Vector3d normal(static_cast<double>(n[0]), static_cast<double>(n[1]),
+                                         static_cast<double>(n[2]));
+            if (!(-normal.dot(frame.depth.camera.ray(u, v).normalized()) > grazing) || !is_within(z_m, u, v))
+                continue;
+            LightSample sample{turn * normal, linear(frame.colour(v, u)), std::min(visible, 1.0), index, u, v, -1};
+            const int bin =
+                bin_of(sample.normal) * visibilities + std::min(visibilities - 1, static_cast<int>(visible * 8));
+            bins[bin].emplace_back(hash(static_cast<std::uint32_t>(v * z_m.cols + u), 17U), sample);
+        }
+    // Each bin's in the order of their hashes, the bins in turns: else floors would outvote everything.
+    for (auto& [bin, members] : bins)
+        std::ranges::sort(members, {}, [](const auto& each) { return each.first; });
+    std::size_t taken = 0;
+    for (std::size_t rank = 0; taken < per_frame_; ++rank) {
+        const std::size_t before = taken;
+        for (const auto& [bin, members] : bins)
+            if (rank < members.size() && taken < per_frame_) {
+                samples_.push_back(members[rank].second);
+                ++taken;
+            }
+        if (taken == before)
+            break;
+    }
+    frames_.push_back({frame.depth.camera, z_m.clone(), frame.world_from_camera});
+}
+
+Eigen::Vector3d LightSamples::place(const LightSample& sample) const {
+    const Kept& frame = frames_[static_cast<std::size_t>(sample.frame)];
+    const double z = static_cast<double>(frame.z_m(sample.v, sample.u));
+    const Eigen::Vector3d seen = frame.camera.ray(sample.u, sample.v) * z;
+    return in_world_ ? frame.world_from_camera * seen : seen;
+}
+
+/// Samples within a cube of a metre whose chromaticities are alike. Without a world, cubes are those of a frame. A
+/// chromaticity begins a new group if it is not near one already there, so that no border cuts through a wall's noise.
+void LightSamples::group() {
+    constexpr double side_m = 1, alike = 0.2;
+    constexpr int fewest = 15;
+    struct Group {
+        Eigen::Vector2d chromaticity;
+        std::vector<std::size_t> members;
+    };
+    std::map<std::array<int, 4>, std::vector<Group>> cubes;
+    for (std::size_t i = 0; i < samples_.size(); ++i) {
+        const LightSample& sample = samples_[i];
+        const Eigen::Vector3d at = place(sample) / side_m;
+        const auto floored = [](double x) { return static_cast<int>(std::clamp(std::floor(x), -1e6, 1e6)); };
+        std::vector<Group>& groups =
+            cubes[{in_world_ ? -1 : sample.frame, floored(at.x()), floored(at.y()), floored(at.z())}];
+        const Eigen::Vector2d chromaticity(std::log(sample.colour.x() / sample.colour.y()),
+                                           std::log(sample.colour.z() / sample.colour.y()));
+        const auto distance = [&](const Group& group) { return (group.chromaticity - chromaticity).norm(); };
+        const auto nearest = std::ranges::min_element(groups, {}, distance);
+        if (nearest != groups.end() && distance(*nearest) < alike)
+            nearest->members.push_back(i);
+        else
+            groups.push_back({chromaticity, {i}});
+    }
+    albedos_ = 0;
+    for (const auto& [cube, groups] : cubes)
+        for (const Group& group : groups) {
+            std::vector<int> bins;
+            double least = 1, most = 0;
+            for (const std::size_t i : group.members) {
+                bins.push_back(bin_of(samples_[i].normal));
+                least = std::min(least, samples_[i].visibility);
+                most = std::max(most, samples_[i].visibility);
+            }
+            std::ranges::sort(bins);
+            const bool one_bin = bins.front() == bins.back();
+            if (static_cast<int>(group.members.size()) < fewest || (one_bin && most - least < 0.2))
+                continue; // tells nothing of light
+            for (const std::size_t i : group.members)
+                samples_[i].albedo = albedos_;
+            ++albedos_;
+        }
+}
+
+Eigen::Vector3d LightSamples::forward() const {
+    if (!in_world_ || frames_.empty())
+        return Eigen::Vector3d::UnitZ();
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const Kept& frame : frames_)
+        sum += frame.world_from_camera.linear().col(2);
+    return sum.norm() > 1e-9 ? Eigen::Vector3d(sum.normalized()) : Eigen::Vector3d::UnitZ();
+}
+
+double LightSamples::lit(const LightSample& sample, const Eigen::Vector3d& towards) const {
+    const Kept& frame = frames_[static_cast<std::size_t>(sample.frame)];
+    const Eigen::Matrix3d camera_from_light = in_world_ ? Eigen::Matrix3d(frame.world_from_camera.linear().transpose())
+                                                        : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
+    const double z = static_cast<double>(frame.z_m(sample.v, sample.u));
+    const Eigen::Vector3d ray = camera_from_light * towards.normalized();
+    const Eigen::Vector3d from =
+        frame.camera.ray(sample.u, sample.v) * z +
+        camera_from_light * sample.normal * static_cast<double>(shared::shadow_bias(static_cast<float>(z)));
+    for (int i = 0; i < shared::shadow_steps; ++i) {
+        const Eigen::Vector3d at = from + ray * static_cast<double>(shared::shadow_step(i));
+        if (!(at.z() > 0.01))
+            return 1;
+        const double u = std::round(frame.camera.fx * at.x() / at.z() + frame.camera.cx);
+        const double v = std::round(frame.camera.fy * at.y() / at.z() + frame.camera.cy);
+        if (!(u >= 0 && v >= 0 && u < frame.z_m.cols && v < frame.z_m.rows))
+            return 1; // beyond the image nothing is known: open
+        const double there = static_cast<double>(frame.z_m(static_cast<int>(v), static_cast<int>(u)));
+        const double behind = at.z() - there;
+        if (there > 0 && behind > static_cast<double>(shared::shadow_bias(static_cast<float>(at.z()))) &&
+            behind < static_cast<double>(shared::shadow_thickness))
+            return 0;
+    }
+    return 1;
+}
+
+} // namespace scanshade

@@ -1,0 +1,161 @@
+// Light of colours: what is estimated on scenes whose light is known.
+#include "ao/light/light.h"
+#include "apps/scenes/light.h"
+#include "projection/base/hash.h"
+#include "projection/srgb.h"
+
+#include <cmath>
+#include <gtest/gtest.h>
+#include <numbers>
+
+namespace scanshade {
+namespace {
+
+using Eigen::Vector3d;
+
+/// Spheres and boxes on a floor, seen from one place; each of one albedo.
+const scene::Scene& still_life() {
+    static const scene::Scene scene = [] {
+        scene::Scene made{.name = "still life", .summary = ""};
+        const auto add = [&](const scene::Solid& solid, const Vector3d& albedo) {
+            made.bodies.push_back({solid, {.tone = albedo, .pattern = scene::Pattern::plain}});
+        };
+        add(scene::Box{{0, 0, -0.5}, {3, 3, 0.5}}, {0.5, 0.45, 0.4});
+        add(scene::Box{{0, 3.5, 1.5}, {3, 0.5, 3.5}}, {0.55, 0.55, 0.5});
+        for (int i = 0; i < 12; ++i) {
+            const double x = -1.8 + 1.2 * (i % 4), y = -1.2 + 1.3 * (i / 4);
+            const Vector3d albedo(0.25 + 0.4 * hash(3U * i) * 0x1p-32, 0.25 + 0.4 * hash(3U * i + 1) * 0x1p-32,
+                                  0.25 + 0.4 * hash(3U * i + 2) * 0x1p-32);
+            if (i % 2)
+                add(scene::Sphere{{x, y, 0.4}, 0.4}, albedo);
+            else
+                add(scene::Box{{x, y, 0.3},
+                               {0.35, 0.3, 0.3},
+                               Eigen::AngleAxisd(0.5 * i, Vector3d::UnitZ()).toRotationMatrix()},
+                    albedo);
+        }
+        return made;
+    }();
+    return scene;
+}
+
+/// A photograph with everything that is known of it.
+struct Photograph {
+    scene::Geometry geometry;
+    cv::Mat1f visibility;
+    cv::Mat3b colour;
+    scene::LitImages lit;
+    Pinhole camera;
+    Eigen::Isometry3d pose;
+};
+
+Photograph taken(const scene::SceneLight& light, const Vector3d& eye, cv::Size size = {320, 240}) {
+    static const scene::World world(still_life());
+    const Pinhole camera{260, 260, (size.width - 1) / 2.0, (size.height - 1) / 2.0, size};
+    const Eigen::Isometry3d pose = scene::looking_at(eye, {0, 0.3, 0.2});
+    Photograph made{scene::render_geometry(world, camera, pose), {}, {}, {}, camera, pose};
+    made.visibility = true_visibility(world, camera, pose, {0.5, 64, 1, false}).visibility[0];
+    made.lit = scene::render_lit(world, camera, pose, light);
+    made.colour = scene::photograph(made.lit, light.occluded ? made.visibility : cv::Mat1f());
+    return made;
+}
+
+void add(LightSamples& samples, const Photograph& photograph) {
+    const DepthImage depth{photograph.camera, photograph.geometry.z_m, {}};
+    const NormalImage normals{photograph.geometry.normals};
+    samples.add({depth, normals, photograph.visibility, photograph.colour, {}, photograph.pose});
+}
+
+const Vector3d eyes[] = {{0.5, -3.5, 2.2}, {-2.5, -2.8, 1.8}, {2.6, -2.2, 2.6}};
+
+LightEstimate estimated(const scene::SceneLight& light, const LightRequest& request = {}) {
+    LightSamples samples(true);
+    for (const Vector3d& eye : eyes)
+        add(samples, taken(light, eye));
+    samples.group();
+    return estimate_light(samples, request);
+}
+
+double degrees_between(const Vector3d& a, const Vector3d& b) {
+    return std::acos(std::clamp(a.normalized().dot(b.normalized()), -1.0, 1.0)) * 180 / std::numbers::pi;
+}
+
+TEST(LightTest, a_sun_is_found_with_its_direction_and_strength) {
+    for (const Vector3d& towards : {Vector3d(0.45, -0.35, 0.82), Vector3d(-0.7, -0.5, 0.5)}) {
+        const LightEstimate found = estimated({.kind = scene::LightKind::sun, .towards = towards, .ratio = 1.5});
+        SCOPED_TRACE(found.sentence);
+        ASSERT_TRUE(found.light.has_direct());
+        EXPECT_LT(degrees_between(found.light.direct, towards), 10);
+        EXPECT_NEAR(found.light.direct.norm(), 1.5, 0.3);
+        EXPECT_GT(found.light.tint.x(), found.light.tint.z()) << "the sun is warmer than the sky";
+    }
+}
+
+TEST(LightTest, ambient_light_alone_holds_no_direct_light) {
+    for (const scene::LightKind kind : {scene::LightKind::ambient, scene::LightKind::overcast}) {
+        const LightEstimate found = estimated({.kind = kind});
+        EXPECT_FALSE(found.light.has_direct()) << found.sentence;
+        EXPECT_NE(found.sentence.find("all of it is ambient"), std::string::npos) << found.sentence;
+        EXPECT_NEAR(found.light.power, 1, 0.3);
+    }
+}
+
+TEST(LightTest, a_term_is_kept_only_where_it_explains_unseen_surfaces_better) {
+    const LightEstimate ambient = estimated({.kind = scene::LightKind::ambient});
+    ASSERT_EQ(ambient.models.size(), 6U);
+    EXPECT_EQ(ambient.chosen, "ambient");
+    EXPECT_LT(ambient.models[1].held_out, 0.9 * ambient.models[0].held_out) << "visibility explains something";
+    const LightEstimate overcast = estimated({.kind = scene::LightKind::overcast});
+    EXPECT_EQ(overcast.chosen, "ambient with a gradient");
+    EXPECT_NEAR(overcast.light.gradient.z(), 0.5, 0.2);
+}
+
+TEST(LightTest, colours_that_show_no_occlusion_have_a_power_near_zero) {
+    const LightEstimate found = estimated({.kind = scene::LightKind::ambient, .occluded = false});
+    EXPECT_LT(found.light.power, 0.1);
+}
+
+TEST(LightTest, a_direction_that_was_given_is_kept_and_none_is_none) {
+    const Vector3d towards(0.45, -0.35, 0.82);
+    const scene::SceneLight sun{.kind = scene::LightKind::sun, .towards = towards, .ratio = 1.5};
+    const LightEstimate given = estimated(sun, {.direct = true, .towards = towards});
+    ASSERT_TRUE(given.light.has_direct()) << given.sentence;
+    EXPECT_LT(degrees_between(given.light.direct, towards), 0.01);
+    EXPECT_NEAR(given.light.direct.norm(), 1.5, 0.3);
+    EXPECT_FALSE(estimated(sun, {.direct = false, .towards = {}}).light.has_direct());
+}
+
+TEST(LightTest, the_same_samples_give_the_same_light) {
+    const scene::SceneLight sun{.kind = scene::LightKind::sun};
+    const LightEstimate a = estimated(sun), b = estimated(sun);
+    EXPECT_EQ(a.light.direct, b.light.direct);
+    EXPECT_EQ(a.sentence, b.sentence);
+}
+
+TEST(LightTest, grey_black_and_clipped_pixels_do_no_harm) {
+    const scene::SceneLight sun{.kind = scene::LightKind::sun};
+    LightSamples samples(true), dark(true);
+    for (const Vector3d& eye : eyes) {
+        Photograph photograph = taken(sun, eye);
+        for (cv::Vec3b& c : photograph.colour)
+            c = cv::Vec3b::all(c[1]);
+        photograph.colour.colRange(0, 40).setTo(cv::Scalar::all(255));
+        photograph.colour.colRange(280, 320).setTo(cv::Scalar::all(0));
+        add(samples, photograph);
+        photograph.colour.setTo(cv::Scalar::all(0));
+        add(dark, photograph);
+    }
+    samples.group();
+    dark.group();
+    for (const LightSample& sample : samples.all())
+        EXPECT_TRUE(sample.u >= 40 && sample.u < 280);
+    const LightEstimate found = estimate_light(samples);
+    EXPECT_TRUE(found.light.direct.allFinite());
+    EXPECT_NEAR(found.light.tint.x(), found.light.tint.z(), 0.02);
+    const LightEstimate none = estimate_light(dark);
+    EXPECT_FALSE(none.light.has_direct());
+    EXPECT_NE(none.sentence.find("too little"), std::string::npos);
+}
+
+} // namespace
+} // namespace scanshade
