@@ -19,7 +19,7 @@ namespace scanshade {
 /// A recording's frames can be fused, seen through each other, and averaged; 0 = not so.
 struct SequenceAoOptions {
     int fuse = 8;     ///< frames around each that noisy depth is averaged with
-    int layers = 6;   ///< other views whose surfaces occlude what a frame shows; of use to surfel
+    int layers = 6;   ///< other views whose surfaces occlude what a frame shows; of use to surfel and vxao
     int reach = 0;    ///< how many frames away these may be; 0 = as reach_for() has it, which the caller asks
     int average = 12; ///< frames around each whose visibility is averaged with its own
 
