@@ -25,7 +25,7 @@ void main() {
     vec3 ray = ray_through(k.camera, vec2(p));
     float narrow = 1.0 / (3.5 * (k.noise_floor + k.noise_per_z2 * z * z));
     float weights = 1.0, sum = 0.0; // of weights and of differences of z
-    int i = 0;
+    int i = 0, count = not_compiled_in(k.neighbours, here);
     do {
         NeighbourPlace place = constants.places[i];
         vec3 there = point_there(ray * z, place);
@@ -37,7 +37,7 @@ void main() {
         float weight = sees && recorded > 0.0 ? positive(1.0 - apart * apart) : 0.0;
         weights += weight;
         sum += weight * (recorded - there.z) / along;
-    } while (++i < k.neighbours);
+    } while (++i < count);
     fused[here] = hole ? nowhere : 1.0 / (z + sum / weights);
     relief[here] = inversesqrt(weights);
 }
