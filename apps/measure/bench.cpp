@@ -401,8 +401,9 @@ class Bench final : public Command {
     int rounds_ = 3;
     bool generated_ = false, overwrite_ = false;
     /// Each is measured instead of captures where its flag asks for it.
-    std::array<std::unique_ptr<BenchPart>, 6> parts_{cacao_times(),     cacao_maps(),         cloud_errors(),
-                                                     hard_cases_kept(), flatness_of_planes(), normals_kept()};
+    std::array<std::unique_ptr<BenchPart>, 7> parts_{cacao_times(),     cacao_maps(),         cloud_errors(),
+                                                     hard_cases_kept(), flatness_of_planes(), normals_kept(),
+                                                     expected_errors()};
 };
 
 } // namespace

@@ -46,7 +46,7 @@ constexpr auto maybe_quality_words = [] {
 }();
 
 std::set<std::string> words_of(const std::string& list) {
-    const std::vector<std::string> known{"ao", "confidence", "shaded", "cloud", "panel", "glb", "mcap"};
+    const std::vector<std::string> known{"ao", "confidence", "error", "shaded", "cloud", "panel", "glb", "mcap"};
     std::set<std::string> words;
     std::istringstream stream(list);
     for (std::string word; std::getline(stream, word, ',');) {
@@ -71,6 +71,7 @@ Outputs outputs_from(const RunSettings& asked) {
         const std::set<std::string> words = words_of(asked.write);
         wanted.ao = words.contains("ao");
         wanted.confidence = words.contains("confidence");
+        wanted.error = words.contains("error");
         wanted.shaded = words.contains("shaded");
         wanted.panel = words.contains("panel");
         wanted.glb = words.contains("glb");
@@ -280,10 +281,11 @@ std::vector<Stage> RunSettings::common_stages() {
            .common = true,
            .writes = Writes::folder},
           {.name = "write",
-           .help =
-               "any of ao,confidence,shaded,cloud,panel,glb,mcap; auto = ao,confidence,shaded, and cloud for clouds. "
-               "glb: each frame's points or mesh as binary glTF; mcap: run.mcap, one recording of all frames for "
-               "Foxglove, Rerun and ROS",
+           .help = "any of ao,confidence,error,shaded,cloud,panel,glb,mcap; auto = ao,confidence,shaded, and cloud for "
+                   "clouds. "
+                   "error: the expected error of each value, in visibility; confidence is 1 - error / 0.3. "
+                   "glb: each frame's points or mesh as binary glTF; mcap: run.mcap, one recording of all frames for "
+                   "Foxglove, Rerun and ROS",
            .value = &s.write,
            .common = true},
           {.name = "format",

@@ -10,7 +10,7 @@ layout(constant_id = spec_map_bits) const int map_bits = 0;
 layout(constant_id = spec_confidence_bits) const int confidence_bits = 0;
 layout(constant_id = spec_picture) const int picture = picture_none;
 layout(binding = 0, r32f) readonly uniform imageBuffer visibility;
-layout(binding = 1, r32f) readonly uniform imageBuffer confidence;
+layout(binding = 1, r32f) readonly uniform imageBuffer expected_error;
 layout(binding = 2, r32f) readonly uniform imageBuffer surface; // 0 in holes
 layout(binding = 3, r32f) readonly uniform imageBuffer cosine;
 layout(binding = 4, r32ui) readonly uniform uimageBuffer colour;       // bytes: blue, green, red of each pixel
@@ -28,6 +28,8 @@ const uvec3 no_surface = uvec3(no_surface_blue, no_surface_green, no_surface_red
 uint as_integer(float value, float most) {
     return isnan(value) ? 0u : uint(clamp(value, 0.0, 1.0) * (most - 1.0) + 1.5);
 }
+
+float confidence_at(int at) { return 1.0 - imageLoad(expected_error, at).x / hopeless_error; }
 
 uint byte_of(uint word, int i) { return word >> (8 * i) & 0xffu; }
 
@@ -66,8 +68,8 @@ void main() {
         map_out[word] = v.x | v.y << 8 | v.z << 16 | v.w << 24;
     }
     if (confidence_bits == 8) {
-        uvec4 v = uvec4(as_integer(imageLoad(confidence, at.x).x, 255.0), as_integer(imageLoad(confidence, at.y).x, 255.0),
-                        as_integer(imageLoad(confidence, at.z).x, 255.0), as_integer(imageLoad(confidence, at.w).x, 255.0));
+        uvec4 v = uvec4(as_integer(confidence_at(at.x), 255.0), as_integer(confidence_at(at.y), 255.0),
+                        as_integer(confidence_at(at.z), 255.0), as_integer(confidence_at(at.w), 255.0));
         confidence_out[word] = v.x | v.y << 8 | v.z << 16 | v.w << 24;
     }
     if (picture == picture_none) return;
