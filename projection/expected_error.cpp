@@ -105,7 +105,8 @@ void for_each_sign(const DepthImage& depth, const cv::Mat1f& visibility, double 
 }
 
 ErrorWeights weights_of(const ErrorSigns& signs, float visibility) {
-    const auto [value, past_value] = knot_below(visibility * (shared::error_values - 1), shared::error_values);
+    const float open = 1 - std::sqrt(1 - std::clamp(visibility, 0.0F, 1.0F));
+    const auto [value, past_value] = knot_below(open * (shared::error_values - 1), shared::error_values);
     const auto [share, past_share] = knot_below(signs.seen * (shared::error_shares - 1), shared::error_shares);
     const auto [reach, past_reach] =
         knot_below(0.5F * std::log2(std::max(signs.reach, 1.0F)), shared::error_reaches);

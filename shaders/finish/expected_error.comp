@@ -27,7 +27,7 @@ float between_knots(int first, int knots, float at) {
 float of_value_and_share(float value, float share) {
     float within = clamp(share * float(error_shares - 1), 0.0, float(error_shares - 1));
     int below = min(int(within), error_shares - 2);
-    float at = value * float(error_values - 1);
+    float at = (1.0 - sqrt(1.0 - value)) * float(error_values - 1);
     return mix(between_knots(below * error_values, error_values, at),
                between_knots((below + 1) * error_values, error_values, at), within - float(below));
 }

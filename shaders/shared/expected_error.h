@@ -17,11 +17,12 @@ SHARED_FN bool ring_is_diagonal(int ring) { return ring == 1 || ring == 3; }
 const float jump_radii = 0.1f, jump_sigmas = 8.0f;
 
 // The squared error is a product, so its logarithms add up. Between knots they are interpolated. Knots lie at
-// - visibility 0, 0.2 ... 1, times the share of the ball that was seen, 0, 0.25 ... 1
+// - visibility 0, 0.31, 0.56, 0.75, 0.89, 0.97, 1: evenly in 1 - sqrt(1 - visibility), since errors fall fast towards 1;
+//   times the share of the ball that was seen, 0, 0.25 ... 1
 // - the nearest ring with a jump of depth, or none; the nearest one with a hole, or none
 // - a radius in the image of 1, 4, 16 ... 1024 pixels
 // - sigma / radius of 0, 1/64, 3/64, 7/64, 15/64
-const int error_values = 6, error_shares = 5, error_reaches = 6, error_noises = 5;
+const int error_values = 7, error_shares = 5, error_reaches = 6, error_noises = 5;
 const int error_edges_at = error_values * error_shares;
 const int error_holes_at = error_edges_at + error_rings + 1;
 const int error_reaches_at = error_holes_at + error_rings + 1;
