@@ -13,11 +13,19 @@ FitPlaneOptions widened_for(const MethodRow& row, FitPlaneOptions preparation) {
     return preparation;
 }
 
+ChosenSettings settings_of(MethodSetup& setup) {
+    ChosenSettings settings;
+    for (const Parameter& row : setup.parameters())
+        settings.emplace_back(row.name, value_text(row));
+    return settings;
+}
+
 } // namespace
 
-FrameAo::FrameAo(gpu::Device& device, const MethodRow& row, const MethodSetup& setup, FitPlaneOptions preparation,
+FrameAo::FrameAo(gpu::Device& device, const MethodRow& row, MethodSetup& setup, FitPlaneOptions preparation,
                  std::shared_ptr<Finishers> finishers)
     : device_(&device), owned_(setup.make(device)), method_(*owned_), preparation_(widened_for(row, preparation)),
+      name_(row.name), settings_(settings_of(setup)),
       finishers_(finishers ? std::move(finishers) : std::make_shared<Finishers>(device)) {}
 
 AoMap FrameAo::compute(const DepthImage& depth, const DepthNoise& noise) {

@@ -4,6 +4,7 @@
 
 #include "ao/base/method.h"
 #include "ao/cloud/cloud_ao.h"
+#include "ao/expected_errors.h"
 #include "ao/finish/finish.h"
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/sequence/sequence_ao.h"
@@ -20,7 +21,7 @@ class FrameAo {
   public:
     /// Keeps a reference to the device. `preparation.smoothing` is multiplied by the method's own. Methods of one
     /// device may share `finishers`, of that device. Throws Misuse naming a setting out of its range.
-    FrameAo(gpu::Device& device, const MethodRow& row, const MethodSetup& setup, FitPlaneOptions preparation = {},
+    FrameAo(gpu::Device& device, const MethodRow& row, MethodSetup& setup, FitPlaneOptions preparation = {},
             std::shared_ptr<Finishers> finishers = nullptr);
     /// A method made elsewhere, which must outlive this one. It sees depth as recorded, whatever its noise.
     explicit FrameAo(Method& method) : method_(method) {}
@@ -47,6 +48,11 @@ class FrameAo {
     /// What makes confidence and pictures of frames on this device; null where there is none.
     [[nodiscard]] Finishers* finishers() const { return finishers_.get(); }
 
+    /// What to expect of the method's errors on depth with that noise; `together`: in sequence().
+    [[nodiscard]] shared::ErrorTable errors(const DepthNoise& noise, bool together = false) const {
+        return errors_of(shipped_error_tables(), name_, settings_, class_of(noise), together);
+    }
+
     /// Sentences: why the result of the last compute() may be wrong; empty = no reason known.
     [[nodiscard]] const std::vector<std::string>& doubts() const { return doubts_; }
     /// Where the time of the last compute() went, in order of execution.
@@ -63,6 +69,8 @@ class FrameAo {
     std::unique_ptr<Method> owned_;
     Method& method_;
     FitPlaneOptions preparation_;
+    std::string name_;        ///< of the method; empty = made elsewhere
+    ChosenSettings settings_; ///< all of them
     std::shared_ptr<Finishers> finishers_;
     std::shared_ptr<const gpu::DeviceBytes> fitted_depth_, fitted_normals_;
     std::optional<FitPlane> fit_; ///< made when noise first asks for it; its pipelines stay for other noise

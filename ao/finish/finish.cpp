@@ -3,7 +3,7 @@
 #include "ao/gpu/transfer.h"
 #include "projection/attach.h"
 #include "projection/base/error.h"
-#include "projection/confidence.h"
+#include "projection/expected_error.h"
 #include "projection/srgb.h"
 #include "shaders/shared/finish.h"
 
@@ -18,12 +18,12 @@ namespace {
 enum Buffers : int {
     seen,       // z; far behind the camera where there is no visibility
     surface,    // of clay: 1/z, or z of plane fits; 0 in holes
-    visibility, // these two pack alone reads
-    colour,
+    visibility, // pack and expected errors read it
+    colour,     // these pack alone reads
     colour_known,
     linear_light,
     stored_light,
-    confidence,
+    error_of_each,
     across, // 1/z smoothed along rows, and
     smooth, // along columns, too
     cosine,
@@ -113,14 +113,14 @@ Finish::Shape Finish::shape_of(const FinishInput& input, const FinishOutputs& ou
     shape.normals = looks_at_surface && (input.fitted_normals || !input.fitted_normals_host.empty());
     shape.on_device = packing_ == Packing::on_device || shape.light || shape.outputs.unshaded || shape.outputs.split;
     if (!shape.on_device) {
-        shape.outputs.confidence = shape.confidence();
+        shape.outputs.error = shape.error();
         shape.outputs.confidence_bits = shape.outputs.map_bits = 0;
     }
     return shape;
 }
 
 gpu::Program& Finish::program_for(const Shape& shape) {
-    constexpr std::size_t most_kept = 3; // a frame has two at most: its confidence in the view, its picture as recorded
+    constexpr std::size_t most_kept = 3; // a frame has two at most: its errors in the view, its picture as recorded
     const auto known = std::ranges::find(programs_, shape, &decltype(programs_)::value_type::first);
     if (known != programs_.end())
         return *known->second;
@@ -151,12 +151,12 @@ gpu::Program& Finish::program_for(const Shape& shape) {
     std::vector<gpu::BufferRow> buffers{
         image("seen", true, Host::upload),
         image("surface", surfaced, Host::upload),
-        image("visibility", packed, Host::upload),
+        image("visibility", packed || shape.error(), Host::upload),
         bytes("colour", colours ? 3 : 0, Host::upload),
         bytes("colour known", colours && shape.picture == shared::picture_both ? 1 : 0, Host::upload),
         {"linear light", light.linear.size() * 4, Host::none, floats, {light.linear.begin(), light.linear.end()}},
         {"stored light", light.stored.size() * 4, Host::none, words, as_floats(light.stored)},
-        image("confidence", shape.confidence(), outputs.confidence ? Host::download : Host::none),
+        image("expected error", shape.error(), outputs.error ? Host::download : Host::none),
         image("across", shape.smoothed),
         image("smooth", shape.smoothed),
         image("cosine", clay, on_device ? Host::none : Host::download),
@@ -179,8 +179,8 @@ gpu::Program& Finish::program_for(const Shape& shape) {
     const std::array<std::uint32_t, 3> rows{groups_of(static_cast<std::size_t>(shape.size.width)),
                                             static_cast<std::uint32_t>(shape.size.height), 1};
     std::vector<gpu::PassRow> passes;
-    if (shape.confidence())
-        passes.push_back({"confidence", "finish/confidence", {seen}, {confidence}, rows, {}});
+    if (shape.error())
+        passes.push_back({"expected error", "finish/expected_error", {seen, visibility}, {error_of_each}, rows, {}});
     if (shape.smoothed) {
         passes.push_back({"smooth across", "finish/smooth", {surface}, {across}, rows, {{shared::spec_down, 0}}});
         passes.push_back({"smooth down", "finish/smooth", {across}, {smooth}, rows, {{shared::spec_down, 1}}});
@@ -198,7 +198,7 @@ gpu::Program& Finish::program_for(const Shape& shape) {
     if (packed)
         passes.push_back({"pack",
                           "finish/pack",
-                          {visibility, shape.confidence() ? confidence : visibility, clay ? surface : visibility,
+                          {visibility, shape.error() ? error_of_each : visibility, clay ? surface : visibility,
                            clay ? cosine : visibility, colours ? colour : stored_light,
                            shape.picture == shared::picture_both ? colour_known : stored_light, linear_light,
                            stored_light, shape.light ? direct : visibility},
@@ -219,7 +219,7 @@ gpu::Program& Finish::program_for(const Shape& shape) {
 void Finish::upload(gpu::Program& program, const Shape& shape, const FinishInput& input) {
     const auto image_of = [&](int buffer) { return gpu::image_on<float>(program.host(buffer), shape.size); };
     const auto is_depth = [](float z) { return z >= 1e-4F && z <= 1e6F; }; // as gpu::upload_depth() has it
-    if (shape.confidence())
+    if (shape.error())
         combine(input.z_m, input.visibility, image_of(seen),
                 [&](float z, float value) { return value == value && is_depth(z) ? z : -1e30F; });
     if (shape.normals && input.fitted_normals)
@@ -239,12 +239,12 @@ Finished Finish::compute(const FinishInput& input, const FinishOutputs& outputs)
     if (!outputs.any())
         return {};
     check_sizes(input);
-    if (!outputs.pictures() && !outputs.confidence && outputs.confidence_bits == 0)
+    if (!outputs.pictures() && !outputs.error && outputs.confidence_bits == 0)
         return {}; // a map alone would cost more to send than to pack
     const Shape shape = shape_of(input, outputs);
     const cv::Size size = shape.size;
     const bool on_device = shape.on_device;
-    if (!on_device && !shape.confidence() && !shape.clay())
+    if (!on_device && !shape.error() && !shape.clay())
         return {.picture = outputs.picture ? picture_on_host(input, {}) : cv::Mat3b()};
     gpu::Program& program = program_for(shape);
 
@@ -256,12 +256,13 @@ Finished Finish::compute(const FinishInput& input, const FinishOutputs& outputs)
     k.noise_per_z2 = static_cast<float>(input.noise.per_z2);
     k.strength = static_cast<float>(input.strength);
     k.light = input.light.value_or(shared::LightConstants{});
+    k.errors = input.errors;
     k.words = static_cast<int>(words_of(size));
-    std::ranges::transform(confidence_seeds(), k.seeds,
+    std::ranges::transform(seeds_of_ball(), k.seeds,
                            [](const cv::Point2f& seed) { return shared::vec2(seed.x, seed.y); });
 
     upload(program, shape, input);
-    if (shape.packed())
+    if (shape.error() || shape.packed())
         gpu::upload(input.visibility, program.host(visibility));
     if (shape.colours())
         gpu::upload(input.colour, program.host(colour));
@@ -271,8 +272,8 @@ Finished Finish::compute(const FinishInput& input, const FinishOutputs& outputs)
     timings_ = program.timings();
 
     Finished finished;
-    if (shape.outputs.confidence)
-        finished.confidence = copied<float>(program, confidence, size);
+    if (shape.outputs.error)
+        finished.error = copied<float>(program, error_of_each, size);
     if (!on_device) {
         if (outputs.picture)
             finished.picture =

@@ -1,5 +1,5 @@
-// The last passes of a frame, on the device: confidence, shading, and the bytes of maps and pictures, downloaded once
-// and encoded as they are.
+// The last passes of a frame, on the device: expected errors, shading, and the bytes of maps and pictures, downloaded
+// once and encoded as they are.
 #pragma once
 
 #include "ao/base/method.h"
@@ -7,6 +7,7 @@
 #include "ao/light/light.h"
 #include "projection/camera.h"
 #include "projection/noise.h"
+#include "shaders/shared/expected_error.h"
 
 #include <array>
 #include <memory>
@@ -20,14 +21,14 @@ namespace scanshade {
 
 /// What is made of a frame.
 struct FinishOutputs {
-    bool confidence = false; ///< as floats: confidence_of() of the view
-    int confidence_bits = 0; ///< as a map of 8 bits; 0 = no map
+    bool error = false;      ///< as floats: expected_error_of() of the view
+    int confidence_bits = 0; ///< as a map of 8 bits: confidence_from() that error; 0 = no map
     int map_bits = 0;        ///< of visibility, 16 or 8; 0 = no map
     bool picture = false;    ///< colour, or clay where there is none, times visibility in linear light
     bool unshaded = false;   ///< colour divided by visibility, where there is colour
     bool split = false;      ///< the ambient and the direct part of colour, where there is colour
 
-    [[nodiscard]] bool any() const { return confidence || confidence_bits > 0 || map_bits > 0 || pictures(); }
+    [[nodiscard]] bool any() const { return error || confidence_bits > 0 || map_bits > 0 || pictures(); }
     [[nodiscard]] bool pictures() const { return picture || unshaded || split; }
     bool operator==(const FinishOutputs&) const = default;
 };
@@ -47,8 +48,9 @@ struct FinishInput {
         nullptr;                        ///< of plane fits, where AO was computed from them
     cv::Mat3f fitted_normals_host = {}; ///< the same on the host; empty = none
     cv::Mat1f fitted_m = {};            ///< the same on the host; empty = none
-    double radius_m = 1;                ///< the method's; confidence depends on it and on
-    DepthNoise noise = {};              ///< that of z_m
+    double radius_m = 1;                ///< the method's; the expected error depends on it, on
+    DepthNoise noise = {};              ///< that of z_m, and on
+    shared::ErrorTable errors = {};     ///< the method's errors (ao/expected_errors.h)
     cv::Mat3b colour = {};              ///< blue, green, red; empty = clay
     cv::Mat1b colour_known = {};        ///< 0 where colour has none; empty = known everywhere
     double strength = 1;                ///< of the visibility in the picture
@@ -56,10 +58,10 @@ struct FinishInput {
     std::optional<shared::LightConstants> light = {}; ///< in camera space; none = all light is ambient
 };
 
-/// Empty images were not asked for. Maps are empty, too, and confidence has floats, where the host packs: on
+/// Empty images were not asked for. Maps are empty, too, and errors are floats, where the host packs: on
 /// processors, and where nothing but a map of visibility was asked for.
 struct Finished {
-    cv::Mat1f confidence = {};     ///< 0 .. 1, NaN where there is no visibility
+    cv::Mat1f error = {};          ///< expected, RMS of visibility; NaN where there is no visibility
     cv::Mat1b confidence_map = {}; ///< 0 = none, 1 .. 255 = 0 .. 1
     cv::Mat map = {};              ///< of visibility: 0 = no surface, 1 .. 255 or 65535 = 0 .. 1
     cv::Mat3b picture = {};        ///< blue, green, red, as all pictures
@@ -88,17 +90,15 @@ class Finish {
         cv::Size size;
         FinishOutputs outputs;
         int picture = 0;
-        bool light = false;         ///< there is direct light to tell apart
-        bool ambient_alone = false; ///< visibility has a say in ambient light alone
+        bool light = false;                                     ///< there is direct light to tell apart
+        bool ambient_alone = false;                             ///< visibility has a say in ambient light alone
         bool fitted = false, smoothed = false, normals = false; ///< of clay and light: which depth they show
         bool on_device = false;                                 ///< packs there
         bool operator==(const Shape&) const = default;
         [[nodiscard]] bool clay() const;
         [[nodiscard]] bool colours() const;
         [[nodiscard]] bool packed() const;
-        [[nodiscard]] bool confidence() const {
-            return outputs.confidence || outputs.confidence_bits > 0 || outputs.unshaded;
-        }
+        [[nodiscard]] bool error() const { return outputs.error || outputs.confidence_bits > 0 || outputs.unshaded; }
     };
     [[nodiscard]] Shape shape_of(const FinishInput& input, const FinishOutputs& outputs) const;
     gpu::Program& program_for(const Shape& shape);

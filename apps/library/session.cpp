@@ -125,6 +125,7 @@ class Session::Sequence {
         computed.row.camera = computed.work.frame.camera;
         describe_frame(computed.work);
         computed.work.finishers = lease_->finishers();
+        computed.work.errors = lease_->errors(options.noise, true);
         sequence_.forget_before(first);
         frames_.erase(frames_.begin(), frames_.lower_bound(first));
         lowest_ = first;
@@ -246,6 +247,7 @@ void Session::load(Computed& computed, const Source& source, std::size_t index) 
 void Session::compute_view(Computed& computed, FrameAo& method, const BatchOptions& options, Wanted wanted) const {
     const Stopwatch stopwatch;
     computed.work.finishers = method.finishers();
+    computed.work.errors = method.errors(options.noise);
     compute_alone(computed.work, method, options.noise);
     computed.row.ms.compute = stopwatch.ms();
     if (wanted.normals)

@@ -72,24 +72,6 @@ TrialFrame load_frame(const Capture& capture, std::size_t index, const Truth& tr
 
 } // namespace
 
-std::string_view name_of(SensorClass sensor) {
-    switch (sensor) {
-    case SensorClass::clean:
-        return "clean";
-    case SensorClass::structured_light:
-        return "structured light";
-    case SensorClass::time_of_flight:
-        return "time of flight";
-    }
-    return "";
-}
-
-SensorClass class_of(const DepthNoise& noise) {
-    if (noise.at(2) < 0.001)
-        return SensorClass::clean;
-    return noise.at(4) > 7 * noise.at(1) ? SensorClass::structured_light : SensorClass::time_of_flight;
-}
-
 namespace {
 
 std::vector<std::size_t> indices_in(const Capture& capture, const TrialRequest& request) {

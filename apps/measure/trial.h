@@ -6,19 +6,13 @@
 #include "apps/method_settings.h"
 #include "apps/walk/measured_noise.h"
 #include "io/captures/capture.h"
+#include "projection/sensor_class.h"
 
 #include <array>
 #include <filesystem>
 #include <optional>
 
 namespace scanshade {
-
-/// How depth was measured, judged by its noise. Errors differ more between these classes than between methods.
-enum class SensorClass { clean, structured_light, time_of_flight };
-[[nodiscard]] std::string_view name_of(SensorClass sensor);
-/// Clean where sigma at 2 m is below 1 mm. Structured light's noise grows with the square of the distance: here more
-/// than 7 times from 1 to 4 m (Kinects 8 to 13 times). Time of flight's noise has a floor (simulated: 5 times).
-[[nodiscard]] SensorClass class_of(const DepthNoise& noise);
 
 /// A frame ready for the methods, and its true visibility.
 struct TrialFrame {

@@ -14,6 +14,9 @@ fs::path ao_file(const std::string& name, const Outputs& outputs) {
 fs::path confidence_file(const std::string& name, const Outputs& outputs) {
     return fs::path("confidence") / (name + extension(outputs.format));
 }
+fs::path error_file(const std::string& name, const Outputs& outputs) {
+    return fs::path("error") / (name + extension(outputs.format));
+}
 fs::path picture_file(const char* kind, const std::string& name) { return fs::path(kind) / (name + ".png"); }
 fs::path cloud_file(const std::string& name, const std::string& extension) {
     return fs::path("clouds") / (name + extension);
@@ -25,7 +28,7 @@ fs::path points_file(const std::string& name, std::size_t part) {
 
 Outputs of_points(const Outputs& outputs) {
     Outputs those = outputs;
-    those.cloud = outputs.cloud || outputs.ao || outputs.confidence;
+    those.cloud = outputs.cloud || outputs.ao || outputs.confidence || outputs.error;
     those.ao = those.confidence = those.shaded = those.unshaded = those.light = those.panel = false;
     return those;
 }
@@ -37,6 +40,8 @@ std::vector<fs::path> files_of(const CaptureEntry& entry, const Outputs& outputs
         add(ao_file(entry.name, outputs));
     if (outputs.confidence)
         add(confidence_file(entry.name, outputs));
+    if (outputs.error)
+        add(error_file(entry.name, outputs));
     if (outputs.shaded)
         add(picture_file("shaded", entry.name));
     if (outputs.unshaded)

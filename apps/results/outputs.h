@@ -18,19 +18,20 @@ namespace scanshade {
 enum class CloudColours { kept, shaded, grey };
 
 /// The folders that Outputs fill.
-inline constexpr std::array result_folders = {"ao",     "confidence", "shaded", "unshaded", "ambient",
+inline constexpr std::array result_folders = {"ao",     "confidence", "error",  "shaded",   "unshaded", "ambient",
                                               "direct", "panel",      "clouds", "previews", "points"};
 /// That of tars of results (result_tars.h).
 inline constexpr const char* tar_folder = "tars";
 
-/// The files written for each frame, under `folder`: ao/NAME.png, confidence/NAME.png, shaded/NAME.png, panel/NAME.png,
-/// clouds/NAME.pcd or .ply; for the page previews/NAME.js, or points/NAME.000.js and on of a cloud computed from its
-/// points.
+/// The files written for each frame, under `folder`: ao/NAME.png, confidence/NAME.png, error/NAME.png, shaded/NAME.png,
+/// panel/NAME.png, clouds/NAME.pcd or .ply; for the page previews/NAME.js, or points/NAME.000.js and on of a cloud
+/// computed from its points.
 struct Outputs {
     std::filesystem::path folder;
     LengthUnit unit = {};   ///< of the capture: lengths are written in it
     bool ao = true;         ///< the visibility map
-    bool confidence = true; ///< how reliable the visibility is (confidence_of()), as 8 bits or floats
+    bool confidence = true; ///< how reliable the visibility is (confidence_from()), as 8 bits or floats
+    bool error = false;     ///< the expected error of the visibility; of clouds the field ao_error
     bool shaded = true; ///< colour times visibility; clay times visibility where colour is not known to fit the depth
     bool unshaded = false; ///< colour divided by visibility, where there is colour
     bool light = false;    ///< colour's ambient and direct part, where there is colour
@@ -56,6 +57,7 @@ struct Outputs {
 /// A frame's files, relative to the folder. `kind` is "shaded" or "panel"; a cloud's points for the page have parts.
 [[nodiscard]] std::filesystem::path ao_file(const std::string& name, const Outputs& outputs);
 [[nodiscard]] std::filesystem::path confidence_file(const std::string& name, const Outputs& outputs);
+[[nodiscard]] std::filesystem::path error_file(const std::string& name, const Outputs& outputs);
 [[nodiscard]] std::filesystem::path picture_file(const char* kind, const std::string& name);
 [[nodiscard]] std::filesystem::path cloud_file(const std::string& name, const std::string& extension);
 [[nodiscard]] std::filesystem::path preview_file(const std::string& name);

@@ -121,7 +121,7 @@ void fit_into_memory(CaptureJob& job, bool on_cpu) {
     // packed; CACAO's buffers.
     constexpr std::uint64_t maps = 12, pictures = 13, points = 100, device = 24;
     const Outputs& outputs = job.batch.outputs;
-    const bool finished = outputs.confidence || outputs.shaded || outputs.panel || outputs.mcap;
+    const bool finished = outputs.confidence || outputs.error || outputs.shaded || outputs.panel || outputs.mcap;
     const cv::Size size = depth_size_in(job);
     const std::uint64_t bytes =
         static_cast<std::uint64_t>(size.area()) *

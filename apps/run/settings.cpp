@@ -51,8 +51,8 @@ constexpr auto maybe_quality_words = [] {
 }();
 
 std::set<std::string> words_of(const std::string& list) {
-    const std::vector<std::string> known{"ao",    "confidence", "shaded", "unshaded", "light",
-                                         "cloud", "panel",      "glb",    "mcap"};
+    const std::vector<std::string> known{"ao",    "confidence", "error", "shaded", "unshaded",
+                                         "light", "cloud",      "panel", "glb",    "mcap"};
     std::set<std::string> words;
     std::istringstream stream(list);
     for (std::string word; std::getline(stream, word, ',');) {
@@ -78,6 +78,7 @@ Outputs outputs_from(const RunSettings& asked) {
         const std::set<std::string> words = words_of(asked.write);
         wanted.ao = words.contains("ao");
         wanted.confidence = words.contains("confidence");
+        wanted.error = words.contains("error");
         wanted.shaded = words.contains("shaded");
         wanted.unshaded = words.contains("unshaded");
         wanted.light = words.contains("light");
@@ -293,8 +294,10 @@ std::vector<Stage> RunSettings::common_stages() {
            .common = true,
            .writes = Writes::folder},
           {.name = "write",
-           .help = "any of ao,confidence,shaded,unshaded,light,cloud,panel,glb,mcap; auto = ao,confidence,shaded, and "
+           .help = "any of ao,confidence,error,shaded,unshaded,light,cloud,panel,glb,mcap; auto = "
+                   "ao,confidence,shaded, and "
                    "cloud for clouds. "
+                   "error: the expected error of each value, in visibility; confidence is 1 - error / 0.3. "
                    "unshaded: colour divided by visibility, where confidence allows it; "
                    "light: ambient and direct, the two parts of colour; glb: each frame's points or mesh as binary "
                    "glTF; mcap: run.mcap, one recording of all frames for "

@@ -7,7 +7,9 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <opencv2/imgproc.hpp>
 #include <tbb/parallel_for.h>
+#include <utility>
 
 namespace scanshade {
 namespace {
@@ -148,6 +150,59 @@ cv::Mat1f record_tof(const Sight& sight) {
     });
 }
 
+// ---------------------------------------------------------------------------------------------------- stereo
+
+/// Two cameras side by side, matched in windows. A window at an outline follows the nearer surface, which therefore
+/// grows by a part of the window (fattening). What only one camera sees has no match.
+cv::Mat1f record_stereo(const Sight& sight) {
+    constexpr double near_m = 0.3, far_m = 12, window_px = 4;
+    const double focal_base = sight.camera.pinhole.fx * stereo_base_m;
+    const cv::Mat1f noise = window_noise(sight, axial), patches = window_noise(sight, grazing),
+                    outline = window_noise(sight, sideways);
+    const auto seen_by_both = [&](int u, int v, double z) {
+        const cv::Vec3f& n = sight.exact.normals(v, u);
+        const Eigen::Vector3d lifted = point_at(sight, u, v, z) + 1e-4 * Eigen::Vector3d(n[0], n[1], n[2]);
+        return !sight.world.surface().blocked(sight.world_from_camera * lifted,
+                                              sight.world_from_camera * Eigen::Vector3d(stereo_base_m, 0, 0));
+    };
+    return per_pixel(sight, [&](int u, int v, double z) -> double {
+        const double reach = window_px * evenly(outline(v, u));
+        double matched = z;
+        for (const auto& [du, dv] : {std::pair(1, 0), {-1, 0}, {0, 1}, {0, -1}})
+            for (int step = 1; step <= static_cast<int>(std::lround(reach)); ++step)
+                matched = std::min(matched, static_cast<double>(depth_at(sight, u + step * du, v + step * dv)));
+        const bool fattened = is_edge(matched, z);
+        if (!fattened && (evenly(patches(v, u)) < grazing_loss(facing(sight, u, v)) || !seen_by_both(u, v, z)))
+            return 0;
+        const double disparity = focal_base / (fattened ? matched : z) + stereo_sigma_px * noise(v, u);
+        const double measured = focal_base / std::max(1.0 / 16, std::round(16 * disparity) / 16);
+        return measured >= near_m && measured <= far_m ? measured : 0;
+    });
+}
+
+// ---------------------------------------------------------------------------------------------------- a phone's lidar
+
+/// A sparse time of flight, completed to 256x192 and resized to the image: no holes, and every outline is smeared over
+/// some pixels.
+cv::Mat1f record_lidar(const Sight& sight) {
+    constexpr double far_m = 5;
+    const cv::Mat1f& exact = sight.exact.z_m;
+    const cv::Size grid(std::min(256, exact.cols), std::min(192, exact.rows));
+    const Noise noise = noise_of(sight, axial);
+    cv::Mat1f coarse(grid), smooth, recorded;
+    for (int v = 0; v < grid.height; ++v)
+        for (int u = 0; u < grid.width; ++u) {
+            const double z = exact(v * exact.rows / grid.height, u * exact.cols / grid.width);
+            coarse(v, u) = static_cast<float>(z * (1 + lidar_sigma * noise.gaussian(u, v)));
+        }
+    cv::GaussianBlur(coarse, smooth, {}, 0.8, 0.8, cv::BORDER_REPLICATE);
+    cv::resize(smooth, recorded, exact.size(), 0, 0, cv::INTER_LINEAR);
+    for (float& z : recorded) // as millimetres
+        z = z <= far_m ? std::round(z * 1000) / 1000 : 0.0F;
+    recorded.setTo(0, exact <= 0);
+    return recorded;
+}
+
 cv::Mat1f record_ideal(const Sight& sight) { return sight.exact.z_m.clone(); }
 
 } // namespace
@@ -157,6 +212,10 @@ const std::vector<Sensor>& sensors() {
         {"ideal", "exact depth of every pixel", record_ideal},
         {"kinect", "structured light: disparity steps, noise, shadows, frayed outlines, 0.4 .. 8 m", record_kinect},
         {"tof", "time of flight: noise, flying pixels at outlines, 0.25 .. 5.5 m", record_tof},
+        {"stereo", "two cameras: disparity steps, noise, fattened outlines, places that one camera sees, 0.3 .. 12 m",
+         record_stereo},
+        {"lidar", "a phone's lidar: 256x192 without holes, resized to the image, smeared outlines, to 5 m",
+         record_lidar},
     };
     return table;
 }

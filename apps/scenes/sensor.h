@@ -22,7 +22,7 @@ struct Sensor {
     cv::Mat1f (*record)(const Sight& sight); ///< metres, 0 = hole
 };
 
-/// The table of sensors: ideal, kinect, tof.
+/// The table of sensors: ideal, kinect, tof, stereo, lidar.
 [[nodiscard]] const std::vector<Sensor>& sensors();
 /// Throws Misuse listing the known names.
 [[nodiscard]] const Sensor& sensor_named(std::string_view name);
@@ -36,5 +36,12 @@ inline constexpr double kinect_step_per_m = 2.85e-3;
 /// Time of flight: depth noise of one pixel facing the sensor; grows with the square of the distance as less light
 /// returns.
 [[nodiscard]] constexpr double tof_sigma_m(double z_m) { return 0.001 + 0.0006 * z_m * z_m; }
+
+/// Stereo: the cameras' distance, and one standard deviation of disparity. Depth errs by z^2 sigma / (focal length x
+/// distance): 10 mm at 2 m with 525 pixels.
+inline constexpr double stereo_base_m = 0.075, stereo_sigma_px = 0.1;
+
+/// A phone's lidar: noise of its coarse image before smoothing, as a share of depth.
+inline constexpr double lidar_sigma = 0.003;
 
 } // namespace scanshade

@@ -276,6 +276,7 @@ class Pipeline {
 
     void compute_view(Work& work, FrameAo& method) const {
         work.finishers = method.finishers();
+        work.errors = method.errors(options_.noise, options_.sequence != nullptr);
         if (options_.sequence) {
             compute_in_sequence(work, capture_, *options_.sequence);
         } else {

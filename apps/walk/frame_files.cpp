@@ -39,6 +39,8 @@ cv::Mat3b panel_picture(const Frame& frame, const Scene& scene, const cv::Mat3b&
 void write_depth_cloud(const std::filesystem::path& file, const Work& work, const FramePoints& all,
                        const LengthUnit& unit) {
     std::vector<AddedField> added = {{"ambient_occlusion", all.visibility}, {"ao_confidence", all.confidence}};
+    if (!all.error.empty())
+        added.push_back({"ao_error", all.error});
     if (has_secondary_camera(work.frame))
         added.push_back({"colour_known", all.colour_known});
     write_new_ply(file, all.made, all.colours, added,
@@ -53,6 +55,8 @@ void write_recorded_cloud(const std::filesystem::path& file, const Work& work, c
     std::vector<AddedField> fields{{"ambient_occlusion", all.visibility}};
     if (!all.confidence.empty())
         fields.push_back({"ao_confidence", all.confidence});
+    if (!all.error.empty())
+        fields.push_back({"ao_error", all.error});
     write_cloud(file, cloud, fields, changed ? std::span(all.colours) : std::span<const cv::Vec3b>());
 }
 
@@ -80,6 +84,8 @@ void write_points_glb(const std::filesystem::path& file, Work& work, FramePoints
     scene.colours = all.colours;
     if (!all.confidence.empty())
         scene.fields.push_back({"_AO_CONFIDENCE", all.confidence});
+    if (!all.error.empty())
+        scene.fields.push_back({"_AO_ERROR", all.error});
     const GlbWritten written = write_glb(file, scene);
     if (work.frame.cloud) // depth images have holes and pixels without a value: no news
         std::ranges::move(describe(written, scene.up, cloud_file(work.entry.name, ".glb").generic_string()),
@@ -131,6 +137,10 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
             write_map(file, images.confidence_map,
                       scene.confidence.empty() ? work.confidence.visibility : scene.confidence,
                       floats ? outputs.format : AoFormat::png8);
+        });
+    if (outputs.error && !work.by_points)
+        wrote(error_file(name, outputs), [&](const auto& file) {
+            write_ao(file, scene.error.empty() ? work.error.visibility : scene.error, outputs.format);
         });
     if (outputs.shaded)
         wrote(picture_file("shaded", name), [&](const auto& file) { write_picture(file, images.shaded); });

@@ -4,7 +4,7 @@
 #include "apps/picture.h"
 #include "apps/results/cloud_picture.h"
 #include "projection/colour_view.h"
-#include "projection/confidence.h"
+#include "projection/expected_error.h"
 
 #include <algorithm>
 #include <fmt/format.h>
@@ -17,10 +17,16 @@ Scene scene_across_cameras(const Work& work, bool colour_view) {
     const Frame& frame = work.frame;
     const SurfaceInColour surface = surface_in_colour(frame.depth_m, frame.camera, *frame.colour_camera);
     if (colour_view) {
-        const cv::Mat1f& confidence = work.confidence.visibility;
-        return {surface.z_m,  on_colour_pixels(work.attached.visibility, surface),
-                frame.colour, frame.colour_camera->camera.pinhole,
-                {},           confidence.empty() ? cv::Mat1f() : on_colour_pixels(confidence, surface)};
+        const auto in_colour = [&](const cv::Mat1f& values) {
+            return values.empty() ? cv::Mat1f() : on_colour_pixels(values, surface);
+        };
+        return {surface.z_m,
+                on_colour_pixels(work.attached.visibility, surface),
+                frame.colour,
+                frame.colour_camera->camera.pinhole,
+                {},
+                in_colour(work.confidence.visibility),
+                in_colour(work.error.visibility)};
     }
     const auto [colour, known] =
         colour_on_depth(frame.colour, frame.depth_m, frame.camera, *frame.colour_camera, surface);
@@ -50,8 +56,9 @@ Finished finished(Work& work, const FinishInput& input, const FinishOutputs& out
     if (work.finishers && input.z_m.total() <= most_pixels)
         return work.finishers->compute(input, outputs, work.row.passes);
     Finished made;
-    if (outputs.confidence || outputs.confidence_bits > 0)
-        made.confidence = confidence_of({input.camera, input.z_m, {}}, input.visibility, input.radius_m, input.noise);
+    if (outputs.error || outputs.confidence_bits > 0)
+        made.error = expected_error_of({input.camera, input.z_m, {}}, input.visibility, input.radius_m, input.noise,
+                                       input.errors);
     if (outputs.unshaded || outputs.split || (outputs.picture && input.shade == Shade::ambient))
         work.row.warnings.push_back("the image is too large for the device: colours are not split into ambient and "
                                     "direct light, and shaded multiplies all of them.");
@@ -65,8 +72,8 @@ Finished finished(Work& work, const FinishInput& input, const FinishOutputs& out
 bool is_float(AoFormat format) { return format == AoFormat::tiff || format == AoFormat::exr; }
 
 bool wants_confidence(const Work& work, const BatchOptions& options, const Outputs& outputs) {
-    return options.cloud || outputs.confidence || (work.frame.cloud ? outputs.cloud : outputs.depth_cloud) ||
-           outputs.glb;
+    return options.cloud || outputs.confidence || outputs.error ||
+           (work.frame.cloud ? outputs.cloud : outputs.depth_cloud) || outputs.glb;
 }
 
 /// The light as the camera of that scene sees it.
@@ -137,7 +144,8 @@ FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outpu
                            .fitted_normals = work.fitted_normals,
                            .fitted_m = work.looked_at.z_m,
                            .radius_m = options.radius_m,
-                           .noise = options.noise};
+                           .noise = options.noise,
+                           .errors = work.errors};
     FinishOutputs made{.map_bits = !outputs.ao || is_float(outputs.format) ? 0
                                    : outputs.format == AoFormat::png8      ? 8
                                                                            : 16,
@@ -154,10 +162,11 @@ FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outpu
         input.light = light_on(work, options, outputs.colour_view);
         warn_of_light(work, options, outputs, images.scene);
         made.confidence_bits = outputs.confidence && !is_float(outputs.format) ? 8 : 0;
-        made.confidence =
-            confidence && (made.confidence_bits == 0 || options.cloud || outputs.depth_cloud || outputs.glb);
+        made.error = confidence && (made.confidence_bits == 0 || outputs.error || options.cloud ||
+                                    outputs.depth_cloud || outputs.glb);
         Finished all = finished(work, input, made);
-        work.confidence_in_view = work.confidence.visibility = all.confidence;
+        work.error_in_view = work.error.visibility = all.error;
+        work.confidence_in_view = work.confidence.visibility = confidence_from(all.error);
         images.map = all.map;
         images.confidence_map = all.confidence_map;
         images.shaded = all.picture;
@@ -167,7 +176,9 @@ FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outpu
         return images;
     }
     if (confidence) {
-        work.confidence_in_view = finished(work, view, {.confidence = true}).confidence;
+        work.error_in_view = finished(work, view, {.error = true}).error;
+        work.confidence_in_view = confidence_from(work.error_in_view);
+        work.error = attach(work.frame, work.depth, {work.error_in_view});
         work.confidence = attach(work.frame, work.depth, {work.confidence_in_view});
     }
     const Scene scene = images.scene = scene_of(work, outputs.colour_view);

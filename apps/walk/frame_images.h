@@ -12,6 +12,7 @@ struct Scene {
     Pinhole camera;
     cv::Mat1b colour_known = {}; ///< 0 where `colour` has none; empty = known everywhere
     cv::Mat1f confidence = {};   ///< in the colour view; empty = as attached
+    cv::Mat1f error = {};        ///< likewise
 };
 
 /// Values of an organised cloud's points as an image; shares their memory.

@@ -61,6 +61,8 @@ FramePoints points_of_depth(const Work& work, const Scene& shown, const Outputs&
             all.made.push_back(camera.point(u, v, outputs.unit.told(z)));
             all.visibility.push_back(work.ao.visibility(v, u));
             all.confidence.push_back(known_or_none(work.confidence_in_view(v, u)));
+            if (outputs.error)
+                all.error.push_back(work.error_in_view(v, u));
             if (!colour.empty())
                 all.colours.push_back(colour(v, u));
             if (!colour_known.empty())
@@ -80,6 +82,8 @@ FramePoints points_of_cloud(const Work& work, const Outputs& outputs) {
     all.visibility = work.attached.per_point;
     all.confidence = work.confidence.per_point;
     std::ranges::transform(all.confidence, all.confidence.begin(), known_or_none);
+    if (outputs.error)
+        all.error = work.error.per_point;
     if (has_colours(cloud))
         all.colours = cloud.colours;
     if (outputs.colour_cloud != CloudColours::kept)

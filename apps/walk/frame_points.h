@@ -21,6 +21,7 @@ struct FramePoints {
     std::vector<cv::Vec3b> colours;    ///< BGR, as Outputs::colour_cloud asks
     std::vector<float> visibility;     ///< NaN where it is not known
     std::vector<float> confidence;     ///< 0 where it is not known
+    std::vector<float> error;          ///< expected, NaN where it is not known; only where asked for
     std::vector<float> colour_known;   ///< of a secondary camera: 1, or 0 where it did not see the point
     std::vector<Eigen::Vector3d> made; ///< from depth
 };

@@ -74,6 +74,8 @@ std::string outputs_text(const Outputs& outputs) {
         text += fmt::format("ao {};", static_cast<int>(outputs.format));
     if (outputs.confidence)
         text += fmt::format("confidence {};", static_cast<int>(outputs.format));
+    if (outputs.error)
+        text += fmt::format("error {};", static_cast<int>(outputs.format));
     if (outputs.shaded)
         text += "shaded;";
     if (outputs.panel)

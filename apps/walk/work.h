@@ -24,7 +24,9 @@ struct Work {
     std::shared_ptr<const gpu::DeviceBytes> fitted = nullptr; ///< depth of plane fits, on that device; null = none
     std::shared_ptr<const gpu::DeviceBytes> fitted_normals = nullptr; ///< theirs
     cv::Mat1f confidence_in_view = {};                                ///< of `ao`, pixel by pixel
-    Attached attached = {}, confidence = {};
+    cv::Mat1f error_in_view = {};                                     ///< expected; from it follows confidence
+    shared::ErrorTable errors = {};                                   ///< of the method on this depth
+    Attached attached = {}, confidence = {}, error = {};
     bool wanted = true;                             ///< false: loaded for the frames around it
     bool by_points = false;                         ///< no view: values come from rays at every point
     PointVisibility of_points = {};                 ///< those values

@@ -14,7 +14,7 @@ layout(constant_id = spec_ambient) const int ambient_alone = 0;
 layout(constant_id = spec_unshaded) const int unshaded = 0;
 layout(constant_id = spec_split) const int split = 0;
 layout(binding = 0, r32f) readonly uniform imageBuffer visibility;
-layout(binding = 1, r32f) readonly uniform imageBuffer confidence;
+layout(binding = 1, r32f) readonly uniform imageBuffer expected_error;
 layout(binding = 2, r32f) readonly uniform imageBuffer surface; // 0 in holes
 layout(binding = 3, r32f) readonly uniform imageBuffer cosine;
 layout(binding = 4, r32ui) readonly uniform uimageBuffer colour;       // bytes: blue, green, red of each pixel
@@ -36,6 +36,8 @@ const uvec3 no_surface = uvec3(no_surface_blue, no_surface_green, no_surface_red
 uint as_integer(float value, float most) {
     return isnan(value) ? 0u : uint(clamp(value, 0.0, 1.0) * (most - 1.0) + 1.5);
 }
+
+float confidence_at(int at) { return 1.0 - imageLoad(expected_error, at).x / hopeless_error; }
 
 uint byte_of(uint word, int i) { return word >> (8 * i) & 0xffu; }
 
@@ -70,7 +72,7 @@ uvec3 shaded_pixel(int at, uvec3 own_colour, uint known, float visible) {
 // a clipped pixel stays as it is.
 uvec3 unshaded_pixel(int at, uvec3 own_colour, float visible) {
     vec3 light = steps_of(own_colour), share = shaded_part(at);
-    float by = divisor(strong(visible), imageLoad(confidence, at).x);
+    float by = divisor(strong(visible), confidence_at(at));
     // Of a photograph that holds its occlusion, the ambient part is what visibility has left: that alone is divided.
     vec3 more = light * (1.0 - share + share / by);
     float most = max(more.x, max(more.y, more.z));
@@ -101,8 +103,8 @@ void main() {
         map_out[word] = v.x | v.y << 8 | v.z << 16 | v.w << 24;
     }
     if (confidence_bits == 8) {
-        uvec4 v = uvec4(as_integer(imageLoad(confidence, at.x).x, 255.0), as_integer(imageLoad(confidence, at.y).x, 255.0),
-                        as_integer(imageLoad(confidence, at.z).x, 255.0), as_integer(imageLoad(confidence, at.w).x, 255.0));
+        uvec4 v = uvec4(as_integer(confidence_at(at.x), 255.0), as_integer(confidence_at(at.y), 255.0),
+                        as_integer(confidence_at(at.z), 255.0), as_integer(confidence_at(at.w), 255.0));
         confidence_out[word] = v.x | v.y << 8 | v.z << 16 | v.w << 24;
     }
     bool has_colour = picture == picture_colour || picture == picture_both || unshaded != 0 || split != 0;

@@ -1,13 +1,11 @@
-// What host and shaders share of the last passes of a frame: confidence, clay, and the bytes of maps and pictures.
+// What host and shaders share of the last passes of a frame: expected errors, clay, and the bytes of maps and pictures.
 #ifndef SCANSHADE_SHARED_FINISH_H
 #define SCANSHADE_SHARED_FINISH_H
 #include "camera.h"
+#include "expected_error.h"
 #include "light.h"
 #include "types.h"
 SHARED_BEGIN
-
-// Positions tested in each pixel's ball.
-const int confidence_seeds = 16;
 
 struct FinishConstants {
     ivec2 size; // of the image
@@ -17,7 +15,8 @@ struct FinishConstants {
     float strength;                  // of the visibility in pictures
     int words;                       // of four pixels each
     LightConstants light;            // that pictures are split by
-    vec2 seeds[confidence_seeds];    // evenly over the unit disc
+    vec2 seeds[ball_seeds];          // evenly over the unit disc
+    ErrorTable errors;               // of the method
 };
 
 // A work group: so many pixels of a row, or words of four pixels.

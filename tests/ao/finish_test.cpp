@@ -4,7 +4,7 @@
 #include "apps/picture.h"
 #include "projection/attach.h"
 #include "projection/base/error.h"
-#include "projection/confidence.h"
+#include "projection/expected_error.h"
 #include "tests/support/scenes.h"
 
 #include <cmath>
@@ -18,6 +18,15 @@ using namespace tests;
 
 constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
 const DepthNoise noise{.floor_m = 0.001, .per_z2 = 0.002};
+
+/// Every factor differs from the others.
+shared::ErrorTable some_errors() {
+    cv::RNG random(5);
+    shared::ErrorTable table{};
+    for (float& factor : table.factors)
+        factor = random.uniform(-3.0F, 0.0F);
+    return table;
+}
 
 /// A step with a slanted wall behind it, holes, and pixels of which the visibility is not known.
 FinishInput scene(cv::Size size) {
@@ -38,6 +47,7 @@ FinishInput scene(cv::Size size) {
             .visibility = visibility,
             .radius_m = 0.3,
             .noise = noise,
+            .errors = some_errors(),
             .colour = colour,
             .strength = 0.9};
 }
@@ -69,28 +79,29 @@ class FinishTest : public testing::Test {
     }
 };
 
-constexpr FinishOutputs everything{.confidence = true, .confidence_bits = 8, .map_bits = 16, .picture = true};
+constexpr FinishOutputs everything{.error = true, .confidence_bits = 8, .map_bits = 16, .picture = true};
 
 TEST_F(FinishTest, the_device_packs_what_the_host_would) {
     Finish finish(device, Packing::on_device);
     for (const cv::Size size : {cv::Size(321, 203), cv::Size(5, 3), cv::Size(1, 1), cv::Size(640, 4)}) {
         const FinishInput input = scene(size);
-        const cv::Mat1f confidence =
-            confidence_of({input.camera, input.z_m, {}}, input.visibility, input.radius_m, input.noise);
+        const cv::Mat1f error = expected_error_of({input.camera, input.z_m, {}}, input.visibility, input.radius_m,
+                                                  input.noise, input.errors);
         for (const int bits : {16, 8}) {
             FinishOutputs outputs = everything;
             outputs.map_bits = bits;
             const Finished made = finish.compute(input, outputs);
-            ASSERT_EQ(made.confidence.size(), size);
-            const cv::Mat known = confidence == confidence; // NOLINT(misc-redundant-expression): false for NaN
-            const cv::Mat known_here = made.confidence == made.confidence; // NOLINT(misc-redundant-expression)
+            ASSERT_EQ(made.error.size(), size);
+            const cv::Mat known = error == error;                // NOLINT(misc-redundant-expression): false for NaN
+            const cv::Mat known_here = made.error == made.error; // NOLINT(misc-redundant-expression)
             EXPECT_EQ(cv::countNonZero(known != known_here), 0);
-            cv::Mat1f a = confidence.clone(), b = made.confidence.clone();
+            cv::Mat1f a = error.clone(), b = made.error.clone();
             a.setTo(0, ~known);
             b.setTo(0, ~known);
             EXPECT_LT(share_beyond(a, b, 1e-4), 0.002) << "a position on a pixel's border may round to the other side";
-            EXPECT_EQ(share_beyond(a, b, 0.13), 0) << "two of 16 positions";
-            EXPECT_EQ(share_beyond(made.confidence_map, quantised<uchar>(made.confidence), 0), 0);
+            EXPECT_EQ(share_beyond(made.confidence_map, quantised<uchar>(confidence_from(made.error)), 1), 0);
+            EXPECT_LT(share_beyond(made.confidence_map, quantised<uchar>(confidence_from(made.error)), 0), 0.001)
+                << "halves may round either way";
             const cv::Mat expected =
                 bits == 16 ? cv::Mat(quantised<ushort>(input.visibility)) : cv::Mat(quantised<uchar>(input.visibility));
             ASSERT_EQ(made.map.type(), expected.type());
@@ -135,7 +146,7 @@ TEST_F(FinishTest, clay_shows_the_depth_of_plane_fits_where_there_are_any) {
     Finish finish(device);
     const cv::Mat3b picture = finish.compute(input, {.picture = true}).picture;
     EXPECT_EQ(share_beyond(picture, clay(flat.z_m, input.camera), 1), 0);
-    EXPECT_EQ(finish.compute(input, {.confidence = true}).picture.size(), cv::Size());
+    EXPECT_EQ(finish.compute(input, {.error = true}).picture.size(), cv::Size());
 }
 
 TEST_F(FinishTest, many_frames_at_once_do_not_disturb_each_other) {

@@ -280,11 +280,16 @@ TEST_F(MeasureTest, a_budget_that_nothing_keeps_is_misuse) {
 
 TEST(SensorClassTest, follows_the_noise) {
     EXPECT_EQ(class_of({}), SensorClass::clean);
-    EXPECT_EQ(class_of({0.0015, 0.0018}), SensorClass::structured_light);
+    EXPECT_EQ(class_of({0.0015, 0.0018, 3}), SensorClass::structured_light);
     EXPECT_EQ(class_of({0.0012, 0.0005}), SensorClass::time_of_flight);
     EXPECT_EQ(class_of({0.0015, 0}), SensorClass::time_of_flight);
-    EXPECT_EQ(class_of({0.00093, 0.00088}), SensorClass::structured_light) << "7-Scenes, as measured";
+    EXPECT_EQ(class_of({0.00093, 0.00088, 3}), SensorClass::structured_light) << "7-Scenes, as measured";
     EXPECT_EQ(class_of({0, 0.0001}), SensorClass::clean);
+    EXPECT_EQ(class_of({.floor_m = 0.0014, .per_z2 = 0.0003, .step_per_z2 = 0.0028}), SensorClass::structured_light)
+        << "disparity's steps, whatever the noise";
+    EXPECT_EQ(class_of({0.00113, 0.00125}), SensorClass::time_of_flight) << "no two pixels share a window";
+    EXPECT_EQ(class_of({0.0012, 0.0003, 7}), SensorClass::interpolated);
+    EXPECT_EQ(class_of({.jumps = Jumps::smeared}), SensorClass::interpolated);
 }
 
 // ---------------------------------------------------------------------------------------------------- places

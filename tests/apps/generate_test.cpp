@@ -257,6 +257,40 @@ TEST(TimeOfFlight, PixelsFlyBetweenTheSurfacesOfAnOutline) {
     EXPECT_LT(flying, 4 * 240);
 }
 
+/// A box of 20 cm, 1 m away, before a wall 3 m away.
+cv::Mat1f recorded_box(std::string_view sensor) {
+    const Scene room = scene_of({{Plane{{0, 3, 0}, {0, 1, 0}}, {}}, {Box{{0, 1.05, 0}, {0.1, 0.05, 5}}, {}}});
+    const Pinhole camera{525, 525, 159.5, 119.5, {320, 240}};
+    const Eigen::Isometry3d pose = scene::looking_at({0, 0, 0}, {0, 1, 0});
+    const scene::World world(room);
+    return sensor_named(sensor).record({world, camera, pose, render_geometry(world, camera, pose), 1, 0});
+}
+
+TEST(Stereo, NoiseGrowsWithTheSquareOfTheDistance) {
+    for (const double z : {1.5, 3.0}) {
+        const auto [mean, sigma] = spread_of(recorded_wall("stereo", z)(cv::Rect(140, 100, 40, 40)));
+        EXPECT_NEAR(sigma, z * z * stereo_sigma_px / (525 * stereo_base_m), 0.2 * sigma) << z;
+        EXPECT_NEAR(mean, z, 0.5 * sigma) << z;
+    }
+}
+
+TEST(Stereo, NearThingsGrowAndOneSideOfThemHasNoMatch) {
+    const cv::Mat1f recorded = recorded_box("stereo");
+    const double width = 0.2 * 525; // of the box, in pixels
+    const double near = cv::countNonZero((recorded > 0.5) & (recorded < 1.5)) / 240.0;
+    EXPECT_GT(near, width + 2);
+    EXPECT_LT(near, width + 8);
+    const double unmatched = cv::countNonZero(recorded == 0) / 240.0;
+    EXPECT_NEAR(unmatched, 525 * stereo_base_m * (1 - 1 / 3.0), 8) << "the shift between the two cameras";
+}
+
+TEST(PhoneLidar, HasNoHolesAndSmearsOutlines) {
+    const cv::Mat1f recorded = recorded_box("lidar");
+    EXPECT_EQ(cv::countNonZero(recorded == 0), 0);
+    EXPECT_GT(cv::countNonZero((recorded > 1.1) & (recorded < 2.9)) / 240.0, 4) << "two outlines of two pixels or more";
+    EXPECT_EQ(cv::countNonZero(recorded_wall("lidar", 5.5)), 0) << "beyond its reach";
+}
+
 TEST(Sensors, NoiseDependsOnSeedAndFrameAlone) {
     for (const Sensor& sensor : sensors()) {
         const auto bytes = [&](int frame) {
@@ -271,7 +305,7 @@ TEST(Sensors, NoiseDependsOnSeedAndFrameAlone) {
 }
 
 TEST(Sensors, UnknownNamesAreRefusedWithTheKnownOnes) {
-    EXPECT_TRUE(says(refusal([] { (void)sensor_named("lidar"); }), "ideal, kinect, tof"));
+    EXPECT_TRUE(says(refusal([] { (void)sensor_named("sonar"); }), "ideal, kinect, tof, stereo, lidar"));
     EXPECT_THROW((void)scene::scene_named("moon"), Misuse);
 }
 
@@ -417,7 +451,7 @@ TEST(Generate, ImpossibleOptionsAreRefusedBeforeAnythingIsWritten) {
     options.frames = 0;
     EXPECT_THROW(generate(options, folder / "room"), Misuse);
     options = tiny();
-    options.sensor = "lidar";
+    options.sensor = "sonar";
     EXPECT_THROW(generate(options, folder / "room"), Misuse);
     EXPECT_FALSE(fs::exists(folder / "room"));
 }

@@ -1,0 +1,205 @@
+// `bench --expected-errors`: whether pixels err as much as expected; fits what is expected.
+#include "ao/expected_errors.h"
+#include "apps/lists.h"
+#include "apps/measure/bench_part.h"
+#include "apps/measure/configurations.h"
+#include "apps/measure/error_fit.h"
+#include "apps/measure/trial.h"
+#include "io/output_file.h"
+#include "projection/base/error.h"
+#include "projection/base/hash.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <map>
+#include <mutex>
+#include <set>
+
+namespace scanshade {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// "office" of "office-kinect": captures of one scene are left out together.
+std::string scene_of(const std::string& capture) { return capture.substr(0, capture.find('-')); }
+
+using Samples = std::map<SensorClass, std::vector<ErrorSample>>;
+
+/// One image: its RMS expected and found.
+struct FrameError {
+    std::string capture;
+    SensorClass sensor;
+    double expected, found;
+};
+
+class ExpectedErrorsPart final : public BenchPart {
+  public:
+    Stage stage() override {
+        return {
+            "expected errors",
+            {{"expected-errors", "captures with truth, with commas: errors expected and found", &captures_},
+             {"expected-errors.methods", "which methods, with commas, at their defaults; empty = all", &methods_},
+             {"expected-errors.fit", "file for tables fitted to these captures, as ao/expected_errors.txt is", &fit_},
+             {"expected-errors.each-scene-left-out",
+              "judges every scene by tables fitted to the others (the word before - names the scene)", &each_left_out_},
+             {"expected-errors.held-out",
+              "captures, with commas, that are not fitted to: these are judged, by tables fitted to the others",
+              &held_out_},
+             {"expected-errors.every", "of the pixels, one in so many", &every_, "", 1, 100000},
+             {"expected-errors.variants", "whether other settings than the defaults are fitted, too", &with_variants_},
+             {"expected-errors.frames", "of each capture", &frames_, "", 1, 1000}}};
+    }
+    [[nodiscard]] bool asked() const override { return !captures_.empty(); }
+
+    int run(const std::string& choice) override {
+        gpu::Device device(choice);
+        TrialRequest request;
+        request.frames = frames_;
+        std::vector<std::string> paths = comma_separated(captures_);
+        first_held_out_ = paths.size();
+        std::ranges::move(comma_separated(held_out_), std::back_inserter(paths));
+        for (const std::string& path : paths) {
+            trials_.push_back(load_trial(path, request));
+            const TrialCapture& capture = trials_.back();
+            fmt::print(stderr, "{}: {} ({})\n", capture.name, name_of(class_of(capture.noise)),
+                       describe(capture.noise));
+            const std::string scene = scene_of(capture.name);
+            if (!scenes_.contains(scene))
+                scenes_.emplace(scene, static_cast<int>(scenes_.size()));
+        }
+        fmt::print("| method | sensor | an eighth of the pixels each, by expected error: expected/found | all |\n"
+                   "| --- | --- | --- | --- |\n");
+        ErrorTables tables;
+        tables.made_by = fmt::format("scanshade bench --expected-errors {} --expected-errors.fit FILE", captures_);
+        for (const MethodRow& row : scanshade::methods())
+            if (wanted(std::string(row.name)))
+                measure(device, std::string(row.name), tables);
+        if (!fit_.empty())
+            write_atomically(fit_, text_of(tables));
+        return all_well;
+    }
+
+  private:
+    [[nodiscard]] bool wanted(const std::string& method) const {
+        const std::vector<std::string> only = comma_separated(methods_);
+        return only.empty() || std::ranges::count(only, method) > 0;
+    }
+
+    void measure(gpu::Device& device, const std::string& method, ErrorTables& tables) {
+        const Configuration usual{method, "as it comes", {}};
+        const Samples samples = samples_of(device, usual, frames_, false);
+        Samples held_out;
+        if (!held_out_.empty())
+            held_out = samples_of(device, usual, frames_, true);
+        for (const auto& [sensor, own] : samples) {
+            const shared::ErrorTable shipped =
+                errors_of(shipped_error_tables(), method, defaults_of(method), sensor, false);
+            MethodErrors errors;
+            if (!fit_.empty() || !held_out_.empty())
+                errors.table = fitted_errors(own);
+            const bool fitted = !fit_.empty() || !held_out_.empty();
+            if (held_out_.empty())
+                tell(method, sensor, own, fitted ? errors.table : shipped);
+            else if (const auto judged = held_out.find(sensor); judged != held_out.end())
+                tell(method, sensor, judged->second, errors.table);
+            if (!fit_.empty())
+                tables.methods[{method, sensor}] = errors;
+        }
+        if (fit_.empty() || !with_variants_)
+            return;
+        for (const Configuration& configuration : configurations()) {
+            if (configuration.method != method || is_default(configuration))
+                continue;
+            for (const auto& [sensor, own] : samples_of(device, configuration, 1, false))
+                if (const auto known = tables.methods.find({method, sensor}); known != tables.methods.end())
+                    known->second.variants.push_back({configuration.settings, factor_of(own, known->second.table)});
+        }
+    }
+
+    static ChosenSettings defaults_of(const std::string& method) {
+        ChosenSettings settings;
+        const auto setup = method_named(method).setup();
+        for (const Parameter& row : setup->parameters())
+            settings.emplace_back(row.name, value_text(row));
+        return settings;
+    }
+
+    static bool is_default(const Configuration& configuration) {
+        const ChosenSettings usual = defaults_of(configuration.method);
+        return std::ranges::all_of(configuration.settings,
+                                   [&](const auto& each) { return std::ranges::find(usual, each) != usual.end(); });
+    }
+
+    /// Pixels of all captures. Frames that are not of the first `frames` of a capture are left out.
+    Samples samples_of(gpu::Device& device, const Configuration& configuration, int frames, bool held_out) {
+        Samples all;
+        std::optional<Trial> trial;
+        double radius_m = 0;
+        for (std::size_t c = held_out ? first_held_out_ : 0; c < (held_out ? trials_.size() : first_held_out_); ++c) {
+            const TrialCapture& capture = trials_[c];
+            if (!trial || radius_m != capture.radius_m)
+                trial.emplace(device, configuration, capture.noise, capture.radius_m);
+            radius_m = capture.radius_m;
+            trial->set_noise(capture.noise);
+            std::vector<ErrorSample>& samples = all[class_of(capture.noise)];
+            const int scene = scenes_.at(scene_of(capture.name));
+            for (std::size_t i = 0; i < std::min(capture.frames.size(), static_cast<std::size_t>(frames)); ++i)
+                add(samples, capture.frames[i], trial->compute(capture.frames[i]), capture, scene,
+                    static_cast<std::uint32_t>(i));
+        }
+        return all;
+    }
+
+    void add(std::vector<ErrorSample>& samples, const TrialFrame& frame, const cv::Mat1f& visibility,
+             const TrialCapture& capture, int scene, std::uint32_t seed) const {
+        if (visibility.size() != frame.depth.z_m.size() || frame.truth.empty())
+            throw Error(frame.name + ": expected errors need truth on the pixels of the view");
+        std::vector<std::vector<ErrorSample>> rows(static_cast<std::size_t>(visibility.rows));
+        for_each_sign(frame.depth, visibility, capture.radius_m, capture.noise,
+                      [&](int v, int u, const ErrorSigns& signs) {
+                          const float off = visibility(v, u) - frame.truth(v, u);
+                          const std::uint32_t dice =
+                              hash(hash(seed, static_cast<std::uint32_t>(v)), static_cast<std::uint32_t>(u));
+                          if (std::isfinite(off) && dice % static_cast<std::uint32_t>(every_) == 0)
+                              rows[static_cast<std::size_t>(v)].push_back(
+                                  {weights_of(signs, visibility(v, u)), off * off, scene});
+                      });
+        for (const auto& row : rows)
+            samples.insert(samples.end(), row.begin(), row.end());
+    }
+
+    void tell(const std::string& method, SensorClass sensor, std::span<const ErrorSample> samples,
+              const shared::ErrorTable& table) {
+        Calibration all;
+        const auto judge = [&](int scene, const shared::ErrorTable& by) {
+            for (const ErrorSample& sample : samples)
+                if (scene < 0 || sample.scene == scene)
+                    all.add(expected_error(sample.signs, by), sample.square);
+        };
+        if (each_left_out_)
+            for (const auto& [name, scene] : scenes_)
+                judge(scene, fitted_errors(samples, scene));
+        else
+            judge(-1, table);
+        std::string cells;
+        for (const auto& [expected, found] : all.in_bins())
+            cells += fmt::format("{:.3f}/{:.3f} ", expected, found);
+        const auto [expected, found] = all.whole();
+        fmt::print("| {} | {} | {}| {:.3f}/{:.3f} |\n", method, name_of(sensor), cells, expected, found);
+        std::fflush(stdout);
+    }
+
+    std::string captures_, methods_, fit_, held_out_;
+    std::size_t first_held_out_ = 0;
+    bool each_left_out_ = false, with_variants_ = true;
+    int every_ = 29, frames_ = 8;
+    std::vector<TrialCapture> trials_;
+    std::map<std::string, int> scenes_;
+};
+
+} // namespace
+
+std::unique_ptr<BenchPart> expected_errors() { return std::make_unique<ExpectedErrorsPart>(); }
+
+} // namespace scanshade
