@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <initializer_list>
+#include <utility>
 
 namespace scanshade::gpu {
 
@@ -43,6 +44,7 @@ struct BoundBuffer {
 };
 
 struct DeviceBytes::State {
+    explicit State(BoundBuffer bound) : buffer(std::move(bound)) {}
     BoundBuffer buffer;
 };
 

@@ -7,7 +7,6 @@
 #include "projection/base/error.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <cstdlib>
 #include <fmt/format.h>
 #include <fstream>
@@ -76,12 +75,14 @@ Task task_from(const json& text, bool fetched) {
     return task;
 }
 
+constexpr std::uint64_t most_shards = 1'000'000'000;
+
 int variable(const char* name, int otherwise) {
     const char* text = std::getenv(name);
     if (!text)
         return otherwise;
     const auto value = whole_number(text);
-    if (!value || *value > 1'000'000'000)
+    if (!value || *value > most_shards)
         throw Misuse(fmt::format("{}: '{}' given, expected a whole number", name, text));
     return static_cast<int>(*value);
 }
@@ -148,12 +149,12 @@ fs::path results_of(const fs::path& job, const Task& task) { return job / "resul
 
 Shard shard_from(const std::string& text) {
     if (!text.empty()) {
-        Shard shard;
-        int used = 0;
-        if (std::sscanf(text.c_str(), "%d/%d%n", &shard.index, &shard.of, &used) != 2 ||
-            used != static_cast<int>(text.size()))
+        const std::size_t slash = std::min(text.find('/'), text.size());
+        const auto index = whole_number(std::string_view(text).substr(0, slash)),
+                   of = whole_number(std::string_view(text).substr(std::min(slash + 1, text.size())));
+        if (!index || !of || *index > most_shards || *of > most_shards)
             throw Misuse("shard: '" + text + "' given, expected INDEX/COUNT from 1/COUNT to COUNT/COUNT");
-        return checked(shard, "--shard");
+        return checked({static_cast<int>(*index), static_cast<int>(*of)}, "--shard");
     }
     if (std::getenv("SLURM_ARRAY_TASK_ID")) {
         const int first = variable("SLURM_ARRAY_TASK_MIN", 0), step = std::max(1, variable("SLURM_ARRAY_TASK_STEP", 1));

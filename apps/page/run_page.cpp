@@ -4,6 +4,7 @@
 #include "apps/page/shell.h"
 #include "apps/page/text.h"
 #include "io/output_file.h"
+#include "io/shallow_json.h"
 #include "io/text.h"
 
 #include <algorithm>
@@ -101,6 +102,8 @@ json read_manifest(const fs::path& file, const std::function<void(const json&)>&
     return reading_json(file.string(), [&] {
         bool among_frames = false;
         const auto keep = [&](int depth, json::parse_event_t event, json& value) {
+            if (depth > deepest_json)
+                throw Error(fmt::format("JSON nested deeper than {} levels", deepest_json));
             if (depth == 1 && event == json::parse_event_t::key)
                 among_frames = value == "frames";
             if (depth != 2 || event != json::parse_event_t::object_end || !among_frames)

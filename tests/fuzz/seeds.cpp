@@ -207,6 +207,63 @@ void texts() {
          "\n");
 }
 
+/// What is typed, and what is shown: words of every command, the small languages of flags, a run's manifest.
+void words() {
+    const std::string settings =
+        R"(=====
+{"settings":{"method":{"method":"cacao"},"method cacao":{"cacao.radius":0.3,"cacao.blur_passes":2}}})";
+    char row = 0; // of the target's table of commands
+    for (const char* line :
+         {"a\nb\n--json\n--all", "capture\n--settings\nsettings.json\n-o\nout\n--radius\n0.4\n--preset\nbest",
+          "data\n-o\njob\n--frames\n10:50:2", "job\n--json", "job", "out", "boards\n--board\n9x6\n--square=0.025",
+          "a\nb\n-o\nc", "--generated\n-o\nreport\n--size\n64x48", "capture\n--free\nstrength,power\n-o\ncurve.json",
+          "office\n-o\ncapture\n--size\n64x48\n--frames\n2", "", ""}) {
+        seed("command_line", "command" + std::to_string(row), std::string(1, row) + line + "\n" + settings);
+        ++row;
+    }
+    seed("command_line", "budget",
+         "\x01"
+         "a\n--max-error\n0.13\n--depth-noise\nkinect\n--depth-range\n0.3:8\n");
+    seed("command_line", "cloud",
+         "\x01"
+         "a\n--cloud.sky\n--cloud.rays=64\n--write\nao,mcap,glb\n--shard\n2/8\n");
+    const auto argument = [](char kind, const std::string& text) {
+        seed("arguments", "kind" + std::to_string(kind) + "_" + std::to_string(text.size()),
+             std::string{kind, '\x32'} + text);
+    };
+    for (const char* text : {"10:50:2", ":100", "7", "-5:", "1::2147483647"})
+        argument(0, text);
+    for (const char* text : {"525,525,319.5,239.5", "kinect", "tum-freiburg1", "481.2,-480,319.5,239.5"})
+        argument(1, text);
+    argument(2, "2/8");
+    argument(3, "8,16,32.5");
+    for (const char* text : {"none", "kinect", "0.001,0.002,3"})
+        argument(4, text);
+    for (const char* text : {"mm", "5000", "1/5000"})
+        argument(5, text);
+    const std::string point =
+        R"({"method":"cacao","name":"high","settings":{"radius":"0.5"},"ns_per_pixel":3,"rms":0.1})";
+    argument(6, R"({"device":"d","clean":{"made_by":"m","points":[)" + point + R"(],"others":[)" + point + "]}}");
+    const std::string frame =
+        R"({"index":0,"name":"000","status":"doubtful","why":"","fault":"none","size":[64,48],"valid_share":0.9,)"
+        R"("coverage":1,"mean_visibility":0.8,"ms":{"load":1,"write":2},"warnings":["w"],"notes":["n"],"doubts":["d"],)"
+        R"("files":["ao/000.png"],"world_from_camera":[1,0,0,0,0,1,0,0,0,0,1,0]})";
+    const std::string manifest =
+        R"({"version":"0.1.0","command_line":"run","started":"2026","device":{"name":"d","kind":"cpu","driver":"v"},)"
+        R"("capture":{"path":"/a/b","kind":"tum","warnings":["<b>"],"camera":{"fx":2}},"method":"cacao","radius":"r",)"
+        R"("settings":{"input":{"frames":"1:2"},"method":{"method":"cacao"}},"totals":{"took_ms":5,"slowest_stage":"load"},)"
+        R"("budget":["b"],"recording_points":"x","frames":[)" +
+        frame + "]}";
+    seed("page", "manifest", std::string(1, '\0') + manifest);
+    seed("page", "blocks", std::string(1, '\0') + manifest + "\n=====\n" + manifest);
+    seed("page", "list",
+         "\x01"
+         "a</script>\n=====\nt<b>\n=====\nn\"\n=====\n'r\n=====\na/index.html\n=====\ns&");
+    seed("page", "table",
+         "\x02"
+         "a,b\n=====\n\"why\"\n=====\nw\n=====\nv;");
+}
+
 void recordings() {
     const std::string header = "{'descr': '<u2', 'fortran_order': False, 'shape': (2, 4, 8), }\n",
                       array = std::string("\x93NUMPY\x01\x00", 8) + raw(static_cast<std::uint16_t>(header.size())) +
@@ -337,6 +394,7 @@ int main(int count, char** words) {
     las();
     cameras();
     texts();
+    words();
     recordings();
     colmap();
     hdf5();
