@@ -492,8 +492,10 @@ TEST_F(HookedJobTest, a_hooked_job_killed_at_random_delivers_the_bytes_of_a_plai
         fs::remove_all(folder / "store");
         fs::remove_all(folder / "job");
         fs::remove(folder / "deliveries");
-        ASSERT_EQ(
-            plan(sometimes + copy_in, sometimes + deliver() + " && echo {task} >>" + path("deliveries") + " && sleep 0.1").exit_code, 0);
+        ASSERT_EQ(plan(sometimes + copy_in,
+                       sometimes + deliver() + " && echo {task} >>" + path("deliveries") + " && sleep 0.1")
+                      .exit_code,
+                  0);
         for (bool done = false; !done;) {
             const pid_t child = tests::start_program({"run", path("job"), "--scratch", path("scratch")});
             std::this_thread::sleep_for(std::chrono::milliseconds(std::uniform_int_distribution(0, 1200)(random)));
