@@ -390,7 +390,7 @@ class Bench final : public Command {
             if (picture.cols > pictures_)
                 cv::resize(picture, small, {pictures_, std::max(1, picture.rows * pictures_ / picture.cols)}, 0, 0,
                            cv::INTER_AREA);
-            write_atomically(fs::path(out_) / name, encoded_jpeg(small, 85));
+            write_atomically(fs::path(out_) / name, encoded_jpeg(small, 75));
         };
         cv::Mat1f ramp(14, 260);
         for (int x = 0; x < ramp.cols; ++x)

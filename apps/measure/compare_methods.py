@@ -74,7 +74,7 @@ def is_there(asked, capture, sensor):
 
 def bench_command(asked, captures, device, folder):
     flags = ["--methods", asked.methods, "--frames", asked.frames, "--rounds", asked.rounds, "--device", device]
-    flags += ["--pictures", 200, "--overwrite", "-o", folder]
+    flags += ["--pictures", 160, "--overwrite", "-o", folder]
     return [asked.program, "bench", *map(str, captures), *map(str, flags)]
 
 
@@ -216,7 +216,16 @@ def markdown(result):
         cells += [cell(together[p], 3) for p in places]
         cells += [ms_text(first["ms"].get(d)) for d in devices]
         lines.append("| " + " | ".join(c.replace("|", "\\|") for c in cells) + " |")
-    return "\n".join(lines)
+    return what_was_measured(result) + "\n\n" + "\n".join(lines)
+
+
+def what_was_measured(result):
+    measured = result["measured"]
+    scenes = list(dict.fromkeys(name.rpartition("-")[0] or name for name in measured["captures"]))
+    views = f"{measured['frames']} view{'s' if measured['frames'] > 1 else ''}"
+    width, height = measured["size"]
+    times = "; ".join(f"{short_name(d['name'])} ({d['name']}; {d['processors']} processors), {d['date']}" for d in result["devices"])
+    return f"Measured: {views} each of {', '.join(scenes)}; {width}x{height} pixels. Times: {times}."
 
 
 def write_between_marks(path, text):

@@ -45,11 +45,12 @@ STYLE = """
 .document th { position: sticky; top: 0; background: var(--paper); }
 .document .wide { max-height: 80vh; overflow: auto; }
 .document td:first-child { white-space: nowrap; }
-.two { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 620px), 1fr)); gap: 18px 28px; }
+.two { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 560px), 1fr)); gap: 18px 28px; }
 .document .views { display: grid; grid-template-columns: repeat(auto-fill, minmax(160px, 1fr)); gap: 10px; }
 .document .views figure { margin: 0; }
 .document .views figure img { width: 100%; height: auto; }
 .document .views img + img { margin-top: 3px; }
+.two svg { max-width: 760px; }
 .document .legend-of-differences img { width: 260px; height: 14px; }
 """
 
@@ -75,7 +76,7 @@ def mark(x, y, kind, label):
 
 
 def plot(rows, device, heading, methods):
-    """Error with the curve against time. A line joins the qualities of one profile, in order of time."""
+    """Error with the curve against time. A line joins the qualities of one profile, lowest to highest."""
     points = {}
     for row in rows:
         ms, error = row["ms"].get(device), row["held_out_rms"]
@@ -102,7 +103,7 @@ def plot(rows, device, heading, methods):
     lines.append(f'<text x="{(LEFT + WIDTH - RIGHT) / 2:.0f}" y="{HEIGHT - 6}" text-anchor="middle">'
                  "device milliseconds a frame (median), logarithmic</text>")
     for kind, method in enumerate(methods):
-        of_method = sorted(points.get(method, []))
+        of_method = points.get(method, [])
         if not of_method:
             continue
         profiles = {}
@@ -210,16 +211,14 @@ def section(heading, html):
 
 def page(result, report, folder, view_count):
     """The whole document. `report` is the bench.json in `folder` whose pictures are shown."""
-    from compare_methods import SENSORS, short_name  # the caller; here, since it imports this file
+    from compare_methods import SENSORS, short_name, what_was_measured  # the caller; here, since it imports this file
 
     devices = [d["name"] for d in result["devices"]]
     methods = list(dict.fromkeys(row["method"] for row in result["rows"]))
     sensors = [s for s in SENSORS if any(row["sensor"] == s for row in result["rows"])]
     of_sensor = {s: [row for row in result["rows"] if row["sensor"] == s] for s in sensors}
-    measured = result["measured"]
-    about = [f"{measured['frames']} views each of {', '.join(measured['captures'])}; {measured['size'][0]}x{measured['size'][1]} pixels."]
-    about += [f"Times: {d['name']} ({d['driver']}), {d['date']}, {d['processors'] or '?'} processors, {d['rounds']} rounds."
-              for d in result["devices"]]
+    about = [what_was_measured(result)]
+    about += [f"{d['name']}: {d['driver']}; each configuration timed {d['rounds']}x on each frame, in turns." for d in result["devices"]]
     about += ["RMSE is that of the method as it comes. With curve: the tone curve that is best for the other captures of the "
               "same sensor, judged on the one left out. Errors by place are with the curve.",
               "Each pixel has one place, the first that fits: thin things (under 4 cm), deep corners (truth below 0.2), near holes "
@@ -244,7 +243,7 @@ def page(result, report, folder, view_count):
 </head>
 <body class="document">
 <header class="top">
-<p class="brand">scanshade {escape(measured["version"])}</p>
+<p class="brand">scanshade {escape(result["measured"]["version"])}</p>
 <h1>{title}</h1>
 </header>
 <main>

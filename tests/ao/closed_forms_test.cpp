@@ -374,7 +374,7 @@ TEST_F(ClosedForms, hdaos_valleys_need_both_sides) {
 
 TEST_F(ClosedForms, a_wall_is_closed_to_a_hard_radius) {
     // Lines of uniform angle, in the limit: .701, .775 and .845 of the table, from 16 lines and 2 x 16 steps.
-    const Settings hard{{"hard", "true"}, {"quality", "highest"}};
+    const Settings hard{{"hard", "true"}, {"lines", "16"}, {"steps", "16"}};
     EXPECT_NEAR(spread_at("abao", hard, symmetric(0.25 * radius), 4).mean, 0.775, 0.03);
     EXPECT_NEAR(spread_at("abao", hard, symmetric(0.5 * radius), 4).mean, 0.845, 0.03);
     EXPECT_NEAR(spread_at("abao", hard, step(), 4).mean, 0.739, 0.04);
