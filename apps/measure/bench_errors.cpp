@@ -15,7 +15,7 @@
 #include <fmt/format.h>
 #include <map>
 #include <mutex>
-#include <set>
+#include <span>
 
 namespace scanshade {
 namespace {
@@ -73,7 +73,10 @@ class ExpectedErrorsPart final : public BenchPart {
             "| method | sensor | an eighth of the pixels each, by expected error: expected/found | all | nine of ten "
             "frames err by at most so many times what is expected |\n| --- | --- | --- | --- | --- |\n");
         ErrorTables tables;
-        tables.made_by = fmt::format("scanshade bench --expected-errors {} --expected-errors.fit FILE", captures_);
+        std::string names;
+        for (const TrialCapture& capture : std::span(trials_).first(first_held_out_))
+            names += (names.empty() ? "" : ",") + capture.name;
+        tables.made_by = fmt::format("scanshade bench --expected-errors {} --expected-errors.fit FILE", names);
         for (const MethodRow& row : scanshade::methods())
             if (wanted(std::string(row.name)))
                 measure(device, std::string(row.name), tables);
