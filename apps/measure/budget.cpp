@@ -12,8 +12,8 @@ namespace scanshade {
 namespace {
 
 constexpr int rounds = 3;
-/// Of ten held-out frames, nine erred by at most so many times what was expected (bench --expected-errors; README.md).
-constexpr double nine_of_ten = 1.25;
+/// Frames may err by more than is expected of them.
+constexpr double safety = 1.25;
 
 /// The points of the capture's sensor class. Where there are none: those of the first class, and a sentence.
 const std::vector<BenchmarkPoint>& points_for(const ParetoFront& front, SensorClass sensor,
@@ -143,11 +143,10 @@ Choice choose(gpu::Device& device, const ParetoFront& front, const TrialCapture&
     if (budget.max_error > 0 && !truth_fits) {
         for (BenchmarkPoint& point : points)
             if (const double expected = trials.expected_of(point.configuration); std::isfinite(expected))
-                point.rms = nine_of_ten * expected;
+                point.rms = safety * expected;
         choice.sentences.push_back(
-            fmt::format("errors are those expected of {} frames of this capture, times {:g}: nine of ten frames of "
-                        "scenes that nothing was fitted to erred by less",
-                        capture.frames.size(), nine_of_ten));
+            fmt::format("errors are those expected of {} frames of this capture, times {:g} for safety",
+                        capture.frames.size(), safety));
     }
     const std::vector<cv::Mat1f> right = truth_fits ? truths(capture) : trials.of(reference).maps;
 
