@@ -12,6 +12,8 @@ namespace scanshade {
 namespace {
 
 constexpr int rounds = 3;
+/// Frames may err by more than is expected of them.
+constexpr double safety = 1.25;
 
 /// The points of the capture's sensor class. Where there are none: those of the first class, and a sentence.
 const std::vector<BenchmarkPoint>& points_for(const ParetoFront& front, SensorClass sensor,
@@ -50,6 +52,15 @@ class TimedTrials {
             }
         tried.ms = median(ms);
         return tried;
+    }
+
+    /// RMS of the errors expected on the frames; NaN where they cannot be told.
+    double expected_of(const Configuration& configuration) const {
+        Trial trial(device_, configuration, capture_.noise, radius_m_, capture_.preparation);
+        double squares = 0;
+        for (const TrialFrame& frame : capture_.frames)
+            squares += std::pow(trial.expected_rms(frame, trial.compute(frame)), 2);
+        return std::sqrt(squares / static_cast<double>(capture_.frames.size()));
     }
 
   private:
@@ -129,6 +140,14 @@ Choice choose(gpu::Device& device, const ParetoFront& front, const TrialCapture&
                     limit_text(budget), name_of(capture.sensor), front.device, slower));
     const bool truth_fits = !capture.reference.empty() && std::abs(capture.radius_m - radius_m) < 1e-6 * radius_m;
     const auto reference = std::ranges::min_element(points, {}, &BenchmarkPoint::rms)->configuration;
+    if (budget.max_error > 0 && !truth_fits) {
+        for (BenchmarkPoint& point : points)
+            if (const double expected = trials.expected_of(point.configuration); std::isfinite(expected))
+                point.rms = safety * expected;
+        choice.sentences.push_back(
+            fmt::format("errors are those expected of {} frames of this capture, times {:g} for safety",
+                        capture.frames.size(), safety));
+    }
     const std::vector<cv::Mat1f> right = truth_fits ? truths(capture) : trials.of(reference).maps;
 
     while (true) {

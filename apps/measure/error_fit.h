@@ -15,6 +15,7 @@ struct ErrorSample {
     ErrorWeights signs;
     float square = 0;
     int scene = 0; ///< pixels of one scene are left out together
+    int frame = 0; ///< of all captures
 };
 
 /// The table whose expected squares have the samples' sums over every knot (Bailey's minimum bias, which is maximum

@@ -6,9 +6,11 @@
 #include "projection/attach.h"
 #include "projection/base/error.h"
 #include "projection/base/stopwatch.h"
+#include "projection/expected_error.h"
 #include "projection/project.h"
 
 #include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
@@ -137,7 +139,7 @@ std::unique_ptr<MethodSetup> set_up(const Configuration& configuration, double r
 Trial::Trial(gpu::Device& device, Configuration configuration, const DepthNoise& noise, double radius_m,
              FitPlaneOptions preparation)
     : configuration_(std::move(configuration)), setup_(set_up(configuration_, radius_m)),
-      method_(device, method_named(configuration_.method), *setup_, preparation), noise_(noise) {}
+      method_(device, method_named(configuration_.method), *setup_, preparation), noise_(noise), radius_m_(radius_m) {}
 
 cv::Mat1f Trial::compute(const TrialFrame& frame) {
     const Stopwatch stopwatch;
@@ -145,6 +147,20 @@ cv::Mat1f Trial::compute(const TrialFrame& frame) {
     wall_ms_ = stopwatch.ms();
     device_ms_ = scanshade::device_ms(method_.timings());
     return attach(frame.frame, frame.depth, ao).visibility;
+}
+
+double Trial::expected_rms(const TrialFrame& frame, const cv::Mat1f& visibility) const {
+    const shared::ErrorTable table = method_.errors(noise_);
+    const cv::Mat1f errors = visibility.size() == frame.depth.z_m.size()
+                                 ? expected_error_of(frame.depth, visibility, radius_m_, noise_, table)
+                                 : cv::Mat1f();
+    double squares = 0, count = 0;
+    for (const float error : errors)
+        if (!std::isnan(error)) {
+            squares += static_cast<double>(error * error);
+            ++count;
+        }
+    return count > 0 ? std::sqrt(squares / count) : std::numeric_limits<double>::quiet_NaN();
 }
 
 double device_ms(const Timings& timings) {

@@ -66,6 +66,8 @@ class Trial {
     [[nodiscard]] cv::Mat1f compute(const TrialFrame& frame);
 
     [[nodiscard]] const Configuration& configuration() const { return configuration_; }
+    /// Expected RMS error of a frame's visibility, as compute() gave it.
+    [[nodiscard]] double expected_rms(const TrialFrame& frame, const cv::Mat1f& visibility) const;
     /// Of the last compute(): device time stamps without transfers, and the whole by the host's clock.
     [[nodiscard]] double device_ms() const { return device_ms_; }
     [[nodiscard]] double wall_ms() const { return wall_ms_; }
@@ -77,6 +79,7 @@ class Trial {
     std::unique_ptr<MethodSetup> setup_;
     FrameAo method_;
     DepthNoise noise_;
+    double radius_m_ = 0;
     double device_ms_ = 0, wall_ms_ = 0;
 };
 
