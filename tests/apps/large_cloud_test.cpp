@@ -302,7 +302,8 @@ TEST(LargeCloud, values_differ_no_more_beside_borders_of_tiles_than_elsewhere) {
             seams_of(tests::corner(400000, sigma), {.radius = 0.2, .outside = "1,1,1", .memory_mib = 64});
         EXPECT_GT(seams.points_beside, 500U);
         EXPECT_LT(seams.elsewhere, 0.02);
-        EXPECT_LT(seams.beside, 1.2 * seams.rays_beside + 0.001); // in the corner, rays differ more
+        // Rays alone change more in the corner than elsewhere.
+        EXPECT_LT(seams.beside, 1.2 * std::max(seams.rays_beside, seams.elsewhere) + 0.001);
         EXPECT_LT(std::abs(seams.mean_beside - seams.mean_elsewhere), 0.003);
     }
 }
