@@ -124,8 +124,8 @@ class LargeCloud {
         finite_ = sample.seen();
         whole_.twins = twins.many();
         distinct_ = whole_.twins ? twins.distinct() : 1;
-        const double share = static_cast<double>(sample.below()) * 0x1p-32;
         std::vector<CloudSample::Point> all = sample.by_number();
+        const double share = static_cast<double>(sample.below()) * 0x1p-32; // by_number() has thinned it
         decide(all);
         CloudDecisions& decided = whole_.decisions;
         const auto beyond = [&](const CloudSample::Point& each) { return is_beyond(each.point); };
