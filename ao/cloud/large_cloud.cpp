@@ -23,7 +23,7 @@ namespace {
 
 using Eigen::Vector3d, Eigen::Vector3f;
 
-constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
+constexpr float not_known = std::numeric_limits<float>::quiet_NaN();
 constexpr std::size_t enough_for_sides = 300000;
 
 /// A share of all hashes.
@@ -124,8 +124,8 @@ class LargeCloud {
         finite_ = sample.seen();
         whole_.twins = twins.many();
         distinct_ = whole_.twins ? twins.distinct() : 1;
-        const double share = static_cast<double>(sample.below()) * 0x1p-32;
         std::vector<CloudSample::Point> all = sample.by_number();
+        const double share = static_cast<double>(sample.below()) * 0x1p-32; // by_number() has thinned it
         decide(all);
         CloudDecisions& decided = whole_.decisions;
         const auto beyond = [&](const CloudSample::Point& each) { return is_beyond(each.point); };
@@ -304,7 +304,7 @@ class LargeCloud {
             found =
                 CloudWork::of_strays(setup_, set, source_.scanner(), whole_.decisions.radius, whole_.decisions.spacing);
         else
-            found.visibility.assign(strays.numbers.size(), nothing),
+            found.visibility.assign(strays.numbers.size(), not_known),
                 found.confidence.assign(strays.numbers.size(), 0.0F),
                 found.normals.assign(strays.numbers.size(), Vector3f::Zero());
         collect(values, strays, found);
@@ -346,7 +346,7 @@ class LargeCloud {
         std::optional<CheckedPart> part;
         if (check_.keep > 0) {
             const TilePoints kept = store_.points(check_tile_);
-            std::vector<float> whole(kept.numbers.size(), nothing);
+            std::vector<float> whole(kept.numbers.size(), not_known);
             for (std::size_t tile = 0; tile < plan_.size(); ++tile) {
                 const TileValues values = store_.values(tile).value_or(TileValues{});
                 for (std::size_t k = 0; k < values.numbers.size(); ++k) {
@@ -473,7 +473,7 @@ class PointsInMemory final : public PointSource {
 class TilesInMemory final : public TileStore {
   public:
     explicit TilesInMemory(const PointSet& cloud) : cloud_(cloud) {
-        result.visibility.assign(cloud.points.size(), nothing);
+        result.visibility.assign(cloud.points.size(), not_known);
         result.confidence.assign(cloud.points.size(), 0.0F);
         result.normals.assign(cloud.points.size(), Vector3f::Zero());
     }

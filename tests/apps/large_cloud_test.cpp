@@ -3,6 +3,7 @@
 #include "ao/cloud/large_cloud.h"
 #include "ao/cloud/surface/neighbours.h"
 #include "apps/large/large_cloud_run.h"
+#include "apps/large/survey.h"
 #include "apps/large/tiles_on_disk.h"
 #include "io/clouds/cloud_file.h"
 #include "projection/base/error.h"
@@ -10,6 +11,7 @@
 #include "tests/support/points.h"
 
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -67,7 +69,7 @@ fs::path write_las(const fs::path& file, const Points& points) {
     bytes[24] = 1, bytes[25] = 2;
     put(bytes, 94, std::uint16_t(227)), put(bytes, 96, std::uint32_t(227)), put(bytes, 105, std::uint16_t(20));
     put(bytes, 107, static_cast<std::uint32_t>(points.size()));
-    std::array<double, 3> low{0, 0, 0}, high{0, 0, 0};
+    std::array<double, 3> low{1e30, 1e30, 1e30}, high{-1e30, -1e30, -1e30};
     for (std::size_t axis = 0; axis < 3; ++axis)
         put(bytes, 131 + 8 * axis, 1e-5);
     for (std::size_t i = 0; i < points.size(); ++i)
@@ -246,9 +248,11 @@ class Observed final : public TileStore {
     TilesOnDisk tiles_;
 };
 
-/// RMS of the differences between one tile and many, beside borders of tiles and elsewhere.
+/// RMS of the differences between one tile and many, beside borders of tiles and elsewhere; and between one tile and
+/// the same with other rays, at the same points.
 struct Seams {
     double beside = 0, elsewhere = 0, mean_beside = 0, mean_elsewhere = 0;
+    double rays_beside = 0;
     std::size_t points_beside = 0;
 };
 Seams seams_of(const Points& points, CloudAoOptions options) {
@@ -260,8 +264,11 @@ Seams seams_of(const Points& points, CloudAoOptions options) {
     options.memory_mib = 4096;
     const PointVisibility whole = CloudAo(options).compute({points});
     EXPECT_EQ(whole.tiles, 1);
+    options.seed = 2;
+    const PointVisibility other_rays = CloudAo(options).compute({points});
     const LocalCloud cloud(points);
     Seams seams;
+    double rays = 0;
     std::array<std::array<double, 3>, 2> sums{};
     for (std::size_t i = 0; i < points.size(); ++i) {
         bool border = false;
@@ -273,15 +280,18 @@ Seams seams_of(const Points& points, CloudAoOptions options) {
             static_cast<double>(store.visibility[number]) - static_cast<double>(whole.visibility[number]);
         if (std::isnan(off))
             continue;
+        if (border)
+            rays += std::pow(static_cast<double>(other_rays.visibility[number] - whole.visibility[number]), 2);
         sums[border][0] += 1, sums[border][1] += off, sums[border][2] += off * off;
     }
     seams.points_beside = static_cast<std::size_t>(sums[1][0]);
+    seams.rays_beside = std::sqrt(rays / sums[1][0]);
     seams.beside = std::sqrt(sums[1][2] / sums[1][0]), seams.elsewhere = std::sqrt(sums[0][2] / sums[0][0]);
     seams.mean_beside = sums[1][1] / sums[1][0], seams.mean_elsewhere = sums[0][1] / sums[0][0];
     fmt::print("seams: {} tiles, {} of {} points within a spacing of a border: RMS of differences {:.5f} there, {:.5f} "
-               "elsewhere; mean {:.5f}, {:.5f}\n",
+               "elsewhere; mean {:.5f}, {:.5f}; with other rays {:.5f} there\n",
                told.tiles, seams.points_beside, points.size(), seams.beside, seams.elsewhere, seams.mean_beside,
-               seams.mean_elsewhere);
+               seams.mean_elsewhere, seams.rays_beside);
     return seams;
 }
 
@@ -292,7 +302,8 @@ TEST(LargeCloud, values_differ_no_more_beside_borders_of_tiles_than_elsewhere) {
             seams_of(tests::corner(400000, sigma), {.radius = 0.2, .outside = "1,1,1", .memory_mib = 64});
         EXPECT_GT(seams.points_beside, 500U);
         EXPECT_LT(seams.elsewhere, 0.02);
-        EXPECT_LT(seams.beside, 1.5 * seams.elsewhere + 0.001);
+        // Rays alone change more in the corner than elsewhere.
+        EXPECT_LT(seams.beside, 1.2 * std::max(seams.rays_beside, seams.elsewhere) + 0.001);
         EXPECT_LT(std::abs(seams.mean_beside - seams.mean_elsewhere), 0.003);
     }
 }
@@ -306,6 +317,81 @@ TEST(LargeCloud, tiles_agree_about_sides_and_noise) {
     const Seams seams = seams_of(points, {.radius = 0.2, .memory_mib = 64});
     EXPECT_LT(seams.elsewhere, 0.02);
     EXPECT_LT(seams.beside, 1.5 * seams.elsewhere + 0.001);
+}
+
+SurveyTile tile(double x, double y, double wide = 10, const std::string& kind = "LAS") {
+    return {{Vector3d(x, y, 0), Vector3d(x + wide, y + wide, 3)}, kind};
+}
+
+TEST(Survey, adjoining_files_of_one_kind_are_tiles) {
+    const auto groups = surveys_in({tile(0, 0), tile(10, 0), tile(0, 10.1), tile(500, 0), tile(20, 0, 10, "PLY")});
+    ASSERT_EQ(groups.size(), 1U);
+    EXPECT_EQ(groups[0], (std::vector<std::size_t>{0, 1, 2})) << "the others are far off, or of another kind";
+    EXPECT_EQ(surveys_in({tile(0, 0), tile(9, 0), std::nullopt, tile(18, 0)}).size(), 1U) << "strips overlap a little";
+}
+
+TEST(Survey, scans_of_one_place_are_no_tiles) {
+    EXPECT_TRUE(surveys_in({tile(0, 0), tile(1, 1), tile(10, 0)}).empty());
+    EXPECT_TRUE(surveys_in({tile(0, 0), tile(0, 0)}).empty());
+    EXPECT_TRUE(surveys_in({tile(0, 0), tile(30, 0)}).empty()) << "apart";
+    EXPECT_TRUE(surveys_in({tile(0, 0)}).empty());
+}
+
+/// The border crosses floor and wall: by itself, a tile does not see the other's half of the wall.
+TEST(Survey, points_at_borders_see_the_neighbouring_tile) {
+    const tests::TemporaryFolder folder;
+    const Points all = tests::corner(120000);
+    Points near, far;
+    for (const Vector3d& point : all)
+        (point.y() < 1 ? near : far).push_back(point);
+    Points in_order = near;
+    in_order.insert(in_order.end(), far.begin(), far.end());
+    const double radius = 0.3;
+    const CloudAoOptions options{.radius = radius, .outside = "1,1,1"};
+    const auto whole = CloudAo(options).compute({in_order}).visibility;
+    std::vector<CloudStream> files{stream_of(write_las(folder / "a.las", near)),
+                                   stream_of(write_las(folder / "b.las", far))};
+    std::vector<std::optional<SurveyTile>> boxes;
+    for (const CloudStream& file : files)
+        boxes.push_back(SurveyTile{file.box().value(), "LAS"});
+    EXPECT_EQ(surveys_in(boxes).size(), 1U);
+    std::vector<float> joined, apart;
+    CloudAo method(options);
+    LargeCloudRun run(files, {.folder = folder / "tiles"});
+    run.compute(method);
+    for (std::size_t k = 0; k < files.size(); ++k) {
+        const fs::path target = folder / fmt::format("{}.las", k);
+        (void)run.result(k, target, {});
+        std::vector<std::string> warnings;
+        std::ranges::copy(recorded_field(read_cloud(target, warnings), "ambient_occlusion", target),
+                          std::back_inserter(joined));
+        std::ranges::copy(CloudAo(options).compute({k == 0 ? near : far}).visibility, std::back_inserter(apart));
+    }
+    const auto beside = [&](const std::vector<float>& values) {
+        std::vector<float> some, same;
+        for (std::size_t i = 0; i < in_order.size(); ++i)
+            if (std::abs(in_order[i].y() - 1) < radius / 4) {
+                some.push_back(values[i]);
+                same.push_back(whole[i]);
+            }
+        return tests::rms_between(some, same);
+    };
+    fmt::print("beside the border: RMS {:.4f} as tiles of one survey, {:.4f} each by itself\n", beside(joined),
+               beside(apart));
+    EXPECT_LT(beside(joined), 0.01);
+    EXPECT_GT(beside(apart), 3 * beside(joined));
+}
+
+TEST(LargeCloud, laz_from_disk_is_that_of_laz_in_memory) {
+    const char* const data = std::getenv("SCANSHADE_LAZ"); // a file with more points than 64 MiB hold
+    if (!data)
+        GTEST_SKIP() << "SCANSHADE_LAZ names no file";
+    const tests::TemporaryFolder folder;
+    const fs::path file = data;
+    const CloudAoOptions options{.rays = 4, .memory_mib = little_memory_mib};
+    in_memory(file, folder / "one.laz", options);
+    (void)from_disk(file, folder / "other.laz", options, {.folder = folder / "tiles", .shown = 1000});
+    EXPECT_TRUE(file_bytes(folder / "one.laz") == file_bytes(folder / "other.laz"));
 }
 
 } // namespace
