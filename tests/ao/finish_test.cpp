@@ -274,7 +274,7 @@ TEST_F(FinishTest, clay_has_the_normals_of_plane_fits) {
     cv::RNG random(5);
     input.z_m = tilted_plane(input.camera, 45, 2).z_m;
     cv::Mat1f noise_m(input.z_m.size());
-    random.fill(noise_m, cv::RNG::NORMAL, 0, 0.004);
+    random.fill(noise_m, cv::RNG::NORMAL, 0, 0.008);
     input.z_m += noise_m;
     input.fitted_m = input.z_m;
     input.fitted_normals_host = cv::Mat3f(input.z_m.size(), cv::Vec3f(std::sqrt(0.5F), 0, -std::sqrt(0.5F)));
