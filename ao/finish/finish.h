@@ -25,7 +25,8 @@ struct FinishOutputs {
     int confidence_bits = 0; ///< as a map of 8 bits: confidence_from() that error; 0 = no map
     int map_bits = 0;        ///< of visibility, 16 or 8; 0 = no map
     bool picture = false;    ///< colour, or clay where there is none, times visibility in linear light
-    bool unshaded = false;   ///< colour divided by visibility, where there is colour
+    bool unshaded = false;   ///< colour divided by what the picture is multiplied by, where there is colour; with
+                             ///< Shade::ambient by visibility to the power that the photographs show
     bool split = false;      ///< the ambient and the direct part of colour, where there is colour
 
     [[nodiscard]] bool any() const { return error || confidence_bits > 0 || map_bits > 0 || pictures(); }

@@ -449,10 +449,12 @@ LightEstimate estimate_light(const LightSamples& samples, const LightRequest& re
     Light& light = result.light;
     light.power = values.power;
     light.gradient = values.gradient;
+    const std::string no_sign =
+        light.power < 0.1 ? "; the colours show no sign of this AO, so unshaded leaves their ambient part" : "";
     const char* space = samples.in_world() ? "the recording's world" : "camera space";
     if (!models[chosen].direct) {
-        result.sentence = fmt::format("light: all of it is ambient ({}); {} samples of {} frames", why_none,
-                                      result.samples, result.frames);
+        result.sentence = fmt::format("light: all of it is ambient ({}); {} samples of {} frames{}", why_none,
+                                      result.samples, result.frames, no_sign);
         return result;
     }
     light.direct = values.direct;
@@ -461,10 +463,10 @@ LightEstimate estimate_light(const LightSamples& samples, const LightRequest& re
         light.tint[channel] = fit.tint(whole, values, channel);
     result.sentence =
         fmt::format("light: ambient, and {:.2f} times as much direct light from {} in {} ({:.0f} degrees between "
-                    "halves); held-out error {:.3f}, {:.3f} without; {} samples of {} frames",
+                    "halves); held-out error {:.3f}, {:.3f} without; {} samples of {} frames{}",
                     light.direct.norm(), text_of(light.direct.normalized()), space, result.spread_deg,
                     result.models[chosen].held_out, std::min(result.models[1].held_out, result.models[2].held_out),
-                    result.samples, result.frames);
+                    result.samples, result.frames, no_sign);
     return result;
 }
 

@@ -72,7 +72,7 @@ uvec3 shaded_pixel(int at, uvec3 own_colour, uint known, float visible) {
 // a clipped pixel stays as it is.
 uvec3 unshaded_pixel(int at, uvec3 own_colour, float visible) {
     vec3 light = steps_of(own_colour), share = shaded_part(at);
-    float by = divisor(strong(visible), confidence_at(at));
+    float by = divisor(pow(strong(visible), k.unshade_power), confidence_at(at));
     // Of a photograph that holds its occlusion, the ambient part is what visibility has left: that alone is divided.
     vec3 more = light * (1.0 - share + share / by);
     float most = max(more.x, max(more.y, more.z));

@@ -5,10 +5,12 @@
 #include "projection/attach.h"
 #include "projection/base/error.h"
 #include "projection/expected_error.h"
+#include "projection/srgb.h"
 #include "tests/support/scenes.h"
 
 #include <cmath>
 #include <gtest/gtest.h>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 
 namespace scanshade {
@@ -147,6 +149,164 @@ TEST_F(FinishTest, clay_shows_the_depth_of_plane_fits_where_there_are_any) {
     const cv::Mat3b picture = finish.compute(input, {.picture = true}).picture;
     EXPECT_EQ(share_beyond(picture, clay(flat.z_m, input.camera), 1), 0);
     EXPECT_EQ(finish.compute(input, {.error = true}).picture.size(), cv::Size());
+}
+
+// ---------------------------------------------------------------------------------------------------- light
+
+/// The same expected error everywhere.
+shared::ErrorTable errors_of(float error) {
+    shared::ErrorTable table{};
+    std::fill_n(table.factors, shared::error_values * shared::error_shares, 2 * std::log2(error));
+    return table;
+}
+
+constexpr FinishOutputs all_of_light{.picture = true, .unshaded = true, .split = true};
+
+/// Light from the camera's left and behind it, twice as strong as ambient light.
+constexpr shared::LightConstants light{
+    .direct = {-1.2F, -0.4F, -1.5F}, .tint = {1.1F, 1, 0.8F}, .gradient = {}, .power = 1, .shadows = 0};
+
+double linear(uchar stored) { return linear_from_srgb(stored / 255.0); }
+
+TEST_F(FinishTest, ambient_and_direct_light_add_up_to_the_colour) {
+    FinishInput input = scene({160, 120});
+    input.light = light;
+    const Finished made = Finish(device).compute(input, all_of_light);
+    ASSERT_EQ(made.ambient.size(), input.colour.size());
+    ASSERT_EQ(made.direct.size(), input.colour.size());
+    for (int v = 0; v < 120; ++v)
+        for (int u = 0; u < 160; ++u)
+            for (int c = 0; c < 3; ++c)
+                EXPECT_NEAR(linear(made.ambient(v, u)[c]) + linear(made.direct(v, u)[c]), linear(input.colour(v, u)[c]),
+                            0.006);
+    EXPECT_GT(cv::countNonZero(made.direct.reshape(1) > 20), 160 * 120 / 2) << "most of it faces the light";
+}
+
+TEST_F(FinishTest, visibility_multiplies_the_ambient_part_alone) {
+    FinishInput input = scene({160, 120});
+    const DepthImage wall = tilted_plane(input.camera, 30, 2);
+    input.z_m = wall.z_m;
+    input.visibility.setTo(0.5);
+    input.strength = 1;
+    input.colour.setTo(cv::Scalar(120, 150, 180));
+    input.light = light;
+    const Finished multiplied = Finish(device).compute(input, {.picture = true});
+    input.shade = Shade::ambient;
+    const Finished made = Finish(device).compute(input, all_of_light);
+    // The wall's normal is the same everywhere, so the share of ambient light is.
+    const float ratio = shared::direct_over_ambient(
+        light,
+        {static_cast<float>(std::sin(std::numbers::pi / 6)), 0, -static_cast<float>(std::cos(std::numbers::pi / 6))},
+        0.5F, 1);
+    const float other = shared::direct_over_ambient(
+        light,
+        {-static_cast<float>(std::sin(std::numbers::pi / 6)), 0, -static_cast<float>(std::cos(std::numbers::pi / 6))},
+        0.5F, 1);
+    const float tint[] = {light.tint.z, light.tint.y, light.tint.x};
+    for (int c = 0; c < 3; ++c) {
+        const double whole = linear(input.colour(60, 80)[c]), found = linear(made.picture(60, 80)[c]);
+        const auto expected = [&](float of) {
+            return whole * (1 - 0.5 * static_cast<double>(shared::ambient_share(of, tint[c])));
+        };
+        EXPECT_TRUE(std::abs(found - expected(ratio)) < 0.01 || std::abs(found - expected(other)) < 0.01)
+            << found << " " << expected(ratio) << " " << expected(other);
+        EXPECT_GT(made.picture(60, 80)[c], multiplied.picture(60, 80)[c]) << "direct light is not darkened";
+        EXPECT_LT(made.picture(60, 80)[c], input.colour(60, 80)[c]);
+    }
+}
+
+TEST_F(FinishTest, without_direct_light_ambient_shading_is_plain_multiplication) {
+    FinishInput input = scene({160, 120});
+    const cv::Mat3b plain = Finish(device, Packing::on_device).compute(input, {.picture = true}).picture;
+    input.shade = Shade::ambient;
+    EXPECT_EQ(share_beyond(Finish(device, Packing::on_device).compute(input, {.picture = true}).picture, plain, 0), 0);
+    input.light = shared::LightConstants{.direct = {}, .tint = {1, 1, 1}, .gradient = {}, .power = 1, .shadows = 1};
+    EXPECT_EQ(share_beyond(Finish(device, Packing::on_device).compute(input, {.picture = true}).picture, plain, 0), 0);
+}
+
+TEST_F(FinishTest, unshaded_undoes_the_multiplication_where_confidence_is_high) {
+    FinishInput input = scene({160, 120});
+    input.z_m = tilted_plane(input.camera, 0, 2).z_m;
+    input.strength = 1;
+    cv::RNG random(11);
+    random.fill(input.visibility, cv::RNG::UNIFORM, 0.3, 1.0);
+    random.fill(input.colour, cv::RNG::UNIFORM, 60, 256);
+    const cv::Mat3b before = input.colour.clone();
+    input.colour = shade(before, input.visibility, 1);
+    input.errors = errors_of(0.1F);
+    const Finished made = Finish(device).compute(input, {.error = true, .unshaded = true});
+    int tried = 0;
+    for (int v = 0; v < 120; ++v)
+        for (int u = 0; u < 160; ++u)
+            if (made.error(v, u) < 0.15F) {
+                ++tried;
+                for (int c = 0; c < 3; ++c)
+                    EXPECT_NEAR(made.unshaded(v, u)[c], before(v, u)[c], 3);
+            }
+    EXPECT_GT(tried, 5000);
+}
+
+TEST_F(FinishTest, unshaded_blows_up_neither_unsure_nor_black_nor_clipped_pixels) {
+    FinishInput input = scene({160, 120});
+    input.z_m = tilted_plane(input.camera, 0, 2).z_m;
+    input.visibility.setTo(0.02);
+    input.colour.setTo(cv::Scalar(20, 30, 40));
+    input.colour(60, 80) = {0, 0, 0};
+    input.colour(60, 81) = {255, 128, 64};
+    input.visibility(60, 82) = unknown;
+    FinishInput unknown_errors = input;
+    unknown_errors.errors = {}; // confidence is zero
+    input.errors = errors_of(0.1F);
+    const Finished sure = Finish(device).compute(input, {.unshaded = true});
+    const Finished unsure = Finish(device).compute(unknown_errors, {.unshaded = true});
+    EXPECT_EQ(share_beyond(unsure.unshaded, input.colour, 1), 0);
+    EXPECT_EQ(sure.unshaded(60, 80), cv::Vec3b(0, 0, 0));
+    EXPECT_EQ(sure.unshaded(60, 81), cv::Vec3b(255, 128, 64)) << "its true light is unknown, its hue is kept";
+    EXPECT_EQ(sure.unshaded(60, 82), input.colour(60, 82));
+    EXPECT_LE(linear(sure.unshaded(60, 90)[0]), linear(20) / 0.15 + 0.01);
+    EXPECT_GT(sure.unshaded(60, 90)[0], 40);
+}
+
+TEST_F(FinishTest, without_colour_nothing_is_divided_or_split) {
+    FinishInput input = scene({64, 48});
+    input.colour.release();
+    input.light = light;
+    input.shade = Shade::ambient;
+    const Finished made = Finish(device).compute(input, all_of_light);
+    EXPECT_TRUE(made.unshaded.empty() && made.ambient.empty() && made.direct.empty());
+    EXPECT_FALSE(made.picture.empty());
+}
+
+TEST_F(FinishTest, clay_hides_colour_where_it_was_asked_for) {
+    FinishInput input = scene({160, 120}), colourless = input;
+    colourless.colour.release();
+    input.shade = Shade::clay;
+    for (const Packing packing : {Packing::on_device, Packing::on_host})
+        EXPECT_EQ(share_beyond(Finish(device, packing).compute(input, {.picture = true}).picture,
+                               Finish(device, packing).compute(colourless, {.picture = true}).picture, 0),
+                  0);
+}
+
+TEST_F(FinishTest, clay_has_the_normals_of_plane_fits) {
+    FinishInput input = scene({160, 120});
+    input.colour.release();
+    input.visibility.setTo(1);
+    cv::RNG random(5);
+    input.z_m = tilted_plane(input.camera, 45, 2).z_m;
+    cv::Mat1f noise_m(input.z_m.size());
+    random.fill(noise_m, cv::RNG::NORMAL, 0, 0.008);
+    input.z_m += noise_m;
+    input.fitted_m = input.z_m;
+    input.fitted_normals_host = cv::Mat3f(input.z_m.size(), cv::Vec3f(std::sqrt(0.5F), 0, -std::sqrt(0.5F)));
+    cv::Mat3b smooth = Finish(device).compute(input, {.picture = true}).picture;
+    input.fitted_normals_host.release();
+    cv::Mat3b rough = Finish(device).compute(input, {.picture = true}).picture;
+    const auto spread = [](const cv::Mat3b& picture) {
+        const cv::Rect here(70, 50, 20, 20);
+        return cv::norm(picture(here), picture(here + cv::Point(1, 0)), cv::NORM_L1) / (3 * here.area());
+    };
+    EXPECT_LT(spread(smooth), 1) << "grey levels from one pixel to the next";
+    EXPECT_GT(spread(rough), 3 * spread(smooth));
 }
 
 TEST_F(FinishTest, many_frames_at_once_do_not_disturb_each_other) {

@@ -1,0 +1,100 @@
+// --shade, --light and --write unshaded,light from the command line.
+#include "apps/json.h"
+#include "tests/support/says.h"
+#include "tests/support/small_capture.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+namespace scanshade::tests {
+namespace {
+
+namespace fs = std::filesystem;
+
+class LightCliTest : public testing::Test {
+  protected:
+    void SetUp() override {
+        if (!program_is_built())
+            GTEST_SKIP() << "the program is not built";
+    }
+    [[nodiscard]] fs::path capture() const { return folder.path() / "office"; }
+    [[nodiscard]] fs::path out() const { return folder.path() / "out"; }
+    void generate(const std::string& how) const {
+        const Ran ran = run_program(fmt::format("generate office -o '{}' --size 160x120 --frames 3 --step 40 --sensor "
+                                                "ideal --truth-rays 16 {}",
+                                                capture().string(), how));
+        ASSERT_EQ(ran.exit_code, 0) << ran.err;
+    }
+    [[nodiscard]] Ran run(const std::string& how, const fs::path& to) const {
+        return run_program(fmt::format("run '{}' -o '{}' --page no {}", capture().string(), to.string(), how));
+    }
+    [[nodiscard]] std::string bytes(const fs::path& in, const char* kind) const {
+        std::string all;
+        std::vector<fs::path> files;
+        for (const auto& entry : fs::directory_iterator(in / kind))
+            files.push_back(entry.path());
+        std::ranges::sort(files);
+        for (const fs::path& file : files)
+            all += read_bytes(file);
+        return all;
+    }
+    TemporaryFolder folder;
+};
+
+TEST_F(LightCliTest, a_resumed_run_has_the_bytes_of_one_without_a_break) {
+    generate("--light sun");
+    const std::string how = "--shade ambient --write shaded,unshaded,light";
+    const Ran whole = run(how, out());
+    ASSERT_EQ(whole.exit_code, 0) << whole.err;
+    EXPECT_TRUE(says(whole.err, "light: ")) << whole.err;
+    const fs::path other = folder.path() / "resumed";
+    ASSERT_EQ(run(how, other).exit_code, 0);
+    fs::remove(fs::directory_iterator(other / "unshaded")->path());
+    const Ran resumed = run(how + " --resume", other);
+    ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+    for (const char* kind : {"shaded", "unshaded", "ambient", "direct"})
+        EXPECT_EQ(bytes(out(), kind), bytes(other, kind)) << kind;
+    EXPECT_EQ(read_bytes(out() / "light.json").size(), read_bytes(other / "light.json").size());
+    const json manifest = json::parse(read_bytes(out() / "manifest.json"));
+    EXPECT_TRUE(manifest.contains("light"));
+}
+
+TEST_F(LightCliTest, pictures_are_those_of_today_unless_something_else_is_asked_for) {
+    generate("--light sun");
+    ASSERT_EQ(run("--write shaded", out()).exit_code, 0);
+    ASSERT_EQ(run("--write shaded --shade multiply", folder.path() / "multiplied").exit_code, 0);
+    ASSERT_EQ(run("--write shaded --shade clay", folder.path() / "clay").exit_code, 0);
+    EXPECT_EQ(bytes(out(), "shaded"), bytes(folder.path() / "multiplied", "shaded"));
+    EXPECT_NE(bytes(out(), "shaded"), bytes(folder.path() / "clay", "shaded"));
+    EXPECT_FALSE(fs::exists(out() / "light.json"));
+}
+
+TEST_F(LightCliTest, a_capture_without_colour_is_refused_with_what_to_do) {
+    generate("--light sun");
+    fs::remove_all(capture() / "rgb");
+    fs::remove(capture() / "rgb.txt");
+    const Ran ran = run("--shade ambient", out());
+    EXPECT_NE(ran.exit_code, 0);
+    EXPECT_TRUE(says(ran.err, "its light cannot be estimated")) << ran.err;
+    EXPECT_TRUE(says(ran.err, "--shade multiply shows clay")) << ran.err;
+    const Ran alone = run("--write unshaded", folder.path() / "alone");
+    EXPECT_TRUE(says(read_bytes(folder.path() / "alone" / "frames.csv"), "no unshaded")) << alone.err;
+}
+
+TEST_F(LightCliTest, settings_out_of_range_are_refused_before_anything_is_opened) {
+    generate("");
+    for (const char* light : {"sideways", "1,2", "0,0,0", "nan,0,1", "1,2,3,4"}) {
+        const Ran ran = run(fmt::format("--shade ambient --light {}", light), out());
+        EXPECT_NE(ran.exit_code, 0);
+        EXPECT_TRUE(says(ran.err, "expected auto, none, or X,Y,Z")) << ran.err;
+    }
+    EXPECT_FALSE(fs::exists(out()));
+    const Ran ran = run("--shade ambient --light none --write shaded", out());
+    EXPECT_EQ(ran.exit_code, 0) << ran.err;
+    EXPECT_TRUE(says(ran.err, "all of it is")) << ran.err;
+}
+
+} // namespace
+} // namespace scanshade::tests
