@@ -303,7 +303,9 @@ Journal::Journal(fs::path folder, const std::string& block)
     : folder_(std::move(folder)), file_(journal_file(folder_, block)) {
     std::error_code trouble;
     fs::create_directories(folder_, trouble);
-    handle_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+    handle_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_NOFOLLOW | O_CLOEXEC, 0666);
+    if (handle_ < 0 && errno == ELOOP)
+        throw Misuse(file_.string() + ": is a symbolic link, which is not followed: a file is expected");
     for (const int needs_another_folder : {EACCES, EPERM, EROFS, EISDIR})
         if (handle_ < 0 && errno == needs_another_folder)
             throw Misuse(fmt::format("{}: cannot be written: {}", file_.string(), std::strerror(errno)));
