@@ -35,6 +35,22 @@ fs::path temporary_name(const fs::path& target) {
            ("." + shortened(stem, longest_name - 1 - std::min(end.size(), longest_name / 2)) + end);
 }
 
+/// A new, empty file under a temporary name. Who may write into the folder may guess the name and put a link to a file
+/// elsewhere there: O_EXCL does not follow it, and the next name is taken.
+fs::path new_temporary(const fs::path& target) {
+    constexpr int tries = 1000;
+    for (int i = 0;; ++i) {
+        fs::path name = temporary_name(target);
+        const int handle = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+        if (handle >= 0) {
+            ::close(handle);
+            return name;
+        }
+        if (errno != EEXIST || i == tries)
+            throw std::system_error(errno, std::generic_category(), "cannot be created");
+    }
+}
+
 /// Syncs the file to disk before the rename makes it visible.
 void sync(const fs::path& path, int flags) {
     const int handle = ::open(path.c_str(), flags | O_CLOEXEC);
@@ -159,15 +175,17 @@ void publish(const fs::path& temporary, const fs::path& target) {
 }
 
 void write_atomically(const fs::path& target, const std::function<void(const fs::path&)>& write) {
-    const fs::path temporary = temporary_name(target);
+    fs::path temporary; // empty until there is one
     const auto clean_up = [&] {
         std::error_code ignored;
-        fs::remove(temporary, ignored);
+        if (!temporary.empty())
+            fs::remove(temporary, ignored);
     };
     try {
         during(target.string(), [&] {
             try {
                 fs::create_directories(folder_of(target));
+                temporary = new_temporary(target);
                 write(temporary);
                 sync_and_rename(temporary, target);
             } catch (const std::system_error& failure) { // the file system's answer; streams throw it, too

@@ -8,9 +8,9 @@
 
 namespace scanshade {
 
-/// Calls `write` with a temporary path in target's folder (same extension, name starting with '.'), then syncs and
-/// renames it to `target`. On failure the temporary file is removed and Outage names `target`. Missing parent folders
-/// are made.
+/// Calls `write` with a new, empty file in target's folder (same extension, name starting with '.'), then syncs and
+/// renames it to `target`. Neither follows a symbolic link: one in the target's place is replaced. On failure the
+/// temporary file is removed and Outage names `target`. Missing parent folders are made.
 void write_atomically(const std::filesystem::path& target,
                       const std::function<void(const std::filesystem::path&)>& write);
 /// The same for bytes already in memory.

@@ -64,7 +64,8 @@ std::string padding_for(std::uint64_t bytes, std::size_t unit) {
 } // namespace
 
 TarOutput::TarOutput(std::filesystem::path file)
-    : file_(std::move(file)), handle_(::open(file_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)) {
+    : file_(std::move(file)),
+      handle_(::open(file_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0666)) {
     if (handle_ < 0)
         fail_to_write(file_, "cannot be created");
 }

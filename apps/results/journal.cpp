@@ -368,11 +368,13 @@ Journal::Journal(fs::path folder, const std::string& block, fs::path results, co
       results_(results.empty() ? folder_ : std::move(results)) {
     std::error_code trouble;
     fs::create_directories(folder_, trouble);
-    constexpr int flags = O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC;
+    constexpr int flags = O_RDWR | O_CREAT | O_APPEND | O_NOFOLLOW | O_CLOEXEC;
     handle_ = ::open(file_.c_str(), flags | O_EXCL, 0666);
     made_ = handle_ >= 0;
     if (handle_ < 0 && errno == EEXIST)
         handle_ = ::open(file_.c_str(), flags, 0666);
+    if (handle_ < 0 && errno == ELOOP)
+        throw Misuse(file_.string() + ": is a symbolic link, which is not followed: a file is expected");
     for (const int needs_another_folder : {EACCES, EPERM, EROFS, EISDIR})
         if (handle_ < 0 && errno == needs_another_folder)
             throw Misuse(fmt::format("{}: cannot be written: {}", file_.string(), std::strerror(errno)));

@@ -83,9 +83,17 @@ void refuse_another_captures_results(const CaptureJob& job) {
 
 void require_folders(const fs::path& folder) {
     require_folder(folder);
-    for (const char* part : result_folders)
-        if (std::error_code ignored; fs::exists(folder / part, ignored))
-            require_folder(folder / part);
+    std::vector<fs::path> parts(result_folders.begin(), result_folders.end());
+    parts.emplace_back(tar_folder);
+    for (const fs::path& part : parts) {
+        const fs::path inside = folder / part;
+        std::error_code ignored;
+        if (fs::is_symlink(fs::symlink_status(inside, ignored)))
+            throw Misuse(inside.string() + ": is a symbolic link, and results are neither written nor removed through "
+                                           "one: make a folder of it, or choose another -o");
+        if (fs::exists(inside, ignored))
+            require_folder(inside);
+    }
 }
 
 void prepare_folder(const CaptureJob& job, const ReportFiles& reports, bool first) {

@@ -10,6 +10,7 @@
 #include <bit>
 #include <cerrno>
 #include <cstring>
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <limits>
 #include <optional>
@@ -281,8 +282,18 @@ std::vector<GroupPlace> groups_in(const fs::path& path) {
     return groups;
 }
 
+namespace {
+
+/// Does not follow a symbolic link in the file's place.
+std::FILE* created(const fs::path& file) {
+    const int handle = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0666);
+    return handle < 0 ? nullptr : ::fdopen(handle, "wb");
+}
+
+} // namespace
+
 McapOutput::McapOutput(fs::path file, const std::string& library, std::vector<Channel> channels)
-    : file_(std::move(file)), stream_(std::fopen(file_.c_str(), "wb"), &std::fclose), channels_(std::move(channels)) {
+    : file_(std::move(file)), stream_(created(file_), &std::fclose), channels_(std::move(channels)) {
     if (!stream_)
         throw Outage(fmt::format("{}: cannot be created: {}", file_.string(), std::generic_category().message(errno)));
     write(magic);
