@@ -112,8 +112,9 @@ ErrorTables error_tables_from(std::istream& text, const std::string& origin) {
 }
 
 std::string text_of(const ErrorTables& tables) {
-    std::string text = "# Expected errors of visibility: binary logarithms of factors of the squared error, in the order "
-                       "of\n# shaders/shared/expected_error.h. Renew them by the command below.\n";
+    std::string text =
+        "# Expected errors of visibility: binary logarithms of factors of the squared error, in the order "
+        "of\n# shaders/shared/expected_error.h. Renew them by the command below.\n";
     text += fmt::format("made_by {}\n", tables.made_by);
     for (const auto& [key, errors] : tables.methods) {
         const std::string head = fmt::format("{} {}", key.first, word_of(key.second));

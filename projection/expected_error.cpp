@@ -50,8 +50,8 @@ struct Seen {
     [[nodiscard]] ErrorSigns signs(int v, int u) const {
         const float z = z_m(v, u), sigma = static_cast<float>(noise.at(z));
         const float jump = shared::jump_radii * radius + shared::jump_sigmas * sigma;
-        ErrorSigns signs{share_of_ball(v, u), shared::error_rings, shared::error_rings,
-                         radius * std::sqrt(fx * fy) / z, sigma / radius};
+        ErrorSigns signs{share_of_ball(v, u), shared::error_rings, shared::error_rings, radius * std::sqrt(fx * fy) / z,
+                         sigma / radius};
         for (int ring = shared::error_rings - 1; ring >= 0; --ring) {
             const int across = shared::ring_across(ring), slope = shared::ring_is_diagonal(ring) ? across : 0;
             bool jumps = false, holes = false;
@@ -108,13 +108,13 @@ ErrorWeights weights_of(const ErrorSigns& signs, float visibility) {
     const float open = 1 - std::sqrt(1 - std::clamp(visibility, 0.0F, 1.0F));
     const auto [value, past_value] = knot_below(open * (shared::error_values - 1), shared::error_values);
     const auto [share, past_share] = knot_below(signs.seen * (shared::error_shares - 1), shared::error_shares);
-    const auto [reach, past_reach] =
-        knot_below(0.5F * std::log2(std::max(signs.reach, 1.0F)), shared::error_reaches);
+    const auto [reach, past_reach] = knot_below(0.5F * std::log2(std::max(signs.reach, 1.0F)), shared::error_reaches);
     const auto [noise, past_noise] = knot_below(std::log2(1 + 64 * signs.noise), shared::error_noises);
     const int first = share * shared::error_values + value;
     return {{first, first + 1, first + shared::error_values, first + shared::error_values + 1,
              shared::error_edges_at + signs.edge, shared::error_holes_at + signs.hole, shared::error_reaches_at + reach,
-             shared::error_reaches_at + reach + 1, shared::error_noises_at + noise, shared::error_noises_at + noise + 1},
+             shared::error_reaches_at + reach + 1, shared::error_noises_at + noise,
+             shared::error_noises_at + noise + 1},
             {(1 - past_share) * (1 - past_value), (1 - past_share) * past_value, past_share * (1 - past_value),
              past_share * past_value, 1, 1, 1 - past_reach, past_reach, 1 - past_noise, past_noise}};
 }

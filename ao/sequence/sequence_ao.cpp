@@ -22,7 +22,8 @@ constexpr double slides = 0.25;
 
 std::vector<Parameter> SequenceAoOptions::parameters() {
     return {{"fuse", "frames around each that noisy depth is averaged with; 0 = none", &fuse, "", 0, 16},
-            {"layers", "other views whose surfaces occlude what a frame shows (surfel, vxao); 0 = none", &layers, "", 0, 16},
+            {"layers", "other views whose surfaces occlude what a frame shows (surfel, vxao); 0 = none", &layers, "", 0,
+             16},
             {"reach",
              "how many frames away those may be; 0 = so many as the camera takes to move by the radius, 4 to 30",
              &reach, "frames", 0, 1000},

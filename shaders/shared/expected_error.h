@@ -7,17 +7,18 @@ SHARED_BEGIN
 // Positions tested in each pixel's ball.
 const int ball_seeds = 16;
 
-// Pixels around each are compared with it at four distances, in two pairs of opposite ones each: along the axes at 1 and 6
-// pixels, along the diagonals at 2.8 and 11.3.
+// Pixels around each are compared with it at four distances, in two pairs of opposite ones each: along the axes at 1
+// and 6 pixels, along the diagonals at 2.8 and 11.3.
 const int error_rings = 4;
 SHARED_FN int ring_across(int ring) { return ring == 0 ? 1 : ring == 1 ? 2 : ring == 2 ? 6 : 8; }
 SHARED_FN bool ring_is_diagonal(int ring) { return ring == 1 || ring == 3; }
-// Depth jumps between three pixels in a row where it is off from flat by more than this share of the radius, and by more
-// than so many sigmas of the middle one.
+// Depth jumps between three pixels in a row where it is off from flat by more than this share of the radius, and by
+// more than so many sigmas of the middle one.
 const float jump_radii = 0.1f, jump_sigmas = 8.0f;
 
 // The squared error is a product, so its logarithms add up. Between knots they are interpolated. Knots lie at
-// - visibility 0, 0.31, 0.56, 0.75, 0.89, 0.97, 1: evenly in 1 - sqrt(1 - visibility), since errors fall fast towards 1;
+// - visibility 0, 0.31, 0.56, 0.75, 0.89, 0.97, 1: evenly in 1 - sqrt(1 - visibility), since errors fall fast towards
+// 1;
 //   times the share of the ball that was seen, 0, 0.25 ... 1
 // - the nearest ring with a jump of depth, or none; the nearest one with a hole, or none
 // - a radius in the image of 1, 4, 16 ... 1024 pixels

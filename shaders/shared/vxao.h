@@ -34,9 +34,9 @@ struct VxaoConstants {
     int slots_log2;              // of each table
     int bricks;                  // there is room for
     int cones;
-    float tangent;               // of a cone's half angle
-    float gain;                  // on opacity: sheets of one voxel are sampled between their centres
-    float open[vxao_levels];     // V of an open plane, where voxels are of this level
+    float tangent;           // of a cone's half angle
+    float gain;              // on opacity: sheets of one voxel are sampled between their centres
+    float open[vxao_levels]; // V of an open plane, where voxels are of this level
 };
 
 // Specialization constants.

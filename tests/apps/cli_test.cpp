@@ -102,6 +102,10 @@ TEST_F(CliTest, frames_are_taken_like_a_slice) {
     EXPECT_EQ(files_in(out() / "ao"), 2u);
     ASSERT_EQ(run("--frames=-1: --overwrite").exit_code, 0);
     EXPECT_EQ(manifest()["frames"][0]["index"], 3);
+    ASSERT_EQ(run("--frames 1::2147483647 --overwrite").exit_code, 0);
+    EXPECT_EQ(manifest()["frames"].size(), 1u);
+    ASSERT_EQ(run("--frames=-2147483648:1 --overwrite").exit_code, 0);
+    EXPECT_EQ(run("--frames 2147483647 --overwrite").exit_code, 1);
     EXPECT_EQ(run("--frames 7:9 --overwrite").exit_code, 1);
     EXPECT_EQ(run("--frames a:b --overwrite").exit_code, 1);
     EXPECT_EQ(run("--frames 3:0:-1 --overwrite").exit_code, 1);

@@ -693,7 +693,7 @@ TEST(ShardTest, schedulers_number_their_tasks_in_their_own_ways) {
               std::pair(3, 3));
     EXPECT_EQ(shard({{"JOB_COMPLETION_INDEX", "0"}, {"JOB_COMPLETIONS", "4"}}), std::pair(1, 4));
     EXPECT_EQ(shard_from("2/8").index, 2);
-    for (const char* wrong : {"0/3", "4/3", "a/b", "1/0", "1/2/3", "1"})
+    for (const char* wrong : {"0/3", "4/3", "a/b", "1/0", "1/2/3", "1", "/", " 1/2", "4294967297/4294967298"})
         EXPECT_THROW((void)shard_from(wrong), Misuse) << wrong;
 }
 

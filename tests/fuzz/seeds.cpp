@@ -208,7 +208,7 @@ void texts() {
 }
 
 /// What is typed, and what is shown: words of every command, the small languages of flags, a run's manifest.
-void words() {
+void typed() {
     const std::string settings =
         R"(=====
 {"settings":{"method":{"method":"cacao"},"method cacao":{"cacao.radius":0.3,"cacao.blur_passes":2}}})";
@@ -394,7 +394,7 @@ int main(int count, char** words) {
     las();
     cameras();
     texts();
-    words();
+    typed();
     recordings();
     colmap();
     hdf5();

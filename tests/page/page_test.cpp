@@ -186,6 +186,14 @@ TEST_F(PageFilesTest, a_manifest_cannot_lead_a_page_out_of_its_folder) {
     EXPECT_EQ(head["file_sets"], nlohmann::json::parse(R"([[["ao", ".png"]], []])"));
 }
 
+TEST_F(PageFilesTest, a_manifest_nested_without_end_is_refused_and_not_followed) {
+    const std::string deep = std::string(200000, '[') + std::string(200000, ']');
+    tests::write_file(out() / "manifest.json", R"({"frames": [], "capture": {"camera": )" + deep + "}}");
+    const Ran ran = run_program(fmt::format("view '{}'", out().string()));
+    EXPECT_EQ(ran.exit_code, 3);
+    EXPECT_NE(ran.err.find("nested deeper than 64 levels"), std::string::npos) << ran.err;
+}
+
 TEST_F(PageFilesTest, the_cloud_of_a_recording_is_on_its_page_until_the_next_run) {
     const std::string made =
         fmt::format("generate office --frames 2 --size 160x120 --truth=false -o '{}'", capture().string());
