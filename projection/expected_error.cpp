@@ -13,6 +13,7 @@
 namespace scanshade {
 namespace {
 
+constexpr float most_noise = 1e6F; // sigma / radius where there is no radius: nothing is told apart from noise
 constexpr float never_seen = -std::numeric_limits<float>::infinity(); // in front of no ball
 
 /// The image in which signs are looked for.
@@ -51,7 +52,7 @@ struct Seen {
         const float z = z_m(v, u), sigma = static_cast<float>(noise.at(z));
         const float jump = shared::jump_radii * radius + shared::jump_sigmas * sigma;
         ErrorSigns signs{share_of_ball(v, u), shared::error_rings, shared::error_rings, radius * std::sqrt(fx * fy) / z,
-                         sigma / radius};
+                         radius > 0 ? sigma / radius : most_noise};
         for (int ring = shared::error_rings - 1; ring >= 0; --ring) {
             const int across = shared::ring_across(ring), slope = shared::ring_is_diagonal(ring) ? across : 0;
             bool jumps = false, holes = false;

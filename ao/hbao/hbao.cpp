@@ -14,12 +14,18 @@ struct Count {
     Quality quality;
     int directions, steps;
 };
+/// More than four steps find ever higher horizons of a surface without a thickness: clean depth had an error of 0.132
+/// with 8x4, 0.145 with 8x8 and 0.162 with 32x16. High qualities have more directions in place of them.
 constexpr std::array counts{Count{Quality::lowest, 4, 2}, Count{Quality::low, 4, 4}, Count{Quality::medium, 8, 4},
-                            Count{Quality::high, 8, 8}, Count{Quality::highest, 32, 16}};
+                            Count{Quality::high, 16, 4}, Count{Quality::highest, 64, 4}};
+/// HBAO+ sums what each step sees, so steps do it no harm.
+constexpr std::array counts_of_plus{Count{Quality::lowest, 4, 2}, Count{Quality::low, 4, 4},
+                                    Count{Quality::medium, 8, 4}, Count{Quality::high, 8, 8},
+                                    Count{Quality::highest, 32, 16}};
 
 /// The quality's values, except those given.
 Count count_of(const HbaoOptions& options) {
-    Count count = level_of(counts, options.quality);
+    Count count = level_of(options.profile == HbaoProfile::plus ? counts_of_plus : counts, options.quality);
     if (options.directions > 0)
         count.directions = options.directions;
     if (options.steps > 0)
@@ -78,7 +84,8 @@ std::vector<Parameter> HbaoOptions::parameters() {
                                "contrast 1.25; plus is HBAO+, a sum of attenuated samples without a horizon",
                        .value = OneOf(&profile, hbao_profile_words)},
                       {.name = "quality",
-                       .help = "directions x steps: lowest 4x2, low 4x4, medium 8x4, high 8x8, highest 32x16",
+                       .help = "directions x steps: lowest 4x2, low 4x4, medium 8x4, high 16x4, highest 64x4; of "
+                               "profile plus 8x8 and 32x16",
                        .value = OneOf(&quality, quality_words)},
                       {.name = "directions",
                        .help = "directions in the image; 0 = as the quality says",

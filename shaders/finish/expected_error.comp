@@ -81,6 +81,6 @@ void main() {
     float sum = of_value_and_share(known ? value : 0.0, share) + factor(error_edges_at + edge) +
                 factor(error_holes_at + hole) +
                 between_knots(error_reaches_at, error_reaches, 0.5 * log2(max(reach, 1.0))) +
-                between_knots(error_noises_at, error_noises, log2(1.0 + 64.0 * sigma / radius));
+                between_knots(error_noises_at, error_noises, log2(1.0 + 64.0 * (radius > 0.0 ? sigma / radius : 1e6)));
     expected_error[here] = known ? min(exp2(0.5 * sum), 1.0) : uintBitsToFloat(0x7fc00000u);
 }

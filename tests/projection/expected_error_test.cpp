@@ -144,6 +144,16 @@ TEST(ExpectedError, factors_multiply_and_are_interpolated_between_knots) {
     EXPECT_EQ(expected_error(weights_of(plain, 1), table(5)), 1) << "nothing errs by more";
 }
 
+TEST(ExpectedError, without_a_radius_the_worst_is_expected) {
+    shared::ErrorTable worse_with_noise{};
+    for (int i = 0; i < shared::error_noises; ++i)
+        worse_with_noise.factors[shared::error_noises_at + i] = static_cast<float>(i - 8);
+    for (const DepthNoise& noise : {DepthNoise{}, DepthNoise{0.001, 0.002}}) {
+        const cv::Mat1f errors = expected_error_of(wall(1), open_where_known(wall(1)), 0, noise, worse_with_noise);
+        EXPECT_FLOAT_EQ(errors(120, 160), std::exp2(0.5F * (shared::error_noises - 1 - 8)));
+    }
+}
+
 TEST(ExpectedError, confidence_is_one_less_error_over_its_limit) {
     EXPECT_EQ(confidence_from(0.0F), 1);
     EXPECT_FLOAT_EQ(confidence_from(0.15F), 0.5F);
