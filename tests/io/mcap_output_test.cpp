@@ -217,6 +217,17 @@ TEST(MessageOutputTest, cameras_come_back) {
     EXPECT_EQ(fisheye->distortion, camera.distortion);
 }
 
+TEST(MessageOutputTest, a_region_whose_area_is_no_int_is_a_camera_of_that_size) {
+    Camera camera;
+    camera.pinhole = {525.5, 526.25, 319.5, 239.75, {640, 480}};
+    CameraInfo info = camera_info_in(message_of(info_of(camera, header_at(5))), Encoding::cdr);
+    info.region = {0, 0, 1 << 20, 1 << 20};
+    const auto found = camera_of(info, false, {512, 512});
+    ASSERT_TRUE(found);
+    EXPECT_EQ(found->pinhole.size, cv::Size(512, 512));
+    EXPECT_DOUBLE_EQ(found->pinhole.fx, 525.5 / 2048);
+}
+
 TEST(MessageOutputTest, images_and_poses_come_back) {
     cv::Mat1w depth(3, 5);
     for (int i = 0; i < 15; ++i)

@@ -277,7 +277,7 @@ std::optional<Camera> camera_of(const CameraInfo& info, bool rectified, cv::Size
     if (!(k.fx > 0) || !(k.fy > 0))
         return std::nullopt;
     // K is for the full image: first the part that is read out, then pixels joined.
-    if (info.region.area() > 0) {
+    if (info.region.width > 0 && info.region.height > 0) { // the area of a damaged one may be no int
         k.cx -= info.region.x;
         k.cy -= info.region.y;
         k.size = info.region.size();
