@@ -148,9 +148,8 @@ void entries_from_match(const fs::path& folder, const fs::path& depth_folder, Ca
     }
 }
 
-/// Pairs by equal stems; where no stem is shared but there are as many of each, by order. Frees each path of depth with
-/// its entry: for a million frames they take as much memory as the entries.
-void entries_from_names(std::vector<fs::path> depths, const std::vector<fs::path>& colours, Capture& capture) {
+/// Pairs by equal stems; where no stem is shared but there are as many of each, by order.
+void entries_from_names(const std::vector<fs::path>& depths, const std::vector<fs::path>& colours, Capture& capture) {
     std::map<std::string, const fs::path*> by_stem;
     for (const fs::path& colour : colours)
         by_stem.emplace(colour.stem().string(), &colour);
@@ -174,7 +173,6 @@ void entries_from_names(std::vector<fs::path> depths, const std::vector<fs::path
             entry.colour = *same->second;
         else if (!colours.empty())
             entry.warnings.push_back(fmt::format("{} has no colour image.", depths[i].string()));
-        depths[i] = fs::path();
     }
     if (!by_order && shared < colours.size())
         capture.warnings.push_back(fmt::format("{} without a depth image of the same name; not used.",
@@ -217,7 +215,7 @@ std::optional<Listing> list_image_folders(const fs::path& folder) {
     const auto depth_folder = folder_named(folder, {"depth", "depths", "Depth", "depth_images"});
     if (!depth_folder)
         return std::nullopt;
-    auto depths = depth_images_in(depth_folder);
+    const auto depths = depth_images_in(depth_folder);
     if (depths.empty())
         return std::nullopt;
     const auto colour_folder = folder_named(folder, {"color", "colour", "rgb", "image", "images", "Color", "RGB"});
@@ -230,7 +228,7 @@ std::optional<Listing> list_image_folders(const fs::path& folder) {
     if (matched)
         entries_from_match(folder, *depth_folder, capture);
     else
-        entries_from_names(std::move(depths), colour_images_in(colour_folder), capture);
+        entries_from_names(depths, colour_images_in(colour_folder), capture);
     add_poses(folder, capture, listing.used);
     listing.find_camera = [folder](cv::Size, std::vector<std::string>& warnings) {
         return camera_in(folder, warnings);
