@@ -12,8 +12,9 @@ namespace scanshade {
 
 /// What tells of the error of a visibility, whatever the method.
 struct ErrorSigns {
-    float seen = 0; ///< share of the ball's image that has depth and is not hidden by something in front of the ball,
-                    ///< in steps of 1/16. Occluders outside the image, in a hole, or behind something near are unknown
+    /// Share of the ball's image that has depth and is not hidden by something in front of the ball, in steps of 1/16.
+    /// Occluders outside the image, in a hole, or behind something near are unknown.
+    float seen = 0;
     int edge = 0;    ///< of the rings around it, the nearest with a jump of depth; shared::error_rings = none
     int hole = 0;    ///< the nearest with a hole; likewise. Outside the image is no hole
     float reach = 0; ///< the radius in the image, pixels
