@@ -159,11 +159,12 @@ class Fit {
             found.emplace_back(terms.shadows ? cost_with_guessed_shadows(part, each) : cost(part, each), each);
         std::ranges::stable_sort(found, {}, [](const auto& each) { return each.first; });
         std::vector<Values> distinct; // false minima are many, and their costs alike
-        for (const auto& [unused, each] : found)
-            if (distinct.size() < (thorough ? 6U : 3U) && std::ranges::none_of(distinct, [&](const Values& other) {
+        for (const auto& [cost, values] : found)
+            if (distinct.size() < (thorough ? 6U : 3U) &&
+                std::ranges::none_of(distinct, [&each = values](const Values& other) {
                     return (other.direct - each.direct).norm() < 0.35 * each.direct.norm();
                 }))
-                distinct.push_back(each);
+                distinct.push_back(values);
         std::pair<double, Values> best{1e9, start};
         std::vector<double> lit_of_best = part.lit;
         for (Values each : distinct) {

@@ -38,12 +38,12 @@ json hooks_json(const Hooks& hooks) {
 }
 
 Hooks hooks_from(const json& text) {
-    const Hooks hooks{.fetch = text.at("fetch"),
-                      .deliver = text.at("deliver"),
-                      .limit_s = text.at("limit_s"),
-                      .tries = text.at("tries"),
-                      .wait_s = text.at("wait_s"),
-                      .scratch_limit = text.at("scratch_limit_gb")};
+    Hooks hooks{.fetch = text.at("fetch"),
+                .deliver = text.at("deliver"),
+                .limit_s = text.at("limit_s"),
+                .tries = text.at("tries"),
+                .wait_s = text.at("wait_s"),
+                .scratch_limit = text.at("scratch_limit_gb")};
     if (hooks.limit_s < 1 || hooks.tries < 1 || !(hooks.wait_s >= 0 && hooks.wait_s <= most_wait_s) ||
         !(hooks.scratch_limit >= 0 && hooks.scratch_limit <= most_scratch_gb))
         throw Error("hooks: a limit is out of range");

@@ -24,7 +24,7 @@ namespace {
 std::string key_for(const Plan& plan, const Task& task) {
     std::vector<std::string> parts{task.capture.string(), std::to_string(task.listed_bytes), task.block()};
     for (const auto& [name, value] : plan.settings)
-        parts.push_back(name + "=" + value);
+        parts.push_back(fmt::format("{}={}", name, value));
     return key_of(parts);
 }
 

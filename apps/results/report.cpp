@@ -161,7 +161,7 @@ std::vector<std::string> files_of_others(const std::filesystem::path& folder,
     for (const std::string& part : parts) {
         std::error_code none_there;
         for (const auto& entry : std::filesystem::directory_iterator(folder / part, none_there)) {
-            const std::string name = entry.path().filename().string(), whole = part + "/" + name;
+            const std::string name = entry.path().filename().string(), whole = fmt::format("{}/{}", part, name);
             if (!name.starts_with('.') && !own.contains(whole))
                 others.push_back(whole);
         }

@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <functional>
 #include <gtest/gtest.h>
 #include <map>
@@ -448,7 +449,7 @@ TEST_F(ClosedForms, a_hole_more_never_darkens) {
         const cv::Mat1f after = made->compute({{punched, normals}}).visibility;
         double least = 0;
         cv::minMaxLoc(after - before, &least, nullptr, nullptr, nullptr, punched.z_m > 0);
-        EXPECT_GE(least, -1e-6) << method << " " << fmt::to_string(fmt::join(more, " "));
+        EXPECT_GE(least, -1e-6) << method << " " << fmt::format("{}", fmt::join(more, " "));
     }
 }
 

@@ -266,9 +266,9 @@ std::string write_floor(const fs::path& file, bool black = false) {
     std::string text = fmt::format("ply\nformat ascii 1.0\nelement vertex 900\nproperty float x\nproperty float y\n"
                                    "property float z\n{}end_header\n",
                                    black ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "");
-    for (int i = 0; i < 900; ++i)
-        text += fmt::format("{} {} {}{}\n", 0.1 * (i % 30), 0.1 * (i / 30), 0.1 * std::sin(0.3 * (i % 30)),
-                            black ? " 0 0 0" : "");
+    for (int y = 0; y < 30; ++y)
+        for (int x = 0; x < 30; ++x)
+            text += fmt::format("{} {} {}{}\n", 0.1 * x, 0.1 * y, 0.1 * std::sin(0.3 * x), black ? " 0 0 0" : "");
     std::ofstream(file) << text;
     return file.string();
 }

@@ -32,8 +32,10 @@ std::vector<ErrorSample> samples_of(const shared::ErrorTable& table, int count) 
 
 shared::ErrorTable some_table() {
     shared::ErrorTable table{};
-    for (int i = 0; i < shared::error_edges_at; ++i)
-        table.factors[i] = -5 - 0.3F * static_cast<float>(i / shared::error_values);
+    for (int i = 0; i < shared::error_edges_at; ++i) {
+        const int share = i / shared::error_values;
+        table.factors[i] = -5 - 0.3F * static_cast<float>(share);
+    }
     for (int ring = 0; ring <= shared::error_rings; ++ring) {
         table.factors[shared::error_edges_at + ring] = 1.5F - 0.3F * static_cast<float>(ring);
         table.factors[shared::error_holes_at + ring] = 0.8F - 0.2F * static_cast<float>(ring);

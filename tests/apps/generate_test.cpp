@@ -38,7 +38,7 @@ TEST(Scene, DepthOfAWallIsTheDistanceToItsPlaneNotTheRaysLength) {
 }
 
 TEST(Scene, RaysHitEverySolidWhereItsFormulaSays) {
-    const auto t = [](const scene::Solid& solid, Eigen::Vector3d origin, Eigen::Vector3d direction) {
+    const auto t = [](const scene::Solid& solid, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
         return scene::cast({{solid, {}}}, {origin, direction}).t;
     };
     EXPECT_DOUBLE_EQ(t(Plane{{0, 0, 1}, {0, 0, 1}}, {0, 0, 3}, {0, 0, -1}), 2);

@@ -130,7 +130,8 @@ TEST(SourcesTest, a_list_has_a_source_a_line_and_maybe_its_size) {
     for (const auto& [text, message] : {std::pair("a\n-b\n", "line 2: "), std::pair("a\n\xff\n", "line 2: "),
                                         std::pair("a\ta lot\n", "a size in bytes"), std::pair("a\na\n", "listed twice"),
                                         std::pair("\t5\n", "empty name"), std::pair("a\t-5\n", "a size in bytes")})
-        EXPECT_TRUE(says(refusal([&] { (void)sources_from({}, write_file(folder / "bad", text)); }), message));
+        EXPECT_TRUE(
+            says(refusal([&, &text = text] { (void)sources_from({}, write_file(folder / "bad", text)); }), message));
     EXPECT_TRUE(says(refusal([&] { (void)sources_from({}, folder / "none"); }), "none"));
 }
 

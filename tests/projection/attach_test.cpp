@@ -128,7 +128,7 @@ TEST(AttachToDepth, ThroughALensNothingIsTakenFromAcrossAnEdge) {
 
 // ---------------------------------------------------------------------------------------------------- clouds
 
-Frame cloud_frame(const Pinhole& camera, std::vector<cv::Point3d> pixels_and_depths) {
+Frame cloud_frame(const Pinhole& camera, const std::vector<cv::Point3d>& pixels_and_depths) {
     Frame frame;
     frame.camera = {camera, {}, "--camera"};
     frame.cloud = Cloud{{static_cast<int>(pixels_and_depths.size()), 1}, {}, {}, {}};
@@ -191,7 +191,7 @@ TEST(Attach, MapsOfDifferentSizesAreRefused) {
 
 // ---------------------------------------------------------------------------------------------------- shading
 
-cv::Vec3b shaded(cv::Vec3b colour, float visibility, double strength = 1) {
+cv::Vec3b shaded(const cv::Vec3b& colour, float visibility, double strength = 1) {
     return shade(cv::Mat3b(1, 1, colour), cv::Mat1f(1, 1, visibility), strength)(0, 0);
 }
 

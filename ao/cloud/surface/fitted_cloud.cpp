@@ -155,7 +155,7 @@ class Thinning {
     /// Of the first member that has one; zero if none has.
     [[nodiscard]] Vector3f first_normal(std::span<const std::uint32_t> members) const {
         for (const std::uint32_t index : members)
-            if (const Vector3f normal = normal_of(index); !normal.isZero())
+            if (Vector3f normal = normal_of(index); !normal.isZero())
                 return normal;
         return Vector3f::Zero();
     }

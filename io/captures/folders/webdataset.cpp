@@ -39,9 +39,8 @@ void take_part(Sample& sample, const std::string& ending) {
         sample.json = true;
     else if (is_one_of(part, {"x.depth", "x.depth_map", "x.depthmap"}) && has_depth_extension(whole))
         sample.depth = ending;
-    else if (is_one_of(part, {"x.rgb", "x.color", "x.colour", "x.image", "x.img"}) && has_colour_extension(whole))
-        sample.colour = ending;
-    else if (part == "x" && sample.colour.empty() && has_colour_extension(whole)) // KEY.jpg
+    else if (has_colour_extension(whole) && (is_one_of(part, {"x.rgb", "x.color", "x.colour", "x.image", "x.img"}) ||
+                                             (part == "x" && sample.colour.empty()))) // KEY.jpg
         sample.colour = ending;
 }
 
