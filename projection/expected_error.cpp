@@ -17,7 +17,7 @@ constexpr float most_noise = 1e6F; // sigma / radius where there is no radius: n
 constexpr float never_seen = -std::numeric_limits<float>::infinity(); // in front of no ball
 
 /// The image in which signs are looked for.
-struct Seen {
+struct SeenDepth {
     const cv::Mat1f& z_m;
     float radius, fx, fy;
     DepthNoise noise;
@@ -96,8 +96,8 @@ void for_each_sign(const DepthImage& depth, const cv::Mat1f& visibility, double 
     cv::Mat1f seen_z(z_m.size());
     std::transform(z_m.begin(), z_m.end(), visibility.begin(), seen_z.begin(),
                    [](float z, float value) { return std::isnan(value) || !(z > 0) ? never_seen : z; });
-    const Seen seen{seen_z, static_cast<float>(radius_m), static_cast<float>(depth.camera.fx),
-                    static_cast<float>(depth.camera.fy), noise};
+    const SeenDepth seen{seen_z, static_cast<float>(radius_m), static_cast<float>(depth.camera.fx),
+                         static_cast<float>(depth.camera.fy), noise};
     tbb::parallel_for(0, z_m.rows, [&](int v) {
         for (int u = 0; u < z_m.cols; ++u)
             if (seen_z(v, u) != never_seen)

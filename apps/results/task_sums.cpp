@@ -35,8 +35,8 @@ ReasonGroups groups_from(const json& text) {
     return groups;
 }
 
-constexpr std::array stages = {&StageTimes::load, &StageTimes::project, &StageTimes::compute, &StageTimes::attach,
-                               &StageTimes::write};
+constexpr std::array stage_times = {&StageTimes::load, &StageTimes::project, &StageTimes::compute, &StageTimes::attach,
+                                    &StageTimes::write};
 
 } // namespace
 
@@ -70,7 +70,7 @@ void TaskSums::add(const FrameRow& row, const std::vector<std::string>& folders)
 
 json to_json(const TaskSums& sums) {
     json text{{"ok", sums.ok}, {"doubtful", sums.doubtful}, {"failed", sums.failed}, {"ms", json::array()}};
-    for (const auto stage : stages)
+    for (const auto stage : stage_times)
         text["ms"].push_back(sums.ms.*stage);
     text["reasons"] = groups_json(sums.reasons);
     text["doubts"] = groups_json(sums.doubts);
@@ -82,8 +82,8 @@ TaskSums sums_from(const json& text) {
     sums.ok = count_at(text, "ok");
     sums.doubtful = count_at(text, "doubtful");
     sums.failed = count_at(text, "failed");
-    for (std::size_t i = 0; i < stages.size(); ++i)
-        sums.ms.*stages[i] = text.at("ms").at(i).get<double>();
+    for (std::size_t i = 0; i < stage_times.size(); ++i)
+        sums.ms.*stage_times[i] = text.at("ms").at(i).get<double>();
     sums.reasons = groups_from(text.at("reasons"));
     sums.doubts = groups_from(text.at("doubts"));
     return sums;
