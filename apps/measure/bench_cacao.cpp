@@ -94,13 +94,13 @@ class Timed {
     std::map<std::string, double> bytes_; // of the buffers a pass touches
 };
 
-struct Calibration {
+struct PlainTaps {
     std::array<std::int32_t, 2> size;
     CacaoTables tables;
 };
 
 /// 32 taps over the same image. Their time relates machines, and busy and quiet minutes of one machine.
-Calibration calibration(cv::Size size) {
+PlainTaps calibration(cv::Size size) {
     const auto pixels = static_cast<std::size_t>(size.area());
     const auto groups = [](int n) { return static_cast<std::uint32_t>((n + 7) / 8); };
     return {{size.width, size.height},
@@ -184,7 +184,7 @@ class CacaoTimes final : public BenchPart {
   private:
     void print_times(gpu::Device& device, cv::Size size) {
         const DepthImage depth = room(size);
-        const Calibration plain = calibration(size);
+        const PlainTaps plain = calibration(size);
         Timed gather(device, plain.tables, std::as_bytes(std::span(plain.size)), gpu::Program::Stamps::total);
         fmt::print("\n{}x{}\n{:<10} {:>11} {:>10} {:>10} {:>10} {:>10}\n", size.width, size.height, "quality",
                    "resolution", "median ms", "least ms", "x gather", "gather ms");
