@@ -418,10 +418,11 @@ TEST_F(HookedJobTest, an_input_larger_than_the_limit_is_an_outage_that_says_so) 
 }
 
 TEST_F(HookedJobTest, a_kill_between_delivery_and_journal_delivers_the_same_again) {
-    // The delivery ends well, and then its worker is killed before it can write that down.
-    const std::string kills =
-        fmt::format(" && echo {{task}} >>{0} && {{ [ $(grep -c . {0}) != 2 ] || {{ touch {1}; sleep 4248; }}; }}",
-                    path("deliveries"), path("now"));
+    // The delivery ends well, and then its worker is killed before it can write that down. Once, from the second
+    // delivery on: several at the same time may be counted together.
+    const std::string kills = fmt::format(
+        " && echo {{task}} >>{0} && {{ [ $(grep -c . {0}) -lt 2 ] || [ -e {1} ] || {{ touch {1}; sleep 4248; }}; }}",
+        path("deliveries"), path("now"));
     ASSERT_EQ(plan(copy_in, deliver() + kills).exit_code, all_well);
     const pid_t child = tests::start_program({"run", path("job"), "--scratch", path("scratch")});
     ASSERT_TRUE(tests::wait_for_file(folder / "now"));
