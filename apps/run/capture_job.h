@@ -1,6 +1,7 @@
 // One capture to compute, and the folder of its results: what is refused there, and what is cleared before a run.
 #pragma once
 
+#include "ao/light/light.h"
 #include "apps/walk/batch_options.h"
 #include "io/captures/capture.h"
 
@@ -19,8 +20,9 @@ struct OpenedCapture {
     Capture capture;
     std::vector<std::size_t> of; ///< all its frames to compute
     /// Made by the first block that needs them.
-    std::once_flag check_poses, make_key;
+    std::once_flag check_poses, make_key, find_light;
     std::string task_key = {};
+    LightEstimate light = {};
 };
 
 /// One capture, the frames to take of it, and where its results go.

@@ -589,16 +589,19 @@ class Run final : public Command {
             return "";
         }
         const fs::path file = job.folder() / "light.json";
-        const std::string task = task_key(asked_.stages_in_use(), job.capture, job.of, asked_.in_sequence(job.capture));
-        auto found = asked_.resume ? light_in(file, task) : std::nullopt;
-        if (!found) {
-            const MethodPool::Lease method = workers().pool().lease();
-            found = light_of(job.capture, job.of, *method, job.batch, light_request(asked_.light));
-            write_atomically(file, text_of(*found, task));
-        }
-        job.batch.light = found->light;
-        report.light = found->sentence;
-        return text_of(*light_in(file, task), "");
+        const std::string task = task_of(job);
+        LightEstimate& light = job.opened->light;
+        std::call_once(job.opened->find_light, [&] {
+            if (!asked_.resume || !light_in(file, task)) {
+                const MethodPool::Lease method = workers().pool().lease();
+                light = light_of(job.capture, job.of, *method, job.batch, light_request(asked_.light));
+                write_atomically(file, text_of(light, task));
+            }
+            light = light_in(file, task).value(); // as a later run reads it
+        });
+        job.batch.light = light.light;
+        report.light = light.sentence;
+        return text_of(light, "");
     }
 
     /// Whether the capture holds clouds that are computed from their points. Judged by the clouds in memory; those that
