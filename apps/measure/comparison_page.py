@@ -1,6 +1,6 @@
 """The page of compare_methods.py: one file with a table to sort, plots of error against time, and pictures side by side.
 
-Looks come from apps/page/ (style.css, document.css). Names and messages enter by html.escape only.
+Looks come from apps/page/ (head.html, style.css, document.css). Names and messages enter by html.escape only.
 """
 
 import base64
@@ -231,17 +231,8 @@ def page(result, report, folder, view_count):
                             views(report, folder, view_count)))
     style = (PAGES / "style.css").read_text() + (PAGES / "document.css").read_text() + STYLE
     title = "Ambient occlusion: all methods against truth"
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="color-scheme" content="light dark">
-<link rel="icon" href="data:,">
-<title>{title}</title>
-<style>{style}</style>
-</head>
-<body class="document">
+    head = (PAGES / "head.html").read_text().partition("<body>")[0].replace("{{title}}", title).replace("{{style}}", style)
+    return f"""{head}<body class="document">
 <header class="top">
 <p class="brand">scanshade {escape(result["measured"]["version"])}</p>
 <h1>{title}</h1>
