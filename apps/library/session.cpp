@@ -276,8 +276,12 @@ void Session::finish_one(Computed& computed, const BatchOptions& options, Wanted
     const Stopwatch stopwatch;
     Work& work = computed.work;
     const Frame& frame = work.frame;
-    if (!work.by_points)
-        (void)finish(work, options, options.outputs);
+    computed.row.expected_error = std::numeric_limits<double>::quiet_NaN();
+    if (work.by_points)
+        computed.row.expected_error = work.of_points.expected_error.value_or(computed.row.expected_error);
+    else
+        computed.row.expected_error =
+            expected_rms(work.error_in_view, finish(work, options, options.outputs).confidence_map);
     computed.row.coverage = work.attached.coverage;
     computed.row.mean_visibility = work.attached.mean_visibility;
     std::ranges::move(doubts_about(work, options.radius_m, options.noise), std::back_inserter(computed.row.doubts));

@@ -100,6 +100,7 @@ scanshade.parts.push(() => {
       : [kind("coverage", "coverage", (row) => row.coverage, 3, "pixels or points with a visibility / those with a depth"),
         kind("valid", "valid", (row) => row.valid, 3, "pixels or points with a depth / all of them"),
         kind("visibility", "AO", (row) => row.visibility, 3, "mean visibility: 1 = open"),
+        ...(rows.some((row) => Number.isFinite(row.errors.expected)) ? [kind("expected", "±", (row) => row.errors.expected ?? NaN, 3, "expected error of visibility, RMS over the frame")] : []),
         kind("total", "ms", (row) => row.total, 1, "milliseconds in all stages")]),
     ...(rows.some((row) => row.why || row.warnings.length > 0) ? [{ key: "warnings", label: "said", value: (row) => row.why || row.warnings[0] || "", text: (row) => [row.why, ...row.warnings].filter(Boolean).join(" ") }] : []),
     ...(of_errors ? [] : stages.map((stage, i) => kind(stage, stage, (row) => row.ms[i], 1, `milliseconds: ${stage}`))),

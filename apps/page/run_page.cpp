@@ -85,6 +85,8 @@ Row row_of(const json& frame) {
             .notes = texts_at(frame, "notes"),
             .files = texts_at(frame, "files"),
             .world_from_camera = pose_at(frame, "world_from_camera")};
+    if (const double expected = number_at(frame, "expected_error"); std::isfinite(expected))
+        row.errors = {{"expected", expected}};
     for (const std::string& doubt : texts_at(frame, "doubts"))
         row.why += (row.why.empty() ? "" : "; ") + doubt;
     if (const auto size = frame.find("size"); size != frame.end()) {

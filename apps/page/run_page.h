@@ -28,7 +28,7 @@ struct Row {
     std::vector<std::string> warnings, notes;
     std::vector<std::string> files; ///< "ao/NAME.png": a folder beside the page, the frame's name, what comes behind it
     std::optional<Eigen::Isometry3d> world_from_camera;
-    std::vector<std::pair<std::string, double>> errors = {}; ///< of a comparison: "rmse" ...
+    std::vector<std::pair<std::string, double>> errors = {}; ///< of a comparison: "rmse" ...; of a run: "expected"
 };
 
 /// Collects the lines of a page, about 200 bytes a frame, and writes it.

@@ -62,7 +62,7 @@ FrameRow skipped_row(const Capture& capture, std::size_t index) {
     row.index = index;
     row.name = capture.entries.at(index).name;
     row.why = "interrupted";
-    row.valid_share = row.coverage = row.mean_visibility = unknown;
+    row.valid_share = row.coverage = row.mean_visibility = row.expected_error = unknown;
     row.ms = {unknown, unknown, unknown, unknown, unknown};
     return row;
 }

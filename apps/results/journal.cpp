@@ -64,6 +64,8 @@ json row_json(
         text["notes"] = row.notes;
     if (!row.doubts.empty())
         text["doubts"] = row.doubts;
+    if (std::isfinite(row.expected_error))
+        text["expected_error"] = row.expected_error;
     return text;
 }
 
@@ -99,6 +101,7 @@ FrameRow row_from(const json& text) {
     row.valid_share = number_or_nan(text.at("valid"));
     row.coverage = number_or_nan(text.at("coverage"));
     row.mean_visibility = number_or_nan(text.at("visibility"));
+    row.expected_error = text.contains("expected_error") ? number_or_nan(text["expected_error"]) : std::nan("");
     row.camera = camera_from(text.at("camera"));
     row.warnings = text.at("warnings").get<std::vector<std::string>>();
     for (const auto& [name, stage] : stages)

@@ -104,6 +104,8 @@ json result_json(const FrameRow& row, bool with_camera, const CaptureEntry& entr
     text["valid_share"] = known(row.valid_share);
     text["coverage"] = known(row.coverage);
     text["mean_visibility"] = known(row.mean_visibility);
+    if (std::isfinite(row.expected_error))
+        text["expected_error"] = known(row.expected_error, 5);
     text["warnings"] = row.warnings;
     return text;
 }
@@ -180,18 +182,18 @@ std::string utc(std::chrono::system_clock::time_point time) {
 } // namespace
 
 std::string csv_head() {
-    return "index,name,status,why,width,height,valid_share,coverage,mean_visibility,"
+    return "index,name,status,why,width,height,valid_share,coverage,mean_visibility,expected_error,"
            "load_ms,project_ms,compute_ms,attach_ms,write_ms,warnings\n";
 }
 
 std::string csv_line(const FrameRow& row) {
     const auto ms = [](double value) { return number(value, 2); };
     const bool loaded = !row.size.empty();
-    return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.index, csv_field(row.name),
+    return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.index, csv_field(row.name),
                        name_of(row.status), csv_field(reason_of(row)), loaded ? std::to_string(row.size.width) : "",
                        loaded ? std::to_string(row.size.height) : "", number(row.valid_share, 4),
-                       number(row.coverage, 4), number(row.mean_visibility, 4), ms(row.ms.load), ms(row.ms.project),
-                       ms(row.ms.compute), ms(row.ms.attach), ms(row.ms.write),
+                       number(row.coverage, 4), number(row.mean_visibility, 4), number(row.expected_error, 4),
+                       ms(row.ms.load), ms(row.ms.project), ms(row.ms.compute), ms(row.ms.attach), ms(row.ms.write),
                        csv_field(fmt::format("{}", fmt::join(row.warnings, "; "))));
 }
 
@@ -297,6 +299,8 @@ page::Row page_row(const FrameRow& row, const CaptureEntry& entry, const LengthU
                     .world_from_camera = {}};
     if (entry.world_from_camera)
         shown.world_from_camera = told(*entry.world_from_camera, unit);
+    if (std::isfinite(row.expected_error))
+        shown.errors = {{"expected", row.expected_error}};
     for (const auto& file : row.files)
         shown.files.push_back(file.generic_string());
     return shown;

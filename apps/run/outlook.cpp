@@ -1,7 +1,9 @@
 #include "apps/run/outlook.h"
 
 #include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
+#include <limits>
 
 namespace scanshade {
 namespace {
@@ -46,6 +48,33 @@ std::string gain_text(const SequenceGain& gain) {
                        gain.configuration.full_name(), gain.alone_rms, gain.together_rms, time);
 }
 
+/// Of the frames: all together, and the least and most of one.
+struct Range {
+    double all, least, most;
+};
+
+std::optional<Range> expected_of(const std::vector<FrameRow>& rows) {
+    Range range{0, std::numeric_limits<double>::infinity(), 0};
+    std::size_t known = 0;
+    for (const FrameRow& row : rows)
+        if (is_done(row.status) && std::isfinite(row.expected_error)) {
+            range.all += row.expected_error * row.expected_error;
+            range.least = std::min(range.least, row.expected_error);
+            range.most = std::max(range.most, row.expected_error);
+            ++known;
+        }
+    if (known == 0)
+        return std::nullopt;
+    range.all = std::sqrt(range.all / static_cast<double>(known));
+    return range;
+}
+
+std::string text_of(const Range& range) {
+    return range.most - range.least < 0.0005
+               ? fmt::format("{:.3f}", range.all)
+               : fmt::format("{:.3f} ({:.3f} to {:.3f} of single frames)", range.all, range.least, range.most);
+}
+
 bool is_prepared_as_measured(const RunSettings& settings) {
     return settings.depth_noise != "none" && settings.drop_flying && settings.depth_smoothing == 1;
 }
@@ -53,7 +82,7 @@ bool is_prepared_as_measured(const RunSettings& settings) {
 } // namespace
 
 std::vector<std::string> outlook(const RunSettings& settings, const DepthNoise& noise, const Capture& capture,
-                                 const ParetoFront& front) {
+                                 const std::vector<FrameRow>& rows, const ParetoFront& front) {
     const bool clouds = std::ranges::any_of(capture.entries, [](const auto& entry) { return !entry.cloud.empty(); });
     if (clouds || capture.unit.arbitrary() || settings.budget.any() || !is_prepared_as_measured(settings))
         return {};
@@ -63,18 +92,24 @@ std::vector<std::string> outlook(const RunSettings& settings, const DepthNoise& 
         return {};
     const bool together = settings.in_sequence(capture);
     const auto gain = front.sequences.find(sensor);
-    std::vector<std::string> sentences{fmt::format(
-        "expected error{}: RMSE {:.3f} to truth, measured with {} on generated scenes with {} depth; real sensors may "
-        "err more",
-        together ? " of each frame by itself" : "", used->rms, used->configuration.full_name(), name_of(sensor))};
+    const std::string alone = together ? " of each frame by itself" : "";
+    const std::string measured =
+        fmt::format("measured with {} on generated scenes with {} depth; real sensors may err more",
+                    used->configuration.full_name(), name_of(sensor));
+    const std::optional<Range> here = expected_of(rows);
+    std::vector<std::string> sentences{
+        here ? fmt::format("expected error{}: RMSE {} to truth, by what errors such pixels had, {}", alone,
+                           text_of(*here), measured)
+             : fmt::format("expected error{}: RMSE {:.3f} to truth, {}", alone, used->rms, measured)};
     if (gain != front.sequences.end() && together)
         sentences.push_back(gain_text(gain->second));
     const auto better = better_preset(front, sensor, *used);
     if (better) {
         const BenchmarkPoint* point = measured_with(front, sensor, *better);
-        sentences.push_back(fmt::format("--preset {}: RMSE {:.3f}, in {:.1f} times the time of the method's passes",
-                                        word_for(*better, preset_words), point->rms,
-                                        point->ns_per_pixel / used->ns_per_pixel));
+        sentences.push_back(fmt::format(
+            "--preset {}: RMSE {:.3f} in place of {:.3f} on those scenes, in {:.1f} times the "
+            "time of the method's passes",
+            word_for(*better, preset_words), point->rms, used->rms, point->ns_per_pixel / used->ns_per_pixel));
     }
     // `best` looks at frames together, too.
     if (gain != front.sequences.end() && !together && has_poses(capture) &&

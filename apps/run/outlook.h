@@ -2,6 +2,7 @@
 #pragma once
 
 #include "apps/measure/front.h"
+#include "apps/results/frame_row.h"
 #include "apps/run/settings.h"
 
 #include <string>
@@ -9,10 +10,11 @@
 
 namespace scanshade {
 
-/// Sentences with measured numbers: the error expected from these settings at this depth noise, and the error and time
-/// of the next better preset. Empty if nothing like it was measured (clouds, other radii, other depth preparation), and
-/// for budgets, which print their own.
+/// Sentences with measured numbers: the error expected of these frames, or where they have none of these settings at
+/// this depth noise, and the error and time of the next better preset. Empty if nothing like it was measured (clouds,
+/// other radii, other depth preparation), and for budgets, which print their own.
 [[nodiscard]] std::vector<std::string> outlook(const RunSettings& settings, const DepthNoise& noise,
-                                               const Capture& capture, const ParetoFront& front);
+                                               const Capture& capture, const std::vector<FrameRow>& rows,
+                                               const ParetoFront& front);
 
 } // namespace scanshade

@@ -659,7 +659,7 @@ class Run final : public Command {
         {
             const std::lock_guard alone(alone_); // the report names settings
             if (count(report.frames, FrameStatus::ok) > 0)
-                report.outlook = outlook(asked_, job.batch.noise, job.capture, shipped_front());
+                report.outlook = outlook(asked_, job.batch.noise, job.capture, report.frames, shipped_front());
             for (const std::string& sentence : report.outlook)
                 if (!std::ranges::count(outlook_, sentence))
                     outlook_.push_back(sentence);

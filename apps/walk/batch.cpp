@@ -86,6 +86,8 @@ void attach_and_write(Work& work, const BatchOptions& options) {
             images = finish(work, options, options.recording ? with_messages(outputs) : outputs);
         work.row.coverage = work.attached.coverage;
         work.row.mean_visibility = work.attached.mean_visibility;
+        work.row.expected_error = work.by_points ? work.of_points.expected_error.value_or(std::nan(""))
+                                                 : expected_rms(work.error_in_view, images.confidence_map);
         std::ranges::move(doubts_about(work, options.radius_m, options.noise, options.outputs.unit),
                           std::back_inserter(work.row.doubts));
     });

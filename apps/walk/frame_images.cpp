@@ -7,7 +7,10 @@
 #include "projection/expected_error.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <fmt/format.h>
+#include <limits>
 
 namespace scanshade {
 namespace {
@@ -132,6 +135,28 @@ Scene scene_of(const Work& work, bool colour_view) {
         return {work.depth.z_m, visibility, colour_in_view(cloud, work.depth), work.depth.camera};
     const cv::Mat3b colour = has_colours(cloud) ? on_grid(cloud.colours, cloud.grid) : cv::Mat3b();
     return {depth_on_grid(cloud), visibility, colour, frame.camera.pinhole};
+}
+
+double expected_rms(const cv::Mat1f& error, const cv::Mat1b& confidence_map) {
+    double squares = 0;
+    std::size_t known = 0;
+    if (!error.empty()) {
+        for (const float each : error) {
+            const float counted = std::min(each, shared::hopeless_error);
+            squares += std::isnan(each) ? 0 : static_cast<double>(counted * counted);
+            known += !std::isnan(each);
+        }
+    } else {
+        std::array<std::size_t, 256> counts{};
+        for (const uchar byte : confidence_map)
+            ++counts[byte];
+        for (std::size_t byte = 1; byte < counts.size(); ++byte) {
+            const double off = shared::hopeless_error * static_cast<double>(255 - byte) / 254;
+            squares += static_cast<double>(counts[byte]) * off * off;
+            known += counts[byte];
+        }
+    }
+    return known > 0 ? std::sqrt(squares / static_cast<double>(known)) : std::numeric_limits<double>::quiet_NaN();
 }
 
 FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outputs) {

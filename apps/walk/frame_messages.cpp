@@ -179,6 +179,8 @@ std::string frame_text(const Work& work) {
               {"valid_share", known(row.valid_share)},
               {"coverage", known(row.coverage)},
               {"mean_visibility", known(row.mean_visibility)}};
+    if (std::isfinite(row.expected_error))
+        text["expected_error"] = known(row.expected_error);
     if (!row.doubts.empty())
         text["doubts"] = row.doubts;
     return json_line(text);

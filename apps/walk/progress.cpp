@@ -74,7 +74,11 @@ std::string line_of(const FrameRow& row) {
         return fmt::format("{}: {}: {}", row.name, name_of(row.status), row.why);
     const StageTimes& ms = row.ms;
     const std::string visibility =
-        std::isnan(row.mean_visibility) ? "no visibility" : fmt::format("visibility {:.3f}", row.mean_visibility);
+        std::isnan(row.mean_visibility)
+            ? "no visibility"
+            : fmt::format("visibility {:.3f}{}", row.mean_visibility,
+                          std::isnan(row.expected_error) ? ""
+                                                         : fmt::format(", expected error {:.3f}", row.expected_error));
     std::string line = fmt::format("{}: {}, valid {:.1f} %, coverage {:.1f} %, {}, {:.0f} ms", row.name,
                                    name_of(row.status), 100 * row.valid_share, 100 * row.coverage, visibility,
                                    ms.load + ms.project + ms.compute + ms.attach + ms.write);

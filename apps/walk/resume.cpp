@@ -145,7 +145,8 @@ FrameRow crash_row(const Capture& capture, std::size_t index) {
     row.status = FrameStatus::failed;
     row.fault = Fault::crash;
     row.why = "the process died while this frame was computed alone";
-    row.valid_share = row.coverage = row.mean_visibility = std::numeric_limits<double>::quiet_NaN();
+    row.valid_share = row.coverage = row.mean_visibility = row.expected_error =
+        std::numeric_limits<double>::quiet_NaN();
     row.ms.load = row.ms.project = row.ms.compute = row.ms.attach = row.ms.write = row.valid_share;
     return row;
 }

@@ -235,8 +235,12 @@ TEST_F(CliTest, a_run_ends_with_measured_errors_and_with_none_where_nothing_was_
     const Ran ran = run();
     EXPECT_NE(ran.err.find("expected error: RMSE 0."), std::string::npos) << ran.err;
     EXPECT_NE(ran.err.find("--preset balanced: RMSE 0."), std::string::npos) << ran.err;
+    EXPECT_NE(ran.err.find("by what errors such pixels had"), std::string::npos)
+        << "of the frames themselves: " << ran.err;
+    const Ran map_alone = run("--overwrite --write ao");
+    EXPECT_EQ(map_alone.err.find("such pixels"), std::string::npos) << "no confidence, no error of these frames";
     const Ran other = run("--overwrite --radius 0.3");
-    EXPECT_EQ(other.err.find("expected error"), std::string::npos) << "nothing was measured at this radius";
+    EXPECT_EQ(other.err.find("expected error:"), std::string::npos) << "nothing was measured at this radius";
 }
 
 TEST_F(CliTest, a_cloud_keeps_its_points_and_gains_a_field) {
