@@ -1,0 +1,87 @@
+// Fits one model of light to samples whose albedos are unknown, too.
+#pragma once
+
+#include "ao/light/light.h"
+
+#include <cstddef>
+#include <functional>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace scanshade {
+
+/// What a model may use.
+struct LightTerms {
+    const char* name;
+    bool power, gradient, direct, shadows;
+};
+
+struct LightValues {
+    Eigen::Vector3d direct = Eigen::Vector3d::Zero(), gradient = Eigen::Vector3d::Zero();
+    double power = 0;
+};
+
+/// Samples, those of one albedo side by side, and which of them see the light.
+struct LightPart {
+    std::vector<std::size_t> samples; ///< numbers of LightSamples::all()
+    std::vector<std::size_t> ends;    ///< of each albedo's, in `samples`
+    std::vector<double> lit;          ///< 0 or 1, as `samples`
+};
+
+/// A direct light to start from, and how well it explains a part as it is.
+struct LightStart {
+    LightValues values;
+    double cost, cost_with_guessed_shadows;
+};
+
+constexpr double light_facing = 0.1; ///< direct light on less than this could be anything
+
+/// Thread-safe but for take_gains().
+class LightFit {
+  public:
+    explicit LightFit(const LightSamples& samples);
+
+    /// Samples of some albedos; of each albedo its share of `most`, evenly spread, and three at least.
+    [[nodiscard]] LightPart part_of(const std::function<bool(int albedo)>& wanted,
+                                    std::size_t most = std::numeric_limits<std::size_t>::max()) const;
+    /// Log residuals, as part.samples; the albedos are the medians of their samples'.
+    [[nodiscard]] std::vector<double> residuals(const LightPart& part, const LightValues& values) const;
+    /// The mean of min(|log residual|, 0.35).
+    [[nodiscard]] double cost(const LightPart& part, const LightValues& values) const;
+    /// Asks the depth images what stands before the light.
+    void cast_shadows(LightPart& part, const Eigen::Vector3d& direct) const;
+
+    /// Lights from all round, or from where `request` says, of several strengths.
+    [[nodiscard]] std::vector<LightStart> starts(const LightPart& part, const LightRequest& request,
+                                                 bool thorough) const;
+    /// The best values of a model; for one with direct light, from the best of `starts`. Sets part.lit. `request` may
+    /// fix the direction. `thorough` tries more of them.
+    [[nodiscard]] LightValues fitted(LightPart& part, const LightTerms& terms, const std::vector<LightStart>& starts,
+                                     const LightRequest& request, bool thorough) const;
+    /// Least squares with a Cauchy loss.
+    [[nodiscard]] LightValues refined(const LightPart& part, const LightTerms& terms, const LightValues& from,
+                                      bool fixed_direction = false) const;
+
+    /// The medians of each frame's residuals under `values`: exposure and its automatic changes.
+    void take_gains(const LightPart& part, const LightValues& values);
+    /// Of direct over ambient light in one channel (0 = red): what explains that channel best.
+    [[nodiscard]] double tint(const LightPart& part, const LightValues& values, Eigen::Index channel) const;
+
+    [[nodiscard]] const LightSample& sample(std::size_t number) const { return all_[number]; }
+
+  private:
+    friend class LightMisfit;
+    [[nodiscard]] double log_gain(const LightSample& sample) const {
+        return gains_[static_cast<std::size_t>(sample.frame)];
+    }
+    /// Log luminances without their frames' gains, as part.samples.
+    [[nodiscard]] std::vector<double> observed(const LightPart& part) const;
+
+    const LightSamples& samples_;
+    const std::vector<LightSample>& all_;
+    std::vector<std::size_t> by_albedo_; ///< of all samples with an albedo
+    std::vector<double> log_luminance_, log_visibility_, gains_;
+};
+
+} // namespace scanshade
