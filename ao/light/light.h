@@ -65,7 +65,7 @@ class LightSamples {
     [[nodiscard]] bool in_world() const { return in_world_; }
     /// The mean direction that cameras look in.
     [[nodiscard]] Eigen::Vector3d forward() const;
-    /// 0 where a depth image has something in the way towards `light`, else 1.
+    /// 0 where a depth image, of any frame in a world, has something in the way towards the light, else 1.
     [[nodiscard]] double lit(const LightSample& sample, const Eigen::Vector3d& towards) const;
 
   private:
@@ -75,6 +75,8 @@ class LightSamples {
         Eigen::Isometry3d world_from_camera;
     };
     [[nodiscard]] Eigen::Vector3d place(const LightSample& sample) const;
+    /// Of a point and a direction in the light's space.
+    [[nodiscard]] bool sees_light(const Kept& frame, const Eigen::Vector3d& from, const Eigen::Vector3d& ray) const;
     bool in_world_;
     std::size_t per_frame_;
     int albedos_ = 0;

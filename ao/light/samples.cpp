@@ -116,10 +116,10 @@ Eigen::Vector3d LightSamples::place(const LightSample& sample) const {
     return in_world_ ? frame.world_from_camera * seen : seen;
 }
 
-/// Samples within a cube of a metre whose chromaticities are alike. Without a world, cubes are those of a frame. A
+/// Samples within a cube of half a metre whose chromaticities are alike. Without a world, cubes are those of a frame. A
 /// chromaticity begins a new group if it is not near one already there, so that no border cuts through a wall's noise.
 void LightSamples::group() {
-    constexpr double side_m = 1, alike = 0.2;
+    constexpr double side_m = 0.5, alike = 0.1;
     constexpr int fewest = 15;
     struct Group {
         Eigen::Vector2d chromaticity;
@@ -171,29 +171,34 @@ Eigen::Vector3d LightSamples::forward() const {
 }
 
 double LightSamples::lit(const LightSample& sample, const Eigen::Vector3d& towards) const {
-    const Kept& frame = frames_[static_cast<std::size_t>(sample.frame)];
-    const Eigen::Matrix3d camera_from_light = in_world_ ? Eigen::Matrix3d(frame.world_from_camera.linear().transpose())
-                                                        : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
-    const double z = static_cast<double>(frame.z_m(sample.v, sample.u));
-    const Eigen::Vector3d ray = camera_from_light * towards.normalized();
-    const Eigen::Vector3d from =
-        frame.camera.ray(sample.u, sample.v) * z +
-        camera_from_light * sample.normal * static_cast<double>(shared::shadow_bias(static_cast<float>(z)));
+    const Kept& own = frames_[static_cast<std::size_t>(sample.frame)];
+    const double z = static_cast<double>(own.z_m(sample.v, sample.u));
+    const double lift = static_cast<double>(shared::shadow_bias(static_cast<float>(z)));
+    const Eigen::Vector3d from = place(sample) + sample.normal * lift, ray = towards.normalized();
+    if (!in_world_)
+        return sees_light(own, from, ray) ? 1 : 0;
+    return std::ranges::all_of(frames_, [&](const Kept& frame) { return sees_light(frame, from, ray); }) ? 1 : 0;
+}
+
+bool LightSamples::sees_light(const Kept& frame, const Eigen::Vector3d& from, const Eigen::Vector3d& ray) const {
+    const Eigen::Isometry3d camera_from_light =
+        in_world_ ? frame.world_from_camera.inverse() : Eigen::Isometry3d::Identity();
+    const Eigen::Vector3d start = camera_from_light * from, step = camera_from_light.linear() * ray;
     for (int i = 0; i < shared::shadow_steps; ++i) {
-        const Eigen::Vector3d at = from + ray * static_cast<double>(shared::shadow_step(i));
+        const Eigen::Vector3d at = start + step * static_cast<double>(shared::shadow_step(i));
         if (!(at.z() > 0.01))
-            return 1;
+            continue;
         const double u = std::round(frame.camera.fx * at.x() / at.z() + frame.camera.cx);
         const double v = std::round(frame.camera.fy * at.y() / at.z() + frame.camera.cy);
         if (!(u >= 0 && v >= 0 && u < frame.z_m.cols && v < frame.z_m.rows))
-            return 1; // beyond the image nothing is known: open
+            continue; // beyond the image nothing is known: open
         const double there = static_cast<double>(frame.z_m(static_cast<int>(v), static_cast<int>(u)));
         const double behind = at.z() - there;
         if (there > 0 && behind > static_cast<double>(shared::shadow_bias(static_cast<float>(at.z()))) &&
             behind < static_cast<double>(shared::shadow_thickness))
-            return 0;
+            return false;
     }
-    return 1;
+    return true;
 }
 
 } // namespace scanshade
