@@ -4,6 +4,7 @@ Looks come from apps/page/ (head.html, style.css, document.css). Names and messa
 """
 
 import base64
+import hashlib
 import math
 from html import escape
 from pathlib import Path
@@ -205,6 +206,11 @@ def views(report, folder, count):
 # ------------------------------------------------------------------------------------------------- the page
 
 
+def policy_hash(text):
+    """A script or style as a Content-Security-Policy names it: nothing else runs, whatever data contain."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
 def section(heading, html):
     return f"<section><h2>{escape(heading)}</h2>\n{html}\n</section>"
 
@@ -230,8 +236,11 @@ def page(result, report, folder, view_count):
     sections.append(section("Pictures", "<p>The first view. Above the method's visibility, below its difference to truth.</p>\n" +
                             views(report, folder, view_count)))
     style = (PAGES / "style.css").read_text() + (PAGES / "document.css").read_text() + STYLE
+    policy = f"default-src 'none'; script-src {policy_hash(SORT)}; style-src {policy_hash(style)}; img-src data:; base-uri 'none'; form-action 'none'"
     title = "Ambient occlusion: all methods against truth"
-    head = (PAGES / "head.html").read_text().partition("<body>")[0].replace("{{title}}", title).replace("{{style}}", style)
+    head = (PAGES / "head.html").read_text()
+    for mark, text in {"title": title, "policy": policy, "styles": f"<style>{style}</style>\n"}.items():
+        head = head.replace("{{" + mark + "}}", text)
     return f"""{head}<body class="document">
 <header class="top">
 <p class="brand">scanshade {escape(result["measured"]["version"])}</p>

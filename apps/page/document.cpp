@@ -240,16 +240,10 @@ std::string figure(const cv::Mat3b& picture, std::string_view caption) {
 std::string paragraph(std::string_view text) { return fmt::format("<p>{}</p>\n", escaped(text)); }
 
 std::string document(std::string_view title, const std::vector<Section>& sections) {
-    std::string html = fmt::format(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-        "<meta name=\"color-scheme\" content=\"light dark\">\n<link rel=\"icon\" href=\"data:,\">\n<title>{0}</title>\n"
-        "<style>{1}{2}</style>\n</head>\n<body class=\"document\">\n<header class=\"top\">\n"
-        "<p class=\"brand\">scanshade {3}</p>\n<h1>{0}</h1>\n</header>\n<main>\n",
-        escaped(title), shared_style(), document_style(), SCANSHADE_VERSION);
+    std::string html;
     for (const Section& section : sections)
         html += fmt::format("<h2>{}</h2>\n{}", escaped(section.heading), section.html);
-    return html + "</main>\n</body>\n</html>\n";
+    return document_shell(title, html);
 }
 
 } // namespace scanshade::page

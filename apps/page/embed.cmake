@@ -1,18 +1,19 @@
-# Joins FILES into OUT, a C++ header with one string constant per file: style.css becomes style_css. A raw string has
-# another end than anything in a page. Long texts are cut, since compilers may refuse literals above 64 KiB.
+# Joins FILES into OUT, a C++ header with one constant per file, its text and its SHA-256: style.css becomes style_css. A raw
+# string has another end than anything in a page. Long texts are cut, since compilers may refuse literals above 64 KiB.
 set(header "// Made by embed.cmake.\n")
 foreach(file IN LISTS FILES)
   get_filename_component(name ${file} NAME)
   string(MAKE_C_IDENTIFIER ${name} id)
   file(READ ${file} text)
   string(LENGTH "${text}" length)
-  string(APPEND header "constexpr std::string_view ${id} =")
+  string(SHA256 hash "${text}")
+  string(APPEND header "constexpr Part ${id} = {")
   set(at 0)
   while(at LESS length)
     string(SUBSTRING "${text}" ${at} 16000 part)
     string(APPEND header "\n    R\"~page~(${part})~page~\"")
     math(EXPR at "${at} + 16000")
   endwhile()
-  string(APPEND header ";\n")
+  string(APPEND header ",\n    \"${hash}\"};\n")
 endforeach()
 file(WRITE ${OUT} "${header}")

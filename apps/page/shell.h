@@ -10,8 +10,7 @@ namespace scanshade::page {
 [[nodiscard]] std::string run_shell(std::string_view title);
 [[nodiscard]] std::string list_shell(std::string_view title);
 
-/// What all pages look like, and what those of one column add.
-[[nodiscard]] std::string_view shared_style();
-[[nodiscard]] std::string_view document_style();
+/// A page of one column without scripts. `main` is HTML.
+[[nodiscard]] std::string document_shell(std::string_view title, std::string_view main);
 
 } // namespace scanshade::page

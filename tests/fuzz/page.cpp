@@ -67,7 +67,7 @@ void make_the_page_of_a_list(std::string_view bytes) {
     must_be_the_template(read_bytes(folder() / "list/index.html"), as_utf8(title));
 }
 
-/// RFC 4180's reading of one record.
+/// RFC 4180's reading of one record, and the text of each field as apps/csv.h has it.
 std::vector<std::string> fields_of(std::string_view record) {
     std::vector<std::string> fields(1);
     bool quoted = false;
@@ -83,6 +83,10 @@ std::vector<std::string> fields_of(std::string_view record) {
             fields.back() += c;
     }
     must_hold(!quoted);
+    for (std::string& field : fields)
+        if (const std::size_t first = field.find_first_not_of('\''); first != std::string::npos && first > 0)
+            if (std::string_view("=+-@\t\r\n").find(field[first]) != std::string_view::npos)
+                field.erase(0, 1);
     return fields;
 }
 

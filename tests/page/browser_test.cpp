@@ -239,6 +239,10 @@ TEST_F(BrowserTest, each_chunk_of_a_cloud_is_an_even_sample_and_strays_are_count
 }
 TEST_F(BrowserTest, without_webgl_the_page_says_so_and_the_rest_works) { EXPECT_EQ(found("without WebGL"), ""); }
 TEST_F(BrowserTest, hostile_names_are_shown_and_never_run) { EXPECT_EQ(found("hostile names"), ""); }
+TEST_F(BrowserTest, what_gets_into_a_page_is_neither_run_nor_loaded) {
+    EXPECT_EQ(found("policy over file"), "");
+    EXPECT_EQ(found("policy over http"), "");
+}
 TEST_F(BrowserTest, ten_thousand_rows_scroll_sort_and_plot) { EXPECT_EQ(found("ten thousand rows"), ""); }
 TEST_F(BrowserTest, a_comparison_has_errors_worst_first_and_difference_pictures) { EXPECT_EQ(found("comparison"), ""); }
 TEST_F(BrowserTest, a_list_leads_to_the_pages_of_its_captures) { EXPECT_EQ(found("list"), ""); }

@@ -142,6 +142,38 @@ TEST_F(PageFilesTest, a_run_leaves_a_page_with_every_frame_and_a_preview_of_each
     EXPECT_TRUE(says(read_bytes(out() / "index.html"), "<title>capture - scanshade</title>"));
 }
 
+/// Every script and style of the text, by its start tag: what is between the tags, for the tags without attributes.
+std::vector<std::string> between(const std::string& html, const std::string& tag) {
+    std::vector<std::string> parts;
+    const std::string begin = "\n<" + tag + ">", end = "</" + tag + ">";
+    for (std::size_t at = html.find(begin); at != std::string::npos; at = html.find(begin, at)) {
+        at += begin.size();
+        parts.push_back(html.substr(at, html.find(end, at) - at));
+    }
+    return parts;
+}
+
+TEST_F(PageFilesTest, a_page_runs_its_own_scripts_and_those_of_its_folder_only) {
+    tests::write_capture(capture(), 1);
+    ASSERT_EQ(run().exit_code, 0);
+    const std::string html = read_bytes(out() / "index.html");
+    const std::size_t at = html.find("<meta http-equiv=\"Content-Security-Policy\" content=\"");
+    ASSERT_NE(at, std::string::npos);
+    EXPECT_LT(at, html.find("<style")) << "a policy holds for what follows it";
+    EXPECT_LT(at, html.find("<script"));
+    const std::string policy = html.substr(at, html.find('>', at) - at);
+    EXPECT_TRUE(says(policy, "default-src 'none'"));
+    EXPECT_FALSE(says(policy, "unsafe"));
+    const auto scripts = between(html, "script"), styles = between(html, "style");
+    EXPECT_EQ(scripts.size(), 9u);
+    EXPECT_EQ(styles.size(), 1u);
+    std::size_t hashes = 0;
+    for (std::size_t each = policy.find("'sha256-"); each != std::string::npos;
+         each = policy.find("'sha256-", each + 1))
+        ++hashes;
+    EXPECT_EQ(hashes, scripts.size() + styles.size()); // browser_test sees that they are the right ones
+}
+
 TEST_F(PageFilesTest, without_a_page_nothing_of_it_is_written) {
     tests::write_capture(capture(), 2);
     ASSERT_EQ(run("--page no").exit_code, 0);
