@@ -34,7 +34,10 @@ enum Buffers : int {
     direct,  // over ambient light
     unshaded_out,
     ambient_out,
-    direct_out
+    direct_out,
+    gathered, // light from neighbours: sums of colours, and of weights
+    bounced,  // their mean times what is closed
+    indirect_out
 };
 
 std::size_t words_of(cv::Size size) { return (static_cast<std::size_t>(size.area()) + 3) / 4; }
@@ -84,7 +87,7 @@ bool shows_colour(int picture) { return picture == shared::picture_colour || pic
 
 bool Finish::Shape::clay() const { return shows_clay(picture); }
 bool Finish::Shape::colours() const {
-    return on_device && (shows_colour(picture) || outputs.unshaded || outputs.split);
+    return on_device && (shows_colour(picture) || outputs.unshaded || outputs.split || outputs.indirect);
 }
 bool Finish::Shape::packed() const {
     return on_device && (outputs.map_bits > 0 || outputs.confidence_bits > 0 || outputs.pictures());
@@ -102,16 +105,18 @@ Finish::Shape Finish::shape_of(const FinishInput& input, const FinishOutputs& ou
                                                               : shared::picture_both;
     shape.outputs.unshaded = outputs.unshaded && colour;
     shape.outputs.split = outputs.split && colour;
+    shape.outputs.indirect = outputs.indirect && colour;
+    shape.known = !input.colour_known.empty() && (shape.picture == shared::picture_both || shape.outputs.indirect);
     const bool shades_ambient = input.shade == Shade::ambient && shows_colour(shape.picture);
     const bool by_light = shades_ambient || (shape.outputs.unshaded && input.shade == Shade::ambient);
     const shared::vec3 from = input.light ? input.light->direct : shared::vec3();
     shape.ambient_alone = by_light && shared::dotted(from, from) > 0;
     shape.light = (by_light || shape.outputs.split) && shared::dotted(from, from) > 0;
-    const bool looks_at_surface = shape.clay() || shape.light;
-    shape.fitted = looks_at_surface && input.fitted;
-    shape.smoothed = looks_at_surface && !input.fitted && input.fitted_m.empty();
-    shape.normals = looks_at_surface && (input.fitted_normals || !input.fitted_normals_host.empty());
-    shape.on_device = packing_ == Packing::on_device || shape.light || shape.outputs.unshaded || shape.outputs.split;
+    shape.fitted = shape.looks_at_surface() && input.fitted;
+    shape.smoothed = shape.looks_at_surface() && !input.fitted && input.fitted_m.empty();
+    shape.normals = shape.looks_at_surface() && (input.fitted_normals || !input.fitted_normals_host.empty());
+    shape.on_device = packing_ == Packing::on_device || shape.light || shape.outputs.unshaded || shape.outputs.split ||
+                      shape.outputs.indirect;
     if (!shape.on_device) {
         shape.outputs.error = shape.error();
         shape.outputs.confidence_bits = shape.outputs.map_bits = 0;
@@ -131,7 +136,7 @@ gpu::Program& Finish::program_for(const Shape& shape) {
     const auto pixels = static_cast<std::size_t>(shape.size.area()), packs = words_of(shape.size);
     const FinishOutputs& outputs = shape.outputs;
     const bool on_device = shape.on_device, packed = shape.packed(), colours = shape.colours(), clay = shape.clay();
-    const bool surfaced = clay || shape.light;
+    const bool surfaced = shape.looks_at_surface();
     // What these outputs do not need has one texel.
     const auto image = [&](std::string_view name, bool needed, Host host = Host::none) {
         return gpu::BufferRow{.name = name,
@@ -153,7 +158,7 @@ gpu::Program& Finish::program_for(const Shape& shape) {
         image("surface", surfaced, Host::upload),
         image("visibility", packed || shape.error(), Host::upload),
         bytes("colour", colours ? 3 : 0, Host::upload),
-        bytes("colour known", colours && shape.picture == shared::picture_both ? 1 : 0, Host::upload),
+        bytes("colour known", colours && shape.known ? 1 : 0, Host::upload),
         {"linear light", light.linear.size() * 4, Host::none, floats, {light.linear.begin(), light.linear.end()}},
         {"stored light", light.stored.size() * 4, Host::none, words, as_floats(light.stored)},
         image("expected error", shape.error(), outputs.error ? Host::download : Host::none),
@@ -172,6 +177,9 @@ gpu::Program& Finish::program_for(const Shape& shape) {
         bytes("unshaded", outputs.unshaded ? 3 : 0, Host::download),
         bytes("ambient part", outputs.split ? 3 : 0, Host::download),
         bytes("direct part", outputs.split ? 3 : 0, Host::download),
+        {.name = "gathered light", .bytes = outputs.indirect ? pixels * 16 : 4, .texels = floats, .plain_writes = true},
+        {.name = "indirect light", .bytes = outputs.indirect ? pixels * 12 : 4, .texels = floats, .plain_writes = true},
+        bytes("indirect", outputs.indirect ? 3 : 0, Host::download),
     };
     const auto groups_of = [](std::size_t n) {
         return static_cast<std::uint32_t>((n + shared::finish_row - 1) / shared::finish_row);
@@ -193,24 +201,41 @@ gpu::Program& Finish::program_for(const Shape& shape) {
         passes.push_back({"clay", "finish/facing", {shown, fitted_normals}, {cosine}, rows, of_surface});
     if (shape.light)
         passes.push_back({"light", "finish/light", {shown, fitted_normals, visibility}, {direct}, rows, of_surface});
+    if (outputs.indirect) {
+        passes.push_back({"bounce",
+                          "finish/bounce",
+                          {shown, fitted_normals, colour, shape.known ? colour_known : stored_light, linear_light},
+                          {gathered},
+                          rows,
+                          {{shared::spec_is_depth, shape.fitted},
+                           {shared::spec_normals, shape.normals},
+                           {shared::spec_known, shape.known}}});
+        passes.push_back({"bounce's mean",
+                          "finish/bounce_mean",
+                          {shown, visibility, gathered},
+                          {bounced},
+                          rows,
+                          {{shared::spec_is_depth, shape.fitted}}});
+    }
     constexpr std::uint32_t most_groups = 1 << 15;
     const std::uint32_t groups = groups_of(packs);
     if (packed)
-        passes.push_back({"pack",
-                          "finish/pack",
-                          {visibility, shape.error() ? error_of_each : visibility, clay ? surface : visibility,
-                           clay ? cosine : visibility, colours ? colour : stored_light,
-                           shape.picture == shared::picture_both ? colour_known : stored_light, linear_light,
-                           stored_light, shape.light ? direct : visibility},
-                          {map_out, confidence_out, picture_out, unshaded_out, ambient_out, direct_out},
-                          {std::min(groups, most_groups), (groups + most_groups - 1) / most_groups, 1},
-                          {{shared::spec_map_bits, outputs.map_bits},
-                           {shared::spec_confidence_bits, outputs.confidence_bits},
-                           {shared::spec_picture, shape.picture},
-                           {shared::spec_light, shape.light},
-                           {shared::spec_ambient, shape.ambient_alone},
-                           {shared::spec_unshaded, outputs.unshaded},
-                           {shared::spec_split, outputs.split}}});
+        passes.push_back(
+            {"pack",
+             "finish/pack",
+             {visibility, shape.error() ? error_of_each : visibility, clay ? surface : visibility,
+              clay ? cosine : visibility, colours ? colour : stored_light, shape.known ? colour_known : stored_light,
+              linear_light, stored_light, shape.light ? direct : visibility, outputs.indirect ? bounced : visibility},
+             {map_out, confidence_out, picture_out, unshaded_out, ambient_out, direct_out, indirect_out},
+             {std::min(groups, most_groups), (groups + most_groups - 1) / most_groups, 1},
+             {{shared::spec_map_bits, outputs.map_bits},
+              {shared::spec_confidence_bits, outputs.confidence_bits},
+              {shared::spec_picture, shape.picture},
+              {shared::spec_light, shape.light},
+              {shared::spec_ambient, shape.ambient_alone},
+              {shared::spec_unshaded, outputs.unshaded},
+              {shared::spec_split, outputs.split},
+              {shared::spec_indirect, outputs.indirect}}});
     auto program =
         std::make_unique<gpu::Program>(device_, std::move(buffers), std::move(passes), sizeof(shared::FinishConstants));
     return *programs_.emplace_back(shape, std::move(program)).second;
@@ -228,7 +253,7 @@ void Finish::upload(gpu::Program& program, const Shape& shape, const FinishInput
         std::memcpy(program.host(normals).data(), input.fitted_normals_host.data, input.z_m.total() * 12);
     if (shape.fitted)
         program.take(surface, 0, input.fitted);
-    else if (shape.clay() || shape.light) {
+    else if (shape.looks_at_surface()) {
         const cv::Mat1f& z_m = input.fitted_m.empty() ? input.z_m : input.fitted_m;
         combine(z_m, z_m, image_of(surface), [&](float z, float) { return is_depth(z) ? 1 / z : 0.0F; });
     }
@@ -267,7 +292,7 @@ Finished Finish::compute(const FinishInput& input, const FinishOutputs& outputs)
         gpu::upload(input.visibility, program.host(visibility));
     if (shape.colours())
         gpu::upload(input.colour, program.host(colour));
-    if (on_device && shape.picture == shared::picture_both)
+    if (on_device && shape.known)
         gpu::upload(input.colour_known, program.host(colour_known));
     program.run(std::as_bytes(std::span(&k, 1)));
     timings_ = program.timings();
@@ -297,6 +322,8 @@ Finished Finish::compute(const FinishInput& input, const FinishOutputs& outputs)
         finished.ambient = copied<cv::Vec3b>(program, ambient_out, size);
         finished.direct = copied<cv::Vec3b>(program, direct_out, size);
     }
+    if (shape.outputs.indirect)
+        finished.indirect = copied<cv::Vec3b>(program, indirect_out, size);
     return finished;
 }
 

@@ -28,9 +28,10 @@ struct FinishOutputs {
     bool unshaded = false;   ///< colour divided by what the picture is multiplied by, where there is colour; with
                              ///< Shade::ambient by visibility to the power that the photographs show
     bool split = false;      ///< the ambient and the direct part of colour, where there is colour
+    bool indirect = false;   ///< one bounce: what colour comes from neighbours within the radius, where there is colour
 
     [[nodiscard]] bool any() const { return error || confidence_bits > 0 || map_bits > 0 || pictures(); }
-    [[nodiscard]] bool pictures() const { return picture || unshaded || split; }
+    [[nodiscard]] bool pictures() const { return picture || unshaded || split || indirect; }
     bool operator==(const FinishOutputs&) const = default;
 };
 
@@ -66,7 +67,7 @@ struct Finished {
     cv::Mat1b confidence_map = {}; ///< 0 = none, 1 .. 255 = 0 .. 1
     cv::Mat map = {};              ///< of visibility: 0 = no surface, 1 .. 255 or 65535 = 0 .. 1
     cv::Mat3b picture = {};        ///< blue, green, red, as all pictures
-    cv::Mat3b unshaded = {}, ambient = {}, direct = {};
+    cv::Mat3b unshaded = {}, ambient = {}, direct = {}, indirect = {};
 };
 
 /// Whether the device turns values into the bytes of maps and pictures. A GPU then has less to download. Where the
@@ -95,8 +96,10 @@ class Finish {
         bool ambient_alone = false;                             ///< visibility has a say in ambient light alone
         bool fitted = false, smoothed = false, normals = false; ///< of clay and light: which depth they show
         bool on_device = false;                                 ///< packs there
+        bool known = false;                                     ///< which pixels' colour is known matters
         bool operator==(const Shape&) const = default;
         [[nodiscard]] bool clay() const;
+        [[nodiscard]] bool looks_at_surface() const { return clay() || light || outputs.indirect; }
         [[nodiscard]] bool colours() const;
         [[nodiscard]] bool packed() const;
         [[nodiscard]] bool error() const { return outputs.error || outputs.confidence_bits > 0 || outputs.unshaded; }

@@ -29,7 +29,7 @@ fs::path points_file(const std::string& name, std::size_t part) {
 Outputs of_points(const Outputs& outputs) {
     Outputs those = outputs;
     those.cloud = outputs.cloud || outputs.ao || outputs.confidence || outputs.error;
-    those.ao = those.confidence = those.shaded = those.unshaded = those.light = those.panel = false;
+    those.ao = those.confidence = those.shaded = those.unshaded = those.light = those.indirect = those.panel = false;
     return those;
 }
 
@@ -49,6 +49,8 @@ std::vector<fs::path> files_of(const CaptureEntry& entry, const Outputs& outputs
     for (const char* part : {"ambient", "direct"})
         if (outputs.light)
             add(picture_file(part, entry.name));
+    if (outputs.indirect)
+        add(picture_file("indirect", entry.name));
     if (outputs.panel)
         add(picture_file("panel", entry.name));
     if (outputs.preview)

@@ -18,8 +18,8 @@ namespace scanshade {
 enum class CloudColours { kept, shaded, grey };
 
 /// The folders that Outputs fill.
-inline constexpr std::array result_folders = {"ao",     "confidence", "error",  "shaded",   "unshaded", "ambient",
-                                              "direct", "panel",      "clouds", "previews", "points"};
+inline constexpr std::array result_folders = {"ao",     "confidence", "error", "shaded", "unshaded", "ambient",
+                                              "direct", "indirect",   "panel", "clouds", "previews", "points"};
 /// That of tars of results (result_tars.h).
 inline constexpr const char* tar_folder = "tars";
 
@@ -35,6 +35,7 @@ struct Outputs {
     bool shaded = true; ///< colour times visibility; clay times visibility where colour is not known to fit the depth
     bool unshaded = false; ///< colour divided by visibility, where there is colour
     bool light = false;    ///< colour's ambient and direct part, where there is colour
+    bool indirect = false; ///< one bounce: colour that comes from neighbours, where there is colour
     bool panel = false;    ///< colour | depth | AO | shaded
     bool cloud = true; ///< a cloud input with the fields ambient_occlusion and ao_confidence, everything else as it was
     bool depth_cloud = false; ///< a new PLY of a depth frame's points, in camera space
@@ -77,8 +78,8 @@ struct Outputs {
 
 /// Whether any output shows the colour images.
 [[nodiscard]] inline bool shows_colour(const Outputs& outputs, bool recording_cloud) {
-    return outputs.shaded || outputs.unshaded || outputs.light || outputs.panel || outputs.depth_cloud || outputs.glb ||
-           outputs.colour_view || recording_cloud;
+    return outputs.shaded || outputs.unshaded || outputs.light || outputs.indirect || outputs.panel ||
+           outputs.depth_cloud || outputs.glb || outputs.colour_view || recording_cloud;
 }
 
 } // namespace scanshade

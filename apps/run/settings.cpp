@@ -51,8 +51,8 @@ constexpr auto maybe_quality_words = [] {
 }();
 
 std::set<std::string> words_of(const std::string& list) {
-    const std::vector<std::string> known{"ao",    "confidence", "error", "shaded", "unshaded",
-                                         "light", "cloud",      "panel", "glb",    "mcap"};
+    const std::vector<std::string> known{"ao",       "confidence", "error", "shaded", "unshaded", "light",
+                                         "indirect", "cloud",      "panel", "glb",    "mcap"};
     std::set<std::string> words;
     std::istringstream stream(list);
     for (std::string word; std::getline(stream, word, ',');) {
@@ -82,6 +82,7 @@ Outputs outputs_from(const RunSettings& asked) {
         wanted.shaded = words.contains("shaded");
         wanted.unshaded = words.contains("unshaded");
         wanted.light = words.contains("light");
+        wanted.indirect = words.contains("indirect");
         wanted.panel = words.contains("panel");
         wanted.glb = words.contains("glb");
         wanted.mcap = words.contains("mcap");
@@ -294,14 +295,16 @@ std::vector<Stage> RunSettings::common_stages() {
            .common = true,
            .writes = Writes::folder},
           {.name = "write",
-           .help = "any of ao,confidence,error,shaded,unshaded,light,cloud,panel,glb,mcap; auto = "
-                   "ao,confidence,shaded, and "
-                   "cloud for clouds. "
-                   "error: the expected error of each value, in visibility; confidence is 1 - error / 0.3. "
-                   "unshaded: colour divided by visibility, where confidence allows it; "
-                   "light: ambient and direct, the two parts of colour; glb: each frame's points or mesh as binary "
-                   "glTF; mcap: run.mcap, one recording of all frames for "
-                   "Foxglove, Rerun and ROS",
+           .help =
+               "any of ao,confidence,error,shaded,unshaded,light,indirect,cloud,panel,glb,mcap; auto = "
+               "ao,confidence,shaded, and "
+               "cloud for clouds. "
+               "error: the expected error of each value, in visibility; confidence is 1 - error / 0.3. "
+               "unshaded: colour divided by visibility, where confidence allows it; "
+               "light: ambient and direct, the two parts of colour; indirect: one bounce, the colour that comes from "
+               "neighbours within the radius; glb: each frame's points or mesh as binary "
+               "glTF; mcap: run.mcap, one recording of all frames for "
+               "Foxglove, Rerun and ROS",
            .value = &s.write,
            .common = true},
           {.name = "format",

@@ -144,8 +144,10 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
         });
     if (outputs.shaded)
         wrote(picture_file("shaded", name), [&](const auto& file) { write_picture(file, images.shaded); });
-    for (const auto& [kind, picture] :
-         {std::pair{"unshaded", &images.unshaded}, {"ambient", &images.ambient}, {"direct", &images.direct}})
+    for (const auto& [kind, picture] : {std::pair{"unshaded", &images.unshaded},
+                                        {"ambient", &images.ambient},
+                                        {"direct", &images.direct},
+                                        {"indirect", &images.indirect}})
         if (!picture->empty())
             wrote(picture_file(kind, name), [&](const auto& file) { write_picture(file, *picture); });
     if (outputs.panel)

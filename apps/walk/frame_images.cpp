@@ -63,9 +63,9 @@ Finished finished(Work& work, const FinishInput& input, const FinishOutputs& out
     if (outputs.error || outputs.confidence_bits > 0)
         made.error = expected_error_of({input.camera, input.z_m, {}}, input.visibility, input.radius_m, input.noise,
                                        input.errors);
-    if (outputs.unshaded || outputs.split || (outputs.picture && input.shade == Shade::ambient))
+    if (outputs.unshaded || outputs.split || outputs.indirect || (outputs.picture && input.shade == Shade::ambient))
         work.row.warnings.push_back("the image is too large for the device: colours are not split into ambient and "
-                                    "direct light, and shaded multiplies all of them.");
+                                    "direct light, none comes from neighbours, and shaded multiplies all of them.");
     if (outputs.picture) {
         const bool has_gaps = input.colour.empty() || !input.colour_known.empty() || input.shade == Shade::clay;
         made.picture = picture_on_host(input, has_gaps ? clay(input.z_m, input.camera) : cv::Mat3b());
@@ -100,11 +100,11 @@ std::optional<shared::LightConstants> light_on(const Work& work, const BatchOpti
 
 /// Sentences for what a frame could not be given.
 void warn_of_light(Work& work, const BatchOptions& options, const Outputs& outputs, const Scene& scene) {
-    const bool divided = outputs.unshaded || outputs.light;
+    const bool divided = outputs.unshaded || outputs.light || outputs.indirect;
     if (scene.colour.empty() && (divided || (outputs.shade == Shade::ambient && (outputs.shaded || outputs.panel))))
         work.row.warnings.push_back(
             fmt::format("no colour that fits the depth: {}",
-                        divided ? "it has no unshaded, ambient or direct image." : "shaded shows clay."));
+                        divided ? "it has no unshaded, ambient, direct or indirect image." : "shaded shows clay."));
     else if (options.light && options.light->in_world && options.light->has_direct() && needs_light(outputs) &&
              !work.frame.world_from_camera)
         work.row.warnings.emplace_back("the frame has no pose, so nobody knows where the light comes from: all of it "
@@ -181,7 +181,8 @@ FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outpu
                                                                            : 16,
                        .picture = outputs.shaded || outputs.panel,
                        .unshaded = outputs.unshaded,
-                       .split = outputs.light};
+                       .split = outputs.light,
+                       .indirect = outputs.indirect};
     FrameImages images;
     if (is_as_recorded(work.frame)) {
         images.scene = scene_of(work, outputs.colour_view);
@@ -203,6 +204,7 @@ FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outpu
         images.unshaded = all.unshaded;
         images.ambient = all.ambient;
         images.direct = all.direct;
+        images.indirect = all.indirect;
         return images;
     }
     if (confidence) {
@@ -230,6 +232,7 @@ FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outpu
     images.unshaded = all.unshaded;
     images.ambient = all.ambient;
     images.direct = all.direct;
+    images.indirect = all.indirect;
     return images;
 }
 

@@ -36,7 +36,7 @@ struct FrameImages {
     cv::Mat map;              ///< of visibility, as the format's integers
     cv::Mat1b confidence_map; ///< likewise
     cv::Mat3b shaded;         ///< colour times visibility; clay where there is no colour, or its camera did not see
-    cv::Mat3b unshaded = {}, ambient = {}, direct = {}; ///< where there is colour
+    cv::Mat3b unshaded = {}, ambient = {}, direct = {}, indirect = {}; ///< where there is colour
 };
 
 /// Attaches visibility and confidence to what was recorded, and makes the images that `outputs` asks for, on the device

@@ -82,6 +82,8 @@ std::string outputs_text(const Outputs& outputs) {
         text += "panel;";
     if (outputs.unshaded)
         text += fmt::format("unshaded {};", outputs.shade_strength);
+    if (outputs.indirect)
+        text += "indirect;";
     if (outputs.light)
         text += "light;";
     if (outputs.cloud)

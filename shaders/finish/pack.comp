@@ -13,6 +13,7 @@ layout(constant_id = spec_light) const int has_light = 0;
 layout(constant_id = spec_ambient) const int ambient_alone = 0;
 layout(constant_id = spec_unshaded) const int unshaded = 0;
 layout(constant_id = spec_split) const int split = 0;
+layout(constant_id = spec_indirect) const int indirect = 0;
 layout(binding = 0, r32f) readonly uniform imageBuffer visibility;
 layout(binding = 1, r32f) readonly uniform imageBuffer expected_error;
 layout(binding = 2, r32f) readonly uniform imageBuffer surface; // 0 in holes
@@ -22,12 +23,14 @@ layout(binding = 5, r32ui) readonly uniform uimageBuffer colour_known; // bytes:
 layout(binding = 6, r32f) readonly uniform imageBuffer linear_light;   // of the 256 stored values, in steps
 layout(binding = 7, r32ui) readonly uniform uimageBuffer stored_light; // of every step
 layout(binding = 8, r32f) readonly uniform imageBuffer direct;         // light over ambient light
+layout(binding = 9, r32f) readonly uniform imageBuffer bounced;        // red, green, blue of each pixel, in steps
 layout(binding = 16, scalar) writeonly buffer MapOut { uint map_out[]; };
 layout(binding = 17, scalar) writeonly buffer ConfidenceOut { uint confidence_out[]; };
 layout(binding = 18, scalar) writeonly buffer PictureOut { uint picture_out[]; };
 layout(binding = 19, scalar) writeonly buffer UnshadedOut { uint unshaded_out[]; };
 layout(binding = 20, scalar) writeonly buffer AmbientOut { uint ambient_out[]; };
 layout(binding = 21, scalar) writeonly buffer DirectOut { uint direct_out[]; };
+layout(binding = 22, scalar) writeonly buffer IndirectOut { uint indirect_out[]; };
 layout(binding = 32, scalar) uniform Constants { FinishConstants k; };
 
 const uvec3 no_surface = uvec3(no_surface_blue, no_surface_green, no_surface_red);
@@ -84,6 +87,11 @@ uvec3 packed(uvec3 a, uvec3 b, uvec3 d, uvec3 e) {
                        d.z | e.x << 8 | e.y << 16 | e.z << 24);
 }
 
+// As all pictures: blue first.
+uvec3 bounced_pixel(int at) {
+    return stored_from(vec3(imageLoad(bounced, 3 * at + 2).x, imageLoad(bounced, 3 * at + 1).x, imageLoad(bounced, 3 * at).x));
+}
+
 void main() {
     int word = int(gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * gl_NumWorkGroups.x * finish_row);
     if (word >= k.words) return;
@@ -106,6 +114,12 @@ void main() {
         uvec4 v = uvec4(as_integer(confidence_at(at.x), 255.0), as_integer(confidence_at(at.y), 255.0),
                         as_integer(confidence_at(at.z), 255.0), as_integer(confidence_at(at.w), 255.0));
         confidence_out[word] = v.x | v.y << 8 | v.z << 16 | v.w << 24;
+    }
+    if (indirect != 0) {
+        uvec3 words = packed(bounced_pixel(at.x), bounced_pixel(at.y), bounced_pixel(at.z), bounced_pixel(at.w));
+        indirect_out[3 * word] = words.x;
+        indirect_out[3 * word + 1] = words.y;
+        indirect_out[3 * word + 2] = words.z;
     }
     bool has_colour = picture == picture_colour || picture == picture_both || unshaded != 0 || split != 0;
     if (picture == picture_none && !has_colour) return;

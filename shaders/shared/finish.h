@@ -23,6 +23,9 @@ struct FinishConstants {
 // A work group: so many pixels of a row, or words of four pixels.
 const int finish_row = 256;
 
+// Of each pixel, to look for what sends light to it.
+const int bounce_directions = 32;
+
 // The colour where there is no surface, a dim one that no visibility has.
 const int no_surface_blue = 64, no_surface_green = 40, no_surface_red = 28;
 // Grey of clay, out of 255: of a surface seen edge-on, and how much is added for one that faces the camera.
@@ -39,6 +42,8 @@ const int spec_light = 6;           // pack: 1 = there is direct light
 const int spec_ambient = 9;         // pack: 1 = visibility multiplies, or divides, ambient light alone
 const int spec_unshaded = 7;        // pack: 1 = colour divided by visibility is made
 const int spec_split = 8;           // pack: 1 = images of ambient and of direct light are made
+const int spec_indirect = 10;       // pack: 1 = the image of one bounce of light is made
+const int spec_known = 11;          // bounce: 1 = there are pixels without a known colour
 const int picture_none = 0;
 const int picture_colour = 1;
 const int picture_clay = 2;

@@ -274,7 +274,88 @@ TEST_F(FinishTest, without_colour_nothing_is_divided_or_split) {
     input.shade = Shade::ambient;
     const Finished made = Finish(device).compute(input, all_of_light);
     EXPECT_TRUE(made.unshaded.empty() && made.ambient.empty() && made.direct.empty());
+    EXPECT_TRUE(Finish(device).compute(input, {.indirect = true}).indirect.empty());
     EXPECT_FALSE(made.picture.empty());
+}
+
+/// A wall 2 m away, and to the left another one that meets it at a right angle.
+struct Corner {
+    static constexpr float left_m = -0.5F, back_m = 2;
+    FinishInput input;
+    int corner_u; ///< the first column of the wall behind
+
+    explicit Corner(cv::Size size = {640, 480}) { // coarser, the wall to the left would jump from column to column
+        input = scene(size);
+        const Pinhole& camera = input.camera;
+        input.z_m = cv::Mat1f(size);
+        corner_u = static_cast<int>(std::ceil(camera.cx + camera.fx * static_cast<double>(left_m / back_m)));
+        for (int v = 0; v < size.height; ++v)
+            for (int u = 0; u < size.width; ++u)
+                input.z_m(v, u) = u < corner_u ? left_m / static_cast<float>((u - camera.cx) / camera.fx) : back_m;
+        input.visibility = cv::Mat1f(size, 0.5F);
+        input.noise = {};
+        input.colour = cv::Mat3b(size, cv::Vec3b(200, 200, 200));
+        input.colour.colRange(0, corner_u) = cv::Scalar(0, 0, 220); // red
+    }
+    /// Of the wall behind, so many metres from the corner.
+    [[nodiscard]] int column_at(float metres) const {
+        return corner_u + static_cast<int>(input.camera.fx * static_cast<double>(metres / back_m));
+    }
+    [[nodiscard]] cv::Vec3b indirect(gpu::Device& device, int u) const {
+        return Finish(device).compute(input, {.indirect = true}).indirect(240, u);
+    }
+};
+
+TEST_F(FinishTest, a_red_wall_lights_its_neighbour_red_within_the_radius) {
+    const Corner corner; // the radius is 0.3 m
+    const cv::Mat3b indirect = Finish(device).compute(corner.input, {.indirect = true}).indirect;
+    const cv::Vec3b near = indirect(240, corner.column_at(0.07F)), far = indirect(240, corner.column_at(0.5F)),
+                    on_red = indirect(240, corner.corner_u - 10);
+    EXPECT_NEAR(linear(near[2]), 0.5 * linear(220), 0.005) << "closed by half, and all that closes it is red";
+    EXPECT_LE(near[0], 5) << "the corner is a little round";
+    EXPECT_EQ(far, cv::Vec3b(0, 0, 0));
+    EXPECT_NEAR(linear(on_red[0]), 0.5 * linear(200), 0.005) << "what the red wall sees is grey";
+    EXPECT_NEAR(on_red[0], on_red[2], 3);
+}
+
+TEST_F(FinishTest, where_everything_has_one_colour_a_bounce_is_it_times_what_is_closed) {
+    FinishInput input = Corner().input;
+    input.colour.setTo(cv::Scalar(90, 140, 190));
+    cv::RNG random(3);
+    random.fill(input.visibility, cv::RNG::UNIFORM, 0.0, 1.0);
+    const cv::Mat3b indirect = Finish(device).compute(input, {.indirect = true}).indirect;
+    int lit = 0, exact = 0; // it fades out where little was found
+    for (int v = 0; v < indirect.rows; ++v)
+        for (int u = 0; u < indirect.cols; ++u) {
+            const double closed = 1 - static_cast<double>(input.visibility(v, u));
+            if (closed < 0.05 || indirect(v, u) == cv::Vec3b(0, 0, 0))
+                continue;
+            ++lit;
+            bool all = true;
+            for (int c = 0; c < 3; ++c) {
+                const double found = linear(indirect(v, u)[c]), expected = linear(input.colour(v, u)[c]) * closed;
+                EXPECT_LE(found, expected + 0.004);
+                all = all && found > expected - 0.004;
+            }
+            exact += all;
+        }
+    EXPECT_GT(exact, lit / 2);
+    EXPECT_GT(lit, 10000);
+}
+
+TEST_F(FinishTest, light_bounces_neither_across_a_gap_nor_from_what_is_not_known) {
+    FinishInput input = Corner().input;
+    input.z_m.setTo(2);
+    input.z_m.colRange(0, 160) = 1.2F; // a board 0.8 m before the wall
+    EXPECT_EQ(cv::countNonZero(Finish(device).compute(input, {.indirect = true}).indirect.reshape(1)), 0);
+    Corner corner;
+    corner.input.colour_known = cv::Mat1b(corner.input.z_m.size(), uchar(255));
+    corner.input.colour_known.colRange(0, corner.corner_u) = 0;
+    EXPECT_EQ(corner.indirect(device, corner.column_at(0.1F)), cv::Vec3b(0, 0, 0)) << "nobody knows that it is red";
+    Corner holes;
+    holes.input.z_m.colRange(0, holes.corner_u) = 0;
+    EXPECT_EQ(holes.indirect(device, holes.column_at(0.1F)), cv::Vec3b(0, 0, 0));
+    EXPECT_EQ(holes.indirect(device, 4), cv::Vec3b(0, 0, 0));
 }
 
 TEST_F(FinishTest, clay_hides_colour_where_it_was_asked_for) {
