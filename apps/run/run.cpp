@@ -437,6 +437,7 @@ class Run final : public Command {
     /// `held`: its journal, where that is not in the folder of its results.
     std::vector<FrameRow> process(CaptureJob job, OrderedOutput& output, const WorkerProcess& worker = {},
                                   Journal* held = nullptr) {
+        return_freed_memory();
         output.set_capture(job.capture.path.string());
         std::optional<Journal> own;
         const auto siblings = siblings_.find(job.folder());

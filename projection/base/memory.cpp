@@ -3,11 +3,13 @@
 #include "projection/base/error.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
 #include <limits>
+#include <malloc.h>
 #include <new>
 #include <opencv2/core.hpp>
 #include <sys/resource.h>
@@ -120,6 +122,15 @@ double peak_memory_mib() {
         if (double kib = 0; word == "VmHWM:" && status >> kib)
             return kib / 1024;
     return std::numeric_limits<double>::quiet_NaN();
+}
+
+void return_freed_memory() {
+    static std::atomic<std::uint64_t> after_last = 0;
+    const std::uint64_t before = after_last;
+    if (pages_of_process(true) < before + before / 10 + (std::uint64_t(16) << 20))
+        return;
+    ::malloc_trim(0);
+    after_last = pages_of_process(true);
 }
 
 void require_memory(std::uint64_t bytes, const std::string& what) {
