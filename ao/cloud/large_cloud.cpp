@@ -12,10 +12,12 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <fmt/format.h>
 #include <limits>
+#include <thread>
 #include <utility>
 
 namespace scanshade {
@@ -102,6 +104,8 @@ class LargeCloud {
         sort_points();
         settle_sides();
         compute_tiles();
+        if (store_.helps())
+            return std::move(result_);
         check();
         tell();
         return std::move(result_);
@@ -261,14 +265,30 @@ class LargeCloud {
     }
 
     void compute_tiles() {
+        std::vector<std::size_t> with_others;
         for (std::size_t tile = 0; tile < plan_.size() + 1; ++tile) {
             may_stop();
-            const std::optional<TileValues> known = store_.values(tile);
-            TileValues values = known ? *known : tile < plan_.size() ? values_of(tile) : values_of_strays();
-            count(tile, values);
-            if (!known)
-                store_.keep(tile, std::move(values));
+            if (store_.claim(tile))
+                compute_tile(tile);
+            else
+                with_others.push_back(tile);
         }
+        for (const std::size_t tile : store_.helps() ? std::vector<std::size_t>() : with_others) {
+            while (!store_.claim(tile)) { // free at last, also where the other process died
+                may_stop();
+                std::this_thread::sleep_for(std::chrono::milliseconds(100));
+            }
+            compute_tile(tile);
+        }
+    }
+
+    void compute_tile(std::size_t tile) {
+        const std::optional<TileValues> known = store_.values(tile);
+        TileValues values = known ? *known : tile < plan_.size() ? values_of(tile) : values_of_strays();
+        count(tile, values);
+        if (!known)
+            store_.keep(tile, std::move(values));
+        store_.release();
     }
 
     TileValues values_of(std::size_t tile) {
@@ -343,6 +363,7 @@ class LargeCloud {
 
     /// Again with a part of the points: where that gives other values, these are not to be relied on.
     void check() {
+        Watch watch(result_.timings); // tiles have counted their own time
         std::optional<CheckedPart> part;
         if (check_.keep > 0) {
             const TilePoints kept = store_.points(check_tile_);
@@ -389,7 +410,7 @@ class LargeCloud {
             values.checked = true;
             store_.keep(tile, std::move(values));
         }
-        watch_.lap("check on a part");
+        watch.lap("check on a part");
     }
 
     void tell() {

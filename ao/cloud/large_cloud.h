@@ -68,6 +68,11 @@ class TileStore {
     /// Values of an earlier run; nothing where there are none.
     [[nodiscard]] virtual std::optional<TileValues> values(std::size_t tile) = 0;
     virtual void keep(std::size_t tile, TileValues values) = 0;
+    /// The tile is this process's until release(); false while another process computes it.
+    [[nodiscard]] virtual bool claim(std::size_t /*tile*/) { return true; }
+    virtual void release() {}
+    /// Whether another process finishes the cloud: then this one computes tiles, and no more.
+    [[nodiscard]] virtual bool helps() const { return false; }
 };
 
 /// Everything but the values, which the store has. `shown`: how many normals to keep with them, about.

@@ -29,6 +29,8 @@ json task_json(const Task& task) {
               {"cost", task.cost}};
     if (task.listed_bytes > 0)
         text["bytes"] = task.listed_bytes;
+    if (task.clouds)
+        text["clouds"] = true;
     return text;
 }
 
@@ -68,6 +70,7 @@ Task task_from(const json& text, bool fetched) {
               text.at("cost").get<double>()};
     if (text.contains("bytes"))
         task.listed_bytes = count_at(text, "bytes");
+    task.clouds = text.value("clouds", false);
     if (fetched && task.frames == 0 && task.first == 0 && task.of == 0)
         return task;
     if (task.frames == 0 || task.first > task.of || task.frames > task.of - task.first)

@@ -23,6 +23,7 @@ struct Task {
     std::size_t of = 0;             ///< all frames of the capture in the plan
     double cost = 0;                ///< about megapixels or million points; shards get equal sums of it
     std::uint64_t listed_bytes = 0; ///< of a source, if its list has them
+    bool clouds = false;            ///< frames are clouds: processes that have nothing else to do help with large ones
 
     /// "" for a whole capture, else "0-500": the end is not included.
     [[nodiscard]] std::string block() const;

@@ -96,8 +96,8 @@ class Attempts {
 } // namespace
 
 int work_through(const std::filesystem::path& job, const Plan& plan, const Shard& shard, const std::atomic<bool>& stop,
-                 std::size_t at_once, bool takes_over,
-                 const std::function<int(const Task&, OrderedOutput&)>& run_task) {
+                 std::size_t at_once, bool takes_over, const std::function<int(const Task&, OrderedOutput&)>& run_task,
+                 const std::function<void(const Task&)>& help) {
     const auto parts = cut(plan.tasks, shard.of);
     const auto& own = parts[static_cast<std::size_t>(shard.index - 1)];
     say(fmt::format("{}: shard {} of {}, {} of {} tasks", job.string(), shard.index, shard.of, own.size(),
@@ -112,6 +112,10 @@ int work_through(const std::filesystem::path& job, const Plan& plan, const Shard
     });
     // Other shards begin with their costliest tasks, so unfinished ones are at their ends. Our own shard comes first:
     // tasks that another run held may be free by now.
+    const auto is_done = [&](const std::filesystem::path& journal) {
+        return is_complete(journal, plan.hooks.any() ? "ended" : "complete");
+    };
+    std::vector<std::size_t> held;
     for (int next = 0; next < (takes_over ? shard.of : 1); ++next) {
         const auto& part = parts[static_cast<std::size_t>((shard.index - 1 + next) % shard.of)];
         for (auto index = part.rbegin(); index != part.rend(); ++index) {
@@ -119,12 +123,32 @@ int work_through(const std::filesystem::path& job, const Plan& plan, const Shard
                 return worse(attempts.code(), unfinished);
             const Task& task = plan.tasks[*index];
             const std::filesystem::path journal = journal_file(results_of(job, task), task.block());
-            if (is_complete(journal, plan.hooks.any() ? "ended" : "complete") || in_use(journal))
+            if (is_done(journal))
                 continue;
+            if (in_use(journal)) {
+                if (task.clouds)
+                    held.push_back(*index);
+                continue;
+            }
             OrderedOutput output;
             if (attempts.attempt(task, output) != Attempts::Result::held && next > 0)
                 say(fmt::format("  taken over from shard {}: {}", (shard.index - 1 + next) % shard.of + 1, task.name));
         }
+    }
+    for (const std::size_t index : help ? held : std::vector<std::size_t>()) {
+        const Task& task = plan.tasks[index];
+        const std::filesystem::path journal = journal_file(results_of(job, task), task.block());
+        try {
+            if (!is_done(journal))
+                help(task);
+        } catch (const Error& failure) {
+            say(fmt::format("no more help with {}: {}", task.name, failure.what()));
+        }
+        if (stop)
+            return worse(attempts.code(), unfinished);
+        OrderedOutput output;
+        if (!is_done(journal) && !in_use(journal) && attempts.attempt(task, output) != Attempts::Result::held)
+            say(fmt::format("  taken over: {}", task.name));
     }
     return attempts.code();
 }

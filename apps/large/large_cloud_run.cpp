@@ -39,7 +39,7 @@ void remove_left_tiles(const fs::path& folder) {
 }
 
 LargeCloudRun::LargeCloudRun(std::vector<CloudStream> files, LargeSettings settings)
-    : source_(std::make_unique<CloudFiles>(std::move(files))), settings_(std::move(settings)) {}
+    : source_(std::make_unique<CloudFiles>(std::move(files))), settings_(std::move(settings)), kept_(settings_.helps) {}
 
 LargeCloudRun::~LargeCloudRun() {
     tiles_.reset();
@@ -49,6 +49,11 @@ LargeCloudRun::~LargeCloudRun() {
 
 std::size_t LargeCloudRun::files() const { return source_->files().size(); }
 const CloudStream& LargeCloudRun::file(std::size_t index) const { return source_->files()[index]; }
+
+bool LargeCloudRun::has_tiles() const {
+    std::error_code ignored;
+    return fs::exists(settings_.folder / "index", ignored);
+}
 
 void LargeCloudRun::compute(PointMethod& method) {
     const std::lock_guard alone(mutex_);
@@ -60,8 +65,8 @@ void LargeCloudRun::compute(PointMethod& method) {
     const double shown = static_cast<double>(settings_.shown) * static_cast<double>(files());
     const std::string key =
         fmt::format("{}\n{}\n{}\n{}", SCANSHADE_VERSION, method.fingerprint(), shown, stamps_of(source_->files()));
-    tiles_ =
-        std::make_unique<TilesOnDisk>(settings_.folder, key, source_->size(), output, settings_.buffers, settings_.say);
+    tiles_ = std::make_unique<TilesOnDisk>(settings_.folder, key, source_->size(), output, settings_.buffers,
+                                           settings_.say, settings_.helps);
     try {
         found_ = method.compute_large(*source_, *tiles_, shown, settings_.stop);
     } catch (const Outage&) {

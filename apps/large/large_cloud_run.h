@@ -25,6 +25,7 @@ struct LargeSettings {
     std::size_t buffers = 64 << 20;
     std::function<bool()> stop = {};                  ///< asked now and then
     std::function<void(const std::string&)> say = {}; ///< what is about to be done
+    bool helps = false; ///< another process computes the files: compute() computes tiles for it, and no more
 };
 
 /// Made once for files that belong together. Temporary files are removed with it, unless keep() was called.
@@ -38,6 +39,8 @@ class LargeCloudRun {
 
     [[nodiscard]] std::size_t files() const;
     [[nodiscard]] const CloudStream& file(std::size_t index) const;
+    /// Whether tiles are there to compute.
+    [[nodiscard]] bool has_tiles() const;
     /// Computes all files; the second time there is nothing to do.
     void compute(PointMethod& method);
     /// Notes, doubts, radius; no values. After compute().
@@ -66,7 +69,7 @@ class LargeCloudRun {
     LargeSettings settings_;
     std::unique_ptr<TilesOnDisk> tiles_;
     PointVisibility found_;
-    bool computed_ = false, kept_ = false;
+    bool computed_ = false, kept_;
     std::mutex mutex_;
 };
 

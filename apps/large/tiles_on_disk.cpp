@@ -13,8 +13,10 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <limits>
+#include <sys/file.h>
 #include <system_error>
 #include <unistd.h>
+#include <utility>
 
 namespace scanshade {
 
@@ -68,11 +70,12 @@ std::string gib(double bytes) { return fmt::format("{:.3g} GiB", bytes / (1024.0
 } // namespace
 
 TilesOnDisk::TilesOnDisk(fs::path folder, std::string key, std::size_t source_points, std::uint64_t output_bytes,
-                         std::size_t buffers, std::function<void(const std::string&)> say)
+                         std::size_t buffers, std::function<void(const std::string&)> say, bool helps)
     : folder_(std::move(folder)), key_(std::move(key)), source_points_(source_points), output_bytes_(output_bytes),
-      buffers_(buffers), say_(std::move(say)) {}
+      buffers_(buffers), say_(std::move(say)), helps_(helps) {}
 
 TilesOnDisk::~TilesOnDisk() {
+    release();
     if (handle_ >= 0)
         ::close(handle_);
 }
@@ -89,11 +92,13 @@ bool TilesOnDisk::begin(const std::string& plan, std::size_t tiles, bool normals
         for (std::size_t tile = 0; tile < tiles; ++tile)
             done += fs::exists(values_file(tile));
         if (say_)
-            say_(fmt::format("goes on with {} of an earlier run: {} of {} tiles are done.", folder_.string(), done,
-                             tiles - 1));
+            say_(fmt::format("{} {} of {}: {} of {} tiles are done.", helps_ ? "helps with" : "goes on with",
+                             folder_.string(), helps_ ? "another process" : "an earlier run", done, tiles - 1));
         open(false);
         return true;
     }
+    if (helps_)
+        throw Outage(folder_.string() + ": tiles of other points or settings, or by another device: no help with them");
     std::error_code ignored;
     fs::remove_all(folder_, ignored);
     require_space(copies);
@@ -282,6 +287,27 @@ void TilesOnDisk::keep(std::size_t tile, TileValues values) {
         put(bytes, values.confidence[k]);
     }
     write_atomically(values_file(tile), bytes);
+}
+
+bool TilesOnDisk::claim(std::size_t tile) {
+    release();
+    if (helps_ && fs::exists(values_file(tile)))
+        return false;
+    const fs::path file = folder_ / fmt::format("lock-{}", tile);
+    lock_ = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    if (lock_ < 0 && errno == ENOENT && helps_) // the cloud is done
+        return false;
+    if (lock_ < 0)
+        fail(file, "cannot be opened");
+    if (::flock(lock_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK)
+        return true;
+    release();
+    return false;
+}
+
+void TilesOnDisk::release() {
+    if (lock_ >= 0)
+        ::close(std::exchange(lock_, -1));
 }
 
 std::optional<TileValues> TilesOnDisk::values(std::size_t tile) {

@@ -30,8 +30,9 @@ struct RecordingData {
 /// From the capture's trajectory; else from the frames before and after, per second or, without stamps, per frame.
 Motion motion_of(const Capture& capture, std::size_t index) {
     const CaptureEntry& entry = capture.entries[index];
-    if (entry.motion.any() || !entry.world_from_camera || index == 0 || index + 1 == capture.entries.size())
-        return entry.motion;
+    const Motion motion = entry.motion.value_or({});
+    if (motion.any() || !entry.world_from_camera || index == 0 || index + 1 == capture.entries.size())
+        return motion;
     const CaptureEntry &before = capture.entries[index - 1], &after = capture.entries[index + 1];
     if (!before.world_from_camera || !after.world_from_camera)
         return {};

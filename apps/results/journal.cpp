@@ -196,17 +196,18 @@ void for_each_line(const fs::path& file, const std::function<void(const json&, s
 
 std::vector<fs::path> inputs_of(const CaptureEntry& entry) {
     std::vector<fs::path> files;
-    for (const std::string* file : {&entry.colour, &entry.depth, &entry.cloud})
+    for (const StoredPath* file : {&entry.colour, &entry.depth, &entry.cloud})
         if (!file->empty())
-            files.emplace_back(*file);
+            files.push_back(*file);
     return files;
 }
 
 /// What a frame's results depend on besides its files. The position of colour depends on the camera's motion.
 std::string listed(const CaptureEntry& entry) {
-    const Eigen::Vector3d &rotation = entry.motion.rotation_per_s, &translation = entry.motion.translation_per_s;
+    const Motion motion = entry.motion.value_or({});
     const double between_s = entry.stamp_s && entry.colour_stamp_s ? *entry.colour_stamp_s - *entry.stamp_s : 0;
-    return fmt::format("{}|{}|{}|{}|", entry.problem, between_s, fmt::join(rotation, " "), fmt::join(translation, " "));
+    return fmt::format("{}|{}|{}|{}|", entry.problem, between_s, fmt::join(motion.rotation_per_s, " "),
+                       fmt::join(motion.translation_per_s, " "));
 }
 
 std::string stamps_of(const CaptureEntry& entry) {

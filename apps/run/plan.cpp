@@ -84,11 +84,9 @@ void report_unused_folders(const Capture& capture, const std::function<void(Foun
     const std::string whole = capture.path.string() + "/";
     std::set<std::string, std::less<>> used;
     for (const CaptureEntry& entry : capture.entries)
-        for (const std::string* file : {&entry.colour, &entry.depth, &entry.cloud})
-            if (const std::string_view path = *file; path.starts_with(whole))
-                if (const auto part = path.substr(whole.size(), path.find('/', whole.size()) - whole.size());
-                    !used.contains(part))
-                    used.emplace(part);
+        for (const StoredPath* file : {&entry.colour, &entry.depth, &entry.cloud})
+            if (const std::string path = file->string(); path.starts_with(whole))
+                used.insert(path.substr(whole.size(), path.find('/', whole.size()) - whole.size()));
     for (const fs::path& folder : content_of(capture.path).folders)
         if (!used.contains(folder.filename().string()))
             found(passed_over(folder, "in the folder of a capture, which takes no frames from it"));
@@ -384,10 +382,13 @@ class PlanCommand final : public Command {
         frames_ += frames.size();
         const std::string name = unique(found.name);
         const std::vector<double> costs = costs_of(*found.capture, frames);
+        const bool clouds = std::ranges::any_of(
+            frames, [&](std::size_t frame) { return !found.capture->entries[frame].cloud.empty(); });
         const std::size_t blocks = (frames.size() + block_ - 1) / static_cast<std::size_t>(block_);
         for (std::size_t b = 0; b < blocks; ++b) { // blocks of one capture are equal up to a frame
             Task task{found.path, name, b * frames.size() / blocks, 0, frames.size(), 0};
             task.frames = (b + 1) * frames.size() / blocks - task.first;
+            task.clouds = clouds;
             for (std::size_t i = 0; i < task.frames; ++i)
                 task.cost += costs[task.first + i];
             plan.tasks.push_back(std::move(task));

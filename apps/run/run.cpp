@@ -15,6 +15,7 @@
 #include "apps/slice.h"
 #include "apps/walk/batch.h"
 #include "apps/walk/capture_light.h"
+#include "apps/walk/large_frames.h"
 #include "apps/walk/overlap.h"
 #include "apps/walk/point_clouds.h"
 #include "apps/walk/pose_check.h"
@@ -365,8 +366,22 @@ class Run final : public Command {
                     return stored->run(task, [&](const TaskFolders& folders, Journal& journal) {
                         return tally_of(process_stored(task, folders, journal, output, worker));
                     });
-                });
+                },
+                stored ? std::function<void(const Task&)>() : [&](const Task& task) { help(job, task); });
         });
+    }
+
+    /// Computes tiles of a task's large clouds for the process that holds it, until that one has ended.
+    void help(const fs::path& job_folder, const Task& task) {
+        CaptureJob job = job_of(task, {task.capture, results_of(job_folder, task)});
+        const std::size_t most = CloudAo(asked_.cloud_ao()).most_at_once();
+        if (job.batch.frames.size() == 1 && // else they may be a survey's
+            !is_large_cloud(job.capture.entries[job.batch.frames.front()].cloud, most))
+            return;
+        const Prepared ready = prepare(job);
+        const fs::path journal = journal_file(job.folder(), job.block);
+        if (ready.by_points)
+            help_with_large_clouds(job.capture, job.batch, [&] { return in_use(journal); });
     }
 
     std::vector<FrameRow> process_stored(const Task& task, const TaskFolders& folders, Journal& journal,

@@ -7,10 +7,13 @@
 #include "projection/base/error.h"
 
 #include <algorithm>
+#include <chrono>
 #include <fmt/format.h>
 #include <iterator>
 #include <limits>
+#include <set>
 #include <tbb/parallel_for.h>
+#include <thread>
 
 namespace scanshade {
 
@@ -48,6 +51,7 @@ LargeSettings LargeFrames::settings(const std::string& name) const {
     if (options_.stop)
         settings.stop = [stop = options_.stop] { return stop->load(); };
     settings.say = options_.say;
+    settings.helps = helps_;
     return settings;
 }
 
@@ -133,7 +137,8 @@ LargeFrames::Part LargeFrames::part_of(std::size_t index, std::vector<std::strin
     std::string why_not;
     std::optional<CloudShape> shape = large_shape(entry.cloud, options_.points->most_at_once(), about_file, why_not);
     if (!shape) {
-        remove_left_tiles(tiles_folder(options_.outputs.folder, entry.name));
+        if (!helps_)
+            remove_left_tiles(tiles_folder(options_.outputs.folder, entry.name));
         if (!why_not.empty())
             notes.push_back(
                 fmt::format("more points than --cloud.memory holds; the file is read as a whole, since {}.", why_not));
@@ -145,6 +150,26 @@ LargeFrames::Part LargeFrames::part_of(std::size_t index, std::vector<std::strin
     std::vector<CloudStream> files;
     files.emplace_back(entry.cloud, *std::move(shape));
     return {std::make_shared<LargeCloudRun>(std::move(files), settings(entry.name)), 0};
+}
+
+void help_with_large_clouds(const Capture& capture, const BatchOptions& options, const std::function<bool()>& at_work) {
+    LargeFrames frames(capture, options, true);
+    std::set<std::shared_ptr<LargeCloudRun>> clouds; // files of a survey have one in common
+    for (const std::size_t index : options.frames) {
+        std::vector<std::string> warnings, notes; // the other process has them, too
+        if (const LargeFrames::Part part = frames.part_of(index, warnings, notes); part.run)
+            clouds.insert(part.run);
+    }
+    const bool any = !clouds.empty();
+    while (any && at_work() && !(options.stop && *options.stop)) {
+        std::erase_if(clouds, [&](const std::shared_ptr<LargeCloudRun>& cloud) {
+            const bool ready = cloud->has_tiles();
+            if (ready)
+                cloud->compute(*options.points);
+            return ready;
+        });
+        std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    }
 }
 
 void compute_large(Work& work, PointMethod& method) {
@@ -180,7 +205,9 @@ void write_large(Work& work, const Outputs& outputs) {
     work.of_points = std::move(result.of_shown);
     work.frame.name = work.entry.name;
     work.frame.cloud = std::move(result.shown);
-    work.frame.world_from_camera = records.viewpoint ? records.viewpoint : work.entry.world_from_camera;
+    work.frame.world_from_camera = work.entry.world_from_camera;
+    if (records.viewpoint)
+        work.frame.world_from_camera = records.viewpoint;
     work.confidence.per_point = work.of_points.confidence;
     work.attached.per_point = work.of_points.visibility;
     const auto share = [](std::size_t part, std::size_t all) {

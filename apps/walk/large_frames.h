@@ -4,6 +4,7 @@
 #include "apps/large/large_cloud_run.h"
 #include "apps/walk/work.h"
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -15,7 +16,9 @@ namespace scanshade {
 /// Of one capture. Safe to use from several threads.
 class LargeFrames {
   public:
-    LargeFrames(const Capture& capture, const BatchOptions& options) : capture_(capture), options_(options) {}
+    /// `helps`: another process computes them, and this one some of their tiles.
+    LargeFrames(const Capture& capture, const BatchOptions& options, bool helps = false)
+        : capture_(capture), options_(options), helps_(helps) {}
 
     /// What computes a frame's cloud from disk, alone or with the others of its survey.
     struct Part {
@@ -33,6 +36,7 @@ class LargeFrames {
 
     const Capture& capture_;
     const BatchOptions& options_;
+    bool helps_;
     std::once_flag looked_;
     std::map<std::size_t, Part> parts_; ///< of surveys, by frame
     std::map<std::size_t, std::string> notes_;
@@ -41,6 +45,10 @@ class LargeFrames {
 /// Whether a cloud in `file` is computed from its points, has more of them than `most_at_once`, and can be read in
 /// blocks. False for what cannot be read: loading it says why.
 [[nodiscard]] bool is_large_cloud(const std::filesystem::path& file, std::size_t most_at_once);
+
+/// Computes tiles of the large clouds among options.frames for the process that computes these, while it is `at_work`.
+/// Nothing where none of them is large.
+void help_with_large_clouds(const Capture& capture, const BatchOptions& options, const std::function<bool()>& at_work);
 
 /// Computes the values, which stay on disk.
 void compute_large(Work& work, PointMethod& method);

@@ -220,8 +220,10 @@ void turn_poses_y_down(Capture& capture) {
         Eigen::Isometry3d& pose = *entry.world_from_camera;
         pose.linear() = (mirror * pose.linear() * mirror).eval();
         pose.translation() = (mirror * pose.translation()).eval();
-        entry.motion.rotation_per_s = -(mirror * entry.motion.rotation_per_s).eval();
-        entry.motion.translation_per_s = (mirror * entry.motion.translation_per_s).eval();
+        if (!entry.motion)
+            continue;
+        entry.motion->rotation_per_s = -(mirror * entry.motion->rotation_per_s).eval();
+        entry.motion->translation_per_s = (mirror * entry.motion->translation_per_s).eval();
     }
 }
 
@@ -279,7 +281,7 @@ std::vector<std::string> unused_in(const fs::path& folder, const Listing& listin
     if (listing.capture.camera)
         used.insert(fs::path(listing.capture.camera->origin).filename().string());
     for (const CaptureEntry& entry : listing.capture.entries) // images may be called so
-        used.insert(fs::path(entry.depth).filename().string());
+        used.insert(entry.depth.path().filename().string());
     std::vector<std::string> unused;
     std::error_code ignored;
     for (const auto& [name, kind] : items_in(folder, ignored))
@@ -559,7 +561,8 @@ void divide_poses(Capture& capture, double by) {
     for (CaptureEntry& entry : capture.entries) {
         if (entry.world_from_camera)
             entry.world_from_camera->translation() /= by;
-        entry.motion.translation_per_s /= by;
+        if (entry.motion)
+            entry.motion->translation_per_s /= by;
     }
 }
 

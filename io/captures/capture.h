@@ -3,6 +3,7 @@
 
 #include "io/cameras/camera_file.h"
 #include "io/captures/listing/container.h"
+#include "io/captures/listing/stored_path.h"
 #include "io/images/image_file.h"
 #include "projection/base/error.h"
 #include "projection/frame.h"
@@ -36,21 +37,19 @@ struct CaptureOptions {
 
 /// One frame's listing: the paths of its parts. Nothing is decoded yet.
 struct CaptureEntry {
-    std::string name; ///< unique in the capture
-    /// Paths; empty where there is none. Not as std::filesystem::path, which stores every component separately: for
-    /// thousands of frames these would take most of a capture's memory.
-    std::string colour, depth, cloud;
+    std::string name;                ///< unique in the capture
+    StoredPath colour, depth, cloud; ///< empty where there is none
     /// Where the images are in one file with those of other frames: `colour`, `depth` and `confidence` name that file,
     /// and stay empty for images that the frame lacks.
     std::shared_ptr<const FrameContainer> container;
     std::size_t place = 0; ///< in the container
-    std::optional<Eigen::Isometry3d> world_from_camera;
+    Rare<Eigen::Isometry3d> world_from_camera;
     std::optional<double> stamp_s;        ///< of the depth image
     std::optional<double> colour_stamp_s; ///< of the colour image paired with it
-    Motion motion;                        ///< of the camera at that time, if the trajectory has it
+    Rare<Motion> motion;                  ///< of the camera at that time, if the trajectory has it
     std::shared_ptr<const Camera> camera; ///< its own; null = the capture's
     double depth_units_per_metre = 0;     ///< its own; 0 = the capture's
-    std::string confidence;               ///< path of an image of depth's size, 0 where depth is not to be believed
+    StoredPath confidence;                ///< an image of depth's size, 0 where depth is not to be believed
     std::string problem; ///< why this frame cannot be loaded (names file and line); empty = it may be tried
     std::vector<std::string> warnings; ///< oddities in the listing of this frame
 };

@@ -129,7 +129,7 @@ RecordingCopy copy_folder(const Capture& capture, const fs::path& folder) {
         copy.depth.push_back(take(entry.depth));
         take(entry.colour);
         if (capture.kind == "7-Scenes / BundleFusion") {
-            const std::string pose = entry.depth.substr(0, entry.depth.rfind(".depth")) + ".pose.txt";
+            const std::string depth = entry.depth.string(), pose = depth.substr(0, depth.rfind(".depth")) + ".pose.txt";
             take(fs::exists(pose) ? pose : "");
         }
     }

@@ -106,8 +106,8 @@ TEST_F(Colmap, geometric_depth_wins_and_missing_depth_is_counted) {
     write_file(folder / "stereo/depth_maps/other.png.geometric.bin", colmap_map(corner_depth(0)));
     const Capture capture = open();
     ASSERT_EQ(capture.entries.size(), 2U);
-    EXPECT_TRUE(capture.entries[0].depth.ends_with("0.jpg.geometric.bin"));
-    EXPECT_TRUE(capture.entries[1].depth.ends_with("1.jpg.photometric.bin"));
+    EXPECT_TRUE(capture.entries[0].depth.string().ends_with("0.jpg.geometric.bin"));
+    EXPECT_TRUE(capture.entries[1].depth.string().ends_with("1.jpg.photometric.bin"));
     EXPECT_TRUE(warned(capture.warnings, "1 image left out, without a depth map"));
     EXPECT_TRUE(warned(capture.warnings, "1 depth map geometric, 1 without one photometric"));
     EXPECT_TRUE(warned(capture.warnings, "such as other.png; not used"));

@@ -55,7 +55,7 @@ void take_facts(const fs::path& file, const Json& all, CaptureEntry& entry) {
     const auto found = all.find(image);
     if (found == all.end() || !found->is_object())
         throw Error(fmt::format("{}: \"{}\" is missing, though depth/{} exists", file.string(), image,
-                                fs::path(entry.depth).filename().string()));
+                                entry.depth.path().filename().string()));
     const auto k = numbers_at(file, image, *found, "cam_K", 9);
     if (k.empty())
         throw Error(fmt::format("{}: \"{}\": \"cam_K\" is missing", file.string(), image));

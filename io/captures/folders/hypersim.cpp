@@ -256,10 +256,8 @@ std::optional<std::int64_t> frame_of_file(const fs::path& file) {
     return number && *number < most ? std::optional(static_cast<std::int64_t>(*number)) : std::nullopt;
 }
 
-std::vector<fs::path> depths_in(const fs::path& folder) {
-    std::vector<fs::path> files = files_in(folder);
-    std::erase_if(files, [](const fs::path& file) { return !frame_of_file(file); });
-    return files;
+FolderFiles depths_in(const fs::path& folder) {
+    return files_in(folder).only([](const fs::path& file) { return frame_of_file(file).has_value(); });
 }
 
 /// The scene's folders with distances, one for each camera.

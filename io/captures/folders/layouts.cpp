@@ -149,13 +149,11 @@ void entries_from_match(const fs::path& folder, const fs::path& depth_folder, Ca
 }
 
 /// Pairs by equal stems; where no stem is shared but there are as many of each, by order.
-void entries_from_names(const std::vector<fs::path>& depths, const std::vector<fs::path>& colours, Capture& capture) {
-    std::map<std::string, const fs::path*> by_stem;
-    for (const fs::path& colour : colours)
-        by_stem.emplace(colour.stem().string(), &colour);
+void entries_from_names(const FolderFiles& depths, const FolderFiles& colours, Capture& capture) {
+    const ImagesByStem by_stem(colours);
     std::size_t shared = 0;
     for (const fs::path& depth : depths)
-        shared += by_stem.count(depth.stem().string());
+        shared += by_stem.of(depth.stem().string()).empty() ? 0 : 1;
     const bool by_order = shared == 0 && !colours.empty() && colours.size() == depths.size();
     if (by_order)
         capture.warnings.push_back(
@@ -166,12 +164,8 @@ void entries_from_names(const std::vector<fs::path>& depths, const std::vector<f
         CaptureEntry& entry = capture.entries.emplace_back();
         entry.name = depths[i].stem().string();
         entry.depth = depths[i];
-        const auto same = by_stem.find(entry.name);
-        if (by_order)
-            entry.colour = colours[i];
-        else if (same != by_stem.end())
-            entry.colour = *same->second;
-        else if (!colours.empty())
+        entry.colour = by_order ? StoredPath(colours[i]) : by_stem.of(entry.name);
+        if (entry.colour.empty() && !colours.empty())
             entry.warnings.push_back(fmt::format("{} has no colour image.", depths[i].string()));
     }
     if (!by_order && shared < colours.size())

@@ -70,8 +70,9 @@ bool has_prefix(const fs::path& file, std::string_view prefix) { return file.ste
 } // namespace
 
 std::optional<Listing> list_replica(const fs::path& folder) {
-    auto depths = depth_images_in(folder_named(folder, {"results"}));
-    std::erase_if(depths, [](const fs::path& file) { return !has_prefix(file, "depth"); });
+    const FolderFiles depths = depth_images_in(folder_named(folder, {"results"})).only([](const fs::path& file) {
+        return has_prefix(file, "depth");
+    });
     if (depths.empty())
         return std::nullopt;
     const bool has_poses = is_file(folder / "traj.txt");

@@ -34,8 +34,10 @@ Camera camera_from_matrix(const fs::path& file) {
 
 /// SCAN.txt, which ScanNet has beside its recordings: in the folder, or beside it with its name.
 std::optional<CameraFile> camera_of_scan(const fs::path& folder) {
-    std::vector<fs::path> files = files_in(folder);
-    std::erase_if(files, [](const fs::path& file) { return lower_extension(file) != ".txt"; });
+    std::vector<fs::path> files;
+    for (const fs::path& file : files_in(folder))
+        if (lower_extension(file) == ".txt")
+            files.push_back(file);
     const fs::path whole = folder.filename().empty() ? folder.parent_path() : folder;
     files.push_back(whole.parent_path() / (whole.filename().string() + ".txt"));
     for (const fs::path& file : files)
@@ -81,13 +83,13 @@ std::optional<ColourCamera> colour_camera_in(const fs::path& folder, const fs::p
 std::optional<Listing> list_scannet(const fs::path& folder) {
     const auto intrinsic =
         first_file(folder, {"intrinsic/intrinsic_depth.txt", "intrinsic_depth.txt", "intrinsics_depth.txt"});
-    const std::vector<fs::path> depths = depth_images_in(folder_named(folder, {"depth"}));
+    const FolderFiles depths = depth_images_in(folder_named(folder, {"depth"}));
     const bool poses = is_folder(folder / "pose");
     const bool numbered = !depths.empty() && whole_number(depths.front().stem().string()) &&
                           is_file(folder / "pose" / (depths.front().stem().string() + ".txt"));
     if (depths.empty() || (!intrinsic && !numbered))
         return std::nullopt;
-    const std::vector<fs::path> colours = colour_images_in(folder_named(folder, {"color"}));
+    const FolderFiles colours = colour_images_in(folder_named(folder, {"color"}));
     const ImagesByStem by_stem(colours);
     Listing listing;
     Capture& capture = listing.capture;

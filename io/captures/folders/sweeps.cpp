@@ -125,8 +125,8 @@ std::optional<Listing> list_kitti_odometry(const fs::path& folder) {
     const auto velodyne = folder_named(folder, {"velodyne"});
     if (!velodyne || !is_file(folder / "calib.txt"))
         return std::nullopt;
-    auto sweeps = files_in(*velodyne);
-    std::erase_if(sweeps, [](const fs::path& file) { return lower_extension(file) != ".bin"; });
+    const FolderFiles sweeps =
+        files_in(*velodyne).only([](const fs::path& file) { return lower_extension(file) == ".bin"; });
     if (sweeps.empty())
         return std::nullopt;
     Listing listing = listing_of_sweeps();

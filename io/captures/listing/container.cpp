@@ -67,7 +67,7 @@ std::string content_hash_of(const CaptureEntry& entry) {
         });
         return all;
     }
-    for (const std::string* file : {&entry.colour, &entry.depth, &entry.cloud})
+    for (const StoredPath* file : {&entry.colour, &entry.depth, &entry.cloud})
         if (!file->empty())
             add([&] { return hash_of_file(*file); });
     return all;

@@ -15,7 +15,7 @@
 #include <fmt/ranges.h>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <set>
+#include <unordered_set>
 
 namespace scanshade {
 
@@ -50,7 +50,7 @@ bool natural_less(const std::string& a, const std::string& b) {
     return a < b; // "01" and "1": any fixed order will do
 }
 
-std::vector<fs::path> files_in(const fs::path& folder) {
+FolderFiles files_in(const fs::path& folder) {
     std::error_code trouble;
     std::vector<FolderItem> items = items_in(folder, trouble);
     if (trouble)
@@ -60,11 +60,9 @@ std::vector<fs::path> files_in(const fs::path& folder) {
                item.name == "desktop.ini";
     });
     std::ranges::sort(items, natural_less, &FolderItem::name);
-    std::vector<fs::path> files;
-    files.reserve(items.size());
-    for (const FolderItem& item : items)
-        files.push_back(folder / item.name);
-    return files;
+    std::vector<std::string> names(items.size());
+    std::ranges::transform(items, names.begin(), [](FolderItem& item) { return std::move(item.name); });
+    return {folder, std::move(names)};
 }
 
 namespace {
@@ -88,32 +86,24 @@ std::optional<fs::path> folder_named(const fs::path& parent, std::initializer_li
 
 namespace {
 
-std::vector<fs::path> images_in(const std::optional<fs::path>& folder, bool (*wanted)(const fs::path&)) {
-    if (!folder)
-        return {};
-    auto files = files_in(*folder);
-    std::erase_if(files, [&](const fs::path& file) { return !wanted(file); });
-    return files;
+FolderFiles images_in(const std::optional<fs::path>& folder, bool (*wanted)(const fs::path&)) {
+    return folder ? files_in(*folder).only(wanted) : FolderFiles();
 }
 
 } // namespace
 
-std::vector<fs::path> depth_images_in(const std::optional<fs::path>& folder) {
-    return images_in(folder, &has_depth_extension);
-}
+FolderFiles depth_images_in(const std::optional<fs::path>& folder) { return images_in(folder, &has_depth_extension); }
 
-std::vector<fs::path> colour_images_in(const std::optional<fs::path>& folder) {
-    return images_in(folder, &has_colour_extension);
-}
+FolderFiles colour_images_in(const std::optional<fs::path>& folder) { return images_in(folder, &has_colour_extension); }
 
-ImagesByStem::ImagesByStem(const std::vector<fs::path>& images) {
+ImagesByStem::ImagesByStem(const FolderFiles& images) {
     for (const fs::path& image : images)
-        paths_.emplace(image.stem().string(), image.string());
+        paths_.emplace(image.stem().string(), image);
 }
 
-std::string ImagesByStem::of(const std::string& stem) const {
+StoredPath ImagesByStem::of(const std::string& stem) const {
     const auto found = paths_.find(stem);
-    return found == paths_.end() ? std::string() : found->second;
+    return found == paths_.end() ? StoredPath() : found->second;
 }
 
 cv::Size image_size(double width, double height, const std::string& where) {
@@ -304,7 +294,8 @@ std::string fit_for_a_file(const std::string& name) {
 } // namespace
 
 void settle_names(std::vector<CaptureEntry>& entries) {
-    std::set<std::string> taken;
+    std::unordered_set<std::string_view> taken; // names that are settled
+    taken.reserve(entries.size());
     std::map<std::string, int> next; // per repeated name
     for (CaptureEntry& entry : entries) {
         const std::string wanted = fit_for_a_file(entry.name);

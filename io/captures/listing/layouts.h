@@ -3,6 +3,7 @@
 
 #include "io/captures/capture.h"
 
+#include <cstddef>
 #include <functional>
 #include <initializer_list>
 #include <memory>
@@ -82,26 +83,65 @@ struct Listing {
 
 // --- what layouts share ---
 
+/// Files of one folder. Their paths are made when they are asked for: a million would take half a gigabyte.
+class FolderFiles {
+  public:
+    FolderFiles() = default;
+    FolderFiles(std::filesystem::path folder, std::vector<std::string> names)
+        : folder_(std::move(folder)), names_(std::move(names)) {}
+    [[nodiscard]] std::size_t size() const { return names_.size(); }
+    [[nodiscard]] bool empty() const { return names_.empty(); }
+    [[nodiscard]] std::filesystem::path operator[](std::size_t index) const { return folder_ / names_[index]; }
+    [[nodiscard]] std::filesystem::path front() const { return (*this)[0]; }
+    /// Leaves out those for whose path this is false.
+    template <class Wanted>
+    [[nodiscard]] FolderFiles only(const Wanted& wanted) && {
+        std::erase_if(names_, [&](const std::string& name) { return !wanted(folder_ / name); });
+        return std::move(*this);
+    }
+
+    class Iterator {
+      public:
+        using value_type = std::filesystem::path;
+        using difference_type = std::ptrdiff_t;
+        Iterator() = default;
+        Iterator(const FolderFiles& files, std::size_t index) : files_(&files), index_(index) {}
+        std::filesystem::path operator*() const { return (*files_)[index_]; }
+        Iterator& operator++() { return ++index_, *this; }
+        Iterator operator++(int) { return {*files_, index_++}; }
+        bool operator==(const Iterator& other) const { return index_ == other.index_; }
+
+      private:
+        const FolderFiles* files_ = nullptr;
+        std::size_t index_ = 0;
+    };
+    [[nodiscard]] Iterator begin() const { return {*this, 0}; }
+    [[nodiscard]] Iterator end() const { return {*this, size()}; }
+
+  private:
+    std::filesystem::path folder_;
+    std::vector<std::string> names_;
+};
 /// The folder's own files, hidden and foreign ones (._*, Thumbs.db) left out, in natural order: 2 before 10.
-[[nodiscard]] std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder);
+[[nodiscard]] FolderFiles files_in(const std::filesystem::path& folder);
 [[nodiscard]] bool natural_less(const std::string& a, const std::string& b);
 
 /// The child folder of the first of these names that is there.
 [[nodiscard]] std::optional<std::filesystem::path> folder_named(const std::filesystem::path& parent,
                                                                 std::initializer_list<std::string_view> names);
 /// A folder's depth, or colour, images in natural order; none of no folder.
-[[nodiscard]] std::vector<std::filesystem::path> depth_images_in(const std::optional<std::filesystem::path>& folder);
-[[nodiscard]] std::vector<std::filesystem::path> colour_images_in(const std::optional<std::filesystem::path>& folder);
+[[nodiscard]] FolderFiles depth_images_in(const std::optional<std::filesystem::path>& folder);
+[[nodiscard]] FolderFiles colour_images_in(const std::optional<std::filesystem::path>& folder);
 /// The same by their names without the extension.
 class ImagesByStem {
   public:
-    explicit ImagesByStem(const std::vector<std::filesystem::path>& images);
+    explicit ImagesByStem(const FolderFiles& images);
     [[nodiscard]] bool empty() const { return paths_.empty(); }
     /// Empty where there is none.
-    [[nodiscard]] std::string of(const std::string& stem) const;
+    [[nodiscard]] StoredPath of(const std::string& stem) const;
 
   private:
-    std::unordered_map<std::string, std::string> paths_;
+    std::unordered_map<std::string, StoredPath> paths_;
 };
 /// A file's JSON. Throws Error naming file and place.
 [[nodiscard]] nlohmann::json json_in(const std::filesystem::path& file);
