@@ -8,8 +8,9 @@
 namespace scanshade {
 namespace {
 
-FitPlaneOptions widened_for(const MethodRow& row, FitPlaneOptions preparation) {
+FitPlaneOptions prepared_for(const MethodRow& row, FitPlaneOptions preparation) {
     preparation.smoothing *= row.smoothing;
+    preparation.fill_holes = preparation.fill_holes && row.fill_holes;
     return preparation;
 }
 
@@ -24,7 +25,7 @@ ChosenSettings settings_of(MethodSetup& setup) {
 
 FrameAo::FrameAo(gpu::Device& device, const MethodRow& row, MethodSetup& setup, FitPlaneOptions preparation,
                  std::shared_ptr<Finishers> finishers)
-    : device_(&device), owned_(setup.make(device)), method_(*owned_), preparation_(widened_for(row, preparation)),
+    : device_(&device), owned_(setup.make(device)), method_(*owned_), preparation_(prepared_for(row, preparation)),
       name_(row.name), settings_(settings_of(setup)),
       finishers_(finishers ? std::move(finishers) : std::make_shared<Finishers>(device)) {}
 
@@ -66,10 +67,12 @@ NormalImage FrameAo::normals(const DepthImage& depth, const DepthNoise& noise) {
 
 AoMap FrameAo::compute_prepared(const DepthImage& depth, const DepthNoise& noise) {
     if (fit_for(noise).planes()) {
-        const Surfaces fitted = fit_->compute_on_device(depth);
-        fitted_depth_ = fitted.z_there;
-        fitted_normals_ = fitted.normals_there;
-        return method_.compute({.surfaces = fitted, .noise = noise, .smoothed = true});
+        const FittedOnDevice fitted = fit_->compute_on_device(depth);
+        fitted_depth_ = fitted.z_m;
+        fitted_normals_ = fitted.surfaces.normals_there;
+        AoMap ao = method_.compute({.surfaces = fitted.surfaces, .noise = noise, .smoothed = true});
+        take_out_filled(fitted, ao.visibility);
+        return ao;
     }
     return method_.compute({.surfaces = fit_->compute(depth).depth, .noise = noise});
 }

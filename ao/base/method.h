@@ -182,6 +182,9 @@ struct MethodRow {
     /// How much wider the windows of plane fits are for it than the noise itself asks for: methods that do not widen
     /// their tolerances by View::noise want it gone.
     double smoothing = 1;
+    /// Whether narrow holes of noisy depth are filled for it, so that what is behind them occludes: where that takes it
+    /// nearer to truth. `surfel` fills them itself.
+    bool fill_holes = true;
 };
 
 /// The table of methods, in the order shown to people.

@@ -5,14 +5,30 @@
 #include "shaders/shared/fit_plane.h"
 
 #include <algorithm>
+#include <bit>
+#include <cassert>
+#include <cmath>
 #include <cstring>
 #include <fmt/format.h>
+#include <limits>
 
 namespace scanshade {
 namespace {
 
-// The order of buffers; all but the first two only where planes are fitted, the last three only where frames are fused.
-enum Buffers : int { recorded, kept, averages, depth_out, normals_out, others_in, fused, relief };
+// The order of buffers; all but the first two only where planes are fitted, the last ones only where frames are fused
+// or holes are filled.
+enum Buffers : int {
+    recorded,
+    kept,
+    averages,
+    depth_out,
+    normals_out,
+    others_in,
+    fused,
+    relief,
+    filled = others_in,
+    marks
+};
 
 /// Of the window's radius, squared, in units of correlation^2 sigma fx / z (pixels). Below it noise tilts normals,
 /// above it a plane no longer is what surfaces are. For independent pixels this leaves the least error in AO on
@@ -20,7 +36,19 @@ enum Buffers : int { recorded, kept, averages, depth_out, normals_out, others_in
 /// pixels than the correlation length says, and its walls would stay mottled.
 constexpr double window_scale = 1.8;
 
-std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bool planes, bool fuse) {
+/// The widest hole that is filled: an angle, 20 pixels of a Kinect. The shadow of structured light is wider close to
+/// the sensor, but filling up to 60 pixels gained nothing.
+constexpr double fill_radians = 0.038;
+int fill_px_for(const Pinhole& camera) {
+    return std::clamp(static_cast<int>(std::lround(fill_radians * camera.fx)), 4, 64);
+}
+
+std::uint32_t marks_of(cv::Size size) {
+    return (static_cast<std::uint32_t>(size.area()) + shared::marks_a_word - 1) / shared::marks_a_word;
+}
+
+/// Frames are fused or holes filled, not both.
+std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bool planes, bool fuse, bool fill) {
     using Host = gpu::BufferRow::Host;
     constexpr auto floats = gpu::BufferRow::Texels::r32f;
     const auto pixels = static_cast<std::size_t>(size.area());
@@ -34,8 +62,8 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
     std::vector<gpu::PassRow> passes{{"flying pixels", "fit_plane/flying", {recorded}, {kept}, groups, {}}};
     if (planes) {
         buffers.insert(buffers.end(), {{"averages", pixels * 4, Host::none, floats},
-                                       {"depth out", pixels * 4, Host::download},
-                                       {"normals out", pixels * 12, Host::download}});
+                                       {"depth out", pixels * 4, Host::download, floats},
+                                       {"normals out", pixels * 12, Host::download, floats}});
         if (fuse) {
             buffers.insert(buffers.end(), {{"others", shared::most_neighbours * pixels * 4, Host::taken, floats},
                                            {"fused", pixels * 4, Host::none, floats},
@@ -47,6 +75,20 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
         passes.push_back(
             {"average", "fit_plane/average", {samples, errs}, {averages}, groups_of(shared::average_rows), is_fused});
         passes.push_back({"fit plane", "fit_plane/fit", {averages, errs}, {depth_out, normals_out}, groups, is_fused});
+        if (fill) {
+            const std::uint32_t words = marks_of(size);
+            buffers.insert(buffers.end(),
+                           {{"filled", pixels * 4, Host::none, floats},
+                            {"marks", std::size_t{words} * 4, Host::download, gpu::BufferRow::Texels::none}});
+            buffers.back().always_downloaded = true;
+            passes.push_back({"fill", "fit_plane/fill", {depth_out, normals_out}, {filled, normals_out}, groups, {}});
+            passes.push_back({"mark filled",
+                              "fit_plane/mark",
+                              {depth_out, filled},
+                              {marks},
+                              {(words + shared::mark_group - 1) / shared::mark_group, 1, 1},
+                              {}});
+        }
     }
     for (gpu::BufferRow& buffer : buffers)
         buffer.plain_writes = true;
@@ -66,7 +108,7 @@ void FitPlane::set_noise(const DepthNoise& noise) {
     noise_ = noise;
 }
 
-void FitPlane::prepare(const DepthImage& depth, std::span<const OtherDepth> others) {
+void FitPlane::prepare(const DepthImage& depth, std::span<const OtherDepth> others, bool fill) {
     const cv::Size size = depth.z_m.size();
     const bool fuse = planes() && !others.empty();
     if (others.size() > shared::most_neighbours)
@@ -75,7 +117,7 @@ void FitPlane::prepare(const DepthImage& depth, std::span<const OtherDepth> othe
         if (other.camera.size != size)
             throw Error("another frame of another image size");
     if (!program_ || size != size_ || fuse != fused_ || planes() != planes_)
-        program_ = program_for(device_, size, planes(), fuse);
+        program_ = program_for(device_, size, planes(), fuse, !fuse && options_.fill_holes);
     size_ = size;
     fused_ = fuse;
     planes_ = planes();
@@ -88,6 +130,7 @@ void FitPlane::prepare(const DepthImage& depth, std::span<const OtherDepth> othe
                   static_cast<float>(window),
                   static_cast<float>(options_.largest_radius_px),
                   options_.drop_flying && noise_.flies() ? 1 : 0,
+                  fill ? fill_px_for(depth.camera) : 0,
                   fuse ? static_cast<int>(others.size()) : 0,
                   {}};
     for (std::size_t i = 0; fuse && i < others.size(); ++i) {
@@ -97,19 +140,41 @@ void FitPlane::prepare(const DepthImage& depth, std::span<const OtherDepth> othe
     gpu::upload_depth(depth.z_m, program_->host_as<float>(recorded));
 }
 
-Surfaces FitPlane::compute_on_device(const DepthImage& depth) {
-    prepare(depth, {});
-    const std::shared_ptr<gpu::DeviceBytes> z_m = pool_.get(depth.z_m.total() * 4),
-                                            normals = pool_.get(depth.z_m.total() * 12);
+FittedOnDevice FitPlane::compute_on_device(const DepthImage& depth) {
+    const bool fill = options_.fill_holes;
+    prepare(depth, {}, fill);
+    const std::size_t pixels = depth.z_m.total();
+    const std::shared_ptr<gpu::DeviceBytes> z_m = pool_.get(pixels * 4), normals = pool_.get(pixels * 12),
+                                            without_holes = fill ? pool_.get(pixels * 4) : z_m;
     program_->give(depth_out, z_m);
     program_->give(normals_out, normals);
+    if (fill)
+        program_->give(filled, without_holes);
     program_->run(std::as_bytes(std::span(&constants_, 1)), gpu::Program::Results::on_device);
     timings_ = program_->timings();
-    return {depth.camera, z_m, normals};
+    FittedOnDevice fitted{{depth.camera, without_holes, normals}, z_m, {}};
+    if (fill) {
+        const auto bits = program_->host_as<std::uint32_t>(marks);
+        fitted.filled.assign(bits.begin(), bits.end());
+    }
+    return fitted;
+}
+
+void take_out_filled(const FittedOnDevice& fitted, cv::Mat1f& visibility) {
+    const auto pixels = static_cast<std::size_t>(visibility.total());
+    assert(visibility.isContinuous());
+    auto* const of_pixel = visibility.ptr<float>();
+    for (std::size_t word = 0; word < fitted.filled.size(); ++word)
+        for (std::uint32_t left = fitted.filled[word]; left != 0; left &= left - 1) {
+            const std::size_t at = word * static_cast<std::size_t>(shared::marks_a_word) +
+                                   static_cast<std::size_t>(std::countr_zero(left));
+            if (at < pixels)
+                of_pixel[at] = std::numeric_limits<float>::quiet_NaN();
+        }
 }
 
 FittedDepth FitPlane::compute(const DepthImage& depth, std::span<const OtherDepth> others) {
-    prepare(depth, others);
+    prepare(depth, others, false);
     program_->run(std::as_bytes(std::span(&constants_, 1)));
     timings_ = program_->timings();
     const cv::Mat1f& z = depth.z_m;

@@ -7,8 +7,10 @@
 #include "projection/noise.h"
 #include "shaders/shared/fit_plane.h"
 
+#include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 namespace scanshade {
 
@@ -23,9 +25,19 @@ struct FitPlaneOptions {
     bool drop_flying = true; ///< pixels between two surfaces that belong to neither become holes
     double smoothing = 1;    ///< of the window's radius; 0 leaves depth as it is, and normals to the method
     double largest_radius_px = 12;
+    bool fill_holes = true; ///< in compute_on_device(): what lies behind narrow holes occludes
 
     bool operator==(const FitPlaneOptions&) const = default;
 };
+
+/// The same, left on the device, with what methods are to see.
+struct FittedOnDevice {
+    Surfaces surfaces;                           ///< narrow holes filled; as `z_m` and `normals` elsewhere
+    std::shared_ptr<const gpu::DeviceBytes> z_m; ///< holes stay holes
+    std::vector<std::uint32_t> filled; ///< a bit for each pixel that had no depth; empty = none has been filled
+};
+/// NaN where a hole has been filled: what is not seen has no visibility.
+void take_out_filled(const FittedOnDevice& fitted, cv::Mat1f& visibility);
 
 /// What another frame of the recording saw, flying pixels dropped: metres, 0 = hole; of the same image size.
 struct OtherDepth {
@@ -45,7 +57,7 @@ class FitPlane {
     /// what that leaves of sigma.
     [[nodiscard]] FittedDepth compute(const DepthImage& depth, std::span<const OtherDepth> others = {});
     /// The same of one frame, left on the device; planes() must hold.
-    [[nodiscard]] Surfaces compute_on_device(const DepthImage& depth);
+    [[nodiscard]] FittedOnDevice compute_on_device(const DepthImage& depth);
     /// Whether depth and normals come from planes, and not depth alone, without flying pixels.
     [[nodiscard]] bool planes() const { return options_.smoothing > 0 && noise_.any(); }
     [[nodiscard]] const DepthNoise& noise() const { return noise_; }
@@ -56,7 +68,7 @@ class FitPlane {
 
   private:
     /// Uploads what is to be fitted.
-    void prepare(const DepthImage& depth, std::span<const OtherDepth> others);
+    void prepare(const DepthImage& depth, std::span<const OtherDepth> others, bool fill);
 
     gpu::Device& device_;
     gpu::DeviceBytesPool pool_;

@@ -175,8 +175,8 @@ struct Program::State {
     vk::raii::QueryPool queries = nullptr;
     vk::raii::Fence fence = nullptr;
     // A run submits them in this order: begin, taken, uploads, commands, download, given, end.
-    vk::raii::CommandBuffer begin = nullptr, taking = nullptr, commands = nullptr, download = nullptr, giving = nullptr,
-                            end = nullptr;
+    vk::raii::CommandBuffer begin = nullptr, taking = nullptr, commands = nullptr, download = nullptr,
+                            download_always = nullptr, giving = nullptr, end = nullptr;
     std::vector<vk::raii::CommandBuffer> uploads; // per row; null where there is nothing to upload
     struct Copy {
         int buffer;
@@ -298,14 +298,16 @@ struct Program::State {
         uploads[row].end();
     }
 
-    void record_downloads() {
-        download = new_commands();
-        download.begin(vk::CommandBufferBeginInfo{});
-        compute_barrier(download);
+    /// All that is downloaded, or only what always is.
+    vk::raii::CommandBuffer recorded_download(bool all) {
+        vk::raii::CommandBuffer into = new_commands();
+        into.begin(vk::CommandBufferBeginInfo{});
+        compute_barrier(into);
         for (std::size_t i = 0; i < rows.size(); ++i)
-            if (rows[i].host == BufferRow::Host::download && staging[i].bytes > 0)
-                download.copyBuffer(*buffers[i].buffer, *staging[i].buffer, vk::BufferCopy(0, 0, rows[i].bytes));
-        download.end();
+            if (rows[i].host == BufferRow::Host::download && staging[i].bytes > 0 && (all || rows[i].always_downloaded))
+                into.copyBuffer(*buffers[i].buffer, *staging[i].buffer, vk::BufferCopy(0, 0, rows[i].bytes));
+        into.end();
+        return into;
     }
 
     /// The command buffers are the same every frame, so they are recorded once.
@@ -326,7 +328,8 @@ struct Program::State {
             if (rows[i].host == BufferRow::Host::upload && staging[i].bytes > 0)
                 record_upload(i);
         }
-        record_downloads();
+        download = recorded_download(true);
+        download_always = recorded_download(false);
         std::uint32_t query = 0;
         begin = new_commands();
         begin.begin(vk::CommandBufferBeginInfo{});
@@ -435,8 +438,7 @@ struct Program::State {
             if (std::ranges::none_of(taken, [&](const Copy& copy) { return copy.buffer == static_cast<int>(i); }))
                 all.push_back(*uploads[i]);
         all.push_back(*commands);
-        if (results == Results::on_host)
-            all.push_back(*download);
+        all.push_back(results == Results::on_host ? *download : *download_always);
         all.insert(all.end(), {record_copies(giving, given, false), *end});
         return all;
     }

@@ -40,6 +40,8 @@ struct BufferRow {
     Image image = {};
     /// Passes that write these texels see a storage buffer: lavapipe stores to one in a quarter of the time.
     bool plain_writes = false;
+    /// Of a download buffer: a few bytes that the host wants even where the other results stay on the device.
+    bool always_downloaded = false;
 };
 
 /// Bytes of all mips of all layers, mip by mip, layer by layer, row by row, as Program::read_back() returns them.

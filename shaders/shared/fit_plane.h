@@ -11,6 +11,7 @@ struct FitPlaneConstants {
     float window;                    // its radius is sqrt(window sigma fx / z), pixels
     float largest_radius;            // but at most this
     int drop_flying;                 // 0 = keep them
+    int fill_px;                     // holes of a row up to this width are filled; 0 = none
     int neighbours;                  // other frames to average with
     NeighbourPlace places[most_neighbours];
 };
@@ -21,6 +22,9 @@ const int spec_fused = 0;
 // In place of 1/z where there is none: so far behind all surfaces that no fit gives it weight, and its square still is
 // a number.
 const float nowhere = -1e17f;
+
+// Threads of a group of the pass that marks filled pixels, each for a word of as many bits.
+const int mark_group = 64, marks_a_word = 32;
 
 // Pixels of a column that one thread averages around.
 const int average_rows = 4;
