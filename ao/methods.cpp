@@ -63,7 +63,7 @@ const std::vector<MethodRow>& methods() {
         {"ssdo", "one point at a random distance along each direction, blocked by what lies in front of it",
          "Ritschel, Grosch, Seidel 2009", SetupOf<SsdoOptions, Ssdo>::start},
         {"gtao", "open arc between two horizons, slice by slice", "Jimenez et al. 2016; XeGTAO (Strugar, McCalla 2021)",
-         SetupOf<GtaoOptions, Gtao>::start},
+         SetupOf<GtaoOptions, Gtao>::start, 1, false},
         {"bitmask", "gtao's slices with 32 sectors, so that what is seen has a thickness",
          "Therrien, Levesque, Gilet 2023", SetupOf<BitmaskOptions, Bitmask>::start},
         {"surfel", "bitmask over pixels that have a direction and a thickness: the most accurate",

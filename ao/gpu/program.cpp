@@ -300,14 +300,14 @@ struct Program::State {
 
     /// All that is downloaded, or only what always is.
     vk::raii::CommandBuffer recorded_download(bool all) {
-        vk::raii::CommandBuffer into = new_commands();
-        into.begin(vk::CommandBufferBeginInfo{});
-        compute_barrier(into);
+        vk::raii::CommandBuffer recorded = new_commands();
+        recorded.begin(vk::CommandBufferBeginInfo{});
+        compute_barrier(recorded);
         for (std::size_t i = 0; i < rows.size(); ++i)
             if (rows[i].host == BufferRow::Host::download && staging[i].bytes > 0 && (all || rows[i].always_downloaded))
-                into.copyBuffer(*buffers[i].buffer, *staging[i].buffer, vk::BufferCopy(0, 0, rows[i].bytes));
-        into.end();
-        return into;
+                recorded.copyBuffer(*buffers[i].buffer, *staging[i].buffer, vk::BufferCopy(0, 0, rows[i].bytes));
+        recorded.end();
+        return recorded;
     }
 
     /// The command buffers are the same every frame, so they are recorded once.
