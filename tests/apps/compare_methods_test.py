@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """Tests of apps/measure/compare_methods.py: two methods on one small view of two scenes. SCANSHADE names the program."""
 
+import base64
 import contextlib
+import hashlib
 import io
 import json
 import os
@@ -96,6 +98,10 @@ class MeasuredOnce(unittest.TestCase):
 
     def test_the_page_is_whole_and_asks_for_nothing(self):
         page = (self.folder / "comparison.html").read_text()
+        for tag in ("script", "style"):  # the policy allows what is there, by its hash, and nothing else
+            text = page.partition(f"<{tag}>")[2].partition(f"</{tag}>")[0]
+            digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+            self.assertIn(f"{tag}-src 'sha256-{digest}'", page)
         self.assertTrue(page.endswith("</html>\n"))
         self.assertEqual(page.count("<table class=\"sorted\">"), 2)
         self.assertEqual(page.count("<svg"), page.count("</svg>"))
