@@ -204,8 +204,14 @@ std::string task_key(const std::vector<Stage>& settings, const Capture& capture,
         for (const Parameter& row : stage.rows)
             if (!std::ranges::count(elsewhere, row.name))
                 parts.push_back(row_text(row));
-    for (const std::size_t index : frames)
-        parts.push_back(stamps(capture.entries[index]));
+    std::string listed; // hashed from time to time: all stamps of a million frames would take as much as their listing
+    constexpr std::size_t most = 1 << 20;
+    for (const std::size_t index : frames) {
+        listed += stamps(capture.entries[index]) + "\n";
+        if (listed.size() > most)
+            listed = hash_of(listed);
+    }
+    parts.push_back(std::move(listed));
     return key_of(parts);
 }
 

@@ -753,7 +753,7 @@ TEST(captures, a_cameras_depth_correction_reaches_the_frames_and_holes_stay) {
     }
 }
 
-static_assert(sizeof(CaptureEntry) <= 232, "a million of them, with names and paths, take 300 MB");
+static_assert(sizeof(CaptureEntry) <= 216, "a million of them, with names and paths, take 300 MB");
 
 TEST(captures, stored_paths_are_the_paths_that_they_were_given) {
     for (const std::string path : {"", "a.png", "/a.png", "depth/a.png", "/data/depth/a b.png", "./a", "a/", "/"}) {
