@@ -3,6 +3,7 @@
 #include "ao/screen/fitted_curves.h"
 #include "shaders/shared/hdao.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -21,6 +22,10 @@ constexpr std::array test_words{Named{"plane", HdaoTest::plane}, Named{"angle", 
                                 Named{"z", HdaoTest::z}};
 
 constexpr float accept = 0.006F; // a, in radii
+
+/// Of depth's noise, by which a tap must stand out from fitted planes, too: these keep what is wider than their
+/// windows, and this method counts whatever stands out, however little. More makes scenes of small things too bright.
+constexpr float fitted_sigmas = 2;
 
 HdaoOptions resolved(HdaoOptions options) {
     options = checked(std::move(options));
@@ -77,8 +82,11 @@ void Hdao::add_passes(ScreenTables& tables) const {
 
 std::vector<std::byte> Hdao::constants(const shared::ScreenConstants& screen) const {
     constexpr double golden_angle = std::numbers::pi * 137.508 / 180;
+    // The published tests keep to their constant.
+    const bool counts = options_.test == HdaoTest::plane;
+    const float sigmas = counts ? std::max(screen.tangent_sigmas, fitted_sigmas) : screen.tangent_sigmas;
     return bytes_of(shared::HdaoConstants{screen, options_.pairs, static_cast<float>(std::cos(golden_angle)),
-                                          static_cast<float>(std::sin(golden_angle)), accept * screen.radius});
+                                          static_cast<float>(std::sin(golden_angle)), accept * screen.radius, sigmas});
 }
 
 } // namespace scanshade

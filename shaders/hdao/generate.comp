@@ -75,7 +75,7 @@ void main() {
     Surface s = surface_at(p, z, here);
     vec2 noise = noise_at(p);
     vec2 radii = disc_px(s);
-    accept = h.accept + k.tangent_sigmas * sigma_of(s.point.z);
+    accept = h.accept + h.sigmas * sigma_of(s.point.z);
     float phi = 3.14159265 * noise.x, inverse_pairs = 1.0 / float(h.pairs);
     vec2 direction = vec2(cos(phi), sin(phi));
 

@@ -8,7 +8,8 @@ struct HdaoConstants {
     ScreenConstants screen;
     int pairs;
     float turn_cosine, turn_sine; // of the golden angle
-    float accept;                 // a: metres by which a tap must stand out, besides depth's own noise
+    float accept;                 // a: metres by which a tap must stand out, besides depth's own noise:
+    float sigmas;                 // so many of its deviations
 };
 
 const int spec_test = 10;             // one of the kinds below

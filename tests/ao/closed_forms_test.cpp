@@ -471,6 +471,26 @@ TEST_F(ClosedForms, the_tone_curve_is_an_exponential_that_keeps_open_open) {
         << "the fitted one is the default";
 }
 
+TEST_F(ClosedForms, hdao_takes_no_noise_for_valleys_that_plane_fits_have_left) {
+    // Waves of one sigma, wider than the windows of plane fits.
+    const Pinhole camera = tests::test_camera();
+    DepthImage depth{camera, cv::Mat1f(camera.size), {}};
+    for (int v = 0; v < depth.z_m.rows; ++v)
+        for (int u = 0; u < depth.z_m.cols; ++u)
+            depth.z_m(v, u) = 2 + 0.01F * std::sin(0.2F * static_cast<float>(u));
+    const NormalImage normals{cv::Mat3f(depth.z_m.size(), cv::Vec3f(0, 0, -1))};
+    const auto mean_of = [&](const Settings& settings, const DepthNoise& noise) {
+        const cv::Mat1f v =
+            method_with("hdao", settings).compute({{depth, normals}, noise, noise.floor_m > 0}).visibility;
+        return cv::mean(v)[0];
+    };
+    DepthNoise noise;
+    noise.floor_m = 0.01;
+    EXPECT_LT(mean_of({}, {}), 0.95) << "clean depth has these waves";
+    EXPECT_GT(mean_of({}, noise), 0.999);
+    EXPECT_EQ(mean_of({{"test", "z"}}, noise), mean_of({{"test", "z"}}, {})) << "as published";
+}
+
 TEST_F(ClosedForms, settings_that_belong_to_another_are_refused) {
     EXPECT_THROW(map_of("hdao", tests::ball_on_floor(tests::test_camera()), {{"normal-rejection", "true"}}), Misuse);
     EXPECT_THROW(map_of("hbao", tests::ball_on_floor(tests::test_camera()), {{"interleaved", "true"}}), Misuse);
