@@ -16,6 +16,8 @@ namespace {
 
 using Eigen::Vector3d;
 
+constexpr double least_power = 0.1;   // less is no sign of AO
+constexpr double most_gradient = 0.3; // of ambient light towards a direct one, and of that light
 constexpr int fewest_samples = 500, fewest_albedos = 12, halvings = 5;
 constexpr std::size_t most_of_search = 2500, most_of_half = 4000; // samples: more change no answer
 
@@ -51,7 +53,7 @@ double degrees_between(const Vector3d& a, const Vector3d& b) {
 }
 
 /// What is wrong with a direct light that explains the samples; empty = nothing.
-std::string doubt_about(const LightFit& fit, const LightPart& part, const LightValues& values,
+std::string doubt_about(const LightFit& fit, const LightTerms& terms, const LightPart& part, const LightValues& values,
                         const std::vector<LightValues>& halves, const LightSamples& samples, bool given) {
     double lit = 0, unlit = 0;
     for (std::size_t i = 0; i < part.samples.size(); ++i) {
@@ -79,6 +81,13 @@ std::string doubt_about(const LightFit& fit, const LightPart& part, const LightV
     }
     if (const double usual = median(apart, 0.0); usual > 0.25)
         return fmt::format("halves of the surfaces disagree about it by {:.0f} %", 100 * usual);
+    // Light that fades out over normals is a sky; that of one direction ends where surfaces turn away from it. Errors
+    // of visibility make the one look like the other: it then takes a gradient, of whatever sign, to tell them apart.
+    LightTerms both = terms;
+    both.gradient = true;
+    const LightValues with = fit.refined(part, both, values, given);
+    if (std::abs(with.gradient.dot(with.direct.normalized())) > most_gradient * with.direct.norm())
+        return "it cannot be told from ambient light that is brighter from one side";
     if (!given && samples.frames() > 0 && degrees_between(values.direct, -samples.forward()) < 15)
         return "it comes from the camera, where everything seen is lit";
     return "";
@@ -140,7 +149,8 @@ LightEstimate estimate_light(const LightSamples& samples, const LightRequest& re
         starts = fit.starts(fit.part_of(every, most_of_search), request, true);
     LightValues values = fit.fitted(whole, models[chosen], starts, request, true);
     if (models[chosen].direct) {
-        why_none = doubt_about(fit, whole, values, halves[chosen], samples, request.towards.has_value());
+        why_none =
+            doubt_about(fit, models[chosen], whole, values, halves[chosen], samples, request.towards.has_value());
         std::vector<double> turns;
         for (const LightValues& half : halves[chosen])
             turns.push_back(degrees_between(half.direct, values.direct));
@@ -155,12 +165,19 @@ LightEstimate estimate_light(const LightSamples& samples, const LightRequest& re
             values = fit.fitted(whole, models[chosen], {}, request, true);
         }
     }
+    // Errors of visibility and light that was not found make the photographs look as if they showed less of it.
+    if (values.power >= least_power && values.power < 1 && fit.most_power(whole, values) >= 1) {
+        LightTerms rest = models[chosen];
+        rest.power = false;
+        values.power = 1;
+        values = fit.refined(whole, rest, values, request.towards.has_value());
+    }
     result.chosen = models[chosen].name;
     Light& light = result.light;
     light.power = values.power;
     light.gradient = values.gradient;
     const std::string no_sign =
-        light.power < 0.1 ? "; the colours show no sign of this AO, so unshaded leaves their ambient part" : "";
+        light.power < least_power ? "; the colours show no sign of this AO, so unshaded leaves their ambient part" : "";
     const char* space = samples.in_world() ? "the recording's world" : "camera space";
     if (!models[chosen].direct) {
         result.sentence = fmt::format("light: all of it is ambient ({}); {} samples of {} frames{}", why_none,

@@ -383,6 +383,29 @@ void LightFit::take_gains(const LightPart& part, const LightValues& values) {
         gain -= first;
 }
 
+double LightFit::most_power(const LightPart& part, const LightValues& values) const {
+    const std::vector<double> r = residuals(part, values);
+    double squares = 0, products = 0; // of colours, and of both
+    std::size_t from = 0;
+    for (const std::size_t end : part.ends) {
+        std::vector<Eigen::Vector2d> pairs; // the power's slope, and log colours without all other light
+        for (; from < end; ++from)
+            if (std::abs(r[from]) < most_residual) {
+                const std::size_t number = part.samples[from];
+                const double slope = lighting(all_[number], log_visibility_[number], values, part.lit[from]).by_power;
+                pairs.emplace_back(slope, values.power * slope + r[from]);
+            }
+        Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+        for (const Eigen::Vector2d& pair : pairs)
+            mean += pair / static_cast<double>(pairs.size());
+        for (const Eigen::Vector2d& pair : pairs) {
+            squares += std::pow(pair[1] - mean[1], 2);
+            products += (pair[0] - mean[0]) * (pair[1] - mean[1]);
+        }
+    }
+    return products > 0 ? squares / products : std::numeric_limits<double>::infinity();
+}
+
 double LightFit::tint(const LightPart& part, const LightValues& values, Eigen::Index channel) const {
     const auto cost_of = [&](double tint) {
         LightValues tinted = values;

@@ -68,6 +68,11 @@ class LightFit {
     /// Of direct over ambient light in one channel (0 = red): what explains that channel best.
     [[nodiscard]] double tint(const LightPart& part, const LightValues& values, Eigen::Index channel) const;
 
+    /// The power that regression of visibility on colours gives, all else as in `values`; infinite where they do not
+    /// vary together. Errors of visibility lower the power that is fitted, texture raises this one: the true one lies
+    /// between them (Frisch 1934).
+    [[nodiscard]] double most_power(const LightPart& part, const LightValues& values) const;
+
     [[nodiscard]] const LightSample& sample(std::size_t number) const { return all_[number]; }
 
   private:

@@ -144,12 +144,14 @@ class LightPart final : public BenchPart {
                 samples.add({shot.depth, shot.normals, shot.visibility, shot.photograph, {}, shot.pose});
             }
             samples.group();
-            report(device, shots, noise, scene.ao_radius_m, name, sensor, sky, estimate_light(samples));
+            report(device, shots, noise, method.errors(noise), scene.ao_radius_m, name, sensor, sky,
+                   estimate_light(samples));
         }
     }
 
-    void report(gpu::Device& device, const std::vector<Shot>& shots, const DepthNoise& noise, double radius_m,
-                const std::string& name, const std::string& sensor, const Sky& sky, const LightEstimate& found) const {
+    void report(gpu::Device& device, const std::vector<Shot>& shots, const DepthNoise& noise,
+                const shared::ErrorTable& errors, double radius_m, const std::string& name, const std::string& sensor,
+                const Sky& sky, const LightEstimate& found) const {
         Light truth{.direct = sky.light.has_sun() ? Eigen::Vector3d(sky.light.ratio * sky.light.towards.normalized())
                                                   : Eigen::Vector3d(0, 0, 0),
                     .gradient = sky.light.gradient(),
@@ -168,6 +170,7 @@ class LightPart final : public BenchPart {
                               .fitted_normals = shot.fitted_normals,
                               .radius_m = radius_m,
                               .noise = noise,
+                              .errors = errors,
                               .colour = shot.photograph};
             const auto made = [&](const FinishOutputs& outputs, std::vector<double>* times) {
                 Finished result = finish.compute(input, outputs);
