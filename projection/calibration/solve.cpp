@@ -78,6 +78,22 @@ namespace {
 
 constexpr int no_cluster = -1;
 
+/// How much wider than two sigmas the interval is that holds as much of Student's distribution as two sigmas hold of
+/// the Gaussian one (95.45 %).
+double students_factor(double degrees_of_freedom) {
+    // Quantiles of Student's distribution for 1, 2, 3, ... degrees of freedom, over 2. Between them, and down to one
+    // degree, their logarithm is nearly linear in the degrees' inverse.
+    constexpr double factors[] = {6.984, 2.264, 1.653, 1.435, 1.325, 1.259, 1.215, 1.184, 1.160, 1.142};
+    constexpr double last = std::size(factors);
+    const double degrees = std::max(1.0, degrees_of_freedom);
+    if (degrees >= last) // Cornish and Fisher 1938, first term
+        return 1 + (factors[std::size(factors) - 1] - 1) * last / degrees;
+    const auto below = static_cast<std::size_t>(degrees);
+    const double from = 1.0 / static_cast<double>(below), to = 1.0 / static_cast<double>(below + 1);
+    const double share = (from - 1 / degrees) / (from - to);
+    return std::exp((1 - share) * std::log(factors[below - 1]) + share * std::log(factors[below]));
+}
+
 /// The normal equations of each cluster, with its points eliminated. The columns of the sparse Jacobian are the `kept`
 /// numbers, then three per point.
 class Reduced {
@@ -113,7 +129,11 @@ class Reduced {
         }
         if (count > 1)
             sum *= many ? (count - 1) / count : count / (count - 1);
-        return sum + inverse * spread_ * inverse;
+        sum += inverse * spread_ * inverse;
+        if (!many)
+            return sum;
+        const Eigen::VectorXd wider = widenings(inverse);
+        return wider.asDiagonal() * sum * wider.asDiagonal();
     }
 
   private:
@@ -126,6 +146,21 @@ class Reduced {
         Eigen::MatrixXd mixed;
         Eigen::Vector3d own_gradient = Eigen::Vector3d::Zero();
     };
+
+    /// Of each kept number, Student's factor for as many clusters as in effect determine it.
+    [[nodiscard]] Eigen::VectorXd widenings(const Eigen::MatrixXd& inverse) const {
+        Eigen::VectorXd sum = (inverse * unclustered_.normal * inverse).diagonal(),
+                        squares = Eigen::VectorXd::Zero(kept_); // independent residuals are many, each a tiny share
+        for (const auto& [number, part] : clusters_) {
+            const Eigen::VectorXd share = (inverse * part.normal * inverse).diagonal();
+            sum += share;
+            squares += share.cwiseAbs2();
+        }
+        Eigen::VectorXd wider(kept_);
+        for (Eigen::Index i = 0; i < kept_; ++i)
+            wider(i) = squares(i) > 0 ? students_factor(sum(i) * sum(i) / squares(i) - 1) : 1;
+        return wider;
+    }
 
     [[nodiscard]] Part part() const { return {Eigen::MatrixXd::Zero(kept_, kept_), Eigen::VectorXd::Zero(kept_)}; }
     Part& cluster(int number) {
