@@ -81,13 +81,19 @@ void Sequence::add_covariance(SequenceAdjustment& adjustment, Fit& fit, const Fr
         fit.covariance *= by_choice * by_choice;
 }
 
+bool Sequence::is_known(const ScenePoint& point, const Views& used) const {
+    const auto seen = std::count_if(point.observations.begin(), point.observations.end(),
+                                    [&](const PointObservation& s) { return used[s.frame]; });
+    const bool measured = std::any_of(point.observations.begin(), point.observations.end(),
+                                      [&](const PointObservation& s) { return used[s.frame] && s.depth_m > 0; });
+    return seen >= 2 && (measured || !observations_.options.registered);
+}
+
 std::vector<ViewScore> Sequence::score(const Fit& from, const Views& wanted) const {
     Fit fit = from;
     std::vector<bool> known(observations_.points.size());
     for (std::size_t i = 0; i < observations_.points.size(); ++i)
-        known[i] =
-            std::count_if(observations_.points[i].observations.begin(), observations_.points[i].observations.end(),
-                          [&](const PointObservation& s) { return fit.used[s.frame]; }) >= 2;
+        known[i] = is_known(observations_.points[i], fit.used);
     std::vector<ViewScore> scores(observations_.frames.size());
     for (std::size_t frame = 0; frame < observations_.frames.size(); ++frame) {
         if (!wanted[frame])
