@@ -225,7 +225,7 @@ Sequence sequence_of(const std::vector<SequenceFrame>& frames, const Camera& dep
         free[time_offset] = sequence.determines_time();
         free[depth_scale] = free[depth_offset] = keeps;
         const Fit fit = sequence.fit(sequence.start(first), free, Views(frames.size(), true), false);
-        return std::sqrt(fit.rss / fit.residuals);
+        return std::sqrt(fit.rss / std::max(1, fit.residuals - fit.unknowns)); // refined poses are unknowns, too
     };
     if (error(kept, true) <= nearly * error(refined, false))
         return kept;
@@ -341,7 +341,7 @@ RecordingResult refine_from_recording(Capture capture, const std::vector<std::si
     options.selection.folds = std::min(options.selection.folds, 4);
     // Depth errors are correlated across a scene in ways that no cluster covers. Real errors of a camera are far larger
     // than this.
-    options.selection.least_sigmas = std::max(options.selection.least_sigmas, 5.0);
+    options.selection.least_sigmas = std::max(options.selection.least_sigmas, 4.0);
 
     const auto with_notes = [&](RecordingResult result) {
         result.stamps_s = data.stamps_s;

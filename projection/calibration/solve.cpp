@@ -78,6 +78,22 @@ namespace {
 
 constexpr int no_cluster = -1;
 
+/// How much wider than two sigmas the interval is that holds as much of Student's distribution as two sigmas hold of
+/// the Gaussian one (95.45 %).
+double students_factor(double degrees_of_freedom) {
+    // Quantiles of Student's distribution for 1, 2, 3, ... degrees of freedom, over 2. Between them, and down to one
+    // degree, their logarithm is nearly linear in the degrees' inverse.
+    constexpr double factors[] = {6.984, 2.264, 1.653, 1.435, 1.325, 1.259, 1.215, 1.184, 1.160, 1.142};
+    constexpr double last = std::size(factors);
+    const double degrees = std::max(1.0, degrees_of_freedom);
+    if (degrees >= last) // Cornish and Fisher 1938, first term
+        return 1 + (factors[std::size(factors) - 1] - 1) * last / degrees;
+    const auto below = static_cast<std::size_t>(degrees);
+    const double from = 1.0 / static_cast<double>(below), to = 1.0 / static_cast<double>(below + 1);
+    const double share = (from - 1 / degrees) / (from - to);
+    return std::exp((1 - share) * std::log(factors[below - 1]) + share * std::log(factors[below]));
+}
+
 /// The normal equations of each cluster, with its points eliminated. The columns of the sparse Jacobian are the `kept`
 /// numbers, then three per point.
 class Reduced {
@@ -102,18 +118,23 @@ class Reduced {
             normal_ += part.normal;
     }
     [[nodiscard]] const Eigen::MatrixXd& normal() const { return normal_; }
-    /// Of the kept numbers, from each cluster's gradient.
-    [[nodiscard]] Eigen::MatrixXd covariance(const Eigen::MatrixXd& inverse, bool many) const {
+    /// Of the first `wanted` kept numbers, from each cluster's gradient.
+    [[nodiscard]] Eigen::MatrixXd covariance(const Eigen::MatrixXd& inverse, Eigen::Index wanted, bool many) const {
         const auto count = static_cast<double>(clusters_.size());
-        Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(kept_, kept_);
+        const Eigen::MatrixXd rows = inverse.topRows(wanted);
+        Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(wanted, wanted);
         for (const auto& [number, part] : clusters_) {
             const Eigen::VectorXd step =
-                many ? Eigen::VectorXd((normal_ - part.normal).ldlt().solve(part.gradient)) : inverse * part.gradient;
+                many ? Eigen::VectorXd(without(part).head(wanted)) : Eigen::VectorXd(rows * part.gradient);
             sum += step * step.transpose();
         }
         if (count > 1)
             sum *= many ? (count - 1) / count : count / (count - 1);
-        return sum + inverse * spread_ * inverse;
+        sum += rows * spread_ * rows.transpose();
+        if (!many)
+            return sum;
+        const Eigen::VectorXd wider = widenings(rows);
+        return wider.asDiagonal() * sum * wider.asDiagonal();
     }
 
   private:
@@ -126,6 +147,33 @@ class Reduced {
         Eigen::MatrixXd mixed;
         Eigen::Vector3d own_gradient = Eigen::Vector3d::Zero();
     };
+
+    /// The Newton step of all residuals but the cluster's, which their own minimum asks for.
+    [[nodiscard]] Eigen::VectorXd without(const Part& part) const {
+        const Eigen::MatrixXd rest = normal_ - part.normal;
+        const Eigen::LLT<Eigen::MatrixXd> fast(rest); // several times as fast; fails where only this cluster tells
+        return fast.info() == Eigen::Success ? Eigen::VectorXd(fast.solve(part.gradient))
+                                             : Eigen::VectorXd(rest.ldlt().solve(part.gradient));
+    }
+
+    /// Student's factor for as many clusters as in effect determine each number. `rows` are theirs of the inverse
+    /// normal matrix, so that (rows normal rows^T) is what a cluster with independent errors adds to their variance.
+    [[nodiscard]] Eigen::VectorXd widenings(const Eigen::MatrixXd& rows) const {
+        const auto variance_by = [&](const Part& part) -> Eigen::VectorXd {
+            return (rows * part.normal).cwiseProduct(rows).rowwise().sum();
+        };
+        Eigen::VectorXd sum = variance_by(unclustered_); // independent residuals are many, each with a tiny share
+        Eigen::VectorXd squares = Eigen::VectorXd::Zero(rows.rows());
+        for (const auto& [number, part] : clusters_) {
+            const Eigen::VectorXd variance = variance_by(part);
+            sum += variance;
+            squares += variance.cwiseAbs2();
+        }
+        Eigen::VectorXd wider(rows.rows());
+        for (Eigen::Index i = 0; i < rows.rows(); ++i)
+            wider(i) = squares(i) > 0 ? students_factor(sum(i) * sum(i) / squares(i) - 1) : 1;
+        return wider;
+    }
 
     [[nodiscard]] Part part() const { return {Eigen::MatrixXd::Zero(kept_, kept_), Eigen::VectorXd::Zero(kept_)}; }
     Part& cluster(int number) {
@@ -246,7 +294,8 @@ void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const s
         fit.covariance.resize(0, 0);
         return;
     }
-    all = clusters.points.empty() ? Eigen::MatrixXd(all * (fit.rss / spare)) : reduced.covariance(all, clusters.many);
+    all = clusters.points.empty() ? Eigen::MatrixXd(all * (fit.rss / spare))
+                                  : reduced.covariance(all, count, clusters.many);
     for (Eigen::Index a = 0; a < count; ++a)
         for (Eigen::Index b = 0; b < count; ++b)
             fit.covariance(indices[a], indices[b]) = all(a, b);

@@ -31,15 +31,19 @@ double depth_at(const cv::Mat1f& depth_m, const Eigen::Vector2d& pixel) {
     const int u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
     if (u < 1 || v < 1 || u + 1 >= depth_m.cols || v + 1 >= depth_m.rows)
         return 0;
-    double low = 1e9, high = 0, sum = 0;
+    double low = 1e9, high = 0, sum = 0, along_u = 0, along_v = 0; // of 1 / z, which is linear on a plane
     for (int dv = -1; dv <= 1; ++dv)
         for (int du = -1; du <= 1; ++du) {
             const double z = depth_m(v + dv, u + du);
             low = std::min(low, z);
             high = std::max(high, z);
-            sum += z;
+            sum += 1 / z;
+            along_u += du / z;
+            along_v += dv / z;
         }
-    return low > 0 && high - low < same_surface * low ? sum / 9 : 0;
+    if (!(low > 0 && high - low < same_surface * low))
+        return 0;
+    return 1 / (sum / 9 + (pixel.x() - u) * along_u / 6 + (pixel.y() - v) * along_v / 6);
 }
 
 Eigen::Vector2d undistorted_direction(const Camera& camera, const Eigen::Vector2d& pixel) {

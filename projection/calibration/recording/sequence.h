@@ -42,6 +42,9 @@ class Sequence final : public Problem {
     [[nodiscard]] std::vector<cv::Mat1f> depth_images() const;
 
   private:
+    /// Whether views outside `used` can be judged by the point. Two rays a hand apart do not tell how far away it is:
+    /// a recorded depth must.
+    [[nodiscard]] bool is_known(const ScenePoint& point, const Views& used) const;
     void add_covariance(SequenceAdjustment& adjustment, Fit& fit, const Free& free) const;
 
     SequenceObservations observations_;

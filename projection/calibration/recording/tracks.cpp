@@ -7,6 +7,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/features2d.hpp>
 #include <set>
+#include <tuple>
 
 namespace scanshade::calibration {
 namespace {
@@ -16,13 +17,20 @@ struct Features {
     cv::Mat descriptors;
 };
 
+/// OpenCV's SIFT doubles the image, by which pixel u comes to 2 u + 0.5, and then halves coordinates: all points are a
+/// quarter of a pixel too far right and down (OpenCV issue 23124; from 4.8 on a flag, off by default, undoes that).
+constexpr float sift_offset_px = 0.25F;
+
 std::vector<Features> features_of(const std::vector<cv::Mat1b>& images) {
     constexpr int most = 1000;
     std::vector<Features> all(images.size());
     cv::parallel_for_({0, static_cast<int>(images.size())}, [&](const cv::Range& range) {
         const auto detector = cv::SIFT::create(most);
-        for (int i = range.start; i < range.end; ++i)
+        for (int i = range.start; i < range.end; ++i) {
             detector->detectAndCompute(images[i], cv::noArray(), all[i].points, all[i].descriptors);
+            for (cv::KeyPoint& point : all[i].points)
+                point.pt -= cv::Point2f(sift_offset_px, sift_offset_px);
+        }
     });
     return all;
 }
@@ -74,11 +82,28 @@ class Chains {
     std::vector<int> parent_;
 };
 
-/// The longest tracks of each part of the image, in turn, so that no textured corner dominates.
-std::vector<Track> spread(std::vector<Track> tracks, cv::Size size, std::size_t most) {
-    constexpr int cells = 8;
+/// SIFT gives a corner with several directions several features, and so several tracks. Only the longest is kept: the
+/// others are no evidence of their own.
+std::vector<Track> without_repeats(std::vector<Track> tracks) {
     std::stable_sort(tracks.begin(), tracks.end(),
                      [](const Track& a, const Track& b) { return a.observations.size() > b.observations.size(); });
+    std::set<std::tuple<int, float, float>> seen;
+    std::erase_if(tracks, [&](const Track& track) {
+        const bool repeated =
+            std::any_of(track.observations.begin(), track.observations.end(), [&](const Track::Observation& s) {
+                return seen.contains({s.frame, s.pixel.x, s.pixel.y});
+            });
+        if (!repeated)
+            for (const Track::Observation& s : track.observations)
+                seen.insert({s.frame, s.pixel.x, s.pixel.y});
+        return repeated;
+    });
+    return tracks;
+}
+
+/// The first tracks of each part of the image, in turn, so that no textured corner dominates.
+std::vector<Track> spread(std::vector<Track> tracks, cv::Size size, std::size_t most) {
+    constexpr int cells = 8;
     std::map<std::pair<int, int>, std::vector<std::size_t>> by_cell;
     for (std::size_t i = 0; i < tracks.size(); ++i) {
         const cv::Point2d pixel = tracks[i].observations.front().pixel;
@@ -131,7 +156,7 @@ std::vector<Track> find_tracks(const std::vector<cv::Mat1b>& images, int shortes
         if (frames.size() == track.observations.size() && static_cast<int>(frames.size()) >= shortest)
             tracks.push_back(std::move(track));
     }
-    return spread(std::move(tracks), images.front().size(), most);
+    return spread(without_repeats(std::move(tracks)), images.front().size(), most);
 }
 
 } // namespace scanshade::calibration
