@@ -17,14 +17,19 @@ void PlaneAdjustment::add(std::size_t index, const PlaneCell& cell, bool plane_i
         problem.SetParameterBlockConstant(plane(index));
 }
 
-void PlaneAdjustment::add_pose_priors() {
+void PlaneAdjustment::add_pose_priors(bool planes_are_known) {
     constexpr double translation_sigma_m = 0.005, rotation_sigma = 0.0035; // a good tracker's, as in SequenceOptions
+    // Beside exact depth these priors weigh next to nothing, and hundreds of steps go into a motion of all poses and
+    // planes together, on which the camera does not depend. The first pose then holds the world.
+    constexpr double exact_mm = 0.2;
+    bool held = planes_are_known || observations_.sigma_mm > exact_mm;
     for (std::size_t i = 0; i < observations_.frames.size(); ++i) {
         double* numbers = pose(static_cast<int>(i));
         if (!problem.HasParameterBlock(numbers))
             continue;
-        if (!observations_.linked) {
+        if (!observations_.linked || !held) {
             problem.SetParameterBlockConstant(numbers);
+            held = true;
             continue;
         }
         // PosePriorResidual takes camera_from_world; here the pose is its inverse, so both are inverted.
@@ -44,7 +49,7 @@ void PlaneAdjustment::add_covariance(const Free& free) {
         poses.push_back(pose(static_cast<int>(i)));
     for (std::size_t i = 0; i < observations_.planes.size(); ++i)
         planes.points.push_back({plane(i), static_cast<int>(i)});
-    calibration::add_covariance(problem, fit_, free, poses, planes);
+    calibration::add_covariance(problem, fit_, free, poses, {planes});
 }
 
 } // namespace scanshade::calibration
