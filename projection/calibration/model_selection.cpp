@@ -135,15 +135,17 @@ std::string inflated(const Fit& before, const Fit& after, const Free& was_free, 
     return {};
 }
 
-/// Whether the free numbers are where they were, measured in their sigmas.
+/// Whether the free numbers are where they were, measured in their sigmas; or in pixels, where sigmas are tiny.
 bool settled(const Fit& before, const Fit& after, const Free& free) {
-    constexpr double least_sigmas = 0.1;
+    constexpr double least_sigmas = 0.1, least_px = 1e-3;
     if (after.covariance.size() == 0)
         return false;
-    for (int i = 0; i < unknown_count; ++i)
-        if (free[i] && !(std::abs(after.model.values[i] - before.model.values[i]) <=
-                         least_sigmas * std::sqrt(after.covariance(i, i))))
+    for (int i = 0; i < unknown_count; ++i) {
+        const bool in_pixels = i == f || i == cx || i == cy;
+        const double least = std::max(least_sigmas * std::sqrt(after.covariance(i, i)), in_pixels ? least_px : 0);
+        if (free[i] && !(std::abs(after.model.values[i] - before.model.values[i]) <= least))
             return false;
+    }
     return true;
 }
 
@@ -161,11 +163,11 @@ Fit continued_fit(const Problem& problem, const Fit& from, const Free& free, con
     return fit;
 }
 
-/// A fit that settles: where it does not from here, and the focal length is among the free numbers, from the best of
-/// several focal lengths.
-Fit settled_fit(const Problem& problem, const Fit& from, const Free& free, const Views& used) {
+/// A fit that settles: where it does not from here, and the focal length was not free before, from the best of several
+/// focal lengths.
+Fit settled_fit(const Problem& problem, const Fit& from, const Free& free, const Views& used, bool frees_focal_length) {
     Fit fit = continued_fit(problem, from, free, used);
-    if (fit.converged || !free[f])
+    if (fit.converged || !frees_focal_length)
         return fit;
     Free others = free;
     others[f] = false;
@@ -224,7 +226,7 @@ class ModelSelection {
             for (const Unknown unknown : groups_[i].unknowns)
                 selection_.free[unknown] = true;
         }
-        selection_.fit = settled_fit(problem_, selection_.fit, selection_.free, used_);
+        selection_.fit = settled_fit(problem_, selection_.fit, selection_.free, used_, selection_.free[f]);
         held_out_ = held_out(problem_, selection_.fit, selection_.free, used_, options_.folds);
         return finished();
     }
@@ -265,7 +267,7 @@ class ModelSelection {
         Free free = selection_.free;
         for (const Unknown unknown : group.unknowns)
             free[unknown] = true;
-        const Fit fit = settled_fit(problem_, selection_.fit, free, used_);
+        const Fit fit = settled_fit(problem_, selection_.fit, free, used_, free[f] && !selection_.free[f]);
         if (free[f] && !selection_.free[f])
             selection_.focal_length_free = fit;
         if (const std::string why = objection(group, fit, free); !why.empty()) {

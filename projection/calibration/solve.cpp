@@ -306,7 +306,7 @@ void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const s
         all = i == 0 ? one : Eigen::MatrixXd(all + one);
         effective += reduced.effective_clusters(inverted, count) / parts;
     }
-    if (!groupings.empty() && groupings.front().many) {
+    if (!groupings.empty()) {
         Eigen::VectorXd wider(count);
         for (Eigen::Index i = 0; i < count; ++i)
             wider(i) = students_factor(effective(i) - 1);

@@ -13,9 +13,8 @@ class PlaneAdjustment {
 
     void add(std::size_t plane, const PlaneCell& cell, bool plane_is_known = false,
              ceres::LossFunction* loss = nullptr);
-    /// Keeps poses near the recorded ones; where frames are not linked, at the origin. `planes_are_known` where they
-    /// are constant, and so hold the world in its place.
-    void add_pose_priors(bool planes_are_known = false);
+    /// Keeps poses near the recorded ones; where frames are not linked, at the origin.
+    void add_pose_priors();
     void add_covariance(const Free& free);
 
     [[nodiscard]] double* pose(int frame) { return &fit_.nuisance[static_cast<std::size_t>(frame) * pose_unknowns]; }

@@ -119,7 +119,7 @@ std::vector<ViewScore> Planes::score(const Fit& from, const Views& wanted) const
         if (adjustment.problem.NumResidualBlocks() < pose_unknowns)
             continue;
         const int cells = adjustment.problem.NumResidualBlocks();
-        adjustment.add_pose_priors(observations_.linked);
+        adjustment.add_pose_priors();
         fix(adjustment.problem, alone.model, {});
         if (observations_.linked || adjustment.problem.NumParameterBlocks() > 0)
             solve(adjustment.problem, alone, false);
