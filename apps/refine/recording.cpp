@@ -180,12 +180,23 @@ std::string agreement_sentence(const std::vector<SequenceFrame>& between, const 
                        between.empty() ? "frames, the refined ones" : "frames that were not refined");
 }
 
+/// A focal length that a short walk cannot free would otherwise reappear as a lens, or as a second focal length.
+void with_focal_length_as_rival(std::vector<ParameterGroup>& groups) {
+    const auto is = [](const ParameterGroup& group, Unknown unknown) { return group.unknowns.front() == unknown; };
+    if (std::none_of(groups.begin(), groups.end(), [&](const ParameterGroup& group) { return is(group, f); }))
+        return;
+    for (ParameterGroup& group : groups)
+        if (!group.rival && group.unknowns.front() < camera_unknowns && !is(group, f))
+            group.rival = f;
+}
+
 /// Refines. While that makes the overlap of depths worse, refines again without the group freed last. `overlap` returns
 /// its millimetres under a fit.
 template <class Overlap>
 Refinement refined_where_depths_agree(Problem& problem, const Model& first, const Camera& before,
                                       std::vector<ParameterGroup> groups, const RefineOptions& options,
                                       const std::string& degeneracy, Overlap&& overlap) {
+    with_focal_length_as_rival(groups);
     const double before_mm = overlap(problem.start(first));
     std::vector<Step> rejected;
     Refinement r = refine(problem, first, before, groups, options, degeneracy);
@@ -340,7 +351,7 @@ RecordingResult refine_from_recording(Capture capture, const std::vector<std::si
     options.selection.guessed = set_first_camera(capture, first, how.registered, depth_size);
     options.selection.folds = std::min(options.selection.folds, 4);
     // Depth errors are correlated across a scene in ways that no cluster covers. Real errors of a camera are far larger
-    // than this.
+    // than this. Sigmas are already wider where few clusters tell, so that this is no more than it says.
     options.selection.least_sigmas = std::max(options.selection.least_sigmas, 4.0);
 
     const auto with_notes = [&](RecordingResult result) {

@@ -82,6 +82,23 @@ double largest(const cv::Mat1d& grid) {
     return most;
 }
 
+/// Where the focal length was kept: whether the observations could have told a wrong one, and whether they ask for
+/// another one after all.
+std::string doubt_of_kept_focal_length(const Selection& found, double most_sigma_px) {
+    constexpr double most_sigmas = 2.5;
+    if (!found.focal_length_free)
+        return {};
+    const Fit& free = *found.focal_length_free;
+    if (!free.converged || free.covariance.size() == 0)
+        return "the focal length is not determined, so it is as it was before";
+    const std::string would_be = fmt::format("{:.6g} +- {:.2g} px", free.model[f], free.sigma(f));
+    if (mean_pixel_sigma(free) > most_sigma_px)
+        return fmt::format("the focal length is hardly determined ({}), so it is as it was before", would_be);
+    if (std::abs(free.model[f] - found.fit.model[f]) > most_sigmas * free.sigma(f))
+        return fmt::format("the views ask for a focal length of {}, but not clearly enough", would_be);
+    return {};
+}
+
 } // namespace
 
 std::string verdict_of(const Refinement& r) {
@@ -101,6 +118,8 @@ std::string verdict_of(const Refinement& r) {
                                      found.held_out_px / found.train_px));
     if (sigma_px > most_sigma_px)
         doubts.push_back(fmt::format("a pixel is known to {:.2g} px only", sigma_px));
+    else if (const std::string doubt = doubt_of_kept_focal_length(found, most_sigma_px); !doubt.empty())
+        doubts.push_back(doubt);
     if (outlying > 0)
         doubts.push_back(
             fmt::format("{} of {} views {} outlying", outlying, r.views.size(), outlying == 1 ? "is" : "are"));

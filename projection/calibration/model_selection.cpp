@@ -8,6 +8,8 @@
 #include <Eigen/Dense>
 #include <fmt/format.h>
 #include <numeric>
+#include <optional>
+#include <utility>
 
 namespace scanshade::calibration {
 namespace {
@@ -133,6 +135,54 @@ std::string inflated(const Fit& before, const Fit& after, const Free& was_free, 
     return {};
 }
 
+/// Whether the free numbers are where they were, measured in their sigmas; or in pixels, where sigmas are tiny.
+bool settled(const Fit& before, const Fit& after, const Free& free) {
+    constexpr double least_sigmas = 0.1, least_px = 1e-3;
+    if (after.covariance.size() == 0)
+        return false;
+    for (int i = 0; i < unknown_count; ++i) {
+        const bool in_pixels = i == f || i == cx || i == cy;
+        const double least = std::max(least_sigmas * std::sqrt(after.covariance(i, i)), in_pixels ? least_px : 0);
+        if (free[i] && !(std::abs(after.model.values[i] - before.model.values[i]) <= least))
+            return false;
+    }
+    return true;
+}
+
+/// A fit, continued while it has not converged. Of exact observations, poses and scene may creep on together for
+/// hundreds of steps, along a motion of the whole world that only weak priors on poses hold. The camera does not depend
+/// on it: a fit has converged, too, once the camera's numbers stay.
+Fit continued_fit(const Problem& problem, const Fit& from, const Free& free, const Views& used) {
+    constexpr int most_rounds = 4;
+    Fit fit = problem.fit(from, free, used, true);
+    for (int round = 1; round < most_rounds && !fit.converged; ++round) {
+        Fit next = problem.fit(fit, free, used, true);
+        next.converged = next.converged || settled(fit, next, free);
+        fit = std::move(next);
+    }
+    return fit;
+}
+
+/// A fit that settles: where it does not from here, and the focal length was not free before, from the best of several
+/// focal lengths.
+Fit settled_fit(const Problem& problem, const Fit& from, const Free& free, const Views& used, bool frees_focal_length) {
+    Fit fit = continued_fit(problem, from, free, used);
+    if (fit.converged || !frees_focal_length)
+        return fit;
+    Free others = free;
+    others[f] = false;
+    std::optional<Fit> best;
+    for (const double scale : {0.8, 0.9, 1.1, 1.25}) {
+        Fit start = from;
+        start.model[f] *= scale;
+        Fit at = problem.fit(start, others, used, false);
+        if (!best || at.rss < best->rss)
+            best = std::move(at);
+    }
+    Fit other = continued_fit(problem, *best, free, used);
+    return other.converged ? other : fit;
+}
+
 /// The state of one selection.
 class ModelSelection {
   public:
@@ -176,7 +226,7 @@ class ModelSelection {
             for (const Unknown unknown : groups_[i].unknowns)
                 selection_.free[unknown] = true;
         }
-        selection_.fit = problem_.fit(selection_.fit, selection_.free, used_, true);
+        selection_.fit = settled_fit(problem_, selection_.fit, selection_.free, used_, selection_.free[f]);
         held_out_ = held_out(problem_, selection_.fit, selection_.free, used_, options_.folds);
         return finished();
     }
@@ -185,6 +235,8 @@ class ModelSelection {
     [[nodiscard]] double train_rms(const Fit& fit) const { return total_rms(problem_.score(fit, used_)); }
 
     Selection finished() {
+        if (selection_.free[f])
+            selection_.focal_length_free.reset();
         selection_.held_out_px = total_rms(held_out_);
         selection_.train_px = train_rms(selection_.fit);
         return selection_;
@@ -215,7 +267,9 @@ class ModelSelection {
         Free free = selection_.free;
         for (const Unknown unknown : group.unknowns)
             free[unknown] = true;
-        const Fit fit = problem_.fit(selection_.fit, free, used_, true);
+        const Fit fit = settled_fit(problem_, selection_.fit, free, used_, free[f] && !selection_.free[f]);
+        if (free[f] && !selection_.free[f])
+            selection_.focal_length_free = fit;
         if (const std::string why = objection(group, fit, free); !why.empty()) {
             record(indices, false, why);
             return Outcome::rejected;
@@ -290,6 +344,8 @@ class ModelSelection {
         const double sigmas = sigmas_from(selection_.fit, selection_.start.model, group.unknowns);
         if (sigmas >= options_.least_sigmas)
             return;
+        if (group.unknowns.front() == f)
+            selection_.focal_length_free = selection_.fit;
         for (const Unknown unknown : group.unknowns) {
             selection_.free[unknown] = false;
             selection_.fit.model[unknown] = selection_.start.model[unknown];

@@ -3,6 +3,8 @@
 
 #include "projection/calibration/problem.h"
 
+#include <optional>
+
 namespace scanshade::calibration {
 
 /// Whether one parameter group was freed, and why.
@@ -24,8 +26,11 @@ struct SelectionOptions {
 };
 
 struct Selection {
-    Fit start, fit;          ///< before and after; `fit` with covariance
-    Free free{};             ///< which numbers were freed
+    Fit start, fit; ///< before and after; `fit` with covariance
+    Free free{};    ///< which numbers were freed
+    /// The last fit that had the focal length free, where it was not freed in the end: how sure the observations are of
+    /// it all the same.
+    std::optional<Fit> focal_length_free = {};
     std::vector<Step> steps; ///< in the order tried, the last decision on each group
     double train_px = 0, train_before_px = 0, held_out_px = 0, held_out_before_px = 0; ///< rms over the views used
     /// Nothing was freed: the input stays as it is.

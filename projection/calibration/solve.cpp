@@ -130,11 +130,24 @@ class Reduced {
         }
         if (count > 1)
             sum *= many ? (count - 1) / count : count / (count - 1);
-        sum += rows * spread_ * rows.transpose();
-        if (!many)
-            return sum;
-        const Eigen::VectorXd wider = widenings(rows);
-        return wider.asDiagonal() * sum * wider.asDiagonal();
+        return sum + rows * spread_ * rows.transpose();
+    }
+    /// As many clusters of equal weight would determine each of these numbers as well; infinite where independent
+    /// residuals do.
+    [[nodiscard]] Eigen::VectorXd effective_clusters(const Eigen::MatrixXd& inverse, Eigen::Index wanted) const {
+        const Eigen::MatrixXd rows = inverse.topRows(wanted);
+        // What a part with independent errors adds to the numbers' variances.
+        const auto variance_by = [&](const Part& part) -> Eigen::VectorXd {
+            return (rows * part.normal).cwiseProduct(rows).rowwise().sum();
+        };
+        Eigen::VectorXd sum = variance_by(unclustered_); // independent residuals are many, each with a tiny share
+        Eigen::VectorXd squares = Eigen::VectorXd::Zero(wanted);
+        for (const auto& [number, part] : clusters_) {
+            const Eigen::VectorXd variance = variance_by(part);
+            sum += variance;
+            squares += variance.cwiseAbs2();
+        }
+        return sum.cwiseAbs2().cwiseQuotient(squares);
     }
 
   private:
@@ -154,25 +167,6 @@ class Reduced {
         const Eigen::LLT<Eigen::MatrixXd> fast(rest); // several times as fast; fails where only this cluster tells
         return fast.info() == Eigen::Success ? Eigen::VectorXd(fast.solve(part.gradient))
                                              : Eigen::VectorXd(rest.ldlt().solve(part.gradient));
-    }
-
-    /// Student's factor for as many clusters as in effect determine each number. `rows` are theirs of the inverse
-    /// normal matrix, so that (rows normal rows^T) is what a cluster with independent errors adds to their variance.
-    [[nodiscard]] Eigen::VectorXd widenings(const Eigen::MatrixXd& rows) const {
-        const auto variance_by = [&](const Part& part) -> Eigen::VectorXd {
-            return (rows * part.normal).cwiseProduct(rows).rowwise().sum();
-        };
-        Eigen::VectorXd sum = variance_by(unclustered_); // independent residuals are many, each with a tiny share
-        Eigen::VectorXd squares = Eigen::VectorXd::Zero(rows.rows());
-        for (const auto& [number, part] : clusters_) {
-            const Eigen::VectorXd variance = variance_by(part);
-            sum += variance;
-            squares += variance.cwiseAbs2();
-        }
-        Eigen::VectorXd wider(rows.rows());
-        for (Eigen::Index i = 0; i < rows.rows(); ++i)
-            wider(i) = squares(i) > 0 ? students_factor(sum(i) * sum(i) / squares(i) - 1) : 1;
-        return wider;
     }
 
     [[nodiscard]] Part part() const { return {Eigen::MatrixXd::Zero(kept_, kept_), Eigen::VectorXd::Zero(kept_)}; }
@@ -251,7 +245,7 @@ Eigen::MatrixXd inverse(const Eigen::MatrixXd& normal) {
 } // namespace
 
 void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const std::vector<double*>& kept_blocks,
-                    const Clusters& clusters) {
+                    const std::vector<Clusters>& groupings) {
     fit.covariance.resize(0, 0);
     const int spare = fit.residuals - fit.unknowns;
     if (spare <= 0)
@@ -274,12 +268,10 @@ void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const s
             options.parameter_blocks.push_back(block);
             kept += problem.ParameterBlockTangentSize(block);
         }
-    std::vector<int> of_points;
-    for (const ClusteredPoint& point : clusters.points)
-        if (problem.HasParameterBlock(point.values)) {
-            options.parameter_blocks.push_back(point.values);
-            of_points.push_back(point.cluster);
-        }
+    if (!groupings.empty())
+        for (const ClusteredPoint& point : groupings.front().points)
+            if (problem.HasParameterBlock(point.values))
+                options.parameter_blocks.push_back(point.values);
     problem.GetResidualBlocks(&options.residual_blocks);
     fit.covariance = Eigen::MatrixXd::Zero(unknown_count, unknown_count);
     if (count == 0)
@@ -287,15 +279,39 @@ void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const s
     ceres::CRSMatrix jacobian;
     std::vector<double> residuals;
     problem.Evaluate(options, nullptr, &residuals, nullptr, &jacobian);
-    const Reduced reduced(jacobian, residuals, kept, of_points,
-                          clusters_of_rows(problem, options.residual_blocks, clusters.residuals));
-    Eigen::MatrixXd all = inverse(reduced.normal());
-    if (all.size() == 0 || !all.allFinite()) {
-        fit.covariance.resize(0, 0);
-        return;
+    const auto reduced_by = [&](const Clusters& clusters) {
+        std::vector<int> of_points;
+        for (const ClusteredPoint& point : clusters.points)
+            if (problem.HasParameterBlock(point.values))
+                of_points.push_back(point.cluster);
+        return Reduced(jacobian, residuals, kept, of_points,
+                       clusters_of_rows(problem, options.residual_blocks, clusters.residuals));
+    };
+    Eigen::MatrixXd all, inverted;
+    Eigen::VectorXd effective = Eigen::VectorXd::Zero(count);
+    const auto parts = static_cast<double>(groupings.size());
+    for (std::size_t i = 0; i < std::max<std::size_t>(1, groupings.size()); ++i) {
+        const Reduced reduced = reduced_by(groupings.empty() ? Clusters() : groupings[i]);
+        if (inverted.size() == 0) // the same for all groupings
+            inverted = inverse(reduced.normal());
+        if (inverted.size() == 0 || !inverted.allFinite()) {
+            fit.covariance.resize(0, 0);
+            return;
+        }
+        if (groupings.empty()) {
+            all = inverted * (fit.rss / spare);
+            continue;
+        }
+        const Eigen::MatrixXd one = reduced.covariance(inverted, count, groupings[i].many) / parts;
+        all = i == 0 ? one : Eigen::MatrixXd(all + one);
+        effective += reduced.effective_clusters(inverted, count) / parts;
     }
-    all = clusters.points.empty() ? Eigen::MatrixXd(all * (fit.rss / spare))
-                                  : reduced.covariance(all, count, clusters.many);
+    if (!groupings.empty()) {
+        Eigen::VectorXd wider(count);
+        for (Eigen::Index i = 0; i < count; ++i)
+            wider(i) = students_factor(effective(i) - 1);
+        all = wider.asDiagonal() * all * wider.asDiagonal();
+    }
     for (Eigen::Index a = 0; a < count; ++a)
         for (Eigen::Index b = 0; b < count; ++b)
             fit.covariance(indices[a], indices[b]) = all(a, b);

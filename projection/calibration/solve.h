@@ -38,9 +38,12 @@ struct Clusters {
 /// residuals of one cluster may be correlated in any way: a wall has the same depth error in all frames, and neighbours
 /// on an outline share theirs. The covariance is then the cluster-robust one (Liang and Zeger 1986). Of many clusters
 /// each is left out in turn, by one Newton step (the jackknife of Bell and McCaffrey 2002): a cluster that dominates
-/// the fit has small residuals.
+/// the fit has small residuals. Their number is that of equal clusters which would determine a number as well
+/// (Satterthwaite 1946, as Bell and McCaffrey take it), and sigmas are wider by Student's factor, so that two of them
+/// hold 95 % even of a few. Where one scene can be cut into clusters in several ways, all with the same points, the
+/// mean over the groupings counts.
 void add_covariance(ceres::Problem& problem, Fit& fit, const Free& free, const std::vector<double*>& kept,
-                    const Clusters& clusters);
+                    const std::vector<Clusters>& groupings);
 
 /// Transforms a point by a pose of six numbers: axis times angle, then translation.
 template <class Number>

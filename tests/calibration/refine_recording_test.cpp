@@ -1,5 +1,6 @@
 // Cameras refined from recordings: tracks, planes, time offsets and a secondary colour camera.
 #include "apps/refine/recording.h"
+#include "apps/refine/report.h"
 #include "apps/scenes/generate.h"
 #include "apps/scenes/scene.h"
 #include "apps/scenes/sensor.h"
@@ -9,6 +10,7 @@
 #include "projection/calibration/recording/planes.h"
 #include "projection/calibration/recording/residuals.h"
 #include "projection/calibration/recording/sequence.h"
+#include "projection/calibration/recording/tracks.h"
 #include "projection/calibration/refinement.h"
 #include "tests/support/files.h"
 
@@ -20,6 +22,7 @@
 #include <map>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
+#include <set>
 #include <sstream>
 
 namespace scanshade {
@@ -76,6 +79,122 @@ TEST(Recordings, AWrongFocalLengthIsFoundAndTheRightOneKept) {
         const Refinement right = refined(office(), {.observations = observations}).refinement;
         EXPECT_FALSE(right.changed()) << observations << ": " << right.selection.fit.model[f];
     }
+}
+
+/// A walk of 20 small frames, and the camera that it is refined from: 5 % off the true 262.5 px.
+Capture short_walk(const fs::path& folder, const std::string& scene, const std::string& sensor, int first,
+                   const std::string& camera) {
+    GenerateOptions options;
+    options.scene = scene;
+    options.sensor = sensor;
+    options.frames = 20;
+    options.first = first;
+    options.step = 3;
+    options.size = "320x240";
+    options.truth = false;
+    generate(options, folder);
+    return open_capture(folder, {.camera = camera, .depth_scale = {}});
+}
+const char *five_percent_short = "249.375,249.375,159.5,119.5", *five_percent_long = "275.625,275.625,159.5,119.5";
+
+TEST(ShortWalks, exact_depth_alone_tells_the_focal_length) {
+    const tests::TemporaryFolder folder;
+    for (const char* camera : {five_percent_short, five_percent_long}) {
+        const Capture walk = short_walk(folder / camera, "kitchen", "ideal", 30, camera);
+        const Refinement r = refined(walk, {.observations = "depth"}).refinement;
+        ASSERT_TRUE(r.selection.free[f]) << r.selection.steps.front().why;
+        EXPECT_FALSE(r.selection.free[aspect]);
+        EXPECT_NEAR(r.after.pinhole.fx, 262.5, 0.01);
+        EXPECT_TRUE(verdict_of(r).starts_with("sound")) << verdict_of(r);
+    }
+}
+
+TEST(ShortWalks, sigmas_of_tracks_hold_the_truth) {
+    const tests::TemporaryFolder folder;
+    for (const char* scene : {"kitchen", "staircase"})
+        for (const char* camera : {five_percent_short, five_percent_long}) {
+            const Capture walk = short_walk(folder / (scene + std::string(camera)), scene, "ideal", 0, camera);
+            const Refinement r = refined(walk).refinement;
+            ASSERT_TRUE(r.selection.free[f]) << scene << ": " << r.selection.steps.front().why;
+            EXPECT_FALSE(r.selection.free[aspect]) << scene;
+            EXPECT_NEAR(r.after.pinhole.fx, 262.5, 2 * r.selection.fit.sigma(f)) << scene;
+            EXPECT_LT(r.selection.fit.sigma(f), 2) << scene;
+        }
+}
+
+TEST(ShortWalks, a_wrong_camera_that_frames_hardly_determine_is_doubted) {
+    const tests::TemporaryFolder folder;
+    const Capture walk = short_walk(folder / "walk", "office", "kinect", 0, five_percent_long);
+    const Refinement r = refined(walk).refinement;
+    EXPECT_TRUE(r.selection.free[f] || r.selection.focal_length_free);
+    EXPECT_TRUE(verdict_of(r).starts_with("doubtful")) << verdict_of(r) << r.after.pinhole.fx;
+    for (const Unknown lens : {aspect, k1, k2, p1, k3}) // they must not stand in for it
+        EXPECT_FALSE(r.selection.free[lens]) << name_of(lens);
+}
+
+TEST(Tracks, features_are_where_the_blobs_are_and_each_makes_one_track) {
+    std::vector<cv::Mat1b> images;
+    std::vector<std::vector<cv::Point2d>> truth;
+    for (int frame = 0; frame < 4; ++frame) {
+        cv::RNG random(3);
+        cv::Mat1f image(240, 320, 60.F);
+        std::vector<cv::Point2d>& blobs = truth.emplace_back();
+        for (int row = 0; row < 5; ++row)
+            for (int column = 0; column < 7; ++column) {
+                const cv::Point2d at(30 + 40 * column + random.uniform(-5.0, 5.0) + 2.3 * frame,
+                                     28 + 42 * row + random.uniform(-5.0, 5.0) + 1.6 * frame);
+                blobs.push_back(at);
+                // Unlike neighbours, so that each descriptor is met once.
+                for (int part = 0; part < 4; ++part) {
+                    const cv::Point2d centre =
+                        part == 0 ? at : at + cv::Point2d(random.uniform(-13.0, 13.0), random.uniform(-13.0, 13.0));
+                    const double height = part == 0 ? 150 : random.uniform(-40.0, 40.0), width = part == 0 ? 2.5 : 4;
+                    for (int v = 0; v < image.rows; ++v)
+                        for (int u = 0; u < image.cols; ++u) {
+                            const double squared = std::pow(u - centre.x, 2) + std::pow(v - centre.y, 2);
+                            if (squared < 25 * width * width)
+                                image(v, u) += static_cast<float>(height * std::exp(-squared / (2 * width * width)));
+                        }
+                }
+            }
+        cv::Mat1b grey;
+        image.convertTo(grey, CV_8U);
+        images.push_back(grey);
+    }
+    const std::vector<Track> tracks = find_tracks(images);
+    ASSERT_GT(tracks.size(), 20U);
+    std::set<std::pair<double, double>> first_places;
+    double sum_u = 0, sum_v = 0;
+    int near = 0;
+    for (const Track& track : tracks) {
+        const Track::Observation& s = track.observations.front();
+        EXPECT_TRUE(first_places.insert({s.pixel.x + 1000 * s.frame, s.pixel.y}).second);
+        for (const cv::Point2d& blob : truth[static_cast<std::size_t>(s.frame)])
+            if (cv::norm(s.pixel - blob) < 1) {
+                sum_u += s.pixel.x - blob.x;
+                sum_v += s.pixel.y - blob.y;
+                ++near;
+            }
+    }
+    ASSERT_GT(near, 10);
+    EXPECT_NEAR(sum_u / near, 0, 0.1); // OpenCV's own coordinates are 0.25 px off
+    EXPECT_NEAR(sum_v / near, 0, 0.1);
+}
+
+TEST(Tracks, depth_at_a_feature_is_that_of_its_own_place) {
+    const Pinhole camera{262.5, 262.5, 159.5, 119.5, {320, 240}};
+    cv::Mat1f depth_m(240, 320);
+    const auto slanted = [&](double u, double v) { // the plane z + 0.5 x + 0.2 y = 2
+        const Eigen::Vector3d ray = camera.ray(u, v);
+        return 2 / (1 + 0.5 * ray.x() + 0.2 * ray.y());
+    };
+    for (int v = 0; v < depth_m.rows; ++v)
+        for (int u = 0; u < depth_m.cols; ++u)
+            depth_m(v, u) = static_cast<float>(slanted(u, v));
+    for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(100.4, 60.3), {200.5, 30.49}, {17.7, 200.2}})
+        EXPECT_NEAR(depth_at(depth_m, pixel), slanted(pixel.x(), pixel.y()), 1e-5);
+    depth_m(60, 101) = 0;
+    EXPECT_EQ(depth_at(depth_m, {100.4, 60.3}), 0);
 }
 
 TEST(Recordings, MissingPosesAreEstimated) {

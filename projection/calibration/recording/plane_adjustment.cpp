@@ -4,6 +4,8 @@
 #include "projection/calibration/recording/geometry.h"
 #include "projection/calibration/recording/residuals.h"
 
+#include <algorithm>
+
 namespace scanshade::calibration {
 
 void PlaneAdjustment::add(std::size_t index, const PlaneCell& cell, bool plane_is_known, ceres::LossFunction* loss) {
@@ -19,6 +21,11 @@ void PlaneAdjustment::add(std::size_t index, const PlaneCell& cell, bool plane_i
 
 void PlaneAdjustment::add_pose_priors() {
     constexpr double translation_sigma_m = 0.005, rotation_sigma = 0.0035; // a good tracker's, as in SequenceOptions
+    // Beside exact depth these priors would weigh next to nothing, and hundreds of steps would go into motions of poses
+    // and planes together, on which the camera does not depend. As if depth were good to a millimetre they still move a
+    // pose by micrometres only.
+    constexpr double exact_mm = 1;
+    const double sigma_mm = std::max(exact_mm, observations_.sigma_mm);
     for (std::size_t i = 0; i < observations_.frames.size(); ++i) {
         double* numbers = pose(static_cast<int>(i));
         if (!problem.HasParameterBlock(numbers))
@@ -32,7 +39,7 @@ void PlaneAdjustment::add_pose_priors() {
         problem.AddResidualBlock(
             new ceres::AutoDiffCostFunction<PosePriorResidual, 6, pose_unknowns>(new PosePriorResidual{
                 Eigen::Quaterniond(camera_from_world.linear()).inverse().normalized(), camera_from_world.translation(),
-                observations_.sigma_mm / rotation_sigma, observations_.sigma_mm / translation_sigma_m}),
+                sigma_mm / rotation_sigma, sigma_mm / translation_sigma_m}),
             nullptr, numbers);
     }
 }
@@ -44,7 +51,7 @@ void PlaneAdjustment::add_covariance(const Free& free) {
         poses.push_back(pose(static_cast<int>(i)));
     for (std::size_t i = 0; i < observations_.planes.size(); ++i)
         planes.points.push_back({plane(i), static_cast<int>(i)});
-    calibration::add_covariance(problem, fit_, free, poses, planes);
+    calibration::add_covariance(problem, fit_, free, poses, {planes});
 }
 
 } // namespace scanshade::calibration
