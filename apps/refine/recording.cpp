@@ -30,7 +30,7 @@ struct RecordingData {
 /// From the capture's trajectory; else from the frames before and after, per second or, without stamps, per frame.
 Motion motion_of(const Capture& capture, std::size_t index) {
     const CaptureEntry& entry = capture.entries[index];
-    const Motion motion = entry.motion.value_or({});
+    Motion motion = entry.motion.value_or({});
     if (motion.any() || !entry.world_from_camera || index == 0 || index + 1 == capture.entries.size())
         return motion;
     const CaptureEntry &before = capture.entries[index - 1], &after = capture.entries[index + 1];
@@ -307,7 +307,7 @@ RecordingResult refine_tracks(const Capture& capture, const RecordingData& data,
     return result;
 }
 
-RecordingResult refine_planes(const Capture& capture, RecordingData data, const Camera& before,
+RecordingResult refine_planes(const Capture& capture, const RecordingData& data, const Camera& before,
                               const RefineOptions& options, const Model& first) {
     RecordingResult result{.refinement = {},
                            .file = {.camera = *capture.camera, .depth_units_per_metre = {}, .warnings = {}}};

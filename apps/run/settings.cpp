@@ -297,14 +297,10 @@ std::vector<Stage> RunSettings::common_stages() {
           {.name = "write",
            .help =
                "any of ao,confidence,error,shaded,unshaded,light,indirect,cloud,panel,glb,mcap; auto = "
-               "ao,confidence,shaded, and "
-               "cloud for clouds. "
-               "error: the expected error of each value, in visibility; confidence is 1 - error / 0.3. "
-               "unshaded: colour divided by visibility, where confidence allows it; "
-               "light: ambient and direct, the two parts of colour; indirect: one bounce, the colour that comes from "
-               "neighbours within the radius; glb: each frame's points or mesh as binary "
-               "glTF; mcap: run.mcap, one recording of all frames for "
-               "Foxglove, Rerun and ROS",
+               "ao,confidence,shaded, and cloud for clouds. error: the expected error of each value; confidence is "
+               "1 - error / 0.3. unshaded: colour divided by visibility, where confidence allows it; light: ambient "
+               "and direct, the parts of colour; indirect: colour that neighbours send; glb: each frame's points or "
+               "mesh as binary glTF; mcap: run.mcap, one recording of all frames for Foxglove, Rerun and ROS",
            .value = &s.write,
            .common = true},
           {.name = "format",

@@ -144,12 +144,14 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
         });
     if (outputs.shaded)
         wrote(picture_file("shaded", name), [&](const auto& file) { write_picture(file, images.shaded); });
-    for (const auto& [kind, picture] : {std::pair{"unshaded", &images.unshaded},
-                                        {"ambient", &images.ambient},
-                                        {"direct", &images.direct},
-                                        {"indirect", &images.indirect}})
-        if (!picture->empty())
-            wrote(picture_file(kind, name), [&](const auto& file) { write_picture(file, *picture); });
+    const auto wrote_if_made = [&](const char* kind, const cv::Mat3b& picture) {
+        if (!picture.empty())
+            wrote(picture_file(kind, name), [&](const auto& file) { write_picture(file, picture); });
+    };
+    wrote_if_made("unshaded", images.unshaded);
+    wrote_if_made("ambient", images.ambient);
+    wrote_if_made("direct", images.direct);
+    wrote_if_made("indirect", images.indirect);
     if (outputs.panel)
         wrote(picture_file("panel", name), [&](const auto& file) {
             write_picture(file, panel_picture(work.frame, scene, images.shaded, outputs.shade));
@@ -179,7 +181,7 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
 }
 
 std::filesystem::path write_cloud_picture(const Work& work, const Outputs& outputs) {
-    const std::filesystem::path file = picture_file(outputs.shaded ? "shaded" : "panel", work.entry.name);
+    std::filesystem::path file = picture_file(outputs.shaded ? "shaded" : "panel", work.entry.name);
     const std::optional<Eigen::Vector3d> viewpoint = scanner_of(work.frame);
     write_picture(outputs.files_folder() / file,
                   cloud_picture(*work.frame.cloud, work.of_points, viewpoint, outputs.shade_strength));

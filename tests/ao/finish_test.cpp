@@ -309,8 +309,9 @@ struct Corner {
 TEST_F(FinishTest, a_red_wall_lights_its_neighbour_red_within_the_radius) {
     const Corner corner; // the radius is 0.3 m
     const cv::Mat3b indirect = Finish(device).compute(corner.input, {.indirect = true}).indirect;
-    const cv::Vec3b near = indirect(240, corner.column_at(0.07F)), far = indirect(240, corner.column_at(0.5F)),
-                    on_red = indirect(240, corner.corner_u - 10);
+    const cv::Vec3b& near = indirect(240, corner.column_at(0.07F));
+    const cv::Vec3b& far = indirect(240, corner.column_at(0.5F));
+    const cv::Vec3b& on_red = indirect(240, corner.corner_u - 10);
     EXPECT_NEAR(linear(near[2]), 0.5 * linear(220), 0.005) << "closed by half, and all that closes it is red";
     EXPECT_LE(near[0], 5) << "the corner is a little round";
     EXPECT_EQ(far, cv::Vec3b(0, 0, 0));

@@ -320,7 +320,8 @@ Listing listing_of(const fs::path& scene, const fs::path& folder, const CaptureO
     for (const fs::path& depth : depths_in(folder)) {
         const std::string name = depth.filename().string(), stem = name.substr(0, name.size() - file_suffix.size());
         CaptureEntry entry;
-        entry.name = camera + "." + stem;
+        entry.name = camera;
+        entry.name.append(".").append(stem);
         entry.depth = depth.string();
         for (const char* extension : {".tonemap.jpg", ".color.jpg"})
             if (const fs::path colour = previews / (stem + extension); entry.colour.empty() && is_file(colour))
