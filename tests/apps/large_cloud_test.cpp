@@ -332,9 +332,8 @@ class BlockMean {
 
 /// Tiles against one tile of all points, within a spacing of borders and elsewhere. Tiles throw other rays, since
 /// directions follow from a tile's tree. Without seams, their differences are therefore those between two runs on all
-/// points with other seeds: at the same points, squares of both have one expectation, and means are 0. Where planes are
-/// fitted to noise, tiles differ by a little more, everywhere alike. A seam is what is more beside borders than
-/// elsewhere.
+/// points with other seeds: at the same points, squares of both have one expectation, and means are 0. A seam is
+/// what is more beside borders than elsewhere.
 struct Seams {
     BlockMean excess[2]; ///< difference squared, less that of the seeds; elsewhere, and beside borders
     BlockMean shift[2];  ///< difference
