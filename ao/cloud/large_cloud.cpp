@@ -114,7 +114,7 @@ class LargeCloud {
   private:
     /// The first pass: a sample, from which everything is decided that concerns all tiles.
     void survey() {
-        CloudSample sample(enough_for_sides);
+        CloudSample sample(enough_for_sides, source_.size());
         TwinLook twins;
         source_.pass([&](std::size_t first, std::span<const Vector3d> points, std::span<const Vector3d> normals) {
             for (std::size_t i = 0; i < points.size(); ++i)
