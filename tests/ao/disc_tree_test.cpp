@@ -87,7 +87,12 @@ TEST(DiscTree, hits_are_those_that_trying_all_discs_finds) {
                 ASSERT_NEAR(first->distance, expected.distance, 1e-5F);
             }
             ASSERT_EQ(discs.blocked(discs.start_at_root(), ray), hit);
-            const Eigen::AlignedBox3f origins(ray.origin - Vector3f::Constant(0.02F), ray.origin);
+            // Two rays to the side of a plane that this one is nearly in.
+            const Vector3f beside = ray.origin - Vector3f::Constant(0.02F),
+                           normal = (ray.direction.normalized() * 0.01F + ray.direction.unitOrthogonal()).normalized();
+            DiscTree::Origins origins{{beside, ray.origin}, {normal, normal}};
+            const Vector3f middle = origins.positions.center();
+            origins.lowest = std::min(normal.dot(beside - middle), normal.dot(ray.origin - middle));
             ASSERT_EQ(discs.blocked(discs.start_near(origins, ray.far), ray), hit);
         }
     }

@@ -41,15 +41,21 @@ void DiscRays::open(std::size_t leaf, const DirectionSet& directions, float radi
                     std::span<const char> asked, std::span<float> values) const {
     const auto [begin, end] = surface_.tree.leaf_range(leaf);
     std::array<DiscRay, NeighbourTree::leaf> rays;
-    Eigen::AlignedBox3f origins;
+    DiscTree::Origins origins;
     const auto is_asked = [&](std::size_t i) { return asked[i] != 0 && !surface_.normals[i].isZero(); };
     for (std::size_t i = begin; i < end; ++i)
         if (is_asked(i)) {
             rays[i - begin] = ray_from(i, surface_.normals[i], radius);
-            origins.extend(rays[i - begin].origin);
+            origins.positions.extend(rays[i - begin].origin);
+            origins.normals.extend(surface_.normals[i]);
         }
-    if (origins.isEmpty())
+    if (origins.positions.isEmpty())
         return;
+    origins.lowest = std::numeric_limits<float>::infinity();
+    for (std::size_t i = begin; i < end; ++i)
+        if (is_asked(i))
+            origins.lowest =
+                std::min(origins.lowest, surface_.normals[i].dot(rays[i - begin].origin - origins.positions.center()));
     const DiscTree::Start start = discs_.start_near(origins, radius);
     for (std::size_t i = begin; i < end; ++i) {
         if (!is_asked(i))

@@ -323,23 +323,29 @@ DiscTree::Start DiscTree::start_at_root() const {
 }
 
 /// Descends from the root, level by level, while the nodes within reach are few.
-DiscTree::Start DiscTree::start_near(const Eigen::AlignedBox3f& origins, float reach) const {
+DiscTree::Start DiscTree::start_near(const Origins& origins, float reach) const {
     Start start = start_at_root(), below;
     const float widened = 1.0001F * reach, reach2 = widened * widened;
+    const Vector3f least = origins.positions.min(), most = origins.positions.max(), middle = origins.positions.center();
+    constexpr float level = 1e-6F; // a direction along the plane may point below it by rounding
+    const float surely_below = origins.lowest - level * reach - static_cast<float>(rounding_);
     while (start.level_ + 1 < levels_.size()) {
         below.count_ = 0;
         below.level_ = start.level_ + 1;
         for (std::size_t k = 0; k < start.count_; ++k) {
             const auto& of = nodes_[levels_[start.level_] + start.node_[k]].box;
             for (std::size_t i = 0; i < wide; ++i) {
-                float apart2 = 0;
+                float apart2 = 0, height = 0; // of the box's highest point, over the middle
                 for (int axis = 0; axis < 3; ++axis) {
                     const float low = of[static_cast<std::size_t>(axis)][i],
                                 high = of[static_cast<std::size_t>(axis) + 3][i];
-                    const float apart = std::max({low - origins.max()[axis], origins.min()[axis] - high, 0.0F});
+                    const float apart = std::max({low - most[axis], least[axis] - high, 0.0F});
                     apart2 += apart * apart;
+                    const float down = low - middle[axis], up = high - middle[axis];
+                    const float from = origins.normals.min()[axis], to = origins.normals.max()[axis];
+                    height += std::max(std::max(from * down, from * up), std::max(to * down, to * up));
                 }
-                if (!(apart2 <= reach2) || of[0][i] == farthest)
+                if (!(apart2 <= reach2) || height < surely_below || of[0][i] == farthest)
                     continue;
                 if (below.count_ == Start::most)
                     return start;

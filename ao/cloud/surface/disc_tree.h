@@ -48,8 +48,14 @@ class DiscTree {
         std::array<std::array<std::array<float, 8>, 6>, most / 8> box_; ///< of eight nodes: low x y z, high x y z
         std::size_t count_ = 0, level_ = 0;
     };
-    /// For rays from anywhere in a box, up to `reach`.
-    [[nodiscard]] Start start_near(const Eigen::AlignedBox3f& origins, float reach) const;
+    /// Where rays start, and the half spaces that they stay in.
+    struct Origins {
+        Eigen::AlignedBox3f positions, normals; ///< boxes round all of them
+        float lowest = 0; ///< the least height of an origin, along its own normal, over the middle of `positions`
+    };
+    /// For rays up to `reach` that leave their origins to the side of the normals. What lies below the planes of all of
+    /// them is left out: of a flat surface nothing is.
+    [[nodiscard]] Start start_near(const Origins& origins, float reach) const;
     [[nodiscard]] Start start_at_root() const;
 
     /// Whether any disc blocks the ray.
