@@ -16,7 +16,8 @@ using Eigen::Vector3d;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-constexpr int apart_px = 12; // of the facets
+constexpr int most_apart_px = 12;      // of the facets
+constexpr double enough_facets = 2100; // of small images, as many as of 640x480 pixels
 /// What is taken for a plane is one to this share of its distance.
 constexpr double flat_to = 1e-4;
 /// Noisy sensors bend space by about this share of the distance. Redwood's poses stay by it, and 7-Scenes' get better.
@@ -105,6 +106,7 @@ struct Encounter {
 std::vector<Encounter> encounters(const Pair& pair, const Isometry3d& here_from_there, double gates = 1) {
     std::vector<Encounter> all;
     const Pinhole& camera = pair.here.depth.camera;
+    const int apart_px = pair.here.apart_px;
     const cv::Mat1f& z_m = pair.here.depth.z_m;
     for (const Facets::Facet& there : pair.there.all) {
         const Vector3d point = here_from_there * there.point;
@@ -236,7 +238,10 @@ std::optional<Evidence> evidence(const Motions& motions, const std::vector<Encou
 } // namespace
 
 Facets facets_of(const DepthImage& depth, const DepthNoise& noise) {
-    Facets facets{depth, {std::max(depth.z_m.cols / apart_px, 1), std::max(depth.z_m.rows / apart_px, 1)}, {}};
+    const int apart_px =
+        std::clamp(cvRound(std::sqrt(static_cast<double>(depth.z_m.total()) / enough_facets)), 1, most_apart_px);
+    Facets facets{
+        depth, apart_px, {std::max(depth.z_m.cols / apart_px, 1), std::max(depth.z_m.rows / apart_px, 1)}, {}};
     facets.all.resize(static_cast<std::size_t>(facets.grid.area()));
     tbb::parallel_for(0, facets.grid.height, [&](int row) {
         for (int column = 0; column < facets.grid.width; ++column)
@@ -272,16 +277,22 @@ Aligned aligned(const Pair& pair, const Isometry3d& here_from_there) {
     }
     Vector6d motion = Vector6d::Zero(), along, known;
     std::optional<Evidence> found;
-    for (const double gates : {3.0, 1.0}) // what is far off must first be found
+    // What is far off must first be found, and must not be given up for what meets sooner: errors that count fully
+    // shrink from round to round. How well a direction is known is told by where the planes meet at last.
+    struct Stage {
+        double gates, last_blur, limit_m;
+    };
+    for (const Stage& stage : {Stage{3, 0.5, pose_sigma_m}, {1, 0, pose_sigma_m}, {1, 0, limit_m}})
         for (int round = 0; round < rounds; ++round) {
-            found = evidence(motions, encounters(pair, motions(motion) * here_from_there, gates), gates > 1 ? 0.5 : 0);
+            found = evidence(motions, encounters(pair, motions(motion) * here_from_there, stage.gates),
+                             stage.last_blur * std::exp2(std::max(3 - round, 0)));
             if (!found)
                 return {here_from_there, 0};
-            known = found->known(gates > 1 ? pose_sigma_m : limit_m);
+            known = found->known(stage.limit_m);
             along = known.cwiseProduct(found->directions.transpose() * motion + found->step_m);
             const Vector6d before = motion;
             motion = found->directions * along;
-            if ((motion - before).norm() < 1e-5)
+            if ((motion - before).norm() < 1e-5 && (stage.last_blur == 0 || round >= 3))
                 break;
         }
     const Isometry3d better = motions(motion) * here_from_there;

@@ -18,6 +18,7 @@ struct Facets {
         double radius_px = 0;                             ///< of the window that the plane was fitted to
     };
     DepthImage depth;
+    int apart_px = 1; ///< pixels from one to the next
     cv::Size grid;
     std::vector<Facet> all; ///< row by row
 };
