@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Eigenvalues>
-#include <numbers>
 #include <optional>
 #include <tbb/parallel_for.h>
 
@@ -17,19 +16,47 @@ using Eigen::Vector3d;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-constexpr int apart_px = 12; // of the facets
+constexpr int most_apart_px = 12;      // of the facets
+constexpr double enough_facets = 2100; // of small images, as many as of 640x480 pixels
+/// What is taken for a plane is one to this share of its distance.
+constexpr double flat_to = 1e-4;
+/// Noisy sensors bend space by about this share of the distance. Redwood's poses stay by it, and 7-Scenes' get better.
+constexpr double bent_by = 1e-3;
+constexpr double pose_sigma_m = 0.06; // what poses may err at worst
+/// A direction is aligned where the planes tell it to this share of the radius, and left as recorded elsewhere.
+constexpr double sufficient = 0.02;
+
+/// The slope of 1/z along a row or a column: the median between five samples, which a step in the window does not move.
+/// A start of zero would lose planes seen at a grazing angle, such as the floor.
+double slope_along(const DepthImage& depth, cv::Point at, cv::Point direction, double apart) {
+    std::vector<double> slopes;
+    int previous = 0;
+    double before = 0; // no depth
+    for (int i = -2; i <= 2; ++i) {
+        const int by = cvRound(i * apart);
+        const cv::Point p = at + by * direction;
+        const bool inside = p.x >= 0 && p.y >= 0 && p.x < depth.z_m.cols && p.y < depth.z_m.rows;
+        const double z = inside ? static_cast<double>(depth.z_m(p)) : 0, w = z > 0 ? 1 / z : 0;
+        if (w > 0 && before > 0)
+            slopes.push_back((w - before) / (by - previous));
+        previous = by;
+        before = w;
+    }
+    return slopes.empty() ? 0 : quantile(slopes, 0.5);
+}
 
 /// The plane w = W + a x + b y in 1/z round a pixel, by least squares over 5x5 samples, twice: what is of another
 /// surface has no say in the second round.
 Facets::Facet facet_at(const DepthImage& depth, int u, int v, const DepthNoise& noise) {
     const double z = depth.z_m(v, u);
     if (!(z > 0))
-        return {Vector3d::Zero(), Vector3d::Zero()};
+        return {};
     const Pinhole& camera = depth.camera;
     const double here = 1 / z, sigma = noise.at(z) * here * here;
     const double radius = std::clamp(
         std::sqrt(1.8 * noise.correlation_px * noise.correlation_px * noise.at(z) * camera.fx / z), 2.0, 12.0);
-    Vector3d plane = Vector3d::Zero(); // a, b, offset from `here`
+    Vector3d plane(slope_along(depth, {u, v}, {1, 0}, radius / 2), slope_along(depth, {u, v}, {0, 1}, radius / 2), 0);
+    double variance = 0; // of the offset, for samples of variance 1
     for (int round = 0; round < 2; ++round) {
         const double limit = 4 * sigma + (round == 0 ? 0.7 * radius * here / camera.fx : 1e-3 * here);
         Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
@@ -49,21 +76,29 @@ Facets::Facet facet_at(const DepthImage& depth, int u, int v, const DepthNoise& 
                 ++used;
             }
         if (used < 10)
-            return {Vector3d::Zero(), Vector3d::Zero()};
-        plane = products.ldlt().solve(right);
+            return {};
+        const auto solved = products.ldlt();
+        plane = solved.solve(right);
+        variance = solved.solve(Vector3d::UnitZ()).z();
     }
     const double w = here + plane.z(), fitted = 1 / w;
     const Vector3d normal(camera.fx * plane.x(), camera.fy * plane.y(),
                           w - plane.x() * (u - camera.cx) - plane.y() * (v - camera.cy));
-    if (!(w > 0) || std::abs(plane.z()) > 4 * sigma + 1e-3 * here)
-        return {Vector3d::Zero(), Vector3d::Zero()};
-    return {camera.point(u, v, fitted), -normal.normalized()};
+    if (!(variance > 0 && variance < 1) || !(w > 0) || std::abs(plane.z()) > 4 * sigma + 1e-3 * here)
+        return {};
+    const Vector3d point = camera.point(u, v, fitted), unit = -normal.normalized();
+    const double bent = noise.any() ? bent_by * fitted : 0;
+    const double correlated = std::max(1.0, 2 * noise.correlation_px / radius); // samples that err together
+    const double across = std::abs(unit.dot(point)) / fitted;
+    return {point, unit, correlated * std::sqrt(variance) * noise.at(fitted) * across + flat_to * fitted + bent,
+            radius};
 }
 
 /// A point of the one frame, and the plane of the other that it meets or misses by a gate.
 struct Encounter {
     Vector3d point, normal; ///< here
     double distance_m;      ///< from the plane, towards the camera
+    double sigma_m;         ///< of the distance
     double tolerable_m;
     bool meets, hides;
 };
@@ -71,6 +106,7 @@ struct Encounter {
 std::vector<Encounter> encounters(const Pair& pair, const Isometry3d& here_from_there, double gates = 1) {
     std::vector<Encounter> all;
     const Pinhole& camera = pair.here.depth.camera;
+    const int apart_px = pair.here.apart_px;
     const cv::Mat1f& z_m = pair.here.depth.z_m;
     for (const Facets::Facet& there : pair.there.all) {
         const Vector3d point = here_from_there * there.point;
@@ -89,7 +125,12 @@ std::vector<Encounter> encounters(const Pair& pair, const Isometry3d& here_from_
         const double distance = here.normal.dot(point - here.point);
         const bool alike = here.normal.dot(here_from_there.linear() * there.normal) > 0.7;
         const bool hides = point.z() < seen_z - gate;
-        all.push_back({point, here.normal, distance, 0.02 * pair.radius_m + sigma, alike && std::abs(distance) < gate,
+        const double du = x - std::min(column * apart_px + apart_px / 2, z_m.cols - 1),
+                     dv = y - std::min(row * apart_px + apart_px / 2, z_m.rows - 1);
+        // The variance of a plane away from the middle of a square of samples.
+        const double away = here.radius_px > 0 ? 1 + 2 * (du * du + dv * dv) / (here.radius_px * here.radius_px) : 1;
+        all.push_back({point, here.normal, distance, std::hypot(there.sigma_m, here.sigma_m * std::sqrt(away)),
+                       0.02 * pair.radius_m + sigma, alike && std::abs(distance) < gate,
                        hides && !(alike && std::abs(distance) < gate)});
     }
     return all;
@@ -104,64 +145,103 @@ std::vector<double> alignment_errors(const std::vector<Encounter>& all, bool in_
     return values;
 }
 
-Isometry3d moved(const Vector6d& by) {
-    Isometry3d motion = Isometry3d::Identity();
-    const Vector3d turn = by.head<3>();
-    if (turn.norm() > 0)
-        motion.linear() = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
-    motion.translation() = by.tail<3>();
-    return motion;
-}
+/// The motions of a frame that are looked for: turns about the middle of the surfaces, and shifts. Turns are measured
+/// by what they move at the surfaces' distance from that middle, so all six numbers are metres.
+struct Motions {
+    Vector3d middle;
+    double extent_m;
 
-/// Of what the planes that meet say about a motion: a turn, then a shift.
-struct NormalEquations {
-    Matrix6d matrix;
-    Vector6d gradient;
-    Vector3d middle; ///< of the surfaces
+    [[nodiscard]] Isometry3d operator()(const Vector6d& by) const {
+        const Vector3d turn = by.head<3>() / extent_m;
+        Isometry3d motion = Isometry3d::Identity();
+        if (turn.norm() > 0)
+            motion.linear() = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+        motion.translation() = by.tail<3>() + middle - motion.linear() * middle;
+        return motion;
+    }
+    /// How a point moves along a normal.
+    [[nodiscard]] Vector6d slope(const Vector3d& point, const Vector3d& normal) const {
+        Vector6d slope;
+        slope << (point - middle).cross(normal) / extent_m, normal;
+        return slope;
+    }
 };
 
-/// After that motion; nothing where too few planes meet.
-std::optional<NormalEquations> normal_equations(const Pair& pair, const Vector6d& motion,
-                                                const Isometry3d& here_from_there, double gates) {
-    const std::vector<Encounter> all = encounters(pair, moved(motion) * here_from_there, gates);
-    std::vector<double> values = alignment_errors(all);
-    if (values.size() < 30)
-        return std::nullopt;
-    const double limit = std::max(3 * quantile(values, 0.5), 0.3);
-    constexpr double turn_sigma = 1.5 * std::numbers::pi / 180, shift_sigma_m = 0.06; // what poses may err at worst
-    Vector6d prior;
-    prior << Vector3d::Constant(1 / (turn_sigma * turn_sigma)), Vector3d::Constant(1 / (shift_sigma_m * shift_sigma_m));
-    NormalEquations system{prior.asDiagonal(), prior.cwiseProduct(motion), Vector3d::Zero()};
-    for (const Encounter& each : all) {
-        system.middle += each.point / static_cast<double>(all.size());
-        const double miss = each.distance_m / each.tolerable_m / limit;
-        if (!each.meets || std::abs(miss) >= 1)
-            continue;
-        // A point's error is that of its patch, not of one pixel among many: a tenth of its weight is what it tells.
-        const double weight = 0.1 * (1 - miss * miss) * (1 - miss * miss) / (each.tolerable_m * each.tolerable_m);
-        Vector6d slope;
-        slope << each.point.cross(each.normal), each.normal;
-        system.matrix += weight * slope * slope.transpose();
-        system.gradient += weight * each.distance_m * slope;
-    }
-    return system;
+Motions motions_about(const std::vector<Encounter>& all) {
+    Motions motions{Vector3d::Zero(), 0};
+    for (const Encounter& each : all)
+        motions.middle += each.point / static_cast<double>(all.size());
+    for (const Encounter& each : all)
+        motions.extent_m += (each.point - motions.middle).squaredNorm() / static_cast<double>(all.size());
+    motions.extent_m = std::max(std::sqrt(motions.extent_m), 1e-9);
+    return motions;
 }
 
-/// Sigma of where the surfaces' middle lies, in the direction that is known least, metres.
-double uncertainty(const NormalEquations& system) {
-    const Vector3d& p = system.middle;
-    Eigen::Matrix<double, 3, 6> by_motion; // turned and shifted
-    by_motion << Eigen::Matrix3d{{0, p.z(), -p.y()}, {-p.z(), 0, p.x()}, {p.y(), -p.x(), 0}},
-        Eigen::Matrix3d::Identity();
-    const Eigen::Matrix3d covariance = by_motion * system.matrix.ldlt().solve(by_motion.transpose());
-    return std::sqrt(
-        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance, Eigen::EigenvaluesOnly).eigenvalues().maxCoeff());
+/// What the planes that meet say about a motion, along six directions.
+struct Evidence {
+    Matrix6d directions; ///< columns, from the one that the planes tell least about
+    Vector6d sigma_m;    ///< along each; infinite where no planes tell
+    Vector6d step_m;     ///< along each, to where the planes meet
+    double scale;        ///< of the distances, in their sigmas; at least 1. Contained in the sigmas
+
+    /// 1 for each direction that is known well enough, 0 for the others.
+    [[nodiscard]] Vector6d known(double limit_m) const { return (sigma_m.array() < limit_m).cast<double>(); }
+    /// The square of the motion in sigmas, each direction that is known.
+    [[nodiscard]] double significance(const Vector6d& along, const Vector6d& known) const {
+        return known.cwiseProduct(along.cwiseQuotient(sigma_m)).squaredNorm();
+    }
+};
+
+/// Nothing where too few planes meet.
+std::optional<Evidence> evidence(const Motions& motions, const std::vector<Encounter>& all, double blur = 0) {
+    std::vector<double> misses;
+    for (const Encounter& each : all)
+        if (each.meets)
+            misses.push_back(std::abs(each.distance_m) / std::hypot(each.sigma_m, blur * each.tolerable_m));
+    if (misses.size() < 30)
+        return std::nullopt;
+    const double scale = std::max(1.0, 1.4826 * quantile(misses, 0.5)); // the robust estimate of a sigma
+    struct Row {
+        Vector6d slope;
+        double weight, distance_m;
+    };
+    std::vector<Row> rows;
+    rows.reserve(misses.size());
+    Matrix6d matrix = Matrix6d::Zero();
+    for (const Encounter& each : all) {
+        // Tukey's weight. Where most planes meet already, those of other directions may still be off by more.
+        const double sigma = scale * std::hypot(each.sigma_m, blur * each.tolerable_m);
+        const double miss = each.distance_m / std::max(4.685 * sigma, 0.3 * each.tolerable_m);
+        if (!each.meets || std::abs(miss) >= 1)
+            continue;
+        const double kept = (1 - miss * miss) * (1 - miss * miss);
+        rows.push_back({motions.slope(each.point, each.normal), kept / (sigma * sigma), each.distance_m});
+        matrix += rows.back().weight * rows.back().slope * rows.back().slope.transpose();
+    }
+    const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(matrix);
+    Evidence result{eigen.eigenvectors(), {}, {}, scale};
+    for (int i = 0; i < 6; ++i) {
+        const Vector6d direction = eigen.eigenvectors().col(i);
+        double told = 0, pull = 0;
+        for (const Row& row : rows) {
+            const double along = row.slope.dot(direction);
+            pull -= row.weight * along * row.distance_m;
+            if (std::abs(along) > 0.2) // less is also what noise makes of a plane that lies along the direction
+                told += row.weight * along * along;
+        }
+        result.sigma_m[i] = 1 / std::sqrt(told);
+        result.step_m[i] = pull / (eigen.eigenvalues()[i] + 1 / (pose_sigma_m * pose_sigma_m));
+    }
+    return result;
 }
 
 } // namespace
 
 Facets facets_of(const DepthImage& depth, const DepthNoise& noise) {
-    Facets facets{depth, {std::max(depth.z_m.cols / apart_px, 1), std::max(depth.z_m.rows / apart_px, 1)}, {}};
+    const int apart_px =
+        std::clamp(cvRound(std::sqrt(static_cast<double>(depth.z_m.total()) / enough_facets)), 1, most_apart_px);
+    Facets facets{
+        depth, apart_px, {std::max(depth.z_m.cols / apart_px, 1), std::max(depth.z_m.rows / apart_px, 1)}, {}};
     facets.all.resize(static_cast<std::size_t>(facets.grid.area()));
     tbb::parallel_for(0, facets.grid.height, [&](int row) {
         for (int column = 0; column < facets.grid.width; ++column)
@@ -185,23 +265,46 @@ Agreement agreement(const Pair& pair, const Isometry3d& here_from_there) {
 
 Aligned aligned(const Pair& pair, const Isometry3d& here_from_there) {
     constexpr int rounds = 8;
-    Vector6d motion = Vector6d::Zero();
-    std::optional<NormalEquations> system;
-    for (const double gates : {3, 1}) // what is far off must first be found
+    constexpr double three_sigma = 9;
+    const double limit_m = sufficient * pair.radius_m;
+    std::vector<Encounter> all = encounters(pair, here_from_there, 1);
+    const Motions motions = motions_about(all);
+    // Noise fits better after any motion: one that is not significant is none. What is off has a large scale.
+    if (const auto first = evidence(motions, all)) {
+        const Vector6d known = first->known(limit_m * first->scale);
+        if (first->scale * first->scale * first->significance(first->step_m, known) < three_sigma * known.sum())
+            return {here_from_there, 0};
+    }
+    Vector6d motion = Vector6d::Zero(), along, known;
+    std::optional<Evidence> found;
+    // What is far off must first be found, and must not be given up for what meets sooner: errors that count fully
+    // shrink from round to round. How well a direction is known is told by where the planes meet at last.
+    struct Stage {
+        double gates, last_blur, limit_m;
+    };
+    for (const Stage& stage : {Stage{3, 0.5, pose_sigma_m}, {1, 0, pose_sigma_m}, {1, 0, limit_m}})
         for (int round = 0; round < rounds; ++round) {
-            system = normal_equations(pair, motion, here_from_there, gates);
-            if (!system)
+            found = evidence(motions, encounters(pair, motions(motion) * here_from_there, stage.gates),
+                             stage.last_blur * std::exp2(std::max(3 - round, 0)));
+            if (!found)
                 return {here_from_there, 0};
-            const Vector6d step = system->matrix.ldlt().solve(-system->gradient);
-            motion += step;
-            if (step.norm() < 1e-5)
+            known = found->known(stage.limit_m);
+            along = known.cwiseProduct(found->directions.transpose() * motion + found->step_m);
+            const Vector6d before = motion;
+            motion = found->directions * along;
+            if ((motion - before).norm() < 1e-5 && (stage.last_blur == 0 || round >= 3))
                 break;
         }
-    const Isometry3d better = moved(motion) * here_from_there;
-    // Noise fits better after any adjustment; a pose that is off, much better.
-    if (agreement(pair, better).alignment_error > 0.75 * agreement(pair, here_from_there).alignment_error)
+    const Isometry3d better = motions(motion) * here_from_there;
+    if (found->significance(along, known) < three_sigma * known.sum() || known.isZero() ||
+        agreement(pair, better).alignment_error > agreement(pair, here_from_there).alignment_error)
         return {here_from_there, 0};
-    return {better, uncertainty(*system)};
+    // What is left as recorded may be off by as much as the rest was.
+    const double left_m = std::sqrt(along.squaredNorm() / known.sum());
+    double sigma_m = 0;
+    for (int i = 0; i < 6; ++i)
+        sigma_m = std::max(sigma_m, known[i] > 0 ? found->sigma_m[i] : left_m);
+    return {better, sigma_m};
 }
 
 } // namespace scanshade

@@ -12,9 +12,13 @@ namespace scanshade {
 /// Pieces of plane on a wide grid of a depth image's pixels: enough to lay frames onto each other.
 struct Facets {
     struct Facet {
-        Eigen::Vector3d point, normal; ///< camera space; the normal is zero where no plane fits
+        Eigen::Vector3d point = Eigen::Vector3d::Zero();
+        Eigen::Vector3d normal = Eigen::Vector3d::Zero(); ///< camera space; zero where no plane fits
+        double sigma_m = 0;                               ///< of the point, across the plane
+        double radius_px = 0;                             ///< of the window that the plane was fitted to
     };
     DepthImage depth;
+    int apart_px = 1; ///< pixels from one to the next
     cv::Size grid;
     std::vector<Facet> all; ///< row by row
 };
@@ -43,8 +47,9 @@ struct Pair {
 [[nodiscard]] Agreement agreement(const Pair& pair, const Eigen::Isometry3d& here_from_there);
 
 /// The pose next to the given one in which the planes of both frames lie on each other. The distances are
-/// point-to-plane (Chen and Medioni 1991); points are paired along the view (Blais and Levine 1995). What the surfaces
-/// leave open stays as given.
+/// point-to-plane (Chen and Medioni 1991), each weighted by its own error; points are paired along the view (Blais and
+/// Levine 1995). Directions that the surfaces leave open stay as given (Zhang, Kaess and Singh 2016), and so does the
+/// pose where no motion is significant.
 struct Aligned {
     Eigen::Isometry3d here_from_there;
     double sigma_m = 0; ///< of where it puts the surfaces, in the direction that they tell least about

@@ -13,8 +13,6 @@ namespace {
 
 using Eigen::Isometry3d;
 
-/// Share of the tolerable alignment_error below which recorded poses are as good as aligned ones.
-constexpr double aligned_already = 0.05;
 /// Of what an alignment leaves open, how much counts as alignment_error: most of it slides surfaces along themselves.
 constexpr double slides = 0.25;
 
@@ -131,8 +129,7 @@ const PackedSurfaces& SequenceAo::packed(std::size_t index) {
 SequenceAo::PairRegistration SequenceAo::registered(const Slot& earlier, const Slot& later) const {
     const Pair pair{*earlier.facets, *later.facets, radius_m_, noise_}, back{pair.there, pair.here, radius_m_, noise_};
     const Isometry3d recorded = earlier.world_from_camera->inverse() * *later.world_from_camera;
-    const auto [pose, sigma_m] =
-        agreement(pair, recorded).alignment_error > aligned_already ? aligned(pair, recorded) : Aligned{recorded};
+    const auto [pose, sigma_m] = aligned(pair, recorded);
     // Each must agree with the other: what one has looked through tells nothing of what is hidden from it.
     const Agreement there = agreement(pair, pose), here = agreement(back, pose.inverse());
     return {{std::min(there.overlap, here.overlap), std::max(there.contradicted, here.contradicted),
