@@ -2,6 +2,7 @@
 #include "ao/cloud/cloud_ao.h"
 #include "ao/cloud/large_cloud.h"
 #include "ao/cloud/surface/neighbours.h"
+#include "ao/gpu/device.h"
 #include "apps/large/large_cloud_run.h"
 #include "apps/large/survey.h"
 #include "apps/large/tiles_on_disk.h"
@@ -237,6 +238,28 @@ TEST(LargeCloud, tiles_that_do_not_fit_on_the_disk_are_refused_before_they_are_w
         EXPECT_NE(std::string(failure.what()).find("too little"), std::string::npos) << failure.what();
     }
     EXPECT_FALSE(fs::exists(folder / "tiles"));
+}
+
+/// What a run takes beside the points in work: a program of 30 MiB, samples, buffers. Software drivers would be 60
+/// more.
+TEST(LargeCloud, a_run_from_disk_takes_little_memory_beside_the_points_in_work) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    GTEST_SKIP() << "sanitizers take memory of their own";
+#endif
+    ::unsetenv("SCANSHADE_VALIDATE"); // which loads drivers
+    if (gpu::may_have_gpu())
+        GTEST_SKIP() << "drivers of GPUs take memory of their own";
+    const tests::TemporaryFolder folder;
+    const fs::path file = write_ply(folder / "a.ply", tests::corner(400000));
+    const std::string command =
+        fmt::format("'{}' run '{}' -o '{}' --page no --write cloud --cloud.outside 1,1,1 --cloud.rays 4 --cloud.memory "
+                    "{} -q >/dev/null 2>&1",
+                    SCANSHADE_PROGRAM, file.string(), (folder / "out").string(), little_memory_mib);
+    ASSERT_EQ(std::system(command.c_str()), 0) << command;
+    const std::string manifest = file_bytes(folder / "out" / "manifest.json"), key = "\"peak_memory_mib\": ";
+    const std::size_t at = manifest.find(key);
+    ASSERT_NE(at, std::string::npos);
+    EXPECT_LT(std::stod(manifest.substr(at + key.size())), little_memory_mib + 96);
 }
 
 TEST(LargeCloud, cut_files_are_refused_by_name) {
