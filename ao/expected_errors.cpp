@@ -76,6 +76,10 @@ void take_line(const std::string& line, ErrorTables& tables) {
             factor = number_in(words);
     } else if (kind == "together") {
         errors.together = number_in(words);
+    } else if (kind == "spread") {
+        errors.spread = number_in(words);
+        if (!(errors.spread > 0))
+            throw Error("a number above 0 expected");
     } else if (kind == "variant") {
         ErrorVariant variant{{}, number_in(words)};
         std::string settings;
@@ -83,7 +87,7 @@ void take_line(const std::string& line, ErrorTables& tables) {
         variant.settings = settings_from(settings);
         errors.variants.push_back(std::move(variant));
     } else {
-        throw Error(fmt::format("made_by, table, together or variant expected, found '{}'", kind));
+        throw Error(fmt::format("made_by, table, together, spread or variant expected, found '{}'", kind));
     }
     if (std::string more; words >> more)
         throw Error(fmt::format("'{}' is one word too many", more));
@@ -121,6 +125,8 @@ std::string text_of(const ErrorTables& tables) {
         text += fmt::format("table {} {:.2f}\n", head, fmt::join(std::span(errors.table.factors), " "));
         if (errors.together != 0)
             text += fmt::format("together {} {:.2f}\n", head, errors.together);
+        if (errors.spread > 0)
+            text += fmt::format("spread {} {:.2f}\n", head, errors.spread);
         for (const ErrorVariant& variant : errors.variants)
             text += fmt::format("variant {} {:.2f} {}\n", head, variant.factor, text_of(variant.settings));
     }
@@ -158,6 +164,18 @@ shared::ErrorTable errors_of(const ErrorTables& tables, const std::string& metho
     for (int i = 0; i < shared::error_edges_at; ++i) // every pixel's sum holds one of these with weights of sum 1
         table.factors[i] += factor;
     return table;
+}
+
+double spread_of(const ErrorTables& tables, const std::string& method, SensorClass sensor) {
+    if (const MethodErrors* errors = known(tables, method, sensor); errors && errors->spread > 0)
+        return static_cast<double>(errors->spread);
+    float of_class = 0, of_all = 1;
+    for (const auto& [key, errors] : tables.methods) {
+        of_all = std::max(of_all, errors.spread);
+        if (key.second == sensor)
+            of_class = std::max(of_class, errors.spread);
+    }
+    return static_cast<double>(of_class > 0 ? of_class : of_all);
 }
 
 } // namespace scanshade

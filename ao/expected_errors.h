@@ -26,6 +26,7 @@ struct ErrorVariant {
 struct MethodErrors {
     shared::ErrorTable table{};
     float together = 0; ///< factor of frames of a recording computed together (--sequence)
+    float spread = 0;   ///< nine of ten frames of scenes not fitted to err by at most so many times what is expected
     std::vector<ErrorVariant> variants;
 };
 
@@ -35,7 +36,8 @@ struct ErrorTables {
 };
 
 /// Lines of text: "made_by COMMAND", "table METHOD CLASS number ...", "variant METHOD CLASS factor name=value,...",
-/// "together METHOD CLASS factor". CLASS has _ for spaces. Throws Error naming `origin` and the line.
+/// "together METHOD CLASS factor", "spread METHOD CLASS times". CLASS has _ for spaces. Throws Error naming `origin`
+/// and the line.
 [[nodiscard]] ErrorTables error_tables_from(std::istream& text, const std::string& origin);
 [[nodiscard]] std::string text_of(const ErrorTables& tables);
 
@@ -47,5 +49,9 @@ struct ErrorTables {
 /// errs most. `together`: with other frames of the recording.
 [[nodiscard]] shared::ErrorTable errors_of(const ErrorTables& tables, const std::string& method,
                                            const ChosenSettings& settings, SensorClass sensor, bool together);
+
+/// How many times what is expected a frame errs by at most, with a chance of nine in ten. The largest of the class, or
+/// of all, where this method has none.
+[[nodiscard]] double spread_of(const ErrorTables& tables, const std::string& method, SensorClass sensor);
 
 } // namespace scanshade

@@ -19,7 +19,8 @@ class CloudSample {
         Eigen::Vector3d point;
         Eigen::Vector3f normal;
     };
-    explicit CloudSample(std::size_t enough) : enough_(enough) {}
+    /// Of `all` points.
+    CloudSample(std::size_t enough, std::size_t all) : enough_(enough) { points_.reserve(std::min(all, most())); }
 
     void add(std::uint32_t number, const Eigen::Vector3d& point, const Eigen::Vector3f& normal) {
         const std::uint32_t by = hash(number);
@@ -27,7 +28,7 @@ class CloudSample {
         if (by >= below_)
             return;
         points_.push_back({number, by, point, normal});
-        if (points_.size() >= 2 * enough_)
+        if (points_.size() >= most())
             thin();
     }
     /// Points that passed by.
@@ -42,6 +43,7 @@ class CloudSample {
     [[nodiscard]] std::uint64_t below() const { return below_; }
 
   private:
+    [[nodiscard]] std::size_t most() const { return enough_ + enough_ / 2; } ///< in memory
     void thin() {
         const auto place = points_.begin() + static_cast<std::ptrdiff_t>(enough_);
         std::nth_element(points_.begin(), place, points_.end(),

@@ -492,10 +492,7 @@ CloudWork::Fitted CloudWork::planes_of(const Indices& which, CloudGpu* gpu) {
     const auto surface_of = [&] {
         LocalCloud local(points);
         watch_.lap("points in order");
-        if (!whole_)
-            fitted = fitted_cloud(local, points, normals, options_.sky ? 10 * result_.spacing : result_.radius);
-        else if (whole_->noise)
-            fitted = fitted_cloud(local, points, normals, *whole_->noise);
+        fitted = without_noise(local, points, normals);
         watch_.lap("noise");
         return fitted.empty() ? cloud_surface(std::move(local), normals, gpu)
                               : cloud_surface(LocalCloud(fitted.points), fitted.normals, gpu, fitted.axes);
@@ -528,6 +525,19 @@ CloudWork::Fitted CloudWork::planes_of(const Indices& which, CloudGpu* gpu) {
         }
     }
     return {std::move(surface), std::move(fitted)};
+}
+
+/// Noise of the cloud, which a tile is told, and another part of a cloud finds by itself.
+FittedCloud CloudWork::without_noise(const LocalCloud& local, std::span<const Vector3d> points,
+                                     std::span<const Vector3d> normals) const {
+    const ThinningGrid grid = thinning_grid(extent_.centre, result_.spacing);
+    const double radius = options_.sky ? 10 * result_.spacing : result_.radius;
+    if (part_ && !whole_)
+        return fitted_cloud(local, points, normals, radius, grid);
+    const std::optional<SharedNoise> noise =
+        whole_ ? whole_->noise
+               : noise_at(noise_places(cloud_.points, valid_), local, normals, look_for_noise(radius, result_.spacing));
+    return noise ? fitted_cloud(local, points, normals, *noise, grid) : FittedCloud();
 }
 
 /// Whether recorded normals are used.
@@ -587,6 +597,26 @@ std::vector<Vector3d> sampled(std::span<const Vector3d> points, const Indices& i
     for (const std::uint32_t i : indices_where(indices, [&](std::uint32_t point) { return hash(point) < chosen; }))
         some.push_back(points[i]);
     return some;
+}
+
+std::vector<NoisePlace> noise_places(std::span<const Vector3d> points, const Indices& those) {
+    struct Hashed {
+        std::uint32_t hash, number;
+        bool operator<(const Hashed& other) const {
+            return hash != other.hash ? hash < other.hash : number < other.number;
+        }
+    };
+    // A threshold that four times as many are below, so that few have to be sorted.
+    const double share = 4.0 * NoisePlace::wanted / static_cast<double>(std::max<std::size_t>(those.size(), 1));
+    const auto chosen = static_cast<std::uint64_t>(std::min(share, 1.0) * 0x1p32);
+    std::vector<Hashed> lowest;
+    for (const std::uint32_t number : indices_where(those, [&](std::uint32_t i) { return hash(i) < chosen; }))
+        lowest.push_back({hash(number), number});
+    std::ranges::sort(lowest, std::less());
+    std::vector<NoisePlace> places;
+    for (std::size_t k = 0; k < std::min(lowest.size(), NoisePlace::wanted); ++k)
+        places.push_back({lowest[k].number, points[lowest[k].number]});
+    return places;
 }
 
 Indices finite(std::span<const Vector3d> points) {

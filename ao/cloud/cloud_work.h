@@ -122,6 +122,8 @@ class CloudWork {
     void settle_orientation(const std::vector<Eigen::Vector3d>& some);
     void settle_extent(std::vector<Eigen::Vector3d>& some);
     [[nodiscard]] bool beyond(const Eigen::Vector3d& point) const;
+    [[nodiscard]] FittedCloud without_noise(const LocalCloud& local, std::span<const Eigen::Vector3d> points,
+                                            std::span<const Eigen::Vector3d> normals) const;
     [[nodiscard]] Picked picked(const Indices& indices) const;
     void compute_strays();
     void compute_thinned();
@@ -163,6 +165,8 @@ class CloudWork {
 /// About `wanted` of these points, chosen by a hash: every n-th point in recording order would skip whole scan lines.
 [[nodiscard]] std::vector<Eigen::Vector3d> sampled(std::span<const Eigen::Vector3d> points, const Indices& indices,
                                                    std::size_t wanted);
+/// The places where noise is looked for: of the points with these numbers.
+[[nodiscard]] std::vector<NoisePlace> noise_places(std::span<const Eigen::Vector3d> points, const Indices& those);
 [[nodiscard]] Indices finite(std::span<const Eigen::Vector3d> points);
 
 /// Sentences about an error that a check on a share `keep` of the points expects. `doubt` is there if it is large.

@@ -114,7 +114,7 @@ class LargeCloud {
   private:
     /// The first pass: a sample, from which everything is decided that concerns all tiles.
     void survey() {
-        CloudSample sample(enough_for_sides);
+        CloudSample sample(enough_for_sides, source_.size());
         TwinLook twins;
         source_.pass([&](std::size_t first, std::span<const Vector3d> points, std::span<const Vector3d> normals) {
             for (std::size_t i = 0; i < points.size(); ++i)
@@ -141,7 +141,10 @@ class LargeCloud {
         std::vector<Vector3d> points;
         for (const CloudSample::Point& each : sample_)
             points.push_back(each.point);
-        plan_ = TilePlan(points, share, decided.radius + 16 * decided.spacing, at_once_);
+        // Beyond the radius: planes of 64 neighbours, and whole boxes of what is thinned together.
+        const double side = thinning_grid(decided.extent.centre, decided.spacing).side;
+        const double beyond_radius = std::max(16 * decided.spacing, side + 4 * decided.spacing);
+        plan_ = TilePlan(points, share, decided.radius + beyond_radius, at_once_);
         watch_.lap("survey");
     }
 
@@ -194,9 +197,7 @@ class LargeCloud {
 
     void sort_anew() {
         const CloudDecisions& decided = whole_.decisions;
-        const double widest = decided.radius / 3;
-        const double reach = std::min(1.5 * widest, NoisePlaces::widest_in_spacings * decided.spacing);
-        NoisePlaces places(noise_places(), reach);
+        NoisePlaces places(noise_places(), look_for_noise(decided.radius, decided.spacing));
         const std::uint64_t checked = hashes_below(check_.keep);
         const Vector3f none = Vector3f::Zero();
         source_.pass([&](std::size_t first, std::span<const Vector3d> points, std::span<const Vector3d> normals) {
@@ -222,18 +223,15 @@ class LargeCloud {
             }
             may_stop();
         });
-        sorted_.noise = places.measured(widest);
+        sorted_.noise = places.measured();
     }
 
-    /// Places spread over the sample, as many as the memory allows.
-    [[nodiscard]] std::vector<NoisePlaces::Place> noise_places() const {
-        constexpr std::size_t fewest = 64, most = 1024;
-        const std::size_t wanted =
-            std::min(sample_.size(), std::clamp(at_once_ / NoisePlaces::usual_points, fewest, most));
-        std::vector<NoisePlaces::Place> places;
+    /// Those of noise_places() for a cloud in memory, whatever --cloud.memory is.
+    [[nodiscard]] std::vector<NoisePlace> noise_places() const {
+        std::vector<NoisePlace> places;
         std::vector<CloudSample::Point> lowest = sample_;
-        std::ranges::sort(lowest, {}, &CloudSample::Point::hash);
-        for (std::size_t k = 0; k < wanted; ++k)
+        std::ranges::sort(lowest, {}, [](const CloudSample::Point& each) { return std::pair(each.hash, each.number); });
+        for (std::size_t k = 0; k < std::min(lowest.size(), NoisePlace::wanted); ++k)
             places.push_back({lowest[k].number, lowest[k].point});
         return places;
     }

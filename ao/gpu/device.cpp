@@ -8,6 +8,7 @@
 #include <charconv>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <fmt/format.h>
 
 namespace scanshade::gpu {
@@ -200,6 +201,21 @@ int Device::State::memory_type(std::uint32_t allowed, vk::MemoryPropertyFlags wa
         if ((allowed >> i & 1u) && (memory.memoryTypes[i].propertyFlags & wanted) == wanted)
             return static_cast<int>(i);
     return -1;
+}
+
+bool may_have_gpu() {
+    namespace fs = std::filesystem;
+    for (const char* chosen : {"VK_DRIVER_FILES", "VK_ICD_FILENAMES", "VK_ADD_DRIVER_FILES", "SCANSHADE_VALIDATE"})
+        if (std::getenv(chosen))
+            return true;
+    std::error_code unreadable;
+    for (const fs::path folder : {"/dev", "/dev/dri"})
+        for (auto each = fs::directory_iterator(folder, unreadable); !unreadable && each != fs::directory_iterator();
+             each.increment(unreadable))
+            for (const char* driver : {"renderD", "nvidia", "dxg", "kgsl", "mali", "kfd", "pvr"})
+                if (each->path().filename().string().starts_with(driver))
+                    return true;
+    return false;
 }
 
 std::vector<DeviceInfo> list_devices() {

@@ -24,6 +24,10 @@ struct DeviceInfo {
 /// Whether the device is software on the processor.
 [[nodiscard]] inline bool is_cpu(const DeviceInfo& info) { return info.kind == "CPU"; }
 
+/// Whether the machine may have a GPU: its kernel offers one, or the environment names Vulkan drivers. Asks no driver,
+/// since loading a software one takes a tenth of a second and 50 MiB.
+[[nodiscard]] bool may_have_gpu();
+
 /// Every device the loader knows, usable or not. Empty without a driver; throws Error only when there is no Vulkan
 /// loader.
 [[nodiscard]] std::vector<DeviceInfo> list_devices();

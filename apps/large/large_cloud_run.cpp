@@ -91,6 +91,12 @@ LargeCloudRun::Result LargeCloudRun::result(std::size_t index, const std::option
     auto records = std::make_shared<CloudRecords>(stream.records());
     records->before.clear();
     records->viewpoint = stream.records().viewpoint;
+    of_shown.visibility.reserve(shown.size());
+    of_shown.confidence.reserve(shown.size());
+    of_shown.normals.reserve(shown.size());
+    result.shown.points.reserve(shown.size());
+    result.shown.colours.reserve(source_->coloured(index) ? shown.size() : 0);
+    records->points.reserve(shown.size() * stream.records().stride);
     std::size_t next = 0; // of those shown
     double sum = 0;
     std::vector<float> visibility, confidence;

@@ -16,6 +16,7 @@
 #include <map>
 #include <mutex>
 #include <span>
+#include <tbb/parallel_for.h>
 
 namespace scanshade {
 namespace {
@@ -104,9 +105,11 @@ class ExpectedErrorsPart final : public BenchPart {
             if (!fit_.empty() || !held_out_.empty())
                 errors.table = fitted_errors(own);
             const bool fitted = !fit_.empty() || !held_out_.empty();
-            if (held_out_.empty())
-                tell(method, sensor, own, fitted ? errors.table : shipped);
-            else if (const auto judged = held_out.find(sensor); judged != held_out.end())
+            if (held_out_.empty()) {
+                const double spread = tell(method, sensor, own, fitted ? errors.table : shipped);
+                if (each_left_out_ && scenes_.size() > 1)
+                    errors.spread = static_cast<float>(spread);
+            } else if (const auto judged = held_out.find(sensor); judged != held_out.end())
                 tell(method, sensor, judged->second, errors.table);
             if (!fit_.empty())
                 tables.methods[{method, sensor}] = errors;
@@ -175,8 +178,9 @@ class ExpectedErrorsPart final : public BenchPart {
             samples.insert(samples.end(), row.begin(), row.end());
     }
 
-    void tell(const std::string& method, SensorClass sensor, std::span<const ErrorSample> samples,
-              const shared::ErrorTable& table) {
+    /// Prints a row. Returns how many times what is expected nine of ten frames err by at most.
+    double tell(const std::string& method, SensorClass sensor, std::span<const ErrorSample> samples,
+                const shared::ErrorTable& table) {
         Calibration all;
         std::map<int, std::pair<double, double>> frames; // expected and found squares
         const auto judge = [&](int scene, const shared::ErrorTable& by) {
@@ -188,21 +192,27 @@ class ExpectedErrorsPart final : public BenchPart {
                     frames[sample.frame].second += static_cast<double>(sample.square);
                 }
         };
-        if (each_left_out_)
-            for (const auto& [name, scene] : scenes_)
-                judge(scene, fitted_errors(samples, scene));
-        else
+        if (each_left_out_) {
+            std::vector<shared::ErrorTable> of_others(scenes_.size());
+            tbb::parallel_for(0, static_cast<int>(scenes_.size()), [&](int scene) {
+                of_others[static_cast<std::size_t>(scene)] = fitted_errors(samples, scene);
+            });
+            for (int scene = 0; scene < static_cast<int>(scenes_.size()); ++scene)
+                judge(scene, of_others[static_cast<std::size_t>(scene)]);
+        } else
             judge(-1, table);
         std::vector<double> times;
         for (const auto& [frame, squares] : frames)
             times.push_back(std::sqrt(squares.second / squares.first));
+        const double spread = quantile(times, 0.9);
         std::string cells;
         for (const auto& [expected, found] : all.in_bins())
             cells += fmt::format("{:.3f}/{:.3f} ", expected, found);
         const auto [expected, found] = all.whole();
         fmt::print("| {} | {} | {}| {:.3f}/{:.3f} | {:.2f} |\n", method, name_of(sensor), cells, expected, found,
-                   quantile(times, 0.9));
+                   spread);
         std::fflush(stdout);
+        return spread;
     }
 
     std::string captures_, methods_, fit_, held_out_;

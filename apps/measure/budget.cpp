@@ -1,5 +1,6 @@
 #include "apps/measure/budget.h"
 
+#include "ao/expected_errors.h"
 #include "apps/measure/bench_results.h"
 #include "projection/base/error.h"
 #include "projection/base/statistics.h"
@@ -12,8 +13,6 @@ namespace scanshade {
 namespace {
 
 constexpr int rounds = 3;
-/// Frames may err by more than is expected of them.
-constexpr double safety = 1.25;
 
 /// The points of the capture's sensor class. Where there are none: those of the first class, and a sentence.
 const std::vector<BenchmarkPoint>& points_for(const ParetoFront& front, SensorClass sensor,
@@ -143,10 +142,11 @@ Choice choose(gpu::Device& device, const ParetoFront& front, const TrialCapture&
     if (budget.max_error > 0 && !truth_fits) {
         for (BenchmarkPoint& point : points)
             if (const double expected = trials.expected_of(point.configuration); std::isfinite(expected))
-                point.rms = safety * expected;
+                point.rms = expected * spread_of(shipped_error_tables(), point.configuration.method, capture.sensor);
         choice.sentences.push_back(
-            fmt::format("errors are those expected of {} frames of this capture, times {:g} for safety",
-                        capture.frames.size(), safety));
+            fmt::format("errors are what {} frames of this capture keep to with a chance of nine in ten, by how much "
+                        "frames of generated scenes exceeded what was expected of them",
+                        capture.frames.size()));
     }
     const std::vector<cv::Mat1f> right = truth_fits ? truths(capture) : trials.of(reference).maps;
 

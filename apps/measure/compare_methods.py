@@ -6,8 +6,8 @@
     apps/measure/compare_methods.py --render FILE...      writes the results of such bench.json files, one for each device
     apps/measure/compare_methods.py --dry-run ...         prints the commands that measure, for a machine without Python
 
-The results are the table between two marks of --readme, --json with the numbers behind it, and the page
-FOLDER/comparison.html. Errors are those of the first file, and every file adds a column of times. Python 3, no package.
+The results are the table between two marks of --readme, the numbers in that of --brief, --json with what is behind them, and
+the page FOLDER/comparison.html. Errors are those of the first file, and every file adds a column of times. Python 3, no package.
 """
 
 import argparse
@@ -24,6 +24,7 @@ sys.dont_write_bytecode = True  # the folder is one of sources
 import comparison_page  # noqa: E402  beside this file
 
 BEGIN, END = "<!-- compare_methods: begin -->", "<!-- compare_methods: end -->"
+BRIEF = ["method and quality", "idea", "source"]  # columns that --brief has already
 PLACE_COLUMNS = ["pixels", "rms", "bias", "held_out_rms"]  # of each place of a row
 SENSORS = ["clean", "structured light", "time of flight"]  # names of groups in bench.json, in the table's order
 
@@ -228,6 +229,23 @@ def what_was_measured(result):
     return f"Measured: {views} each of {', '.join(scenes)}; {width}x{height} pixels. Times: {times}."
 
 
+def brief(path, result):
+    """The table of the top README: its rows as they are, in which the columns of numbers are written anew."""
+    heads = ["clean", "structured light", *(f"ms, {short_name(d['name'])}" for d in result["devices"])]
+    configurations = {f"{method} {name}": rows for (method, name), rows in by_configuration(result).items()}
+    lines = ["| " + " | ".join([*BRIEF, *heads]) + " |", "|" + " --- |" * (len(BRIEF) + len(heads))]
+    for line in path.read_text().split(BEGIN)[1].split(END)[0].splitlines():
+        kept = line.strip("| ").split(" | ")[: len(BRIEF)]
+        if not line.startswith("| `"):
+            continue
+        rows = configurations.get(kept[0].replace("`", ""), {})  # {}: not measured this time
+        numbers = [cell(rows[s]["rms"], 3) if s in rows else "" for s in heads[:2]]
+        times = next(iter(rows.values()))["ms"] if rows else {}
+        numbers += [ms_text(times.get(d["name"])) for d in result["devices"]]
+        lines.append("| " + " | ".join(kept + numbers) + " |")
+    return "\n".join(lines)
+
+
 def write_between_marks(path, text):
     whole = path.read_text()
     if whole.count(BEGIN) != 1 or whole.count(END) != 1 or whole.index(BEGIN) > whole.index(END):
@@ -241,6 +259,7 @@ def render(asked, files):
     result = merged(reports)
     Path(asked.json).write_text(text_of(result))
     write_between_marks(Path(asked.readme), markdown(result))
+    write_between_marks(Path(asked.brief), brief(Path(asked.brief), result))
     page = Path(asked.out) / "comparison.html"
     page.parent.mkdir(parents=True, exist_ok=True)
     page.write_text(comparison_page.page(result, reports[0], Path(files[0]).parent, asked.views))
@@ -270,6 +289,7 @@ def parsed(words):
     parser.add_argument("--rounds", type=int, default=1, help="how often each configuration is timed on each frame")
     parser.add_argument("--views", type=int, default=4, help="captures of which the page shows pictures")
     parser.add_argument("--readme", default=str(ROOT / "ao/README.md"))
+    parser.add_argument("--brief", default=str(ROOT / "README.md"), help="file with a row for some configurations")
     parser.add_argument("--json", default=str(ROOT / "ao/comparison.json"))
     return parser.parse_args(words)
 

@@ -565,8 +565,11 @@ class Run final : public Command {
         job.batch.cloud_tiles = asked_.cloud_tiles;
         job.batch.cloud_walk = own.make_for_points() ? CloudWalk::points : asked_.clouds;
         const bool by_points = computes_points(job);
-        Workers* workers =
-            by_points && !asked_.asks_for_device(job.capture) ? workers_if_any(job.batch.no_method) : &this->workers();
+        const bool no_device = by_points && !asked_.asks_for_device(job.capture);
+        Workers* workers = no_device && !workers_ && !gpu::may_have_gpu() && all_by_points(job)
+                               ? without_workers(job.batch.no_method)
+                           : no_device ? workers_if_any(job.batch.no_method)
+                                       : &this->workers();
         std::vector<std::string> budget;
         if (asked_.budget.any())
             budget = keep_to_budget(job, workers->device());
@@ -631,6 +634,19 @@ class Run final : public Command {
                job.batch.cloud_walk != CloudWalk::view && std::ranges::all_of(job.loaded, [&](const auto& each) {
                    return takes_points(each.second.frame, job.batch.cloud_walk, unused);
                });
+    }
+
+    /// Whether nothing but clouds' points remains to be computed. Clouds that are neither in memory nor large may turn
+    /// out to be images.
+    [[nodiscard]] bool all_by_points(const CaptureJob& job) const {
+        const std::size_t most = CloudAo(asked_.cloud_ao()).most_at_once();
+        return std::ranges::all_of(job.batch.frames, [&](std::size_t frame) {
+            return job.loaded.contains(frame) || is_large_cloud(job.capture.entries[frame].cloud, most);
+        });
+    }
+    static Workers* without_workers(std::string& why_none) {
+        why_none = "no device was opened: no GPU, and only points to compute";
+        return nullptr;
     }
 
     /// The devices; null where there are none, and why.

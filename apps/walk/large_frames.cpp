@@ -47,7 +47,13 @@ bool is_large_cloud(const std::filesystem::path& file, std::size_t most_at_once)
 LargeSettings LargeFrames::settings(const std::string& name) const {
     LargeSettings settings;
     settings.folder = tiles_folder(options_.outputs.folder, name);
-    settings.shown = std::max<std::size_t>(options_.outputs.page_points, 1);
+    const Outputs& outputs = options_.outputs;
+    constexpr std::size_t judged = 65536; // points that tell whether values are to be doubted
+    const bool shows = outputs.preview || outputs.shaded || outputs.panel || outputs.glb || outputs.mcap;
+    settings.shown = std::max<std::size_t>(shows ? outputs.page_points : std::min(outputs.page_points, judged), 1);
+    constexpr double bytes_per_point = 420;
+    const double memory = bytes_per_point * static_cast<double>(options_.points->most_at_once());
+    settings.buffers = static_cast<std::size_t>(std::clamp(memory / 4, 8.0 * (1 << 20), 64.0 * (1 << 20)));
     if (options_.stop)
         settings.stop = [stop = options_.stop] { return stop->load(); };
     settings.say = options_.say;

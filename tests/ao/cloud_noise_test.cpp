@@ -17,7 +17,7 @@ CloudNoise noise_of(const Points& points, float widest = 0.3F) {
     return {local.tree, widest};
 }
 FittedCloud fitted(const Points& points, double radius = 1) {
-    return fitted_cloud(LocalCloud(points), points, {}, radius);
+    return fitted_cloud(LocalCloud(points), points, {}, radius, thinning_grid(Vector3d::Zero(), 0.01));
 }
 
 TEST(CloudNoise, of_a_plane_is_known_at_any_density) {
@@ -97,7 +97,8 @@ TEST(FittedCloud, sheets_do_not_merge) {
         normals.emplace_back(0, 0, i % 2 ? 1 : -1);
     }
     EXPECT_TRUE(fitted(points).empty()) << "without normals, the board's thickness is no noise";
-    const FittedCloud found = fitted_cloud(LocalCloud(points), points, normals, 1);
+    const FittedCloud found =
+        fitted_cloud(LocalCloud(points), points, normals, 1, thinning_grid(Vector3d::Zero(), 0.01));
     ASSERT_FALSE(found.empty());
     EXPECT_NEAR(static_cast<double>(found.noise), sigma, 0.15 * sigma);
     std::size_t between = 0;

@@ -41,7 +41,9 @@ class MeasuredOnce(unittest.TestCase):
         cls.readme.write_text(MARKS)
         cls.words = ["--program", PROGRAM, "-o", cls.folder, "--methods", "alchemy,luna", "--scenes", "office,thin", "--frames", 1,
                      "--sensors", "ideal,kinect", "--size", "64x48", "--rays", 8]
-        cls.results = ["--readme", cls.readme, "--json", cls.folder / "comparison.json"]
+        cls.brief = cls.folder / "brief.md"
+        cls.brief.write_text(MARKS.replace("old", "| `luna` low | an idea | a source | old |\n| `surfel` high | best | ours |"))
+        cls.results = ["--readme", cls.readme, "--brief", cls.brief, "--json", cls.folder / "comparison.json"]
         # The bench's own progress goes to stderr as well; it is of no interest here.
         done = subprocess.run([sys.executable, ROOT / "apps/measure/compare_methods.py", *map(str, cls.words + cls.results)],
                               capture_output=True, text=True)
@@ -84,6 +86,21 @@ class MeasuredOnce(unittest.TestCase):
         pixels = sum(p[0] for p in places)
         rms = (sum(p[0] * p[3] ** 2 for p in places) / pixels) ** 0.5
         self.assertEqual(rows["luna low"][heads.index("near depth edges")], f"{rms:.3f}")
+
+    def test_the_brief_table_keeps_its_words_and_has_the_same_numbers(self):
+        heads, rows = self.table()
+        lines = self.brief.read_text().splitlines()
+        row = rows["luna low"]
+        numbers = " | ".join([*(row[heads.index(s)].split(", ")[0] for s in ("clean", "structured light")), row[-1]])
+        self.assertIn(f"| `luna` low | an idea | a source | {numbers} |", lines)
+        self.assertIn("| `surfel` high | best | ours |  |  |  |", lines, "not measured this time")
+
+    def test_every_row_of_the_top_readme_has_numbers(self):
+        text = (ROOT / "README.md").read_text().split(compare_methods.BEGIN)[1].split(compare_methods.END)[0]
+        known = {f"{row['method']} {row['name']}" for row in json.loads((ROOT / "ao/comparison.json").read_text())["rows"]}
+        rows = [line.split(" | ")[0].strip("| ").replace("`", "") for line in text.splitlines() if line.startswith("| `")]
+        self.assertEqual([row for row in rows if row not in known], [])
+        self.assertGreater(len(rows), 12)
 
     def test_what_is_around_the_table_stays(self):
         text = self.readme.read_text()
@@ -128,8 +145,10 @@ class MeasuredOnce(unittest.TestCase):
         path.write_text(json.dumps(other))
         out = self.folder / "both"
         out.mkdir()
-        (out / "README.md").write_text(MARKS)
-        code, said = called("--render", self.report, path, "-o", out, "--readme", out / "README.md", "--json", out / "c.json")
+        for name in ("README.md", "brief.md"):
+            (out / name).write_text(MARKS)
+        code, said = called("--render", self.report, path, "-o", out, "--readme", out / "README.md", "--brief", out / "brief.md", "--json",
+                            out / "c.json")
         self.assertEqual(code, 0, said)
         self.assertIn("| ms, lavapipe | ms, H100 |", (out / "README.md").read_text())
         self.assertEqual((out / "README.md").read_text().count("| 0.25 |\n"), len(self.result["rows"]) // 2)
@@ -159,7 +178,7 @@ class MeasuredOnce(unittest.TestCase):
             self.assertIn("bad.json", said)
         unmarked = self.folder / "unmarked.md"
         unmarked.write_text("no marks")
-        code, said = called("--render", self.report, "-o", self.folder, "--readme", unmarked, "--json", self.folder / "x.json")
+        code, said = called("--render", self.report, "-o", self.folder, *self.results[2:], "--readme", unmarked)
         self.assertEqual(code, 1)
         self.assertIn("unmarked.md", said)
 

@@ -101,9 +101,9 @@ TEST(ErrorTablesTest, are_read_as_written) {
 }
 
 TEST(ErrorTablesTest, bad_lines_are_refused_with_their_number) {
-    for (const char* line :
-         {"tables surfel clean 1", "table surfel sonar 1", "table surfel clean 1 2 x",
-          "variant surfel clean 0.1 quality", "together surfel clean 1 2", "together surfel clean nan"}) {
+    for (const char* line : {"tables surfel clean 1", "table surfel sonar 1", "table surfel clean 1 2 x",
+                             "variant surfel clean 0.1 quality", "together surfel clean 1 2",
+                             "together surfel clean nan", "spread surfel clean 0", "spread surfel clean"}) {
         std::istringstream text(std::string("# a comment\n") + line + "\n");
         EXPECT_TRUE(says(refusal([&] { (void)error_tables_from(text, "here"); }), "here, line 2")) << line;
     }
@@ -122,6 +122,17 @@ TEST(ErrorTablesTest, the_variant_with_most_matching_settings_counts) {
     EXPECT_FLOAT_EQ(factor({{"quality", "low"}, {"downsampled", "false"}}, false), 2);
     EXPECT_FLOAT_EQ(factor({{"downsampled", "true"}, {"quality", "low"}}, false), 4);
     EXPECT_FLOAT_EQ(factor({{"quality", "low"}}, true), 1);
+}
+
+TEST(ErrorTablesTest, a_method_without_a_spread_of_its_own_takes_the_worst_of_the_class) {
+    std::istringstream text("spread surfel clean 1.1\nspread cacao clean 1.4\nspread cacao time_of_flight 1.7\n");
+    const ErrorTables tables = error_tables_from(text, "here");
+    EXPECT_NEAR(spread_of(tables, "surfel", SensorClass::clean), 1.1, 1e-6);
+    EXPECT_NEAR(spread_of(tables, "hbao", SensorClass::clean), 1.4, 1e-6);
+    EXPECT_NEAR(spread_of(tables, "surfel", SensorClass::time_of_flight), 1.7, 1e-6);
+    EXPECT_NEAR(spread_of(tables, "surfel", SensorClass::interpolated), 1.7, 1e-6) << "nothing of the class: of all";
+    std::istringstream again(text_of(tables));
+    EXPECT_EQ(text_of(error_tables_from(again, "here")), text_of(tables));
 }
 
 TEST(ErrorTablesTest, every_method_has_shipped_ones_for_every_sensor) {

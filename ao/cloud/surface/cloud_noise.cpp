@@ -17,7 +17,7 @@ namespace {
 
 using Eigen::Vector3f;
 
-constexpr std::size_t sample = 1024, most_points = 4096;
+constexpr std::size_t sample = 1024, enough_points = 2048;
 constexpr std::size_t fewest_points = 12;
 
 /// The points within a ball, by the plane through them.
@@ -70,7 +70,7 @@ Ball ball_round(const Facing& facing, std::size_t middle_index, float radius) {
     Moments moments;
     std::vector<Vector3f> offsets;
     facing.tree.for_each_within(at, radius, [&](std::size_t index) {
-        if (offsets.size() < most_points && facing.alike(index, middle_index)) {
+        if (offsets.size() < NoiseLook::most_points && facing.alike(index, middle_index)) {
             offsets.emplace_back((facing.tree[index] - at) / radius);
             moments.add(offsets.back());
         }
@@ -91,7 +91,11 @@ Ball ball_round(const Facing& facing, std::size_t middle_index, float radius) {
             radius * spread_within_cells(offsets), square > 0 ? fourth / square : 3, points};
 }
 
-std::optional<float> sigma_round(const Facing& facing, std::size_t index, float widest) {
+} // namespace
+
+std::optional<float> noise_round(const NeighbourTree& tree, std::span<const Eigen::Vector3d> normals, std::size_t index,
+                                 const NoiseLook& look) {
+    const Facing facing{tree, normals};
     constexpr float two_sheets = 1.6F;          // kurtosis of noisy sheets five sigma apart
     constexpr float growth = 1.5F, flat = 3.5F; // a disc's width is half its radius
     constexpr float no_thicker = 1.3F, rounding = 2e-4F, mostly = 0.7F;
@@ -102,7 +106,8 @@ std::optional<float> sigma_round(const Facing& facing, std::size_t index, float 
     float radius = std::sqrt(nearest.all().back().distance2);
     if (!(radius > 0))
         return std::nullopt;
-    for (Ball ball = ball_round(facing, index, radius); radius < widest && ball.points <= most_points / 2;) {
+    for (Ball ball = ball_round(facing, index, radius);
+         radius < look.widest && growth * radius <= look.reach && ball.points <= enough_points;) {
         radius *= growth;
         const Ball larger = ball_round(facing, index, radius);
         if (ball.points >= fewest_points && ball.width > flat * ball.thickness &&
@@ -114,8 +119,6 @@ std::optional<float> sigma_round(const Facing& facing, std::size_t index, float 
     }
     return std::nullopt;
 }
-
-} // namespace
 
 namespace {
 
@@ -130,17 +133,23 @@ std::vector<std::size_t> spread_over(const NeighbourTree& tree) {
 } // namespace
 
 CloudNoise::CloudNoise(const NeighbourTree& tree, float widest, std::span<const Eigen::Vector3d> normals)
-    : CloudNoise(tree, widest, normals, spread_over(tree)) {}
+    : CloudNoise(tree, NoiseLook{widest}, normals, spread_over(tree)) {}
 
-CloudNoise::CloudNoise(const NeighbourTree& tree, float widest, std::span<const Eigen::Vector3d> normals,
+CloudNoise::CloudNoise(const NeighbourTree& tree, const NoiseLook& look, std::span<const Eigen::Vector3d> normals,
                        std::span<const std::size_t> places) {
-    const Facing facing{tree, normals};
     std::vector<std::optional<float>> found(places.size());
-    tbb::parallel_for(std::size_t(0), places.size(),
-                      [&](std::size_t i) { found[i] = sigma_round(facing, places[i], widest); });
+    std::vector<Vector3f> at(places.size());
+    tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t i) {
+        found[i] = noise_round(tree, normals, places[i], look);
+        at[i] = tree[places[i]];
+    });
+    *this = CloudNoise(at, found);
+}
+
+CloudNoise::CloudNoise(std::span<const Vector3f> places, std::span<const std::optional<float>> found) {
     for (std::size_t i = 0; i < places.size(); ++i)
         if (found[i]) {
-            positions_.push_back(tree[places[i]]);
+            positions_.push_back(places[i]);
             sigmas_.push_back(*found[i]);
         }
     constexpr std::size_t fewest_share = 5; // a fifth

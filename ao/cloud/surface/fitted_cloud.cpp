@@ -6,10 +6,13 @@
 #include "projection/base/statistics.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <Eigen/Geometry>
 #include <limits>
+#include <numeric>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 namespace scanshade {
 namespace {
@@ -45,36 +48,37 @@ Vector3f unit_normal(const Vector3d& normal) {
                                                      : Vector3f(Vector3f::Zero());
 }
 
-/// Halves runs of the tree until each part is a cell.
+/// Halves the points of each box of a grid until each part is a cell.
 class Thinning {
   public:
-    Thinning(const NeighbourTree& tree, std::span<const Vector3d> normals, const CloudNoise& noise, bool sides)
-        : tree_(tree), normals_(normals), noise_(noise), sides_(sides) {}
+    Thinning(const LocalCloud& cloud, std::span<const Vector3d> points, std::span<const Vector3d> normals,
+             const CloudNoise& noise, bool sides, const ThinningGrid& grid)
+        : tree_(cloud.tree), middle_(cloud.middle), points_(points), normals_(normals), noise_(noise), sides_(sides),
+          grid_(grid) {}
 
     /// Empty where noise is felt nowhere.
     [[nodiscard]] Cells run() const {
-        std::vector<std::pair<std::size_t, std::size_t>> blocks;
-        tree_.walk([&](float, std::size_t begin, std::size_t end, bool leaf) {
-            constexpr std::size_t block = 256; // points that one sigma serves
-            if (end - begin > block && !leaf)
-                return true;
-            blocks.emplace_back(begin, end);
-            return false;
-        });
-        std::vector<float> sigmas(blocks.size());
-        tbb::parallel_for(std::size_t(0), blocks.size(),
-                          [&](std::size_t i) { sigmas[i] = felt_noise(blocks[i].first, blocks[i].second); });
-        if (std::ranges::none_of(sigmas, [](float sigma) { return sigma > 0; }))
+        if (!may_be_felt())
             return {};
-        std::vector<Cells> parts(blocks.size());
-        tbb::parallel_for(std::size_t(0), blocks.size(), [&](std::size_t i) {
-            const auto [begin, end] = blocks[i];
+        const std::vector<Boxed> boxed = in_boxes();
+        std::vector<std::size_t> starts;
+        for (std::size_t k = 0; k < boxed.size(); ++k)
+            if (k == 0 || boxed[k].box != boxed[k - 1].box)
+                starts.push_back(k);
+        starts.push_back(boxed.size());
+        std::vector<Cells> parts(starts.size() - 1);
+        std::atomic<bool> felt = false;
+        tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t i) {
             Cells& part = parts[i];
-            part.members.resize(end - begin);
-            for (std::size_t k = begin; k < end; ++k)
-                part.members[k - begin] = static_cast<std::uint32_t>(k);
-            halve(part, 0, part.members.size(), sigmas[i]);
+            for (std::size_t k = starts[i]; k < starts[i + 1]; ++k)
+                part.members.push_back(boxed[k].index);
+            const Vector3d middle =
+                grid_.origin + grid_.side * (place_of(boxed[starts[i]].original) + Vector3d::Constant(0.5));
+            if (in_blocks(part, 0, part.members.size(), noise_.at((middle - middle_).cast<float>())))
+                felt.store(true, std::memory_order_relaxed);
         });
+        if (!felt)
+            return {};
         Cells cells;
         for (Cells& part : parts) {
             const auto before = static_cast<std::uint32_t>(cells.members.size());
@@ -88,24 +92,104 @@ class Thinning {
     }
 
   private:
-    /// 0 where it is far below the points' spacing. Of the smallest of eight parts, since a stray widens its own.
-    [[nodiscard]] float felt_noise(std::size_t begin, std::size_t end) const {
-        constexpr std::size_t parts = 8;
-        float spacing = std::numeric_limits<float>::infinity();
-        for (std::size_t part = 0; part < parts; ++part) {
-            Eigen::AlignedBox3f box;
-            const std::size_t first = begin + (end - begin) * part / parts,
-                              last = begin + (end - begin) * (part + 1) / parts;
-            for (std::size_t index = first; index < last; ++index)
-                box.extend(tree_[index]);
-            if (last - first < 2)
-                continue;
-            Vector3f sizes = box.sizes();
-            std::sort(sizes.begin(), sizes.end());
-            spacing = std::min(spacing, std::sqrt(sizes[2] * sizes[1] / static_cast<float>(last - first)));
+    static constexpr std::size_t block = 256; ///< points that are asked together whether noise is felt
+
+    struct Boxed {
+        std::uint64_t box;
+        std::uint32_t original, index;
+    };
+
+    /// Of a point, the box in the grid.
+    [[nodiscard]] Vector3d place_of(std::uint32_t original) const {
+        return ((points_[original] - grid_.origin) / grid_.side).array().floor();
+    }
+
+    /// Box by box, those of a box in the order given: neither depends on the points in other boxes.
+    [[nodiscard]] std::vector<Boxed> in_boxes() const {
+        std::vector<Boxed> boxed(tree_.size());
+        tbb::parallel_for(std::size_t(0), boxed.size(), [&](std::size_t i) {
+            constexpr double most = (1 << 20) - 1; // 21 bits; beyond, boxes are larger
+            const std::uint32_t original = tree_.original(i);
+            const Vector3d place = place_of(original).cwiseMax(-most).cwiseMin(most);
+            std::uint64_t box = 0;
+            for (const double along : place)
+                box = box << 21 | static_cast<std::uint64_t>(along + most);
+            boxed[i] = {box, original, static_cast<std::uint32_t>(i)};
+        });
+        tbb::parallel_sort(boxed.begin(), boxed.end(), [](const Boxed& a, const Boxed& b) {
+            return a.box != b.box ? a.box < b.box : a.original < b.original;
+        });
+        return boxed;
+    }
+
+    /// False where noise is far too small to be felt anywhere, so that the points need not be sorted. The tree tells
+    /// the spacing within a factor of two.
+    [[nodiscard]] bool may_be_felt() const {
+        std::vector<std::pair<std::size_t, std::size_t>> blocks;
+        tree_.walk([&](float, std::size_t begin, std::size_t end, bool leaf) {
+            if (end - begin > block && !leaf)
+                return true;
+            blocks.emplace_back(begin, end);
+            return false;
+        });
+        constexpr float surely = 4;
+        std::atomic<bool> may = false;
+        tbb::parallel_for(std::size_t(0), blocks.size(), [&](std::size_t i) {
+            Indices members(blocks[i].second - blocks[i].first);
+            std::iota(members.begin(), members.end(), static_cast<std::uint32_t>(blocks[i].first));
+            if (surely * noise_.largest() > felt_from / 4 * spacing_in(members))
+                may.store(true, std::memory_order_relaxed);
+        });
+        return may;
+    }
+
+    /// Cells of runs of few points. Returns whether noise is felt in any.
+    bool in_blocks(Cells& part, std::size_t begin, std::size_t end, float sigma) const {
+        const auto members = std::span(part.members).subspan(begin, end - begin);
+        if (members.size() > block) {
+            const std::size_t half = halved(members);
+            const bool low = in_blocks(part, begin, begin + half, sigma);
+            return in_blocks(part, begin + half, end, sigma) || low;
         }
-        const float sigma = noise_.at(tree_[(begin + end) / 2]);
-        return sigma > felt_from / 4 * spacing ? sigma : 0; // a quarter: spacing varies within a block
+        // A quarter: spacing varies within a block. Fit looks at every cell again.
+        const float felt = sigma > felt_from / 4 * spacing_in(members) ? sigma : 0;
+        halve(part, begin, end, felt);
+        return felt > 0;
+    }
+
+    /// The points' spacing, by the smallest of eight parts, since a stray widens its own. 0 for few points.
+    [[nodiscard]] float spacing_in(std::span<std::uint32_t> members, int halvings = 3) const {
+        constexpr std::size_t fewest = 16;
+        if (members.size() < fewest)
+            return 0;
+        if (halvings > 0 && members.size() >= 2 * fewest) {
+            const std::size_t half = halved(members);
+            return std::min(spacing_in(members.first(half), halvings - 1),
+                            spacing_in(members.subspan(half), halvings - 1));
+        }
+        Vector3f sizes = box_of(members).sizes();
+        std::sort(sizes.begin(), sizes.end());
+        return std::sqrt(sizes[2] * sizes[1] / static_cast<float>(members.size()));
+    }
+
+    [[nodiscard]] Eigen::AlignedBox3f box_of(std::span<const std::uint32_t> members) const {
+        Eigen::AlignedBox3f box;
+        for (const std::uint32_t index : members)
+            box.extend(tree_[index]);
+        return box;
+    }
+
+    /// Along the longest axis; points side by side in the order given. Returns how many are in the first half.
+    std::size_t halved(std::span<std::uint32_t> members) const {
+        int axis = 0;
+        box_of(members).sizes().maxCoeff(&axis);
+        const std::size_t half = members.size() / 2;
+        std::nth_element(members.begin(), members.begin() + static_cast<std::ptrdiff_t>(half), members.end(),
+                         [&](std::uint32_t a, std::uint32_t b) {
+                             return tree_[a][axis] != tree_[b][axis] ? tree_[a][axis] < tree_[b][axis]
+                                                                     : tree_.original(a) < tree_.original(b);
+                         });
+        return half;
     }
 
     void halve(Cells& part, std::size_t begin, std::size_t end, float sigma) const {
@@ -117,10 +201,7 @@ class Thinning {
             }
             return;
         }
-        Eigen::AlignedBox3f box;
-        for (const std::uint32_t index : members)
-            box.extend(tree_[index]);
-        const Vector3f sizes = box.sizes();
+        const Vector3f sizes = box_of(members).sizes();
         if (members.size() == 1 || (sizes.norm() <= thinned_to * sigma && one_side(members))) {
             part.all.push_back(cell_of(members, sigma));
             part.all.back().begin = static_cast<std::uint32_t>(begin);
@@ -135,13 +216,7 @@ class Thinning {
             halve(part, begin + front, end, sigma);
             return;
         }
-        int axis = 0;
-        sizes.maxCoeff(&axis);
-        const std::size_t half = members.size() / 2;
-        std::nth_element(members.begin(), members.begin() + static_cast<std::ptrdiff_t>(half), members.end(),
-                         [&](std::uint32_t a, std::uint32_t b) {
-                             return tree_[a][axis] != tree_[b][axis] ? tree_[a][axis] < tree_[b][axis] : a < b;
-                         });
+        const std::size_t half = halved(members);
         halve(part, begin, begin + half, sigma);
         halve(part, begin + half, end, sigma);
     }
@@ -192,9 +267,11 @@ class Thinning {
     }
 
     const NeighbourTree& tree_;
-    std::span<const Vector3d> normals_;
+    const Vector3d& middle_; ///< that the tree's points are relative to
+    std::span<const Vector3d> points_, normals_;
     const CloudNoise& noise_;
     bool sides_;
+    const ThinningGrid& grid_;
 };
 
 /// The surface through the cells.
@@ -394,31 +471,37 @@ class Fit {
 
 } // namespace
 
-bool sides_agree(const NeighbourTree& tree, std::span<const Vector3d> normals) {
-    constexpr std::size_t sample = 2000;
+ThinningGrid thinning_grid(const Vector3d& centre, double spacing) {
+    constexpr double spacings = 20;
+    const double side = spacing > 0 ? std::exp2(std::round(std::log2(spacings * spacing))) : 1;
+    const Vector3d off = Vector3d(0.37, 0.41, 0.39) * side; // floors and walls are at round coordinates
+    return {(centre / side).array().round().matrix() * side + off, side};
+}
+
+std::optional<bool> opposed_beside(const NeighbourTree& tree, std::span<const Vector3d> normals, std::size_t index) {
+    Nearest nearest;
+    tree.find_round(index, 1, nearest);
+    if (nearest.all().empty())
+        return std::nullopt;
+    return unit_normal(normals[tree.original(index)]).dot(unit_normal(normals[tree.original(nearest.all()[0].point)])) <
+           -0.7F;
+}
+
+bool sides_agree(std::span<const std::optional<bool>> opposed) {
     constexpr double random_from = 0.1;
-    std::size_t opposed = 0, pairs = 0;
-    for (std::size_t k = 0; k < sample; ++k) {
-        const std::size_t index = (2 * k + 1) * tree.size() / (2 * sample);
-        Nearest nearest;
-        tree.find_round(index, 1, nearest);
-        if (nearest.all().empty())
-            continue;
-        ++pairs;
-        opposed += unit_normal(normals[tree.original(index)])
-                       .dot(unit_normal(normals[tree.original(nearest.all()[0].point)])) < -0.7F;
-    }
-    return static_cast<double>(opposed) < random_from * static_cast<double>(pairs);
+    const auto pairs = std::ranges::count_if(opposed, [](const auto& each) { return each.has_value(); });
+    const auto against = std::ranges::count_if(opposed, [](const auto& each) { return each.value_or(false); });
+    return static_cast<double>(against) < random_from * static_cast<double>(pairs);
 }
 
 namespace {
 
 /// `fewest`: of the points must move, else none does.
 FittedCloud fitted_by(const CloudNoise& noise, bool sides, const LocalCloud& local, std::span<const Vector3d> points,
-                      std::span<const Vector3d> normals, std::size_t fewest) {
+                      std::span<const Vector3d> normals, const ThinningGrid& grid, std::size_t fewest) {
     FittedCloud fitted;
     const NeighbourTree& tree = local.tree;
-    Cells cells = Thinning(tree, normals, noise, sides).run();
+    Cells cells = Thinning(local, points, normals, noise, sides, grid).run();
     if (cells.all.empty())
         return fitted;
     fitted.axes = Fit(cells.all, sides).run();
@@ -451,20 +534,25 @@ FittedCloud fitted_by(const CloudNoise& noise, bool sides, const LocalCloud& loc
 } // namespace
 
 FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> points, std::span<const Vector3d> normals,
-                         double radius) {
+                         double radius, const ThinningGrid& grid) {
     if (points.size() < fewest_fitted)
         return {};
-    const bool sides = !normals.empty() && sides_agree(local.tree, normals);
+    constexpr std::size_t sample = 2000;
+    std::vector<std::optional<bool>> opposed(normals.empty() ? 0 : sample);
+    for (std::size_t k = 0; k < opposed.size(); ++k)
+        opposed[k] = opposed_beside(local.tree, normals, (2 * k + 1) * local.size() / (2 * sample));
+    const bool sides = !normals.empty() && sides_agree(opposed);
     const CloudNoise noise(local.tree, static_cast<float>(radius) / 3, sides ? normals : std::span<const Vector3d>());
-    return noise.known() ? fitted_by(noise, sides, local, points, normals, (points.size() + 99) / 100) : FittedCloud();
+    return noise.known() ? fitted_by(noise, sides, local, points, normals, grid, (points.size() + 99) / 100)
+                         : FittedCloud();
 }
 
 FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Vector3d> points, std::span<const Vector3d> normals,
-                         const SharedNoise& noise) {
+                         const SharedNoise& noise, const ThinningGrid& grid) {
     if (points.size() < fewest_fitted)
         return {};
     return fitted_by(noise.noise.moved(local.middle - noise.middle), noise.sides && !normals.empty(), local, points,
-                     normals, 1);
+                     normals, grid, 1);
 }
 
 } // namespace scanshade

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <Eigen/Core>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -24,6 +25,16 @@ struct FittedCloud {
     [[nodiscard]] bool empty() const { return points.empty(); }
 };
 
+/// Boxes of a grid that is the same for every part of a cloud. What is taken together lies in one box, so that a part
+/// thins its points as the whole does.
+struct ThinningGrid {
+    Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+    double side = 0;
+};
+/// Boxes of about 20 spacings hold 400 points of a surface; smaller ones cut more of what belongs together. Their sides
+/// are powers of two, and they stay where they are when the centre or the spacing changes a little.
+[[nodiscard]] ThinningGrid thinning_grid(const Eigen::Vector3d& centre, double spacing);
+
 /// Acts where sigma (CloudNoise) is above a fiftieth of the points' spacing. Points closer together than six sigma are
 /// taken together. Then all move along their normals onto the local surface. That is the mean, weighted by distance, of
 /// the points whose planes are alike and which lie within three sigma of it. Windows hold 16 to 64 of the thinned
@@ -32,13 +43,19 @@ struct FittedCloud {
 /// points. `local` is made of `points`; `normals` is empty or holds one per point. Noise is looked for in balls up to a
 /// third of `radius`.
 [[nodiscard]] FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Eigen::Vector3d> points,
-                                       std::span<const Eigen::Vector3d> normals, double radius);
-/// The same for a part of a cloud with the noise of the whole. However few points noise concerns, they are moved, since
-/// other parts may hold more.
+                                       std::span<const Eigen::Vector3d> normals, double radius,
+                                       const ThinningGrid& grid);
+/// The same with noise that is known. However few points it concerns, they are moved: the points may be a part of a
+/// cloud whose other parts hold more.
 [[nodiscard]] FittedCloud fitted_cloud(const LocalCloud& local, std::span<const Eigen::Vector3d> points,
-                                       std::span<const Eigen::Vector3d> normals, const SharedNoise& noise);
+                                       std::span<const Eigen::Vector3d> normals, const SharedNoise& noise,
+                                       const ThinningGrid& grid);
 
-/// Whether the signs of recorded normals are more than chance; else both sides of a plane are one.
-[[nodiscard]] bool sides_agree(const NeighbourTree& tree, std::span<const Eigen::Vector3d> normals);
+/// Whether the recorded normals of a point and of its nearest neighbour are opposed; nothing where it has none.
+[[nodiscard]] std::optional<bool> opposed_beside(const NeighbourTree& tree, std::span<const Eigen::Vector3d> normals,
+                                                 std::size_t index);
+/// By that of many points, whether the signs of recorded normals are more than chance; else both sides of a plane are
+/// one.
+[[nodiscard]] bool sides_agree(std::span<const std::optional<bool>> opposed);
 
 } // namespace scanshade

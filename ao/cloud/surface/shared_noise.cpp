@@ -1,14 +1,16 @@
-// Noise measured on gathered points.
+// Noise measured round places, on a whole cloud or on points gathered near them.
 #include "ao/cloud/surface/shared_noise.h"
 
 #include "ao/cloud/surface/fitted_cloud.h"
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <tbb/parallel_for.h>
 
 namespace scanshade {
 
-using Eigen::Vector3d, Eigen::Vector3i;
+using Eigen::Vector3d, Eigen::Vector3f, Eigen::Vector3i;
 
 namespace {
 
@@ -24,68 +26,132 @@ std::int64_t number_of(const Vector3d& scaled, const Vector3i& off) {
     return all;
 }
 
+std::optional<SharedNoise> shared(const Vector3d& middle, CloudNoise&& noise, bool sides) {
+    if (!noise.known())
+        return std::nullopt;
+    return SharedNoise{middle, std::move(noise), sides};
+}
+
 } // namespace
 
-NoisePlaces::NoisePlaces(std::vector<Place> places, double reach)
-    : places_(std::move(places)), reach_(reach), gathered_(places_.size(), 0) {
-    if (!(reach_ > 0))
-        places_.clear();
-    for (std::uint32_t k = 0; k < places_.size(); ++k) {
-        sorted_.push_back(places_[k].number);
+NoiseLook look_for_noise(double radius, double spacing) {
+    constexpr double widest_in_spacings = 38;
+    const double widest = radius / 3;
+    return {static_cast<float>(widest), static_cast<float>(std::min(1.5 * widest, widest_in_spacings * spacing))};
+}
+
+std::optional<SharedNoise> noise_at(std::span<const NoisePlace> places, const LocalCloud& cloud,
+                                    std::span<const Vector3d> normals, const NoiseLook& look) {
+    std::vector<std::size_t> indices;
+    for (const NoisePlace& place : places) {
+        Nearest nearest; // by position: a copy of a point may stand for it
+        cloud.tree.find_near((place.point - cloud.middle).cast<float>(), 1, nearest);
+        if (!nearest.all().empty())
+            indices.push_back(nearest.all()[0].point);
+    }
+    std::vector<std::optional<bool>> opposed;
+    for (const std::size_t index : normals.empty() ? std::vector<std::size_t>() : indices)
+        opposed.push_back(opposed_beside(cloud.tree, normals, index));
+    const bool sides = !normals.empty() && sides_agree(opposed);
+    return shared(cloud.middle, CloudNoise(cloud.tree, look, sides ? normals : std::span<const Vector3d>(), indices),
+                  sides);
+}
+
+NoisePlaces::NoisePlaces(std::span<const NoisePlace> places, const NoiseLook& look) : look_(look) {
+    if (!(look.reach > 0 && std::isfinite(look.reach)))
+        return;
+    for (const NoisePlace& place : places) {
+        const auto k = static_cast<std::uint32_t>(rounds_.size());
+        rounds_.push_back({place, look.reach * look.reach, false, {Vector3f::Zero()}, {Vector3f::Zero()}});
         for (int dx = -1; dx <= 1; ++dx)
             for (int dy = -1; dy <= 1; ++dy)
                 for (int dz = -1; dz <= 1; ++dz)
-                    near_[cell(places_[k].point, {dx, dy, dz})].push_back(k);
+                    near_[cell(place.point, {dx, dy, dz})].push_back(k);
     }
-    std::sort(sorted_.begin(), sorted_.end());
 }
 
 std::int64_t NoisePlaces::cell(const Vector3d& point, const Vector3i& off) const {
-    return number_of(point / reach_, off);
+    return number_of(point / static_cast<double>(look_.reach), off);
 }
 
 void NoisePlaces::add(std::uint32_t number, const Vector3d& point, const Vector3d* normal) {
-    constexpr std::uint32_t most = 2 * usual_points; // round a place
-    if (places_.empty())
+    if (rounds_.empty())
         return;
     const auto found = near_.find(cell(point, {0, 0, 0}));
     if (found == near_.end())
         return;
-    const bool place = std::binary_search(sorted_.begin(), sorted_.end(), number);
-    bool wanted = place;
-    for (const std::uint32_t k : found->second)
-        if (gathered_[k] < most && (places_[k].point - point).squaredNorm() <= reach_ * reach_) {
-            ++gathered_[k];
-            wanted = true;
+    with_normals_ |= normal != nullptr;
+    for (const std::uint32_t k : found->second) {
+        Round& round = rounds_[k];
+        const Vector3f offset = (point - round.place.point).cast<float>();
+        if (!(offset.squaredNorm() <= round.reach2))
+            continue;
+        const Vector3f facing = normal ? Vector3f(normal->cast<float>()) : Vector3f(Vector3f::Zero());
+        if (number == round.place.number) {
+            round.complete = true;
+            round.normals[0] = facing;
+            continue;
         }
-    if (!wanted)
-        return;
-    if (place)
-        at_[number] = static_cast<std::uint32_t>(points_.size());
-    points_.push_back(point);
-    if (normal)
-        normals_.push_back(*normal);
+        round.points.push_back(offset);
+        round.normals.push_back(facing);
+        if (round.points.size() >= NoiseLook::most_points * 3 / 2)
+            keep_nearest(round);
+    }
 }
 
-std::optional<SharedNoise> NoisePlaces::measured(double widest) const {
-    constexpr std::size_t fewest = 64;
-    if (points_.size() < fewest)
+/// So dense a place needs no wider balls.
+void NoisePlaces::keep_nearest(Round& round) const {
+    std::vector<std::uint32_t> order(round.points.size() - 1);
+    std::iota(order.begin(), order.end(), 1U);
+    const auto distance2 = [&](std::uint32_t i) { return round.points[i].squaredNorm(); };
+    const auto last = order.begin() + static_cast<std::ptrdiff_t>(NoiseLook::most_points) - 1;
+    std::nth_element(order.begin(), last, order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return distance2(a) < distance2(b); });
+    round.reach2 = distance2(*last);
+    std::sort(order.begin(), last + 1); // in the order in which they came
+    std::vector<Vector3f> points{round.points[0]}, normals{round.normals[0]};
+    for (auto each = order.begin(); each <= last; ++each) {
+        points.push_back(round.points[*each]);
+        normals.push_back(round.normals[*each]);
+    }
+    round.points = std::move(points), round.normals = std::move(normals);
+}
+
+std::optional<SharedNoise> NoisePlaces::measured() const {
+    std::vector<const Round*> rounds;
+    for (const Round& round : rounds_)
+        if (round.complete)
+            rounds.push_back(&round);
+    if (rounds.empty())
         return std::nullopt;
-    const LocalCloud local(points_);
-    std::vector<std::uint32_t> index_of(points_.size());
-    for (std::uint32_t i = 0; i < local.size(); ++i)
-        index_of[local.tree.original(i)] = i;
-    std::vector<std::size_t> middles;
-    for (const Place& place : places_)
-        if (const auto found = at_.find(place.number); found != at_.end())
-            middles.push_back(index_of[found->second]);
-    const std::span<const Vector3d> normals =
-        normals_.size() == points_.size() ? normals_ : std::span<const Vector3d>();
-    const bool sides = !normals.empty() && sides_agree(local.tree, normals);
-    CloudNoise noise(local.tree, static_cast<float>(widest), sides ? normals : std::span<const Vector3d>(), middles);
-    if (!noise.known())
-        return std::nullopt;
-    return SharedNoise{local.middle, std::move(noise), sides};
+    const Vector3d middle = rounds[0]->place.point;
+    std::vector<std::optional<float>> found(rounds.size());
+    std::vector<Vector3f> positions(rounds.size());
+    std::vector<std::optional<bool>> opposed(rounds.size());
+    const auto each = [&](auto&& visit) {
+        tbb::parallel_for(std::size_t(0), rounds.size(), [&](std::size_t k) {
+            const NeighbourTree tree(rounds[k]->points);
+            std::vector<Vector3d> normals;
+            for (std::size_t i = 0; with_normals_ && i < rounds[k]->normals.size(); ++i)
+                normals.push_back(rounds[k]->normals[i].cast<double>());
+            std::size_t own = 0;
+            while (tree.original(own) != 0)
+                ++own;
+            visit(k, tree, normals, own);
+        });
+    };
+    bool sides = false;
+    if (with_normals_) {
+        each([&](std::size_t k, const NeighbourTree& tree, const std::vector<Vector3d>& normals, std::size_t own) {
+            opposed[k] = opposed_beside(tree, normals, own);
+        });
+        sides = sides_agree(opposed);
+    }
+    each([&](std::size_t k, const NeighbourTree& tree, const std::vector<Vector3d>& normals, std::size_t own) {
+        found[k] = noise_round(tree, sides ? normals : std::span<const Vector3d>(), own, look_);
+        positions[k] = (rounds[k]->place.point - middle).cast<float>();
+    });
+    return shared(middle, CloudNoise(positions, found), sides);
 }
 
 } // namespace scanshade

@@ -1,4 +1,4 @@
-// The noise of a cloud that is never in memory as a whole: measured round places of it, and the same for all tiles.
+// The noise of a cloud, measured round places of it: the same whether the cloud is in memory as a whole or passes by.
 #pragma once
 
 #include "ao/cloud/surface/cloud_noise.h"
@@ -19,34 +19,44 @@ struct SharedNoise {
     bool sides = false; ///< recorded normals tell the two sides of a board apart
 };
 
-/// Gathers the points near some places while all points of a cloud pass by.
+/// Where noise is looked for, whatever the memory: so many places, the points with the lowest hashes of their numbers.
+struct NoisePlace {
+    static constexpr std::size_t wanted = 256;
+    std::uint32_t number; ///< of the point
+    Eigen::Vector3d point;
+};
+/// No ball is wider than 38 spacings, so that a place on a plane needs 4600 points.
+[[nodiscard]] NoiseLook look_for_noise(double radius, double spacing);
+
+/// The noise of a cloud in memory. `normals` is empty or holds one per point. Nothing where the cloud does not tell.
+[[nodiscard]] std::optional<SharedNoise> noise_at(std::span<const NoisePlace> places, const LocalCloud& cloud,
+                                                  std::span<const Eigen::Vector3d> normals, const NoiseLook& look);
+
+/// The same of points that pass by: gathers those near the places, of each the nearest NoiseLook::most_points at most.
 class NoisePlaces {
   public:
-    /// `places` are points of the cloud, with their numbers in it. Each gathers points within `reach`.
-    struct Place {
-        std::uint32_t number;
-        Eigen::Vector3d point;
-    };
-    NoisePlaces(std::vector<Place> places, double reach);
+    /// `look`: its reach is finite.
+    NoisePlaces(std::span<const NoisePlace> places, const NoiseLook& look);
 
-    /// Points in the order of their numbers. `normal`: null where there is none.
+    /// `normal`: null where there is none.
     void add(std::uint32_t number, const Eigen::Vector3d& point, const Eigen::Vector3d* normal);
-    /// Nothing where the cloud does not tell. As CloudNoise, looks at balls up to `widest`.
-    [[nodiscard]] std::optional<SharedNoise> measured(double widest) const;
-    /// Balls that measure() looks at are no wider than this many spacings.
-    static constexpr double widest_in_spacings = 38;
-    static constexpr std::size_t usual_points = 4600; ///< round a place: those of such a ball on a plane
+    [[nodiscard]] std::optional<SharedNoise> measured() const;
 
   private:
+    /// The place's own point is the first. Positions are relative to it.
+    struct Round {
+        NoisePlace place;
+        float reach2;
+        bool complete = false; ///< the own point has passed by
+        std::vector<Eigen::Vector3f> points, normals;
+    };
     [[nodiscard]] std::int64_t cell(const Eigen::Vector3d& point, const Eigen::Vector3i& off) const;
+    void keep_nearest(Round& round) const;
 
-    std::vector<Place> places_;
-    double reach_;
+    NoiseLook look_;
+    bool with_normals_ = false;
+    std::vector<Round> rounds_;
     std::unordered_map<std::int64_t, std::vector<std::uint32_t>> near_; ///< by cell: the places within reach of it
-    std::vector<std::uint32_t> gathered_;                               ///< by place
-    std::vector<Eigen::Vector3d> points_, normals_;
-    std::unordered_map<std::uint32_t, std::uint32_t> at_; ///< by a place's number: where its point is
-    std::vector<std::uint32_t> sorted_;                   ///< the numbers of places
 };
 
 } // namespace scanshade

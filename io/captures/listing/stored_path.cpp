@@ -14,7 +14,7 @@ std::shared_ptr<const std::string> shared_folder(std::string_view folder) {
     const auto found = std::ranges::find_if(last, same);
     if (found != last.end())
         return *found;
-    std::ranges::rotate(last, last.end() - 1);
+    std::rotate(last.begin(), last.end() - 1, last.end());
     return last.front() = std::make_shared<const std::string>(folder);
 }
 
