@@ -43,7 +43,7 @@ class Planes final : public Problem {
     [[nodiscard]] std::vector<Eigen::Isometry3d> poses() const;
 
   private:
-    void prune(const Model& first);
+    Model prune(const Model& first);
 
     PlaneObservations observations_;
 };
