@@ -21,7 +21,7 @@ constexpr double still_plane = 0.5;        // share of the cells
 
 } // namespace
 
-Planes::Planes(std::vector<PlaneFrame> frames, const Model& first) : observations_(find_planes(frames, first)) {
+Planes::Planes(const std::vector<PlaneFrame>& frames, const Model& first) : observations_(find_planes(frames, first)) {
     constexpr int most_rounds = 3;
     Model here = first, there = prune(here);
     if (observations_.planes.empty())
