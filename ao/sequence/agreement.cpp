@@ -25,6 +25,7 @@ constexpr double bent_by = 1e-3;
 constexpr double pose_sigma_m = 0.06; // what poses may err at worst
 /// A direction is aligned where the planes tell it to this share of the radius, and left as recorded elsewhere.
 constexpr double sufficient = 0.02;
+constexpr double tiny = 0.001; // share of the radius; surfaces that miss by less are aligned already
 
 /// The slope of 1/z along a row or a column: the median between five samples, which a step in the window does not move.
 /// A start of zero would lose planes seen at a grazing angle, such as the floor.
@@ -105,6 +106,7 @@ struct Encounter {
 
 std::vector<Encounter> encounters(const Pair& pair, const Isometry3d& here_from_there, double gates = 1) {
     std::vector<Encounter> all;
+    all.reserve(pair.there.all.size());
     const Pinhole& camera = pair.here.depth.camera;
     const int apart_px = pair.here.apart_px;
     const cv::Mat1f& z_m = pair.here.depth.z_m;
@@ -129,7 +131,8 @@ std::vector<Encounter> encounters(const Pair& pair, const Isometry3d& here_from_
                      dv = y - std::min(row * apart_px + apart_px / 2, z_m.rows - 1);
         // The variance of a plane away from the middle of a square of samples.
         const double away = here.radius_px > 0 ? 1 + 2 * (du * du + dv * dv) / (here.radius_px * here.radius_px) : 1;
-        all.push_back({point, here.normal, distance, std::hypot(there.sigma_m, here.sigma_m * std::sqrt(away)),
+        all.push_back({point, here.normal, distance,
+                       std::sqrt(there.sigma_m * there.sigma_m + away * here.sigma_m * here.sigma_m),
                        0.02 * pair.radius_m + sigma, alike && std::abs(distance) < gate,
                        hides && !(alike && std::abs(distance) < gate)});
     }
@@ -194,29 +197,33 @@ struct Evidence {
 
 /// Nothing where too few planes meet.
 std::optional<Evidence> evidence(const Motions& motions, const std::vector<Encounter>& all, double blur = 0) {
-    std::vector<double> misses;
-    for (const Encounter& each : all)
-        if (each.meets)
-            misses.push_back(std::abs(each.distance_m) / std::hypot(each.sigma_m, blur * each.tolerable_m));
-    if (misses.size() < 30)
-        return std::nullopt;
-    const double scale = std::max(1.0, 1.4826 * quantile(misses, 0.5)); // the robust estimate of a sigma
     struct Row {
-        Vector6d slope;
-        double weight, distance_m;
+        const Encounter* plane;
+        double sigma_m, weight = 0;
+        Vector6d slope = Vector6d::Zero();
     };
     std::vector<Row> rows;
-    rows.reserve(misses.size());
+    rows.reserve(all.size());
+    std::vector<double> misses;
+    for (const Encounter& each : all)
+        if (each.meets) {
+            const double blurred_m = blur * each.tolerable_m;
+            rows.push_back({&each, std::sqrt(each.sigma_m * each.sigma_m + blurred_m * blurred_m)});
+            misses.push_back(std::abs(each.distance_m) / rows.back().sigma_m);
+        }
+    if (rows.size() < 30)
+        return std::nullopt;
+    const double scale = std::max(1.0, 1.4826 * quantile(misses, 0.5)); // the robust estimate of a sigma
     Matrix6d matrix = Matrix6d::Zero();
-    for (const Encounter& each : all) {
+    for (Row& row : rows) {
         // Tukey's weight. Where most planes meet already, those of other directions may still be off by more.
-        const double sigma = scale * std::hypot(each.sigma_m, blur * each.tolerable_m);
-        const double miss = each.distance_m / std::max(4.685 * sigma, 0.3 * each.tolerable_m);
-        if (!each.meets || std::abs(miss) >= 1)
+        const double sigma = scale * row.sigma_m;
+        const double miss = row.plane->distance_m / std::max(4.685 * sigma, 0.3 * row.plane->tolerable_m);
+        if (std::abs(miss) >= 1)
             continue;
-        const double kept = (1 - miss * miss) * (1 - miss * miss);
-        rows.push_back({motions.slope(each.point, each.normal), kept / (sigma * sigma), each.distance_m});
-        matrix += rows.back().weight * rows.back().slope * rows.back().slope.transpose();
+        row.weight = (1 - miss * miss) * (1 - miss * miss) / (sigma * sigma);
+        row.slope = motions.slope(row.plane->point, row.plane->normal);
+        matrix += row.weight * row.slope * row.slope.transpose();
     }
     const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(matrix);
     Evidence result{eigen.eigenvectors(), {}, {}, scale};
@@ -225,7 +232,7 @@ std::optional<Evidence> evidence(const Motions& motions, const std::vector<Encou
         double told = 0, pull = 0;
         for (const Row& row : rows) {
             const double along = row.slope.dot(direction);
-            pull -= row.weight * along * row.distance_m;
+            pull -= row.weight * along * row.plane->distance_m;
             if (std::abs(along) > 0.2) // less is also what noise makes of a plane that lies along the direction
                 told += row.weight * along * along;
         }
@@ -267,8 +274,11 @@ Aligned aligned(const Pair& pair, const Isometry3d& here_from_there) {
     constexpr int rounds = 8;
     constexpr double three_sigma = 9;
     const double limit_m = sufficient * pair.radius_m;
-    std::vector<Encounter> all = encounters(pair, here_from_there, 1);
+    const std::vector<Encounter> all = encounters(pair, here_from_there);
     const Motions motions = motions_about(all);
+    if (std::vector<double> misses_m = alignment_errors(all, true);
+        !misses_m.empty() && quantile(misses_m, 0.9) < tiny * pair.radius_m)
+        return {here_from_there, 0};
     // Noise fits better after any motion: one that is not significant is none. What is off has a large scale.
     if (const auto first = evidence(motions, all)) {
         const Vector6d known = first->known(limit_m * first->scale);

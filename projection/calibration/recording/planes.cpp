@@ -9,25 +9,44 @@
 #include <algorithm>
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
+#include <utility>
 
 namespace scanshade::calibration {
 namespace {
 
-constexpr int least_known = 4; // cells of a plane; the plane itself takes three
+constexpr int least_known = 4;             // cells of a plane; the plane itself takes three
+constexpr double same_focal_length = 1e-3; // as a share: cells join alike
+constexpr double other_focal_length = 0.2; // nothing determines it
+constexpr double still_plane = 0.5;        // share of the cells
 
 } // namespace
 
-Planes::Planes(std::vector<PlaneFrame> frames, const Model& first)
-    : observations_(find_planes(std::move(frames), first)) {
-    prune(first);
+Planes::Planes(const std::vector<PlaneFrame>& frames, const Model& first) : observations_(find_planes(frames, first)) {
+    constexpr int most_rounds = 3;
+    Model here = first, there = prune(here);
     if (observations_.planes.empty())
         throw Error("no plane stays one: the poses, the depth unit or the camera are far off");
+    // Which cells join to planes depends on the camera. So those of a wrong one are found again under what they say of
+    // it, where they determine it, as long as most still join.
+    for (int round = 1; round < most_rounds && observations_.linked && degeneracy().empty(); ++round) {
+        const double change = std::abs(there.values[f] / here.values[f] - 1);
+        if (change < same_focal_length || change > other_focal_length)
+            break;
+        PlaneObservations before = std::exchange(observations_, find_planes(frames, there));
+        here = there;
+        there = prune(here);
+        if (static_cast<double>(observations_.cells()) < still_plane * static_cast<double>(before.cells())) {
+            observations_ = std::move(before);
+            break;
+        }
+    }
 }
 
 /// Removes cells that do not lie on their planes, judged by a robust fit. Some numbers of the camera are free in it: a
-/// wrong camera must not cost the corners of the image.
-void Planes::prune(const Model& first) {
+/// wrong camera must not cost the corners of the image. Returns that camera.
+Model Planes::prune(const Model& first) {
     constexpr double most_sigmas = 4;
+    Model model = first;
     for (int round = 0; round < 3 && !observations_.planes.empty(); ++round) {
         Fit fit = start(first);
         PlaneAdjustment adjustment(observations_, fit);
@@ -58,7 +77,9 @@ void Planes::prune(const Model& first) {
             plane.cells = std::move(kept);
         }
         observations_.remove_small_planes();
+        model = fit.model;
     }
+    return model;
 }
 
 Fit Planes::start(const Model& model) const {

@@ -16,7 +16,7 @@ class Planes final : public Problem {
   public:
     /// Finds the planes under the first model, and removes outlying cells. Throws Error where hardly anything in the
     /// frames is plane.
-    Planes(std::vector<PlaneFrame> frames, const Model& first);
+    Planes(const std::vector<PlaneFrame>& frames, const Model& first);
 
     void set_weights(const std::vector<double>& weights) override { observations_.weights = weights; }
     [[nodiscard]] std::string_view unit() const override { return "mm"; }
@@ -43,7 +43,7 @@ class Planes final : public Problem {
     [[nodiscard]] std::vector<Eigen::Isometry3d> poses() const;
 
   private:
-    void prune(const Model& first);
+    Model prune(const Model& first);
 
     PlaneObservations observations_;
 };
