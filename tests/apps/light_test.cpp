@@ -24,7 +24,8 @@ const scene::Scene& still_life() {
         add(scene::Box{{0, 0, -0.5}, {3, 3, 0.5}}, {0.5, 0.45, 0.4});
         add(scene::Box{{0, 3.5, 1.5}, {3, 0.5, 3.5}}, {0.55, 0.55, 0.5});
         for (int i = 0; i < 12; ++i) {
-            const double x = -1.8 + 1.2 * (i % 4), y = -1.2 + 1.3 * (i / 4);
+            const int row = i / 4;
+            const double x = -1.8 + 1.2 * (i % 4), y = -1.2 + 1.3 * row;
             const Vector3d albedo(0.25 + 0.4 * hash(3U * i) * 0x1p-32, 0.25 + 0.4 * hash(3U * i + 1) * 0x1p-32,
                                   0.25 + 0.4 * hash(3U * i + 2) * 0x1p-32);
             if (i % 2)
