@@ -18,16 +18,19 @@ using Eigen::Vector3d;
 
 constexpr double least_power = 0.1;   // less is no sign of AO
 constexpr double most_gradient = 0.3; // of ambient light towards a direct one, and of that light
-constexpr int fewest_samples = 500, fewest_albedos = 12, halvings = 5;
+constexpr double most_turn_deg = 20;  // of a direct light between halves of the surfaces, in the median
+constexpr int fewest_samples = 500, fewest_albedos = 12, halvings = 3;
 constexpr std::size_t most_of_search = 2500, most_of_half = 4000; // samples: more change no answer
+constexpr double open = 0.8; // of visibility: it errs least, and counts least, where surfaces are open
 
 // From the simplest on; those with direct light last.
 constexpr std::array models{LightTerms{"albedo alone", false, false, false, false},
                             LightTerms{"ambient", true, false, false, false},
                             LightTerms{"ambient with a gradient", true, true, false, false},
+                            LightTerms{"ambient with a gradient on two tones", true, true, false, true},
                             LightTerms{"ambient and direct", true, false, true, false},
-                            LightTerms{"ambient and direct with shadows", true, false, true, true},
-                            LightTerms{"ambient with a gradient, and direct with shadows", true, true, true, true}};
+                            LightTerms{"ambient with a gradient, and direct", true, true, true, false}};
+constexpr std::size_t ambient_models = 3, tones_model = 3;
 
 /// Half of the albedos, another half in each round; `first` or the others.
 bool in_half(int albedo, int round, bool first) {
@@ -35,16 +38,34 @@ bool in_half(int albedo, int round, bool first) {
            first;
 }
 
-/// One number after the other as they rise; the mean and its standard error of what differs from `than`.
-std::pair<double, double> mean_gain(const std::vector<double>& costs, const std::vector<double>& than) {
-    double sum = 0, squares = 0;
-    const auto n = static_cast<double>(costs.size());
-    for (std::size_t i = 0; i < costs.size(); ++i)
-        sum += than[i] - costs[i];
-    for (std::size_t i = 0; i < costs.size(); ++i)
-        squares += std::pow(than[i] - costs[i] - sum / n, 2);
-    return {sum / n, std::sqrt(squares / (n - 1) / n)};
-}
+/// What each albedo costs in each model, of those fitted to others; and how much it weighs.
+struct HeldOut {
+    std::vector<std::vector<double>> costs; ///< of each model
+    std::vector<double> weights;
+
+    HeldOut(std::size_t tried, int albedos)
+        : costs(tried, std::vector<double>(static_cast<std::size_t>(albedos))),
+          weights(static_cast<std::size_t>(albedos)) {}
+    [[nodiscard]] double mean(std::size_t model) const {
+        return std::inner_product(costs[model].begin(), costs[model].end(), weights.begin(), 0.0) / sum();
+    }
+    /// How much better one model is than another, and the standard error of that: albedos are what is independent,
+    /// samples of one are not.
+    [[nodiscard]] std::pair<double, double> gain(std::size_t model, std::size_t over) const {
+        const double mean_gain = mean(over) - mean(model), all = sum();
+        double squares = 0;
+        for (std::size_t k = 0; k < weights.size(); ++k)
+            squares += std::pow(weights[k] * (costs[over][k] - costs[model][k] - mean_gain), 2);
+        return {mean_gain, std::sqrt(squares) / all};
+    }
+    [[nodiscard]] bool is_better(std::size_t model, std::size_t over, double errors) const {
+        const auto [by, error] = gain(model, over);
+        return by > std::max(errors * error, 0.02 * mean(over));
+    }
+
+  private:
+    [[nodiscard]] double sum() const { return std::max(1.0, std::accumulate(weights.begin(), weights.end(), 0.0)); }
+};
 
 std::string text_of(const Vector3d& v) { return fmt::format("{:.2f}, {:.2f}, {:.2f}", v.x(), v.y(), v.z()); }
 
@@ -93,6 +114,65 @@ std::string doubt_about(const LightFit& fit, const LightTerms& terms, const Ligh
     return "";
 }
 
+struct Judged {
+    HeldOut all, opened;                          ///< on all samples, of ambient models; on open ones, of all models
+    std::vector<std::vector<LightValues>> halves; ///< of each model, as fitted to open samples
+};
+
+/// Fits halves of the albedos and judges on the others: ambient light on all samples, direct light on open ones.
+Judged judged_on_halves(const LightFit& fit, const LightRequest& request, int albedos) {
+    const std::size_t tried = request.direct ? models.size() : ambient_models;
+    Judged judged{{ambient_models, albedos}, {tried, albedos}, {}};
+    judged.halves.assign(tried, std::vector<LightValues>(2 * halvings));
+    struct Scores {
+        LightPart unseen;
+        std::vector<std::vector<double>> costs;
+    };
+    std::vector<std::pair<Scores, Scores>> scores(2 * halvings); // on all samples and on open ones
+    tbb::parallel_for(std::size_t{0}, std::size_t{2 * halvings}, [&](std::size_t half) {
+        const int round = static_cast<int>(half / 2);
+        const bool first = half % 2 == 0;
+        const auto mine = [&](int albedo) { return in_half(albedo, round, first); };
+        const auto others = [&](int albedo) { return in_half(albedo, round, !first); };
+        for (const bool is_open : {false, true}) {
+            if (is_open && !request.direct)
+                continue;
+            const double least = is_open ? open : 0;
+            LightPart seen = fit.part_of(mine, least, most_of_half);
+            Scores& score = is_open ? scores[half].second : scores[half].first;
+            score.unseen = fit.part_of(others, least);
+            std::vector<LightStart> starts;
+            if (is_open)
+                starts = fit.starts(fit.part_of(mine, least, most_of_search), request, false);
+            for (std::size_t model = 0; model < (is_open ? tried : ambient_models); ++model) {
+                const LightValues values = fit.fitted(seen, models[model], starts, request, false);
+                if (is_open)
+                    judged.halves[model][half] = values;
+                std::fill(score.unseen.lit.begin(), score.unseen.lit.end(), 1);
+                score.unseen.centres.clear();
+                if (models[model].direct || models[model].tones)
+                    fit.guess_shadows(score.unseen, values);
+                score.costs.push_back(fit.costs(score.unseen, values));
+            }
+        }
+    });
+    const auto take = [&](HeldOut& into, const Scores& from) {
+        std::size_t begin = 0;
+        for (std::size_t k = 0; k < from.unseen.ends.size(); ++k) {
+            const auto albedo = static_cast<std::size_t>(fit.sample(from.unseen.samples[begin]).albedo);
+            for (std::size_t model = 0; model < from.costs.size(); ++model)
+                into.costs[model][albedo] += from.costs[model][k] / halvings;
+            into.weights[albedo] = static_cast<double>(from.unseen.ends[k] - begin);
+            begin = from.unseen.ends[k];
+        }
+    };
+    for (const auto& [of_all, of_open] : scores) {
+        take(judged.all, of_all);
+        take(judged.opened, of_open);
+    }
+    return judged;
+}
+
 } // namespace
 
 LightEstimate estimate_light(const LightSamples& samples, const LightRequest& request) {
@@ -111,66 +191,69 @@ LightEstimate estimate_light(const LightSamples& samples, const LightRequest& re
         return result;
     }
     fit.take_gains(whole, fit.fitted(whole, models[2], {}, {}, false));
+    LightPart open_part = fit.part_of(every, open);
+    fit.take_price(fit.cost(open_part, fit.fitted(open_part, models[2], {}, {}, false)));
+    const bool tells = open_part.samples.size() >= fewest_samples && open_part.ends.size() >= fewest_albedos;
 
-    const std::size_t tried = request.direct ? models.size() : 3;
-    std::vector<std::vector<double>> costs(tried, std::vector<double>(2 * halvings));
-    std::vector<std::vector<LightValues>> halves(tried, std::vector<LightValues>(2 * halvings));
-    tbb::parallel_for(std::size_t{0}, std::size_t{2 * halvings}, [&](std::size_t half) {
-        const int round = static_cast<int>(half / 2);
-        const bool first = half % 2 == 0;
-        const auto mine = [&](int albedo) { return in_half(albedo, round, first); };
-        const auto others = [&](int albedo) { return in_half(albedo, round, !first); };
-        LightPart seen = fit.part_of(mine, most_of_half), unseen = fit.part_of(others);
-        std::vector<LightStart> starts;
-        if (request.direct)
-            starts = fit.starts(fit.part_of(mine, most_of_search), request, false);
-        for (std::size_t model = 0; model < tried; ++model) {
-            const LightValues values = halves[model][half] = fit.fitted(seen, models[model], starts, request, false);
-            std::fill(unseen.lit.begin(), unseen.lit.end(), 1);
-            if (models[model].shadows)
-                fit.cast_shadows(unseen, values.direct);
-            costs[model][half] = fit.cost(unseen, values);
-        }
-    });
-    std::size_t chosen = 0;
-    for (std::size_t model = 0; model < tried; ++model) {
-        result.models.push_back(
-            {models[model].name, std::accumulate(costs[model].begin(), costs[model].end(), 0.0) / (2 * halvings)});
-        // A term is kept if it explains what it was not fitted to better, by more than chance and two per cent.
-        const auto [gain, error] = mean_gain(costs[model], costs[chosen]);
-        if (model > 0 && gain > std::max(error, 0.02 * result.models[chosen].held_out))
-            chosen = model;
+    const std::size_t tried = request.direct ? models.size() : ambient_models;
+    const Judged judged = judged_on_halves(fit, request, samples.albedos());
+    const HeldOut &all = judged.all, &opened = judged.opened;
+    std::size_t ambient = 0;
+    for (std::size_t model = 1; model < ambient_models; ++model)
+        if (all.is_better(model, ambient, 1))
+            ambient = model;
+    std::size_t chosen = ambient;
+    std::string why_none = !request.direct ? "as asked"
+                           : tells         ? "no direct light explains unseen surfaces better"
+                                           : "too few open surfaces tell of direct light";
+    if (request.direct && tells) {
+        std::size_t rival = 1;
+        for (const std::size_t model : {std::size_t{2}, tones_model})
+            if (opened.mean(model) < opened.mean(rival))
+                rival = model;
+        std::size_t best = tones_model + 1;
+        if (opened.is_better(best + 1, best, 1))
+            ++best;
+        if (opened.is_better(best, rival, 1))
+            chosen = best;
     }
-    std::string why_none = !request.direct         ? "as asked"
-                           : models[chosen].direct ? ""
-                                                   : "no direct light explains unseen surfaces better";
+    for (std::size_t model = 0; model < tried; ++model)
+        result.models.push_back({models[model].name, request.direct ? opened.mean(model) : all.mean(model)});
+    LightPart part = models[chosen].direct ? fit.part_of(every, open) : whole;
     std::vector<LightStart> starts;
     if (models[chosen].direct)
-        starts = fit.starts(fit.part_of(every, most_of_search), request, true);
-    LightValues values = fit.fitted(whole, models[chosen], starts, request, true);
+        starts = fit.starts(fit.part_of(every, open, most_of_search), request, true);
+    LightValues values = fit.fitted(part, models[chosen], starts, request, true);
     if (models[chosen].direct) {
-        why_none =
-            doubt_about(fit, models[chosen], whole, values, halves[chosen], samples, request.towards.has_value());
+        std::string doubt =
+            doubt_about(fit, models[chosen], part, values, judged.halves[chosen], samples, request.towards.has_value());
         std::vector<double> turns;
-        for (const LightValues& half : halves[chosen])
+        for (const LightValues& half : judged.halves[chosen])
             turns.push_back(degrees_between(half.direct, values.direct));
         result.spread_deg = median(turns, 0.0);
-        if (!why_none.empty()) {
-            why_none = fmt::format("a direct light from {} is not believed: {}", text_of(values.direct.normalized()),
-                                   why_none);
-            chosen = 2; // its sum with ambient light; what remains is no light of one direction
-            const auto [gain, error] = mean_gain(costs[2], costs[1]);
-            if (gain <= std::max(error, 0.02 * result.models[1].held_out))
-                chosen = 1;
-            values = fit.fitted(whole, models[chosen], {}, request, true);
+        if (doubt.empty() && result.spread_deg > most_turn_deg)
+            doubt = fmt::format("halves of the surfaces have it {:.0f} degrees apart", result.spread_deg);
+        if (!doubt.empty()) {
+            why_none =
+                fmt::format("a direct light from {} is not believed: {}", text_of(values.direct.normalized()), doubt);
+            chosen = ambient; // its sum with ambient light; what remains is no light of one direction
+            part = whole;
+            values = fit.fitted(part, models[chosen], {}, request, true);
         }
     }
+    if (models[chosen].direct) { // open surfaces tell little of the power
+        part = whole;
+        fit.guess_shadows(part, values);
+        values = fit.refined(part, models[1], values, request.towards.has_value());
+    }
     // Errors of visibility and light that was not found make the photographs look as if they showed less of it.
-    if (values.power >= least_power && values.power < 1 && fit.most_power(whole, values) >= 1) {
-        LightTerms rest = models[chosen];
-        rest.power = false;
+    if (values.power >= least_power && values.power < 1 && fit.most_power(part, values) >= 1) {
         values.power = 1;
-        values = fit.refined(whole, rest, values, request.towards.has_value());
+        if (!models[chosen].direct) {
+            LightTerms rest = models[chosen];
+            rest.power = false;
+            values = fit.refined(part, rest, values);
+        }
     }
     result.chosen = models[chosen].name;
     Light& light = result.light;
@@ -185,14 +268,19 @@ LightEstimate estimate_light(const LightSamples& samples, const LightRequest& re
         return result;
     }
     light.direct = values.direct;
-    light.shadows = models[chosen].shadows;
+    // Whether depth images know its shadows: what they never saw casts none there, and walls that it shines through do.
+    LightPart open_to_it = fit.part_of(every, open, most_of_search);
+    const double without = fit.cost(open_to_it, values);
+    fit.cast_shadows(open_to_it, values.direct);
+    light.shadows = fit.cost(open_to_it, values) < without;
     for (Eigen::Index channel = 0; channel < 3; ++channel)
-        light.tint[channel] = fit.tint(whole, values, channel);
+        light.tint[channel] = fit.tint(part, values, channel);
     result.sentence =
         fmt::format("light: ambient, and {:.2f} times as much direct light from {} in {} ({:.0f} degrees between "
                     "halves); held-out error {:.3f}, {:.3f} without; {} samples of {} frames{}",
                     light.direct.norm(), text_of(light.direct.normalized()), space, result.spread_deg,
-                    result.models[chosen].held_out, std::min(result.models[1].held_out, result.models[2].held_out),
+                    result.models[chosen].held_out,
+                    std::min({result.models[1].held_out, result.models[2].held_out, result.models[3].held_out}),
                     result.samples, result.frames, no_sign);
     return result;
 }

@@ -17,9 +17,8 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr double most_residual = 0.35;   // beyond it a sample is of another albedo, or a highlight
-constexpr double cauchy = 0.1;           // of log residuals: an albedo's own texture
-constexpr double price_of_shadow = 0.08; // a shadow that is only guessed has to explain that much
+constexpr double most_residual = 0.35; // beyond it a sample is of another albedo, or a highlight
+constexpr double cauchy = 0.1;         // of log residuals: an albedo's own texture
 
 /// The smaller of |r| and most_residual.
 double limited(double r) { return std::min(std::abs(r), most_residual); }
@@ -40,7 +39,7 @@ Lighting lighting(const LightSample& sample, double log_visibility, const LightV
     const double open = std::exp(values.power * log_visibility), seen = smoothly_positive(along) + 0.05;
     Lighting light{};
     light.ambient = open * seen;
-    light.all = light.ambient + lit * smoothly_positive(towards);
+    light.all = light.ambient + lit * smoothly_positive(towards); // without a tone, which changes no slope
     light.by_direct = lit * slope_of_smoothly_positive(towards) / light.all * sample.normal;
     light.by_gradient = open * slope_of_smoothly_positive(along) / light.all * sample.normal;
     light.by_power = light.ambient * log_visibility / light.all;
@@ -49,8 +48,47 @@ Lighting lighting(const LightSample& sample, double log_visibility, const LightV
 
 double log_light(const LightSample& sample, double log_visibility, const LightValues& values, double lit) {
     const double along = values.gradient.dot(sample.normal) + 1 - 0.05;
-    return std::log(std::exp(values.power * log_visibility) * (smoothly_positive(along) + 0.05) +
-                    lit * smoothly_positive(values.direct.dot(sample.normal)));
+    const double light = std::exp(values.power * log_visibility) * (smoothly_positive(along) + 0.05) +
+                         lit * smoothly_positive(values.direct.dot(sample.normal));
+    return std::log(light * (lit > 0 ? values.tones : 1));
+}
+
+/// Whether light on a sample depends on its being lit.
+bool may_be_unlit(const LightSample& sample, const LightValues& values) {
+    const double strength = values.direct.norm();
+    return values.tones > 1 || (strength > 0 && sample.normal.dot(values.direct) > light_facing * strength);
+}
+
+/// Log residuals of the samples of one albedo, if they are lit and if not.
+struct Choice {
+    double lit, unlit;
+    bool free; ///< else it is lit
+};
+
+/// The centre that leaves least of them, and what it leaves. An albedo half in the shadow has no median to go by.
+std::pair<double, double> best_centre(std::span<const Choice> choices, double price) {
+    constexpr int tried = 8; // of each kind
+    std::vector<double> lit, unlit;
+    for (const Choice& each : choices) {
+        lit.push_back(each.lit);
+        if (each.free)
+            unlit.push_back(each.unlit);
+    }
+    std::pair<double, double> best{0, std::numeric_limits<double>::infinity()};
+    for (std::vector<double>* values : {&lit, &unlit}) {
+        std::ranges::sort(*values);
+        for (std::size_t k = 0; k < tried && !values->empty(); ++k) {
+            const double centre = (*values)[(2 * k + 1) * values->size() / (2 * tried)];
+            double sum = 0;
+            for (const Choice& each : choices) {
+                const double as_lit = limited(each.lit - centre);
+                sum += each.free ? std::min(as_lit, limited(each.unlit - centre) + price) : as_lit;
+            }
+            if (sum < best.second)
+                best = {centre, sum};
+        }
+    }
+    return best;
 }
 
 /// The upper median; the order of `values` is changed.
@@ -144,7 +182,7 @@ class LightMisfit final : public ceres::CostFunction {
                     continue;
                 }
                 const Lighting light = lighting(sample, log_visibility, values, lit);
-                residuals[i] = observed_[i] - std::log(light.all);
+                residuals[i] = observed_[i] - std::log(light.all * (lit > 0 ? values.tones : 1));
                 for (std::size_t k = 0; k < count; ++k)
                     slopes[i * count + k] = -Unknowns::slope(light, unknowns_.which[k]);
             }
@@ -209,31 +247,31 @@ LightFit::LightFit(const LightSamples& samples) : samples_(samples), all_(sample
     std::ranges::stable_sort(by_albedo_, {}, [&](std::size_t i) { return all_[i].albedo; });
 }
 
-LightPart LightFit::part_of(const std::function<bool(int albedo)>& wanted, std::size_t most) const {
-    constexpr std::size_t fewest = 3;
+LightPart LightFit::part_of(const std::function<bool(int albedo)>& wanted, double open, std::size_t most) const {
+    constexpr std::size_t fewest = 3, fewest_open = 8;
+    std::vector<std::size_t> here;
+    for (const std::size_t i : by_albedo_)
+        if (all_[i].visibility >= open && wanted(all_[i].albedo))
+            here.push_back(i);
     const auto end_of = [&](std::size_t from) { // of the samples of one albedo
         std::size_t end = from;
-        while (end < by_albedo_.size() && all_[by_albedo_[end]].albedo == all_[by_albedo_[from]].albedo)
+        while (end < here.size() && all_[here[end]].albedo == all_[here[from]].albedo)
             ++end;
         return end;
     };
-    std::size_t there = 0;
-    for (std::size_t from = 0, end = 0; from < by_albedo_.size(); from = end) {
-        end = end_of(from);
-        there += wanted(all_[by_albedo_[from]].albedo) ? end - from : 0;
-    }
+    const std::size_t there = here.size();
     const double share =
         std::min(1.0, static_cast<double>(most) / static_cast<double>(std::max<std::size_t>(there, 1)));
     LightPart part;
-    for (std::size_t from = 0, end = 0; from < by_albedo_.size(); from = end) {
+    for (std::size_t from = 0, end = 0; from < here.size(); from = end) {
         end = end_of(from);
-        if (!wanted(all_[by_albedo_[from]].albedo))
-            continue;
         const std::size_t size = end - from;
+        if (open > 0 && size < fewest_open)
+            continue;
         const auto taken = std::clamp(static_cast<std::size_t>(std::ceil(share * static_cast<double>(size))),
                                       std::min(size, fewest), size);
         for (std::size_t i = 0; i < taken; ++i)
-            part.samples.push_back(by_albedo_[from + i * size / taken]);
+            part.samples.push_back(here[from + i * size / taken]);
         part.ends.push_back(part.samples.size());
     }
     part.lit.assign(part.samples.size(), 1);
@@ -251,15 +289,58 @@ std::vector<double> LightFit::residuals(const LightPart& part, const LightValues
     std::vector<double> r = observed(part);
     for (std::size_t i = 0; i < r.size(); ++i)
         r[i] -= log_light(all_[part.samples[i]], log_visibility_[part.samples[i]], values, part.lit[i]);
-    subtract_medians(part, r);
+    if (part.centres.empty())
+        subtract_medians(part, r);
+    std::size_t from = 0;
+    for (std::size_t k = 0; k < part.centres.size(); ++k)
+        for (; from < part.ends[k]; ++from)
+            r[from] -= part.centres[k];
     return r;
 }
 
+std::vector<double> LightFit::costs(const LightPart& part, const LightValues& values) const {
+    const std::vector<double> r = residuals(part, values);
+    std::vector<double> all;
+    std::size_t from = 0;
+    for (const std::size_t end : part.ends) {
+        const auto size = static_cast<double>(end - from);
+        double sum = 0;
+        for (; from < end; ++from)
+            sum += limited(r[from]) + (part.lit[from] > 0 || part.centres.empty() ? 0 : price_);
+        all.push_back(sum / size);
+    }
+    return all;
+}
+
 double LightFit::cost(const LightPart& part, const LightValues& values) const {
+    const std::vector<double> each = costs(part, values);
     double sum = 0;
-    for (const double r : residuals(part, values))
-        sum += limited(r);
+    for (std::size_t k = 0; k < each.size(); ++k)
+        sum += each[k] * static_cast<double>(part.ends[k] - (k > 0 ? part.ends[k - 1] : 0));
     return sum / static_cast<double>(std::max<std::size_t>(part.samples.size(), 1));
+}
+
+void LightFit::guess_shadows(LightPart& part, const LightValues& values) const {
+    const std::vector<double> known = observed(part);
+    part.centres.clear();
+    std::vector<Choice> choices;
+    std::size_t from = 0;
+    for (const std::size_t end : part.ends) {
+        choices.clear();
+        for (std::size_t i = from; i < end; ++i) {
+            const LightSample& sample = all_[part.samples[i]];
+            const double log_visibility = log_visibility_[part.samples[i]];
+            choices.push_back({known[i] - log_light(sample, log_visibility, values, 1),
+                               known[i] - log_light(sample, log_visibility, values, 0), may_be_unlit(sample, values)});
+        }
+        const double centre = best_centre(choices, price_).first;
+        part.centres.push_back(centre);
+        for (std::size_t i = from; i < end; ++i) {
+            const Choice& each = choices[i - from];
+            part.lit[i] = each.free && limited(each.unlit - centre) + price_ < limited(each.lit - centre) ? 0 : 1;
+        }
+        from = end;
+    }
 }
 
 void LightFit::cast_shadows(LightPart& part, const Vector3d& direct) const {
@@ -275,26 +356,25 @@ std::vector<LightStart> LightFit::starts(const LightPart& part, const LightReque
         fixed ? std::vector{request.towards->normalized()} : directions(thorough ? 160 : 80);
     const std::vector<double> known = observed(part), tried = strengths(fixed);
     std::vector<LightStart> all;
-    std::vector<double> facing(known.size()), logs(known.size()), r;
+    std::vector<double> facing(known.size());
+    std::vector<Choice> choices(known.size());
     for (const Vector3d& direction : from) {
         for (std::size_t i = 0; i < known.size(); ++i)
             facing[i] = std::max(0.0, direction.dot(all_[part.samples[i]].normal));
         for (const double strength : tried) {
-            r = known;
             for (std::size_t i = 0; i < known.size(); ++i) {
-                logs[i] = std::log(all_[part.samples[i]].visibility + strength * facing[i]);
-                r[i] -= logs[i];
+                const LightSample& sample = all_[part.samples[i]];
+                choices[i] = {known[i] - std::log(sample.visibility + strength * facing[i]),
+                              known[i] - log_visibility_[part.samples[i]], facing[i] > light_facing};
             }
-            subtract_medians(part, r);
-            double sum = 0, guessed = 0;
-            for (std::size_t i = 0; i < known.size(); ++i) {
-                const double least = limited(r[i]);
-                sum += least;
-                const double in_shadow = std::abs(r[i] + logs[i] - log_visibility_[part.samples[i]]) + price_of_shadow;
-                guessed += strength * facing[i] > light_facing ? std::min(least, in_shadow) : least;
+            double sum = 0;
+            std::size_t first = 0;
+            for (const std::size_t end : part.ends) {
+                sum += best_centre(std::span(choices).subspan(first, end - first), price_).second;
+                first = end;
             }
-            const auto n = static_cast<double>(std::max<std::size_t>(known.size(), 1));
-            all.push_back({{strength * direction, Vector3d::Zero(), 1}, sum / n, guessed / n});
+            all.push_back({{strength * direction, Vector3d::Zero(), 1},
+                           sum / static_cast<double>(std::max<std::size_t>(known.size(), 1))});
         }
     }
     return all;
@@ -303,37 +383,40 @@ std::vector<LightStart> LightFit::starts(const LightPart& part, const LightReque
 LightValues LightFit::fitted(LightPart& part, const LightTerms& terms, const std::vector<LightStart>& starts,
                              const LightRequest& request, bool thorough) const {
     std::fill(part.lit.begin(), part.lit.end(), 1);
+    part.centres.clear();
     LightValues ambient;
-    if (!terms.direct) {
-        ambient.power = terms.power ? 1 : 0;
+    ambient.power = terms.power ? 1 : 0;
+    std::vector<LightValues> from;
+    if (terms.direct) {
+        std::vector<LightStart> found = starts;
+        std::ranges::stable_sort(found, {}, &LightStart::cost);
+        for (const LightStart& start : found) // false minima are many, and their costs alike
+            if (from.size() < (thorough ? 6U : 3U) && std::ranges::none_of(from, [&](const LightValues& other) {
+                    return (other.direct - start.values.direct).norm() < 0.35 * start.values.direct.norm();
+                }))
+                from.push_back(start.values);
+    } else if (terms.tones) {
+        for (const double tones : {1.2, 1.5, 2.0, 3.0, 5.0}) {
+            from.push_back(ambient);
+            from.back().tones = tones;
+        }
+    } else {
         return refined(part, terms, ambient);
     }
-    std::vector<LightStart> found = starts;
-    std::ranges::stable_sort(
-        found, {}, [&](const LightStart& each) { return terms.shadows ? each.cost_with_guessed_shadows : each.cost; });
-    std::vector<LightValues> distinct; // false minima are many, and their costs alike
-    for (const LightStart& start : found)
-        if (distinct.size() < (thorough ? 6U : 3U) && std::ranges::none_of(distinct, [&](const LightValues& other) {
-                return (other.direct - start.values.direct).norm() < 0.35 * start.values.direct.norm();
-            }))
-            distinct.push_back(start.values);
     std::pair<double, LightValues> best{std::numeric_limits<double>::infinity(), ambient};
-    std::vector<double> lit_of_best = part.lit;
-    for (LightValues each : distinct) {
-        std::fill(part.lit.begin(), part.lit.end(), 1);
-        for (int round = 0; round < (terms.shadows ? 3 : 1); ++round) {
-            if (terms.shadows)
-                cast_shadows(part, each.direct);
+    LightPart best_part = part;
+    for (LightValues each : from) {
+        for (int round = 0; round < 3; ++round) {
+            guess_shadows(part, each);
             each = refined(part, terms, each, request.towards.has_value());
         }
-        if (terms.shadows)
-            cast_shadows(part, each.direct);
+        guess_shadows(part, each);
         if (const double now = cost(part, each); now < best.first) {
             best = {now, each};
-            lit_of_best = part.lit;
+            best_part = part;
         }
     }
-    part.lit = lit_of_best;
+    part = best_part;
     return best.second;
 }
 
@@ -382,6 +465,8 @@ void LightFit::take_gains(const LightPart& part, const LightValues& values) {
     for (double& gain : gains_)
         gain -= first;
 }
+
+void LightFit::take_price(double usual) { price_ = std::max(price_, 1.5 * usual); }
 
 double LightFit::most_power(const LightPart& part, const LightValues& values) const {
     const std::vector<double> r = residuals(part, values);

@@ -11,28 +11,32 @@
 
 namespace scanshade {
 
-/// What a model may use.
+/// What a model may use. `tones`: every albedo may come in two, the brighter so many times the other; which of them a
+/// sample shows is guessed from its colour, as shadows of a direct light are. A direct light that explains no more than
+/// these is paint.
 struct LightTerms {
     const char* name;
-    bool power, gradient, direct, shadows;
+    bool power, gradient, direct, tones;
 };
 
 struct LightValues {
     Eigen::Vector3d direct = Eigen::Vector3d::Zero(), gradient = Eigen::Vector3d::Zero();
     double power = 0;
+    double tones = 1; ///< how many times the brighter of two tones is the other; 1 = there is one
 };
 
 /// Samples, those of one albedo side by side, and which of them see the light.
 struct LightPart {
     std::vector<std::size_t> samples; ///< numbers of LightSamples::all()
     std::vector<std::size_t> ends;    ///< of each albedo's, in `samples`
-    std::vector<double> lit;          ///< 0 or 1, as `samples`
+    std::vector<double> lit;          ///< 0 or 1, as `samples`: reached by direct light, or of the brighter tone
+    std::vector<double> centres;      ///< of the log residuals of each albedo, as `ends`; empty = their medians
 };
 
 /// A direct light to start from, and how well it explains a part as it is.
 struct LightStart {
     LightValues values;
-    double cost, cost_with_guessed_shadows;
+    double cost;
 };
 
 constexpr double light_facing = 0.1; ///< direct light on less than this could be anything
@@ -43,12 +47,17 @@ class LightFit {
     explicit LightFit(const LightSamples& samples);
 
     /// Samples of some albedos; of each albedo its share of `most`, evenly spread, and three at least.
-    [[nodiscard]] LightPart part_of(const std::function<bool(int albedo)>& wanted,
+    /// Only those with a visibility of `open` or more; albedos with fewer than eight are left out.
+    [[nodiscard]] LightPart part_of(const std::function<bool(int albedo)>& wanted, double open = 0,
                                     std::size_t most = std::numeric_limits<std::size_t>::max()) const;
     /// Log residuals, as part.samples; the albedos are the medians of their samples'.
     [[nodiscard]] std::vector<double> residuals(const LightPart& part, const LightValues& values) const;
-    /// The mean of min(|log residual|, 0.35).
+    /// The mean of min(|log residual|, 0.35) of each albedo, where guessed shadows have their price.
+    [[nodiscard]] std::vector<double> costs(const LightPart& part, const LightValues& values) const;
+    /// The same of all samples.
     [[nodiscard]] double cost(const LightPart& part, const LightValues& values) const;
+    /// Guesses from colours which samples lie in the shadow of the direct light, or show the darker tone.
+    void guess_shadows(LightPart& part, const LightValues& values) const;
     /// Asks the depth images what stands before the light.
     void cast_shadows(LightPart& part, const Eigen::Vector3d& direct) const;
 
@@ -65,6 +74,8 @@ class LightFit {
 
     /// The medians of each frame's residuals under `values`: exposure and its automatic changes.
     void take_gains(const LightPart& part, const LightValues& values);
+    /// What a shadow that is only guessed has to explain: more than the usual residual.
+    void take_price(double usual);
     /// Of direct over ambient light in one channel (0 = red): what explains that channel best.
     [[nodiscard]] double tint(const LightPart& part, const LightValues& values, Eigen::Index channel) const;
 
@@ -83,6 +94,7 @@ class LightFit {
     /// Log luminances without their frames' gains, as part.samples.
     [[nodiscard]] std::vector<double> observed(const LightPart& part) const;
 
+    double price_ = 0.08;
     const LightSamples& samples_;
     const std::vector<LightSample>& all_;
     std::vector<std::size_t> by_albedo_; ///< of all samples with an albedo

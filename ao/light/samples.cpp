@@ -1,6 +1,7 @@
 #include "ao/light/light.h"
 #include "projection/base/error.h"
 #include "projection/base/hash.h"
+#include "projection/base/statistics.h"
 #include "projection/srgb.h"
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <optional>
 
 namespace scanshade {
 namespace {
@@ -25,18 +27,100 @@ int bin_of(const Eigen::Vector3d& normal) {
     return 7 * face + part;
 }
 
-/// Whether the surface goes on around the pixel, so that colour and depth show the same.
-bool is_within(const cv::Mat1f& z_m, int u, int v) {
-    constexpr int reach = 2;
-    constexpr float jump = 0.03F; // of depth
-    if (u < reach || v < reach || u + reach >= z_m.cols || v + reach >= z_m.rows)
-        return false;
-    const float here = z_m(v, u);
-    for (int y = v - reach; y <= v + reach; ++y)
-        for (int x = u - reach; x <= u + reach; ++x)
-            if (!(std::abs(z_m(y, x) - here) <= jump * here))
-                return false;
-    return true;
+/// Planes through squares of pixels. A plane's inverse depth is linear in u and v; sums from the image's corner on make
+/// each fit a few subtractions, however large the square.
+class PlaneFits {
+  public:
+    struct Plane {
+        Eigen::Vector3d normal; ///< in camera space, towards the camera
+        double rms;             ///< of inverse depth, of the plane's own
+        double tilt;            ///< standard error of the normal, radians
+    };
+
+    PlaneFits(const cv::Mat1f& z_m, const Pinhole& camera)
+        : camera_(camera), width_(z_m.cols + 1), sums_(static_cast<std::size_t>(width_) * (z_m.rows + 1)) {
+        for (int v = 0; v < z_m.rows; ++v) {
+            Sums row{};
+            for (int u = 0; u < z_m.cols; ++u) {
+                if (const double z = static_cast<double>(z_m(v, u)); z > 0 && std::isfinite(z)) {
+                    const double x = u - camera.cx, y = v - camera.cy, w = 1 / z;
+                    const std::array<double, 10> terms{1, x, y, x * x, x * y, y * y, w, w * x, w * y, w * w};
+                    for (std::size_t k = 0; k < terms.size(); ++k)
+                        row[k] += terms[k];
+                }
+                for (std::size_t k = 0; k < row.size(); ++k)
+                    at(u + 1, v + 1)[k] = at(u + 1, v)[k] + row[k];
+            }
+        }
+    }
+
+    /// Of the pixels at most `reach` away; nothing at the image's border and where depth has holes.
+    [[nodiscard]] std::optional<Plane> around(int u, int v, int reach) const {
+        const int left = u - reach, top = v - reach, right = u + reach + 1, bottom = v + reach + 1;
+        if (left < 0 || top < 0 || right >= width_ || static_cast<std::size_t>(bottom) * width_ >= sums_.size())
+            return std::nullopt;
+        Sums s;
+        for (std::size_t k = 0; k < s.size(); ++k)
+            s[k] = at(right, bottom)[k] - at(left, bottom)[k] - at(right, top)[k] + at(left, top)[k];
+        const double n = s[0], side = 2 * reach + 1;
+        if (n < 0.95 * side * side)
+            return std::nullopt;
+        const double x = s[1] / n, y = s[2] / n, w = s[6] / n;
+        const double xx = s[3] / n - x * x, xy = s[4] / n - x * y, yy = s[5] / n - y * y;
+        const double wx = s[7] / n - w * x, wy = s[8] / n - w * y, ww = s[9] / n - w * w;
+        const double det = xx * yy - xy * xy;
+        if (!(det > 1e-9))
+            return std::nullopt;
+        const double a = (wx * yy - wy * xy) / det, b = (wy * xx - wx * xy) / det, c = w - a * x - b * y;
+        // n . ray = w, and the ray of a pixel is (x / fx, y / fy, 1).
+        const Eigen::Vector3d scaled(a * camera_.fx, b * camera_.fy, c);
+        const double rms = std::sqrt(std::max(0.0, ww - a * wx - b * wy)), length = scaled.norm();
+        return Plane{-scaled / length, rms / w, rms * camera_.fx / std::sqrt(n * std::min(xx, yy)) / length};
+    }
+
+  private:
+    using Sums = std::array<double, 10>;
+    [[nodiscard]] const Sums& at(int u, int v) const { return sums_[static_cast<std::size_t>(v) * width_ + u]; }
+    [[nodiscard]] Sums& at(int u, int v) { return sums_[static_cast<std::size_t>(v) * width_ + u]; }
+
+    Pinhole camera_;
+    int width_;
+    std::vector<Sums> sums_;
+};
+
+constexpr int nearest_reach = 3; // pixels
+
+/// What the smallest squares leave in the median: a camera's noise, or the bend of exact depth. Not less than a share
+/// of depth that no light tells.
+double usual_rms(const PlaneFits& fits, cv::Size size) {
+    constexpr int every = 4;
+    constexpr double least = 5e-4;
+    std::vector<double> all;
+    for (int v = 0; v < size.height; v += every)
+        for (int u = 0; u < size.width; u += every)
+            if (const auto plane = fits.around(u, v, nearest_reach))
+                all.push_back(plane->rms);
+    return std::max(least, median(all, 0.0));
+}
+
+/// The normal of the widest square around a pixel that is as flat as the smallest; nothing where that is not flat or
+/// noise may turn it by more than light tells. Errors of normals make a direct light look weaker, then like none.
+std::optional<Eigen::Vector3d> sure_normal(const PlaneFits& fits, int u, int v, double usual) {
+    constexpr double most_tilt = 2 * std::numbers::pi / 180;
+    constexpr double correlated = 3; // neighbours err alike, which widens a fit's standard error
+    std::optional<PlaneFits::Plane> best = fits.around(u, v, nearest_reach);
+    if (!best || best->rms > 3 * usual)
+        return std::nullopt;
+    const double most = 1.3 * std::max(best->rms, usual);
+    for (const int reach : {5, 8, 12, 18}) {
+        const auto wider = fits.around(u, v, reach);
+        if (!wider || wider->rms > most)
+            break;
+        best = wider;
+    }
+    if (correlated * best->tilt > most_tilt)
+        return std::nullopt;
+    return best->normal;
 }
 
 /// Darker values have few steps, brighter ones may be clipped.
@@ -74,20 +158,20 @@ void LightSamples::add(const LightFrame& frame) {
         in_world_ ? Eigen::Matrix3d(frame.world_from_camera.linear()) : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
     const int index = static_cast<int>(frames_.size());
     std::map<int, std::vector<std::pair<std::uint32_t, LightSample>>> bins;
+    const PlaneFits fits(z_m, frame.depth.camera);
+    const double usual = usual_rms(fits, z_m.size());
     // Every so many pixels: there are many more of them than samples.
     const int step = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(z_m.total()) / 60000)));
     for (int v = 0; v < z_m.rows; v += step)
         for (int u = 0; u < z_m.cols; u += step) {
             const double visible = static_cast<double>(frame.visibility(v, u));
-            const cv::Vec3f n = frame.normals.normals(v, u);
             if (!(z_m(v, u) > 0) || !(visible >= darkest) || !is_exposed(frame.colour(v, u)) ||
                 (!frame.colour_known.empty() && frame.colour_known(v, u) == 0))
                 continue;
-            const Eigen::Vector3d normal(static_cast<double>(n[0]), static_cast<double>(n[1]),
-                                         static_cast<double>(n[2]));
-            if (!(-normal.dot(frame.depth.camera.ray(u, v).normalized()) > grazing) || !is_within(z_m, u, v))
+            const std::optional<Eigen::Vector3d> normal = sure_normal(fits, u, v, usual);
+            if (!normal || !(-normal->dot(frame.depth.camera.ray(u, v).normalized()) > grazing))
                 continue;
-            LightSample sample{turn * normal, linear(frame.colour(v, u)), std::min(visible, 1.0), index, u, v, -1};
+            LightSample sample{turn * *normal, linear(frame.colour(v, u)), std::min(visible, 1.0), index, u, v, -1};
             const int bin =
                 bin_of(sample.normal) * visibilities + std::min(visibilities - 1, static_cast<int>(visible * 8));
             bins[bin].emplace_back(hash(static_cast<std::uint32_t>(v * z_m.cols + u), 17U), sample);
@@ -119,7 +203,7 @@ Eigen::Vector3d LightSamples::place(const LightSample& sample) const {
 /// Samples within a cube of half a metre whose chromaticities are alike. Without a world, cubes are those of a frame. A
 /// chromaticity begins a new group if it is not near one already there, so that no border cuts through a wall's noise.
 void LightSamples::group() {
-    constexpr double side_m = 0.5, alike = 0.1;
+    constexpr double side_m = 1, alike = 0.1;
     constexpr int fewest = 15;
     struct Group {
         Eigen::Vector2d chromaticity;

@@ -4,6 +4,7 @@
 #include "projection/base/hash.h"
 #include "projection/srgb.h"
 
+#include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <numbers>
@@ -23,7 +24,8 @@ const scene::Scene& still_life() {
         add(scene::Box{{0, 0, -0.5}, {3, 3, 0.5}}, {0.5, 0.45, 0.4});
         add(scene::Box{{0, 3.5, 1.5}, {3, 0.5, 3.5}}, {0.55, 0.55, 0.5});
         for (int i = 0; i < 12; ++i) {
-            const double x = -1.8 + 1.2 * (i % 4), y = -1.2 + 1.3 * (i / 4);
+            const int row = i / 4;
+            const double x = -1.8 + 1.2 * (i % 4), y = -1.2 + 1.3 * row;
             const Vector3d albedo(0.25 + 0.4 * hash(3U * i) * 0x1p-32, 0.25 + 0.4 * hash(3U * i + 1) * 0x1p-32,
                                   0.25 + 0.4 * hash(3U * i + 2) * 0x1p-32);
             if (i % 2)
@@ -123,6 +125,67 @@ TEST(LightTest, a_direction_that_was_given_is_kept_and_none_is_none) {
     EXPECT_LT(degrees_between(given.light.direct, towards), 0.01);
     EXPECT_NEAR(given.light.direct.norm(), 1.5, 0.3);
     EXPECT_FALSE(estimated(sun, {.direct = false, .towards = {}}).light.has_direct());
+}
+
+/// A depth camera's noise: disparity off by a normal deviate for each pixel.
+Photograph with_noise(Photograph made, double disparity_px) {
+    made.geometry.z_m = made.geometry.z_m.clone();
+    made.geometry.normals = made.geometry.normals.clone();
+    for (int i = 0; i < static_cast<int>(made.geometry.z_m.total()); ++i) {
+        const auto share = [&](std::uint32_t salt) {
+            return (hash(static_cast<std::uint32_t>(i), salt) + 0.5) * 0x1p-32;
+        };
+        const double deviate = std::sqrt(-2 * std::log(share(1))) * std::cos(2 * std::numbers::pi * share(2));
+        float& z = made.geometry.z_m(i);
+        const double baseline_px_m = made.camera.fx * 0.075;
+        if (z > 0)
+            z = static_cast<float>(1 / (1 / static_cast<double>(z) + deviate * disparity_px / baseline_px_m));
+        made.geometry.normals(i) = {0, 0, -1}; // whoever takes these finds nothing
+    }
+    return made;
+}
+
+TEST(LightTest, a_sun_is_found_through_a_depth_cameras_noise) {
+    const Vector3d towards(0.45, -0.35, 0.82);
+    LightSamples samples(true);
+    std::vector<double> off;
+    for (const Vector3d& eye : eyes) {
+        const Photograph clean =
+            taken({.kind = scene::LightKind::sun, .towards = towards, .ratio = 1.5}, eye, {640, 480});
+        add(samples, with_noise(clean, 0.05));
+        for (std::size_t i = off.size(); i < samples.all().size(); ++i) {
+            const LightSample& sample = samples.all()[i];
+            const cv::Vec3f n = clean.geometry.normals(sample.v, sample.u);
+            off.push_back(degrees_between(sample.normal, clean.pose.linear() * Vector3d(static_cast<double>(n[0]),
+                                                                                        static_cast<double>(n[1]),
+                                                                                        static_cast<double>(n[2]))));
+        }
+    }
+    std::ranges::sort(off);
+    EXPECT_LT(off[off.size() / 2], 1.5) << "samples lie where normals are sure";
+    EXPECT_LT(off[off.size() * 9 / 10], 4);
+    samples.group();
+    const LightEstimate found = estimate_light(samples);
+    SCOPED_TRACE(found.sentence);
+    ASSERT_TRUE(found.light.has_direct());
+    EXPECT_LT(degrees_between(found.light.direct, towards), 10);
+    EXPECT_NEAR(found.light.direct.norm(), 1.5, 0.4);
+}
+
+TEST(LightTest, paint_in_two_tones_is_no_light) {
+    LightSamples samples(true);
+    for (const Vector3d& eye : eyes) {
+        Photograph photograph = taken({.kind = scene::LightKind::ambient}, eye);
+        for (int v = 0; v < photograph.colour.rows; ++v)
+            for (int u = 0; u < photograph.colour.cols; ++u)
+                if ((u / 12 + v / 12) % 2 == 0)
+                    for (unsigned char& c : photograph.colour(v, u).val)
+                        c = static_cast<unsigned char>(0.7 * c);
+        add(samples, photograph);
+    }
+    samples.group();
+    const LightEstimate found = estimate_light(samples);
+    EXPECT_FALSE(found.light.has_direct()) << found.sentence;
 }
 
 TEST(LightTest, the_same_samples_give_the_same_light) {
