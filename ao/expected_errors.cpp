@@ -47,7 +47,7 @@ ChosenSettings settings_from(const std::string& text) {
 std::string text_of(const ChosenSettings& settings) {
     std::vector<std::string> all;
     for (const auto& [name, value] : settings)
-        all.push_back(name + "=" + value);
+        all.push_back(fmt::format("{}={}", name, value));
     return fmt::format("{}", fmt::join(all, ","));
 }
 

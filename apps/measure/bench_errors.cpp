@@ -21,8 +21,6 @@
 namespace scanshade {
 namespace {
 
-namespace fs = std::filesystem;
-
 /// "office" of "office-kinect": captures of one scene are left out together.
 std::string scene_of(const std::string& capture) { return capture.substr(0, capture.find('-')); }
 
