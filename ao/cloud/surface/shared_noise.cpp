@@ -26,7 +26,7 @@ std::int64_t number_of(const Vector3d& scaled, const Vector3i& off) {
     return all;
 }
 
-std::optional<SharedNoise> shared(const Vector3d& middle, CloudNoise&& noise, bool sides) {
+std::optional<SharedNoise> known_noise(const Vector3d& middle, CloudNoise&& noise, bool sides) {
     if (!noise.known())
         return std::nullopt;
     return SharedNoise{middle, std::move(noise), sides};
@@ -53,8 +53,8 @@ std::optional<SharedNoise> noise_at(std::span<const NoisePlace> places, const Lo
     for (const std::size_t index : normals.empty() ? std::vector<std::size_t>() : indices)
         opposed.push_back(opposed_beside(cloud.tree, normals, index));
     const bool sides = !normals.empty() && sides_agree(opposed);
-    return shared(cloud.middle, CloudNoise(cloud.tree, look, sides ? normals : std::span<const Vector3d>(), indices),
-                  sides);
+    return known_noise(cloud.middle,
+                       CloudNoise(cloud.tree, look, sides ? normals : std::span<const Vector3d>(), indices), sides);
 }
 
 NoisePlaces::NoisePlaces(std::span<const NoisePlace> places, const NoiseLook& look) : look_(look) {
@@ -151,7 +151,7 @@ std::optional<SharedNoise> NoisePlaces::measured() const {
         found[k] = noise_round(tree, sides ? normals : std::span<const Vector3d>(), own, look_);
         positions[k] = (rounds[k]->place.point - middle).cast<float>();
     });
-    return shared(middle, CloudNoise(positions, found), sides);
+    return known_noise(middle, CloudNoise(positions, found), sides);
 }
 
 } // namespace scanshade
