@@ -126,7 +126,8 @@ class FilteredRows {
 /// to row, as with one object before nothing, none are shown: long repeats count there. Nor are they for small images.
 void sample(FilteredRows& rows, Packer& packer) {
     constexpr std::int64_t samples = 8, looked_at = 64;
-    const int at_once = rows.rows_of(1 << 13);
+    // Long enough that repeats of earlier rows are found.
+    const int at_once = std::max(rows.rows_of(1 << 13), rows.count() / 96);
     std::size_t changed = 0;
     for (std::int64_t i = 0; i < looked_at; ++i)
         changed += rows.changed_in(static_cast<int>(rows.count() * (2 * i + 1) / (2 * looked_at)));
