@@ -1,6 +1,7 @@
 // Files and values: images, cameras, atomic output and captures of every layout come back as they were written.
 #include "io/cameras/camera_file.h"
 #include "io/captures/capture.h"
+#include "io/compression/deflate.h"
 #include "io/images/exif.h"
 #include "io/images/format.h"
 #include "io/images/image_check.h"
@@ -1023,16 +1024,18 @@ void at_depths(int depths, const std::function<void()>& work) {
     further[1] = '\0'; // not a tail call: the frame stays
 }
 
-/// ISA-L's faster levels hash an address: one packing in some thousands of the same pixels is another.
+/// ISA-L's levels 1 and 2 hash an address: one packing in some thousands of the same pixels is another. Small images
+/// are packed by level 3, the others by level 0.
 TEST(images, the_same_pixels_are_the_same_bytes_wherever_the_stack_lies) {
     cv::theRNG().state = 4;
-    std::vector<cv::Mat> images(500);
-    for (cv::Mat& image : images) { // rows that begin alike, so that the first bytes are found again
-        cv::Mat1b row(1, 24), noise(12, 24);
+    std::vector<cv::Mat> images(530);
+    for (std::size_t i = 0; i < images.size(); ++i) { // rows that begin alike, so that the first bytes are found again
+        const int rows = i < 500 ? 12 : 4000;
+        cv::Mat1b row(1, 24), noise(rows, 24);
         cv::randu(row, 0, 256);
         cv::randu(noise, 0, 256);
-        cv::repeat(row, 12, 1, image);
-        noise.copyTo(image, noise > 230);
+        cv::repeat(row, rows, 1, images[i]);
+        noise.copyTo(images[i], noise > (i < 500 ? 230 : 150));
     }
     std::vector<std::string> first;
     std::size_t different = 0;
@@ -1044,6 +1047,27 @@ TEST(images, the_same_pixels_are_the_same_bytes_wherever_the_stack_lies) {
                 different += bytes != first[i];
     });
     EXPECT_EQ(different, 0U);
+}
+
+/// Codes are made from a few rows. They must fit the others as well: whether all rows are alike, one object stands
+/// before nothing, or a strip lies between the rows that were looked at.
+TEST(images, a_png_is_as_small_as_by_the_slower_packer) {
+    cv::theRNG().state = 8;
+    cv::Mat1b noise(480, 640);
+    cv::randn(noise, 128, 6);
+    for (const cv::Rect& seen : {cv::Rect(0, 0, 640, 480), cv::Rect(0, 0, 640, 240), cv::Rect(0, 100, 640, 9),
+                                 cv::Rect(300, 200, 40, 90), cv::Rect(100, 50, 440, 380), cv::Rect()}) {
+        cv::Mat1b image(noise.size(), 0);
+        if (!seen.empty())
+            noise(seen).copyTo(image(seen));
+        std::string rows; // as the writer filters them
+        for (int y = 0; y < image.rows; ++y) {
+            rows += '\2';
+            for (int x = 0; x < image.cols; ++x)
+                rows += static_cast<char>(image(y, x) - (y > 0 ? image(y - 1, x) : 0));
+        }
+        EXPECT_LT(encoded_png(image).size(), deflated(rows).size() * 21 / 20 + 500) << seen;
+    }
 }
 
 /// An image that is packed in bands: a row's differences are those to the last row of the band before.
