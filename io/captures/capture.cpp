@@ -311,7 +311,9 @@ void check_still_there(const Capture& capture) {
 
 void load_colour(const Capture& capture, const CaptureEntry& entry, cv::Size depth_size, Frame& frame) {
     try {
-        frame.colour = colour_of(entry);
+        StoredColour stored = stored_colour_of(entry);
+        frame.colour = stored.colour;
+        frame.deep_colour = stored.deep;
     } catch (const Outage&) {
         throw;
     } catch (const Error& failure) {
@@ -327,11 +329,14 @@ void load_colour(const Capture& capture, const CaptureEntry& entry, cv::Size dep
     if (capture.colour_in_more_pixels && !frame.colour_camera && colour.width > expected.width &&
         std::abs(shape(colour) / shape(expected) - 1) < 0.02) {
         cv::resize(frame.colour, frame.colour, expected, 0, 0, cv::INTER_AREA);
+        if (!frame.deep_colour.empty())
+            cv::resize(frame.deep_colour, frame.deep_colour, expected, 0, 0, cv::INTER_AREA);
         return;
     }
     frame.warnings.push_back(fmt::format("{}: colour is {}, {} is {}; processed without colour.", entry.colour,
                                          text(colour), frame.colour_camera ? "its camera" : "depth", text(expected)));
     frame.colour = cv::Mat3b();
+    frame.deep_colour = cv::Mat3w();
 }
 
 void correct(cv::Mat1f& depth_m, const DepthCorrection& correction) {

@@ -10,12 +10,14 @@
 
 layout(local_size_x = finish_row) in;
 layout(constant_id = spec_known) const int has_unknown = 0;
+layout(constant_id = spec_linear) const int is_linear = 0;
 layout(binding = 0, r32f) readonly uniform imageBuffer surface;
 layout(binding = 1, r32f) readonly uniform imageBuffer normals;
 layout(binding = 2, r32ui) readonly uniform uimageBuffer colour;       // bytes: blue, green, red of each pixel
 layout(binding = 3, r32ui) readonly uniform uimageBuffer colour_known; // bytes: 0 = not
 layout(binding = 4, r32f) readonly uniform imageBuffer linear_light;   // of the 256 stored values, in steps
-layout(binding = 16, scalar) writeonly buffer Sums { vec4 sums[]; };   // red, green, blue in steps; weight
+layout(binding = 5, r32f) readonly uniform imageBuffer linear_colour;  // blue, green, red of each pixel, where is_linear
+layout(binding = 16, scalar) writeonly buffer Sums { vec4 sums[]; };   // red, green, blue, in steps or 0 .. 1; weight
 layout(binding = 32, scalar) uniform Constants { FinishConstants constants; };
 
 FinishConstants k;
@@ -24,7 +26,12 @@ FinishConstants k;
 
 uint byte_at(int index) { return imageLoad(colour, index >> 2).x >> (8 * (index & 3)) & 0xffu; }
 float light_of(int index) { return imageLoad(linear_light, int(byte_at(index))).x; }
-vec3 colour_at(int at) { return vec3(light_of(3 * at + 2), light_of(3 * at + 1), light_of(3 * at)); }
+vec3 colour_at(int at) {
+    if (is_linear != 0)
+        return vec3(imageLoad(linear_colour, 3 * at + 2).x, imageLoad(linear_colour, 3 * at + 1).x,
+                    imageLoad(linear_colour, 3 * at).x);
+    return vec3(light_of(3 * at + 2), light_of(3 * at + 1), light_of(3 * at));
+}
 bool is_known(int at) { return has_unknown == 0 || (imageLoad(colour_known, at >> 2).x >> (8 * (at & 3)) & 0xffu) != 0u; }
 
 // Noise that differs between neighbours (Jimenez 2014).

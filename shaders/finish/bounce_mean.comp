@@ -9,7 +9,7 @@ layout(local_size_x = finish_row) in;
 layout(binding = 0, r32f) readonly uniform imageBuffer surface;
 layout(binding = 1, r32f) readonly uniform imageBuffer visibility;
 layout(binding = 2, r32f) readonly uniform imageBuffer sums; // four a pixel
-layout(binding = 16, scalar) writeonly buffer Out { float indirect[]; }; // red, green, blue in steps
+layout(binding = 16, scalar) writeonly buffer Out { float indirect[]; }; // red, green, blue, scaled as the sums
 layout(binding = 32, scalar) uniform Constants { FinishConstants constants; };
 
 FinishConstants k;
