@@ -212,7 +212,7 @@ gpu::Program& Finish::program_for(const Shape& shape) {
         bytes("unshaded", outputs.unshaded && !linear ? 3 : 0, Host::download),
         bytes("ambient part", outputs.split && !linear ? 3 : 0, Host::download),
         bytes("direct part", outputs.split && !linear ? 3 : 0, Host::download),
-        {.name = "gathered light", .bytes = outputs.indirect ? pixels * 16 : 4, .texels = floats, .plain_writes = true},
+        {.name = "gathered light", .bytes = outputs.indirect ? pixels * 32 : 4, .texels = floats, .plain_writes = true},
         three_floats("indirect light", outputs.indirect, Host::none),
         bytes("indirect", outputs.indirect && !linear ? 3 : 0, Host::download),
         three_floats("linear colour", linear, Host::upload),

@@ -1,4 +1,5 @@
-// One bounce of light, its gathering: for each pixel the colours of what blocks directions over its surface, and their weights.
+// One bounce of light, its gathering: for each pixel the colours of what blocks directions over its surface, those of all that
+// lies within the radius, and their weights.
 //
 // Ritschel, Grosch, Seidel, "Approximating Dynamic Global Illumination in Image Space" (2009), section 3.2, normalised: a
 // direction has one sample at a random distance within the radius, and is blocked where the depth image lies in front of
@@ -42,7 +43,7 @@ void main() {
     ivec2 p = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(p, k.size))) return;
     int here = p.y * k.size.x + p.x;
-    vec4 sum = vec4(0.0);
+    vec4 sum = vec4(0.0), around = vec4(0.0);
     vec3 normal = normal_of(p, here);
     if (dot(normal, normal) > 0.0) {
         vec3 point = unproject(k.camera, vec2(p), 1.0 / inverse_at(here));
@@ -61,10 +62,13 @@ void main() {
             float z = 1.0 / inverse_at(there), slack = 2.0 * (k.noise_floor + k.noise_per_z2 * z * z) + 1e-3 * z;
             vec3 apart = unproject(k.camera, vec2(q), z) - point;
             float away = length(apart);
-            if (z < tip.z - slack && away <= k.radius && dot(apart, normal) > 0.02 * away + slack && is_known(there) &&
-                dot(normal_of(q, there), apart) < 0.0)
-                sum += cosine * vec4(colour_at(there), 1.0);
+            if (away > k.radius || !is_known(there)) continue;
+            vec4 colour_there = vec4(colour_at(there), 1.0);
+            around += colour_there;
+            if (z < tip.z - slack && dot(apart, normal) > 0.02 * away + slack && dot(normal_of(q, there), apart) < 0.0)
+                sum += cosine * colour_there;
         }
     }
-    sums[here] = sum;
+    sums[2 * here] = sum;
+    sums[2 * here + 1] = around;
 }

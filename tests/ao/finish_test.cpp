@@ -394,7 +394,9 @@ TEST_F(FinishTest, a_red_wall_lights_its_neighbour_red_within_the_radius) {
     const cv::Vec3b& on_red = indirect(240, corner.corner_u - 10);
     EXPECT_NEAR(linear(near[2]), 0.5 * linear(220), 0.005) << "closed by half, and all that closes it is red";
     EXPECT_LE(near[0], 5) << "the corner is a little round";
-    EXPECT_EQ(far, cv::Vec3b(0, 0, 0));
+    EXPECT_NEAR(linear(far[2]), 0.5 * linear(200), 0.005)
+        << "what closes it is not to be seen, so it looks as the wall";
+    EXPECT_NEAR(far[0], far[2], 1);
     EXPECT_NEAR(linear(on_red[0]), 0.5 * linear(200), 0.005) << "what the red wall sees is grey";
     EXPECT_NEAR(on_red[0], on_red[2], 3);
 }
@@ -405,23 +407,15 @@ TEST_F(FinishTest, where_everything_has_one_colour_a_bounce_is_it_times_what_is_
     cv::RNG random(3);
     random.fill(input.visibility, cv::RNG::UNIFORM, 0.0, 1.0);
     const cv::Mat3b indirect = Finish(device).compute(input, {.indirect = true}).indirect;
-    int lit = 0, exact = 0; // it fades out where little was found
+    int compared = 0;
     for (int v = 0; v < indirect.rows; ++v)
         for (int u = 0; u < indirect.cols; ++u) {
             const double closed = 1 - static_cast<double>(input.visibility(v, u));
-            if (closed < 0.05 || indirect(v, u) == cv::Vec3b(0, 0, 0))
-                continue;
-            ++lit;
-            bool all = true;
-            for (int c = 0; c < 3; ++c) {
-                const double found = linear(indirect(v, u)[c]), expected = linear(input.colour(v, u)[c]) * closed;
-                EXPECT_LE(found, expected + 0.004);
-                all = all && found > expected - 0.004;
-            }
-            exact += all;
+            compared += closed > 0.05;
+            for (int c = 0; c < 3; ++c)
+                EXPECT_NEAR(linear(indirect(v, u)[c]), linear(input.colour(v, u)[c]) * closed, 0.004);
         }
-    EXPECT_GT(exact, lit / 2);
-    EXPECT_GT(lit, 10000);
+    EXPECT_GT(compared, 100000);
 }
 
 TEST_F(FinishTest, a_bounce_in_floats_has_the_light_of_16_bits) {
@@ -438,15 +432,25 @@ TEST_F(FinishTest, a_bounce_in_floats_has_the_light_of_16_bits) {
 TEST_F(FinishTest, light_bounces_neither_across_a_gap_nor_from_what_is_not_known) {
     FinishInput input = Corner().input;
     input.z_m.setTo(2);
-    input.z_m.colRange(0, 160) = 1.2F; // a board 0.8 m before the wall
-    EXPECT_EQ(cv::countNonZero(Finish(device).compute(input, {.indirect = true}).indirect.reshape(1)), 0);
+    input.z_m.colRange(0, 160) = 1.2F; // a red board 0.8 m before the wall
+    input.colour.setTo(cv::Scalar(200, 200, 200));
+    input.colour.colRange(0, 160) = cv::Scalar(0, 0, 220);
+    const cv::Mat3b indirect = Finish(device).compute(input, {.indirect = true}).indirect;
+    for (int u = 163; u < 640; u += 9) {
+        EXPECT_NEAR(indirect(240, u)[0], indirect(240, u)[2], 1) << "no red from the board, column " << u;
+        EXPECT_NEAR(linear(indirect(240, u)[0]), 0.5 * linear(200), 0.005);
+    }
     Corner corner;
     corner.input.colour_known = cv::Mat1b(corner.input.z_m.size(), uchar(255));
     corner.input.colour_known.colRange(0, corner.corner_u) = 0;
-    EXPECT_EQ(corner.indirect(device, corner.column_at(0.1F)), cv::Vec3b(0, 0, 0)) << "nobody knows that it is red";
+    const cv::Vec3b near = corner.indirect(device, corner.column_at(0.1F));
+    EXPECT_NEAR(near[0], near[2], 1) << "nobody knows that the wall is red";
+    corner.input.colour_known.setTo(0);
+    EXPECT_EQ(corner.indirect(device, corner.column_at(0.1F)), cv::Vec3b(0, 0, 0)) << "nothing is known of any colour";
     Corner holes;
     holes.input.z_m.colRange(0, holes.corner_u) = 0;
-    EXPECT_EQ(holes.indirect(device, holes.column_at(0.1F)), cv::Vec3b(0, 0, 0));
+    const cv::Vec3b beside = holes.indirect(device, holes.column_at(0.1F));
+    EXPECT_NEAR(beside[0], beside[2], 1);
     EXPECT_EQ(holes.indirect(device, 4), cv::Vec3b(0, 0, 0));
 }
 
