@@ -11,7 +11,9 @@ namespace scanshade {
 
 void load_colour(const Capture& capture, const CaptureEntry& entry, cv::Size depth_size, Frame& frame) {
     try {
-        frame.colour = colour_of(entry);
+        StoredColour stored = stored_colour_of(entry);
+        frame.colour = stored.colour;
+        frame.deep_colour = stored.deep;
     } catch (const Outage&) {
         throw;
     } catch (const Error& failure) {
@@ -27,12 +29,15 @@ void load_colour(const Capture& capture, const CaptureEntry& entry, cv::Size dep
     if (capture.colour_in_more_pixels && !frame.colour_camera && colour.width > expected.width &&
         std::abs(shape(colour) / shape(expected) - 1) < 0.02) {
         cv::resize(frame.colour, frame.colour, expected, 0, 0, cv::INTER_AREA);
+        if (!frame.deep_colour.empty())
+            cv::resize(frame.deep_colour, frame.deep_colour, expected, 0, 0, cv::INTER_AREA);
         return;
     }
     frame.warnings.push_back(fmt::format("{}: colour is {}, {} is {}; processed without colour.", entry.colour,
                                          size_text(colour), frame.colour_camera ? "its camera" : "depth",
                                          size_text(expected)));
     frame.colour = cv::Mat3b();
+    frame.deep_colour = cv::Mat3w();
 }
 
 } // namespace scanshade

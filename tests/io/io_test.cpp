@@ -10,6 +10,7 @@
 #include "io/images/png_output.h"
 #include "io/output_file.h"
 #include "projection/base/error.h"
+#include "projection/srgb.h"
 #include "tests/support/files.h"
 
 #include <array>
@@ -238,6 +239,77 @@ TEST(colour_images, png_pictures_are_exact_and_jpeg_is_close) {
     write_picture(folder / "p.JPG", picture());
     EXPECT_LE(worst_difference(read_colour(folder / "p.JPG"), picture()), 12);
     EXPECT_THROW(write_picture(folder / "p.gif", picture()), Error);
+}
+
+/// Light, blue first, as it is stored and as others read it.
+TEST(light_images, hold_srgb_as_integers_and_linear_light_as_floats) {
+    const TemporaryFolder folder;
+    ::setenv("OPENCV_IO_ENABLE_OPENEXR", "1", 1);
+    cv::Mat3f light(9, 11);
+    cv::RNG random(3);
+    random.fill(light, cv::RNG::UNIFORM, 0.0, 1.0);
+    light(0, 0) = {-0.5F, std::numeric_limits<float>::quiet_NaN(), 3.25F};
+    for (const AoFormat format : {AoFormat::png8, AoFormat::png16, AoFormat::tiff, AoFormat::exr}) {
+        const fs::path file = folder / ("light" + extension(format));
+        write_light(file, light, format);
+        const cv::Mat stored = cv::imread(file.string(), cv::IMREAD_UNCHANGED);
+        ASSERT_EQ(stored.channels(), 3);
+        if (is_float(format)) {
+            ASSERT_EQ(stored.type(), CV_32FC3);
+            EXPECT_EQ(cv::norm(stored.rowRange(1, 9), light.rowRange(1, 9), cv::NORM_INF), 0);
+            EXPECT_EQ(stored.at<cv::Vec3f>(0, 0)[2], 3.25F) << "more than white stays";
+            continue;
+        }
+        ASSERT_EQ(stored.depth(), format == AoFormat::png16 ? CV_16U : CV_8U);
+        const double most = format == AoFormat::png16 ? 65535 : 255;
+        cv::Mat3d values;
+        stored.convertTo(values, CV_64F);
+        EXPECT_EQ(values(0, 0), cv::Vec3d(0, 0, most)) << "what is no light is black, what exceeds white is white";
+        for (int i = 0; i < 3; ++i)
+            EXPECT_EQ(values(5, 5)[i], std::round(most * srgb_from_linear(static_cast<double>(light(5, 5)[i]))));
+    }
+}
+
+TEST(light_images, of_16_bits_come_back_bit_for_bit) {
+    const TemporaryFolder folder;
+    cv::Mat3w deep(256, 86);
+    for (int i = 0; i < 256 * 86 * 3; ++i)
+        deep.ptr<ushort>()[i] = static_cast<ushort>(std::min(i, 65535));
+    cv::Mat3f light(deep.size());
+    for (int i = 0; i < 256 * 86 * 3; ++i)
+        light.ptr<float>()[i] = static_cast<float>(linear_from_srgb(deep.ptr<ushort>()[i] / 65535.0));
+    write_light(folder / "light.png", light, AoFormat::png16);
+    EXPECT_EQ(cv::norm(read_stored_colour(folder / "light.png").deep, deep, cv::NORM_INF), 0) << "all 65536 values";
+}
+
+TEST(colour_images, of_16_bits_keep_them_beside_the_8) {
+    const TemporaryFolder folder;
+    cv::theRNG().state = 9;
+    for (const char* kind : {".png", ".tiff", ".ppm"})
+        for (const int type : {CV_16UC3, CV_16UC1, CV_8UC3}) {
+            const bool grey = CV_MAT_CN(type) == 1, deep = CV_MAT_DEPTH(type) == CV_16U;
+            if (grey && std::string(kind) == ".ppm")
+                continue;
+            SCOPED_TRACE(fmt::format("{} of type {}", kind, type));
+            cv::Mat image(19, 23, type), three;
+            cv::randu(image, cv::Scalar::all(0), cv::Scalar::all(deep ? 65536 : 256));
+            const fs::path file = folder / (std::string("image") + kind);
+            ASSERT_TRUE(cv::imwrite(file.string(), image));
+            const StoredColour stored = read_stored_colour(file);
+            EXPECT_EQ(cv::norm(stored.colour, read_colour(file), cv::NORM_INF), 0);
+            if (!deep) {
+                EXPECT_TRUE(stored.deep.empty());
+                continue;
+            }
+            grey ? cv::merge(std::vector<cv::Mat>(3, image), three) : void(three = image);
+            ASSERT_EQ(stored.deep.size(), image.size());
+            EXPECT_EQ(cv::norm(stored.deep, three, cv::NORM_INF), 0);
+        }
+    // Planes one after the other, and numbers up to 1023: as 8 bits, as ever.
+    write_file(folder / "odd.ppm", "P6 1 1 1023\n" + std::string("\3\377\0\1\2\0", 6));
+    EXPECT_TRUE(read_stored_colour(folder / "odd.ppm").deep.empty());
+    const std::string cut = tests::read_bytes(folder / "image.png");
+    EXPECT_NE(refusal([&] { (void)stored_colour_in(cut.substr(0, cut.size() / 2), "cut.png"); }), "");
 }
 
 /// Of every format that OpenCV writes, too, and in each of its depths.
