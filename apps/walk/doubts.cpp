@@ -3,6 +3,7 @@
 
 #include "io/clouds/cloud_file.h"
 #include "projection/base/statistics.h"
+#include "projection/depth_kind.h"
 #include "projection/undistort.h"
 
 #include <algorithm>
@@ -127,6 +128,17 @@ void doubt_noise_in_view(const Work& work, double radius_m, const DepthNoise& no
                                         : "Give a larger --radius, or leave them out with --depth-range."));
 }
 
+/// Planes that bend as those of ranges or of disparities do.
+void doubt_kind(const DepthImage& depth, Doubts& doubts) {
+    const DepthKind kind = depth_kind(depth);
+    add_if(kind == DepthKind::inverse, doubts,
+           "planes bend as if the image held disparities or inverse depths, larger where surfaces are nearer: convert "
+           "them to depth.");
+    add_if(kind == DepthKind::range, doubts,
+           "planes bend as if the image held distances from the camera's centre, not depths along z: divide them by "
+           "the length of each pixel's ray (x, y, 1), or check the camera.");
+}
+
 /// The diagonal of the box without the lowest and highest hundredth of the points along each axis.
 double extent_of(const Cloud& cloud) {
     const std::size_t step = std::max<std::size_t>(1, cloud.points.size() / 50000);
@@ -218,8 +230,10 @@ std::vector<std::string> doubts_about(const Work& work, double radius_m, const D
         doubt_values({visibility.ptr<float>(), visibility.total()}, doubts);
     doubt_radius_in_view(work, radius_m, unit, doubts);
     doubt_noise_in_view(work, radius_m, noise, unit, doubts);
-    if (!work.frame.cloud) // a cloud's camera is recovered or chosen, not given, unless --camera names it
+    if (!work.frame.cloud) { // a cloud's camera is recovered or chosen, not given, unless --camera names it
         doubt_camera(work.row.camera, doubts);
+        doubt_kind(work.depth, doubts);
+    }
     return doubts;
 }
 
