@@ -3,6 +3,7 @@
 
 #include "io/clouds/cloud_file.h"
 #include "projection/base/statistics.h"
+#include "projection/depth_ends.h"
 #include "projection/depth_kind.h"
 #include "projection/undistort.h"
 
@@ -139,6 +140,22 @@ void doubt_kind(const DepthImage& depth, Doubts& doubts) {
            "the length of each pixel's ray (x, y, 1), or check the camera.");
 }
 
+/// One value at either end of the depths that no surface explains.
+void doubt_ends(const DepthImage& depth, const LengthUnit& unit, Doubts& doubts) {
+    const DepthEnds ends = depth_ends(depth.z_m);
+    const auto doubt = [&](const std::optional<DepthEnd>& end, const char* which, const char* beyond) {
+        if (end)
+            doubts.push_back(
+                fmt::format("{:.1f} % of the valid pixels hold exactly {}, the {} depth, {}. They are taken "
+                            "for a surface; --depth-range leaves them out.",
+                            100 * end->share, unit.text(end->z_m, 4), which,
+                            end->apart ? std::string("far from all others, as a file marks holes")
+                                       : fmt::format("as if all {} had been cut off there", beyond)));
+    };
+    doubt(ends.nearest, "smallest", "nearer");
+    doubt(ends.farthest, "largest", "farther away");
+}
+
 /// The diagonal of the box without the lowest and highest hundredth of the points along each axis.
 double extent_of(const Cloud& cloud) {
     const std::size_t step = std::max<std::size_t>(1, cloud.points.size() / 50000);
@@ -233,6 +250,7 @@ std::vector<std::string> doubts_about(const Work& work, double radius_m, const D
     if (!work.frame.cloud) { // a cloud's camera is recovered or chosen, not given, unless --camera names it
         doubt_camera(work.row.camera, doubts);
         doubt_kind(work.depth, doubts);
+        doubt_ends(work.depth, unit, doubts);
     }
     return doubts;
 }
