@@ -1,6 +1,7 @@
 // After a frame is computed: the reasons to doubt its result.
 #include "apps/walk/doubts.h"
 
+#include "apps/walk/coordinate_steps.h"
 #include "io/clouds/cloud_file.h"
 #include "projection/base/statistics.h"
 #include "projection/depth_ends.h"
@@ -8,6 +9,7 @@
 #include "projection/undistort.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fmt/format.h>
 #include <numbers>
@@ -190,6 +192,20 @@ void doubt_radius_of_points(const Work& work, Doubts& doubts) {
                     radius, extent));
 }
 
+void doubt_steps(const Work& work, Doubts& doubts) {
+    const double spacing = work.of_points.spacing;
+    const auto steps = coarse_steps(work.frame.cloud->points, spacing);
+    if (!steps)
+        return;
+    constexpr std::array names{"x", "y", "z"};
+    doubts.push_back(fmt::format(
+        "coordinates along {} are multiples of {:.3g}, and points stand {:.3g} apart: surfaces are steps. {}",
+        names.at(static_cast<std::size_t>(steps->axis)), steps->step, spacing,
+        steps->single_precision ? "Single precision holds coordinates of that size no better: write them in double "
+                                  "precision, or without their offset."
+                                : "Write them with more digits, or give a larger --radius."));
+}
+
 void doubt_unit(const Cloud& cloud, Doubts& doubts) {
     add_if(cloud.records && unit_of(*cloud.records).starts_with("degrees"), doubts,
            "the coordinates are in degrees, so distances between points mean nothing: project them first.");
@@ -240,6 +256,7 @@ std::vector<std::string> doubts_about(const Work& work, double radius_m, const D
         doubt_unit(*work.frame.cloud, doubts);
         doubt_values(work.of_points.visibility, doubts);
         doubt_radius_of_points(work, doubts);
+        doubt_steps(work, doubts);
         return doubts;
     }
     const cv::Mat1f& visibility = work.ao.visibility;
