@@ -234,7 +234,10 @@ class Pipeline {
             take(*work, &StageTimes::compute, [&] { throw Outage(options_.no_method); });
         } else {
             const MethodPool::Lease method = pool_.lease();
-            take(*work, &StageTimes::compute, [&] { compute_view(*work, *method); });
+            // Isolated: some methods use all cores. A frame begun while this one waits for them would wait for a
+            // method.
+            tbb::this_task_arena::isolate(
+                [&] { take(*work, &StageTimes::compute, [&] { compute_view(*work, *method); }); });
         }
         if (work->row.status == FrameStatus::skipped && work->row.fault == Fault::outage)
             given_up_ = true;
