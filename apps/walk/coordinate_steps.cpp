@@ -26,8 +26,7 @@ Axis along(std::span<const Eigen::Vector3d> points, std::size_t stride, int axis
             values.push_back(points[i][axis]);
     const std::size_t count = values.size();
     std::ranges::sort(values);
-    const auto again = std::ranges::unique(values);
-    values.erase(again.begin(), again.end());
+    values.erase(std::unique(values.begin(), values.end()), values.end());
     Axis found{.distinct = values.size()};
     if (values.size() < 3 || least_repeated * values.size() > count)
         return found;

@@ -3,6 +3,7 @@
 
 #include "apps/walk/coordinate_steps.h"
 #include "io/clouds/cloud_file.h"
+#include "io/text.h"
 #include "projection/base/statistics.h"
 #include "projection/depth_ends.h"
 #include "projection/depth_kind.h"
@@ -192,6 +193,19 @@ void doubt_radius_of_points(const Work& work, Doubts& doubts) {
                     radius, extent));
 }
 
+/// What is no cloud of surfaces: hardly any points, or the numbers of lines in place of x.
+void doubt_points(const Cloud& cloud, Doubts& doubts) {
+    constexpr std::size_t fewest = 10, enough = 100;
+    const auto& points = cloud.points;
+    const auto valid = static_cast<std::size_t>(
+        std::ranges::count_if(points, [](const Eigen::Vector3d& point) { return point.allFinite(); }));
+    add_if(valid > 0 && valid < fewest, doubts, counted(valid, "point") + " cannot show a surface.");
+    double next = points.empty() ? 0 : points.front().x();
+    add_if(points.size() >= enough &&
+               std::ranges::all_of(points, [&](const Eigen::Vector3d& point) { return point.x() == next++; }),
+           doubts, "x is the number of the point: the file's first column counts them, and its coordinates follow.");
+}
+
 void doubt_steps(const Work& work, Doubts& doubts) {
     const double spacing = work.of_points.spacing;
     const auto steps = coarse_steps(work.frame.cloud->points, spacing);
@@ -254,6 +268,7 @@ std::vector<std::string> doubts_about(const Work& work, double radius_m, const D
     doubt_shares(work, doubts);
     if (work.by_points) {
         doubt_unit(*work.frame.cloud, doubts);
+        doubt_points(*work.frame.cloud, doubts);
         doubt_values(work.of_points.visibility, doubts);
         doubt_radius_of_points(work, doubts);
         doubt_steps(work, doubts);

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <iterator>
 
 namespace scanshade {
@@ -28,8 +29,9 @@ double valid_share(const Frame& frame) {
 /// A camera that sees none of the points is an error, not an empty result. (No depth at all is a result.)
 void refuse_blind_view(const Work& work) {
     if (work.row.valid_share > 0 && cv::countNonZero(work.depth.z_m) == 0)
-        throw Error(fmt::format("the camera sees none of the recorded points ({}; {})", describe(work.frame.camera),
-                                work.frame.camera.origin));
+        throw Error(fmt::format("the camera sees none of the recorded points ({}; {}){}{}", describe(work.frame.camera),
+                                work.frame.camera.origin, work.frame.doubts.empty() ? "" : "; ",
+                                fmt::join(work.frame.doubts, " ")));
 }
 
 void require_memory_for(const Cloud& cloud) {

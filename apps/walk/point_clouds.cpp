@@ -1,6 +1,7 @@
 // Clouds that no single camera sees.
 #include "apps/walk/point_clouds.h"
 
+#include "io/clouds/cloud_edit.h"
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
 #include "projection/base/error.h"
@@ -46,6 +47,8 @@ PointVisibility visibility_of_points(const Frame& frame, PointMethod& method) {
     const auto normals = recorded_normals(cloud);
     const auto triangles = triangles_of(cloud);
     PointVisibility found = method.compute({cloud.points, normals, triangles, z_is_up(cloud)}, scanner_of(frame));
+    if (normals.empty() && cloud.records && normal_fields(*cloud.records))
+        found.notes.emplace_back("the file's normals are not used: fewer than nine in ten points have one.");
     if (const std::string unit = cloud.records ? unit_of(*cloud.records) : ""; !unit.empty())
         found.notes.insert(found.notes.begin(), fmt::format("coordinates are in {}.", unit));
     return found;

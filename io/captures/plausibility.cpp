@@ -159,6 +159,16 @@ std::string what_others_give(const cv::Mat& stored, const DepthEncoding& encodin
     return fmt::format(" With --depth-scale the other encodings give: {}.", fmt::join(parts, ", "));
 }
 
+/// "With --depth-scale 1000 the median is 3.22 m.": of floats in millimetres or centimetres.
+std::string what_scales_give(float median_m, const DepthEncoding& encoding) {
+    constexpr double nearest_m = 0.3, farthest_m = 20;
+    for (const double scale : {1000.0, 100.0})
+        if (const double metres = static_cast<double>(median_m) * encoding.units_per_metre / scale;
+            scale != encoding.units_per_metre && metres > nearest_m && metres < farthest_m)
+            return fmt::format(" With --depth-scale {} the median is {:.2f} m.", scale, metres);
+    return {};
+}
+
 /// The largest number that nearly all stored values are multiples of; 1 where too few differ to tell.
 int common_divisor(const cv::Mat& stored) {
     constexpr std::size_t enough = 50;
@@ -227,7 +237,9 @@ std::vector<std::string> doubts_about(const Statistics& depth, const cv::Mat& im
             100 * depth.jumps, stated, what_others_give(stored, encoding)));
     else if (depth.median_m < nearest_median_m || depth.median_m > farthest_likely_m || depth.largest_m > farthest_m)
         doubts.push_back(fmt::format("a median depth of {:.3g} m and a largest of {:.3g} m are implausible with {}.{}",
-                                     depth.median_m, depth.largest_m, stated, what_others_give(stored, encoding)));
+                                     depth.median_m, depth.largest_m, stated,
+                                     stored.type() == CV_16UC1 ? what_others_give(stored, encoding)
+                                                               : what_scales_give(depth.median_m, encoding)));
     if (doubts.empty())
         doubt_steps(stored, encoding, doubts);
     doubt_repeats(image, doubts);

@@ -29,9 +29,10 @@ void warn_of(const PointOddities& odd, const std::filesystem::path& file, std::v
 
 /// The fields of recorded normals: nx ny nz, or normal_x ...
 [[nodiscard]] std::optional<std::array<std::size_t, 3>> normal_fields(const CloudRecords& records);
+/// Of unit length, whatever their recorded length; zero or NaN where there is none.
 [[nodiscard]] std::vector<Eigen::Vector3d> normals_of(const CloudRecords& records,
                                                       const std::array<std::size_t, 3>& fields);
-/// Fields called normals are ones where nine in ten points with coordinates have one of unit length.
+/// Fields called normals are ones where nine in ten points with coordinates have one.
 struct NormalCounts {
     std::size_t valid = 0, unit = 0;
     void add(std::span<const Eigen::Vector3d> points, std::span<const Eigen::Vector3d> normals);

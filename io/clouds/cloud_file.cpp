@@ -345,6 +345,11 @@ std::vector<Eigen::Vector3d> normals_of(const CloudRecords& records, const std::
     std::vector<Eigen::Vector3d> normals(records.point_count);
     for (int axis = 0; axis < 3; ++axis)
         read_coordinate(records, fields[static_cast<std::size_t>(axis)], axis, normals);
+    // Some are as long as the area of their faces, and integers of 8 bits are 127 long.
+    tbb::parallel_for(std::size_t(0), normals.size(), [&](std::size_t i) {
+        if (const double length = normals[i].norm(); length > 0 && std::isfinite(length))
+            normals[i] /= length;
+    });
     return normals;
 }
 

@@ -22,8 +22,8 @@ namespace scanshade {
 /// Indices of points, three per triangle, of a mesh (a PLY with faces; polygons are fanned, -1 names no vertex); empty
 /// for clouds.
 [[nodiscard]] std::vector<std::array<int, 3>> triangles_of(const Cloud& cloud);
-/// The file's own normals (nx ny nz, or normal_x ...), one per point; empty where there are none, or fewer than nine in
-/// ten points with coordinates have one of unit length.
+/// The file's own normals (nx ny nz, or normal_x ...), one per point, made as long as 1; empty where there are none, or
+/// fewer than nine in ten points with coordinates have one.
 [[nodiscard]] std::vector<Eigen::Vector3d> recorded_normals(const Cloud& cloud);
 
 /// One value per point; throws Error naming `file` where the cloud has no such field.

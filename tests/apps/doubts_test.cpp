@@ -147,6 +147,20 @@ TEST(doubts, a_camera_of_another_image_size_or_of_the_image_before_it_was_croppe
     EXPECT_TRUE(frame.doubts().empty()) << "as of a lens that sits askew";
 }
 
+TEST(doubts, a_few_points_and_numbers_of_lines) {
+    ComputedCloud cloud;
+    auto& points = cloud.work.frame.cloud->points;
+    const auto all = points;
+    points.resize(1);
+    EXPECT_TRUE(warned(cloud.doubts(), "1 point cannot show a surface"));
+    points = all;
+    for (std::size_t i = 0; i < points.size(); ++i)
+        points[i] = {static_cast<double>(i + 1), all[i].x(), all[i].y()};
+    EXPECT_TRUE(warned(cloud.doubts(), "x is the number of the point"));
+    points.back().x() += 0.5;
+    EXPECT_FALSE(warned(cloud.doubts(), "x is the number of the point"));
+}
+
 TEST(doubts, disparities_and_distances_in_place_of_depth) {
     const auto floor_and_wall = [](const auto& stored) {
         Computed frame;

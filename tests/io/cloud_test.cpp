@@ -412,6 +412,25 @@ TEST(ply, lists_inside_vertices_are_walked) {
     EXPECT_TRUE(with_ao(text, folder / "out.ply").ends_with("2 5 6 1 2 3 nan\n0 4 5 6 0.125\n"));
 }
 
+TEST(ply, normals_of_any_length_are_made_unit_and_missing_ones_tell_nothing) {
+    const TemporaryFolder folder;
+    const auto normals = [&](const std::string& type, const std::string& second) {
+        const std::string fields = fmt::format("property {0} nx\nproperty {0} ny\nproperty {0} nz\n", type);
+        return recorded_normals(
+            read(write_file(folder / "a.ply", "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty "
+                                              "float y\nproperty float z\n" +
+                                                  fields + "end_header\n0 0 0 0 0 127\n1 0 0 " + second + "\n")));
+    };
+    for (const char* type : {"char", "float"}) {
+        const auto found = normals(type, "0 -50 0");
+        ASSERT_EQ(found.size(), 2u) << type;
+        EXPECT_EQ(found[0], Eigen::Vector3d(0, 0, 1));
+        EXPECT_EQ(found[1], Eigen::Vector3d(0, -1, 0));
+    }
+    EXPECT_TRUE(normals("float", "0 0 0").empty());
+    EXPECT_TRUE(normals("float", "nan nan nan").empty());
+}
+
 TEST(ply, elements_before_the_vertices_are_passed_over) {
     const TemporaryFolder folder;
     const std::string header =

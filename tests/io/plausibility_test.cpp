@@ -50,6 +50,14 @@ TEST(plausibility, multiples_show_another_unit) {
     EXPECT_TRUE(doubts(times(waves(), 5)).empty()) << "a named unit may be coarse";
 }
 
+TEST(plausibility, floats_in_millimetres_are_told_with_the_scale_that_suits_them) {
+    cv::Mat1f millimetres;
+    waves().convertTo(millimetres, CV_32F);
+    const DepthEncoding metres = usual_encoding("m", "assumed: floats are metres");
+    const auto told = doubts_about(depth_in_metres(millimetres, metres), millimetres, metres);
+    EXPECT_TRUE(warned(told, "With --depth-scale 1000 the median is 2.")) << tests::joined(told);
+}
+
 /// Every row whose remainder is `copied` becomes a copy of the row above.
 cv::Mat1w with_copies(cv::Mat1w stored, int every, int copied) {
     for (int v = 1; v < stored.rows; ++v)
