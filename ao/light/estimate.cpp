@@ -19,6 +19,8 @@ using Eigen::Vector3d;
 constexpr double least_power = 0.1;   // less is no sign of AO
 constexpr double most_gradient = 0.3; // of ambient light towards a direct one, and of that light
 constexpr double most_turn_deg = 20;  // of a direct light between halves of the surfaces, in the median
+constexpr double surely_explained =
+    0.13; // of what ambient light leaves unexplained, by a direct light whose direction is sure
 constexpr int fewest_samples = 500, fewest_albedos = 12, halvings = 3;
 constexpr std::size_t most_of_search = 2500, most_of_half = 4000; // samples: more change no answer
 constexpr double open = 0.8; // of visibility: it errs least, and counts least, where surfaces are open
@@ -268,6 +270,13 @@ LightEstimate estimate_light(const LightSamples& samples, const LightRequest& re
         return result;
     }
     light.direct = values.direct;
+    if (const double explained = opened.gain(chosen, 1).first / opened.mean(1);
+        !request.towards && explained < surely_explained)
+        light.doubt =
+            fmt::format("the direct light's direction is not sure: it explains {:.0f} % of what ambient light "
+                        "leaves of the colours. Lights that were 20 degrees off and more did so on generated "
+                        "scenes; --light none or X,Y,Z overrides",
+                        100 * explained);
     // Whether depth images know its shadows: what they never saw casts none there, and walls that it shines through do.
     LightPart open_to_it = fit.part_of(every, open, most_of_search);
     const double without = fit.cost(open_to_it, values);
@@ -277,11 +286,11 @@ LightEstimate estimate_light(const LightSamples& samples, const LightRequest& re
         light.tint[channel] = fit.tint(part, values, channel);
     result.sentence =
         fmt::format("light: ambient, and {:.2f} times as much direct light from {} in {} ({:.0f} degrees between "
-                    "halves); held-out error {:.3f}, {:.3f} without; {} samples of {} frames{}",
+                    "halves); held-out error {:.3f}, {:.3f} without; {} samples of {} frames{}{}",
                     light.direct.norm(), text_of(light.direct.normalized()), space, result.spread_deg,
                     result.models[chosen].held_out,
                     std::min({result.models[1].held_out, result.models[2].held_out, result.models[3].held_out}),
-                    result.samples, result.frames, no_sign);
+                    result.samples, result.frames, no_sign, light.doubt.empty() ? "" : "; its direction is not sure");
     return result;
 }
 

@@ -23,6 +23,7 @@ struct Light {
     double power = 1;                     ///< of visibility in the photographs; 0 = they show none
     bool shadows = false;                 ///< shadows of the depth image explain the photographs better
     bool in_world = false;                ///< directions are in the recording's world, else in camera space
+    std::string doubt = {};               ///< a sentence: why the direction may be wrong; empty = no reason known
 
     [[nodiscard]] bool has_direct() const { return direct.norm() > 0; }
     /// For the shaders, in the space of a camera.

@@ -178,7 +178,7 @@ void Vxao::look_at(gpu::Program& program, int first_own) {
         return;
     constexpr double mib = 1024 * 1024;
     const double wanted_mib = std::ceil(room.wanted * static_cast<double>(brick_bytes) / mib);
-    const double taken_mib = std::floor(static_cast<double>(bricks_) * static_cast<double>(brick_bytes) / mib);
+    const double taken_mib = std::round(static_cast<double>(bricks_) * static_cast<double>(brick_bytes) / mib);
     const std::string why =
         fmt::format("voxels of {:.3g} m would take some {:.0f} MiB, and {} MiB are there (--vxao.memory)",
                     options_.voxel_m, wanted_mib, taken_mib);

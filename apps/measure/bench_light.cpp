@@ -69,6 +69,7 @@ class LightPart final : public BenchPart {
                  {"light-split.scenes", "which, with commas", &scenes_},
                  {"light-split.sensors", "which simulated sensors, with commas", &sensors_},
                  {"light-split.method", "that computes visibility, at its defaults", &method_},
+                 {"light-split.suns", "estimates five suns, ambient light and an overcast sky; no pictures", &suns_},
                  {"light-split.frames", "of each", &frames_, "", 1, 100},
                  {"light-split.size", "of images", &size_, "pixels"},
                  {"light-split.rays", "of the true visibility, per pixel", &rays_, "", 1, 65536}}};
@@ -77,13 +78,17 @@ class LightPart final : public BenchPart {
 
     int run(const std::string& choice) override {
         gpu::Device device(choice);
-        fmt::print(
-            "RMSE of stored colours (0 .. 1) to the renderer's own; {} of {} frames, {}\n\n"
-            "| scene | sensor | light | found | direction off, degrees | direct / ambient | share of ambient, "
-            "RMSE | ambient: multiply | ambient | with true light | unshaded: as it is | divided by visibility | "
-            "unshaded | ms: multiply | ambient | unshaded |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- "
-            "| --- | --- | --- | --- | --- | --- | --- |\n",
-            method_, frames_, size_);
+        if (suns_)
+            fmt::print("| scene | sensor | light | found | direction off, degrees | direct / ambient | degrees between "
+                       "halves | sure |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n");
+        else
+            fmt::print(
+                "RMSE of stored colours (0 .. 1) to the renderer's own; {} of {} frames, {}\n\n"
+                "| scene | sensor | light | found | direction off, degrees | direct / ambient | share of ambient, "
+                "RMSE | ambient: multiply | ambient | with true light | unshaded: as it is | divided by visibility | "
+                "unshaded | ms: multiply | ambient | unshaded |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- "
+                "| --- | --- | --- | --- | --- | --- | --- |\n",
+                method_, frames_, size_);
         for (const std::string& name : comma_separated(scenes_))
             for (const std::string& sensor : comma_separated(sensors_))
                 measure(device, name, sensor);
@@ -103,6 +108,30 @@ class LightPart final : public BenchPart {
                 {"sun 0.5", {.kind = LightKind::sun, .towards = {0.45, -0.35, 0.82}, .ratio = 0.5}},
                 {"sun 1.5", {.kind = LightKind::sun, .towards = {0.45, -0.35, 0.82}, .ratio = 1.5}},
                 {"sun 4", {.kind = LightKind::sun, .towards = {-0.7, -0.4, 0.6}, .ratio = 4}}};
+    }
+
+    static std::vector<Sky> suns() {
+        using scene::LightKind;
+        std::vector<Sky> all = skies();
+        all.push_back({"sun 1.5, elsewhere", {.kind = LightKind::sun, .towards = {0.2, 0.6, 0.77}, .ratio = 1.5}});
+        all.push_back({"sun 2.5, elsewhere", {.kind = LightKind::sun, .towards = {-0.8, 0.5, 0.45}, .ratio = 2.5}});
+        return all;
+    }
+
+    static void report_direction(const std::string& name, const std::string& sensor, const Sky& sky,
+                                 const LightEstimate& found) {
+        const bool has = found.light.has_direct();
+        fmt::print("| {} | {} | {} | {} | {} | {} | {:.1f} | {} |\n", name, sensor, sky.name,
+                   found.chosen.empty() ? "too little" : found.chosen,
+                   has && sky.light.has_sun()
+                       ? fmt::format("{:.1f}", degrees_between(found.light.direct, sky.light.towards))
+                       : "",
+                   has ? fmt::format("{:.2f}", found.light.direct.norm()) : "", found.spread_deg,
+                   !has                        ? ""
+                   : found.light.doubt.empty() ? "yes"
+                                               : "no");
+        fmt::print(stderr, "  {}\n", found.sentence);
+        std::fflush(stdout);
     }
 
     void measure(gpu::Device& device, const std::string& name, const std::string& sensor) {
@@ -136,7 +165,7 @@ class LightPart final : public BenchPart {
             shot.fitted_normals = method.fitted_normals();
             shot.normals = method.normals(shot.depth, noise);
         }
-        for (const Sky& sky : skies()) {
+        for (const Sky& sky : suns_ ? suns() : skies()) {
             LightSamples samples(true);
             for (Shot& shot : shots) {
                 shot.lit = scene::render_lit(world, optics, shot.pose, sky.light);
@@ -144,6 +173,10 @@ class LightPart final : public BenchPart {
                 samples.add({shot.depth, shot.normals, shot.visibility, shot.photograph, {}, shot.pose});
             }
             samples.group();
+            if (suns_) {
+                report_direction(name, sensor, sky, estimate_light(samples));
+                continue;
+            }
             report(device, shots, noise, method.errors(noise), scene.ao_radius_m, name, sensor, sky,
                    estimate_light(samples));
         }
@@ -239,7 +272,7 @@ class LightPart final : public BenchPart {
         return {width, height};
     }
 
-    bool asked_ = false;
+    bool asked_ = false, suns_ = false;
     std::string scenes_ = "office,staircase,columns,clutter,outdoor,thin", sensors_ = "ideal,kinect",
                 method_ = "surfel", size_ = "320x240";
     int frames_ = 6, rays_ = 64;

@@ -153,6 +153,8 @@ std::string CaptureRuns::take_light(CaptureJob& job, RunReport& report, bool by_
     });
     job.batch.light = light.light;
     report.light = light.sentence;
+    if (!light.light.doubt.empty())
+        warn(fmt::format("{}: warning: {}", job.capture.path.string(), light.light.doubt));
     return text_of(light, "");
 }
 

@@ -107,6 +107,7 @@ std::string text_of(const LightEstimate& estimate, const std::string& task) {
                    {"ambient_gradient", array_of(light.gradient)},
                    {"visibility_power", light.power},
                    {"shadows", light.shadows},
+                   {"doubt", light.doubt},
                    {"spread_degrees", estimate.spread_deg},
                    {"samples", estimate.samples},
                    {"frames", estimate.frames},
@@ -125,8 +126,13 @@ std::optional<LightEstimate> light_in(const std::filesystem::path& file, const s
         LightEstimate found;
         found.sentence = all.at("sentence");
         found.chosen = all.at("chosen");
-        found.light = {vector_of(all.at("direct")), vector_of(all.at("tint")), vector_of(all.at("ambient_gradient")),
-                       all.at("visibility_power"),  all.at("shadows"),         all.at("space") == "world"};
+        found.light = {vector_of(all.at("direct")),
+                       vector_of(all.at("tint")),
+                       vector_of(all.at("ambient_gradient")),
+                       all.at("visibility_power"),
+                       all.at("shadows"),
+                       all.at("space") == "world",
+                       all.at("doubt")};
         return found;
     } catch (const json::exception&) { // torn or foreign: it is made again
         return std::nullopt;

@@ -1,5 +1,6 @@
 // --shade, --light and --write unshaded,light from the command line.
 #include "apps/json.h"
+#include "io/output_file.h"
 #include "projection/srgb.h"
 #include "tests/support/says.h"
 #include "tests/support/small_capture.h"
@@ -61,6 +62,27 @@ TEST_F(LightCliTest, a_resumed_run_has_the_bytes_of_one_without_a_break) {
     EXPECT_EQ(read_bytes(out() / "light.json").size(), read_bytes(other / "light.json").size());
     const json manifest = json::parse(read_bytes(out() / "manifest.json"));
     EXPECT_TRUE(manifest.contains("light"));
+}
+
+/// Pictures are mostly better than without the light, so frames are not doubtful; the run says it all the same.
+TEST_F(LightCliTest, a_light_of_unsure_direction_is_said) {
+    generate("--light sun");
+    const std::string how = "--shade ambient --write shaded";
+    ASSERT_EQ(run(how, out()).exit_code, 0);
+    json light = json::parse(read_bytes(out() / "light.json"));
+    ASSERT_TRUE(light.contains("doubt"));
+    light["doubt"] = "";
+    write_atomically(out() / "light.json", light.dump());
+    fs::remove(fs::directory_iterator(out() / "shaded")->path()); // else nothing is left to do
+    const Ran sure = run(how + " --resume", out());
+    ASSERT_EQ(sure.exit_code, 0) << sure.err;
+    EXPECT_FALSE(says(sure.err, "warning")) << sure.err;
+    light["doubt"] = "nobody is sure of it";
+    write_atomically(out() / "light.json", light.dump());
+    fs::remove(fs::directory_iterator(out() / "shaded")->path());
+    const Ran unsure = run(how + " --resume --quiet", out());
+    ASSERT_EQ(unsure.exit_code, 0) << unsure.err;
+    EXPECT_TRUE(says(unsure.err, "warning: nobody is sure of it")) << unsure.err;
 }
 
 TEST_F(LightCliTest, pictures_are_those_of_today_unless_something_else_is_asked_for) {

@@ -190,6 +190,29 @@ TEST(LightTest, paint_in_two_tones_is_no_light) {
     EXPECT_FALSE(found.light.has_direct()) << found.sentence;
 }
 
+/// Wrong directions were found on scenes where a direct light explained little (ao/light/README.md).
+TEST(LightTest, a_direction_is_doubted_where_the_light_explains_little) {
+    int found = 0;
+    for (const double ratio : {0.2, 0.4, 1.5}) {
+        const LightEstimate estimate = estimated({.kind = scene::LightKind::sun, .ratio = ratio});
+        if (!estimate.light.has_direct()) {
+            EXPECT_TRUE(estimate.light.doubt.empty());
+            continue;
+        }
+        ++found;
+        const auto of = [&](const std::string& name) {
+            return std::ranges::find(estimate.models, name, &LightModel::name)->held_out;
+        };
+        const double explained = 1 - of(estimate.chosen) / of("ambient");
+        EXPECT_EQ(explained < 0.13, !estimate.light.doubt.empty()) << ratio << ": " << explained;
+        EXPECT_EQ(estimate.sentence.find("not sure") != std::string::npos, !estimate.light.doubt.empty());
+    }
+    EXPECT_GE(found, 1);
+    const LightEstimate given =
+        estimated({.kind = scene::LightKind::sun, .ratio = 0.3}, {.towards = Vector3d(0.45, -0.35, 0.82).normalized()});
+    EXPECT_TRUE(given.light.doubt.empty()) << "its direction was given";
+}
+
 TEST(LightTest, the_same_samples_give_the_same_light) {
     const scene::SceneLight sun{.kind = scene::LightKind::sun};
     const LightEstimate a = estimated(sun), b = estimated(sun);
