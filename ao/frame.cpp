@@ -31,7 +31,6 @@ FrameAo::FrameAo(gpu::Device& device, const MethodRow& row, MethodSetup& setup, 
 
 AoMap FrameAo::compute(const DepthImage& depth, const DepthNoise& noise) {
     timings_.clear();
-    doubts_.clear();
     fitted_depth_.reset();
     fitted_normals_.reset();
     AoMap ao;

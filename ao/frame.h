@@ -54,7 +54,9 @@ class FrameAo {
     }
 
     /// Sentences: why the result of the last compute() may be wrong; empty = no reason known.
-    [[nodiscard]] const std::vector<std::string>& doubts() const { return doubts_; }
+    [[nodiscard]] const std::vector<std::string>& doubts() const { return method_.remarks().doubts; }
+    /// Sentences: what the last compute() did otherwise than asked.
+    [[nodiscard]] const std::vector<std::string>& warnings() const { return method_.remarks().warnings; }
     /// Where the time of the last compute() went, in order of execution.
     [[nodiscard]] const Timings& timings() const { return timings_; }
     /// What lay between the method's passes in the last compute().
@@ -75,7 +77,6 @@ class FrameAo {
     std::shared_ptr<const gpu::DeviceBytes> fitted_depth_, fitted_normals_;
     std::optional<FitPlane> fit_; ///< made when noise first asks for it; its pipelines stay for other noise
     Timings timings_;
-    std::vector<std::string> doubts_;
 };
 
 /// How points are computed: by the method itself where it needs no view, else by rays from every point. `device` = null

@@ -123,17 +123,18 @@ float nearest_about(const cv::Mat1f& z_m, const Seen& place) {
     return nearest;
 }
 
-cv::Vec3b colour_between(const cv::Mat3b& colour, const Seen& place) {
+template <class Sample>
+cv::Vec<Sample, 3> colour_between(const cv::Mat_<cv::Vec<Sample, 3>>& colour, const Seen& place) {
     const int u = std::min(static_cast<int>(place[0]), colour.cols - 2);
     const int v = std::min(static_cast<int>(place[1]), colour.rows - 2);
     const float right = place[0] - static_cast<float>(u), down = place[1] - static_cast<float>(v);
-    cv::Vec3b mixed;
+    cv::Vec<Sample, 3> mixed;
     for (int channel = 0; channel < 3; ++channel) {
         const float upper = static_cast<float>(colour(v, u)[channel]) * (1 - right) +
                             static_cast<float>(colour(v, u + 1)[channel]) * right;
         const float lower = static_cast<float>(colour(v + 1, u)[channel]) * (1 - right) +
                             static_cast<float>(colour(v + 1, u + 1)[channel]) * right;
-        mixed[channel] = static_cast<unsigned char>(std::lround(upper * (1 - down) + lower * down));
+        mixed[channel] = static_cast<Sample>(std::lround(upper * (1 - down) + lower * down));
     }
     return mixed;
 }
@@ -162,13 +163,16 @@ SurfaceInColour surface_in_colour(const cv::Mat1f& depth_m, const Camera& depth_
 }
 
 ColourOnDepth colour_on_depth(const cv::Mat3b& colour, const cv::Mat1f& depth_m, const Camera& depth_camera,
-                              const ColourCamera& colour_camera, const SurfaceInColour& surface) {
+                              const ColourCamera& colour_camera, const SurfaceInColour& surface,
+                              const cv::Mat3w& deep_colour) {
     if (colour.size() != colour_camera.camera.pinhole.size || colour.cols < 2 || colour.rows < 2)
         throw Error(fmt::format("colour is {}x{}, but its camera is for {}x{} ({})", colour.cols, colour.rows,
                                 colour_camera.camera.pinhole.size.width, colour_camera.camera.pinhole.size.height,
                                 colour_camera.camera.origin));
     const cv::Mat_<Seen> places = places_in_colour(depth_m, depth_camera, colour_camera);
-    ColourOnDepth result{cv::Mat3b(depth_m.size(), cv::Vec3b()), cv::Mat1b(depth_m.size(), uchar{0})};
+    const bool deep = deep_colour.size() == colour.size();
+    ColourOnDepth result{cv::Mat3b(depth_m.size(), cv::Vec3b()), cv::Mat1b(depth_m.size(), uchar{0}),
+                         deep ? cv::Mat3w(depth_m.size(), cv::Vec3w()) : cv::Mat3w()};
     for (int v = 0; v < places.rows; ++v)
         for (int u = 0; u < places.cols; ++u) {
             const Seen& place = places(v, u);
@@ -178,6 +182,8 @@ ColourOnDepth colour_on_depth(const cv::Mat3b& colour, const cv::Mat1f& depth_m,
             if (nearest > 0 && nearest < place[2] - same_surface_m(colour_camera.camera.pinhole, place[2]))
                 continue;
             result.colour(v, u) = colour_between(colour, place);
+            if (deep)
+                result.deep(v, u) = colour_between(deep_colour, place);
             result.known(v, u) = 255;
         }
     return result;

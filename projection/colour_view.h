@@ -21,12 +21,13 @@ struct SurfaceInColour {
 struct ColourOnDepth {
     cv::Mat3b colour; ///< black where none is known
     cv::Mat1b known;  ///< 0: no depth, outside the colour image, or hidden from the colour camera by something in front
+    cv::Mat3w deep;   ///< `colour` of a colour image of 16 bits; empty without
 };
 /// A pixel counts as hidden when the surface is nearer in any of the 3x3 colour pixels around it. Otherwise half a
 /// pixel of miscalibration would give pixels along an outline the colour of the object in front.
 [[nodiscard]] ColourOnDepth colour_on_depth(const cv::Mat3b& colour, const cv::Mat1f& depth_m,
                                             const Camera& depth_camera, const ColourCamera& colour_camera,
-                                            const SurfaceInColour& surface);
+                                            const SurfaceInColour& surface, const cv::Mat3w& deep_colour = {});
 
 /// Values of depth pixels (NaN = unknown) on the colour image's pixels: means of the known depth pixels around each
 /// position, weighted by nearness; NaN where no surface is seen.

@@ -40,6 +40,7 @@ struct Frame {
     std::string name;                          ///< names the outputs: unique in its capture, no path separators
     Camera camera;                             ///< of the depth image or the organised cloud's grid
     cv::Mat3b colour;                          ///< BGR, may be empty
+    cv::Mat3w deep_colour = {};                ///< `colour` with 16 bits, where its file has them
     std::optional<ColourCamera> colour_camera; ///< where `colour` was taken, if it is known and not the depth camera's
     cv::Mat1f depth_m; ///< recorded (distorted geometry) depth, corrected, metres along +z; 0 = hole
     std::optional<Cloud> cloud;

@@ -46,11 +46,48 @@ float second_difference(const cv::Mat1f& z, int x, int y, int dx, int dy) {
     return std::abs(1 / a + 1 / b - 2 / c) * c * c;
 }
 
+/// The values that fill areas exactly, and of which there are several times as many as of those next to them: a frame
+/// of one value, the end of a sensor's range, what a file holds where it knows nothing. No noise shows there. Steps of
+/// slanted surfaces fill areas, too, but alike.
+std::vector<float> constants_of(const cv::Mat1f& z) {
+    constexpr std::size_t fewest = 50, by_neighbour = 5;
+    constexpr double least_share = 0.005;
+    std::vector<float> flat;
+    std::size_t valid = 0;
+    for (int y = far_px; y < z.rows - far_px; y += step_px)
+        for (int x = far_px; x < z.cols - far_px; x += step_px) {
+            const float c = z(y, x);
+            valid += c > 0;
+            if (c > 0 && z(y, x - far_px) == c && z(y, x + far_px) == c && z(y - far_px, x) == c &&
+                z(y + far_px, x) == c)
+                flat.push_back(c);
+        }
+    const std::size_t least = std::max(fewest, static_cast<std::size_t>(least_share * static_cast<double>(valid)));
+    if (flat.size() < least)
+        return {};
+    std::sort(flat.begin(), flat.end());
+    std::vector<std::pair<float, std::size_t>> counts;
+    for (const float value : flat) {
+        if (counts.empty() || counts.back().first != value)
+            counts.emplace_back(value, 0);
+        ++counts.back().second;
+    }
+    std::vector<float> constants;
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+        const std::size_t below = i > 0 ? counts[i - 1].second : 0,
+                          above = i + 1 < counts.size() ? counts[i + 1].second : 0;
+        if (counts[i].second >= std::max(least, by_neighbour * std::max(below, above)))
+            constants.push_back(counts[i].first);
+    }
+    return constants;
+}
+
 void collect(const cv::Mat1f& z, std::array<Band, bands>& all) {
+    const std::vector<float> constants = constants_of(z);
     for (int y = lag_px; y < z.rows - lag_px; y += step_px)
         for (int x = lag_px; x < z.cols - lag_px; x += step_px) {
             const float c = z(y, x);
-            if (!(c > nearest_m && c < farthest_m))
+            if (!(c > nearest_m && c < farthest_m) || std::binary_search(constants.begin(), constants.end(), c))
                 continue;
             Band& band = all[static_cast<std::size_t>(std::min(band_of(c), bands - 1))];
             band.depths_m.push_back(c);

@@ -42,6 +42,7 @@ struct DepthNoise {
 /// reaches over those pixels.
 /// Steps are reported where a quarter of the distinct values are one step from the next. Steps are constant (16-bit
 /// files) or grow with z^2 (disparity).
+/// Areas of one value have no say, as of a frame that is one value, or of all that is beyond a sensor's range.
 /// Returns no noise, only steps, where sigma is below 0.1 mm per metre or 0.12 mm: then nothing needs smoothing. Clean
 /// depth in fine 16-bit steps (5000 per metre) has as much.
 /// Constant steps that explain sigma are no noise: values err by half a step at most, and jumps stay sharp. Then sigma

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace scanshade {
 namespace {
@@ -50,17 +51,74 @@ std::optional<double> depth_factor_by_poses(const PosedDepth& a, const PosedDept
     };
     const double recorded = cost_of(1), still = cost_of(0);
     double best = recorded, factor = 1;
-    for (double tried = 1 / farthest; tried < farthest; tried *= factor_step)
+    const auto attempt = [&](double tried) {
         if (const double found = cost_of(1 / tried); found < best) {
             best = found;
             factor = tried;
         }
+    };
+    for (double tried = 1 / farthest; tried < farthest; tried *= factor_step)
+        attempt(tried);
+    for (const double units : {100.0, 1000.0}) { // centimetres and millimetres
+        attempt(units);
+        attempt(1 / units);
+    }
     // Where a camera that stands still explains as much, the motion tells nothing.
     if (best > agreeing || best > clearly_better * still)
         return std::nullopt;
     if (factor < about_one && factor > 1 / about_one)
         return 1;
     return best < clearly_better * recorded ? std::optional(factor) : std::nullopt;
+}
+
+namespace {
+
+using Eigen::Isometry3d;
+
+Isometry3d world_from_camera(const Isometry3d& recorded, PoseReading reading) {
+    const Isometry3d turned(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitX())); // y and z the other way
+    switch (reading) {
+    case PoseReading::inverse:
+        return recorded.inverse();
+    case PoseReading::y_up:
+        return recorded * turned;
+    case PoseReading::inverse_y_up:
+        return recorded.inverse() * turned;
+    case PoseReading::w_first: { // what was taken for x, y, z, w
+        const Eigen::Quaterniond taken(recorded.linear());
+        return Eigen::Translation3d(recorded.translation()) *
+               Eigen::Quaterniond(taken.x(), taken.y(), taken.z(), taken.w());
+    }
+    case PoseReading::recorded:
+    case PoseReading::contradicted:
+        break;
+    }
+    return recorded;
+}
+
+} // namespace
+
+std::optional<PoseReading> pose_reading(const PosedDepth& a, const PosedDepth& b) {
+    constexpr double better_still = 0.75; // right poses cost less than half of none
+    const auto cost_of = [&](PoseReading reading) {
+        return cost(a.depth, b.depth,
+                    world_from_camera(b.world_from_camera, reading).inverse() *
+                        world_from_camera(a.world_from_camera, reading));
+    };
+    const double recorded = cost_of(PoseReading::recorded), still = cost(a.depth, b.depth, Isometry3d::Identity());
+    if (recorded <= agreeing)
+        return recorded < clearly_better * still ? std::optional(PoseReading::recorded) : std::nullopt;
+    PoseReading reading = PoseReading::recorded;
+    double best = recorded;
+    for (const PoseReading tried :
+         {PoseReading::inverse, PoseReading::y_up, PoseReading::inverse_y_up, PoseReading::w_first})
+        if (const double found = cost_of(tried); found < best) {
+            best = found;
+            reading = tried;
+        }
+    if (best <= agreeing && best < clearly_better * std::min(recorded, still))
+        return reading;
+    return still < better_still * recorded ? std::optional(PoseReading::contradicted) : std::nullopt;
 }
 
 } // namespace scanshade

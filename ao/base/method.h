@@ -102,6 +102,12 @@ struct Intermediate {
     std::string meaning = {}; ///< units, and how to read packed words
 };
 
+/// Sentences about one result.
+struct MethodRemarks {
+    std::vector<std::string> warnings = {}; ///< what was done otherwise than asked
+    std::vector<std::string> doubts = {};   ///< why the result may be wrong
+};
+
 /// One AO method, made for one device. Not thread-safe: one frame at a time.
 class Method {
   public:
@@ -112,6 +118,11 @@ class Method {
     [[nodiscard]] virtual bool looks_at_neighbours() const { return false; }
     /// Where the time of the last compute() went.
     [[nodiscard]] virtual const Timings& timings() const = 0;
+    /// What the last compute() has to say, and what its result does not show.
+    [[nodiscard]] virtual const MethodRemarks& remarks() const {
+        static const MethodRemarks none;
+        return none;
+    }
     /// What lay between the passes of the last compute(), for study; most methods have nothing to show.
     [[nodiscard]] virtual std::vector<Intermediate> intermediates() { return {}; }
 };

@@ -11,6 +11,7 @@
 #include <bit>
 #include <cstring>
 #include <fmt/format.h>
+#include <limits>
 
 namespace scanshade {
 namespace {
@@ -37,7 +38,12 @@ enum Buffers : int {
     direct_out,
     gathered, // light from neighbours: sums of colours, and of weights
     bounced,  // their mean times what is closed
-    indirect_out
+    indirect_out,
+    linear_colour, // 0 .. 1, in place of `colour` where floats are made
+    linear_unshaded,
+    linear_ambient,
+    linear_direct,
+    linear_indirect
 };
 
 std::size_t words_of(cv::Size size) { return (static_cast<std::size_t>(size.area()) + 3) / 4; }
@@ -56,7 +62,8 @@ void check_sizes(const FinishInput& input) {
         return image.size() != size && !(may_be_empty && image.empty());
     };
     if (size.empty() || differs(input.visibility, false) || differs(input.colour, true) ||
-        differs(input.colour_known, true) || differs(input.fitted_m, true) || differs(input.fitted_normals_host, true))
+        differs(input.deep_colour, true) || differs(input.colour_known, true) || differs(input.fitted_m, true) ||
+        differs(input.fitted_normals_host, true))
         throw Error(fmt::format("depth is {}x{}, visibility {}x{}, colour {}x{}: nothing says which pixel belongs to "
                                 "which",
                                 size.width, size.height, input.visibility.cols, input.visibility.rows,
@@ -80,15 +87,41 @@ void combine(const cv::Mat1f& a, const cv::Mat1f& b, cv::Mat1f to, Formula&& for
     }
 }
 
+/// Linear light, 0 .. 1, of each stored value.
+template <class Integer>
+const std::vector<float>& light_of_stored() {
+    static const std::vector<float> light = [] {
+        std::vector<float> all(std::size_t(std::numeric_limits<Integer>::max()) + 1);
+        for (std::size_t i = 0; i < all.size(); ++i)
+            all[i] = static_cast<float>(linear_from_srgb(static_cast<double>(i) / static_cast<double>(all.size() - 1)));
+        return all;
+    }();
+    return light;
+}
+
+template <class Integer>
+void linearise(const cv::Mat_<cv::Vec<Integer, 3>>& stored, cv::Mat3f to) {
+    const std::vector<float>& light = light_of_stored<Integer>();
+    for (int y = 0; y < to.rows; ++y)
+        for (int x = 0; x < to.cols; ++x)
+            for (int c = 0; c < 3; ++c)
+                to(y, x)[c] = light[stored(y, x)[c]];
+}
+
+void upload_linear(const FinishInput& input, const cv::Mat3f& to) {
+    if (input.deep_colour.empty())
+        linearise<uchar>(input.colour, to);
+    else
+        linearise<ushort>(input.deep_colour, to);
+}
+
 bool shows_clay(int picture) { return picture == shared::picture_clay || picture == shared::picture_both; }
 bool shows_colour(int picture) { return picture == shared::picture_colour || picture == shared::picture_both; }
 
 } // namespace
 
 bool Finish::Shape::clay() const { return shows_clay(picture); }
-bool Finish::Shape::colours() const {
-    return on_device && (shows_colour(picture) || outputs.unshaded || outputs.split || outputs.indirect);
-}
+bool Finish::Shape::colours() const { return on_device && (shows_colour(picture) || (light() && !linear())); }
 bool Finish::Shape::packed() const {
     return on_device && (outputs.map_bits > 0 || outputs.confidence_bits > 0 || outputs.pictures());
 }
@@ -111,12 +144,11 @@ Finish::Shape Finish::shape_of(const FinishInput& input, const FinishOutputs& ou
     const bool by_light = shades_ambient || (shape.outputs.unshaded && input.shade == Shade::ambient);
     const shared::vec3 from = input.light ? input.light->direct : shared::vec3();
     shape.ambient_alone = by_light && shared::dotted(from, from) > 0;
-    shape.light = (by_light || shape.outputs.split) && shared::dotted(from, from) > 0;
+    shape.direct = (by_light || shape.outputs.split) && shared::dotted(from, from) > 0;
     shape.fitted = shape.looks_at_surface() && input.fitted;
     shape.smoothed = shape.looks_at_surface() && !input.fitted && input.fitted_m.empty();
     shape.normals = shape.looks_at_surface() && (input.fitted_normals || !input.fitted_normals_host.empty());
-    shape.on_device = packing_ == Packing::on_device || shape.light || shape.outputs.unshaded || shape.outputs.split ||
-                      shape.outputs.indirect;
+    shape.on_device = packing_ == Packing::on_device || shape.direct || shape.light();
     if (!shape.on_device) {
         shape.outputs.error = shape.error();
         shape.outputs.confidence_bits = shape.outputs.map_bits = 0;
@@ -136,7 +168,7 @@ gpu::Program& Finish::program_for(const Shape& shape) {
     const auto pixels = static_cast<std::size_t>(shape.size.area()), packs = words_of(shape.size);
     const FinishOutputs& outputs = shape.outputs;
     const bool on_device = shape.on_device, packed = shape.packed(), colours = shape.colours(), clay = shape.clay();
-    const bool surfaced = shape.looks_at_surface();
+    const bool surfaced = shape.looks_at_surface(), linear = shape.linear();
     // What these outputs do not need has one texel.
     const auto image = [&](std::string_view name, bool needed, Host host = Host::none) {
         return gpu::BufferRow{.name = name,
@@ -150,6 +182,13 @@ gpu::Program& Finish::program_for(const Shape& shape) {
                               .bytes = words_a_pack > 0 ? packs * static_cast<std::size_t>(words_a_pack) * 4 : 4,
                               .host = words_a_pack > 0 ? host : Host::none,
                               .texels = words,
+                              .plain_writes = true};
+    };
+    const auto three_floats = [&](std::string_view name, bool needed, Host host) {
+        return gpu::BufferRow{.name = name,
+                              .bytes = needed ? pixels * 12 : 4,
+                              .host = needed ? host : Host::none,
+                              .texels = floats,
                               .plain_writes = true};
     };
     const SrgbTables& light = srgb_tables();
@@ -168,18 +207,19 @@ gpu::Program& Finish::program_for(const Shape& shape) {
         bytes("map", on_device ? outputs.map_bits / 8 : 0, Host::download),
         bytes("confidence map", on_device && outputs.confidence_bits > 0 ? 1 : 0, Host::download),
         bytes("picture", on_device && outputs.picture ? 3 : 0, Host::download),
-        {.name = "normals",
-         .bytes = shape.normals ? pixels * 12 : 4,
-         .host = shape.normals ? Host::upload : Host::none,
-         .texels = floats,
-         .plain_writes = true},
-        image("direct light", shape.light),
-        bytes("unshaded", outputs.unshaded ? 3 : 0, Host::download),
-        bytes("ambient part", outputs.split ? 3 : 0, Host::download),
-        bytes("direct part", outputs.split ? 3 : 0, Host::download),
-        {.name = "gathered light", .bytes = outputs.indirect ? pixels * 16 : 4, .texels = floats, .plain_writes = true},
-        {.name = "indirect light", .bytes = outputs.indirect ? pixels * 12 : 4, .texels = floats, .plain_writes = true},
-        bytes("indirect", outputs.indirect ? 3 : 0, Host::download),
+        three_floats("normals", shape.normals, Host::upload),
+        image("direct light", shape.direct),
+        bytes("unshaded", outputs.unshaded && !linear ? 3 : 0, Host::download),
+        bytes("ambient part", outputs.split && !linear ? 3 : 0, Host::download),
+        bytes("direct part", outputs.split && !linear ? 3 : 0, Host::download),
+        {.name = "gathered light", .bytes = outputs.indirect ? pixels * 32 : 4, .texels = floats, .plain_writes = true},
+        three_floats("indirect light", outputs.indirect, Host::none),
+        bytes("indirect", outputs.indirect && !linear ? 3 : 0, Host::download),
+        three_floats("linear colour", linear, Host::upload),
+        three_floats("linear unshaded", linear && outputs.unshaded, Host::download),
+        three_floats("linear ambient part", linear && outputs.split, Host::download),
+        three_floats("linear direct part", linear && outputs.split, Host::download),
+        three_floats("linear indirect", linear && outputs.indirect, Host::download),
     };
     const auto groups_of = [](std::size_t n) {
         return static_cast<std::uint32_t>((n + shared::finish_row - 1) / shared::finish_row);
@@ -199,17 +239,20 @@ gpu::Program& Finish::program_for(const Shape& shape) {
     const int fitted_normals = shape.normals ? normals : shown; // unread without
     if (clay)
         passes.push_back({"clay", "finish/facing", {shown, fitted_normals}, {cosine}, rows, of_surface});
-    if (shape.light)
+    if (shape.direct)
         passes.push_back({"light", "finish/light", {shown, fitted_normals, visibility}, {direct}, rows, of_surface});
     if (outputs.indirect) {
-        passes.push_back({"bounce",
-                          "finish/bounce",
-                          {shown, fitted_normals, colour, shape.known ? colour_known : stored_light, linear_light},
-                          {gathered},
-                          rows,
-                          {{shared::spec_is_depth, shape.fitted},
-                           {shared::spec_normals, shape.normals},
-                           {shared::spec_known, shape.known}}});
+        passes.push_back(
+            {"bounce",
+             "finish/bounce",
+             {shown, fitted_normals, linear ? stored_light : colour, shape.known ? colour_known : stored_light,
+              linear_light, linear ? linear_colour : linear_light},
+             {gathered},
+             rows,
+             {{shared::spec_is_depth, shape.fitted},
+              {shared::spec_normals, shape.normals},
+              {shared::spec_known, shape.known},
+              {shared::spec_linear, linear}}});
         passes.push_back({"bounce's mean",
                           "finish/bounce_mean",
                           {shown, visibility, gathered},
@@ -217,25 +260,38 @@ gpu::Program& Finish::program_for(const Shape& shape) {
                           rows,
                           {{shared::spec_is_depth, shape.fitted}}});
     }
+    if (linear)
+        passes.push_back({"linear light",
+                          "finish/linear",
+                          {visibility, shape.error() ? error_of_each : visibility, linear_colour,
+                           shape.direct ? direct : visibility, outputs.indirect ? bounced : visibility},
+                          {linear_unshaded, linear_ambient, linear_direct, linear_indirect},
+                          rows,
+                          {{shared::spec_light, shape.direct},
+                           {shared::spec_ambient, shape.ambient_alone},
+                           {shared::spec_unshaded, outputs.unshaded},
+                           {shared::spec_split, outputs.split},
+                           {shared::spec_indirect, outputs.indirect},
+                           {shared::spec_unbounded, outputs.light_values == LightValues::unbounded}}});
     constexpr std::uint32_t most_groups = 1 << 15;
     const std::uint32_t groups = groups_of(packs);
     if (packed)
-        passes.push_back(
-            {"pack",
-             "finish/pack",
-             {visibility, shape.error() ? error_of_each : visibility, clay ? surface : visibility,
-              clay ? cosine : visibility, colours ? colour : stored_light, shape.known ? colour_known : stored_light,
-              linear_light, stored_light, shape.light ? direct : visibility, outputs.indirect ? bounced : visibility},
-             {map_out, confidence_out, picture_out, unshaded_out, ambient_out, direct_out, indirect_out},
-             {std::min(groups, most_groups), (groups + most_groups - 1) / most_groups, 1},
-             {{shared::spec_map_bits, outputs.map_bits},
-              {shared::spec_confidence_bits, outputs.confidence_bits},
-              {shared::spec_picture, shape.picture},
-              {shared::spec_light, shape.light},
-              {shared::spec_ambient, shape.ambient_alone},
-              {shared::spec_unshaded, outputs.unshaded},
-              {shared::spec_split, outputs.split},
-              {shared::spec_indirect, outputs.indirect}}});
+        passes.push_back({"pack",
+                          "finish/pack",
+                          {visibility, shape.error() ? error_of_each : visibility, clay ? surface : visibility,
+                           clay ? cosine : visibility, colours ? colour : stored_light,
+                           shape.known ? colour_known : stored_light, linear_light, stored_light,
+                           shape.direct ? direct : visibility, outputs.indirect && !linear ? bounced : visibility},
+                          {map_out, confidence_out, picture_out, unshaded_out, ambient_out, direct_out, indirect_out},
+                          {std::min(groups, most_groups), (groups + most_groups - 1) / most_groups, 1},
+                          {{shared::spec_map_bits, outputs.map_bits},
+                           {shared::spec_confidence_bits, outputs.confidence_bits},
+                           {shared::spec_picture, shape.picture},
+                           {shared::spec_light, shape.direct},
+                           {shared::spec_ambient, shape.ambient_alone},
+                           {shared::spec_unshaded, outputs.unshaded && !linear},
+                           {shared::spec_split, outputs.split && !linear},
+                           {shared::spec_indirect, outputs.indirect && !linear}}});
     auto program =
         std::make_unique<gpu::Program>(device_, std::move(buffers), std::move(passes), sizeof(shared::FinishConstants));
     return *programs_.emplace_back(shape, std::move(program)).second;
@@ -292,6 +348,8 @@ Finished Finish::compute(const FinishInput& input, const FinishOutputs& outputs)
         gpu::upload(input.visibility, program.host(visibility));
     if (shape.colours())
         gpu::upload(input.colour, program.host(colour));
+    if (shape.linear())
+        upload_linear(input, gpu::image_on<cv::Vec3f>(program.host(linear_colour), size));
     if (on_device && shape.known)
         gpu::upload(input.colour_known, program.host(colour_known));
     program.run(std::as_bytes(std::span(&k, 1)));
@@ -316,6 +374,14 @@ Finished Finish::compute(const FinishInput& input, const FinishOutputs& outputs)
         finished.map = copied<uchar>(program, map_out, size);
     if (outputs.picture)
         finished.picture = copied<cv::Vec3b>(program, picture_out, size);
+    if (shape.linear()) {
+        const auto taken = [&](bool made, int buffer) {
+            return made ? copied<cv::Vec3f>(program, buffer, size) : cv::Mat3f();
+        };
+        finished.linear = {taken(shape.outputs.unshaded, linear_unshaded), taken(shape.outputs.split, linear_ambient),
+                           taken(shape.outputs.split, linear_direct), taken(shape.outputs.indirect, linear_indirect)};
+        return finished;
+    }
     if (shape.outputs.unshaded)
         finished.unshaded = copied<cv::Vec3b>(program, unshaded_out, size);
     if (shape.outputs.split) {

@@ -19,6 +19,10 @@
 
 namespace scanshade {
 
+/// How colour that was divided, split or gathered is given: 8 bits with sRGB's curve; or linear light as floats, 1 =
+/// white, of which none exceeds white (what 16-bit integers hold), or whatever division makes of it.
+enum class LightValues { bytes, to_white, unbounded };
+
 /// What is made of a frame.
 struct FinishOutputs {
     bool error = false;      ///< as floats: expected_error_of() of the view
@@ -29,6 +33,7 @@ struct FinishOutputs {
                              ///< Shade::ambient by visibility to the power that the photographs show
     bool split = false;      ///< the ambient and the direct part of colour, where there is colour
     bool indirect = false;   ///< one bounce: what colour comes from neighbours within the radius, where there is colour
+    LightValues light_values = LightValues::bytes; ///< of the last three
 
     [[nodiscard]] bool any() const { return error || confidence_bits > 0 || map_bits > 0 || pictures(); }
     [[nodiscard]] bool pictures() const { return picture || unshaded || split || indirect; }
@@ -54,10 +59,16 @@ struct FinishInput {
     DepthNoise noise = {};              ///< that of z_m, and on
     shared::ErrorTable errors = {};     ///< the method's errors (ao/expected_errors.h)
     cv::Mat3b colour = {};              ///< blue, green, red; empty = clay
+    cv::Mat3w deep_colour = {};         ///< the same with 16 bits, where it was recorded so; floats are made from it
     cv::Mat1b colour_known = {};        ///< 0 where colour has none; empty = known everywhere
     double strength = 1;                ///< of the visibility in the picture
     Shade shade = Shade::multiply;
     std::optional<shared::LightConstants> light = {}; ///< in camera space; none = all light is ambient
+};
+
+/// Linear light, blue first, 1 = white.
+struct LinearLight {
+    cv::Mat3f unshaded = {}, ambient = {}, direct = {}, indirect = {};
 };
 
 /// Empty images were not asked for. Maps are empty, too, and errors are floats, where the host packs: on
@@ -68,6 +79,7 @@ struct Finished {
     cv::Mat map = {};              ///< of visibility: 0 = no surface, 1 .. 255 or 65535 = 0 .. 1
     cv::Mat3b picture = {};        ///< blue, green, red, as all pictures
     cv::Mat3b unshaded = {}, ambient = {}, direct = {}, indirect = {};
+    LinearLight linear = {}; ///< in their place, where floats were asked for
 };
 
 /// Whether the device turns values into the bytes of maps and pictures. A GPU then has less to download. Where the
@@ -92,15 +104,17 @@ class Finish {
         cv::Size size;
         FinishOutputs outputs;
         int picture = 0;
-        bool light = false;                                     ///< there is direct light to tell apart
+        bool direct = false;                                    ///< there is direct light to tell apart
         bool ambient_alone = false;                             ///< visibility has a say in ambient light alone
         bool fitted = false, smoothed = false, normals = false; ///< of clay and light: which depth they show
         bool on_device = false;                                 ///< packs there
         bool known = false;                                     ///< which pixels' colour is known matters
         bool operator==(const Shape&) const = default;
         [[nodiscard]] bool clay() const;
-        [[nodiscard]] bool looks_at_surface() const { return clay() || light || outputs.indirect; }
-        [[nodiscard]] bool colours() const;
+        [[nodiscard]] bool looks_at_surface() const { return clay() || direct || outputs.indirect; }
+        [[nodiscard]] bool colours() const; ///< as bytes
+        [[nodiscard]] bool light() const { return outputs.unshaded || outputs.split || outputs.indirect; }
+        [[nodiscard]] bool linear() const { return light() && outputs.light_values != LightValues::bytes; }
         [[nodiscard]] bool packed() const;
         [[nodiscard]] bool error() const { return outputs.error || outputs.confidence_bits > 0 || outputs.unshaded; }
     };

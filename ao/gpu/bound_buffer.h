@@ -2,6 +2,7 @@
 #pragma once
 
 #include "ao/gpu/device_bytes.h"
+#include "ao/gpu/memory_pool.h"
 #include "ao/gpu/vulkan.h"
 #include "projection/base/error.h"
 
@@ -17,7 +18,7 @@ constexpr auto shared_memory = vk::MemoryPropertyFlagBits::eDeviceLocal | vk::Me
 
 /// In the first available kind of memory wished for; mapped if the host can reach it.
 struct BoundBuffer {
-    vk::raii::DeviceMemory memory = nullptr;
+    PooledMemory memory;
     vk::raii::Buffer buffer = nullptr;
     vk::raii::BufferView view = nullptr; // texel buffers only
     std::byte* mapped = nullptr;
@@ -36,10 +37,10 @@ struct BoundBuffer {
                 flags = wish;
         if (type < 0)
             throw Error("the device has no suitable memory");
-        memory = gpu.device.allocateMemory({needs.size, static_cast<std::uint32_t>(type)});
+        memory = PooledMemory(gpu, needs, static_cast<std::uint32_t>(type));
         buffer.bindMemory(*memory, 0);
-        if (flags & vk::MemoryPropertyFlagBits::eHostVisible)
-            mapped = static_cast<std::byte*>(memory.mapMemory(0, size));
+        if (flags & vk::MemoryPropertyFlagBits::eHostVisible) // else the host reads it slowly, if at all
+            mapped = memory.mapped();
     }
 };
 

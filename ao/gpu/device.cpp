@@ -243,6 +243,8 @@ Device::Device(const std::string& choice) : state_(std::make_unique<State>()) {
         state_->info = *best;
         state_->physical = physicals[static_cast<std::size_t>(best->index)];
         open_device(*state_);
+        if (!is_cpu(*best))
+            keep_memory(std::min<std::size_t>(std::size_t(1) << 29, best->memory_bytes / 16));
     });
 }
 
@@ -262,6 +264,8 @@ std::vector<std::unique_ptr<Device>> open_devices(const std::string& choice) {
 }
 
 const DeviceInfo& Device::info() const { return state_->info; }
+void Device::keep_memory(std::size_t bytes) { state_->memory_pool->keep(bytes); }
+std::size_t Device::kept_memory() const { return state_->memory_pool->kept(); }
 bool Device::validating() const { return state_->validating; }
 
 std::vector<std::string> Device::validation_messages() const {

@@ -22,7 +22,7 @@ using Memory = vk::MemoryPropertyFlagBits;
 
 /// An image of float layers: a view of everything to sample from, and one of each mip to write to.
 struct BoundImage {
-    vk::raii::DeviceMemory memory = nullptr;
+    PooledMemory memory;
     vk::raii::Image image = nullptr;
     vk::raii::ImageView sampled = nullptr;
     std::vector<vk::raii::ImageView> mips;
@@ -44,7 +44,7 @@ struct BoundImage {
         const int type = gpu.memory_type(needs.memoryTypeBits, Memory::eDeviceLocal);
         if (type < 0)
             throw Error("the device has no suitable memory");
-        memory = gpu.device.allocateMemory({needs.size, static_cast<std::uint32_t>(type)});
+        memory = PooledMemory(gpu, needs, static_cast<std::uint32_t>(type));
         image.bindMemory(*memory, 0);
         const auto view = [&](std::uint32_t first, std::uint32_t count) {
             return gpu.device.createImageView({{},

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "ao/gpu/device.h"
+#include "ao/gpu/memory_pool.h"
 #include "ao/gpu/pipeline.h"
 #include "projection/base/error.h"
 
@@ -51,6 +52,7 @@ struct Device::State {
     vk::raii::Queue queue = nullptr;
     std::mutex submitting; ///< to be held by who submits
     Pipelines pipelines;
+    std::unique_ptr<MemoryPool> memory_pool = std::make_unique<MemoryPool>();
     vk::PhysicalDeviceMemoryProperties memory;
     double nanoseconds_per_tick = 1;
     bool has_timestamps = false;

@@ -221,6 +221,7 @@ AoMap ScreenMethod::compute(const View& view) {
     const double upload_ms = stopwatch.lap_ms();
     program.run(block);
     (void)stopwatch.lap_ms(); // the program times its own passes
+    look_at(program, most > 0 ? screen_neighbours + 1 : screen_own);
     AoMap ao{gpu::image_on<float>(program.host(screen_visibility), image)(window).clone()};
     const double download_ms = stopwatch.ms();
     timings_.assign({{"host upload", upload_ms}});

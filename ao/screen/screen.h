@@ -97,6 +97,8 @@ class ScreenMethod : public Method {
     virtual void add_denoise(ScreenTables& tables) const;
     /// The room's constant block. It begins with `screen`.
     [[nodiscard]] virtual std::vector<std::byte> constants(const shared::ScreenConstants& screen) const = 0;
+    /// After each run: what the room's own downloaded buffers say. The first of them is number `first_own`.
+    virtual void look_at(gpu::Program& /*program*/, int /*first_own*/) {}
 
   private:
     using Shape =

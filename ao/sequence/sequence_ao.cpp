@@ -246,6 +246,7 @@ const AoMap& SequenceAo::visibility(std::size_t index) {
     view.neighbours = neighbours;
     view.instant = options_.average > 0 ? static_cast<int>(index % 65536) : 0; // so that what is averaged differs
     slot.ao = method_.compute(view);
+    slot.remarks = method_.remarks();
     let_go(slot);
     timings_.insert(timings_.end(), method_.timings().begin(), method_.timings().end());
     return *slot.ao;
@@ -278,6 +279,7 @@ SequenceAoResult SequenceAo::compute(std::size_t index) {
     result.fused = slot.fused;
     result.neighbours = slot.neighbours;
     result.left_out = slot.left_out;
+    result.remarks = slot.remarks;
     result.timings = std::move(timings_);
     timings_.clear();
     return result;

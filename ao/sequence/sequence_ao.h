@@ -50,6 +50,7 @@ struct SequenceAoResult {
     Timings timings;
     std::vector<std::size_t> fused, neighbours, averaged; ///< indices of the frames it was looked at with
     std::vector<LeftOut> left_out;
+    MethodRemarks remarks; ///< the method's
 };
 
 /// Not thread-safe: one call at a time. A frame's result depends on the frames within reach() of it and on nothing
@@ -97,6 +98,7 @@ class SequenceAo {
         std::map<std::size_t, PairRegistration> registrations; ///< with later frames
         std::vector<std::size_t> fused, neighbours;
         std::vector<LeftOut> left_out;
+        MethodRemarks remarks;
     };
     [[nodiscard]] const DepthImage& kept(Slot& slot);
     [[nodiscard]] const Facets& facets(Slot& slot);

@@ -59,6 +59,32 @@ int bricks_on(const gpu::Device& device, const VxaoOptions& options) {
     return static_cast<int>(std::min(held, device.info().most_buffer_bytes / sum_bytes));
 }
 
+/// Levels of voxels up to the radius.
+int levels_of(const VxaoOptions& options) {
+    return 1 + static_cast<int>(std::ceil(std::log2(options.screen.radius / options.voxel_m) - 1e-3));
+}
+
+/// What there was room for: shaders/vxao/room.glsl says the same.
+struct Room {
+    int finest = 0;    ///< the level that still has bricks; as many as there are levels where none has
+    double wanted = 0; ///< bricks of all levels. Of a level without room this is a guess: four times those of the next,
+                       ///< since surfaces have that many
+};
+Room room_for(std::span<const std::uint32_t> bricks_of_level, int count, int bricks) {
+    Room room{.finest = count};
+    bool fits = true;
+    double held = 0, last = 0;
+    for (int level = count - 1; level >= 0; --level) {
+        const double own = bricks_of_level[static_cast<std::size_t>(level)];
+        fits = fits && held + own <= bricks;
+        last = fits ? own : std::max(own, 4 * last);
+        held += fits ? own : 0;
+        room.wanted += last;
+        room.finest = fits ? level : room.finest;
+    }
+    return room;
+}
+
 /// Of one hash table, which is at most half full.
 int slots_log2(int bricks) { return std::bit_width(2 * static_cast<unsigned>(bricks) - 1); }
 
@@ -103,7 +129,11 @@ void Vxao::add_passes(ScreenTables& tables) const {
     const auto count = static_cast<std::size_t>(bricks_);
     const std::size_t slots = std::size_t{1} << slots_log2(bricks_);
     const int table = tables.add_buffer({"bricks", shared::vxao_tables * slots * 8, none, Texels::rg32ui});
-    const int counters = tables.add_buffer({"counters", shared::vxao_counters * 4, none, Texels::r32ui});
+    const int counters = tables.add_buffer({.name = "counters",
+                                            .bytes = shared::vxao_counters * 4,
+                                            .host = gpu::BufferRow::Host::download,
+                                            .texels = Texels::r32ui,
+                                            .always_downloaded = true});
     const int keys = tables.add_buffer({"keys", shared::vxao_levels * count * 4, none, Texels::r32ui});
     const int sums = tables.add_buffer({"sums", count * sum_bytes, none});
     const int voxels = tables.add_buffer({"voxels", count * shared::vxao_stored * 4, none, Texels::r32ui});
@@ -139,6 +169,31 @@ void Vxao::add_passes(ScreenTables& tables) const {
                          {screen_depth, screen_surfaces, screen_noise, table, counters, voxels}, {screen_raw});
 }
 
+void Vxao::look_at(gpu::Program& program, int first_own) {
+    constexpr int counters = 1; // after the table of bricks: see add_passes()
+    remarks_ = {};
+    const int count = levels_of(options_);
+    const Room room = room_for(program.host_as<std::uint32_t>(first_own + counters), count, bricks_);
+    if (room.finest == 0)
+        return;
+    constexpr double mib = 1024 * 1024;
+    const double wanted_mib = std::ceil(room.wanted * static_cast<double>(brick_bytes) / mib);
+    const double taken_mib = std::floor(static_cast<double>(bricks_) * static_cast<double>(brick_bytes) / mib);
+    const std::string why =
+        fmt::format("voxels of {:.3g} m would take some {:.0f} MiB, and {} MiB are there (--vxao.memory)",
+                    options_.voxel_m, wanted_mib, taken_mib);
+    if (room.finest == count) {
+        remarks_.doubts.push_back(why + ": not even the largest have room, so nothing is occluded.");
+        return;
+    }
+    const double used_m = options_.voxel_m * (1 << room.finest), voxels = options_.screen.radius / used_m;
+    const std::string sentence = fmt::format("{}: the smallest are {:.3g} m, {:.3g} a radius; what lies closer to a "
+                                             "surface than that does not occlude.",
+                                             why, used_m, voxels);
+    constexpr double fewest = 7.9; // as quality lowest has them
+    (voxels < fewest ? remarks_.doubts : remarks_.warnings).push_back(sentence);
+}
+
 std::vector<std::byte> Vxao::constants(const shared::ScreenConstants& screen) const {
     shared::VxaoConstants c{};
     c.screen = screen;
@@ -160,7 +215,7 @@ std::vector<std::byte> Vxao::constants(const shared::ScreenConstants& screen) co
     c.per_voxel = 1 / c.voxel;
     c.sampled = 2;
     c.sigmas = screen.tangent_sigmas > 0 ? 3.0F : 0.0F;
-    c.levels = 1 + static_cast<int>(std::ceil(std::log2(options_.screen.radius / options_.voxel_m) - 1e-3));
+    c.levels = levels_of(options_);
     c.bricks = bricks_;
     c.slots_log2 = slots_log2(c.bricks);
     c.cones = options_.cones;

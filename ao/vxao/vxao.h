@@ -24,13 +24,18 @@ class Vxao final : public ScreenMethod {
     /// Throws Misuse naming a setting out of its range.
     Vxao(gpu::Device& device, const VxaoOptions& options);
     [[nodiscard]] bool looks_at_neighbours() const override { return true; }
+    /// Says where voxels are larger than asked for, since the memory holds no more.
+    [[nodiscard]] const MethodRemarks& remarks() const override { return remarks_; }
 
   private:
     void add_passes(ScreenTables& tables) const override;
     [[nodiscard]] std::vector<std::byte> constants(const shared::ScreenConstants& screen) const override;
 
+    void look_at(gpu::Program& program, int first_own) override;
+
     VxaoOptions options_;
     int bricks_; ///< there is room for
+    MethodRemarks remarks_;
 };
 
 } // namespace scanshade

@@ -25,6 +25,7 @@ std::unique_ptr<BenchPart> hard_cases_kept();
 std::unique_ptr<BenchPart> flatness_of_planes();
 std::unique_ptr<BenchPart> normals_kept();
 std::unique_ptr<BenchPart> light_split();
+std::unique_ptr<BenchPart> light_bounce();
 std::unique_ptr<BenchPart> expected_errors();
 std::unique_ptr<BenchPart> errors_of_clouds();
 

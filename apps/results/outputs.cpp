@@ -18,6 +18,9 @@ fs::path error_file(const std::string& name, const Outputs& outputs) {
     return fs::path("error") / (name + extension(outputs.format));
 }
 fs::path picture_file(const char* kind, const std::string& name) { return fs::path(kind) / (name + ".png"); }
+fs::path light_file(const char* kind, const std::string& name, const Outputs& outputs) {
+    return fs::path(kind) / (name + extension(outputs.colour_format.value_or(AoFormat::png8)));
+}
 fs::path cloud_file(const std::string& name, const std::string& extension) {
     return fs::path("clouds") / (name + extension);
 }
@@ -45,12 +48,12 @@ std::vector<fs::path> files_of(const CaptureEntry& entry, const Outputs& outputs
     if (outputs.shaded)
         add(picture_file("shaded", entry.name));
     if (outputs.unshaded)
-        add(picture_file("unshaded", entry.name));
+        add(light_file("unshaded", entry.name, outputs));
     for (const char* part : {"ambient", "direct"})
         if (outputs.light)
-            add(picture_file(part, entry.name));
+            add(light_file(part, entry.name, outputs));
     if (outputs.indirect)
-        add(picture_file("indirect", entry.name));
+        add(light_file("indirect", entry.name, outputs));
     if (outputs.panel)
         add(picture_file("panel", entry.name));
     if (outputs.preview)
@@ -65,6 +68,23 @@ std::vector<fs::path> files_of(const CaptureEntry& entry, const Outputs& outputs
         for (const std::string_view extension : written_cloud_extensions())
             add(cloud_file(entry.name, std::string(extension)));
     return files;
+}
+
+std::string colour_encoding(const Outputs& outputs) {
+    if (!outputs.unshaded && !outputs.light && !outputs.indirect)
+        return {};
+    if (!outputs.colour_format)
+        return "sRGB: PNG of 16 bits where the colour image has 16, else of 8";
+    switch (*outputs.colour_format) {
+    case AoFormat::png8:
+        return "sRGB: PNG of 8 bits";
+    case AoFormat::png16:
+        return "sRGB: PNG of 16 bits";
+    case AoFormat::tiff:
+    case AoFormat::exr:
+        break;
+    }
+    return "linear light of sRGB's primaries: floats, 1 = white of the colour image; unshaded may exceed it";
 }
 
 } // namespace scanshade

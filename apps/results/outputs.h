@@ -8,6 +8,7 @@
 #include <array>
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,8 @@ struct Outputs {
     bool glb = false;         ///< the points of either as binary glTF
     bool mcap = false;        ///< all frames as one recording, run.mcap; not a file of a frame
     AoFormat format = AoFormat::png16;
+    /// Of unshaded, ambient, direct and indirect; none: PNG with as many bits as the colour image has.
+    std::optional<AoFormat> colour_format = {};
     Shade shade = Shade::multiply; ///< what visibility multiplies in pictures
     double shade_strength = 1;     ///< 0 leaves the colour, 1 multiplies by visibility
     bool colour_view = false;      ///< maps and pictures of frames with a secondary camera use its pixels
@@ -60,6 +63,8 @@ struct Outputs {
 [[nodiscard]] std::filesystem::path confidence_file(const std::string& name, const Outputs& outputs);
 [[nodiscard]] std::filesystem::path error_file(const std::string& name, const Outputs& outputs);
 [[nodiscard]] std::filesystem::path picture_file(const char* kind, const std::string& name);
+/// Of "unshaded", "ambient", "direct" or "indirect".
+[[nodiscard]] std::filesystem::path light_file(const char* kind, const std::string& name, const Outputs& outputs);
 [[nodiscard]] std::filesystem::path cloud_file(const std::string& name, const std::string& extension);
 [[nodiscard]] std::filesystem::path preview_file(const std::string& name);
 [[nodiscard]] std::filesystem::path points_file(const std::string& name, std::size_t part);
@@ -70,6 +75,9 @@ struct Outputs {
 
 /// The files that `outputs` makes of a frame. A cloud has both possible names, since only its content has the format.
 [[nodiscard]] std::vector<std::filesystem::path> files_of(const CaptureEntry& entry, const Outputs& outputs);
+
+/// What the numbers in unshaded, ambient, direct and indirect mean; empty where none of them is written.
+[[nodiscard]] std::string colour_encoding(const Outputs& outputs);
 
 /// Whether the light of the colour images has to be known.
 [[nodiscard]] inline bool needs_light(const Outputs& outputs) {

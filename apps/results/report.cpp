@@ -278,6 +278,8 @@ json manifest_head(const RunReport& report) {
         head["radius"] = report.radius;
     if (!report.light.empty())
         head["light"] = report.light;
+    if (!report.colour_encoding.empty())
+        head["colour_encoding"] = report.colour_encoding;
     return head;
 }
 

@@ -27,11 +27,12 @@ struct RunReport {
     const Capture& capture;
     Registration registration = Registration::unknown; ///< as used
     std::string registration_reason;
-    std::string radius = {};         ///< of a capture in an arbitrary unit: the radius in it, and what it is a part of
-    std::string depth_noise;         ///< the noise, its origin, and how the depth is prepared
-    std::vector<std::string> budget; ///< what an error or time budget chose, expected and found; empty without one
-    std::string shading;             ///< what the shaded pictures show, and why
-    std::string light = {};          ///< what was found of the colours' light; empty = nothing needs it
+    std::string radius = {};          ///< of a capture in an arbitrary unit: the radius in it, and what it is a part of
+    std::string depth_noise;          ///< the noise, its origin, and how the depth is prepared
+    std::vector<std::string> budget;  ///< what an error or time budget chose, expected and found; empty without one
+    std::string shading;              ///< what the shaded pictures show, and why
+    std::string colour_encoding = {}; ///< of unshaded, ambient, direct and indirect; empty = none is written
+    std::string light = {};           ///< what was found of the colours' light; empty = nothing needs it
     std::vector<std::string> outlook = {}; ///< the error to expect, and the cost of less
     std::vector<FrameRow> frames;          ///< shortened
     std::size_t done_now = 0;              ///< frames that this process computed; others were done before

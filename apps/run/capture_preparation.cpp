@@ -116,6 +116,7 @@ RunReport CaptureRuns::begun_report(const CaptureJob& job, Workers* workers) {
                      .frames = {}};
     report.devices = workers ? workers->devices() : 1;
     report.alone = job.block.empty();
+    report.colour_encoding = colour_encoding(job.batch.outputs);
     return report;
 }
 

@@ -33,6 +33,13 @@ constexpr auto format_words = [] {
     std::ranges::transform(ao_formats, words.begin(), [](const auto& row) { return Named{row.name, row.format}; });
     return words;
 }();
+/// format_words, and none: as many bits as the colour image has.
+constexpr auto colour_format_words = [] {
+    using Maybe = Named<std::optional<AoFormat>>;
+    std::array<Maybe, ao_formats.size() + 1> words{Maybe{"auto", std::nullopt}};
+    std::ranges::transform(ao_formats, words.begin() + 1, [](const auto& row) { return Maybe{row.name, row.format}; });
+    return words;
+}();
 constexpr std::array view_words{Named{"depth", false}, Named{"colour", true}};
 constexpr std::array colour_words{Named{"kept", CloudColours::kept}, Named{"shaded", CloudColours::shaded},
                                   Named{"grey", CloudColours::grey}};
@@ -67,6 +74,7 @@ std::set<std::string> words_of(const std::string& list) {
 Outputs outputs_from(const RunSettings& asked) {
     Outputs wanted;
     wanted.format = asked.format;
+    wanted.colour_format = asked.colour_format;
     wanted.shade = asked.shade;
     wanted.shade_strength = asked.shade_strength;
     wanted.colour_cloud = asked.colour_cloud;
@@ -307,6 +315,11 @@ std::vector<Stage> RunSettings::common_stages() {
            .help = "file format of the ao maps",
            .value = OneOf(&s.format, format_words),
            .common = true},
+          {.name = "colour-format",
+           .help =
+               "file format of unshaded, ambient, direct and indirect: png8 and png16 hold sRGB, tiff and exr linear "
+               "light as floats; auto = png16 where the colour image has 16 bits, else png8",
+           .value = OneOf(&s.colour_format, colour_format_words)},
           {.name = "view",
            .help = "camera whose pixels maps and pictures use, if a secondary camera took the colour images",
            .value = OneOf(&s.colour_view, view_words)},

@@ -47,6 +47,7 @@ class RunSettings {
     Budget budget;
     std::string out, write = "auto", dump;
     AoFormat format = AoFormat::png16;
+    std::optional<AoFormat> colour_format = {};
     bool colour_view = false;
     Shade shade = Shade::multiply;
     std::string light = "auto";

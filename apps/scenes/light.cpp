@@ -1,9 +1,12 @@
 #include "apps/scenes/light.h"
 
+#include "projection/base/hash.h"
 #include "projection/srgb.h"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <set>
 #include <tbb/parallel_for.h>
 
@@ -74,36 +77,98 @@ cv::Vec3f as_pixel(const Vector3d& v) {
     return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
 }
 
+constexpr double lift_m = 1e-4; // of rays above the surface that they start from
+
+Ray sight_of(const Optics& camera, const Eigen::Isometry3d& world_from_camera, int u, int v) {
+    return {world_from_camera.translation(), world_from_camera.linear() * camera.direction(u, v).homogeneous()};
+}
+
+/// What leaves a surface, linear red, green, blue.
+struct Sent {
+    Vector3d albedo, ambient, direct;
+};
+
+class Sender {
+  public:
+    Sender(const World& world, const SceneLight& light)
+        : world_(world), light_(light), shell_(shell_of(world.scene())), sun_(light.towards.normalized()),
+          direct_(light.has_sun() ? light.ratio : 0), unit_(brightest / (1 + direct_)) {}
+
+    [[nodiscard]] Sent from(const Hit& hit, const Vector3d& at) const {
+        const Vector3d albedo = albedo_at(hit, at);
+        const double facing = direct_ > 0 ? std::max(0.0, hit.normal.dot(sun_)) : 0;
+        const bool lights = facing > 0 && !in_shadow(world_, shell_, at + lift_m * hit.normal, sun_);
+        return {albedo, unit_ * (1 + light_.gradient().dot(hit.normal)) * albedo.cwiseProduct(ambient_colour),
+                lights ? Vector3d(unit_ * direct_ * facing * albedo.cwiseProduct(direct_colour)) : Vector3d(0, 0, 0)};
+    }
+
+  private:
+    const World& world_;
+    SceneLight light_;
+    std::set<const Body*> shell_;
+    Vector3d sun_;
+    double direct_, unit_;
+};
+
 } // namespace
 
 Vector3d SceneLight::gradient() const { return kind == LightKind::overcast ? Vector3d(0, 0, 0.5) : Vector3d(0, 0, 0); }
 
 LitImages render_lit(const World& world, const Optics& camera, const Eigen::Isometry3d& world_from_camera,
                      const SceneLight& light) {
-    const std::set<const Body*> shell = shell_of(world.scene());
+    const Sender sender(world, light);
     const cv::Size size = camera.pinhole.size;
     LitImages lit{cv::Mat3f(size, cv::Vec3f()), cv::Mat3f(size, cv::Vec3f()), cv::Mat3f(size, cv::Vec3f())};
-    const Vector3d sun = light.towards.normalized();
-    const double direct = light.has_sun() ? light.ratio : 0, unit = brightest / (1 + direct);
     tbb::parallel_for(0, size.height, [&](int v) {
         for (int u = 0; u < size.width; ++u) {
-            const Vector3d along = world_from_camera.linear() * camera.direction(u, v).homogeneous();
-            const Vector3d eye = world_from_camera.translation();
-            const Hit hit = world.cast({eye, along});
+            const Ray sight = sight_of(camera, world_from_camera, u, v);
+            const Hit hit = world.cast(sight);
             if (!hit.body)
                 continue;
-            const Vector3d at = eye + hit.t * along;
-            const Vector3d albedo = albedo_at(hit, at);
-            const double facing = direct > 0 ? std::max(0.0, hit.normal.dot(sun)) : 0;
-            const bool lights = facing > 0 && !in_shadow(world, shell, at + 1e-4 * hit.normal, sun);
-            lit.albedo(v, u) = as_pixel(albedo);
-            lit.ambient(v, u) =
-                as_pixel(unit * (1 + light.gradient().dot(hit.normal)) * albedo.cwiseProduct(ambient_colour));
-            if (lights)
-                lit.direct(v, u) = as_pixel(unit * direct * facing * albedo.cwiseProduct(direct_colour));
+            const Sent sent = sender.from(hit, sight.origin + hit.t * sight.direction);
+            lit.albedo(v, u) = as_pixel(sent.albedo);
+            lit.ambient(v, u) = as_pixel(sent.ambient);
+            lit.direct(v, u) = as_pixel(sent.direct);
         }
     });
     return lit;
+}
+
+Bounce true_bounce(const World& world, const Optics& camera, const Eigen::Isometry3d& world_from_camera,
+                   const SceneLight& light, const TruthOptions& options) {
+    const Sender sender(world, light);
+    const CosineDirections directions(options.rays, options.seed);
+    const cv::Size size = camera.pinhole.size;
+    Bounce bounce{cv::Mat3f(size, cv::Vec3f()), cv::Mat1f(size, std::numeric_limits<float>::quiet_NaN())};
+    tbb::parallel_for(0, size.height, [&](int v) {
+        for (int u = 0; u < size.width; ++u) {
+            const Ray sight = sight_of(camera, world_from_camera, u, v);
+            const Hit hit = world.cast(sight);
+            if (!hit.body)
+                continue;
+            const Vector3d from = sight.origin + hit.t * sight.direction + lift_m * hit.normal;
+            const std::uint32_t key = hash(static_cast<std::uint32_t>(u), static_cast<std::uint32_t>(v));
+            const Eigen::Matrix3d frame =
+                Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), hit.normal).toRotationMatrix() *
+                Eigen::AngleAxisd(2 * std::numbers::pi * hash(key) * 0x1p-32, Vector3d::UnitZ());
+            Vector3d sum = Vector3d::Zero();
+            int open = 0;
+            for (const CosineDirections::Direction& d : directions.set_for(key)) {
+                const Ray ray{from, frame * Vector3d(static_cast<double>(d.x), static_cast<double>(d.y),
+                                                     static_cast<double>(d.z))};
+                const Hit met = world.cast(ray);
+                if (!met.body || met.t > options.radius_m) {
+                    ++open;
+                    continue;
+                }
+                const Sent sent = sender.from(met, ray.origin + met.t * ray.direction);
+                sum += sent.ambient + sent.direct;
+            }
+            bounce.indirect(v, u) = as_pixel(sum / directions.rays());
+            bounce.visibility(v, u) = static_cast<float>(open) / static_cast<float>(directions.rays());
+        }
+    });
+    return bounce;
 }
 
 cv::Mat3b photograph(const LitImages& lit, const cv::Mat1f& visibility) {

@@ -35,6 +35,20 @@ struct LitImages {
 [[nodiscard]] LitImages render_lit(const World& world, const Optics& camera, const Eigen::Isometry3d& world_from_camera,
                                    const SceneLight& light);
 
+/// Light that arrives at each pixel's exact surface from others: linear light, red, green, blue, and their share of the
+/// hemisphere's complement.
+struct Bounce {
+    cv::Mat3f indirect;
+    cv::Mat1f visibility; ///< of the same rays; NaN where no surface is
+};
+
+/// One diffuse bounce: the mean over the cosine-weighted hemisphere of what leaves the first surface within the radius,
+/// and of nothing where a ray meets none. This is irradiance / pi. Where all surfaces send B, it is B (1 - visibility).
+/// Surfaces send what a photograph without occlusion shows of them: albedo times unoccluded ambient light, and direct
+/// light with cast shadows. `light.occluded` has no say.
+[[nodiscard]] Bounce true_bounce(const World& world, const Optics& camera, const Eigen::Isometry3d& world_from_camera,
+                                 const SceneLight& light, const TruthOptions& options);
+
 /// The photograph: 8 bits of sRGB, blue first. `visibility` multiplies ambient light; NaN or empty = 1.
 [[nodiscard]] cv::Mat3b photograph(const LitImages& lit, const cv::Mat1f& visibility);
 

@@ -1,11 +1,15 @@
 // After a frame is computed: the reasons to doubt its result.
 #include "apps/walk/doubts.h"
 
+#include "apps/walk/coordinate_steps.h"
 #include "io/clouds/cloud_file.h"
 #include "projection/base/statistics.h"
+#include "projection/depth_ends.h"
+#include "projection/depth_kind.h"
 #include "projection/undistort.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fmt/format.h>
 #include <numbers>
@@ -127,6 +131,33 @@ void doubt_noise_in_view(const Work& work, double radius_m, const DepthNoise& no
                                         : "Give a larger --radius, or leave them out with --depth-range."));
 }
 
+/// Planes that bend as those of ranges or of disparities do.
+void doubt_kind(const DepthImage& depth, Doubts& doubts) {
+    const DepthKind kind = depth_kind(depth);
+    add_if(kind == DepthKind::inverse, doubts,
+           "planes bend as if the image held disparities or inverse depths, larger where surfaces are nearer: convert "
+           "them to depth.");
+    add_if(kind == DepthKind::range, doubts,
+           "planes bend as if the image held distances from the camera's centre, not depths along z: divide them by "
+           "the length of each pixel's ray (x, y, 1), or check the camera.");
+}
+
+/// One value at either end of the depths that no surface explains.
+void doubt_ends(const DepthImage& depth, const LengthUnit& unit, Doubts& doubts) {
+    const DepthEnds ends = depth_ends(depth.z_m);
+    const auto doubt = [&](const std::optional<DepthEnd>& end, const char* which, const char* beyond) {
+        if (end)
+            doubts.push_back(
+                fmt::format("{:.1f} % of the valid pixels hold exactly {}, the {} depth, {}. They are taken "
+                            "for a surface; --depth-range leaves them out.",
+                            100 * end->share, unit.text(end->z_m, 4), which,
+                            end->apart ? std::string("far from all others, as a file marks holes")
+                                       : fmt::format("as if all {} had been cut off there", beyond)));
+    };
+    doubt(ends.nearest, "smallest", "nearer");
+    doubt(ends.farthest, "largest", "farther away");
+}
+
 /// The diagonal of the box without the lowest and highest hundredth of the points along each axis.
 double extent_of(const Cloud& cloud) {
     const std::size_t step = std::max<std::size_t>(1, cloud.points.size() / 50000);
@@ -159,6 +190,20 @@ void doubt_radius_of_points(const Work& work, Doubts& doubts) {
         fmt::format("the radius of {:.3g} is larger than the cloud of {:.3g}: give a smaller --radius, or a cloud of "
                     "more than a few points.",
                     radius, extent));
+}
+
+void doubt_steps(const Work& work, Doubts& doubts) {
+    const double spacing = work.of_points.spacing;
+    const auto steps = coarse_steps(work.frame.cloud->points, spacing);
+    if (!steps)
+        return;
+    constexpr std::array names{"x", "y", "z"};
+    doubts.push_back(fmt::format(
+        "coordinates along {} are multiples of {:.3g}, and points stand {:.3g} apart: surfaces are steps. {}",
+        names.at(static_cast<std::size_t>(steps->axis)), steps->step, spacing,
+        steps->single_precision ? "Single precision holds coordinates of that size no better: write them in double "
+                                  "precision, or without their offset."
+                                : "Write them with more digits, or give a larger --radius."));
 }
 
 void doubt_unit(const Cloud& cloud, Doubts& doubts) {
@@ -211,6 +256,7 @@ std::vector<std::string> doubts_about(const Work& work, double radius_m, const D
         doubt_unit(*work.frame.cloud, doubts);
         doubt_values(work.of_points.visibility, doubts);
         doubt_radius_of_points(work, doubts);
+        doubt_steps(work, doubts);
         return doubts;
     }
     const cv::Mat1f& visibility = work.ao.visibility;
@@ -218,8 +264,11 @@ std::vector<std::string> doubts_about(const Work& work, double radius_m, const D
         doubt_values({visibility.ptr<float>(), visibility.total()}, doubts);
     doubt_radius_in_view(work, radius_m, unit, doubts);
     doubt_noise_in_view(work, radius_m, noise, unit, doubts);
-    if (!work.frame.cloud) // a cloud's camera is recovered or chosen, not given, unless --camera names it
+    if (!work.frame.cloud) { // a cloud's camera is recovered or chosen, not given, unless --camera names it
         doubt_camera(work.row.camera, doubts);
+        doubt_kind(work.depth, doubts);
+        doubt_ends(work.depth, unit, doubts);
+    }
     return doubts;
 }
 

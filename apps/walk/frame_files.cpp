@@ -144,14 +144,17 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
         });
     if (outputs.shaded)
         wrote(picture_file("shaded", name), [&](const auto& file) { write_picture(file, images.shaded); });
-    const auto wrote_if_made = [&](const char* kind, const cv::Mat3b& picture) {
-        if (!picture.empty())
-            wrote(picture_file(kind, name), [&](const auto& file) { write_picture(file, picture); });
+    const auto wrote_if_made = [&](const char* kind, const cv::Mat3b& picture, const cv::Mat3f& light) {
+        if (!light.empty())
+            wrote(light_file(kind, name, outputs),
+                  [&](const auto& file) { write_light(file, light, images.light_format); });
+        else if (!picture.empty())
+            wrote(light_file(kind, name, outputs), [&](const auto& file) { write_picture(file, picture); });
     };
-    wrote_if_made("unshaded", images.unshaded);
-    wrote_if_made("ambient", images.ambient);
-    wrote_if_made("direct", images.direct);
-    wrote_if_made("indirect", images.indirect);
+    wrote_if_made("unshaded", images.unshaded, images.linear.unshaded);
+    wrote_if_made("ambient", images.ambient, images.linear.ambient);
+    wrote_if_made("direct", images.direct, images.linear.direct);
+    wrote_if_made("indirect", images.indirect, images.linear.indirect);
     if (outputs.panel)
         wrote(picture_file("panel", name), [&](const auto& file) {
             write_picture(file, panel_picture(work.frame, scene, images.shaded, outputs.shade));

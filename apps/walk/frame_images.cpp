@@ -30,11 +30,12 @@ Scene scene_across_cameras(const Work& work, bool colour_view) {
                 frame.colour_camera->camera.pinhole,
                 {},
                 in_colour(work.confidence.visibility),
-                in_colour(work.error.visibility)};
+                in_colour(work.error.visibility),
+                frame.deep_colour};
     }
-    const auto [colour, known] =
-        colour_on_depth(frame.colour, frame.depth_m, frame.camera, *frame.colour_camera, surface);
-    return {frame.depth_m, work.attached.visibility, colour, frame.camera.pinhole, known};
+    const auto [colour, known, deep] =
+        colour_on_depth(frame.colour, frame.depth_m, frame.camera, *frame.colour_camera, surface, frame.deep_colour);
+    return {frame.depth_m, work.attached.visibility, colour, frame.camera.pinhole, known, {}, {}, deep};
 }
 
 cv::Mat3b colour_in_view(const Cloud& cloud, const DepthImage& depth) {
@@ -72,8 +73,6 @@ Finished finished(Work& work, const FinishInput& input, const FinishOutputs& out
     }
     return made;
 }
-
-bool is_float(AoFormat format) { return format == AoFormat::tiff || format == AoFormat::exr; }
 
 bool wants_confidence(const Work& work, const BatchOptions& options, const Outputs& outputs) {
     return options.cloud || outputs.confidence || outputs.error ||
@@ -129,7 +128,14 @@ Scene scene_of(const Work& work, bool colour_view) {
         if (has_secondary_camera(frame))
             return scene_across_cameras(work, colour_view);
         const bool fits = frame.registration == Registration::yes && frame.colour.size() == frame.depth_m.size();
-        return {frame.depth_m, visibility, fits ? frame.colour : cv::Mat3b(), frame.camera.pinhole};
+        return {frame.depth_m,
+                visibility,
+                fits ? frame.colour : cv::Mat3b(),
+                frame.camera.pinhole,
+                {},
+                {},
+                {},
+                fits ? frame.deep_colour : cv::Mat3w()};
     }
     const Cloud& cloud = *frame.cloud;
     if (!cloud.organised())
@@ -184,10 +190,28 @@ FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outpu
                        .split = outputs.light,
                        .indirect = outputs.indirect};
     FrameImages images;
+    const auto take = [&](const Finished& all) {
+        images.map = all.map;
+        images.shaded = all.picture;
+        images.unshaded = all.unshaded;
+        images.ambient = all.ambient;
+        images.direct = all.direct;
+        images.indirect = all.indirect;
+        images.linear = all.linear;
+    };
+    const auto choose_light_values = [&] {
+        images.light_format =
+            outputs.colour_format.value_or(images.scene.deep_colour.empty() ? AoFormat::png8 : AoFormat::png16);
+        made.light_values = is_float(images.light_format)            ? LightValues::unbounded
+                            : images.light_format == AoFormat::png16 ? LightValues::to_white
+                                                                     : LightValues::bytes;
+    };
     if (is_as_recorded(work.frame)) {
         images.scene = scene_of(work, outputs.colour_view);
+        choose_light_values();
         FinishInput input = view;
         input.colour = images.scene.colour;
+        input.deep_colour = images.scene.deep_colour;
         input.strength = outputs.shade_strength;
         input.shade = outputs.shade;
         input.light = light_on(work, options, outputs.colour_view);
@@ -198,13 +222,8 @@ FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outpu
         Finished all = finished(work, input, made);
         work.error_in_view = work.error.visibility = all.error;
         work.confidence_in_view = work.confidence.visibility = confidence_from(all.error);
-        images.map = all.map;
+        take(all);
         images.confidence_map = all.confidence_map;
-        images.shaded = all.picture;
-        images.unshaded = all.unshaded;
-        images.ambient = all.ambient;
-        images.direct = all.direct;
-        images.indirect = all.indirect;
         return images;
     }
     if (confidence) {
@@ -214,6 +233,7 @@ FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outpu
         work.confidence = attach(work.frame, work.depth, {work.confidence_in_view});
     }
     const Scene scene = images.scene = scene_of(work, outputs.colour_view);
+    choose_light_values();
     warn_of_light(work, options, outputs, scene);
     const Finished all = finished(work,
                                   {.camera = scene.camera,
@@ -222,17 +242,13 @@ FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outpu
                                    .radius_m = options.radius_m,
                                    .noise = options.noise,
                                    .colour = scene.colour,
+                                   .deep_colour = scene.deep_colour,
                                    .colour_known = scene.colour_known,
                                    .strength = outputs.shade_strength,
                                    .shade = outputs.shade,
                                    .light = light_on(work, options, outputs.colour_view)},
                                   made);
-    images.map = all.map;
-    images.shaded = all.picture;
-    images.unshaded = all.unshaded;
-    images.ambient = all.ambient;
-    images.direct = all.direct;
-    images.indirect = all.indirect;
+    take(all);
     return images;
 }
 

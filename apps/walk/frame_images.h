@@ -13,6 +13,7 @@ struct Scene {
     cv::Mat1b colour_known = {}; ///< 0 where `colour` has none; empty = known everywhere
     cv::Mat1f confidence = {};   ///< in the colour view; empty = as attached
     cv::Mat1f error = {};        ///< likewise
+    cv::Mat3w deep_colour = {};  ///< `colour` where it was recorded with 16 bits
 };
 
 /// Values of an organised cloud's points as an image; shares their memory.
@@ -37,6 +38,8 @@ struct FrameImages {
     cv::Mat1b confidence_map; ///< likewise
     cv::Mat3b shaded;         ///< colour times visibility; clay where there is no colour, or its camera did not see
     cv::Mat3b unshaded = {}, ambient = {}, direct = {}, indirect = {}; ///< where there is colour
+    LinearLight linear = {};                ///< in their place, for files of more than 8 bits
+    AoFormat light_format = AoFormat::png8; ///< of these files
 };
 
 /// Attaches visibility and confidence to what was recorded, and makes the images that `outputs` asks for, on the device

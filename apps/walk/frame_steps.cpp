@@ -75,6 +75,7 @@ void compute_alone(Work& work, FrameAo& method, const DepthNoise& noise) {
     work.fitted_normals = method.fitted_normals();
     work.row.passes = method.timings();
     std::ranges::copy(method.doubts(), std::back_inserter(work.row.doubts));
+    std::ranges::copy(method.warnings(), std::back_inserter(work.row.warnings));
 }
 
 void compute_points(Work& work, PointMethod& points) {

@@ -14,6 +14,7 @@
 #include <limits>
 #include <set>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 #include <thread>
 
 namespace scanshade {
@@ -135,7 +136,9 @@ LargeFrames::Part LargeFrames::part_of(std::size_t index, std::vector<std::strin
     const CaptureEntry& entry = capture_.entries[index];
     if (entry.cloud.empty() || !by_points())
         return {};
-    std::call_once(looked_, [&] { find_surveys(); });
+    // Isolated: while it waits for its own tasks this thread must not begin another frame, which would wait here for
+    // it.
+    std::call_once(looked_, [&] { tbb::this_task_arena::isolate([&] { find_surveys(); }); });
     if (const auto survey = parts_.find(index); survey != parts_.end()) {
         notes.push_back(notes_.at(index));
         return survey->second;

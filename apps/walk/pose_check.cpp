@@ -36,49 +36,35 @@ std::optional<std::size_t> partner_of(const Capture& capture, std::size_t index,
     return best;
 }
 
-std::optional<double> factor_of(const Capture& capture, std::size_t a, std::size_t b) {
+/// What a pair of frames tells of all.
+struct Told {
+    std::optional<double> factor;
+    std::optional<PoseReading> reading;
+};
+
+Told told_by(const Capture& capture, std::size_t a, std::size_t b) {
     const auto posed = [&](std::size_t index) {
         return PosedDepth{project(capture.load(index, false)), *capture.entries[index].world_from_camera};
     };
     try {
-        return depth_factor_by_poses(posed(a), posed(b));
+        const PosedDepth one = posed(a), other = posed(b);
+        return {depth_factor_by_poses(one, other), pose_reading(one, other)};
     } catch (const Outage&) {
         throw;
     } catch (const Error&) { // processing the frame reports the error
-        return std::nullopt;
+        return {};
     }
 }
 
-} // namespace
-
-std::string pose_warning(const Capture& capture, const std::vector<std::size_t>& frames) {
-    constexpr std::size_t pairs = 3;
+std::string factor_warning(const std::vector<double>& factors, bool arbitrary_unit) {
     constexpr double alike = 1.3;
-    std::vector<std::size_t> posed;
-    for (const std::size_t i : frames)
-        if (const CaptureEntry& entry = capture.entries[i];
-            entry.world_from_camera && !entry.depth.empty() && entry.problem.empty())
-            posed.push_back(i);
-    const std::vector<std::size_t> chosen = spread(pairs, posed.size());
-    std::vector<std::optional<double>> found(chosen.size());
-    tbb::this_task_arena::isolate([&] {
-        tbb::parallel_for(std::size_t(0), chosen.size(), [&](std::size_t i) {
-            const std::size_t index = posed[chosen[i]];
-            if (const auto partner = partner_of(capture, index, posed))
-                found[i] = factor_of(capture, index, *partner);
-        });
-    });
-    std::vector<double> factors;
-    for (const auto& factor : found)
-        if (factor)
-            factors.push_back(*factor);
     if (factors.empty())
         return {};
     const auto [low, high] = std::ranges::minmax(factors);
     const double factor = std::sqrt(low * high);
     if (low == 1 || high == 1 || high > alike * low)
         return {};
-    if (capture.unit.arbitrary())
+    if (arbitrary_unit)
         return fmt::format(
             "depths fit the poses only if they are multiplied by {:.2g}: depth maps and poses are not of "
             "the same reconstruction.",
@@ -86,6 +72,67 @@ std::string pose_warning(const Capture& capture, const std::vector<std::size_t>&
     return fmt::format("depths fit the poses only if they are multiplied by {:.2g}: the depth unit is wrong, or the "
                        "poses are not in metres.",
                        factor);
+}
+
+/// Where all pairs that tell tell the same, and no fewer than `least`.
+std::string reading_warning(const std::vector<PoseReading>& readings, std::size_t least) {
+    if (readings.empty() || readings.size() < least ||
+        std::ranges::any_of(readings, [&](PoseReading reading) { return reading != readings.front(); }))
+        return {};
+    const auto fits = [](const char* as) {
+        return fmt::format("depths fit the poses only if these are read as {}. They are used as recorded: frames "
+                           "together and clouds of the recording are wrong.",
+                           as);
+    };
+    switch (readings.front()) {
+    case PoseReading::recorded:
+        return {};
+    case PoseReading::inverse:
+        return fits("camera from world, their inverse");
+    case PoseReading::y_up:
+        return fits("those of a camera with y up and z backward (OpenGL, Blender, ARKit)");
+    case PoseReading::inverse_y_up:
+        return fits("camera from world, of a camera with y up and z backward");
+    case PoseReading::w_first:
+        return fits("quaternions of the order w x y z");
+    case PoseReading::contradicted:
+        break;
+    }
+    return "depths contradict the poses: frames agree better if the camera is thought to stand still. The poses may be "
+           "of another recording or clock, or in other axes; frames together and clouds of the recording are wrong.";
+}
+
+} // namespace
+
+std::string pose_warning(const Capture& capture, const std::vector<std::size_t>& frames) {
+    constexpr std::size_t pairs = 3;
+    std::vector<std::size_t> posed;
+    for (const std::size_t i : frames)
+        if (const CaptureEntry& entry = capture.entries[i];
+            entry.world_from_camera && !entry.depth.empty() && entry.problem.empty())
+            posed.push_back(i);
+    const std::vector<std::size_t> chosen = spread(pairs, posed.size());
+    std::vector<Told> found(chosen.size());
+    tbb::this_task_arena::isolate([&] {
+        tbb::parallel_for(std::size_t(0), chosen.size(), [&](std::size_t i) {
+            const std::size_t index = posed[chosen[i]];
+            if (const auto partner = partner_of(capture, index, posed))
+                found[i] = told_by(capture, index, *partner);
+            // Wrong poses choose badly; the next frame sees the same all the same.
+            if (const auto next = std::ranges::upper_bound(posed, index); !found[i].reading && next != posed.end())
+                found[i].reading = told_by(capture, index, *next).reading;
+        });
+    });
+    std::vector<double> factors;
+    std::vector<PoseReading> readings;
+    for (const Told& told : found) {
+        if (told.factor)
+            factors.push_back(*told.factor);
+        if (told.reading)
+            readings.push_back(*told.reading);
+    }
+    std::string warning = factor_warning(factors, capture.unit.arbitrary());
+    return warning.empty() ? reading_warning(readings, std::min<std::size_t>(2, chosen.size())) : warning;
 }
 
 } // namespace scanshade

@@ -18,45 +18,26 @@ namespace scanshade {
 namespace {
 
 /// Settings that do not go into the key as typed: they change no results, or the key has them as used.
-constexpr std::array aside = {"frames",
-                              "camera",
-                              "depth-scale",
-                              "association-limit",
-                              "registered",
-                              "depth-noise",
-                              "method",
-                              "radius",
-                              "quality",
-                              "max-error",
-                              "max-ms",
-                              "settings",
-                              "device",
-                              "out",
-                              "write",
-                              "format",
-                              "overwrite",
-                              "dump",
-                              "resume",
-                              "retry",
-                              "shard",
-                              "scratch",
-                              "scratch-limit",
-                              "no-locks",
-                              "log",
-                              "shade-strength",
-                              "colour-cloud",
-                              "cloud",
-                              "cloud-resolution",
-                              "poses",
-                              "in-flight",
-                              "preset",
-                              "quiet",
-                              "colour",
-                              "page",
-                              "page-points",
-                              "tar",
-                              "shade",
-                              "light"};
+constexpr std::array aside = {"frames",         "camera",
+                              "depth-scale",    "association-limit",
+                              "registered",     "depth-noise",
+                              "method",         "radius",
+                              "quality",        "max-error",
+                              "max-ms",         "settings",
+                              "device",         "out",
+                              "write",          "format",
+                              "colour-format",  "overwrite",
+                              "dump",           "resume",
+                              "retry",          "shard",
+                              "scratch",        "scratch-limit",
+                              "no-locks",       "log",
+                              "shade-strength", "colour-cloud",
+                              "cloud",          "cloud-resolution",
+                              "poses",          "in-flight",
+                              "preset",         "quiet",
+                              "colour",         "page",
+                              "page-points",    "tar",
+                              "shade",          "light"};
 
 /// Settings that change no results when they are typed differently.
 constexpr std::array elsewhere = {"out",           "overwrite", "dump", "resume", "retry",     "shard",  "scratch",
@@ -86,6 +67,8 @@ std::string outputs_text(const Outputs& outputs) {
         text += "indirect;";
     if (outputs.light)
         text += "light;";
+    if ((outputs.unshaded || outputs.indirect || outputs.light) && outputs.colour_format)
+        text += fmt::format("colours {};", static_cast<int>(*outputs.colour_format));
     if (outputs.cloud)
         text += colours + "cloud;";
     if (outputs.depth_cloud)

@@ -96,6 +96,8 @@ void compute_in_sequence(Work& work, const Capture& capture, SequenceAo& sequenc
     work.ao = std::move(result.ao);
     work.looked_at = std::move(result.depth);
     work.row.passes = std::move(result.timings);
+    std::ranges::move(result.remarks.doubts, std::back_inserter(work.row.doubts));
+    std::ranges::move(result.remarks.warnings, std::back_inserter(work.row.warnings));
     if (!result.fused.empty())
         work.row.notes.push_back("depth is averaged with frames " + names_of(capture, result.fused) + ".");
     if (!result.neighbours.empty())

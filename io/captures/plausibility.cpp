@@ -75,18 +75,29 @@ Statistics statistics_of(const cv::Mat1w& stored, const DepthTable& table) {
     return result;
 }
 
-/// Every how many lines one repeats the line before it, exactly: 2 after an enlargement to twice the size; 0 where none
-/// does. Where all lines are alike, as of a wall seen by an ideal sensor, nothing was repeated.
-int repeats_every(const cv::Mat& lines) {
+/// Which lines repeat the line before them, exactly.
+struct Repeats {
+    int every = 0;    ///< 2 after an enlargement to twice the size; 0 where no such pattern is
+    double share = 0; ///< of the lines with content, whatever the pattern: 0.6 after 2.5 times the size
+};
+
+/// Where all lines are alike, as of a wall seen by an ideal sensor, nothing was repeated.
+Repeats repeats_of(const cv::Mat& lines) {
     constexpr int most = 4;
-    constexpr double nearly_all = 0.9, hardly_any = 0.1;
+    constexpr double nearly_all = 0.9, hardly_any = 0.1, all = 0.95;
     std::vector<bool> counts(static_cast<std::size_t>(lines.rows)), repeats(counts.size());
+    double repeated_in_all = 0, of_all = 0;
     for (int v = 1; v < lines.rows; ++v) {
         counts[v] = 4 * cv::countNonZero(lines.row(v)) > lines.cols;
         repeats[v] = counts[v] && std::memcmp(lines.ptr(v), lines.ptr(v - 1),
                                               static_cast<std::size_t>(lines.cols) * lines.elemSize()) == 0;
+        repeated_in_all += repeats[v];
+        of_all += counts[v];
     }
-    for (int every = 2; every <= most; ++every)
+    Repeats found;
+    if (of_all > 4 * most && repeated_in_all < all * of_all)
+        found.share = repeated_in_all / (of_all + 1); // the first line repeats none
+    for (int every = 2; every <= most && found.every == 0; ++every)
         for (int first = 0; first < every; ++first) {
             double repeated = 0, of = 0, others_repeated = 0, others = 0;
             for (int v = 1; v < lines.rows; ++v) {
@@ -94,28 +105,40 @@ int repeats_every(const cv::Mat& lines) {
                 (one ? of : others) += counts[v];
                 (one ? repeated : others_repeated) += repeats[v];
             }
-            if (of > most && repeated > nearly_all * of && others_repeated < hardly_any * others)
-                return every;
+            if (of > most && repeated > nearly_all * of && others_repeated < hardly_any * others) {
+                found.every = every;
+                break;
+            }
         }
-    return 0;
+    return found;
 }
 
 const char* ordinal(int every) { return every == 2 ? "second" : every == 3 ? "third" : "fourth"; }
 
-/// An image that was enlarged by copying pixels repeats rows and columns alike. Rows alone are a fault.
+/// An image that was enlarged by copying pixels repeats rows and columns alike: between the copies are steps, which
+/// occlude. Rows alone are a fault.
 void doubt_repeats(const cv::Mat& image, std::vector<std::string>& doubts) {
-    const int rows = repeats_every(image);
+    constexpr double least_share = 0.3, alike = 1.25;
+    const Repeats rows = repeats_of(image);
     cv::Mat some, transposed; // parts of the columns are enough, and quicker
     const int stride = std::max(1, image.rows / 60);
     for (int v = 0; v < image.rows; v += stride)
         some.push_back(image.row(v));
     cv::transpose(some, transposed);
-    const int columns = repeats_every(transposed);
-    if (rows != columns)
+    const Repeats columns = repeats_of(transposed);
+    const double high = 1 / (1 - rows.share), wide = 1 / (1 - columns.share);
+    if (std::min(rows.share, columns.share) > least_share && std::max(high, wide) < alike * std::min(high, wide))
+        doubts.push_back(fmt::format("pixels are copies of their neighbours, as of an image that was enlarged {:.2g} "
+                                     "times: the steps between them occlude. Reduce it and its camera to about {}x{}, "
+                                     "without interpolation.",
+                                     (high + wide) / 2, std::lround(image.cols / wide),
+                                     std::lround(image.rows / high)));
+    else if (rows.every != columns.every)
         doubts.push_back(fmt::format("every {} {} repeats the one before it, and {} do not: the image was stretched, "
                                      "or lines were lost.",
-                                     ordinal(std::max(rows, columns)), rows > columns ? "row" : "column",
-                                     rows > columns ? "columns" : "rows"));
+                                     ordinal(std::max(rows.every, columns.every)),
+                                     rows.every > columns.every ? "row" : "column",
+                                     rows.every > columns.every ? "columns" : "rows"));
 }
 
 /// "mm: 2.10 m, tum: 0.42 m": the median under each preset for integers but the one in use.

@@ -15,7 +15,8 @@ using DepthTable = cv::Mat1f;
 [[nodiscard]] DepthTable depth_table(const DepthEncoding& encoding);
 
 /// Sentences about what looks wrong in `depth_m` (decoded from `stored` with `encoding`): no valid depth, a range that
-/// no depth sensor has, noise in place of surfaces. Values that are all multiples, and rows that are copies of others.
+/// no depth sensor has, noise in place of surfaces. Values that are all multiples, rows that are copies of others,
+/// and images that were enlarged by copying pixels.
 /// Each says what other encodings would give.
 [[nodiscard]] std::vector<std::string> doubts_about(const cv::Mat1f& depth_m, const cv::Mat& stored,
                                                     const DepthEncoding& encoding);

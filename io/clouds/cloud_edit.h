@@ -12,11 +12,13 @@
 
 namespace scanshade {
 
-/// Points without usable coordinates.
+/// Points without usable coordinates, or that their file does not want used.
 struct PointOddities {
     std::size_t all = 0, absurd = 0, unusable = 0;
+    std::size_t left_out = 0; ///< LAS: withheld, or classified as noise
 };
-/// In the cloud's unit; NaN in all three coordinates where they are infinite, absurd (> 1e30) or unknown.
+/// In the cloud's unit; NaN in all three coordinates where they are infinite, absurd (> 1e30) or unknown, and where LAS
+/// marks the point as withheld or as noise.
 [[nodiscard]] std::vector<Eigen::Vector3d> points_of(const CloudRecords& records, PointOddities& odd);
 void warn_of(const PointOddities& odd, const std::filesystem::path& file, std::vector<std::string>& warnings);
 

@@ -68,6 +68,35 @@ void place_coordinate(const CloudRecords& records, const char* name, int axis, s
                       [&](std::size_t i) { points[i][axis] = points[i][axis] * scale + shift; });
 }
 
+/// Of LAS and LAZ ("LAS Specification 1.4 - R15", tables 8, 9 and 17): withheld points "should not be included in
+/// processing", and classes 7 and 18 are noise, birds and clouds among it. Elsewhere no point is.
+class LeftOut {
+  public:
+    explicit LeftOut(const CloudRecords& records) : records_(records) {
+        if (!records.format || !records.format->wide_colours || records.stride == 0) // as las_colours() tells LAS
+            return;
+        classification_ = records.field_named("classification");
+        if (records.field_named("return_numbers")) // formats 6 to 10, where flags are beside the class
+            flags_ = records.field_named("return_flags");
+    }
+    [[nodiscard]] bool operator()(std::size_t index) const {
+        if (!classification_)
+            return false;
+        const unsigned byte = at(index, *classification_), flags = flags_ ? at(index, *flags_) : byte >> 5;
+        const unsigned kind = flags_ ? byte : byte & 31;
+        constexpr unsigned withheld = 4, low_noise = 7, high_noise = 18;
+        return (flags & withheld) != 0 || kind == low_noise || (flags_ && kind == high_noise);
+    }
+
+  private:
+    [[nodiscard]] unsigned at(std::size_t index, std::size_t field) const {
+        return static_cast<unsigned char>(records_.points[index * records_.stride + records_.fields[field].offset]);
+    }
+
+    const CloudRecords& records_;
+    std::optional<std::size_t> classification_, flags_;
+};
+
 } // namespace
 
 std::vector<Eigen::Vector3d> points_of(const CloudRecords& records, PointOddities& odd) {
@@ -78,18 +107,22 @@ std::vector<Eigen::Vector3d> points_of(const CloudRecords& records, PointOdditie
         place_coordinate(records, "y", 1, points);
         place_coordinate(records, "z", 2, points);
     }
-    std::atomic<std::size_t> absurd = 0, unusable = 0; // hardly ever counted up
+    const LeftOut is_left_out(records);
+    std::atomic<std::size_t> absurd = 0, unusable = 0, left_out = 0; // hardly ever counted up
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
         Eigen::Vector3d& point = points[i];
-        if ((point.array().abs() <= largest_coordinate).all())
+        const bool usable = (point.array().abs() <= largest_coordinate).all(), unwanted = is_left_out(i);
+        if (usable && !unwanted)
             return;
         ++unusable;
-        absurd += !point.array().isNaN().any();
+        absurd += !usable && !point.array().isNaN().any();
+        left_out += usable;
         point.setConstant(std::numeric_limits<double>::quiet_NaN());
     });
     odd.all += points.size();
     odd.absurd += absurd;
     odd.unusable += unusable;
+    odd.left_out += left_out;
     return points;
 }
 
@@ -97,6 +130,9 @@ void warn_of(const PointOddities& odd, const fs::path& file, std::vector<std::st
     if (odd.absurd > 0)
         warnings.push_back(fmt::format("{}: {} with infinite or absurd coordinates (beyond 1e30), treated as invalid.",
                                        file.string(), counted(odd.absurd, "point")));
+    if (odd.left_out > 0)
+        warnings.push_back(fmt::format("{}: {} marked as withheld or as noise: left out, without visibility.",
+                                       file.string(), counted(odd.left_out, "point")));
     if (odd.all == 0)
         warnings.push_back(file.string() + ": no points.");
     else if (odd.unusable == odd.all)

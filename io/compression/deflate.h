@@ -1,4 +1,4 @@
-// zlib streams, as PNG files and pages hold them. ISA-L packs in a quarter of zlib's time, to the same size.
+// zlib streams by ISA-L, as PNG files and pages hold them.
 #pragma once
 
 #include <cstddef>
@@ -9,13 +9,18 @@
 
 namespace scanshade {
 
-/// Packs bytes in pieces into one zlib stream; equal bytes give equal streams.
+/// Packs bytes in pieces into one zlib stream, in a quarter of zlib's time, to the same size. Equal samples and pieces
+/// give equal streams.
 class Packer {
   public:
     Packer();
     ~Packer();
     Packer(const Packer&) = delete;
     Packer& operator=(const Packer&) = delete;
+    /// A part of the bytes to come, before the first of them. With samples packing takes two thirds of the time: codes
+    /// are made from the samples, and the bytes are looked at once. Bytes that are unlike all samples, and long
+    /// repeats, take more room so.
+    void sample(std::string_view bytes);
     /// Appends to `packed` what the stream gives so far, all of it with the last piece.
     void append(std::string_view bytes, bool last, std::string& packed);
 

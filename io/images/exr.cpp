@@ -1,4 +1,5 @@
-// EXR with OpenEXR, from memory and to memory: one channel of any name, halves and integers as floats.
+// EXR with OpenEXR, from memory and to memory. Read: one channel of any name, halves and integers as floats. Written:
+// one channel, or three of colour.
 #include "io/images/readers.h"
 
 #include "projection/base/error.h"
@@ -16,6 +17,7 @@
 #include <ImfVersion.h>
 #include <optional>
 #include <stdexcept>
+#include <vector>
 
 namespace scanshade::images {
 
@@ -138,18 +140,22 @@ cv::Mat stored_exr(std::string_view bytes, const ImageFacts& facts, const Path& 
 }
 
 std::string encoded_exr(const cv::Mat& image) {
-    if (image.type() != CV_32FC1)
-        throw Error(fmt::format("an EXR is made of floats of one channel here, not of OpenCV's type {}", image.type()));
-    const char* const channel = "Y"; // luminance, which viewers show as grey
+    if (image.type() != CV_32FC1 && image.type() != CV_32FC3)
+        throw Error(fmt::format("an EXR is made of floats of one or three channels here, not of OpenCV's type {}",
+                                image.type()));
+    // Y is luminance, which viewers show as grey. OpenCV has blue first.
+    const std::vector<const char*> channels = image.channels() == 3 ? std::vector{"B", "G", "R"} : std::vector{"Y"};
     Imf::Header header(image.cols, image.rows);
     header.compression() = Imf::RLE_COMPRESSION; // ZIP takes ten times as long for a tenth of the size
-    header.channels().insert(channel, Imf::Channel(Imf::FLOAT));
+    Imf::FrameBuffer buffer;
+    for (std::size_t i = 0; i < channels.size(); ++i) {
+        header.channels().insert(channels[i], Imf::Channel(Imf::FLOAT));
+        buffer.insert(channels[i], Imf::Slice::Make(Imf::FLOAT, image.data + i * sizeof(float), header.dataWindow(),
+                                                    image.elemSize(), image.step[0]));
+    }
     Sink sink;
     {
         Imf::OutputFile output(sink, header);
-        Imf::FrameBuffer buffer;
-        buffer.insert(channel,
-                      Imf::Slice::Make(Imf::FLOAT, image.data, header.dataWindow(), sizeof(float), image.step[0]));
         output.setFrameBuffer(buffer);
         output.writePixels(image.rows);
     } // writes the table of lines

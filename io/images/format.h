@@ -31,6 +31,9 @@ struct ImageFormat {
     /// 8-bit BGR, from grey and 16 bits, too. None: the format holds floats.
     cv::Mat3b (*read_colour)(std::string_view bytes, const ImageFacts& facts,
                              const std::filesystem::path& file) = nullptr;
+    /// 16-bit BGR of a file whose samples have 16 bits; empty where this one's are not read so. None: 8 bits at most.
+    cv::Mat3w (*read_deep_colour)(std::string_view bytes, const ImageFacts& facts,
+                                  const std::filesystem::path& file) = nullptr;
     /// The file's bytes. Throws Error for a type of image that the format does not hold. None: not written.
     std::string (*written)(const cv::Mat& image) = nullptr;
 };

@@ -69,6 +69,16 @@ const std::vector<float>& metres_of_integers(double units_per_metre) {
     return metres;
 }
 
+ImageFacts colour_facts(const std::string& bytes, const fs::path& file) {
+    const ImageFacts facts = read_image_header(bytes, file);
+    if (!facts.format)
+        throw Error(fmt::format("{}: neither {}", file.string(), listed(colour_format_names(), "nor")));
+    if (!facts.format->read_colour)
+        throw Error(fmt::format("{}: {} of floats, expected a colour image of 8 or 16 bits", file.string(),
+                                facts.format->name));
+    return facts;
+}
+
 } // namespace
 
 DepthEncoding arbitrary_encoding(const std::string& origin, double units_per_length) {
@@ -157,13 +167,17 @@ cv::Mat1f depth_in_metres(const cv::Mat& stored, const DepthEncoding& encoding) 
 cv::Mat3b read_colour(const fs::path& file) { return colour_in(read_image_bytes(file), file); }
 
 cv::Mat3b colour_in(const std::string& bytes, const fs::path& file) {
-    const ImageFacts facts = read_image_header(bytes, file);
-    if (!facts.format)
-        throw Error(fmt::format("{}: neither {}", file.string(), listed(colour_format_names(), "nor")));
-    if (!facts.format->read_colour)
-        throw Error(fmt::format("{}: {} of floats, expected a colour image of 8 or 16 bits", file.string(),
-                                facts.format->name));
+    const ImageFacts facts = colour_facts(bytes, file);
     return facts.format->read_colour(bytes, facts, file);
+}
+
+StoredColour read_stored_colour(const fs::path& file) { return stored_colour_in(read_image_bytes(file), file); }
+
+StoredColour stored_colour_in(const std::string& bytes, const fs::path& file) {
+    const ImageFacts facts = colour_facts(bytes, file);
+    const bool deep = facts.bits == 16 && facts.format->read_deep_colour;
+    return {facts.format->read_colour(bytes, facts, file),
+            deep ? facts.format->read_deep_colour(bytes, facts, file) : cv::Mat3w()};
 }
 
 cv::Mat1f read_ao(const fs::path& file) {

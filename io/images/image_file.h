@@ -54,6 +54,15 @@ struct DepthEncoding {
 /// The same of an image's bytes.
 [[nodiscard]] cv::Mat3b colour_in(const std::string& bytes, const std::filesystem::path& name);
 
+/// A colour image, and the same with 16 bits where its file has them.
+struct StoredColour {
+    cv::Mat3b colour;
+    cv::Mat3w deep; ///< BGR; empty where the samples have 8 bits
+};
+/// As read_colour() and colour_in().
+[[nodiscard]] StoredColour read_stored_colour(const std::filesystem::path& file);
+[[nodiscard]] StoredColour stored_colour_in(const std::string& bytes, const std::filesystem::path& name);
+
 enum class AoFormat { png16, png8, tiff, exr };
 struct AoFormatRow {
     const char* name; ///< of --format
@@ -68,6 +77,7 @@ inline constexpr std::array ao_formats = {
     AoFormatRow{"tiff", AoFormat::tiff, CV_32F, ".tiff", "floats, NaN = no surface"},
     AoFormatRow{"exr", AoFormat::exr, CV_32F, ".exr", "floats, NaN = no surface"},
 };
+[[nodiscard]] constexpr bool is_float(AoFormat format) { return format == AoFormat::tiff || format == AoFormat::exr; }
 /// Throws Misuse listing the names.
 [[nodiscard]] AoFormat ao_format(const std::string& name);
 /// ".png", ".tiff" or ".exr".
@@ -85,6 +95,10 @@ void write_ao(const std::filesystem::path& file, const cv::Mat1f& visibility, Ao
 void write_ao_integers(const std::filesystem::path& file, const cv::Mat& integers);
 /// The reverse of write_ao (format told by signature and bit depth): NaN = no surface.
 [[nodiscard]] cv::Mat1f read_ao(const std::filesystem::path& file);
+
+/// Linear light, blue first, 1 = white. Integers hold it with sRGB's curve, 0 .. 1; floats as it is, in Rec. 709
+/// primaries, which are sRGB's. Atomic.
+void write_light(const std::filesystem::path& file, const cv::Mat3f& light, AoFormat format);
 
 /// 8-bit BGR picture in the format that the extension names, if that is one that is written. Atomic.
 void write_picture(const std::filesystem::path& file, const cv::Mat3b& picture);

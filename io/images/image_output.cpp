@@ -5,6 +5,7 @@
 #include "io/output_file.h"
 #include "io/text.h"
 #include "projection/base/error.h"
+#include "projection/srgb.h"
 
 #include <algorithm>
 #include <cmath>
@@ -36,6 +37,22 @@ cv::Mat_<Integer> as_integers(const cv::Mat1f& visibility) {
         for (int x = 0; x < image.cols; ++x) {
             const float value = std::clamp(from[x], 0.0F, 1.0F); // a NaN stays one
             to[x] = value == value ? static_cast<Integer>(static_cast<int>(value * steps + 1.5F)) : Integer(0);
+        }
+    }
+    return image;
+}
+
+/// With sRGB's curve.
+template <class Integer>
+cv::Mat stored_light(const cv::Mat3f& light) {
+    constexpr double most = std::numeric_limits<Integer>::max();
+    cv::Mat image(light.size(), CV_MAKETYPE(cv::DataType<Integer>::depth, 3));
+    for (int y = 0; y < image.rows; ++y) {
+        const auto* from = light.ptr<float>(y);
+        auto* to = image.ptr<Integer>(y);
+        for (int i = 0; i < 3 * image.cols; ++i) {
+            const double linear = from[i] > 0 ? std::min<double>(from[i], 1) : 0; // 0 for NaN
+            to[i] = static_cast<Integer>(std::lround(most * srgb_from_linear(linear)));
         }
     }
     return image;
@@ -79,6 +96,15 @@ void write_ao(const fs::path& file, const cv::Mat1f& visibility, AoFormat format
 
 void write_ao_integers(const fs::path& file, const cv::Mat& integers) {
     write_image(file, integers, *image_format_by_extension(".png"));
+}
+
+void write_light(const fs::path& file, const cv::Mat3f& light, AoFormat format) {
+    const AoFormatRow& row = row_of(format);
+    write_image(file,
+                row.depth == CV_32F   ? cv::Mat(light)
+                : row.depth == CV_16U ? stored_light<ushort>(light)
+                                      : stored_light<uchar>(light),
+                image_of(row));
 }
 
 void write_picture(const fs::path& file, const cv::Mat3b& picture) {

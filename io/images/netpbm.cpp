@@ -212,4 +212,18 @@ cv::Mat3b colour_netpbm(std::string_view bytes, const ImageFacts& facts, const P
     return image;
 }
 
+cv::Mat3w deep_netpbm(std::string_view bytes, const ImageFacts& facts, const Path& file) {
+    const Header header = header_of(bytes, file);
+    if (header.text() || header.one_bit() || header.maxval != 65535)
+        return {};
+    cv::Mat image = unpacked_bytes(samples_of(bytes, header, file), facts);
+    if (image.channels() == 2) // grey and how opaque it is
+        cv::extractChannel(image, image, 0);
+    cv::cvtColor(image, image,
+                 image.channels() == 1   ? cv::COLOR_GRAY2BGR
+                 : image.channels() == 3 ? cv::COLOR_RGB2BGR
+                                         : cv::COLOR_RGBA2BGR);
+    return image;
+}
+
 } // namespace scanshade::images

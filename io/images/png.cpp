@@ -101,4 +101,9 @@ cv::Mat3b colour_png(std::string_view bytes, const ImageFacts& facts, const Path
     return image.empty() || image.type() != CV_8UC3 ? decoded(bytes, facts, CV_8UC3, file) : image;
 }
 
+cv::Mat3w deep_png(std::string_view bytes, const ImageFacts& facts, const Path& file) {
+    check_png_chunks(bytes, facts, file);
+    return decoded(bytes, facts, CV_16UC3, file);
+}
+
 } // namespace scanshade::images

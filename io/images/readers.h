@@ -15,6 +15,7 @@ using Path = std::filesystem::path;
 [[nodiscard]] ImageFacts png_header(std::string_view bytes, const Path& file);
 [[nodiscard]] cv::Mat stored_png(std::string_view bytes, const ImageFacts& facts, const Path& file);
 [[nodiscard]] cv::Mat3b colour_png(std::string_view bytes, const ImageFacts& facts, const Path& file);
+[[nodiscard]] cv::Mat3w deep_png(std::string_view bytes, const ImageFacts& facts, const Path& file);
 /// Every chunk, its checksum and length, and the end of the file.
 void check_png_chunks(std::string_view bytes, const ImageFacts& facts, const Path& file);
 
@@ -25,6 +26,7 @@ void check_png_chunks(std::string_view bytes, const ImageFacts& facts, const Pat
 [[nodiscard]] ImageFacts tiff_header(std::string_view bytes, const Path& file);
 [[nodiscard]] cv::Mat stored_tiff(std::string_view bytes, const ImageFacts& facts, const Path& file);
 [[nodiscard]] cv::Mat3b colour_tiff(std::string_view bytes, const ImageFacts& facts, const Path& file);
+[[nodiscard]] cv::Mat3w deep_tiff(std::string_view bytes, const ImageFacts& facts, const Path& file);
 [[nodiscard]] std::string encoded_tiff(const cv::Mat& image);
 
 [[nodiscard]] ImageFacts exr_header(std::string_view bytes, const Path& file);
@@ -35,6 +37,7 @@ void check_png_chunks(std::string_view bytes, const ImageFacts& facts, const Pat
 [[nodiscard]] cv::Mat stored_pgm(std::string_view bytes, const ImageFacts& facts, const Path& file);
 [[nodiscard]] cv::Mat stored_pfm(std::string_view bytes, const ImageFacts& facts, const Path& file);
 [[nodiscard]] cv::Mat3b colour_netpbm(std::string_view bytes, const ImageFacts& facts, const Path& file);
+[[nodiscard]] cv::Mat3w deep_netpbm(std::string_view bytes, const ImageFacts& facts, const Path& file);
 
 [[nodiscard]] ImageFacts bmp_header(std::string_view bytes, const Path& file);
 [[nodiscard]] cv::Mat3b colour_bmp(std::string_view bytes, const ImageFacts& facts, const Path& file);

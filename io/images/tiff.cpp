@@ -240,6 +240,24 @@ cv::Mat3b colour_tiff(std::string_view bytes, const ImageFacts& facts, const Pat
     return upright(bgr, source);
 }
 
+cv::Mat3w deep_tiff(std::string_view bytes, const ImageFacts& facts, const Path& file) {
+    const TiffSource source(bytes, file);
+    const auto colours = source.field<std::uint16_t>(TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISWHITE);
+    const bool usual = source.field<std::uint16_t>(TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT) == SAMPLEFORMAT_UINT &&
+                       source.field<std::uint16_t>(TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG) == PLANARCONFIG_CONTIG;
+    const bool grey = colours == PHOTOMETRIC_MINISBLACK && facts.channels == 1;
+    const bool rgb = colours == PHOTOMETRIC_RGB && (facts.channels == 3 || facts.channels == 4);
+    if (!usual || !(grey || rgb))
+        return {};
+    cv::Mat image(facts.size, CV_MAKETYPE(CV_16U, facts.channels));
+    TIFFIsTiled(source.get()) ? read_tiles(source, image) : read_strips(source, image);
+    cv::cvtColor(image, image,
+                 grey                    ? cv::COLOR_GRAY2BGR
+                 : image.channels() == 3 ? cv::COLOR_RGB2BGR
+                                         : cv::COLOR_RGBA2BGR);
+    return upright(image, source);
+}
+
 std::string encoded_tiff(const cv::Mat& image) {
     const int depth = image.depth(), channels = image.channels();
     if (image.empty() || (depth != CV_8U && depth != CV_16U && depth != CV_32F) || (channels != 1 && channels != 3))

@@ -1,4 +1,5 @@
-// One bounce of light, its gathering: for each pixel the colours of what blocks directions over its surface, and their weights.
+// One bounce of light, its gathering: for each pixel the colours of what blocks directions over its surface, those of all that
+// lies within the radius, and their weights.
 //
 // Ritschel, Grosch, Seidel, "Approximating Dynamic Global Illumination in Image Space" (2009), section 3.2, normalised: a
 // direction has one sample at a random distance within the radius, and is blocked where the depth image lies in front of
@@ -10,12 +11,14 @@
 
 layout(local_size_x = finish_row) in;
 layout(constant_id = spec_known) const int has_unknown = 0;
+layout(constant_id = spec_linear) const int is_linear = 0;
 layout(binding = 0, r32f) readonly uniform imageBuffer surface;
 layout(binding = 1, r32f) readonly uniform imageBuffer normals;
 layout(binding = 2, r32ui) readonly uniform uimageBuffer colour;       // bytes: blue, green, red of each pixel
 layout(binding = 3, r32ui) readonly uniform uimageBuffer colour_known; // bytes: 0 = not
 layout(binding = 4, r32f) readonly uniform imageBuffer linear_light;   // of the 256 stored values, in steps
-layout(binding = 16, scalar) writeonly buffer Sums { vec4 sums[]; };   // red, green, blue in steps; weight
+layout(binding = 5, r32f) readonly uniform imageBuffer linear_colour;  // blue, green, red of each pixel, where is_linear
+layout(binding = 16, scalar) writeonly buffer Sums { vec4 sums[]; };   // red, green, blue, in steps or 0 .. 1; weight
 layout(binding = 32, scalar) uniform Constants { FinishConstants constants; };
 
 FinishConstants k;
@@ -24,7 +27,12 @@ FinishConstants k;
 
 uint byte_at(int index) { return imageLoad(colour, index >> 2).x >> (8 * (index & 3)) & 0xffu; }
 float light_of(int index) { return imageLoad(linear_light, int(byte_at(index))).x; }
-vec3 colour_at(int at) { return vec3(light_of(3 * at + 2), light_of(3 * at + 1), light_of(3 * at)); }
+vec3 colour_at(int at) {
+    if (is_linear != 0)
+        return vec3(imageLoad(linear_colour, 3 * at + 2).x, imageLoad(linear_colour, 3 * at + 1).x,
+                    imageLoad(linear_colour, 3 * at).x);
+    return vec3(light_of(3 * at + 2), light_of(3 * at + 1), light_of(3 * at));
+}
 bool is_known(int at) { return has_unknown == 0 || (imageLoad(colour_known, at >> 2).x >> (8 * (at & 3)) & 0xffu) != 0u; }
 
 // Noise that differs between neighbours (Jimenez 2014).
@@ -35,7 +43,7 @@ void main() {
     ivec2 p = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(p, k.size))) return;
     int here = p.y * k.size.x + p.x;
-    vec4 sum = vec4(0.0);
+    vec4 sum = vec4(0.0), around = vec4(0.0);
     vec3 normal = normal_of(p, here);
     if (dot(normal, normal) > 0.0) {
         vec3 point = unproject(k.camera, vec2(p), 1.0 / inverse_at(here));
@@ -54,10 +62,13 @@ void main() {
             float z = 1.0 / inverse_at(there), slack = 2.0 * (k.noise_floor + k.noise_per_z2 * z * z) + 1e-3 * z;
             vec3 apart = unproject(k.camera, vec2(q), z) - point;
             float away = length(apart);
-            if (z < tip.z - slack && away <= k.radius && dot(apart, normal) > 0.02 * away + slack && is_known(there) &&
-                dot(normal_of(q, there), apart) < 0.0)
-                sum += cosine * vec4(colour_at(there), 1.0);
+            if (away > k.radius || !is_known(there)) continue;
+            vec4 colour_there = vec4(colour_at(there), 1.0);
+            around += colour_there;
+            if (z < tip.z - slack && dot(apart, normal) > 0.02 * away + slack && dot(normal_of(q, there), apart) < 0.0)
+                sum += cosine * colour_there;
         }
     }
-    sums[here] = sum;
+    sums[2 * here] = sum;
+    sums[2 * here + 1] = around;
 }

@@ -40,8 +40,6 @@ uint as_integer(float value, float most) {
     return isnan(value) ? 0u : uint(clamp(value, 0.0, 1.0) * (most - 1.0) + 1.5);
 }
 
-float confidence_at(int at) { return 1.0 - imageLoad(expected_error, at).x / hopeless_error; }
-
 uint byte_of(uint word, int i) { return word >> (8 * i) & 0xffu; }
 
 float steps_of(uint stored) { return imageLoad(linear_light, int(stored)).x; }
@@ -49,18 +47,7 @@ uint stored_from(float steps) { return imageLoad(stored_light, int(min(steps, 40
 vec3 steps_of(uvec3 stored) { return vec3(steps_of(stored.x), steps_of(stored.y), steps_of(stored.z)); }
 uvec3 stored_from(vec3 steps) { return uvec3(stored_from(steps.x), stored_from(steps.y), stored_from(steps.z)); }
 
-// The share of ambient light in blue, green and red.
-vec3 ambient_part(int at) {
-    if (has_light == 0) return vec3(1.0);
-    float ratio = imageLoad(direct, at).x;
-    return vec3(ambient_share(ratio, k.light.tint.z), ambient_share(ratio, k.light.tint.y),
-                ambient_share(ratio, k.light.tint.x));
-}
-
-// What visibility has a say in.
-vec3 shaded_part(int at) { return ambient_alone == 0 ? vec3(1.0) : ambient_part(at); }
-
-float strong(float visible) { return isnan(visible) ? 1.0 : clamp(1.0 - k.strength + k.strength * visible, 0.0, 1.0); }
+#include "finish/parts.glsl"
 
 uvec3 shaded_pixel(int at, uvec3 own_colour, uint known, float visible) {
     float light = strong(visible);
@@ -71,15 +58,8 @@ uvec3 shaded_pixel(int at, uvec3 own_colour, uint known, float visible) {
     return stored_from(steps_of(surface ? uvec3(grey) : no_surface) * light);
 }
 
-// Colour without what visibility took from its ambient part. No channel may exceed what can be stored, so that hues stay:
-// a clipped pixel stays as it is.
 uvec3 unshaded_pixel(int at, uvec3 own_colour, float visible) {
-    vec3 light = steps_of(own_colour), share = shaded_part(at);
-    float by = divisor(pow(strong(visible), k.unshade_power), confidence_at(at));
-    // Of a photograph that holds its occlusion, the ambient part is what visibility has left: that alone is divided.
-    vec3 more = light * (1.0 - share + share / by);
-    float most = max(more.x, max(more.y, more.z));
-    return stored_from(most > 4095.0 ? max(light, more * (4095.0 / most)) : more);
+    return stored_from(unshaded_light(at, steps_of(own_colour), visible, 4095.0));
 }
 
 uvec3 packed(uvec3 a, uvec3 b, uvec3 d, uvec3 e) {

@@ -44,6 +44,8 @@ const int spec_unshaded = 7;        // pack: 1 = colour divided by visibility is
 const int spec_split = 8;           // pack: 1 = images of ambient and of direct light are made
 const int spec_indirect = 10;       // pack: 1 = the image of one bounce of light is made
 const int spec_known = 11;          // bounce: 1 = there are pixels without a known colour
+const int spec_linear = 12;         // bounce: 1 = colours are given as linear light, 0 .. 1
+const int spec_unbounded = 13;      // linear: 1 = colour divided by visibility may exceed white
 const int picture_none = 0;
 const int picture_colour = 1;
 const int picture_clay = 2;

@@ -136,6 +136,36 @@ TEST(gpu, two_programs_may_share_a_device) {
     EXPECT_EQ(two.host_as<std::uint32_t>(1)[0], 9U);
 }
 
+/// The second program's buffers lie where those of the first were; they begin with zeros all the same.
+TEST(gpu, memory_that_programs_gave_back_serves_the_next_ones) {
+    gpu::Device device;
+    device.keep_memory(1 << 20);
+    const std::int32_t n = count;
+    for (int program_number = 0; program_number < 3; ++program_number) {
+        gpu::Program program(device, {words("in", Host::upload), words("a"), words("out", Host::download)},
+                             {add_one(0, 1), add_one(1, 2, 10)}, 4);
+        if (program_number > 0) {
+            EXPECT_LE(device.kept_memory(), 4096U) << "all is used again but the block of read_back()";
+        }
+        for (const std::byte byte : program.read_back(1))
+            ASSERT_EQ(byte, std::byte{0});
+        const auto in = program.host_as<std::uint32_t>(0);
+        std::iota(in.begin(), in.end(), static_cast<std::uint32_t>(program_number));
+        program.run(std::as_bytes(std::span(&n, 1)));
+        const auto out = program.host_as<std::uint32_t>(2);
+        for (std::size_t i = 0; i < count; ++i)
+            ASSERT_EQ(out[i], in[i] + 11);
+    }
+    const std::size_t kept = device.kept_memory();
+    EXPECT_GT(kept, std::size_t(3 * count * 4));
+    device.keep_memory(kept / 2);
+    EXPECT_LE(device.kept_memory(), kept / 2);
+    device.keep_memory(0);
+    EXPECT_EQ(device.kept_memory(), 0U);
+    for (const std::string& message : device.validation_messages())
+        ADD_FAILURE() << message;
+}
+
 TEST(gpu, a_pass_without_a_shader_clears) {
     gpu::Device device;
     gpu::Program program(device, {words("out", Host::download)}, {{"clear", "", {}, {0}, {1, 1, 1}, {}}}, 4);

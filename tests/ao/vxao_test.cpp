@@ -5,9 +5,13 @@
 #include "ao/sequence/pack.h"
 #include "ao/vxao/vxao.h"
 #include "projection/base/error.h"
+#include "tests/support/says.h"
 #include "tests/support/scenes.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 namespace scanshade {
@@ -96,6 +100,58 @@ TEST_F(Voxels, little_memory_costs_detail_and_no_frame) {
     const double apart = mean_difference(coarse, fine);
     EXPECT_GT(apart, 0);
     EXPECT_LT(apart, 0.1);
+}
+
+/// One level fewer is a warning; voxels larger than those of any quality are a reason to doubt; all is well unsaid.
+TEST_F(Voxels, a_level_without_room_is_said) {
+    const DepthImage depth = ball_on_floor(test_camera({640, 480}));
+    VxaoOptions options = raw();
+    options.quality = Quality::high;
+    std::size_t warned = 0, doubted = 0, silent = 0;
+    for (const int mib : {1, 2, 3, 4, 8, 256}) {
+        options.memory_mib = mib;
+        Vxao method(device, options);
+        const cv::Mat1f values = method.compute({depth}).visibility;
+        const MethodRemarks& remarks = method.remarks();
+        SCOPED_TRACE(mib);
+        warned += remarks.warnings.size();
+        doubted += remarks.doubts.size();
+        silent += remarks.warnings.empty() && remarks.doubts.empty();
+        EXPECT_LE(remarks.warnings.size() + remarks.doubts.size(), 1U);
+        for (const std::string& sentence : remarks.warnings)
+            EXPECT_TRUE(says(sentence, fmt::format("{} MiB are there", mib - 1)) ||
+                        says(sentence, fmt::format("{} MiB are there", mib)))
+                << sentence;
+        if (mib == 1) {
+            EXPECT_EQ(remarks.doubts.size(), 1U) << "115 bricks";
+        }
+        if (mib == 256) {
+            EXPECT_LT(mean_difference(values, visibility(depth, options)), 1e-6);
+            EXPECT_TRUE(remarks.warnings.empty() && remarks.doubts.empty());
+        }
+    }
+    EXPECT_GE(warned, 1U);
+    EXPECT_GE(doubted, 1U);
+    EXPECT_GE(silent, 1U);
+}
+
+/// The sentence's guess is good enough to follow: with as much memory as it names, nothing is left out.
+TEST_F(Voxels, the_memory_that_is_named_is_enough) {
+    const DepthImage depth = ball_on_floor(test_camera({640, 480}));
+    VxaoOptions options = raw();
+    options.quality = Quality::high;
+    options.memory_mib = 2;
+    Vxao little(device, options);
+    (void)little.compute({depth});
+    std::vector<std::string> said = little.remarks().warnings;
+    std::ranges::copy(little.remarks().doubts, std::back_inserter(said));
+    ASSERT_EQ(said.size(), 1U);
+    double needed_mib = 0;
+    ASSERT_EQ(std::sscanf(said[0].substr(said[0].find("some ")).c_str(), "some %lf MiB", &needed_mib), 1) << said[0];
+    options.memory_mib = static_cast<int>(1.1 * needed_mib) + 1;
+    Vxao enough(device, options);
+    (void)enough.compute({depth});
+    EXPECT_TRUE(enough.remarks().warnings.empty() && enough.remarks().doubts.empty()) << said[0];
 }
 
 TEST_F(Voxels, a_voxel_out_of_range_is_refused) {

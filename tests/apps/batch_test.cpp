@@ -17,6 +17,7 @@
 #include <gtest/gtest.h>
 #include <limits>
 #include <numeric>
+#include <tbb/parallel_for.h>
 #include <thread>
 
 namespace scanshade {
@@ -101,6 +102,28 @@ TEST_F(BatchTest, rows_keep_the_order_that_was_asked_for) {
     ASSERT_EQ(rows.size(), 3u);
     for (std::size_t i = 0; i < rows.size(); ++i)
         EXPECT_EQ(rows[i].index, options.frames[i]);
+}
+
+/// Rays of depth images are cast on all cores. A frame that waits for them must not begin another one: that would wait
+/// for a method, and all of them may be taken by frames that wait so.
+TEST_F(BatchTest, methods_that_use_all_cores_do_not_wait_for_each_other) {
+    const Capture recorded = capture(4);
+    std::deque<HalfOpen> methods;
+    std::deque<FrameAo> doors;
+    std::vector<FrameAo*> all;
+    const auto on_all_cores = [](int) {
+        tbb::parallel_for(0, 32, [](int) { std::this_thread::sleep_for(std::chrono::microseconds(200)); });
+    };
+    for (int i = 0; i < 4; ++i)
+        all.push_back(&doors.emplace_back(methods.emplace_back(on_all_cores)));
+    MethodPool pool(all);
+    Capture many = recorded;
+    many.entries.clear();
+    for (std::size_t i = 0; i < 100; ++i)
+        many.entries.push_back(recorded.entries[i % 4]);
+    BatchOptions options = all_frames(many, folder / "out");
+    options.outputs.confidence = options.outputs.shaded = options.outputs.preview = false;
+    EXPECT_EQ(count(scanshade::run_batch(many, pool, options), FrameStatus::ok), 100U);
 }
 
 TEST_F(BatchTest, as_many_frames_are_computed_as_there_are_methods_however_few_cores) {

@@ -6,6 +6,7 @@
 #include "tests/support/files.h"
 #include "tests/support/small_capture.h"
 
+#include <algorithm>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <limits>
@@ -144,6 +145,25 @@ TEST(doubts, a_camera_of_another_image_size_or_of_the_image_before_it_was_croppe
     camera.size = whole;
     camera.cy += 0.15 * whole.height;
     EXPECT_TRUE(frame.doubts().empty()) << "as of a lens that sits askew";
+}
+
+TEST(doubts, disparities_and_distances_in_place_of_depth) {
+    const auto floor_and_wall = [](const auto& stored) {
+        Computed frame;
+        frame.row.camera.pinhole = {260, 260, 159.5, 119.5, {320, 240}};
+        frame.work.depth = {frame.row.camera.pinhole, cv::Mat1f(240, 320), {}};
+        for (int v = 0; v < 240; ++v)
+            for (int u = 0; u < 320; ++u) {
+                const Eigen::Vector3d ray = frame.row.camera.pinhole.ray(u, v);
+                const double z = std::min(1.2 / std::max(1e-3, 0.3 + ray.y()), 3 / (0.8 + 0.6 * ray.x()));
+                frame.work.depth.z_m(v, u) = static_cast<float>(stored(z, ray));
+            }
+        return frame.doubts();
+    };
+    EXPECT_TRUE(floor_and_wall([](double z, const Eigen::Vector3d&) { return z; }).empty());
+    EXPECT_TRUE(warned(floor_and_wall([](double z, const Eigen::Vector3d&) { return 6 / z; }), "disparities"));
+    EXPECT_TRUE(warned(floor_and_wall([](double z, const Eigen::Vector3d& ray) { return z * ray.norm(); }),
+                       "distances from the camera's centre"));
 }
 
 // ---------------------------------------------------------------------------------------------------- the program

@@ -6,6 +6,8 @@
 #include "apps/large/large_cloud_run.h"
 #include "apps/large/survey.h"
 #include "apps/large/tiles_on_disk.h"
+#include "apps/walk/batch_options.h"
+#include "apps/walk/large_frames.h"
 #include "io/clouds/cloud_file.h"
 #include "projection/base/error.h"
 #include "projection/expected_error.h"
@@ -13,13 +15,20 @@
 #include "tests/support/points.h"
 
 #include <array>
+#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <fmt/format.h>
+#include <fstream>
 #include <gtest/gtest.h>
 #include <limits>
 #include <map>
+#include <tbb/global_control.h>
+#include <tbb/parallel_pipeline.h>
+#include <tbb/task_arena.h>
+#include <thread>
 
 namespace scanshade {
 namespace {
@@ -516,6 +525,54 @@ TEST(Survey, points_at_borders_see_the_neighbouring_tile) {
                beside(apart));
     EXPECT_LT(beside(joined), 0.01);
     EXPECT_GT(beside(apart), 3 * beside(joined));
+}
+
+/// The frame that looks for surveys waits for tasks of its own; were it to begin another frame meanwhile, it would wait
+/// for itself.
+TEST(Survey, frames_begun_together_do_not_wait_for_each_other) {
+    const tests::TemporaryFolder folder;
+    const fs::path file = folder / "a.ply"; // whose header takes a while to read
+    {
+        std::ofstream text(file);
+        text << "ply\nformat ascii 1.0\n";
+        for (int i = 0; i < 2000; ++i)
+            text << "comment line " << i << '\n';
+        text << "element vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n";
+    }
+    Capture capture;
+    for (int i = 0; i < 50; ++i) {
+        CaptureEntry entry;
+        entry.name = fmt::format("{:03}", i);
+        entry.cloud = file;
+        capture.entries.push_back(std::move(entry));
+    }
+    CloudAo method({.memory_mib = 64});
+    BatchOptions options;
+    options.outputs.folder = folder / "out";
+    options.points = &method;
+    const tbb::global_control more_threads(tbb::global_control::max_allowed_parallelism, 8);
+    tbb::task_arena(8).execute([&] {
+        for (int again = 0; again < 100; ++again) {
+            LargeFrames frames(capture, options);
+            std::atomic<int> in_memory = 0;
+            std::size_t next = 0;
+            const auto begun =
+                tbb::make_filter<void, std::size_t>(tbb::filter_mode::serial_in_order, [&](tbb::flow_control& control) {
+                    if (next == 4 * capture.entries.size())
+                        control.stop();
+                    return next++;
+                });
+            const auto loaded = tbb::make_filter<std::size_t, void>(tbb::filter_mode::parallel, [&](std::size_t i) {
+                std::vector<std::string> warnings, notes;
+                if (i % 4 == 1)
+                    in_memory += frames.part_of(i / 4, warnings, notes).run == nullptr;
+                else // other work, whose threads help with the search
+                    std::this_thread::sleep_for(std::chrono::microseconds(50));
+            });
+            tbb::parallel_pipeline(32, begun & loaded);
+            EXPECT_EQ(in_memory, capture.entries.size());
+        }
+    });
 }
 
 TEST(LargeCloud, laz_from_disk_is_that_of_laz_in_memory) {

@@ -1,5 +1,6 @@
 // --shade, --light and --write unshaded,light from the command line.
 #include "apps/json.h"
+#include "projection/srgb.h"
 #include "tests/support/says.h"
 #include "tests/support/small_capture.h"
 
@@ -7,6 +8,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 namespace scanshade::tests {
 namespace {
@@ -81,6 +83,54 @@ TEST_F(LightCliTest, a_capture_without_colour_is_refused_with_what_to_do) {
     EXPECT_TRUE(says(ran.err, "--shade multiply shows clay")) << ran.err;
     const Ran alone = run("--write unshaded", folder.path() / "alone");
     EXPECT_TRUE(says(read_bytes(folder.path() / "alone" / "frames.csv"), "no unshaded")) << alone.err;
+}
+
+/// The eight bits of the default are those of the floats, rounded; a colour image of 16 bits gives 16.
+TEST_F(LightCliTest, pictures_of_light_have_the_bits_that_were_asked_for) {
+    generate("--light sun");
+    const std::string how = "--write unshaded,light,indirect --light none --shade ambient";
+    ASSERT_EQ(run(how, out()).exit_code, 0);
+    const auto image = [&](const fs::path& in, const char* kind, const char* extension) {
+        std::vector<fs::path> files;
+        for (const auto& entry : fs::directory_iterator(in / kind))
+            if (entry.path().extension() == extension)
+                files.push_back(entry.path());
+        return files.empty() ? cv::Mat() : cv::imread(std::ranges::min(files).string(), cv::IMREAD_UNCHANGED);
+    };
+    const auto encoding = [](const fs::path& in) {
+        return json::parse(read_bytes(in / "manifest.json")).value("colour_encoding", "");
+    };
+    EXPECT_TRUE(says(encoding(out()), "sRGB")) << encoding(out());
+    const fs::path floats = folder.path() / "floats", resumed = folder.path() / "resumed";
+    ASSERT_EQ(run(how + " --colour-format tiff", floats).exit_code, 0);
+    EXPECT_TRUE(says(encoding(floats), "linear light")) << encoding(floats);
+    for (const char* kind : {"unshaded", "ambient", "direct", "indirect"}) {
+        const cv::Mat3b coarse = image(out(), kind, ".png");
+        const cv::Mat3f fine = image(floats, kind, ".tiff");
+        ASSERT_EQ(coarse.size(), fine.size()) << kind;
+        ASSERT_FALSE(fine.empty()) << kind;
+        for (int v = 0; v < fine.rows; v += 7)
+            for (int u = 0; u < fine.cols; u += 7)
+                for (int c = 0; c < 3; ++c)
+                    ASSERT_NEAR(255 * srgb_from_linear(std::clamp(static_cast<double>(fine(v, u)[c]), 0.0, 1.0)),
+                                coarse(v, u)[c], fine(v, u)[c] > 0.9F ? 300 : 1.1) // near white, bytes keep the hue
+                        << kind;
+    }
+    for (const auto& entry : fs::directory_iterator(capture() / "rgb")) {
+        cv::Mat deep;
+        cv::imread(entry.path().string()).convertTo(deep, CV_16U, 257, -100);
+        cv::imwrite(entry.path().string(), deep);
+    }
+    ASSERT_EQ(run(how, resumed).exit_code, 0);
+    const std::string first = bytes(resumed, "unshaded");
+    EXPECT_EQ(image(resumed, "unshaded", ".png").type(), CV_16UC3);
+    EXPECT_EQ(image(resumed, "indirect", ".png").type(), CV_16UC3);
+    fs::remove(fs::directory_iterator(resumed / "unshaded")->path());
+    ASSERT_EQ(run(how + " --resume", resumed).exit_code, 0);
+    EXPECT_EQ(bytes(resumed, "unshaded"), first);
+    const Ran wrong = run(how + " --colour-format jpg --overwrite", out());
+    EXPECT_NE(wrong.exit_code, 0);
+    EXPECT_TRUE(says(wrong.err, "png16")) << wrong.err;
 }
 
 TEST_F(LightCliTest, settings_out_of_range_are_refused_before_anything_is_opened) {

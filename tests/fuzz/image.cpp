@@ -27,7 +27,7 @@ std::string with_checksums(std::string bytes) {
 
 void read_all_ways(const std::filesystem::path& file) {
     (void)accepted([&] { (void)peek(file); });
-    (void)accepted([&] { (void)read_colour(file); });
+    (void)accepted([&] { (void)read_stored_colour(file); });
     (void)accepted([&] { (void)read_ao(file); });
     cv::Mat stored;
     if (!accepted([&] { stored = read_stored_depth(file); }))

@@ -1,6 +1,7 @@
 // Files and values: images, cameras, atomic output and captures of every layout come back as they were written.
 #include "io/cameras/camera_file.h"
 #include "io/captures/capture.h"
+#include "io/compression/deflate.h"
 #include "io/images/exif.h"
 #include "io/images/format.h"
 #include "io/images/image_check.h"
@@ -9,6 +10,7 @@
 #include "io/images/png_output.h"
 #include "io/output_file.h"
 #include "projection/base/error.h"
+#include "projection/srgb.h"
 #include "tests/support/files.h"
 
 #include <array>
@@ -237,6 +239,77 @@ TEST(colour_images, png_pictures_are_exact_and_jpeg_is_close) {
     write_picture(folder / "p.JPG", picture());
     EXPECT_LE(worst_difference(read_colour(folder / "p.JPG"), picture()), 12);
     EXPECT_THROW(write_picture(folder / "p.gif", picture()), Error);
+}
+
+/// Light, blue first, as it is stored and as others read it.
+TEST(light_images, hold_srgb_as_integers_and_linear_light_as_floats) {
+    const TemporaryFolder folder;
+    ::setenv("OPENCV_IO_ENABLE_OPENEXR", "1", 1);
+    cv::Mat3f light(9, 11);
+    cv::RNG random(3);
+    random.fill(light, cv::RNG::UNIFORM, 0.0, 1.0);
+    light(0, 0) = {-0.5F, std::numeric_limits<float>::quiet_NaN(), 3.25F};
+    for (const AoFormat format : {AoFormat::png8, AoFormat::png16, AoFormat::tiff, AoFormat::exr}) {
+        const fs::path file = folder / ("light" + extension(format));
+        write_light(file, light, format);
+        const cv::Mat stored = cv::imread(file.string(), cv::IMREAD_UNCHANGED);
+        ASSERT_EQ(stored.channels(), 3);
+        if (is_float(format)) {
+            ASSERT_EQ(stored.type(), CV_32FC3);
+            EXPECT_EQ(cv::norm(stored.rowRange(1, 9), light.rowRange(1, 9), cv::NORM_INF), 0);
+            EXPECT_EQ(stored.at<cv::Vec3f>(0, 0)[2], 3.25F) << "more than white stays";
+            continue;
+        }
+        ASSERT_EQ(stored.depth(), format == AoFormat::png16 ? CV_16U : CV_8U);
+        const double most = format == AoFormat::png16 ? 65535 : 255;
+        cv::Mat3d values;
+        stored.convertTo(values, CV_64F);
+        EXPECT_EQ(values(0, 0), cv::Vec3d(0, 0, most)) << "what is no light is black, what exceeds white is white";
+        for (int i = 0; i < 3; ++i)
+            EXPECT_EQ(values(5, 5)[i], std::round(most * srgb_from_linear(static_cast<double>(light(5, 5)[i]))));
+    }
+}
+
+TEST(light_images, of_16_bits_come_back_bit_for_bit) {
+    const TemporaryFolder folder;
+    cv::Mat3w deep(256, 86);
+    for (int i = 0; i < 256 * 86 * 3; ++i)
+        deep.ptr<ushort>()[i] = static_cast<ushort>(std::min(i, 65535));
+    cv::Mat3f light(deep.size());
+    for (int i = 0; i < 256 * 86 * 3; ++i)
+        light.ptr<float>()[i] = static_cast<float>(linear_from_srgb(deep.ptr<ushort>()[i] / 65535.0));
+    write_light(folder / "light.png", light, AoFormat::png16);
+    EXPECT_EQ(cv::norm(read_stored_colour(folder / "light.png").deep, deep, cv::NORM_INF), 0) << "all 65536 values";
+}
+
+TEST(colour_images, of_16_bits_keep_them_beside_the_8) {
+    const TemporaryFolder folder;
+    cv::theRNG().state = 9;
+    for (const char* kind : {".png", ".tiff", ".ppm"})
+        for (const int type : {CV_16UC3, CV_16UC1, CV_8UC3}) {
+            const bool grey = CV_MAT_CN(type) == 1, deep = CV_MAT_DEPTH(type) == CV_16U;
+            if (grey && std::string(kind) == ".ppm")
+                continue;
+            SCOPED_TRACE(fmt::format("{} of type {}", kind, type));
+            cv::Mat image(19, 23, type), three;
+            cv::randu(image, cv::Scalar::all(0), cv::Scalar::all(deep ? 65536 : 256));
+            const fs::path file = folder / (std::string("image") + kind);
+            ASSERT_TRUE(cv::imwrite(file.string(), image));
+            const StoredColour stored = read_stored_colour(file);
+            EXPECT_EQ(cv::norm(stored.colour, read_colour(file), cv::NORM_INF), 0);
+            if (!deep) {
+                EXPECT_TRUE(stored.deep.empty());
+                continue;
+            }
+            grey ? cv::merge(std::vector<cv::Mat>(3, image), three) : void(three = image);
+            ASSERT_EQ(stored.deep.size(), image.size());
+            EXPECT_EQ(cv::norm(stored.deep, three, cv::NORM_INF), 0);
+        }
+    // Planes one after the other, and numbers up to 1023: as 8 bits, as ever.
+    write_file(folder / "odd.ppm", "P6 1 1 1023\n" + std::string("\3\377\0\1\2\0", 6));
+    EXPECT_TRUE(read_stored_colour(folder / "odd.ppm").deep.empty());
+    const std::string cut = tests::read_bytes(folder / "image.png");
+    EXPECT_NE(refusal([&] { (void)stored_colour_in(cut.substr(0, cut.size() / 2), "cut.png"); }), "");
 }
 
 /// Of every format that OpenCV writes, too, and in each of its depths.
@@ -1023,16 +1096,18 @@ void at_depths(int depths, const std::function<void()>& work) {
     further[1] = '\0'; // not a tail call: the frame stays
 }
 
-/// ISA-L's faster levels hash an address: one packing in some thousands of the same pixels is another.
+/// ISA-L's levels 1 and 2 hash an address: one packing in some thousands of the same pixels is another. Small images
+/// are packed by level 3, the others by level 0.
 TEST(images, the_same_pixels_are_the_same_bytes_wherever_the_stack_lies) {
     cv::theRNG().state = 4;
-    std::vector<cv::Mat> images(500);
-    for (cv::Mat& image : images) { // rows that begin alike, so that the first bytes are found again
-        cv::Mat1b row(1, 24), noise(12, 24);
+    std::vector<cv::Mat> images(530);
+    for (std::size_t i = 0; i < images.size(); ++i) { // rows that begin alike, so that the first bytes are found again
+        const int rows = i < 500 ? 12 : 4000;
+        cv::Mat1b row(1, 24), noise(rows, 24);
         cv::randu(row, 0, 256);
         cv::randu(noise, 0, 256);
-        cv::repeat(row, 12, 1, image);
-        noise.copyTo(image, noise > 230);
+        cv::repeat(row, rows, 1, images[i]);
+        noise.copyTo(images[i], noise > (i < 500 ? 230 : 150));
     }
     std::vector<std::string> first;
     std::size_t different = 0;
@@ -1044,6 +1119,27 @@ TEST(images, the_same_pixels_are_the_same_bytes_wherever_the_stack_lies) {
                 different += bytes != first[i];
     });
     EXPECT_EQ(different, 0U);
+}
+
+/// Codes are made from a few rows. They must fit the others as well: whether all rows are alike, one object stands
+/// before nothing, or a strip lies between the rows that were looked at.
+TEST(images, a_png_is_as_small_as_by_the_slower_packer) {
+    cv::theRNG().state = 8;
+    cv::Mat1b noise(480, 640);
+    cv::randn(noise, 128, 6);
+    for (const cv::Rect& seen : {cv::Rect(0, 0, 640, 480), cv::Rect(0, 0, 640, 240), cv::Rect(0, 100, 640, 9),
+                                 cv::Rect(300, 200, 40, 90), cv::Rect(100, 50, 440, 380), cv::Rect()}) {
+        cv::Mat1b image(noise.size(), 0);
+        if (!seen.empty())
+            noise(seen).copyTo(image(seen));
+        std::string rows; // as the writer filters them
+        for (int y = 0; y < image.rows; ++y) {
+            rows += '\2';
+            for (int x = 0; x < image.cols; ++x)
+                rows += static_cast<char>(image(y, x) - (y > 0 ? image(y - 1, x) : 0));
+        }
+        EXPECT_LT(encoded_png(image).size(), deflated(rows).size() * 21 / 20 + 500) << seen;
+    }
 }
 
 /// An image that is packed in bands: a row's differences are those to the last row of the band before.

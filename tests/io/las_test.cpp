@@ -74,6 +74,7 @@ std::string las(int minor, int format, std::size_t extra = 0, const std::string&
         std::string record(length, '\0');
         for (std::size_t k = 0; k < length; ++k)
             record[k] = static_cast<char>(17 * k + static_cast<std::size_t>(i));
+        record[15] = record[16] = static_cast<char>(i); // class and flags: neither noise nor withheld
         for (std::size_t axis = 0; axis < 3; ++axis)
             put(record, 4 * axis, static_cast<std::int32_t>(100 * (axis + 1)) + i);
         bytes += record;
@@ -86,6 +87,31 @@ Cloud read(const fs::path& file) {
     Cloud cloud = read_cloud(file, warnings);
     EXPECT_TRUE(warnings.empty()) << joined(warnings);
     return cloud;
+}
+
+TEST(Las, withheld_points_and_noise_are_left_out_and_kept_in_the_file) {
+    const TemporaryFolder folder;
+    struct Row {
+        int format;
+        std::size_t at; // of the byte in the first record
+        int value;
+        bool out;
+    };
+    for (const auto& [format, at, value, out] :
+         {Row{1, 15, 7, true}, Row{1, 15, 2, false}, Row{1, 15, 0x82, true}, Row{1, 15, 0x62, false},
+          Row{1, 15, 18, false}, Row{6, 15, 4, true}, Row{6, 15, 3, false}, Row{6, 16, 7, true}, Row{6, 16, 18, true},
+          Row{6, 16, 0x82, false}}) {
+        SCOPED_TRACE(fmt::format("format {} byte {} is {}", format, at, value));
+        std::string bytes = las(4, format);
+        bytes[bytes.size() - 60 - 3 * base_length[static_cast<std::size_t>(format)] + at] = static_cast<char>(value);
+        std::vector<std::string> warnings;
+        const Cloud cloud = read_cloud(write_file(folder / "a.las", bytes), warnings);
+        EXPECT_EQ(cloud.points[0].allFinite(), !out);
+        EXPECT_TRUE(cloud.points[1].allFinite());
+        EXPECT_EQ(warned(warnings, "1 point marked as withheld or as noise"), out) << joined(warnings);
+        write_cloud(folder / "same.las", cloud, {});
+        EXPECT_EQ(file_bytes(folder / "same.las"), bytes);
+    }
 }
 
 const std::array visibility{0.25F, 0.5F, std::numeric_limits<float>::quiet_NaN()}, confidence{1.0F, 0.75F, 0.0F};

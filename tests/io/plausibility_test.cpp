@@ -4,6 +4,8 @@
 #include "tests/support/files.h"
 
 #include <cmath>
+#include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
 
 namespace scanshade {
 namespace {
@@ -65,10 +67,16 @@ TEST(plausibility, copied_rows_or_columns_are_doubted) {
     EXPECT_TRUE(warned(doubts(columns), "every second column repeats"));
 }
 
-TEST(plausibility, an_image_enlarged_both_ways_is_not_doubted) {
-    cv::Mat1w both;
-    cv::transpose(with_copies(waves(), 2, 1), both);
-    EXPECT_TRUE(doubts(with_copies(both, 2, 1)).empty()) << "some sensors deliver that";
+TEST(plausibility, an_image_enlarged_by_copies_is_doubted) {
+    for (const double by : {2.0, 2.5, 4.0, 5.625}) { // 256x192 to 640x480, or to a phone's 1440x1080
+        cv::Mat1w enlarged;
+        cv::resize(waves(), enlarged, {}, by, by, cv::INTER_NEAREST);
+        EXPECT_TRUE(warned(doubts(enlarged), fmt::format("enlarged {:.2g} times", by))) << by;
+        EXPECT_TRUE(warned(doubts(enlarged), "to about 160x120")) << by;
+    }
+    cv::Mat1w interpolated;
+    cv::resize(waves(), interpolated, {}, 2, 2, cv::INTER_LINEAR);
+    EXPECT_TRUE(doubts(interpolated).empty());
 }
 
 TEST(plausibility, lines_that_are_all_alike_were_not_copied) {

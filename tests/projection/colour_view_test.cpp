@@ -53,7 +53,8 @@ bool hidden(const Eigen::Vector3d& in_depth) {
 
 TEST(ColourOnDepth, HasTheColourThatTheDepthCameraWouldHaveSeen) {
     const Views& all = views();
-    const auto [colour, known] = colour_on_depth(all.colour, all.depth.z_m, depth_camera, colour_camera, all.surface);
+    const auto [colour, known, deep] =
+        colour_on_depth(all.colour, all.depth.z_m, depth_camera, colour_camera, all.surface);
     const cv::Mat3b wanted = scene::render_colour(all.world, depth_camera.pinhole, all.world_from_depth);
     std::vector<double> warped, unwarped;
     double inside = 0, found = 0;
@@ -81,7 +82,8 @@ TEST(ColourOnDepth, HasTheColourThatTheDepthCameraWouldHaveSeen) {
 
 TEST(ColourOnDepth, WhatIsHiddenFromTheColourCameraGetsNoColour) {
     const Views& all = views();
-    const auto [colour, known] = colour_on_depth(all.colour, all.depth.z_m, depth_camera, colour_camera, all.surface);
+    const auto [colour, known, deep] =
+        colour_on_depth(all.colour, all.depth.z_m, depth_camera, colour_camera, all.surface);
     int hidden_pixels = 0, wrong = 0, coloured = 0;
     for (int v = 0; v < known.rows; ++v)
         for (int u = 0; u < known.cols; ++u) {

@@ -63,6 +63,24 @@ TEST(noise, clean_depth_has_none) {
     EXPECT_FALSE(measure_noise(images).any()) << describe(measure_noise(images));
 }
 
+TEST(noise, areas_of_one_value_do_not_hide_it) {
+    // One frame of two that is all 1 m, and all beyond 2 m written as 2 m: the sensor has its noise all the same.
+    const DepthNoise kinect{0.0015, 0.0018};
+    const DepthImage seen = noisy(tilted_plane(test_camera({320, 240}), 60), kinect, 0.0028),
+                     other = noisy(ball_on_floor(test_camera({320, 240})), kinect, 0.0028, 2);
+    const DepthNoise measured = measure_noise(std::vector{seen, other});
+    ASSERT_TRUE(measured.any());
+    const DepthImage constant{seen.camera, cv::Mat1f(seen.z_m.size(), 1.0F), {}};
+    DepthImage clipped{seen.camera, {}, {}};
+    cv::min(seen.z_m, 2.0, clipped.z_m);
+    const float near = 1.5F, far = 2.5F;
+    for (const auto& images : {std::vector{seen, other, constant}, std::vector{clipped, other}}) {
+        const DepthNoise found = measure_noise(images);
+        EXPECT_NEAR(found.at(near), measured.at(near), 0.3 * measured.at(near)) << describe(found);
+        EXPECT_NEAR(found.at(far), measured.at(far), 0.3 * measured.at(far)) << describe(found);
+    }
+}
+
 TEST(noise, clutter_is_not_noise) {
     // Blocks of 16 pixels, each its own slanted plane: half of all differences over 4 + 4 pixels straddle an edge.
     const Pinhole camera = test_camera({320, 240});

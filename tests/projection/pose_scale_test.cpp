@@ -52,7 +52,7 @@ struct Views {
 TEST(pose_scale, right_depths_need_no_factor) { EXPECT_EQ(Views().factor(), 1); }
 
 TEST(pose_scale, a_wrong_unit_is_found) {
-    for (const double unit : {0.1, 0.2, 2.0, 5.0, 10.0}) {
+    for (const double unit : {0.001, 0.1, 0.2, 2.0, 5.0, 10.0, 1000.0}) {
         Views views;
         views.multiply(unit);
         const auto factor = views.factor();
@@ -86,6 +86,43 @@ TEST(pose_scale, views_of_different_places_tell_nothing) {
     Views views;
     views.b = seen_from(pose({0, 0, 0.5}, 3.1));
     EXPECT_FALSE(views.factor());
+}
+
+/// Both poses written otherwise.
+template <class Written>
+std::optional<PoseReading> read(const Written& written) {
+    // From somewhere in the world, not its origin, where inverses look alike.
+    const Eigen::Isometry3d world = pose({3, -1, 2}, 1.2);
+    Views views;
+    for (PosedDepth* view : {&views.a, &views.b})
+        view->world_from_camera = written(world * view->world_from_camera);
+    return pose_reading(views.a, views.b);
+}
+
+TEST(pose_reading, poses_written_in_another_way_are_found) {
+    using Eigen::Isometry3d;
+    const Isometry3d turned(Eigen::AngleAxisd(std::acos(-1.0), Vector3d::UnitX()));
+    EXPECT_EQ(read([](const Isometry3d& p) { return p; }), PoseReading::recorded);
+    EXPECT_EQ(read([](const Isometry3d& p) { return p.inverse(); }), PoseReading::inverse);
+    EXPECT_EQ(read([&](const Isometry3d& p) { return p * turned; }), PoseReading::y_up);
+    EXPECT_EQ(read([&](const Isometry3d& p) { return (p * turned).inverse(); }), PoseReading::inverse_y_up);
+    EXPECT_EQ(read([](const Isometry3d& p) {
+                  const Eigen::Quaterniond q(p.linear());
+                  return Isometry3d(Eigen::Translation3d(p.translation()) *
+                                    Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y()));
+              }),
+              PoseReading::w_first)
+        << "w x y z taken for x y z w";
+}
+
+TEST(pose_reading, poses_of_another_recording_contradict_the_depths) {
+    Views views;
+    views.b = seen_from(pose({0.04, 0, 0.03}, 0.01)); // as the next frame is
+    EXPECT_EQ(pose_reading(views.a, views.b), PoseReading::recorded);
+    views.b.world_from_camera = pose({0.3, 0.2, -0.3}, 0.2);
+    EXPECT_EQ(pose_reading(views.a, views.b), PoseReading::contradicted);
+    views.b = views.a;
+    EXPECT_FALSE(pose_reading(views.a, views.b)) << "without motion nothing is told";
 }
 
 } // namespace

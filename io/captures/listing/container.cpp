@@ -36,6 +36,10 @@ cv::Mat3b colour_of(const CaptureEntry& entry) {
     return entry.container ? cv::Mat3b(entry.container->image(Part::colour, entry.place)) : read_colour(entry.colour);
 }
 
+StoredColour stored_colour_of(const CaptureEntry& entry) {
+    return entry.container ? StoredColour{colour_of(entry), {}} : read_stored_colour(entry.colour);
+}
+
 cv::Mat1b confidence_of(const CaptureEntry& entry) {
     if (entry.container)
         return entry.container->image(Part::confidence, entry.place);

@@ -1,6 +1,8 @@
 // A file that holds the images of a whole recording: ScanNet's .sens, bags of ROS, archives.
 #pragma once
 
+#include "io/images/image_file.h"
+
 #include <cstddef>
 #include <memory>
 #include <opencv2/core.hpp>
@@ -32,6 +34,8 @@ class FrameContainer {
 // An entry's images, wherever they are: in files of their own or in a container. Errors as of the image readers.
 [[nodiscard]] cv::Mat stored_depth_of(const CaptureEntry& entry);
 [[nodiscard]] cv::Mat3b colour_of(const CaptureEntry& entry);
+/// With 16 bits, too, where it is a file that has them.
+[[nodiscard]] StoredColour stored_colour_of(const CaptureEntry& entry);
 [[nodiscard]] cv::Mat1b confidence_of(const CaptureEntry& entry);
 [[nodiscard]] cv::Size depth_size_of(const CaptureEntry& entry);
 [[nodiscard]] cv::Size colour_size_of(const CaptureEntry& entry);

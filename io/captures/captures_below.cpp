@@ -1,0 +1,62 @@
+// Captures in the folders and tars of a folder that is none itself.
+#include "io/captures/capture.h"
+
+#include "io/files.h"
+#include "io/text.h"
+#include "projection/base/error.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+
+namespace scanshade {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// The captures in the folder's own folders and tars, and the last one opened: opening may read a whole recording.
+std::vector<fs::path> captures_below(const fs::path& path, const CaptureOptions& options,
+                                     std::optional<Capture>& last) {
+    std::vector<fs::path> captures;
+    std::error_code ignored;
+    for (const auto& [name, kind] : items_in(path, ignored)) {
+        const bool tar = kind != FolderItem::Kind::folder && lower_extension(name) == ".tar" && is_tar(path / name);
+        if (name.starts_with('.') || (kind != FolderItem::Kind::folder && !tar))
+            continue;
+        try {
+            last = open_capture(path / name, options);
+            captures.push_back(path / name);
+        } catch (const NoFrames&) {
+            continue;
+        }
+    }
+    std::ranges::sort(captures);
+    return captures;
+}
+
+} // namespace
+
+std::vector<fs::path> captures_below(const fs::path& path, const CaptureOptions& options) {
+    std::optional<Capture> last;
+    return captures_below(path, options, last);
+}
+
+Capture open_capture_at_or_below(const fs::path& path, const CaptureOptions& options) {
+    try {
+        return open_capture(path, options);
+    } catch (const NoFrames&) {
+        std::optional<Capture> last;
+        const std::vector<fs::path> captures = captures_below(path, options, last);
+        if (captures.empty())
+            throw;
+        if (captures.size() > 1)
+            throw Error(fmt::format(
+                "{}: {} captures lie in it, among them {} and {}; name one, or let `plan` list them", path.string(),
+                captures.size(), captures[0].filename().string(), captures[1].filename().string()));
+        last->warnings.insert(last->warnings.begin(), fmt::format("{}: no frames of its own; its folder {} is opened.",
+                                                                  path.string(), captures[0].filename().string()));
+        return *std::move(last);
+    }
+}
+
+} // namespace scanshade

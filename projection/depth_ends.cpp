@@ -1,0 +1,102 @@
+#include "projection/depth_ends.h"
+
+#include "projection/base/statistics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace scanshade {
+namespace {
+
+constexpr int step_px = 3; // every third pixel of every third row is plenty
+
+/// How many of the sampled pixels hold a depth.
+struct Level {
+    float z_m = 0;
+    std::size_t count = 0;
+};
+
+bool piles_up(std::size_t count, std::size_t valid) {
+    constexpr std::size_t fewest = 30;
+    constexpr double least_share = 0.005;
+    return count >= fewest && static_cast<double>(count) > least_share * static_cast<double>(valid);
+}
+
+std::vector<Level> levels_of(std::vector<float> depths) {
+    std::ranges::sort(depths);
+    std::vector<Level> levels;
+    for (const float z : depths) {
+        if (levels.empty() || levels.back().z_m != z)
+            levels.push_back({z, 0});
+        ++levels.back().count;
+    }
+    return levels;
+}
+
+/// The first of `levels`, which go from one end inwards.
+std::optional<DepthEnd> end_of(const std::vector<Level>& levels, std::size_t valid) {
+    constexpr std::size_t by_neighbour = 20, neighbours = 4;
+    constexpr double stray = 0.002; // share of pixels in between, as at edges
+    constexpr float apart = 1.25F;
+    const Level& first = levels.front();
+    if (!piles_up(first.count, valid))
+        return std::nullopt;
+    std::size_t inside = 0;
+    for (std::size_t i = 1; i < levels.size(); ++i) {
+        if (i <= neighbours && by_neighbour * levels[i].count > first.count)
+            return std::nullopt;
+        inside += levels[i].count;
+        if (i < neighbours || static_cast<double>(inside) < stray * static_cast<double>(valid))
+            continue;
+        const auto [near, far] = std::minmax(first.z_m, levels[i].z_m);
+        return DepthEnd{first.z_m, static_cast<double>(first.count) / static_cast<double>(valid), far > apart * near};
+    }
+    return std::nullopt; // hardly any others
+}
+
+/// Whether values vary as a noisy sensor's do: by second differences over a few pixels, where values differ at all.
+bool is_noisy(const cv::Mat1f& z_m) {
+    constexpr int lag = 4;
+    constexpr float least = 0.002F; // of depth
+    constexpr std::size_t enough = 100;
+    std::vector<float> bends;
+    for (int v = 0; v < z_m.rows; v += step_px) {
+        const float* row = z_m[v];
+        for (int u = lag; u + lag < z_m.cols; u += step_px) {
+            const float a = row[u - lag], z = row[u], b = row[u + lag];
+            if (a > 0 && z > 0 && b > 0 && !(a == z && z == b))
+                bends.push_back(std::abs(a + b - 2 * z) / z);
+        }
+    }
+    return bends.size() > enough && median(std::move(bends)) > least;
+}
+
+} // namespace
+
+DepthEnds depth_ends(const cv::Mat1f& z_m) {
+    constexpr double least_share_cut = 0.02;
+    std::vector<float> depths;
+    for (int v = 0; v < z_m.rows; v += step_px)
+        for (int u = 0; u < z_m.cols; u += step_px)
+            if (z_m(v, u) > 0)
+                depths.push_back(z_m(v, u));
+    const std::size_t valid = depths.size();
+    if (valid == 0)
+        return {};
+    const auto [low, high] = std::ranges::minmax(depths);
+    if (!piles_up(static_cast<std::size_t>(std::ranges::count(depths, low)), valid) &&
+        !piles_up(static_cast<std::size_t>(std::ranges::count(depths, high)), valid))
+        return {};
+    std::vector<Level> levels = levels_of(std::move(depths));
+    DepthEnds ends;
+    ends.nearest = end_of(levels, valid);
+    std::ranges::reverse(levels);
+    ends.farthest = end_of(levels, valid);
+    for (std::optional<DepthEnd>* end : {&ends.nearest, &ends.farthest})
+        if (*end && !(*end)->apart && ((*end)->share < least_share_cut || !is_noisy(z_m)))
+            end->reset();
+    return ends;
+}
+
+} // namespace scanshade
