@@ -149,4 +149,12 @@ cv::Mat1f confidence_from(const cv::Mat1f& expected_error) {
     return confidence;
 }
 
+std::vector<float> confidence_of_points(std::span<const float> expected_error) {
+    std::vector<float> confidence(expected_error.size());
+    tbb::parallel_for(std::size_t(0), confidence.size(), [&](std::size_t i) {
+        confidence[i] = std::isnan(expected_error[i]) ? 0.0F : confidence_from(expected_error[i]);
+    });
+    return confidence;
+}
+
 } // namespace scanshade

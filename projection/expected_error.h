@@ -7,6 +7,8 @@
 
 #include <array>
 #include <functional>
+#include <span>
+#include <vector>
 
 namespace scanshade {
 
@@ -43,6 +45,8 @@ struct ErrorWeights {
 /// 1 - error / 0.3, at least 0: 1 = exact, 0.5 = off by 0.15, 0 = off by 0.3 and more. NaN stays NaN.
 [[nodiscard]] float confidence_from(float expected_error);
 [[nodiscard]] cv::Mat1f confidence_from(const cv::Mat1f& expected_error);
+/// Of points, which have a confidence of 0 where nothing is known.
+[[nodiscard]] std::vector<float> confidence_of_points(std::span<const float> expected_error);
 
 /// Those positions on the unit disc, evenly spread: a sunflower's seeds (Vogel 1979).
 [[nodiscard]] const std::array<cv::Point2f, shared::ball_seeds>& seeds_of_ball();

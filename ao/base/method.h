@@ -137,12 +137,11 @@ struct PointSet {
 /// Values of points, and what was chosen on the way.
 struct PointVisibility {
     std::vector<float> visibility; ///< per point; NaN where it is not finite or its neighbours make no surface
-    std::vector<float> confidence; ///< 0 .. 1: how flat the surface is round the point, and how many discs span the
-                                   ///< radius. How sure its side is. How far values depend on single points. Empty
-                                   ///< where the method has none
+    std::vector<float> error; ///< expected: RMS of visibility, 0 .. 1; NaN where that is. Empty where the method has
+                              ///< none. confidence_from() it is the confidence
     std::vector<Eigen::Vector3f> normals; ///< as used; zero where there is none; empty for meshes
     double radius = 0, spacing = 0;       ///< as used, in the cloud's unit; spacing 0 = not measured
-    std::optional<double> expected_error; ///< RMS of visibility; nothing where it was not estimated
+    std::optional<double> expected_error; ///< RMS of `error`; nothing where it was not estimated
     int tiles = 1;
     std::vector<std::string> notes;  ///< sentences: what was chosen and why
     std::vector<std::string> doubts; ///< sentences: why the result may be wrong; empty = none

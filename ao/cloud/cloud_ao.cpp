@@ -27,7 +27,10 @@ PointVisibility CloudAo::compute(const PointSet& cloud, const std::optional<Vect
     const CloudSetup setup{options_, device_, up_, viewpoint_};
     if (!options_.sky && cloud.points.size() > points_at_once(setup))
         return in_tiles(setup, cloud, scanner);
-    return CloudWork(setup, cloud, scanner).run();
+    CloudWork work(setup, cloud, scanner);
+    PointVisibility found = work.run();
+    signs_ = work.take_signs();
+    return found;
 }
 
 /// The sky is seen at any distance, past all tiles.
@@ -67,10 +70,12 @@ PointVisibility CloudAo::of_mesh(const PointSet& mesh) const {
     Raycast raycast({.radius_m = result.radius, .rays = rays, .mesh = MeshRays::vertices, .seed = options_.seed});
     result.visibility = raycast.compute(mesh).visibility;
     result.timings = raycast.timings();
-    result.confidence.assign(result.visibility.size(), 0.0F);
-    for (std::size_t i = 0; i < result.visibility.size(); ++i)
-        if (!std::isnan(result.visibility[i]))
-            result.confidence[i] = 1;
+    ErrorSum sum;
+    for (const float visibility : result.visibility) { // that of independent rays; a set of even ones errs less
+        result.error.push_back(std::sqrt(visibility * (1 - visibility) / static_cast<float>(rays)));
+        sum.add(result.error.back());
+    }
+    result.expected_error = sum.rms();
     result.notes = {
         fmt::format("{} faces: {} rays from every vertex against them, about the mean of their normals.",
                     mesh.triangles.size(), rays),

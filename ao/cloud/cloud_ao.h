@@ -2,6 +2,7 @@
 #pragma once
 
 #include "ao/base/method.h"
+#include "ao/cloud/cloud_error.h"
 #include "ao/cloud/surface/cloud_surface.h"
 
 #include <optional>
@@ -26,6 +27,7 @@ struct CloudAoOptions {
     CloudNormals normals = CloudNormals::automatic;
     int memory_mib = 4096; ///< for the points; larger clouds are computed in tiles
     int seed = 1;
+    bool keep_signs = false; ///< for study: see CloudAo::signs()
 
     [[nodiscard]] std::vector<Parameter> parameters();
 };
@@ -44,6 +46,9 @@ class CloudAo final : public PointMethod {
     /// For a mesh, rays are cast from the vertices against its faces.
     PointVisibility compute(const PointSet& cloud, const std::optional<Eigen::Vector3d>& scanner = {}) override;
 
+    /// What told of the errors of the last cloud in memory, of every point.
+    [[nodiscard]] const std::vector<CloudErrorSigns>& signs() const { return signs_; }
+
     [[nodiscard]] std::size_t most_at_once() const override;
     [[nodiscard]] std::string fingerprint() const override;
     PointVisibility compute_large(PointSource& source, TileStore& store, double shown,
@@ -56,6 +61,7 @@ class CloudAo final : public PointMethod {
     gpu::Device* device_;
     Eigen::Vector3d up_;
     std::optional<Eigen::Vector3d> viewpoint_; ///< given by the user
+    std::vector<CloudErrorSigns> signs_;
 };
 
 } // namespace scanshade

@@ -52,9 +52,6 @@ Untouched<float> smoothed(const CloudSurface& surface, const Untouched<float>& v
     return means;
 }
 
-/// Discs that span the radius: 0 for one, 1 for four or more.
-float resolution(float radius, float disc) { return disc > 0 ? std::clamp((radius / disc - 1) / 3, 0.0F, 1.0F) : 0.0F; }
-
 /// 1 for each point whose value the means of the wanted points need.
 template <class IsWanted>
 std::vector<char> asked_by_means(const CloudSurface& surface, const IsWanted& is_wanted, int passes) {
@@ -146,11 +143,8 @@ PointVisibility CloudWork::run() {
         doubt(sentence);
     compute_thinned();
     compute_strays();
-    for (const auto& [point, same_as] : twins_) {
-        result_.visibility[point] = result_.visibility[same_as];
-        result_.confidence[point] = result_.confidence[same_as];
-        result_.normals[point] = result_.normals[same_as];
-    }
+    copy_to_twins();
+    tell_error();
     tell();
     if (gpu_)
         for (const auto& [pass, ms] : gpu_->timings())
@@ -168,15 +162,21 @@ CloudWork::TileResult CloudWork::run_tile(std::span<const char> in_core) {
     const Indices core = indices_where(valid_, [&](std::uint32_t i) { return needed[i] != 0; });
     tile(core, valid_);
     require_results();
-    for (const auto& [point, same_as] : twins_) {
-        result_.visibility[point] = result_.visibility[same_as];
-        result_.confidence[point] = result_.confidence[same_as];
-        result_.normals[point] = result_.normals[same_as];
-    }
+    copy_to_twins();
     if (gpu_)
         for (const auto& [pass, ms] : gpu_->timings())
             result_.timings.emplace_back("on the device: " + pass, ms);
-    return {std::move(result_), fitted_, twins, gpu_tiles_ > 0};
+    return {std::move(result_), std::move(sides_known_), fitted_, twins, gpu_tiles_ > 0};
+}
+
+void CloudWork::copy_to_twins() {
+    for (const auto& [point, same_as] : twins_) {
+        result_.visibility[point] = result_.visibility[same_as];
+        result_.error[point] = result_.error[same_as];
+        result_.normals[point] = result_.normals[same_as];
+        if (!sides_known_.empty())
+            sides_known_[point] = sides_known_[same_as];
+    }
 }
 
 WholeSides CloudWork::settle_sides() {
@@ -208,8 +208,10 @@ void CloudWork::require_results() {
     const std::size_t count = cloud_.points.size();
     if (result_.visibility.size() != count)
         tbb::parallel_invoke([&] { result_.visibility.assign(count, nothing); },
-                             [&] { result_.confidence.assign(count, 0.0F); },
-                             [&] { result_.normals.assign(count, Vector3f::Zero()); });
+                             [&] { result_.error.assign(count, nothing); },
+                             [&] { result_.normals.assign(count, Vector3f::Zero()); },
+                             [&] { sides_known_.assign(is_checked() ? count : 0, 0); },
+                             [&] { signs_.resize(options_.keep_signs ? count : 0); });
 }
 
 void CloudWork::settle_orientation(const std::vector<Vector3d>& some) {
@@ -260,20 +262,29 @@ void CloudWork::compute_strays() {
     const PointVisibility found = of_strays(setup_, {points, normals}, scanner_, result_.radius, result_.spacing);
     for (std::size_t k = 0; k < strays_.size(); ++k) {
         result_.visibility[strays_[k]] = found.visibility[k];
-        result_.confidence[strays_[k]] = found.confidence[k];
+        result_.error[strays_[k]] = found.error[k];
         result_.normals[strays_[k]] = found.normals[k];
     }
 }
 
+ThinnedCheck CloudWork::check_of_whole() const {
+    const std::size_t points = whole_ ? static_cast<std::size_t>(whole_->decisions.points) : valid_.size();
+    return (part_ && !whole_) || options_.sky ? ThinnedCheck()
+                                              : thinned_check(points, result_.radius / result_.spacing);
+}
+
+bool CloudWork::is_checked() const { return check_of_whole().keep > 0; }
+
 /// Again with a part of the points: where that gives other values, these are not to be relied on.
 void CloudWork::compute_thinned() {
-    const ThinnedCheck check = thinned_check(valid_.size(), result_.radius / result_.spacing);
-    if (part_ || options_.sky || !(check.keep > 0))
+    const ThinnedCheck check = check_of_whole();
+    if (!(check.keep > 0))
         return;
     const auto chosen = static_cast<std::uint64_t>(check.keep * 0x1p32);
     const Indices kept = indices_where(valid_, [&](std::uint32_t i) { return hash(i, 1U) < chosen; });
     const auto [points, normals] = picked(kept);
     CloudAoOptions options = options_;
+    options.keep_signs = false;
     if (sides_.recorded_believed)
         options.normals = CloudNormals::recorded;
     const PointSet part{points, normals, {}, cloud_.z_up};
@@ -283,27 +294,52 @@ void CloudWork::compute_thinned() {
                                               order_.empty() ? valid_ : order_);
     order_.clear();
     watch_.lap("check on a part");
-    result_.expected_error = found.error;
-    if (!found.error)
+    tbb::parallel_for(std::size_t(0), result_.error.size(), [&](std::size_t i) {
+        if (!std::isnan(result_.visibility[i]))
+            result_.error[i] =
+                error_once_checked(result_.error[i], result_.visibility[i], sides_known_[i], found.error[i]);
+    });
+    for (std::size_t i = 0; i < signs_.size(); ++i)
+        signs_[i].repeat = found.error[i];
+}
+
+float error_once_checked(float factor_of_surroundings, float visibility, std::uint8_t side, float repeat) {
+    return checked_error(factor_of_surroundings, visibility, side_of(side), repeat, shipped_cloud_errors());
+}
+
+void CloudWork::tell_error() {
+    if (part_)
         return;
-    tbb::parallel_for(std::size_t(0), result_.confidence.size(),
-                      [&](std::size_t i) { result_.confidence[i] *= found.confidence[i]; });
-    const ToldError told = told_error(check.keep, *found.error);
+    ErrorSum sum;
+    for (const float error : result_.error)
+        sum.add(error);
+    result_.expected_error = sum.rms();
+    if (!result_.expected_error)
+        return;
+    const ToldError told = told_error(*result_.expected_error);
     result_.notes.push_back(told.note);
     if (told.doubt)
         doubt(*told.doubt);
 }
 
-ToldError told_error(double keep, double error) {
+void ErrorSum::add(float error) {
+    if (std::isnan(error))
+        return;
+    squares_ += static_cast<double>(error) * static_cast<double>(error);
+    ++count_;
+}
+
+std::optional<double> ErrorSum::rms() const {
+    return count_ > 0 ? std::optional(std::sqrt(squares_ / static_cast<double>(count_))) : std::nullopt;
+}
+
+ToldError told_error(double error) {
     constexpr double largest_error = 0.12;
-    ToldError told{fmt::format("{:.2g} % of the points by themselves give values from which an error of {:.2f} RMS is "
-                               "expected.",
-                               100 * keep, error),
-                   {}};
+    ToldError told{fmt::format("an error of {:.2f} RMS is expected (--write error: of every point).", error), {}};
     if (error > largest_error)
-        told.doubt = fmt::format("an error of {:.2f} RMS is expected: {:.2g} % of the points by themselves give quite "
-                                 "other values. A larger --radius spans more points; ao_confidence tells where",
-                                 error, 100 * keep);
+        told.doubt = fmt::format("an error of {:.2f} RMS is expected. A larger --radius spans more points; "
+                                 "ao_confidence tells where",
+                                 error);
     return told;
 }
 
@@ -409,11 +445,25 @@ void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
         watch_.lap("means");
     }
     require_results();
+    const CloudErrorTables& errors = shipped_cloud_errors();
     const auto give = [&](std::size_t index, std::size_t point) {
         result_.visibility[point] = values[index];
         result_.normals[point] = surface.normals[index];
-        result_.confidence[point] = surface.flatness[index] * resolution(radius, surface.disc_radius[index]) *
-                                    (side_known.empty() ? 1.0F : side_known[index]);
+        const float disc = surface.disc_radius[index];
+        const bool has_plane = surface.flatness[index] > 0; // else nothing tells its side but where the scanner stood
+        const CloudErrorSigns signs{.visibility = values[index],
+                                    .flatness = surface.flatness[index],
+                                    .span = disc > 0 ? radius / disc : 0,
+                                    .rough = surface.roughness[index] / radius,
+                                    .side = side_known.empty() ? CloudErrorSigns::recorded
+                                            : has_plane        ? side_known[index]
+                                                               : 0};
+        result_.error[point] =
+            sides_known_.empty() ? expected_error(signs, errors) : factor_of_surroundings(signs, errors);
+        if (!sides_known_.empty())
+            sides_known_[point] = byte_of_side(signs.side);
+        if (!signs_.empty())
+            signs_[point] = signs;
     };
     if (fitted.empty()) {
         tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {

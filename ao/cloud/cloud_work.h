@@ -3,7 +3,9 @@
 
 #include "ao/base/watch.h"
 #include "ao/cloud/cloud_ao.h"
+#include "ao/cloud/cloud_error.h"
 #include "ao/cloud/extent.h"
+#include "ao/cloud/repeatability.h"
 #include "ao/cloud/settled_sides.h"
 #include "ao/cloud/surface/cloud_gpu.h"
 #include "ao/cloud/surface/disc_rays.h"
@@ -86,7 +88,8 @@ class CloudWork {
     [[nodiscard]] PointVisibility run();
 
     struct TileResult {
-        PointVisibility values; ///< NaN for the rim
+        PointVisibility values; ///< NaN for the rim. Errors of a cloud that is still to be checked are the first step's
+        std::vector<std::uint8_t> sides_known; ///< of such a cloud: for the second step, error_once_checked()
         FittedCounts fitted;
         std::size_t twins = 0; ///< in the core
         bool on_gpu = false;
@@ -100,6 +103,8 @@ class CloudWork {
     [[nodiscard]] CloudDecisions decisions() const;
     [[nodiscard]] const SettledSides& sides() const { return sides_; }
     [[nodiscard]] bool normals_refused() const { return normals_refused_; }
+    /// Of every point; where CloudAoOptions::keep_signs asks for them.
+    [[nodiscard]] std::vector<CloudErrorSigns> take_signs() { return std::move(signs_); }
     /// Sentences so far: what was chosen before the computing.
     [[nodiscard]] const std::vector<std::string>& notes() const { return result_.notes; }
 
@@ -126,7 +131,11 @@ class CloudWork {
                                             std::span<const Eigen::Vector3d> normals) const;
     [[nodiscard]] Picked picked(const Indices& indices) const;
     void compute_strays();
+    [[nodiscard]] ThinnedCheck check_of_whole() const; ///< keep = 0: none
+    [[nodiscard]] bool is_checked() const;
     void compute_thinned();
+    void copy_to_twins();
+    void tell_error();
     void settle_radius(const std::vector<Eigen::Vector3d>& some, double share);
     void settle_rays();
     void tile(const Indices& core, const Indices& round);
@@ -144,6 +153,8 @@ class CloudWork {
     const OfWhole* whole_ = nullptr; ///< of a tile
     bool part_ = false;              ///< of another cloud
     PointVisibility result_;
+    std::vector<std::uint8_t> sides_known_; ///< byte_of_side() of a cloud that is still to be checked; else empty
+    std::vector<CloudErrorSigns> signs_;    ///< only where asked for
     Watch watch_;
     std::optional<CloudGpu> gpu_;
     std::optional<DirectionSet> directions_;
@@ -169,12 +180,26 @@ class CloudWork {
 [[nodiscard]] std::vector<NoisePlace> noise_places(std::span<const Eigen::Vector3d> points, const Indices& those);
 [[nodiscard]] Indices finite(std::span<const Eigen::Vector3d> points);
 
-/// Sentences about an error that a check on a share `keep` of the points expects. `doubt` is there if it is large.
+/// The error of a point of a checked cloud. `side` as byte_of_side() has it, `repeat` as CheckedPart finds it.
+[[nodiscard]] float error_once_checked(float factor_of_surroundings, float visibility, std::uint8_t side, float repeat);
+
+/// The RMS of errors; those that are NaN do not count.
+class ErrorSum {
+  public:
+    void add(float error);
+    [[nodiscard]] std::optional<double> rms() const; ///< nothing without errors
+
+  private:
+    double squares_ = 0;
+    std::size_t count_ = 0;
+};
+
+/// Sentences about the expected error of a cloud. `doubt` is there if it is large.
 struct ToldError {
     std::string note;
     std::optional<std::string> doubt;
 };
-[[nodiscard]] ToldError told_error(double keep, double error);
+[[nodiscard]] ToldError told_error(double error);
 
 constexpr std::size_t enough_to_judge = 60000; ///< points of a sample
 

@@ -299,6 +299,9 @@ class LargeCloud {
         CloudWork work(setup_, set, whole_);
         CloudWork::TileResult found = work.run_tile(round.in_core);
         collect(values, round, found.values);
+        for (std::size_t k = 0; k < found.sides_known.size(); ++k)
+            if (round.in_core[k])
+                values.sides_known.push_back(found.sides_known[k]);
         values.twins = found.twins;
         values.moved = found.fitted.moved;
         values.discs = found.fitted.kept;
@@ -323,7 +326,7 @@ class LargeCloud {
                 CloudWork::of_strays(setup_, set, source_.scanner(), whole_.decisions.radius, whole_.decisions.spacing);
         else
             found.visibility.assign(strays.numbers.size(), not_known),
-                found.confidence.assign(strays.numbers.size(), 0.0F),
+                found.error.assign(strays.numbers.size(), not_known),
                 found.normals.assign(strays.numbers.size(), Vector3f::Zero());
         collect(values, strays, found);
         return values;
@@ -340,7 +343,7 @@ class LargeCloud {
             }
             values.numbers.push_back(round.numbers[k]);
             values.visibility.push_back(found.visibility[k]);
-            values.confidence.push_back(found.confidence[k]);
+            values.error.push_back(found.error[k]);
         }
     }
 
@@ -382,31 +385,35 @@ class LargeCloud {
             CloudWork some(setup, set, source_.scanner(), whole_.decisions);
             const PointVisibility thinned = some.run();
             part.emplace(kept.points, whole, thinned.visibility, check_);
-            result_.expected_error = part->error();
         }
-        if (part && part->error()) {
-            const ToldError told = told_error(check_.keep, *part->error());
-            told_error_ = told.note;
-            if (told.doubt)
-                doubt(*told.doubt);
-        }
-        for (std::size_t tile = 0; tile < plan_.size(); ++tile) {
+        ErrorSum sum;
+        for (std::size_t tile = 0; tile < plan_.size() + 1; ++tile) { // strays are the last one
             may_stop();
             TileValues values = store_.values(tile).value_or(TileValues{});
-            if (values.checked)
-                continue;
-            if (part && part->error()) {
+            if (part && !values.checked) {
                 const TilePoints round = store_.points(tile);
                 std::vector<Vector3d> core;
                 for (std::size_t k = 0; k < round.numbers.size(); ++k)
                     if (round.in_core[k])
                         core.push_back(round.points[k]);
-                const std::vector<float> factors = part->factors(core, values.visibility);
-                for (std::size_t k = 0; k < values.confidence.size(); ++k)
-                    values.confidence[k] *= factors[k];
+                const std::vector<float> repeated = part->errors(core, values.visibility);
+                for (std::size_t k = 0; k < values.error.size(); ++k)
+                    if (!std::isnan(values.visibility[k]))
+                        values.error[k] = error_once_checked(values.error[k], values.visibility[k],
+                                                             values.sides_known[k], repeated[k]);
             }
-            values.checked = true;
+            for (const float error : values.error)
+                sum.add(error);
+            if (std::exchange(values.checked, true))
+                continue;
             store_.keep(tile, std::move(values));
+        }
+        result_.expected_error = sum.rms();
+        if (result_.expected_error) {
+            const ToldError told = told_error(*result_.expected_error);
+            told_error_ = told.note;
+            if (told.doubt)
+                doubt(*told.doubt);
         }
         watch.lap("check on a part");
     }
@@ -493,7 +500,7 @@ class TilesInMemory final : public TileStore {
   public:
     explicit TilesInMemory(const PointSet& cloud) : cloud_(cloud) {
         result.visibility.assign(cloud.points.size(), not_known);
-        result.confidence.assign(cloud.points.size(), 0.0F);
+        result.error.assign(cloud.points.size(), not_known);
         result.normals.assign(cloud.points.size(), Vector3f::Zero());
     }
     bool begin(const std::string&, std::size_t tiles, bool, double, std::string&) override {
@@ -528,20 +535,20 @@ class TilesInMemory final : public TileStore {
                 continue;
             values.numbers.push_back(each);
             values.visibility.push_back(result.visibility[each]);
-            values.confidence.push_back(result.confidence[each]);
+            values.error.push_back(result.error[each]);
         }
         return values;
     }
     void keep(std::size_t tile, TileValues values) override {
         for (std::size_t k = 0; k < values.numbers.size(); ++k) {
             result.visibility[values.numbers[k]] = values.visibility[k];
-            result.confidence[values.numbers[k]] = values.confidence[k];
+            result.error[values.numbers[k]] = values.error[k];
         }
         for (std::size_t k = 0; k < values.shown.size(); ++k)
             result.normals[values.numbers[values.shown[k]]] = values.normals[k];
         for (auto* list : {&values.numbers, &values.shown})
             *list = {};
-        values.visibility = values.confidence = {};
+        values.visibility = values.error = {};
         values.normals = {};
         values_[tile] = std::move(values);
     }
@@ -572,7 +579,7 @@ PointVisibility in_tiles(const CloudSetup& setup, const PointSet& cloud, const s
     TilesInMemory store(cloud);
     PointVisibility told = compute_large(setup, source, store, static_cast<double>(cloud.points.size()));
     told.visibility = std::move(store.result.visibility);
-    told.confidence = std::move(store.result.confidence);
+    told.error = std::move(store.result.error);
     told.normals = std::move(store.result.normals);
     return told;
 }

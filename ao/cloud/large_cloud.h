@@ -40,10 +40,12 @@ struct TilePoints {
 /// What a tile's core came to, by number, ascending.
 struct TileValues {
     std::vector<std::uint32_t> numbers;
-    std::vector<float> visibility, confidence;
-    std::vector<std::uint32_t> shown;     ///< places in `numbers`: those points whose normals are kept
-    std::vector<Eigen::Vector3f> normals; ///< of these
-    bool checked = false;                 ///< confidence has what the check found
+    std::vector<float> visibility;
+    std::vector<float> error;              ///< expected; until `checked` what CloudWork::TileResult has
+    std::vector<std::uint8_t> sides_known; ///< likewise; empty where nothing is to be checked
+    std::vector<std::uint32_t> shown;      ///< places in `numbers`: those points whose normals are kept
+    std::vector<Eigen::Vector3f> normals;  ///< of these
+    bool checked = false;                  ///< errors have what the check found
     // For the notes.
     std::uint64_t round = 0, twins = 0, moved = 0, discs = 0, fitted_from = 0;
     float noise = 0;

@@ -81,7 +81,6 @@ ThinnedCheck thinned_check(std::size_t points, double radius_in_spacings) {
 CheckedPart::CheckedPart(std::span<const Vector3d> points, std::span<const float> whole, std::span<const float> thinned,
                          const ThinnedCheck& check) {
     constexpr std::size_t surroundings = 12; // kept points
-    constexpr float half_at = 0.15F;
     std::vector<Vector3d> compared;
     std::vector<float> squares;
     for (std::size_t k = 0; k < points.size(); ++k)
@@ -91,28 +90,23 @@ CheckedPart::CheckedPart(std::span<const Vector3d> points, std::span<const float
         }
     if (compared.empty())
         return;
-    double sum = 0;
-    for (const float square : squares)
-        sum += square;
-    error_ = check.error_per_difference() * std::sqrt(sum / static_cast<double>(squares.size()));
-
     const NeighbourTree& tree = cloud_.emplace(compared).tree;
-    const auto scale = static_cast<float>(std::pow(check.error_per_difference(), 2) / (half_at * half_at));
-    factor_.resize(tree.size());
+    const auto scale = static_cast<float>(check.error_per_difference());
+    error_.resize(tree.size());
     for_each_neighbourhood(tree, surroundings, [&](std::size_t index, std::span<const Nearest::Neighbour> near) {
         float mean = squares[tree.original(index)];
         for (const Nearest::Neighbour& neighbour : near)
             mean += squares[tree.original(neighbour.point)];
         mean /= static_cast<float>(near.size() + 1);
-        factor_[index] = 1 / (1 + scale * mean);
+        error_[index] = scale * std::sqrt(mean);
     });
 }
 
-std::vector<float> CheckedPart::factors(std::span<const Vector3d> points, std::span<const float> whole,
-                                        std::span<const std::uint32_t> order) const {
-    std::vector<float> factors(points.size(), 1.0F);
+std::vector<float> CheckedPart::errors(std::span<const Vector3d> points, std::span<const float> whole,
+                                       std::span<const std::uint32_t> order) const {
+    std::vector<float> errors(points.size(), 1.0F);
     if (!cloud_)
-        return factors;
+        return errors;
     constexpr std::size_t at_once = 16;
     const std::size_t all = order.empty() ? points.size() : order.size();
     tbb::parallel_for(std::size_t(0), (all + at_once - 1) / at_once, [&](std::size_t block) {
@@ -128,9 +122,9 @@ std::vector<float> CheckedPart::factors(std::span<const Vector3d> points, std::s
         }
         find_nearest(cloud_->tree, std::span(positions.data(), count), nearest);
         for (std::size_t k = 0; k < count; ++k)
-            factors[index[k]] = factor_[nearest[k]];
+            errors[index[k]] = error_[nearest[k]];
     });
-    return factors;
+    return errors;
 }
 
 Repeatability repeatability(std::span<const Vector3d> points, std::span<const float> whole,
@@ -143,7 +137,7 @@ Repeatability repeatability(std::span<const Vector3d> points, std::span<const fl
         kept_whole.push_back(whole[i]);
     }
     const CheckedPart part(kept_points, kept_whole, thinned, check);
-    return {part.error(), part.factors(points, whole, order)};
+    return {part.errors(points, whole, order)};
 }
 
 } // namespace scanshade

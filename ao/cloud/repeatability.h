@@ -29,25 +29,20 @@ class CheckedPart {
     CheckedPart(std::span<const Eigen::Vector3d> points, std::span<const float> whole, std::span<const float> thinned,
                 const ThinnedCheck& check);
 
-    /// Expected RMS error of visibility; nothing where no point has both values.
-    [[nodiscard]] std::optional<double> error() const { return error_; }
-    /// A factor of confidence for each point of the cloud, from the error expected of its surroundings: 1 = none, 1/2 =
-    /// 0.15. `whole`: their values. `order` holds every index once, or is empty for the order given: the time is short
-    /// where its neighbours are neighbours in space.
-    [[nodiscard]] std::vector<float> factors(std::span<const Eigen::Vector3d> points, std::span<const float> whole,
-                                             std::span<const std::uint32_t> order = {}) const;
+    /// For each point of the cloud, the RMS error that the differences round it let expect; 1 where no point has both
+    /// values. `whole`: their values; without one a point has 1, too. `order` holds every index once, or is empty for
+    /// the order given: the time is short where its neighbours are neighbours in space.
+    [[nodiscard]] std::vector<float> errors(std::span<const Eigen::Vector3d> points, std::span<const float> whole,
+                                            std::span<const std::uint32_t> order = {}) const;
 
   private:
     std::optional<LocalCloud> cloud_; ///< of the points that have both values
-    std::vector<float> factor_;       ///< by index in the tree
-    std::optional<double> error_;
+    std::vector<float> error_;        ///< by index in the tree
 };
 
 /// What the check found.
 struct Repeatability {
-    std::optional<double> error; ///< expected RMS error of visibility; nothing where no point has both values
-    /// One per point: the error expected of its surroundings as a factor of confidence: 1 = none, 1/2 = 0.15.
-    std::vector<float> confidence;
+    std::vector<float> error; ///< CheckedPart::errors() of every point
 };
 /// `whole` are the values of `points`, in any unit; `thinned` those of the points with the indices `kept`; NaN where
 /// unknown. `order` holds every index once: the time is short where its neighbours are neighbours in space.

@@ -6,12 +6,14 @@
 #include "io/content_hash.h"
 #include "io/output_file.h"
 #include "projection/base/error.h"
+#include "projection/expected_error.h"
 
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <limits>
 #include <system_error>
+#include <utility>
 
 namespace scanshade {
 
@@ -78,7 +80,7 @@ void LargeCloudRun::compute(PointMethod& method) {
 }
 
 LargeCloudRun::Result LargeCloudRun::result(std::size_t index, const std::optional<fs::path>& target,
-                                            const Colours& colours) const {
+                                            const Colours& colours, bool with_errors) const {
     const CloudStream& stream = file(index);
     const std::size_t start = source_->start(index);
     ValuesInOrder values(*tiles_);
@@ -92,18 +94,18 @@ LargeCloudRun::Result LargeCloudRun::result(std::size_t index, const std::option
     records->before.clear();
     records->viewpoint = stream.records().viewpoint;
     of_shown.visibility.reserve(shown.size());
-    of_shown.confidence.reserve(shown.size());
+    of_shown.error.reserve(shown.size());
     of_shown.normals.reserve(shown.size());
     result.shown.points.reserve(shown.size());
     result.shown.colours.reserve(source_->coloured(index) ? shown.size() : 0);
     records->points.reserve(shown.size() * stream.records().stride);
     std::size_t next = 0; // of those shown
     double sum = 0;
-    std::vector<float> visibility, confidence;
+    std::vector<float> visibility, error;
     const auto look_at = [&](std::size_t first, const CloudRecords& block) {
         PointOddities odd;
         const std::vector<Eigen::Vector3d> points = points_of(block, odd);
-        values.read(start + first, block.point_count, visibility, confidence);
+        values.read(start + first, block.point_count, visibility, error);
         result.points += odd.all;
         result.valid += odd.all - odd.unusable;
         for (const float value : visibility)
@@ -119,18 +121,22 @@ LargeCloudRun::Result LargeCloudRun::result(std::size_t index, const std::option
                 result.shown.colours.push_back(own[i]);
             records->points += block.record(i);
             of_shown.visibility.push_back(visibility[i]);
-            of_shown.confidence.push_back(confidence[i]);
+            of_shown.error.push_back(error[i]);
             of_shown.normals.push_back(shown[next].normal);
         }
         return own;
     };
+    std::vector<std::string> names{"ambient_occlusion", "ao_confidence"};
+    if (with_errors)
+        names.emplace_back("ao_error");
     if (target)
-        stream.write(
-            *target, {"ambient_occlusion", "ao_confidence"},
-            [&](std::size_t first, const CloudRecords& block) -> CloudStream::BlockValues {
-                const std::vector<cv::Vec3b> own = look_at(first, block);
-                return {{visibility, confidence}, colours ? colours(own, visibility) : std::vector<cv::Vec3b>()};
-            });
+        stream.write(*target, names, [&](std::size_t first, const CloudRecords& block) -> CloudStream::BlockValues {
+            const std::vector<cv::Vec3b> own = look_at(first, block);
+            std::vector<std::vector<float>> fields{visibility, confidence_of_points(error)};
+            if (with_errors)
+                fields.push_back(error);
+            return {std::move(fields), colours ? colours(own, visibility) : std::vector<cv::Vec3b>()};
+        });
     else
         stream.pass([&](std::size_t first, const CloudRecords& block) { (void)look_at(first, block); });
     result.mean = result.known > 0 ? sum / static_cast<double>(result.known) : std::numeric_limits<double>::quiet_NaN();

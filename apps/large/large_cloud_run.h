@@ -57,9 +57,10 @@ class LargeCloudRun {
         double mean = 0; ///< visibility; NaN where none is known
         std::vector<std::string> warnings;
     };
-    /// Passes over the file once more. Writes it with values to `target`, where one is given.
+    /// Passes over the file once more. Writes it with values to `target`, where one is given, `with_errors`
+    /// or without ao_error.
     [[nodiscard]] Result result(std::size_t file, const std::optional<std::filesystem::path>& target,
-                                const Colours& colours) const;
+                                const Colours& colours, bool with_errors) const;
 
     /// The temporary files stay: another run goes on.
     void keep() { kept_ = true; }

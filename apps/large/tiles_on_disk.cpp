@@ -27,8 +27,8 @@ namespace {
 using Eigen::Vector3d, Eigen::Vector3f;
 
 constexpr std::uint32_t in_rim = 0x80000000U; ///< of a record's number; readers have fewer points
-constexpr std::string_view index_words = "scanshade tiles 1\n", values_words = "tile values 1\n\0\0";
-constexpr std::size_t value_bytes = 12, shown_bytes = 16;
+constexpr std::string_view index_words = "scanshade tiles 2\n", values_words = "tile values 2\n\0\0";
+constexpr std::size_t value_bytes = 13, shown_bytes = 16;
 
 template <class Number>
 void put(std::string& bytes, Number value) {
@@ -284,7 +284,8 @@ void TilesOnDisk::keep(std::size_t tile, TileValues values) {
     for (std::size_t k = 0; k < values.numbers.size(); ++k) {
         put(bytes, values.numbers[k]);
         put(bytes, values.visibility[k]);
-        put(bytes, values.confidence[k]);
+        put(bytes, values.error[k]);
+        put(bytes, values.sides_known.empty() ? std::uint8_t{0} : values.sides_known[k]);
     }
     write_atomically(values_file(tile), bytes);
 }
@@ -322,11 +323,12 @@ std::optional<TileValues> TilesOnDisk::values(std::size_t tile) {
         values.shown.push_back(load<std::uint32_t>(from));
         values.normals.emplace_back(load<float>(from + 4), load<float>(from + 8), load<float>(from + 12));
     }
-    values.numbers.reserve(head.count), values.visibility.reserve(head.count), values.confidence.reserve(head.count);
+    values.numbers.reserve(head.count), values.visibility.reserve(head.count), values.error.reserve(head.count);
     for (std::uint64_t k = 0; k < head.count; ++k, from += value_bytes) {
         values.numbers.push_back(load<std::uint32_t>(from));
         values.visibility.push_back(load<float>(from + 4));
-        values.confidence.push_back(load<float>(from + 8));
+        values.error.push_back(load<float>(from + 8));
+        values.sides_known.push_back(load<std::uint8_t>(from + 12));
     }
     values.round = head.round, values.twins = head.twins, values.moved = head.moved, values.discs = head.discs;
     values.fitted_from = head.fitted_from, values.noise = head.noise;
@@ -421,13 +423,13 @@ void ValuesInOrder::seek(std::size_t first) {
 }
 
 void ValuesInOrder::read(std::size_t first, std::size_t count, std::vector<float>& visibility,
-                         std::vector<float>& confidence) {
+                         std::vector<float>& error) {
     visibility.assign(count, std::numeric_limits<float>::quiet_NaN());
-    confidence.assign(count, 0.0F);
+    error.assign(count, std::numeric_limits<float>::quiet_NaN());
     for (const auto& cursor : cursors_)
-        cursor->until(first + count, [&](std::uint32_t number, float value, float sure) {
+        cursor->until(first + count, [&](std::uint32_t number, float value, float expected) {
             visibility[number - first] = value;
-            confidence[number - first] = sure;
+            error[number - first] = expected;
         });
 }
 

@@ -78,7 +78,7 @@ class ValuesInOrder {
   public:
     explicit ValuesInOrder(const TilesOnDisk& tiles);
     /// For the points first .. first + count - 1. Numbers must rise from call to call, else seek() comes before.
-    void read(std::size_t first, std::size_t count, std::vector<float>& visibility, std::vector<float>& confidence);
+    void read(std::size_t first, std::size_t count, std::vector<float>& visibility, std::vector<float>& error);
     void seek(std::size_t first);
 
     struct Shown {

@@ -457,9 +457,9 @@ class Bench final : public Command {
     int rounds_ = 3, pictures_ = 0;
     bool generated_ = false, overwrite_ = false;
     /// Each is measured instead of captures where its flag asks for it.
-    std::array<std::unique_ptr<BenchPart>, 9> parts_{cacao_times(),     cacao_maps(),         cloud_errors(),
-                                                     hard_cases_kept(), flatness_of_planes(), normals_kept(),
-                                                     light_split(),     light_bounce(),       expected_errors()};
+    std::array<std::unique_ptr<BenchPart>, 10> parts_{
+        cacao_times(),  cacao_maps(),  cloud_errors(), hard_cases_kept(), flatness_of_planes(),
+        normals_kept(), light_split(), light_bounce(), expected_errors(), errors_of_clouds()};
 };
 
 } // namespace

@@ -14,6 +14,7 @@
 #include "projection/base/memory.h"
 #include "projection/base/statistics.h"
 #include "projection/base/stopwatch.h"
+#include "projection/expected_error.h"
 
 #include <ctime>
 #include <fmt/format.h>
@@ -133,6 +134,7 @@ struct Sides {
     double median_deg = 0, most_deg = 0;              ///< angles to the true plane; 95 % are smaller
 };
 Sides sides_of(const PointVisibility& found, const std::vector<Vector3d>& exact) {
+    const std::vector<float> confidence = confidence_of_points(found.error);
     double all = 0, away = 0, sure = 0, sure_away = 0;
     std::vector<double> angles;
     for (std::size_t i = 0; i < exact.size(); ++i) {
@@ -142,7 +144,7 @@ Sides sides_of(const PointVisibility& found, const std::vector<Vector3d>& exact)
         angles.push_back(std::acos(std::min(std::abs(cosine), 1.0)) * 180 / std::numbers::pi);
         if (std::abs(cosine) < 0.5)
             continue;
-        const bool is_sure = found.confidence[i] > 0.8F;
+        const bool is_sure = confidence[i] > 0.8F;
         all += 1;
         away += cosine < 0;
         sure += is_sure;

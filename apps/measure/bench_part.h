@@ -27,5 +27,6 @@ std::unique_ptr<BenchPart> normals_kept();
 std::unique_ptr<BenchPart> light_split();
 std::unique_ptr<BenchPart> light_bounce();
 std::unique_ptr<BenchPart> expected_errors();
+std::unique_ptr<BenchPart> errors_of_clouds();
 
 } // namespace scanshade

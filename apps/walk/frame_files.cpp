@@ -166,9 +166,8 @@ void write_all(Work& work, const FrameImages& images, const Outputs& outputs) {
         !takes_colours(*work.frame.cloud))
         work.row.warnings.push_back("the file's point format has no colour, so grey is not written; the field "
                                     "ambient_occlusion has the values.");
-    if (outputs.error && work.by_points)
-        work.row.warnings.push_back("errors of single points are not estimated for clouds computed from their points, "
-                                    "so there is no field ao_error; ao_confidence tells which are less sure.");
+    if (outputs.error && work.by_points && work.error.per_point.empty())
+        work.row.warnings.push_back("the method estimates no errors of single points, so there is no field ao_error.");
     if (work.frame.cloud && outputs.cloud)
         wrote(cloud_file(name, extension(*work.frame.cloud->records)),
               [&](const auto& file) { write_recorded_cloud(file, work, points_of_cloud(work, outputs), outputs); });

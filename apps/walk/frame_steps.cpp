@@ -3,6 +3,7 @@
 #include "apps/walk/point_clouds.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
+#include "projection/expected_error.h"
 #include "projection/project.h"
 
 #include <algorithm>
@@ -44,7 +45,8 @@ void take_points(Work& work, PointVisibility found) {
     work.of_points = std::move(found);
     std::ranges::copy(work.of_points.notes, std::back_inserter(work.row.notes));
     std::ranges::copy(work.of_points.doubts, std::back_inserter(work.row.doubts));
-    work.confidence.per_point = work.of_points.confidence;
+    work.confidence.per_point = confidence_of_points(work.of_points.error);
+    work.error.per_point = std::move(work.of_points.error);
     work.row.passes = work.of_points.timings;
     work.attached = attached_points(*work.frame.cloud, work.of_points.visibility);
 }

@@ -5,6 +5,7 @@
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/format.h"
 #include "projection/base/error.h"
+#include "projection/expected_error.h"
 
 #include <algorithm>
 #include <chrono>
@@ -207,7 +208,7 @@ void write_large(Work& work, const Outputs& outputs) {
     else if (outputs.cloud && outputs.colour_cloud == CloudColours::grey)
         work.row.warnings.push_back("the file's point format has no colour, so grey is not written; the field "
                                     "ambient_occlusion has the values.");
-    LargeCloudRun::Result result = work.large->result(work.large_file, target, colours);
+    LargeCloudRun::Result result = work.large->result(work.large_file, target, colours, outputs.error);
     if (target)
         work.row.files.push_back(file);
     std::ranges::move(result.warnings, std::back_inserter(work.row.warnings));
@@ -217,7 +218,8 @@ void write_large(Work& work, const Outputs& outputs) {
     work.frame.world_from_camera = work.entry.world_from_camera;
     if (records.viewpoint)
         work.frame.world_from_camera = records.viewpoint;
-    work.confidence.per_point = work.of_points.confidence;
+    work.confidence.per_point = confidence_of_points(work.of_points.error);
+    work.error.per_point = std::move(work.of_points.error);
     work.attached.per_point = work.of_points.visibility;
     const auto share = [](std::size_t part, std::size_t all) {
         return all > 0 ? static_cast<double>(part) / static_cast<double>(all) : 0;

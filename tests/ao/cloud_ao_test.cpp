@@ -3,13 +3,16 @@
 #include "ao/cloud/surface/leaf_neighbours.h"
 #include "apps/scenes/scanner.h"
 #include "projection/base/error.h"
+#include "projection/expected_error.h"
 #include "tests/support/files.h"
 #include "tests/support/points.h"
 
 #include <cmath>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <numbers>
 #include <numeric>
+#include <sstream>
 
 namespace scanshade {
 namespace {
@@ -208,7 +211,7 @@ TEST(CloudAo, confidence_knows_where_the_error_is) {
     const auto truth = scene::true_visibility(world, cloud, {.radius_m = 0.5, .rays = 256}, 4);
     std::vector<float> sure = found.visibility, unsure = found.visibility;
     for (std::size_t i = 0; i < sure.size(); ++i)
-        (found.confidence[i] > 0.5F ? unsure : sure)[i] = static_cast<float>(nan);
+        (confidence_from(found.error[i]) > 0.5F ? unsure : sure)[i] = static_cast<float>(nan);
     EXPECT_LT(rms_between(sure, truth), 0.5 * rms_between(unsure, truth));
 }
 
@@ -271,7 +274,7 @@ TEST(CloudAo, odd_clouds_are_results_not_failures) {
         ASSERT_EQ(found.visibility.size(), points.size());
         for (std::size_t i = 0; i < points.size(); ++i) {
             EXPECT_TRUE(std::isnan(found.visibility[i]));
-            EXPECT_EQ(found.confidence[i], 0.0F);
+            EXPECT_TRUE(std::isnan(found.error[i]));
         }
     }
     Points line(100, Vector3d::Zero());
@@ -279,8 +282,8 @@ TEST(CloudAo, odd_clouds_are_results_not_failures) {
         line[i].x() = static_cast<double>(i) / 10;
     for (const float v : visibility(line, {.outside = "outward"}).visibility)
         EXPECT_TRUE(std::isnan(v)); // no plane, no side
-    for (const float c : visibility(line, {.outside = "5,0,9"}).confidence)
-        EXPECT_EQ(c, 0.0F);
+    for (const float error : visibility(line, {.outside = "5,0,9"}).error)
+        EXPECT_GT(error, 0.2F) << "no plane tells the side";
 }
 
 TEST(CloudAo, holes_and_duplicates_leave_the_others_alone) {
@@ -311,6 +314,9 @@ TEST(CloudAo, tiles_change_hardly_anything) {
     EXPECT_GE(tiled.tiles, 2);
     EXPECT_EQ(whole.radius, tiled.radius);
     EXPECT_LT(rms_between(whole.visibility, tiled.visibility), 0.015);
+    EXPECT_LT(rms_between(whole.error, tiled.error), 0.01);
+    ASSERT_TRUE(whole.expected_error && tiled.expected_error);
+    EXPECT_NEAR(*whole.expected_error, *tiled.expected_error, 0.003);
 }
 
 /// A part of a ball by itself could be seen from either side.
@@ -334,15 +340,22 @@ TEST(CloudAo, same_input_same_bits) {
     const Points points = corner(30000);
     const auto one = visibility(points), other = visibility(points);
     EXPECT_EQ(one.visibility, other.visibility);
-    EXPECT_EQ(one.confidence, other.confidence);
+    EXPECT_EQ(one.error, other.error);
 }
 
-TEST(CloudAo, confidence_is_high_on_planes_and_low_where_discs_span_the_radius) {
+TEST(CloudAo, confidence_is_high_on_planes_and_lower_where_few_discs_span_the_radius) {
     const Points points = square(10000);
     const Points up(points.size(), Vector3d(0, 0, 1));
-    EXPECT_GT(mean(visibility(points, {.radius = 0.5}, up).confidence), 0.99);
-    EXPECT_LT(mean(visibility(points, {.radius = 0.03}, up).confidence), 0.4);
-    EXPECT_GT(mean(visibility(points, {.radius = 0.5}).confidence), 0.95) << "sides are nearly sure";
+    const auto confidence = [&](const Points& of, double radius, const Points& normals) {
+        return mean(confidence_of_points(visibility(of, {.radius = radius}, normals).error));
+    };
+    EXPECT_GT(confidence(points, 0.5, up), 0.95);
+    EXPECT_GT(confidence(points, 0.5, {}), 0.95) << "sides are nearly sure";
+    EXPECT_LT(confidence(points, 0.03, up), confidence(points, 0.5, up));
+    const scene::World world(scene::scene_named("clutter"));
+    const auto cloud = scene::scanned_cloud(world, 20000, {.stations = 0});
+    EXPECT_LT(confidence(cloud.points, 0.2, cloud.normals), 0.45) << "few discs among many things";
+    EXPECT_GT(confidence(cloud.points, 2, cloud.normals), 0.5);
 }
 
 TEST(CloudAo, the_default_radius_is_a_twentieth_of_the_extent_within_its_bounds) {
@@ -448,6 +461,38 @@ TEST(CloudAo, run_gives_a_plain_cloud_a_value_on_every_point) {
     const std::string manifest = tests::file_bytes(folder / "out/manifest.json");
     EXPECT_NE(manifest.find("radius"), std::string::npos);
     EXPECT_NE(manifest.find("points stand"), std::string::npos);
+}
+
+TEST(CloudAo, run_writes_the_error_that_confidence_follows_from) {
+    const tests::TemporaryFolder folder;
+    std::string text = "ply\nformat ascii 1.0\nelement vertex 2000\nproperty double x\nproperty double y\nproperty "
+                       "double z\nend_header\n";
+    for (const Vector3d& p : corner(2000))
+        text += std::to_string(p.x()) + " " + std::to_string(p.y()) + " " + std::to_string(p.z()) + "\n";
+    tests::write_file(folder / "c.ply", text);
+    const tests::Ran ran = tests::run_program("run " + (folder / "c.ply").string() + " -o " +
+                                              (folder / "out").string() + " --write cloud,error");
+    ASSERT_EQ(ran.exit_code, 0) << ran.err;
+    std::istringstream written(tests::file_bytes(folder / "out/clouds/c.ply"));
+    std::string header;
+    for (std::string line; line != "end_header" && std::getline(written, line);)
+        header += line + "\n";
+    ASSERT_NE(header.find("ambient_occlusion\nproperty float ao_confidence\nproperty float ao_error\n"),
+              std::string::npos)
+        << header;
+    double x = 0, y = 0, z = 0, squares = 0;
+    float value = 0, confidence = 0, error = 0;
+    int count = 0;
+    for (; written >> x >> y >> z >> value >> confidence >> error; ++count) {
+        ASSERT_NEAR(confidence, confidence_from(error), 1e-4);
+        ASSERT_GT(error, 0);
+        squares += static_cast<double>(error) * static_cast<double>(error);
+    }
+    EXPECT_EQ(count, 2000);
+    const std::string manifest = tests::file_bytes(folder / "out/manifest.json");
+    EXPECT_NE(manifest.find(fmt::format("an error of {:.2f} RMS is expected", std::sqrt(squares / count))),
+              std::string::npos)
+        << "that of the cloud is the mean of its points'";
 }
 
 } // namespace

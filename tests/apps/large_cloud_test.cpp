@@ -10,6 +10,7 @@
 #include "apps/walk/large_frames.h"
 #include "io/clouds/cloud_file.h"
 #include "projection/base/error.h"
+#include "projection/expected_error.h"
 #include "tests/support/files.h"
 #include "tests/support/points.h"
 
@@ -111,7 +112,7 @@ LargeCloudRun::Result from_disk(const fs::path& file, const fs::path& target, co
     LargeCloudRun run(std::move(files), std::move(settings));
     run.compute(method);
     EXPECT_GT(run.found().tiles, 1);
-    return run.result(0, target, {});
+    return run.result(0, target, {}, true);
 }
 
 /// Computes and writes a file that is read as a whole.
@@ -124,7 +125,9 @@ void in_memory(const fs::path& file, const fs::path& target, const CloudAoOption
     const auto normals = recorded_normals(cloud);
     const PointVisibility found = CloudAo(options).compute({cloud.points, normals, {}, z_is_up(cloud)}, scanner);
     EXPECT_GT(found.tiles, 1);
-    write_cloud(target, cloud, {{"ambient_occlusion", found.visibility}, {"ao_confidence", found.confidence}});
+    const std::vector<float> confidence = confidence_of_points(found.error);
+    write_cloud(target, cloud,
+                {{"ambient_occlusion", found.visibility}, {"ao_confidence", confidence}, {"ao_error", found.error}});
 }
 
 TEST(LargeCloud, files_from_disk_have_the_bytes_of_those_computed_in_memory) {
@@ -503,7 +506,7 @@ TEST(Survey, points_at_borders_see_the_neighbouring_tile) {
     run.compute(method);
     for (std::size_t k = 0; k < files.size(); ++k) {
         const fs::path target = folder / fmt::format("{}.las", k);
-        (void)run.result(k, target, {});
+        (void)run.result(k, target, {}, false);
         std::vector<std::string> warnings;
         std::ranges::copy(recorded_field(read_cloud(target, warnings), "ambient_occlusion", target),
                           std::back_inserter(joined));

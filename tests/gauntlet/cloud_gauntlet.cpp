@@ -8,6 +8,7 @@
 #include "io/clouds/cloud_file.h"
 #include "projection/base/error.h"
 #include "projection/base/stopwatch.h"
+#include "projection/expected_error.h"
 #include "tests/gauntlet/perturb.h"
 
 #include <algorithm>
@@ -82,7 +83,7 @@ Difference difference(const Perturbed& perturbed, const PointVisibility& found, 
         if (const auto off = static_cast<double>(found.visibility[i] - reference.visibility[there]); !std::isnan(off)) {
             squares += off * off;
             values += 1;
-            const bool sure = found.confidence[i] > 0.5F;
+            const bool sure = confidence_from(found.error[i]) > 0.5F;
             sure_squares += sure ? off * off : 0;
             sure_values += sure;
         }

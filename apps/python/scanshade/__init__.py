@@ -79,7 +79,7 @@ class Result:
     """Values of one call. Arrays are read-only views of the library's memory; they stay valid as long as they live.
 
     ao:          float32, 0 .. 1, NaN = no surface: (H, W), (N, H, W), or (N,) for points
-    confidence:  the same shape: how far each value can be believed, 0 .. 1; None where not asked for
+    confidence:  the same shape: how far each value can be believed, 0 .. 1 (1 - expected error / 0.3); None where not asked for
     normals:     the same shape and 3: unit normals in the space of the points, NaN = none; None where not asked for
     """
 

@@ -161,7 +161,8 @@ typedef struct scanshade_arrays {
     size_t size;
     int64_t count, height, width;
     const float* visibility; /* 0 .. 1, NaN = no surface */
-    const float* confidence; /* 0 .. 1, how far each value can be believed; NaN like visibility; NULL = not asked for */
+    const float* confidence; /* 0 .. 1, how far each value can be believed: 1 - expected error / 0.3, of images as of
+                                points; NaN like visibility, of points 0; NULL = not asked for */
     const float* normals; /* x, y, z of each, unit length, of depth in camera space; NaN = none; NULL = not asked for,
                              or a mesh */
 } scanshade_arrays;
