@@ -293,6 +293,7 @@ void CloudWork::compute_thinned() {
     const Repeatability found = repeatability(cloud_.points, result_.visibility, kept, some.run().visibility, check,
                                               order_.empty() ? valid_ : order_);
     order_.clear();
+    error_by_check_ = found.rms;
     watch_.lap("check on a part");
     tbb::parallel_for(std::size_t(0), result_.error.size(), [&](std::size_t i) {
         if (!std::isnan(result_.visibility[i]))
@@ -316,7 +317,7 @@ void CloudWork::tell_error() {
     result_.expected_error = sum.rms();
     if (!result_.expected_error)
         return;
-    const ToldError told = told_error(*result_.expected_error);
+    const ToldError told = told_error(*result_.expected_error, error_by_check_);
     result_.notes.push_back(told.note);
     if (told.doubt)
         doubt(*told.doubt);
@@ -333,13 +334,16 @@ std::optional<double> ErrorSum::rms() const {
     return count_ > 0 ? std::optional(std::sqrt(squares_ / static_cast<double>(count_))) : std::nullopt;
 }
 
-ToldError told_error(double error) {
+ToldError told_error(double error, double by_check) {
     constexpr double largest_error = 0.12;
+    constexpr const char* way_out = "A larger --radius spans more points; ao_confidence tells where";
     ToldError told{fmt::format("an error of {:.2f} RMS is expected (--write error: of every point).", error), {}};
     if (error > largest_error)
-        told.doubt = fmt::format("an error of {:.2f} RMS is expected. A larger --radius spans more points; "
-                                 "ao_confidence tells where",
-                                 error);
+        told.doubt = fmt::format("an error of {:.2f} RMS is expected. {}", error, way_out);
+    else if (by_check > largest_error)
+        told.doubt = fmt::format("a part of the points by themselves give quite other values, as if the error were "
+                                 "{:.2f} RMS. {}",
+                                 by_check, way_out);
     return told;
 }
 

@@ -90,6 +90,10 @@ CheckedPart::CheckedPart(std::span<const Vector3d> points, std::span<const float
         }
     if (compared.empty())
         return;
+    double sum = 0;
+    for (const float square : squares)
+        sum += square;
+    rms_ = check.error_per_difference() * std::sqrt(sum / static_cast<double>(squares.size()));
     const NeighbourTree& tree = cloud_.emplace(compared).tree;
     const auto scale = static_cast<float>(check.error_per_difference());
     error_.resize(tree.size());
@@ -137,7 +141,7 @@ Repeatability repeatability(std::span<const Vector3d> points, std::span<const fl
         kept_whole.push_back(whole[i]);
     }
     const CheckedPart part(kept_points, kept_whole, thinned, check);
-    return {part.errors(points, whole, order)};
+    return {part.error(), part.errors(points, whole, order)};
 }
 
 } // namespace scanshade

@@ -3,6 +3,7 @@
 #include "ao/cloud/cloud_error.h"
 
 #include "ao/cloud/cloud_ao.h"
+#include "ao/cloud/cloud_work.h"
 #include "apps/measure/cloud_error_fit.h"
 #include "apps/measure/error_fit.h"
 #include "apps/scenes/scanner.h"
@@ -191,6 +192,13 @@ std::vector<CloudErrorSample> samples_of(const char* name, int number) {
         }
     }
     return samples;
+}
+
+TEST(CloudErrors, a_check_that_finds_quite_other_values_is_a_reason_to_doubt) {
+    EXPECT_FALSE(told_error(0.05, 0.05).doubt);
+    EXPECT_TRUE(told_error(0.2, 0.05).doubt);
+    ASSERT_TRUE(told_error(0.05, 0.2).doubt) << "the factors have not seen every kind of cloud";
+    EXPECT_TRUE(told_error(0.05, 0.2).doubt->starts_with("a part of the points"));
 }
 
 /// The README has more scenes and noise, and closer bounds.
