@@ -199,7 +199,8 @@ void doubt_points(const Cloud& cloud, Doubts& doubts) {
     const auto& points = cloud.points;
     const auto valid = static_cast<std::size_t>(
         std::ranges::count_if(points, [](const Eigen::Vector3d& point) { return point.allFinite(); }));
-    add_if(valid > 0 && valid < fewest, doubts, counted(valid, "point") + " cannot show a surface.");
+    const bool few = valid > 0 && valid < fewest;
+    add_if(few && triangles_of(cloud).empty(), doubts, counted(valid, "point") + " cannot show a surface.");
     double next = points.empty() ? 0 : points.front().x();
     add_if(points.size() >= enough &&
                std::ranges::all_of(points, [&](const Eigen::Vector3d& point) { return point.x() == next++; }),

@@ -633,7 +633,7 @@ TEST(Derivatives, OfEveryResidualOfRecordingsAgreeWithNumericOnes) {
     const std::vector<double> depth = {1.02, -0.01, 0.003}, extrinsics = {0.02, -0.03, 0.01, 0.03, 0.002, -0.004},
                               clock = {0.01}, pose = {0.3, -0.2, 0.1, 0.2, -0.1, 0.3}, point = {0.3, -0.2, 1.9};
     for (const LensModel lens : {LensModel::brown_conrady, LensModel::kannala_brandt}) {
-        const std::vector<double> camera = {530, 0.99, 322, 238, -0.1, 0.03, 0.002, -0.001, 0.01, -0.01};
+        const std::vector<double> camera = {530, 0.99, 322, 238, -0.1, 0.03, 0.002, -0.001, 0.01, -0.01, 0.02, 0.003};
         expect_right_derivatives<ObservationResidual, 2, camera_unknowns, 1, 6, 3>(
             {lens, {300, 200}, motion, 0.004, 1.5}, {camera, clock, pose, point});
         expect_right_derivatives<SecondaryObservationResidual, 2, camera_unknowns, extrinsic_unknowns, 1, 6, 3>(

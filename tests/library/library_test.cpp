@@ -27,7 +27,7 @@ cv::Mat1w corner() {
     cv::Mat1w depth(480, 640);
     for (int v = 0; v < depth.rows; ++v)
         for (int u = 0; u < depth.cols; ++u)
-            depth(v, u) = static_cast<ushort>(2000 - 2 * std::abs(u - 320));
+            depth(v, u) = static_cast<ushort>(2000 / (1 + 0.0015 * std::abs(u - 320))); // two planes
     depth(cv::Rect(10, 10, 30, 20)) = 0;
     return depth;
 }
