@@ -9,7 +9,7 @@
 namespace scanshade {
 namespace {
 
-constexpr int step_px = 3; // every third pixel of every third row is plenty
+constexpr int every_px = 3; // every third pixel of every third row is plenty
 
 /// How many of the sampled pixels hold a depth.
 struct Level {
@@ -61,9 +61,9 @@ bool is_noisy(const cv::Mat1f& z_m) {
     constexpr float least = 0.002F; // of depth
     constexpr std::size_t enough = 100;
     std::vector<float> bends;
-    for (int v = 0; v < z_m.rows; v += step_px) {
+    for (int v = 0; v < z_m.rows; v += every_px) {
         const float* row = z_m[v];
-        for (int u = lag; u + lag < z_m.cols; u += step_px) {
+        for (int u = lag; u + lag < z_m.cols; u += every_px) {
             const float a = row[u - lag], z = row[u], b = row[u + lag];
             if (a > 0 && z > 0 && b > 0 && !(a == z && z == b))
                 bends.push_back(std::abs(a + b - 2 * z) / z);
@@ -77,8 +77,8 @@ bool is_noisy(const cv::Mat1f& z_m) {
 DepthEnds depth_ends(const cv::Mat1f& z_m) {
     constexpr double least_share_cut = 0.02;
     std::vector<float> depths;
-    for (int v = 0; v < z_m.rows; v += step_px)
-        for (int u = 0; u < z_m.cols; u += step_px)
+    for (int v = 0; v < z_m.rows; v += every_px)
+        for (int u = 0; u < z_m.cols; u += every_px)
             if (z_m(v, u) > 0)
                 depths.push_back(z_m(v, u));
     const std::size_t valid = depths.size();

@@ -40,7 +40,7 @@ class Rmse {
 };
 
 /// A frame that was rendered, and what the method makes of it.
-struct Shot {
+struct LitShot {
     Eigen::Isometry3d pose;
     DepthImage depth;
     NormalImage normals;
@@ -141,11 +141,11 @@ class LightPart final : public BenchPart {
         const double f = 525.0 * std::max(size.width / 640.0, size.height / 480.0);
         const Pinhole camera{f, f, (size.width - 1) / 2.0, (size.height - 1) / 2.0, size};
         const scene::Optics optics(camera);
-        std::vector<Shot> shots;
+        std::vector<LitShot> shots;
         std::vector<DepthImage> recorded;
         std::vector<scene::Geometry> exact;
         for (int i = 0; i < frames_; ++i) {
-            Shot& shot = shots.emplace_back();
+            LitShot& shot = shots.emplace_back();
             shot.pose = scene::world_from_camera(scene.walk, i * scene.walk.period_s / frames_);
             const Sight sight{world, optics, shot.pose, render_geometry(world, optics, shot.pose), 1, i};
             shot.depth = {camera, sensor_named(sensor).record(sight), {}};
@@ -159,7 +159,7 @@ class LightPart final : public BenchPart {
         if (const Parameter* radius = row_named(rows, "radius"))
             set(*radius, scene.ao_radius_m);
         FrameAo method(device, row, *setup);
-        for (Shot& shot : shots) {
+        for (LitShot& shot : shots) {
             shot.visibility = method.compute(shot.depth, noise).visibility;
             shot.fitted = method.fitted_depth();
             shot.fitted_normals = method.fitted_normals();
@@ -167,7 +167,7 @@ class LightPart final : public BenchPart {
         }
         for (const Sky& sky : suns_ ? suns() : skies()) {
             LightSamples samples(true);
-            for (Shot& shot : shots) {
+            for (LitShot& shot : shots) {
                 shot.lit = scene::render_lit(world, optics, shot.pose, sky.light);
                 shot.photograph = scene::photograph(shot.lit, shot.truth);
                 samples.add({shot.depth, shot.normals, shot.visibility, shot.photograph, {}, shot.pose});
@@ -182,7 +182,7 @@ class LightPart final : public BenchPart {
         }
     }
 
-    void report(gpu::Device& device, const std::vector<Shot>& shots, const DepthNoise& noise,
+    void report(gpu::Device& device, const std::vector<LitShot>& shots, const DepthNoise& noise,
                 const shared::ErrorTable& errors, double radius_m, const std::string& name, const std::string& sensor,
                 const Sky& sky, const LightEstimate& found) const {
         Light truth{.direct = sky.light.has_sun() ? Eigen::Vector3d(sky.light.ratio * sky.light.towards.normalized())
@@ -195,7 +195,7 @@ class LightPart final : public BenchPart {
         Rmse multiply, ambient, by_truth, as_is, divided, unshaded;
         double share_squares = 0, share_count = 0;
         std::array<std::vector<double>, 3> ms;
-        for (const Shot& shot : shots) {
+        for (const LitShot& shot : shots) {
             FinishInput input{.camera = shot.depth.camera,
                               .z_m = shot.depth.z_m,
                               .visibility = shot.visibility,
@@ -247,7 +247,7 @@ class LightPart final : public BenchPart {
     }
 
     /// Green light: that of dark pixels has no share worth the name.
-    static void add_shares(const Finished& parts, const Shot& shot, double& squares, double& count) {
+    static void add_shares(const Finished& parts, const LitShot& shot, double& squares, double& count) {
         for (int v = 0; v < shot.truth.rows; ++v)
             for (int u = 0; u < shot.truth.cols; ++u) {
                 if (std::isnan(shot.visibility(v, u)) || std::isnan(shot.truth(v, u)) || shot.photograph(v, u)[1] < 24)
