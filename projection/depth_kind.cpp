@@ -5,7 +5,9 @@
 #include <array>
 #include <cmath>
 #include <Eigen/Core>
+#include <numeric>
 #include <optional>
+#include <vector>
 
 namespace scanshade {
 namespace {
@@ -70,13 +72,22 @@ Shape range_by_z(const Pinhole& camera, double u, double v, double half_px) {
             0};
 }
 
+/// A slope in the image's own numbers, on whichever side of an edge or a ridge.
+using Slope = Eigen::Array2d;
+
 /// Patches for z and against it, weighted by how many standard deviations the bends of both kinds are apart.
 struct Votes {
+    struct Against {
+        Slope slope;
+        double weight;
+    };
     int patches = 0;
     double z = 0, other = 0;
+    std::vector<Against> against;
 
     /// `measured` and its deviations, and what it would be if the image held z, or the other kind.
-    void count(const Vector3d& measured, const Vector3d& sigma, const Vector3d& of_z, const Vector3d& of_other) {
+    void count(const Vector3d& measured, const Vector3d& sigma, const Vector3d& of_z, const Vector3d& of_other,
+               const Slope& slope) {
         constexpr double least_apart = 2, most_apart = 10, largest_off = 3;
         const Vector3d apart = (of_z - of_other).cwiseQuotient(sigma),
                        from = (measured - of_other).cwiseQuotient(sigma);
@@ -88,7 +99,25 @@ struct Votes {
             return; // neither: a surface that bends
         ++patches;
         const double weight = std::min(distance, most_apart) * std::min(distance, most_apart);
-        (share > 0.5 ? z : other) += weight;
+        if (share > 0.5) {
+            z += weight;
+            return;
+        }
+        other += weight;
+        against.push_back({slope.abs(), weight});
+    }
+    /// Most of what speaks against z has one slope: a ramp of numbers that somebody drew looks like that, and like the
+    /// disparities of a single plane.
+    [[nodiscard]] bool of_one_slope() const {
+        constexpr double alike = 0.2, most = 0.85;
+        return std::any_of(against.begin(), against.end(), [&](const Against& one) {
+            const double weight =
+                std::accumulate(against.begin(), against.end(), 0.0, [&](double sum, const Against& another) {
+                    const bool same = (another.slope - one.slope).matrix().norm() < alike * one.slope.matrix().norm();
+                    return same ? sum + another.weight : sum;
+                });
+            return weight > most * other;
+        });
     }
     [[nodiscard]] bool decided() const {
         constexpr int fewest = 6;
@@ -142,13 +171,15 @@ DepthKind depth_kind(const DepthImage& depth) {
                              sigma_xy = std::max(shape.deviation / xy_norm, least_deviation);
                 const Vector3d sigma(sigma_xx, sigma_xy, sigma_xx);
                 const Vector3d of_z = bend_of_plane(shape.along_x, shape.along_y);
-                inverse.count(shape.bend, sigma, of_z, -of_z);
+                const Slope slope = std::exp(values->mean()) / half * Slope(shape.along_x, shape.along_y);
+                inverse.count(shape.bend, sigma, of_z, -of_z, slope);
                 const Shape ratio = range_by_z(camera, u, v, half);
                 range.count(shape.bend, sigma, of_z,
-                            ratio.bend + bend_of_plane(shape.along_x - ratio.along_x, shape.along_y - ratio.along_y));
+                            ratio.bend + bend_of_plane(shape.along_x - ratio.along_x, shape.along_y - ratio.along_y),
+                            slope);
             }
     }
-    if (inverse.against_z())
+    if (inverse.against_z() && !inverse.of_one_slope())
         return DepthKind::inverse;
     if (range.against_z())
         return DepthKind::range;

@@ -356,7 +356,7 @@ TEST(Planes, AScaleIsNotMistakenForAFocalLengthInABareRoom) {
         std::vector<PlaneFrame> frames = frames_of_walls(tiny, room, poses);
         for (PlaneFrame& frame : frames)
             frame.depth_m *= depths;
-        Planes planes(std::move(frames), model_of(first));
+        Planes planes(frames, model_of(first));
         std::vector<ParameterGroup> groups = planes.group_orders().front();
         std::erase_if(groups,
                       [](const ParameterGroup& group) { return group.name != "f" && group.name != "depth scale"; });
@@ -407,8 +407,10 @@ TEST(Planes, DegenerateScenesAreNamedAndChangeNothing) {
     std::vector<PlaneFrame> stairs;
     for (const Eigen::Isometry3d& pose : poses) {
         cv::Mat1f depth(small.pinhole.size);
-        for (int row = 0; row < depth.rows; ++row)
-            depth.row(row).setTo(3.0F - 0.3F * static_cast<float>(row / 48));
+        for (int row = 0; row < depth.rows; ++row) {
+            const int step = row / 48;
+            depth.row(row).setTo(3.0F - 0.3F * static_cast<float>(step));
+        }
         stairs.push_back({"stairs", depth, pose});
     }
     EXPECT_TRUE(says(Planes(stairs, model_of(small)).degeneracy(), "all planes face one way"));

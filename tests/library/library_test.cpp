@@ -1,9 +1,10 @@
 // The library as its users see it: public headers alone, against what the program writes for the same input.
+#include <bit>
+#include <cstdint>
 #include <scanshade/capture.h>
 
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <gtest/gtest.h>
 #include <limits>
@@ -61,7 +62,9 @@ class LibraryTest : public testing::Test {
         int different = 0;
         for (int v = 0; v < a.rows; ++v)
             for (int u = 0; u < a.cols; ++u) // any NaN is as good as another: a file has one of its own
-                different += std::isnan(a(v, u)) ? !std::isnan(b(v, u)) : std::memcmp(&a(v, u), &b(v, u), 4) != 0;
+                different += std::isnan(a(v, u))
+                                 ? !std::isnan(b(v, u))
+                                 : std::bit_cast<std::uint32_t>(a(v, u)) != std::bit_cast<std::uint32_t>(b(v, u));
         EXPECT_EQ(different, 0);
     }
     fs::path folder;

@@ -80,6 +80,20 @@ TEST(depth_kind, nothing_is_told_of_a_wall_ahead_of_holes_and_of_small_images) {
     EXPECT_NE(depth_kind(with(room(), [](double, const Vector3d&) { return 2.0; })), DepthKind::range);
 }
 
+TEST(depth_kind, drawn_ramps_of_depth_are_not_called_disparities) {
+    const auto drawn = [](auto value) {
+        DepthImage image{{525, 525, 319.5, 239.5, {640, 480}}, cv::Mat1f(480, 640), {}};
+        for (int v = 0; v < 480; ++v)
+            for (int u = 0; u < 640; ++u)
+                image.z_m(v, u) = std::round(1000 * static_cast<float>(value(u, v))) / 1000;
+        return image;
+    };
+    for (const DepthImage& image : {drawn([](int u, int) { return 1 + 0.003 * u; }),
+                                    drawn([](int u, int v) { return 4 - 0.003 * u - 0.002 * v; }),
+                                    drawn([](int u, int) { return 2 - 0.003 * std::abs(u - 320); })})
+        EXPECT_NE(depth_kind(image), DepthKind::inverse);
+}
+
 TEST(depth_kind, bent_surfaces_are_not_mistaken) {
     // Waves of a cloth, a ball before a wall, and the inside of a pipe along z.
     const DepthImage cloth = with(

@@ -86,7 +86,7 @@ class Result {
             throw Error(SCANSHADE_MISUSE, "image: not one of this result");
         if (!values)
             return {};
-        const std::int64_t channels = static_cast<std::int64_t>(sizeof(Pixel) / sizeof(float));
+        const std::int64_t channels = cv::DataType<Pixel>::channels;
         const float* first = values + image * arrays_.height * arrays_.width * channels;
         return cv::Mat_<Pixel>(static_cast<int>(arrays_.height), static_cast<int>(arrays_.width),
                                reinterpret_cast<Pixel*>(const_cast<float*>(first)))
