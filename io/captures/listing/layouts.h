@@ -165,7 +165,7 @@ void settle_own_cameras(Listing& listing);
 void tell_ignored(const std::filesystem::path& folder, std::initializer_list<std::string_view> names,
                   std::vector<std::string>& warnings);
 
-/// Why a listed file cannot be opened: it is missing, or outside the capture's folder, by name or through a link.
+/// Why a listed file cannot be opened: it is missing, or its name leads out of the capture's folder. Links are followed.
 /// Empty = it can be opened.
 [[nodiscard]] std::string trouble_with(const std::filesystem::path& folder, const std::string& name);
 
