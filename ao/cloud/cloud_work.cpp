@@ -110,6 +110,8 @@ CloudWork::CloudWork(const CloudSetup& setup, const PointSet& cloud, const std::
                      const CloudDecisions& whole)
     : setup_(setup), options_(setup.options), scanner_(scanner), cloud_(cloud), part_(true), watch_(result_.timings),
       sides_(setup.options, setup.up, cloud.z_up), extent_(whole.extent) {
+    if (setup.device)
+        gpu_.emplace(*setup.device);
     valid_ = finite(cloud.points);
     twins_ = take_out_twins(cloud.points, recorded() ? cloud.normals : std::span<const Vector3d>(), valid_);
     sides_.orientation = whole.orientation;
@@ -288,7 +290,7 @@ void CloudWork::compute_thinned() {
     if (sides_.recorded_believed)
         options.normals = CloudNormals::recorded;
     const PointSet part{points, normals, {}, cloud_.z_up};
-    const CloudSetup setup{options, nullptr, setup_.up, setup_.viewpoint};
+    const CloudSetup setup{options, setup_.device, setup_.up, setup_.viewpoint};
     CloudWork some(setup, part, scanner_, decisions());
     const Repeatability found = repeatability(cloud_.points, result_.visibility, kept, some.run().visibility, check,
                                               order_.empty() ? valid_ : order_);
@@ -367,9 +369,10 @@ void CloudWork::settle_radius(const std::vector<Vector3d>& some, double share) {
 void CloudWork::settle_rays() {
     const double spacings = options_.sky || !(result_.spacing > 0) ? 0 : result_.radius / result_.spacing;
     const int level = spacings > 120 ? 2 : spacings > 60 ? 1 : 0;
-    constexpr int on_gpu = 64; // costs a GPU less time than the other stages cost the host
+    constexpr int on_gpu = 64;            // costs a GPU less time than the other stages cost the host
+    const bool checks = part_ && !whole_; // with as many rays on any machine: expected errors were fitted to these
     const int rays = options_.rays > 0 ? options_.rays
-                     : gpu_            ? on_gpu
+                     : gpu_ && !checks ? on_gpu
                                        : std::array{16, 8, 4}[static_cast<std::size_t>(level)];
     passes_ = options_.smooth >= 0 ? options_.smooth : std::array{2, 3, 5}[static_cast<std::size_t>(level)];
     directions_.emplace(rays, options_.seed);

@@ -79,14 +79,33 @@ Drawn some_of(const Cloud& cloud, const PointVisibility& found, std::size_t most
     drawn.middle = median_of(drawn.at);
     for (Vector3d& point : drawn.at)
         point -= drawn.middle;
-    if (!found.normals.empty()) {
-        for (const std::uint32_t i : drawn.index)
-            drawn.normals.push_back(found.normals[i]);
-    } else if (const std::vector<Vector3d> recorded = recorded_normals(cloud); !recorded.empty()) {
-        for (const std::uint32_t i : drawn.index)
-            drawn.normals.push_back(recorded[i].allFinite() ? Vector3f(recorded[i].cast<float>()) : Vector3f::Zero());
-    }
+    const auto give_normals = [&](const auto& of) {
+        drawn.normals.resize(drawn.index.size());
+        tbb::parallel_for(std::size_t(0), drawn.index.size(),
+                          [&](std::size_t i) { drawn.normals[i] = of(drawn.index[i]); });
+    };
+    if (!found.normals.empty())
+        give_normals([&](std::uint32_t i) { return found.normals[i]; });
+    else if (const std::vector<Vector3d> recorded = recorded_normals(cloud); !recorded.empty())
+        give_normals([&](std::uint32_t i) {
+            return recorded[i].allFinite() ? Vector3f(recorded[i].cast<float>()) : Vector3f(Vector3f::Zero());
+        });
     return drawn;
+}
+
+/// Enough of the points to choose views by, without their spacing.
+Drawn few_of(const Drawn& drawn) {
+    constexpr std::size_t enough = 20000;
+    const std::size_t step = std::max<std::size_t>(1, drawn.at.size() / enough);
+    Drawn few;
+    few.middle = drawn.middle;
+    for (std::size_t i = 0; i < drawn.at.size(); i += step) {
+        few.index.push_back(drawn.index[i]);
+        few.at.push_back(drawn.at[i]);
+        if (!drawn.normals.empty())
+            few.normals.push_back(drawn.normals[i]);
+    }
+    return few;
 }
 
 Drawn drawn_of(const Cloud& cloud, const PointVisibility& found) {
@@ -400,9 +419,14 @@ struct Raster {
     double px_per_unit = 1, x = 0, y = 0; ///< what the pixel (0, 0) sees
 };
 
-/// The quantiles, widened by a tenth where there are points, and a border.
-Range framed(std::vector<double> values) {
-    const Range usual{quantile(values, 0.01), quantile(values, 0.99)};
+/// The quantiles of some, widened by a tenth where there are points, and a border.
+Range framed(const std::vector<double>& values) {
+    constexpr std::size_t enough = 50000;
+    std::vector<double> some;
+    for (std::size_t i = 0; i < values.size(); i += std::max<std::size_t>(1, values.size() / enough))
+        some.push_back(values[i]);
+    const double lowest = quantile(some, 0.01);
+    const Range usual{lowest, quantile(some, 0.99)};
     const auto [low, high] = std::ranges::minmax(values);
     const double slack = 0.1 * usual.length(), border = 0.02 * usual.length();
     return {std::max(low, usual.low - slack) - border, std::min(high, usual.high + slack) + border};
@@ -418,7 +442,7 @@ Raster raster_of(const std::vector<std::optional<Seen>>& seen, PictureView::Kind
     if (x.empty())
         return {};
     Range across, down;
-    tbb::parallel_invoke([&] { across = framed(std::move(x)); }, [&] { down = framed(std::move(y)); });
+    tbb::parallel_invoke([&] { across = framed(x); }, [&] { down = framed(y); });
     const bool panorama = kind == PictureView::Kind::panorama;
     const int widest = panorama ? 1800 : 900, highest = 900;
     const double largest = std::max({across.length(), down.length(), 1e-9});
@@ -582,7 +606,7 @@ Vector3d up_of(const Cloud& cloud, const PointVisibility& found, const std::opti
 cv::Mat3b cloud_picture(const Cloud& cloud, const PointVisibility& found, const std::optional<Vector3d>& viewpoint,
                         double strength) {
     const Drawn drawn = drawn_of(cloud, found);
-    const std::array<PictureView, 2> views = views_of(cloud, drawn, viewpoint);
+    const std::array<PictureView, 2> views = views_of(cloud, few_of(drawn), viewpoint);
     std::array<cv::Mat3b, 2> rows;
     tbb::parallel_for(std::size_t(0), rows.size(), [&](std::size_t i) {
         const Canvas canvas = drawing_of(cloud, found, drawn, views[i]);
