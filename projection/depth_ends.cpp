@@ -55,21 +55,45 @@ std::optional<DepthEnd> end_of(const std::vector<Level>& levels, std::size_t val
     return std::nullopt; // hardly any others
 }
 
-/// Whether values vary as a noisy sensor's do: by second differences over a few pixels, where values differ at all.
-bool is_noisy(const cv::Mat1f& z_m) {
-    constexpr int lag = 4;
-    constexpr float least = 0.002F; // of depth
+/// The median second difference over this many pixels, of depth, where values differ at all, but not by an edge; 0 if
+/// hardly any do.
+float median_bend(const cv::Mat1f& z_m, int lag) {
     constexpr std::size_t enough = 100;
+    constexpr float edge = 0.05F;
     std::vector<float> bends;
     for (int v = 0; v < z_m.rows; v += every_px) {
         const float* row = z_m[v];
         for (int u = lag; u + lag < z_m.cols; u += every_px) {
             const float a = row[u - lag], z = row[u], b = row[u + lag];
-            if (a > 0 && z > 0 && b > 0 && !(a == z && z == b))
+            if (a > 0 && z > 0 && b > 0 && !(a == z && z == b) && std::max(std::abs(a - z), std::abs(b - z)) < edge * z)
                 bends.push_back(std::abs(a + b - 2 * z) / z);
         }
     }
-    return bends.size() > enough && median(std::move(bends)) > least;
+    return bends.size() > enough ? median(std::move(bends)) : 0;
+}
+
+/// Whether values vary as a noisy sensor's do. Noise bends as much over a few pixels as over many; surfaces, whose
+/// second differences grow with the square of the distance, do not.
+bool is_noisy(const cv::Mat1f& z_m) {
+    constexpr float least = 0.002F; // of depth
+    constexpr float alike = 0.4F;
+    const float few = median_bend(z_m, 2);
+    return few > least && few > alike * median_bend(z_m, 6);
+}
+
+/// Numbers that programs write for "nothing": 10, 20, 50, 100 ... metres, and the largest of 12 .. 16 bits of
+/// millimetres.
+bool is_customary_mark(float z_m) {
+    constexpr double alike = 1e-5;
+    const auto is = [&](double value) { return std::abs(static_cast<double>(z_m) - value) < alike * value; };
+    for (double power = 10; power <= 1e6; power *= 10)
+        for (const int digit : {1, 2, 5})
+            if (is(digit * power))
+                return true;
+    for (int bits = 12; bits <= 16; ++bits)
+        if (is(((1 << bits) - 1) / 1000.0))
+            return true;
+    return false;
 }
 
 } // namespace
@@ -94,7 +118,8 @@ DepthEnds depth_ends(const cv::Mat1f& z_m) {
     std::ranges::reverse(levels);
     ends.farthest = end_of(levels, valid);
     for (std::optional<DepthEnd>* end : {&ends.nearest, &ends.farthest})
-        if (*end && !(*end)->apart && ((*end)->share < least_share_cut || !is_noisy(z_m)))
+        if (*end && !((*end)->apart && is_customary_mark((*end)->z_m)) &&
+            ((!(*end)->apart && (*end)->share < least_share_cut) || !is_noisy(z_m)))
             end->reset();
     return ends;
 }

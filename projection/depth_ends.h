@@ -17,8 +17,8 @@ struct DepthEnds {
     std::optional<DepthEnd> nearest, farthest;
 };
 
-/// Of a depth image, 0 = hole. An end to which the others come up is told where depth has noise: a wall that faces an
-/// ideal sensor holds one value, too.
+/// Of a depth image, 0 = hole. An end is told where depth has noise, for a wall that faces an ideal sensor holds one
+/// value, too; one apart from the others also where it is a number by which programs mark holes.
 [[nodiscard]] DepthEnds depth_ends(const cv::Mat1f& z_m);
 
 } // namespace scanshade

@@ -8,16 +8,17 @@ namespace scanshade {
 namespace {
 
 constexpr int most_samples = 4000;
-constexpr double least_overlap = 0.3;  ///< share of the samples that land on a depth
+constexpr double least_overlap = 0.3;  ///< share of the samples that land in the other image
+constexpr double fewest_landed = 50;   ///< samples that land on a depth
 constexpr double truncated_at = 0.05;  ///< of the depth: a larger distance is to another surface
 constexpr double agreeing = 0.35;      ///< mean truncated distance, in units of the truncation
 constexpr double clearly_better = 0.5; ///< a cost is clearly lower if it is below this share of the other
 constexpr double farthest = 20, factor_step = 1.1, about_one = 1.35;
 
-/// Mean truncated distance between the surfaces, 0 .. 1; 1 without overlap.
-double cost(const DepthImage& a, const DepthImage& b, const Eigen::Isometry3d& b_from_a) {
+/// Mean truncated distance between the surfaces, 0 .. 1; none without overlap.
+std::optional<double> overlap_cost(const DepthImage& a, const DepthImage& b, const Eigen::Isometry3d& b_from_a) {
     const int stride = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(a.z_m.total()) / most_samples)));
-    double samples = 0, landed = 0, sum = 0;
+    double samples = 0, inside = 0, landed = 0, sum = 0;
     for (int v = stride / 2; v < a.z_m.rows; v += stride)
         for (int u = stride / 2; u < a.z_m.cols; u += stride) {
             if (!(a.z_m(v, u) > 0))
@@ -29,6 +30,7 @@ double cost(const DepthImage& a, const DepthImage& b, const Eigen::Isometry3d& b
             const Eigen::Vector2d pixel = b.camera.pixel(point);
             if (!(pixel.x() > -0.5 && pixel.y() > -0.5 && pixel.x() < b.z_m.cols - 0.5 && pixel.y() < b.z_m.rows - 0.5))
                 continue;
+            ++inside;
             const auto there = static_cast<double>(
                 b.z_m(static_cast<int>(std::lround(pixel.y())), static_cast<int>(std::lround(pixel.x()))));
             if (!(there > 0))
@@ -36,7 +38,12 @@ double cost(const DepthImage& a, const DepthImage& b, const Eigen::Isometry3d& b
             ++landed;
             sum += std::min(1.0, std::abs(point.z() - there) / (truncated_at * there));
         }
-    return landed > least_overlap * samples ? sum / landed : 1;
+    return inside > least_overlap * samples && landed > fewest_landed ? std::optional(sum / landed) : std::nullopt;
+}
+
+/// The same; 1 without overlap.
+double cost(const DepthImage& a, const DepthImage& b, const Eigen::Isometry3d& b_from_a) {
+    return overlap_cost(a, b, b_from_a).value_or(1);
 }
 
 } // namespace
@@ -100,11 +107,13 @@ Isometry3d world_from_camera(const Isometry3d& recorded, PoseReading reading) {
 
 std::optional<PoseReading> pose_reading(const PosedDepth& a, const PosedDepth& b) {
     constexpr double better_still = 0.75; // right poses cost less than half of none
-    const auto cost_of = [&](PoseReading reading) {
-        return cost(a.depth, b.depth,
-                    world_from_camera(b.world_from_camera, reading).inverse() *
-                        world_from_camera(a.world_from_camera, reading));
+    const auto between = [&](PoseReading reading) {
+        return overlap_cost(a.depth, b.depth,
+                            world_from_camera(b.world_from_camera, reading).inverse() *
+                                world_from_camera(a.world_from_camera, reading));
     };
+    const auto cost_of = [&](PoseReading reading) { return between(reading).value_or(1); };
+    const bool overlaps = between(PoseReading::recorded).has_value();
     const double recorded = cost_of(PoseReading::recorded), still = cost(a.depth, b.depth, Isometry3d::Identity());
     if (recorded <= agreeing)
         return recorded < clearly_better * still ? std::optional(PoseReading::recorded) : std::nullopt;
@@ -118,7 +127,9 @@ std::optional<PoseReading> pose_reading(const PosedDepth& a, const PosedDepth& b
         }
     if (best <= agreeing && best < clearly_better * std::min(recorded, still))
         return reading;
-    return still < better_still * recorded ? std::optional(PoseReading::contradicted) : std::nullopt;
+    // Frames of which poses say that they see other things may well be of other things, unless they look the same.
+    return still < (overlaps ? better_still * recorded : agreeing) ? std::optional(PoseReading::contradicted)
+                                                                   : std::nullopt;
 }
 
 } // namespace scanshade

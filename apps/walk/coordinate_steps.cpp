@@ -20,15 +20,23 @@ struct Axis {
 
 Axis along(std::span<const Eigen::Vector3d> points, std::size_t stride, int axis) {
     constexpr std::size_t least_repeated = 3; // points to a value
+    constexpr double flat = 0.9;              // share of the points at one value: a plane and strays
     std::vector<double> values;
     for (std::size_t i = 0; i < points.size(); i += stride)
         if (points[i].allFinite())
             values.push_back(points[i][axis]);
     const std::size_t count = values.size();
     std::ranges::sort(values);
+    std::size_t most_alike = 0, first = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        if (values[i] != values[first])
+            first = i;
+        most_alike = std::max(most_alike, i - first + 1);
+    }
     values.erase(std::unique(values.begin(), values.end()), values.end());
     Axis found{.distinct = values.size()};
-    if (values.size() < 3 || least_repeated * values.size() > count)
+    if (values.size() < 3 || least_repeated * values.size() > count ||
+        static_cast<double>(most_alike) > flat * static_cast<double>(count))
         return found;
     std::vector<double> gaps;
     for (std::size_t i = 1; i < values.size(); ++i)
@@ -68,7 +76,10 @@ std::optional<CoordinateSteps> coarse_steps(std::span<const Eigen::Vector3d> poi
     if (grid_of_heights ||
         !(stepped == 3 || (stepped == 2 && !one_a_cell) || largest->step > very_coarse * spacing || precision))
         return std::nullopt;
-    return CoordinateSteps{static_cast<int>(largest - axes.begin()), largest->step, largest->single_precision};
+    constexpr double alike = 0.01;
+    const bool in_all = std::ranges::all_of(
+        axes, [&](const Axis& axis) { return std::abs(axis.step - largest->step) < alike * largest->step; });
+    return CoordinateSteps{static_cast<int>(largest - axes.begin()), largest->step, largest->single_precision, in_all};
 }
 
 } // namespace scanshade

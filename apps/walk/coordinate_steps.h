@@ -11,6 +11,7 @@ struct CoordinateSteps {
     int axis = 0;                  ///< the one of the largest step
     double step = 0;               ///< the distance between neighbouring values
     bool single_precision = false; ///< as floats of 32 bits round coordinates of that size
+    bool in_all = false;           ///< the same step along all axes, as of a grid of voxels
 };
 
 /// Nothing where steps are fine for points that are `spacing` apart. A grid of heights has steps along two axes, and a

@@ -22,6 +22,7 @@ namespace {
 using Doubts = std::vector<std::string>;
 
 constexpr double least_share = 0.2;         ///< of valid pixels, and of valid pixels or points with a value
+constexpr double least_neighboured = 0.3;   ///< share of the valid pixels with a valid one next to them
 constexpr double all_alike = 0.999;         ///< share of the values that are exactly 0, or exactly 1
 constexpr std::size_t enough_values = 100;  ///< fewer may be alike by chance
 constexpr double least_radius_px = 2;       ///< at the median depth
@@ -30,6 +31,7 @@ constexpr double largest_sigma = 0.25;      ///< of the radius; beyond, noise is
 constexpr double most_noisy = 0.3;          ///< share of the valid pixels
 constexpr double least_scene_radii = 2;     ///< extent of an image's scene, in radii
 constexpr double farthest_centre = 0.2;     ///< of the principal point from the image's middle, in widths or heights
+constexpr double near_centre = 0.05;        ///< likewise, of cameras as they are built
 constexpr double narrowest_degrees = 0.5;   ///< of view, along the wider side
 constexpr double widest_degrees = 175;
 constexpr double largest_aspect = 2;       ///< fx / fy, either way
@@ -39,6 +41,21 @@ constexpr double most_blind_fisheye = 0.5; ///< a fisheye's corners may be beyon
 void add_if(bool doubtful, Doubts& doubts, const std::string& sentence) {
     if (doubtful)
         doubts.push_back(sentence);
+}
+
+/// Shares of the valid pixels with a valid one to the left or right, and above or below.
+std::array<double, 2> neighboured(const cv::Mat1f& z_m) {
+    std::size_t valid = 0, beside = 0, above = 0;
+    for (int v = 1; v + 1 < z_m.rows; ++v)
+        for (int u = 1; u + 1 < z_m.cols; u += 3) {
+            if (!(z_m(v, u) > 0))
+                continue;
+            ++valid;
+            beside += z_m(v, u - 1) > 0 || z_m(v, u + 1) > 0;
+            above += z_m(v - 1, u) > 0 || z_m(v + 1, u) > 0;
+        }
+    const auto all = static_cast<double>(std::max<std::size_t>(valid, 1));
+    return {valid == 0 ? 1 : static_cast<double>(beside) / all, valid == 0 ? 1 : static_cast<double>(above) / all};
 }
 
 void doubt_shares(const Work& work, Doubts& doubts) {
@@ -52,12 +69,71 @@ void doubt_shares(const Work& work, Doubts& doubts) {
     add_if(image && row.valid_share < least_share, doubts,
            fmt::format("only {:.1f} % of the pixels hold a depth: what hides in the holes cannot occlude.",
                        100 * row.valid_share));
+    if (image && row.valid_share >= least_share && !work.depth.z_m.empty()) {
+        const auto [beside, above] = neighboured(work.depth.z_m);
+        add_if(std::min(beside, above) < least_neighboured, doubts,
+               fmt::format("only {:.0f} % of the valid pixels have a valid one {}: what hides between them cannot "
+                           "occlude.",
+                           100 * std::min(beside, above), beside < above ? "beside them" : "above or below them"));
+    }
     add_if(row.coverage < least_share, doubts,
            fmt::format("only {:.1f} % of the valid {} got a value.", 100 * row.coverage,
                        work.frame.cloud ? "points" : "pixels"));
 }
 
-void doubt_values(std::span<const float> values, Doubts& doubts) {
+/// Whether depth shows hollows well within the radius, such as corners and what stands before something: a share of
+/// the pixels lies behind the line between neighbours.
+bool has_hollows(const DepthImage& depth, double radius_m) {
+    constexpr double least_radii = 0.05, least_share_hollow = 0.01;
+    constexpr int farthest_px = 32;
+    std::size_t valid = 0, hollow = 0;
+    for (int v = 0; v < depth.z_m.rows; v += 3)
+        for (int u = 0; u < depth.z_m.cols; u += 3) {
+            const double z = depth.z_m(v, u);
+            if (!(z > 0))
+                continue;
+            ++valid;
+            const int lag = std::clamp(static_cast<int>(radius_m * depth.camera.fx / z / 2), 1, farthest_px);
+            const auto behind = [&](int du, int dv) {
+                const cv::Rect image(0, 0, depth.z_m.cols, depth.z_m.rows);
+                if (!image.contains({u - du, v - dv}) || !image.contains({u + du, v + dv}))
+                    return false;
+                const double a = depth.z_m(v - dv, u - du), b = depth.z_m(v + dv, u + du);
+                return a > 0 && b > 0 && std::abs(a - z) < radius_m && std::abs(b - z) < radius_m &&
+                       z - 2 / (1 / a + 1 / b) > least_radii * radius_m; // 1 / z is linear along a plane
+            };
+            hollow += behind(lag, 0) || behind(0, lag);
+        }
+    return static_cast<double>(hollow) > least_share_hollow * static_cast<double>(valid);
+}
+
+/// The same of a cloud: a share of some points have others within the radius in front of their planes.
+bool has_hollows(const Cloud& cloud, const PointVisibility& found) {
+    constexpr std::size_t looking = 300, seen = 30000;
+    constexpr double least_radii = 0.05, least_share_hollow = 0.02;
+    if (found.normals.size() != cloud.points.size() || !(found.radius > 0))
+        return true; // nothing is known
+    const std::size_t count = cloud.points.size();
+    const std::size_t each = std::max<std::size_t>(1, count / looking), other = std::max<std::size_t>(1, count / seen);
+    std::size_t valid = 0, hollow = 0;
+    for (std::size_t i = 0; i < count; i += each) {
+        const Eigen::Vector3d at = cloud.points[i], normal = found.normals[i].cast<double>();
+        if (std::isnan(found.visibility[i]))
+            continue;
+        ++valid;
+        for (std::size_t j = 0; j < count; j += other)
+            if (const Eigen::Vector3d apart = cloud.points[j] - at;
+                apart.dot(normal) > least_radii * found.radius && apart.norm() < found.radius) {
+                ++hollow;
+                break;
+            }
+    }
+    return static_cast<double>(hollow) > least_share_hollow * static_cast<double>(valid);
+}
+
+/// `may_be_open()`: all may be open, as of a convex surface.
+template <class MayBeOpen>
+void doubt_values(std::span<const float> values, const MayBeOpen& may_be_open, Doubts& doubts) {
     std::size_t known = 0, closed = 0, open = 0;
     for (const float value : values) {
         known += !std::isnan(value);
@@ -67,9 +143,9 @@ void doubt_values(std::span<const float> values, Doubts& doubts) {
     if (known < enough_values)
         return;
     const auto most = static_cast<std::size_t>(all_alike * static_cast<double>(known));
-    add_if(open > most, doubts,
-           "every value is exactly 1, fully open: only a single flat surface reads so. Otherwise depth unit, camera or "
-           "radius are wrong.");
+    add_if(open > most && !may_be_open(), doubts,
+           "every value is exactly 1, fully open: only flat and convex surfaces read so. Otherwise depth unit, camera "
+           "or radius are wrong.");
     add_if(closed > most, doubts,
            "every value is exactly 0, fully closed: no real surface reads so. Depth unit, camera, normals or radius "
            "are wrong.");
@@ -210,7 +286,8 @@ void doubt_points(const Cloud& cloud, Doubts& doubts) {
 void doubt_steps(const Work& work, Doubts& doubts) {
     const double spacing = work.of_points.spacing;
     const auto steps = coarse_steps(work.frame.cloud->points, spacing);
-    if (!steps)
+    constexpr double enough_steps = 4; // in the radius: of a voxel grid, whose steps are alike everywhere
+    if (!steps || (steps->in_all && work.of_points.radius > enough_steps * steps->step))
         return;
     constexpr std::array names{"x", "y", "z"};
     doubts.push_back(fmt::format(
@@ -242,9 +319,16 @@ void doubt_camera(const Camera& camera, Doubts& doubts) {
            fmt::format("the camera's pixels are {:.3g} times as long as wide ({}; {}).", aspect, describe(camera),
                        camera.origin));
     const double middle_x = (pinhole.size.width - 1) / 2.0, middle_y = (pinhole.size.height - 1) / 2.0;
-    add_if(std::abs(pinhole.cx - middle_x) > farthest_centre * pinhole.size.width ||
-               std::abs(pinhole.cy - middle_y) > farthest_centre * pinhole.size.height,
-           doubts,
+    const auto off = [&](double x, double y) {
+        return std::max(std::abs(pinhole.cx - x) / pinhole.size.width, std::abs(pinhole.cy - y) / pinhole.size.height);
+    };
+    const double off_centre = off(middle_x, middle_y);
+    const bool turned = off_centre > 2 * near_centre && off(middle_y, middle_x) < near_centre;
+    add_if(turned, doubts,
+           fmt::format("the principal point is the middle of a {}x{} image: the camera seems to be that of the image "
+                       "before it was turned ({}; {}).",
+                       pinhole.size.height, pinhole.size.width, describe(camera), camera.origin));
+    add_if(!turned && off_centre > farthest_centre, doubts,
            fmt::format("the principal point is far from the middle of the image: the camera may be that of another "
                        "image size, or of the image before it was cropped ({}; {}).",
                        describe(camera), camera.origin));
@@ -270,14 +354,17 @@ std::vector<std::string> doubts_about(const Work& work, double radius_m, const D
     if (work.by_points) {
         doubt_unit(*work.frame.cloud, doubts);
         doubt_points(*work.frame.cloud, doubts);
-        doubt_values(work.of_points.visibility, doubts);
+        doubt_values(
+            work.of_points.visibility, [&] { return !has_hollows(*work.frame.cloud, work.of_points); }, doubts);
         doubt_radius_of_points(work, doubts);
         doubt_steps(work, doubts);
         return doubts;
     }
     const cv::Mat1f& visibility = work.ao.visibility;
     if (visibility.isContinuous())
-        doubt_values({visibility.ptr<float>(), visibility.total()}, doubts);
+        doubt_values(
+            {visibility.ptr<float>(), visibility.total()},
+            [&] { return radius_m > 0 && !has_hollows(work.depth, radius_m); }, doubts);
     doubt_radius_in_view(work, radius_m, unit, doubts);
     doubt_noise_in_view(work, radius_m, noise, unit, doubts);
     if (!work.frame.cloud) { // a cloud's camera is recovered or chosen, not given, unless --camera names it

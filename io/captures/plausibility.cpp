@@ -78,25 +78,42 @@ Statistics statistics_of(const cv::Mat1w& stored, const DepthTable& table) {
 /// Which lines repeat the line before them, exactly.
 struct Repeats {
     int every = 0;    ///< 2 after an enlargement to twice the size; 0 where no such pattern is
-    double share = 0; ///< of the lines with content, whatever the pattern: 0.6 after 2.5 times the size
+    double share = 0; ///< of the lines with content, if runs of equal ones are alike: 0.6 after 2.5 times the size
 };
+
+/// The share of lines that lie in runs of equal ones as long as those of an enlargement: its factor rounded down or up.
+/// Surfaces across the axis of an ideal camera make long runs beside short ones.
+double in_alike_runs(const std::vector<int>& runs, double factor) {
+    double alike = 0, all = 0;
+    for (const int run : runs) {
+        alike += std::abs(run - factor) < 1 ? run : 0;
+        all += run;
+    }
+    return all > 0 ? alike / all : 0;
+}
 
 /// Where all lines are alike, as of a wall seen by an ideal sensor, nothing was repeated.
 Repeats repeats_of(const cv::Mat& lines) {
     constexpr int most = 4;
-    constexpr double nearly_all = 0.9, hardly_any = 0.1, all = 0.95;
+    constexpr double nearly_all = 0.9, hardly_any = 0.1, all = 0.95, mostly = 0.8;
     std::vector<bool> counts(static_cast<std::size_t>(lines.rows)), repeats(counts.size());
     double repeated_in_all = 0, of_all = 0;
+    std::vector<int> runs;
     for (int v = 1; v < lines.rows; ++v) {
         counts[v] = 4 * cv::countNonZero(lines.row(v)) > lines.cols;
         repeats[v] = counts[v] && std::memcmp(lines.ptr(v), lines.ptr(v - 1),
                                               static_cast<std::size_t>(lines.cols) * lines.elemSize()) == 0;
         repeated_in_all += repeats[v];
         of_all += counts[v];
+        if (repeats[v] && !runs.empty())
+            ++runs.back();
+        else if (counts[v])
+            runs.push_back(1);
     }
     Repeats found;
-    if (of_all > 4 * most && repeated_in_all < all * of_all)
-        found.share = repeated_in_all / (of_all + 1); // the first line repeats none
+    const double share = repeated_in_all / (of_all + 1); // the first line repeats none
+    if (of_all > 4 * most && repeated_in_all < all * of_all && in_alike_runs(runs, 1 / (1 - share)) > mostly)
+        found.share = share;
     for (int every = 2; every <= most && found.every == 0; ++every)
         for (int first = 0; first < every; ++first) {
             double repeated = 0, of = 0, others_repeated = 0, others = 0;
@@ -172,7 +189,7 @@ std::string what_scales_give(float median_m, const DepthEncoding& encoding) {
 /// The largest number that nearly all stored values are multiples of; 1 where too few differ to tell.
 int common_divisor(const cv::Mat& stored) {
     constexpr std::size_t enough = 50;
-    constexpr int largest = 100;
+    constexpr int largest = 257;       // 8 bits widened to 16
     constexpr double nearly_all = 0.9; // beyond 8 m, SUN RGB-D's rotated bits end in odd ones
     std::vector<bool> there(65536);
     for (int v = 0; v < stored.rows; v += 3)
@@ -206,13 +223,29 @@ void doubt_steps(const cv::Mat& stored, const DepthEncoding& encoding, std::vect
                         step_mm, encoding.name, encoding.origin, what_others_give(stored, encoding)));
 }
 
+/// From next to zero to the largest integer or to one: depth that was stretched from its smallest to its largest value.
+bool is_stretched(const cv::Mat& stored) {
+    constexpr double hardly_any = 0.01, nearly_all = 0.98;
+    const bool integers = stored.type() == CV_16UC1;
+    if (!integers && stored.type() != CV_32FC1)
+        return false;
+    const double whole = integers ? 65535 : 1;
+    const cv::Mat holes = stored <= 0, full = stored >= whole; // the largest integer marks holes in other files
+    const cv::Mat others = integers ? cv::Mat((holes == 0) & (full == 0)) : cv::Mat(holes == 0);
+    double least = 0, most = 0;
+    if (cv::countNonZero(others) < 100)
+        return false;
+    cv::minMaxIdx(stored, &least, &most, nullptr, nullptr, others);
+    return least < hardly_any * whole && (integers ? most > nearly_all * whole : most == whole);
+}
+
 /// `image`: depths of any kind, 0 = hole.
 std::vector<std::string> doubts_about(const Statistics& depth, const cv::Mat& image, const cv::Mat& stored,
                                       const DepthEncoding& encoding) {
     constexpr float nearest_median_m = 0.05F, farthest_median_m = 200, farthest_m = 1000;
     // If nobody named the encoding, but the layout or custom did, depth beyond an indoor sensor's range is worth a
-    // warning, too.
-    constexpr float assumed_farthest_median_m = 12;
+    // warning, too. Floats may be of streets and halls; in centimetres or millimetres they are beyond these as well.
+    constexpr float assumed_farthest_median_m = 12, floats_farthest_median_m = 40;
     if (depth.valid == 0) {
         if (depth.largest_m > 0)
             return {}; // a few pixels between those sampled
@@ -227,7 +260,9 @@ std::vector<std::string> doubts_about(const Statistics& depth, const cv::Mat& im
         return doubts;
     }
     const bool assumed = !encoding.stated;
-    const float farthest_likely_m = assumed ? assumed_farthest_median_m : farthest_median_m;
+    const float farthest_likely_m = !assumed                    ? farthest_median_m
+                                    : stored.type() == CV_16UC1 ? assumed_farthest_median_m
+                                                                : floats_farthest_median_m;
     const std::string stated = fmt::format("encoding {} ({})", encoding.name, encoding.origin);
     std::vector<std::string> doubts;
     if (depth.jumps > 0.2)
@@ -242,6 +277,10 @@ std::vector<std::string> doubts_about(const Statistics& depth, const cv::Mat& im
                                                                : what_scales_give(depth.median_m, encoding)));
     if (doubts.empty())
         doubt_steps(stored, encoding, doubts);
+    if (doubts.empty() && assumed && is_stretched(stored))
+        doubts.push_back(fmt::format("values fill the whole range of the file's numbers, as of depth stretched for "
+                                     "looking at: they are no lengths, whatever {} says.",
+                                     stated));
     doubt_repeats(image, doubts);
     return doubts;
 }
