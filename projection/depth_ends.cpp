@@ -91,9 +91,27 @@ bool is_customary_mark(float z_m) {
             if (is(digit * power))
                 return true;
     for (int bits = 12; bits <= 16; ++bits)
-        if (is(((1 << bits) - 1) / 1000.0))
+        if (std::abs(static_cast<double>(z_m) - ((1 << bits) - 1) / 1000.0) < 0.0011) // or the one before
             return true;
     return false;
+}
+
+/// Whether the pixels that hold this depth end raggedly, as where noise decides which are cut off: by the share of
+/// those at the border that touch others on more than one side. Walls and tables have edges.
+bool is_ragged(const cv::Mat1f& z_m, float value) {
+    constexpr double least = 0.15; // 0.25 .. 0.5 of ranges cut off, 0.03 of walls
+    std::size_t border = 0, ragged = 0;
+    for (int v = 1; v + 1 < z_m.rows; ++v)
+        for (int u = 1; u + 1 < z_m.cols; ++u) {
+            if (z_m(v, u) != value)
+                continue;
+            int others = 0;
+            for (const float next : {z_m(v, u - 1), z_m(v, u + 1), z_m(v - 1, u), z_m(v + 1, u)})
+                others += next > 0 && next != value;
+            border += others > 0;
+            ragged += others > 1;
+        }
+    return static_cast<double>(ragged) > least * static_cast<double>(border);
 }
 
 } // namespace
@@ -119,7 +137,7 @@ DepthEnds depth_ends(const cv::Mat1f& z_m) {
     ends.farthest = end_of(levels, valid);
     for (std::optional<DepthEnd>* end : {&ends.nearest, &ends.farthest})
         if (*end && !((*end)->apart && is_customary_mark((*end)->z_m)) &&
-            ((!(*end)->apart && (*end)->share < least_share_cut) || !is_noisy(z_m)))
+            ((!(*end)->apart && (*end)->share < least_share_cut) || !is_noisy(z_m) || !is_ragged(z_m, (*end)->z_m)))
             end->reset();
     return ends;
 }

@@ -72,22 +72,35 @@ Shape range_by_z(const Pinhole& camera, double u, double v, double half_px) {
             0};
 }
 
-/// A slope in the image's own numbers, on whichever side of an edge or a ridge.
-using Slope = Eigen::Array2d;
+/// An inverse depth that is linear in the pixel, as a plane's: at the middle of a patch, and per pixel.
+struct Inverse {
+    double u = 0, v = 0, half_px = 0, middle = 0, by_u = 0, by_v = 0;
+
+    [[nodiscard]] double at(double other_u, double other_v) const {
+        return middle + by_u * (other_u - u) + by_v * (other_v - v);
+    }
+    /// Whether the planes through both patches are one, though the patches lie apart: curved surfaces have none such.
+    [[nodiscard]] bool goes_on_in(const Inverse& other) const {
+        constexpr double nearest = 1.45, farthest = 4, alike = 0.002; // half patches; of inverse depth
+        const double apart_px = std::max(std::abs(other.u - u), std::abs(other.v - v));
+        return apart_px >= nearest * half_px && apart_px <= farthest * half_px &&
+               std::abs(at(other.u, other.v) - other.middle) < alike * other.middle &&
+               std::abs(other.at(u, v) - middle) < alike * middle;
+    }
+    /// Of its plane, unit.
+    [[nodiscard]] Vector3d normal(const Pinhole& camera) const {
+        return Vector3d(by_u * camera.fx, by_v * camera.fy, at(camera.cx, camera.cy)).normalized();
+    }
+};
 
 /// Patches for z and against it, weighted by how many standard deviations the bends of both kinds are apart.
-struct Votes {
-    struct Against {
-        Slope slope;
-        double weight;
-    };
-    int patches = 0;
-    double z = 0, other = 0;
-    std::vector<Against> against;
-
-    /// `measured` and its deviations, and what it would be if the image held z, or the other kind.
+class Votes {
+  public:
+    /// `measured` and its deviations, and what it would be if the image held z, or the other kind. `inverse`: by the
+    /// other kind.
+    template <class Of>
     void count(const Vector3d& measured, const Vector3d& sigma, const Vector3d& of_z, const Vector3d& of_other,
-               const Slope& slope) {
+               const Of& inverse) {
         constexpr double least_apart = 2, most_apart = 10, largest_off = 3;
         const Vector3d apart = (of_z - of_other).cwiseQuotient(sigma),
                        from = (measured - of_other).cwiseQuotient(sigma);
@@ -97,35 +110,81 @@ struct Votes {
         const double share = from.dot(apart) / apart.squaredNorm(); // 0 if the other kind, 1 if z
         if ((from - share * apart).norm() > std::max(largest_off, distance / 2) || std::abs(share - 0.5) > 1)
             return; // neither: a surface that bends
-        ++patches;
+        ++patches_;
         const double weight = std::min(distance, most_apart) * std::min(distance, most_apart);
         if (share > 0.5) {
-            z += weight;
+            z_ += weight;
             return;
         }
-        other += weight;
-        against.push_back({slope.abs(), weight});
+        other_ += weight;
+        against_.push_back({inverse(), weight});
+    }
+    [[nodiscard]] bool for_z() const { return decided() && z_ > most_ * (z_ + other_); }
+
+    /// Most speaks against z, and most of that lies on planes that go on elsewhere. To second order a ball in front of
+    /// the camera looks like the distances of a wall.
+    [[nodiscard]] bool against_z() const {
+        constexpr double enough = 0.5;
+        if (!decided() || other_ <= most_ * (z_ + other_))
+            return false;
+        return enough * other_ < weight_where([&](const Against& one) {
+                   return std::any_of(against_.begin(), against_.end(),
+                                      [&](const Against& another) { return one.inverse.goes_on_in(another.inverse); });
+               });
     }
     /// Most of what speaks against z has one slope: a ramp of numbers that somebody drew looks like that, and like the
     /// disparities of a single plane.
     [[nodiscard]] bool of_one_slope() const {
-        constexpr double alike = 0.2, most = 0.85;
-        return std::any_of(against.begin(), against.end(), [&](const Against& one) {
-            const double weight =
-                std::accumulate(against.begin(), against.end(), 0.0, [&](double sum, const Against& another) {
-                    const bool same = (another.slope - one.slope).matrix().norm() < alike * one.slope.matrix().norm();
-                    return same ? sum + another.weight : sum;
-                });
-            return weight > most * other;
+        constexpr double alike = 0.2, nearly_all = 0.85;
+        const auto slope = [](const Against& one) { // on whichever side of an edge or a ridge
+            return Eigen::Vector2d(std::abs(one.inverse.by_u), std::abs(one.inverse.by_v));
+        };
+        return std::any_of(against_.begin(), against_.end(), [&](const Against& one) {
+            return nearly_all * other_ < weight_where([&](const Against& another) {
+                       return (slope(another) - slope(one)).norm() < alike * slope(one).norm();
+                   });
         });
     }
+    /// A part of what speaks against z lies on planes that are turned to most of the others.
+    [[nodiscard]] bool of_several_planes(const Pinhole& camera) const {
+        constexpr double alike = 0.9945, turned = 0.951; // cosines of 6 and 18 degrees
+        constexpr double enough = 0.05;
+        double most = 0;
+        Vector3d usual = Vector3d::UnitZ();
+        for (const Against& one : against_) {
+            const Vector3d normal = one.inverse.normal(camera);
+            const double weight = weight_where(
+                [&](const Against& another) { return another.inverse.normal(camera).dot(normal) > alike; });
+            if (weight > most) {
+                most = weight;
+                usual = normal;
+            }
+        }
+        return enough * other_ <
+               weight_where([&](const Against& one) { return one.inverse.normal(camera).dot(usual) < turned; });
+    }
+
+  private:
+    struct Against {
+        Inverse inverse;
+        double weight;
+    };
+    static constexpr double most_ = 0.8;
+
     [[nodiscard]] bool decided() const {
         constexpr int fewest = 6;
         constexpr double least = 60;
-        return patches >= fewest && z + other >= least;
+        return patches_ >= fewest && z_ + other_ >= least;
     }
-    [[nodiscard]] bool against_z() const { return decided() && other > 0.8 * (z + other); }
-    [[nodiscard]] bool for_z() const { return decided() && z > 0.8 * (z + other); }
+    template <class Holds>
+    [[nodiscard]] double weight_where(const Holds& holds) const {
+        return std::accumulate(against_.begin(), against_.end(), 0.0,
+                               [&](double sum, const Against& one) { return holds(one) ? sum + one.weight : sum; });
+    }
+
+    int patches_ = 0;
+    double z_ = 0, other_ = 0;
+    std::vector<Against> against_;
 };
 
 /// The pixel of a patch's sample: the middle is at `at`.
@@ -145,6 +204,15 @@ std::optional<Patch> logarithms_at(const cv::Mat1f& values, double u, double v, 
         }
     }
     return Patch(patch.array().log());
+}
+
+/// Of the rays (x, y, 1) through a patch's samples.
+Patch ray_lengths(const Pinhole& camera, double u, double v, double half_px) {
+    Patch lengths;
+    for (int i = 0; i < side; ++i)
+        for (int j = 0; j < side; ++j)
+            lengths(i, j) = static_cast<float>(camera.ray(nearest(u, half_px, j), nearest(v, half_px, i)).norm());
+    return lengths;
 }
 
 } // namespace
@@ -171,17 +239,21 @@ DepthKind depth_kind(const DepthImage& depth) {
                              sigma_xy = std::max(shape.deviation / xy_norm, least_deviation);
                 const Vector3d sigma(sigma_xx, sigma_xy, sigma_xx);
                 const Vector3d of_z = bend_of_plane(shape.along_x, shape.along_y);
-                const Slope slope = std::exp(values->mean()) / half * Slope(shape.along_x, shape.along_y);
-                inverse.count(shape.bend, sigma, of_z, -of_z, slope);
+                const Patch of_patch = values->array().exp();
+                const auto linear = [&](const Patch& w) {
+                    return Inverse{
+                        u, v, half, double{w.mean()}, factor(w, basis().x) / half, factor(w, basis().y) / half};
+                };
+                inverse.count(shape.bend, sigma, of_z, -of_z, [&] { return linear(of_patch); });
                 const Shape ratio = range_by_z(camera, u, v, half);
                 range.count(shape.bend, sigma, of_z,
                             ratio.bend + bend_of_plane(shape.along_x - ratio.along_x, shape.along_y - ratio.along_y),
-                            slope);
+                            [&] { return linear(ray_lengths(camera, u, v, half).cwiseQuotient(of_patch)); });
             }
     }
     if (inverse.against_z() && !inverse.of_one_slope())
         return DepthKind::inverse;
-    if (range.against_z())
+    if (range.against_z() && range.of_several_planes(camera))
         return DepthKind::range;
     return inverse.for_z() || range.for_z() ? DepthKind::z : DepthKind::unknown;
 }

@@ -15,7 +15,8 @@ enum class DepthKind {
 /// By how patches of the image bend. Along a plane 1 / z is linear in the pixel; each kind makes another bend of it,
 /// whatever the unit. Patches that are not even, or whose noise hides the bend, have no say. `unknown` where few
 /// patches can tell, or where they disagree: surfaces bend, too, but not alike everywhere.
-/// Ramps of one slope are unknown, too: disparities of a single plane, or depth that somebody drew. Range needs a right
+/// What speaks against z must lie on planes that go on elsewhere. Ramps of one slope are unknown, too: disparities of a
+/// single plane, or depth that somebody drew; and ranges of one plane, which look like a ball. Range needs a right
 /// camera.
 [[nodiscard]] DepthKind depth_kind(const DepthImage& depth);
 

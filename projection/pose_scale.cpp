@@ -127,9 +127,8 @@ std::optional<PoseReading> pose_reading(const PosedDepth& a, const PosedDepth& b
         }
     if (best <= agreeing && best < clearly_better * std::min(recorded, still))
         return reading;
-    // Frames of which poses say that they see other things may well be of other things, unless they look the same.
-    return still < (overlaps ? better_still * recorded : agreeing) ? std::optional(PoseReading::contradicted)
-                                                                   : std::nullopt;
+    // Frames of which poses say that they see other things may well be of other things.
+    return overlaps && still < better_still * recorded ? std::optional(PoseReading::contradicted) : std::nullopt;
 }
 
 } // namespace scanshade

@@ -292,18 +292,16 @@ void CloudWork::compute_thinned() {
     const PointSet part{points, normals, {}, cloud_.z_up};
     const CloudSetup setup{options, setup_.device, setup_.up, setup_.viewpoint};
     CloudWork some(setup, part, scanner_, decisions());
-    const Repeatability found = repeatability(cloud_.points, result_.visibility, kept, some.run().visibility, check,
-                                              order_.empty() ? valid_ : order_);
+    const std::vector<float> repeats = repeatability(cloud_.points, result_.visibility, kept, some.run().visibility,
+                                                     check, order_.empty() ? valid_ : order_);
     order_.clear();
-    error_by_check_ = found.rms;
     watch_.lap("check on a part");
     tbb::parallel_for(std::size_t(0), result_.error.size(), [&](std::size_t i) {
         if (!std::isnan(result_.visibility[i]))
-            result_.error[i] =
-                error_once_checked(result_.error[i], result_.visibility[i], sides_known_[i], found.error[i]);
+            result_.error[i] = error_once_checked(result_.error[i], result_.visibility[i], sides_known_[i], repeats[i]);
     });
     for (std::size_t i = 0; i < signs_.size(); ++i)
-        signs_[i].repeat = found.error[i];
+        signs_[i].repeat = repeats[i];
 }
 
 float error_once_checked(float factor_of_surroundings, float visibility, std::uint8_t side, float repeat) {
@@ -319,7 +317,7 @@ void CloudWork::tell_error() {
     result_.expected_error = sum.rms();
     if (!result_.expected_error)
         return;
-    const ToldError told = told_error(*result_.expected_error, error_by_check_);
+    const ToldError told = told_error(*result_.expected_error);
     result_.notes.push_back(told.note);
     if (told.doubt)
         doubt(*told.doubt);
@@ -336,16 +334,12 @@ std::optional<double> ErrorSum::rms() const {
     return count_ > 0 ? std::optional(std::sqrt(squares_ / static_cast<double>(count_))) : std::nullopt;
 }
 
-ToldError told_error(double error, double by_check) {
+ToldError told_error(double error) {
     constexpr double largest_error = 0.12;
-    constexpr const char* way_out = "A larger --radius spans more points; ao_confidence tells where";
+    constexpr const char* way_out = "A larger --radius spans more points; ao_confidence tells where.";
     ToldError told{fmt::format("an error of {:.2f} RMS is expected (--write error: of every point).", error), {}};
     if (error > largest_error)
         told.doubt = fmt::format("an error of {:.2f} RMS is expected. {}", error, way_out);
-    else if (by_check > largest_error)
-        told.doubt = fmt::format("a part of the points by themselves give quite other values, as if the error were "
-                                 "{:.2f} RMS. {}",
-                                 by_check, way_out);
     return told;
 }
 
@@ -402,6 +396,8 @@ void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
     Fitted planes = planes_of(round, gpu);
     CloudSurface& surface = planes.surface;
     FittedCloud& fitted = planes.points;
+    if (!part_)
+        doubt_lines(surface);
     const std::vector<std::uint32_t> lonely = drop_strays(surface, extent_.centre, result_.spacing);
     std::optional<DiscRays> rays;
     const std::vector<float> side_known =
@@ -524,6 +520,15 @@ std::vector<float> CloudWork::sides_as_in_whole(CloudSurface& surface) const {
             normal = -normal;
     });
     return known;
+}
+
+void CloudWork::doubt_lines(const CloudSurface& surface) {
+    constexpr double many =
+        0.15; // 0.17 .. 0.6 in sweeps of 64 and 16 lasers along a street, 0.1 in a scan from a tripod
+    if (const double share = share_on_lines(surface); share > many)
+        doubt(fmt::format("{:.0f} % of the points have all near neighbours on a line, as in the rings of a spinning "
+                          "lidar: planes across the lines are guesses. Several sweeps in one cloud fill the gaps.",
+                          100 * share));
 }
 
 void CloudWork::doubt(const std::string& sentence) {

@@ -141,6 +141,7 @@ class CloudWork {
     void tile(const Indices& core, const Indices& round);
     void tile(const Indices& core, const Indices& round, CloudGpu* gpu);
     [[nodiscard]] std::vector<float> sides_as_in_whole(CloudSurface& surface) const;
+    void doubt_lines(const CloudSurface& surface);
     void doubt(const std::string& sentence);
     [[nodiscard]] Fitted planes_of(const Indices& which, CloudGpu* gpu);
     [[nodiscard]] bool recorded() const;
@@ -165,7 +166,6 @@ class CloudWork {
     std::vector<Twin> twins_; ///< copies of points, in neither
     bool normals_refused_ = false;
     FittedCounts fitted_;
-    double error_by_check_ = 0;
     int gpu_tiles_ = 0, passes_ = 2;
 };
 
@@ -195,13 +195,12 @@ class ErrorSum {
     std::size_t count_ = 0;
 };
 
-/// Sentences about the expected error of a cloud, and the error that its check alone lets expect. `doubt` is there if
-/// one of them is large.
+/// Sentences about the expected error of a cloud; `doubt` is there if it is large.
 struct ToldError {
     std::string note;
     std::optional<std::string> doubt;
 };
-[[nodiscard]] ToldError told_error(double error, double by_check);
+[[nodiscard]] ToldError told_error(double error);
 
 constexpr std::size_t enough_to_judge = 60000; ///< points of a sample
 

@@ -84,10 +84,17 @@ std::vector<float> SettledSides::settle_recorded(CloudSurface& surface, std::opt
         constexpr double enough = 0.3; // of the points: else nothing is said
         return all > enough * static_cast<double>(of.size()) ? opposed / all : 0;
     };
+    // Where scanners could have stood that see recorded fronts as well as those found, who recorded them knew better.
+    const auto as_good = [](const Sides& found) {
+        constexpr double tie = 0.05;
+        return !found.sure && found.explained_as_given && *found.explained_as_given > *found.explained - tie;
+    };
     const auto all_is_well = [&](const CloudSurface& of, const Patches& patches, std::optional<DiscRays>& rays_of) {
-        constexpr SidesEffort quick{4000, 60, 300};
-        recorded_believed = recorded_sides(of, patches).random <= hardly_random &&
-                            opposed_share(of, found_in(of, patches, rays_of, quick)) <= some_opposed;
+        constexpr SidesEffort quick{4000, 60, 300, true};
+        if (recorded_sides(of, patches).random > hardly_random)
+            return false;
+        const Sides found = found_in(of, patches, rays_of, quick);
+        recorded_believed = as_good(found) || opposed_share(of, found) <= some_opposed;
         return recorded_believed;
     };
     constexpr std::size_t enough = 100000;
@@ -102,9 +109,20 @@ std::vector<float> SettledSides::settle_recorded(CloudSurface& surface, std::opt
         return {};
     const RecordedSides order = recorded_sides(surface, patches);
     const bool in_order = order.random <= hardly_random;
-    Sides found = found_in(surface, patches, rays);
-    const double opposed = opposed_share(surface, found);
-    recorded_believed = in_order && !told && opposed <= some_opposed;
+    SidesEffort thorough;
+    thorough.given_too = in_order && !told;
+    Sides found = found_in(surface, patches, rays, thorough);
+    double opposed = opposed_share(surface, found);
+    if (thorough.given_too && orientation.kind == NormalOrientation::Kind::viewpoint && opposed > some_opposed &&
+        opposed < all_opposed) {
+        // Nearly everything is seen first from the foot of a table, too, where no scanner stood.
+        if (!rays)
+            rays.emplace(surface);
+        const Sides free = sides_of(surface, patches, &*rays, {}, SidesRule::automatic, thorough);
+        if (as_good(free) || opposed_share(surface, free) <= some_opposed)
+            opposed = 0;
+    }
+    recorded_believed = in_order && !told && (as_good(found) || opposed <= some_opposed);
     if (recorded_believed)
         return {};
     if (constexpr double clearly = 0.3; in_order && !told && opposed > all_opposed && found.margin < clearly) {
@@ -113,12 +131,12 @@ std::vector<float> SettledSides::settle_recorded(CloudSurface& surface, std::opt
             doubts.push_back(
                 fmt::format("{:.0f} % of the recorded normals look down, though the cloud seems to be seen from "
                             "above; they are kept: --cloud.outside up turns them, --cloud.normals recorded is "
-                            "sure of them",
+                            "sure of them.",
                             100 * opposed));
         else if (orientation.kind != NormalOrientation::Kind::terrain && !found.doubt) // z may point anywhere
             doubts.push_back(
                 fmt::format("{:.0f} % of the recorded normals face away from {}; they are kept: --cloud.outside "
-                            "turns them, --cloud.normals recorded is sure of them",
+                            "turns them, --cloud.normals recorded is sure of them.",
                             100 * opposed, viewed ? orientation.why : "where scanners could have stood"));
         return {};
     }
@@ -140,7 +158,7 @@ std::vector<float> SettledSides::settle_recorded(CloudSurface& surface, std::opt
     if (!told && (in_order || turned > surface.size() * 3 / 5))
         doubts.push_back(fmt::format(
             "{:.0f} % of the recorded normals face away from where scanners could have stood; they "
-            "were turned: --cloud.normals recorded keeps them",
+            "were turned: --cloud.normals recorded keeps them.",
             in_order ? 100 * opposed : 100 * static_cast<double>(turned) / static_cast<double>(surface.size())));
     note(found);
     return all ? std::move(found.confidence) : std::vector<float>();

@@ -14,6 +14,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <numbers>
+#include <opencv2/imgproc.hpp>
 #include <span>
 
 namespace scanshade {
@@ -43,19 +44,31 @@ void add_if(bool doubtful, Doubts& doubts, const std::string& sentence) {
         doubts.push_back(sentence);
 }
 
-/// Shares of the valid pixels with a valid one to the left or right, and above or below.
+/// Shares of the valid pixels with a valid one at most two to the left or right, and above or below.
 std::array<double, 2> neighboured(const cv::Mat1f& z_m) {
     std::size_t valid = 0, beside = 0, above = 0;
-    for (int v = 1; v + 1 < z_m.rows; ++v)
-        for (int u = 1; u + 1 < z_m.cols; u += 3) {
-            if (!(z_m(v, u) > 0))
+    const auto holds = [&](int v, int u) { return z_m(v, u) > 0; };
+    for (int v = 2; v + 2 < z_m.rows; ++v)
+        for (int u = 2; u + 2 < z_m.cols; u += 3) {
+            if (!holds(v, u))
                 continue;
             ++valid;
-            beside += z_m(v, u - 1) > 0 || z_m(v, u + 1) > 0;
-            above += z_m(v - 1, u) > 0 || z_m(v + 1, u) > 0;
+            beside += holds(v, u - 1) || holds(v, u + 1) || holds(v, u - 2) || holds(v, u + 2);
+            above += holds(v - 1, u) || holds(v + 1, u) || holds(v - 2, u) || holds(v + 2, u);
         }
     const auto all = static_cast<double>(std::max<std::size_t>(valid, 1));
     return {valid == 0 ? 1 : static_cast<double>(beside) / all, valid == 0 ? 1 : static_cast<double>(above) / all};
+}
+
+/// Whether the valid pixels are those of an object without its background: most of the box round them.
+bool is_cut_out(const cv::Mat1f& z_m) {
+    constexpr double most = 0.4, least = 0.001;
+    if (z_m.empty())
+        return false;
+    const cv::Mat valid = z_m > 0;
+    const cv::Rect box = cv::boundingRect(valid);
+    const double inside = cv::countNonZero(valid);
+    return inside > most * box.area() && inside > least * static_cast<double>(z_m.total());
 }
 
 void doubt_shares(const Work& work, Doubts& doubts) {
@@ -66,7 +79,7 @@ void doubt_shares(const Work& work, Doubts& doubts) {
                work.frame.cloud ? "no point is valid." : "no pixel holds a valid depth.");
         return;
     }
-    add_if(image && row.valid_share < least_share, doubts,
+    add_if(image && row.valid_share < least_share && !is_cut_out(work.depth.z_m), doubts,
            fmt::format("only {:.1f} % of the pixels hold a depth: what hides in the holes cannot occlude.",
                        100 * row.valid_share));
     if (image && row.valid_share >= least_share && !work.depth.z_m.empty()) {

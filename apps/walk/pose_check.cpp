@@ -56,6 +56,11 @@ Told told_by(const Capture& capture, std::size_t a, std::size_t b) {
     }
 }
 
+/// "2.3", "1000".
+std::string two_digits(double value) {
+    return value < 99.5 ? fmt::format("{:.2g}", value) : fmt::format("{:.0f}", value);
+}
+
 std::string factor_warning(const std::vector<double>& factors, bool arbitrary_unit) {
     constexpr double alike = 1.3;
     if (factors.empty())
@@ -64,14 +69,16 @@ std::string factor_warning(const std::vector<double>& factors, bool arbitrary_un
     const double factor = std::sqrt(low * high);
     if (low == 1 || high == 1 || high > alike * low)
         return {};
+    const double power = std::abs(std::log10(factor));
+    if (factors.size() < 2 && std::abs(power - std::round(power)) > std::log10(alike)) // one pair may be a bad pose
+        return {};
     if (arbitrary_unit)
-        return fmt::format(
-            "depths fit the poses only if they are multiplied by {:.2g}: depth maps and poses are not of "
-            "the same reconstruction.",
-            factor);
-    return fmt::format("depths fit the poses only if they are multiplied by {:.2g}: the depth unit is wrong, or the "
+        return fmt::format("depths fit the poses only if they are multiplied by {}: depth maps and poses are not of "
+                           "the same reconstruction.",
+                           two_digits(factor));
+    return fmt::format("depths fit the poses only if they are multiplied by {}: the depth unit is wrong, or the "
                        "poses are not in metres.",
-                       factor);
+                       two_digits(factor));
 }
 
 /// Where all pairs that tell tell the same, and no fewer than `least`.

@@ -45,13 +45,17 @@ Statistics sampled(const cv::Mat_<Pixel>& image, const Metres& metres, const Kee
     return result;
 }
 
+/// What renderers write where there is nothing: 1e10, or the largest number of half precision.
+bool is_background(float z_m) { return z_m >= 1e6F || z_m == 65504; }
+
 Statistics statistics_of(const cv::Mat1f& depth_m) {
     std::vector<float> sample;
     Statistics result = sampled(
-        depth_m, [](float z) { return z; }, [&](float z) { sample.push_back(z); });
-    double largest_m = 0;
-    cv::minMaxIdx(depth_m, nullptr, &largest_m);
-    result.largest_m = static_cast<float>(largest_m);
+        depth_m, [](float z) { return is_background(z) ? 0 : z; }, [&](float z) { sample.push_back(z); });
+    for (int v = 0; v < depth_m.rows; ++v)
+        for (int u = 0; u < depth_m.cols; ++u)
+            if (const float z = depth_m(v, u); z > result.largest_m && !is_background(z))
+                result.largest_m = z;
     if (!sample.empty())
         result.median_m = median(std::move(sample));
     return result;

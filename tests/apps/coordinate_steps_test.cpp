@@ -84,5 +84,23 @@ TEST(coordinate_steps, grids_of_heights_and_profiles_are_as_they_should_be) {
     EXPECT_FALSE(coarse_steps(in_floats(heights), 0.5));
 }
 
+TEST(coordinate_steps, voxels_have_the_same_step_along_all_axes) {
+    const auto voxels = coarse_steps(rounded(room(), {0.05, 0.05, 0.05}), 0.06);
+    ASSERT_TRUE(voxels);
+    EXPECT_TRUE(voxels->in_all);
+    const auto precision = coarse_steps(in_floats(room({500000, 5800000, 300})), spacing);
+    ASSERT_TRUE(precision);
+    EXPECT_FALSE(precision->in_all);
+}
+
+TEST(coordinate_steps, a_plane_and_strays_have_none) {
+    Points plane;
+    for (const Vector3d& point : room())
+        plane.emplace_back(point.x(), point.y() + point.z(), 0.0);
+    for (const double stray : {1000.0, 2010.0, -1500.0})
+        plane.emplace_back(0, 0, stray);
+    EXPECT_FALSE(coarse_steps(plane, spacing));
+}
+
 } // namespace
 } // namespace scanshade

@@ -66,13 +66,28 @@ TEST(doubts, a_plausible_result_has_none) {
 TEST(doubts, few_pixels_with_a_depth_or_a_value) {
     Computed few;
     few.row.valid_share = 0.19;
+    const cv::Mat1f whole = few.work.depth.z_m.clone();
+    for (int v = 0; v < whole.rows; ++v)
+        for (int u = 0; u < whole.cols; ++u)
+            if ((7 * u + 13 * v) % 5 != 0)
+                few.work.depth.z_m(v, u) = 0;
     EXPECT_TRUE(warned(few.doubts(), "only 19.0 % of the pixels hold a depth"));
+    few.work.depth.z_m = whole;
     few.row.valid_share = 0.21;
     EXPECT_TRUE(few.doubts().empty());
     few.row.coverage = 0.1;
     EXPECT_TRUE(warned(few.doubts(), "only 10.0 % of the valid pixels got a value"));
     few.row.valid_share = 0;
     EXPECT_TRUE(warned(few.doubts(), "no pixel holds a valid depth"));
+}
+
+TEST(doubts, an_object_cut_out_of_its_background_is_no_reason) {
+    Computed object;
+    object.row.valid_share = 0.05;
+    cv::Mat1f& z = object.work.depth.z_m;
+    z.colRange(0, z.cols / 2).setTo(0);
+    z.rowRange(0, z.rows / 2).setTo(0);
+    EXPECT_TRUE(object.doubts().empty()) << tests::joined(object.doubts());
 }
 
 TEST(doubts, noise_as_large_as_the_radius) {
@@ -102,6 +117,39 @@ TEST(doubts, values_that_are_all_exactly_open_or_closed) {
         cloud.work.of_points.visibility.assign(1600, value);
         EXPECT_TRUE(warned(cloud.doubts(), fmt::format("every value is exactly {}", value)));
     }
+}
+
+TEST(doubts, flat_and_convex_things_may_be_open_everywhere) {
+    Computed wall;
+    wall.work.ao.visibility = cv::Mat1f(wall.work.depth.z_m.size(), 1.0F);
+    for (int v = 0; v < wall.work.depth.z_m.rows; ++v)
+        for (int u = 0; u < wall.work.depth.z_m.cols; ++u)
+            wall.work.depth.z_m(v, u) = static_cast<float>(1 / (0.5 + 0.002 * u + 0.001 * v));
+    EXPECT_TRUE(wall.doubts().empty()) << tests::joined(wall.doubts());
+    ComputedCloud square;
+    square.work.of_points.visibility.assign(1600, 1.0F);
+    square.work.of_points.normals.assign(1600, Eigen::Vector3f::UnitZ());
+    EXPECT_TRUE(square.doubts().empty()) << tests::joined(square.doubts());
+    for (int i = 0; i < 400; ++i) // what stands on it is a reason again
+        square.work.frame.cloud->points[4 * i].z() = 0.3;
+    EXPECT_TRUE(warned(square.doubts(), "every value is exactly 1"));
+}
+
+TEST(doubts, pixels_that_stand_alone_in_one_direction) {
+    Computed lines;
+    lines.row.valid_share = 0.3;
+    for (int v = 0; v < lines.work.depth.z_m.rows; ++v)
+        if (v % 3 != 0)
+            lines.work.depth.z_m.row(v).setTo(0);
+    EXPECT_TRUE(warned(lines.doubts(), "valid one above or below them"));
+}
+
+TEST(doubts, a_camera_of_the_image_before_it_was_turned) {
+    Computed frame;
+    Pinhole& pinhole = frame.row.camera.pinhole;
+    pinhole.cx = (pinhole.size.height - 1) / 2.0;
+    pinhole.cy = (pinhole.size.width - 1) / 2.0;
+    EXPECT_TRUE(warned(frame.doubts(), "before it was turned"));
 }
 
 TEST(doubts, a_radius_below_two_pixels_or_above_the_scene) {
@@ -188,7 +236,8 @@ class DoubtfulRun : public testing::Test {
     void SetUp() override {
         tests::write_capture(folder / "capture", 4);
         cv::Mat1f scattered(48, 64, 0.0F);
-        scattered(cv::Rect(10, 10, 16, 16)) = 1.5F; // 8 % of the pixels
+        for (int i = 0; i < 16; ++i)
+            scattered(cv::Rect(3 + 15 * (i % 4), 2 + 12 * (i / 4), 4, 4)) = 1.5F; // 8 % of the pixels
         write_depth_png(folder / "capture/depth/002.png", scattered, 1000);
     }
     [[nodiscard]] tests::Ran run(const std::string& flags) const {
@@ -211,7 +260,8 @@ TEST_F(DoubtfulRun, is_told_by_exit_code_messages_table_and_manifest) {
     EXPECT_EQ(manifest["totals"]["ok"], 3);
     EXPECT_EQ(manifest["totals"]["doubtful"], 1);
     EXPECT_EQ(manifest["frames"][2]["status"], "doubtful");
-    EXPECT_EQ(manifest["frames"][2]["doubts"].size(), 1) << "the patch is flat, so every value is exactly 1, as it should";
+    EXPECT_EQ(manifest["frames"][2]["doubts"].size(), 1)
+        << "the patches are flat, so every value is exactly 1, as it should";
     EXPECT_FALSE(manifest["frames"][1].contains("doubts"));
 }
 

@@ -96,5 +96,39 @@ TEST(plausibility, lines_that_are_all_alike_were_not_copied) {
     EXPECT_TRUE(doubts(wall).empty()) << "nor were holes";
 }
 
+TEST(plausibility, boxes_seen_straight_were_not_enlarged) {
+    cv::Mat1w room(240, 320); // the end of a corridor: each row of floor differs, those of the wall are alike
+    for (int v = 0; v < 240; ++v)
+        for (int u = 0; u < 320; ++u) {
+            const double x = std::abs(u - 159.5) / 260, y = std::abs(v - 119.5) / 260;
+            room(v, u) = static_cast<std::uint16_t>(std::lround(1000 * std::min({4.0, 1.5 / x, 1.2 / y})));
+        }
+    EXPECT_TRUE(doubts(room).empty()) << tests::joined(doubts(room));
+}
+
+TEST(plausibility, numbers_for_looking_at_are_no_lengths) {
+    const DepthEncoding usual = usual_encoding("mm", "assumed");
+    cv::Mat1w eight; // bits
+    waves().convertTo(eight, CV_16U, 1 / 12.0);
+    EXPECT_FALSE(doubts(times(eight, 257), usual).empty()) << "widened to 16 bits";
+    cv::Mat stretched;
+    cv::normalize(waves(), stretched, 0, 65535, cv::NORM_MINMAX);
+    EXPECT_FALSE(doubts(stretched, usual).empty());
+    cv::Mat1f shares;
+    cv::normalize(waves(), shares, 0, 1, cv::NORM_MINMAX, CV_32F);
+    const DepthEncoding metres = usual_encoding("m", "assumed: floats are metres");
+    EXPECT_TRUE(warned(doubts_about(depth_in_metres(shares, metres), shares, metres), "fill the whole range"));
+    cv::Mat1f near; // to 1.5 m
+    shares.convertTo(near, CV_32F, 1, 0.5);
+    EXPECT_TRUE(doubts_about(depth_in_metres(near, metres), near, metres).empty());
+}
+
+TEST(plausibility, halls_and_streets_in_floats_are_not_doubted) {
+    const DepthEncoding metres = usual_encoding("m", "assumed: floats are metres");
+    cv::Mat1f hall;
+    waves().convertTo(hall, CV_32F, 0.01); // 25 m
+    EXPECT_TRUE(doubts_about(depth_in_metres(hall, metres), hall, metres).empty());
+}
+
 } // namespace
 } // namespace scanshade

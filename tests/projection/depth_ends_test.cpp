@@ -71,5 +71,26 @@ TEST(depth_ends, a_range_that_was_cut_off_is_told_from_a_wall) {
     EXPECT_FALSE(depth_ends(cut_off(floor_seen(0), 3)).farthest) << "a wall that faces an ideal sensor";
 }
 
+/// What an ideal camera sees: a ball in front of a wall at `wall`, and above a floor where that is nearer.
+cv::Mat1f ball_before_a_wall(double wall, bool floor) {
+    cv::Mat1f z(240, 320);
+    for (int v = 0; v < z.rows; ++v)
+        for (int u = 0; u < z.cols; ++u) {
+            const double x = (u - 160) / 260.0, y = (v - 120) / 260.0, square = x * x + y * y + 1;
+            const double under = 4 - square * (4 - 0.25), low = y > 0 ? 1.2 / y : 1e9; // a radius of .5 m at 2 m
+            double depth = floor ? std::min(wall, low) : wall;
+            if (under > 0)
+                depth = (2 - std::sqrt(under)) / square;
+            z(v, u) = static_cast<float>(std::round(1000 * depth) / 1000);
+        }
+    return z;
+}
+
+TEST(depth_ends, walls_that_face_an_ideal_camera_are_none) {
+    EXPECT_FALSE(depth_ends(ball_before_a_wall(4.2, false)).farthest) << "apart from the ball";
+    EXPECT_FALSE(depth_ends(ball_before_a_wall(4.2, true)).farthest) << "the floor comes up to it";
+    EXPECT_TRUE(depth_ends(ball_before_a_wall(50, false)).farthest) << "no wall, but where the renderer ended";
+}
+
 } // namespace
 } // namespace scanshade

@@ -125,5 +125,24 @@ TEST(pose_reading, poses_of_another_recording_contradict_the_depths) {
     EXPECT_FALSE(pose_reading(views.a, views.b)) << "without motion nothing is told";
 }
 
+TEST(pose_reading, frames_of_different_places_contradict_nothing) {
+    Views views;
+    for (const double turn : {1.05, 1.57, 3.1}) { // as of a panorama
+        views.b = seen_from(pose({0, 0, 0.1}, turn));
+        EXPECT_NE(pose_reading(views.a, views.b), PoseReading::contradicted) << turn;
+    }
+}
+
+TEST(pose_reading, holes_are_no_contradiction) {
+    Views views;
+    views.a = seen_from(pose({0, 0.1, 0.3}, 0.2));
+    for (PosedDepth* view : {&views.a, &views.b}) // three of four pixels
+        for (int v = 0; v < view->depth.z_m.rows; ++v)
+            for (int u = 0; u < view->depth.z_m.cols; ++u)
+                if (u % 2 != 0 || v % 2 != 0)
+                    view->depth.z_m(v, u) = 0;
+    EXPECT_NE(pose_reading(views.a, views.b), PoseReading::contradicted);
+}
+
 } // namespace
 } // namespace scanshade

@@ -2,10 +2,12 @@
 #include "ao/cloud/sides/sides.h"
 
 #include "ao/cloud/sides/stations.h"
+#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <limits>
 #include <numeric>
 #include <tbb/parallel_for.h>
 
@@ -40,7 +42,8 @@ struct Decision {
     bool lost = false; ///< no station sees clean fronts
     std::vector<std::size_t> chosen;
     std::string why{};
-    double margin = 0;
+    double margin = 0, explained = 0;
+    bool sure = false;
     std::optional<std::string> doubt{};
 };
 
@@ -49,6 +52,7 @@ struct Scene {
     const Reach& reach;
     bool up_known = false;
     double front_meets = 0.5; ///< share of the rays that met something, that left fronts
+    double smallest = 0;      ///< extent along the axes
 };
 
 Decision decide(const Stations& stations, const Signs& labels, const Scene& scene, SidesRule rule) {
@@ -86,9 +90,15 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
     } else if (const bool body = fronts >= 0.9 && afar >= 0.97; body || margin < (boxed > walled ? walled_tie : tie)) {
         // Both sides could be the scanned one: a closed room looks like a body from outside. Walls and floors tell,
         // less so the density of the points.
+        // What is seen from all round without a gap has nothing within, and is either. Then a room is as high as rooms
+        // are, in metres as is the custom. Of furnished rooms a few of a hundred points are not seen through gaps.
+        constexpr double lowest_room = 1.8, highest_room = 5, without_gap = 0.99;
+        const bool empty_within = afar > without_gap,
+                   as_high_as_rooms = scene.smallest > lowest_room && scene.smallest < highest_room;
+        const bool from_within = within > std::max(scanned_within, outside + clearly_better);
         const bool room =
-            boxed > (body ? walled : hardly_walled) || within > std::max(scanned_within, outside + clearly_better);
-        const bool sure_room = boxed > walled && outer_meets > empty;
+            (boxed > (body ? walled : hardly_walled) && (!empty_within || as_high_as_rooms)) || from_within;
+        const bool sure_room = boxed > walled && outer_meets > empty && (!empty_within || from_within);
         decision.sign = room ? inner : -inner;
         decision.body = body && !room;
         if (room)
@@ -97,24 +107,27 @@ Decision decide(const Stations& stations, const Signs& labels, const Scene& scen
             decision.why = fmt::format("outward, as of a body: {:.0f} % of it is seen from all round", 100 * afar);
         else
             decision.why = "to the outer side of a shell";
-        if (room ? !sure_room : !body || within > std::max(scanned_within, outside))
+        if (room ? !sure_room : !body || boxed > walled || within > std::max(scanned_within, outside))
             decision.doubt = fmt::format("both sides of all surfaces could be the scanned one, as of a room and of a "
-                                         "body of its shape: the {} one was taken; --cloud.outside sets it",
+                                         "body of its shape: the {} one was taken; --cloud.outside sets it.",
                                          room ? "inner" : "outer");
+        decision.sure = !decision.doubt;
     } else {
         decision.sign = covered;
         decision.margin = margin;
         decision.why = "to where a scanner could stand: " + explained(covered);
-        if (margin < near_tie && !(covered == inner && boxed > walled))
+        const bool sure_body = covered == -inner && afar > 0.97 && boxed < hardly_walled;
+        if (margin < near_tie && !sure_body && !(covered == inner && boxed > walled))
             decision.doubt = fmt::format("the other side of all surfaces explains the cloud nearly as well ({:.0f} % "
-                                         "against {:.0f} %); --cloud.outside sets it",
+                                         "against {:.0f} %); --cloud.outside sets it.",
                                          100 * shares[at(-covered)], 100 * shares[at(covered)]);
         else if (!scene.up_known && shares[at(covered)] < hardly_explained)
             decision.doubt = fmt::format("the places where a scanner could have stood see only {:.0f} % of the points "
-                                         "from the front, as among plants; --cloud.outside sets the side",
+                                         "from the front, as among plants; --cloud.outside sets the side.",
                                          100 * shares[at(covered)]);
     }
     decision.chosen = covers[at(decision.sign)].chosen;
+    decision.explained = shares[at(decision.sign)];
     if (scene.up_known && rule != SidesRule::outward && rule != SidesRule::inward && !decision.body &&
         shares[at(decision.sign)] < 0.6) {
         decision.lost = true;
@@ -193,7 +206,21 @@ struct Judged {
     Signs label;
     UnaryTerms evidence;
     Decision decision;
+    std::optional<double> explained_as_given{};
 };
+
+/// The smallest extent of the tests along the axes, without the outermost.
+double smallest_extent(const CloudSurface& surface, const std::vector<std::uint32_t>& tests) {
+    double smallest = std::numeric_limits<double>::infinity();
+    for (int axis = 0; axis < 3; ++axis) {
+        std::vector<float> along;
+        for (const std::uint32_t index : tests)
+            along.push_back(surface.tree[index][axis]);
+        const auto low = static_cast<double>(quantile(along, 0.02)), high = static_cast<double>(quantile(along, 0.98));
+        smallest = std::min(smallest, high - low);
+    }
+    return smallest;
+}
 
 Judged judged(const CloudSurface& surface, const DiscRays& rays, const Patches& patches, const std::vector<Link>& near,
               const std::optional<Vector3f>& up, SidesRule rule, const SidesEffort& effort, const Reach& reach) {
@@ -229,13 +256,18 @@ Judged judged(const CloudSurface& surface, const DiscRays& rays, const Patches& 
         front_meets += (label[patches.patch[ray.from]] * patches.sign(ray.from) > 0) == normal_side;
         meets += 1;
     }
-    Decision decision =
-        decide(stations, of_tests, {reach, up.has_value(), meets > 0 ? front_meets / meets : 0.5}, rule);
+    Decision decision = decide(
+        stations, of_tests,
+        {reach, up.has_value(), meets > 0 ? front_meets / meets : 0.5, smallest_extent(surface, stations.tests())},
+        rule);
+    std::optional<double> as_given;
+    if (effort.given_too)
+        as_given = stations.cover(Signs(of_tests.size(), 1)).share;
     for (Signs* signs : {&label, &of_tests})
         for (std::int8_t& sign : *signs)
             sign = static_cast<std::int8_t>(sign * decision.sign);
     if (decision.lost)
-        return {label, facing(surface, patches, label, *up), std::move(decision)};
+        return {label, facing(surface, patches, label, *up), std::move(decision), as_given};
 
     constexpr std::size_t most = 24;
     std::vector<std::size_t> chosen = decision.chosen;
@@ -260,29 +292,34 @@ Judged judged(const CloudSurface& surface, const DiscRays& rays, const Patches& 
             evidence.rays_most[patch] += std::abs(agreed);
         }
     }
-    return {std::move(label), std::move(evidence), std::move(decision)};
+    return {std::move(label), std::move(evidence), std::move(decision), as_given};
 }
 
 } // namespace
 
 Sides sides_of(const CloudSurface& surface, const Patches& patches, const DiscRays* rays,
                const std::optional<Vector3f>& up, SidesRule rule, const SidesEffort& effort) {
-    Sides sides{Signs(surface.size(), 1), std::vector<float>(surface.size(), 0.0F), {}, 0, {}};
+    Sides sides{Signs(surface.size(), 1), std::vector<float>(surface.size(), 0.0F), {}, 0, {}, {}, {}};
     const Reach reach = reach_of(surface);
     if (!(reach.far > 0)) {
         sides.why = "as estimated: there are no surfaces to tell sides by";
         return sides;
     }
     const std::vector<Link>& near = patches.links;
-    auto [label, evidence, decision] = [&]() -> Judged {
+    auto [label, evidence, decision, as_given] = [&]() -> Judged {
         if (rule != SidesRule::up)
             return judged(surface, *rays, patches, near, up, rule, effort, reach);
         Signs all(patches.count, 1);
-        return {all, facing(surface, patches, all, up.value_or(Vector3f::UnitZ())), {}};
+        return {all, facing(surface, patches, all, up.value_or(Vector3f::UnitZ())), {}, {}};
     }();
     sides.why = decision.why;
     sides.doubt = decision.doubt;
     sides.margin = decision.margin;
+    sides.sure = decision.sure;
+    if (as_given) {
+        sides.explained = decision.explained;
+        sides.explained_as_given = as_given;
+    }
 
     // One more node is the truth: it links to every patch by what was seen of it.
     SignedGraph absolute(patches.count + 1);

@@ -15,6 +15,7 @@ struct SidesEffort {
     std::size_t points = 25000; ///< that eight rays leave from on either side
     std::size_t stations = 200; ///< candidates within the cloud; 64 round it come on top
     std::size_t tests = 1000;   ///< points that candidates are judged by
+    bool given_too = false;     ///< the sides as they were given are judged, too
 };
 
 /// The sides found. Signs refer to the surface's normals as they were given.
@@ -24,7 +25,11 @@ struct Sides {
     std::string why;               ///< in words; empty where the rule says it all
     double margin = 0; ///< by how much more of the cloud stations explain with these sides than with all turned over;
                        ///< 0 where something else decided
-    std::optional<std::string> doubt; ///< where both answers explain the cloud equally well
+    std::optional<std::string> doubt{}; ///< where both answers explain the cloud equally well
+    bool sure = false;                  ///< a room or a body, and nothing else would do
+    /// Shares of the cloud that stations explain with these sides, and with those given: if asked for, and where
+    /// stations were looked for.
+    std::optional<double> explained{}, explained_as_given{};
 };
 
 /// Who decides between the two sides of everything: the cloud itself, or a person who knows what it is.

@@ -102,6 +102,26 @@ float spacing_of(const LocalCloud& points) {
     return median_of_lengths(sixth) / sixth_on_grid;
 }
 
+double share_on_lines(const CloudSurface& surface) {
+    constexpr std::size_t enough = 20000;
+    constexpr float narrow = 0.02F; // variance across / along
+    const std::size_t step = std::max<std::size_t>(1, surface.size() / enough);
+    const auto on_line = [&](std::size_t i) {
+        Vector3f middle = Vector3f::Zero();
+        for (const std::uint32_t j : surface.near[i])
+            middle += surface.tree[j] / CloudSurface::kept;
+        Eigen::Matrix3f spread = Eigen::Matrix3f::Zero();
+        for (const std::uint32_t j : surface.near[i])
+            spread += (surface.tree[j] - middle) * (surface.tree[j] - middle).transpose();
+        const Vector3f variance = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f>(spread).eigenvalues();
+        return variance[1] < narrow * variance[2];
+    };
+    std::size_t lines = 0, all = 0;
+    for (std::size_t i = step / 2; i < surface.size(); i += step, ++all)
+        lines += on_line(i);
+    return all > 0 ? static_cast<double>(lines) / static_cast<double>(all) : 0;
+}
+
 CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normals, CloudGpu* gpu,
                            std::span<const Vector3f> axes) {
     const std::size_t count = points.size();

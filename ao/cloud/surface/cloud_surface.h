@@ -59,6 +59,9 @@ struct CloudSurface {
 /// The median distance of points, as CloudSurface::spacing has it.
 [[nodiscard]] float spacing_of(const LocalCloud& points);
 
+/// The share of points whose kept neighbours all lie on a line, as on the rings of a spinning lidar; of a sample.
+[[nodiscard]] double share_on_lines(const CloudSurface& surface);
+
 /// Finds neighbours and planes of `points`. `normals` is empty or holds one per point, in the order given; those of
 /// zero length are replaced by the normals of the planes. Planes are fitted to 16 neighbours, weighted by distance, and
 /// to 64 where the 16 are on a line, as on a scanner's rings. Estimated normals are not oriented yet. `axes` is empty

@@ -140,7 +140,7 @@ void add_colour(const fs::path& folder, const ListedImage& colour, CaptureEntry&
 void add_colours(const fs::path& folder, const std::vector<ListedImage>& depths, double limit_s, Capture& capture) {
     const fs::path list = folder / "rgb.txt";
     if (!is_file(list)) {
-        capture.warnings.push_back(folder.string() + ": no rgb.txt; depth alone is processed.");
+        capture.warnings.emplace_back("no rgb.txt; depth alone is processed.");
         return;
     }
     const auto colours = read_list(list, capture.warnings);
