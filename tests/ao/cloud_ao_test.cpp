@@ -496,5 +496,23 @@ TEST(CloudAo, run_writes_the_error_that_confidence_follows_from) {
         << "that of the cloud is the mean of its points'";
 }
 
+TEST(CloudAo, rings_of_a_spinning_lidar_are_doubted) {
+    Points rings, even;
+    for (int laser = 0; laser < 16; ++laser) { // on a floor 2 m below, and the walls of a street
+        const double down = (1 + 2 * laser) * std::numbers::pi / 180;
+        for (int i = 0; i < 1500; ++i) {
+            const double turn = 2 * std::numbers::pi * i / 1500;
+            const double range = std::min(2 / std::tan(down), 6 / std::max(std::abs(std::sin(turn)), 1e-3));
+            rings.emplace_back(range * std::cos(turn), range * std::sin(turn), -range * std::tan(down));
+        }
+    }
+    const auto found = visibility(rings, {.radius = 0.5});
+    EXPECT_TRUE(std::ranges::any_of(found.doubts, [](const auto& doubt) {
+        return doubt.find("on a line") != doubt.npos;
+    })) << tests::joined(found.doubts);
+    for (const std::string& doubt : visibility(corner(20000), {.radius = 0.5}).doubts)
+        EXPECT_EQ(doubt.find("on a line"), doubt.npos) << doubt;
+}
+
 } // namespace
 } // namespace scanshade

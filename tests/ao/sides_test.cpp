@@ -215,5 +215,65 @@ TEST(Sides, round_bodies_are_seen_from_outside) {
     EXPECT_TRUE(found.doubts.empty()) << tests::joined(found.doubts);
 }
 
+/// The faces of boxes that stand on each other, without what lies within another one; normals look out.
+struct Faces {
+    Points points, normals;
+};
+Faces faces_of(const std::vector<Eigen::AlignedBox3d>& boxes, double points_per_area) {
+    Faces faces;
+    Dice dice(3);
+    for (const auto& box : boxes)
+        for (int axis = 0; axis < 3; ++axis)
+            for (const double side : {-1.0, 1.0}) {
+                const Vector3d normal = side * Vector3d::Unit(axis);
+                const Vector3d size = box.sizes();
+                const double area = size.prod() / size[axis];
+                for (int i = 0; i < points_per_area * area; ++i) {
+                    Vector3d at = box.min() + size.cwiseProduct(Vector3d(dice.roll(), dice.roll(), dice.roll()));
+                    at[axis] = side < 0 ? box.min()[axis] : box.max()[axis];
+                    const bool inside = std::ranges::any_of(
+                        boxes, [&](const auto& other) { return other.contains(at + 1e-6 * normal); });
+                    if (!inside) {
+                        faces.points.push_back(at);
+                        faces.normals.push_back(normal);
+                    }
+                }
+            }
+    return faces;
+}
+
+/// Half a metre high, in the shape of an L: as a room it would be as good.
+TEST(Sides, an_angular_body_could_be_a_room_and_its_recorded_normals_are_believed) {
+    const Faces block =
+        faces_of({{Vector3d(0, 0, 0), Vector3d(1, 0.4, 0.5)}, {Vector3d(0, 0.4, 0), Vector3d(0.4, 1, 0.5)}}, 10000);
+    const auto alone = visibility(block.points, {}, {.radius = 0.1});
+    EXPECT_NE(doubts_of_sides(alone), "");
+    EXPECT_LT(wrong_sides(alone, block.normals).all, 0.01) << "too low for a room";
+    const auto recorded = visibility(block.points, block.normals, {.radius = 0.1});
+    EXPECT_EQ(doubts_of_sides(recorded), "");
+    EXPECT_EQ(wrong_sides(recorded, block.normals).all, 0);
+}
+
+/// Beneath a table, at the origin, no scanner stood, though nearly all is seen first from there.
+TEST(Sides, right_normals_of_a_table_are_kept) {
+    std::vector<Eigen::AlignedBox3d> boxes{{Vector3d(0, 0, 0.7), Vector3d(1.2, 0.8, 0.74)}};
+    for (const double x : {0.02, 1.12})
+        for (const double y : {0.02, 0.72})
+            boxes.emplace_back(Vector3d(x, y, 0), Vector3d(x + 0.06, y + 0.06, 0.7));
+    const Faces table = faces_of(boxes, 6000);
+    EXPECT_EQ(wrong_sides(visibility(table.points, table.normals, {.radius = 0.1}), table.normals).all, 0);
+}
+
+TEST(Sides, a_ball_whose_normals_look_in_is_doubted) {
+    const Points ball = sphere(20000, {3, 1, 2});
+    Points outward, inward;
+    for (const Vector3d& point : ball) {
+        outward.push_back(point - Vector3d(3, 1, 2));
+        inward.push_back(-outward.back());
+    }
+    EXPECT_EQ(doubts_of_sides(visibility(ball, outward)), "");
+    EXPECT_NE(doubts_of_sides(visibility(ball, inward)), "");
+}
+
 } // namespace
 } // namespace scanshade

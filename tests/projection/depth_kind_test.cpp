@@ -110,5 +110,19 @@ TEST(depth_kind, bent_surfaces_are_not_mistaken) {
     }
 }
 
+TEST(depth_kind, balls_before_the_camera_are_no_walls_of_ranges) {
+    for (const double radius : {0.5, 0.8, 1.0})
+        for (const double nearest : {0.4, 0.6, 0.8}) {
+            const double middle = radius + nearest;
+            const DepthImage ball = with(room(), [&](double, const Vector3d& ray) {
+                const double b = middle / ray.squaredNorm(),
+                             under = b * b - (middle * middle - radius * radius) / ray.squaredNorm();
+                return under > 0 ? b - std::sqrt(under) : 0;
+            });
+            EXPECT_NE(depth_kind(ball), DepthKind::range) << radius << " " << nearest;
+            EXPECT_NE(depth_kind(ball), DepthKind::inverse) << radius << " " << nearest;
+        }
+}
+
 } // namespace
 } // namespace scanshade
