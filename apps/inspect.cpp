@@ -1,6 +1,8 @@
 // `scanshade inspect`: the content of a capture, and its problems, before anything is computed.
 #include "apps/command.h"
 #include "apps/json.h"
+#include "apps/walk/doubts.h"
+#include "apps/walk/pose_check.h"
 #include "io/captures/capture.h"
 #include "io/clouds/cloud_file.h"
 #include "io/images/format.h"
@@ -20,7 +22,7 @@
 namespace scanshade {
 namespace {
 
-constexpr std::size_t most_samples = 10;
+constexpr std::size_t most_samples = 10, most_images = 3;
 
 // ---------------------------------------------------------------------------------------------------- measuring
 
@@ -105,10 +107,10 @@ void add_frame(const ExaminedFrame& examined, Samples& samples) {
     }
 }
 
-/// Up to most_samples indices, evenly spread, first and last included.
-std::vector<std::size_t> spread(std::size_t count) {
+/// Up to `most` indices, evenly spread, first and last included.
+std::vector<std::size_t> first_to_last(std::size_t count, std::size_t most) {
     std::vector<std::size_t> chosen;
-    const std::size_t samples = std::min(count, most_samples);
+    const std::size_t samples = std::min(count, most);
     for (std::size_t i = 0; i < samples; ++i)
         chosen.push_back(samples == 1 ? 0 : i * (count - 1) / (samples - 1));
     return chosen;
@@ -147,6 +149,27 @@ void measure_poses(Findings& findings) {
     }
 }
 
+/// What a run would doubt in a few of the images, and in the poses.
+void doubt_images(Findings& findings, const std::vector<std::size_t>& loadable) {
+    const Capture& capture = findings.capture;
+    std::vector<std::string>& warnings = findings.samples.warnings;
+    for (const std::size_t place : first_to_last(loadable.size(), most_images)) {
+        try {
+            const Frame frame = capture.load(loadable[place], false);
+            if (frame.cloud || frame.camera.pinhole.fx == 0)
+                continue;
+            const Camera camera = camera_of(frame);
+            for (const std::string& doubt : doubts_about(camera, project(frame), capture.unit))
+                warnings.push_back(frame.name + ": " + doubt);
+        } catch (const OutOfMemory&) {
+            throw;
+        } catch (const Error&) { // examining the frame has told it
+        }
+    }
+    if (std::string warning = pose_warning(capture, loadable); !warning.empty())
+        warnings.push_back(std::move(warning));
+}
+
 void measure_samples(Findings& findings) {
     std::vector<std::size_t> loadable;
     for (std::size_t i = 0; i < findings.capture.entries.size(); ++i) {
@@ -158,7 +181,7 @@ void measure_samples(Findings& findings) {
         for (const std::string& warning : entry.warnings)
             findings.samples.warnings.push_back(entry.name + ": " + warning);
     }
-    for (const std::size_t place : spread(loadable.size())) {
+    for (const std::size_t place : first_to_last(loadable.size(), most_samples)) {
         try {
             add_frame(findings.capture.examine(loadable[place]), findings.samples);
         } catch (const OutOfMemory&) {
@@ -167,6 +190,7 @@ void measure_samples(Findings& findings) {
             findings.problems.push_back({findings.capture.entries[loadable[place]].name, failure.what()});
         }
     }
+    doubt_images(findings, loadable);
     if (auto& all = findings.samples.without_camera; all.size() > 1) // sweeps of a scanner: all of them
         all = {fmt::format("{} of {} examined clouds have no single camera. The first of them: {}", all.size(),
                            findings.samples.frames, all.front())};

@@ -13,6 +13,7 @@
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
+#include <iterator>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <span>
@@ -360,6 +361,14 @@ void doubt_camera(const Camera& camera, Doubts& doubts) {
 
 } // namespace
 
+std::vector<std::string> doubts_about(const Camera& camera, const DepthImage& depth, const LengthUnit& unit) {
+    Doubts doubts;
+    doubt_camera(camera, doubts);
+    doubt_kind(depth, doubts);
+    doubt_ends(depth, unit, doubts);
+    return doubts;
+}
+
 std::vector<std::string> doubts_about(const Work& work, double radius_m, const DepthNoise& noise,
                                       const LengthUnit& unit) {
     Doubts doubts = work.frame.doubts;
@@ -380,11 +389,8 @@ std::vector<std::string> doubts_about(const Work& work, double radius_m, const D
             [&] { return radius_m > 0 && !has_hollows(work.depth, radius_m); }, doubts);
     doubt_radius_in_view(work, radius_m, unit, doubts);
     doubt_noise_in_view(work, radius_m, noise, unit, doubts);
-    if (!work.frame.cloud) { // a cloud's camera is recovered or chosen, not given, unless --camera names it
-        doubt_camera(work.row.camera, doubts);
-        doubt_kind(work.depth, doubts);
-        doubt_ends(work.depth, unit, doubts);
-    }
+    if (!work.frame.cloud) // a cloud's camera is recovered or chosen, not given, unless --camera names it
+        std::ranges::move(doubts_about(work.row.camera, work.depth, unit), std::back_inserter(doubts));
     return doubts;
 }
 

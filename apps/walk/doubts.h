@@ -15,4 +15,8 @@ namespace scanshade {
 [[nodiscard]] std::vector<std::string> doubts_about(const Work& work, double radius_m, const DepthNoise& noise = {},
                                                     const LengthUnit& unit = {});
 
+/// What is implausible before anything is computed: about a camera, and about a depth image that it took.
+[[nodiscard]] std::vector<std::string> doubts_about(const Camera& camera, const DepthImage& depth,
+                                                    const LengthUnit& unit = {});
+
 } // namespace scanshade

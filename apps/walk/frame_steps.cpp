@@ -28,11 +28,15 @@ double valid_share(const Frame& frame) {
 }
 
 /// A camera that sees none of the points is an error, not an empty result. (No depth at all is a result.)
-void refuse_blind_view(const Work& work) {
-    if (work.row.valid_share > 0 && cv::countNonZero(work.depth.z_m) == 0)
-        throw Error(fmt::format("the camera sees none of the recorded points ({}; {}){}{}", describe(work.frame.camera),
-                                work.frame.camera.origin, work.frame.doubts.empty() ? "" : "; ",
-                                fmt::join(work.frame.doubts, " ")));
+void refuse_blind_view(const Work& work, const ProjectOptions& range) {
+    if (work.row.valid_share == 0 || cv::countNonZero(work.depth.z_m) > 0)
+        return;
+    const std::string reason = work.frame.cloud
+                                   ? fmt::format("the camera sees none of the recorded points ({}; {})",
+                                                 describe(work.frame.camera), work.frame.camera.origin)
+                                   : fmt::format("no depth is within {:g} and {:g} m", range.near_m, range.far_m);
+    throw Error(
+        fmt::format("{}{}{}", reason, work.frame.doubts.empty() ? "" : "; ", fmt::join(work.frame.doubts, " ")));
 }
 
 void require_memory_for(const Cloud& cloud) {
@@ -68,7 +72,7 @@ void describe_frame(Work& work) {
 void prepare_view(Work& work, const ProjectOptions& range) {
     work.frame.camera = work.row.camera = camera_of(work.frame);
     work.depth = project(work.frame, range);
-    refuse_blind_view(work);
+    refuse_blind_view(work, range);
 }
 
 void compute_alone(Work& work, FrameAo& method, const DepthNoise& noise) {

@@ -254,6 +254,37 @@ TEST(Sides, an_angular_body_could_be_a_room_and_its_recorded_normals_are_believe
     EXPECT_EQ(wrong_sides(recorded, block.normals).all, 0);
 }
 
+/// As high as a room, it is taken for one, and that is a guess.
+TEST(Sides, an_empty_room_of_several_parts_could_be_a_body) {
+    const Faces room =
+        faces_of({{Vector3d(0, 0, 0), Vector3d(5, 2, 2.5)}, {Vector3d(0, 2, 0), Vector3d(2, 5, 2.5)}}, 400);
+    EXPECT_NE(doubts_of_sides(visibility(room.points)), "");
+}
+
+/// Its wheels reach into it, so the places that explain it best stand within.
+TEST(Sides, right_normals_of_a_car_are_believed) {
+    Faces car = faces_of(
+        {{Vector3d(-2, -0.8, 0.3), Vector3d(2, 0.8, 0.9)}, {Vector3d(-1, -0.7, 0.9), Vector3d(1, 0.7, 1.5)}}, 400);
+    Dice dice(9);
+    const auto add = [&](const Vector3d& at, const Vector3d& normal) {
+        car.points.push_back(at);
+        car.normals.push_back(normal);
+    };
+    for (const double x : {-1.3, 1.3})
+        for (const double y : {-0.85, 0.65})
+            for (int i = 0; i < 380; ++i) { // of a radius of 30 cm, 20 cm wide
+                const double turn = 2 * std::numbers::pi * dice.roll(), off = 0.3 * std::sqrt(dice.roll());
+                const Vector3d axle(x, y, 0.3), out(std::cos(turn), 0, std::sin(turn));
+                if (i < 150)
+                    add(axle + 0.3 * out + Vector3d(0, 0.2 * dice.roll(), 0), out);
+                else
+                    add(axle + off * out + Vector3d(0, i % 2 ? 0.2 : 0, 0), Vector3d(0, i % 2 ? 1 : -1, 0));
+            }
+    const auto found = visibility(car.points, car.normals, {.radius = 0.3});
+    EXPECT_EQ(doubts_of_sides(found), "");
+    EXPECT_EQ(wrong_sides(found, car.normals).all, 0);
+}
+
 /// Beneath a table, at the origin, no scanner stood, though nearly all is seen first from there.
 TEST(Sides, right_normals_of_a_table_are_kept) {
     std::vector<Eigen::AlignedBox3d> boxes{{Vector3d(0, 0, 0.7), Vector3d(1.2, 0.8, 0.74)}};

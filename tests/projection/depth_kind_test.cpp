@@ -110,6 +110,24 @@ TEST(depth_kind, bent_surfaces_are_not_mistaken) {
     }
 }
 
+TEST(depth_kind, waves_and_bowls_of_any_kind_are_depth) {
+    for (const double bend : {-0.5, -0.25, -0.1, 0.1, 0.25, 0.5})
+        for (const double x : {-0.6, 0.0, 0.4})
+            for (const double slope : {0.0, 0.4, 0.9}) {
+                const DepthImage bowl = with(room(), [&](double, const Vector3d& ray) {
+                    const double right = ray.x() - x, down = ray.y() + 0.3;
+                    return 2 + bend * (right * right + down * down) + slope * right;
+                });
+                const DepthImage waves = with(room(), [&](double, const Vector3d& ray) {
+                    return 2 + 0.5 * bend * std::sin(4 * (ray.x() - x)) + slope * ray.y();
+                });
+                for (const DepthImage& image : {bowl, waves}) {
+                    EXPECT_NE(depth_kind(image), DepthKind::inverse) << bend << " " << x << " " << slope;
+                    EXPECT_NE(depth_kind(image), DepthKind::range) << bend << " " << x << " " << slope;
+                }
+            }
+}
+
 TEST(depth_kind, balls_before_the_camera_are_no_walls_of_ranges) {
     for (const double radius : {0.5, 0.8, 1.0})
         for (const double nearest : {0.4, 0.6, 0.8}) {

@@ -131,6 +131,9 @@ TEST(pose_reading, frames_of_different_places_contradict_nothing) {
         views.b = seen_from(pose({0, 0, 0.1}, turn));
         EXPECT_NE(pose_reading(views.a, views.b), PoseReading::contradicted) << turn;
     }
+    views.b = views.a; // the next wall of a square room looks the same
+    views.b.world_from_camera = pose({0, 0, 0.1}, 1.57);
+    EXPECT_FALSE(pose_reading(views.a, views.b));
 }
 
 TEST(pose_reading, holes_are_no_contradiction) {
