@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <fmt/format.h>
 #include <iterator>
 #include <map>
@@ -153,6 +154,11 @@ void measure_poses(Findings& findings) {
 void doubt_images(Findings& findings, const std::vector<std::size_t>& loadable) {
     const Capture& capture = findings.capture;
     std::vector<std::string>& warnings = findings.samples.warnings;
+    constexpr int largest_px = 20'000'000; // of several gigabytes, several would be in memory
+    if (std::ranges::any_of(findings.samples.depth_sizes, [](const auto& size) {
+            return std::int64_t{size.first.first} * size.first.second > largest_px;
+        }))
+        return;
     for (const std::size_t place : first_to_last(loadable.size(), most_images)) {
         try {
             const Frame frame = capture.load(loadable[place], false);

@@ -81,10 +81,13 @@ bool is_noisy(const cv::Mat1f& z_m) {
     return few > least && few > alike * median_bend(z_m, 6);
 }
 
-/// Numbers that programs write for "nothing": 10, 20, 50, 100 ... metres, and the largest of 12 .. 16 bits of
-/// millimetres.
+/// Numbers that programs write for "nothing": next to zero, 10, 20, 50, 100 ... metres, and the largest of 12 .. 16
+/// bits of millimetres.
 bool is_customary_mark(float z_m) {
     constexpr double alike = 1e-5;
+    constexpr float next_to_zero = 0.05F;
+    if (z_m < next_to_zero)
+        return true;
     const auto is = [&](double value) { return std::abs(static_cast<double>(z_m) - value) < alike * value; };
     for (double power = 10; power <= 1e6; power *= 10)
         for (const int digit : {1, 2, 5})

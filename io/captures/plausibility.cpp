@@ -227,20 +227,28 @@ void doubt_steps(const cv::Mat& stored, const DepthEncoding& encoding, std::vect
                         step_mm, encoding.name, encoding.origin, what_others_give(stored, encoding)));
 }
 
-/// From next to zero to the largest integer or to one: depth that was stretched from its smallest to its largest value.
+/// From next to zero to the largest number: depth that was stretched from its smallest to its largest value.
+template <class Pixel>
+bool is_stretched(const cv::Mat_<Pixel>& stored, double whole, double nearly_all) {
+    constexpr double hardly_any = 0.01;
+    std::size_t others = 0;
+    double least = whole, most = 0;
+    for (int v = 0; v < stored.rows; ++v)
+        for (int u = 0; u < stored.cols; ++u)
+            if (const double value = stored(v, u); value > 0) {
+                least = std::min(least, value);
+                if (value < whole) // the largest integer marks holes in other files
+                    ++others;
+                if (value < whole || nearly_all == 1)
+                    most = std::max(most, value);
+            }
+    return others >= 100 && least < hardly_any * whole && most >= nearly_all * whole && most <= whole;
+}
+
 bool is_stretched(const cv::Mat& stored) {
-    constexpr double hardly_any = 0.01, nearly_all = 0.98;
-    const bool integers = stored.type() == CV_16UC1;
-    if (!integers && stored.type() != CV_32FC1)
-        return false;
-    const double whole = integers ? 65535 : 1;
-    const cv::Mat holes = stored <= 0, full = stored >= whole; // the largest integer marks holes in other files
-    const cv::Mat others = integers ? cv::Mat((holes == 0) & (full == 0)) : cv::Mat(holes == 0);
-    double least = 0, most = 0;
-    if (cv::countNonZero(others) < 100)
-        return false;
-    cv::minMaxIdx(stored, &least, &most, nullptr, nullptr, others);
-    return least < hardly_any * whole && (integers ? most > nearly_all * whole : most == whole);
+    return stored.type() == CV_16UC1   ? is_stretched(cv::Mat1w(stored), 65535, 0.98)
+           : stored.type() == CV_32FC1 ? is_stretched(cv::Mat1f(stored), 1, 1)
+                                       : false;
 }
 
 /// `image`: depths of any kind, 0 = hole.

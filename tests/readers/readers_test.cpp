@@ -99,7 +99,7 @@ TEST_F(ReadersTest, frames_without_stamps_or_poses_are_a_thirtieth_apart_and_upr
 TEST_F(ReadersTest, a_cloud_is_a_recording_of_its_points) {
     const tests::Points points = tests::corner(5000);
     write_new_ply(folder / "corner.ply", points, {}, {});
-    const json found = recording_of((folder / "corner.ply").string() + " --write cloud,mcap");
+    const json found = recording_of((folder / "corner.ply").string() + " --write cloud,mcap --cloud.outside inward");
     EXPECT_EQ(found["problems"], json::array());
     EXPECT_EQ(found["compared_points"], 5000);
     EXPECT_EQ(found["frame_ids"]["/scanshade/points"], "scanner");
