@@ -184,11 +184,9 @@ Vector3d up_across_largest_plane(const Drawn& drawn) {
         scores[c] = alike / height * (c < others ? 1 : c == others ? 1.5 : 1.2);
     });
     const auto highest = std::ranges::max_element(scores);
-    const double most = *highest;
-    const Vector3d best =
-        most < 0 ? Vector3d(Vector3d::UnitZ()) : candidates[static_cast<std::size_t>(highest - scores.begin())];
-    if (most < 0) // no plane, so no floor
-        return best;
+    if (*highest < 0) // no plane, so no floor
+        return Vector3d::UnitZ();
+    const Vector3d& best = candidates[static_cast<std::size_t>(highest - scores.begin())];
     double sign = 0;
     for (const Vector3f& normal : drawn.normals)
         if (const double along = normal.cast<double>().dot(best); std::abs(along) > within)

@@ -292,7 +292,8 @@ TEST_F(Hostile, lists_named_like_coordinates_are_not_read_as_such) {
              "property list uchar double ambient_occlusion\n"}) {
         std::string body = twelve;
         body.append(lists.find("ny") == std::string::npos ? 1 : 9, '\0');
-        const fs::path file = write_file(folder / "a.ply", start + place + lists + "end_header\n" + body);
+        const fs::path file =
+            write_file(folder / "a.ply", fmt::format("{}{}{}end_header\n{}", start, place, lists, body));
         std::vector<std::string> warnings;
         const Cloud cloud = read_cloud(file, warnings);
         EXPECT_EQ(cloud.points, std::vector<Eigen::Vector3d>{Eigen::Vector3d::Zero()});

@@ -165,8 +165,8 @@ void settle_own_cameras(Listing& listing);
 void tell_ignored(const std::filesystem::path& folder, std::initializer_list<std::string_view> names,
                   std::vector<std::string>& warnings);
 
-/// Why a listed file cannot be opened: it is missing, or its name leads out of the capture's folder. Links are followed.
-/// Empty = it can be opened.
+/// Why a listed file cannot be opened: it is missing, or its name leads out of the capture's folder. Links are
+/// followed. Empty = it can be opened.
 [[nodiscard]] std::string trouble_with(const std::filesystem::path& folder, const std::string& name);
 
 /// The camera among a folder's files: camera.json, any JSON or text file whose name speaks of a camera or intrinsics,
