@@ -131,7 +131,8 @@ class Method {
 struct PointSet {
     std::span<const Eigen::Vector3d> points, normals = {};
     std::span<const std::array<int, 3>> triangles = {};
-    bool z_up = false; ///< whether z is known to point to the sky
+    bool z_up = false;         ///< whether z is known to point to the sky
+    bool from_scanner = false; ///< whether all were surely seen from the scanner's position, as in a lidar's sweep
 };
 
 /// Values of points, and what was chosen on the way.

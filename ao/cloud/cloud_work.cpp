@@ -82,6 +82,8 @@ CloudWork::CloudWork(const CloudSetup& setup, const PointSet& cloud, const std::
       sides_(setup.options, setup.up, cloud.z_up) {
     if (setup.device)
         gpu_.emplace(*setup.device);
+    if (cloud.from_scanner)
+        sides_.seen_from = scanner;
     valid_ = finite(cloud.points);
     twins_ = take_out_twins(cloud.points, recorded() ? cloud.normals : std::span<const Vector3d>(), valid_);
     std::vector<Vector3d> some = sampled(cloud.points, valid_, enough_to_judge);
@@ -292,6 +294,7 @@ void CloudWork::compute_thinned() {
     const PointSet part{points, normals, {}, cloud_.z_up};
     const CloudSetup setup{options, setup_.device, setup_.up, setup_.viewpoint};
     CloudWork some(setup, part, scanner_, decisions());
+    some.sides_.seen_from = sides_.seen_from;
     const std::vector<float> repeats = repeatability(cloud_.points, result_.visibility, kept, some.run().visibility,
                                                      check, order_.empty() ? valid_ : order_);
     order_.clear();

@@ -48,6 +48,7 @@ std::vector<float> SettledSides::settle(CloudSurface& surface, std::optional<Dis
     if (recorded)
         return settle_recorded(surface, rays);
     Sides found = found_in(surface, patches_of(surface), rays);
+    decide_by_scanner(surface, found);
     tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
         if (found.sign[i] < 0)
             surface.normals[i] = -surface.normals[i];
@@ -64,6 +65,26 @@ std::vector<float> SettledSides::settle(CloudSurface& surface, std::optional<Dis
                                  .stableNormalized();
     note(found);
     return std::move(found.confidence);
+}
+
+void SettledSides::decide_by_scanner(const CloudSurface& surface, Sides& found) const {
+    constexpr double most = 0.85;
+    if (!found.doubt || !seen_from)
+        return;
+    const Vector3f scanner = (*seen_from - surface.middle).cast<float>();
+    double facing = 0, all = 0;
+    for (std::size_t i = 0; i < surface.size(); ++i) {
+        const float towards = surface.normals[i].dot(scanner - surface.tree[i]) * static_cast<float>(found.sign[i]);
+        facing += towards > 0;
+        all += towards != 0;
+    }
+    if (facing > (1 - most) * all && facing < most * all)
+        return;
+    found.doubt.reset();
+    found.why = "to the scanner's position, which decides between both sides";
+    if (facing < most * all)
+        for (std::int8_t& sign : found.sign)
+            sign = static_cast<std::int8_t>(-sign);
 }
 
 /// Recorded sides are right as a rule. Random ones show within patches; patches turned over, or all, show in where

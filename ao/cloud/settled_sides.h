@@ -17,10 +17,11 @@ class SettledSides {
     SettledSides(const CloudAoOptions& options, Eigen::Vector3d up, bool z_up)
         : options_(options), up_(std::move(up)), z_up_(z_up) {}
 
-    NormalOrientation orientation;   ///< as given or guessed; `why` becomes what was found
-    std::vector<std::string> doubts; ///< sentences, some of them twice
-    std::size_t turned_points = 0;   ///< whose recorded normals were turned
-    std::size_t judged_points = 0;   ///< of the surfaces where some were
+    NormalOrientation orientation;            ///< as given or guessed; `why` becomes what was found
+    std::optional<Eigen::Vector3d> seen_from; ///< where the scanner of all points stood, if that is known
+    std::vector<std::string> doubts;          ///< sentences, some of them twice
+    std::size_t turned_points = 0;            ///< whose recorded normals were turned
+    std::size_t judged_points = 0;            ///< of the surfaces where some were
     std::string turned_why;
     bool recorded_believed = false; ///< recorded sides were looked at, and are right
 
@@ -32,6 +33,8 @@ class SettledSides {
   private:
     [[nodiscard]] Sides found_in(const CloudSurface& surface, const Patches& patches, std::optional<DiscRays>& rays,
                                  const SidesEffort& effort = {}) const;
+    /// Where both sides would do, that to the scanner is right.
+    void decide_by_scanner(const CloudSurface& surface, Sides& found) const;
     std::vector<float> settle_recorded(CloudSurface& surface, std::optional<DiscRays>& rays);
     void note(const Sides& found);
 

@@ -188,6 +188,16 @@ TEST(Sides, an_empty_box_could_be_either) {
         box.push_back(p.cwiseProduct(Vector3d(2, 1.5, 1)) + Vector3d(10, 20, 5));
     }
     EXPECT_FALSE(visibility(box).doubts.empty());
+    for (const bool within : {true, false}) { // a sweep's scanner decides
+        const Vector3d scanner = within ? Vector3d(10.4, 19.7, 5.1) : Vector3d(90, 40, 25);
+        const auto swept = CloudAo({.radius = 0.5}).compute({box, {}, {}, false, true}, scanner);
+        if (within) {
+            EXPECT_TRUE(swept.doubts.empty()) << tests::joined(swept.doubts);
+            EXPECT_GT(swept.normals[1].cast<double>().dot(scanner - box[1]), 0);
+        } else {
+            EXPECT_FALSE(swept.doubts.empty()) << "not all of it is seen from there";
+        }
+    }
     EXPECT_TRUE(visibility(box, {}, {.radius = 0.5, .outside = "inward"}).doubts.empty());
 }
 
