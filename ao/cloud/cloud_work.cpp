@@ -295,16 +295,18 @@ void CloudWork::compute_thinned() {
     const CloudSetup setup{options, setup_.device, setup_.up, setup_.viewpoint};
     CloudWork some(setup, part, scanner_, decisions());
     some.sides_.seen_from = sides_.seen_from;
-    const std::vector<float> repeats = repeatability(cloud_.points, result_.visibility, kept, some.run().visibility,
-                                                     check, order_.empty() ? valid_ : order_);
+    const Repeatability found = repeatability(cloud_.points, result_.visibility, kept, some.run().visibility, check,
+                                              order_.empty() ? valid_ : order_);
     order_.clear();
+    error_by_check_ = found.rms;
     watch_.lap("check on a part");
     tbb::parallel_for(std::size_t(0), result_.error.size(), [&](std::size_t i) {
         if (!std::isnan(result_.visibility[i]))
-            result_.error[i] = error_once_checked(result_.error[i], result_.visibility[i], sides_known_[i], repeats[i]);
+            result_.error[i] =
+                error_once_checked(result_.error[i], result_.visibility[i], sides_known_[i], found.error[i]);
     });
     for (std::size_t i = 0; i < signs_.size(); ++i)
-        signs_[i].repeat = repeats[i];
+        signs_[i].repeat = found.error[i];
 }
 
 float error_once_checked(float factor_of_surroundings, float visibility, std::uint8_t side, float repeat) {
@@ -320,7 +322,7 @@ void CloudWork::tell_error() {
     result_.expected_error = sum.rms();
     if (!result_.expected_error)
         return;
-    const ToldError told = told_error(*result_.expected_error);
+    const ToldError told = told_error(*result_.expected_error, error_by_check_);
     result_.notes.push_back(told.note);
     if (told.doubt)
         doubt(*told.doubt);
@@ -337,12 +339,17 @@ std::optional<double> ErrorSum::rms() const {
     return count_ > 0 ? std::optional(std::sqrt(squares_ / static_cast<double>(count_))) : std::nullopt;
 }
 
-ToldError told_error(double error) {
+ToldError told_error(double error, double by_check) {
     constexpr double largest_error = 0.12;
+    constexpr double largest_by_check = 0.22; // noise alone makes up to 0.2 of what errs by less than 0.1
     constexpr const char* way_out = "A larger --radius spans more points; ao_confidence tells where.";
     ToldError told{fmt::format("an error of {:.2f} RMS is expected (--write error: of every point).", error), {}};
     if (error > largest_error)
         told.doubt = fmt::format("an error of {:.2f} RMS is expected. {}", error, way_out);
+    else if (by_check > largest_by_check)
+        told.doubt = fmt::format("a part of the points by themselves give quite other values, as if the error were "
+                                 "{:.2f} RMS. {}",
+                                 by_check, way_out);
     return told;
 }
 

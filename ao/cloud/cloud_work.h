@@ -166,6 +166,7 @@ class CloudWork {
     std::vector<Twin> twins_; ///< copies of points, in neither
     bool normals_refused_ = false;
     FittedCounts fitted_;
+    double error_by_check_ = 0;
     int gpu_tiles_ = 0, passes_ = 2;
 };
 
@@ -195,12 +196,13 @@ class ErrorSum {
     std::size_t count_ = 0;
 };
 
-/// Sentences about the expected error of a cloud; `doubt` is there if it is large.
+/// Sentences about the expected error of a cloud, and the error that its check alone lets expect. `doubt` is there if
+/// the first is large, or the other very large.
 struct ToldError {
     std::string note;
     std::optional<std::string> doubt;
 };
-[[nodiscard]] ToldError told_error(double error);
+[[nodiscard]] ToldError told_error(double error, double by_check);
 
 constexpr std::size_t enough_to_judge = 60000; ///< points of a sample
 

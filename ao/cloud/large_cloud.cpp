@@ -410,7 +410,7 @@ class LargeCloud {
         }
         result_.expected_error = sum.rms();
         if (result_.expected_error) {
-            const ToldError told = told_error(*result_.expected_error);
+            const ToldError told = told_error(*result_.expected_error, part ? part->error() : 0);
             told_error_ = told.note;
             if (told.doubt)
                 doubt(*told.doubt);

@@ -90,6 +90,10 @@ CheckedPart::CheckedPart(std::span<const Vector3d> points, std::span<const float
         }
     if (compared.empty())
         return;
+    double sum = 0;
+    for (const float square : squares)
+        sum += square;
+    rms_ = check.error_per_difference() * std::sqrt(sum / static_cast<double>(squares.size()));
     const NeighbourTree& tree = cloud_.emplace(compared).tree;
     const auto scale = static_cast<float>(check.error_per_difference());
     error_.resize(tree.size());
@@ -127,16 +131,17 @@ std::vector<float> CheckedPart::errors(std::span<const Vector3d> points, std::sp
     return errors;
 }
 
-std::vector<float> repeatability(std::span<const Vector3d> points, std::span<const float> whole,
-                                 std::span<const std::uint32_t> kept, std::span<const float> thinned,
-                                 const ThinnedCheck& check, std::span<const std::uint32_t> order) {
+Repeatability repeatability(std::span<const Vector3d> points, std::span<const float> whole,
+                            std::span<const std::uint32_t> kept, std::span<const float> thinned,
+                            const ThinnedCheck& check, std::span<const std::uint32_t> order) {
     std::vector<Vector3d> kept_points;
     std::vector<float> kept_whole;
     for (const std::uint32_t i : kept) {
         kept_points.push_back(points[i]);
         kept_whole.push_back(whole[i]);
     }
-    return CheckedPart(kept_points, kept_whole, thinned, check).errors(points, whole, order);
+    const CheckedPart part(kept_points, kept_whole, thinned, check);
+    return {part.error(), part.errors(points, whole, order)};
 }
 
 } // namespace scanshade

@@ -29,6 +29,8 @@ class CheckedPart {
     CheckedPart(std::span<const Eigen::Vector3d> points, std::span<const float> whole, std::span<const float> thinned,
                 const ThinnedCheck& check);
 
+    /// RMS error that all differences together let expect; 0 where there are none.
+    [[nodiscard]] double error() const { return rms_; }
     /// For each point of the cloud, the RMS error that the differences round it let expect; 1 where no point has both
     /// values. `whole`: their values; without one a point has 1, too. `order` holds every index once, or is empty for
     /// the order given: the time is short where its neighbours are neighbours in space.
@@ -36,15 +38,21 @@ class CheckedPart {
                                             std::span<const std::uint32_t> order = {}) const;
 
   private:
+    double rms_ = 0;
     std::optional<LocalCloud> cloud_; ///< of the points that have both values
     std::vector<float> error_;        ///< by index in the tree
 };
 
-/// CheckedPart::errors() of every point. `whole` are the values of `points`, in any unit; `thinned` those of the points
+/// What the check found.
+struct Repeatability {
+    double rms = 0;           ///< CheckedPart::error()
+    std::vector<float> error; ///< CheckedPart::errors() of every point
+};
+/// `whole` are the values of `points`, in any unit; `thinned` those of the points
 /// with the indices `kept`; NaN where unknown. `order` holds every index once: the time is short where its neighbours
 /// are neighbours in space.
-[[nodiscard]] std::vector<float> repeatability(std::span<const Eigen::Vector3d> points, std::span<const float> whole,
-                                               std::span<const std::uint32_t> kept, std::span<const float> thinned,
-                                               const ThinnedCheck& check, std::span<const std::uint32_t> order);
+[[nodiscard]] Repeatability repeatability(std::span<const Eigen::Vector3d> points, std::span<const float> whole,
+                                          std::span<const std::uint32_t> kept, std::span<const float> thinned,
+                                          const ThinnedCheck& check, std::span<const std::uint32_t> order);
 
 } // namespace scanshade

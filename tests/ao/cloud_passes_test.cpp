@@ -67,14 +67,14 @@ TEST(CloudPasses, the_order_of_points_does_not_change_their_error) {
     }
     std::iota(order.begin(), order.end(), 0U);
     const ThinnedCheck check{0.25};
-    const std::vector<float> in_file = repeatability(points, whole, kept, thinned, check, order);
+    const Repeatability in_file = repeatability(points, whole, kept, thinned, check, order);
     std::sort(order.begin(), order.end(),
               [&](std::uint32_t a, std::uint32_t b) { return points[a].x() < points[b].x(); });
-    const std::vector<float> in_space = repeatability(points, whole, kept, thinned, check, order);
-    ASSERT_EQ(in_file.size(), points.size());
-    EXPECT_EQ(in_file, in_space);
+    const Repeatability in_space = repeatability(points, whole, kept, thinned, check, order);
+    ASSERT_EQ(in_file.error.size(), points.size());
+    EXPECT_EQ(in_file.error, in_space.error);
     std::size_t below = 0;
-    for (const float error : in_file)
+    for (const float error : in_file.error)
         below += error < 1;
     EXPECT_GT(below, points.size() / 2);
 }
