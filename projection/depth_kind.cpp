@@ -239,16 +239,16 @@ DepthKind depth_kind(const DepthImage& depth) {
                              sigma_xy = std::max(shape.deviation / xy_norm, least_deviation);
                 const Vector3d sigma(sigma_xx, sigma_xy, sigma_xx);
                 const Vector3d of_z = bend_of_plane(shape.along_x, shape.along_y);
-                const Patch of_patch = values->array().exp();
+                const auto of_patch = [&] { return Patch(values->array().exp()); };
                 const auto linear = [&](const Patch& w) {
                     return Inverse{
                         u, v, half, double{w.mean()}, factor(w, basis().x) / half, factor(w, basis().y) / half};
                 };
-                inverse.count(shape.bend, sigma, of_z, -of_z, [&] { return linear(of_patch); });
+                inverse.count(shape.bend, sigma, of_z, -of_z, [&] { return linear(of_patch()); });
                 const Shape ratio = range_by_z(camera, u, v, half);
                 range.count(shape.bend, sigma, of_z,
                             ratio.bend + bend_of_plane(shape.along_x - ratio.along_x, shape.along_y - ratio.along_y),
-                            [&] { return linear(ray_lengths(camera, u, v, half).cwiseQuotient(of_patch)); });
+                            [&] { return linear(ray_lengths(camera, u, v, half).cwiseQuotient(of_patch())); });
             }
     }
     if (inverse.against_z() && !inverse.of_one_slope())

@@ -114,6 +114,8 @@ CloudWork::CloudWork(const CloudSetup& setup, const PointSet& cloud, const std::
       sides_(setup.options, setup.up, cloud.z_up), extent_(whole.extent) {
     if (setup.device)
         gpu_.emplace(*setup.device);
+    if (cloud.from_scanner)
+        sides_.seen_from = scanner;
     valid_ = finite(cloud.points);
     twins_ = take_out_twins(cloud.points, recorded() ? cloud.normals : std::span<const Vector3d>(), valid_);
     sides_.orientation = whole.orientation;
@@ -291,10 +293,9 @@ void CloudWork::compute_thinned() {
     options.keep_signs = false;
     if (sides_.recorded_believed)
         options.normals = CloudNormals::recorded;
-    const PointSet part{points, normals, {}, cloud_.z_up};
+    const PointSet part{points, normals, {}, cloud_.z_up, cloud_.from_scanner};
     const CloudSetup setup{options, setup_.device, setup_.up, setup_.viewpoint};
     CloudWork some(setup, part, scanner_, decisions());
-    some.sides_.seen_from = sides_.seen_from;
     const Repeatability found = repeatability(cloud_.points, result_.visibility, kept, some.run().visibility, check,
                                               order_.empty() ? valid_ : order_);
     order_.clear();
@@ -533,8 +534,8 @@ std::vector<float> CloudWork::sides_as_in_whole(CloudSurface& surface) const {
 }
 
 void CloudWork::doubt_lines(const CloudSurface& surface) {
-    constexpr double many =
-        0.15; // 0.17 .. 0.6 in sweeps of 64 and 16 lasers along a street, 0.1 in a scan from a tripod
+    // 0.17 .. 0.6 in sweeps of 64 and 16 lasers along a street, 0.1 in a scan from a tripod.
+    constexpr double many = 0.15;
     if (const double share = share_on_lines(surface); share > many)
         doubt(fmt::format("{:.0f} % of the points have all near neighbours on a line, as in the rings of a spinning "
                           "lidar: planes across the lines are guesses. Several sweeps in one cloud fill the gaps.",

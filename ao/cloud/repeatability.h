@@ -48,9 +48,8 @@ struct Repeatability {
     double rms = 0;           ///< CheckedPart::error()
     std::vector<float> error; ///< CheckedPart::errors() of every point
 };
-/// `whole` are the values of `points`, in any unit; `thinned` those of the points
-/// with the indices `kept`; NaN where unknown. `order` holds every index once: the time is short where its neighbours
-/// are neighbours in space.
+/// `whole` are the values of `points`, in any unit; `thinned` those of the points with the indices `kept`; NaN where
+/// unknown. `order` holds every index once: the time is short where its neighbours are neighbours in space.
 [[nodiscard]] Repeatability repeatability(std::span<const Eigen::Vector3d> points, std::span<const float> whole,
                                           std::span<const std::uint32_t> kept, std::span<const float> thinned,
                                           const ThinnedCheck& check, std::span<const std::uint32_t> order);

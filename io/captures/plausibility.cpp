@@ -207,8 +207,12 @@ int common_divisor(const cv::Mat& stored) {
     if (values.size() < enough)
         return 1;
     const auto wanted = static_cast<std::ptrdiff_t>(nearly_all * static_cast<double>(values.size()));
+    const auto divides_most = [&, most_others = std::ssize(values) - wanted](int divisor) {
+        std::ptrdiff_t others = 0; // soon too many, of most divisors
+        return std::ranges::none_of(values, [&](int value) { return (others += value % divisor != 0) > most_others; });
+    };
     int divisor = largest;
-    while (std::ranges::count_if(values, [&](int value) { return value % divisor == 0; }) < wanted)
+    while (!divides_most(divisor))
         --divisor;
     return divisor;
 }

@@ -299,7 +299,7 @@ Judged judged(const CloudSurface& surface, const DiscRays& rays, const Patches& 
 
 Sides sides_of(const CloudSurface& surface, const Patches& patches, const DiscRays* rays,
                const std::optional<Vector3f>& up, SidesRule rule, const SidesEffort& effort) {
-    Sides sides{Signs(surface.size(), 1), std::vector<float>(surface.size(), 0.0F), {}, 0, {}, {}, {}};
+    Sides sides{.sign = Signs(surface.size(), 1), .confidence = std::vector<float>(surface.size(), 0.0F), .why = {}};
     const Reach reach = reach_of(surface);
     if (!(reach.far > 0)) {
         sides.why = "as estimated: there are no surfaces to tell sides by";

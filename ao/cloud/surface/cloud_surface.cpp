@@ -12,6 +12,7 @@
 #include <cmath>
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <functional>
 #include <limits>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
@@ -116,10 +117,16 @@ double share_on_lines(const CloudSurface& surface) {
         const Vector3f variance = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f>(spread).eigenvalues();
         return variance[1] < narrow * variance[2];
     };
-    std::size_t lines = 0, all = 0;
-    for (std::size_t i = step / 2; i < surface.size(); i += step, ++all)
-        lines += on_line(i);
-    return all > 0 ? static_cast<double>(lines) / static_cast<double>(all) : 0;
+    const std::size_t looked_at = surface.size() / step;
+    const std::size_t lines = tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, looked_at), std::size_t(0),
+        [&](const auto& range, std::size_t sum) {
+            for (std::size_t k = range.begin(); k < range.end(); ++k)
+                sum += on_line(k * step + step / 2);
+            return sum;
+        },
+        std::plus<>());
+    return looked_at > 0 ? static_cast<double>(lines) / static_cast<double>(looked_at) : 0;
 }
 
 CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normals, CloudGpu* gpu,
