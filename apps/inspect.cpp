@@ -1,8 +1,8 @@
 // `scanshade inspect`: the content of a capture, and its problems, before anything is computed.
 #include "apps/command.h"
+#include "apps/doubts/doubts.h"
+#include "apps/doubts/pose_check.h"
 #include "apps/json.h"
-#include "apps/walk/doubts.h"
-#include "apps/walk/pose_check.h"
 #include "io/captures/capture.h"
 #include "io/clouds/cloud_file.h"
 #include "io/images/format.h"

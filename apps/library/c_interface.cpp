@@ -8,6 +8,7 @@
 #include "io/captures/plausibility.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
+#include "projection/base/spread.h"
 #include "projection/base/stopwatch.h"
 #include "projection/project.h"
 

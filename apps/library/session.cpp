@@ -1,7 +1,7 @@
 #include "apps/library/session.h"
 
+#include "apps/doubts/doubts.h"
 #include "apps/run/messages.h"
-#include "apps/walk/doubts.h"
 #include "apps/walk/frame_images.h"
 #include "apps/walk/frame_steps.h"
 #include "apps/walk/point_clouds.h"
@@ -284,7 +284,8 @@ void Session::finish_one(Computed& computed, const BatchOptions& options, Wanted
             expected_rms(work.error_in_view, finish(work, options, options.outputs).confidence_map);
     computed.row.coverage = work.attached.coverage;
     computed.row.mean_visibility = work.attached.mean_visibility;
-    std::ranges::move(doubts_about(work, options.radius_m, options.noise), std::back_inserter(computed.row.doubts));
+    std::ranges::move(doubts_about(computed_frame(work), options.radius_m, options.noise),
+                      std::back_inserter(computed.row.doubts));
     const auto values = [&](const Attached& of) {
         return frame.cloud ? of.per_point.empty() ? cv::Mat1f() : on_grid(of.per_point, frame.cloud->grid).clone()
                            : of.visibility;

@@ -4,6 +4,7 @@
 #include "projection/attach.h"
 #include "projection/base/error.h"
 #include "projection/base/hash.h"
+#include "projection/base/spread.h"
 #include "projection/project.h"
 
 #include <array>

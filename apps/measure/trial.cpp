@@ -5,6 +5,7 @@
 #include "io/images/image_file.h"
 #include "projection/attach.h"
 #include "projection/base/error.h"
+#include "projection/base/spread.h"
 #include "projection/base/stopwatch.h"
 #include "projection/expected_error.h"
 #include "projection/project.h"

@@ -1,5 +1,6 @@
 #include "apps/run/capture_runs.h"
 
+#include "apps/doubts/pose_check.h"
 #include "apps/measure/front.h"
 #include "apps/page/run_page.h"
 #include "apps/results/mcap_recording.h"
@@ -8,7 +9,6 @@
 #include "apps/run/outlook.h"
 #include "apps/walk/batch.h"
 #include "apps/walk/large_frames.h"
-#include "apps/walk/pose_check.h"
 #include "apps/walk/progress.h"
 #include "apps/walk/sequence_order.h"
 #include "io/files.h"

@@ -1,7 +1,7 @@
 // The walk for many frames: load, project, compute, attach, write, with a bounded number of frames in memory.
 #include "apps/walk/batch.h"
 
-#include "apps/walk/doubts.h"
+#include "apps/doubts/doubts.h"
 #include "apps/walk/frame_files.h"
 #include "apps/walk/frame_messages.h"
 #include "apps/walk/frame_steps.h"
@@ -88,7 +88,7 @@ void attach_and_write(Work& work, const BatchOptions& options) {
         work.row.mean_visibility = work.attached.mean_visibility;
         work.row.expected_error = work.by_points ? work.of_points.expected_error.value_or(std::nan(""))
                                                  : expected_rms(work.error_in_view, images.confidence_map);
-        std::ranges::move(doubts_about(work, options.radius_m, options.noise, options.outputs.unit),
+        std::ranges::move(doubts_about(computed_frame(work), options.radius_m, options.noise, options.outputs.unit),
                           std::back_inserter(work.row.doubts));
     });
     take(work, &StageTimes::write, [&] {

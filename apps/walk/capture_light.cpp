@@ -7,6 +7,7 @@
 #include "io/text.h"
 #include "projection/attach.h"
 #include "projection/base/error.h"
+#include "projection/base/spread.h"
 
 #include <algorithm>
 #include <array>

@@ -2,6 +2,7 @@
 
 #include "apps/walk/large_frames.h"
 #include "projection/base/error.h"
+#include "projection/base/spread.h"
 #include "projection/base/stopwatch.h"
 #include "projection/project.h"
 
@@ -42,14 +43,6 @@ DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& fram
         if (loaded[i])
             kept->emplace(frames[chosen[i]], *std::move(loaded[i]));
     return measure_noise(images);
-}
-
-std::vector<std::size_t> spread(std::size_t count, std::size_t total) {
-    count = std::min(count, total);
-    std::vector<std::size_t> indices(count);
-    for (std::size_t i = 0; i < count; ++i)
-        indices[i] = i * total / count;
-    return indices;
 }
 
 } // namespace scanshade

@@ -27,7 +27,4 @@ using LoadedFrames = std::map<std::size_t, LoadedFrame>; ///< by index in the ca
                                   LoadedFrames* kept = nullptr, bool with_colour = false,
                                   std::size_t most_points = std::numeric_limits<std::size_t>::max());
 
-/// `count` of `total` indices, spread evenly from the first on.
-[[nodiscard]] std::vector<std::size_t> spread(std::size_t count, std::size_t total);
-
 } // namespace scanshade

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "ao/finish/finish.h"
+#include "apps/doubts/doubts.h"
 #include "apps/results/frame_row.h"
 #include "apps/walk/batch_options.h"
 #include "projection/attach.h"
@@ -36,5 +37,16 @@ struct Work {
 };
 
 using WorkPtr = std::shared_ptr<Work>;
+
+/// What is judged once it is computed. Reads `row.valid_share` and `row.coverage`.
+[[nodiscard]] inline ComputedFrame computed_frame(const Work& work) {
+    return {work.frame,
+            work.row.camera,
+            work.row.valid_share,
+            work.row.coverage,
+            work.depth,
+            work.ao.visibility,
+            work.by_points ? &work.of_points : nullptr};
+}
 
 } // namespace scanshade

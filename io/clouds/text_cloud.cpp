@@ -224,12 +224,12 @@ CloudRecords read_ptx(std::string_view bytes, const fs::path& file, std::vector<
             throw Error(fmt::format("{}: {}{} columns of {} rows are {} points, the file holds {}", file.string(), scan,
                                     header.columns, header.rows, expected, found));
         grid = {static_cast<int>(header.rows), static_cast<int>(header.columns)};
-        const std::size_t rest = bytes.find_first_not_of(" \t\r\n", behind);
-        if (rest == std::string_view::npos) {
+        const std::string_view rest = trimmed(bytes.substr(behind)); // without what words() takes for blanks
+        if (rest.empty()) {
             records.grid = scans == 0 ? grid : cv::Size(static_cast<int>(records.point_count), 1);
             break;
         }
-        at = bytes.rfind('\n', rest) + 1;
+        at = bytes.rfind('\n', static_cast<std::size_t>(rest.data() - bytes.data())) + 1;
         line = lines.line() + static_cast<int>(std::count(bytes.begin() + static_cast<std::ptrdiff_t>(behind),
                                                           bytes.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
         header = ptx_header(bytes.substr(at), line, file);

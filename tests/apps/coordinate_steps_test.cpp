@@ -1,5 +1,5 @@
 // Coordinates that were rounded more coarsely than points stand apart are found; grids and profiles are no such.
-#include "apps/walk/coordinate_steps.h"
+#include "apps/doubts/coordinate_steps.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

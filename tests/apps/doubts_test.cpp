@@ -1,6 +1,6 @@
 // A result that is implausible is doubtful, with reasons, wherever the result is told; a plausible one is not.
 #include "apps/walk/batch.h"
-#include "apps/walk/doubts.h"
+#include "apps/walk/work.h"
 #include "io/cameras/camera_file.h"
 #include "io/images/image_file.h"
 #include "tests/support/files.h"
@@ -39,7 +39,9 @@ struct Computed {
         work.depth = {row.camera.pinhole, tests::corner_depth(0), {}};
         work.ao.visibility = cv::Mat1f(work.depth.z_m.size(), 0.5F);
     }
-    [[nodiscard]] std::vector<std::string> doubts() const { return doubts_about(work, radius_m, noise); }
+    [[nodiscard]] std::vector<std::string> doubts() const {
+        return doubts_about(computed_frame(work), radius_m, noise);
+    }
 };
 
 /// The same of a cloud: a square of 40 x 40 points, 10 cm apart.

@@ -1,5 +1,5 @@
 // Poses that depths contradict are told of before a run: another convention, another unit, another recording.
-#include "apps/walk/pose_check.h"
+#include "apps/doubts/pose_check.h"
 #include "io/images/image_file.h"
 #include "tests/support/files.h"
 

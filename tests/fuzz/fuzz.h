@@ -10,11 +10,15 @@
 #include <fstream>
 #include <string>
 #include <string_view>
+#include <tbb/global_control.h>
 #include <unistd.h>
 #include <utility>
 #include <vector>
 
 namespace scanshade::fuzz {
+
+/// Targets run side by side, one a processor: threads of each for every processor would mostly wait for each other.
+inline const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
 
 /// A folder of this process's own, under TMPDIR.
 inline const std::filesystem::path& folder() {

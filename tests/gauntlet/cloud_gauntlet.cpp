@@ -1,9 +1,10 @@
 // Clouds, real and generated, each perturbed in every way of a table: where is the result wrong without a word?
 #include "ao/cloud/cloud_ao.h"
 #include "ao/cloud/extent.h"
+#include "apps/doubts/doubts.h"
 #include "apps/scenes/scanner.h"
-#include "apps/walk/doubts.h"
 #include "apps/walk/point_clouds.h"
+#include "apps/walk/work.h"
 #include "io/captures/capture.h"
 #include "io/clouds/cloud_file.h"
 #include "projection/base/error.h"
@@ -51,7 +52,7 @@ Result result_of(const TestCloud& test, double radius) {
     row.valid_share = 1;
     row.coverage = attached_points(*work.frame.cloud, result.found.visibility).coverage;
     result.doubts = result.found.doubts;
-    std::ranges::copy(doubts_about(work, result.found.radius), std::back_inserter(result.doubts));
+    std::ranges::copy(doubts_about(computed_frame(work), result.found.radius), std::back_inserter(result.doubts));
     return result;
 }
 

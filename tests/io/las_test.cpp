@@ -354,6 +354,10 @@ TEST(TextClouds, ptx_is_a_grid_placed_by_its_matrix) {
     // Two columns of three rows each, column by column: neighbours in the file are above each other.
     const Cloud oblong = read(write_file(folder / "e.ptx", "2\n3" + head.substr(3) + body + "0 0 2 0.5\n0 0 3 0.5\n"));
     EXPECT_EQ(oblong.grid, cv::Size(3, 2));
+    // Any blank may follow the last word. A vertical tab was once taken for the begin of another scan on the same line.
+    const Cloud blanks_at_end = read(write_file(folder / "f.ptx", head + body.substr(0, body.size() - 1) + "\v\n\f\n"));
+    EXPECT_EQ(blanks_at_end.points.size(), 4U);
+    EXPECT_EQ(blanks_at_end.grid, cv::Size(2, 2));
 }
 
 TEST(TextClouds, scans_of_a_ptx_file_are_one_cloud_and_come_back_line_by_line) {

@@ -26,12 +26,6 @@ std::uint64_t number_at(std::string_view bytes, std::size_t at) {
     return number;
 }
 
-std::string_view trimmed(std::string_view text) {
-    constexpr std::string_view blanks = " \t\r\n";
-    const auto first = text.find_first_not_of(blanks);
-    return first == std::string_view::npos ? "" : text.substr(first, text.find_last_not_of(blanks) - first + 1);
-}
-
 /// `what` says whose number it is. No text stands for `otherwise`.
 template <class Number>
 Number number_of(std::string_view text, Number otherwise, const std::string& what) {

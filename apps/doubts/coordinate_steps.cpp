@@ -1,4 +1,4 @@
-#include "apps/walk/coordinate_steps.h"
+#include "apps/doubts/coordinate_steps.h"
 
 #include "projection/base/statistics.h"
 

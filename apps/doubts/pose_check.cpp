@@ -1,6 +1,7 @@
-#include "apps/walk/pose_check.h"
+#include "apps/doubts/pose_check.h"
 
-#include "apps/walk/measured_noise.h"
+#include "projection/base/error.h"
+#include "projection/base/spread.h"
 #include "projection/pose_scale.h"
 #include "projection/project.h"
 

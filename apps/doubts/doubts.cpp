@@ -1,0 +1,129 @@
+// The rules for a computed frame, one after the other.
+#include "apps/doubts/doubts.h"
+
+#include "apps/doubts/of_points.h"
+#include "apps/doubts/of_view.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fmt/format.h>
+#include <iterator>
+#include <opencv2/imgproc.hpp>
+#include <span>
+
+namespace scanshade {
+namespace {
+
+constexpr double least_share = 0.2;        ///< of valid pixels, and of valid pixels or points with a value
+constexpr double least_neighboured = 0.3;  ///< share of the valid pixels with a valid one next to them
+constexpr double all_alike = 0.999;        ///< share of the values that are exactly 0, or exactly 1
+constexpr std::size_t enough_values = 100; ///< fewer may be alike by chance
+
+/// Shares of the valid pixels with a valid one at most two to the left or right, and above or below.
+std::array<double, 2> neighboured(const cv::Mat1f& z_m) {
+    std::size_t valid = 0, beside = 0, above = 0;
+    const auto holds = [&](int v, int u) { return z_m(v, u) > 0; };
+    for (int v = 2; v + 2 < z_m.rows; ++v)
+        for (int u = 2; u + 2 < z_m.cols; u += 3) {
+            if (!holds(v, u))
+                continue;
+            ++valid;
+            beside += holds(v, u - 1) || holds(v, u + 1) || holds(v, u - 2) || holds(v, u + 2);
+            above += holds(v - 1, u) || holds(v + 1, u) || holds(v - 2, u) || holds(v + 2, u);
+        }
+    const auto all = static_cast<double>(std::max<std::size_t>(valid, 1));
+    return {valid == 0 ? 1 : static_cast<double>(beside) / all, valid == 0 ? 1 : static_cast<double>(above) / all};
+}
+
+/// Whether the valid pixels are those of an object without its background: most of the box round them.
+bool is_cut_out(const cv::Mat1f& z_m) {
+    constexpr double most = 0.4, least = 0.001;
+    if (z_m.empty())
+        return false;
+    const cv::Mat valid = z_m > 0;
+    const cv::Rect box = cv::boundingRect(valid);
+    const double inside = cv::countNonZero(valid);
+    return inside > most * box.area() && inside > least * static_cast<double>(z_m.total());
+}
+
+void doubt_shares(const ComputedFrame& computed, Doubts& doubts) {
+    const bool image = !computed.frame.cloud || (computed.frame.cloud->organised() && !computed.of_points);
+    if (computed.valid_share == 0) {
+        add_if(computed.frame.doubts.empty(), doubts,
+               computed.frame.cloud ? "no point is valid." : "no pixel holds a valid depth.");
+        return;
+    }
+    add_if(image && computed.valid_share < least_share && !is_cut_out(computed.depth.z_m), doubts,
+           fmt::format("only {:.1f} % of the pixels hold a depth: what hides in the holes cannot occlude.",
+                       100 * computed.valid_share));
+    if (image && computed.valid_share >= least_share && !computed.depth.z_m.empty()) {
+        const auto [beside, above] = neighboured(computed.depth.z_m);
+        add_if(std::min(beside, above) < least_neighboured, doubts,
+               fmt::format("only {:.0f} % of the valid pixels have a valid one {}: what hides between them cannot "
+                           "occlude.",
+                           100 * std::min(beside, above), beside < above ? "beside them" : "above or below them"));
+    }
+    add_if(computed.coverage < least_share, doubts,
+           fmt::format("only {:.1f} % of the valid {} got a value.", 100 * computed.coverage,
+                       computed.frame.cloud ? "points" : "pixels"));
+}
+
+/// `may_be_open()`: all may be open, as of a convex surface.
+template <class MayBeOpen>
+void doubt_values(std::span<const float> values, const MayBeOpen& may_be_open, Doubts& doubts) {
+    std::size_t known = 0, closed = 0, open = 0;
+    for (const float value : values) {
+        known += !std::isnan(value);
+        closed += value == 0;
+        open += value == 1;
+    }
+    if (known < enough_values)
+        return;
+    const auto most = static_cast<std::size_t>(all_alike * static_cast<double>(known));
+    add_if(open > most && !may_be_open(), doubts,
+           "every value is exactly 1, fully open: only flat and convex surfaces read so. Otherwise depth unit, camera "
+           "or radius are wrong.");
+    add_if(closed > most, doubts,
+           "every value is exactly 0, fully closed: no real surface reads so. Depth unit, camera, normals or radius "
+           "are wrong.");
+}
+
+} // namespace
+
+std::vector<std::string> doubts_about(const Camera& camera, const DepthImage& depth, const LengthUnit& unit) {
+    Doubts doubts;
+    doubt_camera(camera, doubts);
+    doubt_kind(depth, doubts);
+    doubt_ends(depth, unit, doubts);
+    return doubts;
+}
+
+std::vector<std::string> doubts_about(const ComputedFrame& computed, double radius_m, const DepthNoise& noise,
+                                      const LengthUnit& unit) {
+    Doubts doubts = computed.frame.doubts;
+    doubt_shares(computed, doubts);
+    if (computed.of_points) {
+        const Cloud& cloud = *computed.frame.cloud;
+        const PointVisibility& found = *computed.of_points;
+        doubt_unit(cloud, doubts);
+        doubt_points(cloud, doubts);
+        doubt_values(
+            found.visibility, [&] { return !has_hollows(cloud, found); }, doubts);
+        doubt_radius_of_points(cloud, found, doubts);
+        doubt_steps(cloud, found, doubts);
+        return doubts;
+    }
+    const cv::Mat1f& visibility = computed.visibility;
+    if (visibility.isContinuous())
+        doubt_values(
+            {visibility.ptr<float>(), visibility.total()},
+            [&] { return radius_m > 0 && !has_hollows(computed.depth, radius_m); }, doubts);
+    doubt_radius_in_view(computed.depth, radius_m, unit, doubts);
+    doubt_noise_in_view(computed.depth, radius_m, noise, unit, doubts);
+    if (!computed.frame.cloud) // a cloud's camera is recovered or chosen, not given, unless --camera names it
+        std::ranges::move(doubts_about(computed.camera, computed.depth, unit), std::back_inserter(doubts));
+    return doubts;
+}
+
+} // namespace scanshade
