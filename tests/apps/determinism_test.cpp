@@ -92,7 +92,7 @@ TEST_P(Determinism, results_are_those_of_the_golden_hashes) {
         hashes[key] = hash;
         std::string text;
         for (const auto& [name, value] : hashes)
-            text += name + " | " + value + "\n";
+            text += fmt::format("{} | {}\n", name, value);
         write_file(golden_file, text);
         GTEST_SKIP() << "written: " << key;
     }

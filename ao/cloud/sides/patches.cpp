@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <span>
 #include <tbb/parallel_for.h>
 #include <utility>
 
@@ -13,7 +14,11 @@ namespace {
 
 using Eigen::Vector3f;
 
-constexpr int classes = 128;
+constexpr std::size_t classes = 128; ///< of sureness
+constexpr float sure = 0.85F, likely = 0.6F;
+
+/// How sure pairs of a class are at most, 0 .. 1.
+constexpr float sureness_of(std::size_t rank) { return 1 - static_cast<float>(rank) / (classes - 1); }
 
 /// Points joined into pieces. Each point knows whether it must be turned to agree with its piece.
 class Pieces {
@@ -26,6 +31,13 @@ class Pieces {
         std::uint32_t piece;
         bool turned; ///< against the piece's first point
     };
+    /// As find(), for several threads at once.
+    [[nodiscard]] Member found(std::uint32_t point) const {
+        bool turned = false;
+        for (; parent_[point] != point; point = parent_[point])
+            turned ^= turned_[point] != 0;
+        return {point, turned};
+    }
     Member find(std::uint32_t point) {
         bool turned = false;
         std::uint32_t root = point;
@@ -58,26 +70,33 @@ class Pieces {
     std::vector<std::uint32_t> size_;
 };
 
-/// Pairs of neighbours, the surest ones first, whose planes are less than 75 degrees apart. Sure pairs have parallel
+/// Pairs of neighbours whose planes are less than 75 degrees apart, by how sure they are. Sure pairs have parallel
 /// planes, each point within the plane of the other.
+///
+/// Pairs within a region, points of indices side by side, are kept together: regions can be joined at the same time,
+/// and what they touch fits into a core's cache.
 class SurePairs {
   public:
     using Pair = std::array<std::uint32_t, 2>;
 
     explicit SurePairs(const CloudSurface& surface);
-    [[nodiscard]] const std::vector<Pair>& all() const { return pairs_; }
-    /// How sure all pairs from this one on are at most, 0 .. 1.
-    [[nodiscard]] float sureness(std::size_t pair) const;
+    [[nodiscard]] std::size_t regions() const { return starts_.size() - 1; }
+    /// Of a class, those within a region; of the region regions(), those between two of them.
+    [[nodiscard]] std::span<const Pair> of(std::size_t region, std::size_t rank) const {
+        return std::span(pairs_).subspan(starts_[region][rank], starts_[region][rank + 1] - starts_[region][rank]);
+    }
 
   private:
     std::vector<Pair> pairs_;
-    std::vector<std::size_t> starts_; ///< of the classes of equal sureness
+    std::vector<std::array<std::size_t, classes + 1>> starts_; ///< of the classes in each region, then between them
 };
 
-SurePairs::SurePairs(const CloudSurface& surface) : starts_(classes + 1, 0) {
+SurePairs::SurePairs(const CloudSurface& surface) {
     constexpr float least = 0.26F; // the cosine of 75 degrees
-    constexpr std::size_t at_once = 1 << 13;
+    constexpr std::size_t at_once = 1 << 13, blocks_of_region = 8;
     const std::size_t blocks = (surface.size() + at_once - 1) / at_once;
+    const auto region_of = [](std::size_t point) { return point / (at_once * blocks_of_region); };
+    enum Where : std::size_t { within, between, places };
     const auto for_each_pair = [&](std::size_t block, auto&& visit) {
         for (std::size_t i = block * at_once; i < std::min((block + 1) * at_once, surface.size()); ++i) {
             if (surface.normals[i].isZero())
@@ -92,49 +111,57 @@ SurePairs::SurePairs(const CloudSurface& surface) : starts_(classes + 1, 0) {
                     continue;
                 const Vector3f apart = (surface.tree[j] - surface.tree[i]).stableNormalized();
                 const float beside = 1 - std::max(std::abs(apart.dot(a)), std::abs(apart.dot(b)));
-                visit(static_cast<std::uint32_t>(i), j,
+                visit(Pair{static_cast<std::uint32_t>(i), j}, region_of(i) == region_of(j) ? within : between,
                       static_cast<std::size_t>((classes - 1) * (1 - std::clamp(like * beside, 0.0F, 1.0F))));
             }
         }
     };
-    std::vector<std::array<std::size_t, classes>> next(blocks); // by block and class, where its pairs go
+    using Counts = std::array<std::array<std::size_t, classes>, places>;
+    std::vector<Counts> next(blocks); // where the pairs of a block go
     tbb::parallel_for(std::size_t(0), blocks, [&](std::size_t block) {
-        next[block].fill(0);
-        for_each_pair(block, [&](std::uint32_t, std::uint32_t, std::size_t rank) { ++next[block][rank]; });
+        next[block] = {};
+        for_each_pair(block, [&](const Pair&, Where where, std::size_t rank) { ++next[block][where][rank]; });
     });
+    const std::size_t regions = (blocks + blocks_of_region - 1) / blocks_of_region;
+    starts_.resize(regions + 1);
     std::size_t before = 0;
-    for (std::size_t rank = 0; rank < classes; ++rank) {
-        for (auto& block : next)
-            before += std::exchange(block[rank], before);
-        starts_[rank + 1] = before;
+    for (std::size_t region = 0; region <= regions; ++region) {
+        const std::size_t first = region < regions ? region * blocks_of_region : 0;
+        const std::size_t end = region < regions ? std::min(first + blocks_of_region, blocks) : blocks;
+        for (std::size_t rank = 0; rank < classes; ++rank) {
+            starts_[region][rank] = before;
+            for (std::size_t block = first; block < end; ++block)
+                before += std::exchange(next[block][region < regions ? within : between][rank], before);
+        }
+        starts_[region][classes] = before;
     }
     pairs_.resize(before);
     tbb::parallel_for(std::size_t(0), blocks, [&](std::size_t block) {
-        for_each_pair(block, [&](std::uint32_t i, std::uint32_t j, std::size_t rank) {
-            pairs_[next[block][rank]++] = {i, j};
-        });
+        for_each_pair(
+            block, [&](const Pair& pair, Where where, std::size_t rank) { pairs_[next[block][where][rank]++] = pair; });
     });
-}
-
-float SurePairs::sureness(std::size_t pair) const {
-    const auto after = std::upper_bound(starts_.begin(), starts_.end(), pair);
-    return 1 - static_cast<float>(after - starts_.begin() - 1) / (classes - 1);
 }
 
 /// As Patches::links says.
 std::vector<SignedGraph::Link> links_between(const Patches& patches, const CloudSurface& surface,
                                              const SurePairs& pairs) {
+    std::vector<std::vector<SignedGraph::Link>> of_region(pairs.regions() + 1);
+    tbb::parallel_for(std::size_t(0), of_region.size(), [&](std::size_t region) {
+        for (std::size_t rank = 0; rank < classes; ++rank) {
+            const auto sureness = static_cast<double>(sureness_of(rank));
+            for (const auto& [i, j] : pairs.of(region, rank)) {
+                const std::uint32_t a = patches.patch[i], b = patches.patch[j];
+                if (a == b)
+                    continue;
+                const int sign =
+                    (surface.normals[i].dot(surface.normals[j]) < 0 ? -1 : 1) * patches.sign(i) * patches.sign(j);
+                of_region[region].push_back({std::min(a, b), std::max(a, b), sign * sureness * sureness});
+            }
+        }
+    });
     std::vector<SignedGraph::Link> links;
-    const std::vector<SurePairs::Pair>& all = pairs.all();
-    for (std::size_t k = 0; k < all.size(); ++k) {
-        const auto& [i, j] = all[k];
-        const std::uint32_t a = patches.patch[i], b = patches.patch[j];
-        if (a == b)
-            continue;
-        const double sureness = static_cast<double>(pairs.sureness(k));
-        const int sign = (surface.normals[i].dot(surface.normals[j]) < 0 ? -1 : 1) * patches.sign(i) * patches.sign(j);
-        links.push_back({std::min(a, b), std::max(a, b), sign * sureness * sureness});
-    }
+    for (const auto& some : of_region)
+        links.insert(links.end(), some.begin(), some.end());
     return summed(std::move(links));
 }
 
@@ -142,33 +169,48 @@ std::vector<SignedGraph::Link> links_between(const Patches& patches, const Cloud
 
 Patches patches_of(const CloudSurface& surface) {
     const SurePairs pairs(surface);
-    constexpr float sure = 0.85F, likely = 0.6F;
     constexpr std::uint32_t crumb = 8;
     const auto most = static_cast<std::uint32_t>(std::max<std::size_t>(32, surface.size() / 3000));
     Pieces pieces(surface.size());
-    const std::vector<SurePairs::Pair>& all = pairs.all();
-    for (std::size_t k = 0; k < all.size(); ++k) {
-        const float sureness = pairs.sureness(k);
-        if (sureness < likely)
-            break;
-        const auto& [i, j] = all[k];
-        const Pieces::Member one = pieces.find(i), other = pieces.find(j);
-        if (one.piece == other.piece)
-            continue;
-        const bool small = sureness >= sure ? pieces.size(one) + pieces.size(other) <= most
-                                            : std::min(pieces.size(one), pieces.size(other)) <= crumb;
-        if (small)
-            pieces.join(one, other, surface.normals[i].dot(surface.normals[j]) < 0);
-    }
+    const auto join = [&](std::size_t region, std::size_t rank) {
+        const bool surely = sureness_of(rank) >= sure;
+        for (const auto& [i, j] : pairs.of(region, rank)) {
+            const Pieces::Member one = pieces.find(i), other = pieces.find(j);
+            if (one.piece == other.piece)
+                continue;
+            const bool small = surely ? pieces.size(one) + pieces.size(other) <= most
+                                      : std::min(pieces.size(one), pieces.size(other)) <= crumb;
+            if (small)
+                pieces.join(one, other, surface.normals[i].dot(surface.normals[j]) < 0);
+        }
+    };
+    std::size_t sure_classes = 0, likely_classes = 0;
+    while (sure_classes < classes && sureness_of(sure_classes) >= sure)
+        ++sure_classes;
+    while (likely_classes < classes && sureness_of(likely_classes) >= likely)
+        ++likely_classes;
+    // Sure pairs within regions, all regions at the same time; then those between regions, which are few; then crumbs.
+    tbb::parallel_for(std::size_t(0), pairs.regions(), [&](std::size_t region) {
+        for (std::size_t rank = 0; rank < sure_classes; ++rank)
+            join(region, rank);
+    });
+    for (std::size_t rank = 0; rank < sure_classes; ++rank)
+        join(pairs.regions(), rank);
+    for (std::size_t rank = sure_classes; rank < likely_classes; ++rank)
+        for (std::size_t region = 0; region <= pairs.regions(); ++region)
+            join(region, rank);
     Patches patches{std::vector<std::uint32_t>(surface.size()), std::vector<char>(surface.size()), 0, {}};
+    tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {
+        const auto [piece, turned] = pieces.found(static_cast<std::uint32_t>(i));
+        patches.patch[i] = piece;
+        patches.turned[i] = turned;
+    });
     constexpr auto nobody = static_cast<std::uint32_t>(-1);
     std::vector<std::uint32_t> number(surface.size(), nobody);
-    for (std::size_t i = 0; i < surface.size(); ++i) {
-        const auto [piece, turned] = pieces.find(static_cast<std::uint32_t>(i));
-        if (number[piece] == nobody)
-            number[piece] = patches.count++;
-        patches.patch[i] = number[piece];
-        patches.turned[i] = turned;
+    for (std::uint32_t& patch : patches.patch) {
+        if (number[patch] == nobody)
+            number[patch] = patches.count++;
+        patch = number[patch];
     }
     patches.links = links_between(patches, surface, pairs);
     return patches;

@@ -71,7 +71,8 @@ void add_fields(pugi::xml_node structure, const std::string& what, int depth, st
     for (const pugi::xml_node node : structure.children()) {
         if (node.type() != pugi::node_element)
             continue;
-        const std::string type = node.attribute("type").value(), name = node.name(), whose = what + " " + name;
+        const std::string type = node.attribute("type").value(), name = node.name(),
+                          whose = fmt::format("{} {}", what, name);
         if (type == "Structure") {
             add_fields(node, what, depth + 1, fields);
             continue;
