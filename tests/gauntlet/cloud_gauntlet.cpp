@@ -4,7 +4,6 @@
 #include "apps/doubts/doubts.h"
 #include "apps/scenes/scanner.h"
 #include "apps/walk/point_clouds.h"
-#include "apps/walk/work.h"
 #include "io/captures/capture.h"
 #include "io/clouds/cloud_file.h"
 #include "projection/base/error.h"
@@ -43,16 +42,12 @@ Result result_of(const TestCloud& test, double radius) {
     Result result;
     result.found = CloudAo({.radius = radius}).compute({test.points, test.normals, {}, test.z_up}, test.scanner);
     result.seconds = stopwatch.ms() / 1000;
-    const CaptureEntry entry;
-    FrameRow row;
-    Work work{entry, row};
-    work.by_points = true;
-    work.of_points = result.found;
-    work.frame.cloud = Cloud{{static_cast<int>(test.points.size()), 1}, test.points, {}, test.records};
-    row.valid_share = 1;
-    row.coverage = attached_points(*work.frame.cloud, result.found.visibility).coverage;
+    Frame frame;
+    frame.cloud = Cloud{{static_cast<int>(test.points.size()), 1}, test.points, {}, test.records};
+    const double coverage = attached_points(*frame.cloud, result.found.visibility).coverage;
     result.doubts = result.found.doubts;
-    std::ranges::copy(doubts_about(computed_frame(work), result.found.radius), std::back_inserter(result.doubts));
+    std::ranges::copy(doubts_about({frame, {}, 1, coverage, {}, {}, &result.found}, result.found.radius),
+                      std::back_inserter(result.doubts));
     return result;
 }
 

@@ -1,4 +1,4 @@
-// Patches: union and find over pairs in the order of their sureness.
+// Patches: union and find over pairs, the surest first: within regions on all cores, then between them.
 #include "ao/cloud/sides/patches.h"
 
 #include <algorithm>
@@ -31,28 +31,25 @@ class Pieces {
         std::uint32_t piece;
         bool turned; ///< against the piece's first point
     };
-    /// As find(), for several threads at once.
+    /// Leaves all as it is, so several threads may ask.
     [[nodiscard]] Member found(std::uint32_t point) const {
         bool turned = false;
         for (; parent_[point] != point; point = parent_[point])
             turned ^= turned_[point] != 0;
         return {point, turned};
     }
+    /// The same, with path compression: all points on the way become the root's children.
     Member find(std::uint32_t point) {
-        bool turned = false;
-        std::uint32_t root = point;
-        for (; parent_[root] != root; root = parent_[root])
-            turned ^= turned_[root] != 0;
-        // Path compression: all points on the way become the root's children.
-        for (bool rest = turned; parent_[point] != point;) {
+        const Member member = found(point);
+        for (bool rest = member.turned; parent_[point] != point;) {
             const std::uint32_t next = parent_[point];
             const bool own = turned_[point] != 0;
-            parent_[point] = root;
+            parent_[point] = member.piece;
             turned_[point] = rest;
             rest ^= own;
             point = next;
         }
-        return {root, turned};
+        return member;
     }
     [[nodiscard]] std::uint32_t size(const Member& member) const { return size_[member.piece]; }
 
@@ -81,7 +78,9 @@ class SurePairs {
 
     explicit SurePairs(const CloudSurface& surface);
     [[nodiscard]] std::size_t regions() const { return starts_.size() - 1; }
-    /// Of a class, those within a region; of the region regions(), those between two of them.
+    /// Stands for a region in of(): the pairs between two regions.
+    [[nodiscard]] std::size_t between() const { return regions(); }
+    /// Of a class, those within a region.
     [[nodiscard]] std::span<const Pair> of(std::size_t region, std::size_t rank) const {
         return std::span(pairs_).subspan(starts_[region][rank], starts_[region][rank + 1] - starts_[region][rank]);
     }
@@ -96,7 +95,7 @@ SurePairs::SurePairs(const CloudSurface& surface) {
     constexpr std::size_t at_once = 1 << 13, blocks_of_region = 8;
     const std::size_t blocks = (surface.size() + at_once - 1) / at_once;
     const auto region_of = [](std::size_t point) { return point / (at_once * blocks_of_region); };
-    enum Where : std::size_t { within, between, places };
+    enum Where : std::size_t { within, across, places };
     const auto for_each_pair = [&](std::size_t block, auto&& visit) {
         for (std::size_t i = block * at_once; i < std::min((block + 1) * at_once, surface.size()); ++i) {
             if (surface.normals[i].isZero())
@@ -111,7 +110,7 @@ SurePairs::SurePairs(const CloudSurface& surface) {
                     continue;
                 const Vector3f apart = (surface.tree[j] - surface.tree[i]).stableNormalized();
                 const float beside = 1 - std::max(std::abs(apart.dot(a)), std::abs(apart.dot(b)));
-                visit(Pair{static_cast<std::uint32_t>(i), j}, region_of(i) == region_of(j) ? within : between,
+                visit(Pair{static_cast<std::uint32_t>(i), j}, region_of(i) == region_of(j) ? within : across,
                       static_cast<std::size_t>((classes - 1) * (1 - std::clamp(like * beside, 0.0F, 1.0F))));
             }
         }
@@ -126,12 +125,13 @@ SurePairs::SurePairs(const CloudSurface& surface) {
     starts_.resize(regions + 1);
     std::size_t before = 0;
     for (std::size_t region = 0; region <= regions; ++region) {
-        const std::size_t first = region < regions ? region * blocks_of_region : 0;
-        const std::size_t end = region < regions ? std::min(first + blocks_of_region, blocks) : blocks;
+        const Where where = region < regions ? within : across;
+        const std::size_t first = where == within ? region * blocks_of_region : 0;
+        const std::size_t end = where == within ? std::min(first + blocks_of_region, blocks) : blocks;
         for (std::size_t rank = 0; rank < classes; ++rank) {
             starts_[region][rank] = before;
             for (std::size_t block = first; block < end; ++block)
-                before += std::exchange(next[block][region < regions ? within : between][rank], before);
+                before += std::exchange(next[block][where][rank], before);
         }
         starts_[region][classes] = before;
     }
@@ -195,9 +195,9 @@ Patches patches_of(const CloudSurface& surface) {
             join(region, rank);
     });
     for (std::size_t rank = 0; rank < sure_classes; ++rank)
-        join(pairs.regions(), rank);
+        join(pairs.between(), rank);
     for (std::size_t rank = sure_classes; rank < likely_classes; ++rank)
-        for (std::size_t region = 0; region <= pairs.regions(); ++region)
+        for (std::size_t region = 0; region <= pairs.between(); ++region)
             join(region, rank);
     Patches patches{std::vector<std::uint32_t>(surface.size()), std::vector<char>(surface.size()), 0, {}};
     tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {

@@ -20,6 +20,8 @@ struct Patches {
 };
 
 /// Joins the surest pairs of neighbours first, while patches are small: so that a wrong pair cannot turn a wall over.
+/// Regions of 65,536 points side by side are joined by themselves, then with each other. Works on all cores; the result
+/// does not depend on their number.
 [[nodiscard]] Patches patches_of(const CloudSurface& surface);
 
 /// The sum of all links between the same two nodes, sorted by them; sums run in the order given.
