@@ -139,9 +139,13 @@ class TextRecords {
 /// keep their names.
 [[nodiscard]] CloudRecords read_las(std::string_view bytes, const std::filesystem::path& file,
                                     std::vector<std::string>& warnings);
-/// One point a line: .xyz (a line of names may come first) and .pts (the count comes first).
+/// One point a line: .xyz (a line of names may come first) and .pts (the count comes first). Columns without names are x
+/// y z, then colours (bytes) and normals (of length 1) as their values tell, an intensity before or another value behind.
 [[nodiscard]] CloudRecords read_xyz(std::string_view bytes, const std::filesystem::path& file,
                                     std::vector<std::string>& warnings);
+/// Whether a text of another name begins as read_xyz() reads it: eight lines or more of x y z, alone or with colours or
+/// normals, or under their names. Trajectories and matrices have other numbers of columns, or fewer lines.
+[[nodiscard]] bool is_text_cloud(std::string_view start);
 /// One point a line, .ptx: each scan has sizes, pose, then the grid; "0 0 0" = nothing seen. A scan alone keeps its
 /// grid.
 [[nodiscard]] CloudRecords read_ptx(std::string_view bytes, const std::filesystem::path& file,

@@ -108,6 +108,15 @@ constexpr CloudFormat formats[] = {
      .written = &pcd_bytes,
      .shape = &pcd_shape,
      .new_colours = NewColours::packed},
+    {.name = "text", // S3DIS, Semantic3D, and what programs call .txt or .asc
+     .content = "lines of x y z [intensity] [red green blue] [nx ny nz], eight or more",
+     .signature = &is_text_cloud,
+     .extensions = {},
+     .written_extension = ".xyz",
+     .read = &read_xyz,
+     .written = &text_bytes,
+     .new_colours = NewColours::bytes,
+     .z_up = true},
 };
 
 bool named_so(const CloudFormat& format, const fs::path& file) {

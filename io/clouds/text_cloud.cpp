@@ -17,24 +17,74 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// The columns of a line without names; colours are bytes by convention.
-std::vector<std::string> usual_names(std::size_t columns) {
-    switch (columns) {
-    case 3:
-        return {"x", "y", "z"};
-    case 4:
-        return {"x", "y", "z", "intensity"};
-    case 6:
-        return {"x", "y", "z", "red", "green", "blue"};
-    case 7:
-        return {"x", "y", "z", "intensity", "red", "green", "blue"};
-    default:
-        break;
+/// What three columns beside each other hold.
+enum class Triple { colours, normals, other };
+
+/// Told by their values in the first lines: normals are as long as 1, colours are bytes.
+Triple triple_in(const std::vector<std::vector<double>>& lines, std::size_t first) {
+    constexpr double written_with_two_digits = 0.02;
+    bool normals = !lines.empty(), colours = !lines.empty();
+    for (const auto& line : lines) {
+        const Eigen::Vector3d value(line[first], line[first + 1], line[first + 2]);
+        normals = normals && std::abs(value.norm() - 1) <= written_with_two_digits;
+        colours = colours && (value.array() >= 0).all() && (value.array() <= 255).all() &&
+                  (value.array() == value.array().floor()).all();
     }
+    return normals ? Triple::normals : colours ? Triple::colours : Triple::other;
+}
+
+/// The columns of lines without names: x y z, then colours and normals as their values tell, and an intensity before or
+/// one more value behind them. `lines` are the first ones, equally long.
+std::vector<std::string> usual_names(const std::vector<std::vector<double>>& lines) {
+    const std::size_t columns = lines.empty() ? 3 : lines.front().size();
     std::vector<std::string> names{"x", "y", "z"};
-    for (std::size_t i = 3; i < columns; ++i)
-        names.push_back(fmt::format("column_{}", i + 1));
+    const auto take_triples = [&](std::size_t end) { // false where one of them is neither
+        while (names.size() + 3 <= end) {
+            const Triple triple = triple_in(lines, names.size());
+            if (triple == Triple::other ||
+                std::ranges::find(names, triple == Triple::colours ? "red" : "nx") != names.end())
+                return false;
+            if (triple == Triple::colours)
+                names.insert(names.end(), {"red", "green", "blue"});
+            else
+                names.insert(names.end(), {"nx", "ny", "nz"});
+        }
+        return true;
+    };
+    constexpr std::size_t most_usual = 10;
+    if (columns > 3 && columns <= most_usual && columns % 3 == 1) {
+        names.emplace_back("intensity");
+        if (!take_triples(columns)) {
+            names.resize(3);
+            if (!take_triples(columns - 1))
+                names = {"x", "y", "z", "intensity"};
+        }
+    } else if (columns <= most_usual && columns % 3 == 0 && !take_triples(columns)) {
+        names.resize(3);
+    }
+    while (names.size() < columns)
+        names.push_back(fmt::format("column_{}", names.size() + 1));
     return names;
+}
+
+constexpr std::size_t enough_lines = 100;
+
+/// Up to `enough_lines` lines of equally many numbers that the text begins with; without one that may be cut off.
+std::vector<std::vector<double>> first_numbers(std::string_view text, bool may_be_cut) {
+    std::vector<std::vector<double>> lines;
+    if (may_be_cut)
+        text = text.substr(0, text.rfind('\n') + 1);
+    TextRecords records(text, 1);
+    while (lines.size() < enough_lines && records.next()) {
+        std::vector<double> line;
+        for (const auto word : records.words())
+            if (const auto value = number(word); value && std::isfinite(*value))
+                line.push_back(*value);
+        if (line.size() != records.words().size() || (!lines.empty() && line.size() != lines.front().size()))
+            break;
+        lines.push_back(std::move(line));
+    }
+    return lines;
 }
 
 /// PTX has an intensity and may have colours; what comes behind them is not PTX's own (our AO, for one).
@@ -96,9 +146,15 @@ void check_numbers(const TextRecords& lines, std::size_t expected, const fs::pat
 /// The lines of `body` as records of equally many words.
 void read_lines(CloudRecords& records, std::string_view body, int first_line, const fs::path& file) {
     TextRecords lines(body, first_line);
+    const auto names_of_first = [&](std::size_t columns) {
+        auto first = first_numbers(body, false);
+        if (first.empty()) // refused below
+            first.emplace_back(columns);
+        return usual_names(first);
+    };
     while (lines.next()) {
         if (records.fields.empty())
-            records.fields = fields_named(usual_names(lines.words().size()));
+            records.fields = fields_named(names_of_first(lines.words().size()));
         check_numbers(lines, records.fields.size(), file);
         records.ends.push_back(lines.end());
     }
@@ -245,6 +301,34 @@ CloudRecords read_ptx(std::string_view bytes, const fs::path& file, std::vector<
     return records;
 }
 
+bool is_text_cloud(std::string_view start) {
+    constexpr std::size_t enough = 4096, not_a_matrix = 8;
+    const bool cut = start.size() >= enough;
+    start = start.substr(0, enough);
+    const std::size_t first_end = std::min(start.find('\n'), start.size());
+    const auto first = words(start.substr(0, first_end));
+    bool named = !first.empty() && !all_numbers(first);
+    if (named) {
+        const auto names = names_in(first);
+        for (const char* axis : {"x", "y", "z"})
+            if (std::ranges::count(names, axis) != 1)
+                return false;
+        start.remove_prefix(std::min(first_end + 1, start.size()));
+    }
+    const auto lines = first_numbers(start, cut);
+    if (lines.size() < not_a_matrix)
+        return false;
+    const std::size_t columns = lines.front().size();
+    if (named)
+        return columns >= 3;
+    const auto colours_from = [&](std::size_t first_column) {
+        return triple_in(lines, first_column) == Triple::colours;
+    };
+    return columns == 3 || (columns == 6 && (colours_from(3) || triple_in(lines, 3) == Triple::normals)) ||
+           (columns == 7 && colours_from(4)) ||
+           (columns == 9 && colours_from(3) && triple_in(lines, 6) == Triple::normals);
+}
+
 CloudRecords read_xyz(std::string_view bytes, const fs::path& file, std::vector<std::string>& warnings) {
     CloudRecords records;
     records.encoding = CloudRecords::Encoding::ascii;
@@ -269,7 +353,7 @@ CloudRecords read_xyz(std::string_view bytes, const fs::path& file, std::vector<
         throw Error(fmt::format("{}: {} a line, expected x y z at least", file.string(),
                                 counted(records.fields.size(), "value")));
     if (records.fields.empty())
-        records.fields = fields_named(usual_names(3));
+        records.fields = fields_named({"x", "y", "z"});
     if (counted_first && said != records.point_count)
         warnings.push_back(
             fmt::format("{}: says {} points, holds {}; all are read.", file.string(), said, records.point_count));

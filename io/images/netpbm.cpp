@@ -144,6 +144,13 @@ cv::Mat unpacked_bits(std::string_view samples, cv::Size size) {
     return image;
 }
 
+/// A sample of 0 .. maxval as one of 0 .. 255; of 16 bits the upper byte, as with all other formats.
+uchar as_byte(std::uint64_t sample, unsigned maxval) {
+    if (maxval == 65535)
+        return static_cast<uchar>(sample >> 8);
+    return static_cast<uchar>(std::min<std::uint64_t>(sample, maxval) * 255 / maxval);
+}
+
 /// Numbers as text, brought to 0 .. 255; PBM's need no blanks between them.
 cv::Mat unpacked_text(std::string_view bytes, const Header& header, const Path& file) {
     const ImageFacts& facts = header.facts;
@@ -162,7 +169,7 @@ cv::Mat unpacked_text(std::string_view bytes, const Header& header, const Path& 
         const auto value = whole_number(word);
         if (!value || *value > header.maxval)
             refuse(file, fmt::format("sample {} is {}, expected 0 .. {}", i + 1, in_quotes(word), header.maxval));
-        const auto grey = static_cast<uchar>(header.maxval > 255 ? *value >> 8 : *value * 255 / header.maxval);
+        const uchar grey = as_byte(*value, header.maxval);
         image.data[i] = header.one_bit() ? 255 - grey : grey;
     }
     return image;
@@ -196,12 +203,14 @@ cv::Mat3b colour_netpbm(std::string_view bytes, const ImageFacts& facts, const P
     cv::Mat image = header.text()      ? unpacked_text(bytes, header, file)
                     : header.one_bit() ? unpacked_bits(samples_of(bytes, header, file), facts.size)
                                        : unpacked_bytes(samples_of(bytes, header, file), facts);
-    if (image.depth() == CV_16U) { // the upper byte of each
-        cv::Mat upper(image.size(), CV_MAKETYPE(CV_8U, image.channels()));
-        std::transform(image.ptr<ushort>(),
-                       image.ptr<ushort>() + image.total() * static_cast<std::size_t>(image.channels()), upper.data,
-                       [](ushort value) { return static_cast<uchar>(value >> 8); });
-        image = upper;
+    if (!header.text() && !header.one_bit() && header.maxval != 255) {
+        cv::Mat bytes_of(image.size(), CV_MAKETYPE(CV_8U, image.channels()));
+        const auto convert = [&](const auto* from) {
+            std::transform(from, from + image.total() * static_cast<std::size_t>(image.channels()), bytes_of.data,
+                           [&](auto sample) { return as_byte(sample, header.maxval); });
+        };
+        image.depth() == CV_16U ? convert(image.ptr<ushort>()) : convert(image.ptr<uchar>());
+        image = bytes_of;
     }
     if (image.channels() == 2) // grey and how opaque it is
         cv::extractChannel(image, image, 0);

@@ -308,6 +308,8 @@ TEST(colour_images, of_16_bits_keep_them_beside_the_8) {
     // Planes one after the other, and numbers up to 1023: as 8 bits, as ever.
     write_file(folder / "odd.ppm", "P6 1 1 1023\n" + std::string("\3\377\0\1\2\0", 6));
     EXPECT_TRUE(read_stored_colour(folder / "odd.ppm").deep.empty());
+    EXPECT_EQ(read_colour(folder / "odd.ppm")(0, 0), cv::Vec3b(127, 0, 255))
+        << "1023 is white: 1023, 1, 512 are red, green, blue";
     const std::string cut = tests::read_bytes(folder / "image.png");
     EXPECT_NE(refusal([&] { (void)stored_colour_in(cut.substr(0, cut.size() / 2), "cut.png"); }), "");
 }
@@ -343,6 +345,12 @@ TEST(colour_images, netpbm_and_bmp_of_rare_kinds_are_read) {
     EXPECT_EQ(read("P1 3 1\n101")(0, 2), black);
     EXPECT_EQ(read("P4 3 1\n\xA0")(0, 1), white);
     EXPECT_EQ(read("P2 2 1 100\n50 100\n")(0, 0), cv::Vec3b(127, 127, 127));
+    EXPECT_EQ(read("P2 2 1 1023\n512 1023\n")(0, 1), white);
+    EXPECT_EQ(read("P5 2 1 100\n2d")(0, 0), cv::Vec3b(127, 127, 127)); // "2" is 50, "d" is 100
+    EXPECT_EQ(read("P5 2 1 100\n2d")(0, 1), white);
+    EXPECT_EQ(
+        read("P7 WIDTH 2 HEIGHT 1 DEPTH 1 MAXVAL 1 TUPLTYPE BLACKANDWHITE ENDHDR\n" + std::string("\0\1", 2))(0, 1),
+        white);
     EXPECT_EQ(read("P3 1 1 255\n1 2 3\n")(0, 0), cv::Vec3b(3, 2, 1));
     EXPECT_EQ(read("P7\nWIDTH 1\nHEIGHT 1\nDEPTH 4\nMAXVAL 255\nTUPLTYPE RGB_ALPHA\nENDHDR\n\1\2\3\4")(0, 0),
               cv::Vec3b(3, 2, 1));

@@ -1,6 +1,7 @@
 // LAS and clouds as text: every version and point format read, and written back with two fields more and nothing less.
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
+#include "io/clouds/format.h"
 #include "tests/support/files.h"
 
 #include <array>
@@ -329,6 +330,50 @@ TEST(TextClouds, keep_every_word_and_get_two_more) {
         says(refusal([&] { (void)read_cloud(write_file(folder / "e.xyz", "1 2 3\n1 2 x\n"), warnings); }), "line 2"));
     (void)read_cloud(write_file(folder / "f.pts", "5\n1 2 3\n"), warnings);
     EXPECT_TRUE(warned(warnings, "says 5 points, holds 1"));
+}
+
+/// As CloudCompare, Open3D, S3DIS and Semantic3D write them, none with names of columns.
+TEST(TextClouds, columns_are_told_by_their_values) {
+    const TemporaryFolder folder;
+    const auto names = [&](const std::string& lines) {
+        std::string text;
+        const Cloud cloud = read(write_file(folder / "c.xyz", lines));
+        for (const CloudField& field : cloud.records->fields)
+            text += (text.empty() ? "" : " ") + field.name;
+        return text;
+    };
+    EXPECT_EQ(names("1 2 3 200 100 0\n4 5 6 1 0 0\n"), "x y z red green blue");
+    EXPECT_EQ(names("1 2 3 0 0 1\n4 5 6 0.6 -0.8 0\n"), "x y z nx ny nz");
+    EXPECT_EQ(names("1 2 3 0 0 1\n4 5 6 1 0 0\n"), "x y z nx ny nz") << "no colour is as dark as that everywhere";
+    EXPECT_EQ(names("1 2 3 0.2 0.1 0.9\n4 5 6 0 0 0\n"), "x y z column_4 column_5 column_6");
+    EXPECT_EQ(names("1 2 3 -1270 40 50 60\n4 5 6 -900 1 2 3\n"), "x y z intensity red green blue");
+    EXPECT_EQ(names("1 2 3 40 50 60 0.25\n4 5 6 1 2 3 0.5\n"), "x y z red green blue column_7") << "an AO of ours, say";
+    EXPECT_EQ(names("1 2 3 40 50 60 0 0 1\n4 5 6 1 2 3 0 1 0\n"), "x y z red green blue nx ny nz");
+    EXPECT_EQ(names("1 2 3 9\n4 5 6 8\n"), "x y z intensity");
+    EXPECT_EQ(names("1 2 3 9 9 9 9 9\n"), "x y z column_4 column_5 column_6 column_7 column_8");
+}
+
+TEST(TextClouds, of_any_name_are_told_by_their_lines) {
+    const TemporaryFolder folder;
+    const auto is_read = [&](const std::string& name, const std::string& line, int lines) {
+        std::string text;
+        for (int i = 0; i < lines; ++i)
+            text += line + "\n";
+        const auto file = write_file(folder / name, text);
+        return is_cloud(text.substr(0, 4096), file);
+    };
+    EXPECT_TRUE(is_read("office_1.txt", "-15.6 39.2 2.05 43 47 48", 400)) << "S3DIS";
+    EXPECT_TRUE(is_read("domfountain.txt", "-15.6 39.2 2.05 -1270 43 47 48", 9)) << "Semantic3D";
+    EXPECT_TRUE(is_read("points", "1 2 3", 8));
+    EXPECT_TRUE(is_read("normals.asc", "1 2 3 0.6 0 0.8", 8));
+    EXPECT_FALSE(is_read("intrinsics.txt", "525 0 319.5", 3)) << "a matrix";
+    EXPECT_FALSE(is_read("pose.txt", "1 0 0 0", 4));
+    EXPECT_FALSE(is_read("groundtruth.txt", "1305031098.6659 1.35 0.63 1.63 0.66 0.61 -0.29 -0.32", 50))
+        << "TUM's poses";
+    EXPECT_FALSE(is_read("00.txt", "1 0 0 0 0 1 0 0 0 0 1 0", 50)) << "KITTI's poses";
+    EXPECT_FALSE(is_read("accelerometer.txt", "1305031098.6659 0.1 0.2 9.8", 50));
+    EXPECT_FALSE(is_read("depth.txt", "1305031098.6659 depth/1305031098.6659.png", 50));
+    EXPECT_FALSE(is_read("read.txt", "Read me first.", 50));
 }
 
 TEST(TextClouds, ptx_is_a_grid_placed_by_its_matrix) {

@@ -290,13 +290,24 @@ bool is_colmap_model(const fs::path& file) {
         file.filename().string());
 }
 
+/// A .txt or .asc file that begins with points.
+bool is_cloud_in_text(const fs::path& file) {
+    constexpr std::size_t enough = 4096;
+    const std::string extension = lower_extension(file);
+    return (extension == ".txt" || extension == ".asc") && is_cloud(read_bytes(file, enough), file);
+}
+
 } // namespace
 
 std::optional<Listing> list_clouds(const fs::path& folder) {
+    const auto files = files_in(folder);
+    std::vector<fs::path> clouds;
+    std::ranges::copy_if(files, std::back_inserter(clouds),
+                         [](const fs::path& file) { return has_cloud_extension(file) && !is_colmap_model(file); });
+    if (clouds.empty()) // beside others a text is more likely a list
+        std::ranges::copy_if(files, std::back_inserter(clouds), &is_cloud_in_text);
     Listing listing;
-    for (const fs::path& file : files_in(folder)) {
-        if (!has_cloud_extension(file) || is_colmap_model(file))
-            continue;
+    for (const fs::path& file : clouds) {
         CaptureEntry entry;
         entry.name = file.stem().string();
         entry.cloud = file;
