@@ -3,7 +3,8 @@
 // stay where they are.
 //
 // Two rounds of weighted least squares: the first weighs samples by their depth difference to the pixel, the second by their
-// distance from the plane. 25 and 49 averages spread over the window stand for all its pixels.
+// distance from the plane. 25 and 49 averages spread over the window stand for all its pixels. On disparity a third round tries
+// a wider window.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -86,6 +87,9 @@ Plane slope_at(ivec2 p, int reach, float w_here) {
     return Plane(inner && high.x - low.x == 2 * reach ? a : 0.0, inner && high.y - low.y == 2 * reach ? b : 0.0, 0.0);
 }
 
+// Of the greatest sum of weights, what a wider window must have to count at all, and to count alone.
+const float no_plane = 0.6, one_plane = 0.85;
+
 float window_of(float z, float sigma) { return clamp(sqrt(k.window * sigma * k.camera.fx / z), 1.5, k.largest_radius); }
 
 void main() {
@@ -107,6 +111,16 @@ void main() {
     float tolerance = 3.0 * sigma_on(first, sigma);
     narrow = 1.0 / (tolerance * relief_here);
     good = solve(square(p, true, max(radius * (1.0 / 3.0), 1.0), wc, first, narrow), first, plane) && good;
+
+    // Disparity comes from windows of pixels, so it errs in waves longer than this window. A window twice as wide levels them. Its
+    // plane counts by the share of samples that lie about it, so that edges, relief and curves keep theirs.
+    if (k.wide_sigmas > 0.0) {
+        float wide_narrow = 1.0 / (k.wide_sigmas * sigma_on(plane, sigma) * relief_here);
+        Sums wide = square(p, true, radius * (2.0 / 3.0), wc, plane, wide_narrow);
+        Plane wider;
+        float share = solve(wide, plane, wider) ? clamp((wide.g * (1.0 / 49.0) - no_plane) * (1.0 / (one_plane - no_plane)), 0.0, 1.0) : 0.0;
+        plane = Plane(mix(plane.a, wider.a, share), mix(plane.b, wider.b, share), mix(plane.c, wider.c, share));
+    }
 
     // Plane w = W + a u + b v  =>  n ~ (fx a, fy b, w at the principal point), turned to the camera.
     float w_here = wc + plane.c;

@@ -10,6 +10,7 @@ struct FitPlaneConstants {
     float noise_floor, noise_per_z2; // sigma(z) = floor + per_z2 z^2, metres
     float window;                    // its radius is sqrt(window sigma fx / z), pixels
     float largest_radius;            // but at most this
+    float wide_sigmas;               // a window twice as wide serves where values lie so near to one plane; 0 = never
     int drop_flying;                 // 0 = keep them
     int fill_px;                     // holes of a row up to this width are filled; 0 = none
     int neighbours;                  // other frames to average with
