@@ -139,8 +139,9 @@ class TextRecords {
 /// keep their names.
 [[nodiscard]] CloudRecords read_las(std::string_view bytes, const std::filesystem::path& file,
                                     std::vector<std::string>& warnings);
-/// One point a line: .xyz (a line of names may come first) and .pts (the count comes first). Columns without names are x
-/// y z, then colours (bytes) and normals (of length 1) as their values tell, an intensity before or another value behind.
+/// One point a line: .xyz (a line of names may come first) and .pts (the count comes first). Columns without names are
+/// x y z, then colours (bytes) and normals (of length 1) as their values tell, an intensity before or another value
+/// behind.
 [[nodiscard]] CloudRecords read_xyz(std::string_view bytes, const std::filesystem::path& file,
                                     std::vector<std::string>& warnings);
 /// Whether a text of another name begins as read_xyz() reads it: eight lines or more of x y z, alone or with colours or
