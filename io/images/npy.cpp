@@ -187,8 +187,8 @@ struct DepthArray {
 DepthArray depth_array_in(std::string_view bytes, const Path& file) {
     DepthArray depth{npy_array_in(bytes, file.string()), {}};
     const NpyArray& array = depth.array;
-    if (!(array.kind == 'f' && array.element_bytes > 2) && !(array.kind == 'u' && array.element_bytes == 2))
-        refuse(file, fmt::format("npy of type {}{}, expected <f4, <f8 or <u2, or big-endian ones", array.kind,
+    if (array.element_bytes < 2)
+        refuse(file, fmt::format("npy of type {}{}, expected floats, or integers of 16 bits or more", array.kind,
                                  array.element_bytes));
     std::vector<std::uint64_t> shape = array.shape;
     if (shape.size() == 3 && shape[2] == 1)
@@ -225,7 +225,18 @@ cv::Mat stored_npy(std::string_view bytes, const ImageFacts&, const Path& file) 
     if (const std::size_t found = bytes.size() - depth.array.data; found != expected)
         refuse(file, fmt::format("npy of {}x{} needs {} bytes of elements, found {}", depth.size.width,
                                  depth.size.height, expected, found));
-    return npy_image(bytes.substr(depth.array.data), depth.array, depth.size);
+    const std::string_view elements = bytes.substr(depth.array.data);
+    const bool as_stored = depth.array.kind == 'f' || (depth.array.kind == 'u' && depth.array.element_bytes == 2);
+    if (as_stored)
+        return npy_image(elements, depth.array, depth.size);
+    // Wider integers, as arithmetic leaves them, hold 16-bit depth all the same; negative ones mark holes.
+    return filled<ushort>(depth.size, depth.array.column_major, [&](std::uint64_t place) {
+        const double value = number_at(elements, depth.array, place);
+        if (value > 65535)
+            refuse(file, fmt::format("npy of type {}{} holds {}, expected depth of 16 bits, 0 .. 65535",
+                                     depth.array.kind, depth.array.element_bytes, value));
+        return std::max(value, 0.0);
+    });
 }
 
 } // namespace scanshade::images

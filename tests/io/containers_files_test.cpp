@@ -3,6 +3,7 @@
 #include "io/captures/capture.h"
 #include "io/compression/inflated_stream.h"
 #include "io/compression/lzfse.h"
+#include "io/images/image_file.h"
 #include "tests/support/files.h"
 
 #include <cmath>
@@ -251,6 +252,24 @@ TEST_F(ContainerFiles, a_stack_of_frames_needs_no_archive) {
     const std::string bytes = two_frames();
     EXPECT_TRUE(
         says(refusal([&] { (void)open_capture(file("cut.npy", bytes.substr(0, bytes.size() - 1))); }), "192 bytes"));
+}
+
+/// NumPy's arithmetic widens: depth is often saved as int32, int64 or float16.
+TEST_F(ContainerFiles, an_array_is_depth_in_any_type_that_holds_it) {
+    const auto stored = [&](const std::string& type, const std::string& elements) {
+        return stored_depth_in(npy(type, "1, 3", elements), "a.npy");
+    };
+    const cv::Mat1w counts{0, 2000, 65535};
+    const auto is_counts = [&](const cv::Mat& image) {
+        return image.type() == CV_16UC1 && cv::norm(image, counts.reshape(1, 1), cv::NORM_INF) == 0;
+    };
+    EXPECT_TRUE(is_counts(stored("<i4", raw_all<std::int32_t>({-1, 2000, 65535}))));
+    EXPECT_TRUE(is_counts(stored("<i8", raw_all<std::int64_t>({0, 2000, 65535}))));
+    EXPECT_TRUE(is_counts(stored(">u4", std::string("\0\0\0\0\0\0\7\xd0\0\0\xff\xff", 12))));
+    EXPECT_EQ(stored("<i2", raw_all<std::int16_t>({-5, 2000, 1})).at<ushort>(0, 0), 0) << "a mark of holes";
+    EXPECT_EQ(stored("<f2", u16(0x4000) + u16(0x3800) + u16(0)).at<float>(0, 1), 0.5F);
+    EXPECT_TRUE(says(refusal([&] { (void)stored("<i4", raw_all<std::int32_t>({0, 70000, 1})); }), "70000"));
+    EXPECT_TRUE(says(refusal([&] { (void)stored("|u1", "abc"); }), "16 bits or more"));
 }
 
 // --- long deflate streams ---
