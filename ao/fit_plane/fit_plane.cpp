@@ -49,7 +49,8 @@ std::uint32_t marks_of(cv::Size size) {
 }
 
 /// Frames are fused or holes filled, not both.
-std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bool planes, bool fuse, bool fill) {
+std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bool planes, bool fuse, bool waves,
+                                          bool fill) {
     using Host = gpu::BufferRow::Host;
     constexpr auto floats = gpu::BufferRow::Texels::r32f;
     const auto pixels = static_cast<std::size_t>(size.area());
@@ -72,10 +73,11 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
             passes.push_back({"fuse", "fit_plane/fuse", {kept, others_in}, {fused, relief}, groups, {}});
         }
         const std::vector<std::pair<int, int>> is_fused{{shared::spec_fused, fuse}};
+        const std::vector<std::pair<int, int>> fits{{shared::spec_fused, fuse}, {shared::spec_waves, waves}};
         const int samples = fuse ? fused : kept, errs = fuse ? relief : kept; // unread without
         passes.push_back(
             {"average", "fit_plane/average", {samples, errs}, {averages}, groups_of(shared::average_rows), is_fused});
-        passes.push_back({"fit plane", "fit_plane/fit", {averages, errs}, {depth_out, normals_out}, groups, is_fused});
+        passes.push_back({"fit plane", "fit_plane/fit", {averages, errs}, {depth_out, normals_out}, groups, fits});
         if (fill) {
             const std::uint32_t words = marks_of(size);
             buffers.insert(buffers.end(),
@@ -117,23 +119,23 @@ void FitPlane::prepare(const DepthImage& depth, std::span<const OtherDepth> othe
     for (const OtherDepth& other : others) // before any is taken: a run that fails must leave nothing to the next
         if (other.camera.size != size)
             throw Error("another frame of another image size");
-    if (!program_ || size != size_ || fuse != fused_ || planes() != planes_)
-        program_ = program_for(device_, size, planes(), fuse, !fuse && options_.fill_holes);
+    // Averages over frames have lost most of the waves: there a wider window took errors from 0.118 to 0.121 (office).
+    const bool waves = !fuse && class_of(noise_) == SensorClass::structured_light;
+    if (!program_ || size != size_ || fuse != fused_ || waves != waves_ || planes() != planes_)
+        program_ = program_for(device_, size, planes(), fuse, waves, !fuse && options_.fill_holes);
     size_ = size;
     fused_ = fuse;
+    waves_ = waves;
     planes_ = planes();
     const double window =
         window_scale * noise_.correlation_px * noise_.correlation_px * options_.smoothing * options_.smoothing;
-    // Averages over frames have lost most of the waves: there a wider window took errors from 0.118 to 0.121 (office).
-    const bool errs_in_waves = !fuse && class_of(noise_) == SensorClass::structured_light;
-    const double wide_sigmas = errs_in_waves ? 3 * options_.smoothing * options_.smoothing : 0;
     constants_ = {{size.width, size.height},
                   depth.camera.on_gpu(),
                   static_cast<float>(noise_.floor_m),
                   static_cast<float>(noise_.per_z2),
                   static_cast<float>(window),
                   static_cast<float>(options_.largest_radius_px),
-                  static_cast<float>(wide_sigmas),
+                  static_cast<float>(3 * options_.smoothing),
                   options_.drop_flying && noise_.flies() ? 1 : 0,
                   fill ? fill_px_for(depth.camera) : 0,
                   fuse ? static_cast<int>(others.size()) : 0,

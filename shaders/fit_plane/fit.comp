@@ -18,6 +18,8 @@ layout(binding = 16, scalar) writeonly buffer Depth { float depth_out[]; };
 layout(binding = 17, scalar) writeonly buffer Normals { vec3 normals_out[]; };
 layout(binding = 32, scalar) uniform Constants { FitPlaneConstants constants; };
 
+layout(constant_id = spec_waves) const int in_waves = 0;
+
 FitPlaneConstants k;
 #include "fit_plane/fit_plane.glsl"
 
@@ -112,13 +114,14 @@ void main() {
     narrow = 1.0 / (tolerance * relief_here);
     good = solve(square(p, true, max(radius * (1.0 / 3.0), 1.0), wc, first, narrow), first, plane) && good;
 
-    // Disparity comes from windows of pixels, so it errs in waves longer than this window. A window twice as wide levels them. Its
-    // plane counts by the share of samples that lie about it, so that edges, relief and curves keep theirs.
-    if (k.wide_sigmas > 0.0) {
+    // Disparity comes from windows of pixels, so it errs in waves longer than this window. A window twice as wide levels
+    // them. Its plane counts by the share of samples that lie about it, so that edges, relief and curves keep theirs.
+    if (in_waves == 1) {
         float wide_narrow = 1.0 / (k.wide_sigmas * sigma_on(plane, sigma) * relief_here);
         Sums wide = square(p, true, radius * (2.0 / 3.0), wc, plane, wide_narrow);
         Plane wider;
-        float share = solve(wide, plane, wider) ? clamp((wide.g * (1.0 / 49.0) - no_plane) * (1.0 / (one_plane - no_plane)), 0.0, 1.0) : 0.0;
+        bool fits = solve(wide, plane, wider);
+        float share = fits ? clamp((wide.g * (1.0 / 49.0) - no_plane) * (1.0 / (one_plane - no_plane)), 0.0, 1.0) : 0.0;
         plane = Plane(mix(plane.a, wider.a, share), mix(plane.b, wider.b, share), mix(plane.c, wider.c, share));
     }
 

@@ -10,15 +10,16 @@ struct FitPlaneConstants {
     float noise_floor, noise_per_z2; // sigma(z) = floor + per_z2 z^2, metres
     float window;                    // its radius is sqrt(window sigma fx / z), pixels
     float largest_radius;            // but at most this
-    float wide_sigmas;               // a window twice as wide serves where values lie so near to one plane; 0 = never
+    float wide_sigmas;               // a window twice as wide serves where values lie so near to one plane
     int drop_flying;                 // 0 = keep them
     int fill_px;                     // holes of a row up to this width are filled; 0 = none
     int neighbours;                  // other frames to average with
     NeighbourPlace places[most_neighbours];
 };
 
-// Specialization constant: 1 = samples have been averaged over frames, and tell by how much less they err.
-const int spec_fused = 0;
+// Specialization constants. 1 = samples have been averaged over frames, and tell by how much less they err. 1 = they
+// err in waves (disparity), and a wider window is tried; a uniform here would be compiled in anew for every capture.
+const int spec_fused = 0, spec_waves = 1;
 
 // In place of 1/z where there is none: so far behind all surfaces that no fit gives it weight, and its square still is
 // a number.
