@@ -2,6 +2,7 @@
 
 #include "projection/depth_ends.h"
 #include "projection/depth_kind.h"
+#include "projection/scene_extent.h"
 #include "projection/undistort.h"
 
 #include <algorithm>
@@ -24,16 +25,6 @@ constexpr double widest_degrees = 175;
 constexpr double largest_aspect = 2;       ///< fx / fy, either way
 constexpr double most_blind = 0.02;        ///< share of the pixels beyond the radius at which the lens model folds back
 constexpr double most_blind_fisheye = 0.5; ///< a fisheye's corners may be beyond 90 degrees
-
-/// Of every third row and column, which is enough to judge by.
-std::vector<double> depths_of(const cv::Mat1f& z_m) {
-    std::vector<double> depths;
-    for (int v = 0; v < z_m.rows; v += 3)
-        for (int u = 0; u < z_m.cols; u += 3)
-            if (z_m(v, u) > 0)
-                depths.push_back(z_m(v, u));
-    return depths;
-}
 
 double view_degrees(double focal_length, int pixels) {
     return 2 * std::atan(pixels / (2 * focal_length)) * 180 / std::numbers::pi;
@@ -66,14 +57,11 @@ bool has_hollows(const DepthImage& depth, double radius_m) {
 }
 
 void doubt_radius_in_view(const DepthImage& depth, double radius_m, const LengthUnit& unit, Doubts& doubts) {
-    std::vector<double> depths = depths_of(depth.z_m);
-    if (depths.size() < 3 || !(radius_m > 0)) // a method without a radius
+    const SceneExtent scene = scene_extent(depth);
+    const double scene_m = scene.diagonal_m, middle = scene.middle_m;
+    if (!(scene_m > 0) || !(radius_m > 0)) // a method without a radius
         return;
-    const auto [near, middle, far] = spread_of(depths);
-    const Pinhole& camera = depth.camera;
-    const double radius_px = radius_m * std::min(camera.fx, camera.fy) / middle;
-    const double width = middle * camera.size.width / camera.fx, height = middle * camera.size.height / camera.fy;
-    const double scene_m = std::hypot(width, height, far - near);
+    const double radius_px = radius_m * std::min(depth.camera.fx, depth.camera.fy) / middle;
     const char* const advice = unit.arbitrary() ? "Give" : "Check the depth unit, or give";
     const char* const flag = unit.arbitrary() ? "--relative-radius" : "--radius";
     add_if(radius_px < least_radius_px, doubts,
@@ -89,7 +77,7 @@ void doubt_radius_in_view(const DepthImage& depth, double radius_m, const Length
 
 void doubt_noise_in_view(const DepthImage& depth, double radius_m, const DepthNoise& noise, const LengthUnit& unit,
                          Doubts& doubts) {
-    std::vector<double> depths = depths_of(depth.z_m);
+    std::vector<double> depths = sampled_depths(depth.z_m);
     if (depths.empty() || !(radius_m > 0) || !noise.any())
         return;
     const auto noisy = static_cast<double>(

@@ -80,7 +80,7 @@ DepthNoise OpenedCapture::noise() const {
     if (!noise_) {
         std::vector<std::size_t> frames(capture.entries.size());
         std::iota(frames.begin(), frames.end(), std::size_t{0});
-        noise_ = scanshade::noise_of(capture, frames);
+        noise_ = measure_noise(first_look(capture, frames));
     }
     return *noise_;
 }
@@ -190,10 +190,9 @@ Workers& Session::workers() {
 MethodPool& Session::methods() {
     Workers& open = workers();
     const std::lock_guard alone(opening_);
-    if (!methods_made_)
-        open.make(asked_.method, asked_.chosen_setup(), asked_.preparation());
-    methods_made_ = true;
-    return open.pool();
+    if (!methods_)
+        methods_ = open.pool_of(asked_.method, asked_.chosen_setup(), asked_.preparation());
+    return *methods_;
 }
 
 PointMethod& Session::points() {

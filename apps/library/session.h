@@ -98,7 +98,7 @@ class Session {
     bool by_rays_; ///< the method needs no view, so that clouds never get one
     std::mutex opening_, one_cloud_, one_sequence_;
     std::unique_ptr<Workers> workers_;
-    bool methods_made_ = false;
+    std::shared_ptr<MethodPool> methods_;
     std::unique_ptr<PointMethod> points_;
     std::unique_ptr<Sequence> sequence_; ///< of the capture that was computed last
 };

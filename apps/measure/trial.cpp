@@ -2,6 +2,7 @@
 
 #include "ao/gpu/device.h"
 #include "apps/measure/map_set.h"
+#include "apps/walk/first_look.h"
 #include "io/images/image_file.h"
 #include "projection/attach.h"
 #include "projection/base/error.h"
@@ -90,8 +91,8 @@ TrialCapture load_trial(const fs::path& path, const TrialRequest& request) {
     const Capture capture = open_capture(path, request.capture);
     require_metres(capture, "a comparison of methods");
     const bool measured = request.depth_noise == "auto";
-    const DepthNoise noise =
-        measured ? noise_of(capture, indices_in(capture, request)) : noise_from_text(request.depth_noise);
+    const DepthNoise noise = measured ? measure_noise(first_look(capture, indices_in(capture, request)))
+                                      : noise_from_text(request.depth_noise);
     return load_trial(capture, noise, measured ? "measured" : "--depth-noise", request);
 }
 

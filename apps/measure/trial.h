@@ -4,8 +4,8 @@
 #include "ao/compare.h"
 #include "ao/frame.h"
 #include "apps/method_settings.h"
-#include "apps/walk/measured_noise.h"
 #include "io/captures/capture.h"
+#include "projection/noise.h"
 #include "projection/sensor_class.h"
 
 #include <array>

@@ -27,7 +27,7 @@ struct RunReport {
     const Capture& capture;
     Registration registration = Registration::unknown; ///< as used
     std::string registration_reason;
-    std::string radius = {};          ///< of a capture in an arbitrary unit: the radius in it, and what it is a part of
+    std::string radius = {};          ///< where the capture asked for another: which, and why
     std::string depth_noise;          ///< the noise, its origin, and how the depth is prepared
     std::vector<std::string> budget;  ///< what an error or time budget chose, expected and found; empty without one
     std::string shading;              ///< what the shaded pictures show, and why

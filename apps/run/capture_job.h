@@ -35,7 +35,8 @@ struct CaptureJob {
     const std::vector<std::size_t>& of;
     BatchOptions batch = {};  ///< batch.frames may be a block of `of`
     std::string block = {};   ///< "" = all, else as Task::block() says
-    LoadedFrames loaded = {}; ///< decoded for the noise; the walk takes them
+    LoadedFrames loaded = {}; ///< decoded for the first look; the walk takes them
+    double extent_m = 0;      ///< of its scene: the median of SceneExtent::diagonal_m; 0 = not looked at
 
     [[nodiscard]] const std::filesystem::path& folder() const { return batch.outputs.folder; }
 };

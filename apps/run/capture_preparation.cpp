@@ -7,11 +7,15 @@
 #include "apps/walk/large_frames.h"
 #include "io/output_file.h"
 #include "projection/base/error.h"
+#include "projection/base/statistics.h"
+#include "projection/scene_extent.h"
 
 #include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
 #include <limits>
 #include <set>
+#include <span>
 
 namespace scanshade {
 
@@ -39,6 +43,27 @@ bool computes_points(const CaptureJob& job) {
            });
 }
 
+/// The middle one of the views' extents; 0 where none shows anything.
+double typical_extent(std::span<const DepthImage> views) {
+    std::vector<double> extents;
+    for (const DepthImage& view : views)
+        if (const SceneExtent scene = scene_extent(view); scene.diagonal_m > 0)
+            extents.push_back(scene.diagonal_m);
+    return median(std::move(extents), 0);
+}
+
+/// A radius of half the scene looks mostly at what no view shows (doubts/of_view.cpp). Near that, since views differ,
+/// it is the longest of 0.2, 0.1, 0.05, 0.02 ... m that is no more than a quarter of the scene: few values, so that
+/// captures of one thing share theirs.
+double suited_radius(double usual, double extent) {
+    constexpr double least_radii = 2.5;
+    if (extent >= least_radii * usual)
+        return usual;
+    const double most = extent / 4, decade = std::pow(10, std::floor(std::log10(most)));
+    const double step = most >= 5 * decade ? 5 : most >= 2 * decade ? 2 : 1;
+    return std::min(usual, step * decade);
+}
+
 Workers* without_workers(std::string& why_none) {
     why_none = "no device was opened: no GPU, and only points to compute";
     return nullptr;
@@ -46,26 +71,37 @@ Workers* without_workers(std::string& why_none) {
 
 } // namespace
 
-void CaptureRuns::measure_noise_of(CaptureJob& job) const {
-    if (asked_.depth_noise != "auto") {
+void CaptureRuns::look_at(CaptureJob& job) const {
+    const bool measures_noise = asked_.depth_noise == "auto";
+    if (!measures_noise)
         job.batch.noise = noise_from_text(asked_.depth_noise);
+    const bool images = std::ranges::all_of(job.capture.entries, [](const auto& entry) { return entry.cloud.empty(); });
+    if (!measures_noise && (!images || asked_.gives_radius()))
         return;
-    }
     const bool colour = shows_colour(job.batch.outputs, !asked_.recording_cloud.empty() || job.batch.outputs.mcap);
     const bool by_points = asked_.clouds != CloudWalk::view && !job.capture.camera;
-    job.batch.noise =
-        noise_of(job.capture, job.of, &job.loaded, colour,
-                 by_points ? CloudAo(asked_.cloud_ao()).most_at_once() : std::numeric_limits<std::size_t>::max());
+    const std::vector<DepthImage> seen =
+        first_look(job.capture, job.of, &job.loaded, colour,
+                   by_points ? CloudAo(asked_.cloud_ao()).most_at_once() : std::numeric_limits<std::size_t>::max());
+    if (measures_noise)
+        job.batch.noise = measure_noise(seen);
+    if (!job.capture.unit.arbitrary())
+        job.extent_m = typical_extent(seen);
     const std::set<std::size_t> wanted(job.batch.frames.begin(), job.batch.frames.end());
     std::erase_if(job.loaded, [&](const auto& each) { return !wanted.contains(each.first); });
     job.batch.loaded = &job.loaded;
 }
 
+double CaptureRuns::radius_for(const CaptureJob& job) const {
+    const double usual = asked_.radius_m();
+    return asked_.gives_radius() || !(job.extent_m > 0) ? usual : suited_radius(usual, job.extent_m);
+}
+
 CaptureRuns::Prepared CaptureRuns::prepare(CaptureJob& job) {
     const std::lock_guard alone(alone_);
-    MethodSetup& own = asked_.chosen_setup();
+    const bool needs_no_view = asked_.chosen_setup().make_for_points() != nullptr;
     job.batch.cloud_tiles = asked_.cloud_tiles;
-    job.batch.cloud_walk = own.make_for_points() ? CloudWalk::points : asked_.clouds;
+    job.batch.cloud_walk = needs_no_view ? CloudWalk::points : asked_.clouds;
     const bool by_points = computes_points(job);
     const bool no_device = by_points && !asked_.asks_for_device(job.capture);
     Workers* workers = no_device && !workers_ && !gpu::may_have_gpu() && all_by_points(job)
@@ -75,41 +111,45 @@ CaptureRuns::Prepared CaptureRuns::prepare(CaptureJob& job) {
     std::vector<std::string> budget;
     if (asked_.budget.any())
         budget = keep_to_budget(job, workers->device());
-    MethodSetup& setup = asked_.chosen_setup();
-    if (workers)
-        workers->make(asked_.method, setup, asked_.preparation());
-    job.batch.radius_m = asked_.radius_m();
+    job.batch.radius_m = radius_for(job);
+    std::unique_ptr<MethodSetup> setup = asked_.setup_with(job.batch.radius_m);
+    std::shared_ptr<MethodPool> methods =
+        workers ? workers->pool_of(asked_.method, *setup, asked_.preparation()) : nullptr;
     gpu::Device* gpu = workers && !gpu::is_cpu(workers->device().info()) ? &workers->device() : nullptr;
-    auto points = point_method(setup, asked_.cloud_ao(), gpu);
+    auto points = point_method(*setup, asked_.cloud_ao(), gpu);
     job.batch.points = points.get();
-    RunReport report = begun_report(job, workers);
+    if (job.batch.radius_m != asked_.radius_m())
+        if (std::string warning = small_scene_warning(job); !std::ranges::count(job.capture.warnings, warning))
+            job.capture.warnings.push_back(std::move(warning)); // once for all blocks
+    RunReport report = begun_report(job, workers, *setup);
     report.budget = budget;
-    const std::string light = take_light(job, report, by_points);
+    const std::string light = take_light(job, report, by_points ? nullptr : methods.get());
     std::string settings = settings_key(report, job.batch.outputs, job.batch.noise, light);
     std::string at_work;
     if (by_points) {
-        if (!own.make_for_points())
+        if (!needs_no_view)
             report.method = "rays from every point";
         if (!gpu)
             report.device = the_processor();
         at_work = fmt::format("{} on {}", report.method, report.device.name);
     } else {
-        at_work = fmt::format("{} on {}", asked_.method, workers->description());
+        at_work = fmt::format("{} on {}", asked_.method, workers->description(*methods));
     }
-    return {std::move(report), std::move(settings), std::move(points), by_points, std::move(at_work)};
+    return {std::move(setup),  std::move(methods), std::move(report), std::move(settings),
+            std::move(points), by_points,          std::move(at_work)};
 }
 
-RunReport CaptureRuns::begun_report(const CaptureJob& job, Workers* workers) {
+RunReport CaptureRuns::begun_report(const CaptureJob& job, Workers* workers, MethodSetup& setup) {
     const auto& said = job.batch.registration;
     const Registration registration = said.value_or(job.capture.registration);
     RunReport report{.started = std::chrono::system_clock::now(),
                      .device = workers ? workers->device().info() : the_processor(),
                      .method = asked_.method,
-                     .settings = asked_.stages_in_use(),
+                     .settings = asked_.stages_in_use(setup),
                      .capture = job.capture,
                      .registration = registration,
                      .registration_reason = said ? "--registered" : job.capture.registration_reason,
-                     .radius = radius_sentence(asked_, job.capture),
+                     .radius = radius_sentence(asked_, job),
                      .depth_noise = noise_sentence(job.batch.noise, asked_, job.capture.unit),
                      .budget = {},
                      .shading = shading_sentence(job.capture, registration, job.batch.outputs.shade),
@@ -126,16 +166,15 @@ std::vector<std::string> CaptureRuns::keep_to_budget(const CaptureJob& job, gpu:
     request.leave_bad_out = true;
     request.preparation = asked_.preparation();
     const TrialCapture trial = load_trial(job.capture, job.batch.noise, noise_origin(asked_), request);
-    const double radius_m = asked_.radius.value_or(request.radius_m);
-    const Choice choice = choose(device, shipped_front(), trial, radius_m, asked_.budget);
+    const Choice choice = choose(device, shipped_front(), trial, radius_for(job), asked_.budget);
     asked_.choose(choice.configuration);
     return choice.sentences;
 }
 
-std::string CaptureRuns::take_light(CaptureJob& job, RunReport& report, bool by_points) {
+std::string CaptureRuns::take_light(CaptureJob& job, RunReport& report, MethodPool* methods) {
     if (!needs_light(job.batch.outputs))
         return "";
-    if (by_points) {
+    if (!methods) {
         job.capture.warnings.emplace_back(
             "--shade ambient and --write light need images: clouds computed from their points are multiplied.");
         return "";
@@ -145,7 +184,7 @@ std::string CaptureRuns::take_light(CaptureJob& job, RunReport& report, bool by_
     LightEstimate& light = job.opened->light;
     std::call_once(job.opened->find_light, [&] {
         if (!asked_.resume || !light_in(file, task)) {
-            const MethodPool::Lease method = workers().pool().lease();
+            const MethodPool::Lease method = methods->lease();
             light = light_of(job.capture, job.of, *method, job.batch, light_request(asked_.light));
             write_atomically(file, text_of(light, task));
         }

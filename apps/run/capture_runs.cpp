@@ -33,13 +33,13 @@ namespace {
 
 /// Computes a capture's frames together, with one method leased for all of them.
 struct Together {
-    Together(Workers& workers, const CaptureJob& job, const RunSettings& asked)
-        : lease(workers.pool()), pool(*lease),
+    Together(MethodPool& methods, const Workers& workers, const CaptureJob& job, const RunSettings& asked)
+        : lease(methods), pool(*lease),
           sequence(lease->sequence(job.batch.radius_m, job.batch.noise,
                                    asked.in_sequence(job.capture)
                                        ? sequence_options(asked.sequences, job.capture, job.batch.radius_m)
                                        : alone())) {
-        if (workers.pool().size() > workers.devices())
+        if (methods.size() > workers.devices())
             say("  frames of a sequence are computed one at a time, in their order");
         if (sequence.reach() > 0)
             say(fmt::format("  frames within {} of each other are computed together", sequence.reach()));
@@ -115,7 +115,7 @@ std::vector<FrameRow> CaptureRuns::process(CaptureJob job, OrderedOutput& output
     const std::string task = task_of(job);
     if (auto rows = rows_if_done(job, journal, task, files))
         return *std::move(rows);
-    measure_noise_of(job);
+    look_at(job);
     std::call_once(job.opened->check_poses, [&] {
         if (std::string warning = pose_warning(job.capture, job.of); !warning.empty())
             job.capture.warnings.push_back(std::move(warning));
@@ -147,7 +147,7 @@ std::vector<FrameRow> CaptureRuns::process(CaptureJob job, OrderedOutput& output
                               .carefully = worker.carefully,
                               .finished = worker.finished,
                               .tars = tars ? &*tars : nullptr};
-    walk(job, ready.report, recording);
+    walk(job, ready, recording);
     if (mcap) {
         finish_mcap(*mcap, job.capture);
         ready.report.recording = mcap->path().filename().string();
@@ -156,7 +156,7 @@ std::vector<FrameRow> CaptureRuns::process(CaptureJob job, OrderedOutput& output
         tars->clean_up();
     const bool recorded =
         cloud && !interrupted && write_recording(*cloud, job, asked_.recording_cloud, writes_page(job));
-    report_on(job, ready.report, journal, files, recorded);
+    report_on(job, ready, journal, files, recorded);
     return std::move(ready.report.frames);
 }
 
@@ -191,14 +191,15 @@ std::optional<std::vector<FrameRow>> CaptureRuns::rows_if_done(const CaptureJob&
     return rows;
 }
 
-void CaptureRuns::walk(CaptureJob& job, RunReport& report, const Recording& recording) {
+void CaptureRuns::walk(CaptureJob& job, Prepared& ready, const Recording& recording) {
+    RunReport& report = ready.report;
     Entrance entrance(entrance_);
     job.batch.all_begun = [&] { entrance.leave(); };
     std::optional<Together> together;
     if (asked_.in_sequence(job.capture) || job.batch.cloud)
-        job.batch.sequence = &together.emplace(workers(), job, asked_).sequence;
+        job.batch.sequence = &together.emplace(*ready.methods, workers(), job, asked_).sequence;
     MethodPool none;
-    MethodPool& pool = together ? together->pool : job.batch.no_method.empty() ? workers().pool() : none;
+    MethodPool& pool = together ? together->pool : ready.methods ? *ready.methods : none;
     report.at_once = std::max<std::size_t>(pool.size(), 1);
     Progress progress(job.batch.frames.size());
     const Stopwatch stopwatch;
@@ -211,12 +212,14 @@ void CaptureRuns::walk(CaptureJob& job, RunReport& report, const Recording& reco
     progress.end();
 }
 
-void CaptureRuns::report_on(const CaptureJob& job, RunReport& report, const Journal& journal, const ReportFiles& files,
+void CaptureRuns::report_on(const CaptureJob& job, Prepared& ready, const Journal& journal, const ReportFiles& files,
                             bool recorded) {
+    RunReport& report = ready.report;
     {
         const std::lock_guard alone(alone_); // the report names settings
         if (count(report.frames, FrameStatus::ok) > 0)
-            report.outlook = outlook(asked_, job.batch.noise, job.capture, report.frames, shipped_front());
+            report.outlook =
+                outlook(asked_, *ready.setup, job.batch.noise, job.capture, report.frames, shipped_front());
         for (const std::string& sentence : report.outlook)
             if (!std::ranges::count(outlook_, sentence))
                 outlook_.push_back(sentence);

@@ -69,6 +69,8 @@ class CaptureRuns {
     };
     /// A capture's method, and its report before any frame is computed.
     struct Prepared {
+        std::unique_ptr<MethodSetup> setup;  ///< as this capture is computed with; the report has its rows
+        std::shared_ptr<MethodPool> methods; ///< null without a device
         RunReport report;
         std::string settings; ///< settings_key()
         std::unique_ptr<PointMethod> points;
@@ -81,29 +83,33 @@ class CaptureRuns {
     /// The rows of a capture that an earlier run has finished.
     [[nodiscard]] std::optional<std::vector<FrameRow>> rows_if_done(const CaptureJob& job, const Journal& journal,
                                                                     const std::string& task, const ReportFiles& files);
-    /// Measures frames spread over the whole capture, so that its blocks agree. Frames of this block stay in memory.
-    void measure_noise_of(CaptureJob& job) const;
+    /// Measures noise and extent on frames spread over the whole capture, so that its blocks agree. Frames of this
+    /// block stay in memory.
+    void look_at(CaptureJob& job) const;
+    /// The radius that was set; where none was, and the scene is too small for the usual one, a radius that suits it.
+    [[nodiscard]] double radius_for(const CaptureJob& job) const;
     /// Makes the methods, or keeps those of the last capture. Without a Vulkan device, clouds are computed from their
     /// points on the processor.
     [[nodiscard]] Prepared prepare(CaptureJob& job);
     /// `workers`: null without a Vulkan device.
-    RunReport begun_report(const CaptureJob& job, Workers* workers);
+    RunReport begun_report(const CaptureJob& job, Workers* workers, MethodSetup& setup);
     /// Picks method and settings for the capture, starting from the command line. Returns sentences about the choice.
     std::vector<std::string> keep_to_budget(const CaptureJob& job, gpu::Device& device);
     /// The light of the colours, where outputs need it: what an earlier run of the same task has found, else estimated
     /// anew and written beside the results. Returns its text, which belongs to what results were made from.
-    std::string take_light(CaptureJob& job, RunReport& report, bool by_points);
+    /// `methods`: null where clouds are computed from their points.
+    std::string take_light(CaptureJob& job, RunReport& report, MethodPool* methods);
     /// Whether nothing but clouds' points remains to be computed. Clouds that are neither in memory nor large may turn
     /// out to be images.
     [[nodiscard]] bool all_by_points(const CaptureJob& job) const;
     /// The devices; null where there are none, and why.
     [[nodiscard]] Workers* workers_if_any(std::string& why_none);
     /// Computes the frames that the journal does not have.
-    void walk(CaptureJob& job, RunReport& report, const Recording& recording);
+    void walk(CaptureJob& job, Prepared& ready, const Recording& recording);
     /// A capture's blocks are joined by `merge`, which writes their page.
     [[nodiscard]] bool writes_page(const CaptureJob& job) const { return asked_.page && job.block.empty(); }
     /// `recorded`: a cloud of all frames is there for the page.
-    void report_on(const CaptureJob& job, RunReport& report, const Journal& journal, const ReportFiles& files,
+    void report_on(const CaptureJob& job, Prepared& ready, const Journal& journal, const ReportFiles& files,
                    bool recorded);
 
     RunSettings& asked_;

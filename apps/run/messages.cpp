@@ -45,13 +45,23 @@ std::string shading_sentence(const Capture& capture, Registration registration, 
         why, capture.registration_reason.empty() ? "" : " (" + capture.registration_reason + ")");
 }
 
+std::string small_scene_warning(const CaptureJob& job) {
+    return fmt::format(
+        "the scene is only {:.2g} m large, so the radius is {} m; --radius sets another. If the scene is "
+        "larger, check the depth unit.",
+        job.extent_m, job.batch.radius_m);
+}
+
 std::string noise_origin(const RunSettings& settings) {
     return settings.depth_noise == "auto" ? "measured" : "--depth-noise";
 }
 
-std::string radius_sentence(const RunSettings& settings, const Capture& capture) {
+std::string radius_sentence(const RunSettings& settings, const CaptureJob& job) {
+    const Capture& capture = job.capture;
     if (!capture.unit.arbitrary())
-        return "";
+        return job.batch.radius_m == settings.radius_m() ? ""
+                                                         : fmt::format("{} m, in place of {}, since the scene is small",
+                                                                       job.batch.radius_m, settings.radius_m());
     if (!(capture.median_depth > 0))
         return "not known: no depth could be read; the recording's unit is arbitrary";
     const double radius = settings.radius_m();

@@ -81,13 +81,13 @@ bool is_prepared_as_measured(const RunSettings& settings) {
 
 } // namespace
 
-std::vector<std::string> outlook(const RunSettings& settings, const DepthNoise& noise, const Capture& capture,
-                                 const std::vector<FrameRow>& rows, const ParetoFront& front) {
+std::vector<std::string> outlook(const RunSettings& settings, MethodSetup& setup, const DepthNoise& noise,
+                                 const Capture& capture, const std::vector<FrameRow>& rows, const ParetoFront& front) {
     const bool clouds = std::ranges::any_of(capture.entries, [](const auto& entry) { return !entry.cloud.empty(); });
     if (clouds || capture.unit.arbitrary() || settings.budget.any() || !is_prepared_as_measured(settings))
         return {};
     const SensorClass sensor = class_of(noise);
-    const BenchmarkPoint* used = measured_with(front, sensor, settings.method, values_of(settings.chosen_setup()));
+    const BenchmarkPoint* used = measured_with(front, sensor, settings.method, values_of(setup));
     if (!used)
         return {};
     const bool together = settings.in_sequence(capture);

@@ -13,7 +13,8 @@ namespace scanshade {
 /// Sentences with measured numbers: the error expected of these frames, or where they have none of these settings at
 /// this depth noise, and the error and time of the next better preset. Empty if nothing like it was measured (clouds,
 /// other radii, other depth preparation), and for budgets, which print their own.
-[[nodiscard]] std::vector<std::string> outlook(const RunSettings& settings, const DepthNoise& noise,
+/// `setup`: the method's settings, as the capture was computed with.
+[[nodiscard]] std::vector<std::string> outlook(const RunSettings& settings, MethodSetup& setup, const DepthNoise& noise,
                                                const Capture& capture, const std::vector<FrameRow>& rows,
                                                const ParetoFront& front);
 

@@ -164,9 +164,9 @@ std::vector<Stage> RunSettings::stages() {
     return all;
 }
 
-std::vector<Stage> RunSettings::stages_in_use() {
+std::vector<Stage> RunSettings::stages_in_use(MethodSetup& setup) {
     std::vector<Stage> all = common_stages();
-    all.push_back(method_stage(method, chosen_setup()));
+    all.push_back(method_stage(method, setup));
     all.push_back(cloud_stage());
     all.push_back(sequence_stage());
     return all;
@@ -483,6 +483,24 @@ MethodSetup& RunSettings::setup_of(std::string_view name) const {
 double RunSettings::radius_m() const {
     const std::vector<Parameter> rows = chosen_setup().parameters();
     return number_of(*row_named(rows, "radius"));
+}
+
+bool RunSettings::gives_radius() const {
+    const auto usual = method_named(method).setup();
+    const std::vector<Parameter> defaults = usual->parameters(), rows = chosen_setup().parameters();
+    return radius || std::ranges::any_of(rows, [&](const Parameter& row) {
+               return row.unit == "m" && value_text(row) != value_text(*row_named(defaults, row.name));
+           });
+}
+
+std::unique_ptr<MethodSetup> RunSettings::setup_with(double radius_m) const {
+    std::unique_ptr<MethodSetup> setup = method_named(method).setup();
+    apply({method, "as given", values_of(chosen_setup())}, *setup);
+    if (radius_m != this->radius_m()) {
+        const std::vector<Parameter> rows = setup->parameters();
+        set(*row_named(rows, "radius"), radius_m);
+    }
+    return setup;
 }
 
 std::vector<std::string> RunSettings::given_in_metres() {

@@ -69,7 +69,9 @@ class RunSettings {
     /// All rows, grouped as in the help.
     [[nodiscard]] std::vector<Stage> stages();
     /// All rows except those of other methods: these shape the results and are in the report.
-    [[nodiscard]] std::vector<Stage> stages_in_use();
+    [[nodiscard]] std::vector<Stage> stages_in_use() { return stages_in_use(chosen_setup()); }
+    /// The same with the method's settings as a capture is computed with; see setup_with().
+    [[nodiscard]] std::vector<Stage> stages_in_use(MethodSetup& setup);
 
     /// Changes defaults to those of `preset`; call it before anything else is set.
     void take_preset();
@@ -88,6 +90,10 @@ class RunSettings {
     [[nodiscard]] const CloudAoOptions& cloud_ao() const { return cloud_options_; }
     [[nodiscard]] MethodSetup& chosen_setup() const { return setup_of(method); }
     [[nodiscard]] double radius_m() const; ///< the chosen method's
+    /// Whether somebody chose the radius, or other lengths of the method, which go with it.
+    [[nodiscard]] bool gives_radius() const;
+    /// The chosen method's settings with that radius, for one capture.
+    [[nodiscard]] std::unique_ptr<MethodSetup> setup_with(double radius_m) const;
     /// "--radius 0.5": what was set in metres, or is chosen by sensors' noise in metres. None of it can be used for a
     /// capture in an arbitrary unit.
     [[nodiscard]] std::vector<std::string> given_in_metres();

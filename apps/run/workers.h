@@ -26,25 +26,26 @@ class Workers {
                   in_flight) {}
     /// The same on devices that are open already; at least one.
     Workers(Devices devices, int in_flight);
+    ~Workers();
 
     /// The device for work that computes one frame at a time.
     [[nodiscard]] gpu::Device& device() { return *devices_->front(); }
-    /// Makes the methods again if method or settings have changed, so that shaders are compiled once for all captures.
-    /// None may be leased then. A method that uses all cores by itself exists once.
-    void make(const std::string& method, MethodSetup& setup, const FitPlaneOptions& preparation);
-    [[nodiscard]] MethodPool& pool() { return *pool_; }
+    /// Methods of these settings, made once for all captures that ask for the same: shaders are compiled then. Captures
+    /// that are computed side by side may have settings of their own. A method that uses all cores by itself exists
+    /// once.
+    [[nodiscard]] std::shared_ptr<MethodPool> pool_of(const std::string& method, MethodSetup& setup,
+                                                      const FitPlaneOptions& preparation);
 
     /// "NVIDIA H100 (NVIDIA 550.54)", "2 x NVIDIA ..., 6 frames at once"
-    [[nodiscard]] std::string description() const;
+    [[nodiscard]] std::string description(const MethodPool& pool) const;
     [[nodiscard]] std::size_t devices() const { return devices_->size(); }
 
   private:
+    struct Made; ///< methods, and what they were made from
+
     Devices devices_; ///< outlive what is made on them
     std::size_t in_flight_;
-    Configuration configuration_; ///< what made_ was made from, and
-    FitPlaneOptions preparation_;
-    std::vector<std::unique_ptr<FrameAo>> made_;
-    std::unique_ptr<MethodPool> pool_;
+    std::vector<std::shared_ptr<Made>> made_; ///< the last few; the last used is the last
 };
 
 } // namespace scanshade

@@ -6,8 +6,9 @@
 #include "apps/results/mcap_recording.h"
 #include "apps/results/outputs.h"
 #include "apps/results/recording_cloud.h"
-#include "apps/walk/measured_noise.h"
+#include "apps/walk/first_look.h"
 #include "io/captures/capture.h"
+#include "projection/noise.h"
 #include "projection/project.h"
 
 #include <atomic>

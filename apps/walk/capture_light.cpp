@@ -1,9 +1,9 @@
 #include "apps/walk/capture_light.h"
 
 #include "apps/json.h"
+#include "apps/walk/first_look.h"
 #include "apps/walk/frame_images.h"
 #include "apps/walk/frame_steps.h"
-#include "apps/walk/measured_noise.h"
 #include "io/text.h"
 #include "projection/attach.h"
 #include "projection/base/error.h"

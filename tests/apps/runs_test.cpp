@@ -91,6 +91,35 @@ void write_other_capture(const fs::path& folder, int frames) {
     }
 }
 
+TEST_F(RunsTest, a_scene_too_small_for_the_usual_radius_gets_its_own) {
+    tests::write_capture(folder / "room", 2);
+    tests::write_capture(folder / "thing", 2);
+    for (int i = 0; i < 2; ++i) {
+        cv::Mat1f walls = tests::corner_depth(i);
+        walls *= 0.2;
+        write_depth_png(folder / fmt::format("thing/depth/{:03}.png", i), walls, 1000);
+    }
+    const auto radius_in = [&](const std::string& manifest) {
+        return json::parse(read_bytes(out() / manifest))["settings"]["method cacao"]["cacao.radius"].get<double>();
+    };
+    const std::string both =
+        fmt::format("run '{}' '{}' -o '{}' ", (folder / "room").string(), (folder / "thing").string(), out().string());
+    const Ran ran = run_program(both + "--depth-noise none");
+    EXPECT_EQ(ran.exit_code, all_well) << ran.err;
+    EXPECT_EQ(radius_in("room/manifest.json"), 0.5);
+    EXPECT_EQ(radius_in("thing/manifest.json"), 0.1);
+    EXPECT_TRUE(says(ran.err, "thing: the scene is only 0.5")) << ran.err;
+    EXPECT_FALSE(says(ran.err, "room: the scene"));
+    const Ran resumed = run_program(both + "--depth-noise none --resume");
+    EXPECT_EQ(resumed.exit_code, all_well);
+    EXPECT_TRUE(says(resumed.out + resumed.err, "done already")) << resumed.out << resumed.err;
+    // What a person says stays.
+    const Ran told = run_program(both + "--depth-noise none --overwrite --radius 0.4");
+    EXPECT_EQ(radius_in("thing/manifest.json"), 0.4);
+    EXPECT_EQ(told.exit_code, some_failed) << "more than half of it";
+    EXPECT_FALSE(says(told.err, "the scene is only"));
+}
+
 TEST_F(RunsTest, results_of_another_capture_are_not_resumed) {
     tests::write_capture(capture(), 2);
     write_other_capture(folder / "other", 2);

@@ -28,8 +28,8 @@ class WorkersTest : public testing::TestWithParam<const char*> {
     std::vector<FrameRow> run(int in_flight, const DepthNoise& noise, const fs::path& out) {
         Workers workers("", in_flight);
         const auto setup = method_named(GetParam()).setup();
-        workers.make(GetParam(), *setup, {});
-        EXPECT_EQ(workers.pool().size(), static_cast<std::size_t>(in_flight));
+        const auto pool = workers.pool_of(GetParam(), *setup, {});
+        EXPECT_EQ(pool->size(), static_cast<std::size_t>(in_flight));
         const Capture capture = open_capture(folder / "capture");
         BatchOptions options;
         options.frames.resize(capture.entries.size());
@@ -38,7 +38,7 @@ class WorkersTest : public testing::TestWithParam<const char*> {
         options.outputs.format = AoFormat::tiff; // every bit of every float
         options.radius_m = 0.5;
         options.noise = noise;
-        auto rows = run_batch(capture, workers.pool(), options);
+        auto rows = run_batch(capture, *pool, options);
         for (const std::string& message : workers.device().validation_messages())
             ADD_FAILURE() << message;
         return rows;
@@ -84,10 +84,29 @@ TEST(DevicesTest, all_are_the_gpus_of_one_kind_or_else_one_software_device) {
 TEST(DevicesTest, a_processor_computes_one_frame_at_a_time_unless_asked) {
     Workers workers("all", 0);
     const auto setup = method_named("cacao").setup();
-    workers.make("cacao", *setup, {});
+    const auto pool = workers.pool_of("cacao", *setup, {});
     const std::size_t each = gpu::is_cpu(workers.device().info()) ? 1 : 3;
-    EXPECT_EQ(workers.pool().size(), each * workers.devices());
-    EXPECT_NE(workers.description().find(workers.device().info().name), std::string::npos);
+    EXPECT_EQ(pool->size(), each * workers.devices());
+    EXPECT_NE(workers.description(*pool).find(workers.device().info().name), std::string::npos);
+}
+
+TEST(DevicesTest, equal_settings_share_methods_and_captures_keep_theirs) {
+    Workers workers("", 0);
+    const auto with_radius = [](double radius) {
+        auto setup = method_named("cacao").setup();
+        const std::vector<Parameter> rows = setup->parameters();
+        set(*row_named(rows, "radius"), radius);
+        return setup;
+    };
+    const auto half = workers.pool_of("cacao", *with_radius(0.5), {});
+    const auto tenth = workers.pool_of("cacao", *with_radius(0.1), {});
+    EXPECT_NE(half, tenth);
+    EXPECT_EQ(workers.pool_of("cacao", *with_radius(0.5), {}), half);
+    for (const double radius : {0.2, 0.05, 0.02})
+        (void)workers.pool_of("cacao", *with_radius(radius), {});
+    EXPECT_GT(tenth->size(), 0U);
+    EXPECT_FALSE(
+        half->lease()->compute({tests::small_camera().pinhole, tests::corner_depth(0), {}}, {}).visibility.empty());
 }
 
 } // namespace

@@ -1,4 +1,4 @@
-#include "apps/walk/measured_noise.h"
+#include "apps/walk/first_look.h"
 
 #include "apps/walk/large_frames.h"
 #include "projection/base/error.h"
@@ -13,8 +13,8 @@
 
 namespace scanshade {
 
-DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& frames, LoadedFrames* kept,
-                    bool with_colour, std::size_t most_points) {
+std::vector<DepthImage> first_look(const Capture& capture, const std::vector<std::size_t>& frames, LoadedFrames* kept,
+                                   bool with_colour, std::size_t most_points) {
     constexpr std::size_t most = 5;
     const std::vector<std::size_t> chosen = spread(most, frames.size());
     std::vector<DepthImage> images(chosen.size());
@@ -42,7 +42,7 @@ DepthNoise noise_of(const Capture& capture, const std::vector<std::size_t>& fram
     for (std::size_t i = 0; i < chosen.size(); ++i)
         if (loaded[i])
             kept->emplace(frames[chosen[i]], *std::move(loaded[i]));
-    return measure_noise(images);
+    return images;
 }
 
 } // namespace scanshade

@@ -1,0 +1,29 @@
+// A look at a few of a capture's frames before the walk begins: its noise and the size of its scene are measured there.
+#pragma once
+
+#include "io/captures/capture.h"
+#include "projection/project.h"
+
+#include <cstddef>
+#include <limits>
+#include <map>
+#include <vector>
+
+namespace scanshade {
+
+/// Frames that were decoded before the walk began, so that it need not decode them again.
+struct LoadedFrame {
+    Frame frame;
+    double took_ms = 0;
+};
+using LoadedFrames = std::map<std::size_t, LoadedFrame>; ///< by index in the capture
+
+/// Depth images of up to five of the frames, spread evenly; empty ones of frames that cannot be loaded, and of clouds
+/// without a grid, which are no sensor's image. `kept`, if given, receives the frames, with their colour if
+/// `with_colour`. Of several clouds without a grid it keeps none, since they may be large.
+/// Clouds without a grid of more than `most_points` are not looked at, if they are computed from disk.
+[[nodiscard]] std::vector<DepthImage> first_look(const Capture& capture, const std::vector<std::size_t>& frames,
+                                                 LoadedFrames* kept = nullptr, bool with_colour = false,
+                                                 std::size_t most_points = std::numeric_limits<std::size_t>::max());
+
+} // namespace scanshade
