@@ -56,8 +56,8 @@ double typical_extent(std::span<const DepthImage> views) {
 /// it is the longest of 0.2, 0.1, 0.05, 0.02 ... m that is no more than a quarter of the scene: few values, so that
 /// captures of one thing share theirs.
 double suited_radius(double usual, double extent) {
-    constexpr double least_radii = 2.5;
-    if (extent >= least_radii * usual)
+    constexpr double least_radii = 2.5, least_scene_m = 0.02; // smaller ones are in a wrong unit
+    if (extent >= least_radii * usual || extent < least_scene_m)
         return usual;
     const double most = extent / 4, decade = std::pow(10, std::floor(std::log10(most)));
     const double step = most >= 5 * decade ? 5 : most >= 2 * decade ? 2 : 1;
@@ -111,7 +111,7 @@ CaptureRuns::Prepared CaptureRuns::prepare(CaptureJob& job) {
     std::vector<std::string> budget;
     if (asked_.budget.any())
         budget = keep_to_budget(job, workers->device());
-    job.batch.radius_m = radius_for(job);
+    job.batch.radius_m = by_points ? asked_.radius_m() : radius_for(job);
     std::unique_ptr<MethodSetup> setup = asked_.setup_with(job.batch.radius_m);
     std::shared_ptr<MethodPool> methods =
         workers ? workers->pool_of(asked_.method, *setup, asked_.preparation()) : nullptr;

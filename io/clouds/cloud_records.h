@@ -141,7 +141,7 @@ class TextRecords {
                                     std::vector<std::string>& warnings);
 /// One point a line: .xyz (a line of names may come first) and .pts (the count comes first). Columns without names are
 /// x y z, then colours (bytes) and normals (of length 1) as their values tell, an intensity before or another value
-/// behind.
+/// behind. Cells between commas or semicolons (CSV) become words between blanks.
 [[nodiscard]] CloudRecords read_xyz(std::string_view bytes, const std::filesystem::path& file,
                                     std::vector<std::string>& warnings);
 /// Whether a text of another name begins as read_xyz() reads it: eight lines or more of x y z, alone or with colours or

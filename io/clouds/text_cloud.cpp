@@ -6,10 +6,13 @@
 #include "projection/base/error.h"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <limits>
+#include <optional>
 
 namespace scanshade {
 
@@ -104,6 +107,43 @@ std::vector<CloudField> fields_named(const std::vector<std::string>& names) {
         fields.push_back({name, colour ? Scalar::uint8 : Scalar::float64, 1, std::nullopt, 0});
     }
     return fields;
+}
+
+/// A name of CSV as one word: without quotes, its blanks joined. ParaView and VeloView number coordinates: "Points:0",
+/// "Points_m_XYZ:0".
+std::string name_in_cell(std::string_view cell) {
+    std::string name(cell);
+    std::erase(name, '"');
+    std::ranges::replace_if(
+        name, [](unsigned char c) { return std::isspace(c) != 0; }, '_');
+    constexpr std::array<std::string_view, 3> axes{"x", "y", "z"};
+    for (std::size_t axis = 0; axis < axes.size(); ++axis)
+        if ((name.starts_with("Points:") || name.starts_with("Points_m_XYZ:")) &&
+            name.ends_with(fmt::format(":{}", axis)))
+            return std::string(axes[axis]);
+    return name.empty() ? "unnamed" : name; // pandas writes the number of each line in a column without a name
+}
+
+/// A text of cells between commas or semicolons, as words between blanks; nothing for other texts. With semicolons, a
+/// comma is a decimal point.
+std::optional<std::string> words_for_cells(std::string_view bytes) {
+    const std::string_view first = bytes.substr(0, bytes.find('\n'));
+    const char between = first.find(';') != std::string_view::npos ? ';' : ',';
+    if (first.find(between) == std::string_view::npos)
+        return std::nullopt;
+    std::string text;
+    for (std::size_t at = 0; at <= first.size();) { // numbers or names
+        const std::size_t end = std::min(first.find(between, at), first.size());
+        const std::string_view cell = trimmed(first.substr(at, end - at));
+        if (!cell.empty() || end < first.size()) // else a comma at the line's end
+            text += (text.empty() ? "" : " ") + name_in_cell(cell);
+        at = end + 1;
+    }
+    text += bytes.substr(first.size());
+    std::ranges::replace(text, between, ' ');
+    if (between == ';')
+        std::ranges::replace(text, ',', '.');
+    return text;
 }
 
 /// "//X Y Z R G B" as names of ours; none where a word is no name.
@@ -305,6 +345,8 @@ bool is_text_cloud(std::string_view start) {
     constexpr std::size_t enough = 4096, not_a_matrix = 8;
     const bool cut = start.size() >= enough;
     start = start.substr(0, enough);
+    const std::optional<std::string> of_cells = words_for_cells(start);
+    start = of_cells ? *of_cells : start;
     const std::size_t first_end = std::min(start.find('\n'), start.size());
     const auto first = words(start.substr(0, first_end));
     bool named = !first.empty() && !all_numbers(first);
@@ -313,6 +355,8 @@ bool is_text_cloud(std::string_view start) {
         for (const char* axis : {"x", "y", "z"})
             if (std::ranges::count(names, axis) != 1)
                 return false;
+        if (std::ranges::count(names, "qw") > 0) // poses
+            return false;
         start.remove_prefix(std::min(first_end + 1, start.size()));
     }
     const auto lines = first_numbers(start, cut);
@@ -330,6 +374,8 @@ bool is_text_cloud(std::string_view start) {
 }
 
 CloudRecords read_xyz(std::string_view bytes, const fs::path& file, std::vector<std::string>& warnings) {
+    const std::optional<std::string> of_cells = words_for_cells(bytes);
+    bytes = of_cells ? *of_cells : bytes;
     CloudRecords records;
     records.encoding = CloudRecords::Encoding::ascii;
     std::size_t length = 0;

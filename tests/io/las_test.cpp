@@ -366,6 +366,8 @@ TEST(TextClouds, of_any_name_are_told_by_their_lines) {
     EXPECT_TRUE(is_read("domfountain.txt", "-15.6 39.2 2.05 -1270 43 47 48", 9)) << "Semantic3D";
     EXPECT_TRUE(is_read("points", "1 2 3", 8));
     EXPECT_TRUE(is_read("normals.asc", "1 2 3 0.6 0 0.8", 8));
+    EXPECT_TRUE(is_read("scan.csv", "1.5,2,3,200,100,0", 8));
+    EXPECT_FALSE(is_read("imu.csv", "1305031098.6659,0.1,0.2,9.8", 50));
     EXPECT_FALSE(is_read("intrinsics.txt", "525 0 319.5", 3)) << "a matrix";
     EXPECT_FALSE(is_read("pose.txt", "1 0 0 0", 4));
     EXPECT_FALSE(is_read("groundtruth.txt", "1305031098.6659 1.35 0.63 1.63 0.66 0.61 -0.29 -0.32", 50))
@@ -374,6 +376,41 @@ TEST(TextClouds, of_any_name_are_told_by_their_lines) {
     EXPECT_FALSE(is_read("accelerometer.txt", "1305031098.6659 0.1 0.2 9.8", 50));
     EXPECT_FALSE(is_read("depth.txt", "1305031098.6659 depth/1305031098.6659.png", 50));
     EXPECT_FALSE(is_read("read.txt", "Read me first.", 50));
+}
+
+/// CloudCompare, VeloView, and a spreadsheet of a country with decimal commas.
+TEST(TextClouds, csv_has_cells_in_place_of_words) {
+    const TemporaryFolder folder;
+    const auto lines = [](const std::string& head, const std::string& line) {
+        std::string text = head;
+        for (int i = 0; i < 8; ++i)
+            text += line;
+        return text;
+    };
+    const std::string compared = lines("//X,Y,Z,R,G,B\n", "1.5,-2,3,200,100,7\n");
+    const std::string velodyne =
+        lines("\"Points_m_XYZ:0\",\"Points_m_XYZ:1\",\"Points_m_XYZ:2\",\"laser id\"\r\n", "1.5,-2,3,7\r\n");
+    const std::string german = lines("x;y;z;Intensity\n", "1,5;-2,0;3;7\n");
+    const std::string pandas = lines(",x,y,z\n", "17,1.5,-2,3\n");
+    const std::string closed = lines("", "1.5,-2,3,\n");
+    for (const std::string& text :
+         {compared, velodyne, german, pandas, closed, lines("", "1.5, -2, 3, 200, 100, 7\n")}) {
+        const auto file = write_file(folder / "a.csv", text);
+        ASSERT_TRUE(is_cloud(text.substr(0, 4096), file)) << text;
+        const Cloud cloud = read(file);
+        ASSERT_EQ(cloud.points.size(), 8U);
+        EXPECT_EQ(cloud.points[7], Eigen::Vector3d(1.5, -2, 3));
+    }
+    const Cloud coloured = read(write_file(folder / "a.csv", compared));
+    EXPECT_EQ(coloured.colours.at(7), cv::Vec3b(7, 100, 200));
+    const std::vector<float> ao(8, 0.5F);
+    write_cloud(folder / "b.xyz", coloured, {{"ambient_occlusion", ao}});
+    EXPECT_TRUE(file_bytes(folder / "b.xyz").starts_with("//X Y Z R G B ambient_occlusion\n1.5 -2 3 200 100 7 0.5\n"));
+    const std::string poses = lines("time,x,y,z,qx,qy,qz,qw\n", "1,2,3,4,0,0,0,1\n");
+    EXPECT_FALSE(is_cloud(poses, write_file(folder / "poses.csv", poses)));
+    std::vector<std::string> warnings;
+    const std::string gap = compared + "1.5,,3,200,100,7\n";
+    EXPECT_TRUE(says(refusal([&] { (void)read_cloud(write_file(folder / "gap.csv", gap), warnings); }), "line 10"));
 }
 
 TEST(TextClouds, ptx_is_a_grid_placed_by_its_matrix) {
