@@ -75,7 +75,7 @@ std::string raw_bytes(Number value, bool big_endian) {
 template <class Action>
 decltype(auto) with_type(Scalar type, Action&& action) {
     switch (type) {
-    case Scalar::int8:
+    case Scalar::int8: // NOLINT(bugprone-branch-clone): clang-tidy 14 takes the types of a template for one
         return action(std::int8_t());
     case Scalar::uint8:
         return action(std::uint8_t());

@@ -74,8 +74,10 @@ std::string zip(const std::vector<Member>& members) {
             all = u16(7) + u16(2) + "xx" + u16(1) + u16(24) + both + raw(std::uint64_t(file.size()));
         }
         rows += "PK\1\2" + u16(20) + facts + u16(unsigned(all.size())) + u16(0) + u16(0) + u16(0) + u32(0) +
-                u32(member.zip64 ? ones : file.size()) + member.name + all;
-        file += "PK\3\4" + facts + u16(unsigned(sizes.size())) + member.name + sizes + data;
+                u32(member.zip64 ? ones : file.size());
+        rows.append(member.name).append(all);
+        file += "PK\3\4" + facts + u16(unsigned(sizes.size()));
+        file.append(member.name).append(sizes).append(data);
     }
     const auto count = static_cast<unsigned>(members.size());
     return file + rows + "PK\5\6" + u16(0) + u16(0) + u16(count) + u16(count) + u32(rows.size()) + u32(file.size()) +
@@ -192,7 +194,8 @@ std::string sens(bool packed, std::uint64_t frames_said = 2) {
         const std::string colour = "\x0a\x14\x1e\x28\x32\x3c"; // red, green, blue
         bytes += matrix_of(1, 0, 0, static_cast<float>(metres)) + raw(std::uint64_t(1000000 * metres)) +
                  raw(std::uint64_t(1000000 * metres + 4000)) + raw(std::uint64_t(colour.size())) +
-                 raw(std::uint64_t(depth.size())) + colour + depth;
+                 raw(std::uint64_t(depth.size()));
+        bytes.append(colour).append(depth);
     }
     return bytes;
 }
