@@ -178,9 +178,9 @@ class ResumeTest : public testing::Test {
     /// A job of four blocks of one capture, three frames in flight; what a plain run, one frame after the other,
     /// leaves.
     [[nodiscard]] std::map<std::string, std::string> plan_four_blocks() {
-        record(200);
+        record(120);
         EXPECT_EQ(run(all_files).exit_code, 0);
-        EXPECT_EQ(plan(fmt::format("--block 50 --in-flight 3 {}", all_files)).exit_code, 0);
+        EXPECT_EQ(plan(fmt::format("--block 30 --in-flight 3 {}", all_files)).exit_code, 0);
         return results_in(out());
     }
     [[nodiscard]] fs::path job_results() const { return job() / "results/data/capture"; }
@@ -192,10 +192,10 @@ class ResumeTest : public testing::Test {
 // ---------------------------------------------------------------------------------------------------- killed
 
 TEST_F(ResumeTest, a_run_killed_at_random_and_resumed_leaves_the_bytes_of_an_uninterrupted_one) {
-    record(200);
+    record(120);
     ASSERT_EQ(run(all_files).exit_code, 0);
     const auto expected = results_in(out());
-    ASSERT_EQ(expected.size(), 1200u);
+    ASSERT_EQ(expected.size(), 720u);
     fs::remove_all(out());
     const std::string arguments =
         fmt::format("run {} -o {} --resume {}", capture().string(), out().string(), all_files);
@@ -230,7 +230,7 @@ TEST_F(ResumeTest, every_run_of_a_job_leaves_the_bytes_of_a_plain_run) {
 }
 
 TEST_F(ResumeTest, a_share_that_goes_amid_a_run_is_no_fault_of_its_frames) {
-    record(200);
+    record(120);
     ASSERT_EQ(run(all_files).exit_code, 0);
     const auto expected = results_in(out());
     fs::remove_all(out());
