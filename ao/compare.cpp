@@ -38,16 +38,38 @@ void each_pair(const cv::Mat1f& a, const cv::Mat1f& b, Use&& use) {
 
 constexpr double darkest = 1e-4; // below power 1 the slope at 0 is infinite, which solvers cannot handle
 
-/// sqrt(n) (curve(v) - mean truth) of one bin: the part of the squared error that a tone curve can change.
-struct BinResidual {
+/// What the fit knows of a bin: sqrt(n), and the means of both sides.
+struct BinMeans {
     double root_n, ours, truth;
-    template <class Number>
-    bool operator()(const Number* strength, const Number* power, Number* residual) const {
-        const Number light = Number(1) - *strength * Number(1 - ours);
-        const Number shown = light < Number(darkest) ? Number(darkest) : light > Number(1) ? Number(1) : light;
-        residual[0] = Number(root_n) * (pow(shown, *power) - Number(truth));
+};
+
+/// sqrt(n) (curve(v) - mean truth) of each bin: the part of the squared error that a tone curve can change. Of strength
+/// and power, with derivatives: as a block for each bin, derived by Ceres, the fit took ten times as long.
+class BinResiduals final : public ceres::CostFunction {
+  public:
+    explicit BinResiduals(std::vector<BinMeans> bins) : bins_(std::move(bins)) {
+        set_num_residuals(static_cast<int>(bins_.size()));
+        *mutable_parameter_block_sizes() = {1, 1};
+    }
+    bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+        const double strength = *parameters[0], power = *parameters[1];
+        double* const by_strength = jacobians ? jacobians[0] : nullptr;
+        double* const by_power = jacobians ? jacobians[1] : nullptr;
+        for (std::size_t i = 0; i < bins_.size(); ++i) {
+            const auto& [root_n, ours, truth] = bins_[i];
+            const double light = 1 - strength * (1 - ours), shown = std::clamp(light, darkest, 1.0);
+            const double log_shown = std::log(shown), value = std::exp(power * log_shown);
+            residuals[i] = root_n * (value - truth);
+            if (by_strength) // flat where the light is clamped
+                by_strength[i] = light == shown ? -root_n * (1 - ours) * power * value / shown : 0;
+            if (by_power)
+                by_power[i] = root_n * value * log_shown;
+        }
         return true;
     }
+
+  private:
+    std::vector<BinMeans> bins_;
 };
 
 /// Starts of the fit: the identity, a weaker curve, and both ends of the valley that strength and power share.
@@ -153,15 +175,18 @@ ToneCurve PairSums::best_curve(const ToneCurve& least, const ToneCurve& most) co
     ToneCurve best;
     if (count_ == 0)
         return best;
+    std::vector<BinMeans> means;
+    for (const Bin& bin : bins_)
+        if (bin.n > 0)
+            means.push_back({std::sqrt(bin.n), bin.ours / bin.n, bin.truth / bin.n});
+    BinResiduals residuals(std::move(means));
     for (ToneCurve curve : starts) {
         curve = {std::clamp(curve.strength, least.strength, most.strength),
                  std::clamp(curve.power, least.power, most.power)};
-        ceres::Problem problem;
-        for (const Bin& bin : bins_)
-            if (bin.n > 0)
-                problem.AddResidualBlock(new ceres::AutoDiffCostFunction<BinResidual, 1, 1, 1>(
-                                             new BinResidual{std::sqrt(bin.n), bin.ours / bin.n, bin.truth / bin.n}),
-                                         nullptr, &curve.strength, &curve.power);
+        ceres::Problem::Options borrowed;
+        borrowed.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+        ceres::Problem problem(borrowed);
+        problem.AddResidualBlock(&residuals, nullptr, &curve.strength, &curve.power);
         problem.SetParameterLowerBound(&curve.strength, 0, least.strength);
         problem.SetParameterUpperBound(&curve.strength, 0, most.strength);
         problem.SetParameterLowerBound(&curve.power, 0, least.power);
