@@ -1,6 +1,7 @@
 // A tar's headers, walked once. Formats: POSIX.1-2001 (ustar, pax), GNU tar's manual, "Basic Tar Format".
 #include "io/tar_index.h"
 
+#include "io/checksum.h"
 #include "io/text.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
@@ -71,7 +72,7 @@ bool is_header(std::string_view block) {
         sum += static_cast<unsigned char>(c);
         signed_sum += static_cast<signed char>(c);
     }
-    return *stated == sum || static_cast<std::int64_t>(*stated) == signed_sum;
+    return sums_agree(sum, *stated) || static_cast<std::int64_t>(*stated) == signed_sum;
 }
 
 /// '/' before every other character, so that a folder's content follows it at once.

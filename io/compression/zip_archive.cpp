@@ -1,5 +1,6 @@
 #include "io/compression/zip_archive.h"
 
+#include "io/checksum.h"
 #include "io/compression/inflate.h"
 #include "io/text.h"
 #include "projection/base/error.h"
@@ -195,7 +196,7 @@ std::string ZipArchive::bytes(const ZipMember& member, std::uint64_t most) const
         crc = crc32(crc, reinterpret_cast<const Bytef*>(all.data() + at), part);
         at += part;
     }
-    if (static_cast<std::uint32_t>(crc) != member.crc)
+    if (!sums_agree(static_cast<std::uint32_t>(crc), member.crc))
         throw Error(fmt::format("{}: checksum {:08x}, expected {:08x}", where(member), crc, member.crc));
     return all;
 }
@@ -210,7 +211,7 @@ ZipMemberStream::ZipMemberStream(const ZipArchive& archive, const ZipMember& mem
                                 member.bytes));
     if (!unpacked_->damage().empty())
         throw Error(fmt::format("{}: {}", archive.where(member), unpacked_->damage()));
-    if (unpacked_->crc() != member.crc)
+    if (!sums_agree(unpacked_->crc(), member.crc))
         throw Error(
             fmt::format("{}: checksum {:08x}, expected {:08x}", archive.where(member), unpacked_->crc(), member.crc));
 }

@@ -5,6 +5,9 @@
 #include "io/clouds/cloud_file.h"
 #include "io/images/image_file.h"
 #include "tests/fuzz/fuzz.h"
+#include "tests/support/e57_file.h"
+#include "tests/support/laz_file.h"
+#include "tests/support/ros_files.h"
 #include "tests/support/tar.h"
 
 #include <array>
@@ -17,6 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace scanshade;
+using tests::raw;
 
 fs::path root;
 
@@ -26,13 +30,6 @@ fs::path root;
 void seed(const std::string& target, const std::string& name, const std::string& bytes) {
     fs::create_directories(root / target);
     std::ofstream(root / target / name, std::ios::binary) << bytes;
-}
-
-template <class Number>
-std::string raw(Number value) {
-    std::string bytes(sizeof value, '\0');
-    std::memcpy(bytes.data(), &value, sizeof value);
-    return bytes;
 }
 
 void images() {
@@ -128,6 +125,43 @@ void las() {
     for (int i = 0; i < 2; ++i)
         points += raw(100 + i) + raw(200) + raw(300) + std::string(14, '\x07') + raw(1.5F);
     seed("las", "seed.las", header + record + descriptor + points);
+}
+
+/// Chunks of both kinds, and COPC's of varying length.
+void laz_and_copc() {
+    for (const int format : {3, 7})
+        seed("laz", fmt::format("format{}.laz", format),
+             tests::laz_file(format, laz::usual_packing(format, format == 3 ? 38 : 40), tests::twelve_records(format)));
+    seed("laz", "copc.laz", tests::copc_file());
+}
+
+/// Two scans; angles and packed integers.
+void e57_scans() {
+    using namespace tests;
+    TestScan posed = float_scan(5, 100);
+    posed.before =
+        "<pose type=\"Structure\"><rotation type=\"Structure\"><w type=\"Float\">0.6</w><z type=\"Float\">0.8</z>"
+        "</rotation><translation type=\"Structure\"><x type=\"Float\">1</x></translation></pose>";
+    seed("e57", "two.e57", e57_file({float_scan(40), posed}));
+    TestScan coloured = float_scan(6);
+    coloured.prototype += "<colorRed type=\"Integer\" minimum=\"0\" maximum=\"255\"/><cartesianInvalidState "
+                          "type=\"Integer\" minimum=\"0\" maximum=\"2\"/>";
+    Bits invalid;
+    for (const unsigned state : {0U, 0U, 2U, 0U, 1U, 0U})
+        invalid.add(state, 2);
+    coloured.streams.insert(coloured.streams.end(), {std::string(6, 'r'), invalid.bytes()});
+    seed("e57", "coloured.e57", e57_file({coloured}));
+}
+
+/// Every container of ROS, packed and not.
+void ros_recordings() {
+    using namespace tests;
+    for (const char* packing : {"none", "bz2", "lz4"})
+        seed("bag", fmt::format("{}.bag", packing), bag_of_ros1(RosMessages(false).messages(), packing, ""));
+    for (const char* packing : {"", "lz4", "zstd"})
+        seed("bag", fmt::format("{}.mcap", packing), mcap(RosMessages(true).messages(), packing, ""));
+    for (const char* packing : {"plain", "zstd"})
+        (void)sqlite(RosMessages(true).messages(), packing, root / "bag" / fmt::format("{}.db3", packing));
 }
 
 void cameras() {
@@ -392,6 +426,9 @@ int main(int count, char** words) {
     images();
     clouds();
     las();
+    laz_and_copc();
+    e57_scans();
+    ros_recordings();
     cameras();
     texts();
     typed();

@@ -5,6 +5,7 @@
 #include "io/compression/lzfse.h"
 #include "io/images/image_file.h"
 #include "tests/support/files.h"
+#include "tests/support/raw.h"
 
 #include <cmath>
 #include <cstring>
@@ -17,17 +18,11 @@ namespace scanshade {
 namespace {
 
 namespace fs = std::filesystem;
+using tests::raw;
 using tests::refusal;
 using tests::says;
 using tests::warned;
 using tests::write_file;
-
-template <class Number>
-std::string raw(Number value) {
-    std::string bytes(sizeof value, '\0');
-    std::memcpy(bytes.data(), &value, sizeof value);
-    return bytes;
-}
 
 std::string u16(unsigned value) { return raw(static_cast<std::uint16_t>(value)); }
 std::string u32(std::size_t value) { return raw(static_cast<std::uint32_t>(value)); }

@@ -1,6 +1,7 @@
 // Pages of 1020 bytes of content and a checksum.
 #include "io/clouds/e57/e57.h"
 
+#include "io/checksum.h"
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
 
@@ -70,7 +71,7 @@ std::string without_pages(std::string_view file) {
     tbb::parallel_for(std::size_t(0), pages, [&](std::size_t page) {
         const auto [found, stored] = sums(page);
         std::size_t first = damaged;
-        while (found != stored && page < first && !damaged.compare_exchange_weak(first, page)) {
+        while (!sums_agree(found, stored) && page < first && !damaged.compare_exchange_weak(first, page)) {
         }
         file.substr(page * page_size).copy(contents.data() + page * page_content, page_content);
     });

@@ -3,6 +3,7 @@
 #include "io/captures/recordings/ros/bag.h"
 #include "io/captures/recordings/ros/mcap_records.h"
 #include "io/captures/recordings/ros/unpack.h"
+#include "io/checksum.h"
 #include "io/file_bytes.h"
 #include "io/text.h"
 #include "projection/base/error.h"
@@ -163,7 +164,7 @@ class Mcap final : public Bag {
         const auto records_of = [&](std::string_view records, std::uint32_t chunk, std::uint64_t base) {
             const auto found =
                 static_cast<std::uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(records.data()), records.size()));
-            if (checksum != 0 && found != checksum)
+            if (checksum != 0 && !sums_agree(found, checksum))
                 throw Error(fmt::format("{}: chunk at byte {}: checksum {:08x}, expected {:08x}", path.string(), at,
                                         found, checksum));
             take_records(records, chunk, base);
