@@ -101,7 +101,7 @@ Header header_of(std::string_view bytes, const Path& file) {
             header.maxval = checked_maxval(next_number(bytes, at, file, "maxval"), file);
         header.facts.bits = header.maxval > 255 ? 16 : 8;
     }
-    header.samples_at = at + 1; // exactly one white space follows
+    header.samples_at = std::min(at + 1, bytes.size()); // exactly one white space follows
     return header;
 }
 
@@ -112,7 +112,7 @@ std::string_view samples_of(std::string_view bytes, const Header& header, const 
                height = static_cast<std::uint64_t>(facts.size.height);
     const std::uint64_t row =
         header.one_bit() ? (width + 7) / 8 : width * static_cast<unsigned>(facts.channels * facts.bits / 8);
-    const std::string_view samples = bytes.substr(std::min(bytes.size(), header.samples_at));
+    const std::string_view samples = bytes.substr(header.samples_at);
     if (samples.size() != row * height)
         refuse(file, fmt::format("{}x{} at {} bits needs {} bytes of samples, found {}", width, height,
                                  header.one_bit() ? 1 : facts.bits, row * height, samples.size()));

@@ -20,6 +20,14 @@ inline void ask_for_all(const Cloud& cloud, const std::filesystem::path& file) {
     (void)describe(*cloud.records);
 }
 
+/// Whether the file begins as one of another format does.
+inline bool has_a_signature(const std::filesystem::path& file) {
+    std::string start(8, '\0');
+    std::ifstream(file, std::ios::binary).read(start.data(), 8);
+    return start.starts_with("LASF") || start.starts_with("ASTM-E57") || start.starts_with("ply") ||
+           start.starts_with("# .PCD") || start.starts_with("VERSION") || start.starts_with("glTF");
+}
+
 inline void take_cloud(std::string_view bytes, const std::string& name) {
     const std::filesystem::path file = as_file(bytes, name);
     std::vector<std::string> warnings;
@@ -31,11 +39,13 @@ inline void take_cloud(std::string_view bytes, const std::string& name) {
     const std::filesystem::path more = folder() / ("more-" + name);
     if (!accepted([&] { write_cloud(more, cloud, {{"ambient_occlusion", values}}, cloud.colours); }))
         return;
+    const std::string end = extension(*cloud.records);
+    const bool text = end == ".xyz" || end == ".pts" || end == ".ptx"; // whose columns may have no names
+    if (text && has_a_signature(more))                                 // which blanks, not written again, stood before
+        return;
     const Cloud again = read_cloud(more, warnings);
     must_hold(again.points.size() == cloud.points.size());
     must_hold(again.grid == cloud.grid);
-    const std::string end = extension(*cloud.records);
-    const bool text = end == ".xyz" || end == ".pts" || end == ".ptx"; // whose columns may have no names
     must_hold(text || recorded_field(again, "ambient_occlusion", more).size() == values.size());
 }
 

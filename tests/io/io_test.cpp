@@ -355,7 +355,7 @@ TEST(colour_images, netpbm_and_bmp_of_rare_kinds_are_read) {
     EXPECT_EQ(read("P7\nWIDTH 1\nHEIGHT 1\nDEPTH 4\nMAXVAL 255\nTUPLTYPE RGB_ALPHA\nENDHDR\n\1\2\3\4")(0, 0),
               cv::Vec3b(3, 2, 1));
     for (const char* broken :
-         {"P1 3 1\n10", "P4 9 1\n\xA0", "P2 2 1 100\n50\n", "P3 1 1 255\n1 2 256\n", "P7\nWIDTH 1\n"})
+         {"P1 3 1\n10", "P4 9 1\n\xA0", "P2 2 1 100\n50\n", "P3 1 1 255\n1 2 256\n", "P7\nWIDTH 1\n", "P2 1 1 255"})
         EXPECT_NE(refusal([&] { (void)read(broken); }), "") << broken;
 
     // 3x2 pixels of a palette of 2, in runs: the bottom row is 1 0 0, the top one ends after its first pixel.
