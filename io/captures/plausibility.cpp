@@ -67,8 +67,10 @@ Statistics statistics_of(const cv::Mat1w& stored, const DepthTable& table) {
     std::vector<std::size_t> counts(table.total());
     Statistics result = sampled(
         stored, [&](ushort value) { return metres[value]; }, [&](ushort value) { ++counts[value]; });
-    std::vector<int> order(table.total());
-    std::iota(order.begin(), order.end(), 0);
+    std::vector<int> order; // of the values that occur
+    for (int value = 0; value < static_cast<int>(counts.size()); ++value)
+        if (counts[static_cast<std::size_t>(value)] > 0)
+            order.push_back(value);
     std::ranges::sort(order, {}, [&](int value) { return metres[value]; });
     std::size_t below = 0;
     for (const int value : order)

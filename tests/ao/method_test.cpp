@@ -64,13 +64,12 @@ class Laws : public testing::TestWithParam<Case> {
         set(*row_named(rows, "radius"), std::to_string(radius_m));
         return setup->make(opened);
     }
-    /// Made once per size, since pipelines take long to compile.
+    /// Made once for images of all sizes, since pipelines take long to compile.
     AoMap ao(const DepthImage& depth, double radius_m = 0.5) {
         static gpu::Device& opened = device(); // opened before the methods, destroyed after them
         static std::map<std::string, std::unique_ptr<Method>> made;
-        const cv::Size size = depth.z_m.size();
-        auto& one = made[fmt::format("{} {} {} {} {}x{}", GetParam().method, GetParam().quality, GetParam().downsampled,
-                                     radius_m, size.width, size.height)];
+        auto& one =
+            made[fmt::format("{} {} {} {}", GetParam().method, GetParam().quality, GetParam().downsampled, radius_m)];
         if (!one)
             one = make(radius_m, opened);
         return one->compute({depth});
