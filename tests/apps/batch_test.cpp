@@ -127,12 +127,10 @@ TEST_F(BatchTest, methods_that_use_all_cores_do_not_wait_for_each_other) {
 }
 
 TEST_F(BatchTest, as_many_frames_are_computed_as_there_are_methods_however_few_cores) {
-    // Devices that take 50 ms a frame, whatever the host does meanwhile: much more than the host takes on a busy
-    // machine.
-    constexpr std::chrono::milliseconds device_time(50);
+    // Devices that take 50 ms a frame, whatever the host does meanwhile. The host's own part is measured beside it, by
+    // devices that take no time: on a machine with other work it may be the longer one.
     const Capture recorded = capture(4);
-    // The share of the devices' time that a run uses.
-    const auto share = [&](std::size_t devices, std::size_t frames) {
+    const auto run_ms = [&](std::size_t devices, std::size_t frames, std::chrono::milliseconds device_time) {
         std::deque<HalfOpen> methods;
         std::deque<FrameAo> doors;
         std::vector<FrameAo*> all;
@@ -147,22 +145,23 @@ TEST_F(BatchTest, as_many_frames_are_computed_as_there_are_methods_however_few_c
         BatchOptions options = all_frames(many, folder / "out");
         options.outputs.confidence = options.outputs.shaded = options.outputs.preview = false;
         const Stopwatch stopwatch;
-        const auto rows = scanshade::run_batch(many, pool, options);
-        const std::size_t turns = (frames + devices - 1) / devices;
-        const double used = static_cast<double>(turns * device_time.count()) / stopwatch.ms();
-        EXPECT_EQ(count(rows, FrameStatus::ok), frames);
-        return used;
+        EXPECT_EQ(count(scanshade::run_batch(many, pool, options), FrameStatus::ok), frames);
+        return stopwatch.ms();
     };
+    constexpr std::chrono::milliseconds device_time(50);
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
     constexpr double nearly_all = 0; // sanitizers slow the host, not the sleeping devices
 #else
-    constexpr double nearly_all = 0.75; // 0.9 to 0.98 on two idle cores
+    constexpr double nearly_all = 0.75; // 0.9 to 0.98 of the devices alone on two idle cores
 #endif
     for (const std::size_t devices : {1, 4, 16})
         for (const std::size_t frames : {std::size_t(40), 50 * devices}) {
-            double best = 0; // other work on the machine only slows: one of three runs must show what is possible
-            for (int run = 0; run < 3 && best <= nearly_all; ++run)
-                best = std::max(best, share(devices, frames));
+            const std::size_t turns = (frames + devices - 1) / devices;
+            double best = 0; // other work only slows: one of ten runs must show what is possible
+            for (int run = 0; run < 10 && best <= nearly_all; ++run) {
+                const double took = run_ms(devices, frames, device_time), host = run_ms(devices, frames, {});
+                best = std::max(best, (static_cast<double>(turns * device_time.count()) + host) / took);
+            }
             EXPECT_GT(best, nearly_all) << devices << " devices, " << frames << " frames";
         }
 }
