@@ -159,7 +159,9 @@ TEST_P(Ros, compressed_depth_is_png_or_rvl_and_inverse_depth_becomes_metres) {
          {std::pair(words_of({0, 15, 7}), "0 zeros and 63 values at pixel 0 of 6"), // none may go behind the image
           {words_of({15, 7, 0}), "63 zeros and 0 values at pixel 0 of 6"},
           {words_of({0, 0}), "0 zeros and 0 values at pixel 0 of 6"}}) {
-        all[0] = message(1, "16UC1; compressedDepth rvl", settings + size + groups);
+        std::string packed_depth = settings;
+        packed_depth.append(size).append(groups);
+        all[0] = message(1, "16UC1; compressedDepth rvl", packed_depth);
         const Capture wrong = open_capture(recording(all));
         EXPECT_TRUE(says(refusal([&] { (void)wrong.load(0); }), said));
     }

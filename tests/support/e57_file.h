@@ -44,8 +44,8 @@ inline std::string section(std::uint64_t at, const std::vector<std::string>& str
         }
         if (data.empty())
             break;
-        std::string packet =
-            std::string("\1\0\0\0", 4) + raw(static_cast<std::uint16_t>(streams.size())) + lengths + data;
+        std::string packet("\1\0\0\0", 4);
+        packet.append(raw(static_cast<std::uint16_t>(streams.size()))).append(lengths).append(data);
         packet.resize((packet.size() + 3) / 4 * 4);
         packet.replace(2, 2, raw(static_cast<std::uint16_t>(packet.size() - 1)));
         packets += packet;
