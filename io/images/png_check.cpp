@@ -20,8 +20,8 @@ int channels_of(int colour_type) {
     switch (colour_type) {
     case 0:
         return 1; // grey
-    case 2: // RGB
-    case 3: // palette, RGB once decoded
+    case 2:       // RGB
+    case 3:       // palette, RGB once decoded
         return 3;
     case 4:
         return 2; // grey and alpha
