@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <CLI/CLI.hpp>
-#include <cstdint>
 #include <fmt/format.h>
 #include <memory>
 #include <utility>
@@ -27,7 +26,7 @@ void add_flag(CLI::App& parser, const Parameter& row, Given& given) {
     if (row.name == settings_flag)
         parser.set_config(names)->each(take);
     else if (is_switch(row))
-        parser.add_flag_function(names, [take](std::int64_t count) { take(count > 0 ? "true" : "false"); });
+        parser.add_flag(names)->each(take);
     else
         parser.add_option_function<std::string>(names, take);
 }

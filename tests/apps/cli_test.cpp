@@ -650,7 +650,8 @@ TEST(CliHelpTest, mistyped_words_get_the_nearest_one_as_a_hint) {
           std::pair("insepct x", "insepct: no such command; did you mean inspect?"),
           std::pair("run x -o y --method surfle", "did you mean surfel?"),
           std::pair("run x -o y --preset bets", "did you mean best?"),
-          std::pair("run x -o y --write ao,shadde", "did you mean shaded?")}) {
+          std::pair("run x -o y --write ao,shadde", "did you mean shaded?"),
+          std::pair("inspect x --json=--g", "json: '--g' given, expected true | false")}) {
         const Ran ran = run_program(words);
         EXPECT_EQ(ran.exit_code, 1) << words;
         EXPECT_NE(ran.err.find(meant), std::string::npos) << ran.err;
