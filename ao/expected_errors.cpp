@@ -160,7 +160,10 @@ shared::ErrorTable errors_of(const ErrorTables& tables, const std::string& metho
             of_variant = variant.factor;
         }
     factor += of_variant;
-    shared::ErrorTable table = errors->table;
+    return scaled(errors->table, factor);
+}
+
+shared::ErrorTable scaled(shared::ErrorTable table, float factor) {
     for (int i = 0; i < shared::error_edges_at; ++i) // every pixel's sum holds one of these with weights of sum 1
         table.factors[i] += factor;
     return table;

@@ -50,6 +50,9 @@ struct ErrorTables {
 [[nodiscard]] shared::ErrorTable errors_of(const ErrorTables& tables, const std::string& method,
                                            const ChosenSettings& settings, SensorClass sensor, bool together);
 
+/// A table of squared errors 2^factor times as large.
+[[nodiscard]] shared::ErrorTable scaled(shared::ErrorTable table, float factor);
+
 /// How many times what is expected a frame errs by at most, with a chance of nine in ten. The largest of the class, or
 /// of all, where this method has none.
 [[nodiscard]] double spread_of(const ErrorTables& tables, const std::string& method, SensorClass sensor);

@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <span>
@@ -48,14 +49,17 @@ class ExpectedErrorsPart final : public BenchPart {
               &held_out_},
              {"expected-errors.every", "of the pixels, one in so many", &every_, "", 1, 100000},
              {"expected-errors.variants", "whether other settings than the defaults are fitted, too", &with_variants_},
-             {"expected-errors.frames", "of each capture", &frames_, "", 1, 1000}}};
+             {"expected-errors.together",
+              "judges frames computed together (run --sequence on), and fits the factor that the shipped tables get",
+              &together_},
+             {"expected-errors.frames", "of each capture; together: those in its middle", &frames_, "", 1, 1000}}};
     }
     [[nodiscard]] bool asked() const override { return !captures_.empty(); }
 
     int run(const std::string& choice) override {
         gpu::Device device(choice);
         TrialRequest request;
-        request.frames = frames_;
+        request.frames = together_ ? 1000 : frames_;
         std::vector<std::string> paths = comma_separated(captures_);
         first_held_out_ = paths.size();
         std::ranges::move(comma_separated(held_out_), std::back_inserter(paths));
@@ -76,8 +80,12 @@ class ExpectedErrorsPart final : public BenchPart {
         for (const TrialCapture& capture : std::span(trials_).first(first_held_out_))
             names += (names.empty() ? "" : ",") + capture.name;
         tables.made_by = fmt::format("scanshade bench --expected-errors {} --expected-errors.fit FILE", names);
+        if (together_)
+            tables = shipped_error_tables();
         for (const MethodRow& row : scanshade::methods())
-            if (wanted(std::string(row.name)))
+            if (wanted(std::string(row.name)) && together_)
+                measure_together(device, std::string(row.name), tables);
+            else if (wanted(std::string(row.name)))
                 measure(device, std::string(row.name), tables);
         if (!fit_.empty())
             write_atomically(fit_, text_of(tables));
@@ -104,11 +112,12 @@ class ExpectedErrorsPart final : public BenchPart {
                 errors.table = fitted_errors(own);
             const bool fitted = !fit_.empty() || !held_out_.empty();
             if (held_out_.empty()) {
-                const double spread = tell(method, sensor, own, fitted ? errors.table : shipped);
+                const double spread = tell(method, sensor, own, fitted ? errors.table : shipped,
+                                           [&of_all = own](int scene) { return fitted_errors(of_all, scene); });
                 if (each_left_out_ && scenes_.size() > 1)
                     errors.spread = static_cast<float>(spread);
             } else if (const auto judged = held_out.find(sensor); judged != held_out.end())
-                tell(method, sensor, judged->second, errors.table);
+                tell(method, sensor, judged->second, errors.table, {});
             if (!fit_.empty())
                 tables.methods[{method, sensor}] = errors;
         }
@@ -120,6 +129,27 @@ class ExpectedErrorsPart final : public BenchPart {
             for (const auto& [sensor, own] : samples_of(device, configuration, 1, false))
                 if (const auto known = tables.methods.find({method, sensor}); known != tables.methods.end())
                     known->second.variants.push_back({configuration.settings, factor_of(own, known->second.table)});
+        }
+    }
+
+    /// What computing frames together makes of their squared error, by the same frames computed alone: how hard the
+    /// captures are cancels out.
+    void measure_together(gpu::Device& device, const std::string& method, ErrorTables& tables) {
+        const Configuration usual{method, "as it comes", {}};
+        const Samples together = samples_of(device, usual, frames_, false, true);
+        Samples alone = samples_of(device, usual, frames_, false, false);
+        for (const auto& [sensor, own] : together) {
+            const ChosenSettings settings = defaults_of(method);
+            const shared::ErrorTable table = errors_of(shipped_error_tables(), method, settings, sensor, false);
+            const auto factor = [&table, &with_others = own, &by_itself = alone[sensor]](int without) {
+                return factor_of(with_others, table, without) - factor_of(by_itself, table, without);
+            };
+            tell(method, sensor, own,
+                 fit_.empty() ? errors_of(shipped_error_tables(), method, settings, sensor, true)
+                              : scaled(table, factor(-1)),
+                 [&](int scene) { return scaled(table, factor(scene)); });
+            if (const auto known = tables.methods.find({method, sensor}); known != tables.methods.end())
+                known->second.together = factor(-1);
         }
     }
 
@@ -138,7 +168,8 @@ class ExpectedErrorsPart final : public BenchPart {
     }
 
     /// Pixels of all captures. Frames that are not of the first `frames` of a capture are left out.
-    Samples samples_of(gpu::Device& device, const Configuration& configuration, int frames, bool held_out) {
+    Samples samples_of(gpu::Device& device, const Configuration& configuration, int frames, bool held_out,
+                       bool together = false) {
         Samples all;
         std::optional<Trial> trial;
         double radius_m = 0;
@@ -150,9 +181,14 @@ class ExpectedErrorsPart final : public BenchPart {
             trial->set_noise(capture.noise);
             std::vector<ErrorSample>& samples = all[class_of(capture.noise)];
             const int scene = scenes_.at(scene_of(capture.name));
-            for (std::size_t i = 0; i < std::min(capture.frames.size(), static_cast<std::size_t>(frames)); ++i)
-                add(samples, capture.frames[i], trial->compute(capture.frames[i]), capture, scene,
-                    static_cast<int>(c) * 1000 + static_cast<int>(i));
+            const std::size_t count = std::min(capture.frames.size(), static_cast<std::size_t>(frames));
+            const std::size_t first = together_ ? (capture.frames.size() - count) / 2 : 0;
+            std::vector<cv::Mat1f> maps;
+            if (together)
+                maps = trial->compute_together(capture.frames, first, count);
+            for (std::size_t i = first; i < first + count; ++i)
+                add(samples, capture.frames[i], together ? maps[i - first] : trial->compute(capture.frames[i]), capture,
+                    scene, static_cast<int>(c) * 1000 + static_cast<int>(i));
         }
         return all;
     }
@@ -176,9 +212,10 @@ class ExpectedErrorsPart final : public BenchPart {
             samples.insert(samples.end(), row.begin(), row.end());
     }
 
-    /// Prints a row. Returns how many times what is expected nine of ten frames err by at most.
+    /// Prints a row; `of_others` makes a table without a scene. Returns how many times what is expected nine of ten
+    /// frames err by at most.
     double tell(const std::string& method, SensorClass sensor, std::span<const ErrorSample> samples,
-                const shared::ErrorTable& table) {
+                const shared::ErrorTable& table, const std::function<shared::ErrorTable(int)>& of_others) {
         Calibration all;
         std::map<int, std::pair<double, double>> frames; // expected and found squares
         const auto judge = [&](int scene, const shared::ErrorTable& by) {
@@ -190,13 +227,12 @@ class ExpectedErrorsPart final : public BenchPart {
                     frames[sample.frame].second += static_cast<double>(sample.square);
                 }
         };
-        if (each_left_out_) {
-            std::vector<shared::ErrorTable> of_others(scenes_.size());
-            tbb::parallel_for(0, static_cast<int>(scenes_.size()), [&](int scene) {
-                of_others[static_cast<std::size_t>(scene)] = fitted_errors(samples, scene);
-            });
+        if (each_left_out_ && of_others) {
+            std::vector<shared::ErrorTable> by(scenes_.size());
+            tbb::parallel_for(0, static_cast<int>(scenes_.size()),
+                              [&](int scene) { by[static_cast<std::size_t>(scene)] = of_others(scene); });
             for (int scene = 0; scene < static_cast<int>(scenes_.size()); ++scene)
-                judge(scene, of_others[static_cast<std::size_t>(scene)]);
+                judge(scene, by[static_cast<std::size_t>(scene)]);
         } else
             judge(-1, table);
         std::vector<double> times;
@@ -215,7 +251,7 @@ class ExpectedErrorsPart final : public BenchPart {
 
     std::string captures_, methods_, fit_, held_out_;
     std::size_t first_held_out_ = 0;
-    bool each_left_out_ = false, with_variants_ = true;
+    bool each_left_out_ = false, with_variants_ = true, together_ = false;
     int every_ = 29, frames_ = 8;
     std::vector<TrialCapture> trials_;
     std::map<std::string, int> scenes_;

@@ -61,9 +61,11 @@ shared::ErrorTable fitted_errors(std::span<const ErrorSample> samples, int witho
     return table;
 }
 
-float factor_of(std::span<const ErrorSample> samples, const shared::ErrorTable& table) {
+float factor_of(std::span<const ErrorSample> samples, const shared::ErrorTable& table, int without) {
     double found = 0, expects = 0;
     for (const ErrorSample& sample : samples) {
+        if (sample.scene == without)
+            continue;
         found += static_cast<double>(sample.square);
         expects += squared(sample.signs, table);
     }

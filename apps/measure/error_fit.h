@@ -24,8 +24,9 @@ struct ErrorSample {
 /// the scene `without` are left out. Nothing but zeros where there are none.
 [[nodiscard]] shared::ErrorTable fitted_errors(std::span<const ErrorSample> samples, int without = -1);
 
-/// The binary logarithm of true squares / expected ones; 0 where there are no samples.
-[[nodiscard]] float factor_of(std::span<const ErrorSample> samples, const shared::ErrorTable& table);
+/// The binary logarithm of true squares / expected ones; 0 where there are no samples. Those of the scene `without` are
+/// left out.
+[[nodiscard]] float factor_of(std::span<const ErrorSample> samples, const shared::ErrorTable& table, int without = -1);
 
 /// Expected against found errors, in eight bins of equally many pixels by the expected one.
 class Calibration {

@@ -151,6 +151,22 @@ cv::Mat1f Trial::compute(const TrialFrame& frame) {
     return attach(frame.frame, frame.depth, ao).visibility;
 }
 
+std::vector<cv::Mat1f> Trial::compute_together(const std::vector<TrialFrame>& frames, std::size_t first,
+                                               std::size_t count) {
+    std::vector<std::optional<Eigen::Isometry3d>> poses;
+    for (const TrialFrame& each : frames)
+        poses.push_back(each.frame.world_from_camera);
+    SequenceAoOptions options;
+    options.reach = reach_for(poses, radius_m_);
+    SequenceAo sequence = method_.sequence(radius_m_, noise_, options);
+    for (std::size_t i = 0; i < frames.size(); ++i)
+        sequence.add(i, frames[i].depth, poses[i]);
+    std::vector<cv::Mat1f> maps;
+    for (std::size_t i = first; i < first + count; ++i)
+        maps.push_back(attach(frames[i].frame, frames[i].depth, sequence.compute(i).ao).visibility);
+    return maps;
+}
+
 double Trial::expected_rms(const TrialFrame& frame, const cv::Mat1f& visibility) const {
     const shared::ErrorTable table = method_.errors(noise_);
     const cv::Mat1f errors = visibility.size() == frame.depth.z_m.size()

@@ -64,6 +64,10 @@ class Trial {
     void set_noise(const DepthNoise& noise) { noise_ = noise; }
     /// Visibility on the recorded pixels.
     [[nodiscard]] cv::Mat1f compute(const TrialFrame& frame);
+    /// The same of `count` frames from `first` on, each computed together with those around it as `run --sequence on`
+    /// does.
+    [[nodiscard]] std::vector<cv::Mat1f> compute_together(const std::vector<TrialFrame>& frames, std::size_t first,
+                                                          std::size_t count);
 
     [[nodiscard]] const Configuration& configuration() const { return configuration_; }
     /// Expected RMS error of a frame's visibility, as compute() gave it.

@@ -98,8 +98,8 @@ std::vector<std::string> outlook(const RunSettings& settings, MethodSetup& setup
                     used->configuration.full_name(), name_of(sensor));
     const std::optional<Range> here = expected_of(rows);
     std::vector<std::string> sentences{
-        here ? fmt::format("expected error{}: RMSE {} to truth, by what errors such pixels had, {}", alone,
-                           text_of(*here), measured)
+        here ? fmt::format("expected error: RMSE {} to truth, by what errors such pixels had, {}", text_of(*here),
+                           measured)
              : fmt::format("expected error{}: RMSE {:.3f} to truth, {}", alone, used->rms, measured)};
     if (gain != front.sequences.end() && together)
         sentences.push_back(gain_text(gain->second));

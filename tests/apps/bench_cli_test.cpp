@@ -510,6 +510,14 @@ TEST_F(MeasureTest, bench_parts_print_what_they_measure) {
     EXPECT_TRUE(says(printed("--hard-cases --hard-cases.only units --hard-cases.methods gtao"), "every gate kept"));
     EXPECT_TRUE(says(printed("--cacao --cacao.sizes 64x48,48x64 --cacao.repeat 1 --cacao.passes"), "48x64"));
     EXPECT_TRUE(says(printed("--clouds --clouds.points 3000 --clouds.rays 2,4"), "4 rays a point"));
+    const fs::path tables = folder / "errors.txt";
+    EXPECT_TRUE(says(printed(fmt::format("--expected-errors {} --expected-errors.together --expected-errors.methods "
+                                         "surfel --expected-errors.frames 1 --expected-errors.fit {}",
+                                         capture(), tables.string())),
+                     "| surfel | "));
+    const std::string fitted = read_bytes(tables);
+    EXPECT_TRUE(says(fitted, "\ntogether surfel ")) << fitted;
+    EXPECT_TRUE(says(fitted, "\nspread gtao ")) << "the others' lines stay";
     const fs::path maps = folder / "maps";
     (void)printed(fmt::format("--write-maps {}", maps.string()));
     EXPECT_TRUE(says(printed(fmt::format("--compare-maps {}", maps.string())), "highest_downsampled"));

@@ -83,6 +83,17 @@ TEST(ErrorFit, leaves_a_scene_out) {
     EXPECT_EQ(expected_error(samples[0].signs, fitted_errors({})), 1) << "nothing is known";
 }
 
+TEST(ErrorFit, one_factor_scales_a_table_to_samples_of_other_scenes) {
+    std::vector<ErrorSample> samples = samples_of(some_table(), 3000);
+    const float as_made = factor_of(samples, some_table(), 1);
+    EXPECT_NEAR(factor_of(samples, scaled(some_table(), 1), 1), as_made - 1, 1e-3F)
+        << "expected squares twice as large";
+    for (ErrorSample& sample : samples)
+        sample.square *= sample.scene == 1 ? 100 : 4;
+    EXPECT_NEAR(factor_of(samples, some_table(), 1), as_made + 2, 1e-3F) << "scene 1 is left out";
+    EXPECT_EQ(factor_of({}, some_table()), 0);
+}
+
 TEST(ErrorTablesTest, are_read_as_written) {
     ErrorTables tables{.made_by = "a command", .methods = {}};
     MethodErrors& errors = tables.methods[{"surfel", SensorClass::structured_light}];
