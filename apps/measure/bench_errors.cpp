@@ -14,6 +14,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <functional>
+#include <limits>
 #include <map>
 #include <mutex>
 #include <span>
@@ -57,9 +58,13 @@ class ExpectedErrorsPart final : public BenchPart {
     [[nodiscard]] bool asked() const override { return !captures_.empty(); }
 
     int run(const std::string& choice) override {
+        if (together_ && !held_out_.empty())
+            throw Misuse(
+                "--expected-errors.together judges no captures held out; --expected-errors.each-scene-left-out "
+                "judges each scene by the others");
         gpu::Device device(choice);
         TrialRequest request;
-        request.frames = together_ ? 1000 : frames_;
+        request.frames = together_ ? std::numeric_limits<int>::max() : frames_; // neighbours are needed, too
         std::vector<std::string> paths = comma_separated(captures_);
         first_held_out_ = paths.size();
         std::ranges::move(comma_separated(held_out_), std::back_inserter(paths));
@@ -83,10 +88,12 @@ class ExpectedErrorsPart final : public BenchPart {
         if (together_)
             tables = shipped_error_tables();
         for (const MethodRow& row : scanshade::methods())
-            if (wanted(std::string(row.name)) && together_)
-                measure_together(device, std::string(row.name), tables);
-            else if (wanted(std::string(row.name)))
-                measure(device, std::string(row.name), tables);
+            if (const std::string name(row.name); wanted(name)) {
+                if (together_)
+                    measure_together(device, name, tables);
+                else
+                    measure(device, name, tables);
+            }
         if (!fit_.empty())
             write_atomically(fit_, text_of(tables));
         return all_well;
@@ -167,7 +174,8 @@ class ExpectedErrorsPart final : public BenchPart {
                                    [&](const auto& each) { return std::ranges::find(usual, each) != usual.end(); });
     }
 
-    /// Pixels of all captures. Frames that are not of the first `frames` of a capture are left out.
+    /// Pixels of `frames` frames of each capture: the first, or with --expected-errors.together those in the middle.
+    /// `together`: of these as computed together, not each by itself.
     Samples samples_of(gpu::Device& device, const Configuration& configuration, int frames, bool held_out,
                        bool together = false) {
         Samples all;
