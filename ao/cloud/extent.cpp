@@ -2,6 +2,7 @@
 #include "ao/cloud/extent.h"
 
 #include "ao/cloud/surface/leaf_neighbours.h"
+#include "ao/cloud/surface/order_statistics.h"
 #include "projection/base/indices_where.h"
 #include "projection/base/statistics.h"
 
@@ -101,9 +102,9 @@ std::vector<std::uint32_t> drop_strays(CloudSurface& surface, const Vector3d& ce
         std::array<float, sixth + 1> of_near;
         for (std::size_t k = 0; k < of_near.size(); ++k)
             of_near[k] = reach[surface.near[i][k]];
-        std::nth_element(of_near.begin(), of_near.begin() + 1, of_near.end());
+        of_near = ascending(of_near);
         const float second = (surface.tree[surface.near[i][1]] - surface.tree[i]).norm();
-        if (reach[i] > detached_from * of_near[1] || second > apart_from * median(of_near))
+        if (reach[i] > detached_from * of_near[1] || second > apart_from * of_near[of_near.size() / 2])
             kind[i] = detached;
     });
     tbb::parallel_for(std::size_t(0), surface.size(), [&](std::size_t i) {

@@ -5,7 +5,6 @@
 #include "ao/cloud/surface/leaf_neighbours.h"
 #include "ao/cloud/surface/moments.h"
 #include "ao/cloud/surface/order_statistics.h"
-#include "projection/base/statistics.h"
 
 #include <algorithm>
 #include <atomic>
@@ -69,7 +68,7 @@ void limit_discs(CloudSurface& surface) {
         std::array<float, CloudSurface::kept> round;
         std::transform(surface.near[i].begin(), surface.near[i].end(), round.begin(),
                        [&](std::uint32_t other) { return surface.disc_radius[other]; });
-        const float usual_radius = median(round);
+        const float usual_radius = ascending(round)[round.size() / 2];
         limited[i] = usual_radius > 0 ? std::clamp(surface.disc_radius[i], usual_radius / 2, 2 * usual_radius)
                                       : surface.disc_radius[i];
     });
@@ -142,6 +141,9 @@ CloudSurface cloud_surface(LocalCloud&& points, std::span<const Vector3d> normal
     Untouched<float> sixth(count);
     std::atomic<bool> all_given = true;
     const auto settle = [&](std::size_t i, std::size_t found, Plane plane) {
+        constexpr std::size_t soon = 16; // the file's order is another: each of its normals is a cache miss
+        if (!normals.empty() && i + soon < count)
+            __builtin_prefetch(&normals[surface.tree.original(i + soon)]);
         if (on_a_line(plane) && found == usual) {
             Nearest far;
             surface.tree.find_round(i, wider, far);

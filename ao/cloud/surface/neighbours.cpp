@@ -2,7 +2,9 @@
 #include "ao/cloud/surface/neighbours.h"
 
 #include <algorithm>
+#include <bit>
 #include <Eigen/Geometry>
+#include <memory>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 #include <tbb/parallel_reduce.h>
@@ -40,45 +42,86 @@ void Nearest::offer(float distance2, std::uint32_t point) {
         reach2_ = found_[count_ - 1].distance2;
 }
 
-struct NeighbourTree::Placed {
-    Vector3f point;
+/// A point, and its index in the cloud given.
+struct alignas(16) NeighbourTree::Placed {
+    std::array<float, 3> at; // not a Vector3f, whose copies are not those of plain bytes
     std::uint32_t index;
+
+    [[nodiscard]] Vector3f point() const { return {at[0], at[1], at[2]}; }
 };
 
 /// Points in the order along an axis; those side by side in the order given.
 struct NeighbourTree::Halving {
-    int axis;
+    std::size_t axis;
 
-    bool operator()(const Placed& a, const Placed& b) const {
-        return a.point[axis] != b.point[axis] ? a.point[axis] < b.point[axis] : a.index < b.index;
+    /// Ascending in that order, and different for any two points. The bits of floats of one sign are in the order of
+    /// their values.
+    [[nodiscard]] std::uint64_t key(const Placed& point) const {
+        const auto bits = std::bit_cast<std::uint32_t>(point.at[axis] + 0.0F); // no -0
+        const std::uint32_t ordered = bits ^ ((bits >> 31) != 0 ? 0xffffffffU : 0x80000000U);
+        return std::uint64_t(ordered) << 32 | point.index;
     }
-    /// So that none before the middle comes after it.
-    void in_place(std::span<Placed> points) const {
-        std::nth_element(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(points.size() / 2), points.end(),
-                         *this);
+    /// Keys of points evenly chosen, ascending.
+    template <std::size_t count>
+    [[nodiscard]] std::array<std::uint64_t, count> sample(std::span<const Placed> points) const {
+        std::array<std::uint64_t, count> keys;
+        for (std::size_t i = 0; i < count; ++i)
+            keys[i] = key(points[(2 * i + 1) * points.size() / (2 * count)]);
+        std::sort(keys.begin(), keys.end());
+        return keys;
     }
-    /// The same into another place, on all cores: a sample tells between which two points the middle lies, and only
-    /// what is between them needs to be looked at again.
+    /// About that of the point that is at `place` of all. Not the greatest: some must stay behind it.
+    template <std::size_t sampled>
+    [[nodiscard]] std::uint64_t quantile(std::span<const Placed> points, std::size_t place) const {
+        return sample<sampled>(points)[std::min(place * sampled / points.size(), sampled - 2)];
+    }
+    /// Moves the points whose keys are at most `last` to the front, and returns their number. Which points these are is
+    /// a coin flip for the processor, so nothing branches on it.
+    std::size_t move_to_front(std::span<Placed> points, std::uint64_t last) const {
+        std::size_t front = 0;
+        for (Placed& each : points) {
+            const Placed point = each;
+            each = points[front];
+            points[front] = point;
+            front += key(point) <= last ? 1 : 0;
+        }
+        return front;
+    }
+    /// So that none before `middle` comes after it. Selection with a sample's quantile as the pivot (Floyd and Rivest
+    /// 1975, Algorithm 489).
+    void in_place(std::span<Placed> points, std::size_t middle) const {
+        constexpr std::size_t few = 16, many = 512;
+        constexpr int enough_turns = 24; // in an order made to mislead the samples
+        for (int turn = 0; turn < enough_turns && points.size() > few; ++turn) {
+            const std::uint64_t pivot =
+                points.size() > many ? quantile<32>(points, middle) : quantile<5>(points, middle);
+            const std::size_t front = move_to_front(points, pivot);
+            points = middle < front ? points.first(front) : points.subspan(front);
+            middle -= middle < front ? 0 : front;
+        }
+        std::nth_element(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(middle), points.end(),
+                         [this](const Placed& a, const Placed& b) { return key(a) < key(b); });
+    }
+    /// The same into another place, for the middle of all, on all cores: a sample tells between which two points the
+    /// middle lies, and only what is between them needs to be looked at again.
     void copy(std::span<const Placed> from, std::span<Placed> to) const {
         constexpr std::size_t sampled = 4096, off = 96, at_once = 1 << 15; // off: three sigma of the middle's place
-        std::vector<Placed> sample(sampled);
-        for (std::size_t i = 0; i < sampled; ++i)
-            sample[i] = from[(2 * i + 1) * from.size() / (2 * sampled)];
-        std::sort(sample.begin(), sample.end(), *this);
-        const Placed low = sample[sampled / 2 - off], high = sample[sampled / 2 + off];
-        enum Part : std::size_t { below, between, above, parts };
-        const auto part_of = [&](const Placed& point) {
-            return (*this)(point, low) ? below : (*this)(high, point) ? above : between;
-        };
+        const auto keys = std::make_unique<std::array<std::uint64_t, sampled>>(sample<sampled>(from));
+        const std::uint64_t low = (*keys)[sampled / 2 - off], high = (*keys)[sampled / 2 + off];
+        constexpr std::size_t between = 1, parts = 3; // below, between, above
         const std::size_t blocks = (from.size() + at_once - 1) / at_once;
         std::vector<std::array<std::size_t, parts>> next(blocks, {0, 0, 0});
         const auto for_each = [&](std::size_t block, auto&& visit) {
-            for (const Placed& point : from.subspan(block * at_once, std::min(at_once, from.size() - block * at_once)))
-                visit(point, next[block][part_of(point)]);
+            auto places = next[block];
+            for (const Placed& point :
+                 from.subspan(block * at_once, std::min(at_once, from.size() - block * at_once))) {
+                const std::uint64_t own = key(point);
+                visit(point, places[std::size_t(own >= low) + std::size_t(own > high)]++);
+            }
+            return places;
         };
-        tbb::parallel_for(std::size_t(0), blocks, [&](std::size_t block) {
-            for_each(block, [](const Placed&, std::size_t& count) { ++count; });
-        });
+        tbb::parallel_for(std::size_t(0), blocks,
+                          [&](std::size_t block) { next[block] = for_each(block, [](const Placed&, std::size_t) {}); });
         std::array<std::size_t, parts + 1> starts{};
         for (std::size_t part = 0, before = 0; part < parts; ++part) {
             for (auto& block : next)
@@ -86,26 +129,27 @@ struct NeighbourTree::Halving {
             starts[part + 1] = before;
         }
         tbb::parallel_for(std::size_t(0), blocks, [&](std::size_t block) {
-            for_each(block, [&](const Placed& point, std::size_t& place) { to[place++] = point; });
+            (void)for_each(block, [&](const Placed& point, std::size_t place) { to[place] = point; });
         });
         const std::size_t middle = from.size() / 2;
-        const bool bracketed = starts[between] <= middle && middle < starts[above];
-        const std::size_t first = bracketed ? starts[between] : 0, end = bracketed ? starts[above] : to.size();
-        std::nth_element(to.begin() + static_cast<std::ptrdiff_t>(first),
-                         to.begin() + static_cast<std::ptrdiff_t>(middle),
-                         to.begin() + static_cast<std::ptrdiff_t>(end), *this);
+        const bool bracketed = starts[between] <= middle && middle < starts[between + 1];
+        const std::size_t first = bracketed ? starts[between] : 0, end = bracketed ? starts[between + 1] : to.size();
+        in_place(to.subspan(first, end - first), middle - first);
     }
 };
 
 NeighbourTree::NeighbourTree(std::span<const Vector3f> points) {
+    // Levels whose nodes are halved by all cores. Their number may not depend on that of the cores: neither does the
+    // order of the points then.
     constexpr std::size_t worth_all_cores = 1 << 16;
-    int wide = 0; // levels whose nodes are halved by all cores
-    while ((points.size() >> wide) >= worth_all_cores)
+    constexpr int most_wide = 6;
+    int wide = 0;
+    while (wide < most_wide && (points.size() >> wide) >= worth_all_cores)
         ++wide;
     Untouched<Placed> placed(points.size()), spare(wide > 0 ? points.size() : 0);
     Untouched<Placed>& first = wide % 2 == 0 ? placed : spare; // every wide level moves the points to the other
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
-        first[i] = {points[i], static_cast<std::uint32_t>(i)};
+        first[i] = {{points[i].x(), points[i].y(), points[i].z()}, static_cast<std::uint32_t>(i)};
     });
     while ((points.size() >> levels_) >= leaf)
         ++levels_;
@@ -115,54 +159,54 @@ NeighbourTree::NeighbourTree(std::span<const Vector3f> points) {
     points_.resize(points.size());
     original_.resize(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
-        points_[i] = placed[i].point;
+        points_[i] = placed[i].point();
         original_[i] = placed[i].index;
     });
 }
 
-/// The axis along which most points are far apart. In large nodes between the eighth and the seventh eighth of a
-/// sample, since strays widen a box along all axes. A wall halved along its noise would make two layers.
-int NeighbourTree::split_axis(std::span<const Placed> points, const Vector3f& box) {
+/// The axis along which most points are far apart; in large nodes between the eighth and the seventh eighth of a
+/// sample, since strays widen a box along all axes. A wall halved along its noise would make two layers. `box_of_all`
+/// is called where the box must be known.
+template <class BoxOfAll>
+std::size_t NeighbourTree::split_axis(std::span<const Placed> points, const BoxOfAll& box_of_all) {
     constexpr std::size_t sampled = 32, large = 8 * sampled;
-    Vector3f width = box;
-    for (int axis = 0; axis < 3 && points.size() > large; ++axis) {
+    Vector3f width = Vector3f::Zero();
+    for (std::size_t axis = 0; axis < 3 && points.size() > large; ++axis) {
         std::array<float, sampled> along;
         for (std::size_t i = 0; i < sampled; ++i)
-            along[i] = points[(2 * i + 1) * points.size() / (2 * sampled)].point[axis];
+            along[i] = points[(2 * i + 1) * points.size() / (2 * sampled)].at[axis];
         std::sort(along.begin(), along.end());
-        width[axis] = along[sampled - sampled / 8] - along[sampled / 8];
+        width[static_cast<Eigen::Index>(axis)] = along[sampled - sampled / 8] - along[sampled / 8];
     }
-    if (!(width.maxCoeff() > 0))
-        width = box;
-    int axis = 0;
+    if (!(width.maxCoeff() > 0)) {
+        const Box box = box_of_all();
+        width = box.high - box.low;
+    }
+    Eigen::Index axis = 0;
     width.maxCoeff(&axis);
-    return axis;
+    return static_cast<std::size_t>(axis);
 }
 
 NeighbourTree::Box NeighbourTree::box_of(std::span<const Placed> points) {
     const auto infinite = Vector3f::Constant(std::numeric_limits<float>::infinity());
-    const auto join = [](const Box& a, const Box& b) { return Box{a.low.cwiseMin(b.low), a.high.cwiseMax(b.high)}; };
-    const auto round = [&](const auto& range, Box box) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i)
-            box = join(box, {points[i].point, points[i].point});
-        return box;
-    };
-    constexpr std::size_t worth_tasks = 1 << 18;
-    const tbb::blocked_range<std::size_t> all(0, points.size(), worth_tasks / 8);
-    const Box nothing{infinite, -infinite};
-    return points.size() < worth_tasks ? round(all, nothing) : tbb::parallel_reduce(all, nothing, round, join);
+    Box box{infinite, -infinite};
+    for (const Placed& point : points)
+        box = box.joined({point.point(), point.point()});
+    return box;
 }
 
 void NeighbourTree::build(std::span<Placed> points, std::span<Placed> spare, const Subtree& at) {
-    const Box& box = boxes_[at.root] = box_of(points);
-    if (at.levels == 0)
+    Box& box = boxes_[at.root];
+    if (at.levels == 0) {
+        box = box_of(points);
         return;
-    const Halving halving{split_axis(points, box.high - box.low)};
+    }
+    const Halving halving{split_axis(points, [&] { return box_of(points); })};
     if (at.wide > 0) {
         halving.copy(points, spare);
         std::swap(points, spare);
     } else {
-        halving.in_place(points);
+        halving.in_place(points, points.size() / 2);
     }
     const std::size_t half = points.size() / 2;
     const auto half_of = [&](std::span<Placed> all, std::size_t side) {
@@ -179,6 +223,7 @@ void NeighbourTree::build(std::span<Placed> points, std::span<Placed> spare, con
         build_half(0);
         build_half(1);
     }
+    box = boxes_[2 * at.root + 1].joined(boxes_[2 * at.root + 2]);
 }
 
 std::pair<std::size_t, std::size_t> NeighbourTree::leaf_range(std::size_t number) const {

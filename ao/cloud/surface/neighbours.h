@@ -86,6 +86,9 @@ class NeighbourTree {
         [[nodiscard]] float distance2(const Eigen::Vector3f& point) const {
             return (low - point).cwiseMax(point - high).cwiseMax(0).squaredNorm();
         }
+        [[nodiscard]] Box joined(const Box& other) const {
+            return {low.cwiseMin(other.low), high.cwiseMax(other.high)};
+        }
     };
     struct Node {
         std::size_t number, begin, end;
@@ -99,7 +102,8 @@ class NeighbourTree {
 
     struct Placed;
     void find(const Eigen::Vector3f& at, std::size_t but, std::size_t wanted, Nearest& found, float reach2) const;
-    static int split_axis(std::span<const Placed> points, const Eigen::Vector3f& box);
+    template <class BoxOfAll>
+    static std::size_t split_axis(std::span<const Placed> points, const BoxOfAll& box_of_all);
     struct Halving;
     struct Subtree {
         std::size_t root;
