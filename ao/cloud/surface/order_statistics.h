@@ -14,8 +14,8 @@
 
 namespace scanshade {
 
-/// Ascending. Of millions of small arrays, since nothing branches on values: odd-even transposition (Knuth 1998, The Art
-/// of Computer Programming 3, 5.3.4).
+/// Ascending. Of millions of small arrays, since nothing branches on values: odd-even transposition (Knuth 1998, The
+/// Art of Computer Programming 3, 5.3.4).
 template <std::size_t count>
 [[nodiscard]] std::array<float, count> ascending(std::array<float, count> values) {
     for (std::size_t round = 0; round < count; ++round)
