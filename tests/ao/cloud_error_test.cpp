@@ -218,10 +218,18 @@ TEST(CloudErrors, scenes_left_out_err_by_what_is_expected) {
                 all.add(expected_error(sample.signs, tables), sample.square);
     }
     const auto bins = all.in_bins();
+    const double of_a_bin = static_cast<double>(samples.size()) / static_cast<double>(bins.size());
+    int judged = 0;
     for (std::size_t bin = 1; bin < bins.size(); ++bin) {
-        EXPECT_NEAR(bins[bin].found / bins[bin].expected, 1, 0.3) << bin;
+        // A turned point errs by up to 1. Where a bin's error is that of a few of them, it is luck.
+        const double turned_points = bins[bin].expected * bins[bin].expected * of_a_bin;
+        if (constexpr double few = 10; turned_points > few) {
+            EXPECT_NEAR(bins[bin].found / bins[bin].expected, 1, 0.3) << bin;
+            ++judged;
+        }
         EXPECT_GT(bins[bin].found, bins[bin - 1].found) << "errors are in order";
     }
+    EXPECT_GE(judged, 6);
     EXPECT_NEAR(all.whole().found / all.whole().expected, 1, 0.15);
 }
 

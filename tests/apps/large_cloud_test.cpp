@@ -376,8 +376,9 @@ struct Seams {
     std::size_t beside = 0;
     double told_error = 0; ///< of the run in tiles
 
-    /// Three standard errors: one in 700 tests without a seam fails, once and for all as everything is a hash of
-    /// numbers.
+    /// Three standard errors, and half a step of 8 bits, which nobody sees. Standard errors are of blocks, so they do
+    /// not cover what all blocks share, the directions of a seed: with five seeds the noisy corner's squares were
+    /// -1.9e-6 .. 4.2e-6 more beside borders than elsewhere, where one standard error is 0.7e-6 .. 3e-6.
     void check(const char* what) const {
         fmt::print(
             "seams, {}: {} points beside borders; RMS of rays {:.4f} there, {:.4f} elsewhere; excess of squares "
@@ -386,11 +387,12 @@ struct Seams {
             excess[0].mean(), excess[0].error(), shift[1].mean(), shift[1].error(), told_error);
         EXPECT_GT(beside, 500U) << what;
         const double uncertain = std::hypot(excess[1].error(), excess[0].error());
-        EXPECT_LT(excess[1].mean() - excess[0].mean(), 3 * uncertain) << what;
+        constexpr double unseen = 0.5 / 255;
+        EXPECT_LT(excess[1].mean() - excess[0].mean(), 3 * uncertain + unseen * unseen) << what;
         EXPECT_LT(excess[0].mean(), 0.2 * seeds[0].mean() + 3 * excess[0].error())
             << what << ": tiles change values everywhere by more than other rays do";
         EXPECT_LT(std::abs(shift[1].mean()), 3 * shift[1].error()) << what;
-        EXPECT_LT(std::sqrt(3 * uncertain), 0.02) << what << ": a step of that height would be seen";
+        EXPECT_LT(std::sqrt(3 * uncertain + unseen * unseen), 0.02) << what << ": a step of that height would be seen";
     }
 };
 Seams seams_of(const Points& points, CloudAoOptions options) {
