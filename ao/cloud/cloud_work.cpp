@@ -567,6 +567,8 @@ CloudWork::Fitted CloudWork::planes_of(const Indices& which, CloudGpu* gpu) {
         watch_.lap("points in order");
         fitted = without_noise(local, points, normals);
         watch_.lap("noise");
+        if (gpu && fitted.empty() && !normals.empty() && !whole_)
+            sides_.judge_early(local, normals); // while the device works, the cores have time
         return fitted.empty() ? cloud_surface(std::move(local), normals, gpu)
                               : cloud_surface(LocalCloud(fitted.points), fitted.normals, gpu, fitted.axes);
     };

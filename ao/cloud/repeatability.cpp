@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <Eigen/Core>
+#include <limits>
 #include <tbb/parallel_for.h>
 
 namespace scanshade {
@@ -14,51 +15,80 @@ using Eigen::Vector3d, Eigen::Vector3f;
 
 namespace {
 
-/// The point of the tree nearest to each position; of equal distances the lower index. Positions side by side share a
-/// walk through the tree.
+constexpr std::size_t at_once = 16; ///< positions that share a walk through a tree
+
+/// Positions side by side, and the nearest points to them so far.
+struct Block {
+    using Row = std::array<float, at_once>;
+    alignas(32) Row x, y, z, distance2;
+    alignas(32) std::array<std::uint32_t, at_once> nearest;
+};
+
+/// The compiler turns the inner loop into vector code.
+[[gnu::always_inline]] inline void look_at(const NeighbourTree& tree, std::size_t begin, std::size_t end,
+                                           Block& block) {
+    for (std::size_t i = begin; i < end; ++i) {
+        const float x = tree[i].x(), y = tree[i].y(), z = tree[i].z();
+        for (std::size_t k = 0; k < at_once; ++k) {
+            const float dx = x - block.x[k], dy = y - block.y[k], dz = z - block.z[k];
+            const float distance2 = dx * dx + (dy * dy + dz * dz); // as Eigen's squaredNorm() adds
+            const bool nearer = distance2 < block.distance2[k];
+            block.distance2[k] = nearer ? distance2 : block.distance2[k];
+            block.nearest[k] = nearer ? static_cast<std::uint32_t>(i) : block.nearest[k];
+        }
+    }
+}
+
+void look_at_any(const NeighbourTree& tree, std::size_t begin, std::size_t end, Block& block) {
+    look_at(tree, begin, end, block);
+}
+
+#if defined(__x86_64__)
+[[gnu::target("avx2")]] void look_at_avx2(const NeighbourTree& tree, std::size_t begin, std::size_t end, Block& block) {
+    look_at(tree, begin, end, block);
+}
+#endif
+
+auto* fastest_look_at() {
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2"))
+        return &look_at_avx2;
+#endif
+    return &look_at_any;
+}
+
+/// The point of the tree nearest to each position; of equal distances the lower index.
 void find_nearest(const NeighbourTree& tree, std::span<const Vector3f> positions, std::span<std::uint32_t> nearest) {
+    static const auto look_at_here = fastest_look_at();
     if (positions.empty())
         return;
     Nearest single;
     tree.find_near(positions[0], 1, single);
-    const float to_first = std::sqrt(single.all()[0].distance2);
+    const Vector3f& nearest_to_first = tree[single.all()[0].point];
+    Block block;
+    block.distance2.fill(std::numeric_limits<float>::infinity());
     Eigen::AlignedBox3f round;
-    float apart = 0;
-    for (const Vector3f& position : positions) {
+    float reach2 = 0;
+    for (std::size_t k = 0; k < at_once; ++k) {
+        const Vector3f& position = positions[std::min(k, positions.size() - 1)];
+        block.x[k] = position.x();
+        block.y[k] = position.y();
+        block.z[k] = position.z();
         round.extend(position);
-        apart = std::max(apart, (position - positions[0]).norm());
+        reach2 = std::max(reach2, (position - nearest_to_first).squaredNorm());
     }
-    constexpr std::size_t most = 256;
-    using Row = Eigen::Array<float, Eigen::Dynamic, 1, Eigen::ColMajor, most, 1>;
-    std::array<std::uint32_t, most> candidates;
-    std::array<Row, 3> along; // their coordinates
-    along.fill(Row(static_cast<Eigen::Index>(most)));
-    std::size_t count = 0;
-    bool fits = true;
-    const float reach = (to_first + apart) * (1 + 1e-5F); // to the first one's nearest point at most
-    tree.for_each_leaf_near(round, reach * reach, [&](std::size_t begin, std::size_t end) {
-        fits = count + (end - begin) <= most;
-        for (std::size_t i = begin; fits && i < end; ++i, ++count) {
-            candidates[count] = static_cast<std::uint32_t>(i);
-            for (int axis = 0; axis < 3; ++axis)
-                along[static_cast<std::size_t>(axis)][static_cast<Eigen::Index>(count)] = tree[i][axis];
-        }
-        return fits;
+    constexpr std::size_t most = 256; // points looked at; positions far apart are searched for one by one
+    std::size_t looked_at = 0;
+    tree.for_each_leaf_near(round, reach2 * (1 + 1e-5F), [&](std::size_t begin, std::size_t end) {
+        looked_at += end - begin;
+        if (looked_at <= most)
+            look_at_here(tree, begin, end, block);
+        return looked_at <= most;
     });
     for (std::size_t k = 0; k < positions.size(); ++k) {
-        if (!fits) {
+        if (looked_at > most)
             tree.find_near(positions[k], 1, single);
-            nearest[k] = single.all()[0].point;
-            continue;
-        }
-        const auto off = [&](int axis) {
-            return (along[static_cast<std::size_t>(axis)].head(static_cast<Eigen::Index>(count)) - positions[k][axis])
-                .square();
-        };
-        const Row distance2 = off(0) + off(1) + off(2);
-        Eigen::Index least = 0;
-        distance2.minCoeff(&least);
-        nearest[k] = candidates[static_cast<std::size_t>(least)];
+        nearest[k] = looked_at > most ? single.all()[0].point : block.nearest[k];
     }
 }
 
@@ -111,7 +141,6 @@ std::vector<float> CheckedPart::errors(std::span<const Vector3d> points, std::sp
     std::vector<float> errors(points.size(), 1.0F);
     if (!cloud_)
         return errors;
-    constexpr std::size_t at_once = 16;
     const std::size_t all = order.empty() ? points.size() : order.size();
     tbb::parallel_for(std::size_t(0), (all + at_once - 1) / at_once, [&](std::size_t block) {
         std::array<Vector3f, at_once> positions;

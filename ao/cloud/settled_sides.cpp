@@ -12,16 +12,46 @@ using Eigen::Vector3d, Eigen::Vector3f;
 
 namespace {
 
-/// The same cloud with about `wanted` points, evenly chosen, and with the normals that it has.
-CloudSurface thinned(const CloudSurface& surface, std::size_t wanted) {
+constexpr std::size_t enough = 100000; ///< points to judge recorded sides by
+constexpr float sure = 0.8F;
+
+/// Part of a cloud, evenly chosen, with the normals that it has.
+struct Part {
     std::vector<Vector3d> points, normals;
-    const std::size_t step = std::max<std::size_t>(1, surface.size() / wanted);
-    for (std::size_t index = step / 2; index < surface.size(); index += step) {
-        points.push_back(surface.tree[index].cast<double>());
-        normals.push_back(surface.normals[index].cast<double>());
+    [[nodiscard]] CloudSurface surface() const { return cloud_surface(LocalCloud(points), normals); }
+};
+
+/// About `enough` points. `normal_of(index)`: by index in the tree.
+template <class Normal>
+Part part_of(const NeighbourTree& tree, const Vector3d& middle, const Normal& normal_of) {
+    Part part;
+    const std::size_t step = std::max<std::size_t>(1, tree.size() / enough);
+    for (std::size_t index = step / 2; index < tree.size(); index += step) {
+        part.points.push_back(middle + tree[index].cast<double>());
+        part.normals.push_back(normal_of(index));
     }
-    return cloud_surface(LocalCloud(points), normals);
+    return part;
 }
+
+/// The share of sure sides that oppose the normals as they are; 0 where too few are sure.
+double opposed_share(const CloudSurface& surface, const Sides& found) {
+    double opposed = 0, all = 0;
+    for (std::size_t i = 0; i < surface.size(); ++i)
+        if (found.confidence[i] > sure && !surface.normals[i].isZero()) {
+            all += 1;
+            opposed += found.sign[i] < 0;
+        }
+    constexpr double enough_sure = 0.3; // of the points
+    return all > enough_sure * static_cast<double>(surface.size()) ? opposed / all : 0;
+}
+
+/// Where scanners could have stood that see recorded fronts as well as those found, who recorded them knew better.
+bool as_good(const Sides& found) {
+    constexpr double tie = 0.05;
+    return !found.sure && found.explained_as_given && *found.explained_as_given > *found.explained - tie;
+}
+
+constexpr double hardly_random = 0.05, some_opposed = 0.05;
 
 } // namespace
 
@@ -87,47 +117,55 @@ void SettledSides::decide_by_scanner(const CloudSurface& surface, Sides& found) 
             sign = static_cast<std::int8_t>(-sign);
 }
 
+bool SettledSides::look_right(const CloudSurface& surface, const Patches& patches,
+                              std::optional<DiscRays>& rays) const {
+    constexpr SidesEffort quick{4000, 60, 300, true};
+    if (recorded_sides(surface, patches).random > hardly_random)
+        return false;
+    const Sides found = found_in(surface, patches, rays, quick);
+    return as_good(found) || opposed_share(surface, found) <= some_opposed;
+}
+
+bool SettledSides::judged_by_part(std::size_t points) const {
+    return options_.normals == CloudNormals::automatic && options_.outside == "auto" && points > 2 * enough;
+}
+
+void SettledSides::judge_early(const LocalCloud& points, std::span<const Vector3d> normals) {
+    if (!judged_by_part(points.size()))
+        return;
+    Part part = part_of(points.tree, points.middle, [&](std::size_t i) { return normals[points.tree.original(i)]; });
+    early_ = std::async(std::launch::async, [this, part = std::move(part)] {
+        const CloudSurface surface = part.surface();
+        std::optional<DiscRays> rays;
+        return look_right(surface, patches_of(surface), rays);
+    });
+}
+
 /// Recorded sides are right as a rule. Random ones show within patches; patches turned over, or all, show in where
 /// a scanner could have stood.
 std::vector<float> SettledSides::settle_recorded(CloudSurface& surface, std::optional<DiscRays>& rays) {
-    constexpr double hardly_random = 0.05, mostly_random = 0.2, some_opposed = 0.05, all_opposed = 0.9;
-    constexpr float sure = 0.8F;
+    constexpr double mostly_random = 0.2, all_opposed = 0.9;
     if (options_.normals != CloudNormals::automatic)
         return {};
     const bool told = options_.outside != "auto";
-    const auto opposed_share = [&](const CloudSurface& of, const Sides& sides) {
-        double opposed = 0, all = 0;
-        for (std::size_t i = 0; i < of.size(); ++i)
-            if (sides.confidence[i] > sure && !of.normals[i].isZero()) {
-                all += 1;
-                opposed += sides.sign[i] < 0;
-            }
-        constexpr double enough = 0.3; // of the points: else nothing is said
-        return all > enough * static_cast<double>(of.size()) ? opposed / all : 0;
-    };
-    // Where scanners could have stood that see recorded fronts as well as those found, who recorded them knew better.
-    const auto as_good = [](const Sides& found) {
-        constexpr double tie = 0.05;
-        return !found.sure && found.explained_as_given && *found.explained_as_given > *found.explained - tie;
-    };
-    const auto all_is_well = [&](const CloudSurface& of, const Patches& patches, std::optional<DiscRays>& rays_of) {
-        constexpr SidesEffort quick{4000, 60, 300, true};
-        if (recorded_sides(of, patches).random > hardly_random)
-            return false;
-        const Sides found = found_in(of, patches, rays_of, quick);
-        recorded_believed = as_good(found) || opposed_share(of, found) <= some_opposed;
-        return recorded_believed;
-    };
-    constexpr std::size_t enough = 100000;
-    const bool large = surface.size() > 2 * enough;
-    if (!told && large) {
-        const CloudSurface some = thinned(surface, enough);
-        if (std::optional<DiscRays> rays_of_some; all_is_well(some, patches_of(some), rays_of_some))
+    if (judged_by_part(surface.size())) {
+        const auto by_part = [&] {
+            const CloudSurface some = part_of(surface.tree, surface.middle, [&](std::size_t i) {
+                                          return Vector3d(surface.normals[i].cast<double>());
+                                      }).surface();
+            std::optional<DiscRays> rays_of_some;
+            return look_right(some, patches_of(some), rays_of_some);
+        };
+        recorded_believed = early_.valid() ? early_.get() : by_part();
+        if (recorded_believed)
             return {};
     }
     const Patches patches = patches_of(surface);
-    if (!told && !large && all_is_well(surface, patches, rays))
-        return {};
+    if (!told && !judged_by_part(surface.size())) {
+        recorded_believed = look_right(surface, patches, rays);
+        if (recorded_believed)
+            return {};
+    }
     const RecordedSides order = recorded_sides(surface, patches);
     const bool in_order = order.random <= hardly_random;
     SidesEffort thorough;

@@ -4,7 +4,9 @@
 #include "ao/cloud/cloud_ao.h"
 #include "ao/cloud/sides/sides.h"
 
+#include <future>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,6 +27,10 @@ class SettledSides {
     std::string turned_why;
     bool recorded_believed = false; ///< recorded sides were looked at, and are right
 
+    /// Begins to judge recorded sides by a part of the points, beside other work, where settle() will need that first.
+    /// `normals`: the recorded ones of these points.
+    void judge_early(const LocalCloud& points, std::span<const Eigen::Vector3d> normals);
+
     /// Turns the normals to the sides that were scanned. Returns how sure that is, 0 .. 1, by index in the tree; empty
     /// where the recorded sides are taken. `rays` are made of the surface if they are needed. `recorded`: the normals
     /// are recorded ones.
@@ -33,6 +39,11 @@ class SettledSides {
   private:
     [[nodiscard]] Sides found_in(const CloudSurface& surface, const Patches& patches, std::optional<DiscRays>& rays,
                                  const SidesEffort& effort = {}) const;
+    /// Whether a quick look at recorded sides finds nothing wrong. `rays` as for settle().
+    [[nodiscard]] bool look_right(const CloudSurface& surface, const Patches& patches,
+                                  std::optional<DiscRays>& rays) const;
+    /// Whether recorded sides are judged by a part of so many points first.
+    [[nodiscard]] bool judged_by_part(std::size_t points) const;
     /// Where both sides would do, that to the scanner is right.
     void decide_by_scanner(const CloudSurface& surface, Sides& found) const;
     std::vector<float> settle_recorded(CloudSurface& surface, std::optional<DiscRays>& rays);
@@ -41,6 +52,7 @@ class SettledSides {
     const CloudAoOptions& options_;
     Eigen::Vector3d up_;
     bool z_up_;
+    std::future<bool> early_; ///< what judge_early() began
 };
 
 } // namespace scanshade
