@@ -6,6 +6,7 @@
 #include "projection/undistort.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fmt/format.h>
 #include <limits>
@@ -31,13 +32,13 @@ class Tally {
     /// Pixels side by side. Eight sums at once: a processor adds them in one instruction.
     void add_row(const float* z_m, const float* visibility, int count) {
         constexpr int lanes = 8;
-        float sums[lanes] = {};
-        int valid = 0, attached = 0;
+        std::array<float, lanes> sums{};
+        std::array<int, lanes> valid{}, attached{};
         const auto take = [&](int x, int lane) {
-            const bool is_valid = z_m[x] > 0 && z_m[x] <= std::numeric_limits<float>::max();
-            const bool is_known = is_valid && visibility[x] == visibility[x];
-            valid += is_valid;
-            attached += is_known;
+            const bool is_valid = (z_m[x] > 0) & (z_m[x] <= std::numeric_limits<float>::max());
+            const bool is_known = is_valid & (visibility[x] == visibility[x]);
+            valid[lane] += is_valid;
+            attached[lane] += is_known;
             sums[lane] += is_known ? visibility[x] : 0;
         };
         int x = 0;
@@ -46,10 +47,11 @@ class Tally {
                 take(x + lane, lane);
         for (; x < count; ++x)
             take(x, 0);
-        valid_ += valid;
-        attached_ += attached;
-        for (const float sum : sums)
-            sum_ += sum;
+        for (int lane = 0; lane < lanes; ++lane) {
+            valid_ += valid[lane];
+            attached_ += attached[lane];
+            sum_ += sums[lane];
+        }
     }
     void write_to(Attached& result) const {
         result.coverage = valid_ > 0 ? attached_ / valid_ : 0;

@@ -8,6 +8,7 @@
 #include <bitset>
 #include <cmath>
 #include <fmt/format.h>
+#include <limits>
 #include <tuple>
 
 namespace scanshade {
@@ -138,13 +139,31 @@ Camera camera_of_cloud(const Frame& frame) {
 
 // ---------------------------------------------------------------------------------------------------- depth images
 
+/// The least float that is not below a number.
+float not_below(double number) {
+    const auto nearest = static_cast<float>(number);
+    return nearest < number ? std::nextafter(nearest, std::numeric_limits<float>::infinity()) : nearest;
+}
+
+/// Plain rows without branches, so that the compiler makes vectors of them.
 cv::Mat1f without_invalid(const cv::Mat1f& depth_m, const ProjectOptions& options) {
-    const auto good = [&](float z) { return z == 0 || in_range(z, options); };
-    if (std::all_of(depth_m.begin(), depth_m.end(), good))
+    const float near_m = not_below(options.near_m), far_m = -not_below(-options.far_m);
+    const auto good = [&](float z) { return (z == 0) | ((z >= near_m) & (z <= far_m)); }; // false for NaN
+    int bad = 0;
+    for (int v = 0; v < depth_m.rows; ++v) {
+        const float* row = depth_m[v];
+        for (int u = 0; u < depth_m.cols; ++u)
+            bad |= !good(row[u]);
+    }
+    if (!bad)
         return depth_m;
-    cv::Mat1f clean = depth_m.clone();
-    std::replace_if(
-        clean.begin(), clean.end(), [&](float z) { return !good(z); }, 0.0F);
+    cv::Mat1f clean(depth_m.size());
+    for (int v = 0; v < depth_m.rows; ++v) {
+        const float* from = depth_m[v];
+        float* to = clean[v];
+        for (int u = 0; u < depth_m.cols; ++u)
+            to[u] = good(from[u]) ? from[u] : 0;
+    }
     return clean;
 }
 

@@ -8,7 +8,7 @@
 namespace scanshade {
 
 /// Of every third row and column, those that are no holes; metres. Enough to judge by.
-[[nodiscard]] std::vector<double> sampled_depths(const cv::Mat1f& z_m);
+[[nodiscard]] std::vector<float> sampled_depths(const cv::Mat1f& z_m);
 
 /// Depths of a view, and the size of what it shows.
 struct SceneExtent {

@@ -77,18 +77,21 @@ void doubt_radius_in_view(const DepthImage& depth, double radius_m, const Length
 
 void doubt_noise_in_view(const DepthImage& depth, double radius_m, const DepthNoise& noise, const LengthUnit& unit,
                          Doubts& doubts) {
-    std::vector<double> depths = sampled_depths(depth.z_m);
-    if (depths.empty() || !(radius_m > 0) || !noise.any())
+    if (!(radius_m > 0) || !noise.any())
         return;
+    std::vector<float> depths = sampled_depths(depth.z_m);
     const auto noisy = static_cast<double>(
         std::ranges::count_if(depths, [&](double z) { return noise.at(z) > largest_sigma * radius_m; }));
-    const double share = noisy / static_cast<double>(depths.size()), far = quantile(depths, 0.9);
-    add_if(share > most_noisy, doubts,
-           fmt::format("noise is above a quarter of the radius at {:.0f} % of the pixels (sigma {} at {}): their "
-                       "values say little. {}",
-                       100 * share, unit.text(noise.at(far), 2), unit.text(far, 2),
-                       unit.arbitrary() ? "Give a larger --relative-radius."
-                                        : "Give a larger --radius, or leave them out with --depth-range."));
+    const double share = noisy / static_cast<double>(std::max<std::size_t>(depths.size(), 1));
+    if (share <= most_noisy)
+        return;
+    const double far = quantile(depths, 0.9);
+    doubts.push_back(
+        fmt::format("noise is above a quarter of the radius at {:.0f} % of the pixels (sigma {} at {}): their "
+                    "values say little. {}",
+                    100 * share, unit.text(noise.at(far), 2), unit.text(far, 2),
+                    unit.arbitrary() ? "Give a larger --relative-radius."
+                                     : "Give a larger --radius, or leave them out with --depth-range."));
 }
 
 void doubt_kind(const DepthImage& depth, Doubts& doubts) {

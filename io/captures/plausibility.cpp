@@ -4,7 +4,9 @@
 #include "projection/base/statistics.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -46,16 +48,29 @@ Statistics sampled(const cv::Mat_<Pixel>& image, const Metres& metres, const Kee
 }
 
 /// What renderers write where there is nothing: 1e10, or the largest number of half precision.
-bool is_background(float z_m) { return z_m >= 1e6F || z_m == 65504; }
+bool is_background(float z_m) { return (z_m >= 1e6F) | (z_m == 65504); }
+
+/// The largest depth but backgrounds; 0 for none. Bits of positive floats are in the order of their values, and the
+/// compiler finds the largest of many integers at once.
+float largest_of(const cv::Mat1f& depth_m) {
+    constexpr auto background = std::bit_cast<std::int32_t>(1e6F), largest_half = std::bit_cast<std::int32_t>(65504.0F);
+    std::int32_t largest = 0;
+    for (int v = 0; v < depth_m.rows; ++v) {
+        const float* row = depth_m[v];
+        for (int u = 0; u < depth_m.cols; ++u) {
+            const auto bits = std::bit_cast<std::int32_t>(row[u]);
+            const bool counts = (bits < background) & (bits != largest_half); // as is_background(); not NaN
+            largest = std::max(largest, counts ? bits : 0);
+        }
+    }
+    return std::bit_cast<float>(largest);
+}
 
 Statistics statistics_of(const cv::Mat1f& depth_m) {
     std::vector<float> sample;
     Statistics result = sampled(
         depth_m, [](float z) { return is_background(z) ? 0 : z; }, [&](float z) { sample.push_back(z); });
-    for (int v = 0; v < depth_m.rows; ++v)
-        for (int u = 0; u < depth_m.cols; ++u)
-            if (const float z = depth_m(v, u); z > result.largest_m && !is_background(z))
-                result.largest_m = z;
+    result.largest_m = largest_of(depth_m);
     if (!sample.empty())
         result.median_m = median(std::move(sample));
     return result;
@@ -197,14 +212,16 @@ int common_divisor(const cv::Mat& stored) {
     constexpr std::size_t enough = 50;
     constexpr int largest = 257;       // 8 bits widened to 16
     constexpr double nearly_all = 0.9; // beyond 8 m, SUN RGB-D's rotated bits end in odd ones
-    std::vector<bool> there(65536);
-    for (int v = 0; v < stored.rows; v += 3)
+    std::vector<char> there(65536);
+    for (int v = 0; v < stored.rows; v += 3) {
+        const auto* row = stored.ptr<std::uint16_t>(v);
         for (int u = 0; u < stored.cols; u += 3)
-            there[stored.at<std::uint16_t>(v, u)] = true;
-    there[0] = there[65535] = false; // holes
+            there[row[u]] = 1;
+    }
+    there[0] = there[65535] = 0; // holes
     std::vector<int> values;
     for (int value = 0; value < 65536; ++value)
-        if (there[static_cast<std::size_t>(value)])
+        if (there[static_cast<std::size_t>(value)] != 0)
             values.push_back(value);
     if (values.size() < enough)
         return 1;
@@ -237,17 +254,23 @@ void doubt_steps(const cv::Mat& stored, const DepthEncoding& encoding, std::vect
 template <class Pixel>
 bool is_stretched(const cv::Mat_<Pixel>& stored, double whole, double nearly_all) {
     constexpr double hardly_any = 0.01;
+    const auto largest = static_cast<Pixel>(whole);
+    const bool largest_counts = nearly_all == 1; // the largest integer marks holes in other files
     std::size_t others = 0;
-    double least = whole, most = 0;
-    for (int v = 0; v < stored.rows; ++v)
-        for (int u = 0; u < stored.cols; ++u)
-            if (const double value = stored(v, u); value > 0) {
-                least = std::min(least, value);
-                if (value < whole) // the largest integer marks holes in other files
-                    ++others;
-                if (value < whole || nearly_all == 1)
-                    most = std::max(most, value);
-            }
+    Pixel least = largest, most = 0;
+    for (int v = 0; v < stored.rows; ++v) { // without branches, so that the compiler makes vectors of integers
+        const Pixel* row = stored[v];
+        int others_here = 0;
+        for (int u = 0; u < stored.cols; ++u) {
+            const Pixel value = row[u], known = value > 0 ? value : largest;
+            const bool is_other = (value > 0) & (value < largest);
+            const Pixel counted = is_other | largest_counts ? value : Pixel(0);
+            others_here += is_other;
+            least = known < least ? known : least;
+            most = counted > most ? counted : most;
+        }
+        others += static_cast<std::size_t>(others_here);
+    }
     return others >= 100 && least < hardly_any * whole && most >= nearly_all * whole && most <= whole;
 }
 

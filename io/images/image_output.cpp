@@ -35,8 +35,9 @@ cv::Mat_<Integer> as_integers(const cv::Mat1f& visibility) {
         const float* from = visibility[y];
         Integer* to = image[y];
         for (int x = 0; x < image.cols; ++x) {
-            const float value = std::clamp(from[x], 0.0F, 1.0F); // a NaN stays one
-            to[x] = value == value ? static_cast<Integer>(static_cast<int>(value * steps + 1.5F)) : Integer(0);
+            const float value = from[x], above = value > 0 ? value : 0, within = above < 1 ? above : 1; // of NaN 0
+            const int code = static_cast<int>(within * steps + 1.5F);
+            to[x] = static_cast<Integer>(value == value ? code : 0);
         }
     }
     return image;
