@@ -18,9 +18,23 @@ constexpr float never_seen = -std::numeric_limits<float>::infinity(); // in fron
 
 /// The image in which signs are looked for.
 struct SeenDepth {
-    const cv::Mat1f& z_m;
+    SeenDepth(const DepthImage& depth, const cv::Mat1f& values, double radius_m, const DepthNoise& sigma)
+        : z_m(depth.z_m), visibility(values), radius(static_cast<float>(radius_m)),
+          fx(static_cast<float>(depth.camera.fx)), fy(static_cast<float>(depth.camera.fy)), noise(sigma) {
+        if (visibility.size() != z_m.size())
+            throw Error(fmt::format("visibility is {}x{}, its depth image {}x{}", visibility.cols, visibility.rows,
+                                    z_m.cols, z_m.rows));
+    }
+
+    const cv::Mat1f &z_m, &visibility;
     float radius, fx, fy;
     DepthNoise noise;
+
+    /// Pixels without visibility count as holes.
+    [[nodiscard]] float at(int v, int u) const {
+        const float z = z_m(v, u);
+        return std::isnan(visibility(v, u)) || !(z > 0) ? never_seen : z;
+    }
 
     [[nodiscard]] bool inside(int v, int u) const {
         return static_cast<unsigned>(u) < static_cast<unsigned>(z_m.cols) &&
@@ -28,11 +42,11 @@ struct SeenDepth {
     }
 
     [[nodiscard]] float share_of_ball(int v, int u) const {
-        const float z = z_m(v, u), across = std::min(radius * fx / z, 1e6F), down = std::min(radius * fy / z, 1e6F);
+        const float z = at(v, u), across = std::min(radius * fx / z, 1e6F), down = std::min(radius * fy / z, 1e6F);
         int seen = 0;
         for (const cv::Point2f& seed : seeds_of_ball()) {
             const int x = u + cvRound(seed.x * across), y = v + cvRound(seed.y * down);
-            seen += inside(y, x) && z_m(y, x) > z - radius;
+            seen += inside(y, x) && at(y, x) > z - radius;
         }
         return static_cast<float>(seen) / static_cast<float>(shared::ball_seeds);
     }
@@ -40,16 +54,16 @@ struct SeenDepth {
     /// A pair of opposite pixels: planes are straight lines in 1/z, so |1/a + 1/b - 2/z| z^2 is by how far, in metres,
     /// the three are not on one.
     void look_at_pair(int v, int u, int dv, int du, float jump, bool& jumps, bool& holes) const {
-        const float z = z_m(v, u);
+        const float z = at(v, u);
         const bool has_a = inside(v + dv, u + du), has_b = inside(v - dv, u - du);
-        const float a = has_a ? z_m(v + dv, u + du) : z, b = has_b ? z_m(v - dv, u - du) : z;
+        const float a = has_a ? at(v + dv, u + du) : z, b = has_b ? at(v - dv, u - du) : z;
         holes = holes || a == never_seen || b == never_seen;
         jumps = jumps || (has_a && has_b && a != never_seen && b != never_seen &&
                           std::abs(z * (a + b) - 2 * a * b) * z > jump * a * b);
     }
 
     [[nodiscard]] ErrorSigns signs(int v, int u) const {
-        const float z = z_m(v, u), sigma = static_cast<float>(noise.at(z));
+        const float z = at(v, u), sigma = static_cast<float>(noise.at(z));
         const float jump = shared::jump_radii * radius + shared::jump_sigmas * sigma;
         ErrorSigns signs{share_of_ball(v, u), shared::error_rings, shared::error_rings, radius * std::sqrt(fx * fy) / z,
                          radius > 0 ? sigma / radius : most_noise};
@@ -89,18 +103,10 @@ const std::array<cv::Point2f, shared::ball_seeds>& seeds_of_ball() {
 
 void for_each_sign(const DepthImage& depth, const cv::Mat1f& visibility, double radius_m, const DepthNoise& noise,
                    const std::function<void(int, int, const ErrorSigns&)>& found) {
-    const cv::Mat1f& z_m = depth.z_m;
-    if (visibility.size() != z_m.size())
-        throw Error(fmt::format("visibility is {}x{}, its depth image {}x{}", visibility.cols, visibility.rows,
-                                z_m.cols, z_m.rows));
-    cv::Mat1f seen_z(z_m.size());
-    std::transform(z_m.begin(), z_m.end(), visibility.begin(), seen_z.begin(),
-                   [](float z, float value) { return std::isnan(value) || !(z > 0) ? never_seen : z; });
-    const SeenDepth seen{seen_z, static_cast<float>(radius_m), static_cast<float>(depth.camera.fx),
-                         static_cast<float>(depth.camera.fy), noise};
-    tbb::parallel_for(0, z_m.rows, [&](int v) {
-        for (int u = 0; u < z_m.cols; ++u)
-            if (seen_z(v, u) != never_seen)
+    const SeenDepth seen(depth, visibility, radius_m, noise);
+    tbb::parallel_for(0, depth.z_m.rows, [&](int v) {
+        for (int u = 0; u < depth.z_m.cols; ++u)
+            if (seen.at(v, u) != never_seen)
                 found(v, u, seen.signs(v, u));
     });
 }
@@ -134,6 +140,24 @@ cv::Mat1f expected_error_of(const DepthImage& depth, const cv::Mat1f& visibility
         errors(v, u) = expected_error(weights_of(signs, visibility(v, u)), table);
     });
     return errors;
+}
+
+double expected_rms_of(const DepthImage& depth, const cv::Mat1f& visibility, double radius_m, const DepthNoise& noise,
+                       const shared::ErrorTable& table) {
+    constexpr double enough = 2500; // pixels: the RMS is then within about 1 % of that of all
+    const SeenDepth seen(depth, visibility, radius_m, noise);
+    const int step = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(visibility.total()) / enough)));
+    double squares = 0;
+    std::size_t known = 0;
+    for (int v = step / 2; v < visibility.rows; v += step)
+        for (int u = step / 2; u < visibility.cols; u += step)
+            if (seen.at(v, u) != never_seen) {
+                const float error = expected_error(weights_of(seen.signs(v, u), visibility(v, u)), table),
+                            counted = std::min(error, shared::hopeless_error);
+                squares += static_cast<double>(counted * counted);
+                ++known;
+            }
+    return known > 0 ? std::sqrt(squares / static_cast<double>(known)) : std::numeric_limits<double>::quiet_NaN();
 }
 
 float confidence_from(float expected_error) {

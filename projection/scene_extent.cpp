@@ -26,14 +26,15 @@ SceneExtent scene_extent(const DepthImage& depth) {
     constexpr std::size_t fewest = 3;
     if (depths.size() < fewest)
         return {};
-    // The middle first: then the others have only their halves to search.
+    // The middle first: then the others have only their halves to search, without it.
     const auto rank = [&](double share) {
         return depths.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(depths.size() - 1));
     };
     const auto near = rank(0.01), middle = rank(0.5), far = rank(0.99);
     std::nth_element(depths.begin(), middle, depths.end());
     std::nth_element(depths.begin(), near, middle);
-    std::nth_element(middle, far, depths.end());
+    if (far != middle)
+        std::nth_element(middle + 1, far, depths.end());
     SceneExtent scene{*near, *middle, *far};
     const Pinhole& camera = depth.camera;
     scene.diagonal_m = std::hypot(scene.middle_m * camera.size.width / camera.fx,

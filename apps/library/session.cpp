@@ -9,6 +9,7 @@
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
 #include "projection/base/stopwatch.h"
+#include "projection/expected_error.h"
 
 #include <algorithm>
 #include <array>
@@ -278,9 +279,11 @@ void Session::finish_one(Computed& computed, const BatchOptions& options, Wanted
     computed.row.expected_error = std::numeric_limits<double>::quiet_NaN();
     if (work.by_points)
         computed.row.expected_error = work.of_points.expected_error.value_or(computed.row.expected_error);
-    else
+    else {
+        (void)finish(work, options, options.outputs);
         computed.row.expected_error =
-            expected_rms(work.error_in_view, finish(work, options, options.outputs).confidence_map);
+            expected_rms_of(work.depth, work.ao.visibility, options.radius_m, options.noise, work.errors);
+    }
     computed.row.coverage = work.attached.coverage;
     computed.row.mean_visibility = work.attached.mean_visibility;
     std::ranges::move(doubts_about(computed_frame(work), options.radius_m, options.noise),

@@ -86,11 +86,12 @@ void finish_mcap(McapRecording& recording, const Capture& capture) {
 std::size_t CaptureRuns::at_once(bool stored) {
     if (asked_.budget.any())
         return 1;
-    std::size_t entering = std::max(1U, std::thread::hardware_concurrency() / 16);
+    const std::size_t sixteens = std::max(1U, std::thread::hardware_concurrency() / 16);
+    std::size_t entering = sixteens;
     if (asked_.sequence != SequenceUse::off) // keeps one device busy
         entering = asked_.device == "all" ? workers().devices() : 1;
     entrance_.release(static_cast<std::ptrdiff_t>(entering - 1));
-    return entering + (stored ? 2 : 4);
+    return entering + sixteens * (stored ? 2 : 4);
 }
 
 Workers& CaptureRuns::workers() {

@@ -28,8 +28,8 @@ class CaptureRuns {
   public:
     explicit CaptureRuns(RunSettings& asked) : asked_(asked) {}
 
-    /// How many captures are open at once: those whose frames enter the walk (one per sixteen cores), two being opened
-    /// before them, and two being finished after them. On a GPU, 40 frames take no longer than opening their capture.
+    /// How many captures are open at once. Per sixteen cores there is one whose frames enter the walk, two are being
+    /// opened before it, and two finished after it. On a GPU, 40 frames take no longer than opening their capture.
     /// With a budget it is one: nothing may disturb its measurements, and each capture gets other settings.
     /// `stored`: input is fetched for one task and results are delivered for another, both in bounded space.
     [[nodiscard]] std::size_t at_once(bool stored = false);

@@ -11,6 +11,7 @@
 #include "projection/base/error.h"
 #include "projection/base/memory.h"
 #include "projection/base/stopwatch.h"
+#include "projection/expected_error.h"
 
 #include <algorithm>
 #include <exception>
@@ -87,7 +88,8 @@ void attach_and_write(Work& work, const BatchOptions& options) {
         work.row.coverage = work.attached.coverage;
         work.row.mean_visibility = work.attached.mean_visibility;
         work.row.expected_error = work.by_points ? work.of_points.expected_error.value_or(std::nan(""))
-                                                 : expected_rms(work.error_in_view, images.confidence_map);
+                                                 : expected_rms_of(work.depth, work.ao.visibility, options.radius_m,
+                                                                   options.noise, work.errors);
         std::ranges::move(doubts_about(computed_frame(work), options.radius_m, options.noise, options.outputs.unit),
                           std::back_inserter(work.row.doubts));
     });

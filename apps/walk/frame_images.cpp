@@ -7,11 +7,7 @@
 #include "projection/expected_error.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <fmt/format.h>
-#include <limits>
-#include <numeric>
 
 namespace scanshade {
 namespace {
@@ -142,32 +138,6 @@ Scene scene_of(const Work& work, bool colour_view) {
         return {work.depth.z_m, visibility, colour_in_view(cloud, work.depth), work.depth.camera};
     const cv::Mat3b colour = has_colours(cloud) ? on_grid(cloud.colours, cloud.grid) : cv::Mat3b();
     return {depth_on_grid(cloud), visibility, colour, frame.camera.pinhole};
-}
-
-double expected_rms(const cv::Mat1f& error, const cv::Mat1b& confidence_map) {
-    constexpr int lanes = 4; // sums and counts that do not wait for each other
-    std::array<double, lanes> squares{};
-    std::array<std::size_t, lanes> known{};
-    std::array<std::array<std::size_t, 256>, lanes> counts{};
-    for (int v = 0; v < error.rows; ++v)
-        for (int u = 0; u < error.cols; ++u) {
-            const auto lane = static_cast<std::size_t>(u % lanes);
-            const float each = error(v, u), counted = std::min(each, shared::hopeless_error);
-            squares[lane] += std::isnan(each) ? 0 : static_cast<double>(counted * counted);
-            known[lane] += !std::isnan(each);
-        }
-    for (int v = 0; v < confidence_map.rows && error.empty(); ++v)
-        for (int u = 0; u < confidence_map.cols; ++u)
-            ++counts[static_cast<std::size_t>(u % lanes)][confidence_map(v, u)];
-    for (std::size_t lane = 0; lane < lanes; ++lane)
-        for (std::size_t byte = 1; byte < counts[lane].size(); ++byte) {
-            const double off = static_cast<double>(shared::hopeless_error) * static_cast<double>(255 - byte) / 254;
-            squares[lane] += static_cast<double>(counts[lane][byte]) * off * off;
-            known[lane] += counts[lane][byte];
-        }
-    const auto all = static_cast<double>(std::accumulate(known.begin(), known.end(), std::size_t{0}));
-    return all > 0 ? std::sqrt(std::accumulate(squares.begin(), squares.end(), 0.0) / all)
-                   : std::numeric_limits<double>::quiet_NaN();
 }
 
 FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outputs) {

@@ -46,8 +46,4 @@ struct FrameImages {
 /// that computed the frame.
 [[nodiscard]] FrameImages finish(Work& work, const BatchOptions& options, const Outputs& outputs);
 
-/// RMS of the expected errors of all pixels with a value, where one above 0.3 counts as 0.3; NaN if there are none.
-/// From `error` if it is there, else from the bytes of confidence: one number, whichever outputs were asked for.
-[[nodiscard]] double expected_rms(const cv::Mat1f& error, const cv::Mat1b& confidence_map);
-
 } // namespace scanshade

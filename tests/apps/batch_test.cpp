@@ -345,28 +345,18 @@ TEST_F(BatchTest, the_table_quotes_what_would_break_it) {
     EXPECT_EQ(line.find("nan"), std::string::npos);
 }
 
-TEST(ExpectedRms, is_the_same_from_errors_and_from_the_bytes_of_confidence) {
-    const float none = std::numeric_limits<float>::quiet_NaN();
-    const cv::Mat1f error = (cv::Mat1f(2, 3) << 0.0f, 0.1f, 0.2f, 0.3f, 0.7f, none);
-    const cv::Mat1b confidence = (cv::Mat1b(2, 3) << 255, 170, 86, 1, 1, 0);
-    const double exact = std::sqrt((0.01 + 0.04 + 0.09 + 0.09) / 5); // 0.7 counts as 0.3, the hole not at all
-    EXPECT_NEAR(expected_rms(error, {}), exact, 1e-7);
-    EXPECT_NEAR(expected_rms({}, confidence), exact, 0.3 / 254);
-    EXPECT_TRUE(std::isnan(expected_rms({}, {})));
-    EXPECT_TRUE(std::isnan(expected_rms(cv::Mat1f(2, 2, none), {})));
-}
-
 TEST_F(BatchTest, frames_say_how_far_their_values_are_expected_to_be_off) {
     const Capture recorded = capture(2);
     HalfOpen method;
     BatchOptions options = all_frames(recorded, folder / "out");
-    for (const FrameRow& row : run_batch(recorded, method, options)) {
-        EXPECT_GT(row.expected_error, 0.001);
-        EXPECT_LE(row.expected_error, 0.3);
-    }
+    const std::vector<FrameRow> with_confidence = run_batch(recorded, method, options);
     options.outputs.confidence = false;
-    for (const FrameRow& row : run_batch(recorded, method, options))
-        EXPECT_TRUE(std::isnan(row.expected_error)) << "nobody estimated it";
+    const std::vector<FrameRow> without = run_batch(recorded, method, options);
+    for (std::size_t i = 0; i < without.size(); ++i) {
+        EXPECT_GT(without[i].expected_error, 0.001);
+        EXPECT_LE(without[i].expected_error, 0.3);
+        EXPECT_EQ(without[i].expected_error, with_confidence[i].expected_error) << "whatever is written";
+    }
 }
 
 } // namespace

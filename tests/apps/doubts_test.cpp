@@ -100,6 +100,16 @@ TEST(doubts, noise_as_large_as_the_radius) {
     EXPECT_TRUE(warned(noisy.doubts(), "noise is above a quarter of the radius"));
 }
 
+TEST(doubts, values_that_are_expected_to_be_far_off) {
+    Computed rough;
+    rough.row.expected_error = 0.19;
+    EXPECT_TRUE(rough.doubts().empty()) << tests::joined(rough.doubts());
+    rough.row.expected_error = 0.21;
+    EXPECT_TRUE(warned(rough.doubts(), "an error of 0.21 RMS is expected"));
+    rough.row.expected_error = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_TRUE(rough.doubts().empty()) << "unknown";
+}
+
 TEST(doubts, a_sparse_grid_of_a_cloud_computed_from_its_points_is_no_reason) {
     ComputedCloud cropped; // an object cut out of an organised cloud: the rest of the grid is NaN
     cropped.work.frame.cloud->grid = {40, 40};

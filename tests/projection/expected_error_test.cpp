@@ -144,6 +144,26 @@ TEST(ExpectedError, factors_multiply_and_are_interpolated_between_knots) {
     EXPECT_EQ(expected_error(weights_of(plain, 1), table(5)), 1) << "nothing errs by more";
 }
 
+TEST(ExpectedError, a_sample_tells_the_rms_of_all) {
+    const DepthImage depth = with_holes(tilted_plane(test_camera({640, 480}), 50, 2), 0.002);
+    const cv::Mat1f visible = open_where_known(depth);
+    shared::ErrorTable uneven = table(-6);
+    for (int ring = 0; ring < shared::error_rings; ++ring)
+        uneven.factors[shared::error_holes_at + ring] = 4; // four times the error
+    double squares = 0, known = 0;
+    for (const float error : expected_error_of(depth, visible, radius_m, {}, uneven))
+        if (error == error) {
+            squares += std::pow(std::min(error, shared::hopeless_error), 2);
+            ++known;
+        }
+    const double all = std::sqrt(squares / known);
+    EXPECT_GT(all, 0.127);
+    EXPECT_LT(all, 0.29) << "both kinds of pixels count";
+    EXPECT_NEAR(expected_rms_of(depth, visible, radius_m, {}, uneven), all, 0.03 * all);
+    const cv::Mat1f unknown(visible.size(), std::numeric_limits<float>::quiet_NaN());
+    EXPECT_TRUE(std::isnan(expected_rms_of(depth, unknown, radius_m, {}, uneven)));
+}
+
 TEST(ExpectedError, without_a_radius_the_worst_is_expected) {
     shared::ErrorTable worse_with_noise{};
     for (int i = 0; i < shared::error_noises; ++i)
