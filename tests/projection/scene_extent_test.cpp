@@ -38,14 +38,14 @@ TEST(SceneExtent, has_the_ranks_of_sorted_depths) {
 }
 
 TEST(SceneExtent, samples_every_third_row_and_column_without_holes) {
-    cv::Mat1f z_m = cv::Mat1f::zeros(7, 8);
+    cv::Mat1f z_m(7, 8, 0.0F);
     z_m(0, 0) = 1;
     z_m(3, 6) = 2;
     z_m(4, 6) = 3; // between
     z_m(6, 3) = 4;
     EXPECT_EQ(sampled_depths(z_m), (std::vector<float>{1, 2, 4}));
     EXPECT_TRUE(sampled_depths(cv::Mat1f()).empty());
-    EXPECT_EQ(scene_extent({{500, 500, 0, 0, {8, 7}}, cv::Mat1f::zeros(7, 8), {}}).diagonal_m, 0);
+    EXPECT_EQ(scene_extent({{500, 500, 0, 0, {8, 7}}, cv::Mat1f(7, 8, 0.0F), {}}).diagonal_m, 0);
 }
 
 } // namespace
