@@ -2,7 +2,7 @@
 // tests/golden/hashes.txt, so that no change of results goes unnoticed.
 //
 // The hashes are those of one driver on one width of vectors, since compilers round differently, and of one family of
-// processors, most likely since their reciprocals are approximate: a line is DEVICE | METHOD | HASH. On a device
+// processors, to be careful: the three families known agree. A line is DEVICE | METHOD | HASH. On a device
 // without lines the comparison is skipped. UPDATE_GOLDEN=1 writes them anew: for a change that is meant, with its
 // reason and its errors before and after in the commit's message.
 #include "ao/base/method.h"
