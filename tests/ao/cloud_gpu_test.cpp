@@ -112,6 +112,25 @@ TEST_F(CloudGpuTest, tiles_are_those_of_the_processor) {
     expect_alike({cloud.points, cloud.normals}, options, 0.002, 0.25);
 }
 
+/// So many that a part of them is judged, beside the device's work: right ones, and all of them turned.
+TEST_F(CloudGpuTest, recorded_sides_of_many_points_are_judged_as_on_the_processor) {
+    const scene::SceneCloud cloud = scene::scene_cloud(scene::World(scene::scene_named("office")), 210000);
+    Points turned = cloud.normals;
+    for (Vector3d& normal : turned)
+        normal = -normal;
+    const CloudAoOptions options{.radius = 0.2, .rays = 4};
+    for (const Points* normals : {&cloud.normals, static_cast<const Points*>(&turned)}) {
+        const PointSet set{cloud.points, *normals};
+        const PointVisibility here = CloudAo(options).compute(set), there = CloudAo(options, &device()).compute(set);
+        std::size_t other_sides = 0;
+        for (std::size_t i = 0; i < cloud.points.size(); ++i)
+            other_sides += here.normals[i].dot(there.normals[i]) < 0;
+        EXPECT_EQ(other_sides, 0U);
+        EXPECT_EQ(here.doubts, there.doubts);
+        EXPECT_EQ(here.doubts.empty(), normals == &cloud.normals);
+    }
+}
+
 TEST_F(CloudGpuTest, many_points_at_one_place_are_no_matter) {
     constexpr std::size_t many = 100000; // each with each, they would take minutes
     Points points = office().points, normals = office().normals;
