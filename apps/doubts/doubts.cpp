@@ -24,7 +24,7 @@ constexpr double largest_error = 0.2;      ///< RMS that is expected of a view
 /// Shares of the valid pixels with a valid one at most two to the left or right, and above or below.
 std::array<double, 2> neighboured(const cv::Mat1f& z_m) {
     std::size_t valid = 0, beside = 0, above = 0;
-    for (int v = 2; v + 2 < z_m.rows; v += 5) { // enough to judge by, of any pattern
+    for (int v = 2; v + 2 < z_m.rows; v += 5) { // enough to judge by; rows are lost in other steps
         const float *row = z_m[v], *up = z_m[v - 1], *down = z_m[v + 1], *far_up = z_m[v - 2], *far_down = z_m[v + 2];
         for (int u = 2; u + 2 < z_m.cols; u += 3) { // without branches, which holes make unforeseeable
             const int holds = row[u] > 0;

@@ -258,7 +258,7 @@ bool is_stretched(const cv::Mat_<Pixel>& stored, double whole, double nearly_all
     const bool largest_counts = nearly_all == 1; // the largest integer marks holes in other files
     std::size_t others = 0;
     Pixel least = largest, most = 0;
-    for (int v = 0; v < stored.rows; ++v) { // without branches, so that the compiler makes vectors of integers
+    for (int v = 0; v < stored.rows; ++v) { // without branches, which noise makes unforeseeable
         const Pixel* row = stored[v];
         int others_here = 0;
         for (int u = 0; u < stored.cols; ++u) {
