@@ -27,6 +27,7 @@ enum Buffers : int {
     others_in,
     fused,
     relief,
+    ends,
     filled = others_in,
     marks
 };
@@ -40,6 +41,10 @@ constexpr double window_scale = 1.8;
 /// The widest hole that is filled: an angle, 20 pixels of a Kinect. The shadow of structured light is wider close to
 /// the sensor, but filling up to 60 pixels gained nothing.
 constexpr double fill_radians = 0.038;
+/// Of window_scale, for fused frames, whose flat surfaces a wider window levels, and what that takes to be on its plane.
+constexpr double fused_window = 0.5;
+constexpr float fused_wide_sigmas = 4;
+
 int fill_px_for(const Pinhole& camera) {
     return std::clamp(static_cast<int>(std::lround(fill_radians * camera.fx)), 4, 64);
 }
@@ -49,7 +54,7 @@ std::uint32_t marks_of(cv::Size size) {
 }
 
 /// Frames are fused or holes filled, not both.
-std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bool planes, bool fuse, bool waves,
+std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bool planes, bool fuse, bool wide,
                                           bool fill) {
     using Host = gpu::BufferRow::Host;
     constexpr auto floats = gpu::BufferRow::Texels::r32f;
@@ -69,15 +74,27 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
         if (fuse) {
             buffers.insert(buffers.end(), {{"others", shared::most_neighbours * pixels * 4, Host::taken, floats},
                                            {"fused", pixels * 4, Host::none, floats},
-                                           {"relief", pixels * 4, Host::none, floats}});
-            passes.push_back({"fuse", "fit_plane/fuse", {kept, others_in}, {fused, relief}, groups, {}});
+                                           {"relief", pixels * 4, Host::none, floats},
+                                           {"ends", 2 * pixels * 4, Host::none, gpu::BufferRow::Texels::r32ui}});
+            passes.push_back({"clear ends", "", {}, {ends}, {1, 1, 1}, {}});
+            passes.push_back({"splat",
+                              "fit_plane/splat",
+                              {kept, others_in},
+                              {ends},
+                              {groups[0], groups[1], shared::most_neighbours},
+                              {}});
+            passes.push_back({"fuse", "fit_plane/fuse", {kept, others_in, ends}, {fused, relief}, groups, {}});
+        } else {
+            passes.push_back(
+                {"average", "fit_plane/average", {kept}, {averages}, groups_of(shared::average_rows), {}});
         }
-        const std::vector<std::pair<int, int>> is_fused{{shared::spec_fused, fuse}};
-        const std::vector<std::pair<int, int>> fits{{shared::spec_fused, fuse}, {shared::spec_waves, waves}};
-        const int samples = fuse ? fused : kept, errs = fuse ? relief : kept; // unread without
-        passes.push_back(
-            {"average", "fit_plane/average", {samples, errs}, {averages}, groups_of(shared::average_rows), is_fused});
-        passes.push_back({"fit plane", "fit_plane/fit", {averages, errs}, {depth_out, normals_out}, groups, fits});
+        const std::vector<int> samples = fuse ? std::vector<int>{fused, relief} : std::vector<int>{averages, kept};
+        passes.push_back({"fit plane",
+                          "fit_plane/fit",
+                          samples, // the second one is unread without fused frames
+                          {depth_out, normals_out},
+                          groups,
+                          {{shared::spec_fused, fuse}, {shared::spec_wide, wide}}});
         if (fill) {
             const std::uint32_t words = marks_of(size);
             buffers.insert(buffers.end(),
@@ -119,23 +136,24 @@ void FitPlane::prepare(const DepthImage& depth, std::span<const OtherDepth> othe
     for (const OtherDepth& other : others) // before any is taken: a run that fails must leave nothing to the next
         if (other.camera.size != size)
             throw Error("another frame of another image size");
-    // Averages over frames have lost most of the waves: there a wider window took errors from 0.118 to 0.121 (office).
-    const bool waves = !fuse && class_of(noise_) == SensorClass::structured_light;
-    if (!program_ || size != size_ || fuse != fused_ || waves != waves_ || planes() != planes_)
-        program_ = program_for(device_, size, planes(), fuse, waves, !fuse && options_.fill_holes);
+    const bool wide = fuse || class_of(noise_) == SensorClass::structured_light;
+    if (!program_ || size != size_ || fuse != fused_ || wide != wide_ || planes() != planes_)
+        program_ = program_for(device_, size, planes(), fuse, wide, !fuse && options_.fill_holes);
     size_ = size;
     fused_ = fuse;
-    waves_ = waves;
+    wide_ = wide;
     planes_ = planes();
-    const double window =
+    double window =
         window_scale * noise_.correlation_px * noise_.correlation_px * options_.smoothing * options_.smoothing;
+    if (fuse)
+        window *= fused_window;
     constants_ = {{size.width, size.height},
                   depth.camera.on_gpu(),
                   static_cast<float>(noise_.floor_m),
                   static_cast<float>(noise_.per_z2),
                   static_cast<float>(window),
                   static_cast<float>(options_.largest_radius_px),
-                  static_cast<float>(3 * options_.smoothing),
+                  fuse ? fused_wide_sigmas : static_cast<float>(3 * options_.smoothing),
                   options_.drop_flying && noise_.flies() ? 1 : 0,
                   fill ? fill_px_for(depth.camera) : 0,
                   fuse ? static_cast<int>(others.size()) : 0,

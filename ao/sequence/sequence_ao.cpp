@@ -4,6 +4,7 @@
 #include "projection/base/stopwatch.h"
 
 #include <algorithm>
+#include <limits>
 #include <tbb/parallel_for_each.h>
 #include <tbb/task_arena.h>
 
@@ -246,6 +247,8 @@ const AoMap& SequenceAo::visibility(std::size_t index) {
     view.neighbours = neighbours;
     view.instant = options_.average > 0 ? static_cast<int>(index % 65536) : 0; // so that what is averaged differs
     slot.ao = method_.compute(view);
+    if (!slot.fused.empty())
+        slot.ao->visibility.setTo(std::numeric_limits<float>::quiet_NaN(), holes(slot));
     slot.remarks = method_.remarks();
     let_go(slot);
     timings_.insert(timings_.end(), method_.timings().begin(), method_.timings().end());
@@ -274,8 +277,12 @@ SequenceAoResult SequenceAo::compute(std::size_t index) {
         account("average", gather_.timings());
     }
     averaged_ = !others.empty();
-    const Slot& slot = slots_.at(index);
+    Slot& slot = slots_.at(index);
     result.depth = fit_ ? slot.fitted->depth : slot.depth;
+    if (!slot.fused.empty()) {
+        result.depth.z_m = result.depth.z_m.clone();
+        result.depth.z_m.setTo(0, holes(slot));
+    }
     result.fused = slot.fused;
     result.neighbours = slot.neighbours;
     result.left_out = slot.left_out;

@@ -18,7 +18,7 @@ namespace scanshade {
 
 /// A recording's frames can be fused, seen through each other, and averaged; 0 = not so.
 struct SequenceAoOptions {
-    int fuse = 8;     ///< frames around each that noisy depth is averaged with
+    int fuse = 12;    ///< frames around each that noisy depth is averaged with
     int layers = 6;   ///< other views whose surfaces occlude what a frame shows; of use to surfel and vxao
     int reach = 0;    ///< how many frames away these may be; 0 = as reach_for() has it, which the caller asks
     int average = 12; ///< frames around each whose visibility is averaged with its own
@@ -104,6 +104,8 @@ class SequenceAo {
     [[nodiscard]] const Facets& facets(Slot& slot);
     [[nodiscard]] View view_of(std::size_t index);
     static void let_go(Slot& slot);
+    /// Where the frame itself has no depth: holes that others have filled occlude, but have no value.
+    [[nodiscard]] cv::Mat1b holes(Slot& slot) { return cv::Mat1b(kept(slot).z_m <= 0); }
     [[nodiscard]] const PackedSurfaces& packed(std::size_t index);
     [[nodiscard]] const AoMap& visibility(std::size_t index);
     [[nodiscard]] Seen seen(std::size_t index);

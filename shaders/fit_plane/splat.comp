@@ -1,0 +1,30 @@
+// In recordings, before frames are fused: the nearest and the farthest surface that the neighbours saw where this frame has a
+// hole. One thread for each of their pixels. The order of threads changes nothing.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "shared/fit_plane.h"
+#include "lib/cheap.glsl"
+#include "lib/neighbour.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(binding = 0, r32f) readonly uniform imageBuffer kept;       // 1/z, `nowhere` where there is none
+layout(binding = 1, r32f) readonly uniform imageBuffer neighbours; // z of each, one image after the other
+layout(binding = 16, scalar) buffer Ends { uint ends[]; }; // of each pixel the bits of the greatest 1/z, then of the greatest z; 0 = none
+layout(binding = 32, scalar) uniform Constants { FitPlaneConstants constants; };
+
+void main() {
+    FitPlaneConstants k = constants;
+    ivec3 id = ivec3(gl_GlobalInvocationID);
+    if (id.z >= k.neighbours || any(greaterThanEqual(id.xy, k.size))) return;
+    NeighbourPlace place = constants.places[id.z];
+    float z = imageLoad(neighbours, (id.z * k.size.y + id.y) * k.size.x + id.x).x;
+    vec3 point = point_here(ray_there(vec2(id.xy), place) * z, place);
+    vec2 at = vec2(k.camera.fx, k.camera.fy) * point.xy / point.z + vec2(k.camera.cx, k.camera.cy);
+    bool sees = z > 0.0 && point.z > 0.0 && all(greaterThan(at, vec2(-0.5))) && all(lessThan(at, vec2(k.size) - 0.5));
+    if (!sees) return;
+    int there = nearest(at.y) * k.size.x + nearest(at.x);
+    if (imageLoad(kept, there).x > 0.0) return;
+    atomicMax(ends[there], floatBitsToUint(1.0 / point.z)); // bits of positive numbers order as these do
+    atomicMax(ends[k.size.x * k.size.y + there], floatBitsToUint(point.z));
+}
