@@ -41,7 +41,8 @@ constexpr double window_scale = 1.8;
 /// The widest hole that is filled: an angle, 20 pixels of a Kinect. The shadow of structured light is wider close to
 /// the sensor, but filling up to 60 pixels gained nothing.
 constexpr double fill_radians = 0.038;
-/// Of window_scale, for fused frames, whose flat surfaces a wider window levels, and what that takes to be on its plane.
+/// Of window_scale, for fused frames, whose flat surfaces a wider window levels, and what that takes to be on its
+/// plane.
 constexpr double fused_window = 0.5;
 constexpr float fused_wide_sigmas = 4;
 
@@ -85,8 +86,7 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
                               {}});
             passes.push_back({"fuse", "fit_plane/fuse", {kept, others_in, ends}, {fused, relief}, groups, {}});
         } else {
-            passes.push_back(
-                {"average", "fit_plane/average", {kept}, {averages}, groups_of(shared::average_rows), {}});
+            passes.push_back({"average", "fit_plane/average", {kept}, {averages}, groups_of(shared::average_rows), {}});
         }
         const std::vector<int> samples = fuse ? std::vector<int>{fused, relief} : std::vector<int>{averages, kept};
         passes.push_back({"fit plane",

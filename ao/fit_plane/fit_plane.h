@@ -14,8 +14,8 @@
 
 namespace scanshade {
 
-/// Depth and normals of the same size as the input; holes stay holes, but for those that other frames fill. Normals are (0, 0, 0) where no plane fits, and
-/// empty where none were asked for.
+/// Depth and normals of the same size as the input; holes stay holes, but for those that other frames fill. Normals are
+/// (0, 0, 0) where no plane fits, and empty where none were asked for.
 struct FittedDepth {
     DepthImage depth;
     NormalImage normals;
@@ -54,7 +54,8 @@ class FitPlane {
     FitPlane(gpu::Device& device, const DepthNoise& noise, const FitPlaneOptions& options = {});
 
     /// With others, each pixel's depth is first averaged with what they saw of its surface, and the windows shrink with
-    /// what that leaves of sigma. Holes that they saw into are filled: such pixels occlude, but have no value of their own.
+    /// what that leaves of sigma. Holes that they saw into are filled: such pixels occlude, but have no value of their
+    /// own.
     [[nodiscard]] FittedDepth compute(const DepthImage& depth, std::span<const OtherDepth> others = {});
     /// The same of one frame, left on the device; planes() must hold.
     [[nodiscard]] FittedOnDevice compute_on_device(const DepthImage& depth);
