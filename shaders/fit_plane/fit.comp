@@ -117,7 +117,7 @@ void main() {
 
     Plane expected = slope_at(p, int(half_way), wc), first, plane;
     // A slope up to 45 degrees more is still the pixel's own surface in the first round.
-    float narrow = 1.0 / (3.0 * sigma_on(expected, sigma) * relief_here + steeper * radius * wc / k.camera.fx);
+    float narrow = 1.0 / (3.0 * sigma_on(expected, sigma) + steeper * radius * wc / k.camera.fx);
     bool good = solve(square(p, false, half_way, wc, expected, narrow), expected, first);
     float tolerance = 3.0 * sigma_on(first, sigma);
     narrow = 1.0 / (apart_sigmas * sigma_on(first, sigma) * relief_here);
