@@ -21,11 +21,10 @@ namespace {
 enum Buffers : int {
     recorded,
     kept,
-    averages,
+    samples, // what planes are fitted to: averages of one frame, or values of fused ones
     depth_out,
     normals_out,
     others_in,
-    fused,
     relief,
     ends,
     filled = others_in,
@@ -37,15 +36,14 @@ enum Buffers : int {
 /// simulated sensors. For correlated ones a somewhat lower value does. But a real Kinect's noise correlates over more
 /// pixels than the correlation length says, and its walls would stay mottled.
 constexpr double window_scale = 1.8;
+/// Fused frames: the share of window_scale, and within how many sigmas of a plane the wider window, which levels what
+/// is flat, takes a value to be on it.
+constexpr double fused_window = 0.5;
+constexpr float fused_wide_sigmas = 4;
 
 /// The widest hole that is filled: an angle, 20 pixels of a Kinect. The shadow of structured light is wider close to
 /// the sensor, but filling up to 60 pixels gained nothing.
 constexpr double fill_radians = 0.038;
-/// Of window_scale, for fused frames, whose flat surfaces a wider window levels, and what that takes to be on its
-/// plane.
-constexpr double fused_window = 0.5;
-constexpr float fused_wide_sigmas = 4;
-
 int fill_px_for(const Pinhole& camera) {
     return std::clamp(static_cast<int>(std::lround(fill_radians * camera.fx)), 4, 64);
 }
@@ -69,12 +67,11 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
                                         {"kept", pixels * 4, planes ? Host::none : Host::download, floats}};
     std::vector<gpu::PassRow> passes{{"flying pixels", "fit_plane/flying", {recorded}, {kept}, groups, {}}};
     if (planes) {
-        buffers.insert(buffers.end(), {{"averages", pixels * 4, Host::none, floats},
+        buffers.insert(buffers.end(), {{"samples", pixels * 4, Host::none, floats},
                                        {"depth out", pixels * 4, Host::download, floats},
                                        {"normals out", pixels * 12, Host::download, floats}});
         if (fuse) {
             buffers.insert(buffers.end(), {{"others", shared::most_neighbours * pixels * 4, Host::taken, floats},
-                                           {"fused", pixels * 4, Host::none, floats},
                                            {"relief", pixels * 4, Host::none, floats},
                                            {"ends", 2 * pixels * 4, Host::none, gpu::BufferRow::Texels::r32ui}});
             passes.push_back({"clear ends", "", {}, {ends}, {1, 1, 1}, {}});
@@ -84,14 +81,13 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
                               {ends},
                               {groups[0], groups[1], shared::most_neighbours},
                               {}});
-            passes.push_back({"fuse", "fit_plane/fuse", {kept, others_in, ends}, {fused, relief}, groups, {}});
+            passes.push_back({"fuse", "fit_plane/fuse", {kept, others_in, ends}, {samples, relief}, groups, {}});
         } else {
-            passes.push_back({"average", "fit_plane/average", {kept}, {averages}, groups_of(shared::average_rows), {}});
+            passes.push_back({"average", "fit_plane/average", {kept}, {samples}, groups_of(shared::average_rows), {}});
         }
-        const std::vector<int> samples = fuse ? std::vector<int>{fused, relief} : std::vector<int>{averages, kept};
         passes.push_back({"fit plane",
                           "fit_plane/fit",
-                          samples, // the second one is unread without fused frames
+                          {samples, fuse ? relief : kept}, // the second one is unread without fused frames
                           {depth_out, normals_out},
                           groups,
                           {{shared::spec_fused, fuse}, {shared::spec_wide, wide}}});

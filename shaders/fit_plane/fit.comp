@@ -97,7 +97,8 @@ float relief_at(int index) { return is_fused == 0 ? 1.0 : imageLoad(relief, inde
 // from their plane than averages do.
 const float no_plane = is_fused == 0 ? 0.6 : 0.3, one_plane = is_fused == 0 ? 0.85 : 0.6;
 
-// Fused frames tell smaller shapes: another slope may differ by less, and narrow windows take fewer samples, not closer ones.
+// Fused frames tell smaller shapes: another slope may differ by 26 degrees, not 45, and narrow windows take fewer samples, as
+// these cannot lie closer. Their values are no averages of 5x5 pixels, so they may lie farther from the plane.
 const float steeper = is_fused == 0 ? 0.7 : 0.35, apart_sigmas = is_fused == 0 ? 3.0 : 3.9;
 const float narrow_window = is_fused == 0 ? 0.0 : 3.0; // pixels
 
@@ -116,7 +117,8 @@ void main() {
     float half_way = max(radius * 0.5, 1.0);
 
     Plane expected = slope_at(p, int(half_way), wc), first, plane;
-    // A slope up to 45 degrees more is still the pixel's own surface in the first round.
+    // A slope up to 45 degrees more (`steeper`) is still the pixel's own surface in the first round. Fused frames keep a single
+    // frame's tolerance here, too: real ones err alike, and outliers would find no plane.
     float narrow = 1.0 / (3.0 * sigma_on(expected, sigma) + steeper * radius * wc / k.camera.fx);
     bool good = solve(square(p, false, half_way, wc, expected, narrow), expected, first);
     float tolerance = 3.0 * sigma_on(first, sigma);
