@@ -10,6 +10,7 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0, r32f) readonly uniform imageBuffer samples; // 1/z, `nowhere` where there is none
+layout(binding = 1, r32f) readonly uniform imageBuffer relief;
 layout(binding = 16, scalar) writeonly buffer Averages { float averages[]; };
 layout(binding = 32, scalar) uniform Constants { FitPlaneConstants constants; };
 
@@ -56,7 +57,7 @@ void main() {
         float b = slope_between(vec3(above2.b, above2.c, above2.d), vec3(below2.b, below2.c, below2.d), wc, 4.0);
         Plane expected = Plane(a, b, 0.0), plane;
         // A slope up to 45 degrees more is still the pixel's own surface.
-        float sigma = sigma_on(expected, sigma_of(zc) * wc * wc);
+        float sigma = sigma_on(expected, sigma_of(zc) * wc * wc) * relief_at(here);
         float narrow = 1.0 / (3.0 * sigma + 0.7 * 2.8 * wc / k.camera.fx);
         Sums sums = nothing;
         add_five(sums, -2.0, above2, wc, expected, narrow);

@@ -3,8 +3,8 @@
 // stay where they are.
 //
 // Two rounds of weighted least squares: the first weighs samples by their depth difference to the pixel, the second by their
-// distance from the plane. 25 and 49 averages spread over the window stand for all its pixels. On disparity and on
-// fused frames a third round tries a wider window.
+// distance from the plane. 25 and 49 averages spread over the window stand for all its pixels. On disparity a third round tries
+// a wider window.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -12,14 +12,13 @@
 #include "lib/cheap.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(binding = 0, r32f) readonly uniform imageBuffer samples; // averages of 1/z, `nowhere` where there is none; of fused frames the values
+layout(binding = 0, r32f) readonly uniform imageBuffer samples; // averages of 1/z, `nowhere` where there is none
 layout(binding = 1, r32f) readonly uniform imageBuffer relief;
 layout(binding = 16, scalar) writeonly buffer Depth { float depth_out[]; };
 layout(binding = 17, scalar) writeonly buffer Normals { vec3 normals_out[]; };
 layout(binding = 32, scalar) uniform Constants { FitPlaneConstants constants; };
 
-layout(constant_id = spec_fused) const int is_fused = 0;
-layout(constant_id = spec_wide) const int wide_too = 0;
+layout(constant_id = spec_waves) const int in_waves = 0;
 
 FitPlaneConstants k;
 #include "fit_plane/fit_plane.glsl"
@@ -90,17 +89,8 @@ Plane slope_at(ivec2 p, int reach, float w_here) {
     return Plane(inner && high.x - low.x == 2 * reach ? a : 0.0, inner && high.y - low.y == 2 * reach ? b : 0.0, 0.0);
 }
 
-// Of a single frame's sigma, what is left where several have been averaged.
-float relief_at(int index) { return is_fused == 0 ? 1.0 : imageLoad(relief, index).x; }
-
-// Of the greatest sum of weights, what a wider window must have to count at all, and to count alone. Single values lie farther
-// from their plane than averages do.
-const float no_plane = is_fused == 0 ? 0.6 : 0.3, one_plane = is_fused == 0 ? 0.85 : 0.6;
-
-// Fused frames tell smaller shapes: another slope may differ by 26 degrees, not 45, and narrow windows take fewer samples, as
-// these cannot lie closer. Their values are no averages of 5x5 pixels, so they may lie farther from the plane.
-const float steeper = is_fused == 0 ? 0.7 : 0.35, apart_sigmas = is_fused == 0 ? 3.0 : 3.9;
-const float narrow_window = is_fused == 0 ? 0.0 : 3.0; // pixels
+// Of the greatest sum of weights, what a wider window must have to count at all, and to count alone.
+const float no_plane = 0.6, one_plane = 0.85;
 
 float window_of(float z, float sigma) { return clamp(sqrt(k.window * sigma * k.camera.fx / z), 1.5, k.largest_radius); }
 
@@ -117,19 +107,16 @@ void main() {
     float half_way = max(radius * 0.5, 1.0);
 
     Plane expected = slope_at(p, int(half_way), wc), first, plane;
-    // A slope up to 45 degrees more (`steeper`) is still the pixel's own surface in the first round. Fused frames keep a single
-    // frame's tolerance here, too: real ones err alike, and outliers would find no plane.
-    float narrow = 1.0 / (3.0 * sigma_on(expected, sigma) + steeper * radius * wc / k.camera.fx);
+    // A slope up to 45 degrees more is still the pixel's own surface in the first round.
+    float narrow = 1.0 / (3.0 * sigma_on(expected, sigma) + 0.7 * radius * wc / k.camera.fx);
     bool good = solve(square(p, false, half_way, wc, expected, narrow), expected, first);
     float tolerance = 3.0 * sigma_on(first, sigma);
-    narrow = 1.0 / (apart_sigmas * sigma_on(first, sigma) * relief_here);
-    bool seven = radius > narrow_window;
-    good = solve(square(p, seven, max(radius * (seven ? 1.0 / 3.0 : 0.5), 1.0), wc, first, narrow), first, plane) && good;
+    narrow = 1.0 / (tolerance * relief_here);
+    good = solve(square(p, true, max(radius * (1.0 / 3.0), 1.0), wc, first, narrow), first, plane) && good;
 
     // Disparity comes from windows of pixels, so it errs in waves longer than this window. A window twice as wide levels
-    // them. Its plane counts by the share of samples that lie about it, so that edges, relief and curves keep theirs. Fused
-    // frames have narrow windows, which leave noise on what is flat.
-    if (wide_too == 1) {
+    // them. Its plane counts by the share of samples that lie about it, so that edges, relief and curves keep theirs.
+    if (in_waves == 1) {
         float wide_narrow = 1.0 / (k.wide_sigmas * sigma_on(plane, sigma) * relief_here);
         Sums wide = square(p, true, radius * (2.0 / 3.0), wc, plane, wide_narrow);
         Plane wider;

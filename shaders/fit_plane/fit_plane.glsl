@@ -1,5 +1,5 @@
 // A plane in 1/z through weighted samples: 1/z is linear in the image on any plane. Included by the passes of the plane fit,
-// which declare `samples`, their 1/z (`nowhere` where there is none), and `k`.
+// which declare `samples`, their 1/z (`nowhere` where there is none), `relief`, and `k`.
 //
 // Almost all time goes into taking up a sample, so that is kept short: no sample is asked whether it is a hole or lies outside
 // the image. Those are so far from what is expected that their weight is zero. And what a row has in common waits for its end.
@@ -68,6 +68,11 @@ bool solve(Sums s, Plane expected, out Plane plane) {
     if (good) plane = Plane(expected.a + a, expected.b + b, expected.c + mr - mx * a - my * b);
     return good;
 }
+
+layout(constant_id = spec_fused) const int is_fused = 0;
+
+// Of a single frame's sigma, what is left where several have been averaged.
+float relief_at(int index) { return is_fused == 0 ? 1.0 : imageLoad(relief, index).x; }
 
 float sigma_of(float z) { return k.noise_floor + k.noise_per_z2 * z * z; }
 

@@ -1,4 +1,4 @@
-// In recordings, between the first pass of depth preparation and the plane fit: the mean depth of a pixel's surface over this
+// In recordings, between the first and the second pass of depth preparation: the mean depth of a pixel's surface over this
 // frame and its neighbours. Frames that saw another surface there do not count.
 //
 // Holes take what neighbours saw there: shadows of the projector, and the outlines where a sensor mixed two surfaces. Of the

@@ -17,9 +17,9 @@ struct FitPlaneConstants {
     NeighbourPlace places[most_neighbours];
 };
 
-// Specialization constants. 1 = samples have been averaged over frames, and tell by how much less they err. 1 = a wider
-// window is tried, too; a uniform here would be compiled in anew for every capture.
-const int spec_fused = 0, spec_wide = 1;
+// Specialization constants. 1 = samples have been averaged over frames, and tell by how much less they err. 1 = they
+// err in waves (disparity), and a wider window is tried; a uniform here would be compiled in anew for every capture.
+const int spec_fused = 0, spec_waves = 1;
 
 // In place of 1/z where there is none: so far behind all surfaces that no fit gives it weight, and its square still is
 // a number.
