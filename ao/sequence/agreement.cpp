@@ -264,10 +264,12 @@ Agreement agreement(const Pair& pair, const Isometry3d& here_from_there) {
     std::vector<double> values = alignment_errors(all), metres = alignment_errors(all, true);
     if (values.empty())
         return {};
+    constexpr double largest = 0.5; // of what is tolerable
     const double met = static_cast<double>(values.size());
     const auto hiding = static_cast<double>(std::ranges::count(all, true, &Encounter::hides));
     const auto known = std::ranges::count_if(pair.there.all, [](const auto& facet) { return !facet.normal.isZero(); });
-    return {met / static_cast<double>(known), hiding / (met + hiding), quantile(metres, 0.9), quantile(values, 0.5)};
+    return {met / static_cast<double>(known), hiding / (met + hiding), quantile(metres, 0.9),
+            quantile(values, 0.5) / largest};
 }
 
 Aligned aligned(const Pair& pair, const Isometry3d& here_from_there) {

@@ -31,9 +31,9 @@ struct Agreement {
     double overlap = 0;      ///< share of them that meet the other's
     double contradicted = 0; ///< share of these and of those that would hide what the other has seen, of the latter
     double alignment_error_m = 0; ///< distance from the other's planes that nine tenths of the former stay below
-    double alignment_error =
-        0; ///< median of these distances in what is tolerable: 2 % of the AO's radius and the sensor's sigma
-    [[nodiscard]] bool fits() const { return overlap > 0.1 && contradicted < 0.15 && alignment_error < 0.5; }
+    double alignment_error = 0;   ///< median of these distances in the largest that fits: 1 % of the AO's radius and
+                                  ///< half the sensor's sigma
+    [[nodiscard]] bool fits() const { return overlap > 0.1 && contradicted < 0.15 && alignment_error < 1; }
 };
 
 /// Two frames, and what is tolerable between them.

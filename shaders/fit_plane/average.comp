@@ -1,5 +1,5 @@
 // Second pass of depth preparation: each pixel takes the value of a plane through its 5x5 surroundings. The few samples of the
-// next pass then represent all pixels of a large window.
+// next pass then represent all pixels of a large window. Fused frames have small windows, and 3x3 keep smaller shapes.
 //
 // A thread walks down a few pixels of a column, and of each one's surroundings loads only the row that is new.
 #version 460
@@ -34,13 +34,15 @@ Five five_at(ivec2 p) {
                 sample_at(line, p.x + 1, inside), sample_at(line, p.x + 2, inside));
 }
 
-void add_five(inout Sums sums, float y, Five w, float w_here, Plane plane, float narrow) {
+void add_line(inout Sums sums, float y, Five w, float w_here, Plane plane, float narrow) {
     float there = w_here + y * plane.b;
     Row row = row_from(w.c - there, narrow);
     add_pair(row, 1.0, w.b - there + plane.a, w.d - there - plane.a, narrow);
-    add_pair(row, 2.0, w.a - there + 2.0 * plane.a, w.e - there - 2.0 * plane.a, narrow);
+    if (is_fused == 0) add_pair(row, 2.0, w.a - there + 2.0 * plane.a, w.e - there - 2.0 * plane.a, narrow);
     add_row(sums, y, row);
 }
+
+const float corner = is_fused == 0 ? 2.8 : 1.4; // pixels to the farthest sample
 
 void main() {
     k = constants;
@@ -58,13 +60,13 @@ void main() {
         Plane expected = Plane(a, b, 0.0), plane;
         // A slope up to 45 degrees more is still the pixel's own surface.
         float sigma = sigma_on(expected, sigma_of(zc) * wc * wc) * relief_at(here);
-        float narrow = 1.0 / (3.0 * sigma + 0.7 * 2.8 * wc / k.camera.fx);
+        float narrow = 1.0 / (3.0 * sigma + 0.7 * corner * wc / k.camera.fx);
         Sums sums = nothing;
-        add_five(sums, -2.0, above2, wc, expected, narrow);
-        add_five(sums, -1.0, above, wc, expected, narrow);
-        add_five(sums, 0.0, middle, wc, expected, narrow);
-        add_five(sums, 1.0, below, wc, expected, narrow);
-        add_five(sums, 2.0, below2, wc, expected, narrow);
+        if (is_fused == 0) add_line(sums, -2.0, above2, wc, expected, narrow);
+        add_line(sums, -1.0, above, wc, expected, narrow);
+        add_line(sums, 0.0, middle, wc, expected, narrow);
+        add_line(sums, 1.0, below, wc, expected, narrow);
+        if (is_fused == 0) add_line(sums, 2.0, below2, wc, expected, narrow);
         solve(sums, expected, plane); // where none fits the plane is level, the pixel keeps its value
         averages[here] = hole ? nowhere : wc + plane.c;
         above2 = above;
