@@ -111,16 +111,24 @@ struct Measured {
     double z, sigma;
     double adjacent, distant; // the deviations by adjacent pixels, and over the shorter lag
     int lag_px;               // over which sigma was measured
+    bool smoothed;            // steps that the sensor has smoothed, as the deviations over both lags tell
     double weight;
 };
 
 /// Sigma from the mean of the smallest `share` of the differences, assumed Gaussian; `mean_of_share` is that mean for
 /// sigma 1. A second difference of three independent values has sqrt(6) times the deviation of one.
-double sigma_of(std::vector<float>& spread_m, double share, double mean_of_share) {
+double sigma_of_share(std::vector<float>& spread_m, double share, double mean_of_share) {
     const double count = share * static_cast<double>(spread_m.size());
     const auto at = spread_m.begin() + static_cast<std::ptrdiff_t>(count);
     std::nth_element(spread_m.begin(), at, spread_m.end());
     return std::accumulate(spread_m.begin(), at, 0.0) / count / (mean_of_share * std::sqrt(6.0));
+}
+double sigma_of_most(std::vector<float>& spread_m) { return sigma_of_share(spread_m, 0.8, 0.5586); }
+double sigma_of_few(std::vector<float>& spread_m) { return sigma_of_share(spread_m, 0.4, 0.2563); }
+double sigma_of_median(std::vector<float>& spread_m) {
+    const auto middle = spread_m.begin() + static_cast<std::ptrdiff_t>(spread_m.size() / 2);
+    std::nth_element(spread_m.begin(), middle, spread_m.end());
+    return *middle / (0.6745 * std::sqrt(6.0));
 }
 
 /// Sorts the values and drops duplicates.
@@ -142,21 +150,23 @@ double step_of(const std::vector<float>& depths_m) {
 /// The lower 80 % of |N(0, 1)| have the mean 0.5586, the lower 40 % 0.2563. Among clutter more than a fifth of the
 /// differences straddle an edge, so the smaller share decides. Quantised values are an exception: many
 /// differences are exactly zero there, and the steps are the noise: a value errs by a root of 1/12 of the step or more.
+/// A sensor that smooths steps leaves small differences on them and large ones between them: the smaller share tells
+/// too little, and the median decides. Then four fifths give no more than the median; with edges among them they would.
 /// Noise that a sensor has smoothed is larger over more pixels, and then no longer; surfaces go on to bend.
 Measured measured_in(Band& band) {
-    const double most = sigma_of(band.spread_m, 0.8, 0.5586), few = sigma_of(band.spread_m, 0.4, 0.2563);
-    const double step = step_of(band.depths_m);
-    const bool quantised = step >= 0.5 * most, by_most = quantised || few >= most;
-    const auto sigma_by = [by_most](std::vector<float>& differences) {
-        return by_most ? sigma_of(differences, 0.8, 0.5586) : sigma_of(differences, 0.4, 0.2563);
-    };
-    const double count = static_cast<double>(band.spread_m.size()), distant = std::max(by_most ? most : few, 1e-6);
-    Measured measured{band.z_sum / count, distant, sigma_by(band.adjacent_m), distant, lag_px, count};
+    const double most = sigma_of_most(band.spread_m), few = sigma_of_few(band.spread_m);
+    const double middle = sigma_of_median(band.spread_m), step = step_of(band.depths_m);
+    const bool quantised = step >= 0.5 * most, by_most = quantised || few >= most,
+               smoothed = !by_most && few < 0.9 * most && most < 1.1 * middle;
+    const auto sigma_of = by_most ? sigma_of_most : smoothed ? sigma_of_median : sigma_of_few;
+    const double count = static_cast<double>(band.spread_m.size()), distant = std::max(sigma_of(band.spread_m), 1e-6);
+    Measured measured{band.z_sum / count, distant, sigma_of(band.adjacent_m), distant, lag_px, false, count};
     if (std::min(band.far_m.size(), band.farther_m.size()) >= enough) {
-        const double far = sigma_by(band.far_m);
-        if (far > 1.3 * distant && far < 1.9 * distant && sigma_by(band.farther_m) < 1.35 * far) {
+        const double far = sigma_of(band.far_m);
+        if (far > 1.3 * distant && far < 1.9 * distant && sigma_of(band.farther_m) < 1.35 * far) {
             measured.sigma = far;
             measured.lag_px = far_px;
+            measured.smoothed = smoothed;
         }
     }
     if (quantised && band.spread_m.size() > 20 * band.depths_m.size())
@@ -171,13 +181,14 @@ double second_difference_variance(double lag, double s) {
     return 6 - 8 * correlation(lag) + 2 * correlation(2 * lag);
 }
 
-/// The deviation s of the correlation at which adjacent second differences are `ratio` times as large as distant ones.
-double correlation_of(double ratio) {
+/// The deviation s of the correlation at which second differences over the one lag are `ratio` times as large as over
+/// the other.
+double correlation_of(double ratio, int lag, int longer) {
     double low = 0.3, high = 3; // of s
     for (int i = 0; i < 30; ++i) {
         const double s = (low + high) / 2;
         const bool too_smooth =
-            second_difference_variance(1, s) < ratio * ratio * second_difference_variance(lag_px, s);
+            second_difference_variance(lag, s) < ratio * ratio * second_difference_variance(longer, s);
         (too_smooth ? high : low) = s;
     }
     return low;
@@ -366,10 +377,15 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
     if (std::all_of(points.begin(), points.end(),
                     [&](const Measured& p) { return seen.at(p.z) < std::max(1e-4 * p.z, 1.2e-4); }))
         return steps;
-    double ratios = 0, weights = 0;
-    for (const Measured& p : points)
+    double ratios = 0, weights = 0, smoothed_ratios = 0, smoothed = 0;
+    for (const Measured& p : points) {
         ratios += p.weight * p.adjacent / p.distant, weights += p.weight;
-    const double s = correlation_of(ratios / weights);
+        if (p.smoothed)
+            smoothed_ratios += p.weight * p.distant / p.sigma, smoothed += p.weight;
+    }
+    // Between steps, adjacent differences are large even where the sensor smooths.
+    const double s = smoothed > 0.2 * weights ? correlation_of(smoothed_ratios / smoothed, lag_px, far_px)
+                                              : correlation_of(ratios / weights, 1, lag_px);
     for (Measured& p : points) // what correlates over the lag is missing in the differences
         p.sigma *= std::sqrt(6 / second_difference_variance(p.lag_px, s));
     DepthNoise noise = law_through(points);

@@ -135,6 +135,37 @@ TEST(noise, correlation_length_is_that_of_the_sensors_window) {
     }
 }
 
+/// A Kinect whose driver smooths: on the steps of disparity hardly anything differs, and between them much.
+TEST(noise, smoothed_steps_hide_none_of_it) {
+    const Pinhole camera = test_camera({320, 240});
+    constexpr double step_per_z2 = 2.85e-3;
+    std::vector<DepthImage> images;
+    double squares = 0, count = 0; // of the errors in z^2
+    for (const double z : {1.5, 2.5, 4.0, 5.5}) {
+        const DepthImage clean = tilted_plane(camera, 20, z);
+        cv::Mat1f disparity = noisy(clean, {0, 2.5 * step_per_z2}, 0, static_cast<unsigned>(z * 10)).z_m;
+        disparity = 1 / disparity - 1 / clean.z_m; // white, then in waves, then in steps, then smoothed
+        cv::GaussianBlur(disparity, disparity, {}, 2.5);
+        disparity += 1 / clean.z_m;
+        for (float& w : disparity)
+            w = static_cast<float>(std::round(w / step_per_z2) * step_per_z2);
+        cv::GaussianBlur(disparity, disparity, {}, 1);
+        DepthImage recorded{camera, cv::Mat1f(1 / disparity), {}};
+        for (float& m : recorded.z_m)
+            m = std::round(m * 1000) / 1000;
+        for (int y = 10; y < 230; ++y)
+            for (int x = 10; x < 310; ++x) {
+                const double error = (recorded.z_m(y, x) - clean.z_m(y, x)) / std::pow(clean.z_m(y, x), 2);
+                squares += error * error, ++count;
+            }
+        images.push_back(recorded);
+    }
+    const DepthNoise measured = measure_noise(images);
+    const double per_z2 = std::sqrt(squares / count);
+    EXPECT_NEAR(measured.at(4) / 16, per_z2, 0.25 * per_z2) << describe(measured);
+    EXPECT_GT(measured.correlation_px, 5) << describe(measured);
+}
+
 /// The farthest wall of a Kinect's picture shows one value or two; its depth is not exact for that.
 TEST(noise, is_no_smaller_than_a_step_explains) {
     const Pinhole camera = test_camera({320, 240});
