@@ -42,7 +42,8 @@ void add_line(inout Sums sums, float y, Five w, float w_here, Plane plane, float
     add_row(sums, y, row);
 }
 
-const float corner = is_fused == 0 ? 2.8 : 1.4; // pixels to the farthest sample
+// A slope up to 45 degrees more is still the pixel's own surface; the farthest sample is 2.8 pixels away, or 1.4.
+const float own = is_fused == 0 ? 0.7 * 2.8 : 0.7 * 1.4;
 
 void main() {
     k = constants;
@@ -58,9 +59,8 @@ void main() {
         float a = slope_between(vec3(above.a, middle.a, below.a), vec3(above.e, middle.e, below.e), wc, 4.0);
         float b = slope_between(vec3(above2.b, above2.c, above2.d), vec3(below2.b, below2.c, below2.d), wc, 4.0);
         Plane expected = Plane(a, b, 0.0), plane;
-        // A slope up to 45 degrees more is still the pixel's own surface.
         float sigma = sigma_on(expected, sigma_of(zc) * wc * wc) * relief_at(here);
-        float narrow = 1.0 / (3.0 * sigma + 0.7 * corner * wc / k.camera.fx);
+        float narrow = 1.0 / (3.0 * sigma + own * wc / k.camera.fx);
         Sums sums = nothing;
         if (is_fused == 0) add_line(sums, -2.0, above2, wc, expected, narrow);
         add_line(sums, -1.0, above, wc, expected, narrow);
