@@ -57,11 +57,11 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
     using Host = gpu::BufferRow::Host;
     constexpr auto floats = gpu::BufferRow::Texels::r32f;
     const auto pixels = static_cast<std::size_t>(size.area());
-    const auto groups_of = [&](int rows) { // of 8x8 threads, each of that many pixels
+    const auto groups_of = [&](int columns, int rows) { // of 8x8 threads, each of that many pixels
         const auto tiles = [](int n, int of) { return static_cast<std::uint32_t>((n + of - 1) / of); };
-        return std::array<std::uint32_t, 3>{tiles(size.width, 8), tiles(size.height, 8 * rows), 1};
+        return std::array<std::uint32_t, 3>{tiles(size.width, 8 * columns), tiles(size.height, 8 * rows), 1};
     };
-    const std::array<std::uint32_t, 3> groups = groups_of(1);
+    const std::array<std::uint32_t, 3> groups = groups_of(1, 1);
     std::vector<gpu::BufferRow> buffers{{"recorded", pixels * 4, Host::upload, floats},
                                         {"kept", pixels * 4, planes ? Host::none : Host::download, floats}};
     std::vector<gpu::PassRow> passes{{"flying pixels", "fit_plane/flying", {recorded}, {kept}, groups, {}}};
@@ -75,19 +75,23 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
                                            {"relief", pixels * 4, Host::none, floats},
                                            {"ends", 2 * pixels * 4, Host::none, gpu::BufferRow::Texels::r32ui}});
             passes.push_back({"clear ends", "", {}, {ends}, {1, 1, 1}, {}});
-            passes.push_back({"splat",
-                              "fit_plane/splat",
-                              {kept, others_in},
-                              {ends},
-                              {groups[0], groups[1], shared::most_neighbours},
+            passes.push_back({"splat", "fit_plane/splat", {kept, others_in}, {ends}, groups_of(2, 2), {}});
+            passes.push_back({"fuse",
+                              "fit_plane/fuse",
+                              {kept, others_in, ends},
+                              {fused, relief},
+                              groups_of(1, shared::fused_rows),
                               {}});
-            passes.push_back({"fuse", "fit_plane/fuse", {kept, others_in, ends}, {fused, relief}, groups, {}});
         }
         const std::vector<std::pair<int, int>> is_fused{{shared::spec_fused, fuse}};
         const std::vector<std::pair<int, int>> fits{{shared::spec_fused, fuse}, {shared::spec_waves, waves}};
         const int samples = fuse ? fused : kept, errs = fuse ? relief : kept; // unread without
-        passes.push_back(
-            {"average", "fit_plane/average", {samples, errs}, {averages}, groups_of(shared::average_rows), is_fused});
+        passes.push_back({"average",
+                          "fit_plane/average",
+                          {samples, errs},
+                          {averages},
+                          groups_of(1, shared::average_rows),
+                          is_fused});
         passes.push_back({"fit plane", "fit_plane/fit", {averages, errs}, {depth_out, normals_out}, groups, fits});
         if (fill) {
             const std::uint32_t words = marks_of(size);

@@ -15,16 +15,20 @@ layout(binding = 32, scalar) uniform Constants { FitPlaneConstants constants; };
 
 void main() {
     FitPlaneConstants k = constants;
-    ivec3 id = ivec3(gl_GlobalInvocationID);
-    if (id.z >= k.neighbours || any(greaterThanEqual(id.xy, k.size))) return;
-    NeighbourPlace place = constants.places[id.z];
-    float z = imageLoad(neighbours, (id.z * k.size.y + id.y) * k.size.x + id.x).x;
-    vec3 point = point_here(ray_there(vec2(id.xy), place) * z, place);
-    vec2 at = vec2(k.camera.fx, k.camera.fy) * point.xy / point.z + vec2(k.camera.cx, k.camera.cy);
-    bool sees = z > 0.0 && point.z > 0.0 && all(greaterThan(at, vec2(-0.5))) && all(lessThan(at, vec2(k.size) - 0.5));
-    if (!sees) return;
-    int there = nearest(at.y) * k.size.x + nearest(at.x);
-    if (imageLoad(kept, there).x > 0.0) return;
-    atomicMax(ends[there], floatBitsToUint(1.0 / point.z)); // bits of positive numbers order as these do
-    atomicMax(ends[k.size.x * k.size.y + there], floatBitsToUint(point.z));
+    ivec2 block = ivec2(gl_GlobalInvocationID.xy) * 2;
+    if (any(greaterThanEqual(block, k.size))) return;
+    int count = not_compiled_in(k.neighbours, block.x), i = 0;
+    do {
+        NeighbourPlace place = constants.places[i];
+        ivec2 p = min(block + ivec2(i & 1, (i >> 1) & 1), k.size - 1);
+        float z = imageLoad(neighbours, (i * k.size.y + p.y) * k.size.x + p.x).x;
+        vec3 point = point_here(ray_there(vec2(p), place) * z, place);
+        vec2 at = vec2(k.camera.fx, k.camera.fy) * point.xy / point.z + vec2(k.camera.cx, k.camera.cy);
+        bool sees = z > 0.0 && point.z > 0.0 && all(greaterThan(at, vec2(-0.5))) && all(lessThan(at, vec2(k.size) - 0.5));
+        int there = sees ? nearest(at.y) * k.size.x + nearest(at.x) : 0;
+        if (sees && imageLoad(kept, there).x <= 0.0) {
+            atomicMax(ends[there], floatBitsToUint(1.0 / point.z)); // bits of positive numbers order as these do
+            atomicMax(ends[k.size.x * k.size.y + there], floatBitsToUint(point.z));
+        }
+    } while (++i < count);
 }
