@@ -1,5 +1,6 @@
 // In recordings, before frames are fused: the nearest and the farthest surface that the neighbours saw where this frame has a
-// hole. One thread for each of their pixels. The order of threads changes nothing.
+// hole. Of 2x2 pixels of each neighbour one takes part, from neighbour to neighbour another one: all of them would take four
+// times as long (50 ms on lavapipe), and fuse.comp finds what is missing beside it. The order of threads changes nothing.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
