@@ -151,8 +151,8 @@ double step_of(const std::vector<float>& depths_m) {
 /// differences straddle an edge, so the smaller share decides. Quantised values are an exception: many
 /// differences are exactly zero there, and the steps are the noise: a value errs by a root of 1/12 of the step or more.
 /// A sensor that smooths steps leaves small differences on them and large ones between them: the smaller share tells
-/// too little, and the median decides. Then four fifths give no more than the median; with edges among them they would.
-/// Noise that a sensor has smoothed is larger over more pixels, and then no longer; surfaces go on to bend.
+/// too little, and the median decides. Then four fifths give hardly more than the median; with edges among them they
+/// would. Noise that a sensor has smoothed is larger over more pixels, and then no longer; surfaces go on to bend.
 Measured measured_in(Band& band) {
     const double most = sigma_of_most(band.spread_m), few = sigma_of_few(band.spread_m);
     const double middle = sigma_of_median(band.spread_m), step = step_of(band.depths_m);

@@ -1,6 +1,7 @@
 // In recordings, before frames are fused: the nearest and the farthest surface that the neighbours saw where this frame has a
-// hole. Of 2x2 pixels of each neighbour one takes part, from neighbour to neighbour another one: all of them would take four
-// times as long (50 ms on lavapipe), and fuse.comp finds what is missing beside it. The order of threads changes nothing.
+// hole. Of 2x2 pixels of each neighbour one takes part, from neighbour to neighbour another one, or all where there are few
+// neighbours: all of twelve would take four times as long (50 ms on lavapipe), and of what is missing fuse.comp finds most beside
+// it. The order of threads changes nothing.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -18,10 +19,13 @@ void main() {
     FitPlaneConstants k = constants;
     ivec2 block = ivec2(gl_GlobalInvocationID.xy) * 2;
     if (any(greaterThanEqual(block, k.size))) return;
-    int count = not_compiled_in(k.neighbours, block.x), i = 0;
+    int each = k.neighbours < 4 ? 4 : 1, count = not_compiled_in(k.neighbours, block.x) * each, turn = 0;
     do {
+        int i = turn / each;
         NeighbourPlace place = constants.places[i];
-        ivec2 p = min(block + ivec2(i & 1, (i >> 1) & 1), k.size - 1);
+        // They come from before and from after this frame in turns: four in a row take all four pixels, and so do four of either side.
+        int corner = (each == 4 ? turn : (i >> 1) + 2 * (i & 1)) & 3;
+        ivec2 p = min(block + ivec2(corner == 1 || corner == 2 ? 1 : 0, corner & 1), k.size - 1);
         float z = imageLoad(neighbours, (i * k.size.y + p.y) * k.size.x + p.x).x;
         vec3 point = point_here(ray_there(vec2(p), place) * z, place);
         vec2 at = vec2(k.camera.fx, k.camera.fy) * point.xy / point.z + vec2(k.camera.cx, k.camera.cy);
@@ -31,5 +35,5 @@ void main() {
             atomicMax(ends[there], floatBitsToUint(1.0 / point.z)); // bits of positive numbers order as these do
             atomicMax(ends[k.size.x * k.size.y + there], floatBitsToUint(point.z));
         }
-    } while (++i < count);
+    } while (++turn < count);
 }
