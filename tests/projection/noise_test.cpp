@@ -3,6 +3,7 @@
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/frame.h"
 #include "ao/gpu/device.h"
+#include "ao/gpu/image_upload.h"
 #include "projection/base/error.h"
 #include "tests/support/says.h"
 #include "tests/support/scenes.h"
@@ -345,6 +346,33 @@ TEST(fit_plane, edges_stay_within_a_pixel) {
     for (int y = 0; y < z.rows; ++y)
         for (int x = 0; x < z.cols; ++x)
             ASSERT_NEAR(z(y, x), x < 160 ? 2.0 : 2.3, 0.06) << x << ", " << y;
+}
+
+TEST(fit_plane, a_hole_that_few_other_frames_saw_is_filled_everywhere) {
+    // A wall whose middle this frame has lost, and outlines of one pixel; the others stand 5 mm to the side.
+    const Pinhole camera = test_camera({320, 240});
+    const DepthNoise kinect{0.0012, 0.0018};
+    const DepthImage wall = noisy({camera, cv::Mat1f(camera.size, 2.0F), {}}, kinect);
+    DepthImage lost{camera, wall.z_m.clone(), {}};
+    lost.z_m(cv::Rect(100, 60, 80, 100)) = 0;
+    for (int i = 20; i < 80; ++i)
+        lost.z_m(i, i) = lost.z_m(i, 300) = 0;
+    gpu::ImageUpload upload(device());
+    for (const int count : {1, 2, 3}) {
+        std::vector<OtherDepth> others;
+        for (int i = 0; i < count; ++i) {
+            const DepthImage seen =
+                noisy({camera, cv::Mat1f(camera.size, 2.0F), {}}, kinect, 0, 5U + static_cast<unsigned>(i));
+            Eigen::Isometry3d aside = Eigen::Isometry3d::Identity();
+            aside.translation().x() = i % 2 == 0 ? 0.005 : -0.005;
+            others.push_back({camera, upload(seen.z_m), aside});
+        }
+        const cv::Mat1f z = FitPlane(device(), kinect).compute(lost, others).depth.z_m;
+        const cv::Mat1b missing = z(cv::Rect(5, 5, 310, 230)) <= 0;
+        EXPECT_LT(cv::countNonZero(missing), 10) << count << " others";
+        cv::Mat1b wrong = (cv::abs(z - 2) > 0.05) & (z > 0);
+        EXPECT_LT(cv::countNonZero(wrong), 10) << count << " others";
+    }
 }
 
 TEST(fit_plane, a_surface_beyond_what_noise_explains_hardly_counts) {
