@@ -154,12 +154,18 @@ double step_of(const std::vector<float>& depths_m) {
 /// too little, and the median decides. Then four fifths give hardly more than the median; with edges among them they
 /// would. Noise that a sensor has smoothed is larger over more pixels, and then no longer; surfaces go on to bend.
 Measured measured_in(Band& band) {
-    const double most = sigma_of_most(band.spread_m), few = sigma_of_few(band.spread_m);
-    const double middle = sigma_of_median(band.spread_m), step = step_of(band.depths_m);
-    const bool quantised = step >= 0.5 * most, by_most = quantised || few >= most,
-               smoothed = !by_most && few < 0.9 * most && most < 1.1 * middle;
-    const auto sigma_of = by_most ? sigma_of_most : smoothed ? sigma_of_median : sigma_of_few;
-    const double count = static_cast<double>(band.spread_m.size()), distant = std::max(sigma_of(band.spread_m), 1e-6);
+    const double most = sigma_of_most(band.spread_m), few = sigma_of_few(band.spread_m), step = step_of(band.depths_m);
+    const bool quantised = step >= 0.5 * most, by_most = quantised || few >= most;
+    double sigma = by_most ? most : few;
+    auto* sigma_of = by_most ? sigma_of_most : sigma_of_few;
+    bool smoothed = false;
+    if (!by_most && few < 0.9 * most)
+        if (const double middle = sigma_of_median(band.spread_m); most < 1.1 * middle) {
+            smoothed = true;
+            sigma = middle;
+            sigma_of = sigma_of_median;
+        }
+    const double count = static_cast<double>(band.spread_m.size()), distant = std::max(sigma, 1e-6);
     Measured measured{band.z_sum / count, distant, sigma_of(band.adjacent_m), distant, lag_px, false, count};
     if (std::min(band.far_m.size(), band.farther_m.size()) >= enough) {
         const double far = sigma_of(band.far_m);

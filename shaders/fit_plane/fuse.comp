@@ -50,7 +50,7 @@ vec4 farther_of(int i, vec4 z, Column column) {
 }
 
 // Of what all frames saw along the rays about depths z. A second round is about the first one's mean, so that it leans to no frame.
-Means means_about(vec4 z, Column column, int count) {
+Means means_about(vec4 z, Column column) {
     vec4 narrow = 1.0 / (3.5 * (k.noise_floor + k.noise_per_z2 * z * z));
     vec4 apart[most_neighbours], sum = vec4(0.0), weights = column.own;
     int i = 0;
@@ -59,7 +59,7 @@ Means means_about(vec4 z, Column column, int count) {
         apart[i] = e;
         weights += weight;
         sum += weight * e;
-    } while (++i < count);
+    } while (++i < k.neighbours);
     vec4 middle = sum / max(weights, 1e-6);
     weights = column.own * positive(1.0 - middle * middle);
     sum = vec4(0.0);
@@ -68,7 +68,7 @@ Means means_about(vec4 z, Column column, int count) {
         vec4 e = apart[i], from_middle = e - middle, weight = positive(1.0 - from_middle * from_middle);
         weights += weight;
         sum += weight * e;
-    } while (++i < count);
+    } while (++i < k.neighbours);
     return Means(z + sum / (max(weights, 1e-6) * narrow), weights);
 }
 
@@ -105,9 +105,9 @@ void main() {
     vec4 z = 1.0 / mix(mix(vec4(1.0), nearest_w, fills), w, seen);
     Column column = Column(ray_through(k.camera, vec2(p)), vec3(0.0, 1.0 / k.camera.fy, 0.0), vec4(seen));
     Means means = Means(z, vec4(0.0));
-    int count = not_compiled_in(k.neighbours, at.x), hypotheses = any(fills) ? 2 : 1, hypothesis = 0;
+    int hypotheses = any(fills) ? 2 : 1, hypothesis = 0;
     do {
-        Means found = means_about(z, column, count);
+        Means found = means_about(z, column);
         bvec4 takes = hypothesis == 0 ? bvec4(true) : lessThan(mix(vec4(nothing), means.weights, fills), 2.0 * found.weights);
         means = Means(mix(means.z, found.z, takes), mix(means.weights, found.weights, takes));
         z = mix(z, farthest_z, fills);

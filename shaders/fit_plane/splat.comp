@@ -19,12 +19,12 @@ void main() {
     FitPlaneConstants k = constants;
     ivec2 block = ivec2(gl_GlobalInvocationID.xy) * 2;
     if (any(greaterThanEqual(block, k.size))) return;
-    int each = k.neighbours < 4 ? 4 : 1, count = not_compiled_in(k.neighbours, block.x) * each, turn = 0;
+    int corners = k.neighbours < 4 ? 4 : 1, count = not_compiled_in(k.neighbours, block.x) * corners, turn = 0;
     do {
-        int i = turn / each;
+        int i = turn / corners;
         NeighbourPlace place = constants.places[i];
         // They come from before and from after this frame in turns: four in a row take all four pixels, and so do four of either side.
-        int corner = (each == 4 ? turn : (i >> 1) + 2 * (i & 1)) & 3;
+        int corner = (corners == 4 ? turn : (i >> 1) + 2 * (i & 1)) & 3;
         ivec2 p = min(block + ivec2(corner == 1 || corner == 2 ? 1 : 0, corner & 1), k.size - 1);
         float z = imageLoad(neighbours, (i * k.size.y + p.y) * k.size.x + p.x).x;
         vec3 point = point_here(ray_there(vec2(p), place) * z, place);

@@ -23,5 +23,5 @@ int index_there(int i, vec2 at, ivec2 size, bool seen) {
 }
 
 // A count for loops. Lavapipe (Mesa 22.3) compiles a shader anew on every run in which a uniform alone ends a loop that it can
-// unroll, and keeps each: `fuse` took 12 KB and its compile time a frame. `index` >= 0 is any that differs between threads.
+// unroll, and keeps each: one pass took 12 KB and its compile time a frame. `index` >= 0 is any that differs between threads.
 int not_compiled_in(int count, int index) { return max(count, min(index, 0)); }

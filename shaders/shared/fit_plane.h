@@ -28,7 +28,7 @@ const float nowhere = -1e17f;
 // Threads of a group of the pass that marks filled pixels, each for a word of as many bits.
 const int mark_group = 64, marks_a_word = 32;
 
-// Pixels of a column that one thread averages around, and that it fuses.
+// Pixels of a column that one thread averages around, and that it fuses: as many as a vec4 has.
 const int average_rows = 4, fused_rows = 4;
 
 SHARED_END
