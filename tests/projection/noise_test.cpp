@@ -368,9 +368,9 @@ TEST(fit_plane, a_hole_that_few_other_frames_saw_is_filled_everywhere) {
             others.push_back({camera, upload(seen.z_m), aside});
         }
         const cv::Mat1f z = FitPlane(device(), kinect).compute(lost, others).depth.z_m;
-        const cv::Mat1b missing = z(cv::Rect(5, 5, 310, 230)) <= 0;
+        const cv::Mat1b missing(z(cv::Rect(5, 5, 310, 230)) <= 0);
         EXPECT_LT(cv::countNonZero(missing), 10) << count << " others";
-        cv::Mat1b wrong = (cv::abs(z - 2) > 0.05) & (z > 0);
+        const cv::Mat1b wrong((cv::abs(z - 2) > 0.05) & (z > 0));
         EXPECT_LT(cv::countNonZero(wrong), 10) << count << " others";
     }
 }
