@@ -142,7 +142,7 @@ const ErrorTables& shipped_error_tables() {
 }
 
 shared::ErrorTable errors_of(const ErrorTables& tables, const std::string& method, const ChosenSettings& settings,
-                             SensorClass sensor, bool together) {
+                             SensorClass sensor, double together) {
     const MethodErrors* errors = known(tables, method, sensor);
     if (!errors)
         errors = known(tables, method, SensorClass::structured_light);
@@ -150,7 +150,7 @@ shared::ErrorTable errors_of(const ErrorTables& tables, const std::string& metho
         errors = known(tables, "cacao", sensor);
     if (!errors)
         return {};
-    float factor = together ? errors->together : 0;
+    float factor = static_cast<float>(together) * errors->together;
     std::size_t most = 0;
     float of_variant = 0;
     for (const ErrorVariant& variant : errors->variants)

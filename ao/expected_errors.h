@@ -46,9 +46,9 @@ struct ErrorTables {
 
 /// What to expect of a method with these settings, on depth with that noise: of the variants of which all settings
 /// match, the one with most. A method or class without a table gets that of the default method, or of the class that
-/// errs most. `together`: with other frames of the recording.
+/// errs most. `together`: from 0, by itself, to 1, with as many frames of the recording as the tables were made with.
 [[nodiscard]] shared::ErrorTable errors_of(const ErrorTables& tables, const std::string& method,
-                                           const ChosenSettings& settings, SensorClass sensor, bool together);
+                                           const ChosenSettings& settings, SensorClass sensor, double together);
 
 /// A table of squared errors 2^factor times as large.
 [[nodiscard]] shared::ErrorTable scaled(shared::ErrorTable table, float factor);

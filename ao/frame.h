@@ -48,8 +48,8 @@ class FrameAo {
     /// What makes confidence and pictures of frames on this device; null where there is none.
     [[nodiscard]] Finishers* finishers() const { return finishers_.get(); }
 
-    /// What to expect of the method's errors on depth with that noise; `together`: in sequence().
-    [[nodiscard]] shared::ErrorTable errors(const DepthNoise& noise, bool together = false) const {
+    /// What to expect of the method's errors on depth with that noise; `together`: as in errors_of().
+    [[nodiscard]] shared::ErrorTable errors(const DepthNoise& noise, double together = 0) const {
         return errors_of(shipped_error_tables(), name_, settings_, class_of(noise), together);
     }
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fmt/format.h>
+#include <limits>
 #include <numbers>
 #include <numeric>
 #include <optional>
@@ -18,19 +19,21 @@
 namespace scanshade {
 namespace {
 
-constexpr int lag_px = 4;  // longer than most sensors' own smoothing, shorter than most surfaces
-constexpr int far_px = 8;  // for sensors that smooth more
+constexpr int lag_px = 4; // longer than most sensors' own smoothing, shorter than most surfaces
+constexpr int far_px = 8; // areas of one value are so large
+constexpr std::array<int, 3> longer_px{8, 12, 16};
 constexpr int step_px = 3; // every third pixel of every third row is plenty
 constexpr int bands = 24;  // equal steps of log z over 0.2 .. 50 m
 constexpr double nearest_m = 0.2, farthest_m = 50;
-constexpr std::size_t enough = 400; // samples a band needs
+constexpr std::size_t enough = 400;        // samples a band needs
+constexpr double least_disparity_px = 2.8; // correlation length
+constexpr double much_missing = 1.15;      // of sigma by differences over lag_px, whose pixels correlate
 
 struct Band {
     std::vector<float> spread_m;   // |second difference| of depth
     std::vector<float> adjacent_m; // of neighbouring pixels
-    std::vector<float> far_m;      // over far_px
-    std::vector<float> farther_m;  // over twice far_px
-    std::vector<float> depths_m;   // at their middles; keep_distinct() reduces them to the distinct values
+    std::array<std::vector<float>, longer_px.size()> longer_m;
+    std::vector<float> depths_m; // at their middles; keep_distinct() reduces them to the distinct values
     double z_sum = 0;
 };
 
@@ -98,21 +101,21 @@ void collect(const cv::Mat1f& z, std::array<Band, bands>& all) {
                     continue;
                 band.spread_m.push_back(d);
                 band.adjacent_m.push_back(adjacent);
-                for (const auto& [lag, differences] :
-                     {std::pair{far_px, &band.far_m}, std::pair{2 * far_px, &band.farther_m}})
-                    if (const float far = second_difference(z, x, y, lag * dx, lag * dy); far >= 0)
-                        differences->push_back(far);
+                for (std::size_t i = 0; i < longer_px.size(); ++i)
+                    if (const float far = second_difference(z, x, y, longer_px[i] * dx, longer_px[i] * dy); far >= 0)
+                        band.longer_m[i].push_back(far);
                 band.z_sum += c;
             }
         }
 }
 
 struct Measured {
-    double z, sigma;
-    double adjacent, distant; // the deviations by adjacent pixels, and over the shorter lag
-    int lag_px;               // over which sigma was measured
-    bool smoothed;            // steps that the sensor has smoothed, as the deviations over both lags tell
+    double z;
+    double sigma;             // by differences over lag_px
+    double wide_sigma;        // by those over more pixels, too
+    double adjacent, distant; // the deviations by adjacent pixels, and over lag_px, steps as they are
     double weight;
+    bool hidden = false; // smaller than what a step explains: most values are on the same one
 };
 
 /// Sigma from the mean of the smallest `share` of the differences, assumed Gaussian; `mean_of_share` is that mean for
@@ -147,36 +150,69 @@ double step_of(const std::vector<float>& depths_m) {
     return median(std::move(gaps));
 }
 
+/// Variance of one value by its smallest differences. Those of values in steps are whole steps, half of them often 0,
+/// which tells nothing of how large they are: spread evenly over a step (dithered) they tell it, and more by the
+/// variance of that (Sheppard). A sensor that smooths steps leaves small differences on them and large ones between
+/// them: the smallest tell too little, and the median too much. Then four fifths give hardly more than the median; with
+/// edges among them they would.
+double variance_of(std::vector<float>& spread_m, double step_m) {
+    double place = 0;
+    for (float& value : spread_m) {
+        place += std::numbers::phi - 1; // never near where it has been
+        place -= std::floor(place);
+        value = std::abs(value + static_cast<float>(step_m * (place - 0.5)));
+    }
+    const double few = sigma_of_few(spread_m), most = sigma_of_most(spread_m), middle = sigma_of_median(spread_m);
+    const double without_edges = std::clamp((1.2 * middle - most) / (0.1 * middle), 0.0, 1.0);
+    const double sigma = few + 0.5 * without_edges * std::max(middle - few, 0.0);
+    return std::max(sigma * sigma - step_m * step_m / 72, 0.0);
+}
+
+/// The variance that noise has over more pixels than lag_px, over which it has `variance`, where the sensor takes
+/// depths from windows of pixels. Surfaces that bend or end have a share of the differences that grows with the square
+/// of the lag, or faster. The lags between which least is added tell that share; what is left of the others is noise.
+double wide_variance(double variance, Band& band, double step_m) {
+    constexpr double least = 0.5, most = 2.5 * 2.5; // what grows faster is fine structure
+    constexpr double slack = 0.2;                   // so much more than over lag_px are surfaces
+    std::array<double, longer_px.size()> longer{};
+    double surfaces = std::numeric_limits<double>::infinity(), before = variance; // per square of the lag
+    for (std::size_t i = 0; i < longer_px.size(); ++i) {
+        if (band.longer_m[i].size() < enough)
+            return variance;
+        longer[i] = variance_of(band.longer_m[i], step_m);
+        const int lag = longer_px[i], shorter = i > 0 ? longer_px[i - 1] : lag_px;
+        surfaces = std::min(surfaces, std::max(longer[i] - before, 0.0) / (lag * lag - shorter * shorter));
+        before = longer[i];
+    }
+    const double near = std::max(variance - surfaces * lag_px * lag_px, least * variance);
+    double noise = near;
+    for (std::size_t i = 0; i + 1 < longer_px.size(); ++i)
+        noise = std::max(noise, longer[i] - surfaces * longer_px[i] * longer_px[i]);
+    return std::clamp(noise - slack * near, near, most * near);
+}
+
 /// The lower 80 % of |N(0, 1)| have the mean 0.5586, the lower 40 % 0.2563. Among clutter more than a fifth of the
-/// differences straddle an edge, so the smaller share decides. Quantised values are an exception: many
-/// differences are exactly zero there, and the steps are the noise: a value errs by a root of 1/12 of the step or more.
-/// A sensor that smooths steps leaves small differences on them and large ones between them: the smaller share tells
-/// too little, and the median decides. Then four fifths give hardly more than the median; with edges among them they
-/// would. Noise that a sensor has smoothed is larger over more pixels, and then no longer; surfaces go on to bend.
+/// differences straddle an edge, so the smaller share decides. A value that comes in steps errs by a root of 1/12 of
+/// the step or more.
 Measured measured_in(Band& band) {
     const double most = sigma_of_most(band.spread_m), few = sigma_of_few(band.spread_m), step = step_of(band.depths_m);
     const bool quantised = step >= 0.5 * most, by_most = quantised || few >= most;
-    double sigma = by_most ? most : few;
-    auto* sigma_of = by_most ? sigma_of_most : sigma_of_few;
-    bool smoothed = false;
-    if (!by_most && few < 0.9 * most)
-        if (const double middle = sigma_of_median(band.spread_m); most < 1.1 * middle) {
-            smoothed = true;
-            sigma = middle;
-            sigma_of = sigma_of_median;
-        }
-    const double count = static_cast<double>(band.spread_m.size()), distant = std::max(sigma, 1e-6);
-    Measured measured{band.z_sum / count, distant, sigma_of(band.adjacent_m), distant, lag_px, false, count};
-    if (std::min(band.far_m.size(), band.farther_m.size()) >= enough) {
-        const double far = sigma_of(band.far_m);
-        if (far > 1.3 * distant && far < 1.9 * distant && sigma_of(band.farther_m) < 1.35 * far) {
-            measured.sigma = far;
-            measured.lag_px = far_px;
-            measured.smoothed = smoothed;
-        }
+    const double adjacent = by_most ? sigma_of_most(band.adjacent_m) : sigma_of_few(band.adjacent_m);
+    const double count = static_cast<double>(band.spread_m.size());
+    const bool in_steps = count > 20 * static_cast<double>(band.depths_m.size()); // else the gaps are of chance
+    const double dither = in_steps ? step : 0, variance = std::max(variance_of(band.spread_m, dither), 1e-12);
+    Measured measured{.z = band.z_sum / count,
+                      .sigma = std::sqrt(variance),
+                      .wide_sigma = std::sqrt(wide_variance(variance, band, dither)),
+                      .adjacent = adjacent,
+                      .distant = std::max(by_most ? most : few, 1e-6),
+                      .weight = count};
+    if (quantised && in_steps) {
+        const double of_step = step / std::sqrt(12.0);
+        measured.hidden = measured.sigma < of_step;
+        measured.sigma = std::max(measured.sigma, of_step);
+        measured.wide_sigma = std::max(measured.wide_sigma, of_step);
     }
-    if (quantised && band.spread_m.size() > 20 * band.depths_m.size())
-        measured.sigma = std::max(measured.sigma, step / std::sqrt(12.0));
     return measured;
 }
 
@@ -187,17 +223,30 @@ double second_difference_variance(double lag, double s) {
     return 6 - 8 * correlation(lag) + 2 * correlation(2 * lag);
 }
 
-/// The deviation s of the correlation at which second differences over the one lag are `ratio` times as large as over
-/// the other.
-double correlation_of(double ratio, int lag, int longer) {
+/// The deviation s of the correlation at which second differences of adjacent pixels are `ratio` times as large as over
+/// lag_px.
+double correlation_of(double ratio) {
     double low = 0.3, high = 3; // of s
     for (int i = 0; i < 30; ++i) {
         const double s = (low + high) / 2;
         const bool too_smooth =
-            second_difference_variance(lag, s) < ratio * ratio * second_difference_variance(longer, s);
+            second_difference_variance(1, s) < ratio * ratio * second_difference_variance(lag_px, s);
         (too_smooth ? high : low) = s;
     }
     return low;
+}
+
+/// The integral of that correlation.
+double length_of(double s) { return std::sqrt(2 * std::numbers::pi) * s; }
+
+/// Where most values are on one step, little is known of their noise. Other depths tell more, if there are enough.
+void forget_hidden(std::vector<Measured>& points) {
+    constexpr double enough_share = 0.2;
+    double told = 0, all = 0;
+    for (const Measured& p : points)
+        told += p.hidden ? 0 : p.weight, all += p.weight;
+    if (told > enough_share * all)
+        std::erase_if(points, [](const Measured& p) { return p.hidden; });
 }
 
 /// The step, if steps grow with that power of z, and the share of the gaps between distinct values that equal it.
@@ -303,7 +352,8 @@ JumpCounts jumps_of(std::span<const DepthImage> images) {
     return sums;
 }
 
-/// floor + per_z2 z^2 through the bands by least squares of relative error, both terms at least zero.
+/// floor + per_z2 z^2 through the bands by least squares of relative error, both terms at least zero. Relative to each
+/// band's sigma, since clutter only adds to these: the smaller ones are to be believed.
 DepthNoise law_through(const std::vector<Measured>& points) {
     double s00 = 0, s01 = 0, s11 = 0, t0 = 0, t1 = 0;
     for (const Measured& p : points) {
@@ -383,17 +433,18 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
     if (std::all_of(points.begin(), points.end(),
                     [&](const Measured& p) { return seen.at(p.z) < std::max(1e-4 * p.z, 1.2e-4); }))
         return steps;
-    double ratios = 0, weights = 0, smoothed_ratios = 0, smoothed = 0;
-    for (const Measured& p : points) {
+    forget_hidden(points);
+    double ratios = 0, weights = 0;
+    for (const Measured& p : points)
         ratios += p.weight * p.adjacent / p.distant, weights += p.weight;
-        if (p.smoothed)
-            smoothed_ratios += p.weight * p.distant / p.sigma, smoothed += p.weight;
-    }
-    // Between steps, adjacent differences are large even where the sensor smooths.
-    const double s = smoothed > 0.2 * weights ? correlation_of(smoothed_ratios / smoothed, lag_px, far_px)
-                                              : correlation_of(ratios / weights, 1, lag_px);
-    for (Measured& p : points) // what correlates over the lag is missing in the differences
-        p.sigma *= std::sqrt(6 / second_difference_variance(p.lag_px, s));
+    double s = correlation_of(ratios / weights);
+    const double missing = std::sqrt(6 / second_difference_variance(lag_px, s)); // what correlates over the lag
+    const bool disparity = steps.step_per_z2 > 0; // it comes from windows of pixels, which jumps between steps hide
+    const bool wide = disparity || missing > much_missing;
+    for (Measured& p : points)
+        p.sigma = wide ? std::max(p.wide_sigma, std::min(p.sigma, p.wide_sigma) * missing) : p.sigma * missing;
+    if (disparity)
+        s = std::max(s, least_disparity_px / length_of(1));
     DepthNoise noise = law_through(points);
     noise.step_m = steps.step_m, noise.step_per_z2 = steps.step_per_z2;
     if (explains(steps.step_m, points)) {
@@ -402,7 +453,7 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
         noise.floor_m = steps.step_m / std::sqrt(12.0), noise.per_z2 = 0;
         noise.jumps = steps.jumps;
     }
-    noise.correlation_px = std::max(1.0, std::sqrt(2 * std::numbers::pi) * s);
+    noise.correlation_px = std::max(1.0, length_of(s));
     return noise;
 }
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <set>
 #include <tbb/parallel_for_each.h>
 #include <tbb/task_arena.h>
 
@@ -261,6 +262,18 @@ Seen SequenceAo::seen(std::size_t index) {
     if (!slot.ao_there)
         slot.ao_there = upload_(ao.visibility);
     return {&packed(index), slot.ao_there};
+}
+
+std::size_t SequenceAoResult::others() const {
+    std::set<std::size_t> all(fused.begin(), fused.end());
+    all.insert(neighbours.begin(), neighbours.end());
+    all.insert(averaged.begin(), averaged.end());
+    return all.size();
+}
+
+double share_of_gain(std::size_t others) {
+    const auto n = static_cast<double>(others);
+    return std::min(1.0, 7.0 / 6.0 * n / (n + 2));
 }
 
 SequenceAoResult SequenceAo::compute(std::size_t index) {

@@ -51,7 +51,13 @@ struct SequenceAoResult {
     std::vector<std::size_t> fused, neighbours, averaged; ///< indices of the frames it was looked at with
     std::vector<LeftOut> left_out;
     MethodRemarks remarks; ///< the method's
+
+    /// How many different frames it was looked at with.
+    [[nodiscard]] std::size_t others() const;
 };
+
+/// What share of the usual gain (ErrorTables' `together`, of a dozen frames on either side) so many others bring.
+[[nodiscard]] double share_of_gain(std::size_t others);
 
 /// Not thread-safe: one call at a time. A frame's result depends on the frames within reach() of it and on nothing
 /// else.

@@ -126,12 +126,12 @@ class Session::Sequence {
         computed.row.camera = computed.work.frame.camera;
         describe_frame(computed.work);
         computed.work.finishers = lease_->finishers();
-        computed.work.errors = lease_->errors(options.noise, true);
         sequence_.forget_before(first);
         frames_.erase(frames_.begin(), frames_.lower_bound(first));
         lowest_ = first;
         computed.row.index = index;
-        compute_in_sequence(computed.work, source_.listing, sequence_);
+        const double together = compute_in_sequence(computed.work, source_.listing, sequence_);
+        computed.work.errors = lease_->errors(options.noise, together);
         if (wanted.normals)
             computed.normals = lease_->normals(computed.work.depth, options.noise).normals;
     }

@@ -113,7 +113,7 @@ class ExpectedErrorsPart final : public BenchPart {
             held_out = samples_of(device, usual, frames_, true);
         for (const auto& [sensor, own] : samples) {
             const shared::ErrorTable shipped =
-                errors_of(shipped_error_tables(), method, defaults_of(method), sensor, false);
+                errors_of(shipped_error_tables(), method, defaults_of(method), sensor, 0);
             MethodErrors errors;
             if (!fit_.empty() || !held_out_.empty())
                 errors.table = fitted_errors(own);
@@ -147,12 +147,12 @@ class ExpectedErrorsPart final : public BenchPart {
         Samples alone = samples_of(device, usual, frames_, false, false);
         for (const auto& [sensor, own] : together) {
             const ChosenSettings settings = defaults_of(method);
-            const shared::ErrorTable table = errors_of(shipped_error_tables(), method, settings, sensor, false);
+            const shared::ErrorTable table = errors_of(shipped_error_tables(), method, settings, sensor, 0);
             const auto factor = [&table, &with_others = own, &by_itself = alone[sensor]](int without) {
                 return factor_of(with_others, table, without) - factor_of(by_itself, table, without);
             };
             tell(method, sensor, own,
-                 fit_.empty() ? errors_of(shipped_error_tables(), method, settings, sensor, true)
+                 fit_.empty() ? errors_of(shipped_error_tables(), method, settings, sensor, 1)
                               : scaled(table, factor(-1)),
                  [&](int scene) { return scaled(table, factor(scene)); });
             if (const auto known = tables.methods.find({method, sensor}); known != tables.methods.end())

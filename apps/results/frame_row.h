@@ -44,8 +44,9 @@ struct FrameRow {
     double valid_share = 0; ///< pixels or points with a depth / all of them
     double coverage = 0;    ///< pixels or points with a visibility / those with a depth
     double mean_visibility = 0;
-    double expected_error = 0; ///< RMS of visibility over the frame; NaN = unknown
-    Camera camera;             ///< as used
+    double expected_error = 0;    ///< RMS of visibility over the frame; NaN = unknown
+    std::size_t other_frames = 0; ///< of the recording, that it was looked at with
+    Camera camera;                ///< as used
     StageTimes ms;
     Timings passes; ///< the method's own account of `ms.compute`
     std::vector<std::string> warnings;

@@ -66,6 +66,8 @@ json row_json(
         text["doubts"] = row.doubts;
     if (std::isfinite(row.expected_error))
         text["expected_error"] = row.expected_error;
+    if (row.other_frames > 0)
+        text["other_frames"] = row.other_frames;
     return text;
 }
 
@@ -102,6 +104,7 @@ FrameRow row_from(const json& text) {
     row.coverage = number_or_nan(text.at("coverage"));
     row.mean_visibility = number_or_nan(text.at("visibility"));
     row.expected_error = text.contains("expected_error") ? number_or_nan(text["expected_error"]) : std::nan("");
+    row.other_frames = text.contains("other_frames") ? count_at(text, "other_frames") : 0;
     row.camera = camera_from(text.at("camera"));
     row.warnings = text.at("warnings").get<std::vector<std::string>>();
     for (const auto& [name, stage] : stages)

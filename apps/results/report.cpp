@@ -106,6 +106,8 @@ json result_json(const FrameRow& row, bool with_camera, const CaptureEntry& entr
     text["mean_visibility"] = known(row.mean_visibility);
     if (std::isfinite(row.expected_error))
         text["expected_error"] = known(row.expected_error, 5);
+    if (row.other_frames > 0)
+        text["other_frames"] = row.other_frames;
     text["warnings"] = row.warnings;
     return text;
 }

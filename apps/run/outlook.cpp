@@ -90,9 +90,10 @@ std::vector<std::string> outlook(const RunSettings& settings, MethodSetup& setup
     const BenchmarkPoint* used = measured_with(front, sensor, settings.method, values_of(setup));
     if (!used)
         return {};
-    const bool together = settings.in_sequence(capture);
+    const bool together = std::ranges::any_of(rows, [](const FrameRow& row) { return row.other_frames > 0; });
     const auto gain = front.sequences.find(sensor);
     const std::string alone = together ? " of each frame by itself" : "";
+    const bool asked_together = settings.in_sequence(capture);
     const std::string measured =
         fmt::format("measured with {} on generated scenes with {} depth; real sensors may err more",
                     used->configuration.full_name(), name_of(sensor));
@@ -103,6 +104,9 @@ std::vector<std::string> outlook(const RunSettings& settings, MethodSetup& setup
              : fmt::format("expected error{}: RMSE {:.3f} to truth, {}", alone, used->rms, measured)};
     if (gain != front.sequences.end() && together)
         sentences.push_back(gain_text(gain->second));
+    if (asked_together && !together)
+        sentences.emplace_back("no frame fitted together with another, so each was computed by itself: the frames' "
+                               "notes say why");
     const auto better = better_preset(front, sensor, *used);
     if (better) {
         const BenchmarkPoint* point = measured_with(front, sensor, *better);
@@ -112,7 +116,7 @@ std::vector<std::string> outlook(const RunSettings& settings, MethodSetup& setup
             word_for(*better, preset_words), point->rms, used->rms, point->ns_per_pixel / used->ns_per_pixel));
     }
     // `best` looks at frames together, too.
-    if (gain != front.sequences.end() && !together && has_poses(capture) &&
+    if (gain != front.sequences.end() && !asked_together && has_poses(capture) &&
         better.value_or(Preset::best) == Preset::best)
         sentences.push_back(fmt::format("{}: {}", settings.preset == Preset::best ? "--sequence on" : "--preset best",
                                         gain_text(gain->second)));

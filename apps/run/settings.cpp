@@ -536,7 +536,7 @@ double RunSettings::median_depth() const {
 }
 
 bool RunSettings::in_sequence(const Capture& capture) const {
-    return sequence == SequenceUse::on || (sequence == SequenceUse::automatic && has_poses(capture));
+    return sequence != SequenceUse::off && has_poses(capture);
 }
 
 bool RunSettings::asks_for_device(const Capture& capture) const {

@@ -283,12 +283,13 @@ class Pipeline {
 
     void compute_view(Work& work, FrameAo& method) const {
         work.finishers = method.finishers();
-        work.errors = method.errors(options_.noise, options_.sequence != nullptr);
+        double together = 0;
         if (options_.sequence) {
-            compute_in_sequence(work, capture_, *options_.sequence);
+            together = compute_in_sequence(work, capture_, *options_.sequence);
         } else {
             compute_alone(work, method, options_.noise);
         }
+        work.errors = method.errors(options_.noise, together);
         if (options_.dump.empty())
             return;
         std::vector<Intermediate> all = method.intermediates();

@@ -91,11 +91,12 @@ SequenceAoOptions sequence_options(SequenceAoOptions asked, const Capture& captu
     return asked;
 }
 
-void compute_in_sequence(Work& work, const Capture& capture, SequenceAo& sequence) {
+double compute_in_sequence(Work& work, const Capture& capture, SequenceAo& sequence) {
     SequenceAoResult result = sequence.compute(work.row.index);
     work.ao = std::move(result.ao);
     work.looked_at = std::move(result.depth);
     work.row.passes = std::move(result.timings);
+    work.row.other_frames = result.others();
     std::ranges::move(result.remarks.doubts, std::back_inserter(work.row.doubts));
     std::ranges::move(result.remarks.warnings, std::back_inserter(work.row.warnings));
     if (!result.fused.empty())
@@ -110,6 +111,7 @@ void compute_in_sequence(Work& work, const Capture& capture, SequenceAo& sequenc
                         "alignment error {:.1f} times the limit.",
                         capture.entries[other.index].name, 100 * other.agreement.overlap,
                         100 * other.agreement.contradicted, other.agreement.alignment_error));
+    return share_of_gain(work.row.other_frames);
 }
 
 } // namespace scanshade

@@ -53,7 +53,7 @@ class SequenceBuffer {
 [[nodiscard]] SequenceAoOptions sequence_options(SequenceAoOptions asked, const Capture& capture, double radius_m);
 
 /// Computes a frame's visibility with its neighbours. The row's notes list the neighbours used, and those left out with
-/// the reason.
-void compute_in_sequence(Work& work, const Capture& capture, SequenceAo& sequence);
+/// the reason. Returns what share of the usual gain these bring (share_of_gain()).
+[[nodiscard]] double compute_in_sequence(Work& work, const Capture& capture, SequenceAo& sequence);
 
 } // namespace scanshade

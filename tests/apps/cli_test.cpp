@@ -206,6 +206,25 @@ TEST_F(CliTest, frames_are_looked_at_together_only_where_there_are_poses) {
     EXPECT_NE(together.err.find("computed together"), std::string::npos) << together.err;
 }
 
+TEST_F(CliTest, frames_computed_by_themselves_have_the_errors_of_such) {
+    const auto errors_with = [&](const std::string& flags) {
+        const Ran ran = run("--overwrite --method surfel --surfel.quality lowest " + flags);
+        EXPECT_EQ(ran.exit_code, 0) << ran.err;
+        std::vector<double> errors;
+        for (const auto& frame : manifest()["frames"])
+            errors.push_back(frame["expected_error"]);
+        return std::pair{errors, ran.err};
+    };
+    const auto [alone, of_alone] = errors_with("");
+    const auto [asked, of_asked] = errors_with("--sequence on");
+    EXPECT_EQ(asked, alone) << "no frame has a pose";
+    EXPECT_NE(of_asked.find("fewer than two frames have a pose"), std::string::npos) << of_asked;
+    EXPECT_EQ(of_asked.find("computed together"), std::string::npos) << of_asked;
+    EXPECT_EQ(of_asked.find("computing frames together"), std::string::npos) << of_asked;
+    EXPECT_EQ(errors_with("--cloud " + (folder / "all.ply").string()).first, alone)
+        << "a cloud of the recording takes frames one by one";
+}
+
 TEST_F(CliTest, a_quiet_run_prints_only_warnings_and_failures) {
     const Ran silent = run("-q");
     EXPECT_EQ(silent.exit_code, 0);

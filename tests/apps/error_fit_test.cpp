@@ -126,13 +126,14 @@ TEST(ErrorTablesTest, the_variant_with_most_matching_settings_counts) {
     errors.table = some_table();
     errors.together = -1;
     errors.variants = {{{{"quality", "low"}}, 2}, {{{"quality", "low"}, {"downsampled", "true"}}, 4}};
-    const auto factor = [&](const ChosenSettings& settings, bool together) {
+    const auto factor = [&](const ChosenSettings& settings, double together) {
         return errors_of(tables, "surfel", settings, SensorClass::clean, together).factors[0] - some_table().factors[0];
     };
-    EXPECT_FLOAT_EQ(factor({{"quality", "high"}}, false), 0);
-    EXPECT_FLOAT_EQ(factor({{"quality", "low"}, {"downsampled", "false"}}, false), 2);
-    EXPECT_FLOAT_EQ(factor({{"downsampled", "true"}, {"quality", "low"}}, false), 4);
-    EXPECT_FLOAT_EQ(factor({{"quality", "low"}}, true), 1);
+    EXPECT_FLOAT_EQ(factor({{"quality", "high"}}, 0), 0);
+    EXPECT_FLOAT_EQ(factor({{"quality", "low"}, {"downsampled", "false"}}, 0), 2);
+    EXPECT_FLOAT_EQ(factor({{"downsampled", "true"}, {"quality", "low"}}, 0), 4);
+    EXPECT_FLOAT_EQ(factor({{"quality", "low"}}, 1), 1);
+    EXPECT_FLOAT_EQ(factor({{"quality", "low"}}, 0.5), 1.5);
 }
 
 TEST(ErrorTablesTest, a_method_without_a_spread_of_its_own_takes_the_worst_of_the_class) {
@@ -150,8 +151,7 @@ TEST(ErrorTablesTest, every_method_has_shipped_ones_for_every_sensor) {
     for (const MethodRow& method : methods())
         for (const SensorClass sensor : {SensorClass::clean, SensorClass::structured_light, SensorClass::time_of_flight,
                                          SensorClass::interpolated}) {
-            const shared::ErrorTable table =
-                errors_of(shipped_error_tables(), std::string(method.name), {}, sensor, false);
+            const shared::ErrorTable table = errors_of(shipped_error_tables(), std::string(method.name), {}, sensor, 0);
             const ErrorSigns open{1, shared::error_rings, shared::error_rings, 64, 0}, corner{0.4F, 0, 0, 64, 0.05F};
             EXPECT_LT(expected_error(weights_of(open, 1), table), 0.15) << method.name;
             EXPECT_LT(expected_error(weights_of(open, 1), table), expected_error(weights_of(corner, 0.5F), table));
