@@ -31,6 +31,7 @@ constexpr double much_missing = 1.15;      // of sigma by differences over lag_p
 
 struct Band {
     std::vector<float> spread_m;   // |second difference| of depth
+    std::vector<float> slopes_m;   // |difference| of depth between the two ends
     std::vector<float> adjacent_m; // of neighbouring pixels
     std::array<std::vector<float>, longer_px.size()> longer_m;
     std::vector<float> depths_m; // at their middles; keep_distinct() reduces them to the distinct values
@@ -100,6 +101,8 @@ void collect(const cv::Mat1f& z, std::array<Band, bands>& all) {
                 if (d < 0 || adjacent < 0)
                     continue;
                 band.spread_m.push_back(d);
+                band.slopes_m.push_back(
+                    std::abs(z(y + lag_px * dy, x + lag_px * dx) - z(y - lag_px * dy, x - lag_px * dx)));
                 band.adjacent_m.push_back(adjacent);
                 for (std::size_t i = 0; i < longer_px.size(); ++i)
                     if (const float far = second_difference(z, x, y, longer_px[i] * dx, longer_px[i] * dy); far >= 0)
@@ -150,6 +153,19 @@ double step_of(const std::vector<float>& depths_m) {
     return median(std::move(gaps));
 }
 
+/// Whether depth is exact, for all that its values are that far apart: rows of a floor before a level camera. A
+/// sensor's steps bend most of the slopes that they show.
+bool is_exact(const Band& band, double step_m) {
+    constexpr std::size_t enough_slopes = 50;
+    std::size_t slopes = 0, even = 0;
+    for (std::size_t i = 0; i < band.slopes_m.size(); ++i)
+        if (band.slopes_m[i] > 0.5 * step_m) {
+            ++slopes;
+            even += band.spread_m[i] < 0.25 * step_m ? 1 : 0;
+        }
+    return slopes > enough_slopes && even > slopes - slopes / 10;
+}
+
 /// Variance of one value by its smallest differences. Those of values in steps are whole steps, half of them often 0,
 /// which tells nothing of how large they are: spread evenly over a step (dithered) they tell it, and more by the
 /// variance of that (Sheppard). A sensor that smooths steps leaves small differences on them and large ones between
@@ -195,19 +211,20 @@ double wide_variance(double variance, Band& band, double step_m) {
 /// differences straddle an edge, so the smaller share decides. A value that comes in steps errs by a root of 1/12 of
 /// the step or more.
 Measured measured_in(Band& band) {
-    const double most = sigma_of_most(band.spread_m), few = sigma_of_few(band.spread_m), step = step_of(band.depths_m);
+    const double gap = step_of(band.depths_m),
+                 step = is_exact(band, gap) ? 0 : gap; // before others sort the differences
+    const double most = sigma_of_most(band.spread_m), few = sigma_of_few(band.spread_m);
     const bool quantised = step >= 0.5 * most, by_most = quantised || few >= most;
     const double adjacent = by_most ? sigma_of_most(band.adjacent_m) : sigma_of_few(band.adjacent_m);
-    const double count = static_cast<double>(band.spread_m.size());
-    const bool in_steps = count > 20 * static_cast<double>(band.depths_m.size()); // else the gaps are of chance
-    const double dither = in_steps ? step : 0, variance = std::max(variance_of(band.spread_m, dither), 1e-12);
+    const double count = static_cast<double>(band.spread_m.size()),
+                 variance = std::max(variance_of(band.spread_m, step), 1e-12);
     Measured measured{.z = band.z_sum / count,
                       .sigma = std::sqrt(variance),
-                      .wide_sigma = std::sqrt(wide_variance(variance, band, dither)),
+                      .wide_sigma = std::sqrt(wide_variance(variance, band, step)),
                       .adjacent = adjacent,
                       .distant = std::max(by_most ? most : few, 1e-6),
                       .weight = count};
-    if (quantised && in_steps) {
+    if (quantised && band.spread_m.size() > 20 * band.depths_m.size()) {
         const double of_step = step / std::sqrt(12.0);
         measured.hidden = measured.sigma < of_step;
         measured.sigma = std::max(measured.sigma, of_step);
@@ -267,13 +284,23 @@ Step step_by(const std::vector<float>& values_m, int power) {
     return {sum / count, count / static_cast<double>(gaps.size())};
 }
 
+/// Files hold growing steps in whole millimetres, which near the camera are all that shows: the values tell whose steps
+/// would be well above these.
 void find_steps(DepthNoise& noise, const std::vector<float>& values_m) {
-    const Step even = step_by(values_m, 0), growing = step_by(values_m, 2);
+    const Step even = step_by(values_m, 0);
+    Step growing = step_by(values_m, 2);
     constexpr double enough_share = 0.25; // of unquantised values the share is 0.02
     if (std::max(even.share, growing.share) < enough_share)
         return;
-    (even.share >= growing.share ? noise.step_m : noise.step_per_z2) =
-        (even.share >= growing.share ? even : growing).size;
+    bool grows = growing.share > even.share;
+    if (!grows && growing.share >= enough_share) {
+        const auto far = std::ranges::lower_bound(values_m, std::sqrt(1.5 * even.size / growing.size));
+        const std::vector<float> far_m(far, values_m.end());
+        const Step growing_far = step_by(far_m, 2);
+        grows = growing_far.share > std::max(enough_share, step_by(far_m, 0).share);
+        growing = grows ? growing_far : growing;
+    }
+    (grows ? noise.step_per_z2 : noise.step_m) = (grows ? growing : even).size;
 }
 
 /// Jumps from one even surface to another within 2 reach - 1 pixels, by how many of these lie between both.

@@ -177,31 +177,33 @@ TEST(noise, whole_steps_hide_none_of_it) {
     EXPECT_GE(measured.correlation_px, 2.8) << "jumps between steps hide the sensor's window";
 }
 
-TEST(noise, a_wall_on_one_step_has_no_say_where_others_tell) {
+TEST(noise, a_wall_on_few_steps_has_no_say_where_others_tell) {
+    // Five steps across the wall, with hardly a jump on any.
     std::vector<DepthImage> images;
     std::vector<double> errors, none;
     for (const double z : {1.2, 1.8, 2.6, 4.4})
         images.push_back(in_disparity_steps(tilted_plane(test_camera({320, 240}), 15, z), 0.8, 2.85e-3,
                                             static_cast<unsigned>(10 * z), errors));
-    const double on_a_step = 1 / (std::round(1 / 4.4 / 2.85e-3) * 2.85e-3);
-    for (const unsigned seed : {1U, 2U, 3U})
-        images.push_back(
-            in_disparity_steps(tilted_plane(test_camera({320, 240}), 0, on_a_step), 0.02, 2.85e-3, seed, none));
+    for (unsigned seed = 1; seed <= 4; ++seed)
+        images.push_back(in_disparity_steps(tilted_plane(test_camera({320, 240}), 3, 4.4), 0.02, 2.85e-3, seed, none));
     const DepthNoise measured = measure_noise(images);
-    for (const double z : {1.5, 2.5, 4.0})
+    for (const double z : {1.5, 2.5, 4.4})
         EXPECT_NEAR(measured.at(z) / (z * z), root_mean_square(errors), 0.25 * root_mean_square(errors))
             << z << " m: " << describe(measured);
 }
 
-TEST(noise, gaps_between_values_that_come_once_are_no_steps) {
-    // A floor seen to 40 m: few samples a band, far apart, and exact.
-    DepthImage floor{test_camera({320, 240}), cv::Mat1f(240, 320), {}};
-    for (int y = 0; y < 240; ++y)
-        for (int x = 0; x < 320; ++x) {
-            const double down = (y + 0.25 - floor.camera.cy) / floor.camera.fy;
-            floor.z_m(y, x) = down > 1.5 / 40 ? static_cast<float>(1.5 / (down + 1e-4 * x)) : 0.0F;
-        }
-    EXPECT_FALSE(measure_noise(std::vector{floor}).any()) << describe(measure_noise(std::vector{floor}));
+TEST(noise, rows_of_a_floor_before_a_level_camera_are_no_steps) {
+    // Rendered: all of a row at one depth, rows far apart, and a wall behind.
+    DepthImage floor{test_camera({640, 480}), cv::Mat1f(480, 640), {}};
+    for (int y = 0; y < 480; ++y) {
+        const double down = (y + 0.25 - floor.camera.cy) / floor.camera.fy;
+        floor.z_m.row(y) = down > 1.5 / 6 ? static_cast<float>(1.5 / down) : 6.0F;
+    }
+    DepthImage in_millimetres{floor.camera, floor.z_m.clone(), {}};
+    for (float& z : in_millimetres.z_m)
+        z = std::round(z * 1000) / 1000;
+    for (const DepthImage& each : {floor, in_millimetres})
+        EXPECT_FALSE(measure_noise(std::vector{each}).any()) << describe(measure_noise(std::vector{each}));
 }
 
 /// The farthest wall of a Kinect's picture shows one value or two; its depth is not exact for that.
@@ -229,6 +231,19 @@ TEST(noise, steps_are_told_and_nothing_is_taken_for_one) {
     }
     const DepthNoise none = measure_noise(std::vector{unquantised});
     EXPECT_EQ(none.step_m + none.step_per_z2, 0) << describe(none);
+}
+
+TEST(noise, steps_that_grow_are_told_in_a_file_of_millimetres) {
+    // Near the camera they are below a millimetre; farther away they are two to six.
+    std::vector<DepthImage> images;
+    for (const double z : {0.5, 0.6, 0.8, 1.2})
+        images.push_back(noisy(tilted_plane(test_camera({320, 240}), 30, z), {0, 0.0009}, 1.6e-3));
+    for (DepthImage& image : images)
+        for (float& z : image.z_m)
+            z = std::round(z * 1000) / 1000;
+    const DepthNoise measured = measure_noise(images);
+    EXPECT_NEAR(measured.step_per_z2, 1.6e-3, 0.1 * 1.6e-3) << describe(measured);
+    EXPECT_EQ(measured.step_m, 0) << describe(measured);
 }
 
 /// Blocks of 40 pixels, each its own slanted plane.
