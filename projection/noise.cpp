@@ -179,7 +179,7 @@ double variance_of(std::vector<float>& spread_m, double step_m) {
         value = std::abs(value + static_cast<float>(step_m * (place - 0.5)));
     }
     const double few = sigma_of_few(spread_m), most = sigma_of_most(spread_m), middle = sigma_of_median(spread_m);
-    const double without_edges = std::clamp((1.2 * middle - most) / (0.1 * middle), 0.0, 1.0);
+    const double without_edges = middle > 0 ? std::clamp((1.2 * middle - most) / (0.1 * middle), 0.0, 1.0) : 0;
     const double sigma = few + 0.5 * without_edges * std::max(middle - few, 0.0);
     return std::max(sigma * sigma - step_m * step_m / 72, 0.0);
 }
