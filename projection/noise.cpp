@@ -2,6 +2,8 @@
 
 #include "projection/base/error.h"
 #include "projection/base/statistics.h"
+#include "projection/depth_jumps.h"
+#include "projection/depth_steps.h"
 
 #include <algorithm>
 #include <array>
@@ -114,10 +116,11 @@ void collect(const cv::Mat1f& z, std::array<Band, bands>& all) {
 
 struct Measured {
     double z;
-    double sigma;             // by differences over lag_px
+    double near_sigma;        // by differences over lag_px
     double wide_sigma;        // by those over more pixels, too
     double adjacent, distant; // the deviations by adjacent pixels, and over lag_px, steps as they are
     double weight;
+    double sigma = 0;    // what is believed of these
     bool hidden = false; // smaller than what a step explains: most values are on the same one
 };
 
@@ -219,17 +222,18 @@ Measured measured_in(Band& band) {
     const double count = static_cast<double>(band.spread_m.size()),
                  variance = std::max(variance_of(band.spread_m, step), 1e-12);
     Measured measured{.z = band.z_sum / count,
-                      .sigma = std::sqrt(variance),
+                      .near_sigma = std::sqrt(variance),
                       .wide_sigma = std::sqrt(wide_variance(variance, band, step)),
                       .adjacent = adjacent,
                       .distant = std::max(by_most ? most : few, 1e-6),
                       .weight = count};
     if (quantised && band.spread_m.size() > 20 * band.depths_m.size()) {
         const double of_step = step / std::sqrt(12.0);
-        measured.hidden = measured.sigma < of_step;
-        measured.sigma = std::max(measured.sigma, of_step);
+        measured.hidden = measured.near_sigma < of_step;
+        measured.near_sigma = std::max(measured.near_sigma, of_step);
         measured.wide_sigma = std::max(measured.wide_sigma, of_step);
     }
+    measured.sigma = measured.near_sigma;
     return measured;
 }
 
@@ -266,119 +270,6 @@ void forget_hidden(std::vector<Measured>& points) {
         std::erase_if(points, [](const Measured& p) { return p.hidden; });
 }
 
-/// The step, if steps grow with that power of z, and the share of the gaps between distinct values that equal it.
-struct Step {
-    double size = 0, share = 0;
-};
-Step step_by(const std::vector<float>& values_m, int power) {
-    std::vector<double> gaps;
-    for (std::size_t i = 1; i < values_m.size(); ++i)
-        gaps.push_back((static_cast<double>(values_m[i]) - values_m[i - 1]) / std::pow(values_m[i], power));
-    if (gaps.size() < 50)
-        return {}; // a disparity sensor has some hundred values in all
-    const double low = ranked(gaps, gaps.size() / 10);
-    double sum = 0, count = 0;
-    for (const double gap : gaps)
-        if (gap > 0.75 * low && gap < 1.35 * low)
-            sum += gap, ++count;
-    return {sum / count, count / static_cast<double>(gaps.size())};
-}
-
-/// Files hold growing steps in whole millimetres, which near the camera are all that shows: the values tell whose steps
-/// would be well above these.
-void find_steps(DepthNoise& noise, const std::vector<float>& values_m) {
-    const Step even = step_by(values_m, 0);
-    Step growing = step_by(values_m, 2);
-    constexpr double enough_share = 0.25; // of unquantised values the share is 0.02
-    if (std::max(even.share, growing.share) < enough_share)
-        return;
-    bool grows = growing.share > even.share;
-    if (!grows && growing.share >= enough_share) {
-        const auto far = std::ranges::lower_bound(values_m, std::sqrt(1.5 * even.size / growing.size));
-        const std::vector<float> far_m(far, values_m.end());
-        const Step growing_far = step_by(far_m, 2);
-        grows = growing_far.share > std::max(enough_share, step_by(far_m, 0).share);
-        growing = grows ? growing_far : growing;
-    }
-    (grows ? noise.step_per_z2 : noise.step_m) = (grows ? growing : even).size;
-}
-
-/// Jumps from one even surface to another within 2 reach - 1 pixels, by how many of these lie between both.
-struct JumpCount {
-    double all = 0, sharp = 0, smeared = 0; // without such a pixel; with two and more
-};
-constexpr std::array<int, 3> reaches{2, 4, 8}; // pixels from the middle to the first one of either surface
-using JumpCounts = std::array<JumpCount, reaches.size()>;
-
-Jumps kind_of(const JumpCounts& counts) {
-    // Depth resized or smoothed has 0.8 with two and more, and hardly any without: by the reach that spans its edges.
-    // Rendered depth has 0.1 with two and more over the shortest reach. Over longer ones its slopes count, too, but
-    // sharp jumps are as many. Time of flight mixes one pixel: 0.35 are sharp, and 0.8 and more of rendered depth.
-    constexpr double enough_jumps = 50, least_smeared = 0.4, few_sharp = 0.05, least_sharp = 0.7;
-    for (const JumpCount& count : counts)
-        if (count.all > enough_jumps && count.smeared > least_smeared * count.all &&
-            count.sharp < few_sharp * count.all)
-            return Jumps::smeared;
-    const JumpCount& near = counts.front();
-    return near.all > enough_jumps && near.sharp < least_sharp * near.all ? Jumps::unknown : Jumps::sharp;
-}
-
-/// Along a row or a column: `next` is from one value to the next.
-void count_jump(const float* at, std::ptrdiff_t next, int reach, JumpCount& count) {
-    const float before = at[-reach * next], after = at[reach * next], jump = std::abs(after - before);
-    const float even = 0.15F * jump / static_cast<float>(reach); // a third of the mean slope between
-    const auto is_even = [&](float here, float beyond) {
-        return here > 0 && beyond > 0 && std::abs(here - beyond) <= even;
-    };
-    if (!(jump >= 0.1F && jump >= 0.05F * std::min(before, after)) || !is_even(before, at[-(reach + 1) * next]) ||
-        !is_even(after, at[(reach + 1) * next]))
-        return;
-    float share = 0; // of the way, which goes on in one direction
-    int mixed = 0;
-    for (int i = -reach + 1; i < reach; ++i) {
-        const float here = at[i * next], then = (here - before) / (after - before);
-        if (!(here > 0) || then < share - 0.05F || then > 1.05F)
-            return;
-        share = then;
-        mixed += share > 0.15F && share < 0.85F ? 1 : 0;
-    }
-    const double once = 1.0 / (2 * reach - mixed); // it is met from as many middles
-    count.all += once;
-    count.sharp += mixed == 0 ? once : 0;
-    count.smeared += mixed >= 2 ? once : 0;
-}
-
-void count_jumps(const cv::Mat1f& z, int reach, JumpCount& count) {
-    constexpr int line_px = 6; // every sixth row and column is plenty
-    const auto down = static_cast<std::ptrdiff_t>(z.step1());
-    const int border = reach + 1;
-    for (int y = border; y < z.rows - border; ++y) {
-        if (y % line_px == 0)
-            for (int x = border; x < z.cols - border; ++x)
-                count_jump(z[y] + x, 1, reach, count);
-        for (int x = line_px * (border / line_px + 1); x < z.cols - border; x += line_px)
-            count_jump(z[y] + x, down, reach, count);
-    }
-}
-
-/// Of all images, on all cores.
-JumpCounts jumps_of(std::span<const DepthImage> images) {
-    std::vector<JumpCount> each(images.size() * reaches.size());
-    tbb::this_task_arena::isolate([&] {
-        tbb::parallel_for(std::size_t(0), each.size(), [&](std::size_t i) {
-            count_jumps(images[i / reaches.size()].z_m, reaches[i % reaches.size()], each[i]);
-        });
-    });
-    JumpCounts sums;
-    for (std::size_t i = 0; i < each.size(); ++i) {
-        JumpCount& sum = sums[i % reaches.size()];
-        sum.all += each[i].all;
-        sum.sharp += each[i].sharp;
-        sum.smeared += each[i].smeared;
-    }
-    return sums;
-}
-
 /// floor + per_z2 z^2 through the bands by least squares of relative error, both terms at least zero. Relative to each
 /// band's sigma, since clutter only adds to these: the smaller ones are to be believed.
 DepthNoise law_through(const std::vector<Measured>& points) {
@@ -402,39 +293,65 @@ DepthNoise law_through(const std::vector<Measured>& points) {
     return noise;
 }
 
-/// Whether a value's error is that of rounding to a step, and hardly more: uniform over the step, whose deviation is
-/// step / sqrt(12). Noise would show between adjacent pixels and over more of them, at most depths. Noise that a sensor
-/// has smoothed would show over more pixels at all depths; a scene's relief, which looks like it, leaves some even.
-bool explains(double step_m, const std::vector<Measured>& points) {
-    constexpr double most = 1.6, most_distant = 3; // deviations of a step
-    const double step = step_m / std::sqrt(12.0);
-    double all = 0, even = 0, distant = 0;
+/// Whether a value's error is that of rounding to a step, and hardly more. Noise would show between adjacent pixels and
+/// over more of them, at most depths. Noise that a sensor has smoothed would show over more pixels at all depths; a
+/// scene's relief, which looks like it, leaves some even. A Kinect's disparity, whose noise shows over more pixels,
+/// errs by 1.4 to 2.5 times what rounding explains. What is rounded more finely than by any sensor may err more.
+bool explains(const DepthSteps& steps, const std::vector<Measured>& points) {
+    const bool even = steps.step_m > 0 && !steps.halves, coarse = steps.step_per_z2 > 0.0005;
+    double all = 0, rounded = 0, distant = 0;
     for (const Measured& p : points) {
+        const double sigma = steps.sigma(p.z);
+        const bool is_rounded = even     ? std::min(p.adjacent, p.distant) < 1.6 * sigma
+                                : coarse ? p.wide_sigma < 1.15 * sigma
+                                         : p.near_sigma < 2 * sigma;
         all += p.weight;
-        even += std::min(p.adjacent, p.distant) < most * step ? p.weight : 0;
-        distant += p.sigma < most_distant * step ? p.weight : 0;
+        rounded += is_rounded ? p.weight : 0;
+        distant += p.sigma < 3 * sigma ? p.weight : 0;
     }
-    return even > 0.5 * all && distant > 0.1 * all;
+    return rounded > 0.5 * all && distant > 0.1 * all;
 }
 
 /// Whether a step between adjacent pixels tilts the surface by more than AO bears.
-bool tilts(double step_m, double focal_px, const std::vector<Measured>& points) {
+bool tilts(const DepthSteps& steps, double focal_px, const std::vector<Measured>& points) {
     constexpr double most = 0.7;
     double slopes = 0, weights = 0;
     for (const Measured& p : points)
-        slopes += p.weight * step_m * focal_px / p.z, weights += p.weight;
+        slopes += p.weight * steps.at(p.z) * focal_px / p.z, weights += p.weight;
     return slopes > most * weights;
 }
 
-} // namespace
+/// Whether sigma is so small that nothing needs smoothing.
+bool is_clean(const std::vector<Measured>& points) {
+    const DepthNoise seen = law_through(points);
+    return std::ranges::all_of(points, [&](const Measured& p) { return seen.at(p.z) < std::max(1e-4 * p.z, 1.2e-4); });
+}
 
-DepthNoise measure_noise(std::span<const DepthImage> images) {
+/// Chooses each band's sigma, and returns the deviation of the correlation.
+double settle(std::vector<Measured>& points, const DepthSteps& steps) {
+    double ratios = 0, weights = 0;
+    for (const Measured& p : points)
+        ratios += p.weight * p.adjacent / p.distant, weights += p.weight;
+    const double s = correlation_of(ratios / weights);
+    const double missing = std::sqrt(6 / second_difference_variance(lag_px, s)); // what correlates over the lag
+    const bool disparity = steps.step_per_z2 > 0; // it comes from windows of pixels, which jumps between steps hide
+    const bool wide = disparity || missing > much_missing;
+    for (Measured& p : points)
+        p.sigma =
+            wide ? std::max(p.wide_sigma, std::min(p.near_sigma, p.wide_sigma) * missing) : p.near_sigma * missing;
+    return disparity ? std::max(s, least_disparity_px / length_of(1)) : s;
+}
+
+/// All bands of some images.
+struct Survey {
+    std::vector<Measured> points;
+    std::vector<float> values_m; ///< the distinct depths, in order
+};
+
+Survey survey_of(std::span<const DepthImage> images) {
     std::array<Band, bands> all;
-    double focal_px = 0;
-    for (const DepthImage& image : images) {
+    for (const DepthImage& image : images)
         collect(image.z_m, all);
-        focal_px = std::max(focal_px, image.camera.fx);
-    }
     std::array<std::optional<Measured>, bands> measured;
     tbb::this_task_arena::isolate([&] {
         tbb::parallel_for(std::size_t(0), all.size(), [&](std::size_t i) {
@@ -444,43 +361,39 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
                 measured[i] = measured_in(band);
         });
     });
-    std::vector<Measured> points;
-    std::vector<float> values_m; // in order, as bands are
+    Survey survey;
     for (std::size_t i = 0; i < all.size(); ++i) {
-        values_m.insert(values_m.end(), all[i].depths_m.begin(), all[i].depths_m.end());
+        survey.values_m.insert(survey.values_m.end(), all[i].depths_m.begin(), all[i].depths_m.end());
         if (measured[i])
-            points.push_back(*measured[i]);
+            survey.points.push_back(*measured[i]);
     }
-    DepthNoise steps;
-    find_steps(steps, values_m);
-    steps.jumps = kind_of(jumps_of(images));
-    if (points.empty())
-        return steps;
-    const DepthNoise seen = law_through(points);
-    if (std::all_of(points.begin(), points.end(),
-                    [&](const Measured& p) { return seen.at(p.z) < std::max(1e-4 * p.z, 1.2e-4); }))
-        return steps;
+    return survey;
+}
+
+} // namespace
+
+DepthNoise measure_noise(std::span<const DepthImage> images) {
+    auto [points, values_m] = survey_of(images);
+    const DepthSteps steps = steps_of(values_m);
+    const DepthNoise exact{.step_m = steps.step_m, .step_per_z2 = steps.step_per_z2, .jumps = jumps_of(images)};
+    if (points.empty() || is_clean(points))
+        return exact;
     forget_hidden(points);
-    double ratios = 0, weights = 0;
-    for (const Measured& p : points)
-        ratios += p.weight * p.adjacent / p.distant, weights += p.weight;
-    double s = correlation_of(ratios / weights);
-    const double missing = std::sqrt(6 / second_difference_variance(lag_px, s)); // what correlates over the lag
-    const bool disparity = steps.step_per_z2 > 0; // it comes from windows of pixels, which jumps between steps hide
-    const bool wide = disparity || missing > much_missing;
-    for (Measured& p : points)
-        p.sigma = wide ? std::max(p.wide_sigma, std::min(p.sigma, p.wide_sigma) * missing) : p.sigma * missing;
-    if (disparity)
-        s = std::max(s, least_disparity_px / length_of(1));
-    DepthNoise noise = law_through(points);
-    noise.step_m = steps.step_m, noise.step_per_z2 = steps.step_per_z2;
-    if (explains(steps.step_m, points)) {
-        if (!tilts(steps.step_m, focal_px, points))
-            return steps;
-        noise.floor_m = steps.step_m / std::sqrt(12.0), noise.per_z2 = 0;
-        noise.jumps = steps.jumps;
+    const double s = settle(points, steps);
+    const bool rounded = explains(steps, points);
+    if (rounded) {
+        double focal_px = 0;
+        for (const DepthImage& image : images)
+            focal_px = std::max(focal_px, image.camera.fx);
+        if (!tilts(steps, focal_px, points))
+            return exact;
+        for (Measured& p : points)
+            p.sigma = steps.sigma(p.z);
     }
+    DepthNoise noise = law_through(points);
     noise.correlation_px = std::max(1.0, length_of(s));
+    noise.step_m = steps.step_m, noise.step_per_z2 = steps.step_per_z2;
+    noise.jumps = rounded ? exact.jumps : Jumps::unknown;
     return noise;
 }
 

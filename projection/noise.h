@@ -35,20 +35,26 @@ struct DepthNoise {
 
 /// Measures sigma(z) on depth images of one sensor: the spread of second differences of 1/z (zero on any plane) in
 /// bands of z, and the law fitted through the bands. Edges and curvature form the far tail of the spread; three fifths
-/// of the samples are ignored for them. Differences of quantised values are spread evenly over a step first (dithered),
-/// and a band whose values are mostly on one step has no say where others tell. They are taken over 4 pixels. Disparity
-/// comes from windows of pixels, which err alike, and so may a sensor that smooths: there differences over 8 and 12
-/// pixels tell more. What surfaces add to these grows with the square of the distance, and differences over 16 pixels
-/// tell how much that is. The correlation length follows from the ratio of second differences over 1 and over 4 pixels.
-/// It assumes a correlation exp(-d^2 / 2 s^2); sigma is corrected for what of it reaches over those pixels. That of
-/// disparity is 2.8 pixels or more, since jumps between steps hide it. Steps are reported where a quarter of the
-/// distinct values are one step from the next. Steps are constant (16-bit files) or grow with z^2 (disparity). Areas of
-/// one value have no say, as of a frame that is one value, or of all that is beyond a sensor's range. Returns no noise,
-/// only steps, where sigma is below 0.1 mm per metre or 0.12 mm: then nothing needs smoothing. Clean depth in fine
-/// 16-bit steps (5000 per metre) has as much. Constant steps that explain sigma are no noise: values err by half a step
-/// at most, and jumps stay sharp. Then sigma is that of the steps where they tilt the surface between adjacent pixels
-/// by much, and none where they do not. Jumps are told of depth without other noise; with it, unknown: flying pixels
-/// are expected anyway.
+/// of the samples are ignored for them.
+///
+/// The differences are over 4 pixels. Disparity comes from windows of pixels, which err alike, and so may a sensor that
+/// smooths: there differences over 8 and 12 pixels tell more. What surfaces add to these grows with the square of the
+/// distance, and differences over 16 pixels tell how much that is. Differences of values in steps are spread evenly
+/// over a step (dithered). A band whose values are mostly on one step has no say where others tell; nor have areas of
+/// one value, as of all that is beyond a sensor's range.
+///
+/// The correlation length follows from the ratio of second differences over 1 and over 4 pixels. It assumes a
+/// correlation exp(-d^2 / 2 s^2); sigma is corrected for what of it reaches over those pixels. That of disparity is 2.8
+/// pixels or more, since jumps between steps hide it.
+///
+/// Steps are reported where a quarter of the distinct values are one step from the next. They are constant (16-bit
+/// files) or grow with z^2 (disparity). Steps that explain sigma are no noise: values err by half a step at most, and
+/// jumps stay sharp. They may be constant, grow with z^2 (depth buffers), or be those of 16-bit floats. Then sigma is
+/// that of the steps where they tilt the surface between adjacent pixels by much, and none where they do not.
+///
+/// Returns no noise, only steps, where sigma is below 0.1 mm per metre or 0.12 mm: then nothing needs smoothing. Clean
+/// depth in fine 16-bit steps (5000 per metre) has as much. Jumps are told of depth without other noise; with it,
+/// unknown: flying pixels are expected anyway.
 [[nodiscard]] DepthNoise measure_noise(std::span<const DepthImage> images);
 
 /// From "none", "kinect" (0.0015, 0.0018, 3 px), "tof" (0.0015, 0) or "floor,per_z2[,correlation]". The caller handles

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <gtest/gtest.h>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
@@ -204,6 +205,33 @@ TEST(noise, rows_of_a_floor_before_a_level_camera_are_no_steps) {
         z = std::round(z * 1000) / 1000;
     for (const DepthImage& each : {floor, in_millimetres})
         EXPECT_EQ(measure_noise(std::vector{each}).at(2), 0) << describe(measure_noise(std::vector{each}));
+}
+
+TEST(noise, exact_depth_in_few_digits_has_none) {
+    // As OpenEXR files hold it, in 11 binary digits, and as a renderer's depth buffer of 16 bits does, from 0.1 to 20
+    // m.
+    const auto half = [](double z) {
+        return static_cast<double>(static_cast<float>(Eigen::half(static_cast<float>(z))));
+    };
+    const auto buffered = [](double z) {
+        const double place = std::round((10 - 1 / z) / 9.95 * 65535) / 65535;
+        return 1 / (10 - 9.95 * place);
+    };
+    for (const std::function<double(double)>& held : {std::function<double(double)>(half), {buffered}}) {
+        std::vector<DepthImage> images{tilted_plane(test_camera({640, 480}), 40, 2.5),
+                                       tilted_plane(test_camera({640, 480}), 20, 4),
+                                       ball_on_floor(test_camera({640, 480}))};
+        for (DepthImage& image : images)
+            for (float& z : image.z_m)
+                z = z > 0 ? static_cast<float>(held(z)) : 0;
+        EXPECT_EQ(measure_noise(images).at(2), 0) << describe(measure_noise(images));
+        for (std::size_t i = 0; i < images.size(); ++i) {
+            images[i] = noisy(images[i], {0.002, 0.001}, 0, static_cast<unsigned>(i));
+            for (float& z : images[i].z_m)
+                z = z > 0 ? static_cast<float>(held(z)) : 0;
+        }
+        EXPECT_NEAR(measure_noise(images).at(2), 0.006, 0.0012) << describe(measure_noise(images));
+    }
 }
 
 /// The farthest wall of a Kinect's picture shows one value or two; its depth is not exact for that.

@@ -1,0 +1,68 @@
+#include "projection/depth_steps.h"
+
+#include "projection/base/statistics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <Eigen/Core>
+
+namespace scanshade {
+namespace {
+
+/// The step, if steps grow with that power of z, and the share of the gaps between distinct values that equal it.
+struct Step {
+    double size = 0, share = 0;
+};
+Step step_by(const std::vector<float>& values_m, int power) {
+    std::vector<double> gaps;
+    for (std::size_t i = 1; i < values_m.size(); ++i)
+        gaps.push_back((static_cast<double>(values_m[i]) - values_m[i - 1]) / std::pow(values_m[i], power));
+    if (gaps.size() < 50)
+        return {}; // a disparity sensor has some hundred values in all
+    const double low = ranked(gaps, gaps.size() / 10);
+    double sum = 0, count = 0;
+    for (const double gap : gaps)
+        if (gap > 0.75 * low && gap < 1.35 * low)
+            sum += gap, ++count;
+    return {sum / count, count / static_cast<double>(gaps.size())};
+}
+
+/// Whether all values are those of 16-bit floats, as OpenEXR files hold them.
+bool are_halves(const std::vector<float>& values_m) {
+    constexpr std::size_t enough_values = 100;
+    return values_m.size() >= enough_values && std::ranges::all_of(values_m, [](float value) {
+               return static_cast<float>(static_cast<Eigen::half>(value)) == value;
+           });
+}
+
+} // namespace
+
+double DepthSteps::at(double z_m) const {
+    return halves ? std::exp2(std::floor(std::log2(z_m)) - 10) : step_m + step_per_z2 * z_m * z_m;
+}
+
+double DepthSteps::sigma(double z_m) const { return at(z_m) / std::sqrt(12.0); }
+
+/// Files hold growing steps in whole millimetres, which near the camera are all that shows: the values tell whose steps
+/// would be well above these.
+DepthSteps steps_of(const std::vector<float>& values_m) {
+    DepthSteps steps{.halves = are_halves(values_m)};
+    const Step even = step_by(values_m, 0);
+    Step growing = step_by(values_m, 2);
+    constexpr double enough_share = 0.25; // of unquantised values the share is 0.02
+    if (std::max(even.share, growing.share) < enough_share)
+        return steps;
+    bool grows = growing.share > even.share;
+    if (!grows && growing.share >= enough_share) {
+        const auto far = std::ranges::lower_bound(values_m, std::sqrt(1.5 * even.size / growing.size));
+        const std::vector<float> far_m(far, values_m.end());
+        const Step growing_far = step_by(far_m, 2);
+        grows = growing_far.share > std::max(enough_share, step_by(far_m, 0).share);
+        growing = grows ? growing_far : growing;
+    }
+    (grows ? steps.step_per_z2 : steps.step_m) = (grows ? growing : even).size;
+    return steps;
+}
+
+} // namespace scanshade
