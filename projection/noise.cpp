@@ -38,18 +38,40 @@ struct Band {
     std::array<std::vector<float>, longer_px.size()> longer_m;
     std::vector<float> depths_m; // at their middles; keep_distinct() reduces them to the distinct values
     double z_sum = 0;
+
+    void take(Band&& other) {
+        const auto append = [](std::vector<float>& to, std::vector<float>& from) {
+            if (to.empty())
+                to = std::move(from);
+            else
+                to.insert(to.end(), from.begin(), from.end());
+        };
+        append(spread_m, other.spread_m);
+        append(slopes_m, other.slopes_m);
+        append(adjacent_m, other.adjacent_m);
+        for (std::size_t i = 0; i < longer_m.size(); ++i)
+            append(longer_m[i], other.longer_m[i]);
+        append(depths_m, other.depths_m);
+        z_sum += other.z_sum;
+    }
 };
 
 int band_of(double z) { return static_cast<int>(bands * std::log(z / nearest_m) / std::log(farthest_m / nearest_m)); }
 
-/// Second difference of 1/z along (dx, dy), as metres of depth at z; negative where something is unknown.
-float second_difference(const cv::Mat1f& z, int x, int y, int dx, int dy) {
-    if (x < dx || y < dy || x + dx >= z.cols || y + dy >= z.rows)
+/// 1/z, 0 at holes.
+cv::Mat1f inverse_of(const cv::Mat1f& z) {
+    cv::Mat1f inverse(z.size());
+    for (int y = 0; y < z.rows; ++y)
+        std::transform(z[y], z[y] + z.cols, inverse[y], [](float value) { return value > 0 ? 1 / value : 0.0F; });
+    return inverse;
+}
+
+/// Second difference of 1/z along (dx, dy), as metres of depth at `z_m`; negative where something is unknown.
+float second_difference(const cv::Mat1f& inverse, float z_m, int x, int y, int dx, int dy) {
+    if (x < dx || y < dy || x + dx >= inverse.cols || y + dy >= inverse.rows)
         return -1;
-    const float c = z(y, x), a = z(y - dy, x - dx), b = z(y + dy, x + dx);
-    if (!(a > 0 && b > 0))
-        return -1;
-    return std::abs(1 / a + 1 / b - 2 / c) * c * c;
+    const float c = inverse(y, x), a = inverse(y - dy, x - dx), b = inverse(y + dy, x + dx);
+    return a > 0 && b > 0 ? std::abs(a + b - 2 * c) * z_m * z_m : -1;
 }
 
 /// The values that fill areas exactly, and of which there are several times as many as of those next to them: a frame
@@ -90,6 +112,7 @@ std::vector<float> constants_of(const cv::Mat1f& z) {
 
 void collect(const cv::Mat1f& z, std::array<Band, bands>& all) {
     const std::vector<float> constants = constants_of(z);
+    const cv::Mat1f inverse = inverse_of(z);
     for (int y = lag_px; y < z.rows - lag_px; y += step_px)
         for (int x = lag_px; x < z.cols - lag_px; x += step_px) {
             const float c = z(y, x);
@@ -97,17 +120,19 @@ void collect(const cv::Mat1f& z, std::array<Band, bands>& all) {
                 continue;
             Band& band = all[static_cast<std::size_t>(std::min(band_of(c), bands - 1))];
             band.depths_m.push_back(c);
+            const bool among_longer = (x - lag_px) / step_px % 2 == (y - lag_px) / step_px % 2; // half are plenty
             for (const auto& [dx, dy] : {std::pair{1, 0}, std::pair{0, 1}}) {
-                const float d = second_difference(z, x, y, lag_px * dx, lag_px * dy),
-                            adjacent = second_difference(z, x, y, dx, dy);
+                const float d = second_difference(inverse, c, x, y, lag_px * dx, lag_px * dy),
+                            adjacent = second_difference(inverse, c, x, y, dx, dy);
                 if (d < 0 || adjacent < 0)
                     continue;
                 band.spread_m.push_back(d);
                 band.slopes_m.push_back(
                     std::abs(z(y + lag_px * dy, x + lag_px * dx) - z(y - lag_px * dy, x - lag_px * dx)));
                 band.adjacent_m.push_back(adjacent);
-                for (std::size_t i = 0; i < longer_px.size(); ++i)
-                    if (const float far = second_difference(z, x, y, longer_px[i] * dx, longer_px[i] * dy); far >= 0)
+                for (std::size_t i = 0; among_longer && i < longer_px.size(); ++i)
+                    if (const float far = second_difference(inverse, c, x, y, longer_px[i] * dx, longer_px[i] * dy);
+                        far >= 0)
                         band.longer_m[i].push_back(far);
                 band.z_sum += c;
             }
@@ -124,20 +149,27 @@ struct Measured {
     bool hidden = false; // smaller than what a step explains: most values are on the same one
 };
 
-/// Sigma from the mean of the smallest `share` of the differences, assumed Gaussian; `mean_of_share` is that mean for
-/// sigma 1. A second difference of three independent values has sqrt(6) times the deviation of one.
-double sigma_of_share(std::vector<float>& spread_m, double share, double mean_of_share) {
-    const double count = share * static_cast<double>(spread_m.size());
-    const auto at = spread_m.begin() + static_cast<std::ptrdiff_t>(count);
-    std::nth_element(spread_m.begin(), at, spread_m.end());
-    return std::accumulate(spread_m.begin(), at, 0.0) / count / (mean_of_share * std::sqrt(6.0));
-}
-double sigma_of_most(std::vector<float>& spread_m) { return sigma_of_share(spread_m, 0.8, 0.5586); }
-double sigma_of_few(std::vector<float>& spread_m) { return sigma_of_share(spread_m, 0.4, 0.2563); }
-double sigma_of_median(std::vector<float>& spread_m) {
-    const auto middle = spread_m.begin() + static_cast<std::ptrdiff_t>(spread_m.size() / 2);
-    std::nth_element(spread_m.begin(), middle, spread_m.end());
-    return *middle / (0.6745 * std::sqrt(6.0));
+/// Sigma by the means of the smallest differences, assumed Gaussian: the lower 40 % of |N(0, 1)| have the mean 0.2563,
+/// the lower 80 % 0.5586, and their median is 0.6745. A second difference of three independent values has sqrt(6) times
+/// the deviation of one.
+struct Sigmas {
+    double few, middle, most;
+};
+Sigmas sigmas_of(std::vector<float>& spread_m) {
+    const auto first = spread_m.begin();
+    const auto at = [&](double share) {
+        return first + static_cast<std::ptrdiff_t>(share * static_cast<double>(spread_m.size()));
+    };
+    const auto few = at(0.4), middle = at(0.5), most = at(0.8);
+    std::nth_element(first, most, spread_m.end()); // from the largest share down, each within the last
+    std::nth_element(first, middle, most);
+    std::nth_element(first, few, middle);
+    const double of_few = std::accumulate(first, few, 0.0), of_most = std::accumulate(few, most, of_few);
+    const auto mean = [&](double sum, auto end) {
+        return sum / static_cast<double>(std::max<std::ptrdiff_t>(end - first, 1));
+    };
+    const double one = std::sqrt(6.0);
+    return {mean(of_few, few) / (0.2563 * one), *middle / (0.6745 * one), mean(of_most, most) / (0.5586 * one)};
 }
 
 /// Sorts the values and drops duplicates.
@@ -181,7 +213,7 @@ double variance_of(std::vector<float>& spread_m, double step_m) {
         place -= std::floor(place);
         value = std::abs(value + static_cast<float>(step_m * (place - 0.5)));
     }
-    const double few = sigma_of_few(spread_m), most = sigma_of_most(spread_m), middle = sigma_of_median(spread_m);
+    const auto [few, middle, most] = sigmas_of(spread_m);
     const double without_edges = middle > 0 ? std::clamp((1.2 * middle - most) / (0.1 * middle), 0.0, 1.0) : 0;
     const double sigma = few + 0.5 * without_edges * std::max(middle - few, 0.0);
     return std::max(sigma * sigma - step_m * step_m / 72, 0.0);
@@ -210,22 +242,20 @@ double wide_variance(double variance, Band& band, double step_m) {
     return std::clamp(noise - slack * near, near, most * near);
 }
 
-/// The lower 80 % of |N(0, 1)| have the mean 0.5586, the lower 40 % 0.2563. Among clutter more than a fifth of the
-/// differences straddle an edge, so the smaller share decides. A value that comes in steps errs by a root of 1/12 of
-/// the step or more.
+/// Among clutter more than a fifth of the differences straddle an edge, so the smaller share decides. A value that
+/// comes in steps errs by a root of 1/12 of the step or more.
 Measured measured_in(Band& band) {
     const double gap = step_of(band.depths_m),
                  step = is_exact(band, gap) ? 0 : gap; // before others sort the differences
-    const double most = sigma_of_most(band.spread_m), few = sigma_of_few(band.spread_m);
-    const bool quantised = step >= 0.5 * most, by_most = quantised || few >= most;
-    const double adjacent = by_most ? sigma_of_most(band.adjacent_m) : sigma_of_few(band.adjacent_m);
+    const Sigmas distant = sigmas_of(band.spread_m), adjacent = sigmas_of(band.adjacent_m);
+    const bool quantised = step >= 0.5 * distant.most, by_most = quantised || distant.few >= distant.most;
     const double count = static_cast<double>(band.spread_m.size()),
                  variance = std::max(variance_of(band.spread_m, step), 1e-12);
     Measured measured{.z = band.z_sum / count,
                       .near_sigma = std::sqrt(variance),
                       .wide_sigma = std::sqrt(wide_variance(variance, band, step)),
-                      .adjacent = adjacent,
-                      .distant = std::max(by_most ? most : few, 1e-6),
+                      .adjacent = by_most ? adjacent.most : adjacent.few,
+                      .distant = std::max(by_most ? distant.most : distant.few, 1e-6),
                       .weight = count};
     if (quantised && band.spread_m.size() > 20 * band.depths_m.size()) {
         const double of_step = step / std::sqrt(12.0);
@@ -349,9 +379,15 @@ struct Survey {
 };
 
 Survey survey_of(std::span<const DepthImage> images) {
+    std::vector<std::array<Band, bands>> each(images.size());
     std::array<Band, bands> all;
-    for (const DepthImage& image : images)
-        collect(image.z_m, all);
+    tbb::this_task_arena::isolate([&] {
+        tbb::parallel_for(std::size_t(0), images.size(), [&](std::size_t i) { collect(images[i].z_m, each[i]); });
+        tbb::parallel_for(std::size_t(0), all.size(), [&](std::size_t i) {
+            for (std::array<Band, bands>& of_image : each) // in order: results do not depend on timing
+                all[i].take(std::move(of_image[i]));
+        });
+    });
     std::array<std::optional<Measured>, bands> measured;
     tbb::this_task_arena::isolate([&] {
         tbb::parallel_for(std::size_t(0), all.size(), [&](std::size_t i) {
