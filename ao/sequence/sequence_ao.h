@@ -56,7 +56,8 @@ struct SequenceAoResult {
     [[nodiscard]] std::size_t others() const;
 };
 
-/// What share of the usual gain (ErrorTables' `together`, of a dozen frames on either side) so many others bring.
+/// What share of the usual gain (`together` of MethodErrors, of a dozen others) so many others bring, as the README's
+/// table has it: 7/6 n / (n + 2), at most 1.
 [[nodiscard]] double share_of_gain(std::size_t others);
 
 /// Not thread-safe: one call at a time. A frame's result depends on the frames within reach() of it and on nothing
