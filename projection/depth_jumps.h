@@ -7,7 +7,7 @@
 
 namespace scanshade {
 
-/// Of all images, on all cores. Unknown where they show few jumps, or some of either kind.
+/// Of all images, on all cores. Unknown where jumps are of either kind; sharp where there are next to none.
 [[nodiscard]] Jumps jumps_of(std::span<const DepthImage> images);
 
 } // namespace scanshade

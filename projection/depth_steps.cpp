@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <Eigen/Core>
+#include <iterator>
 
 namespace scanshade {
 namespace {
@@ -28,12 +29,27 @@ Step step_by(const std::vector<float>& values_m, int power) {
     return {sum / count, count / static_cast<double>(gaps.size())};
 }
 
-/// Whether all values are those of 16-bit floats, as OpenEXR files hold them.
+/// Whether all values are those of 16-bit floats, as OpenEXR files hold them, and use their last digit from one power
+/// of two to the next: whole 256ths of a metre are such floats, too.
 bool are_halves(const std::vector<float>& values_m) {
-    constexpr std::size_t enough_values = 100;
-    return values_m.size() >= enough_values && std::ranges::all_of(values_m, [](float value) {
-               return static_cast<float>(static_cast<Eigen::half>(value)) == value;
-           });
+    constexpr std::ptrdiff_t enough_values = 100, enough_in_octave = 20;
+    if (std::ssize(values_m) < enough_values)
+        return false;
+    for (auto first = values_m.begin(); first != values_m.end();) {
+        const int octave = std::ilogb(*first);
+        const auto end = std::find_if(first, values_m.end(), [&](float value) { return std::ilogb(value) != octave; });
+        std::ptrdiff_t odd = 0;
+        for (auto each = first; each != end; ++each) {
+            const auto half = static_cast<Eigen::half>(*each);
+            if (static_cast<float>(half) != *each)
+                return false;
+            odd += half.x & 1;
+        }
+        if (end - first >= enough_in_octave && odd < (end - first) / 4)
+            return false;
+        first = end;
+    }
+    return true;
 }
 
 } // namespace
@@ -48,6 +64,8 @@ double DepthSteps::sigma(double z_m) const { return at(z_m) / std::sqrt(12.0); }
 /// would be well above these.
 DepthSteps steps_of(const std::vector<float>& values_m) {
     DepthSteps steps{.halves = are_halves(values_m)};
+    if (steps.halves)
+        return steps;
     const Step even = step_by(values_m, 0);
     Step growing = step_by(values_m, 2);
     constexpr double enough_share = 0.25; // of unquantised values the share is 0.02

@@ -189,12 +189,12 @@ double step_of(const std::vector<float>& depths_m) {
 }
 
 /// Whether depth is exact, for all that its values are that far apart: rows of a floor before a level camera. A
-/// sensor's steps bend most of the slopes that they show.
+/// sensor's steps bend a fifth of the slopes that they show, or more. Steeper slopes are edges.
 bool is_exact(const Band& band, double step_m) {
     constexpr std::size_t enough_slopes = 50;
     std::size_t slopes = 0, even = 0;
     for (std::size_t i = 0; i < band.slopes_m.size(); ++i)
-        if (band.slopes_m[i] > 0.5 * step_m) {
+        if (band.slopes_m[i] > 0.5 * step_m && band.slopes_m[i] < 6 * step_m) {
             ++slopes;
             even += band.spread_m[i] < 0.25 * step_m ? 1 : 0;
         }
@@ -207,11 +207,11 @@ bool is_exact(const Band& band, double step_m) {
 /// them: the smallest tell too little, and the median too much. Then four fifths give hardly more than the median; with
 /// edges among them they would.
 double variance_of(std::vector<float>& spread_m, double step_m) {
-    double place = 0;
+    double share = 0; // of the step
     for (float& value : spread_m) {
-        place += std::numbers::phi - 1; // never near where it has been
-        place -= std::floor(place);
-        value = std::abs(value + static_cast<float>(step_m * (place - 0.5)));
+        share += std::numbers::phi - 1; // never near where it has been
+        share -= std::floor(share);
+        value = std::abs(value + static_cast<float>(step_m * (share - 0.5)));
     }
     const auto [few, middle, most] = sigmas_of(spread_m);
     const double without_edges = middle > 0 ? std::clamp((1.2 * middle - most) / (0.1 * middle), 0.0, 1.0) : 0;
@@ -248,12 +248,13 @@ Measured measured_in(Band& band) {
     const double gap = step_of(band.depths_m),
                  step = is_exact(band, gap) ? 0 : gap; // before others sort the differences
     const Sigmas distant = sigmas_of(band.spread_m), adjacent = sigmas_of(band.adjacent_m);
+    const double dither = distant.most < 0.05 * step ? 0 : step; // else next to nothing would become something
     const bool quantised = step >= 0.5 * distant.most, by_most = quantised || distant.few >= distant.most;
     const double count = static_cast<double>(band.spread_m.size()),
-                 variance = std::max(variance_of(band.spread_m, step), 1e-12);
+                 variance = std::max(variance_of(band.spread_m, dither), 1e-12);
     Measured measured{.z = band.z_sum / count,
                       .near_sigma = std::sqrt(variance),
-                      .wide_sigma = std::sqrt(wide_variance(variance, band, step)),
+                      .wide_sigma = std::sqrt(wide_variance(variance, band, dither)),
                       .adjacent = by_most ? adjacent.most : adjacent.few,
                       .distant = std::max(by_most ? distant.most : distant.few, 1e-6),
                       .weight = count};
@@ -263,6 +264,7 @@ Measured measured_in(Band& band) {
         measured.near_sigma = std::max(measured.near_sigma, of_step);
         measured.wide_sigma = std::max(measured.wide_sigma, of_step);
     }
+    measured.hidden = measured.hidden || band.depths_m.size() == 1;
     measured.sigma = measured.near_sigma;
     return measured;
 }
@@ -369,7 +371,26 @@ double settle(std::vector<Measured>& points, const DepthSteps& steps) {
     for (Measured& p : points)
         p.sigma =
             wide ? std::max(p.wide_sigma, std::min(p.near_sigma, p.wide_sigma) * missing) : p.near_sigma * missing;
-    return disparity ? std::max(s, least_disparity_px / length_of(1)) : s;
+    double coarse = 0; // steps that hide what adjacent pixels have in common
+    for (const Measured& p : points)
+        coarse += steps.sigma(p.z) > 0.25 * p.near_sigma ? p.weight : 0;
+    return disparity && coarse > 0.5 * weights ? std::max(s, least_disparity_px / length_of(1)) : s;
+}
+
+/// Of errors that are uniform over a step.
+DepthNoise law_of(const DepthSteps& steps, std::vector<Measured> points) {
+    if (!steps.halves)
+        return {.floor_m = steps.step_m / std::sqrt(12.0), .per_z2 = steps.step_per_z2 / std::sqrt(12.0)};
+    for (Measured& p : points)
+        p.sigma = steps.sigma(p.z);
+    return law_through(points);
+}
+
+double largest_focal_px(std::span<const DepthImage> images) {
+    double focal_px = 0;
+    for (const DepthImage& image : images)
+        focal_px = std::max(focal_px, image.camera.fx);
+    return focal_px;
 }
 
 /// All bands of some images.
@@ -412,21 +433,14 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
     auto [points, values_m] = survey_of(images);
     const DepthSteps steps = steps_of(values_m);
     const DepthNoise exact{.step_m = steps.step_m, .step_per_z2 = steps.step_per_z2, .jumps = jumps_of(images)};
+    forget_hidden(points);
     if (points.empty() || is_clean(points))
         return exact;
-    forget_hidden(points);
     const double s = settle(points, steps);
     const bool rounded = explains(steps, points);
-    if (rounded) {
-        double focal_px = 0;
-        for (const DepthImage& image : images)
-            focal_px = std::max(focal_px, image.camera.fx);
-        if (!tilts(steps, focal_px, points))
-            return exact;
-        for (Measured& p : points)
-            p.sigma = steps.sigma(p.z);
-    }
-    DepthNoise noise = law_through(points);
+    if (rounded && !tilts(steps, largest_focal_px(images), points))
+        return exact;
+    DepthNoise noise = rounded ? law_of(steps, points) : law_through(points);
     noise.correlation_px = std::max(1.0, length_of(s));
     noise.step_m = steps.step_m, noise.step_per_z2 = steps.step_per_z2;
     noise.jumps = rounded ? exact.jumps : Jumps::unknown;

@@ -120,9 +120,7 @@ std::vector<FrameRow> CaptureRuns::process(CaptureJob job, OrderedOutput& output
     std::call_once(job.opened->check_poses, [&] {
         if (std::string warning = pose_warning(job.capture, job.of); !warning.empty())
             job.capture.warnings.push_back(std::move(warning));
-        const bool images =
-            std::ranges::any_of(job.capture.entries, [](const auto& entry) { return entry.cloud.empty(); });
-        if (asked_.sequence == SequenceUse::on && images && !has_poses(job.capture))
+        if (asked_.sequence == SequenceUse::on && !asked_.in_sequence(job.capture))
             job.capture.warnings.emplace_back(
                 "--sequence on: fewer than two frames have a pose, so each is computed by itself.");
     });

@@ -105,8 +105,7 @@ std::vector<std::string> outlook(const RunSettings& settings, MethodSetup& setup
     if (gain != front.sequences.end() && together)
         sentences.push_back(gain_text(gain->second));
     if (asked_together && !together)
-        sentences.emplace_back("no frame fitted together with another, so each was computed by itself: the frames' "
-                               "notes say why");
+        sentences.emplace_back("no frame fitted together with another, so each was computed by itself");
     const auto better = better_preset(front, sensor, *used);
     if (better) {
         const BenchmarkPoint* point = measured_with(front, sensor, *better);

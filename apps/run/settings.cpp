@@ -250,7 +250,8 @@ std::vector<Stage> RunSettings::common_stages() {
                    "unless the cloud has a grid or --camera is given",
            .value = OneOf(&s.clouds, cloud_words)},
           {.name = "sequence",
-           .help = "on: frames of a recording with poses are computed together; auto: if there are poses",
+           .help = "on: frames of a recording with poses are computed together; auto: the same, and no warning where "
+                   "there are none",
            .value = OneOf(&s.sequence, sequence_words),
            .common = true},
           {.name = "radius",
@@ -535,8 +536,12 @@ double RunSettings::median_depth() const {
     return of_method > 0 ? of_method / relative_radius : usual_median_depth;
 }
 
+bool has_cloud(const CaptureEntry& entry) { return !entry.cloud.empty(); }
+
 bool RunSettings::in_sequence(const Capture& capture) const {
-    return sequence != SequenceUse::off && has_poses(capture);
+    if (sequence == SequenceUse::on) // clouds taken as views say where they were seen from once they are loaded
+        return has_poses(capture) || std::ranges::any_of(capture.entries, has_cloud);
+    return sequence == SequenceUse::automatic && has_poses(capture);
 }
 
 bool RunSettings::asks_for_device(const Capture& capture) const {
@@ -544,7 +549,7 @@ bool RunSettings::asks_for_device(const Capture& capture) const {
 }
 
 bool has_poses(const Capture& capture) {
-    const auto posed = [](const CaptureEntry& entry) { return entry.world_from_camera && entry.cloud.empty(); };
+    const auto posed = [](const CaptureEntry& entry) { return entry.world_from_camera && !has_cloud(entry); };
     return std::ranges::count_if(capture.entries, posed) > 1;
 }
 

@@ -114,6 +114,18 @@ TEST(Sequence, a_frame_without_pose_is_what_it_is_by_itself) {
     EXPECT_TRUE(same_bytes(result.ao.visibility, surfel.compute(view).visibility));
 }
 
+TEST(Sequence, few_others_are_expected_to_bring_less_than_a_dozen) {
+    EXPECT_EQ(share_of_gain(0), 0);
+    EXPECT_NEAR(share_of_gain(2), 0.58, 0.01);
+    EXPECT_EQ(share_of_gain(12), 1);
+    EXPECT_EQ(share_of_gain(30), 1);
+    SequenceAoResult result;
+    result.fused = {4, 6};
+    result.neighbours = {1, 6};
+    result.averaged = {4, 5, 6};
+    EXPECT_EQ(result.others(), 4U) << "each counts once";
+}
+
 TEST(Sequence, other_views_see_what_hides_from_one) {
     double before = 0, after = 0;
     for (const char* name : {"office", "clutter", "columns"}) {

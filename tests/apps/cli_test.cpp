@@ -204,6 +204,25 @@ TEST_F(CliTest, frames_are_looked_at_together_only_where_there_are_poses) {
         fmt::format("run {} -o {} --preset best --surfel.quality lowest", recording.string(), (folder / "b").string()));
     ASSERT_EQ(together.exit_code, 0);
     EXPECT_NE(together.err.find("computed together"), std::string::npos) << together.err;
+    const auto frames_of = [&](const std::string& out) {
+        return json::parse(read_bytes(folder / out / "manifest.json"))["frames"];
+    };
+    ASSERT_EQ(run_program(fmt::format("run {} -o {} --preset best --surfel.quality lowest --sequence off",
+                                      recording.string(), (folder / "c").string()))
+                  .exit_code,
+              0);
+    const json with_others = frames_of("b"), alone = frames_of("c");
+    for (std::size_t i = 0; i < 3; ++i) {
+        EXPECT_EQ(with_others[i]["other_frames"], 2);
+        EXPECT_FALSE(alone[i].contains("other_frames"));
+        EXPECT_LT(with_others[i]["expected_error"], 0.97 * alone[i]["expected_error"].get<double>());
+    }
+    fs::remove(folder / "b/manifest.json");
+    ASSERT_EQ(run_program(fmt::format("run {} -o {} --preset best --surfel.quality lowest --resume", recording.string(),
+                                      (folder / "b").string()))
+                  .exit_code,
+              0);
+    EXPECT_EQ(frames_of("b")[1]["other_frames"], 2) << "from the journal";
 }
 
 TEST_F(CliTest, frames_computed_by_themselves_have_the_errors_of_such) {
