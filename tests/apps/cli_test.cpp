@@ -197,7 +197,7 @@ TEST_F(CliTest, frames_are_looked_at_together_only_where_there_are_poses) {
     EXPECT_EQ(manifest()["totals"]["ok"], 4) << "no poses: each frame by itself";
     const fs::path recording = folder / "recording";
     ASSERT_EQ(
-        run_program(fmt::format("generate office -o {} --frames 3 --size 64x48 --truth=false", recording.string()))
+        run_program(fmt::format("generate office -o {} --frames 3 --size 160x120 --truth=false", recording.string()))
             .exit_code,
         0);
     const Ran together = run_program(
