@@ -230,8 +230,10 @@ TEST_F(CliTest, frames_computed_by_themselves_have_the_errors_of_such) {
         const Ran ran = run("--overwrite --method surfel --surfel.quality lowest " + flags);
         EXPECT_EQ(ran.exit_code, 0) << ran.err;
         std::vector<double> errors;
-        for (const auto& frame : manifest()["frames"])
+        const json written = manifest();
+        for (const auto& frame : written["frames"])
             errors.push_back(frame["expected_error"]);
+        EXPECT_EQ(errors.size(), 4U);
         return std::pair{errors, ran.err};
     };
     const auto [alone, of_alone] = errors_with("");
