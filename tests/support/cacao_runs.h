@@ -237,7 +237,7 @@ struct Figures {
     double low = 0, high = 0, average = 0;
 };
 inline Figures figures(const cv::Mat1f& v, const cv::Mat& mask = {}) {
-    cv::Mat known = v == v;
+    cv::Mat known = v == v; // NOLINT(misc-redundant-expression): false for NaN
     if (!mask.empty())
         known &= mask;
     Figures f;
