@@ -189,7 +189,7 @@ double step_of(const std::vector<float>& depths_m) {
 }
 
 /// Whether depth is exact, for all that its values are that far apart: rows of a floor before a level camera. A
-/// sensor's steps bend a fifth of the slopes that they show, or more. Steeper slopes are edges.
+/// sensor's steps bend about half of the slopes that they show. Steeper slopes are edges.
 bool is_exact(const Band& band, double step_m) {
     constexpr std::size_t enough_slopes = 50;
     std::size_t slopes = 0, even = 0;
@@ -328,7 +328,7 @@ DepthNoise law_through(const std::vector<Measured>& points) {
 /// Whether a value's error is that of rounding to a step, and hardly more. Noise would show between adjacent pixels and
 /// over more of them, at most depths. Noise that a sensor has smoothed would show over more pixels at all depths; a
 /// scene's relief, which looks like it, leaves some even. A Kinect's disparity, whose noise shows over more pixels,
-/// errs by 1.4 to 2.5 times what rounding explains. What is rounded more finely than by any sensor may err more.
+/// errs by 1.4 to 2.8 times what rounding explains. What is rounded more finely than by any sensor may err more.
 bool explains(const DepthSteps& steps, const std::vector<Measured>& points) {
     const bool even = steps.step_m > 0 && !steps.halves, coarse = steps.step_per_z2 > 0.0005;
     double all = 0, rounded = 0, distant = 0;

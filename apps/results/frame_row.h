@@ -45,7 +45,7 @@ struct FrameRow {
     double coverage = 0;    ///< pixels or points with a visibility / those with a depth
     double mean_visibility = 0;
     double expected_error = 0;    ///< RMS of visibility over the frame; NaN = unknown
-    std::size_t other_frames = 0; ///< of the recording that it was computed with
+    std::size_t other_frames = 0; ///< how many of the recording it was computed with
     Camera camera;                ///< as used
     StageTimes ms;
     Timings passes; ///< the method's own account of `ms.compute`

@@ -19,6 +19,8 @@
 namespace scanshade {
 namespace {
 
+bool has_cloud(const CaptureEntry& entry) { return !entry.cloud.empty(); }
+
 constexpr std::array registered_words{Named{"auto", Registration::unknown}, Named{"yes", Registration::yes},
                                       Named{"no", Registration::no}};
 constexpr std::array flying_words{Named{"drop", true}, Named{"keep", false}};
@@ -535,8 +537,6 @@ double RunSettings::median_depth() const {
     const double of_method = radius_m();
     return of_method > 0 ? of_method / relative_radius : usual_median_depth;
 }
-
-bool has_cloud(const CaptureEntry& entry) { return !entry.cloud.empty(); }
 
 bool RunSettings::in_sequence(const Capture& capture) const {
     if (sequence == SequenceUse::on) // clouds taken as views say where they were seen from once they are loaded

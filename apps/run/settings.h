@@ -119,6 +119,5 @@ class RunSettings {
 
 /// Whether at least two depth frames have a pose, so that frames can be computed together.
 [[nodiscard]] bool has_poses(const Capture& capture);
-[[nodiscard]] bool has_cloud(const CaptureEntry& entry);
 
 } // namespace scanshade
