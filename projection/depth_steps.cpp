@@ -52,6 +52,31 @@ bool are_halves(const std::vector<float>& values_m) {
     return true;
 }
 
+/// The step that all values are whole numbers of apart, 0 if there is none that floats could tell.
+double common_step_of(const std::vector<float>& values_m) {
+    constexpr std::size_t enough_values = 20;
+    constexpr double least_m = 5e-5, most_off = 0.1; // of a step
+    if (values_m.size() < enough_values)
+        return 0;
+    double least_gap = values_m.back();
+    for (std::size_t i = 1; i < values_m.size(); ++i)
+        least_gap = std::min(least_gap, static_cast<double>(values_m[i]) - values_m[i - 1]);
+    for (const int steps_of_least : {1, 2, 3}) {
+        double step = least_gap / steps_of_least, steps = 0; // from the first value on, which make the step more exact
+        const bool common = std::ranges::all_of(values_m, [&](float value) {
+            const double from_first = static_cast<double>(value) - values_m.front(),
+                         whole = std::round(from_first / step - steps);
+            const bool fits = std::abs(from_first / step - steps - whole) < most_off;
+            steps += whole;
+            step = steps > 0 ? from_first / steps : step;
+            return fits;
+        });
+        if (common && step > least_m)
+            return step;
+    }
+    return 0;
+}
+
 } // namespace
 
 double DepthSteps::at(double z_m) const {
@@ -66,11 +91,14 @@ DepthSteps steps_of(const std::vector<float>& values_m) {
     DepthSteps steps{.halves = are_halves(values_m)};
     if (steps.halves)
         return steps;
+    steps.rounding_m = common_step_of(values_m);
     const Step even = step_by(values_m, 0);
     Step growing = step_by(values_m, 2);
     constexpr double enough_share = 0.25; // of unquantised values the share is 0.02
-    if (std::max(even.share, growing.share) < enough_share)
+    if (std::max(even.share, growing.share) < enough_share) {
+        steps.step_m = steps.rounding_m; // a level camera sees few values
         return steps;
+    }
     bool grows = growing.share > even.share;
     if (!grows && growing.share >= enough_share) {
         const auto far = std::ranges::lower_bound(values_m, std::sqrt(1.5 * even.size / growing.size));
@@ -79,7 +107,10 @@ DepthSteps steps_of(const std::vector<float>& values_m) {
         grows = growing_far.share > std::max(enough_share, step_by(far_m, 0).share);
         growing = grows ? growing_far : growing;
     }
-    (grows ? steps.step_per_z2 : steps.step_m) = (grows ? growing : even).size;
+    if (grows)
+        steps.step_per_z2 = growing.size;
+    else if (steps.rounding_m > 0 || even.share > 0.5) // else the rows of a floor look like steps
+        steps.step_m = steps.rounding_m > 0 ? steps.rounding_m : even.size;
     return steps;
 }
 

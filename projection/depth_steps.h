@@ -8,7 +8,8 @@ namespace scanshade {
 /// Depths are step_m + step_per_z2 z^2 apart, in metres and 1/m; 0 = none found.
 struct DepthSteps {
     double step_m = 0, step_per_z2 = 0;
-    bool halves = false; ///< they are 16-bit floats, of 11 binary digits; then both are 0
+    double rounding_m = 0; ///< all values are whole numbers of these apart; 0 = none found
+    bool halves = false;   ///< they are 16-bit floats, of 11 binary digits; then both are 0
 
     /// The step in metres at a depth above 0.
     [[nodiscard]] double at(double z_m) const;

@@ -27,28 +27,37 @@ constexpr std::array<int, 3> longer_px{8, 12, 16};
 constexpr int step_px = 3; // every third pixel of every third row is plenty
 constexpr int bands = 24;  // equal steps of log z over 0.2 .. 50 m
 constexpr double nearest_m = 0.2, farthest_m = 50;
-constexpr std::size_t enough = 400;        // samples a band needs
-constexpr double least_disparity_px = 2.8; // correlation length
-constexpr double much_missing = 1.15;      // of sigma by differences over lag_px, whose pixels correlate
+constexpr std::size_t enough = 400;             // samples a band needs
+constexpr double least_disparity_px = 2.8;      // correlation length
+constexpr double much_missing = 1.15;           // of sigma by differences over lag_px, whose pixels correlate
+constexpr int small_px = 320, small_lag_px = 2; // in images less wide, slopes are shorter
+
+/// Where depth goes on growing, or falling, over two lags.
+struct Slope {
+    float z_m;
+    float rise_m; // |difference| of depth over the flatter lag
+    float bend_m; // |second difference|
+    float off_m;  // how far the difference to the next pixel is off its share of the lag's
+};
 
 struct Band {
     std::vector<float> spread_m;   // |second difference| of depth
-    std::vector<float> slopes_m;   // |difference| of depth between the two ends
     std::vector<float> adjacent_m; // of neighbouring pixels
+    std::vector<Slope> slopes;
     std::array<std::vector<float>, longer_px.size()> longer_m;
     std::vector<float> depths_m; // at their middles; keep_distinct() reduces them to the distinct values
     double z_sum = 0;
 
     void take(Band&& other) {
-        const auto append = [](std::vector<float>& to, std::vector<float>& from) {
+        const auto append = [](auto& to, auto& from) {
             if (to.empty())
                 to = std::move(from);
             else
                 to.insert(to.end(), from.begin(), from.end());
         };
         append(spread_m, other.spread_m);
-        append(slopes_m, other.slopes_m);
         append(adjacent_m, other.adjacent_m);
+        append(slopes, other.slopes);
         for (std::size_t i = 0; i < longer_m.size(); ++i)
             append(longer_m[i], other.longer_m[i]);
         append(depths_m, other.depths_m);
@@ -113,6 +122,7 @@ std::vector<float> constants_of(const cv::Mat1f& z) {
 void collect(const cv::Mat1f& z, std::array<Band, bands>& all) {
     const std::vector<float> constants = constants_of(z);
     const cv::Mat1f inverse = inverse_of(z);
+    const int slope_px = z.cols < small_px ? small_lag_px : lag_px;
     for (int y = lag_px; y < z.rows - lag_px; y += step_px)
         for (int x = lag_px; x < z.cols - lag_px; x += step_px) {
             const float c = z(y, x);
@@ -127,9 +137,15 @@ void collect(const cv::Mat1f& z, std::array<Band, bands>& all) {
                 if (d < 0 || adjacent < 0)
                     continue;
                 band.spread_m.push_back(d);
-                band.slopes_m.push_back(
-                    std::abs(z(y + lag_px * dy, x + lag_px * dx) - z(y - lag_px * dy, x - lag_px * dx)));
                 band.adjacent_m.push_back(adjacent);
+                const float before = c - z(y - slope_px * dy, x - slope_px * dx),
+                            after = z(y + slope_px * dy, x + slope_px * dx) - c;
+                if (before * after > 0)
+                    band.slopes.push_back(
+                        {.z_m = c,
+                         .rise_m = std::min(std::abs(before), std::abs(after)),
+                         .bend_m = second_difference(inverse, c, x, y, slope_px * dx, slope_px * dy),
+                         .off_m = std::abs(z(y + dy, x + dx) - c - after / static_cast<float>(slope_px))});
                 for (std::size_t i = 0; among_longer && i < longer_px.size(); ++i)
                     if (const float far = second_difference(inverse, c, x, y, longer_px[i] * dx, longer_px[i] * dy);
                         far >= 0)
@@ -188,19 +204,6 @@ double step_of(const std::vector<float>& depths_m) {
     return median(std::move(gaps));
 }
 
-/// Whether depth is exact, for all that its values are that far apart: rows of a floor before a level camera. A
-/// sensor's steps bend about half of the slopes that they show. Steeper slopes are edges.
-bool is_exact(const Band& band, double step_m) {
-    constexpr std::size_t enough_slopes = 50;
-    std::size_t slopes = 0, even = 0;
-    for (std::size_t i = 0; i < band.slopes_m.size(); ++i)
-        if (band.slopes_m[i] > 0.5 * step_m && band.slopes_m[i] < 6 * step_m) {
-            ++slopes;
-            even += band.spread_m[i] < 0.25 * step_m ? 1 : 0;
-        }
-    return slopes > enough_slopes && even > slopes - slopes / 10;
-}
-
 /// Variance of one value by its smallest differences. Those of values in steps are whole steps, half of them often 0,
 /// which tells nothing of how large they are: spread evenly over a step (dithered) they tell it, and more by the
 /// variance of that (Sheppard). A sensor that smooths steps leaves small differences on them and large ones between
@@ -245,8 +248,7 @@ double wide_variance(double variance, Band& band, double step_m) {
 /// Among clutter more than a fifth of the differences straddle an edge, so the smaller share decides. A value that
 /// comes in steps errs by a root of 1/12 of the step or more.
 Measured measured_in(Band& band) {
-    const double gap = step_of(band.depths_m),
-                 step = is_exact(band, gap) ? 0 : gap; // before others sort the differences
+    const double step = step_of(band.depths_m);
     const Sigmas distant = sigmas_of(band.spread_m), adjacent = sigmas_of(band.adjacent_m);
     const double dither = distant.most < 0.05 * step ? 0 : step; // else next to nothing would become something
     const bool quantised = step >= 0.5 * distant.most, by_most = quantised || distant.few >= distant.most;
@@ -359,6 +361,22 @@ bool is_clean(const std::vector<Measured>& points) {
     return std::ranges::all_of(points, [&](const Measured& p) { return seen.at(p.z) < std::max(1e-4 * p.z, 1.2e-4); });
 }
 
+/// Whether depth is exact, for all that it seems noisy: the rows of a floor before a level camera are far apart, too,
+/// and where much of an image is edges, these count. Exact slopes are straight to a fraction of that sigma, and rise by
+/// as much from each pixel to the next. Noise bends them, and a sensor's steps are stairs.
+bool is_straight(const std::vector<Slope>& slopes, const DepthNoise& noise, double rounding_m) {
+    constexpr double enough_slopes = 100, least_share = 0.6;
+    double all = 0, straight = 0;
+    for (const Slope& slope : slopes)
+        if (const double sigma = noise.at(slope.z_m); slope.rise_m > 2 * sigma) {
+            const double least_bend = std::max(sigma / 3, std::min(1.5 * rounding_m, 0.8 * sigma)),
+                         least_off = 0.1 * slope.rise_m + 0.7 * rounding_m;
+            ++all;
+            straight += slope.bend_m < least_bend && slope.off_m < least_off ? 1 : 0;
+        }
+    return all > enough_slopes && straight > least_share * all;
+}
+
 /// Chooses each band's sigma, and returns the deviation of the correlation.
 double settle(std::vector<Measured>& points, const DepthSteps& steps) {
     double ratios = 0, weights = 0;
@@ -397,6 +415,7 @@ double largest_focal_px(std::span<const DepthImage> images) {
 struct Survey {
     std::vector<Measured> points;
     std::vector<float> values_m; ///< the distinct depths, in order
+    std::vector<Slope> slopes;
 };
 
 Survey survey_of(std::span<const DepthImage> images) {
@@ -421,6 +440,7 @@ Survey survey_of(std::span<const DepthImage> images) {
     Survey survey;
     for (std::size_t i = 0; i < all.size(); ++i) {
         survey.values_m.insert(survey.values_m.end(), all[i].depths_m.begin(), all[i].depths_m.end());
+        survey.slopes.insert(survey.slopes.end(), all[i].slopes.begin(), all[i].slopes.end());
         if (measured[i])
             survey.points.push_back(*measured[i]);
     }
@@ -430,7 +450,7 @@ Survey survey_of(std::span<const DepthImage> images) {
 } // namespace
 
 DepthNoise measure_noise(std::span<const DepthImage> images) {
-    auto [points, values_m] = survey_of(images);
+    auto [points, values_m, slopes] = survey_of(images);
     const DepthSteps steps = steps_of(values_m);
     const DepthNoise exact{.step_m = steps.step_m, .step_per_z2 = steps.step_per_z2, .jumps = jumps_of(images)};
     forget_hidden(points);
@@ -441,6 +461,9 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
     if (rounded && !tilts(steps, largest_focal_px(images), points))
         return exact;
     DepthNoise noise = rounded ? law_of(steps, points) : law_through(points);
+    const bool coarse = rounded && steps.step_m > 0; // steps are stairs, too
+    if (!coarse && is_straight(slopes, noise, steps.rounding_m))
+        return exact;
     noise.correlation_px = std::max(1.0, length_of(s));
     noise.step_m = steps.step_m, noise.step_per_z2 = steps.step_per_z2;
     noise.jumps = rounded ? exact.jumps : Jumps::unknown;

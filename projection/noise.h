@@ -47,10 +47,14 @@ struct DepthNoise {
 /// correlation exp(-d^2 / 2 s^2); sigma is corrected for what of it reaches over those pixels. That of disparity is 2.8
 /// pixels or more, since jumps between steps hide it.
 ///
-/// Steps are reported where a quarter of the distinct values are one step from the next. They are constant (16-bit
-/// files) or grow with z^2 (disparity). Steps that explain sigma are no noise: values err by half a step at most, and
-/// jumps stay sharp. They may be constant, grow with z^2 (depth buffers), or be those of 16-bit floats. Then sigma is
-/// that of the steps where they tilt the surface between adjacent pixels by much, and none where they do not.
+/// Steps are reported where a quarter of the distinct values are one step from the next, or all are whole numbers of
+/// one. They are constant (16-bit files) or grow with z^2 (disparity). Steps that explain sigma are no noise: values
+/// err by half a step at most, and jumps stay sharp. They may be constant, grow with z^2 (depth buffers), or be those
+/// of 16-bit floats. Then sigma is that of the steps where they tilt the surface between adjacent pixels by much, and
+/// none where they do not.
+///
+/// Exact depth may look noisy: rows of a floor are far apart, and edges may be much of an image. Its slopes tell. Six
+/// of ten and more are straight, from each pixel to the next.
 ///
 /// Returns no noise, only steps, where sigma is below 0.1 mm per metre or 0.12 mm: then nothing needs smoothing. Clean
 /// depth in fine 16-bit steps (5000 per metre) has as much. Jumps are told of depth without other noise; with it,
