@@ -18,11 +18,13 @@ struct JumpCount {
 constexpr std::array<int, 3> reaches{2, 4, 8}; // pixels from the middle to the first one of either surface
 using JumpCounts = std::array<JumpCount, reaches.size()>;
 
+constexpr double enough_jumps = 50;
+
 Jumps kind_of(const JumpCounts& counts) {
     // Depth resized or smoothed has 0.8 with two and more, and hardly any without: by the reach that spans its edges.
     // Rendered depth has 0.1 with two and more over the shortest reach. Over longer ones its slopes count, too, but
     // sharp jumps are as many. Time of flight mixes one pixel: 0.35 are sharp, and 0.8 and more of rendered depth.
-    constexpr double enough_jumps = 50, least_smeared = 0.4, few_sharp = 0.05, least_sharp = 0.7;
+    constexpr double least_smeared = 0.4, few_sharp = 0.05, least_sharp = 0.7;
     for (const JumpCount& count : counts)
         if (count.all > enough_jumps && count.smeared > least_smeared * count.all &&
             count.sharp < few_sharp * count.all)
@@ -71,7 +73,7 @@ void count_jumps(const cv::Mat1f& z, int reach, JumpCount& count) {
 
 } // namespace
 
-Jumps jumps_of(std::span<const DepthImage> images) {
+JumpsSeen jumps_of(std::span<const DepthImage> images) {
     std::vector<JumpCount> each(images.size() * reaches.size());
     tbb::this_task_arena::isolate([&] {
         tbb::parallel_for(std::size_t(0), each.size(), [&](std::size_t i) {
@@ -85,7 +87,8 @@ Jumps jumps_of(std::span<const DepthImage> images) {
         sum.sharp += each[i].sharp;
         sum.smeared += each[i].smeared;
     }
-    return kind_of(sums);
+    const JumpCount& near = sums.front();
+    return {kind_of(sums), near.all > enough_jumps ? near.sharp / near.all : 0};
 }
 
 } // namespace scanshade

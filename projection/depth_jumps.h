@@ -7,7 +7,12 @@
 
 namespace scanshade {
 
-/// Of all images, on all cores. Unknown where jumps are of either kind; sharp where there are next to none.
-[[nodiscard]] Jumps jumps_of(std::span<const DepthImage> images);
+struct JumpsSeen {
+    Jumps kind = Jumps::unknown; ///< unknown where jumps are of either kind; sharp where there are next to none
+    double sharp_share = 0;      ///< of all jumps; 0 where there are next to none
+};
+
+/// Of all images, on all cores.
+[[nodiscard]] JumpsSeen jumps_of(std::span<const DepthImage> images);
 
 } // namespace scanshade

@@ -377,6 +377,15 @@ bool is_straight(const std::vector<Slope>& slopes, const DepthNoise& noise, doub
     return all > enough_slopes && straight > least_share * all;
 }
 
+/// Whether what seems to be noise is relief: uneven ground, rows of books. It is smooth from pixel to pixel, as only a
+/// sensor's depth is that was resized or smoothed. Then jumps are smeared, or, with a Kinect's drivers, the noise is
+/// large.
+bool is_relief(const DepthNoise& noise, const JumpsSeen& jumps) {
+    constexpr double smooth_px = 5, least_sharp = 0.3, far_m = 2, most_m = 0.004;
+    return noise.step_per_z2 == 0 && noise.correlation_px >= smooth_px && noise.at(far_m) < most_m &&
+           jumps.sharp_share > least_sharp;
+}
+
 /// Chooses each band's sigma, and returns the deviation of the correlation.
 double settle(std::vector<Measured>& points, const DepthSteps& steps) {
     double ratios = 0, weights = 0;
@@ -452,7 +461,8 @@ Survey survey_of(std::span<const DepthImage> images) {
 DepthNoise measure_noise(std::span<const DepthImage> images) {
     auto [points, values_m, slopes] = survey_of(images);
     const DepthSteps steps = steps_of(values_m);
-    const DepthNoise exact{.step_m = steps.step_m, .step_per_z2 = steps.step_per_z2, .jumps = jumps_of(images)};
+    const JumpsSeen jumps = jumps_of(images);
+    const DepthNoise exact{.step_m = steps.step_m, .step_per_z2 = steps.step_per_z2, .jumps = jumps.kind};
     forget_hidden(points);
     if (points.empty() || is_clean(points))
         return exact;
@@ -461,11 +471,11 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
     if (rounded && !tilts(steps, largest_focal_px(images), points))
         return exact;
     DepthNoise noise = rounded ? law_of(steps, points) : law_through(points);
-    const bool coarse = rounded && steps.step_m > 0; // steps are stairs, too
-    if (!coarse && is_straight(slopes, noise, steps.rounding_m))
-        return exact;
     noise.correlation_px = std::max(1.0, length_of(s));
     noise.step_m = steps.step_m, noise.step_per_z2 = steps.step_per_z2;
+    const bool coarse = rounded && steps.step_m > 0; // steps are stairs, too
+    if (!coarse && (is_straight(slopes, noise, steps.rounding_m) || is_relief(noise, jumps)))
+        return exact;
     noise.jumps = rounded ? exact.jumps : Jumps::unknown;
     return noise;
 }
