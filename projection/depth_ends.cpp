@@ -120,7 +120,7 @@ bool is_ragged(const cv::Mat1f& z_m, float value) {
 } // namespace
 
 DepthEnds depth_ends(const cv::Mat1f& z_m) {
-    constexpr double least_share_cut = 0.02;
+    constexpr double least_share_cut = 0.02, much = 0.05;
     std::vector<float> depths;
     for (int v = 0; v < z_m.rows; v += every_px)
         for (int u = 0; u < z_m.cols; u += every_px)
@@ -139,7 +139,7 @@ DepthEnds depth_ends(const cv::Mat1f& z_m) {
     std::ranges::reverse(levels);
     ends.farthest = end_of(levels, valid);
     for (std::optional<DepthEnd>* end : {&ends.nearest, &ends.farthest})
-        if (*end && !((*end)->apart && is_customary_mark((*end)->z_m)) &&
+        if (*end && !(((*end)->apart || (*end)->share > much) && is_customary_mark((*end)->z_m)) &&
             ((!(*end)->apart && (*end)->share < least_share_cut) || !is_noisy(z_m) || !is_ragged(z_m, (*end)->z_m)))
             end->reset();
     return ends;

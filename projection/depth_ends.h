@@ -18,7 +18,8 @@ struct DepthEnds {
 };
 
 /// Of a depth image, 0 = hole. An end is told where depth has noise, for a wall that faces an ideal sensor holds one
-/// value, too; one apart from the others also where it is a number by which programs mark holes.
+/// value, too. Numbers by which programs mark holes are also told where they are apart from the others, or much of the
+/// image.
 [[nodiscard]] DepthEnds depth_ends(const cv::Mat1f& z_m);
 
 } // namespace scanshade

@@ -456,11 +456,27 @@ Survey survey_of(std::span<const DepthImage> images) {
     return survey;
 }
 
+bool are_interpolated(std::span<const DepthImage> images) {
+    return std::ranges::any_of(images, [](const DepthImage& image) { return !image.recorded_m.empty(); });
+}
+
+/// The distinct depths before a lens's distortion was removed, in order: interpolation hides their steps.
+std::vector<float> recorded_values_of(std::span<const DepthImage> images) {
+    std::vector<float> values_m;
+    for (const DepthImage& image : images)
+        for (int y = 0; y < image.recorded_m.rows; y += step_px)
+            for (int x = 0; x < image.recorded_m.cols; x += step_px)
+                if (const float z_m = image.recorded_m(y, x); z_m > nearest_m && z_m < farthest_m)
+                    values_m.push_back(z_m);
+    keep_distinct(values_m);
+    return values_m;
+}
+
 } // namespace
 
 DepthNoise measure_noise(std::span<const DepthImage> images) {
     auto [points, values_m, slopes] = survey_of(images);
-    const DepthSteps steps = steps_of(values_m);
+    const DepthSteps steps = steps_of(are_interpolated(images) ? recorded_values_of(images) : values_m);
     const JumpsSeen jumps = jumps_of(images);
     const DepthNoise exact{.step_m = steps.step_m, .step_per_z2 = steps.step_per_z2, .jumps = jumps.kind};
     forget_hidden(points);

@@ -204,7 +204,7 @@ DepthImage without_distortion(const cv::Mat1f& depth_m, const Camera& camera, co
                 depth_between(depth_m, maps->recorded_at()(v, u), nearest_m, same_surface_m(camera.pinhole, nearest_m));
             z_m(v, u) = between_m > 0 ? between_m : nearest_m;
         }
-    return {maps->straight_camera(), z_m, {}};
+    return {maps->straight_camera(), z_m, {}, depth_m};
 }
 
 // ---------------------------------------------------------------------------------------------------- clouds

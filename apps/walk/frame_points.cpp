@@ -47,7 +47,8 @@ std::vector<cv::Vec3b> cloud_colours(const std::vector<cv::Vec3b>& own, const st
 }
 
 FramePoints points_of_depth(const Work& work, const Scene& shown, const Outputs& outputs) {
-    const auto& [camera, z_m, source] = work.depth;
+    const Pinhole& camera = work.depth.camera;
+    const cv::Mat1f& z_m = work.depth.z_m;
     const bool warped = has_secondary_camera(work.frame);
     const Scene scene = warped && outputs.colour_view ? scene_of(work, false) : shown;
     const cv::Mat3b colour = undistorted(scene.colour, work.frame.camera);

@@ -4,8 +4,10 @@
 #include "projection/base/error.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fmt/format.h>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 namespace scanshade {
@@ -123,22 +125,58 @@ Pinhole from_keys(const fs::path& file, const Json& object) {
     return camera;
 }
 
+/// Whether the file names a lens model of four radial coefficients.
+bool names_fisheye(const Json& object) {
+    constexpr std::array keys{"camera_model", "distortion_model", "model"};
+    constexpr std::array names{"fisheye", "FISHEYE", "equidistant", "EQUIDISTANT", "kannala", "KANNALA"};
+    return std::ranges::any_of(keys, [&](const char* key) {
+        const std::string model = object.contains(key) ? object[key].dump() : "";
+        return std::ranges::any_of(names, [&](const char* name) { return model.find(name) != std::string::npos; });
+    });
+}
+
+/// Ours are `distortion` and `fisheye`. Other names that lenses go by are read, too, for one left out bends planes:
+/// lists, and single numbers as instant-ngp has them.
+Distortion lens_of(const fs::path& file, const Json& object) {
+    constexpr std::array lists{"distortion", "fisheye", "distortion_coefficients", "dist_coeffs", "distCoeffs", "dist",
+                               "coeffs",     "D"};
+    constexpr std::array numbers{"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
+    const auto is_there = [&](const char* key) { return object.contains(key); };
+    std::vector<std::string> found;
+    std::ranges::copy_if(lists, std::back_inserter(found), is_there);
+    if (const auto* number = std::ranges::find_if(numbers, is_there); number != numbers.end())
+        found.emplace_back(*number);
+    if (found.empty())
+        return {};
+    if (found.size() > 1)
+        refuse_camera(file,
+                      fmt::format("\"{}\" and \"{}\" are both there, one lens expected", found.front(), found.back()));
+    const std::string& key = found.front();
+    const bool fisheye = key == "fisheye" || names_fisheye(object);
+    if (std::ranges::count(lists, key) > 0) {
+        const Json& list = object[key];
+        if (fisheye)
+            return kannala_brandt(numbers_of(file, object, key, 4));
+        const bool short_or_rational = list.is_array() && (list.size() == 4 || list.size() == 8); // else 5 are expected
+        return brown_conrady(numbers_of(file, object, key, short_or_rational ? list.size() : 5));
+    }
+    const auto number = [&](const char* name) {
+        return object.contains(name) ? number_of(file, object[name], name) : 0.0;
+    };
+    if (fisheye)
+        return kannala_brandt({number("k1"), number("k2"), number("k3"), number("k4")});
+    std::vector<double> coefficients;
+    std::ranges::transform(numbers, std::back_inserter(coefficients), number);
+    return brown_conrady(coefficients);
+}
+
 Camera one_camera(const fs::path& file, const Json& object) {
     Camera camera;
     camera.pinhole = object.contains("intrinsic_matrix")
                          ? from_columns(file, numbers_of(file, object, "intrinsic_matrix", 9))
                          : from_keys(file, object);
     camera.pinhole.size = {size_of(file, object, "width"), size_of(file, object, "height")};
-    if (object.contains("distortion")) {
-        const Json& list = object["distortion"];
-        const bool rational = list.is_array() && list.size() == 8; // else 5 are expected
-        camera.distortion = brown_conrady(numbers_of(file, object, "distortion", rational ? 8 : 5));
-    }
-    if (object.contains("fisheye")) {
-        if (object.contains("distortion"))
-            refuse_camera(file, "\"distortion\" and \"fisheye\" are both there, one lens expected");
-        camera.distortion = kannala_brandt(numbers_of(file, object, "fisheye", 4));
-    }
+    camera.distortion = lens_of(file, object);
     return camera;
 }
 

@@ -274,9 +274,16 @@ bool is_stretched(const cv::Mat_<Pixel>& stored, double whole, double nearly_all
     return others >= 100 && least < hardly_any * whole && most >= nearly_all * whole && most <= whole;
 }
 
+/// Whether exactly 1 is the largest number, and of few pixels: a frame was divided by its largest depth.
+bool is_divided(const cv::Mat1f& stored) {
+    constexpr int most_share = 1000; // a wall at one metre has more
+    const int largest = cv::countNonZero(stored == 1);
+    return largest > 0 && most_share * largest < stored.rows * stored.cols && largest_of(stored) == 1;
+}
+
 bool is_stretched(const cv::Mat& stored) {
     return stored.type() == CV_16UC1   ? is_stretched(cv::Mat1w(stored), 65535, 0.98)
-           : stored.type() == CV_32FC1 ? is_stretched(cv::Mat1f(stored), 1, 1)
+           : stored.type() == CV_32FC1 ? is_stretched(cv::Mat1f(stored), 1, 1) || is_divided(cv::Mat1f(stored))
                                        : false;
 }
 

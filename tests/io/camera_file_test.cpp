@@ -224,6 +224,29 @@ TEST(camera_files, a_negative_fy_is_a_y_axis_upwards) {
     EXPECT_FALSE(camera_from_argument("481.2,480,319.5,239.5").y_was_up);
 }
 
+TEST(camera_files, json_lenses_are_read_by_any_of_their_names) {
+    const TemporaryFolder folder;
+    const auto text = [](const std::string& lens) {
+        return R"({"fx": 50, "fy": 50, "cx": 31.5, "cy": 23.5, "width": 64, "height": 48, )" + lens + "}";
+    };
+    const auto read = [&](const std::string& lens) {
+        return read_camera_file(write_file(folder / "c.json", text(lens))).camera.distortion;
+    };
+    const Distortion lens{.k1 = 0.1, .k2 = -0.2, .p1 = 0.01, .p2 = 0.02};
+    for (const char* name : {"distortion", "distortion_coefficients", "dist_coeffs", "distCoeffs", "dist", "D"}) {
+        EXPECT_EQ(read(fmt::format(R"("{}": [0.1, -0.2, 0.01, 0.02])", name)), lens) << name;
+        EXPECT_EQ(read(fmt::format(R"("{}": [0.1, -0.2, 0.01, 0.02, 0])", name)), lens) << name;
+    }
+    EXPECT_EQ(read(R"("k1": 0.1, "k2": -0.2, "p1": 0.01, "p2": 0.02)"), lens);
+    EXPECT_EQ(read(R"("k1": 0.1, "k6": 0.3)"), (Distortion{.k1 = 0.1, .k6 = 0.3}));
+    const Distortion fisheye{.k1 = 0.1, .k2 = 0.2, .model = LensModel::kannala_brandt};
+    EXPECT_EQ(read(R"("fisheye": [0.1, 0.2, 0, 0])"), fisheye);
+    EXPECT_EQ(read(R"("k1": 0.1, "k2": 0.2, "camera_model": "OPENCV_FISHEYE")"), fisheye);
+    EXPECT_EQ(read(R"("dist": [0.1, 0.2, 0, 0], "distortion_model": "equidistant")"), fisheye);
+    const std::string both = refusal([&] { (void)read(R"("dist": [0.1, 0, 0, 0], "k1": 0.1)"); });
+    EXPECT_TRUE(says(both, "\"dist\" and \"k1\" are both there")) << both;
+}
+
 TEST(camera_files, json_of_the_wrong_shape_names_the_key) {
     const TemporaryFolder folder;
     const auto message = [&](const std::string& text) {

@@ -118,6 +118,11 @@ TEST(plausibility, numbers_for_looking_at_are_no_lengths) {
     cv::normalize(waves(), shares, 0, 1, cv::NORM_MINMAX, CV_32F);
     const DepthEncoding metres = usual_encoding("m", "assumed: floats are metres");
     EXPECT_TRUE(warned(doubts_about(depth_in_metres(shares, metres), shares, metres), "fill the whole range"));
+    cv::Mat1f divided; // by its largest value
+    cv::normalize(waves(), divided, 1, 0, cv::NORM_INF, CV_32F);
+    EXPECT_TRUE(warned(doubts_about(depth_in_metres(divided, metres), divided, metres), "fill the whole range"));
+    divided.colRange(0, 20) = 1; // a wall at one metre
+    EXPECT_TRUE(doubts_about(depth_in_metres(divided, metres), divided, metres).empty());
     cv::Mat1f near; // to 1.5 m
     shares.convertTo(near, CV_32F, 1, 0.5);
     EXPECT_TRUE(doubts_about(depth_in_metres(near, metres), near, metres).empty());

@@ -69,6 +69,9 @@ TEST(depth_ends, a_range_that_was_cut_off_is_told_from_a_wall) {
     EXPECT_FALSE(far->apart);
     EXPECT_GT(far->share, 0.2);
     EXPECT_FALSE(depth_ends(cut_off(floor_seen(0), 3)).farthest) << "a wall that faces an ideal sensor";
+    const auto mark = depth_ends(cut_off(cv::Mat1f(4 * floor_seen(0)), 10)).farthest;
+    ASSERT_TRUE(mark) << "at a number by which programs mark holes";
+    EXPECT_FALSE(mark->apart);
 }
 
 /// What an ideal camera sees: a ball in front of a wall at `wall`, and above a floor where that is nearer.

@@ -1,5 +1,6 @@
 // Exact depth that looks noisy, as renderers and their files leave it: nothing of it is dropped or smoothed.
 #include "projection/noise.h"
+#include "projection/project.h"
 #include "tests/support/noisy.h"
 #include "tests/support/scenes.h"
 
@@ -124,6 +125,65 @@ TEST(exact_depth, noise_is_found_in_rooms_before_a_level_camera) {
                                        [unit](double z) { return unit > 0 ? std::round(z * unit) / unit : z; }));
                 EXPECT_NEAR(measured.at(3), floor_m, 0.4 * floor_m) << number << ": " << describe(measured);
             }
+}
+
+/// Ground that is rough at every scale, as far as 12 m before a camera 1.4 m above it, and a row of posts on it.
+DepthImage uneven_ground(cv::Size size, double rough_m) {
+    DepthImage ground{test_camera(size), cv::Mat1f(size), {}};
+    const auto height = [rough_m](double x, double z) {
+        double sum = 0;
+        for (int octave = 0; octave < 6; ++octave) {
+            const double cycles = 2 * std::exp2(octave);
+            sum += std::sin(cycles * x + octave) * std::sin(cycles * z + 2 * octave) / std::exp2(octave);
+        }
+        return rough_m * sum;
+    };
+    for (int y = 0; y < size.height; ++y)
+        for (int x = 0; x < size.width; ++x) {
+            const double right = (x - ground.camera.cx) / ground.camera.fx,
+                         down = (y - ground.camera.cy) / ground.camera.fy + 0.45;
+            double z = 0.5;
+            while (z < 12 && down * z < 1.4 + height(right * z, z))
+                z *= 1.002;
+            double above = z / 1.002;
+            for (int i = 0; i < 40; ++i) {
+                const double middle = (above + z) / 2;
+                (down * middle < 1.4 + height(right * middle, middle) ? above : z) = middle;
+            }
+            const double post_z = 2 + std::floor(8 * static_cast<double>(x) / size.width) / 2;
+            const bool post = x % (size.width / 8) < size.width / 40 && down * post_z > 0.2;
+            ground.z_m(y, x) = static_cast<float>(post ? std::min(z, post_z) : z);
+        }
+    return ground;
+}
+
+TEST(exact_depth, uneven_ground_is_no_noise) {
+    for (const double unit : {0.0, 1000.0}) {
+        const auto stored = [unit](double z) { return unit > 0 ? std::round(z * unit) / unit : z; };
+        const DepthNoise none = measure_noise(held({uneven_ground({640, 480}, 0.05)}, stored));
+        EXPECT_EQ(none.at(2), 0) << unit << ": " << describe(none);
+        const DepthNoise some = measure_noise(held(with_noise({uneven_ground({640, 480}, 0.02)}, {0.004, 0}), stored));
+        EXPECT_NEAR(some.at(2), 0.004, 0.002) << unit << ": " << describe(some);
+    }
+}
+
+TEST(exact_depth, millimetres_behind_a_lens_are_steps_though_interpolation_hides_them) {
+    Frame frame;
+    frame.camera.pinhole = test_camera({512, 424});
+    frame.camera.distortion = {.k1 = 0.09};
+    const auto seen = [&](const std::vector<DepthImage>& images) {
+        std::vector<DepthImage> straight;
+        for (const DepthImage& image : held(images, [](double z) { return std::round(z * 1000) / 1000; })) {
+            frame.depth_m = image.z_m;
+            straight.push_back(project(frame));
+        }
+        return measure_noise(straight);
+    };
+    const DepthNoise none = seen(slopes({512, 424}));
+    EXPECT_EQ(none.at(2), 0) << describe(none);
+    EXPECT_NEAR(none.step_m, 0.001, 1e-5) << describe(none);
+    const DepthNoise some = seen(with_noise(slopes({512, 424}), {0.004, 0}));
+    EXPECT_NEAR(some.at(2), 0.0035, 0.001) << "interpolation takes some away: " << describe(some);
 }
 
 TEST(exact_depth, few_digits_are_no_noise) {
