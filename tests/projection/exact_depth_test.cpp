@@ -1,4 +1,5 @@
 // Exact depth that looks noisy, as renderers and their files leave it: nothing of it is dropped or smoothed.
+#include "projection/depth_steps.h"
 #include "projection/noise.h"
 #include "projection/project.h"
 #include "tests/support/noisy.h"
@@ -100,7 +101,8 @@ TEST(exact_depth, rows_of_a_floor_before_a_level_camera_are_no_steps) {
 
 // A tenth to a half of these would seem noisy by the spread of their differences, with a sigma of up to 4 cm.
 TEST(exact_depth, rooms_before_a_level_camera_are_exact_in_images_of_any_size) {
-    for (const cv::Size size : {cv::Size(64, 64), cv::Size(84, 84), cv::Size(160, 120), cv::Size(256, 256)})
+    for (const cv::Size size :
+         {cv::Size(64, 64), cv::Size(84, 84), cv::Size(160, 120), cv::Size(256, 256), cv::Size(512, 512)})
         for (const double unit : {0.0, 1000.0}) {
             int noisy_rooms = 0;
             std::string told;
@@ -144,9 +146,9 @@ DepthImage uneven_ground(cv::Size size, double rough_m) {
                          down = (y - ground.camera.cy) / ground.camera.fy + 0.45;
             double z = 0.5;
             while (z < 12 && down * z < 1.4 + height(right * z, z))
-                z *= 1.002;
-            double above = z / 1.002;
-            for (int i = 0; i < 40; ++i) {
+                z *= 1.02;
+            double above = z / 1.02;
+            for (int i = 0; i < 25; ++i) {
                 const double middle = (above + z) / 2;
                 (down * middle < 1.4 + height(right * middle, middle) ? above : z) = middle;
             }
@@ -157,12 +159,22 @@ DepthImage uneven_ground(cv::Size size, double rough_m) {
     return ground;
 }
 
+TEST(exact_depth, few_values_tell_the_step_that_all_are_whole_numbers_of) {
+    std::vector<float> rows_mm, rows_m; // of a floor, 1.4 m below a camera of 365 pixels
+    for (int row = 200; row > 40; row -= 4)
+        rows_mm.push_back(static_cast<float>(std::round(1000 * 1.4 * 365 / row) / 1000)),
+            rows_m.push_back(static_cast<float>(1.4 * 365 / row));
+    EXPECT_NEAR(steps_of(rows_mm).step_m, 0.001, 1e-6);
+    EXPECT_EQ(steps_of(rows_m).step_m, 0);
+}
+
 TEST(exact_depth, uneven_ground_is_no_noise) {
+    const DepthImage rough = uneven_ground({320, 240}, 0.05), smoother = uneven_ground({320, 240}, 0.02);
     for (const double unit : {0.0, 1000.0}) {
         const auto stored = [unit](double z) { return unit > 0 ? std::round(z * unit) / unit : z; };
-        const DepthNoise none = measure_noise(held({uneven_ground({640, 480}, 0.05)}, stored));
+        const DepthNoise none = measure_noise(held({rough}, stored));
         EXPECT_EQ(none.at(2), 0) << unit << ": " << describe(none);
-        const DepthNoise some = measure_noise(held(with_noise({uneven_ground({640, 480}, 0.02)}, {0.004, 0}), stored));
+        const DepthNoise some = measure_noise(held(with_noise({smoother}, {0.004, 0}), stored));
         EXPECT_NEAR(some.at(2), 0.004, 0.002) << unit << ": " << describe(some);
     }
 }
