@@ -52,19 +52,13 @@ bool are_halves(const std::vector<float>& values_m) {
     return true;
 }
 
-/// The step that all values are whole numbers of apart, 0 if there is none that floats could tell: that of a file's
-/// usual units, or the least gap between two values, or a part of it.
+/// The step that all values are whole numbers of apart, 0 if there is none that floats could tell: the least gap
+/// between two values, or a part of it, or that of a file's usual units.
 double common_step_of(const std::vector<float>& values_m) {
     constexpr std::size_t enough_values = 20;
     constexpr double least_m = 5e-5, most_off = 0.1; // of a step
     if (values_m.size() < enough_values)
         return 0;
-    for (const double per_metre : {100.0, 1000.0, 4000.0, 5000.0, 10000.0})
-        if (std::ranges::all_of(values_m, [&](float value) {
-                const double steps = static_cast<double>(value) * per_metre;
-                return std::abs(steps - std::round(steps)) < most_off;
-            }))
-            return 1 / per_metre;
     double least_gap = values_m.back();
     for (std::size_t i = 1; i < values_m.size(); ++i)
         least_gap = std::min(least_gap, static_cast<double>(values_m[i]) - values_m[i - 1]);
@@ -80,6 +74,12 @@ double common_step_of(const std::vector<float>& values_m) {
         if (common && step > least_m)
             return step;
     }
+    for (const double per_metre : {100.0, 1000.0, 4000.0, 5000.0, 10000.0})
+        if (std::ranges::all_of(values_m, [&](float value) {
+                const double steps = static_cast<double>(value) * per_metre;
+                return std::abs(steps - std::round(steps)) < most_off;
+            }))
+            return 1 / per_metre;
     return 0;
 }
 
