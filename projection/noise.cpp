@@ -4,6 +4,7 @@
 #include "projection/base/statistics.h"
 #include "projection/depth_jumps.h"
 #include "projection/depth_steps.h"
+#include "projection/pixel_locking.h"
 
 #include <algorithm>
 #include <array>
@@ -472,6 +473,24 @@ std::vector<float> recorded_values_of(std::span<const DepthImage> images) {
     return values_m;
 }
 
+/// 1/z of some thousand pixels as they were recorded.
+std::vector<float> some_inverse_depths(std::span<const DepthImage> images) {
+    constexpr double wanted = 6000;
+    double pixels = 0;
+    for (const DepthImage& image : images)
+        pixels += static_cast<double>(image.z_m.total());
+    const int every = std::max(1, static_cast<int>(std::sqrt(pixels / wanted)));
+    std::vector<float> inverse_m;
+    for (const DepthImage& image : images) {
+        const cv::Mat1f& z_m = image.recorded_m.empty() ? image.z_m : image.recorded_m;
+        for (int y = every / 2; y < z_m.rows; y += every)
+            for (int x = every / 2; x < z_m.cols; x += every)
+                if (z_m(y, x) > nearest_m && z_m(y, x) < farthest_m)
+                    inverse_m.push_back(1 / z_m(y, x));
+    }
+    return inverse_m;
+}
+
 } // namespace
 
 DepthNoise measure_noise(std::span<const DepthImage> images) {
@@ -489,6 +508,8 @@ DepthNoise measure_noise(std::span<const DepthImage> images) {
     DepthNoise noise = rounded ? law_of(steps, points) : law_through(points);
     noise.correlation_px = std::max(1.0, length_of(s));
     noise.step_m = steps.step_m, noise.step_per_z2 = steps.step_per_z2;
+    if (steps.step_per_z2 > 0)
+        noise.per_z2 = std::hypot(noise.per_z2, locking_of(some_inverse_depths(images), steps.step_per_z2));
     const bool coarse = rounded && steps.step_m > 0; // steps are stairs, too
     if (!coarse && (is_straight(slopes, noise, steps.rounding_m) || is_relief(noise, jumps)))
         return exact;

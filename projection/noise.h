@@ -53,8 +53,11 @@ struct DepthNoise {
 /// of 16-bit floats. Then sigma is that of the steps where they tilt the surface between adjacent pixels by much, and
 /// none where they do not.
 ///
+/// Stereo matchers may prefer whole disparities; what that adds is told from the fractions (pixel_locking.h).
+///
 /// Exact depth may look noisy: rows of a floor are far apart, and edges may be much of an image. Its slopes tell. Six
-/// of ten and more are straight, from each pixel to the next.
+/// of ten and more are straight, from each pixel to the next. Or depth is smooth, what seems noise is small, and jumps
+/// are sharp.
 ///
 /// Returns no noise, only steps, where sigma is below 0.1 mm per metre or 0.12 mm: then nothing needs smoothing. Clean
 /// depth in fine 16-bit steps (5000 per metre) has as much. Jumps are told of depth without other noise; with it,
