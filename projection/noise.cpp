@@ -475,7 +475,7 @@ std::vector<float> recorded_values_of(std::span<const DepthImage> images) {
 
 /// 1/z of some thousand pixels as they were recorded.
 std::vector<float> some_inverse_depths(std::span<const DepthImage> images) {
-    constexpr double wanted = 6000;
+    constexpr double wanted = 4000;
     double pixels = 0;
     for (const DepthImage& image : images)
         pixels += static_cast<double>(image.z_m.total());

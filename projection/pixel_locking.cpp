@@ -53,7 +53,7 @@ double locking_of(const std::vector<float>& inverse_m, double step_per_m) {
         return 0;
     double period = 0, strongest = 0;
     for (const int steps : {8, 16, 32})
-        for (double off = -0.06; off <= 0.06; off += 0.001) { // a step is not told more exactly
+        for (double off = -0.06; off <= 0.06; off += 0.002) { // a step is not told more exactly
             const double tried = steps * step_per_m * (1 + off), found = std::abs(preference(inverse_m, tried));
             if (found > strongest)
                 strongest = found, period = tried;

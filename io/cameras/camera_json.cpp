@@ -141,7 +141,9 @@ Distortion lens_of(const fs::path& file, const Json& object) {
     constexpr std::array lists{"distortion", "fisheye", "distortion_coefficients", "dist_coeffs", "distCoeffs", "dist",
                                "coeffs",     "D"};
     constexpr std::array numbers{"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
-    const auto is_there = [&](const char* key) { return object.contains(key); };
+    const auto is_there = [&](const char* key) { // null and an empty list say that there is no lens
+        return object.contains(key) && !object[key].empty();
+    };
     std::vector<std::string> found;
     std::ranges::copy_if(lists, std::back_inserter(found), is_there);
     if (const auto* number = std::ranges::find_if(numbers, is_there); number != numbers.end())

@@ -238,6 +238,7 @@ TEST(camera_files, json_lenses_are_read_by_any_of_their_names) {
         EXPECT_EQ(read(fmt::format(R"("{}": [0.1, -0.2, 0.01, 0.02, 0])", name)), lens) << name;
     }
     EXPECT_EQ(read(R"("k1": 0.1, "k2": -0.2, "p1": 0.01, "p2": 0.02)"), lens);
+    EXPECT_EQ(read(R"("D": [], "distortion": null)"), Distortion{});
     EXPECT_EQ(read(R"("k1": 0.1, "k6": 0.3)"), (Distortion{.k1 = 0.1, .k6 = 0.3}));
     const Distortion fisheye{.k1 = 0.1, .k2 = 0.2, .model = LensModel::kannala_brandt};
     EXPECT_EQ(read(R"("fisheye": [0.1, 0.2, 0, 0])"), fisheye);
