@@ -79,7 +79,8 @@ using Quality = CameraQuality;
 constexpr CameraFormatRow formats[] = {
     {.name = "scanshade",
      .recognised = "JSON with `fx`",
-     .content = "lens, fisheye, depth unit and correction, registration, a colour camera",
+     .content = "lens (`distortion`, also as `dist`, `dist_coeffs`, `D`, ... or `k1`, `k2`, ...), fisheye, depth unit "
+                "and correction, registration, a colour camera",
      .is = is_json,
      .read = read_json,
      .extension = ".json",

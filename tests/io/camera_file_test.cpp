@@ -7,6 +7,7 @@
 
 #include <array>
 #include <filesystem>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 
