@@ -1,7 +1,5 @@
 #include "projection/pixel_locking.h"
 
-#include "projection/base/statistics.h"
-
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -18,12 +16,23 @@ std::complex<double> preference(const std::vector<float>& inverse_m, double peri
     return sum / static_cast<double>(inverse_m.size());
 }
 
-/// How strong it is off the period, where a narrow range of disparities makes it strong, too.
-double preference_nearby(const std::vector<float>& inverse_m, double period) {
-    std::vector<double> others;
-    for (const double factor : {0.7, 0.74, 0.78, 0.82, 0.86, 1.16, 1.22, 1.28, 1.34, 1.4})
-        others.push_back(std::abs(preference(inverse_m, factor * period)));
-    return median(std::move(others));
+/// Whether pixels near, far and between prefer the same disparities: whole ones. Walls prefer those that they are at.
+bool is_everywhere(std::vector<float> inverse_m, double period) {
+    constexpr std::size_t parts = 4, enough = 2;
+    constexpr double least_periods = 2, least = 0.2, same_phase = 0.12; // in periods
+    std::ranges::sort(inverse_m);
+    std::size_t telling = 0;
+    for (std::size_t part = 0; part < parts; ++part) {
+        const auto first = inverse_m.begin() + static_cast<std::ptrdiff_t>(part * inverse_m.size() / parts),
+                   last = inverse_m.begin() + static_cast<std::ptrdiff_t>((part + 1) * inverse_m.size() / parts);
+        if (static_cast<double>(*(last - 1) - *first) < least_periods * period)
+            continue;
+        const std::complex<double> preferred = preference({first, last}, period);
+        if (std::abs(preferred) < least || std::abs(std::arg(preferred)) > 2 * std::numbers::pi * same_phase)
+            return false;
+        ++telling;
+    }
+    return telling >= enough;
 }
 
 /// The deviation of the share of smaller fractions from the fraction, in periods.
@@ -48,7 +57,7 @@ double unevenness(const std::vector<float>& inverse_m, double period) {
 
 double locking_of(const std::vector<float>& inverse_m, double step_per_m) {
     constexpr std::size_t enough = 1000;
-    constexpr double least = 0.25, least_times = 2.5; // what is found nearby
+    constexpr double least = 0.25;
     if (inverse_m.size() < enough)
         return 0;
     double period = 0, strongest = 0;
@@ -58,7 +67,7 @@ double locking_of(const std::vector<float>& inverse_m, double step_per_m) {
             if (found > strongest)
                 strongest = found, period = tried;
         }
-    if (strongest < least || strongest < least_times * preference_nearby(inverse_m, period))
+    if (strongest < least || !is_everywhere(inverse_m, period))
         return 0;
     return unevenness(inverse_m, period) * period;
 }
