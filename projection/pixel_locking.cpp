@@ -1,5 +1,7 @@
 #include "projection/pixel_locking.h"
 
+#include "projection/base/statistics.h"
+
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -14,6 +16,14 @@ std::complex<double> preference(const std::vector<float>& inverse_m, double peri
     for (const float q : inverse_m)
         sum += std::polar(1.0, 2 * std::numbers::pi * static_cast<double>(q) / period);
     return sum / static_cast<double>(inverse_m.size());
+}
+
+/// How strong it is off the period, where a narrow range of disparities makes it strong, too.
+double preference_nearby(const std::vector<float>& inverse_m, double period) {
+    std::vector<double> others;
+    for (const double factor : {0.7, 0.74, 0.78, 0.82, 0.86, 1.16, 1.22, 1.28, 1.34, 1.4})
+        others.push_back(std::abs(preference(inverse_m, factor * period)));
+    return median(std::move(others));
 }
 
 /// Whether pixels near, far and between prefer the same disparities: whole ones. Walls prefer those that they are at.
@@ -57,7 +67,7 @@ double unevenness(const std::vector<float>& inverse_m, double period) {
 
 double locking_of(const std::vector<float>& inverse_m, double step_per_m) {
     constexpr std::size_t enough = 1000;
-    constexpr double least = 0.25;
+    constexpr double least = 0.25, least_times = 2.5; // what is found nearby
     if (inverse_m.size() < enough)
         return 0;
     double period = 0, strongest = 0;
@@ -67,7 +77,8 @@ double locking_of(const std::vector<float>& inverse_m, double step_per_m) {
             if (found > strongest)
                 strongest = found, period = tried;
         }
-    if (strongest < least || !is_everywhere(inverse_m, period))
+    if (strongest < least || strongest < least_times * preference_nearby(inverse_m, period) ||
+        !is_everywhere(inverse_m, period))
         return 0;
     return unevenness(inverse_m, period) * period;
 }
