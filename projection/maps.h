@@ -12,7 +12,8 @@ struct DepthImage {
     Pinhole camera;
     cv::Mat1f z_m;    ///< metres along +z; 0 = hole; always finite, never negative
     cv::Mat1i source; ///< index of the point each pixel shows, -1 for none; empty when the sensor gave an image
-    cv::Mat1f recorded_m = {}; ///< what `z_m` was interpolated from where a lens bent the image; else empty
+    cv::Mat1f recorded_m =
+        {}; ///< where a lens bent the image: the recorded one that `z_m` was made from, metres; else empty
 };
 
 /// Unit normals in camera space, facing the camera; (0, 0, 0) where there is none.

@@ -370,10 +370,10 @@ bool is_straight(const std::vector<Slope>& slopes, const DepthNoise& noise, doub
     double all = 0, straight = 0;
     for (const Slope& slope : slopes)
         if (const double sigma = noise.at(slope.z_m); slope.rise_m > 2 * sigma) {
-            const double least_bend = std::max(sigma / 3, std::min(1.5 * rounding_m, 0.8 * sigma)),
-                         least_off = 0.1 * slope.rise_m + 0.7 * rounding_m;
+            const double most_bend_m = std::max(sigma / 3, std::min(1.5 * rounding_m, 0.8 * sigma)),
+                         most_off_m = 0.1 * slope.rise_m + 0.7 * rounding_m;
             ++all;
-            straight += slope.bend_m < least_bend && slope.off_m < least_off ? 1 : 0;
+            straight += slope.bend_m < most_bend_m && slope.off_m < most_off_m ? 1 : 0;
         }
     return all > enough_slopes && straight > least_share * all;
 }

@@ -5,21 +5,23 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <Eigen/Core>
+#include <iterator>
 #include <numbers>
+#include <span>
 
 namespace scanshade {
 namespace {
 
 /// The mean of exp(2 pi i q / period): 0 where fractions of the period are even, its length 1 where all are the same.
-std::complex<double> preference(const std::vector<float>& inverse_m, double period) {
-    std::complex<double> sum = 0;
-    for (const float q : inverse_m)
-        sum += std::polar(1.0, 2 * std::numbers::pi * static_cast<double>(q) / period);
-    return sum / static_cast<double>(inverse_m.size());
+std::complex<double> preference(std::span<const float> inverse_m, double period) {
+    const Eigen::Map<const Eigen::ArrayXf> q(inverse_m.data(), std::ssize(inverse_m));
+    const Eigen::ArrayXf phases = q * static_cast<float>(2 * std::numbers::pi / period);
+    return {static_cast<double>(phases.cos().mean()), static_cast<double>(phases.sin().mean())};
 }
 
 /// How strong it is off the period, where a narrow range of disparities makes it strong, too.
-double preference_nearby(const std::vector<float>& inverse_m, double period) {
+double preference_nearby(std::span<const float> inverse_m, double period) {
     std::vector<double> others;
     for (const double factor : {0.7, 0.74, 0.78, 0.82, 0.86, 1.16, 1.22, 1.28, 1.34, 1.4})
         others.push_back(std::abs(preference(inverse_m, factor * period)));
@@ -33,11 +35,11 @@ bool is_everywhere(std::vector<float> inverse_m, double period) {
     std::ranges::sort(inverse_m);
     std::size_t telling = 0;
     for (std::size_t part = 0; part < parts; ++part) {
-        const auto first = inverse_m.begin() + static_cast<std::ptrdiff_t>(part * inverse_m.size() / parts),
-                   last = inverse_m.begin() + static_cast<std::ptrdiff_t>((part + 1) * inverse_m.size() / parts);
-        if (static_cast<double>(*(last - 1) - *first) < least_periods * period)
+        const std::size_t first = part * inverse_m.size() / parts, end = (part + 1) * inverse_m.size() / parts;
+        const auto some = std::span<const float>(inverse_m).subspan(first, end - first);
+        if (static_cast<double>(some.back() - some.front()) < least_periods * period)
             continue;
-        const std::complex<double> preferred = preference({first, last}, period);
+        const std::complex<double> preferred = preference(some, period);
         if (std::abs(preferred) < least || std::abs(std::arg(preferred)) > 2 * std::numbers::pi * same_phase)
             return false;
         ++telling;
@@ -46,7 +48,7 @@ bool is_everywhere(std::vector<float> inverse_m, double period) {
 }
 
 /// The deviation of the share of smaller fractions from the fraction, in periods.
-double unevenness(const std::vector<float>& inverse_m, double period) {
+double unevenness(std::span<const float> inverse_m, double period) {
     const double phase = std::arg(preference(inverse_m, period)) / (2 * std::numbers::pi);
     std::vector<double> fractions;
     for (const float q : inverse_m) {

@@ -274,16 +274,16 @@ bool is_stretched(const cv::Mat_<Pixel>& stored, double whole, double nearly_all
     return others >= 100 && least < hardly_any * whole && most >= nearly_all * whole && most <= whole;
 }
 
-/// Whether exactly 1 is the largest number, and of few pixels: a frame was divided by its largest depth.
-bool is_divided(const cv::Mat1f& stored) {
-    constexpr int most_share = 1000; // a wall at one metre has more
-    const int largest = cv::countNonZero(stored == 1);
-    return largest > 0 && most_share * largest < stored.rows * stored.cols && largest_of(stored) == 1;
+/// Whether the largest number is exactly 1, and few pixels hold it: a frame was divided by its largest depth.
+bool is_divided(const cv::Mat1f& stored, float largest) {
+    constexpr int some = 1000; // one pixel in so many; a wall at one metre has more
+    return largest == 1 && some * cv::countNonZero(stored == 1) < stored.rows * stored.cols;
 }
 
-bool is_stretched(const cv::Mat& stored) {
+/// `largest`: of the stored numbers, if they are floats.
+bool is_stretched(const cv::Mat& stored, float largest) {
     return stored.type() == CV_16UC1   ? is_stretched(cv::Mat1w(stored), 65535, 0.98)
-           : stored.type() == CV_32FC1 ? is_stretched(cv::Mat1f(stored), 1, 1) || is_divided(cv::Mat1f(stored))
+           : stored.type() == CV_32FC1 ? is_stretched(cv::Mat1f(stored), 1, 1) || is_divided(stored, largest)
                                        : false;
 }
 
@@ -325,7 +325,8 @@ std::vector<std::string> doubts_about(const Statistics& depth, const cv::Mat& im
                                                                : what_scales_give(depth.median_m, encoding)));
     if (doubts.empty())
         doubt_steps(stored, encoding, doubts);
-    if (doubts.empty() && assumed && is_stretched(stored))
+    const auto largest = static_cast<float>(static_cast<double>(depth.largest_m) * encoding.units_per_metre);
+    if (doubts.empty() && assumed && is_stretched(stored, largest))
         doubts.push_back(fmt::format("values fill the whole range of the file's numbers, as of depth stretched for "
                                      "looking at: they are no lengths, whatever {} says.",
                                      stated));

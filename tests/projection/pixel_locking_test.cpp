@@ -61,6 +61,19 @@ TEST(pixel_locking, even_disparities_and_walls_at_one_distance_have_none) {
     EXPECT_EQ(locking_of({}, step), 0);
 }
 
+TEST(pixel_locking, areas_of_one_value_and_walls_at_several_distances_have_none) {
+    const std::vector<float> even = inverse_depths(0.25, 1, 0);
+    const auto with_walls = [&even](const std::vector<double>& disparities) {
+        std::vector<float> inverse_m = even;
+        for (const double disparity : disparities)
+            inverse_m.insert(inverse_m.end(), 3000, static_cast<float>(matched(disparity / disparity_px_m, 0)));
+        return inverse_m;
+    };
+    EXPECT_EQ(locking_of(with_walls({20}), step), 0);
+    EXPECT_EQ(locking_of(with_walls({12, 31}), step), 0);
+    EXPECT_EQ(locking_of(with_walls({11.1, 20.9, 34.1}), step), 0);
+}
+
 TEST(pixel_locking, adds_to_the_noise_of_disparity) {
     const auto sigma = [](double pull_px) {
         const DepthImage image = walls(pull_px);
