@@ -2,7 +2,7 @@
 #pragma once
 
 #include "ao/base/method.h"
-#include "projection/sensor_class.h"
+#include "projection/sensor/sensor_class.h"
 #include "shaders/shared/expected_error.h"
 
 #include <istream>

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "projection/maps.h"
-#include "projection/noise.h"
+#include "projection/sensor/noise.h"
 #include "shaders/shared/expected_error.h"
 
 #include <array>

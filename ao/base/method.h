@@ -4,7 +4,7 @@
 #include "projection/base/error.h"
 #include "projection/base/parameters.h"
 #include "projection/maps.h"
-#include "projection/noise.h"
+#include "projection/sensor/noise.h"
 
 #include <array>
 #include <Eigen/Geometry>

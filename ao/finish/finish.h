@@ -6,7 +6,7 @@
 #include "ao/gpu/program.h"
 #include "ao/light/light.h"
 #include "projection/camera.h"
-#include "projection/noise.h"
+#include "projection/sensor/noise.h"
 #include "shaders/shared/expected_error.h"
 
 #include <array>

@@ -2,7 +2,7 @@
 
 #include "ao/gpu/transfer.h"
 #include "projection/base/error.h"
-#include "projection/sensor_class.h"
+#include "projection/sensor/sensor_class.h"
 #include "shaders/shared/fit_plane.h"
 
 #include <algorithm>

@@ -4,7 +4,7 @@
 
 #include "ao/base/method.h"
 #include "ao/gpu/program.h"
-#include "projection/noise.h"
+#include "projection/sensor/noise.h"
 #include "shaders/shared/fit_plane.h"
 
 #include <cstdint>

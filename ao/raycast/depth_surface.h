@@ -3,7 +3,7 @@
 
 #include "ao/raycast/ray_surface.h"
 #include "projection/maps.h"
-#include "projection/noise.h"
+#include "projection/sensor/noise.h"
 
 namespace scanshade {
 

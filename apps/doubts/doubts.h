@@ -5,7 +5,7 @@
 #include "ao/frame.h"
 #include "projection/frame.h"
 #include "projection/length_unit.h"
-#include "projection/noise.h"
+#include "projection/sensor/noise.h"
 
 #include <limits>
 #include <string>

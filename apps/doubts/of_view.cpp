@@ -1,8 +1,8 @@
 #include "apps/doubts/of_view.h"
 
-#include "projection/depth_ends.h"
-#include "projection/depth_kind.h"
 #include "projection/scene_extent.h"
+#include "projection/sensor/depth_ends.h"
+#include "projection/sensor/depth_kind.h"
 #include "projection/undistort.h"
 
 #include <algorithm>

@@ -4,8 +4,8 @@
 #include "apps/doubts/sentences.h"
 #include "projection/camera.h"
 #include "projection/length_unit.h"
-#include "projection/noise.h"
 #include "projection/project.h"
+#include "projection/sensor/noise.h"
 
 namespace scanshade {
 

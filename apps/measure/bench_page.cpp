@@ -1,5 +1,5 @@
 // The bench's page: speed against error, where the errors are, pictures of them, and every setting.
-#include "apps/measure/bench_results.h"
+#include "apps/measure/front/bench_results.h"
 #include "apps/page/document.h"
 #include "apps/picture.h"
 #include "projection/base/statistics.h"

@@ -4,7 +4,7 @@
 #include "apps/command_line.h"
 #include "apps/json.h"
 #include "apps/lists.h"
-#include "apps/measure/trial.h"
+#include "apps/measure/trials/trial.h"
 #include "apps/walk/progress.h"
 #include "io/output_file.h"
 #include "projection/base/error.h"

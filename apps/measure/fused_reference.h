@@ -3,7 +3,7 @@
 
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/raycast/ray_hemisphere.h"
-#include "apps/measure/trial.h"
+#include "apps/measure/trials/trial.h"
 
 #include <optional>
 

@@ -6,7 +6,7 @@
 #include "ao/fit_plane/fit_plane.h"
 #include "ao/sequence/sequence_ao.h"
 #include "apps/command.h"
-#include "apps/measure/budget.h"
+#include "apps/measure/front/budget.h"
 #include "apps/run/presets.h"
 #include "apps/walk/batch.h"
 

@@ -6,8 +6,8 @@
 namespace scanshade::scene {
 
 const std::vector<Scene>& scenes() {
-    static const std::vector<Scene> table{office(),  staircase(), columns(), clutter(),
-                                          outdoor(), thin(),      kitchen(), attic()};
+    static const std::vector<Scene> table{office(), staircase(), columns(), clutter(), outdoor(),
+                                          thin(),   kitchen(),   attic(),   library()};
     return table;
 }
 

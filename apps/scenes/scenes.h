@@ -22,5 +22,7 @@ namespace scanshade::scene {
 [[nodiscard]] Scene kitchen();
 /// An attic of 5 x 6 x 3 m under a pitched roof with rafters, crates and a chimney. Nothing was fitted to it.
 [[nodiscard]] Scene attic();
+/// A library of 3.8 x 4.8 x 2.7 m: books, masonry, slats and battens, as fine as what noise hides.
+[[nodiscard]] Scene library();
 
 } // namespace scanshade::scene

@@ -8,8 +8,8 @@
 #include "apps/results/recording_cloud.h"
 #include "apps/walk/first_look.h"
 #include "io/captures/capture.h"
-#include "projection/noise.h"
 #include "projection/project.h"
+#include "projection/sensor/noise.h"
 
 #include <atomic>
 #include <cstddef>

@@ -4,8 +4,8 @@
 
 #include "ao/cloud/cloud_ao.h"
 #include "ao/cloud/cloud_work.h"
-#include "apps/measure/cloud_error_fit.h"
-#include "apps/measure/error_fit.h"
+#include "apps/measure/expected_errors/cloud_error_fit.h"
+#include "apps/measure/expected_errors/error_fit.h"
 #include "apps/scenes/scanner.h"
 #include "apps/scenes/scenes.h"
 #include "projection/base/error.h"

@@ -2,7 +2,7 @@
 #include "ao/base/method.h"
 #include "ao/compare.h"
 #include "ao/gpu/device.h"
-#include "apps/measure/front.h"
+#include "apps/measure/front/front.h"
 #include "apps/measure/fused_reference.h"
 #include "tests/support/measured.h"
 #include "tests/support/says.h"

@@ -1,5 +1,5 @@
 // Expected errors: tables are found again, read as written, and chosen by method, settings and sensor.
-#include "apps/measure/error_fit.h"
+#include "apps/measure/expected_errors/error_fit.h"
 
 #include "ao/base/method.h"
 #include "ao/expected_errors.h"

@@ -1,5 +1,5 @@
 // The flatness of real captures is judged where planes are open: on generated rooms, truth says whether they are.
-#include "apps/measure/flat_surfaces.h"
+#include "apps/measure/parts/flat_surfaces.h"
 #include "apps/scenes/scene.h"
 #include "projection/base/statistics.h"
 

@@ -1,6 +1,6 @@
 // Hard cases of recorded depth: methods keep the gates of every family.
 #include "ao/gpu/device.h"
-#include "apps/measure/hard_cases/judge.h"
+#include "apps/measure/parts/hard_cases/judge.h"
 
 #include <gtest/gtest.h>
 

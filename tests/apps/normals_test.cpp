@@ -1,5 +1,5 @@
 // Normals of prepared depth are close to those of the generated scenes.
-#include "apps/measure/normal_errors.h"
+#include "apps/measure/parts/normal_errors.h"
 
 #include <gtest/gtest.h>
 

@@ -3,11 +3,11 @@
 #include "apps/jobs/job.h"
 #include "apps/json.h"
 #include "apps/lists.h"
-#include "apps/measure/front.h"
+#include "apps/measure/front/front.h"
 #include "apps/slice.h"
 #include "io/cameras/camera_file.h"
 #include "io/images/image_file.h"
-#include "projection/noise.h"
+#include "projection/sensor/noise.h"
 #include "tests/fuzz/fuzz.h"
 
 #include <algorithm>

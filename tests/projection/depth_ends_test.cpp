@@ -1,5 +1,5 @@
 // Marks of holes and cut-off ranges among depths are found; walls and the steps of a sensor are not mistaken for them.
-#include "projection/depth_ends.h"
+#include "projection/sensor/depth_ends.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Planes tell whether an image holds depth along z, distances or disparities; noise and bent surfaces do not mislead.
-#include "projection/depth_kind.h"
+#include "projection/sensor/depth_kind.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

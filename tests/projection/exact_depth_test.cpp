@@ -1,7 +1,7 @@
 // Exact depth that looks noisy, as renderers and their files leave it: nothing of it is dropped or smoothed.
-#include "projection/depth_steps.h"
-#include "projection/noise.h"
 #include "projection/project.h"
+#include "projection/sensor/depth_steps.h"
+#include "projection/sensor/noise.h"
 #include "tests/support/noisy.h"
 #include "tests/support/scenes.h"
 

@@ -1,6 +1,6 @@
 // Disparities that a stereo matcher pulls towards whole pixels are told from even ones, and how far they are pulled.
-#include "projection/noise.h"
-#include "projection/pixel_locking.h"
+#include "projection/sensor/noise.h"
+#include "projection/sensor/pixel_locking.h"
 #include "tests/support/scenes.h"
 
 #include <cmath>

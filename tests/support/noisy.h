@@ -2,7 +2,7 @@
 #pragma once
 
 #include "projection/maps.h"
-#include "projection/noise.h"
+#include "projection/sensor/noise.h"
 
 #include <cmath>
 #include <random>

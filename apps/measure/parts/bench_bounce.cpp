@@ -1,0 +1,190 @@
+// `bench --bounce`: the light that neighbours send (--write indirect), against one bounce of rays on generated scenes.
+#include "ao/finish/finish.h"
+#include "apps/lists.h"
+#include "apps/measure/trials/bench_part.h"
+#include "apps/measure/trials/trial.h"
+#include "apps/scenes/light.h"
+#include "apps/scenes/sensor.h"
+#include "projection/base/error.h"
+#include "projection/srgb.h"
+
+#include <cmath>
+#include <fmt/format.h>
+#include <limits>
+#include <utility>
+
+namespace scanshade {
+namespace {
+
+/// Sums of linear light, found and true, of all channels of all pixels.
+class Comparison {
+  public:
+    void add(const cv::Mat3f& found, const cv::Mat3f& truth, const cv::Mat1f& known) {
+        for (int v = 0; v < found.rows; ++v)
+            for (int u = 0; u < found.cols; ++u)
+                for (int c = 0; c < 3 && !std::isnan(known(v, u)); ++c)
+                    add(static_cast<double>(found(v, u)[c]), static_cast<double>(truth(v, u)[c]));
+    }
+    /// "RMSE, bias, correlation, scale"; the last is the truth's slope over what was found.
+    [[nodiscard]] std::string text() const {
+        const double xx = xx_ - x_ * x_ / n_, yy = yy_ - y_ * y_ / n_, xy = xy_ - x_ * y_ / n_;
+        const double rmse = std::sqrt(std::max(xx_ - 2 * xy_ + yy_, 0.0) / n_);
+        if (xx_ <= 0)
+            return fmt::format("{:.4f}, {:+.4f}", rmse, (x_ - y_) / n_);
+        return fmt::format("{:.4f}, {:+.4f}, {:.2f}, {:.2f}", rmse, (x_ - y_) / n_, xy / std::sqrt(xx * yy), xy_ / xx_);
+    }
+
+  private:
+    void add(double found, double truth) {
+        n_ += 1;
+        x_ += found;
+        y_ += truth;
+        xx_ += found * found;
+        yy_ += truth * truth;
+        xy_ += found * truth;
+    }
+    double n_ = 0, x_ = 0, y_ = 0, xx_ = 0, yy_ = 0, xy_ = 0;
+};
+
+struct Shot {
+    DepthImage depth;
+    cv::Mat3b photograph;
+    scene::Bounce truth; ///< blue first, as pictures
+};
+
+class BouncePart final : public BenchPart {
+  public:
+    Stage stage() override {
+        return {"light from neighbours",
+                {{"bounce", "measures --write indirect against one bounce of rays on generated scenes", &asked_},
+                 {"bounce.scenes", "which, with commas", &scenes_},
+                 {"bounce.sensors", "which simulated sensors, with commas", &sensors_},
+                 {"bounce.methods", "that compute visibility, at their defaults, with commas", &methods_},
+                 {"bounce.frames", "of each", &frames_, "", 1, 100},
+                 {"bounce.size", "of images", &size_, "pixels"},
+                 {"bounce.rays", "of the truth, per pixel", &rays_, "", 1, 65536}}};
+    }
+    [[nodiscard]] bool asked() const override { return asked_; }
+
+    int run(const std::string& choice) override {
+        gpu::Device device(choice);
+        const std::vector<std::string> methods = comma_separated(methods_);
+        fmt::print("Linear light, 0 .. 1: RMSE, bias, correlation, best factor; {} frames of {}, {} rays a pixel\n\n"
+                   "| scene | sensor | light | none | own colour times 1 - V | with true visibility |",
+                   frames_, size_, rays_);
+        for (const std::string& method : methods)
+            fmt::print(" {} |", method);
+        fmt::print("\n| --- | --- | --- | --- | --- | --- |");
+        for (std::size_t i = 0; i < methods.size(); ++i)
+            fmt::print(" --- |");
+        fmt::print("\n");
+        for (const std::string& name : comma_separated(scenes_))
+            for (const std::string& sensor : comma_separated(sensors_))
+                for (const scene::LightKind kind : {scene::LightKind::ambient, scene::LightKind::sun})
+                    measure(device, name, sensor, kind);
+        return all_well;
+    }
+
+  private:
+    void measure(gpu::Device& device, const std::string& name, const std::string& sensor, scene::LightKind kind) const {
+        const scene::Scene& scene = scene::scene_named(name);
+        const scene::World world(scene);
+        const cv::Size size = size_of();
+        const double f = 525.0 * std::max(size.width / 640.0, size.height / 480.0);
+        const Pinhole camera{f, f, (size.width - 1) / 2.0, (size.height - 1) / 2.0, size};
+        const scene::Optics optics(camera);
+        std::vector<Shot> shots;
+        std::vector<DepthImage> recorded;
+        const scene::SceneLight light{.kind = kind, .occluded = false};
+        for (int i = 0; i < frames_; ++i) {
+            const Eigen::Isometry3d pose =
+                scene::world_from_camera(scene.walk, (i + 0.5) * scene.walk.period_s / frames_);
+            const Sight sight{world, optics, pose, render_geometry(world, optics, pose), 1, i};
+            Shot& shot = shots.emplace_back();
+            shot.depth = {camera, sensor_named(sensor).record(sight), {}};
+            shot.photograph = scene::photograph(render_lit(world, optics, pose, light), {});
+            shot.truth = true_bounce(world, optics, pose, light, {scene.ao_radius_m, rays_, 1, false});
+            for (cv::Vec3f& pixel : shot.truth.indirect)
+                std::swap(pixel[0], pixel[2]);
+            recorded.push_back(shot.depth);
+        }
+        const DepthNoise noise = measure_noise(recorded);
+        fmt::print("| {} | {} | {} |", name, sensor, kind == scene::LightKind::sun ? "sun 1.5" : "ambient");
+        Finish finish(device, Packing::on_device);
+        const auto indirect = [&](const Shot& shot, const cv::Mat1f& visibility, const FrameAo* method) {
+            const FinishInput input{.camera = camera,
+                                    .z_m = shot.depth.z_m,
+                                    .visibility = visibility,
+                                    .fitted = method ? method->fitted_depth() : nullptr,
+                                    .fitted_normals = method ? method->fitted_normals() : nullptr,
+                                    .radius_m = scene.ao_radius_m,
+                                    .noise = noise,
+                                    .colour = shot.photograph};
+            return finish.compute(input, {.indirect = true, .light_values = LightValues::unbounded}).linear.indirect;
+        };
+        Comparison none, own, by_truth;
+        for (const Shot& shot : shots) {
+            const cv::Mat1f seen = known(shot, shot.truth.visibility);
+            none.add(cv::Mat3f(size, cv::Vec3f()), shot.truth.indirect, seen);
+            own.add(own_colour(shot), shot.truth.indirect, seen);
+            by_truth.add(indirect(shot, seen, nullptr), shot.truth.indirect, seen);
+        }
+        fmt::print(" {} | {} | {} |", none.text(), own.text(), by_truth.text());
+        for (const std::string& each : comma_separated(methods_)) {
+            const MethodRow& row = method_named(each);
+            const auto setup = row.setup();
+            const std::vector<Parameter> rows = setup->parameters();
+            if (const Parameter* radius = row_named(rows, "radius"))
+                set(*radius, scene.ao_radius_m);
+            FrameAo method(device, row, *setup);
+            Comparison found;
+            for (const Shot& shot : shots) {
+                const cv::Mat1f visibility = known(shot, method.compute(shot.depth, noise).visibility);
+                found.add(indirect(shot, visibility, &method), shot.truth.indirect, visibility);
+            }
+            fmt::print(" {} |", found.text());
+        }
+        fmt::print("\n");
+        std::fflush(stdout);
+    }
+
+    /// Pixels with recorded depth and a true surface.
+    static cv::Mat1f known(const Shot& shot, const cv::Mat1f& visibility) {
+        cv::Mat1f both = visibility.clone();
+        for (int v = 0; v < both.rows; ++v)
+            for (int u = 0; u < both.cols; ++u)
+                if (!(shot.depth.z_m(v, u) > 0) || std::isnan(shot.truth.visibility(v, u)))
+                    both(v, u) = std::numeric_limits<float>::quiet_NaN();
+        return both;
+    }
+
+    /// As if all surfaces had the pixel's own colour.
+    static cv::Mat3f own_colour(const Shot& shot) {
+        cv::Mat3f light(shot.photograph.size());
+        for (int v = 0; v < light.rows; ++v)
+            for (int u = 0; u < light.cols; ++u)
+                for (int c = 0; c < 3; ++c)
+                    light(v, u)[c] = static_cast<float>(linear_from_srgb(shot.photograph(v, u)[c] / 255.0)) *
+                                     (1 - shot.truth.visibility(v, u));
+        return light;
+    }
+
+    [[nodiscard]] cv::Size size_of() const {
+        int width = 0, height = 0, used = 0;
+        if (std::sscanf(size_.c_str(), "%dx%d%n", &width, &height, &used) != 2 ||
+            used != static_cast<int>(size_.size()) || width < 16 || height < 16 || width > 8192 || height > 8192)
+            throw Misuse("bounce.size: '" + size_ + "' given, expected width x height such as 320x240");
+        return {width, height};
+    }
+
+    bool asked_ = false;
+    std::string scenes_ = "office,staircase,clutter,kitchen,attic", sensors_ = "ideal,kinect",
+                methods_ = "ssdo,gtao,surfel", size_ = "320x240";
+    int frames_ = 3, rays_ = 128;
+};
+
+} // namespace
+
+std::unique_ptr<BenchPart> light_bounce() { return std::make_unique<BouncePart>(); }
+
+} // namespace scanshade
