@@ -11,7 +11,7 @@
 namespace scanshade::scene {
 namespace {
 
-/// Books side by side from `from` on, their backs towards -y; some are pushed in, some are missing.
+/// Books side by side from `from` on, their spines towards -y; some are pushed in, some are missing.
 void add_row_of_books(Bodies& bodies, const LocalFrame& at, double from, double until, double low, double high,
                       Random& random) {
     double common_high = 0, common_deep = 0, front = 0;

@@ -17,10 +17,10 @@ namespace scanshade::scene {
 [[nodiscard]] Scene outdoor();
 /// A conservatory of 4.4 x 5 x 2.7 m whose objects are 5 to 20 mm thick.
 [[nodiscard]] Scene thin();
-/// A kitchen of 3.6 x 4.4 x 2.5 m with cupboards, some of them open, crowded worktops and a table. Nothing was fitted
+/// A kitchen of 3.6 x 4.4 x 2.5 m with cupboards, some of them open, crowded worktops and a table. No method was fitted
 /// to it.
 [[nodiscard]] Scene kitchen();
-/// An attic of 5 x 6 x 3 m under a pitched roof with rafters, crates and a chimney. Nothing was fitted to it.
+/// An attic of 5 x 6 x 3 m under a pitched roof with rafters, crates and a chimney. No method was fitted to it.
 [[nodiscard]] Scene attic();
 /// A library of 3.8 x 4.8 x 2.7 m: books, masonry, slats and battens, as fine as what noise hides.
 [[nodiscard]] Scene library();

@@ -8,11 +8,9 @@
 #include "projection/sensor/pixel_locking.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <fmt/format.h>
-#include <limits>
 #include <numbers>
 #include <vector>
 
