@@ -177,7 +177,7 @@ class Tangents {
 };
 
 Vector3d normal_at(const Tangents& tangents, const Pinhole& camera, cv::Point p) {
-    const Vector3d to_eye = -tangents.point(p).normalized();
+    Vector3d to_eye = -tangents.point(p).normalized();
     std::optional<Vector3d> first, second; // rows and columns; beside holes diagonals stand in
     for (const cv::Point axis : {cv::Point(1, 0), cv::Point(0, 1), cv::Point(1, 1), cv::Point(1, -1)})
         if (auto tangent = tangents.along(p, axis, axis.x ? camera.fx : camera.fy); tangent && !second)

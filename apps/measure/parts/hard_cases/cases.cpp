@@ -43,10 +43,10 @@ Case open_everywhere(std::string name, DepthImage depth, double radius_m = 0.5, 
     return made;
 }
 
-Body plane(Vector3d point, Vector3d normal) { return {Plane{std::move(point), normal.normalized()}, {}}; }
+Body plane(Vector3d point, const Vector3d& normal) { return {Plane{std::move(point), normal.normalized()}, {}}; }
 Body ball(Vector3d centre, double radius) { return {Sphere{std::move(centre), radius}, {}}; }
 Body box(Vector3d centre, Vector3d half) { return {Box{std::move(centre), std::move(half)}, {}}; }
-Body rod(Vector3d base, Vector3d axis, double radius, double height) {
+Body rod(Vector3d base, const Vector3d& axis, double radius, double height) {
     return {Cylinder{std::move(base), radius, height, axis.normalized()}, {}};
 }
 
