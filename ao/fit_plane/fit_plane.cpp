@@ -37,6 +37,9 @@ enum Buffers : int {
 /// simulated sensors. For correlated ones a somewhat lower value does. But a real Kinect's noise correlates over more
 /// pixels than the correlation length says, and its walls would stay mottled.
 constexpr double window_scale = 1.8;
+/// Of pixels that err each by themselves: least error at once with noise of a time-of-flight camera, and with two and
+/// four times as much.
+constexpr double independent_window_scale = 5;
 /// Of fused frames, as their values tell smaller shapes.
 constexpr double fused_window = 0.5;
 
@@ -53,7 +56,7 @@ std::uint32_t marks_of(cv::Size size) {
 
 /// Frames are fused or holes filled, not both.
 std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bool planes, bool fuse, bool waves,
-                                          bool fill) {
+                                          bool small, bool fill) {
     using Host = gpu::BufferRow::Host;
     constexpr auto floats = gpu::BufferRow::Texels::r32f;
     const auto pixels = static_cast<std::size_t>(size.area());
@@ -83,7 +86,7 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
                               groups_of(1, shared::fused_rows),
                               {}});
         }
-        const std::vector<std::pair<int, int>> is_fused{{shared::spec_fused, fuse}};
+        const std::vector<std::pair<int, int>> averages_of{{shared::spec_fused, fuse}, {shared::spec_small, small}};
         const std::vector<std::pair<int, int>> fits{{shared::spec_fused, fuse}, {shared::spec_waves, waves}};
         const int samples = fuse ? fused : kept, errs = fuse ? relief : kept; // unread without
         passes.push_back({"average",
@@ -91,7 +94,7 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
                           {samples, errs},
                           {averages},
                           groups_of(1, shared::average_rows),
-                          is_fused});
+                          averages_of});
         passes.push_back({"fit plane", "fit_plane/fit", {averages, errs}, {depth_out, normals_out}, groups, fits});
         if (fill) {
             const std::uint32_t words = marks_of(size);
@@ -134,20 +137,22 @@ void FitPlane::prepare(const DepthImage& depth, std::span<const OtherDepth> othe
     for (const OtherDepth& other : others) // before any is taken: a run that fails must leave nothing to the next
         if (other.camera.size != size)
             throw Error("another frame of another image size");
-    const bool waves = class_of(noise_) == SensorClass::structured_light;
-    if (!program_ || size != size_ || fuse != fused_ || waves != waves_ || planes() != planes_)
-        program_ = program_for(device_, size, planes(), fuse, waves, !fuse && options_.fill_holes);
+    const bool waves = class_of(noise_) == SensorClass::structured_light,
+               independent = !waves && noise_.correlation_px < independent_px, small = fuse || independent;
+    if (!program_ || size != size_ || fuse != fused_ || waves != waves_ || small != small_ || planes() != planes_)
+        program_ = program_for(device_, size, planes(), fuse, waves, small, !fuse && options_.fill_holes);
     size_ = size;
     fused_ = fuse;
     waves_ = waves;
+    small_ = small;
     planes_ = planes();
-    const double window = window_scale * (fuse ? fused_window : 1) * noise_.correlation_px * noise_.correlation_px *
-                          options_.smoothing * options_.smoothing;
+    const double scale = (independent ? independent_window_scale : window_scale) * (fuse ? fused_window : 1),
+                 pixels = noise_.correlation_px * options_.smoothing;
     constants_ = {{size.width, size.height},
                   depth.camera.on_gpu(),
                   static_cast<float>(noise_.floor_m),
                   static_cast<float>(noise_.per_z2),
-                  static_cast<float>(window),
+                  static_cast<float>(scale * pixels * pixels),
                   static_cast<float>(options_.largest_radius_px),
                   static_cast<float>(3 * options_.smoothing),
                   options_.drop_flying && noise_.flies() ? 1 : 0,

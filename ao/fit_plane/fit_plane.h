@@ -76,7 +76,7 @@ class FitPlane {
     DepthNoise noise_;
     FitPlaneOptions options_;
     cv::Size size_;
-    bool fused_ = false, waves_ = false, planes_ = false; ///< as the program has it
+    bool fused_ = false, waves_ = false, small_ = false, planes_ = false; ///< as the program has it
     shared::FitPlaneConstants constants_ = {};
     std::unique_ptr<gpu::Program> program_;
     Timings timings_;

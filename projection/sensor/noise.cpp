@@ -28,13 +28,12 @@ double second_difference_variance(double lag, double s) {
 }
 
 /// The deviation s of the correlation at which second differences of adjacent pixels are `ratio` times as large as over
-/// noise_lag_px.
-double correlation_of(double ratio) {
+/// `lag` pixels.
+double correlation_of(double ratio, int lag) {
     double low = 0.3, high = 3; // of s
     for (int i = 0; i < 30; ++i) {
         const double s = (low + high) / 2;
-        const bool too_smooth =
-            second_difference_variance(1, s) < ratio * ratio * second_difference_variance(noise_lag_px, s);
+        const bool too_smooth = second_difference_variance(1, s) < ratio * ratio * second_difference_variance(lag, s);
         (too_smooth ? high : low) = s;
     }
     return low;
@@ -136,13 +135,26 @@ bool is_relief(const DepthNoise& noise, const JumpsSeen& jumps) {
 }
 
 /// Chooses each band's sigma, and returns the deviation of the correlation.
+///
+/// Relief shows over noise_lag_px as noise does whose pixels correlate. Over two pixels there is hardly any: where
+/// their differences are no larger than those of adjacent pixels, each pixel errs by itself, and these tell by how
+/// much.
 double settle(std::vector<NoiseBand>& points, const DepthSteps& steps) {
-    double ratios = 0, weights = 0;
+    double ratios = 0, near_ratios = 0, weights = 0;
     for (const NoiseBand& p : points)
-        ratios += p.weight * p.adjacent / p.distant, weights += p.weight;
-    const double s = correlation_of(ratios / weights);
-    const double missing = std::sqrt(6 / second_difference_variance(noise_lag_px, s)); // what correlates over the lag
+        ratios += p.weight * p.adjacent / p.distant, near_ratios += p.weight * p.adjacent / p.second,
+            weights += p.weight;
+    const double s = correlation_of(ratios / weights, noise_lag_px), near_s = correlation_of(near_ratios / weights, 2);
+    const auto missing_over = [](int lag, double deviation) {
+        return std::sqrt(6 / second_difference_variance(lag, deviation));
+    };
     const bool disparity = steps.step_per_z2 > 0; // it comes from windows of pixels, which jumps between steps hide
+    if (!disparity && length_of(near_s) < independent_px) {
+        for (NoiseBand& p : points)
+            p.sigma = p.pixel_sigma * missing_over(1, near_s);
+        return near_s;
+    }
+    const double missing = missing_over(noise_lag_px, s); // what correlates over the lag
     const bool wide = disparity || missing > much_missing;
     for (NoiseBand& p : points)
         p.sigma =

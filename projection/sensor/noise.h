@@ -33,6 +33,9 @@ struct DepthNoise {
     [[nodiscard]] bool needs_preparation() const { return any() || flies(); }
 };
 
+/// Shorter correlation lengths are those of pixels that err each by itself, as with time of flight.
+inline constexpr double independent_px = 1.5;
+
 /// Measures sigma(z) on depth images of one sensor: the spread of second differences of 1/z (zero on any plane) in
 /// bands of z, and the law fitted through the bands. Edges and curvature form the far tail of the spread; three fifths
 /// of the samples are ignored for them.
@@ -45,7 +48,9 @@ struct DepthNoise {
 ///
 /// The correlation length follows from the ratio of second differences over 1 and over 4 pixels. It assumes a
 /// correlation exp(-d^2 / 2 s^2); sigma is corrected for what of it reaches over those pixels. That of disparity is 2.8
-/// pixels or more, since jumps between steps hide it.
+/// pixels or more, since jumps between steps hide it. Of depth without disparity steps, relief shows over 4 pixels as
+/// such noise does. So the ratio over 1 and 2 pixels is asked first: where that length is below independent_px,
+/// differences of adjacent pixels tell sigma.
 ///
 /// Steps are reported where a quarter of the distinct values are one step from the next, or all are whole numbers of
 /// one. They are constant (16-bit files) or grow with z^2 (disparity). Steps that explain sigma are no noise: values

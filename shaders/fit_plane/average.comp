@@ -1,5 +1,6 @@
 // Second pass of depth preparation: each pixel takes the value of a plane through its 5x5 surroundings. The few samples of the
-// next pass then represent all pixels of a large window. Fused frames have small windows, and 3x3 keep smaller shapes.
+// next pass then represent all pixels of a large window. Where windows are small anyway, 3x3 keep smaller shapes: in fused
+// frames, and where each pixel errs by itself.
 //
 // A thread walks down a few pixels of a column, and of each one's surroundings loads only the row that is new.
 #version 460
@@ -12,6 +13,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0, r32f) readonly uniform imageBuffer samples; // 1/z, `nowhere` where there is none
 layout(binding = 1, r32f) readonly uniform imageBuffer relief;
 layout(binding = 16, scalar) writeonly buffer Averages { float averages[]; };
+layout(constant_id = spec_small) const int is_small = 0;
 layout(binding = 32, scalar) uniform Constants { FitPlaneConstants constants; };
 
 FitPlaneConstants k;
@@ -38,12 +40,12 @@ void add_line(inout Sums sums, float y, Five w, float w_here, Plane plane, float
     float there = w_here + y * plane.b;
     Row row = row_from(w.c - there, narrow);
     add_pair(row, 1.0, w.b - there + plane.a, w.d - there - plane.a, narrow);
-    if (is_fused == 0) add_pair(row, 2.0, w.a - there + 2.0 * plane.a, w.e - there - 2.0 * plane.a, narrow);
+    if (is_small == 0) add_pair(row, 2.0, w.a - there + 2.0 * plane.a, w.e - there - 2.0 * plane.a, narrow);
     add_row(sums, y, row);
 }
 
 // A slope up to 45 degrees more is still the pixel's own surface; the farthest sample is 2.8 pixels away, or 1.4.
-const float own = is_fused == 0 ? 0.7 * 2.8 : 0.7 * 1.4;
+const float own = is_small == 0 ? 0.7 * 2.8 : 0.7 * 1.4;
 
 void main() {
     k = constants;
@@ -62,11 +64,11 @@ void main() {
         float sigma = sigma_on(expected, sigma_of(zc) * wc * wc) * relief_at(here);
         float narrow = 1.0 / (3.0 * sigma + own * wc / k.camera.fx);
         Sums sums = nothing;
-        if (is_fused == 0) add_line(sums, -2.0, above2, wc, expected, narrow);
+        if (is_small == 0) add_line(sums, -2.0, above2, wc, expected, narrow);
         add_line(sums, -1.0, above, wc, expected, narrow);
         add_line(sums, 0.0, middle, wc, expected, narrow);
         add_line(sums, 1.0, below, wc, expected, narrow);
-        if (is_fused == 0) add_line(sums, 2.0, below2, wc, expected, narrow);
+        if (is_small == 0) add_line(sums, 2.0, below2, wc, expected, narrow);
         solve(sums, expected, plane); // where none fits the plane is level, the pixel keeps its value
         averages[here] = hole ? nowhere : wc + plane.c;
         above2 = above;

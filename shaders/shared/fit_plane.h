@@ -17,9 +17,10 @@ struct FitPlaneConstants {
     NeighbourPlace places[most_neighbours];
 };
 
-// Specialization constants. 1 = samples have been averaged over frames, and tell by how much less they err. 1 = they
-// err in waves (disparity), and a wider window is tried; a uniform here would be compiled in anew for every capture.
-const int spec_fused = 0, spec_waves = 1;
+// Specialization constants; a uniform here would be compiled in anew for every capture. 1 = samples have been averaged
+// over frames, and tell by how much less they err. 1 = they err in waves (disparity), and a wider window is tried.
+// 1 = each errs by itself, or is an average of frames: 3x3 of them are averaged, not 5x5.
+const int spec_fused = 0, spec_waves = 1, spec_small = 2;
 
 // In place of 1/z where there is none: so far behind all surfaces that no fit gives it weight, and its square still is
 // a number.
