@@ -44,8 +44,9 @@ void add_line(inout Sums sums, float y, Five w, float w_here, Plane plane, float
     add_row(sums, y, row);
 }
 
-// A slope up to 45 degrees more is still the pixel's own surface; the farthest sample is 2.8 pixels away, or 1.4.
-const float own = is_small == 0 ? 0.7 * 2.8 : 0.7 * 1.4;
+// A slope up to 45 degrees more is still the pixel's own surface; the farthest sample is 2.8 pixels away. Of 3x3 it is 1.4 pixels
+// away, and a slope may be 55 degrees more: less would tilt floors that noise across the image has bent.
+const float own = is_small == 0 ? 0.7 * 2.8 : 1.0 * 1.4;
 
 void main() {
     k = constants;

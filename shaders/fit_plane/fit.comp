@@ -94,13 +94,6 @@ const float no_plane = 0.6, one_plane = 0.85;
 
 float window_of(float z, float sigma) { return clamp(sqrt(k.window * sigma * k.camera.fx / z), 1.5, k.largest_radius); }
 
-// In the second round. Where the window is smaller than 7x7 pixels, samples move together, and those in between count twice.
-// Fused frames err more alike than is known of them, and would stay mottled.
-float second_spread(float radius) {
-    float least = is_fused == 0 ? min(radius * 0.3, 1.0) : 1.0;
-    return max(radius * (1.0 / 3.0), least);
-}
-
 void main() {
     k = constants;
     ivec2 p = ivec2(gl_GlobalInvocationID.xy);
@@ -119,7 +112,7 @@ void main() {
     bool good = solve(square(p, false, half_way, wc, expected, narrow), expected, first);
     float tolerance = 3.0 * sigma_on(first, sigma);
     narrow = 1.0 / (tolerance * relief_here);
-    good = solve(square(p, true, second_spread(radius), wc, first, narrow), first, plane) && good;
+    good = solve(square(p, true, max(radius * (1.0 / 3.0), 1.0), wc, first, narrow), first, plane) && good;
 
     // Disparity comes from windows of pixels, so it errs in waves longer than this window. A window twice as wide levels
     // them. Its plane counts by the share of samples that lie about it, so that edges, relief and curves keep theirs.
