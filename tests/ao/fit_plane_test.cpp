@@ -230,6 +230,27 @@ TEST(fit_plane, lateral_noise_does_not_tilt_a_floor) {
     EXPECT_LT(errors[errors.size() * 19 / 20], 13);
 }
 
+/// Of a joint's depth, what is left of it in the middle of its three pixels.
+double joint_left(const DepthNoise& noise) {
+    constexpr double deeper_m = 0.015;
+    const auto is_joint = [](int x) { return x % 24 < 3; };
+    DepthImage wall{test_camera({320, 240}), cv::Mat1f(240, 320), {}};
+    for (int y = 0; y < 240; ++y)
+        for (int x = 0; x < 320; ++x)
+            wall.z_m(y, x) = static_cast<float>(2 + (is_joint(x) ? deeper_m : 0));
+    FitPlane fit(device(), noise);
+    const cv::Mat1f z_m = fit.compute(noisy(wall, noise)).depth.z_m;
+    double joints = 0, bricks = 0;
+    for (int x = 24; x + 24 <= 320; x += 24)
+        joints += cv::mean(z_m.col(x + 1))[0], bricks += cv::mean(z_m.col(x + 13))[0];
+    return (joints - bricks) / (deeper_m * (320 / 24 - 1));
+}
+
+TEST(fit_plane, small_shapes_stay_where_each_pixel_errs_by_itself) {
+    EXPECT_GT(joint_left({0.004, 0, 1}), 0.65);
+    EXPECT_LT(joint_left({0.004, 0, 1.6}), 0.55); // noise over more pixels may be as large
+}
+
 TEST(fit_plane, a_wire_is_no_flying_pixel) {
     const Pinhole camera = test_camera({320, 240});
     DepthImage wires{camera, cv::Mat1f(camera.size, 2.0F), {}};

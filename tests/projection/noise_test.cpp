@@ -206,6 +206,21 @@ TEST(noise, surfaces_that_bend_add_nothing_to_noise_over_more_pixels) {
             << z << " m: " << describe(measured);
 }
 
+TEST(noise, relief_is_no_correlation_of_pixels_that_err_by_themselves) {
+    // Brickwork: rows of 28 pixels, and joints of 4 that lie 15 mm deeper. Over 4 pixels it looks like noise whose
+    // pixels correlate over 1.4 pixels, and 1.3 times as large.
+    const DepthNoise tof{0.004, 0};
+    DepthImage wall{test_camera({320, 240}), cv::Mat1f(240, 320), {}};
+    for (int y = 0; y < 240; ++y)
+        for (int x = 0; x < 320; ++x) {
+            const bool joint = y % 32 < 4 || (x + y / 32 % 2 * 32) % 64 < 4;
+            wall.z_m(y, x) = static_cast<float>(2.5 + 0.001 * x + (joint ? 0.015 : 0));
+        }
+    const DepthNoise measured = measure_noise(std::vector{noisy(wall, tof)});
+    EXPECT_LT(measured.correlation_px, 1.25) << describe(measured);
+    EXPECT_NEAR(measured.at(2.6), 0.004, 0.0006) << describe(measured);
+}
+
 TEST(noise, bands_of_one_value_have_no_say) {
     // Two marks of what is beyond the range, far apart and alike in size.
     const DepthNoise tof{0.003, 0.001};
