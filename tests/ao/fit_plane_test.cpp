@@ -240,10 +240,10 @@ double joint_left(const DepthNoise& noise) {
             wall.z_m(y, x) = static_cast<float>(2 + (is_joint(x) ? deeper_m : 0));
     FitPlane fit(device(), noise);
     const cv::Mat1f z_m = fit.compute(noisy(wall, noise)).depth.z_m;
-    double joints = 0, bricks = 0;
-    for (int x = 24; x + 24 <= 320; x += 24)
-        joints += cv::mean(z_m.col(x + 1))[0], bricks += cv::mean(z_m.col(x + 13))[0];
-    return (joints - bricks) / (deeper_m * (320 / 24 - 1));
+    double left = 0, count = 0;
+    for (int x = 24; x + 24 <= 320; x += 24, ++count)
+        left += cv::mean(z_m.col(x + 1))[0] - cv::mean(z_m.col(x + 13))[0];
+    return left / (deeper_m * count);
 }
 
 TEST(fit_plane, small_shapes_stay_where_each_pixel_errs_by_itself) {
