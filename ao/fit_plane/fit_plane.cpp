@@ -33,12 +33,12 @@ enum Buffers : int {
 };
 
 /// Of the window's radius, squared, in units of correlation^2 sigma fx / z (pixels). Below it noise tilts normals,
-/// above it a plane no longer is what surfaces are. For independent pixels this leaves the least error in AO on
-/// simulated sensors. For correlated ones a somewhat lower value does. But a real Kinect's noise correlates over more
-/// pixels than the correlation length says, and its walls would stay mottled.
+/// above it a plane no longer is what surfaces are. A somewhat lower value leaves less error in AO on simulated Kinects.
+/// But a real one's noise correlates over more pixels than the correlation length says, and its walls would stay
+/// mottled.
 constexpr double window_scale = 1.8;
-/// Of pixels that err each by themselves: least error at once with noise of a time-of-flight camera, and with two and
-/// four times as much.
+/// The same where each pixel errs by itself, after means of 3x3: a compromise between a time-of-flight camera's noise,
+/// which asks for less, and four times as much, which asks for more.
 constexpr double independent_window_scale = 5;
 /// Of fused frames, as their values tell smaller shapes.
 constexpr double fused_window = 0.5;
