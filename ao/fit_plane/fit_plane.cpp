@@ -33,9 +33,9 @@ enum Buffers : int {
 };
 
 /// Of the window's radius, squared, in units of correlation^2 sigma fx / z (pixels). Below it noise tilts normals,
-/// above it a plane no longer is what surfaces are. A somewhat lower value leaves less error in AO on simulated Kinects.
-/// But a real one's noise correlates over more pixels than the correlation length says, and its walls would stay
-/// mottled.
+/// above it a plane no longer is what surfaces are. A somewhat lower value leaves less error in AO on simulated
+/// Kinects. But a real one's noise correlates over more pixels than the correlation length says, and its walls would
+/// stay mottled.
 constexpr double window_scale = 1.8;
 /// The same where each pixel errs by itself, after means of 3x3: a compromise between a time-of-flight camera's noise,
 /// which asks for less, and four times as much, which asks for more.
