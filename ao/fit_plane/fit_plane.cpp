@@ -54,9 +54,8 @@ std::uint32_t marks_of(cv::Size size) {
     return (static_cast<std::uint32_t>(size.area()) + shared::marks_a_word - 1) / shared::marks_a_word;
 }
 
-/// Frames are fused or holes filled, not both.
-std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bool planes, bool fuse, bool waves,
-                                          bool small, bool fill) {
+std::unique_ptr<gpu::Program> program_for(gpu::Device& device, const FitPlaneVariant& variant) {
+    const auto& [size, planes, fuse, waves, independent, fill] = variant;
     using Host = gpu::BufferRow::Host;
     constexpr auto floats = gpu::BufferRow::Texels::r32f;
     const auto pixels = static_cast<std::size_t>(size.area());
@@ -86,7 +85,8 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, cv::Size size, bo
                               groups_of(1, shared::fused_rows),
                               {}});
         }
-        const std::vector<std::pair<int, int>> averages_of{{shared::spec_fused, fuse}, {shared::spec_small, small}};
+        const std::vector<std::pair<int, int>> averages_of{{shared::spec_fused, fuse},
+                                                           {shared::spec_small, fuse || independent}};
         const std::vector<std::pair<int, int>> fits{{shared::spec_fused, fuse}, {shared::spec_waves, waves}};
         const int samples = fuse ? fused : kept, errs = fuse ? relief : kept; // unread without
         passes.push_back({"average",
@@ -137,16 +137,17 @@ void FitPlane::prepare(const DepthImage& depth, std::span<const OtherDepth> othe
     for (const OtherDepth& other : others) // before any is taken: a run that fails must leave nothing to the next
         if (other.camera.size != size)
             throw Error("another frame of another image size");
-    const bool waves = class_of(noise_) == SensorClass::structured_light,
-               independent = !waves && noise_.correlation_px < independent_px, small = fuse || independent;
-    if (!program_ || size != size_ || fuse != fused_ || waves != waves_ || small != small_ || planes() != planes_)
-        program_ = program_for(device_, size, planes(), fuse, waves, small, !fuse && options_.fill_holes);
-    size_ = size;
-    fused_ = fuse;
-    waves_ = waves;
-    small_ = small;
-    planes_ = planes();
-    const double scale = (independent ? independent_window_scale : window_scale) * (fuse ? fused_window : 1),
+    const bool waves = class_of(noise_) == SensorClass::structured_light;
+    const FitPlaneVariant variant{.size = size,
+                                  .planes = planes(),
+                                  .fused = fuse,
+                                  .waves = waves,
+                                  .independent = !waves && noise_.correlation_px < independent_px,
+                                  .filled = !fuse && options_.fill_holes};
+    if (!program_ || variant != variant_)
+        program_ = program_for(device_, variant);
+    variant_ = variant;
+    const double scale = (variant.independent ? independent_window_scale : window_scale) * (fuse ? fused_window : 1),
                  pixels = noise_.correlation_px * options_.smoothing;
     constants_ = {{size.width, size.height},
                   depth.camera.on_gpu(),

@@ -46,6 +46,18 @@ struct OtherDepth {
     Eigen::Isometry3d here_from_there;
 };
 
+/// What the passes are compiled and chosen for. Frames are fused or holes filled, not both.
+struct FitPlaneVariant {
+    cv::Size size;
+    bool planes = false;      ///< fitted; else flying pixels are all that is looked for
+    bool fused = false;       ///< with what other frames saw
+    bool waves = false;       ///< values err alike over windows of pixels, as disparity does
+    bool independent = false; ///< each pixel errs by itself
+    bool filled = false;      ///< narrow holes are
+
+    bool operator==(const FitPlaneVariant&) const = default;
+};
+
 /// Not thread-safe: one frame at a time.
 class FitPlane {
   public:
@@ -75,8 +87,7 @@ class FitPlane {
     gpu::DeviceBytesPool pool_;
     DepthNoise noise_;
     FitPlaneOptions options_;
-    cv::Size size_;
-    bool fused_ = false, waves_ = false, small_ = false, planes_ = false; ///< as the program has it
+    FitPlaneVariant variant_; ///< as the program has it
     shared::FitPlaneConstants constants_ = {};
     std::unique_ptr<gpu::Program> program_;
     Timings timings_;

@@ -142,7 +142,7 @@ bool is_relief(const DepthNoise& noise, const JumpsSeen& jumps) {
 double settle(std::vector<NoiseBand>& points, const DepthSteps& steps) {
     double ratios = 0, near_ratios = 0, weights = 0;
     for (const NoiseBand& p : points)
-        ratios += p.weight * p.adjacent / p.distant, near_ratios += p.weight * p.adjacent / p.second,
+        ratios += p.weight * p.adjacent / p.distant, near_ratios += p.weight * p.adjacent / p.over_two,
             weights += p.weight;
     const double s = correlation_of(ratios / weights, noise_lag_px), near_s = correlation_of(near_ratios / weights, 2);
     const auto missing_over = [](int lag, double deviation) {

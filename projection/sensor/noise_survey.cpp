@@ -27,7 +27,7 @@ constexpr int small_px = 320, small_lag_px = 2; // in images less wide, slopes a
 struct Band {
     std::vector<float> spread_m;   // |second difference| of depth
     std::vector<float> adjacent_m; // of neighbouring pixels
-    std::vector<float> second_m;   // over two
+    std::vector<float> over_two_m; // over two pixels
     std::vector<DepthSlope> slopes;
     std::array<std::vector<float>, longer_px.size()> longer_m;
     std::vector<float> depths_m; // at their middles; keep_distinct() reduces them to the distinct values
@@ -42,7 +42,7 @@ struct Band {
         };
         append(spread_m, other.spread_m);
         append(adjacent_m, other.adjacent_m);
-        append(second_m, other.second_m);
+        append(over_two_m, other.over_two_m);
         append(slopes, other.slopes);
         for (std::size_t i = 0; i < longer_m.size(); ++i)
             append(longer_m[i], other.longer_m[i]);
@@ -123,12 +123,12 @@ void collect(const cv::Mat1f& z, std::array<Band, bands>& all) {
             for (const auto& [dx, dy] : {std::pair{1, 0}, std::pair{0, 1}}) {
                 const float d = second_difference(inverse, c, x, y, lag_px * dx, lag_px * dy),
                             adjacent = second_difference(inverse, c, x, y, dx, dy),
-                            second = second_difference(inverse, c, x, y, 2 * dx, 2 * dy);
-                if (d < 0 || adjacent < 0 || second < 0)
+                            over_two = second_difference(inverse, c, x, y, 2 * dx, 2 * dy);
+                if (d < 0 || adjacent < 0 || over_two < 0)
                     continue;
                 band.spread_m.push_back(d);
                 band.adjacent_m.push_back(adjacent);
-                band.second_m.push_back(second);
+                band.over_two_m.push_back(over_two);
                 const float before = c - z(y - slope_px * dy, x - slope_px * dx),
                             after = z(y + slope_px * dy, x + slope_px * dx) - c;
                 if (before * after > 0)
@@ -231,17 +231,18 @@ double wide_variance(double variance, Band& band, double step_m) {
 NoiseBand measured_in(Band& band) {
     const double step = step_of(band.depths_m);
     const Sigmas distant = sigmas_of(band.spread_m), adjacent = sigmas_of(band.adjacent_m),
-                 second = sigmas_of(band.second_m);
+                 over_two = sigmas_of(band.over_two_m);
     const double dither = distant.most < 0.05 * step ? 0 : step; // else next to nothing would become something
     const bool quantised = step >= 0.5 * distant.most, by_most = quantised || distant.few >= distant.most;
     const double count = static_cast<double>(band.spread_m.size()),
-                 variance = std::max(variance_of(band.spread_m, dither), 1e-12);
+                 variance = std::max(variance_of(band.spread_m, dither), 1e-12),
+                 of_pixel = std::max(variance_of(band.adjacent_m, dither), 1e-12);
     NoiseBand measured{.z = band.z_sum / count,
-                       .pixel_sigma = std::sqrt(variance_of(band.adjacent_m, dither)),
+                       .pixel_sigma = std::sqrt(of_pixel),
                        .near_sigma = std::sqrt(variance),
                        .wide_sigma = std::sqrt(wide_variance(variance, band, dither)),
                        .adjacent = by_most ? adjacent.most : adjacent.few,
-                       .second = std::max(by_most ? second.most : second.few, 1e-6),
+                       .over_two = std::max(by_most ? over_two.most : over_two.few, 1e-6),
                        .distant = std::max(by_most ? distant.most : distant.few, 1e-6),
                        .weight = count};
     if (quantised && band.spread_m.size() > 20 * band.depths_m.size()) {

@@ -21,14 +21,14 @@ struct DepthSlope {
 
 /// The deviations of one value, in metres, that the second differences of a band show.
 struct NoiseBand {
-    double z;                         ///< the mean
-    double pixel_sigma;               ///< by differences of adjacent pixels
-    double near_sigma;                ///< by those over noise_lag_px
-    double wide_sigma;                ///< by those over more pixels, too
-    double adjacent, second, distant; ///< by those over one, two and noise_lag_px pixels, steps as they are
-    double weight;                    ///< the number of differences
-    double sigma = 0;                 ///< what is believed of these
-    bool hidden = false;              ///< smaller than what a step explains: most values are on the same one
+    double z;                           ///< the mean
+    double pixel_sigma;                 ///< by differences of adjacent pixels
+    double near_sigma;                  ///< by those over noise_lag_px
+    double wide_sigma;                  ///< by those over more pixels, too
+    double adjacent, over_two, distant; ///< by those over one, two and noise_lag_px pixels, steps as they are
+    double weight;                      ///< the number of differences
+    double sigma = 0;                   ///< what is believed of these
+    bool hidden = false;                ///< smaller than what a step explains: most values are on the same one
 };
 
 struct NoiseSurvey {
