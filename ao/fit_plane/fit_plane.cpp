@@ -55,7 +55,8 @@ std::uint32_t marks_of(cv::Size size) {
 }
 
 std::unique_ptr<gpu::Program> program_for(gpu::Device& device, const FitPlaneVariant& variant) {
-    const auto& [size, planes, fuse, waves, independent, fill] = variant;
+    const cv::Size size = variant.size;
+    const bool planes = variant.planes, fuse = variant.fused;
     using Host = gpu::BufferRow::Host;
     constexpr auto floats = gpu::BufferRow::Texels::r32f;
     const auto pixels = static_cast<std::size_t>(size.area());
@@ -86,8 +87,8 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, const FitPlaneVar
                               {}});
         }
         const std::vector<std::pair<int, int>> averages_of{{shared::spec_fused, fuse},
-                                                           {shared::spec_small, fuse || independent}};
-        const std::vector<std::pair<int, int>> fits{{shared::spec_fused, fuse}, {shared::spec_waves, waves}};
+                                                           {shared::spec_small, fuse || variant.independent}};
+        const std::vector<std::pair<int, int>> fits{{shared::spec_fused, fuse}, {shared::spec_waves, variant.waves}};
         const int samples = fuse ? fused : kept, errs = fuse ? relief : kept; // unread without
         passes.push_back({"average",
                           "fit_plane/average",
@@ -96,7 +97,7 @@ std::unique_ptr<gpu::Program> program_for(gpu::Device& device, const FitPlaneVar
                           groups_of(1, shared::average_rows),
                           averages_of});
         passes.push_back({"fit plane", "fit_plane/fit", {averages, errs}, {depth_out, normals_out}, groups, fits});
-        if (fill) {
+        if (variant.filled) {
             const std::uint32_t words = marks_of(size);
             buffers.insert(buffers.end(),
                            {{"filled", pixels * 4, Host::none, floats},
