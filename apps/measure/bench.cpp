@@ -9,7 +9,7 @@
 #include "apps/measure/trials/configurations.h"
 #include "apps/picture.h"
 #include "apps/scenes/generate.h"
-#include "apps/scenes/scene.h"
+#include "apps/scenes/places/scenes.h"
 #include "apps/scenes/sensor.h"
 #include "apps/walk/progress.h"
 #include "io/images/jpeg_output.h"

@@ -1,11 +1,11 @@
 // Captures with known truth: frames along the scene's walk, rendered, recorded, written.
 #include "apps/scenes/generate.h"
 
-#include "apps/scenes/light.h"
-#include "apps/scenes/random_noise.h"
-#include "apps/scenes/scene.h"
+#include "apps/scenes/places/scenes.h"
 #include "apps/scenes/scene_cloud.h"
 #include "apps/scenes/sensor.h"
+#include "apps/scenes/world/light.h"
+#include "apps/scenes/world/random_noise.h"
 #include "io/cameras/camera_file.h"
 #include "io/clouds/cloud_file.h"
 #include "io/images/image_file.h"

@@ -1,8 +1,8 @@
 // Captures with known truth: a synthetic scene seen by a simulated depth sensor, written in TUM's layout.
 #pragma once
 
-#include "apps/scenes/light.h"
 #include "apps/scenes/scanner.h"
+#include "apps/scenes/world/light.h"
 #include "projection/base/parameters.h"
 
 #include <filesystem>
@@ -15,7 +15,7 @@ namespace scanshade {
 
 /// What to generate. The rows of parameters() point into this object: do not move it while they are used.
 struct GenerateOptions {
-    std::string scene = "office";  ///< a name of scenes() (apps/scenes/scene.h)
+    std::string scene = "office";  ///< a name of scenes() (apps/scenes/places/scenes.h)
     std::string sensor = "kinect"; ///< a name of sensors() (apps/scenes/sensor.h)
     int frames = 8;
     int first = 0, step = 1;            ///< frames first, first + step, ... of the scene's walk, ten per second

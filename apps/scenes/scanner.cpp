@@ -1,7 +1,7 @@
 // A simulated laser scanner: a grid of beams from each station, then noise, mixed pixels and misalignment.
 #include "apps/scenes/scanner.h"
 
-#include "apps/scenes/random_noise.h"
+#include "apps/scenes/world/random_noise.h"
 
 #include <cmath>
 #include <numbers>

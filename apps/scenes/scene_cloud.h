@@ -1,7 +1,7 @@
 // A scene as a cloud: points spread evenly over all visible surfaces, with exact truth.
 #pragma once
 
-#include "apps/scenes/scene.h"
+#include "apps/scenes/world/scene.h"
 
 #include <vector>
 

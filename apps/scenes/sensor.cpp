@@ -1,6 +1,6 @@
 #include "apps/scenes/sensor.h"
 
-#include "apps/scenes/random_noise.h"
+#include "apps/scenes/world/random_noise.h"
 #include "projection/base/named.h"
 
 #include <algorithm>

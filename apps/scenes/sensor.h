@@ -1,7 +1,7 @@
 // Simulated depth sensors: exact depth in, recorded depth out.
 #pragma once
 
-#include "apps/scenes/scene.h"
+#include "apps/scenes/world/scene.h"
 
 #include <string_view>
 #include <vector>

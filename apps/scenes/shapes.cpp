@@ -1,7 +1,7 @@
 #include "apps/scenes/shapes.h"
 
-#include "apps/scenes/random_noise.h"
-#include "apps/scenes/scene.h"
+#include "apps/scenes/world/random_noise.h"
+#include "apps/scenes/world/scene.h"
 
 #include <cmath>
 #include <numbers>

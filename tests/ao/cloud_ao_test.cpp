@@ -1,6 +1,7 @@
 // Clouds without a view: laws and closed forms that visibility from the points themselves must keep.
 #include "ao/cloud/cloud_ao.h"
 #include "ao/cloud/surface/leaf_neighbours.h"
+#include "apps/scenes/places/scenes.h"
 #include "apps/scenes/scanner.h"
 #include "projection/base/error.h"
 #include "projection/expected_error.h"

@@ -1,6 +1,7 @@
 // Clouds on a Vulkan device: the same neighbours, planes and values as on the processor.
 #include "ao/cloud/cloud_ao.h"
 #include "ao/cloud/surface/cloud_gpu.h"
+#include "apps/scenes/places/scenes.h"
 #include "apps/scenes/scene_cloud.h"
 
 #include <cmath>

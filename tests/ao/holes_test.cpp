@@ -1,7 +1,7 @@
 // What a sensor did not see: narrow holes get the depth of the surface behind them, which occludes but is no pixel.
 #include "ao/frame.h"
 #include "ao/gpu/image_upload.h"
-#include "apps/scenes/scene.h"
+#include "apps/scenes/world/scene.h"
 #include "tests/support/scenes.h"
 #include "tests/support/watched.h"
 

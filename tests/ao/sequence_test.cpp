@@ -4,7 +4,7 @@
 #include "ao/sequence/sequence_ao.h"
 #include "ao/surfel/surfel.h"
 #include "apps/scenes/generate.h"
-#include "apps/scenes/scene.h"
+#include "apps/scenes/places/scenes.h"
 #include "apps/scenes/sensor.h"
 #include "apps/walk/batch.h"
 #include "apps/walk/sequence_order.h"

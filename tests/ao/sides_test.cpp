@@ -3,6 +3,7 @@
 
 #include "ao/cloud/cloud_ao.h"
 #include "ao/cloud/sides/patches.h"
+#include "apps/scenes/places/scenes.h"
 #include "apps/scenes/scanner.h"
 #include "projection/expected_error.h"
 #include "tests/support/files.h"

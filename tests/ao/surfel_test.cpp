@@ -1,7 +1,7 @@
 // The accurate method against closed forms: an open plane and right-angled corners, whatever the number of reads.
 #include "ao/gpu/device.h"
 #include "ao/surfel/surfel.h"
-#include "apps/scenes/scene.h"
+#include "apps/scenes/world/scene.h"
 #include "tests/support/scenes.h"
 #include "tests/support/watched.h"
 

@@ -1,6 +1,6 @@
 // The flatness of real captures is judged where planes are open: on generated rooms, truth says whether they are.
 #include "apps/measure/parts/flat_surfaces.h"
-#include "apps/scenes/scene.h"
+#include "apps/scenes/places/scenes.h"
 #include "projection/base/statistics.h"
 
 #include <cmath>

@@ -1,7 +1,7 @@
 // Generated captures: the truth is true, the sensors err as stated, and the same options give the same bytes.
 #include "apps/scenes/generate.h"
 
-#include "apps/scenes/scene.h"
+#include "apps/scenes/places/scenes.h"
 #include "apps/scenes/sensor.h"
 #include "io/captures/capture.h"
 #include "projection/base/error.h"

@@ -2,7 +2,7 @@
 #include "ao/finish/finish.h"
 #include "ao/gpu/device.h"
 #include "ao/light/light.h"
-#include "apps/scenes/light.h"
+#include "apps/scenes/world/light.h"
 #include "projection/base/hash.h"
 #include "projection/srgb.h"
 

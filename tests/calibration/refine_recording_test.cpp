@@ -2,7 +2,7 @@
 #include "apps/refine/recording.h"
 #include "apps/refine/report.h"
 #include "apps/scenes/generate.h"
-#include "apps/scenes/scene.h"
+#include "apps/scenes/places/scenes.h"
 #include "apps/scenes/sensor.h"
 #include "io/cameras/camera_file.h"
 #include "projection/base/error.h"

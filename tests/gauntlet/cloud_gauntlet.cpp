@@ -2,6 +2,7 @@
 #include "ao/cloud/cloud_ao.h"
 #include "ao/cloud/extent.h"
 #include "apps/doubts/doubts.h"
+#include "apps/scenes/places/scenes.h"
 #include "apps/scenes/scanner.h"
 #include "apps/walk/point_clouds.h"
 #include "io/captures/capture.h"

@@ -1,7 +1,7 @@
 // What may be wrong with a cloud, as a table.
 #include "tests/gauntlet/perturb.h"
 
-#include "apps/scenes/random_noise.h"
+#include "apps/scenes/world/random_noise.h"
 
 #include <cmath>
 #include <Eigen/Geometry>

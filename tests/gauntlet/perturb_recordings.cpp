@@ -1,7 +1,7 @@
 // What may be wrong with a recording, as a table.
 #include "tests/gauntlet/perturb_recordings.h"
 
-#include "apps/scenes/random_noise.h"
+#include "apps/scenes/world/random_noise.h"
 #include "io/images/image_file.h"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 // The alignment of two frames against PCL's ICP, point to plane, from the same wrong poses on the same depth.
 #include "ao/sequence/agreement.h"
 #include "apps/scenes/generate.h"
-#include "apps/scenes/scene.h"
+#include "apps/scenes/places/scenes.h"
 #include "apps/scenes/sensor.h"
 #include "projection/base/statistics.h"
 

@@ -1,5 +1,5 @@
 // Colour laid over depth and AO over colour: right where both cameras see the surface, nothing where one does not.
-#include "apps/scenes/scene.h"
+#include "apps/scenes/places/scenes.h"
 #include "projection/base/error.h"
 #include "projection/base/statistics.h"
 #include "projection/colour_view.h"

@@ -6,8 +6,8 @@
 #include "apps/measure/expected_errors/cloud_error_fit.h"
 #include "apps/measure/expected_errors/error_fit.h"
 #include "apps/measure/trials/bench_part.h"
+#include "apps/scenes/places/scenes.h"
 #include "apps/scenes/scanner.h"
-#include "apps/scenes/scenes.h"
 #include "io/output_file.h"
 #include "projection/base/statistics.h"
 

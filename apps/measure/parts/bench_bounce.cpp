@@ -3,8 +3,9 @@
 #include "apps/lists.h"
 #include "apps/measure/trials/bench_part.h"
 #include "apps/measure/trials/trial.h"
-#include "apps/scenes/light.h"
+#include "apps/scenes/places/scenes.h"
 #include "apps/scenes/sensor.h"
+#include "apps/scenes/world/light.h"
 #include "projection/base/error.h"
 #include "projection/srgb.h"
 

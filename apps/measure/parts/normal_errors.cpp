@@ -4,7 +4,7 @@
 #include "ao/gpu/transfer.h"
 #include "ao/screen/screen.h"
 #include "apps/measure/trials/error_classes.h"
-#include "apps/scenes/scene.h"
+#include "apps/scenes/places/scenes.h"
 #include "apps/scenes/sensor.h"
 #include "projection/base/statistics.h"
 

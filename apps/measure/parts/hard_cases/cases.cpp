@@ -1,8 +1,8 @@
 #include "apps/measure/parts/hard_cases/cases.h"
 
-#include "apps/scenes/scene.h"
 #include "apps/scenes/sensor.h"
 #include "apps/scenes/shapes.h"
+#include "apps/scenes/world/scene.h"
 
 #include <cmath>
 #include <fmt/format.h>

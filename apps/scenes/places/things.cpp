@@ -1,7 +1,7 @@
 // Furniture, built of parts.
-#include "apps/scenes/things.h"
+#include "apps/scenes/places/things.h"
 
-#include "apps/scenes/materials.h"
+#include "apps/scenes/places/materials.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 // apps/scenes/scene.h. Units are metres and radians.
 #pragma once
 
-#include "apps/scenes/scene.h"
+#include "apps/scenes/world/scene.h"
 #include "projection/base/hash.h"
 
 #include <initializer_list>

@@ -1,5 +1,5 @@
 // The parts that furniture is built of, as solids that rays can hit.
-#include "apps/scenes/parts.h"
+#include "apps/scenes/places/parts.h"
 
 #include <cmath>
 

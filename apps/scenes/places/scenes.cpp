@@ -1,5 +1,5 @@
 // The table of scenes.
-#include "apps/scenes/scenes.h"
+#include "apps/scenes/places/scenes.h"
 
 #include "projection/base/named.h"
 

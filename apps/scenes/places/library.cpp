@@ -1,9 +1,9 @@
 // The scene library: relief as fine as what plane fits smooth. Books side by side, joints of masonry, slats, battens.
-#include "apps/scenes/scenes.h"
+#include "apps/scenes/places/scenes.h"
 
-#include "apps/scenes/materials.h"
-#include "apps/scenes/parts.h"
-#include "apps/scenes/things.h"
+#include "apps/scenes/places/materials.h"
+#include "apps/scenes/places/parts.h"
+#include "apps/scenes/places/things.h"
 
 #include <algorithm>
 #include <cmath>

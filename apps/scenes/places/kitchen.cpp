@@ -1,9 +1,9 @@
 // The scene kitchen: cupboards with open doors and deep niches, things that stand close to each other on worktops.
-#include "apps/scenes/scenes.h"
+#include "apps/scenes/places/scenes.h"
 
-#include "apps/scenes/materials.h"
-#include "apps/scenes/parts.h"
-#include "apps/scenes/things.h"
+#include "apps/scenes/places/materials.h"
+#include "apps/scenes/places/parts.h"
+#include "apps/scenes/places/things.h"
 
 #include <cmath>
 

@@ -1,9 +1,14 @@
-// The scenes, one per file. Rooms are made of furniture, furniture of parts.
+// The scenes, one per file, and their table. Rooms are made of furniture, furniture of parts.
 #pragma once
 
-#include "apps/scenes/scene.h"
+#include "apps/scenes/world/scene.h"
 
 namespace scanshade::scene {
+
+/// The table of scenes.
+[[nodiscard]] const std::vector<Scene>& scenes();
+/// Throws Misuse listing the known names.
+[[nodiscard]] const Scene& scene_named(std::string_view name);
 
 /// A room of 4.2 x 5.2 x 2.6 m with furniture against its walls and objects on the floor.
 [[nodiscard]] Scene office();

@@ -1,9 +1,9 @@
 // The scene outdoor: uneven ground, houses, trees and fences from 5 to 150 m.
-#include "apps/scenes/scenes.h"
+#include "apps/scenes/places/scenes.h"
 
-#include "apps/scenes/heap.h"
-#include "apps/scenes/materials.h"
-#include "apps/scenes/parts.h"
+#include "apps/scenes/places/heap.h"
+#include "apps/scenes/places/materials.h"
+#include "apps/scenes/places/parts.h"
 
 #include <algorithm>
 #include <array>

@@ -1,9 +1,9 @@
 // The scene attic: rafters and sloping planes, a gap behind every beam, stored things under cloths and in crates.
-#include "apps/scenes/scenes.h"
+#include "apps/scenes/places/scenes.h"
 
-#include "apps/scenes/materials.h"
-#include "apps/scenes/parts.h"
-#include "apps/scenes/things.h"
+#include "apps/scenes/places/materials.h"
+#include "apps/scenes/places/parts.h"
+#include "apps/scenes/places/things.h"
 
 #include <cmath>
 

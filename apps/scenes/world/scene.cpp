@@ -1,7 +1,7 @@
 // Rays against scenes: a tree finds the solid, and its formula gives the exact hit.
-#include "apps/scenes/scene.h"
+#include "apps/scenes/world/scene.h"
 
-#include "apps/scenes/random_noise.h"
+#include "apps/scenes/world/random_noise.h"
 #include "projection/base/error.h"
 #include "projection/srgb.h"
 #include "projection/undistort.h"

@@ -1,7 +1,7 @@
 // Objects dropped one by one, each on those below it.
-#include "apps/scenes/heap.h"
+#include "apps/scenes/places/heap.h"
 
-#include "apps/scenes/materials.h"
+#include "apps/scenes/places/materials.h"
 
 #include <algorithm>
 #include <cmath>

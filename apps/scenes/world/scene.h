@@ -83,11 +83,6 @@ struct Scene {
     double far_m = 10;        ///< nothing is seen beyond
 };
 
-/// The table of scenes (apps/scenes/).
-[[nodiscard]] const std::vector<Scene>& scenes();
-/// Throws Misuse listing the known names.
-[[nodiscard]] const Scene& scene_named(std::string_view name);
-
 /// Camera to world at a time on the scene's walk, with the sway of a hand-held camera.
 [[nodiscard]] Eigen::Isometry3d world_from_camera(const Walk& walk, double seconds);
 /// A camera at `eye` whose optical axis goes through `target`, image upright.

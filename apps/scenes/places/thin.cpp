@@ -1,9 +1,9 @@
 // The scene thin: indoor objects that are a pixel or two wide in a picture.
-#include "apps/scenes/scenes.h"
+#include "apps/scenes/places/scenes.h"
 
-#include "apps/scenes/materials.h"
-#include "apps/scenes/parts.h"
-#include "apps/scenes/things.h"
+#include "apps/scenes/places/materials.h"
+#include "apps/scenes/places/parts.h"
+#include "apps/scenes/places/things.h"
 
 #include <cmath>
 #include <utility>

@@ -1,7 +1,7 @@
 // Light on synthetic scenes whose parts are known: albedo, ambient light and direct light with cast shadows.
 #pragma once
 
-#include "apps/scenes/scene.h"
+#include "apps/scenes/world/scene.h"
 #include "projection/base/parameters.h"
 
 #include <string>

@@ -1,7 +1,7 @@
 // Heaps of boxes, balls, cans and bowls, as in store rooms.
 #pragma once
 
-#include "apps/scenes/parts.h"
+#include "apps/scenes/places/parts.h"
 
 namespace scanshade::scene {
 

@@ -1,9 +1,9 @@
 // The scene columns: round and carved stone in a hall of 13 m.
-#include "apps/scenes/scenes.h"
+#include "apps/scenes/places/scenes.h"
 
-#include "apps/scenes/heap.h"
-#include "apps/scenes/materials.h"
-#include "apps/scenes/parts.h"
+#include "apps/scenes/places/heap.h"
+#include "apps/scenes/places/materials.h"
+#include "apps/scenes/places/parts.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "apps/scenes/light.h"
+#include "apps/scenes/world/light.h"
 
 #include "projection/base/hash.h"
 #include "projection/srgb.h"

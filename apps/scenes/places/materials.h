@@ -1,7 +1,7 @@
 // Colours and patterns of the scenes' surfaces.
 #pragma once
 
-#include "apps/scenes/scene.h"
+#include "apps/scenes/world/scene.h"
 
 namespace scanshade::scene {
 

@@ -1,8 +1,8 @@
 // The scene office: one room, furnished along its walls, the simplest of the six.
-#include "apps/scenes/scenes.h"
+#include "apps/scenes/places/scenes.h"
 
-#include "apps/scenes/materials.h"
-#include "apps/scenes/parts.h"
+#include "apps/scenes/places/materials.h"
+#include "apps/scenes/places/parts.h"
 
 #include <utility>
 

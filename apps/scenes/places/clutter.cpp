@@ -1,10 +1,10 @@
 // The scene clutter: heaps of several hundred objects, and hardly a plane.
-#include "apps/scenes/scenes.h"
+#include "apps/scenes/places/scenes.h"
 
-#include "apps/scenes/heap.h"
-#include "apps/scenes/materials.h"
-#include "apps/scenes/parts.h"
-#include "apps/scenes/things.h"
+#include "apps/scenes/places/heap.h"
+#include "apps/scenes/places/materials.h"
+#include "apps/scenes/places/parts.h"
+#include "apps/scenes/places/things.h"
 
 namespace scanshade::scene {
 

@@ -1,7 +1,7 @@
 // Furniture that several scenes share.
 #pragma once
 
-#include "apps/scenes/parts.h"
+#include "apps/scenes/places/parts.h"
 
 namespace scanshade::scene {
 
