@@ -205,4 +205,19 @@ const CloudErrorTables& shipped_cloud_errors() {
     return tables;
 }
 
+float error_once_checked(float factor_of_surroundings, float visibility, std::uint8_t side, float repeat) {
+    return checked_error(factor_of_surroundings, visibility, side_of(side), repeat, shipped_cloud_errors());
+}
+
+void ErrorSum::add(float error) {
+    if (std::isnan(error))
+        return;
+    squares_ += static_cast<double>(error) * static_cast<double>(error);
+    ++count_;
+}
+
+std::optional<double> ErrorSum::rms() const {
+    return count_ > 0 ? std::optional(std::sqrt(squares_ / static_cast<double>(count_))) : std::nullopt;
+}
+
 } // namespace scanshade

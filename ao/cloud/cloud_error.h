@@ -72,5 +72,18 @@ struct CloudErrorTables {
 
 /// Those the program was built with.
 [[nodiscard]] const CloudErrorTables& shipped_cloud_errors();
+/// checked_error() with these tables and the side as byte_of_side() has it.
+[[nodiscard]] float error_once_checked(float factor_of_surroundings, float visibility, std::uint8_t side, float repeat);
+
+/// The RMS of errors; those that are NaN do not count.
+class ErrorSum {
+  public:
+    void add(float error);
+    [[nodiscard]] std::optional<double> rms() const; ///< nothing without errors
+
+  private:
+    double squares_ = 0;
+    std::size_t count_ = 0;
+};
 
 } // namespace scanshade

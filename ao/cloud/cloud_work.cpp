@@ -1,6 +1,7 @@
 // Visibility of the points of a cloud or of a tile: neighbours, planes, sides, discs, rays, and means over neighbours.
 #include "ao/cloud/cloud_work.h"
 
+#include "ao/cloud/neighbour_means.h"
 #include "ao/cloud/repeatability.h"
 #include "projection/base/error.h"
 #include "projection/base/hash.h"
@@ -8,66 +9,21 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <Eigen/Geometry>
 #include <fmt/format.h>
-#include <iterator>
 #include <limits>
 #include <numbers>
 #include <numeric>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
+#include <utility>
 
 namespace scanshade {
 namespace {
 
 using Eigen::Vector3d, Eigen::Vector3f;
 constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
-
-/// A neighbour's weight in the mean is e^(this distance^2): visibility hardly changes over a tenth of the radius.
-float mean_falloff(float radius) { return -1 / (2 * 0.01F * radius * radius); }
-
-/// The mean of a value and its neighbours' on the same surface: parallel planes, distances small against the radius.
-Untouched<float> smoothed(const CloudSurface& surface, const Untouched<float>& values, float radius) {
-    Untouched<float> means(values.size());
-    const float falloff = mean_falloff(radius);
-    tbb::parallel_for(std::size_t(0), values.size(), [&](std::size_t i) {
-        means[i] = nothing;
-        if (std::isnan(values[i]))
-            return;
-        float sum = values[i], weights = 1;
-        for (const std::uint32_t j : surface.near[i]) {
-            const float alike = surface.normals[i].dot(surface.normals[j]);
-            if (j == i || std::isnan(values[j]) || !(alike > 0.9F))
-                continue;
-            const Vector3f apart = surface.tree[j] - surface.tree[i];
-            const float off = (values[i] - values[j]) / shared::mean_apart;
-            const float weight = std::exp(falloff * apart.squaredNorm()) * std::max(1 - off * off, 0.0F);
-            sum += weight * values[j];
-            weights += weight;
-        }
-        means[i] = sum / weights;
-    });
-    return means;
-}
-
-/// 1 for each point whose value the means of the wanted points need.
-template <class IsWanted>
-std::vector<char> asked_by_means(const CloudSurface& surface, const IsWanted& is_wanted, int passes) {
-    std::vector<char> asked(surface.size());
-    tbb::parallel_for(std::size_t(0), asked.size(), [&](std::size_t i) { asked[i] = is_wanted(i); });
-    for (int pass = 0; pass < passes; ++pass) {
-        std::vector<char> further = asked;
-        tbb::parallel_for(std::size_t(0), asked.size(), [&](std::size_t i) {
-            if (asked[i])
-                for (const std::uint32_t j : surface.near[i])
-                    std::atomic_ref(further[j]).store(1, std::memory_order_relaxed);
-        });
-        asked = std::move(further);
-    }
-    return asked;
-}
 
 } // namespace
 
@@ -310,10 +266,6 @@ void CloudWork::compute_thinned() {
         signs_[i].repeat = found.error[i];
 }
 
-float error_once_checked(float factor_of_surroundings, float visibility, std::uint8_t side, float repeat) {
-    return checked_error(factor_of_surroundings, visibility, side_of(side), repeat, shipped_cloud_errors());
-}
-
 void CloudWork::tell_error() {
     if (part_)
         return;
@@ -327,31 +279,6 @@ void CloudWork::tell_error() {
     result_.notes.push_back(told.note);
     if (told.doubt)
         doubt(*told.doubt);
-}
-
-void ErrorSum::add(float error) {
-    if (std::isnan(error))
-        return;
-    squares_ += static_cast<double>(error) * static_cast<double>(error);
-    ++count_;
-}
-
-std::optional<double> ErrorSum::rms() const {
-    return count_ > 0 ? std::optional(std::sqrt(squares_ / static_cast<double>(count_))) : std::nullopt;
-}
-
-ToldError told_error(double error, double by_check) {
-    constexpr double largest_error = 0.12;
-    constexpr double largest_by_check = 0.22; // noise alone makes up to 0.2 of what errs by less than 0.1
-    constexpr const char* way_out = "A larger --radius spans more points; ao_confidence tells where.";
-    ToldError told{fmt::format("an error of {:.2f} RMS is expected (--write error: of every point).", error), {}};
-    if (error > largest_error)
-        told.doubt = fmt::format("an error of {:.2f} RMS is expected. {}", error, way_out);
-    else if (by_check > largest_by_check)
-        told.doubt = fmt::format("a part of the points by themselves give quite other values, as if the error were "
-                                 "{:.2f} RMS. {}",
-                                 by_check, way_out);
-    return told;
 }
 
 /// The spacing of a sample is larger by the root of its share: points are on surfaces.
@@ -446,8 +373,11 @@ void CloudWork::tile(const Indices& core, const Indices& round, CloudGpu* gpu) {
         watch_.lap("tree");
         values.resize(surface.size());
         tbb::parallel_for(std::size_t(0), values.size(), [&](std::size_t i) { values[i] = nothing; });
-        const std::vector<char> asked =
-            wanted.empty() ? std::vector<char>(surface.size(), 1) : asked_by_means(surface, is_wanted, passes_);
+        std::vector<char> asked(surface.size(), 1);
+        if (!wanted.empty()) {
+            tbb::parallel_for(std::size_t(0), asked.size(), [&](std::size_t i) { asked[i] = is_wanted(i); });
+            asked = asked_by_means(surface, std::move(asked), passes_);
+        }
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, surface.tree.leaves(), 8), [&](const auto& range) {
             for (std::size_t leaf = range.begin(); leaf < range.end(); ++leaf)
                 rays->open(leaf, *directions_, radius, up, asked, values);
@@ -620,25 +550,6 @@ bool CloudWork::recorded() const {
     return !cloud_.normals.empty() && options_.normals != CloudNormals::estimated && !normals_refused_;
 }
 
-std::optional<std::string> told_noise(const FittedCounts& fitted) {
-    if (fitted.moved == 0)
-        return std::nullopt;
-    return fmt::format("noise of {:.2g} (sigma across surfaces): {:.0f} % of the points were moved onto fitted planes; "
-                       "{} discs stand for them.",
-                       fitted.noise, 100.0 * static_cast<double>(fitted.moved) / static_cast<double>(fitted.from),
-                       fitted.kept);
-}
-
-std::string told_sides(const SettledSides& sides, bool recorded) {
-    const std::string facing = sides.orientation.kind == NormalOrientation::Kind::viewpoint ? "turned to " : "turned ";
-    if (recorded && sides.turned_points > 0)
-        return fmt::format("normals: recorded; {:.2g} % of them were turned, since {}; {}{}.",
-                           100.0 * static_cast<double>(sides.turned_points) / static_cast<double>(sides.judged_points),
-                           sides.turned_why, facing, sides.orientation.why);
-    return recorded ? "normals: recorded."
-                    : "normals: from planes through 16 neighbours, " + facing + sides.orientation.why + ".";
-}
-
 void CloudWork::tell() {
     if (const auto told = told_noise(fitted_))
         result_.notes.push_back(*told);
@@ -662,40 +573,6 @@ void CloudWork::tell() {
     if (unknown > 0)
         result_.notes.push_back(fmt::format("{} of {} points have no surface round them; their visibility is unknown.",
                                             unknown, valid_.size() + strays_.size()));
-}
-
-std::vector<Vector3d> sampled(std::span<const Vector3d> points, const Indices& indices, std::size_t wanted) {
-    const double share =
-        std::min(1.0, static_cast<double>(wanted) / static_cast<double>(std::max<std::size_t>(indices.size(), 1)));
-    const auto chosen = static_cast<std::uint64_t>(share * 0x1p32);
-    std::vector<Vector3d> some;
-    for (const std::uint32_t i : indices_where(indices, [&](std::uint32_t point) { return hash(point) < chosen; }))
-        some.push_back(points[i]);
-    return some;
-}
-
-std::vector<NoisePlace> noise_places(std::span<const Vector3d> points, const Indices& those) {
-    struct Hashed {
-        std::uint32_t hash, number;
-        bool operator<(const Hashed& other) const {
-            return hash != other.hash ? hash < other.hash : number < other.number;
-        }
-    };
-    // A threshold that four times as many are below, so that few have to be sorted.
-    const double share = 4.0 * NoisePlace::wanted / static_cast<double>(std::max<std::size_t>(those.size(), 1));
-    const auto chosen = static_cast<std::uint64_t>(std::min(share, 1.0) * 0x1p32);
-    std::vector<Hashed> lowest;
-    for (const std::uint32_t number : indices_where(those, [&](std::uint32_t i) { return hash(i) < chosen; }))
-        lowest.push_back({hash(number), number});
-    std::ranges::sort(lowest, std::less());
-    std::vector<NoisePlace> places;
-    for (std::size_t k = 0; k < std::min(lowest.size(), NoisePlace::wanted); ++k)
-        places.push_back({lowest[k].number, points[lowest[k].number]});
-    return places;
-}
-
-Indices finite(std::span<const Vector3d> points) {
-    return indices_where(points.size(), [&](std::size_t i) { return points[i].allFinite(); });
 }
 
 } // namespace scanshade

@@ -2,8 +2,10 @@
 #pragma once
 
 #include "ao/base/watch.h"
+#include "ao/cloud/chosen_points.h"
 #include "ao/cloud/cloud_ao.h"
 #include "ao/cloud/cloud_error.h"
+#include "ao/cloud/cloud_notes.h"
 #include "ao/cloud/extent.h"
 #include "ao/cloud/repeatability.h"
 #include "ao/cloud/settled_sides.h"
@@ -21,9 +23,6 @@
 #include <vector>
 
 namespace scanshade {
-
-/// Indices of points, ascending.
-using Indices = std::vector<std::uint32_t>;
 
 /// What a person asked for, and where it is computed.
 struct CloudSetup {
@@ -62,12 +61,6 @@ struct OfWhole {
     std::optional<SharedNoise> noise; ///< none: it is not known, and nothing is smoothed
     bool normals_refused = false;     ///< recorded ones
     bool twins = false;               ///< there are copies of points
-};
-
-/// What fitting did to the points of a tile, its rim included.
-struct FittedCounts {
-    float noise = 0;
-    std::uint64_t moved = 0, kept = 0, from = 0;
 };
 
 class CloudWork {
@@ -169,41 +162,5 @@ class CloudWork {
     double error_by_check_ = 0;
     int gpu_tiles_ = 0, passes_ = 2;
 };
-
-/// About the points that a cloud's sides are of, in words: for notes. `recorded`: the normals were.
-[[nodiscard]] std::string told_sides(const SettledSides& sides, bool recorded);
-/// The same about noise; none where no point was moved.
-[[nodiscard]] std::optional<std::string> told_noise(const FittedCounts& fitted);
-
-/// About `wanted` of these points, chosen by a hash: every n-th point in recording order would skip whole scan lines.
-[[nodiscard]] std::vector<Eigen::Vector3d> sampled(std::span<const Eigen::Vector3d> points, const Indices& indices,
-                                                   std::size_t wanted);
-/// The places where noise is looked for: of the points with these numbers.
-[[nodiscard]] std::vector<NoisePlace> noise_places(std::span<const Eigen::Vector3d> points, const Indices& those);
-[[nodiscard]] Indices finite(std::span<const Eigen::Vector3d> points);
-
-/// The error of a point of a checked cloud. `side` as byte_of_side() has it, `repeat` as CheckedPart finds it.
-[[nodiscard]] float error_once_checked(float factor_of_surroundings, float visibility, std::uint8_t side, float repeat);
-
-/// The RMS of errors; those that are NaN do not count.
-class ErrorSum {
-  public:
-    void add(float error);
-    [[nodiscard]] std::optional<double> rms() const; ///< nothing without errors
-
-  private:
-    double squares_ = 0;
-    std::size_t count_ = 0;
-};
-
-/// Sentences about the expected error of a cloud, and the error that its check alone lets expect. `doubt` is there if
-/// the first is large, or the other very large.
-struct ToldError {
-    std::string note;
-    std::optional<std::string> doubt;
-};
-[[nodiscard]] ToldError told_error(double error, double by_check);
-
-constexpr std::size_t enough_to_judge = 60000; ///< points of a sample
 
 } // namespace scanshade

@@ -47,12 +47,6 @@ std::string stamp(Microseconds time) {
     return fmt::format("{}.{:06}", absolute / 1000000, absolute % 1000000);
 }
 
-/// A Kinect's 525 px at 640x480, the same field of view at other sizes.
-Pinhole camera_of_size(cv::Size size) {
-    const double f = 525.0 * std::max(size.width / 640.0, size.height / 480.0);
-    return {f, f, (size.width - 1) / 2.0, (size.height - 1) / 2.0, size};
-}
-
 /// truth/truth.json marks a generated capture. No other folder is ever removed.
 void make_room(const fs::path& out, bool overwrite) {
     if (!fs::exists(out) || (fs::is_directory(out) && fs::is_empty(out)))
@@ -320,7 +314,7 @@ void write_scene_cloud(const GenerateOptions& options, const scene::World& world
 
 } // namespace
 
-cv::Size parsed_size(const std::string& text) {
+cv::Size parsed_size(const std::string& text, std::string_view setting) {
     constexpr int largest = 8192;
     cv::Size size;
     const char* end = text.data() + text.size();
@@ -331,7 +325,13 @@ cv::Size parsed_size(const std::string& text) {
             std::max(size.width, size.height) <= largest)
             return size;
     }
-    throw Misuse(fmt::format("size: '{}' given, expected width x height such as 640x480, each 1 .. {}", text, largest));
+    throw Misuse(
+        fmt::format("{}: '{}' given, expected width x height such as 640x480, each 1 .. {}", setting, text, largest));
+}
+
+Pinhole camera_of_size(cv::Size size) {
+    const double f = 525.0 * std::max(size.width / 640.0, size.height / 480.0);
+    return {f, f, (size.width - 1) / 2.0, (size.height - 1) / 2.0, size};
 }
 
 std::vector<Parameter> GenerateOptions::parameters() {

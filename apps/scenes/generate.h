@@ -42,8 +42,10 @@ struct GenerateOptions {
     [[nodiscard]] std::vector<Parameter> parameters();
 };
 
-/// From width x height such as "640x480", each 1 .. 8192. Throws Misuse.
-[[nodiscard]] cv::Size parsed_size(const std::string& text);
+/// From width x height such as "640x480", each 1 .. 8192. Throws Misuse naming the setting.
+[[nodiscard]] cv::Size parsed_size(const std::string& text, std::string_view setting = "size");
+/// A Kinect's 525 px at 640x480, the same field of view at other sizes.
+[[nodiscard]] Pinhole camera_of_size(cv::Size size);
 
 /// Called after each frame that is on disk, from the calling thread.
 using GenerateProgress = std::function<void(int done, int total)>;

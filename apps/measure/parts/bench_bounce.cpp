@@ -3,6 +3,7 @@
 #include "apps/lists.h"
 #include "apps/measure/trials/bench_part.h"
 #include "apps/measure/trials/trial.h"
+#include "apps/scenes/generate.h"
 #include "apps/scenes/places/scenes.h"
 #include "apps/scenes/sensor.h"
 #include "apps/scenes/world/light.h"
@@ -90,9 +91,7 @@ class BouncePart final : public BenchPart {
     void measure(gpu::Device& device, const std::string& name, const std::string& sensor, scene::LightKind kind) const {
         const scene::Scene& scene = scene::scene_named(name);
         const scene::World world(scene);
-        const cv::Size size = size_of();
-        const double f = 525.0 * std::max(size.width / 640.0, size.height / 480.0);
-        const Pinhole camera{f, f, (size.width - 1) / 2.0, (size.height - 1) / 2.0, size};
+        const Pinhole camera = camera_of_size(parsed_size(size_, "bounce.size"));
         const scene::Optics optics(camera);
         std::vector<Shot> shots;
         std::vector<DepthImage> recorded;
@@ -126,17 +125,14 @@ class BouncePart final : public BenchPart {
         Comparison none, own, by_truth;
         for (const Shot& shot : shots) {
             const cv::Mat1f seen = known(shot, shot.truth.visibility);
-            none.add(cv::Mat3f(size, cv::Vec3f()), shot.truth.indirect, seen);
+            none.add(cv::Mat3f(camera.size, cv::Vec3f()), shot.truth.indirect, seen);
             own.add(own_colour(shot), shot.truth.indirect, seen);
             by_truth.add(indirect(shot, seen, nullptr), shot.truth.indirect, seen);
         }
         fmt::print(" {} | {} | {} |", none.text(), own.text(), by_truth.text());
         for (const std::string& each : comma_separated(methods_)) {
             const MethodRow& row = method_named(each);
-            const auto setup = row.setup();
-            const std::vector<Parameter> rows = setup->parameters();
-            if (const Parameter* radius = row_named(rows, "radius"))
-                set(*radius, scene.ao_radius_m);
+            const auto setup = set_up({each, {}, {}}, scene.ao_radius_m);
             FrameAo method(device, row, *setup);
             Comparison found;
             for (const Shot& shot : shots) {
@@ -168,14 +164,6 @@ class BouncePart final : public BenchPart {
                     light(v, u)[c] = static_cast<float>(linear_from_srgb(shot.photograph(v, u)[c] / 255.0)) *
                                      (1 - shot.truth.visibility(v, u));
         return light;
-    }
-
-    [[nodiscard]] cv::Size size_of() const {
-        int width = 0, height = 0, used = 0;
-        if (std::sscanf(size_.c_str(), "%dx%d%n", &width, &height, &used) != 2 ||
-            used != static_cast<int>(size_.size()) || width < 16 || height < 16 || width > 8192 || height > 8192)
-            throw Misuse("bounce.size: '" + size_ + "' given, expected width x height such as 320x240");
-        return {width, height};
     }
 
     bool asked_ = false;

@@ -5,6 +5,7 @@
 #include "apps/lists.h"
 #include "apps/measure/trials/bench_part.h"
 #include "apps/measure/trials/trial.h"
+#include "apps/scenes/generate.h"
 #include "apps/scenes/places/scenes.h"
 #include "apps/scenes/sensor.h"
 #include "apps/scenes/world/light.h"
@@ -138,9 +139,7 @@ class LightPart final : public BenchPart {
     void measure(gpu::Device& device, const std::string& name, const std::string& sensor) {
         const scene::Scene& scene = scene::scene_named(name);
         const scene::World world(scene);
-        const cv::Size size = size_of();
-        const double f = 525.0 * std::max(size.width / 640.0, size.height / 480.0);
-        const Pinhole camera{f, f, (size.width - 1) / 2.0, (size.height - 1) / 2.0, size};
+        const Pinhole camera = camera_of_size(parsed_size(size_, "light-split.size"));
         const scene::Optics optics(camera);
         std::vector<LitShot> shots;
         std::vector<DepthImage> recorded;
@@ -155,10 +154,7 @@ class LightPart final : public BenchPart {
         }
         const DepthNoise noise = measure_noise(recorded);
         const MethodRow& row = method_named(method_);
-        const auto setup = row.setup();
-        const std::vector<Parameter> rows = setup->parameters();
-        if (const Parameter* radius = row_named(rows, "radius"))
-            set(*radius, scene.ao_radius_m);
+        const auto setup = set_up({method_, {}, {}}, scene.ao_radius_m);
         FrameAo method(device, row, *setup);
         for (LitShot& shot : shots) {
             shot.visibility = method.compute(shot.depth, noise).visibility;
@@ -263,14 +259,6 @@ class LightPart final : public BenchPart {
                     ++count;
                 }
             }
-    }
-
-    [[nodiscard]] cv::Size size_of() const {
-        int width = 0, height = 0, used = 0;
-        if (std::sscanf(size_.c_str(), "%dx%d%n", &width, &height, &used) != 2 ||
-            used != static_cast<int>(size_.size()) || width < 16 || height < 16 || width > 8192 || height > 8192)
-            throw Misuse("light-split.size: '" + size_ + "' given, expected width x height such as 320x240");
-        return {width, height};
     }
 
     bool asked_ = false, suns_ = false;

@@ -124,9 +124,6 @@ TrialCapture load_trial(const Capture& capture, const DepthNoise& noise, const s
     return trial;
 }
 
-namespace {
-
-/// The capture's radius goes first, so that a configuration may override it.
 std::unique_ptr<MethodSetup> set_up(const Configuration& configuration, double radius_m) {
     std::unique_ptr<MethodSetup> setup = method_named(configuration.method).setup();
     const std::vector<Parameter> rows = setup->parameters();
@@ -135,8 +132,6 @@ std::unique_ptr<MethodSetup> set_up(const Configuration& configuration, double r
     apply(configuration, *setup);
     return setup;
 }
-
-} // namespace
 
 Trial::Trial(gpu::Device& device, Configuration configuration, const DepthNoise& noise, double radius_m,
              FitPlaneOptions preparation)

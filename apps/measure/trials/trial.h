@@ -52,6 +52,9 @@ struct TrialRequest {
 [[nodiscard]] TrialCapture load_trial(const Capture& capture, const DepthNoise& noise, const std::string& noise_origin,
                                       const TrialRequest& request);
 
+/// A method's settings with the radius, which the configuration may override.
+[[nodiscard]] std::unique_ptr<MethodSetup> set_up(const Configuration& configuration, double radius_m);
+
 /// One configuration on one device, as `run` would use it on depth with that noise.
 class Trial {
   public:

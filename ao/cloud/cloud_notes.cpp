@@ -1,0 +1,40 @@
+#include "ao/cloud/cloud_notes.h"
+
+#include <fmt/format.h>
+
+namespace scanshade {
+
+std::optional<std::string> told_noise(const FittedCounts& fitted) {
+    if (fitted.moved == 0)
+        return std::nullopt;
+    return fmt::format("noise of {:.2g} (sigma across surfaces): {:.0f} % of the points were moved onto fitted planes; "
+                       "{} discs stand for them.",
+                       fitted.noise, 100.0 * static_cast<double>(fitted.moved) / static_cast<double>(fitted.from),
+                       fitted.kept);
+}
+
+std::string told_sides(const SettledSides& sides, bool recorded) {
+    const std::string facing = sides.orientation.kind == NormalOrientation::Kind::viewpoint ? "turned to " : "turned ";
+    if (recorded && sides.turned_points > 0)
+        return fmt::format("normals: recorded; {:.2g} % of them were turned, since {}; {}{}.",
+                           100.0 * static_cast<double>(sides.turned_points) / static_cast<double>(sides.judged_points),
+                           sides.turned_why, facing, sides.orientation.why);
+    return recorded ? "normals: recorded."
+                    : "normals: from planes through 16 neighbours, " + facing + sides.orientation.why + ".";
+}
+
+ToldError told_error(double error, double by_check) {
+    constexpr double largest_error = 0.12;
+    constexpr double largest_by_check = 0.22; // noise alone makes up to 0.2 of what errs by less than 0.1
+    constexpr const char* way_out = "A larger --radius spans more points; ao_confidence tells where.";
+    ToldError told{fmt::format("an error of {:.2f} RMS is expected (--write error: of every point).", error), {}};
+    if (error > largest_error)
+        told.doubt = fmt::format("an error of {:.2f} RMS is expected. {}", error, way_out);
+    else if (by_check > largest_by_check)
+        told.doubt = fmt::format("a part of the points by themselves give quite other values, as if the error were "
+                                 "{:.2f} RMS. {}",
+                                 by_check, way_out);
+    return told;
+}
+
+} // namespace scanshade

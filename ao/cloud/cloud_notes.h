@@ -1,0 +1,31 @@
+// What was done to a cloud, in sentences for its notes.
+#pragma once
+
+#include "ao/cloud/settled_sides.h"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace scanshade {
+
+/// What fitting did to the points of a tile, its rim included.
+struct FittedCounts {
+    float noise = 0;
+    std::uint64_t moved = 0, kept = 0, from = 0;
+};
+
+/// About the points that a cloud's sides are of, in words: for notes. `recorded`: the normals were.
+[[nodiscard]] std::string told_sides(const SettledSides& sides, bool recorded);
+/// The same about noise; none where no point was moved.
+[[nodiscard]] std::optional<std::string> told_noise(const FittedCounts& fitted);
+
+/// Sentences about the expected error of a cloud, and the error that its check alone lets expect. `doubt` is there if
+/// the first is large, or the other very large.
+struct ToldError {
+    std::string note;
+    std::optional<std::string> doubt;
+};
+[[nodiscard]] ToldError told_error(double error, double by_check);
+
+} // namespace scanshade
