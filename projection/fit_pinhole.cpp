@@ -1,6 +1,7 @@
 #include "projection/fit_pinhole.h"
 
 #include "projection/base/error.h"
+#include "projection/base/line_fit.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,29 +11,6 @@ namespace scanshade {
 namespace {
 
 constexpr double worst_rms_px = 2.0;
-
-struct Line {
-    double slope = 0, offset = 0;
-    [[nodiscard]] double residual(double x, double y) const { return y - (slope * x + offset); }
-};
-
-/// Least squares of pixel = slope * tangent + offset, with running means so that nothing cancels (Welford 1962).
-class LineFit {
-  public:
-    void add(double x, double y) {
-        ++count_;
-        const double dx = x - mean_x_;
-        mean_x_ += dx / count_;
-        mean_y_ += (y - mean_y_) / count_;
-        xx_ += dx * (x - mean_x_);
-        xy_ += dx * (y - mean_y_);
-    }
-    [[nodiscard]] bool determined() const { return count_ >= 3 && xx_ > count_ * 1e-14; }
-    [[nodiscard]] Line line() const { return {xy_ / xx_, mean_y_ - xy_ / xx_ * mean_x_}; }
-
-  private:
-    double count_ = 0, mean_x_ = 0, mean_y_ = 0, xx_ = 0, xy_ = 0;
-};
 
 /// Calls visit(x/z, y/z, column, row) for each point in front of the camera.
 template <class Visit>

@@ -22,6 +22,7 @@ struct Cloud {
     std::vector<Eigen::Vector3d> points; ///< grid.area() of them, row by row; NaN in all three where invalid
     std::vector<cv::Vec3b> colours;      ///< BGR, one per point, or empty
     std::shared_ptr<const CloudRecords> records;
+    bool pixels_of_one_image = false; ///< an unorganised cloud: each point is a pixel of the frame's camera
 
     [[nodiscard]] bool organised() const { return grid.height > 1; }
 };

@@ -294,7 +294,7 @@ DepthImage project_cloud(const Cloud& cloud, const Pinhole& camera, const Projec
     if (lies_on_grid(cloud, camera, options))
         return keep_grid(cloud, camera, options);
     DepthImage view = splat(cloud, camera, options);
-    return cloud.organised() ? view : without_gaps(view);
+    return cloud.organised() || cloud.pixels_of_one_image ? view : without_gaps(view);
 }
 
 } // namespace

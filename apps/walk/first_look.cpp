@@ -28,7 +28,7 @@ std::vector<DepthImage> first_look(const Capture& capture, const std::vector<std
                 const Stopwatch stopwatch;
                 Frame frame = capture.load(frames[chosen[i]], with_colour);
                 const double ms = stopwatch.ms();
-                const bool image = !frame.cloud || frame.cloud->organised();
+                const bool image = !frame.cloud || frame.cloud->organised() || frame.cloud->pixels_of_one_image;
                 if (image)
                     images[i] = project(frame);
                 if (kept && (image || frames.size() == 1))

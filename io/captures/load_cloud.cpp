@@ -4,18 +4,50 @@
 #include "io/clouds/cloud_file.h"
 #include "io/clouds/cloud_records.h"
 #include "projection/base/error.h"
+#include "projection/base/statistics.h"
+#include "projection/pixel_cloud.h"
 
 #include <cmath>
 #include <fmt/format.h>
 
 namespace scanshade {
+namespace {
+
+/// A depth image that was written as a cloud is one again. Not where its unit can hardly be metres: rays from points
+/// need no unit.
+void see_pixels(Frame& frame) {
+    constexpr double nearest_m = 0.15, farthest_m = 30;
+    Cloud& cloud = *frame.cloud;
+    const std::optional<PixelCloud> found = pixel_cloud(cloud);
+    if (!found)
+        return;
+    std::vector<double> depths_m;
+    for (const Eigen::Vector3d& point : cloud.points)
+        if (point.allFinite() && point.z() != 0)
+            depths_m.push_back(std::abs(point.z()));
+    if (const double middle_m = median(std::move(depths_m)); middle_m < nearest_m || middle_m > farthest_m)
+        return;
+    if (found->flipped)
+        for (Eigen::Vector3d& point : cloud.points)
+            point = {point.x(), -point.y(), -point.z()};
+    cloud.pixels_of_one_image = true;
+    frame.camera = {found->fit.camera,
+                    {},
+                    fmt::format("recovered from the points, which are the pixels of one image{}; rms {:.4f} px",
+                                found->flipped ? " seen along -z, with y up" : "", found->fit.rms_px)};
+}
+
+} // namespace
 
 void load_cloud(const Capture& capture, const CaptureEntry& entry, Frame& frame) {
     frame.cloud = read_cloud(entry.cloud, frame.warnings);
     if (frame.cloud->records->viewpoint)
         frame.world_from_camera = frame.cloud->records->viewpoint;
-    if (!capture.camera)
+    if (!capture.camera) {
+        if (!frame.cloud->organised() && triangles_of(*frame.cloud).empty())
+            see_pixels(frame);
         return;
+    }
     frame.camera = *capture.camera;
     Pinhole& pinhole = frame.camera.pinhole;
     const cv::Size grid = frame.cloud->grid;
