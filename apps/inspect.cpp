@@ -172,8 +172,8 @@ void doubt_images(Findings& findings, const std::vector<std::size_t>& loadable) 
         } catch (const Error&) { // examining the frame has told it
         }
     }
-    if (std::string warning = pose_warning(capture, loadable); !warning.empty())
-        warnings.push_back(std::move(warning));
+    if (PoseCheck poses = check_poses(capture, loadable); !poses.warning.empty())
+        warnings.push_back(std::move(poses.warning));
 }
 
 void measure_samples(Findings& findings) {

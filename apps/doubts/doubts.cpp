@@ -129,6 +129,7 @@ std::vector<std::string> doubts_about(const ComputedFrame& computed, double radi
             [&] { return radius_m > 0 && !has_hollows(computed.depth, radius_m); }, doubts);
     doubt_radius_in_view(computed.depth, radius_m, unit, doubts);
     doubt_noise_in_view(computed.depth, radius_m, noise, unit, doubts);
+    doubt_steps_in_view(radius_m, noise, unit, doubts);
     add_if(radius_m > 0 && computed.expected_error > largest_error, doubts, // without a radius nothing is known
            fmt::format("an error of {:.2f} RMS is expected, as such pixels had with this method on generated scenes: "
                        "values say little. ao_confidence tells where; --preset balanced or best may err less.",

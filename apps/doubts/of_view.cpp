@@ -17,6 +17,7 @@ namespace {
 constexpr double least_radius_px = 2;     ///< at the median depth
 constexpr double largest_sigma = 0.25;    ///< of the radius; beyond, noise is what occludes
 constexpr double most_noisy = 0.3;        ///< share of the valid pixels
+constexpr double largest_step = 0.022;    ///< of the radius; 0.02 costs exact depth nothing
 constexpr double least_scene_radii = 2;   ///< extent of an image's scene, in radii
 constexpr double farthest_centre = 0.2;   ///< of the principal point from the image's middle, in widths or heights
 constexpr double near_centre = 0.05;      ///< likewise, of cameras as they are built
@@ -92,6 +93,15 @@ void doubt_noise_in_view(const DepthImage& depth, double radius_m, const DepthNo
                     100 * share, unit.text(noise.at(far), 2), unit.text(far, 2),
                     unit.arbitrary() ? "Give a larger --relative-radius."
                                      : "Give a larger --radius, or leave them out with --depth-range."));
+}
+
+void doubt_steps_in_view(double radius_m, const DepthNoise& noise, const LengthUnit& unit, Doubts& doubts) {
+    add_if(radius_m > 0 && noise.step_m > largest_step * radius_m, doubts,
+           fmt::format("depths come in steps of {}, {:.0f} % of the radius, as images of 8 bits and lossy compression "
+                       "leave them: surfaces are stairs. {}",
+                       unit.text(noise.step_m, 2), 100 * noise.step_m / radius_m,
+                       unit.arbitrary() ? "Give a larger --relative-radius."
+                                        : "Take the depth as it was recorded, or give a larger --radius."));
 }
 
 void doubt_kind(const DepthImage& depth, Doubts& doubts) {

@@ -18,6 +18,8 @@ void doubt_ends(const DepthImage& depth, const LengthUnit& unit, Doubts& doubts)
 void doubt_radius_in_view(const DepthImage& depth, double radius_m, const LengthUnit& unit, Doubts& doubts);
 void doubt_noise_in_view(const DepthImage& depth, double radius_m, const DepthNoise& noise, const LengthUnit& unit,
                          Doubts& doubts);
+/// Depth that was rounded so coarsely that surfaces are stairs.
+void doubt_steps_in_view(double radius_m, const DepthNoise& noise, const LengthUnit& unit, Doubts& doubts);
 /// Whether depth shows hollows well within the radius, such as corners and what stands before something: a share of
 /// the pixels lies behind the line between neighbours.
 [[nodiscard]] bool has_hollows(const DepthImage& depth, double radius_m);

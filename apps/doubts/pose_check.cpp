@@ -62,8 +62,8 @@ std::string two_digits(double value) {
     return value < 99.5 ? fmt::format("{:.2g}", value) : fmt::format("{:.0f}", value);
 }
 
-std::string factor_warning(const std::vector<double>& factors, bool arbitrary_unit) {
-    constexpr double alike = 1.3;
+PoseCheck factor_check(const std::vector<double>& factors, bool arbitrary_unit) {
+    constexpr double alike = 1.3, of_depths = 20;
     if (factors.empty())
         return {};
     const auto [low, high] = std::ranges::minmax(factors);
@@ -74,12 +74,13 @@ std::string factor_warning(const std::vector<double>& factors, bool arbitrary_un
     if (factors.size() < 2 && std::abs(power - std::round(power)) > std::log10(alike)) // one pair may be a bad pose
         return {};
     if (arbitrary_unit)
-        return fmt::format("depths fit the poses only if they are multiplied by {}: depth maps and poses are not of "
-                           "the same reconstruction.",
-                           two_digits(factor));
-    return fmt::format("depths fit the poses only if they are multiplied by {}: the depth unit is wrong, or the "
-                       "poses are not in metres.",
-                       two_digits(factor));
+        return {fmt::format("depths fit the poses only if they are multiplied by {}: depth maps and poses are not of "
+                            "the same reconstruction.",
+                            two_digits(factor))};
+    return {fmt::format("depths fit the poses only if they are multiplied by {}: the depth unit is wrong, or the "
+                        "poses are not in metres.",
+                        two_digits(factor)),
+            power < std::log10(of_depths)};
 }
 
 /// Where all pairs that tell tell the same, and no fewer than `least`.
@@ -107,12 +108,13 @@ std::string reading_warning(const std::vector<PoseReading>& readings, std::size_
         break;
     }
     return "depths contradict the poses: frames agree better if the camera is thought to stand still. The poses may be "
-           "of another recording or clock, or in other axes; frames together and clouds of the recording are wrong.";
+           "of another recording or clock, or in other axes, or the images hold no depths along z; frames together and "
+           "clouds of the recording are wrong.";
 }
 
 } // namespace
 
-std::string pose_warning(const Capture& capture, const std::vector<std::size_t>& frames) {
+PoseCheck check_poses(const Capture& capture, const std::vector<std::size_t>& frames) {
     constexpr std::size_t pairs = 3;
     std::vector<std::size_t> posed;
     for (const std::size_t i : frames)
@@ -139,8 +141,10 @@ std::string pose_warning(const Capture& capture, const std::vector<std::size_t>&
         if (told.reading)
             readings.push_back(*told.reading);
     }
-    std::string warning = factor_warning(factors, capture.unit.arbitrary());
-    return warning.empty() ? reading_warning(readings, std::min<std::size_t>(2, chosen.size())) : warning;
+    PoseCheck check = factor_check(factors, capture.unit.arbitrary());
+    if (check.warning.empty())
+        check.warning = reading_warning(readings, std::min<std::size_t>(2, chosen.size()));
+    return check;
 }
 
 } // namespace scanshade

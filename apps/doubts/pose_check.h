@@ -9,9 +9,14 @@
 
 namespace scanshade {
 
-/// A sentence if pairs of the frames agree that all depths are too long or too short for the poses' motion, or that the
-/// poses must be read in another way. Empty where they are right, where there are none, and where nothing can be told.
+struct PoseCheck {
+    std::string warning;        ///< empty = nothing is wrong, or nothing can be told
+    bool doubts_depths = false; ///< depths may be in a wrong unit: then all results of the capture are doubtful
+};
+
+/// Whether pairs of the frames agree that all depths are too long or too short for the poses' motion, or that the poses
+/// must be read in another way. By a factor of more than 20, poses in another unit are likelier than depths.
 /// Decodes up to six depth images.
-[[nodiscard]] std::string pose_warning(const Capture& capture, const std::vector<std::size_t>& frames);
+[[nodiscard]] PoseCheck check_poses(const Capture& capture, const std::vector<std::size_t>& frames);
 
 } // namespace scanshade

@@ -23,6 +23,7 @@ struct OpenedCapture {
     std::once_flag check_poses, make_key, find_light;
     std::string task_key = {};
     LightEstimate light = {};
+    std::vector<std::string> doubts = {}; ///< of the capture as a whole
 };
 
 /// One capture, the frames to take of it, and where its results go.

@@ -118,12 +118,16 @@ std::vector<FrameRow> CaptureRuns::process(CaptureJob job, OrderedOutput& output
         return *std::move(rows);
     look_at(job);
     std::call_once(job.opened->check_poses, [&] {
-        if (std::string warning = pose_warning(job.capture, job.of); !warning.empty())
-            job.capture.warnings.push_back(std::move(warning));
+        if (const PoseCheck poses = check_poses(job.capture, job.of); !poses.warning.empty()) {
+            job.capture.warnings.push_back(poses.warning);
+            if (poses.doubts_depths)
+                job.opened->doubts.push_back(poses.warning);
+        }
         if (asked_.sequence == SequenceUse::on && !asked_.in_sequence(job.capture))
             job.capture.warnings.emplace_back(
                 "--sequence on: fewer than two frames have a pose, so each is computed by itself.");
     });
+    job.batch.doubts = job.opened->doubts;
 
     Prepared ready = prepare(job);
     std::optional<RecordingCloud> cloud;

@@ -92,6 +92,8 @@ void attach_and_write(Work& work, const BatchOptions& options) {
                                                                    options.noise, work.errors);
         std::ranges::move(doubts_about(computed_frame(work), options.radius_m, options.noise, options.outputs.unit),
                           std::back_inserter(work.row.doubts));
+        if (!by_points)
+            std::ranges::copy(options.doubts, std::back_inserter(work.row.doubts));
     });
     take(work, &StageTimes::write, [&] {
         if (by_points) {

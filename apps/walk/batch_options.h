@@ -16,6 +16,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace scanshade {
@@ -33,6 +34,7 @@ struct BatchOptions {
     ProjectOptions range;                     ///< depth outside counts as a hole
     double radius_m = 0;                      ///< the method's, and
     DepthNoise noise;                         ///< the depth's: what confidence depends on
+    std::vector<std::string> doubts;          ///< about the capture as a whole: each of its images has them
     std::optional<Light> light;               ///< of the colour images, where outputs need it
     std::optional<Registration> registration; ///< as the user set it; none: as the capture says
     PointMethod* points = nullptr;            ///< computes clouds and meshes where `cloud_walk` asks for points

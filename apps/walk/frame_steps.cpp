@@ -27,13 +27,27 @@ double valid_share(const Frame& frame) {
                  points.size());
 }
 
+std::string why_no_point_is_seen(const Frame& frame, const ProjectOptions& range) {
+    double nearest = std::numeric_limits<double>::infinity(), farthest = 0;
+    for (const Eigen::Vector3d& point : frame.cloud->points)
+        if (point.allFinite() && point.z() > 0) {
+            nearest = std::min(nearest, point.z());
+            farthest = std::max(farthest, point.z());
+        }
+    if (farthest > 0 && (nearest > range.far_m || farthest < range.near_m))
+        return fmt::format("the points' z is {:.4g} to {:.4g}, taken for metres, of which {:g} to {:g} are used "
+                           "(--depth-range). --clouds points computes clouds of any unit",
+                           nearest, farthest, range.near_m, range.far_m);
+    return fmt::format("the camera sees none of the recorded points ({}; {})", describe(frame.camera),
+                       frame.camera.origin);
+}
+
 /// A camera that sees none of the points is an error, not an empty result. (No depth at all is a result.)
 void refuse_blind_view(const Work& work, const ProjectOptions& range) {
     if (work.row.valid_share == 0 || cv::countNonZero(work.depth.z_m) > 0)
         return;
     const std::string reason = work.frame.cloud
-                                   ? fmt::format("the camera sees none of the recorded points ({}; {})",
-                                                 describe(work.frame.camera), work.frame.camera.origin)
+                                   ? why_no_point_is_seen(work.frame, range)
                                    : fmt::format("no depth is within {:g} and {:g} m", range.near_m, range.far_m);
     throw Error(
         fmt::format("{}{}{}", reason, work.frame.doubts.empty() ? "" : "; ", fmt::join(work.frame.doubts, " ")));

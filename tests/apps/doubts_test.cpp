@@ -100,6 +100,16 @@ TEST(doubts, noise_as_large_as_the_radius) {
     EXPECT_TRUE(warned(noisy.doubts(), "noise is above a quarter of the radius"));
 }
 
+TEST(doubts, depths_in_steps_that_the_radius_feels) {
+    Computed stairs;
+    stairs.noise.step_m = 0.01; // whole centimetres
+    EXPECT_TRUE(stairs.doubts().empty()) << tests::joined(stairs.doubts());
+    stairs.noise.step_m = 0.018; // 4.6 m in 8 bits
+    EXPECT_TRUE(warned(stairs.doubts(), "depths come in steps of 0.018 m, 4 % of the radius"));
+    stairs.radius_m = 1;
+    EXPECT_TRUE(stairs.doubts().empty()) << tests::joined(stairs.doubts());
+}
+
 TEST(doubts, values_that_are_expected_to_be_far_off) {
     Computed rough;
     rough.row.expected_error = 0.19;
@@ -309,6 +319,20 @@ TEST_F(DoubtfulRun, is_counted_and_explained_by_a_job) {
     EXPECT_EQ(text["doubts"].size(), 1);
     EXPECT_EQ(run_program("merge " + job).exit_code, 2);
     EXPECT_EQ(json::parse(read_bytes(folder / "job/manifest.json"))["totals"]["doubtful"], 1);
+}
+
+TEST(DoubtfulRecording, depths_in_a_unit_that_the_poses_refute) {
+    const TemporaryFolder folder;
+    const std::string capture = (folder / "capture").string(), out = (folder / "out").string();
+    ASSERT_EQ(run_program(fmt::format("generate office -o {} --frames 6 --step 4 --size 160x120 --truth=no", capture))
+                  .exit_code,
+              0);
+    EXPECT_EQ(run_program(fmt::format("run {} -o {} --write ao", capture, out)).exit_code, 0);
+    const auto ran = run_program(fmt::format("run {} -o {} --overwrite --write ao --depth-scale 1000", capture, out));
+    EXPECT_EQ(ran.exit_code, 2) << ran.err;
+    EXPECT_NE(ran.err.find("6 of 6 frames, 6 doubtful"), std::string::npos) << ran.err;
+    EXPECT_NE(read_bytes(folder / "out/frames.csv").find("depths fit the poses only if they are multiplied by 0.2"),
+              std::string::npos);
 }
 
 TEST_F(DoubtfulRun, cameras_that_see_nothing_usual) {

@@ -42,7 +42,7 @@ cv::Mat1f seen_from(const Isometry3d& pose, const Pinhole& camera) {
 
 /// What is told of a TUM recording whose poses are written by `written`.
 template <class Written>
-std::string warning_about(const Written& written) {
+PoseCheck check_of(const Written& written) {
     const tests::TemporaryFolder folder;
     const Pinhole camera{130, 130, 79.5, 59.5, {160, 120}};
     std::filesystem::create_directories(folder / "depth");
@@ -62,38 +62,46 @@ std::string warning_about(const Written& written) {
     std::vector<std::size_t> all(frames);
     for (std::size_t i = 0; i < all.size(); ++i)
         all[i] = i;
-    return pose_warning(open_capture(folder / "", {}), all);
+    return check_poses(open_capture(folder / "", {}), all);
 }
 
 TEST(pose_check, right_poses_are_passed) {
-    EXPECT_EQ(warning_about([](const Isometry3d& pose) { return pose; }), "");
+    EXPECT_EQ(check_of([](const Isometry3d& pose) { return pose; }).warning, "");
 }
 
 TEST(pose_check, another_convention_is_named) {
     const Isometry3d turned(Eigen::AngleAxisd(std::acos(-1.0), Vector3d::UnitX()));
-    EXPECT_NE(
-        warning_about([](const Isometry3d& pose) { return pose.inverse(); }).find("camera from world, their inverse"),
-        std::string::npos);
-    EXPECT_NE(warning_about([&](const Isometry3d& pose) { return pose * turned; }).find("y up and z backward"),
+    EXPECT_NE(check_of([](const Isometry3d& pose) {
+                  return pose.inverse();
+              }).warning.find("camera from world, their inverse"),
+              std::string::npos);
+    EXPECT_NE(check_of([&](const Isometry3d& pose) { return pose * turned; }).warning.find("y up and z backward"),
               std::string::npos);
 }
 
 TEST(pose_check, another_unit_is_named) {
-    const std::string told = warning_about([](Isometry3d pose) {
-        pose.translation() *= 1000;
-        return pose;
-    });
-    EXPECT_NE(told.find("multiplied by 1000:"), std::string::npos) << told;
+    const auto by = [](double factor) {
+        return check_of([=](Isometry3d pose) {
+            pose.translation() *= factor;
+            return pose;
+        });
+    };
+    const PoseCheck millimetres = by(1000), five = by(5), right = by(1);
+    EXPECT_NE(millimetres.warning.find("multiplied by 1000:"), std::string::npos) << millimetres.warning;
+    EXPECT_FALSE(millimetres.doubts_depths); // depths of kilometres are no likelier than such poses
+    EXPECT_NE(five.warning.find("multiplied by "), std::string::npos) << five.warning;
+    EXPECT_TRUE(five.doubts_depths);
+    EXPECT_FALSE(right.doubts_depths);
 }
 
 TEST(pose_check, poses_mirrored_in_the_world_do_not_pass) {
-    const std::string told = warning_about([](const Isometry3d& pose) {
-        const Eigen::Matrix3d mirror = Vector3d(1, 1, -1).asDiagonal();
-        Isometry3d mirrored = Isometry3d::Identity();
-        mirrored.linear() = mirror * pose.linear() * mirror;
-        mirrored.translation() = mirror * pose.translation();
-        return mirrored;
-    });
+    const std::string told = check_of([](const Isometry3d& pose) {
+                                 const Eigen::Matrix3d mirror = Vector3d(1, 1, -1).asDiagonal();
+                                 Isometry3d mirrored = Isometry3d::Identity();
+                                 mirrored.linear() = mirror * pose.linear() * mirror;
+                                 mirrored.translation() = mirror * pose.translation();
+                                 return mirrored;
+                             }).warning;
     EXPECT_FALSE(told.empty()); // where the camera hardly turns about other axes than y, y up explains them as well
 }
 

@@ -154,7 +154,7 @@ void add_colours(const fs::path& folder, const std::vector<ListedImage>& depths,
     if (pairs == 0)
         throw Error(fmt::format(
             "{}: no depth and colour image are within {} s of each other: depth.txt starts {:.3f} s {} rgb.txt "
-            "({} against {})",
+            "({} against {}). --association-limit sets how far apart they may be",
             folder.string(), limit_s, std::abs(depths[0].stamp_s - colours[0].stamp_s),
             depths[0].stamp_s < colours[0].stamp_s ? "before" : "after", depths[0].stamp, colours[0].stamp));
     for (std::size_t i = 0; i < depths.size(); ++i) {
