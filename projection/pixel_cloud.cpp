@@ -7,6 +7,7 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
+#include <span>
 #include <vector>
 
 namespace scanshade {
@@ -20,9 +21,9 @@ struct Rays {
 };
 
 /// Nothing where points lie before and behind the origin.
-std::optional<Rays> rays_of(const Cloud& cloud) {
+std::optional<Rays> rays_of(std::span<const Eigen::Vector3d> points) {
     Rays rays;
-    for (const Eigen::Vector3d& point : cloud.points) {
+    for (const Eigen::Vector3d& point : points) {
         if (!point.allFinite() || point.isZero())
             continue;
         const bool behind = point.z() < 0;
@@ -35,12 +36,12 @@ std::optional<Rays> rays_of(const Cloud& cloud) {
     return rays.x.size() >= fewest_points ? std::optional(std::move(rays)) : std::nullopt;
 }
 
-/// Of the steps from each point to the next, `along` the rows and `across` them: what most steps along are; and what
-/// those across are where a row ends. 0 where the points come in no rows.
+/// Of the steps from each point to the next, what most steps along rows are, and what those across them are where a row
+/// ends. 0 where the points come in no such rows.
 struct Pitches {
-    double along = 0, across = 0;
+    double x = 0, y = 0;
 };
-Pitches pitches(const std::vector<double>& along, const std::vector<double>& across) {
+Pitches pitches_along(const std::vector<double>& along, const std::vector<double>& across) {
     constexpr double in_row = 0.2, next_row = 20;
     std::vector<double> steps, sideways;
     for (std::size_t i = 1; i < along.size(); ++i) {
@@ -55,6 +56,31 @@ Pitches pitches(const std::vector<double>& along, const std::vector<double>& acr
         if (steps[i] > next_row * step)
             ends.push_back(sideways[i]);
     return {step, ends.empty() ? 0 : median(std::move(ends))};
+}
+
+/// Row by row or column by column.
+Pitches pitches(const Rays& rays) {
+    const Pitches rows = pitches_along(rays.x, rays.y);
+    if (rows.x > 0)
+        return rows;
+    const Pitches columns = pitches_along(rays.y, rays.x);
+    return {columns.y, columns.x};
+}
+
+/// By some of the points, side by side, so that other clouds cost next to nothing.
+bool comes_in_rows(std::span<const Eigen::Vector3d> points) {
+    constexpr std::size_t places = 32, run = 128;
+    if (points.size() < fewest_points)
+        return false;
+    std::vector<Eigen::Vector3d> some;
+    for (std::size_t place = 0; place < places; ++place)
+        for (const Eigen::Vector3d& point : points.subspan(place * (points.size() - run) / (places - 1), run))
+            some.push_back(point);
+    const std::optional<Rays> rays = rays_of(some);
+    if (!rays)
+        return false;
+    const Pitches found = pitches(*rays);
+    return found.x > 0 || found.y > 0;
 }
 
 /// Pixels by tangents along one axis.
@@ -144,15 +170,12 @@ std::optional<PixelCloud> pixel_cloud(const Cloud& cloud) {
     constexpr double worst_rms_px = 0.2; // 0.29 of points anywhere
     if (cloud.organised())
         return std::nullopt;
-    const std::optional<Rays> rays = rays_of(cloud);
+    if (!comes_in_rows(cloud.points))
+        return std::nullopt;
+    const std::optional<Rays> rays = rays_of(cloud.points);
     if (!rays)
         return std::nullopt;
-    Pitches rows = pitches(rays->x, rays->y);
-    double pitch_x = rows.along, pitch_y = rows.across;
-    if (!(pitch_x > 0)) { // column by column
-        rows = pitches(rays->y, rays->x);
-        pitch_x = rows.across, pitch_y = rows.along;
-    }
+    const auto [pitch_x, pitch_y] = pitches(*rays);
     const std::optional<Axis> u = axis_of(rays->x, pitch_x), v = u ? axis_of(rays->y, pitch_y) : std::nullopt;
     if (!v || !are_pixels(*rays, *u, *v))
         return std::nullopt;

@@ -13,28 +13,65 @@
 namespace scanshade {
 namespace {
 
-/// A depth image that was written as a cloud is one again. Not where its unit can hardly be metres: rays from points
-/// need no unit.
+/// Median of what is not 0; 0 where nothing is.
+double middle_z(const Cloud& cloud) {
+    std::vector<double> all;
+    for (const Eigen::Vector3d& point : cloud.points)
+        if (point.allFinite() && point.z() != 0)
+            all.push_back(std::abs(point.z()));
+    return median(std::move(all), 0);
+}
+
+/// Depth cameras see 0.1 to 30 m. What they see at 100 to 30,000 is in millimetres.
+bool may_be_metres(double middle) { return middle >= 0.1 && middle <= 30; }
+bool may_be_millimetres(double middle) { return middle > 100 && middle <= 30000; }
+
+void take_for_millimetres(Frame& frame, double middle) {
+    constexpr double metres = 0.001;
+    for (Eigen::Vector3d& point : frame.cloud->points)
+        point *= metres;
+    if (frame.world_from_camera)
+        frame.world_from_camera->translation() *= metres;
+    frame.warnings.push_back(fmt::format("the points of this image are taken for millimetres, since half of them are "
+                                         "farther than {:.4g}; the radius is in metres.",
+                                         middle));
+}
+
+/// A depth image that was written as a cloud is one again. Not where its unit can hardly be told: rays from points need
+/// none.
 void see_pixels(Frame& frame) {
-    constexpr double nearest_m = 0.15, farthest_m = 30;
     Cloud& cloud = *frame.cloud;
+    const double middle = middle_z(cloud);
+    if (!may_be_metres(middle) && !may_be_millimetres(middle))
+        return;
     const std::optional<PixelCloud> found = pixel_cloud(cloud);
     if (!found)
         return;
-    std::vector<double> depths_m;
-    for (const Eigen::Vector3d& point : cloud.points)
-        if (point.allFinite() && point.z() != 0)
-            depths_m.push_back(std::abs(point.z()));
-    if (const double middle_m = median(std::move(depths_m)); middle_m < nearest_m || middle_m > farthest_m)
-        return;
-    if (found->flipped)
+    if (found->flipped) {
         for (Eigen::Vector3d& point : cloud.points)
             point = {point.x(), -point.y(), -point.z()};
+        if (frame.world_from_camera)
+            frame.world_from_camera->linear() *= Eigen::Vector3d(1, -1, -1).asDiagonal();
+    }
     cloud.pixels_of_one_image = true;
     frame.camera = {found->fit.camera,
                     {},
                     fmt::format("recovered from the points, which are the pixels of one image{}; rms {:.4f} px",
                                 found->flipped ? " seen along -z, with y up" : "", found->fit.rms_px)};
+    if (may_be_millimetres(middle))
+        take_for_millimetres(frame, middle);
+}
+
+/// An organised cloud of a pinhole camera in millimetres.
+bool is_image_in_millimetres(const Cloud& cloud, double middle) {
+    if (!may_be_millimetres(middle))
+        return false;
+    try {
+        (void)fit_pinhole(cloud);
+        return true;
+    } catch (const Error&) {
+        return false;
+    }
 }
 
 } // namespace
@@ -43,11 +80,14 @@ void load_cloud(const Capture& capture, const CaptureEntry& entry, Frame& frame)
     frame.cloud = read_cloud(entry.cloud, frame.warnings);
     if (frame.cloud->records->viewpoint)
         frame.world_from_camera = frame.cloud->records->viewpoint;
-    if (!capture.camera) {
-        if (!frame.cloud->organised() && triangles_of(*frame.cloud).empty())
-            see_pixels(frame);
-        return;
+    if (frame.cloud->organised()) {
+        if (const double middle = middle_z(*frame.cloud); is_image_in_millimetres(*frame.cloud, middle))
+            take_for_millimetres(frame, middle);
+    } else if (!capture.camera) {
+        see_pixels(frame);
     }
+    if (!capture.camera)
+        return;
     frame.camera = *capture.camera;
     Pinhole& pinhole = frame.camera.pinhole;
     const cv::Size grid = frame.cloud->grid;

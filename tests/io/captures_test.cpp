@@ -2,6 +2,7 @@
 #include "io/captures/capture.h"
 #include "tests/support/wall_captures.h"
 
+#include <cmath>
 #include <filesystem>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -195,6 +196,59 @@ TEST(captures, single_files_are_captures_of_one_frame) {
     EXPECT_EQ(cloud.kind, "cloud");
     EXPECT_EQ(cloud.load(0).cloud->points[0], Eigen::Vector3d(1, 2, 3));
     EXPECT_TRUE(says(refusal([&] { (void)open_capture(write_file(folder / "notes.txt", "hello")); }), "neither"));
+}
+
+/// A bulging wall as 64 x 48 pixels see it, without every seventh pixel; each point is multiplied by `by`.
+std::string wall_as_cloud(const Eigen::Vector3d& by, bool with_a_face) {
+    std::string points;
+    int count = 0;
+    for (int v = 0; v < 48; ++v)
+        for (int u = 0; u < 64; ++u) {
+            const double z = 2 + 0.3 * std::sin(0.1 * u) + 0.01 * v;
+            const Eigen::Vector3d point = by.cwiseProduct(Eigen::Vector3d((u - 31.5) / 50 * z, (v - 23.5) / 50 * z, z));
+            if ((u + 3 * v) % 7 == 0)
+                continue;
+            points += fmt::format("{:.6f} {:.6f} {:.6f}\n", point.x(), point.y(), point.z());
+            ++count;
+        }
+    return fmt::format("ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float "
+                       "z\n{}end_header\n{}{}",
+                       count, with_a_face ? "element face 1\nproperty list uchar int vertex_indices\n" : "", points,
+                       with_a_face ? "3 0 1 2\n" : "");
+}
+
+TEST(captures, a_depth_image_written_as_a_cloud_has_its_camera_again) {
+    const TemporaryFolder folder;
+    const auto loaded = [&](const Eigen::Vector3d& by, bool with_a_face = false) {
+        return open_capture(write_file(folder / "c.ply", wall_as_cloud(by, with_a_face))).load(0);
+    };
+    const Frame metres = loaded({1, 1, 1}), opengl = loaded({1, -1, -1}, true),
+                millimetres = loaded({1000, 1000, 1000});
+    for (const Frame* frame : {&metres, &opengl, &millimetres}) {
+        EXPECT_TRUE(frame->cloud->pixels_of_one_image);
+        EXPECT_NEAR(frame->camera.pinhole.fx, 50, 0.01);
+        EXPECT_NEAR(frame->camera.pinhole.cy, 23.5, 0.01);
+        EXPECT_EQ(frame->camera.pinhole.size, cv::Size(64, 48));
+        EXPECT_TRUE(frame->cloud->points[100].isApprox(metres.cloud->points[100], 1e-6));
+    }
+    EXPECT_FALSE(warned(metres.warnings, "millimetres"));
+    EXPECT_TRUE(warned(millimetres.warnings, "taken for millimetres"));
+    const Frame kilometres = loaded({1e5, 1e5, 1e5}); // rays from points need no unit
+    EXPECT_FALSE(kilometres.cloud->pixels_of_one_image);
+    EXPECT_EQ(kilometres.camera.pinhole.fx, 0);
+}
+
+TEST(captures, an_organised_cloud_of_a_pinhole_camera_may_be_in_millimetres) {
+    const TemporaryFolder folder;
+    std::string text = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 8\nHEIGHT 6\n"
+                       "VIEWPOINT 1000 0 0 1 0 0 0\nPOINTS 48\nDATA ascii\n";
+    for (int i = 0; i < 48; ++i)
+        text +=
+            fmt::format("{} {} 2000\n", (i % 8 - 3.5) * 40, (i / 8 - 2.5) * 40); // NOLINT(bugprone-integer-division)
+    const Frame frame = open_capture(write_file(folder / "c.pcd", text)).load(0);
+    EXPECT_TRUE(warned(frame.warnings, "taken for millimetres"));
+    EXPECT_EQ(frame.cloud->points[0].z(), 2);
+    EXPECT_EQ(frame.world_from_camera->translation().x(), 1);
 }
 
 TEST(captures, frame_names_are_unique_and_fit_for_files) {
