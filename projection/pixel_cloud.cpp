@@ -149,7 +149,7 @@ std::optional<Axis> axis_of(const std::vector<double>& tangents, double pitch) {
 
 /// Whether hardly two points share a pixel, and most have another beside them.
 bool are_pixels(const Rays& rays, const Axis& u, const Axis& v) {
-    constexpr double most_shared = 0.001, fewest_beside = 0.6;
+    constexpr double most_shared = 0.001, fewest_beside = 0.8;
     std::vector<char> taken(static_cast<std::size_t>(u.pixels) * static_cast<std::size_t>(v.pixels));
     const auto at = [&](std::size_t i) {
         return static_cast<std::size_t>(v.pixel(rays.y[i])) * static_cast<std::size_t>(u.pixels) +

@@ -91,7 +91,7 @@ TEST(PixelCloud, other_clouds_have_no_pixels) {
         point += Eigen::Vector3d(0.05, 0.02, 0.1);
     sampled.points.clear();
     for (std::size_t i = 0; i < image.points.size(); ++i) {
-        if (hash(static_cast<std::uint32_t>(i)) % 3 == 0)
+        if (hash(static_cast<std::uint32_t>(i)) % 10 < 7)
             sampled.points.push_back(image.points[i]);
         const std::size_t other = hash(static_cast<std::uint32_t>(i), 7U) % (i + 1);
         std::swap(shuffled.points[i], shuffled.points[other]);
